@@ -1,0 +1,180 @@
+# Builds the contact solver service. `make help` lists the targets.
+.DEFAULT_GOAL := all
+SHELL := /bin/bash
+MAKEFLAGS += --no-builtin-rules
+
+BUILD  ?= build
+CC     ?= gcc
+ifeq ($(origin CC),default)
+CC     := gcc
+endif
+OPT    ?= -O2 -g
+SAN    ?=
+PREFIX ?= /usr/local
+PYTHON ?= /usr/bin/python3
+
+PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
+            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev
+TEST_PACKAGES := python3 python3-jsonschema curl clang clang-format cppcheck libclang-rt-14-dev
+
+WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
+STD  := -std=c11 -D_GNU_SOURCE
+INC  := -Isolver -Iserver -Iclient -I$(BUILD)/gen
+
+# Package flags are asked for once, when first needed, so that `make deps` works on a bare machine.
+pkg = $(shell pkg-config $(1) 2>/dev/null)
+SERVER_CFLAGS = $(call pkg,--cflags libmicrohttpd jansson sqlite3 libcurl gnutls)
+SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp $(call pkg,--libs gnutls) -lm
+SERVER_LIBS   = $(call pkg,--libs libmicrohttpd jansson sqlite3) -lz $(SOLVER_LIBS) -lpthread
+CLIENT_LIBS   = $(call pkg,--libs libcurl jansson) -lm
+CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)
+LDFLAGS_ALL   = $(SAN) -pthread $(LDFLAGS)
+
+SOLVER_SRC := $(sort $(wildcard solver/*.c solver/*/*.c))
+SERVER_SRC := $(sort $(wildcard server/*.c server/*/*.c))
+CLIENT_SRC := $(sort $(wildcard client/*.c))
+UNIT_SRC   := $(sort $(wildcard tests/unit/test_*.c))
+FUZZ_SRC   := $(sort $(wildcard tests/fuzz/fuzz_*.c))
+BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
+SCHEMAS    := $(sort $(wildcard schemas/*.json))
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) tests/harness.c
+H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
+
+obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
+SOLVER_OBJ := $(call obj,$(SOLVER_SRC))
+SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(BUILD)/obj/gen/embedded.o
+CLIENT_OBJ := $(call obj,$(CLIENT_SRC))
+# What unit tests may link: everything but the two mains.
+PARTS_OBJ  := $(filter-out $(BUILD)/obj/server/main.o,$(SERVER_OBJ)) $(filter-out $(BUILD)/obj/client/main.o,$(CLIENT_OBJ))
+UNIT_BIN   := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(UNIT_SRC))
+FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
+
+##@ Use
+.PHONY: all demo run install clean help deps
+all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
+
+demo: deps ## install what is missing, build, start the daemon, solve the paper's body, show the answer
+	@$(MAKE) --no-print-directory -s all
+	@tests/demo.sh $(BUILD)
+
+run: deps ## keep the daemon in the foreground on 127.0.0.1:8080 with ./contact.db
+	@$(MAKE) --no-print-directory -s all
+	exec $(BUILD)/uzawad --listen 127.0.0.1:8080 --db ./contact.db
+
+deps: ## install the Debian packages that are missing
+	@tests/deps.sh $(PACKAGES)
+
+deps-test: ## the same with what only the tests use
+	@tests/deps.sh $(PACKAGES) $(TEST_PACKAGES)
+
+install: all ## install both programs under PREFIX
+	install -D -m 755 $(BUILD)/uzawad $(DESTDIR)$(PREFIX)/bin/uzawad
+	install -D -m 755 $(BUILD)/uzawa $(DESTDIR)$(PREFIX)/bin/uzawa
+
+clean: ## remove everything built
+	rm -rf build
+
+help: ## this list
+	@awk 'BEGIN{FS=":.*## "} /^##@/{printf "\n%s\n",substr($$0,5)} /^[a-z][a-z-]*:.*## /{printf "  %-14s %s\n",$$1,$$2}' Makefile
+
+print-%:
+	@echo '$($*)'
+
+# ------------------------------------------------------------------ building
+
+$(BUILD)/libuzawa.a: $(SOLVER_OBJ)
+	@rm -f $@
+	@ar rcs $@ $^
+
+$(BUILD)/uzawad: $(SERVER_OBJ) $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS)
+
+$(BUILD)/uzawa: $(CLIENT_OBJ)
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(CLIENT_LIBS)
+
+$(BUILD)/obj/%.o: %.c
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests) -c -o $@ $<
+
+$(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS)
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS_ALL) -c -o $@ $<
+
+# Every schema file becomes bytes in the daemon, found by name (server/codec/embedded.h).
+$(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
+	@mkdir -p $(@D)
+	@{ echo '#include "codec/embedded.h"'; \
+	   n=0; for f in $(SCHEMAS); do n=$$((n+1)); \
+	     echo "__asm__(\".section .rodata\\nembedded_$$n: .incbin \\\"$$f\\\"\\nembedded_$${n}_end: .byte 0\\n.text\");"; \
+	     echo "extern const char embedded_$$n[], embedded_$${n}_end[];"; done; \
+	   echo 'size_t embedded_count(void) { return '$$n'; }'; \
+	   echo 'embedded_file embedded_at(size_t i) {'; \
+	   n=0; for f in $(SCHEMAS); do n=$$((n+1)); \
+	     echo "    if (i == $$((n-1))) return (embedded_file){\"$$(basename $$f)\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
+	   echo '    return (embedded_file){0, 0, 0};'; echo '}'; } > $@
+
+$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(BUILD)/obj/tests/harness.o $(PARTS_OBJ) $(BUILD)/libuzawa.a
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
+comma := ,
+
+$(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs jansson) -lpthread
+
+.SECONDARY:
+
+##@ Test
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz bench
+test: deps-test ## build and pass every test
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
+	@tests/run.sh $(BUILD)
+
+unit-bins: $(UNIT_BIN)
+
+test-unit: all unit-bins ## the C tests only; FILTER=name runs some
+	@tests/run.sh $(BUILD) unit $(FILTER)
+
+test-api: all ## the tests that drive the real daemon and client; FILTER=name runs some
+	@tests/run.sh $(BUILD) api $(FILTER)
+
+test-hygiene: ## formatting, static analysis, both compilers
+	@tests/run.sh $(BUILD) hygiene
+
+asan: ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
+	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/asan OPT="-O1 -g" SAN="-fsanitize=address,undefined -fno-sanitize-recover=all" all unit-bins
+	@tests/run.sh build/asan "unit api"
+
+ubsan: ## the C tests under UndefinedBehaviorSanitizer alone
+	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/ubsan OPT="-O1 -g" SAN="-fsanitize=undefined -fno-sanitize-recover=all" all unit-bins
+	@tests/run.sh build/ubsan unit
+
+tsan: ## the server's tests under ThreadSanitizer
+	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/tsan OPT="-O1 -g" SAN="-fsanitize=thread" all unit-bins
+	@tests/run.sh build/tsan "unit api" "$(FILTER)"
+
+fuzz: ## run every fuzz target for FUZZ_SECONDS (default 30) each
+	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/fuzzing CC=clang OPT="-O1 -g" SAN="-fsanitize=address,undefined,fuzzer-no-link" fuzz-bins
+	@tests/fuzz/run.sh build/fuzzing $${FUZZ_SECONDS:-30}
+
+.PHONY: fuzz-bins
+fuzz-bins: $(FUZZ_BIN)
+$(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(PARTS_OBJ) $(BUILD)/libuzawa.a
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS_ALL) -fsanitize=fuzzer -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
+
+bench: deps ## measured ratios in one run: a table and build/bench.json
+	@$(MAKE) --no-print-directory -s $(BUILD)/bench
+	@$(BUILD)/bench $(BUILD)/bench.json $(FILTER)
+
+##@ Style
+.PHONY: format lint
+format: ## rewrite the sources in the project's format
+	clang-format -i $(C_FILES) $(H_FILES)
+
+lint: ## formatting, cppcheck, and both compilers with every warning an error
+	@tests/lint.sh
+
+print-sources:
+	@printf '%s\n' $(C_FILES) $(H_FILES)
+
+-include $(shell find $(BUILD)/obj -name '*.d' 2>/dev/null)

@@ -1,0 +1,16 @@
+/* alloc.h: overflow-checked allocation. Tests inject failures by wrapping malloc, calloc and realloc at link time. */
+#ifndef UZ_CORE_ALLOC_H
+#define UZ_CORE_ALLOC_H
+
+#include <stdint.h>
+#include <stddef.h>
+
+/* Uninitialised / zeroed room for `count` items of `size` bytes; NULL when count < 0, the product overflows or there
+ * is no memory. A count of 0 gives a unique pointer, so NULL always means failure. Free with free(). */
+void *uz_alloc(int64_t count, size_t size);
+void *uz_alloc_zero(int64_t count, size_t size);
+
+/* Grows or shrinks; on failure NULL and the old block stays. */
+void *uz_realloc(void *block, int64_t count, size_t size);
+
+#endif

@@ -1,0 +1,83 @@
+#include "core/blas.h"
+
+#include <cblas.h>
+#include <lapacke.h>
+
+/* Dense orders stay far below 2^31: they are bounded by the memory of an n x n array. */
+static int narrow(int64_t n)
+{
+    return (int)n;
+}
+
+double uz_dot(int64_t n, const double *x, const double *y)
+{
+    return cblas_ddot(narrow(n), x, 1, y, 1);
+}
+
+double uz_norm(int64_t n, const double *x)
+{
+    return cblas_dnrm2(narrow(n), x, 1);
+}
+
+void uz_axpy(int64_t n, double alpha, const double *x, double *y)
+{
+    cblas_daxpy(narrow(n), alpha, x, 1, y, 1);
+}
+
+void uz_symv_lower(int64_t n, const double *A, const double *x, double *y)
+{
+    if (n > 0)
+        cblas_dsymv(CblasColMajor, CblasLower, narrow(n), 1.0, A, narrow(n), x, 1, 0.0, y, 1);
+}
+
+void uz_trsv_lower(int64_t n, const double *L, double *x)
+{
+    if (n > 0)
+        cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
+}
+
+void uz_trsv_lower_t(int64_t n, const double *L, double *x)
+{
+    if (n > 0)
+        cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
+}
+
+void uz_trmv_lower_t(int64_t n, const double *L, double *x)
+{
+    if (n > 0)
+        cblas_dtrmv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
+}
+
+void uz_trsm_lower(int64_t n, int64_t k, const double *L, double *X)
+{
+    if (n > 0 && k > 0)
+        cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), narrow(k), 1.0, L,
+                    narrow(n), X, narrow(n));
+}
+
+void uz_syrk_lower_t(int64_t n, int64_t k, const double *Z, double *C)
+{
+    if (n > 0 && k > 0)
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k), 1.0, Z, narrow(k), 0.0, C, narrow(n));
+}
+
+bool uz_potrf_lower(int64_t n, double *A)
+{
+    return n == 0 || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(n), A, narrow(n)) == 0;
+}
+
+void uz_potrs_lower(int64_t n, const double *L, double *x)
+{
+    uz_trsv_lower(n, L, x);
+    uz_trsv_lower_t(n, L, x);
+}
+
+bool uz_potri_lower(int64_t n, double *L)
+{
+    return n == 0 || LAPACKE_dpotri_work(LAPACK_COL_MAJOR, 'L', narrow(n), L, narrow(n)) == 0;
+}
+
+bool uz_stev(int64_t n, double *d, double *e, double *V)
+{
+    return LAPACKE_dstev(LAPACK_COL_MAJOR, 'V', narrow(n), d, e, V, narrow(n)) == 0;
+}

@@ -1,0 +1,25 @@
+/* blas.h: the dense kernels in use, with sizes checked once and column-major lower storage throughout. The only file
+ * that knows cblas and LAPACKE is blas.c. */
+#ifndef UZ_CORE_BLAS_H
+#define UZ_CORE_BLAS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+double uz_dot(int64_t n, const double *x, const double *y);
+double uz_norm(int64_t n, const double *x); /* 2-norm, without overflow */
+void uz_axpy(int64_t n, double alpha, const double *x, double *y);
+
+void uz_symv_lower(int64_t n, const double *A, const double *x, double *y); /* y = A x */
+void uz_trsv_lower(int64_t n, const double *L, double *x);                  /* x = L^-1 x */
+void uz_trsv_lower_t(int64_t n, const double *L, double *x);                /* x = L'^-1 x */
+void uz_trmv_lower_t(int64_t n, const double *L, double *x);                /* x = L'x */
+void uz_trsm_lower(int64_t n, int64_t k, const double *L, double *X);       /* X = L^-1 X, n x k */
+void uz_syrk_lower_t(int64_t n, int64_t k, const double *Z, double *C);     /* C = Z'Z, Z k x n */
+bool uz_potrf_lower(int64_t n, double *A);                  /* A = LL'; false: a pivot is not positive */
+void uz_potrs_lower(int64_t n, const double *L, double *x); /* x = (LL')^-1 x */
+bool uz_potri_lower(int64_t n, double *L);                  /* L -> lower triangle of (LL')^-1 */
+/* Eigenvalues of the symmetric tridiagonal matrix (d, n; e, n - 1), ascending in d; with vectors in V (n x n). */
+bool uz_stev(int64_t n, double *d, double *e, double *V);
+
+#endif

@@ -1,0 +1,366 @@
+/* uzawa.h: the one public header of the contact solver library.
+ *
+ * The library answers one question: where does an elastic body touch, how hard, and how far can that
+ * answer be from the exact one?  In the notation of Kanno, "An accelerated Uzawa method for application
+ * to frictionless contact problem":
+ *
+ *     minimize 1/2 u'Ku - p'u   subject to   g(u) = h - N u >= 0
+ *
+ * K  d x d  stiffness, symmetric positive definite      u  d  displacement
+ * N  m x d  outward contact normals, a row per contact  r  m  reaction, <= 0 (compression negative)
+ * p  d      load                                        g  m  gap, >= 0
+ * h  m      initial gap
+ *
+ * Units are the caller's own and consistent; nothing here depends on them.
+ *
+ * Contracts that hold for every function unless it says otherwise:
+ *   - the return value says how a *call* failed; how a *solve* ended is uz_outcome in its summary;
+ *   - *err (may be NULL) is written on failure only; the innermost cause wins;
+ *   - outputs are NULL or zero at entry and published only on success;
+ *   - every X_free takes NULL and half-built objects;
+ *   - no function prints, exits, touches signal dispositions or keeps global state.
+ */
+#ifndef UZAWA_H
+#define UZAWA_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ------------------------------------------------------------------ errors */
+
+/* How a call failed. */
+typedef enum {
+    UZ_OK = 0,
+    UZ_ERR_MEMORY,        /* an allocation failed, or a size would overflow */
+    UZ_ERR_ARGUMENT,      /* the caller broke this header's contract */
+    UZ_ERR_FORMAT,        /* Matrix Market text is malformed: see line */
+    UZ_ERR_UNSUPPORTED,   /* well formed, but a kind that is not solved here (complex, pattern, ...) */
+    UZ_ERR_SIZE,          /* shapes do not agree */
+    UZ_ERR_NOT_FINITE,    /* NaN or Inf in the input, or produced by overflow */
+    UZ_ERR_NOT_SYMMETRIC, /* K differs from K' */
+    UZ_ERR_NOT_SPD,       /* K is not positive definite to working precision */
+    UZ_ERR_FREE_BODY,     /* supports leave a rigid-body mode free */
+    UZ_ERR_SCENE,         /* a scene that cannot be modelled: unknown group, inverted element, ... */
+    UZ_ERR_LIMIT,         /* more memory than allowed */
+    UZ_ERR_CANCELLED,     /* the cancel hook said so before there was an answer to return */
+    UZ_ERR_IO,            /* reading or writing a file failed */
+    UZ_ERR_INTERNAL       /* a bug: an invariant did not hold */
+} uz_status;
+
+/* What went wrong, for a person and for a program. */
+typedef struct {
+    uz_status status;
+    char where[96];    /* which input: "K", "h", "/contacts/0/on" (JSON pointer into the problem); "" if none */
+    int64_t line;      /* 1-based line of Matrix Market text, 0 if none */
+    char message[512]; /* what is wrong and what to do, UTF-8, no trailing newline */
+} uz_error;
+
+/* Stable machine name of a status: "not_positive_definite", ... Never NULL. */
+const char *uz_status_name(uz_status status);
+
+/* ------------------------------------------------------- sparse matrices */
+
+/* Compressed sparse columns. Rows ascend within a column and no entry occurs twice.
+ * A symmetric matrix is stored as its lower triangle, diagonal included; the text says where. */
+typedef struct {
+    int64_t rows, cols;
+    int64_t *ptr; /* cols + 1 */
+    int64_t *idx; /* ptr[cols], row of each entry */
+    double *val;  /* ptr[cols] */
+} uz_csc;
+
+/* Allocates ptr, idx, val for `nnz` entries, all zero. A previous content of *A is not freed. */
+uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_error *err);
+void uz_csc_clear(uz_csc *A); /* frees the arrays and zeroes *A */
+uz_status uz_csc_copy(uz_csc *out, const uz_csc *A, uz_error *err);
+uz_status uz_csc_transpose(uz_csc *out, const uz_csc *A, uz_error *err);
+
+/* Builds a CSC matrix from `count` triplets (0-based), adding entries that occur twice in the order given. */
+uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t count, const int64_t *row,
+                               const int64_t *col, const double *val, uz_error *err);
+
+/* y += alpha A x and y += alpha A' x. x and y do not overlap. */
+void uz_csc_gaxpy(double *y, const uz_csc *A, double alpha, const double *x);
+void uz_csc_gaxpy_t(double *y, const uz_csc *A, double alpha, const double *x);
+/* y += alpha A x for symmetric A given by its lower triangle. */
+void uz_csc_symv(double *y, const uz_csc *A, double alpha, const double *x);
+
+/* --------------------------------------------------------- Matrix Market */
+
+typedef enum { UZ_MM_COORDINATE, UZ_MM_ARRAY } uz_mm_format;
+typedef enum { UZ_MM_GENERAL, UZ_MM_SYMMETRIC } uz_mm_symmetry;
+
+/* What the banner and the size line said. */
+typedef struct {
+    uz_mm_format format;
+    uz_mm_symmetry symmetry;
+    bool integer; /* field was "integer" */
+    int64_t rows, cols, entries;
+} uz_mm_info;
+
+/* Reads a whole Matrix Market text of `len` bytes (NUL not needed) as a matrix. A symmetric file gives the
+ * lower triangle (see info->symmetry); duplicates in a coordinate file are refused; exact zeros are kept.
+ * max_bytes (0: none) bounds what the result may take. Errors: UZ_ERR_FORMAT, _UNSUPPORTED, _NOT_FINITE,
+ * _LIMIT, _MEMORY, with the line. Source: Boisvert, Pozo, Remington, NISTIR 5935 (1996). */
+uz_status uz_mm_read(uz_csc *out, uz_mm_info *info, const char *text, size_t len, size_t max_bytes, uz_error *err);
+
+/* Reads a text that is a vector (n x 1 or 1 x n, array or coordinate); *out has *n numbers, the caller frees it. */
+uz_status uz_mm_read_vector(double **out, int64_t *n, const char *text, size_t len, size_t max_bytes, uz_error *err);
+
+/* Writes coordinate text that reads back bit for bit (shortest digits that do). *text is NUL-terminated, caller frees.
+ */
+uz_status uz_mm_write(char **text, size_t *len, const uz_csc *A, uz_mm_symmetry symmetry, uz_error *err);
+/* Writes array text, n x 1. */
+uz_status uz_mm_write_vector(char **text, size_t *len, const double *x, int64_t n, uz_error *err);
+
+/* Reads the decimal number at the start of text[0..len): digits, one '.', an exponent, a sign; no NaN, Inf or hex.
+ * Returns the bytes used, 0 if there is no number; *value is correctly rounded, +-Inf on overflow. */
+size_t uz_parse_double(double *value, const char *text, size_t len);
+
+/* -------------------------------------------------------------- problems */
+
+/* A problem in matrices. K: lower triangle. N: general. p: d. h: m. */
+typedef struct {
+    uz_csc K, N;
+    double *p, *h;
+} uz_qp;
+void uz_qp_clear(uz_qp *qp);
+/* Full validation: shapes, finiteness. */
+uz_status uz_qp_check(const uz_qp *qp, uz_error *err);
+/* Replaces a general square K by its lower triangle; UZ_ERR_NOT_SYMMETRIC names the worst pair. The tolerance is
+ * relative to the larger diagonal of the pair: 1e-12; within it the two halves are averaged. */
+uz_status uz_symmetric_lower(uz_csc *K, uz_error *err);
+
+/* A scene: what a person says about a body. Plain data; strings are group names.
+ * Numbers that a scene leaves out are NaN where the text says so. */
+typedef enum { UZ_PLANE_STRESS, UZ_PLANE_STRAIN } uz_model;
+typedef struct {
+    double origin[3], size[3];
+    int64_t cells[3];
+    char element[16]; /* "quad4" */
+    int dim;          /* 2 */
+} uz_box;
+typedef struct {
+    char on[64];
+    double young, poisson;
+} uz_material;
+typedef struct {
+    char on[64];
+    double u[3];
+} uz_support; /* NaN: that direction is free */
+typedef struct {
+    char on[64];
+    double traction[3];
+} uz_load; /* force per area on the edges of a group */
+typedef struct {
+    char on[64];
+    double point[3], normal[3];
+} uz_contact; /* rigid half space; normal points out of the obstacle */
+typedef struct {
+    uz_model model;
+    double thickness;
+    uz_box box;
+    uz_material *materials;
+    int64_t n_materials;
+    uz_support *supports;
+    int64_t n_supports;
+    uz_load *loads;
+    int64_t n_loads;
+    uz_contact *contacts;
+    int64_t n_contacts;
+} uz_scene;
+void uz_scene_clear(uz_scene *scene);
+
+/* Where a scene's unknowns live. */
+typedef struct {
+    int dim;
+    int64_t n_nodes, n_elements;
+    double *xyz;            /* n_nodes x dim, row by row */
+    int64_t *contact_node;  /* m: the node of each contact row */
+    double *contact_area;   /* m: tributary area of each contact node (length x thickness in 2D) */
+    double *contact_normal; /* m x dim: unit normal of the obstacle at the contact, pointing towards the body */
+} uz_mesh_info;
+void uz_mesh_info_clear(uz_mesh_info *info);
+
+/* Mesh, assembly, boundary conditions: the scene as matrices. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the
+ * modes), _NOT_FINITE, with `where` a JSON pointer into the problem. Nothing is factored. */
+uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
+/* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. */
+uz_status uz_scene_check(const uz_scene *scene, uz_error *err);
+
+typedef enum { UZ_PROBLEM_MATRICES, UZ_PROBLEM_SCENE } uz_problem_kind;
+typedef struct {
+    uz_problem_kind kind;
+    uz_qp qp;       /* UZ_PROBLEM_MATRICES */
+    uz_scene scene; /* UZ_PROBLEM_SCENE */
+} uz_problem;
+void uz_problem_clear(uz_problem *problem);
+
+/* -------------------------------------------------------------- settings */
+
+typedef enum {
+    UZ_METHOD_AUTO,                /* accelerated_restart, handed to active_set when that is cheaper */
+    UZ_METHOD_UZAWA,               /* Kanno, Algorithm 1 */
+    UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
+    UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
+    UZ_METHOD_ACTIVE_SET           /* exact, by guessing which rows touch; condensed operator only */
+} uz_method;
+typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED } uz_operator;
+typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;
+typedef enum { UZ_STOP_CERTIFIED, UZ_STOP_PAPER } uz_stopping;
+
+typedef struct {
+    uz_method method;
+    uz_operator op;
+    uz_ordering ordering;
+    uz_stopping stopping;
+    double relative_error;  /* certified: ||u - u*||_K / ||u||_K asked for, in (0, 1]; 0: rounding level */
+    bool balanced;          /* scenes: relative_error is a tenth of the estimated discretization error instead */
+    double epsilon;         /* UZ_STOP_PAPER: stop when ||rho - r|| <= epsilon, a force */
+    double alpha;           /* step size; 0: 1 / lambda_max(D) */
+    int64_t max_iterations; /* >= 0 */
+    double time_limit_s;    /* of the whole solve; INFINITY: none */
+    size_t memory_limit;    /* bytes for matrices and factor; 0: none */
+} uz_settings;
+/* auto, certified 1e-8, 100000 iterations, no time limit. */
+uz_settings uz_settings_default(void);
+
+/* Names as in the HTTP interface ("accelerated_restart"); never NULL. uz_*_parse: false if the name is unknown. */
+const char *uz_method_name(uz_method);
+const char *uz_operator_name(uz_operator);
+const char *uz_ordering_name(uz_ordering);
+const char *uz_stopping_name(uz_stopping);
+bool uz_method_parse(uz_method *out, const char *name);
+bool uz_operator_parse(uz_operator *out, const char *name);
+bool uz_ordering_parse(uz_ordering *out, const char *name);
+bool uz_stopping_parse(uz_stopping *out, const char *name);
+
+/* --------------------------------------------------------------- results */
+
+/* How a solve ended. */
+typedef enum {
+    UZ_CONVERGED, /* the certificate meets the request; nothing else is called converged */
+    UZ_ITERATION_LIMIT,
+    UZ_TIME_LIMIT,
+    UZ_PRECISION_LIMIT, /* more was asked than double precision holds here */
+    UZ_PAPER_RULE,      /* the paper's stopping rule ended it before the certificate met the request */
+    UZ_INFEASIBLE,
+    UZ_DISMISSED
+} uz_outcome;
+const char *uz_outcome_name(uz_outcome);
+
+/* KKT residual of the paper, section 4: e1 = Ku - p - N'r, e2 = min(g, 0), e3 = max(r, 0), e4 = -g.r; 2-norms. */
+typedef struct {
+    double total, e1, e2, e3, e4;
+} uz_residual;
+
+typedef struct {
+    double relative_error; /* bound on ||u - u*||_K over the energy norm of u*; INFINITY: nothing could be certified */
+    double absolute_error; /* bound on ||u - u*||_K, sqrt(2 gap) */
+    double gap;            /* pi(v) - psi(r) for the feasible v that the certificate built */
+    double energy_primal;  /* pi(v) */
+    double energy_dual;    /* psi(r) */
+    double energy_norm;    /* ||u||_K */
+    uz_residual residual;  /* absolute */
+    uz_residual relative_residual; /* force by ||p||, length by the gap scale, energy by |psi| */
+} uz_certificate;
+
+typedef struct {
+    double queue, parse, assemble, order, factor, condense, iterate, certify, total;
+} uz_timings; /* seconds; queue and parse are the caller's */
+
+/* One row of the convergence history. Columns as in the HTTP interface. */
+typedef struct {
+    int64_t iteration;
+    double seconds;        /* since the first iteration */
+    double dual_objective; /* psi(r) */
+    uz_residual residual;
+    double step_norm;   /* ||rho - r||, the paper's stopping quantity; 0 in row 0 */
+    double error_bound; /* bound on ||u - u*||_K of the best answer held so far; INFINITY until there is one */
+    int64_t contacts;   /* rows with r < 0 */
+    bool restart;
+} uz_history_row;
+
+typedef struct {
+    uz_history_row *rows;
+    int64_t count, capacity;
+} uz_history;
+
+typedef struct {
+    uz_outcome outcome;
+    uz_method method;
+    uz_operator op;
+    uz_ordering ordering;
+    int64_t d, m, iterations, restarts;
+    int64_t active; /* rows with r < 0 */
+    double reaction_sum, max_penetration;
+    int dim;             /* scene: 2 or 3, else 0 */
+    double force[3];     /* scene: force of the body on the obstacle's normal side, sum of -r n */
+    double max_pressure; /* scene: max of -r / tributary area; NaN otherwise */
+    double alpha, lambda_max;
+    double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
+    double requested_error;      /* the relative error that `converged` had to meet */
+    uz_certificate certificate;
+    bool factor_cached;
+    int64_t factor_nnz;
+    size_t factor_bytes;
+    double rcond;
+    uz_timings timings;
+    char message[256]; /* one sentence on the outcome where it is not `converged`; "" otherwise */
+} uz_summary;
+
+typedef struct {
+    uz_summary summary;
+    int64_t d, m, n_nodes;
+    double *u, *r,
+        *g; /* d, m, m. A scene's u is n_nodes x dim by node, supported dofs included: d counts only free ones */
+    uz_mesh_info mesh; /* scene only */
+    uz_history history;
+} uz_result;
+void uz_result_free(uz_result *result);
+
+/* Asked between iterations and before every expensive step; from the solving thread. */
+typedef struct {
+    void *ctx;
+    bool (*cancelled)(void *ctx);                           /* may be NULL */
+    void (*progress)(void *ctx, const uz_history_row *row); /* may be NULL; after each iteration */
+} uz_hooks;
+
+/* ------------------------------------------------------------ factor cache */
+
+/* Thread-safe, bounded in bytes, least recently used first out. Entries in use are never freed under their user. */
+typedef struct uz_cache uz_cache;
+uz_cache *uz_cache_new(size_t max_bytes); /* NULL: no memory */
+void uz_cache_free(uz_cache *cache);      /* no solve may be running on it */
+
+typedef struct {
+    char digest[65]; /* SHA-256 of what determines the factor, hex */
+    int64_t d, m, nnz, hits;
+    size_t bytes;
+} uz_cache_entry;
+/* A snapshot, most recently used first; the caller frees *entries with free(). */
+uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **entries, size_t *count, uz_error *err);
+
+/* ------------------------------------------------------------------ solve */
+
+/* Solves one problem: the pipeline from scene or matrices to a certified result. `cache` may be NULL.
+ * The problem is only read. Called from many threads at once with one cache.
+ * Prepare each calling thread once with uz_thread_init. */
+uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                   const uz_hooks *hooks, uz_error *err);
+
+/* Process-wide settings that a library must not choose alone: BLAS threads. Call once from main before threads start;
+ * `workers` is how many threads will call uz_solve at once. */
+void uz_process_init(int workers);
+/* Per-thread cure for CHOLMOD's compiled-in OpenMP team (4 threads whatever the machine has). */
+void uz_thread_init(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
