@@ -1,0 +1,218 @@
+/* Compressed sparse columns: making them and multiplying with them. Everything here is O(entries + rows + cols). */
+#include "uzawa.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_error *err)
+{
+    uz_csc made = {.rows = rows, .cols = cols};
+    memset(A, 0, sizeof *A);
+    uz_error_reset(err);
+    if (rows < 0 || cols < 0 || nnz < 0)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a matrix cannot have negative sizes");
+    if (cols == INT64_MAX)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "a matrix of %lld columns does not fit in memory", (long long)cols);
+    made.ptr = uz_alloc_zero(cols + 1, sizeof *made.ptr);
+    made.idx = uz_alloc_zero(nnz, sizeof *made.idx);
+    made.val = uz_alloc_zero(nnz, sizeof *made.val);
+    if (!made.ptr || !made.idx || !made.val) {
+        uz_csc_clear(&made);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a matrix of %lld columns and %lld entries",
+                       (long long)cols, (long long)nnz);
+    }
+    *A = made;
+    return UZ_OK;
+}
+
+void uz_csc_clear(uz_csc *A)
+{
+    if (!A)
+        return;
+    free(A->ptr);
+    free(A->idx);
+    free(A->val);
+    memset(A, 0, sizeof *A);
+}
+
+/* A zeroed matrix has no arrays and counts as empty. */
+static int64_t entries(const uz_csc *A)
+{
+    return A->ptr ? A->ptr[A->cols] : 0;
+}
+
+uz_status uz_csc_copy(uz_csc *out, const uz_csc *A, uz_error *err)
+{
+    int64_t nnz = entries(A);
+    uz_csc made;
+    memset(out, 0, sizeof *out);
+    uz_status status = uz_csc_init(&made, A->rows, A->cols, nnz, err);
+    if (status != UZ_OK)
+        return status;
+    if (A->ptr)
+        memcpy(made.ptr, A->ptr, ((size_t)A->cols + 1) * sizeof *made.ptr);
+    if (nnz > 0) {
+        memcpy(made.idx, A->idx, (size_t)nnz * sizeof *made.idx);
+        memcpy(made.val, A->val, (size_t)nnz * sizeof *made.val);
+    }
+    *out = made;
+    return UZ_OK;
+}
+
+/* ptr[1 + k] holds the size of bucket k and ptr[0] = 0. Afterwards ptr[1 + k] is where bucket k starts: filling the
+ * buckets with ptr[1 + k]++ then leaves the starts in ptr[k] and the total in ptr[count], without a second array. */
+static void counts_to_starts(int64_t *ptr, int64_t count)
+{
+    int64_t start = 0;
+    for (int64_t k = 1; k <= count; k++) {
+        int64_t size = ptr[k];
+        ptr[k] = start;
+        start += size;
+    }
+}
+
+uz_status uz_csc_transpose(uz_csc *out, const uz_csc *A, uz_error *err)
+{
+    int64_t nnz = entries(A);
+    uz_csc made;
+    memset(out, 0, sizeof *out);
+    uz_status status = uz_csc_init(&made, A->cols, A->rows, nnz, err);
+    if (status != UZ_OK)
+        return status;
+    for (int64_t k = 0; k < nnz; k++)
+        made.ptr[1 + A->idx[k]]++;
+    counts_to_starts(made.ptr, A->rows);
+    for (int64_t j = 0; nnz > 0 && j < A->cols; j++) {
+        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
+            int64_t at = made.ptr[1 + A->idx[k]]++;
+            made.idx[at] = j;
+            made.val[at] = A->val[k];
+        }
+    }
+    *out = made;
+    return UZ_OK;
+}
+
+static uz_status check_triplets(int64_t rows, int64_t cols, int64_t count, const int64_t *row, const int64_t *col,
+                                uz_error *err)
+{
+    if (count < 0)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a negative number of triplets");
+    for (int64_t k = 0; k < count; k++) {
+        if (row[k] < 0 || row[k] >= rows || col[k] < 0 || col[k] >= cols)
+            return uz_fail(err, UZ_ERR_ARGUMENT, "", "triplet %lld at (%lld, %lld) is outside the %lld x %lld matrix",
+                           (long long)k, (long long)row[k], (long long)col[k], (long long)rows, (long long)cols);
+    }
+    return UZ_OK;
+}
+
+/* order[0..count) lists the triplets by ascending row, in the order given within a row. start: rows + 1, zero. */
+static void order_by_row(int64_t *order, int64_t *start, int64_t rows, int64_t count, const int64_t *row)
+{
+    for (int64_t k = 0; k < count; k++)
+        start[1 + row[k]]++;
+    counts_to_starts(start, rows);
+    for (int64_t k = 0; k < count; k++)
+        order[start[1 + row[k]]++] = k;
+}
+
+static void fill_columns(uz_csc *A, int64_t count, const int64_t *order, const int64_t *row, const int64_t *col,
+                         const double *val)
+{
+    for (int64_t k = 0; k < count; k++)
+        A->ptr[1 + col[k]]++;
+    counts_to_starts(A->ptr, A->cols);
+    for (int64_t k = 0; k < count; k++) {
+        int64_t at = A->ptr[1 + col[order[k]]]++;
+        A->idx[at] = row[order[k]];
+        A->val[at] = val[order[k]];
+    }
+}
+
+/* Adds up entries that stand next to each other with the same row; the arrays keep their room. */
+static void sum_duplicates(uz_csc *A)
+{
+    int64_t to = 0, from = 0;
+    for (int64_t j = 0; j < A->cols; j++) {
+        int64_t first = to, end = A->ptr[j + 1];
+        for (; from < end; from++) {
+            if (to > first && A->idx[to - 1] == A->idx[from]) {
+                A->val[to - 1] += A->val[from];
+            } else {
+                A->idx[to] = A->idx[from];
+                A->val[to++] = A->val[from];
+            }
+        }
+        A->ptr[j + 1] = to;
+    }
+}
+
+uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t count, const int64_t *row,
+                               const int64_t *col, const double *val, uz_error *err)
+{
+    uz_csc made = {0};
+    int64_t *order = NULL, *start = NULL;
+    memset(out, 0, sizeof *out);
+    uz_error_reset(err);
+    uz_status status = check_triplets(rows, cols, count, row, col, err);
+    if (status == UZ_OK)
+        status = uz_csc_init(&made, rows, cols, count, err);
+    if (status != UZ_OK || count == 0)
+        goto done;
+    order = uz_alloc(count, sizeof *order);
+    start = rows < INT64_MAX ? uz_alloc_zero(rows + 1, sizeof *start) : NULL;
+    if (!order || !start) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to sort %lld entries", (long long)count);
+        goto done;
+    }
+    order_by_row(order, start, rows, count, row);
+    fill_columns(&made, count, order, row, col, val);
+    sum_duplicates(&made);
+done:
+    free(order);
+    free(start);
+    if (status == UZ_OK)
+        *out = made;
+    else
+        uz_csc_clear(&made);
+    return status;
+}
+
+void uz_csc_gaxpy(double *y, const uz_csc *A, double alpha, const double *x)
+{
+    for (int64_t j = 0; j < A->cols; j++) {
+        double factor = alpha * x[j];
+        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++)
+            y[A->idx[k]] += A->val[k] * factor;
+    }
+}
+
+void uz_csc_gaxpy_t(double *y, const uz_csc *A, double alpha, const double *x)
+{
+    for (int64_t j = 0; j < A->cols; j++) {
+        double sum = 0.0;
+        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++)
+            sum += A->val[k] * x[A->idx[k]];
+        y[j] += alpha * sum;
+    }
+}
+
+void uz_csc_symv(double *y, const uz_csc *A, double alpha, const double *x)
+{
+    for (int64_t j = 0; j < A->cols; j++) {
+        double factor = alpha * x[j], sum = 0.0;
+        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
+            int64_t i = A->idx[k];
+            if (i == j) {
+                sum += A->val[k] * x[j];
+            } else {
+                y[i] += A->val[k] * factor;
+                sum += A->val[k] * x[i];
+            }
+        }
+        y[j] += alpha * sum;
+    }
+}

@@ -1,0 +1,91 @@
+/* The problem in matrices: freeing it, and checking all that can be known without a factorization. */
+#include "uzawa.h"
+
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void uz_qp_clear(uz_qp *qp)
+{
+    if (!qp)
+        return;
+    uz_csc_clear(&qp->K);
+    uz_csc_clear(&qp->N);
+    free(qp->p);
+    free(qp->h);
+    memset(qp, 0, sizeof *qp);
+}
+
+/* One column: starts in order, rows ascending within [first_row, rows), values finite. */
+static uz_status check_column(const uz_csc *A, int64_t j, int64_t first_row, const char *name, uz_error *err)
+{
+    int64_t above = first_row - 1;
+    if (A->ptr[j + 1] < A->ptr[j])
+        return uz_fail(err, UZ_ERR_ARGUMENT, name, "the column starts of %s do not ascend", name);
+    for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
+        if (A->idx[k] <= above || A->idx[k] >= A->rows)
+            return uz_fail(err, UZ_ERR_ARGUMENT, name,
+                           "%s, column %lld: row indices must ascend and stay within the stored part", name,
+                           (long long)j + 1);
+        above = A->idx[k];
+        if (!isfinite(A->val[k]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld, %lld) is not a finite number (counted from 1)", name,
+                           (long long)above + 1, (long long)j + 1);
+    }
+    return UZ_OK;
+}
+
+static uz_status check_matrix(const uz_csc *A, bool lower, const char *name, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    if (!A->ptr || A->ptr[0] != 0)
+        return uz_fail(err, UZ_ERR_ARGUMENT, name, "%s has no column starts", name);
+    for (int64_t j = 0; status == UZ_OK && j < A->cols; j++)
+        status = check_column(A, j, lower ? j : 0, name, err);
+    return status;
+}
+
+static uz_status check_vector(const double *x, int64_t n, const char *name, uz_error *err)
+{
+    if (n > 0 && !x)
+        return uz_fail(err, UZ_ERR_SIZE, name, "%s is missing; it must have %lld numbers", name, (long long)n);
+    for (int64_t i = 0; i < n; i++) {
+        if (!isfinite(x[i]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld) is not a finite number (counted from 1)", name,
+                           (long long)i + 1);
+    }
+    return UZ_OK;
+}
+
+static uz_status check_shapes(const uz_qp *qp, uz_error *err)
+{
+    const uz_csc *K = &qp->K, *N = &qp->N;
+    if (K->rows != K->cols)
+        return uz_fail(err, UZ_ERR_SIZE, "K", "K is %lld x %lld; a stiffness matrix is square", (long long)K->rows,
+                       (long long)K->cols);
+    if (K->rows <= 0)
+        return uz_fail(err, UZ_ERR_SIZE, "K", "K is empty; a problem needs at least one unknown");
+    if (N->rows < 0 || (N->cols != K->cols && (N->rows != 0 || N->cols != 0)))
+        return uz_fail(err, UZ_ERR_SIZE, "N", "N is %lld x %lld but K is %lld x %lld; N needs %lld columns",
+                       (long long)N->rows, (long long)N->cols, (long long)K->rows, (long long)K->cols,
+                       (long long)K->cols);
+    return UZ_OK;
+}
+
+/* N may be a zeroed struct when there are no contacts. */
+uz_status uz_qp_check(const uz_qp *qp, uz_error *err)
+{
+    uz_error_reset(err);
+    uz_status status = check_shapes(qp, err);
+    if (status == UZ_OK)
+        status = check_matrix(&qp->K, true, "K", err);
+    if (status == UZ_OK && qp->N.cols > 0)
+        status = check_matrix(&qp->N, false, "N", err);
+    if (status == UZ_OK)
+        status = check_vector(qp->h, qp->N.rows, "h", err);
+    if (status == UZ_OK)
+        status = check_vector(qp->p, qp->K.cols, "p", err);
+    return status;
+}
