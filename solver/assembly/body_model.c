@@ -1,0 +1,173 @@
+/* body_model.c: the chain from a scene to matrices. */
+#include "assembly/parts.h"
+
+#include "assembly/quad4.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void uz_mesh_info_clear(uz_mesh_info *info)
+{
+    if (!info)
+        return;
+    free(info->xyz);
+    free(info->contact_node);
+    free(info->contact_area);
+    free(info->contact_normal);
+    memset(info, 0, sizeof *info);
+}
+
+void uz_body_model_clear(uz_body_model *model)
+{
+    if (!model)
+        return;
+    model->info.xyz = NULL; /* the mesh frees it */
+    uz_mesh_info_clear(&model->info);
+    uz_mesh_clear(&model->mesh);
+    uz_csc_clear(&model->K);
+    uz_csc_clear(&model->N);
+    uz_csc_clear(&model->K_fixed);
+    free(model->dof);
+    memset(model, 0, sizeof *model);
+}
+
+static void describe_mesh(uz_body_model *model, const uz_scene *scene)
+{
+    model->info.dim = model->mesh.dim;
+    model->info.n_nodes = model->mesh.n_nodes;
+    model->info.n_elements = model->mesh.n_elements;
+    model->info.xyz = model->mesh.xyz;
+    model->thickness = scene->thickness;
+    uz_elasticity(model->elasticity, scene->model, scene->materials[0].young, scene->materials[0].poisson);
+}
+
+/* Everything but the stiffness. */
+static uz_status prepare(uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    uz_status status = uz_mesh_from_box(&model->mesh, &scene->box, err);
+    if (status == UZ_OK)
+        status = uz_scene_check_body(scene, &model->mesh, err);
+    if (status != UZ_OK)
+        return status;
+    describe_mesh(model, scene);
+    status = uz_number_dofs(model, scene, err);
+    if (status == UZ_OK)
+        status = uz_check_rigid_modes(model, err);
+    if (status == UZ_OK)
+        status = uz_build_contact_rows(model, scene, err);
+    return status;
+}
+
+uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_error *err)
+{
+    memset(out, 0, sizeof *out);
+    uz_status status = prepare(out, scene, err);
+    if (status == UZ_OK)
+        status = uz_build_stiffness(out, err);
+    if (status != UZ_OK)
+        uz_body_model_clear(out);
+    return status;
+}
+
+static uz_status check_finite(const double *x, int64_t n, const char *where, uz_error *err)
+{
+    for (int64_t i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the numbers overflow; use other units");
+    return UZ_OK;
+}
+
+static uz_status fill_load(double *p, double *h, double *prescribed, const uz_body_model *model, const uz_scene *scene,
+                           uz_error *err)
+{
+    uz_status status = uz_prescribed_values(prescribed, model, scene, err);
+    if (status == UZ_OK)
+        status = uz_initial_gaps(h, prescribed, model, scene, err);
+    if (status == UZ_OK)
+        status = check_finite(h, model->m, "/contacts", err);
+    if (status != UZ_OK)
+        return status;
+    memset(p, 0, (size_t)model->d * sizeof *p);
+    uz_add_tractions(p, model, scene);
+    uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
+    return check_finite(p, model->d, "/loads", err);
+}
+
+uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
+                             const uz_scene *scene, uz_error *err)
+{
+    double *own = NULL;
+    uz_status status = uz_scene_check_load(scene, &model->mesh, err);
+    if (status != UZ_OK)
+        return status;
+    if (!prescribed && !(prescribed = own = uz_alloc(model->n_fixed, sizeof *own)))
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
+    status = fill_load(p, h, prescribed, model, scene, err);
+    free(own);
+    return status;
+}
+
+/* The same with vectors of its own; the caller frees them, also on failure. */
+static uz_status new_load(double **p, double **h, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    *p = uz_alloc(model->d, sizeof **p);
+    *h = uz_alloc(model->m, sizeof **h);
+    if (!*p || !*h)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld loads", (long long)model->d);
+    return uz_body_model_load(*p, *h, NULL, model, scene, err);
+}
+
+/* Moves what a caller of uz_scene_to_qp gets out of the model. */
+static void publish(uz_qp *qp, uz_mesh_info *info, uz_body_model *model, double *p, double *h)
+{
+    *qp = (uz_qp){model->K, model->N, p, h};
+    memset(&model->K, 0, sizeof model->K);
+    memset(&model->N, 0, sizeof model->N);
+    if (info) {
+        *info = model->info;
+        memset(&model->info, 0, sizeof model->info);
+        model->mesh.xyz = NULL;
+    }
+}
+
+uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err)
+{
+    uz_body_model model;
+    double *p = NULL, *h = NULL;
+    uz_error_reset(err);
+    memset(qp, 0, sizeof *qp);
+    if (info)
+        memset(info, 0, sizeof *info);
+    uz_status status = uz_body_model_build(&model, scene, err);
+    if (status == UZ_OK)
+        status = new_load(&p, &h, &model, scene, err);
+    if (status == UZ_OK) {
+        publish(qp, info, &model, p, h);
+        p = h = NULL;
+    }
+    free(p);
+    free(h);
+    uz_body_model_clear(&model);
+    return status;
+}
+
+uz_status uz_scene_check(const uz_scene *scene, uz_error *err)
+{
+    uz_body_model model;
+    double *p = NULL, *h = NULL;
+    uz_error_reset(err);
+    memset(&model, 0, sizeof model);
+    uz_status status = prepare(&model, scene, err);
+    if (status == UZ_OK)
+        status = uz_check_elements(&model, err);
+    if (status == UZ_OK)
+        status = new_load(&p, &h, &model, scene, err);
+    free(p);
+    free(h);
+    uz_body_model_clear(&model);
+    return status;
+}

@@ -1,0 +1,36 @@
+/* parts.h: the steps of uz_body_model_build and uz_body_model_load, each filling its own fields of the model. */
+#ifndef UZ_ASSEMBLY_PARTS_H
+#define UZ_ASSEMBLY_PARTS_H
+
+#include "assembly/assembly.h"
+
+/* mesh -> dof, d, n_fixed. UZ_ERR_SCENE where nothing is left to move. */
+uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *err);
+
+/* mesh, dof: does every connected part stay in place under its supports alone? UZ_ERR_FREE_BODY names the rigid-body
+ * modes that are left. */
+uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err);
+
+/* mesh, dof -> N, m, info.contact_*. */
+uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* Does `node` get a row from an obstacle with this unit normal? Only where the normal moves some free dof of it. */
+bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3]);
+
+/* mesh, dof, elasticity -> K, K_fixed. */
+uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
+/* Refuses what uz_build_stiffness would refuse. */
+uz_status uz_check_elements(const uz_body_model *model, uz_error *err);
+/* Corner coordinates of an element, relative to its first corner. */
+void uz_element_corners(double xy[8], const uz_mesh *mesh, int64_t element);
+
+/* n_fixed values; two supports that contradict each other: UZ_ERR_SCENE. */
+uz_status uz_prescribed_values(double *value, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* Area of the boundary that an edge stands for: length x thickness. */
+double uz_edge_area(const uz_body_model *model, const int64_t ends[2]);
+/* p += the scene's tractions. */
+void uz_add_tractions(double *p, const uz_body_model *model, const uz_scene *scene);
+/* h; a supported node inside an obstacle: UZ_ERR_SCENE. */
+uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_model *model, const uz_scene *scene,
+                          uz_error *err);
+
+#endif

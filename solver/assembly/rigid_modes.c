@@ -1,0 +1,215 @@
+/* rigid_modes.c: which rigid-body motions the supports leave to each connected part of the body.
+ *
+ * A small motion of a plane part is q = (translation x, translation y, rotation times size), about its centre. A
+ * supported dof forbids one combination of the three: u_x = q0 - q2 (y - cy)/size, u_y = q1 + q2 (x - cx)/size. The
+ * part stays in place when these combinations span all of q. */
+#include "assembly/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DIM = 2, MODES = 3 };
+static const double DEPENDENT = 1e-9; /* a unit row that differs less from the span of others adds nothing */
+
+typedef struct {
+    int64_t node; /* one of its nodes */
+    double low[DIM], high[DIM];
+    int rank;
+    double held[MODES][MODES]; /* rank orthonormal rows: combinations of q that supports forbid */
+} part;
+
+/* Representative of a node's part; halves the path on its way. */
+static int64_t find_root(int64_t *parent, int64_t a)
+{
+    while (parent[a] != a) {
+        parent[a] = parent[parent[a]];
+        a = parent[a];
+    }
+    return a;
+}
+
+/* part_of[node] = number of its connected part, parts numbered by their first node. Returns how many, -1: no memory. */
+static int64_t number_parts(int64_t *part_of, const uz_mesh *mesh)
+{
+    const int corners = mesh->nodes_per_element;
+    int64_t count = 0;
+    int64_t *parent = uz_alloc(mesh->n_nodes, sizeof *parent);
+    if (!parent)
+        return -1;
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        parent[a] = a;
+    for (int64_t i = 0; i < mesh->n_elements * corners; i++) {
+        int64_t a = find_root(parent, mesh->element[i]);
+        int64_t b = find_root(parent, mesh->element[i - i % corners]);
+        parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
+    }
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        part_of[a] = parent[a] == a ? count++ : part_of[find_root(parent, a)];
+    free(parent);
+    return count;
+}
+
+/* v minus its projection on the rows, twice for accuracy; returns the length of what is left. */
+static double reject(double v[MODES], double rows[][MODES], int n)
+{
+    for (int twice = 0; twice < 2; twice++)
+        for (int i = 0; i < n; i++) {
+            double dot = v[0] * rows[i][0] + v[1] * rows[i][1] + v[2] * rows[i][2];
+            for (int k = 0; k < MODES; k++)
+                v[k] -= dot * rows[i][k];
+        }
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* Appends v to the orthonormal rows unless they span it already. */
+static void extend(double rows[][MODES], int *n, const double v[MODES])
+{
+    double rest[MODES] = {v[0], v[1], v[2]};
+    if (*n == MODES)
+        return;
+    double length = reject(rest, rows, *n);
+    if (length <= DEPENDENT)
+        return;
+    for (int k = 0; k < MODES; k++)
+        rows[*n][k] = rest[k] / length;
+    (*n)++;
+}
+
+static double part_size(const part *p)
+{
+    double size = 0.5 * hypot(p->high[0] - p->low[0], p->high[1] - p->low[1]);
+    return size > 0 ? size : 1;
+}
+
+static double part_centre(const part *p, int axis)
+{
+    return 0.5 * p->low[axis] + 0.5 * p->high[axis];
+}
+
+static void hold(part *p, const double *x, int axis)
+{
+    const double across = (x[1 - axis] - part_centre(p, 1 - axis)) / part_size(p);
+    const double row[MODES] = {axis == 0 ? 1 : 0, axis == 1 ? 1 : 0, axis == 0 ? -across : across};
+    extend(p->held, &p->rank, row);
+}
+
+static void measure_parts(part *parts, int64_t n_parts, const int64_t *part_of, const uz_mesh *mesh)
+{
+    for (int64_t i = 0; i < n_parts; i++)
+        for (int c = 0; c < DIM; c++) {
+            parts[i].low[c] = DBL_MAX;
+            parts[i].high[c] = -DBL_MAX;
+        }
+    for (int64_t a = mesh->n_nodes - 1; a >= 0; a--) {
+        part *p = &parts[part_of[a]];
+        p->node = a;
+        for (int c = 0; c < DIM; c++) {
+            p->low[c] = fmin(p->low[c], mesh->xyz[a * DIM + c]);
+            p->high[c] = fmax(p->high[c], mesh->xyz[a * DIM + c]);
+        }
+    }
+}
+
+static void hold_parts(part *parts, const int64_t *part_of, const uz_body_model *model)
+{
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++)
+        for (int c = 0; c < DIM; c++)
+            if (model->dof[a * DIM + c] < 0)
+                hold(&parts[part_of[a]], &model->mesh.xyz[a * DIM], c);
+}
+
+/* What is zero but for rounding reads as zero. */
+static double tidy(double value, double scale)
+{
+    return fabs(value) > 1e-9 * scale ? value : 0;
+}
+
+static void name_mode(char *text, size_t size, const part *p, const double q[MODES])
+{
+    const double length = hypot(q[0], q[1]);
+    if (fabs(q[2]) <= 1e-7 * length) {
+        const double x = tidy(q[0] / length, 1), y = tidy(q[1] / length, 1);
+        if (x == 0 || y == 0)
+            snprintf(text, size, "translation along %s", y == 0 ? "x" : "y");
+        else
+            snprintf(text, size, "translation along (%.6g, %.6g)", x, y);
+        return;
+    }
+    /* The point that stays where it is. */
+    const double L = part_size(p);
+    const double x = part_centre(p, 0) - tidy(q[1] / q[2], 1) * L, y = part_centre(p, 1) + tidy(q[0] / q[2], 1) * L;
+    snprintf(text, size, "rotation about (%.6g, %.6g)", tidy(x, L), tidy(y, L));
+}
+
+/* Orthonormal modes that no support holds, translations first. Returns how many. */
+static int free_modes(double mode[MODES][MODES], const part *p)
+{
+    static const double axis[MODES][MODES] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    double rows[MODES][MODES];
+    int n = p->rank;
+    memcpy(rows, p->held, sizeof rows);
+    for (int k = 0; k < MODES; k++)
+        extend(rows, &n, axis[k]);
+    memcpy(mode, rows[p->rank], (size_t)(n - p->rank) * sizeof rows[0]);
+    n -= p->rank;
+    /* Two modes are a plane: turn them so that the first one does not rotate. */
+    const double spin = n == 2 ? hypot(mode[0][2], mode[1][2]) : 0;
+    if (spin > 0) {
+        const double c = mode[1][2] / spin, s = mode[0][2] / spin;
+        for (int k = 0; k < MODES; k++) {
+            const double still = c * mode[0][k] - s * mode[1][k], turning = s * mode[0][k] + c * mode[1][k];
+            mode[0][k] = still;
+            mode[1][k] = turning;
+        }
+    }
+    return n;
+}
+
+static uz_status refuse(const part *p, int64_t n_parts, uz_error *err)
+{
+    char names[300] = "", which[96] = "", name[96];
+    double mode[MODES][MODES];
+    const int n = free_modes(mode, p);
+    for (int i = 0; i < n; i++) {
+        const size_t used = strlen(names);
+        name_mode(name, sizeof name, p, mode[i]);
+        snprintf(names + used, sizeof names - used, "%s%s", i ? ", " : "", name);
+    }
+    if (n_parts > 1)
+        snprintf(which, sizeof which, " of the part with node %lld", (long long)p->node);
+    return uz_fail(err, UZ_ERR_FREE_BODY, "/supports",
+                   "the supports leave %s%s free; hold it by further supports (an obstacle does not count as one)",
+                   names, which);
+}
+
+uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
+{
+    const uz_mesh *mesh = &model->mesh;
+    uz_status status = UZ_ERR_MEMORY;
+    part *parts = NULL;
+    int64_t n_parts = -1, *part_of = uz_alloc(mesh->n_nodes, sizeof *part_of);
+    if (part_of)
+        n_parts = number_parts(part_of, mesh);
+    if (n_parts >= 0)
+        parts = uz_alloc_zero(n_parts, sizeof *parts);
+    if (!parts) {
+        uz_fail(err, status, "", "no memory for the parts of %lld nodes", (long long)mesh->n_nodes);
+        goto done;
+    }
+    measure_parts(parts, n_parts, part_of, mesh);
+    hold_parts(parts, part_of, model);
+    status = UZ_OK;
+    for (int64_t i = 0; i < n_parts && status == UZ_OK; i++)
+        if (parts[i].rank < MODES)
+            status = refuse(&parts[i], n_parts, err);
+done:
+    free(parts);
+    free(part_of);
+    return status;
+}

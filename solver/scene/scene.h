@@ -1,0 +1,20 @@
+/* scene.h: what a scene must satisfy, each refusal with the JSON pointer of the culprit. */
+#ifndef UZ_SCENE_SCENE_H
+#define UZ_SCENE_SCENE_H
+
+#include "scene/mesh.h"
+#include "uzawa.h"
+
+/* Model, thickness, materials, the groups and directions of supports, the groups and normals of contacts: whatever
+ * K and N are built from. Errors: UZ_ERR_SCENE, _NOT_FINITE. */
+uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
+
+/* What one case adds: loads, prescribed values, the obstacles' points. Supports and contacts are checked here too: the
+ * scene may come with a body that was built from another one. */
+uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
+
+/* normal / ||normal||, whatever its length. A component that is zero but for rounding becomes zero: it would make a
+ * contact row out of noise. False where there is no direction (zero, NaN, Inf). */
+bool uz_unit_normal(double out[3], const double normal[3], int dim);
+
+#endif
