@@ -1,0 +1,124 @@
+#include "body.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/digest.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void add_matrix(uz_digest *digest, const uz_csc *A)
+{
+    int64_t shape[2] = {A->rows, A->cols};
+    size_t nnz = (size_t)A->ptr[A->cols];
+    uz_digest_add(digest, shape, sizeof shape);
+    uz_digest_add(digest, A->ptr, (size_t)(A->cols + 1) * sizeof *A->ptr);
+    uz_digest_add(digest, A->idx, nnz * sizeof *A->idx);
+    uz_digest_add(digest, A->val, nnz * sizeof *A->val);
+}
+
+static uz_status add_scene(uz_digest *digest, const uz_scene *scene, uz_error *err)
+{
+    unsigned char *key = NULL;
+    size_t len = 0;
+    uz_status status = uz_scene_body_key(&key, &len, scene, err);
+    if (status == UZ_OK)
+        uz_digest_add(digest, key, len);
+    free(key);
+    return status;
+}
+
+uz_status uz_body_digest(char digest[65], const uz_problem *problem, const uz_settings *settings, uz_error *err)
+{
+    uz_digest *state = uz_digest_new();
+    if (!state)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
+    int choices[3] = {(int)problem->kind, (int)settings->op, (int)settings->ordering};
+    uz_status status = UZ_OK;
+    uz_digest_add(state, choices, sizeof choices);
+    if (problem->kind == UZ_PROBLEM_SCENE) {
+        status = add_scene(state, &problem->scene, err);
+    } else {
+        add_matrix(state, &problem->qp.K);
+        add_matrix(state, &problem->qp.N);
+    }
+    if (!uz_digest_end(state, digest) && status == UZ_OK)
+        status = uz_fail(err, UZ_ERR_INTERNAL, "", "hashing failed");
+    return status;
+}
+
+const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem)
+{
+    return body->is_scene ? &body->model.K : &problem->qp.K;
+}
+
+const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
+{
+    return body->is_scene ? &body->model.N : &problem->qp.N;
+}
+
+static size_t csc_bytes(const uz_csc *A)
+{
+    return 8 * (size_t)(A->cols + 1) + 16 * (size_t)A->ptr[A->cols];
+}
+
+static size_t model_bytes(const uz_body_model *model)
+{
+    size_t nodes = (size_t)(model->mesh.n_nodes + model->info.n_nodes);
+    return csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed) + 32 * nodes;
+}
+
+static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_csc *N, const uz_settings *settings,
+                                     const uz_hooks *hooks, uz_error *err)
+{
+    int64_t *dofs = NULL, n_b = 0;
+    uz_status status = uz_dual_contact_dofs(&dofs, &n_b, N, err);
+    if (status != UZ_OK)
+        return status;
+    uz_operator op = uz_dual_choose(K->rows, N->rows, n_b, settings->op);
+    status = uz_factor_create(&body->factor, K, dofs, op == UZ_OPERATOR_CONDENSED ? n_b : 0, settings->ordering,
+                              settings->memory_limit, hooks, err);
+    free(dofs);
+    double start = uz_seconds();
+    if (status == UZ_OK)
+        status = uz_dual_create(&body->dual, N, body->factor, op, hooks, err);
+    body->condense_s = uz_seconds() - start;
+    return status;
+}
+
+uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                         uz_error *err)
+{
+    *out = NULL;
+    uz_body *body = uz_alloc_zero(1, sizeof *body);
+    if (!body)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+    double start = uz_seconds();
+    uz_status status = UZ_OK;
+    body->is_scene = problem->kind == UZ_PROBLEM_SCENE;
+    if (body->is_scene)
+        status = uz_body_model_build(&body->model, &problem->scene, err);
+    body->assemble_s = uz_seconds() - start;
+    if (status == UZ_OK)
+        status = factor_and_condense(body, uz_body_K(body, problem), uz_body_N(body, problem), settings, hooks, err);
+    if (status == UZ_OK) {
+        body->bytes = sizeof *body + uz_factor_describe(body->factor).bytes + uz_dual_describe(body->dual).bytes +
+                      (body->is_scene ? model_bytes(&body->model) : 0);
+        *out = body;
+    } else {
+        uz_body_free(body);
+    }
+    return status;
+}
+
+void uz_body_free(uz_body *body)
+{
+    if (!body)
+        return;
+    uz_dual_free(body->dual);
+    uz_factor_free(body->factor);
+    if (body->is_scene)
+        uz_body_model_clear(&body->model);
+    free(body);
+}

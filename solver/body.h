@@ -1,0 +1,33 @@
+/* body.h: what is known of a body before its load: the part of a problem that is worth caching. */
+#ifndef UZ_BODY_H
+#define UZ_BODY_H
+
+#include "assembly/assembly.h"
+#include "dual/dual.h"
+#include "factor/factor.h"
+#include "uzawa.h"
+
+/* Immutable once built, shared by threads. */
+typedef struct {
+    char digest[65];
+    bool is_scene;
+    uz_body_model model; /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
+    uz_factor *factor;
+    uz_dual *dual;
+    double assemble_s, condense_s;
+    size_t bytes;
+} uz_body;
+
+/* Hex SHA-256 of everything the body is built from, the chosen operator and ordering included. */
+uz_status uz_body_digest(char digest[65], const uz_problem *problem, const uz_settings *settings, uz_error *err);
+
+/* Assembles (scenes), factors and condenses. */
+uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                         uz_error *err);
+void uz_body_free(uz_body *body);
+
+/* The body's matrices: the model's for a scene, the problem's otherwise. */
+const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem);
+const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem);
+
+#endif

@@ -1,0 +1,238 @@
+#include "certificate/certificate.h"
+
+#include "certificate/residual.h"
+#include "certificate/twofold.h"
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_SWEEPS = 200, CLOSING_SWEEPS = 12 };
+
+/* Twofold arithmetic carries about 100 bits: a violation of the constraints by 2^-80 of their size is rounding. */
+#define NEGLIGIBLE 0x1p-80
+
+typedef struct {
+    const uz_certify_input *in;
+    uz_csc Nt;          /* d x m */
+    double *weight;     /* d: W = diag(K)^-1 */
+    double *correction; /* d: v = u + correction */
+    uz_residuals res;   /* d each */
+    int64_t d, m;
+} certifier;
+
+static double norm2(const double *x, int64_t n)
+{
+    double scale = 0.0, sum = 0.0;
+    for (int64_t i = 0; i < n; i++)
+        scale = fmax(scale, fabs(x[i]));
+    for (int64_t i = 0; scale > 0.0 && i < n; i++)
+        sum += (x[i] / scale) * (x[i] / scale);
+    return scale * sqrt(sum);
+}
+
+static uz_status prepare(certifier *c, const uz_certify_input *in, uz_error *err)
+{
+    memset(c, 0, sizeof *c);
+    c->in = in;
+    c->d = in->K->rows;
+    c->m = in->N->rows;
+    c->weight = uz_alloc(c->d, sizeof(double));
+    c->correction = uz_alloc_zero(c->d, sizeof(double));
+    double **room[] = {&c->res.e, &c->res.e_u, &c->res.Ku, &c->res.Kc};
+    bool ok = true;
+    for (int k = 0; k < 4; k++)
+        ok = (*room[k] = uz_alloc(c->d, sizeof(double))) && ok;
+    if (!ok || !c->weight || !c->correction)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->d);
+    for (int64_t j = 0; j < c->d; j++) {
+        int64_t first = in->K->ptr[j];
+        bool diagonal = first < in->K->ptr[j + 1] && in->K->idx[first] == j && in->K->val[first] > 0.0;
+        c->weight[j] = diagonal ? 1.0 / in->K->val[first] : 1.0;
+    }
+    return uz_csc_transpose(&c->Nt, in->N, err);
+}
+
+static void release(certifier *c)
+{
+    uz_csc_clear(&c->Nt);
+    free(c->weight);
+    free(c->correction);
+    free(c->res.e);
+    free(c->res.e_u);
+    free(c->res.Ku);
+    free(c->res.Kc);
+}
+
+/* g_i(u + c) for g = g(u). */
+static double corrected_gap(const certifier *c, const double *g, int64_t i)
+{
+    twofold sum = {g[i], 0.0};
+    for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++)
+        twofold_add_product(&sum.hi, &sum.lo, -c->Nt.val[k], c->correction[c->Nt.idx[k]], 0);
+    return sum.hi + sum.lo;
+}
+
+/* n_i'W n_i, the compliance of row i when W is taken for K^-1. */
+static double compliance(const certifier *c, int64_t i)
+{
+    double sum = 0.0;
+    for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++)
+        sum += c->Nt.val[k] * c->Nt.val[k] * c->weight[c->Nt.idx[k]];
+    return sum;
+}
+
+/* Moves the correction along W n_i by what takes the gap to zero; `excess` more, relative, so that rounding can't leave
+ * it negative. */
+static void move_row(const certifier *c, int64_t i, double gap, double excess)
+{
+    double size = compliance(c, i);
+    for (int64_t k = c->Nt.ptr[i]; size > 0.0 && k < c->Nt.ptr[i + 1]; k++)
+        c->correction[c->Nt.idx[k]] += gap / size * (1.0 + excess) * c->weight[c->Nt.idx[k]] * c->Nt.val[k];
+}
+
+/* Closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g. */
+static bool worth_closing(const certifier *c, const double *r, int64_t i, double gap)
+{
+    return r[i] < 0.0 && gap <= -2.0 * r[i] * compliance(c, i);
+}
+
+/* Fills the correction by sweeps over the rows (Kaczmarz 1937; Hildreth 1957 for the inequalities): first towards
+ * closed gaps, later, where dependent rows can't all be closed, towards feasible ones only. True when no gap of u + c
+ * is negative by more than the rounding of twofold arithmetic. */
+static bool make_feasible(const certifier *c, const double *r, const double *g)
+{
+    double scale = 0.0;
+    bool feasible = false;
+    for (int64_t i = 0; i < c->m; i++)
+        scale = fmax(scale, fmax(fabs(g[i]), fabs(c->in->h[i])));
+    for (int sweep = 0; !feasible && sweep < MAX_SWEEPS; sweep++) {
+        bool closing = sweep < CLOSING_SWEEPS;
+        feasible = !closing;
+        for (int64_t i = 0; i < c->m; i++) {
+            double gap = corrected_gap(c, g, i);
+            if (closing && worth_closing(c, r, i, fabs(gap))) {
+                move_row(c, i, gap, 0.0);
+            } else if (gap < 0.0) {
+                feasible &= gap >= -NEGLIGIBLE * scale;
+                move_row(c, i, gap, ldexp(DBL_EPSILON, sweep < 40 ? sweep : 40));
+            }
+        }
+    }
+    return feasible;
+}
+
+/* Paper, section 4. */
+static void residuals(const certifier *c, uz_certificate *out, const double *r, const double *g, double positive_part)
+{
+    double e2 = 0.0, e4 = 0.0;
+    for (int64_t i = 0; i < c->m; i++) {
+        e2 = hypot(e2, fmin(g[i], 0.0));
+        e4 = hypot(e4, g[i] * r[i]);
+    }
+    uz_residual *a = &out->residual;
+    a->e1 = norm2(c->res.e_u, c->d);
+    a->e2 = e2;
+    a->e3 = positive_part;
+    a->e4 = e4;
+    a->total = hypot(hypot(a->e1, a->e2), hypot(a->e3, a->e4));
+}
+
+static double ratio(double value, double scale)
+{
+    if (value == 0.0)
+        return 0.0;
+    return scale > 0.0 ? value / scale : INFINITY;
+}
+
+/* Force by ||p|| (by the reactions where there is no load), length by the size of h and N u, energy by |psi|. */
+static void scale_residuals(const certifier *c, uz_certificate *out, const double *r, const double *g)
+{
+    double h = norm2(c->in->h, c->m), Nu = 0.0, force = norm2(c->in->p, c->d);
+    for (int64_t i = 0; i < c->m; i++)
+        Nu = hypot(Nu, c->in->h[i] - g[i]);
+    if (force == 0.0)
+        force = norm2(r, c->m);
+    const uz_residual *a = &out->residual;
+    uz_residual *b = &out->relative_residual;
+    b->e1 = ratio(a->e1, force);
+    b->e2 = ratio(a->e2, fmax(h, Nu));
+    b->e3 = ratio(a->e3, force);
+    b->e4 = ratio(a->e4, fabs(out->energy_dual));
+    b->total = hypot(hypot(b->e1, b->e2), hypot(b->e3, b->e4));
+}
+
+/* ||v - u_r||_K^2 = e'K^-1 e, enlarged by what the factor's own rounding may hide; and ||c||_K. */
+static uz_status distances(const certifier *c, double *square, double *correction_norm, uz_error *err)
+{
+    double energy = 0.0, trust = 1.0 + 100.0 * DBL_EPSILON / fmax(c->in->rcond, DBL_MIN);
+    for (int64_t j = 0; j < c->d; j++)
+        energy += c->correction[j] * c->res.Kc[j];
+    uz_status status = c->in->inverse_norm(c->in->ctx, square, c->res.e, err);
+    *square *= trust * trust;
+    *correction_norm = sqrt(fmax(0.0, energy));
+    return status;
+}
+
+static void energies(const certifier *c, uz_certificate *out, const double *u)
+{
+    double stiffness = 0.0, load = 0.0;
+    for (int64_t j = 0; j < c->d; j++) {
+        stiffness += u[j] * c->res.Ku[j];
+        load += u[j] * c->in->p[j];
+    }
+    out->energy_norm = sqrt(fmax(0.0, stiffness));
+    out->energy_primal = 0.5 * stiffness - load;
+    out->energy_dual = out->energy_primal - out->gap;
+}
+
+/* The error over ||u*||_K, which is at least ||v||_K minus the error. */
+static double relative_to_exact(double error, double norm)
+{
+    if (error == 0.0)
+        return 0.0;
+    return norm > error ? error / (norm - error) : INFINITY;
+}
+
+static uz_status measure(certifier *c, uz_certificate *out, const double *u, const double *r, double *g,
+                         double positive_part, uz_error *err)
+{
+    double square = INFINITY, correction_norm = INFINITY, complementarity = 0.0;
+    for (int64_t i = 0; i < c->m; i++)
+        g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, u);
+    bool feasible = make_feasible(c, r, g);
+    uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, u, c->correction, r, err);
+    if (status == UZ_OK && feasible)
+        status = distances(c, &square, &correction_norm, err);
+    if (status != UZ_OK)
+        return status;
+    for (int64_t i = 0; i < c->m; i++)
+        complementarity -= r[i] * fmax(0.0, corrected_gap(c, g, i));
+    out->gap = feasible ? 0.5 * square + complementarity : INFINITY;
+    energies(c, out, u);
+    out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;
+    out->relative_error = relative_to_exact(out->absolute_error, out->energy_norm);
+    residuals(c, out, r, g, positive_part);
+    scale_residuals(c, out, r, g);
+    return UZ_OK;
+}
+
+uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,
+                     uz_error *err)
+{
+    certifier c;
+    double positive_part = 0.0;
+    memset(out, 0, sizeof *out);
+    uz_status status = prepare(&c, input, err);
+    for (int64_t i = 0; status == UZ_OK && i < c.m; i++) {
+        positive_part = hypot(positive_part, fmax(r[i], 0.0));
+        r[i] = fmin(r[i], 0.0);
+    }
+    if (status == UZ_OK)
+        status = measure(&c, out, u, r, g, positive_part, err);
+    release(&c);
+    return status;
+}

@@ -1,0 +1,38 @@
+/* certificate.h: how far can an answer be from the exact one?
+ *
+ * Shares nothing with the methods and starts again from the original K, N, h, p. For any r <= 0 and any feasible v,
+ * with K u_r = p + N'r:
+ *
+ *     pi(v) - psi(r) = 1/2 ||v - u_r||_K^2 - r'g(v)  >=  1/2 ||v - u*||_K^2 + 1/2 ||u_r - u*||_K^2
+ *
+ * Both terms on the left are >= 0, so nothing cancels, and v - u_r = K^-1 e with e = K v - p - N'r: the residual of the
+ * linear solve and the distance between v and u_r enter as one quantity, ||e|| in the norm of K^-1.
+ *
+ * The u to certify is a vector of doubles: its gaps can't all be exactly zero or positive, and a gap of one rounding
+ * error, times a reaction, under the root would limit every certificate to the root of the machine precision. So v is
+ * u + c with a correction c of its own, as small as rounding where u is good, that lifts every negative gap and closes
+ * the gaps of the rows in contact; u itself is then at most ||c||_K further away. Residuals and gaps are computed in
+ * twofold precision: their rounding is far below that of u. */
+#ifndef UZ_CERTIFICATE_H
+#define UZ_CERTIFICATE_H
+
+#include "uzawa.h"
+
+/* *value = e'K^-1 e for e (d), within the accuracy of a factorization of K. */
+typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, const double *e, uz_error *err);
+
+typedef struct {
+    const uz_csc *K, *N; /* lower triangle; m x d */
+    const double *p, *h;
+    uz_inverse_norm inverse_norm;
+    void *ctx;
+    double rcond; /* of K: how far inverse_norm may be trusted */
+} uz_certify_input;
+
+/* u (d): the answer to certify. r (m): <= 0, else its positive part counts as e3 and r is cut at 0. g (m): out, the
+ * gaps of u. absolute_error bounds both ||u - u*||_K and ||u_r - u*||_K. When no feasible v was found near u the errors
+ * are INFINITY. */
+uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,
+                     uz_error *err);
+
+#endif

@@ -1,0 +1,18 @@
+/* residual.h: residuals of the original data in twofold precision. */
+#ifndef UZ_RESIDUAL_H
+#define UZ_RESIDUAL_H
+
+#include "uzawa.h"
+
+/* One pass over K for v = u + c: e (d) = K v - p - N'r and e_u (d) = K u - p - N'r; Ku and Kc (d) in passing.
+ * K is the lower triangle; c is small beside u and enters in double precision. */
+typedef struct {
+    double *e, *e_u, *Ku, *Kc;
+} uz_residuals;
+uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
+                                  const double *c, const double *r, uz_error *err);
+
+/* h_i - n_i'u for row i of N, given as column i of N'. */
+double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u);
+
+#endif

@@ -1,0 +1,239 @@
+/* dual.c: the one door to both forms of the operator. */
+#include "dual/dual_private.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err)
+{
+    *dofs = uz_alloc(N->cols, sizeof **dofs);
+    *count = 0;
+    if (!*dofs)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld dofs", (long long)N->cols);
+    for (int64_t j = 0; j < N->cols; j++)
+        if (N->ptr[j + 1] > N->ptr[j])
+            (*dofs)[(*count)++] = j;
+    return UZ_OK;
+}
+
+/* Dense work of the condensed form is about 2 n^3 flops once, at a rate some 30 times that of sparse substitutions;
+ * the factored form pays a sparse solve of about 60 d flops for each of some 300 iterations. In between the choice
+ * matters little. */
+uz_operator uz_dual_choose(int64_t d, int64_t m, int64_t n_b, uz_operator asked)
+{
+    double n = (double)(n_b > m ? n_b : m);
+    if (asked != UZ_OPERATOR_AUTO)
+        return asked;
+    return n <= 512 || 2.0 * n * n * n / 30.0 <= 300.0 * 60.0 * (double)d ? UZ_OPERATOR_CONDENSED
+                                                                          : UZ_OPERATOR_FACTORED;
+}
+
+static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
+{
+    return uz_case_apply(ctx, y, x, err);
+}
+
+/* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
+#define LAMBDA_TOLERANCE 1e-4
+
+/* Lanczos applies D only: any K of the right order serves the case. */
+static uz_status estimate_lambda_max(uz_dual *dual, uz_error *err)
+{
+    uz_case *load = NULL;
+    double *zero = uz_alloc_zero(dual->info.d + dual->info.m, sizeof *zero);
+    uz_status status = zero ? uz_case_create(&load, dual, NULL, zero, zero, err)
+                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)dual->info.d);
+    if (status == UZ_OK)
+        status = uz_lanczos_max(&dual->info.lambda_max, dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
+    uz_case_free(load);
+    free(zero);
+    return status;
+}
+
+uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
+                         uz_error *err)
+{
+    *out = NULL;
+    uz_dual *dual = uz_alloc_zero(1, sizeof *dual);
+    if (!dual)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
+    dual->info.op = op;
+    dual->info.d = N->cols;
+    dual->info.m = N->rows;
+    dual->factor = factor;
+    uz_status status = uz_csc_copy(&dual->N, N, err);
+    if (status == UZ_OK)
+        status = uz_csc_transpose(&dual->Nt, N, err);
+    dual->info.bytes = 48 * (size_t)N->ptr[N->cols];
+    if (status == UZ_OK && op == UZ_OPERATOR_CONDENSED)
+        status = uz_condensed_create(dual, err);
+    if (status == UZ_OK && hooks && hooks->cancelled && hooks->cancelled(hooks->ctx))
+        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
+    if (status == UZ_OK && dual->info.m > 0)
+        status = estimate_lambda_max(dual, err);
+    if (status == UZ_OK)
+        *out = dual;
+    else
+        uz_dual_free(dual);
+    return status;
+}
+
+void uz_dual_free(uz_dual *dual)
+{
+    if (!dual)
+        return;
+    uz_csc_clear(&dual->N);
+    uz_csc_clear(&dual->Nt);
+    uz_condensed_clear(&dual->dense);
+    free(dual);
+}
+
+uz_dual_info uz_dual_describe(const uz_dual *dual)
+{
+    return dual->info;
+}
+
+static bool allocate_load(uz_case *load)
+{
+    int64_t d = load->dual->info.d, m = load->dual->info.m, room = d > m ? d : m;
+    load->ws = uz_factor_workspace_new();
+    load->base = uz_alloc_zero(d, sizeof(double));
+    load->g0 = uz_alloc_zero(m, sizeof(double));
+    load->response = uz_alloc_zero(load->dual->info.op == UZ_OPERATOR_FACTORED ? d : 0, sizeof(double));
+    load->work = uz_alloc_zero(room, sizeof(double));
+    load->work2 = uz_alloc_zero(room, sizeof(double));
+    load->push = uz_alloc_zero(d, sizeof(double));
+    load->kept = uz_alloc_zero(d, sizeof(double));
+    return load->ws && load->base && load->g0 && load->response && load->work && load->work2 && load->push &&
+           load->kept;
+}
+
+uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
+                         uz_error *err)
+{
+    *out = NULL;
+    uz_case *load = uz_alloc_zero(1, sizeof *load);
+    if (!load)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
+    load->dual = dual;
+    load->K = K;
+    load->h = h;
+    uz_status status = UZ_OK;
+    if (!allocate_load(load))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->info.d);
+    if (status == UZ_OK)
+        status =
+            dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_load(load, p, err) : uz_factored_load(load, p, err);
+    if (status == UZ_OK)
+        *out = load;
+    else
+        uz_case_free(load);
+    return status;
+}
+
+void uz_case_free(uz_case *load)
+{
+    if (!load)
+        return;
+    uz_factor_workspace_free(load->ws);
+    free(load->base);
+    free(load->g0);
+    free(load->response);
+    free(load->work);
+    free(load->work2);
+    free(load->push_weight);
+    free(load->push);
+    free(load->kept);
+    free(load);
+}
+
+const double *uz_case_g0(const uz_case *load)
+{
+    return load->g0;
+}
+
+double uz_case_psi0(const uz_case *load)
+{
+    return load->psi0;
+}
+
+int64_t uz_case_m(const uz_case *load)
+{
+    return load->dual->info.m;
+}
+
+double uz_case_lambda_max(const uz_case *load)
+{
+    return load->dual->info.lambda_max;
+}
+
+double uz_case_force_norm(uz_case *load, const double *x)
+{
+    bool condensed = load->dual->info.op == UZ_OPERATOR_CONDENSED;
+    const uz_csc *N = condensed ? &load->dual->dense.N_b : &load->dual->N;
+    double sum = 0.0;
+    for (int64_t j = 0; j < N->cols; j++) {
+        double force = 0.0;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+            force += N->val[k] * x[N->idx[k]];
+        sum += force * force;
+    }
+    return sqrt(sum);
+}
+
+/* psi(r) = psi0 + r'g0 - 1/2 r'Dr, and psi(r) = -1/2 ||u(r)||_K^2 + r'h. */
+void uz_case_energies(const uz_case *load, double *psi, double *norm2, const double *r, const double *Dr)
+{
+    double linear = 0.0, quadratic = 0.0, work = 0.0;
+    for (int64_t i = 0; i < load->dual->info.m; i++) {
+        linear += r[i] * load->g0[i];
+        quadratic += r[i] * Dr[i];
+        work += r[i] * load->h[i];
+    }
+    *psi = load->psi0 + linear - 0.5 * quadratic;
+    *norm2 = fmax(0.0, 2.0 * (work - *psi));
+}
+
+uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
+{
+    if (load->dual->info.op != UZ_OPERATOR_CONDENSED)
+        return uz_factored_apply(load, Dr, r, err);
+    uz_condensed_apply(load, Dr, r);
+    return UZ_OK;
+}
+
+uz_status uz_case_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close,
+                       uz_error *err)
+{
+    (void)err;
+    *bound2 = INFINITY;
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_push(load, bound2, r, g, close)
+                                                        : uz_factored_push(load, bound2, r, g, close);
+}
+
+void uz_case_keep_push(uz_case *load)
+{
+    double *swap = load->kept;
+    load->kept = load->push;
+    load->push = swap;
+    load->has_kept = true;
+}
+
+uz_status uz_case_solve_active(uz_case *load, double *r, bool *solved, const bool *active, uz_error *err)
+{
+    *solved = false;
+    if (load->dual->info.op != UZ_OPERATOR_CONDENSED)
+        return UZ_OK;
+    return uz_condensed_solve_active(load, r, solved, active, err);
+}
+
+uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
+{
+    bool push = with_push && load->has_kept;
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_recover(load, u, r, push, err)
+                                                        : uz_factored_recover(load, u, r, push, err);
+}

@@ -1,0 +1,73 @@
+/* dual.h: the dual operator D = N K^-1 N' of one body, and the dual problem of one load on it.
+ *
+ *     psi(r) = psi0 + r'g0 - 1/2 r'D r,   gap g(u(r)) = g0 - D r,   K u(r) = p + N'r
+ *
+ * The methods see only this interface: apply, push, recover, and the numbers of uz_case. Behind it stand two forms:
+ *   condensed  dense D on the contact, from the trailing block of a factor with the contact dofs last;
+ *   factored   one sparse solve per application (Kanno's form).
+ * A uz_dual is immutable once created and shared by threads; a uz_case belongs to one thread. */
+#ifndef UZ_DUAL_H
+#define UZ_DUAL_H
+
+#include "factor/factor.h"
+#include "uzawa.h"
+
+typedef struct uz_dual uz_dual;
+
+typedef struct {
+    uz_operator op;
+    int64_t d, m;
+    double lambda_max; /* of D, Lanczos value plus its residual bound; 0 when m = 0 or D = 0 */
+    size_t bytes;      /* beside K, N and the factor */
+} uz_dual_info;
+
+/* The form that AUTO stands for, from the sizes (n_b: dofs that N touches). */
+uz_operator uz_dual_choose(int64_t d, int64_t m, int64_t n_b, uz_operator asked);
+
+/* The factor stays the caller's and must outlive *out; N (m x d) is copied. When op is CONDENSED the factor's last
+ * dofs must be the ones that N touches: uz_dual_contact_dofs lists them, ascending; the caller frees *dofs. */
+uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
+                         uz_error *err);
+void uz_dual_free(uz_dual *dual);
+uz_dual_info uz_dual_describe(const uz_dual *dual);
+uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err);
+
+/* One load p (d), h (m) on the body. K (lower triangle) and h are borrowed for the case's life, p is only read. */
+typedef struct uz_case uz_case;
+uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
+                         uz_error *err);
+void uz_case_free(uz_case *load);
+const double *uz_case_g0(const uz_case *load); /* m: gap of the body without reactions */
+double uz_case_psi0(const uz_case *load);      /* -1/2 p'K^-1 p */
+int64_t uz_case_m(const uz_case *load);
+double uz_case_lambda_max(const uz_case *load);
+/* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
+double uz_case_force_norm(uz_case *load, const double *x);
+/* psi(r) and ||u(r)||_K^2 from r and D r. */
+void uz_case_energies(const uz_case *load, double *psi, double *norm2, const double *r, const double *Dr);
+
+/* Dr = D r (m). */
+uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
+
+/* A feasible displacement near u(r), and what it proves.
+ * Given r <= 0, the r of the last apply, and g = g0 - D r, builds a displacement correction that closes the gap of the
+ * rows that `close` names and lifts every penetrating row, and keeps it. *bound2 = ||c||_K^2 - 2 r'g(v), so that
+ * ||u(r) - u*||_K and ||v - u*||_K are both at most sqrt(*bound2) (design: the gap formula); INFINITY when no feasible
+ * v was found. */
+uz_status uz_case_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close,
+                       uz_error *err);
+
+/* Keeps the correction of the last push; uz_case_recover adds the kept one when it is asked to: u = u(r) + c (d). */
+void uz_case_keep_push(uz_case *load);
+uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
+
+/* r (m) with D_AA r_A = g0_A on the active rows and 0 elsewhere: the contact problem with these rows as equations.
+ * *solved false: this form can't, or D_AA is singular to working precision. CONDENSED only. */
+uz_status uz_case_solve_active(uz_case *load, double *r, bool *solved, const bool *active, uz_error *err);
+
+/* Largest eigenvalue of a symmetric positive semidefinite operator of order m by Lanczos with full
+ * reorthogonalisation: Ritz value plus residual bound, relative accuracy `tolerance`. */
+typedef uz_status (*uz_apply)(void *ctx, double *y, const double *x, uz_error *err);
+uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, double tolerance, uz_error *err);
+
+#endif

@@ -1,0 +1,61 @@
+/* dual_private.h: what the two forms of the operator share. */
+#ifndef UZ_DUAL_PRIVATE_H
+#define UZ_DUAL_PRIVATE_H
+
+#include "dual/dual.h"
+
+/* Dense matrices are column-major; symmetric ones and factors use the lower triangle. */
+typedef struct {
+    int64_t n_b;       /* dofs that N touches, in the factor's order */
+    int64_t *position; /* n_b: their places in the factor's order */
+    uz_csc N_b;        /* m x n_b: those columns of N */
+    double *L_bb;      /* n_b x n_b: Cholesky factor of the Schur complement S */
+    double *D;         /* m x m */
+    double *D_chol;    /* m x m: Cholesky factor of D; NULL when D is singular to working precision or `scaled` */
+    bool scaled;       /* N_b has one entry in each row and column: D = N_b S^-1 N_b' and D^-1 needs no factor */
+    int64_t *row_of;   /* scaled: row_of[k] is the row of column k's entry, n_b */
+    double *scale;     /* scaled: that entry, n_b */
+} uz_condensed;
+
+struct uz_dual {
+    uz_dual_info info;
+    uz_csc N; /* m x d */
+    const uz_factor *factor;
+    uz_csc Nt;          /* d x m */
+    uz_condensed dense; /* CONDENSED */
+};
+
+struct uz_case {
+    const uz_dual *dual;
+    const uz_csc *K; /* d x d lower triangle, borrowed */
+    const double *h; /* m, borrowed */
+    uz_factor_workspace *ws;
+    double *base; /* d: CONDENSED y = L^-1 P p in the factor's order; FACTORED u0 = K^-1 p */
+    double *g0;   /* m */
+    double psi0;
+    double *response;     /* FACTORED: d, K^-1 N'r of the last apply */
+    double *work, *work2; /* max(d, m, n_b) each */
+    double *push_weight;  /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
+    double *push, *kept;  /* correction: CONDENSED L_bb'c (n_b), FACTORED c (d) */
+    bool has_kept;
+};
+
+uz_status uz_condensed_create(uz_dual *dual, uz_error *err);
+void uz_condensed_clear(uz_condensed *dense);
+uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err);
+void uz_condensed_apply(const uz_case *load, double *Dr, const double *r);
+uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close);
+uz_status uz_condensed_solve_active(uz_case *load, double *r, bool *solved, const bool *active, uz_error *err);
+uz_status uz_condensed_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
+
+uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err);
+uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
+uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close);
+uz_status uz_factored_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
+
+/* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
+ * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.
+ * True when no row is left penetrating by more than rounding; c (rows of Nt) and Nc (m) are outputs. */
+bool uz_push_sweeps(double *c, double *Nc, const uz_csc *Nt, const double *weight, const double *g, const bool *close);
+
+#endif

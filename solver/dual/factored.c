@@ -1,0 +1,85 @@
+/* factored.c: the dual operator by one sparse solve per application, the form of Kanno's algorithm. */
+#include "dual/dual_private.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Lanczos makes cases without K: they never push. */
+static uz_status weigh(uz_case *load, uz_error *err)
+{
+    int64_t d = load->dual->info.d;
+    load->push_weight = uz_alloc(d, sizeof(double));
+    if (!load->push_weight)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)d);
+    for (int64_t j = 0; load->K && j < d; j++) /* sorted lower triangle: the diagonal comes first */
+        load->push_weight[j] = 1.0 / load->K->val[load->K->ptr[j]];
+    return UZ_OK;
+}
+
+/* x = K^-1 x, through load->work2. */
+static uz_status solve(uz_case *load, double *x, uz_error *err)
+{
+    const uz_factor *factor = load->dual->factor;
+    uz_factor_permute(factor, load->work2, x);
+    uz_status status = uz_factor_forward(factor, load->ws, load->work2, 1, err);
+    if (status == UZ_OK)
+        status = uz_factor_backward(factor, load->ws, load->work2, 1, err);
+    uz_factor_unpermute(factor, x, load->work2);
+    return status;
+}
+
+uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err)
+{
+    int64_t d = load->dual->info.d, m = load->dual->info.m;
+    memcpy(load->base, p, (size_t)d * sizeof *p);
+    uz_status status = weigh(load, err);
+    if (status == UZ_OK)
+        status = solve(load, load->base, err);
+    if (status != UZ_OK)
+        return status;
+    for (int64_t j = 0; j < d; j++)
+        load->psi0 -= 0.5 * p[j] * load->base[j];
+    memcpy(load->g0, load->h, (size_t)m * sizeof *load->g0);
+    uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, load->base);
+    return UZ_OK;
+}
+
+uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
+{
+    const uz_dual *dual = load->dual;
+    memset(load->response, 0, (size_t)dual->info.d * sizeof(double));
+    uz_csc_gaxpy_t(load->response, &dual->N, 1.0, r);
+    uz_status status = solve(load, load->response, err);
+    memset(Dr, 0, (size_t)dual->info.m * sizeof *Dr);
+    if (status == UZ_OK)
+        uz_csc_gaxpy(Dr, &dual->N, 1.0, load->response);
+    return status;
+}
+
+uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close)
+{
+    const uz_dual *dual = load->dual;
+    double *c = load->push, *Nc = load->work, *Kc = load->work2, square = 0.0, complementarity = 0.0;
+    if (!uz_push_sweeps(c, Nc, &dual->Nt, load->push_weight, g, close))
+        return UZ_OK;
+    for (int64_t i = 0; i < dual->info.m; i++)
+        complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
+    memset(Kc, 0, (size_t)dual->info.d * sizeof *Kc);
+    uz_csc_symv(Kc, load->K, 1.0, c);
+    for (int64_t j = 0; j < dual->info.d; j++)
+        square += c[j] * Kc[j];
+    *bound2 = fmax(0.0, square) + 2.0 * complementarity;
+    return UZ_OK;
+}
+
+uz_status uz_factored_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
+{
+    const uz_dual *dual = load->dual;
+    uz_status status = uz_factored_apply(load, load->work, r, err);
+    for (int64_t j = 0; j < dual->info.d; j++)
+        u[j] = load->base[j] + load->response[j] + (with_push ? load->kept[j] : 0.0);
+    return status;
+}

@@ -1,0 +1,47 @@
+/* factor.h: the sparse Cholesky factor P K P' = L L' with the dofs of the contact last. The only folder that knows
+ * CHOLMOD (Chen, Davis, Hager, Rajamanickam, ACM TOMS 35 (2008), algorithm 887). */
+#ifndef UZ_FACTOR_H
+#define UZ_FACTOR_H
+
+#include "uzawa.h"
+
+typedef struct uz_factor uz_factor;                     /* immutable after creation: shared by any number of threads */
+typedef struct uz_factor_workspace uz_factor_workspace; /* one per thread */
+
+typedef struct {
+    uz_ordering ordering; /* the one that was used */
+    int64_t n, nnz;       /* of L, lower triangle */
+    size_t bytes;
+    double rcond; /* CHOLMOD's estimate from the diagonal of L: (min/max)^2, an upper bound for 1/cond(K) */
+    double order_s, factor_s;
+} uz_factor_info;
+
+/* Factors K (lower triangle, n x n). last: the n_last dofs, ascending, that come after all others in the elimination
+ * (Schur complement ordering). memory_limit 0: none. `cancelled` is asked between ordering and factorization, as
+ * CHOLMOD itself can't be interrupted. Errors: NOT_SPD names the pivot, LIMIT the predicted bytes. */
+uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const int64_t *last, int64_t n_last, uz_ordering ordering,
+                           size_t memory_limit, const uz_hooks *hooks, uz_error *err);
+void uz_factor_free(uz_factor *factor);
+uz_factor_info uz_factor_describe(const uz_factor *factor);
+
+uz_factor_workspace *uz_factor_workspace_new(void); /* NULL: no memory */
+void uz_factor_workspace_free(uz_factor_workspace *ws);
+
+/* Vectors in the factor's own order: permuted[k] = x[perm[k]]. */
+void uz_factor_permute(const uz_factor *factor, double *permuted, const double *x);
+void uz_factor_unpermute(const uz_factor *factor, double *x, const double *permuted);
+/* In place on an n x columns array, column-major, in the factor's order: x = L^-1 x and x = L'^-1 x. */
+uz_status uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
+                            uz_error *err);
+uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
+                             uz_error *err);
+
+/* Where dof i stands in the factor's order: position[i], n. */
+const int64_t *uz_factor_position(const uz_factor *factor);
+
+/* The rows and columns of L at the `last` dofs as a dense lower triangle, n_last x n_last column-major, strict upper
+ * part zero; order[k] is the dof of row k (ascending position), where[k] its position. It is the Cholesky factor of the
+ * Schur complement of K on these dofs: checked by the elimination structure, UZ_ERR_INTERNAL if it is not. */
+uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err);
+
+#endif

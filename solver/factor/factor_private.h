@@ -1,0 +1,31 @@
+/* factor_private.h: what the files of this folder share. */
+#ifndef UZ_FACTOR_PRIVATE_H
+#define UZ_FACTOR_PRIVATE_H
+
+#include "factor/factor.h"
+
+#include <suitesparse/cholmod.h>
+
+struct uz_factor {
+    cholmod_factor *L;
+    int64_t n, n_last;
+    int64_t *last;     /* n_last dofs, ascending */
+    int64_t *position; /* n: inverse of L->Perm */
+    uz_factor_info info;
+};
+
+struct uz_factor_workspace {
+    cholmod_common common;
+    double *panel; /* CHOLMOD's gather room, grown on demand */
+    size_t panel_size;
+};
+
+/* Starts a CHOLMOD workspace that never prints, never aborts and gives LL' supernodal factors with 64-bit integers. */
+bool uz_cholmod_start(cholmod_common *common);
+
+/* Fills perm (n) with a fill-reducing ordering of A that keeps `last` at the end. *ordering: what was asked for on
+ * entry (not AUTO), what was used on return. */
+uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,
+                   cholmod_common *common, uz_error *err);
+
+#endif

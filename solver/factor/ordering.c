@@ -1,0 +1,82 @@
+/* ordering.c: fill-reducing orderings with the contact dofs last. */
+#include "factor/factor_private.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <pthread.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Amestoy, Davis, Duff, SIAM J. Matrix Anal. Appl. 17 (1996), with the constraint sets of CAMD. */
+static bool order_camd(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, cholmod_common *common)
+{
+    SuiteSparse_long *member = uz_alloc_zero((int64_t)A->nrow, sizeof *member);
+    if (!member)
+        return false;
+    for (int64_t k = 0; k < n_last; k++)
+        member[last[k]] = 1;
+    bool ok = cholmod_l_camd(A, NULL, 0, member, (SuiteSparse_long *)perm, common);
+    free(member);
+    return ok;
+}
+
+/* METIS installs its own handlers for SIGTERM and SIGABRT while it runs and uses the process's rand(): calls are
+ * serialised for the whole process and the dispositions put back. The mutex guards METIS's process-wide state, it holds
+ * none of ours. Callers block these signals in their threads (see uz_thread_init). */
+static bool order_metis(int64_t *perm, cholmod_sparse *A, cholmod_common *common)
+{
+    static pthread_mutex_t metis_mutex = PTHREAD_MUTEX_INITIALIZER;
+    static const int taken[2] = {SIGTERM, SIGABRT};
+    struct sigaction before[2];
+    pthread_mutex_lock(&metis_mutex);
+    for (int i = 0; i < 2; i++)
+        sigaction(taken[i], NULL, &before[i]);
+    bool ok = cholmod_l_metis(A, NULL, 0, 1, (SuiteSparse_long *)perm, common);
+    for (int i = 0; i < 2; i++)
+        sigaction(taken[i], &before[i], NULL);
+    pthread_mutex_unlock(&metis_mutex);
+    return ok;
+}
+
+/* Moves `last` behind all others and keeps the order within both groups. */
+static bool move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last)
+{
+    bool *is_last = uz_alloc_zero(n, sizeof *is_last);
+    int64_t *tail = uz_alloc(n_last, sizeof *tail);
+    bool ok = is_last && tail;
+    if (ok) {
+        int64_t kept = 0, moved = 0;
+        for (int64_t k = 0; k < n_last; k++)
+            is_last[last[k]] = true;
+        for (int64_t k = 0; k < n; k++) {
+            if (is_last[perm[k]])
+                tail[moved++] = perm[k];
+            else
+                perm[kept++] = perm[k];
+        }
+        memcpy(perm + kept, tail, (size_t)moved * sizeof *tail);
+    }
+    free(is_last);
+    free(tail);
+    return ok;
+}
+
+uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,
+                   cholmod_common *common, uz_error *err)
+{
+    bool ok;
+    if (*ordering == UZ_ORDERING_CAMD)
+        ok = order_camd(perm, A, last, n_last, common);
+    else if (*ordering == UZ_ORDERING_AMD)
+        ok = cholmod_l_amd(A, NULL, 0, (SuiteSparse_long *)perm, common) &&
+             move_last(perm, (int64_t)A->nrow, last, n_last);
+    else
+        ok = order_metis(perm, A, common) && move_last(perm, (int64_t)A->nrow, last, n_last);
+    if (ok && common->status >= CHOLMOD_OK)
+        return UZ_OK;
+    if (common->status == CHOLMOD_OUT_OF_MEMORY || common->status == CHOLMOD_OK)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)A->nrow);
+    return uz_fail(err, UZ_ERR_INTERNAL, "K", "ordering failed (CHOLMOD status %d)", common->status);
+}

@@ -1,0 +1,145 @@
+/* triangular.c: substitutions with the factor, and its trailing block. */
+#include "factor/factor_private.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+uz_factor_workspace *uz_factor_workspace_new(void)
+{
+    uz_factor_workspace *ws = uz_alloc_zero(1, sizeof *ws);
+    if (ws && !uz_cholmod_start(&ws->common)) {
+        free(ws);
+        ws = NULL;
+    }
+    return ws;
+}
+
+void uz_factor_workspace_free(uz_factor_workspace *ws)
+{
+    if (!ws)
+        return;
+    cholmod_l_finish(&ws->common);
+    free(ws->panel);
+    free(ws);
+}
+
+void uz_factor_permute(const uz_factor *factor, double *permuted, const double *x)
+{
+    const SuiteSparse_long *perm = factor->L->Perm;
+    for (int64_t k = 0; k < factor->n; k++)
+        permuted[k] = x[perm[k]];
+}
+
+void uz_factor_unpermute(const uz_factor *factor, double *x, const double *permuted)
+{
+    const SuiteSparse_long *perm = factor->L->Perm;
+    for (int64_t k = 0; k < factor->n; k++)
+        x[perm[k]] = permuted[k];
+}
+
+static cholmod_dense view_dense(double *x, int64_t rows, int64_t columns)
+{
+    cholmod_dense X;
+    memset(&X, 0, sizeof X);
+    X.nrow = (size_t)rows;
+    X.ncol = (size_t)columns;
+    X.d = X.nrow;
+    X.nzmax = X.nrow * X.ncol;
+    X.x = x;
+    X.xtype = CHOLMOD_REAL;
+    X.dtype = CHOLMOD_DOUBLE;
+    return X;
+}
+
+typedef int (*substitution)(cholmod_factor *, cholmod_dense *, cholmod_dense *, cholmod_common *);
+
+static uz_status substitute(substitution solve, const uz_factor *factor, uz_factor_workspace *ws, double *x,
+                            int64_t columns, uz_error *err)
+{
+    size_t need = factor->L->maxesize * (size_t)columns;
+    if (need > ws->panel_size || !ws->panel) {
+        free(ws->panel);
+        ws->panel = uz_alloc((int64_t)need, sizeof *ws->panel);
+        ws->panel_size = ws->panel ? need : 0;
+        if (!ws->panel)
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %lld columns",
+                           (long long)columns);
+    }
+    cholmod_dense X = view_dense(x, factor->n, columns),
+                  E = view_dense(ws->panel, (int64_t)factor->L->maxesize, columns);
+    if (!solve(factor->L, &X, &E, &ws->common) || ws->common.status != CHOLMOD_OK)
+        return uz_fail(err, UZ_ERR_INTERNAL, "", "substitution failed (CHOLMOD status %d)", ws->common.status);
+    return UZ_OK;
+}
+
+uz_status uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns, uz_error *err)
+{
+    return substitute(cholmod_l_super_lsolve, factor, ws, x, columns, err);
+}
+
+uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
+                             uz_error *err)
+{
+    return substitute(cholmod_l_super_ltsolve, factor, ws, x, columns, err);
+}
+
+/* rank[k]: the place of position k among the last dofs, -1 for the others. */
+static void rank_last(const uz_factor *factor, int64_t *rank, int64_t *order, int64_t *where)
+{
+    const SuiteSparse_long *perm = factor->L->Perm;
+    int64_t count = 0;
+    for (int64_t k = 0; k < factor->n; k++)
+        rank[k] = -1;
+    for (int64_t i = 0; i < factor->n_last; i++)
+        rank[factor->position[factor->last[i]]] = 0;
+    for (int64_t k = 0; k < factor->n; k++) {
+        if (rank[k] < 0)
+            continue;
+        rank[k] = count;
+        order[count] = perm[k];
+        where[count++] = k;
+    }
+}
+
+/* One supernode: columns [first, first + ncols), nrows row indices, values column-major. */
+static bool copy_supernode(double *block, int64_t n_last, const int64_t *rank, const SuiteSparse_long *rows,
+                           int64_t nrows, int64_t first, int64_t ncols, const double *values)
+{
+    for (int64_t j = 0; j < ncols; j++) {
+        int64_t column = rank[first + j];
+        if (column < 0)
+            continue;
+        for (int64_t i = j; i < nrows; i++) {
+            int64_t row = rank[rows[i]];
+            double value = values[i + j * nrows];
+            if (row >= 0)
+                block[row + column * n_last] = value;
+            else if (value != 0.0)
+                return false; /* an interior dof is eliminated after a contact dof that it couples to */
+        }
+    }
+    return true;
+}
+
+/* The elimination tree of several unconnected bodies is a forest and its postorder may put one body's contact dofs
+ * before another body's interior. That is harmless: all that is needed is that the columns of the last dofs reach only
+ * rows of last dofs, which copy_supernode checks. */
+uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err)
+{
+    const cholmod_factor *L = factor->L;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
+    int64_t *rank = uz_alloc(factor->n, sizeof *rank);
+    if (!rank)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)factor->n);
+    rank_last(factor, rank, order, where);
+    memset(block, 0, (size_t)factor->n_last * (size_t)factor->n_last * sizeof *block);
+    bool ok = true;
+    for (size_t k = 0; ok && k < L->nsuper; k++)
+        ok = copy_supernode(block, factor->n_last, rank, s + pi[k], pi[k + 1] - pi[k], super[k],
+                            super[k + 1] - super[k], (const double *)L->x + px[k]);
+    free(rank);
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_INTERNAL, "", "the contact dofs are not last in the elimination");
+}

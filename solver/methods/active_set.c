@@ -1,0 +1,163 @@
+/* active_set.c: exact solution on the contact by guessing which rows touch.
+ *
+ * Primal-dual active set steps (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2003)): solve D_AA r_A = g0_A, then
+ * drop rows that pull and add rows that penetrate, all at once. For a general positive definite D these steps may
+ * cycle, so the number of wrong rows is watched: when it has not come down for a few steps, one row at a time is
+ * exchanged, the last wrong one (Murty 1974), until it does: block principal pivoting (Judice and Pires, Comput. Oper.
+ * Res. 21 (1994)), which terminates. */
+#include "methods/iterate.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PATIENCE = 3, MAX_STEPS = 400 };
+
+typedef struct {
+    bool *active; /* m: the current guess */
+    double *r;    /* m: its solution, signs unchecked */
+    double *g;    /* m: its gaps */
+    int64_t wrong, fewest, patience;
+    double r_scale, g_scale; /* sizes that sign errors are measured against */
+} pivoting;
+
+static bool allocate(pivoting *p, int64_t m)
+{
+    memset(p, 0, sizeof *p);
+    p->active = uz_alloc_zero(m, sizeof(bool));
+    p->r = uz_alloc_zero(m, sizeof(double));
+    p->g = uz_alloc_zero(m, sizeof(double));
+    p->fewest = m + 1;
+    p->patience = PATIENCE;
+    return p->active && p->r && p->g;
+}
+
+static void release(pivoting *p)
+{
+    free(p->active);
+    free(p->r);
+    free(p->g);
+}
+
+static double largest(const double *x, int64_t n)
+{
+    double value = 0.0;
+    for (int64_t i = 0; i < n; i++)
+        value = fmax(value, fabs(x[i]));
+    return value;
+}
+
+/* Rows that a projected gradient step would leave in contact. */
+static void guess(pivoting *p, const uz_iterate *it, const double *g0)
+{
+    for (int64_t i = 0; i < it->m; i++)
+        p->active[i] = it->r[i] + it->alpha * (g0[i] - it->Dr[i]) < 0.0;
+}
+
+/* A sign is wrong only beyond rounding: weakly active rows must not make the steps chatter. */
+static bool is_wrong(const pivoting *p, int64_t i)
+{
+    const double tolerance = 64.0 * DBL_EPSILON;
+    return p->active[i] ? p->r[i] > tolerance * p->r_scale : p->g[i] < -tolerance * p->g_scale;
+}
+
+static int64_t count_wrong(pivoting *p, int64_t m)
+{
+    int64_t wrong = 0;
+    for (int64_t i = 0; i < m; i++)
+        wrong += is_wrong(p, i);
+    return wrong;
+}
+
+static void exchange(pivoting *p, int64_t m)
+{
+    bool all = true;
+    if (p->wrong < p->fewest) {
+        p->fewest = p->wrong;
+        p->patience = PATIENCE;
+    } else if (p->patience > 0) {
+        p->patience--;
+    } else {
+        all = false;
+    }
+    for (int64_t i = m - 1; i >= 0; i--) {
+        if (!is_wrong(p, i))
+            continue;
+        p->active[i] = !p->active[i];
+        if (!all)
+            break;
+    }
+}
+
+/* The guess's answer as an iterate: r <= 0, D r, and the bound on it. */
+static uz_status take(uz_iterate *it, const pivoting *p, uz_case *load, uz_error *err)
+{
+    for (int64_t i = 0; i < it->m; i++)
+        it->r[i] = fmin(0.0, p->r[i]);
+    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+    it->tau = 1.0;
+    it->iteration++;
+    return status == UZ_OK ? uz_iterate_bound(it, load, UZ_METHOD_ACTIVE_SET, err) : status;
+}
+
+static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    const double *g0 = uz_case_g0(load);
+    uz_status status = uz_case_solve_active(load, p->r, solved, p->active, err);
+    if (status != UZ_OK || !*solved)
+        return status;
+    status = uz_case_apply(load, p->g, p->r, err);
+    for (int64_t i = 0; i < it->m; i++)
+        p->g[i] = g0[i] - p->g[i];
+    p->r_scale = largest(p->r, it->m);
+    p->wrong = count_wrong(p, it->m);
+    return status;
+}
+
+static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                       uz_history *history, uz_error *err)
+{
+    *end = UZ_END_STALLED;
+    for (int k = 0; k < MAX_STEPS; k++) {
+        bool solved = false;
+        if (uz_should_stop(end, it, options))
+            return UZ_OK;
+        uz_status status = solve_guess(p, &solved, it, load, err);
+        if (status != UZ_OK || !solved)
+            return status;
+        status = take(it, p, load, err);
+        if (status == UZ_OK)
+            status = uz_iterate_record(it, load, options, history, 0.0, false, err);
+        if (status != UZ_OK)
+            return status;
+        if (it->best_relative <= options->target)
+            *end = UZ_END_TARGET;
+        if (*end == UZ_END_TARGET || p->wrong == 0)
+            return UZ_OK;
+        exchange(p, it->m);
+    }
+    return UZ_OK;
+}
+
+uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                            uz_history *history, uz_error *err)
+{
+    pivoting p;
+    uz_status status = history->count ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
+    if (!allocate(&p, it->m))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)it->m);
+    if (status == UZ_OK) {
+        p.g_scale = largest(uz_case_g0(load), it->m);
+        guess(&p, it, uz_case_g0(load));
+        status = steps(&p, end, it, load, options, history, err);
+    }
+    release(&p);
+    return status;
+}

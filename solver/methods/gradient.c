@@ -1,0 +1,151 @@
+/* gradient.c: projected gradient steps on the dual: Kanno's Algorithm 1 (uzawa) and Algorithm 2 (accelerated, with and
+ * without restart), with the corrections of the design: tau from 1 + 4 tau^2, rho from r(k+1).
+ *
+ * D is applied once per iteration, to r(k+1); D rho follows from D r(k+1) and D r(k), rho being their combination. */
+#include "methods/iterate.h"
+
+#include "core/clock.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+static void swap(double **a, double **b)
+{
+    double *t = *a;
+    *a = *b;
+    *b = t;
+}
+
+/* r(k+1) = min(0, rho + alpha gamma). Returns ||rho - r(k+1)||. */
+static double project(uz_iterate *it, const double *g0)
+{
+    double square = 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        it->gamma[i] = g0[i] - it->Drho[i];
+        it->r_next[i] = fmin(0.0, it->rho[i] + it->alpha * it->gamma[i]);
+        double step = it->rho[i] - it->r_next[i];
+        square += step * step;
+    }
+    return sqrt(square);
+}
+
+/* psi must curve by no more than 1/alpha along the step: s'Ds <= s's / alpha for s = r(k+1) - rho (Beck and Teboulle
+ * 2009, Lemma 2.3). Where it curves more, the step was too long: alpha is shortened to what was seen and the step is
+ * not taken. */
+static bool step_too_long(uz_iterate *it)
+{
+    double curvature = 0.0, square = 0.0, size = 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        double s = it->r_next[i] - it->rho[i];
+        curvature += s * (it->Dr_next[i] - it->Drho[i]);
+        square += s * s;
+        size += it->r_next[i] * it->r_next[i];
+    }
+    bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
+    if (noise || it->alpha * curvature <= square * (1.0 + 1e-6))
+        return false;
+    it->alpha = 0.9 * square / curvature;
+    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+    it->tau = 1.0;
+    return true;
+}
+
+/* rho(k+1) and tau; true if the momentum was dropped (O'Donoghue and Candes 2015). */
+static bool extrapolate(uz_iterate *it, uz_method method)
+{
+    double tau = 0.5 * (1.0 + sqrt(1.0 + 4.0 * it->tau * it->tau)), omega = (it->tau - 1.0) / tau, ascent = 0.0;
+    for (int64_t i = 0; i < it->m; i++)
+        ascent += it->gamma[i] * (it->r_next[i] - it->r[i]);
+    bool restart = method == UZ_METHOD_ACCELERATED_RESTART && ascent < 0.0;
+    if (method == UZ_METHOD_UZAWA || restart)
+        omega = 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        it->rho[i] = it->r_next[i] + omega * (it->r_next[i] - it->r[i]);
+        it->Drho[i] = it->Dr_next[i] + omega * (it->Dr_next[i] - it->Dr[i]);
+    }
+    it->tau = restart ? 1.0 : tau;
+    swap(&it->r, &it->r_next);
+    swap(&it->Dr, &it->Dr_next);
+    it->restarts += restart;
+    return restart;
+}
+
+/* Bounds cost about one iteration; a check at every sixteenth of the way adds 6 % and overshoots by 6 %. */
+static void plan_next_check(uz_iterate *it)
+{
+    it->next_check = it->iteration + (it->iteration < 16 ? 1 : it->iteration / 16);
+}
+
+static bool stalled(const uz_iterate *it, double step_norm)
+{
+    double size = 0.0;
+    for (int64_t i = 0; i < it->m; i++)
+        size += it->r[i] * it->r[i];
+    int64_t patience = it->best_iteration / 2 + 4000;
+    return step_norm <= 4.0 * DBL_EPSILON * sqrt(size) || it->iteration - it->best_iteration > patience;
+}
+
+static bool should_end(uz_end *end, const uz_iterate *it, const uz_method_options *options, double step_norm)
+{
+    bool started = it->iteration > 0, paper = options->stopping == UZ_STOP_PAPER;
+    if (paper && started && step_norm <= options->epsilon)
+        *end = UZ_END_PAPER;
+    else if (!paper && it->best_relative <= options->target)
+        *end = UZ_END_TARGET;
+    else if (uz_should_stop(end, it, options))
+        return true;
+    else if (!paper && started && stalled(it, step_norm))
+        *end = UZ_END_STALLED;
+    else
+        return false;
+    return true;
+}
+
+static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *options, double *step_norm, bool *restart,
+                      uz_error *err)
+{
+    *step_norm = project(it, uz_case_g0(load));
+    uz_status status = uz_case_apply(load, it->Dr_next, it->r_next, err);
+    it->iteration++;
+    *restart = status == UZ_OK && step_too_long(it);
+    if (status != UZ_OK)
+        return status;
+    if (*restart) {
+        it->restarts++;
+        *step_norm = NAN; /* no step was taken */
+        return uz_case_apply(load, it->Dr, it->r, err);
+    }
+    *restart = extrapolate(it, options->method);
+    return UZ_OK;
+}
+
+/* The answer of the paper's rule is its last r, good or bad; otherwise the last r may still be the best. */
+static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                        uz_error *err)
+{
+    if (options->stopping == UZ_STOP_PAPER)
+        it->best_bound = INFINITY;
+    uz_status status = uz_iterate_bound(it, load, options->method, err);
+    history->rows[history->count - 1].error_bound = it->best_bound;
+    return status;
+}
+
+uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                          uz_history *history, uz_error *err)
+{
+    double step_norm = history->count ? history->rows[history->count - 1].step_norm : 0.0;
+    bool restart = false;
+    uz_status status = history->count ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
+    while (status == UZ_OK && !should_end(end, it, options, step_norm)) {
+        status = step(it, load, options, &step_norm, &restart, err);
+        if (status == UZ_OK && options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check) {
+            status = uz_iterate_bound(it, load, options->method, err);
+            plan_next_check(it);
+        }
+        if (status == UZ_OK)
+            status = uz_iterate_record(it, load, options, history, step_norm, restart, err);
+    }
+    return status == UZ_OK ? finish(it, load, options, history, err) : status;
+}

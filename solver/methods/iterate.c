@@ -1,0 +1,135 @@
+/* iterate.c: the state of an iteration, and the bound on what it holds. */
+#include "methods/iterate.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err)
+{
+    memset(it, 0, sizeof *it);
+    double **vectors[] = {&it->r, &it->Dr, &it->r_next, &it->Dr_next, &it->rho, &it->Drho, &it->gamma, &it->best_r};
+    bool ok = true;
+    for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++) {
+        *vectors[k] = uz_alloc_zero(m, sizeof(double));
+        ok = ok && *vectors[k];
+    }
+    it->close = uz_alloc_zero(m, sizeof(bool));
+    if (!ok || !it->close) {
+        uz_iterate_clear(it);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the iterates of %lld contacts", (long long)m);
+    }
+    it->m = m;
+    it->alpha = alpha;
+    it->tau = 1.0;
+    it->best_bound = INFINITY;
+    it->best_relative = INFINITY;
+    return UZ_OK;
+}
+
+void uz_iterate_clear(uz_iterate *it)
+{
+    double *vectors[] = {it->r, it->Dr, it->r_next, it->Dr_next, it->rho, it->Drho, it->gamma, it->best_r};
+    for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++)
+        free(vectors[k]);
+    free(it->close);
+    memset(it, 0, sizeof *it);
+}
+
+/* Rows that a projected step would keep in contact are closed, so that the complementarity term of the bound vanishes
+ * there; the prediction is that of the primal-dual active set (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2003)).
+ */
+uz_status uz_iterate_bound(uz_iterate *it, uz_case *load, uz_method by, uz_error *err)
+{
+    const double *g0 = uz_case_g0(load);
+    double bound2, psi, norm2;
+    for (int64_t i = 0; i < it->m; i++) {
+        it->gamma[i] = g0[i] - it->Dr[i];
+        it->close[i] = it->r[i] + it->alpha * it->gamma[i] < 0.0;
+    }
+    uz_status status = uz_case_push(load, &bound2, it->r, it->gamma, it->close, err);
+    double bound = sqrt(bound2);
+    if (status != UZ_OK || !(bound < it->best_bound))
+        return status;
+    uz_case_energies(load, &psi, &norm2, it->r, it->Dr);
+    double norm = sqrt(norm2);
+    it->best_bound = bound;
+    it->best_relative = bound == 0.0 ? 0.0 : norm > 2.0 * bound ? bound / (norm - 2.0 * bound) : INFINITY;
+    it->best_iteration = it->iteration;
+    it->made_by = by;
+    memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
+    uz_case_keep_push(load);
+    return UZ_OK;
+}
+
+/* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
+static uz_residual residual(uz_iterate *it, uz_case *load)
+{
+    const double *g0 = uz_case_g0(load);
+    uz_residual e = {0};
+    double e2 = 0.0, e4 = 0.0, *difference = it->r_next;
+    for (int64_t i = 0; i < it->m; i++) {
+        double gap = g0[i] - it->Drho[i], complementarity = gap * it->r[i], penetration = fmin(gap, 0.0);
+        difference[i] = it->rho[i] - it->r[i];
+        e2 += penetration * penetration;
+        e4 += complementarity * complementarity;
+    }
+    e.e1 = uz_case_force_norm(load, difference);
+    e.e2 = sqrt(e2);
+    e.e4 = sqrt(e4);
+    e.total = sqrt(e.e1 * e.e1 + e2 + e4);
+    return e;
+}
+
+static uz_history_row describe(uz_iterate *it, uz_case *load, double step_norm, bool restart)
+{
+    uz_history_row row = {.iteration = it->iteration, .step_norm = step_norm, .restart = restart};
+    double norm2;
+    uz_case_energies(load, &row.dual_objective, &norm2, it->r, it->Dr);
+    row.residual = residual(it, load);
+    for (int64_t i = 0; i < it->m; i++)
+        row.contacts += it->r[i] < 0.0;
+    row.error_bound = it->best_bound;
+    row.seconds = uz_seconds() - it->started;
+    return row;
+}
+
+uz_status uz_iterate_record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                            double step_norm, bool restart, uz_error *err)
+{
+    uz_history_row row = describe(it, load, step_norm, restart);
+    uz_status status = uz_history_append(history, &row, err);
+    if (status == UZ_OK && options->hooks && options->hooks->progress)
+        options->hooks->progress(options->hooks->ctx, &row);
+    return status;
+}
+
+uz_status uz_iterate_begin(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                           uz_error *err)
+{
+    it->started = uz_seconds();
+    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+    if (status == UZ_OK)
+        status = uz_iterate_bound(it, load, UZ_METHOD_ACCELERATED_RESTART, err);
+    return status == UZ_OK ? uz_iterate_record(it, load, options, history, 0.0, false, err) : status;
+}
+
+bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options)
+{
+    const uz_hooks *hooks = options->hooks;
+    if (hooks && hooks->cancelled && hooks->cancelled(hooks->ctx))
+        *end = UZ_END_CANCELLED;
+    else if (it->iteration >= options->max_iterations)
+        *end = UZ_END_ITERATIONS;
+    else if (uz_seconds() >= options->deadline)
+        *end = UZ_END_TIME;
+    else
+        return false;
+    return true;
+}

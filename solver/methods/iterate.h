@@ -1,0 +1,20 @@
+/* iterate.h: what the files of this folder share. */
+#ifndef UZ_ITERATE_H
+#define UZ_ITERATE_H
+
+#include "methods/method.h"
+
+/* Bounds the error of the answer that r (the one of the last apply) gives and keeps it if it is the best so far.
+ * Overwrites gamma. */
+uz_status uz_iterate_bound(uz_iterate *it, uz_case *load, uz_method by, uz_error *err);
+
+/* Row 0: applies D to the start and bounds it. */
+uz_status uz_iterate_begin(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                           uz_error *err);
+/* Appends the iterate's row to the history and tells the progress hook. Overwrites r_next. */
+uz_status uz_iterate_record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                            double step_norm, bool restart, uz_error *err);
+/* The limits that every method honours: cancel, iterations, time. */
+bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options);
+
+#endif

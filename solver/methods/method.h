@@ -1,0 +1,54 @@
+/* method.h: the iterations on the dual problem maximize psi(r), r <= 0. They see the body through dual/dual.h only. */
+#ifndef UZ_METHOD_H
+#define UZ_METHOD_H
+
+#include "dual/dual.h"
+#include "uzawa.h"
+
+/* Why a method returned. */
+typedef enum { UZ_END_TARGET, UZ_END_ITERATIONS, UZ_END_TIME, UZ_END_STALLED, UZ_END_PAPER, UZ_END_CANCELLED } uz_end;
+
+/* The iterate, kept between calls so that a run can be continued. Vectors of m. */
+typedef struct {
+    int64_t m, iteration, restarts, next_check;
+    double alpha, tau;
+    double *r, *Dr; /* r(k) <= 0 and D r(k) */
+    double *r_next, *Dr_next;
+    double *rho, *Drho;   /* extrapolated point */
+    double *gamma;        /* gap at rho, or at r while a bound is computed */
+    bool *close;          /* rows whose gap the pushed answer closes */
+    double *best_r;       /* the r whose bound is best; its push is kept in the uz_case */
+    double best_bound;    /* on the energy-norm error; INFINITY before the first */
+    double best_relative; /* the same over the energy norm of the answer */
+    int64_t best_iteration;
+    double started;    /* uz_seconds() of the first iteration */
+    uz_method made_by; /* the method that made the best answer */
+} uz_iterate;
+
+uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err);
+void uz_iterate_clear(uz_iterate *it);
+
+typedef struct {
+    uz_method method;
+    uz_stopping stopping;
+    double target;  /* relative error at which to return */
+    double epsilon; /* UZ_STOP_PAPER */
+    int64_t max_iterations;
+    double deadline; /* uz_seconds() */
+    const uz_hooks *hooks;
+} uz_method_options;
+
+/* Iterates until an end is reached; appends a row per iteration to history (row 0 is the start). */
+uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                        uz_history *history, uz_error *err);
+
+/* The engines behind it: projected gradient steps (uzawa, accelerated, accelerated_restart) and the active set. */
+uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                          uz_history *history, uz_error *err);
+uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                            uz_history *history, uz_error *err);
+
+/* Appends a row; grows by doubling. */
+uz_status uz_history_append(uz_history *history, const uz_history_row *row, uz_error *err);
+
+#endif

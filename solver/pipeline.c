@@ -1,0 +1,210 @@
+/* pipeline.c: from a problem to a certified answer, read from top to bottom as the paper does.
+ *
+ *     scene -> K, N        assembly          (cached with the factor)
+ *     K -> L, D            factor, condense  (cached)
+ *     p, h -> y, g0        one forward substitution
+ *     r                    iterations on D
+ *     u                    one backward substitution
+ *     (u, r) -> bound      certificate, from the original data */
+#include "body.h"
+#include "cache/cache.h"
+#include "certificate/certificate.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "methods/method.h"
+#include "solve.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool cancelled(const uz_hooks *hooks)
+{
+    return hooks && hooks->cancelled && hooks->cancelled(hooks->ctx);
+}
+
+/* p and h: the problem's own, or assembled from the scene's loads. */
+static uz_status make_load(uz_run *run, uz_error *err)
+{
+    const uz_body *body = run->body;
+    if (!body->is_scene) {
+        run->p = run->problem->qp.p;
+        run->h = run->problem->qp.h;
+        return UZ_OK;
+    }
+    run->owned = uz_alloc_zero(run->d + run->m + body->model.n_fixed, sizeof(double));
+    if (!run->owned)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
+    run->p = run->owned;
+    run->h = run->owned + run->d;
+    run->prescribed = run->owned + run->d + run->m;
+    return uz_body_model_load(run->owned, run->owned + run->d, run->prescribed, &body->model, &run->problem->scene,
+                              err);
+}
+
+static uz_method_options method_options(const uz_run *run)
+{
+    const uz_settings *s = run->settings;
+    uz_method_options options = {
+        .method = s->method,
+        .stopping = s->stopping,
+        .target = run->target,
+        .epsilon = s->epsilon,
+        .max_iterations = s->max_iterations,
+        .deadline = run->deadline,
+        .hooks = run->hooks,
+    };
+    return options;
+}
+
+static uz_status iterate(uz_run *run, uz_error *err)
+{
+    uz_method_options options = method_options(run);
+    double start = uz_seconds();
+    uz_status status = uz_method_run(&run->end, &run->it, run->load, &options, &run->result->history, err);
+    run->result->summary.timings.iterate += uz_seconds() - start;
+    return status;
+}
+
+/* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. */
+static uz_status inverse_norm(void *ctx, double *value, const double *e, uz_error *err)
+{
+    uz_run *run = ctx;
+    const uz_factor *factor = run->body->factor;
+    uz_factor_permute(factor, run->work, e);
+    uz_status status = uz_factor_forward(factor, run->ws, run->work, 1, err);
+    double sum = 0.0;
+    for (int64_t j = 0; j < run->d; j++)
+        sum += run->work[j] * run->work[j];
+    *value = sum;
+    return status;
+}
+
+static uz_status recover_and_certify(uz_run *run, uz_error *err)
+{
+    uz_result *result = run->result;
+    uz_certify_input input = {
+        .K = uz_body_K(run->body, run->problem),
+        .N = uz_body_N(run->body, run->problem),
+        .p = run->p,
+        .h = run->h,
+        .inverse_norm = inverse_norm,
+        .ctx = run,
+        .rcond = uz_factor_describe(run->body->factor).rcond,
+    };
+    double start = uz_seconds();
+    memcpy(result->r, run->it.best_r, (size_t)run->m * sizeof *result->r);
+    uz_status status = uz_case_recover(run->load, run->u, result->r, isfinite(run->it.best_bound), err);
+    if (status == UZ_OK)
+        status = uz_certify(&result->summary.certificate, result->r, result->g, run->u, &input, err);
+    result->summary.timings.certify += uz_seconds() - start;
+    return status;
+}
+
+/* A tenth of what the mesh itself loses: digits beyond that describe the mesh, not the body. */
+static void balance_request(uz_run *run)
+{
+    uz_summary *summary = &run->result->summary;
+    double *nodal = uz_alloc(run->body->model.mesh.n_nodes * run->body->model.mesh.dim, sizeof *nodal);
+    if (!nodal)
+        return; /* the request stays at what it was, which is stricter */
+    uz_recover_nodal(nodal, &run->body->model, run->u, run->prescribed);
+    summary->discretization_error = uz_estimate_discretization_error(&run->body->model, nodal);
+    free(nodal);
+    if (summary->discretization_error > 0.0)
+        run->requested = fmin(1.0, 0.1 * summary->discretization_error);
+}
+
+enum { MAX_ROUNDS = 8 };
+
+/* The methods stop at their own estimate; only the certificate decides. While it is missed although the estimate was
+ * met, the estimate is asked for more. */
+static uz_status iterate_until_certified(uz_run *run, uz_error *err)
+{
+    uz_certificate *certificate = &run->result->summary.certificate;
+    bool balance = run->settings->balanced && run->body->is_scene;
+    for (int round = 0; round < MAX_ROUNDS; round++) {
+        uz_status status = iterate(run, err);
+        if (status == UZ_OK)
+            status = recover_and_certify(run, err);
+        if (status != UZ_OK)
+            return status;
+        if (balance) {
+            balance_request(run);
+            balance = false;
+            run->target = run->requested;
+        }
+        if (certificate->relative_error <= run->requested || run->end != UZ_END_TARGET)
+            return UZ_OK;
+        if (run->it.best_relative <= run->target)
+            run->target = 0.25 * run->it.best_relative;
+    }
+    run->end = UZ_END_STALLED;
+    return UZ_OK;
+}
+
+static uz_outcome conclude(const uz_run *run)
+{
+    if (run->result->summary.certificate.relative_error <= run->requested)
+        return UZ_CONVERGED;
+    switch (run->end) {
+    case UZ_END_ITERATIONS:
+        return UZ_ITERATION_LIMIT;
+    case UZ_END_TIME:
+        return UZ_TIME_LIMIT;
+    case UZ_END_CANCELLED:
+        return UZ_DISMISSED;
+    case UZ_END_PAPER:
+        return UZ_PAPER_RULE;
+    default:
+        return UZ_PRECISION_LIMIT;
+    }
+}
+
+static uz_status solve_case(uz_run *run, uz_error *err)
+{
+    double start = uz_seconds(), lambda = uz_dual_describe(run->body->dual).lambda_max;
+    double alpha = run->settings->alpha > 0.0 ? run->settings->alpha : lambda > 0.0 ? 1.0 / lambda : 1.0;
+    uz_status status = make_load(run, err);
+    run->result->summary.timings.assemble += uz_seconds() - start;
+    start = uz_seconds();
+    if (status == UZ_OK)
+        status = uz_run_allocate(run, err);
+    if (status == UZ_OK)
+        status = uz_case_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
+    run->result->summary.timings.iterate += uz_seconds() - start;
+    if (status == UZ_OK)
+        status = uz_iterate_init(&run->it, run->m, alpha, err);
+    if (status == UZ_OK)
+        status = iterate_until_certified(run, err);
+    if (status == UZ_OK)
+        run->result->summary.outcome = conclude(run);
+    return status == UZ_OK ? uz_run_report(run, err) : status;
+}
+
+uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                   const uz_hooks *hooks, uz_error *err)
+{
+    uz_run run;
+    bool hit = false;
+    *out = NULL;
+    uz_error_reset(err);
+    uz_status status = uz_run_begin(&run, problem, settings, hooks, err);
+    if (status == UZ_OK && problem->kind == UZ_PROBLEM_MATRICES)
+        status = uz_qp_check(&problem->qp, err);
+    if (status == UZ_OK && cancelled(hooks))
+        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
+    if (status == UZ_OK)
+        status = uz_cache_acquire(&run.body, &hit, cache, problem, settings, hooks, err);
+    if (status == UZ_OK) {
+        uz_run_take_body(&run, hit);
+        status = solve_case(&run, err);
+    }
+    if (status == UZ_OK) {
+        *out = run.result;
+        run.result = NULL;
+    }
+    uz_run_end(&run, cache);
+    return status;
+}

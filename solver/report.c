@@ -1,0 +1,211 @@
+/* report.c: what a solve leaves behind. */
+#include "solve.h"
+
+#include "cache/cache.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* `exact` means rounding level: no certificate in double precision can be expected below this. */
+#define EXACT_RELATIVE_ERROR 1e-12
+
+static uz_status check_settings(const uz_settings *s, uz_error *err)
+{
+    if (!(s->relative_error >= 0.0 && s->relative_error <= 1.0))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "relative_error must lie in [0, 1], it is %g", s->relative_error);
+    if (!(s->epsilon >= 0.0 && isfinite(s->epsilon)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "epsilon must be finite and not negative, it is %g", s->epsilon);
+    if (!(s->alpha >= 0.0 && isfinite(s->alpha)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
+    if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
+    return UZ_OK;
+}
+
+uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                       uz_error *err)
+{
+    memset(run, 0, sizeof *run);
+    run->problem = problem;
+    run->settings = settings;
+    run->hooks = hooks;
+    run->started = uz_seconds();
+    uz_status status = check_settings(settings, err);
+    if (status != UZ_OK)
+        return status;
+    run->deadline = run->started + settings->time_limit_s;
+    run->requested = settings->relative_error > 0.0 ? settings->relative_error : EXACT_RELATIVE_ERROR;
+    run->target = settings->balanced ? 1e-2 : run->requested;
+    run->result = uz_alloc_zero(1, sizeof *run->result);
+    if (!run->result)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
+    run->result->summary.discretization_error = NAN;
+    run->result->summary.max_pressure = NAN;
+    return UZ_OK;
+}
+
+void uz_run_take_body(uz_run *run, bool hit)
+{
+    uz_summary *summary = &run->result->summary;
+    uz_factor_info factor = uz_factor_describe(run->body->factor);
+    uz_dual_info dual = uz_dual_describe(run->body->dual);
+    run->d = summary->d = run->result->d = dual.d;
+    run->m = summary->m = run->result->m = dual.m;
+    summary->op = dual.op;
+    summary->lambda_max = dual.lambda_max;
+    summary->ordering = factor.ordering;
+    summary->factor_cached = hit;
+    summary->factor_nnz = factor.nnz;
+    summary->factor_bytes = factor.bytes;
+    summary->rcond = factor.rcond;
+    if (hit)
+        return;
+    summary->timings.assemble = run->body->assemble_s;
+    summary->timings.order = factor.order_s;
+    summary->timings.factor = factor.factor_s;
+    summary->timings.condense = run->body->condense_s;
+}
+
+uz_status uz_run_allocate(uz_run *run, uz_error *err)
+{
+    uz_result *result = run->result;
+    run->ws = uz_factor_workspace_new();
+    run->work = uz_alloc(run->d, sizeof(double));
+    run->u = uz_alloc_zero(run->d, sizeof(double));
+    result->r = uz_alloc_zero(run->m, sizeof(double));
+    result->g = uz_alloc_zero(run->m, sizeof(double));
+    if (run->ws && run->work && run->u && result->r && result->g)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+}
+
+static void report_contact(uz_run *run)
+{
+    uz_result *result = run->result;
+    uz_summary *summary = &result->summary;
+    for (int64_t i = 0; i < run->m; i++) {
+        summary->active += result->r[i] < 0.0;
+        summary->reaction_sum += result->r[i];
+        summary->max_penetration = fmax(summary->max_penetration, -result->g[i]);
+    }
+}
+
+/* Force and pressure on the body: the obstacle pushes along its normal by -r. */
+static void report_pressure(uz_run *run)
+{
+    uz_result *result = run->result;
+    uz_summary *summary = &result->summary;
+    const uz_mesh_info *mesh = &result->mesh;
+    summary->dim = mesh->dim;
+    summary->max_pressure = 0.0;
+    for (int64_t i = 0; i < run->m; i++) {
+        for (int axis = 0; axis < mesh->dim; axis++)
+            summary->force[axis] -= result->r[i] * mesh->contact_normal[i * mesh->dim + axis];
+        if (mesh->contact_area[i] > 0.0)
+            summary->max_pressure = fmax(summary->max_pressure, -result->r[i] / mesh->contact_area[i]);
+    }
+}
+
+static uz_status report_displacements(uz_run *run, uz_error *err)
+{
+    uz_result *result = run->result;
+    const uz_body_model *model = &run->body->model;
+    if (!run->body->is_scene) {
+        result->u = run->u;
+        run->u = NULL;
+        return UZ_OK;
+    }
+    uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, run->m, err);
+    result->n_nodes = model->mesh.n_nodes;
+    result->u = uz_alloc(result->n_nodes * model->mesh.dim, sizeof(double));
+    if (!result->u)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
+                       (long long)result->n_nodes);
+    uz_recover_nodal(result->u, model, run->u, run->prescribed);
+    if (status == UZ_OK)
+        report_pressure(run);
+    return status;
+}
+
+/* One sentence on an outcome that is not `converged`. */
+static void explain(uz_run *run)
+{
+    uz_summary *s = &run->result->summary;
+    const char *why = "";
+    switch (s->outcome) {
+    case UZ_ITERATION_LIMIT:
+        why = "the iterations allowed were used up: raise max_iterations";
+        break;
+    case UZ_TIME_LIMIT:
+        why = "the time allowed was used up: raise time_limit_s";
+        break;
+    case UZ_PRECISION_LIMIT:
+        why = "double precision holds no more digits for this method and problem";
+        break;
+    case UZ_PAPER_RULE:
+        why = "the paper's stopping rule was met; it bounds a force, not an error";
+        break;
+    case UZ_DISMISSED:
+        why = "stopped by request";
+        break;
+    default:
+        return;
+    }
+    snprintf(s->message, sizeof s->message, "%s. Certified: relative error at most %.3g, asked for %.3g.", why,
+             s->certificate.relative_error, s->requested_error);
+}
+
+uz_status uz_run_report(uz_run *run, uz_error *err)
+{
+    uz_summary *summary = &run->result->summary;
+    summary->method = run->settings->method == UZ_METHOD_AUTO ? UZ_METHOD_ACCELERATED_RESTART : run->settings->method;
+    summary->iterations = run->it.iteration;
+    summary->restarts = run->it.restarts;
+    summary->alpha = run->it.alpha;
+    summary->requested_error = run->requested;
+    report_contact(run);
+    uz_status status = report_displacements(run, err);
+    explain(run);
+    summary->timings.total = uz_seconds() - run->started;
+    return status;
+}
+
+void uz_run_end(uz_run *run, uz_cache *cache)
+{
+    uz_case_free(run->load);
+    uz_iterate_clear(&run->it);
+    uz_factor_workspace_free(run->ws);
+    uz_cache_release(cache, run->body);
+    free(run->owned);
+    free(run->u);
+    free(run->work);
+    uz_result_free(run->result);
+}
+
+void uz_result_free(uz_result *result)
+{
+    if (!result)
+        return;
+    free(result->u);
+    free(result->r);
+    free(result->g);
+    free(result->history.rows);
+    uz_mesh_info_clear(&result->mesh);
+    free(result);
+}
+
+void uz_problem_clear(uz_problem *problem)
+{
+    if (!problem)
+        return;
+    if (problem->kind == UZ_PROBLEM_SCENE)
+        uz_scene_clear(&problem->scene);
+    else
+        uz_qp_clear(&problem->qp);
+    memset(problem, 0, sizeof *problem);
+}

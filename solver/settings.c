@@ -1,0 +1,118 @@
+/* settings.c: defaults, and the names of choices and outcomes. */
+#include "uzawa.h"
+
+#include <math.h>
+#include <string.h>
+
+static const char *const METHODS[] = {
+    [UZ_METHOD_AUTO] = "auto",
+    [UZ_METHOD_UZAWA] = "uzawa",
+    [UZ_METHOD_ACCELERATED] = "accelerated",
+    [UZ_METHOD_ACCELERATED_RESTART] = "accelerated_restart",
+    [UZ_METHOD_ACTIVE_SET] = "active_set",
+};
+static const char *const OPERATORS[] = {
+    [UZ_OPERATOR_AUTO] = "auto",
+    [UZ_OPERATOR_CONDENSED] = "condensed",
+    [UZ_OPERATOR_FACTORED] = "factored",
+};
+static const char *const ORDERINGS[] = {
+    [UZ_ORDERING_AUTO] = "auto",
+    [UZ_ORDERING_CAMD] = "camd",
+    [UZ_ORDERING_AMD] = "amd",
+    [UZ_ORDERING_METIS] = "metis",
+};
+static const char *const STOPPINGS[] = {
+    [UZ_STOP_CERTIFIED] = "certified",
+    [UZ_STOP_PAPER] = "paper",
+};
+static const char *const OUTCOMES[] = {
+    [UZ_CONVERGED] = "converged",   [UZ_ITERATION_LIMIT] = "iteration_limit",
+    [UZ_TIME_LIMIT] = "time_limit", [UZ_PRECISION_LIMIT] = "precision_limit",
+    [UZ_PAPER_RULE] = "paper_rule", [UZ_INFEASIBLE] = "infeasible",
+    [UZ_DISMISSED] = "dismissed",
+};
+
+#define COUNT(table) (sizeof(table) / sizeof((table)[0]))
+
+static const char *name_at(const char *const *table, size_t count, unsigned value)
+{
+    return value < count ? table[value] : "unknown";
+}
+
+/* The index of the name in the table, or -1. */
+static int find_name(const char *const *table, size_t count, const char *name)
+{
+    for (size_t i = 0; i < count; i++)
+        if (strcmp(table[i], name) == 0)
+            return (int)i;
+    return -1;
+}
+
+const char *uz_method_name(uz_method value)
+{
+    return name_at(METHODS, COUNT(METHODS), (unsigned)value);
+}
+
+const char *uz_operator_name(uz_operator value)
+{
+    return name_at(OPERATORS, COUNT(OPERATORS), (unsigned)value);
+}
+
+const char *uz_ordering_name(uz_ordering value)
+{
+    return name_at(ORDERINGS, COUNT(ORDERINGS), (unsigned)value);
+}
+
+const char *uz_stopping_name(uz_stopping value)
+{
+    return name_at(STOPPINGS, COUNT(STOPPINGS), (unsigned)value);
+}
+
+const char *uz_outcome_name(uz_outcome value)
+{
+    return name_at(OUTCOMES, COUNT(OUTCOMES), (unsigned)value);
+}
+
+bool uz_method_parse(uz_method *out, const char *name)
+{
+    int found = find_name(METHODS, COUNT(METHODS), name);
+    if (found >= 0)
+        *out = (uz_method)found;
+    return found >= 0;
+}
+
+bool uz_operator_parse(uz_operator *out, const char *name)
+{
+    int found = find_name(OPERATORS, COUNT(OPERATORS), name);
+    if (found >= 0)
+        *out = (uz_operator)found;
+    return found >= 0;
+}
+
+bool uz_ordering_parse(uz_ordering *out, const char *name)
+{
+    int found = find_name(ORDERINGS, COUNT(ORDERINGS), name);
+    if (found >= 0)
+        *out = (uz_ordering)found;
+    return found >= 0;
+}
+
+bool uz_stopping_parse(uz_stopping *out, const char *name)
+{
+    int found = find_name(STOPPINGS, COUNT(STOPPINGS), name);
+    if (found >= 0)
+        *out = (uz_stopping)found;
+    return found >= 0;
+}
+
+uz_settings uz_settings_default(void)
+{
+    uz_settings settings = {
+        .relative_error = 1e-8,
+        .epsilon = 1e-6,
+        .max_iterations = 100000,
+        .time_limit_s = INFINITY,
+    };
+    return settings;
+}
