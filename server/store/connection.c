@@ -1,0 +1,164 @@
+#include "store/connection.h"
+#include "store/file_format.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#define BUSY_TIMEOUT_MS 5000
+#define JOB_COLUMNS     "id, status, progress, attempts, created, started, finished, tags, summary, error"
+
+static const char *const SQL[QUERY_COUNT] = {
+    [QUERY_BEGIN] = "BEGIN IMMEDIATE",
+    [QUERY_COMMIT] = "COMMIT",
+    [QUERY_ROLLBACK] = "ROLLBACK",
+    [QUERY_NEWEST_ID] = "SELECT max(id) FROM job",
+    [QUERY_FIND_KEY] = "SELECT " JOB_COLUMNS ", length(body) = ?2 AND body = ?3"
+                       " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",
+    [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key) VALUES(?1, 0, ?2, ?3, ?4)",
+    [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body) VALUES(?1, ?2)",
+    [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
+                          " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
+    [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, owner = ?2,"
+                    " lease = ?1 + ?3 WHERE id = (SELECT id FROM job WHERE status = 0 ORDER BY id LIMIT 1)"
+                    " RETURNING " JOB_COLUMNS,
+    [QUERY_BODY] = "SELECT body FROM request WHERE job = ?1",
+    [QUERY_RENEW] = "UPDATE job SET lease = ?3, progress = ?4 WHERE id = ?1 AND status = 1 AND owner = ?2",
+    [QUERY_FINISH] = "UPDATE job SET status = ?3, finished = ?4, summary = ?5, error = ?6, owner = NULL, lease = 0,"
+                     " progress = CASE WHEN ?3 = 2 THEN 100 ELSE progress END"
+                     " WHERE id = ?1 AND status = 1 AND owner = ?2",
+    [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data) VALUES(?1, ?2, ?3, ?4, ?5, ?6)",
+    [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, part, version, columns, last, data)"
+                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6)",
+    [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - 1, progress = 0, started = 0, owner = NULL,"
+                      " lease = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
+    [QUERY_RECOVER_FAIL] = "UPDATE job SET status = 3, finished = ?2, error = ?3, owner = NULL, lease = 0"
+                           " WHERE status = 1 AND attempts >= ?1",
+    [QUERY_RECOVER_REQUEUE] = "UPDATE job SET status = 0, progress = 0, started = 0, owner = NULL, lease = 0"
+                              " WHERE status = 1",
+    [QUERY_DISMISS] = "UPDATE job SET status = 4, finished = ?2 WHERE id = ?1 AND status = 0",
+    [QUERY_DELETE] = "DELETE FROM job WHERE id = ?1",
+    [QUERY_JOB] = "SELECT " JOB_COLUMNS " FROM job WHERE id = ?1",
+    [QUERY_LIST] = "SELECT " JOB_COLUMNS " FROM job WHERE id < ?1 ORDER BY id DESC LIMIT ?2",
+    [QUERY_LIST_STATUS] = "SELECT " JOB_COLUMNS " FROM job WHERE id < ?1 AND status = ?3 ORDER BY id DESC LIMIT ?2",
+    [QUERY_LIST_TAG] = "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job"
+                       " WHERE tag.tag = ?4 AND tag.job < ?1 ORDER BY tag.job DESC LIMIT ?2",
+    [QUERY_LIST_TAG_STATUS] = "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job"
+                              " WHERE tag.tag = ?4 AND tag.job < ?1 AND status = ?3 ORDER BY tag.job DESC LIMIT ?2",
+    [QUERY_VECTOR] = "SELECT version, count, data FROM vector WHERE job = ?1 AND name = ?2 ORDER BY part",
+    [QUERY_HISTORY] = "SELECT version, columns, CASE WHEN last > ?2 THEN data END FROM history WHERE job = ?1"
+                      " ORDER BY part",
+    [QUERY_COUNTS] = "SELECT status, count(*) FROM job GROUP BY status",
+};
+
+/* Settings of every connection. secure_delete FAST: freed pages are not rewritten only to blank them. */
+static const char *const COMMON_PRAGMAS = "PRAGMA foreign_keys = ON; PRAGMA mmap_size = 0; PRAGMA temp_store = MEMORY;"
+                                          "PRAGMA trusted_schema = OFF;";
+/* FULL, because in WAL mode NORMAL may lose the last commits at power loss, and a 202 promises the job is on disk. */
+static const char *const WRITER_PRAGMAS = "PRAGMA synchronous = FULL; PRAGMA journal_size_limit = 16777216;"
+                                          "PRAGMA secure_delete = FAST;";
+
+bool connection_open(connection *c, const char *path, bool writer, char *message, size_t size)
+{
+    memset(c, 0, sizeof *c);
+    int flags = SQLITE_OPEN_NOMUTEX | (writer ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY);
+    if (sqlite3_open_v2(path, &c->db, flags, NULL) == SQLITE_OK &&
+        sqlite3_busy_timeout(c->db, BUSY_TIMEOUT_MS) == SQLITE_OK &&
+        sqlite3_exec(c->db, COMMON_PRAGMAS, NULL, NULL, NULL) == SQLITE_OK &&
+        (!writer || sqlite3_exec(c->db, WRITER_PRAGMAS, NULL, NULL, NULL) == SQLITE_OK))
+        return true;
+    snprintf(message, size, "cannot use the file: %s", file_format_why_unreadable(c->db));
+    connection_close(c);
+    return false;
+}
+
+void connection_close(connection *c)
+{
+    for (int i = 0; i < QUERY_COUNT; i++)
+        sqlite3_finalize(c->statements[i]);
+    sqlite3_close(c->db);
+    memset(c, 0, sizeof *c);
+}
+
+statement statement_begin(connection *c, query_id q)
+{
+    statement st = {.c = c, .stmt = c->statements[q], .rc = SQLITE_OK};
+    if (!st.stmt) {
+        st.rc = sqlite3_prepare_v3(c->db, SQL[q], -1, SQLITE_PREPARE_PERSISTENT, &st.stmt, NULL);
+        c->statements[q] = st.stmt;
+    }
+    return st;
+}
+
+void bind_integer(statement *st, int at, int64_t value)
+{
+    if (st->rc == SQLITE_OK)
+        st->rc = sqlite3_bind_int64(st->stmt, at, value);
+}
+
+void bind_real(statement *st, int at, double value)
+{
+    if (st->rc == SQLITE_OK)
+        st->rc = sqlite3_bind_double(st->stmt, at, value);
+}
+
+void bind_text(statement *st, int at, const char *text)
+{
+    if (st->rc == SQLITE_OK)
+        st->rc = sqlite3_bind_text(st->stmt, at, text, -1, SQLITE_STATIC);
+}
+
+void bind_blob(statement *st, int at, const void *data, size_t size)
+{
+    /* A NULL pointer would bind NULL instead of an empty blob. */
+    if (st->rc == SQLITE_OK)
+        st->rc = sqlite3_bind_blob64(st->stmt, at, data ? data : "", data ? size : 0, SQLITE_STATIC);
+}
+
+bool statement_row(statement *st)
+{
+    if (st->rc != SQLITE_OK && st->rc != SQLITE_ROW)
+        return false;
+    st->rc = sqlite3_step(st->stmt);
+    return st->rc == SQLITE_ROW;
+}
+
+/* A full disk shows as SQLITE_FULL, or as an I/O error whose cause is the quota or the largest file allowed. */
+static bool means_full(connection *c, int rc)
+{
+    if ((rc & 0xff) == SQLITE_FULL)
+        return true;
+    int cause = sqlite3_system_errno(c->db);
+    return (rc & 0xff) == SQLITE_IOERR && (cause == ENOSPC || cause == EDQUOT || cause == EFBIG);
+}
+
+store_status statement_end(statement *st)
+{
+    store_status status = STORE_OK;
+    if (st->rc != SQLITE_OK && st->rc != SQLITE_ROW && st->rc != SQLITE_DONE) {
+        status = means_full(st->c, st->rc) ? STORE_FULL : STORE_ERROR;
+        snprintf(st->c->message, sizeof st->c->message, "%s (SQLite code %d)", sqlite3_errmsg(st->c->db),
+                 sqlite3_extended_errcode(st->c->db));
+    }
+    if (st->stmt) {
+        sqlite3_reset(st->stmt);
+        sqlite3_clear_bindings(st->stmt);
+    }
+    return status;
+}
+
+store_status statement_run(statement *st)
+{
+    statement_row(st);
+    return statement_end(st);
+}
+
+int64_t connection_changes(const connection *c)
+{
+    return sqlite3_changes64(c->db);
+}
+
+void connection_checkpoint(connection *c)
+{
+    sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+}

@@ -1,0 +1,78 @@
+/* connection.h: one SQLite connection and the statements prepared on it. Used by one thread at a time. */
+#ifndef SERVER_STORE_CONNECTION_H
+#define SERVER_STORE_CONNECTION_H
+
+#include "store/store.h"
+
+#include <sqlite3.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum {
+    QUERY_BEGIN,
+    QUERY_COMMIT,
+    QUERY_ROLLBACK,
+    QUERY_NEWEST_ID,
+    QUERY_FIND_KEY,
+    QUERY_INSERT_JOB,
+    QUERY_INSERT_REQUEST,
+    QUERY_INSERT_TAGS,
+    QUERY_CLAIM,
+    QUERY_BODY,
+    QUERY_RENEW,
+    QUERY_FINISH,
+    QUERY_INSERT_VECTOR,
+    QUERY_INSERT_HISTORY,
+    QUERY_RELEASE,
+    QUERY_RECOVER_FAIL,
+    QUERY_RECOVER_REQUEUE,
+    QUERY_DISMISS,
+    QUERY_DELETE,
+    QUERY_JOB,
+    QUERY_LIST,
+    QUERY_LIST_STATUS,
+    QUERY_LIST_TAG,
+    QUERY_LIST_TAG_STATUS,
+    QUERY_VECTOR,
+    QUERY_HISTORY,
+    QUERY_COUNTS,
+    QUERY_COUNT
+} query_id;
+
+typedef struct {
+    sqlite3 *db;
+    sqlite3_stmt *statements[QUERY_COUNT]; /* prepared when first used */
+    char message[256];                     /* cause of the last failure that statement_status saw */
+} connection;
+
+/* The writer sets WAL, full synchronisation and the limit of the journal; a reader cannot write. */
+bool connection_open(connection *c, const char *path, bool writer, char *message, size_t size);
+void connection_close(connection *c);
+
+/* A statement in use. The first failure of its calls is kept in rc and makes the later ones do nothing, so that only
+ * the end needs a look: bind..., step..., statement_end. Bound memory must live until statement_end. */
+typedef struct {
+    connection *c;
+    sqlite3_stmt *stmt;
+    int rc;
+} statement;
+
+statement statement_begin(connection *c, query_id q);
+void bind_integer(statement *st, int at, int64_t value);
+void bind_real(statement *st, int at, double value);
+void bind_text(statement *st, int at, const char *text); /* NULL binds NULL */
+void bind_blob(statement *st, int at, const void *data, size_t size);
+bool statement_row(statement *st); /* true while there is a row; then columns may be read */
+/* Ends it: STORE_OK, STORE_FULL or STORE_ERROR, and the cause in c->message. */
+store_status statement_end(statement *st);
+/* Steps a statement that yields nothing and ends it. */
+store_status statement_run(statement *st);
+
+/* Rows that the last write of this connection changed. */
+int64_t connection_changes(const connection *c);
+
+/* Moves the journal into the database and cuts it to nothing. */
+void connection_checkpoint(connection *c);
+
+#endif

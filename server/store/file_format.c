@@ -1,0 +1,118 @@
+#include "store/file_format.h"
+
+#include "store/store.h"
+
+#include <stdint.h>
+#include <stdio.h>
+
+/* The rule for changing this format:
+ *   - A released version never changes. A change adds 1 to FILE_FORMAT_VERSION and brings a step that turns version n
+ *     into n + 1 in one transaction, which also sets user_version; opening then applies the missing steps in order.
+ *   - A newer file is refused by an older program, so a column never changes its meaning silently.
+ *   - Numbers that stand in rows keep their meaning: job.status is the value of job_status, 0 accepted, 1 running,
+ *     2 successful, 3 failed, 4 dismissed. New values are added at the end.
+ *   - Rows of doubles carry their own version, FILE_FORMAT_VECTOR_VERSION: another encoding gets another number, and
+ *     the reader keeps every number it ever wrote.
+ *
+ * job      what a listing needs, in small rows. Times are Unix seconds, 0: not yet. lease is when the owner's claim
+ * ends. request  the body as it was sent; in its own table, so that a listing never reads past it. tag      one row for
+ * each tag of a job, so that a filter by tag is a range of an index. vector   a named vector of a result, in parts of
+ * bounded size; every part repeats the count of the whole vector. history  rows of a convergence history, in parts;
+ * last is the iteration of the part's last row, so that a reader who has seen some rows skips whole parts. Deleting a
+ * job deletes its rows in every other table. */
+static const char *const SCHEMA =
+    "CREATE TABLE job("
+    "  id TEXT PRIMARY KEY NOT NULL,"
+    "  status INTEGER NOT NULL CHECK(status BETWEEN 0 AND 4),"
+    "  progress INTEGER NOT NULL DEFAULT 0 CHECK(progress BETWEEN 0 AND 100),"
+    "  attempts INTEGER NOT NULL DEFAULT 0,"
+    "  created REAL NOT NULL, started REAL NOT NULL DEFAULT 0, finished REAL NOT NULL DEFAULT 0,"
+    "  owner TEXT, lease REAL NOT NULL DEFAULT 0,"
+    "  tags TEXT NOT NULL, summary TEXT, error TEXT,"
+    "  idempotency_key TEXT UNIQUE"
+    ") STRICT;"
+    "CREATE INDEX job_by_status ON job(status, id);"
+    "CREATE TABLE request("
+    "  job TEXT PRIMARY KEY NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
+    "  body BLOB NOT NULL"
+    ") STRICT;"
+    "CREATE TABLE tag("
+    "  tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
+    "  PRIMARY KEY(tag, job)"
+    ") STRICT, WITHOUT ROWID;"
+    "CREATE INDEX tag_by_job ON tag(job);"
+    "CREATE TABLE vector("
+    "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
+    "  name TEXT NOT NULL, part INTEGER NOT NULL, version INTEGER NOT NULL,"
+    "  count INTEGER NOT NULL, data BLOB NOT NULL,"
+    "  PRIMARY KEY(job, name, part)"
+    ") STRICT;"
+    "CREATE TABLE history("
+    "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
+    "  part INTEGER NOT NULL, version INTEGER NOT NULL,"
+    "  columns INTEGER NOT NULL, last REAL NOT NULL, data BLOB NOT NULL,"
+    "  PRIMARY KEY(job, part)"
+    ") STRICT;";
+
+_Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
+               "these numbers stand in stored rows");
+
+const char *file_format_why_unreadable(sqlite3 *db)
+{
+    if (db && sqlite3_errcode(db) == SQLITE_NOTADB)
+        return "the file is not an SQLite database; give the path of a new file instead";
+    return db ? sqlite3_errmsg(db) : "no memory";
+}
+
+/* The single integer that `sql` yields; false on any error. */
+static bool read_integer(sqlite3 *db, const char *sql, int64_t *value)
+{
+    sqlite3_stmt *stmt = NULL;
+    bool ok = sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW;
+    if (ok)
+        *value = sqlite3_column_int64(stmt, 0);
+    sqlite3_finalize(stmt);
+    return ok;
+}
+
+bool file_format_check(sqlite3 *db, bool *fresh, char *message, size_t size)
+{
+    int64_t application = 0, version = 0, objects = 0;
+    *fresh = false;
+    if (!read_integer(db, "SELECT count(*) FROM sqlite_schema", &objects) ||
+        !read_integer(db, "PRAGMA application_id", &application) ||
+        !read_integer(db, "PRAGMA user_version", &version)) {
+        snprintf(message, size, "%s", file_format_why_unreadable(db));
+        return false;
+    }
+    if (objects == 0 && application == 0 && version == 0) {
+        *fresh = true;
+        return true;
+    }
+    if (application != FILE_FORMAT_APPLICATION_ID) {
+        snprintf(message, size, "the file is the SQLite database of another program; give the path of a new file");
+        return false;
+    }
+    if (version != FILE_FORMAT_VERSION) {
+        snprintf(message, size, "the file has format version %lld and this program reads version %d%s",
+                 (long long)version, FILE_FORMAT_VERSION,
+                 version > FILE_FORMAT_VERSION ? ": it was written by a newer program" : "");
+        return false;
+    }
+    return true;
+}
+
+bool file_format_create(sqlite3 *db, char *message, size_t size)
+{
+    char pragmas[128];
+    snprintf(pragmas, sizeof pragmas, "PRAGMA application_id = %d; PRAGMA user_version = %d; COMMIT;",
+             FILE_FORMAT_APPLICATION_ID, FILE_FORMAT_VERSION);
+    if (sqlite3_exec(db, "BEGIN IMMEDIATE", NULL, NULL, NULL) == SQLITE_OK &&
+        sqlite3_exec(db, SCHEMA, NULL, NULL, NULL) == SQLITE_OK &&
+        sqlite3_exec(db, pragmas, NULL, NULL, NULL) == SQLITE_OK)
+        return true;
+    snprintf(message, size, "cannot create the tables: %s", sqlite3_errmsg(db));
+    if (!sqlite3_get_autocommit(db))
+        sqlite3_exec(db, "ROLLBACK", NULL, NULL, NULL);
+    return false;
+}

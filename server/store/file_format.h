@@ -1,0 +1,23 @@
+/* file_format.h: the format of the database file, and the rule for changing it. */
+#ifndef SERVER_STORE_FILE_FORMAT_H
+#define SERVER_STORE_FILE_FORMAT_H
+
+#include <sqlite3.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+#define FILE_FORMAT_APPLICATION_ID 0x757a6177 /* "uzaw" */
+#define FILE_FORMAT_VERSION        1          /* PRAGMA user_version */
+#define FILE_FORMAT_VECTOR_VERSION 1          /* of each row of doubles: 1 is little-endian IEEE 754 binary64 */
+
+/* Why the last read of the file failed, for the person who gave its path. Valid until the next call on db. */
+const char *file_format_why_unreadable(sqlite3 *db);
+
+/* True if the file is empty (*fresh) or ours in a version that this program reads; otherwise the reason in message.
+ * Changes nothing, so that a file that belongs to another program stays as it was. */
+bool file_format_check(sqlite3 *db, bool *fresh, char *message, size_t size);
+
+/* Creates all tables in one transaction: a crash leaves an empty file, which the next start takes as fresh. */
+bool file_format_create(sqlite3 *db, char *message, size_t size);
+
+#endif

@@ -1,0 +1,54 @@
+/* internal.h: what the files of the store share. */
+#ifndef SERVER_STORE_INTERNAL_H
+#define SERVER_STORE_INTERNAL_H
+
+#include "store/connection.h"
+#include "store/store.h"
+
+#include <pthread.h>
+
+#define STORE_READERS 4
+
+/* Lock order: none of these is taken while another is held, except message under writer_lock. */
+struct store {
+    pthread_mutex_t writer_lock; /* writer, last_ms, sequence */
+    connection writer;           /* the only one that writes and checkpoints */
+    uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
+    unsigned sequence;
+
+    pthread_mutex_t readers_lock; /* readers_free */
+    pthread_cond_t reader_free;
+    connection readers[STORE_READERS];
+    connection *readers_free[STORE_READERS];
+    int n_readers_free;
+
+    pthread_mutex_t message_lock; /* message */
+    char message[256];
+    int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
+};
+
+/* Runs `change` as one transaction on the writer: STORE_OK commits, anything else rolls back. On a full disk the
+ * journal is moved into the database and `change` runs once more, so it must reset what it publishes. */
+typedef store_status (*store_change)(store *s, connection *c, void *args);
+store_status store_write(store *s, store_change change, void *args);
+
+/* A reader for the calling thread alone, until it is given back with how the read ended, which is returned. */
+connection *store_take_reader(store *s);
+store_status store_give_reader(store *s, connection *c, store_status status);
+
+/* The next id, 32 hex digits: 12 of milliseconds, 4 of a counter within them, 16 random. Under writer_lock. */
+void store_next_id(store *s, char id[33]);
+
+double store_now(void); /* Unix seconds */
+
+/* The job in the current row, whose first columns are the job's. Failure leaves *out zero. */
+store_status store_read_job(statement *st, job *out);
+
+/* STORE_CONFLICT if the job exists, else STORE_NOT_FOUND: why an update found nothing to change. */
+store_status store_why_unchanged(connection *c, const char *id);
+
+/* Inserts the vectors and the history of a job that has none. */
+store_status store_insert_vectors(connection *c, const char *id, const store_outcome *outcome);
+store_status store_insert_history(connection *c, const char *id, const store_outcome *outcome);
+
+#endif

@@ -1,0 +1,368 @@
+/* jobs.c: the life of a job, each step one transaction. */
+#include "store/internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const STATUS_NAMES[] = {"accepted", "running", "successful", "failed", "dismissed"};
+#define STATUS_COUNT (sizeof STATUS_NAMES / sizeof STATUS_NAMES[0])
+
+const char *job_status_name(job_status status)
+{
+    return (size_t)status < STATUS_COUNT ? STATUS_NAMES[status] : "unknown";
+}
+
+bool job_status_parse(job_status *out, const char *name)
+{
+    for (size_t i = 0; i < STATUS_COUNT; i++)
+        if (strcmp(name, STATUS_NAMES[i]) == 0) {
+            *out = (job_status)i;
+            return true;
+        }
+    return false;
+}
+
+void job_clear(job *j)
+{
+    if (!j)
+        return;
+    free(j->tags);
+    free(j->summary);
+    free(j->error);
+    memset(j, 0, sizeof *j);
+}
+
+static bool has_ended(job_status status)
+{
+    return status == JOB_SUCCESSFUL || status == JOB_FAILED || status == JOB_DISMISSED;
+}
+
+store_status store_why_unchanged(connection *c, const char *id)
+{
+    statement st = statement_begin(c, QUERY_JOB);
+    bind_text(&st, 1, id);
+    bool exists = statement_row(&st);
+    store_status status = statement_end(&st);
+    return status != STORE_OK ? status : exists ? STORE_CONFLICT : STORE_NOT_FOUND;
+}
+
+/* Runs an update that must change the job `id`. */
+static store_status run_update(statement *st, const char *id)
+{
+    connection *c = st->c;
+    store_status status = statement_run(st);
+    return status == STORE_OK && connection_changes(c) == 0 ? store_why_unchanged(c, id) : status;
+}
+
+/* ---- submit */
+
+typedef struct {
+    const char *body;
+    size_t body_len;
+    const char *tags, *key;
+    job *out;
+    bool repeated;
+} submit_args;
+
+/* The job that came with this key before: STORE_NOT_FOUND, STORE_CONFLICT if its body was another one. Bodies are
+ * compared byte by byte: nothing has to be stored or computed for the many requests that are never repeated. */
+static store_status find_key(connection *c, submit_args *a)
+{
+    store_status status = STORE_NOT_FOUND;
+    statement st = statement_begin(c, QUERY_FIND_KEY);
+    bind_text(&st, 1, a->key);
+    bind_integer(&st, 2, (int64_t)a->body_len);
+    bind_blob(&st, 3, a->body, a->body_len);
+    if (statement_row(&st))
+        status = sqlite3_column_int(st.stmt, 10) ? store_read_job(&st, a->out) : STORE_CONFLICT;
+    store_status ended = statement_end(&st);
+    return ended == STORE_OK ? status : ended;
+}
+
+static store_status insert_job(connection *c, const submit_args *a, const char *id)
+{
+    statement st = statement_begin(c, QUERY_INSERT_JOB);
+    bind_text(&st, 1, id);
+    bind_real(&st, 2, store_now());
+    bind_text(&st, 3, a->tags);
+    bind_text(&st, 4, a->key);
+    store_status status = statement_run(&st);
+    if (status != STORE_OK)
+        return status;
+    st = statement_begin(c, QUERY_INSERT_REQUEST);
+    bind_text(&st, 1, id);
+    bind_blob(&st, 2, a->body, a->body_len);
+    status = statement_run(&st);
+    if (status != STORE_OK)
+        return status;
+    st = statement_begin(c, QUERY_INSERT_TAGS);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, a->tags);
+    return statement_run(&st);
+}
+
+static store_status read_by_id(connection *c, const char *id, job *out)
+{
+    store_status status = STORE_NOT_FOUND;
+    statement st = statement_begin(c, QUERY_JOB);
+    bind_text(&st, 1, id);
+    if (statement_row(&st))
+        status = store_read_job(&st, out);
+    store_status ended = statement_end(&st);
+    return ended == STORE_OK ? status : ended;
+}
+
+static store_status submit(store *s, connection *c, void *args)
+{
+    submit_args *a = args;
+    char id[33];
+    job_clear(a->out);
+    a->repeated = false;
+    if (a->key) {
+        store_status status = find_key(c, a);
+        a->repeated = status == STORE_OK;
+        if (status != STORE_NOT_FOUND)
+            return status;
+    }
+    store_next_id(s, id);
+    store_status status = insert_job(c, a, id);
+    return status == STORE_OK ? read_by_id(c, id, a->out) : status;
+}
+
+store_status store_submit(store *s, const char *body, size_t body_len, const char *tags, const char *idempotency_key,
+                          job *out, bool *repeated)
+{
+    memset(out, 0, sizeof *out);
+    submit_args a = {body, body_len, tags ? tags : "[]", idempotency_key, out, false};
+    store_status status = store_write(s, submit, &a);
+    if (status != STORE_OK)
+        job_clear(out);
+    *repeated = status == STORE_OK && a.repeated;
+    return status;
+}
+
+/* ---- claim */
+
+typedef struct {
+    const char *owner;
+    double lease_s;
+    job *out;
+    char *body;
+    size_t body_len;
+} claim_args;
+
+static store_status read_body(connection *c, claim_args *a)
+{
+    store_status status = STORE_ERROR;
+    statement st = statement_begin(c, QUERY_BODY);
+    bind_text(&st, 1, a->out->id);
+    if (statement_row(&st)) {
+        size_t size = (size_t)sqlite3_column_bytes(st.stmt, 0);
+        const void *data = sqlite3_column_blob(st.stmt, 0);
+        a->body = malloc(size + 1);
+        if (a->body && (data || size == 0)) {
+            if (size > 0)
+                memcpy(a->body, data, size);
+            a->body[size] = '\0';
+            a->body_len = size;
+            status = STORE_OK;
+        }
+    }
+    store_status ended = statement_end(&st);
+    if (ended == STORE_OK && status != STORE_OK)
+        strcpy(c->message, "the request of a job is missing, or there is no memory for it");
+    return ended == STORE_OK ? status : ended;
+}
+
+static store_status claim(store *s, connection *c, void *args)
+{
+    (void)s;
+    claim_args *a = args;
+    job_clear(a->out);
+    free(a->body);
+    a->body = NULL;
+    store_status status = STORE_NOT_FOUND;
+    statement st = statement_begin(c, QUERY_CLAIM);
+    bind_real(&st, 1, store_now());
+    bind_text(&st, 2, a->owner);
+    bind_real(&st, 3, a->lease_s);
+    if (statement_row(&st))
+        status = store_read_job(&st, a->out);
+    store_status ended = statement_end(&st);
+    if (ended != STORE_OK)
+        status = ended;
+    return status == STORE_OK ? read_body(c, a) : status;
+}
+
+store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len)
+{
+    memset(out, 0, sizeof *out);
+    *body = NULL;
+    *body_len = 0;
+    claim_args a = {owner, lease_s, out, NULL, 0};
+    store_status status = store_write(s, claim, &a);
+    if (status != STORE_OK) {
+        job_clear(out);
+        free(a.body);
+        return status;
+    }
+    *body = a.body;
+    *body_len = a.body_len;
+    return STORE_OK;
+}
+
+/* ---- while it runs and when it ends */
+
+typedef struct {
+    const char *id, *owner;
+    double lease_s;
+    int progress;
+    const store_outcome *outcome;
+} owner_args;
+
+static store_status renew(store *s, connection *c, void *args)
+{
+    (void)s;
+    const owner_args *a = args;
+    statement st = statement_begin(c, QUERY_RENEW);
+    bind_text(&st, 1, a->id);
+    bind_text(&st, 2, a->owner);
+    bind_real(&st, 3, store_now() + a->lease_s);
+    bind_integer(&st, 4, a->progress < 0 ? 0 : a->progress > 100 ? 100 : a->progress);
+    return run_update(&st, a->id);
+}
+
+store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress)
+{
+    owner_args a = {id, owner, lease_s, progress, NULL};
+    return store_write(s, renew, &a);
+}
+
+static store_status finish(store *s, connection *c, void *args)
+{
+    (void)s;
+    const owner_args *a = args;
+    if (!has_ended(a->outcome->status)) {
+        strcpy(c->message, "a job cannot be finished with a status that is not an end");
+        return STORE_ERROR;
+    }
+    statement st = statement_begin(c, QUERY_FINISH);
+    bind_text(&st, 1, a->id);
+    bind_text(&st, 2, a->owner);
+    bind_integer(&st, 3, a->outcome->status);
+    bind_real(&st, 4, store_now());
+    bind_text(&st, 5, a->outcome->summary);
+    bind_text(&st, 6, a->outcome->error);
+    store_status status = run_update(&st, a->id);
+    if (status == STORE_OK)
+        status = store_insert_vectors(c, a->id, a->outcome);
+    if (status == STORE_OK)
+        status = store_insert_history(c, a->id, a->outcome);
+    return status;
+}
+
+store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome)
+{
+    owner_args a = {id, owner, 0.0, 0, outcome};
+    return store_write(s, finish, &a);
+}
+
+static store_status release(store *s, connection *c, void *args)
+{
+    (void)s;
+    const owner_args *a = args;
+    statement st = statement_begin(c, QUERY_RELEASE);
+    bind_text(&st, 1, a->id);
+    bind_text(&st, 2, a->owner);
+    return run_update(&st, a->id);
+}
+
+store_status store_release(store *s, const char *id, const char *owner)
+{
+    owner_args a = {id, owner, 0.0, 0, NULL};
+    return store_write(s, release, &a);
+}
+
+/* ---- recover */
+
+typedef struct {
+    int max_attempts;
+    const char *error_json;
+    int64_t requeued, failed;
+} recover_args;
+
+static store_status recover(store *s, connection *c, void *args)
+{
+    (void)s;
+    recover_args *a = args;
+    statement st = statement_begin(c, QUERY_RECOVER_FAIL);
+    bind_integer(&st, 1, a->max_attempts);
+    bind_real(&st, 2, store_now());
+    bind_text(&st, 3, a->error_json);
+    store_status status = statement_run(&st);
+    if (status != STORE_OK)
+        return status;
+    a->failed = connection_changes(c);
+    st = statement_begin(c, QUERY_RECOVER_REQUEUE);
+    status = statement_run(&st);
+    a->requeued = connection_changes(c);
+    return status;
+}
+
+/* The lock on the file proves that no owner of a running job is alive, whatever its lease says. */
+store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)
+{
+    recover_args a = {max_attempts, error_json, 0, 0};
+    store_status status = store_write(s, recover, &a);
+    if (requeued)
+        *requeued = status == STORE_OK ? a.requeued : 0;
+    if (failed)
+        *failed = status == STORE_OK ? a.failed : 0;
+    return status;
+}
+
+/* ---- dismiss */
+
+typedef struct {
+    const char *id;
+    job_status was;
+} dismiss_args;
+
+static store_status dismiss(store *s, connection *c, void *args)
+{
+    (void)s;
+    dismiss_args *a = args;
+    job j = {0};
+    store_status status = read_by_id(c, a->id, &j);
+    if (status != STORE_OK)
+        return status;
+    a->was = j.status;
+    job_clear(&j);
+    if (a->was == JOB_RUNNING)
+        return STORE_OK;
+    statement st = statement_begin(c, a->was == JOB_ACCEPTED ? QUERY_DISMISS : QUERY_DELETE);
+    bind_text(&st, 1, a->id);
+    if (a->was == JOB_ACCEPTED)
+        bind_real(&st, 2, store_now());
+    return statement_run(&st);
+}
+
+store_status store_dismiss(store *s, const char *id, job_status *was)
+{
+    dismiss_args a = {id, JOB_ACCEPTED};
+    store_status status = store_write(s, dismiss, &a);
+    *was = a.was;
+    return status;
+}
+
+/* ---- one job */
+
+store_status store_get(store *s, const char *id, job *out)
+{
+    memset(out, 0, sizeof *out);
+    connection *c = store_take_reader(s);
+    store_status status = read_by_id(c, id, out);
+    if (status != STORE_OK)
+        job_clear(out);
+    return store_give_reader(s, c, status);
+}

@@ -1,0 +1,108 @@
+/* query.c: jobs read in rows. */
+#include "store/internal.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* A copy of a text column; NULL for SQL NULL, and *ok false when there is no memory. */
+static char *copy_text(sqlite3_stmt *stmt, int at, bool *ok)
+{
+    if (sqlite3_column_type(stmt, at) == SQLITE_NULL)
+        return NULL;
+    const char *text = (const char *)sqlite3_column_text(stmt, at);
+    char *copy = text ? strdup(text) : NULL;
+    *ok = *ok && copy;
+    return copy;
+}
+
+store_status store_read_job(statement *st, job *out)
+{
+    sqlite3_stmt *row = st->stmt;
+    job_clear(out);
+    const char *id = (const char *)sqlite3_column_text(row, 0);
+    bool ok = id && strlen(id) < sizeof out->id;
+    if (ok)
+        strcpy(out->id, id);
+    out->status = (job_status)sqlite3_column_int(row, 1);
+    out->progress = sqlite3_column_int(row, 2);
+    out->attempts = sqlite3_column_int(row, 3);
+    out->created = sqlite3_column_double(row, 4);
+    out->started = sqlite3_column_double(row, 5);
+    out->finished = sqlite3_column_double(row, 6);
+    out->tags = copy_text(row, 7, &ok);
+    out->summary = copy_text(row, 8, &ok);
+    out->error = copy_text(row, 9, &ok);
+    if (ok)
+        return STORE_OK;
+    job_clear(out);
+    strcpy(st->c->message, "a job's row is damaged, or there is no memory for it");
+    return STORE_ERROR;
+}
+
+static query_id list_query(const store_query *q)
+{
+    if (q->tag)
+        return q->by_status ? QUERY_LIST_TAG_STATUS : QUERY_LIST_TAG;
+    return q->by_status ? QUERY_LIST_STATUS : QUERY_LIST;
+}
+
+/* Reads up to limit + 1 rows: one more says whether there are older ones. */
+static store_status read_list(connection *c, const store_query *q, int limit, job *jobs, size_t *count)
+{
+    store_status status = STORE_OK;
+    statement st = statement_begin(c, list_query(q));
+    bind_text(&st, 1, q->before ? q->before : "~"); /* after every hex digit */
+    bind_integer(&st, 2, limit + 1);
+    if (q->by_status)
+        bind_integer(&st, 3, q->status);
+    if (q->tag)
+        bind_text(&st, 4, q->tag);
+    while (status == STORE_OK && *count <= (size_t)limit && statement_row(&st)) {
+        status = store_read_job(&st, &jobs[*count]);
+        *count += status == STORE_OK;
+    }
+    store_status ended = statement_end(&st);
+    return ended == STORE_OK ? status : ended;
+}
+
+store_status store_list(store *s, const store_query *query, job **jobs, size_t *count, bool *more)
+{
+    int limit = query->limit < 1 ? 1 : query->limit > 1000 ? 1000 : query->limit;
+    *jobs = NULL;
+    *count = 0;
+    *more = false;
+    job *found = calloc((size_t)limit + 1, sizeof *found);
+    size_t n = 0;
+    connection *c = store_take_reader(s);
+    store_status status = STORE_ERROR;
+    if (found)
+        status = read_list(c, query, limit, found, &n);
+    else
+        strcpy(c->message, "no memory for a list of jobs");
+    store_give_reader(s, c, status);
+    if (status != STORE_OK) {
+        while (n > 0)
+            job_clear(&found[--n]);
+        free(found);
+        return status;
+    }
+    *more = n > (size_t)limit;
+    if (*more)
+        job_clear(&found[--n]);
+    *jobs = found;
+    *count = n;
+    return STORE_OK;
+}
+
+store_status store_counts(store *s, int64_t counts[5])
+{
+    memset(counts, 0, 5 * sizeof counts[0]);
+    connection *c = store_take_reader(s);
+    statement st = statement_begin(c, QUERY_COUNTS);
+    while (statement_row(&st)) {
+        int status = sqlite3_column_int(st.stmt, 0);
+        if (status >= 0 && status < 5)
+            counts[status] = sqlite3_column_int64(st.stmt, 1);
+    }
+    return store_give_reader(s, c, statement_end(&st));
+}

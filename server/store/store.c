@@ -1,0 +1,255 @@
+#include "store/internal.h"
+#include "store/file_format.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+/* ---- opening */
+
+/* Opens or creates the file and locks it against a second daemon; -1 with the reason. flock, not a file beside it:
+ * it follows links, ends with the process and leaves nothing behind. It does not meet SQLite's own locks, but closing
+ * any descriptor of the file drops those of this process, so this one is closed after SQLite's. */
+static int lock_file(const char *path, char *message, size_t size)
+{
+    struct stat st;
+    int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0600);
+    if (file < 0) {
+        snprintf(message, size, "cannot open the file: %s", strerror(errno));
+        return -1;
+    }
+    if (fstat(file, &st) != 0 || !S_ISREG(st.st_mode))
+        snprintf(message, size, "it is not a regular file");
+    else if (flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+        snprintf(message, size, "another daemon is using this file; stop it or give another path");
+    else
+        return file; /* a file system without flock (ENOLCK, EOPNOTSUPP) is used unguarded */
+    close(file);
+    return -1;
+}
+
+/* The journal must be WAL: readers then never wait for the writer. */
+static bool set_wal(sqlite3 *db, char *message, size_t size)
+{
+    sqlite3_stmt *stmt = NULL;
+    bool ok = sqlite3_prepare_v2(db, "PRAGMA journal_mode = WAL", -1, &stmt, NULL) == SQLITE_OK &&
+              sqlite3_step(stmt) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(stmt, 0), "wal") == 0;
+    sqlite3_finalize(stmt);
+    if (!ok)
+        snprintf(message, size, "cannot use a write-ahead log beside the file: %s", sqlite3_errmsg(db));
+    return ok;
+}
+
+static bool open_writer(store *s, const char *path, char *message, size_t size)
+{
+    bool fresh;
+    return connection_open(&s->writer, path, true, message, size) &&
+           file_format_check(s->writer.db, &fresh, message, size) && set_wal(s->writer.db, message, size) &&
+           (!fresh || file_format_create(s->writer.db, message, size));
+}
+
+static bool open_readers(store *s, const char *path, char *message, size_t size)
+{
+    for (int i = 0; i < STORE_READERS; i++) {
+        if (!connection_open(&s->readers[i], path, false, message, size))
+            return false;
+        s->readers_free[s->n_readers_free++] = &s->readers[i];
+    }
+    return true;
+}
+
+/* Continues the ids where the file's newest one stands. */
+static bool read_newest_id(store *s, char *message, size_t size)
+{
+    statement st = statement_begin(&s->writer, QUERY_NEWEST_ID);
+    unsigned long long ms = 0;
+    unsigned sequence = 0;
+    if (statement_row(&st) && sqlite3_column_type(st.stmt, 0) == SQLITE_TEXT &&
+        sscanf((const char *)sqlite3_column_text(st.stmt, 0), "%12llx%4x", &ms, &sequence) == 2) {
+        s->last_ms = ms;
+        s->sequence = sequence;
+    }
+    if (statement_end(&st) == STORE_OK)
+        return true;
+    snprintf(message, size, "cannot read the jobs: %s", s->writer.message);
+    return false;
+}
+
+/* An absolute path: SQLite would take "file:..." for a URI. */
+static bool open_connections(store *s, const char *path, char *message, size_t size)
+{
+    char *absolute = realpath(path, NULL);
+    bool ok = absolute && open_writer(s, absolute, message, size) && read_newest_id(s, message, size) &&
+              open_readers(s, absolute, message, size);
+    if (!absolute)
+        snprintf(message, size, "cannot resolve the path: %s", strerror(errno));
+    free(absolute);
+    return ok;
+}
+
+store *store_open(const char *path, char *message, size_t size)
+{
+    char why[300] = "";
+    store *s = calloc(1, sizeof *s);
+    if (!s) {
+        snprintf(message, size, "%s: no memory", path);
+        return NULL;
+    }
+    pthread_mutex_init(&s->writer_lock, NULL);
+    pthread_mutex_init(&s->readers_lock, NULL);
+    pthread_mutex_init(&s->message_lock, NULL);
+    pthread_cond_init(&s->reader_free, NULL);
+    s->file = lock_file(path, why, sizeof why);
+    if (s->file < 0 || !open_connections(s, path, why, sizeof why)) {
+        snprintf(message, size, "%s: %s", path, why);
+        store_close(s);
+        return NULL;
+    }
+    return s;
+}
+
+void store_close(store *s)
+{
+    if (!s)
+        return;
+    for (int i = 0; i < STORE_READERS; i++)
+        connection_close(&s->readers[i]);
+    connection_close(&s->writer); /* the last one: checkpoints and removes the journal */
+    if (s->file >= 0)
+        close(s->file);
+    pthread_cond_destroy(&s->reader_free);
+    pthread_mutex_destroy(&s->message_lock);
+    pthread_mutex_destroy(&s->readers_lock);
+    pthread_mutex_destroy(&s->writer_lock);
+    free(s);
+}
+
+/* ---- the last failure's cause */
+
+static void keep_message(store *s, const connection *c)
+{
+    pthread_mutex_lock(&s->message_lock);
+    snprintf(s->message, sizeof s->message, "%s", c->message);
+    pthread_mutex_unlock(&s->message_lock);
+}
+
+void store_message(store *s, char *buffer, size_t size)
+{
+    pthread_mutex_lock(&s->message_lock);
+    snprintf(buffer, size, "%s", s->message);
+    pthread_mutex_unlock(&s->message_lock);
+}
+
+/* ---- transactions */
+
+static store_status run_query(connection *c, query_id q)
+{
+    statement st = statement_begin(c, q);
+    return statement_run(&st);
+}
+
+static store_status attempt(store *s, store_change change, void *args)
+{
+    connection *c = &s->writer;
+    store_status status = run_query(c, QUERY_BEGIN);
+    if (status != STORE_OK)
+        return status;
+    status = change(s, c, args);
+    if (status == STORE_OK)
+        status = run_query(c, QUERY_COMMIT);
+    if (!sqlite3_get_autocommit(c->db)) { /* a full disk may have rolled back already */
+        char cause[sizeof c->message];
+        memcpy(cause, c->message, sizeof cause);
+        run_query(c, QUERY_ROLLBACK);
+        memcpy(c->message, cause, sizeof cause);
+    }
+    return status;
+}
+
+store_status store_write(store *s, store_change change, void *args)
+{
+    pthread_mutex_lock(&s->writer_lock);
+    store_status status = attempt(s, change, args);
+    if (status == STORE_FULL) {
+        connection_checkpoint(&s->writer);
+        status = attempt(s, change, args);
+    }
+    if (status == STORE_ERROR || status == STORE_FULL)
+        keep_message(s, &s->writer);
+    pthread_mutex_unlock(&s->writer_lock);
+    return status;
+}
+
+connection *store_take_reader(store *s)
+{
+    pthread_mutex_lock(&s->readers_lock);
+    while (s->n_readers_free == 0)
+        pthread_cond_wait(&s->reader_free, &s->readers_lock);
+    connection *c = s->readers_free[--s->n_readers_free];
+    pthread_mutex_unlock(&s->readers_lock);
+    return c;
+}
+
+store_status store_give_reader(store *s, connection *c, store_status status)
+{
+    if (status == STORE_ERROR)
+        keep_message(s, c);
+    pthread_mutex_lock(&s->readers_lock);
+    s->readers_free[s->n_readers_free++] = c;
+    pthread_cond_signal(&s->reader_free);
+    pthread_mutex_unlock(&s->readers_lock);
+    return status;
+}
+
+store_status store_limit_bytes(store *s, int64_t bytes)
+{
+    char sql[96];
+    sqlite3_stmt *stmt = NULL;
+    pthread_mutex_lock(&s->writer_lock);
+    connection *c = &s->writer;
+    int64_t page = 4096;
+    if (sqlite3_prepare_v2(c->db, "PRAGMA page_size", -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW)
+        page = sqlite3_column_int64(stmt, 0);
+    sqlite3_finalize(stmt);
+    /* 2^32 - 2 pages is SQLite's own limit; 0 would ask for the limit instead of setting it. */
+    long long pages = bytes <= 0 ? 4294967294LL : bytes < page ? 1 : (long long)(bytes / page);
+    snprintf(sql, sizeof sql, "PRAGMA max_page_count = %lld", pages);
+    int rc = sqlite3_exec(c->db, sql, NULL, NULL, NULL);
+    snprintf(c->message, sizeof c->message, "%s", sqlite3_errmsg(c->db));
+    if (rc != SQLITE_OK)
+        keep_message(s, c);
+    pthread_mutex_unlock(&s->writer_lock);
+    return rc == SQLITE_OK ? STORE_OK : STORE_ERROR;
+}
+
+/* ---- ids and time */
+
+double store_now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_REALTIME, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+void store_next_id(store *s, char id[33])
+{
+    uint64_t random = 0, ms = (uint64_t)(store_now() * 1e3) & 0xffffffffffffu;
+    if (ms > s->last_ms) {
+        s->last_ms = ms;
+        s->sequence = 0;
+    } else if (++s->sequence > 0xffff) {
+        s->last_ms++;
+        s->sequence = 0;
+    }
+    /* Time and counter alone make the id unique in this file; the random part keeps ids from being guessed. */
+    if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
+        random = ms * 0x9e3779b97f4a7c15u;
+    snprintf(id, 33, "%012llx%04x%016llx", (unsigned long long)s->last_ms, s->sequence, (unsigned long long)random);
+}

@@ -1,0 +1,118 @@
+/* store.h: jobs, results and histories that survive a restart.
+ *
+ * The interface is narrow on purpose: each operation is one whole transaction, claims carry an owner and a lease, and
+ * nothing of SQLite shows, so that a shared engine (PostgreSQL) can stand behind the same calls.
+ * Every function may be called from any thread. Writes go through one connection under one mutex; reads use their own
+ * read-only connections. All strings are UTF-8; JSON texts are stored as given. Times are Unix seconds, 0: not yet. */
+#ifndef SERVER_STORE_H
+#define SERVER_STORE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct store store;
+
+typedef enum {
+    STORE_OK,
+    STORE_NOT_FOUND, /* no such job, or nothing to claim */
+    STORE_CONFLICT,  /* the job is not in a state that allows this; or the idempotency key came with another body */
+    STORE_FULL,      /* the disk is full; nothing was changed */
+    STORE_ERROR      /* anything else: store_message says what */
+} store_status;
+
+typedef enum { JOB_ACCEPTED, JOB_RUNNING, JOB_SUCCESSFUL, JOB_FAILED, JOB_DISMISSED } job_status;
+const char *job_status_name(job_status status);
+bool job_status_parse(job_status *out, const char *name);
+
+typedef struct {
+    char id[33]; /* 32 hex digits; ids sort in order of creation (millisecond time, counter, random) */
+    job_status status;
+    int progress; /* 0..100 */
+    int attempts; /* runs begun */
+    double created, started, finished;
+    char *tags;    /* JSON array of strings, never NULL */
+    char *summary; /* JSON object once it ended with an answer, else NULL */
+    char *error;   /* JSON object (problem details) when it failed, else NULL */
+} job;
+void job_clear(job *j); /* frees the texts, zeroes *j; NULL is fine */
+
+/* Opens or creates the database file. NULL on failure with the reason in message[0..size). Refuses, with a clear
+ * message, a file that is not its own or has a newer schema version. */
+store *store_open(const char *path, char *message, size_t size);
+void store_close(store *s);
+/* The last STORE_ERROR's cause, for the log; copied to buffer. */
+void store_message(store *s, char *buffer, size_t size);
+/* The largest size of the database file (never less than it has), without its journal; 0: no limit. More is
+ * STORE_FULL, as a full disk is. Not kept in the file. */
+store_status store_limit_bytes(store *s, int64_t bytes);
+
+/* ---- submit: the job is on disk (fsync) before STORE_OK is returned.
+ * idempotency_key may be NULL. When the key is known and came with the same body, *out is the earlier job and
+ * *repeated is true; with another body STORE_CONFLICT. tags: JSON array text. */
+store_status store_submit(store *s, const char *body, size_t body_len, const char *tags, const char *idempotency_key,
+                          job *out, bool *repeated);
+
+/* ---- claim: the oldest accepted job becomes running, attempts + 1, owner and lease set; *body is the request as
+ * submitted, freed by the caller. STORE_NOT_FOUND when nothing waits. */
+store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
+/* Extends the lease of a running job; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
+store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress);
+
+/* A named vector of doubles in a result: "reactions", "gaps", "displacements", "nodes", "contact_nodes", ...
+ * On disk: little-endian IEEE 754 binary64, version in the row. */
+typedef struct {
+    char name[32];
+    int64_t count;
+    const double *data;
+} store_vector;
+
+/* What a run leaves behind. */
+typedef struct {
+    job_status status;   /* JOB_SUCCESSFUL, JOB_FAILED or JOB_DISMISSED */
+    const char *summary; /* JSON object or NULL */
+    const char *error;   /* JSON object or NULL */
+    const store_vector *vectors;
+    size_t n_vectors;
+    const double *history; /* history_rows x history_columns, row by row; NULL when there is none */
+    int64_t history_rows, history_columns;
+} store_outcome;
+
+/* ---- finish: status, summary, result and history in one transaction. Only the owner of the running job may;
+ * otherwise STORE_CONFLICT and nothing is written: each job gets one result. */
+store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome);
+
+/* ---- requeue. store_release: one running job of ours goes back to accepted (shutdown), the attempt is not counted.
+ * store_recover, once at start before any claim: jobs left running by owners that are gone become accepted again, or
+ * failed with the given error JSON when attempts >= max_attempts. Counts may be NULL. */
+store_status store_release(store *s, const char *id, const char *owner);
+store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
+
+/* ---- dismiss: an accepted job becomes dismissed and *was is JOB_ACCEPTED; a running one is only reported (*was is
+ * JOB_RUNNING: the caller tells the worker); an ended one is deleted with its result and *was is its status. */
+store_status store_dismiss(store *s, const char *id, job_status *was);
+
+/* ---- read */
+store_status store_get(store *s, const char *id, job *out);
+
+typedef struct {
+    bool by_status;
+    job_status status;
+    const char *tag;    /* NULL: any */
+    const char *before; /* only jobs older than this id (the cursor); NULL: from the newest */
+    int limit;          /* 1..1000 */
+} store_query;
+/* Newest first; the caller frees with job_clear and free. *more: there are older ones. */
+store_status store_list(store *s, const store_query *query, job **jobs, size_t *count, bool *more);
+
+/* The named vector; *data is freed by the caller. STORE_NOT_FOUND if the result has none of that name. */
+store_status store_get_vector(store *s, const char *id, const char *name, double **data, int64_t *count);
+/* Rows whose first column (iteration) is > after; pass -1 for all. The caller frees *rows. STORE_NOT_FOUND if the job
+ * has no stored history; STORE_OK with a count of 0 when it has one but nothing after `after`. */
+store_status store_get_history(store *s, const char *id, int64_t after, double **rows, int64_t *count,
+                               int64_t *columns);
+
+/* Jobs in each status, indexed by job_status. */
+store_status store_counts(store *s, int64_t counts[5]);
+
+#endif
