@@ -1,0 +1,29 @@
+#include "codec/codec.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <string.h>
+
+static void copy_member(char *out, size_t size, const json_t *object, const char *key)
+{
+    const char *text = json_string_value(json_object_get(object, key));
+    snprintf(out, size, "%s", text ? text : "");
+}
+
+bool codec_decode_problem(problem_details *out, const char *json)
+{
+    memset(out, 0, sizeof *out);
+    json_t *object = json_loads(json, JSON_REJECT_DUPLICATES, NULL);
+    if (!json_is_object(object)) {
+        json_decref(object);
+        return false;
+    }
+    out->status = (int)json_integer_value(json_object_get(object, "status"));
+    out->line = json_integer_value(json_object_get(object, "line"));
+    copy_member(out->code, sizeof out->code, object, "code");
+    copy_member(out->title, sizeof out->title, object, "title");
+    copy_member(out->detail, sizeof out->detail, object, "detail");
+    copy_member(out->pointer, sizeof out->pointer, object, "pointer");
+    json_decref(object);
+    return true;
+}

@@ -1,0 +1,184 @@
+/* Replies about jobs and about the service. */
+#include "codec/codec.h"
+#include "codec/text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <time.h>
+
+/* ------------------------------------------------------------- problems */
+
+static void put_problem(text *t, const problem_details *problem)
+{
+    text_open(t, '{');
+    text_key(t, "type");
+    text_format(t, "\"/schemas/problem-details.json#%s\"", problem->code);
+    text_key(t, "title");
+    text_string(t, problem->title);
+    text_key(t, "status");
+    text_integer(t, problem->status);
+    text_key(t, "code");
+    text_string(t, problem->code);
+    text_key(t, "detail");
+    text_string(t, problem->detail);
+    if (problem->pointer[0] || problem->status == 422) {
+        text_key(t, "pointer");
+        text_string(t, problem->pointer);
+    }
+    if (problem->line > 0) {
+        text_key(t, "line");
+        text_integer(t, problem->line);
+    }
+    text_close(t, '}');
+}
+
+char *codec_encode_problem(const problem_details *problem)
+{
+    text t = {0};
+    put_problem(&t, problem);
+    return text_finish(&t, NULL);
+}
+
+/* ----------------------------------------------------------------- jobs */
+
+/* RFC 3339, UTC, milliseconds; null for 0. */
+static void put_time(text *t, const char *key, double unix_s)
+{
+    char date[32];
+    struct tm tm;
+    long long ms = (long long)floor(unix_s * 1000 + 0.5);
+    time_t seconds = (time_t)(ms / 1000);
+    text_key(t, key);
+    if (!(unix_s > 0) || !gmtime_r(&seconds, &tm) || strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%S", &tm) == 0)
+        text_put(t, "null");
+    else
+        text_format(t, "\"%s.%03dZ\"", date, (int)(ms % 1000));
+}
+
+static void put_link(text *t, const char *rel, const char *id, const char *tail)
+{
+    text_open(t, '{');
+    text_key(t, "rel");
+    text_string(t, rel);
+    text_key(t, "href");
+    text_format(t, "\"/v1/jobs%s%s%s\"", *id ? "/" : "", id, tail);
+    text_close(t, '}');
+}
+
+static void put_links(text *t, const job *j)
+{
+    text_key(t, "links");
+    text_open(t, '[');
+    put_link(t, "self", j->id, "");
+    if (j->status == JOB_SUCCESSFUL) {
+        put_link(t, "result", j->id, "/result");
+        put_link(t, "history", j->id, "/history");
+        put_link(t, "history_csv", j->id, "/history.csv");
+    }
+    text_close(t, ']');
+}
+
+static void put_job(text *t, const job *j)
+{
+    text_open(t, '{');
+    text_key(t, "id");
+    text_string(t, j->id);
+    text_key(t, "status");
+    text_string(t, job_status_name(j->status));
+    text_key(t, "progress");
+    text_integer(t, j->progress);
+    put_time(t, "created", j->created);
+    put_time(t, "started", j->started);
+    put_time(t, "finished", j->finished);
+    text_key(t, "attempts");
+    text_integer(t, j->attempts);
+    text_key(t, "tags");
+    text_raw(t, j->tags ? j->tags : "[]");
+    text_key(t, "summary");
+    text_raw(t, j->summary);
+    text_key(t, "error");
+    text_raw(t, j->error);
+    put_links(t, j);
+    text_close(t, '}');
+}
+
+char *codec_encode_job(const job *j)
+{
+    text t = {0};
+    put_job(&t, j);
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_jobs(const job *jobs, size_t count, bool more)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "jobs");
+    text_open(&t, '[');
+    for (size_t i = 0; i < count; i++)
+        put_job(&t, &jobs[i]);
+    text_close(&t, ']');
+    text_key(&t, "next");
+    text_string(&t, more && count > 0 ? jobs[count - 1].id : NULL);
+    text_key(&t, "links");
+    text_open(&t, '[');
+    put_link(&t, "self", "", "");
+    text_close(&t, ']');
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+/* -------------------------------------------------------------- service */
+
+char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes)
+{
+    text t = {0};
+    size_t bytes = 0;
+    text_open(&t, '{');
+    text_key(&t, "factors");
+    text_open(&t, '[');
+    for (size_t i = 0; i < count; i++) {
+        const uz_cache_entry *e = &entries[i];
+        bytes += e->bytes;
+        text_open(&t, '{');
+        text_key(&t, "digest");
+        text_string(&t, e->digest);
+        text_key(&t, "d");
+        text_integer(&t, e->d);
+        text_key(&t, "m");
+        text_integer(&t, e->m);
+        text_key(&t, "nnz");
+        text_integer(&t, e->nnz);
+        text_key(&t, "bytes");
+        text_integer(&t, (int64_t)e->bytes);
+        text_key(&t, "hits");
+        text_integer(&t, e->hits);
+        text_close(&t, '}');
+    }
+    text_close(&t, ']');
+    text_key(&t, "bytes");
+    text_integer(&t, (int64_t)bytes);
+    text_key(&t, "max_bytes");
+    text_integer(&t, (int64_t)max_bytes);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_health(const char *status, const int64_t counts[5], int workers)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "status");
+    text_string(&t, status);
+    text_key(&t, "workers");
+    text_integer(&t, workers);
+    text_key(&t, "jobs");
+    text_open(&t, '{');
+    for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++) {
+        text_key(&t, job_status_name((job_status)i));
+        text_integer(&t, counts[i]);
+    }
+    text_close(&t, '}');
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}

@@ -1,0 +1,106 @@
+/* Results and histories: long texts, written straight from the numbers. */
+#include "codec/codec.h"
+#include "codec/text.h"
+
+#include <math.h>
+
+/* Numbers, or points of `dim` numbers each; nothing for a vector that was not asked for. */
+static void put_vector(text *t, const char *key, const double *x, int64_t n, int dim)
+{
+    if (!x)
+        return;
+    text_key(t, key);
+    if (dim < 2) {
+        text_numbers(t, x, n);
+        return;
+    }
+    text_open(t, '[');
+    for (int64_t i = 0; i + dim <= n && !t->failed; i += dim)
+        text_numbers(t, x + i, dim);
+    text_close(t, ']');
+}
+
+char *codec_encode_result(const codec_result *result, size_t *len)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "job");
+    text_string(&t, result->job_id);
+    text_key(&t, "summary");
+    text_raw(&t, result->summary);
+    put_vector(&t, "reactions", result->reactions, result->m, 0);
+    put_vector(&t, "gaps", result->gaps, result->m, 0);
+    put_vector(&t, "displacements", result->displacements, result->n_u, result->dim);
+    put_vector(&t, "nodes", result->nodes, result->n_nodes, result->dim);
+    put_vector(&t, "contact_nodes", result->contact_nodes, result->m, 0);
+    text_close(&t, '}');
+    return text_finish(&t, len);
+}
+
+const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS] = {
+    "iteration", "seconds", "dual_objective", "residual_total", "e1",       "e2",
+    "e3",        "e4",      "step_norm",      "error_bound",    "contacts", "restart"};
+
+void codec_history_row(double out[CODEC_HISTORY_COLUMNS], const uz_history_row *row)
+{
+    const uz_residual *e = &row->residual;
+    const double values[CODEC_HISTORY_COLUMNS] = {(double)row->iteration,
+                                                  row->seconds,
+                                                  row->dual_objective,
+                                                  e->total,
+                                                  e->e1,
+                                                  e->e2,
+                                                  e->e3,
+                                                  e->e4,
+                                                  row->step_norm,
+                                                  row->error_bound,
+                                                  (double)row->contacts,
+                                                  row->restart ? 1.0 : 0.0};
+    for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++)
+        out[i] = values[i];
+}
+
+char *codec_encode_history(const double *rows, int64_t count, size_t *len)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "columns");
+    text_open(&t, '[');
+    for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++)
+        text_string(&t, CODEC_HISTORY_NAMES[i]);
+    text_close(&t, ']');
+    text_key(&t, "rows");
+    text_open(&t, '[');
+    for (int64_t i = 0; i < count && !t.failed; i++)
+        text_numbers(&t, rows + i * CODEC_HISTORY_COLUMNS, CODEC_HISTORY_COLUMNS);
+    text_close(&t, ']');
+    text_close(&t, '}');
+    return text_finish(&t, len);
+}
+
+/* CSV has no null: what is not finite is written as inf, -inf or nan, which every reader of numbers understands. */
+static void put_cell(text *t, double x)
+{
+    char digits[TEXT_DOUBLE];
+    if (isfinite(x))
+        text_bytes(t, digits, text_shortest(digits, x));
+    else
+        text_put(t, isnan(x) ? "nan" : x < 0 ? "-inf" : "inf");
+}
+
+char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len)
+{
+    text t = {0};
+    for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++) {
+        text_put(&t, i ? "," : "");
+        text_put(&t, CODEC_HISTORY_NAMES[i]);
+    }
+    text_put(&t, "\n");
+    for (int64_t i = 0; i < count && !t.failed; i++)
+        for (int j = 0; j < CODEC_HISTORY_COLUMNS; j++) {
+            text_put(&t, j ? "," : "");
+            put_cell(&t, rows[i * CODEC_HISTORY_COLUMNS + j]);
+            text_put(&t, j + 1 < CODEC_HISTORY_COLUMNS ? "" : "\n");
+        }
+    return text_finish(&t, len);
+}

@@ -1,0 +1,127 @@
+#include "codec/codec.h"
+#include "codec/text.h"
+
+/* A named number inside an object. */
+typedef struct {
+    const char *key;
+    double value;
+} named;
+
+static void put_named(text *t, const named *list, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        text_key(t, list[i].key);
+        text_number(t, list[i].value);
+    }
+}
+
+static void put_object(text *t, const char *key, const named *list, size_t count)
+{
+    text_key(t, key);
+    text_open(t, '{');
+    put_named(t, list, count);
+    text_close(t, '}');
+}
+
+static void put_count(text *t, const char *key, int64_t value)
+{
+    text_key(t, key);
+    text_integer(t, value);
+}
+
+static void put_word(text *t, const char *key, const char *value)
+{
+    text_key(t, key);
+    text_string(t, value);
+}
+
+static void put_residual(text *t, const char *key, const uz_residual *e)
+{
+    put_object(t, key, (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
+}
+
+static void put_contact(text *t, const uz_summary *s, bool scene)
+{
+    text_key(t, "contact");
+    text_open(t, '{');
+    put_count(t, "candidates", s->m);
+    put_count(t, "active", s->active);
+    put_named(t, (named[]){{"reaction_sum", s->reaction_sum}, {"max_penetration", s->max_penetration}}, 2);
+    if (scene) {
+        text_key(t, "force");
+        text_numbers(t, s->force, s->dim);
+        put_named(t, (named[]){{"max_pressure", s->max_pressure}}, 1);
+    }
+    text_close(t, '}');
+}
+
+static void put_certificate(text *t, const uz_certificate *c)
+{
+    text_key(t, "certificate");
+    text_open(t, '{');
+    put_named(
+        t, (named[]){{"relative_error", c->relative_error}, {"absolute_error", c->absolute_error}, {"gap", c->gap}}, 3);
+    put_residual(t, "residual", &c->residual);
+    put_residual(t, "relative_residual", &c->relative_residual);
+    text_close(t, '}');
+}
+
+static void put_factor(text *t, const uz_summary *s)
+{
+    text_key(t, "factor");
+    text_open(t, '{');
+    text_key(t, "cached");
+    text_bool(t, s->factor_cached);
+    put_word(t, "ordering", uz_ordering_name(s->ordering));
+    put_count(t, "nnz", s->factor_nnz);
+    put_count(t, "bytes", (int64_t)s->factor_bytes);
+    put_named(t, (named[]){{"rcond", s->rcond}}, 1);
+    text_close(t, '}');
+}
+
+static void put_timings(text *t, const uz_timings *s)
+{
+    const named list[] = {{"queue", s->queue},     {"parse", s->parse},     {"assemble", s->assemble},
+                          {"order", s->order},     {"factor", s->factor},   {"condense", s->condense},
+                          {"iterate", s->iterate}, {"certify", s->certify}, {"total", s->total}};
+    put_object(t, "timings_s", list, sizeof list / sizeof list[0]);
+}
+
+static void put_problem(text *t, const uz_summary *s, bool scene)
+{
+    text_key(t, "problem");
+    text_open(t, '{');
+    put_word(t, "kind", scene ? "scene" : "matrices");
+    put_count(t, "d", s->d);
+    put_count(t, "m", s->m);
+    text_close(t, '}');
+}
+
+char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind)
+{
+    text t = {0};
+    bool scene = kind == UZ_PROBLEM_SCENE;
+    text_open(&t, '{');
+    put_word(&t, "outcome", uz_outcome_name(summary->outcome));
+    put_word(&t, "message", summary->message);
+    put_word(&t, "method", uz_method_name(summary->method));
+    put_word(&t, "operator", uz_operator_name(summary->op));
+    put_count(&t, "iterations", summary->iterations);
+    put_count(&t, "restarts", summary->restarts);
+    put_problem(&t, summary, scene);
+    put_contact(&t, summary, scene);
+    put_object(&t, "energy",
+               (named[]){{"primal", summary->certificate.energy_primal}, {"dual", summary->certificate.energy_dual}},
+               2);
+    put_certificate(&t, &summary->certificate);
+    put_named(&t,
+              (named[]){{"requested_error", summary->requested_error},
+                        {"discretization_error", summary->discretization_error},
+                        {"alpha", summary->alpha},
+                        {"lambda_max", summary->lambda_max}},
+              4);
+    put_factor(&t, summary);
+    put_timings(&t, &summary->timings);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}

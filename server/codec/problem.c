@@ -1,0 +1,150 @@
+#include "codec/problem.h"
+
+#include <ctype.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+static const struct {
+    const char *code, *title;
+} TITLES[] = {
+    {"json_syntax", "The body is not JSON"},
+    {"json_depth", "The JSON is nested too deep"},
+    {"duplicate_key", "A key stands twice in one object"},
+    {"number_out_of_range", "A number is beyond double precision"},
+    {"too_many_values", "The JSON has too many single values"},
+    {"unknown_key", "A key is not known"},
+    {"missing_key", "A key is missing"},
+    {"wrong_type", "A value has the wrong type"},
+    {"out_of_range", "A value is out of range"},
+    {"not_allowed", "A value is not one of those allowed"},
+    {"matrix_market_syntax", "A Matrix Market text is malformed"},
+    {"matrix_market_unsupported", "A kind of matrix that is not solved here"},
+    {"size_mismatch", "Shapes do not agree"},
+    {"not_finite", "A value is not finite"},
+    {"not_symmetric", "The stiffness matrix is not symmetric"},
+    {"not_positive_definite", "The stiffness matrix is not positive definite"},
+    {"free_body", "The body is free to move"},
+    {"bad_scene", "The scene cannot be modelled"},
+    {"memory_limit", "The problem needs more memory than allowed"},
+    {"out_of_memory", "Not enough memory now"},
+    {"cancelled", "The job was dismissed"},
+    {"internal", "A fault of this service"},
+};
+
+const char *problem_title(const char *code)
+{
+    for (size_t i = 0; i < sizeof TITLES / sizeof TITLES[0]; i++)
+        if (strcmp(TITLES[i].code, code) == 0)
+            return TITLES[i].title;
+    return "The request was refused";
+}
+
+/* Takes back the last character of out[0..len) if the size cut it in two. */
+static void mend_utf8(char *out)
+{
+    size_t len = strlen(out), start = len;
+    while (start > 0 && ((unsigned char)out[start - 1] & 0xc0) == 0x80)
+        start--;
+    if (start > 0 && (unsigned char)out[start - 1] >= 0x80)
+        start--;
+    if (start < len && json_utf8_length(out + start, len - start) != len - start)
+        out[start] = '\0';
+}
+
+void problem_set(problem_details *out, int status, const char *code, const json_path *path, const char *format, ...)
+{
+    va_list args;
+    *out = (problem_details){.status = status};
+    snprintf(out->code, sizeof out->code, "%s", code);
+    snprintf(out->title, sizeof out->title, "%s", problem_title(code));
+    json_path_write(out->pointer, sizeof out->pointer, path);
+    va_start(args, format);
+    vsnprintf(out->detail, sizeof out->detail, format, args);
+    va_end(args);
+    mend_utf8(out->detail);
+}
+
+void problem_add(problem_details *out, const char *format, ...)
+{
+    va_list args;
+    size_t used = strlen(out->detail);
+    va_start(args, format);
+    vsnprintf(out->detail + used, sizeof out->detail - used, format, args);
+    va_end(args);
+    mend_utf8(out->detail);
+}
+
+void problem_quote(char *out, size_t size, const char *text, size_t len)
+{
+    size_t used = 0, i = 0;
+    out[used++] = '"';
+    while (i < len) {
+        size_t step = json_utf8_length(text + i, len - i);
+        bool odd = step == 0 || (unsigned char)text[i] < 0x20 || text[i] == 0x7f;
+        if (used + step + sizeof "...\"" > size)
+            break;
+        if (odd) {
+            out[used++] = '?';
+            step = 1;
+        } else {
+            memcpy(out + used, text + i, step);
+            used += step;
+        }
+        i += step;
+    }
+    snprintf(out + used, size - used, "%s\"", i < len ? "..." : "");
+}
+
+enum { CLOSEST_LEN = 40 };
+
+static int least(int a, int b)
+{
+    return a < b ? a : b;
+}
+
+static bool same_letter(char a, char b)
+{
+    return tolower((unsigned char)a) == tolower((unsigned char)b);
+}
+
+/* Optimal string alignment distance, with three rows of the table kept. */
+static int distance(const char *a, size_t n, const char *b, size_t m)
+{
+    int rows[3][CLOSEST_LEN + 1] = {{0}};
+    int *before = rows[0], *above = rows[1], *row = rows[2];
+    for (size_t j = 0; j <= m; j++)
+        above[j] = (int)j;
+    for (size_t i = 1; i <= n; i++) {
+        row[0] = (int)i;
+        for (size_t j = 1; j <= m; j++) {
+            row[j] = above[j - 1] + !same_letter(a[i - 1], b[j - 1]);
+            row[j] = least(row[j], least(above[j], row[j - 1]) + 1);
+            if (i > 1 && j > 1 && same_letter(a[i - 1], b[j - 2]) && same_letter(a[i - 2], b[j - 1]))
+                row[j] = least(row[j], before[j - 2] + 1);
+        }
+        int *oldest = before;
+        before = above;
+        above = row;
+        row = oldest;
+    }
+    return above[m];
+}
+
+int problem_closest(const char *text, size_t len, const char *const *candidates, size_t count)
+{
+    int best = -1, best_distance = CLOSEST_LEN;
+    if (len > CLOSEST_LEN)
+        return -1;
+    for (size_t i = 0; i < count; i++) {
+        size_t n = candidates[i] ? strlen(candidates[i]) : CLOSEST_LEN + 1;
+        if (n > CLOSEST_LEN)
+            continue;
+        int d = distance(text, len, candidates[i], n);
+        if (d < best_distance) {
+            best = (int)i;
+            best_distance = d;
+        }
+    }
+    return best_distance <= 1 + (int)len / 4 && best_distance < (int)len ? best : -1;
+}

@@ -1,0 +1,27 @@
+/* problem.h: how the codec fills problem_details. */
+#ifndef SERVER_CODEC_PROBLEM_H
+#define SERVER_CODEC_PROBLEM_H
+
+#include "codec/json_doc.h"
+#include "problem_details.h"
+
+#include <stddef.h>
+
+/* Overwrites *out; the title follows from the code. A detail that does not fit is cut after a whole character. */
+void problem_set(problem_details *out, int status, const char *code, const json_path *path, const char *format, ...)
+    __attribute__((format(printf, 5, 6)));
+/* Appends to the detail, within its size. */
+void problem_add(problem_details *out, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* The title of every problem with this code; never NULL. */
+const char *problem_title(const char *code);
+
+/* Writes text[0..len) in double quotes for a person to read: control characters become '?', a long text is shortened
+ * with "..." after a whole character. */
+void problem_quote(char *out, size_t size, const char *text, size_t len);
+
+/* The candidate closest to text in edits (insert, delete, replace, swap neighbours; case counts for nothing), or -1
+ * when none is close enough to be meant. candidates[i] may be NULL: passed over. */
+int problem_closest(const char *text, size_t len, const char *const *candidates, size_t count);
+
+#endif

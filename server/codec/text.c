@@ -1,0 +1,181 @@
+#include "codec/text.h"
+#include "codec/json_doc.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Room for n more bytes and a NUL. */
+static bool reserve(text *t, size_t n)
+{
+    size_t need = 0, capacity = t->capacity ? t->capacity : 256;
+    if (t->failed || __builtin_add_overflow(t->len, n + 1, &need))
+        t->failed = true;
+    if (t->failed || need <= t->capacity)
+        return !t->failed;
+    while (capacity < need && capacity < SIZE_MAX / 2)
+        capacity += capacity / 2;
+    char *grown = realloc(t->data, capacity < need ? need : capacity);
+    if (!grown) {
+        t->failed = true;
+        return false;
+    }
+    t->data = grown;
+    t->capacity = capacity < need ? need : capacity;
+    return true;
+}
+
+void text_bytes(text *t, const char *bytes, size_t n)
+{
+    if (n == 0 || !reserve(t, n))
+        return;
+    memcpy(t->data + t->len, bytes, n);
+    t->len += n;
+}
+
+void text_put(text *t, const char *string)
+{
+    if (string)
+        text_bytes(t, string, strlen(string));
+}
+
+void text_format(text *t, const char *format, ...)
+{
+    char line[512];
+    va_list args;
+    va_start(args, format);
+    int n = vsnprintf(line, sizeof line, format, args);
+    va_end(args);
+    if (n < 0 || (size_t)n >= sizeof line)
+        t->failed = true;
+    else
+        text_bytes(t, line, (size_t)n);
+}
+
+static void comma(text *t)
+{
+    char last = t->len > 0 ? t->data[t->len - 1] : '[';
+    if (last != '{' && last != '[' && last != ':')
+        text_bytes(t, ",", 1);
+}
+
+void text_open(text *t, char bracket)
+{
+    comma(t);
+    text_bytes(t, &bracket, 1);
+}
+
+void text_close(text *t, char bracket)
+{
+    text_bytes(t, &bracket, 1);
+}
+
+void text_key(text *t, const char *key)
+{
+    comma(t);
+    text_bytes(t, "\"", 1);
+    text_put(t, key);
+    text_bytes(t, "\":", 2);
+}
+
+static void put_escaped(text *t, unsigned char c)
+{
+    static const char NAMED[] = "\b\f\n\r\t\"\\", NAMES[] = "bfnrt\"\\";
+    const char *named = c ? strchr(NAMED, c) : NULL;
+    if (named)
+        text_bytes(t, (char[2]){'\\', NAMES[named - NAMED]}, 2);
+    else
+        text_format(t, "\\u%04x", c);
+}
+
+static bool needs_escape(unsigned char c)
+{
+    return c < 0x20 || c == '"' || c == '\\' || c == 0x7f;
+}
+
+void text_string(text *t, const char *string)
+{
+    size_t len = string ? strlen(string) : 0;
+    comma(t);
+    if (!string) {
+        text_put(t, "null");
+        return;
+    }
+    text_bytes(t, "\"", 1);
+    for (size_t i = 0; i < len;) {
+        size_t step = json_utf8_length(string + i, len - i);
+        if (step == 0)
+            text_put(t, "\xef\xbf\xbd");
+        else if (needs_escape((unsigned char)string[i]))
+            put_escaped(t, (unsigned char)string[i]);
+        else
+            text_bytes(t, string + i, step);
+        i += step ? step : 1;
+    }
+    text_bytes(t, "\"", 1);
+}
+
+void text_integer(text *t, int64_t value)
+{
+    comma(t);
+    text_format(t, "%" PRId64, value);
+}
+
+void text_bool(text *t, bool value)
+{
+    comma(t);
+    text_put(t, value ? "true" : "false");
+}
+
+void text_raw(text *t, const char *json)
+{
+    comma(t);
+    text_put(t, json ? json : "null");
+}
+
+/* Whole numbers below 2^53 need no trial; others read back from 15, 16 or 17 digits (Steele and White 1990). */
+size_t text_shortest(char out[TEXT_DOUBLE], double x)
+{
+    int n = 0;
+    if (x == floor(x) && fabs(x) < 1e15 && !(x == 0 && signbit(x)))
+        return (size_t)snprintf(out, TEXT_DOUBLE, "%" PRId64, (int64_t)x);
+    for (int digits = 15; digits <= 17; digits++) {
+        n = snprintf(out, TEXT_DOUBLE, "%.*g", digits, x);
+        if (digits == 17 || strtod(out, NULL) == x)
+            break;
+    }
+    return (size_t)n;
+}
+
+void text_number(text *t, double value)
+{
+    comma(t);
+    if (!isfinite(value))
+        text_put(t, "null");
+    else if (reserve(t, TEXT_DOUBLE))
+        t->len += text_shortest(t->data + t->len, value);
+}
+
+void text_numbers(text *t, const double *x, int64_t n)
+{
+    text_open(t, '[');
+    for (int64_t i = 0; i < n && !t->failed; i++)
+        text_number(t, x[i]);
+    text_close(t, ']');
+}
+
+char *text_finish(text *t, size_t *len)
+{
+    if (reserve(t, 0))
+        t->data[t->len] = '\0';
+    else
+        free(t->data);
+    char *data = t->failed ? NULL : t->data;
+    if (len)
+        *len = data ? t->len : 0;
+    *t = (text){0};
+    return data;
+}

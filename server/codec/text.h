@@ -1,0 +1,38 @@
+/* text.h: a growing text that is JSON most of the time. A failed allocation is remembered and reported once, at the
+ * end; until then every call is a no-op. */
+#ifndef SERVER_CODEC_TEXT_H
+#define SERVER_CODEC_TEXT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct {
+    char *data; /* len bytes, not terminated until text_finish */
+    size_t len, capacity;
+    bool failed;
+} text;
+
+void text_bytes(text *t, const char *bytes, size_t n);
+void text_put(text *t, const char *string); /* as it is; NULL puts nothing */
+void text_format(text *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* JSON. A comma is put first where one is due: wherever neither '{', '[' nor ':' is the last byte. */
+void text_open(text *t, char bracket);                  /* a value that begins with '{' or '[' */
+void text_close(text *t, char bracket);                 /* '}' or ']' */
+void text_key(text *t, const char *key);                /* a name of ours: nothing in it needs an escape */
+void text_string(text *t, const char *string);          /* UTF-8; NULL becomes null; bad UTF-8 becomes U+FFFD */
+void text_integer(text *t, int64_t value);              /* */
+void text_number(text *t, double value);                /* shortest digits that read back; NaN and Inf become null */
+void text_bool(text *t, bool value);                    /* */
+void text_raw(text *t, const char *json);               /* JSON text embedded as it is; NULL becomes null */
+void text_numbers(text *t, const double *x, int64_t n); /* an array */
+
+/* The NUL-terminated text, owned by the caller; NULL if memory ran out. *len (may be NULL) without the NUL. */
+char *text_finish(text *t, size_t *len);
+
+/* The shortest decimal that reads back as x, at most 24 bytes and a NUL; x must be finite. Returns its length. */
+enum { TEXT_DOUBLE = 32 };
+size_t text_shortest(char out[TEXT_DOUBLE], double x);
+
+#endif
