@@ -1,0 +1,60 @@
+/* admission.c: what is refused before a body is read, cheapest check first. */
+#include "http/conn.h"
+#include "http/problem.h"
+
+#include <string.h>
+
+/* A page of another site must not submit or delete through its visitor's browser. Programs send no such header. */
+static bool check_site(const http_request *rq, problem_details *problem)
+{
+    const header_field *site = header_find(&rq->headers, "Sec-Fetch-Site", NULL);
+    if (!site || !token_equal(site->value, site->value_len, "cross-site") || strcmp(rq->route->method, "GET") == 0)
+        return true;
+    return http_problem(problem, 403, "cross_site", "Requests from other sites are refused",
+                        "a browser sent this for a page of another site");
+}
+
+static bool check_body(const http_server *server, const http_request *rq, problem_details *problem)
+{
+    bool takes_body = strcmp(rq->route->method, "POST") == 0;
+    if (!takes_body && (rq->framing.chunked || rq->framing.length > 0))
+        return http_problem(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
+                            rq->route->method, rq->route->pattern);
+    if (rq->framing.length > server->options.max_body)
+        return http_problem(problem, 413, "body_too_large", "The request body is too large",
+                            "the body has %llu bytes, the limit of this server is %zu",
+                            (unsigned long long)rq->framing.length, server->options.max_body);
+    return true;
+}
+
+static bool check_type(const http_request *rq, problem_details *problem)
+{
+    const header_field *coding = header_find(&rq->headers, "Content-Encoding", NULL);
+    if (strcmp(rq->route->method, "POST") != 0)
+        return true;
+    if (coding && !token_equal(coding->value, coding->value_len, "identity"))
+        return http_problem(problem, 415, "content_encoding", "The content coding is not supported",
+                            "send the body without Content-Encoding");
+    if (!request_is_json(rq))
+        return http_problem(problem, 415, "content_type", "The body must be JSON",
+                            "send the header field Content-Type: application/json");
+    return true;
+}
+
+static bool check_draining(http_server *server, http_request *rq, problem_details *problem)
+{
+    if (!atomic_load(&server->context.draining) || strcmp(rq->route->method, "POST") != 0)
+        return true;
+    rq->reply.retry_after_s = 5;
+    return http_problem(problem, 503, "draining", "The server is shutting down",
+                        "no new work is taken: try again when the server is back");
+}
+
+bool admit(http_server *server, http_request *rq)
+{
+    problem_details *problem = &rq->refused;
+    return target_parse(&rq->target, rq->raw_target, problem) &&
+           route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem) && check_site(rq, problem) &&
+           check_body(server, rq, problem) && route_check_parameters(rq, problem) && check_type(rq, problem) &&
+           check_draining(server, rq, problem);
+}

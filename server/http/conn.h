@@ -1,0 +1,52 @@
+/* connection.h: private to server/http: the server object and one connection's state. */
+#ifndef SERVER_HTTP_CONN_H
+#define SERVER_HTTP_CONN_H
+
+#include "http/deadlines.h"
+#include "http/http.h"
+#include "http/request.h"
+
+#include <microhttpd.h>
+
+/* Bytes of each connection's buffer: bounds the header block, and is the piece in which a body arrives. */
+#define CONNECTION_MEMORY (64 * 1024)
+/* All bodies in memory at once; a request beyond it is told to come back later. */
+#define BODY_BUDGET(max_body) ((max_body) < SIZE_MAX / 8 ? 8 * (max_body) : SIZE_MAX)
+/* Slowest transfer that is waited for, bytes per second: the allowance that a body's length adds to a deadline. */
+#define SLOWEST_RATE 100e3
+
+struct http_server {
+    api context;
+    http_options options;
+    struct MHD_Daemon *daemon;
+    deadlines *deadlines;
+    bool check_layout;
+    size_t body_budget;
+    atomic_size_t body_bytes; /* reserved now */
+};
+
+typedef struct {
+    http_server *server;
+    deadline *deadline;
+    http_request *request; /* NULL between requests */
+    int fd;
+    framing_layout layout;
+} conn;
+
+/* NULL: no memory; the connection's requests are then refused. */
+conn *conn_new(http_server *server, int fd);
+void conn_free(conn *c);
+
+void conn_begin_request(conn *c, const char *raw_target);
+/* The next three return false when the connection must be closed without a (further) reply. */
+bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const char *version);
+bool conn_body(conn *c, const char *data, size_t size);
+bool conn_answer(conn *c, struct MHD_Connection *mhd);
+/* status: of the reply that libmicrohttpd made by itself, 0 if there was none. */
+void conn_end_request(conn *c, unsigned status, bool completed);
+
+/* admission.c: everything that can be refused before the body is read; false with rq->refused and the header fields of
+ * rq->reply. */
+bool admit(http_server *server, http_request *rq);
+
+#endif

@@ -1,0 +1,164 @@
+/* daemon.c: libmicrohttpd's callbacks and the life of a connection.
+ *
+ * A connection has at most one request at a time. The request is made when its first line has come (on_target), looked
+ * at when its header block has come (begin), fed with its body (take_body), answered (answer) and ended
+ * (on_completed). All of this happens in the connection's own thread. */
+#include "http/conn.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static conn *connection_of(struct MHD_Connection *mhd)
+{
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
+    return info ? info->socket_context : NULL;
+}
+
+static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_context,
+                          enum MHD_ConnectionNotificationCode code)
+{
+    http_server *server = ctx;
+    if (code == MHD_CONNECTION_NOTIFY_STARTED) {
+        const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD);
+        *socket_context = info ? conn_new(server, info->connect_fd) : NULL;
+    } else {
+        conn_free(*socket_context);
+        *socket_context = NULL;
+    }
+}
+
+/* The first line has come; `raw` is still as received. What is returned becomes *request_context below. */
+static void *on_target(void *ctx, const char *raw, struct MHD_Connection *mhd)
+{
+    (void)ctx;
+    conn *c = connection_of(mhd);
+    if (c)
+        conn_begin_request(c, raw);
+    return NULL;
+}
+
+static enum MHD_Result on_request(void *ctx, struct MHD_Connection *mhd, const char *url, const char *method,
+                                  const char *version, const char *data, size_t *size, void **request_context)
+{
+    (void)ctx;
+    (void)url;
+    (void)request_context;
+    conn *c = connection_of(mhd);
+    if (!c || !c->request)
+        return MHD_NO; /* no memory for it: libmicrohttpd closes the conn */
+    bool ok;
+    if (!c->request->begun) {
+        ok = conn_headers(c, mhd, method, version);
+    } else if (*size > 0) {
+        ok = conn_body(c, data, *size);
+        *size = 0;
+    } else {
+        ok = conn_answer(c, mhd);
+    }
+    return ok ? MHD_YES : MHD_NO;
+}
+
+static void on_completed(void *ctx, struct MHD_Connection *mhd, void **request_context,
+                         enum MHD_RequestTerminationCode code)
+{
+    (void)ctx;
+    (void)request_context;
+    conn *c = connection_of(mhd);
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_HTTP_STATUS);
+    if (c)
+        conn_end_request(c, info ? info->http_status : 0, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
+}
+
+/* libmicrohttpd's own complaints, which are about clients. */
+__attribute__((format(printf, 2, 0))) static void on_message(void *ctx, const char *format, va_list args)
+{
+    http_server *server = ctx;
+    char text[512];
+    vsnprintf(text, sizeof text, format, args);
+    text[strcspn(text, "\n")] = '\0';
+    log_write(server->context.log, LOG_DEBUG, "http_message", (log_field[]){LOG_S("message", text), {0}});
+}
+
+/* What a client reads whose request was not complete in time. */
+static char *make_last_words(double deadline_s)
+{
+    http_reply reply = {.close = true};
+    reply_refuse(&reply, 408, "request_timeout", "The request took too long",
+                 "a request must be complete within %g s, plus the time its body needs at 100 kB/s", deadline_s);
+    char *text = reply_message(&reply);
+    reply_clear(&reply);
+    return text;
+}
+
+static struct MHD_Daemon *start_daemon(http_server *server, int listen_fd, const http_options *options)
+{
+    /* The watch over deadlines is exact; this one only backs it up, and must not end a long poll. */
+    unsigned idle_s = (unsigned)(options->max_wait_s + 2 * options->request_deadline_s + 60);
+    struct MHD_OptionItem items[] = {
+        {MHD_OPTION_LISTEN_SOCKET, listen_fd, NULL},
+        {MHD_OPTION_CONNECTION_LIMIT, (intptr_t)options->max_connections, NULL},
+        {MHD_OPTION_CONNECTION_MEMORY_LIMIT, CONNECTION_MEMORY, NULL},
+        {MHD_OPTION_CONNECTION_TIMEOUT, (intptr_t)idle_s, NULL},
+        {MHD_OPTION_STRICT_FOR_CLIENT, 1, NULL},
+        {MHD_OPTION_SIGPIPE_HANDLED_BY_APP, 1, NULL},
+        {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)on_completed, server},
+        {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, server},
+        {MHD_OPTION_URI_LOG_CALLBACK, (intptr_t)on_target, server},
+        {MHD_OPTION_END, 0, NULL},
+    };
+    return MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL |
+                                MHD_USE_ITC | MHD_USE_ERROR_LOG,
+                            0, NULL, NULL, on_request, server, MHD_OPTION_EXTERNAL_LOGGER, on_message, server,
+                            MHD_OPTION_ARRAY, items, MHD_OPTION_END);
+}
+
+http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message, size_t size)
+{
+    char *words = make_last_words(options->request_deadline_s);
+    http_server *server = calloc(1, sizeof *server);
+    if (!server || !words)
+        goto fail;
+    server->context.store = parts->store;
+    server->context.work = parts->work;
+    server->context.log = parts->log;
+    server->context.max_wait_s = options->max_wait_s;
+    atomic_init(&server->context.draining, false);
+    server->options = *options;
+    server->body_budget = BODY_BUDGET(options->max_body);
+    atomic_init(&server->body_bytes, 0);
+    /* The tiling of a header block is how 0.9.x parses; later versions refuse by themselves what it finds. */
+    server->check_layout = strncmp(MHD_get_version(), "0.9.", 4) == 0;
+    server->deadlines = deadlines_new(words);
+    if (!server->deadlines)
+        goto fail;
+    server->daemon = start_daemon(server, listen_fd, options);
+    if (!server->daemon)
+        goto fail;
+    free(words);
+    return server;
+fail:
+    snprintf(message, size, "cannot start the HTTP server: %s", errno ? strerror(errno) : "out of memory");
+    if (server)
+        deadlines_free(server->deadlines);
+    free(server);
+    free(words);
+    close(listen_fd);
+    return NULL;
+}
+
+void http_drain(http_server *server)
+{
+    atomic_store(&server->context.draining, true);
+}
+
+void http_stop(http_server *server)
+{
+    if (!server)
+        return;
+    MHD_stop_daemon(server->daemon); /* closes the listening socket too */
+    deadlines_free(server->deadlines);
+    free(server);
+}

@@ -1,0 +1,177 @@
+#include "http/deadlines.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+
+struct deadline {
+    deadlines *all;
+    deadline *previous, *next;
+    double at;
+    int fd;
+    bool speak, expired;
+};
+
+struct deadlines {
+    pthread_mutex_t mutex;
+    pthread_cond_t changed;
+    pthread_t thread;
+    deadline *first;
+    double wake_at; /* when the thread looks again */
+    bool stop;
+    char *last_words;
+};
+
+double deadlines_now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void cut(const deadlines *all, deadline *d)
+{
+    d->expired = true;
+    d->at = INFINITY;
+    if (d->speak)
+        (void)send(d->fd, all->last_words, strlen(all->last_words), MSG_DONTWAIT | MSG_NOSIGNAL);
+    shutdown(d->fd, SHUT_RDWR);
+}
+
+/* Cuts what is overdue and returns the earliest deadline left. */
+static double sweep(const deadlines *all, double now)
+{
+    double earliest = INFINITY;
+    for (deadline *d = all->first; d; d = d->next) {
+        if (d->at <= now)
+            cut(all, d);
+        earliest = fmin(earliest, d->at);
+    }
+    return earliest;
+}
+
+static void wait_until(deadlines *all, double at)
+{
+    if (isinf(at)) {
+        pthread_cond_wait(&all->changed, &all->mutex);
+        return;
+    }
+    struct timespec t = {.tv_sec = (time_t)at};
+    t.tv_nsec = (long)((at - (double)t.tv_sec) * 1e9);
+    pthread_cond_timedwait(&all->changed, &all->mutex, &t);
+}
+
+static void *watch(void *argument)
+{
+    deadlines *all = argument;
+    pthread_mutex_lock(&all->mutex);
+    while (!all->stop) {
+        all->wake_at = sweep(all, deadlines_now());
+        wait_until(all, all->wake_at);
+    }
+    pthread_mutex_unlock(&all->mutex);
+    return NULL;
+}
+
+deadlines *deadlines_new(const char *last_words)
+{
+    deadlines *all = calloc(1, sizeof *all);
+    char *words = strdup(last_words);
+    if (!all || !words) {
+        free(all);
+        free(words);
+        return NULL;
+    }
+    pthread_condattr_t monotonic;
+    pthread_condattr_init(&monotonic);
+    pthread_condattr_setclock(&monotonic, CLOCK_MONOTONIC);
+    pthread_cond_init(&all->changed, &monotonic);
+    pthread_condattr_destroy(&monotonic);
+    pthread_mutex_init(&all->mutex, NULL);
+    all->wake_at = INFINITY;
+    all->last_words = words;
+    if (pthread_create(&all->thread, NULL, watch, all) != 0) {
+        pthread_cond_destroy(&all->changed);
+        pthread_mutex_destroy(&all->mutex);
+        free(words);
+        free(all);
+        return NULL;
+    }
+    return all;
+}
+
+void deadlines_free(deadlines *all)
+{
+    if (!all)
+        return;
+    pthread_mutex_lock(&all->mutex);
+    all->stop = true;
+    pthread_cond_signal(&all->changed);
+    pthread_mutex_unlock(&all->mutex);
+    pthread_join(all->thread, NULL);
+    pthread_cond_destroy(&all->changed);
+    pthread_mutex_destroy(&all->mutex);
+    free(all->last_words);
+    free(all);
+}
+
+/* Under the mutex. */
+static void wake_for(deadlines *all, double at)
+{
+    if (at < all->wake_at)
+        pthread_cond_signal(&all->changed);
+}
+
+deadline *deadlines_add(deadlines *all, int fd, double at)
+{
+    deadline *d = calloc(1, sizeof *d);
+    if (!d)
+        return NULL;
+    *d = (deadline){.all = all, .at = at, .fd = fd};
+    pthread_mutex_lock(&all->mutex);
+    d->next = all->first;
+    if (d->next)
+        d->next->previous = d;
+    all->first = d;
+    wake_for(all, at);
+    pthread_mutex_unlock(&all->mutex);
+    return d;
+}
+
+void deadline_set(deadline *d, double at, bool speak)
+{
+    pthread_mutex_lock(&d->all->mutex);
+    if (!d->expired) {
+        d->at = at;
+        d->speak = speak;
+        wake_for(d->all, at);
+    }
+    pthread_mutex_unlock(&d->all->mutex);
+}
+
+bool deadline_expired(deadline *d)
+{
+    pthread_mutex_lock(&d->all->mutex);
+    bool expired = d->expired;
+    pthread_mutex_unlock(&d->all->mutex);
+    return expired;
+}
+
+void deadline_remove(deadline *d)
+{
+    if (!d)
+        return;
+    deadlines *all = d->all;
+    pthread_mutex_lock(&all->mutex);
+    if (d->previous)
+        d->previous->next = d->next;
+    else
+        all->first = d->next;
+    if (d->next)
+        d->next->previous = d->previous;
+    pthread_mutex_unlock(&all->mutex);
+    free(d);
+}

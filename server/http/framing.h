@@ -1,0 +1,49 @@
+/* framing.h: where a request ends, decided as strictly as RFC 9112 allows, so that no proxy in front can disagree.
+ *
+ * libmicrohttpd 0.9.75 accepts Content-Length beside Transfer-Encoding, two lengths, "Content-Length : 5", bare LF,
+ * NUL in a header and folded lines. Each is refused here with 400, and the connection closes: what follows such a
+ * request on the connection can't be trusted. */
+#ifndef SERVER_HTTP_FRAMING_H
+#define SERVER_HTTP_FRAMING_H
+
+#include "problem_details.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define HEADERS_MAX 128
+
+/* Header fields as received, in order; they live in the connection's buffer until the request completes. */
+typedef struct {
+    const char *name, *value;
+    size_t name_len, value_len;
+} header_field;
+typedef struct {
+    header_field fields[HEADERS_MAX];
+    size_t count;
+    bool overflow; /* there were more than HEADERS_MAX */
+} header_list;
+
+/* The first field of that name, NULL if there is none; *count (may be NULL) is how many there are. */
+const header_field *header_find(const header_list *headers, const char *name, size_t *count);
+
+typedef struct {
+    bool chunked;
+    uint64_t length; /* of the body when it is not chunked; 0 when there is none */
+} framing;
+
+/* Reads the framing; false with the problem: 400 for anything ambiguous or malformed, 417, 431, 505. */
+bool framing_read(framing *out, const char *version, const header_list *headers, problem_details *problem);
+
+/* Where libmicrohttpd left the parts of a header block in its read buffer. It parses in place and writes NULs over the
+ * separators, so the parts must tile the block, with one byte between words and two (CR LF) between lines. A bare LF,
+ * a NUL in the text, a folded line, a doubled space each break the tiling. */
+typedef struct {
+    const char *method, *target, *version;
+    size_t target_len; /* before libmicrohttpd decoded it in place */
+    size_t block_len;  /* of the whole header block, empty line included */
+} framing_layout;
+bool framing_tiles(const framing_layout *layout, const header_list *headers);
+
+#endif

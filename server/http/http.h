@@ -1,0 +1,46 @@
+/* http.h: the daemon's HTTP side, start to stop. The only folder that knows libmicrohttpd.
+ *
+ * bytes -> framing (framing.h) -> target (target.h) -> route table (routes.c) -> handler (jobs.c, results.c,
+ * service.c) -> reply (reply.h). One thread per connection, so a handler may block; deadlines.h ends connections that
+ * are too slow. Handlers own nothing beyond their request: the store and the workers own the jobs. */
+#ifndef SERVER_HTTP_H
+#define SERVER_HTTP_H
+
+#include "log.h"
+#include "store/store.h"
+#include "work/work.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct http_server http_server;
+
+typedef struct {
+    store *store;
+    work *work;
+    server_log *log;
+} http_parts;
+
+typedef struct {
+    size_t max_body;           /* bytes of one request's body */
+    unsigned max_connections;  /* open at once */
+    double request_deadline_s; /* for a whole request, without the allowance for its body's length */
+    double max_wait_s;         /* cap of Prefer: wait */
+} http_options;
+
+/* Opens a listening socket on "HOST:PORT" or "[IPv6]:PORT"; port 0 takes a free one. url becomes "http://HOST:PORT"
+ * with the real port. -1 on failure with the reason in message. */
+int http_listen(const char *host_port, char *url, size_t url_size, char *message, size_t size);
+
+/* Serves on listen_fd, which it owns from then on, also on failure. NULL on failure with the reason in message. */
+http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message,
+                        size_t size);
+
+/* From now on submissions are answered 503, /readyz too, and long polls end early; everything else goes on. */
+void http_drain(http_server *server);
+
+/* Ends every connection and frees the server. The work must have been stopped (not freed) before, so that no handler
+ * waits in it. */
+void http_stop(http_server *server);
+
+#endif

@@ -1,0 +1,86 @@
+/* listen.c: from "HOST:PORT" to a listening socket. */
+#include "http/http.h"
+
+#include <errno.h>
+#include <netdb.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+/* Splits at the last colon; brackets around an IPv6 address are required and dropped. */
+static bool split_host_port(const char *text, char host[256], char port[6])
+{
+    const char *colon = strrchr(text, ':');
+    if (!colon || colon == text || strlen(colon + 1) > 5 || !colon[1] || colon[1 + strspn(colon + 1, "0123456789")])
+        return false;
+    size_t len = (size_t)(colon - text);
+    bool bracketed = text[0] == '[' && text[len - 1] == ']';
+    if (bracketed) {
+        text++;
+        len -= 2;
+    } else if (memchr(text, ':', len)) {
+        return false;
+    }
+    if (len == 0 || len > 255)
+        return false;
+    memcpy(host, text, len);
+    host[len] = '\0';
+    strcpy(port, colon + 1);
+    return atoi(port) <= 65535;
+}
+
+static int listen_on(const struct addrinfo *at)
+{
+    int on = 1;
+    int fd = socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, at->ai_protocol);
+    if (fd < 0)
+        return -1;
+    /* A restart must not wait for the old connections' TIME_WAIT; a live listener still excludes a second one. */
+    if (setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 && bind(fd, at->ai_addr, at->ai_addrlen) == 0 &&
+        listen(fd, SOMAXCONN) == 0)
+        return fd;
+    int cause = errno;
+    close(fd);
+    errno = cause;
+    return -1;
+}
+
+static bool describe(int fd, char *url, size_t size)
+{
+    struct sockaddr_storage name;
+    socklen_t len = sizeof name;
+    char host[128], port[16];
+    if (getsockname(fd, (struct sockaddr *)&name, &len) != 0 ||
+        getnameinfo((struct sockaddr *)&name, len, host, sizeof host, port, sizeof port,
+                    NI_NUMERICHOST | NI_NUMERICSERV) != 0)
+        return false;
+    int n = snprintf(url, size, name.ss_family == AF_INET6 ? "http://[%s]:%s" : "http://%s:%s", host, port);
+    return n > 0 && (size_t)n < size;
+}
+
+int http_listen(const char *host_port, char *url, size_t url_size, char *message, size_t size)
+{
+    char host[256], port[6];
+    if (!split_host_port(host_port, host, port)) {
+        snprintf(message, size, "\"%s\" is not HOST:PORT or [IPv6]:PORT with a port from 0 to 65535", host_port);
+        return -1;
+    }
+    struct addrinfo hints = {.ai_socktype = SOCK_STREAM, .ai_flags = AI_PASSIVE | AI_NUMERICSERV}, *found = NULL;
+    int failure = getaddrinfo(host, port, &hints, &found);
+    if (failure != 0) {
+        snprintf(message, size, "cannot find the address of %s: %s", host, gai_strerror(failure));
+        return -1;
+    }
+    int fd = listen_on(found);
+    if (fd < 0)
+        snprintf(message, size, "cannot listen on %s: %s", host_port, strerror(errno));
+    freeaddrinfo(found);
+    if (fd >= 0 && !describe(fd, url, url_size)) {
+        snprintf(message, size, "cannot tell the address of the socket on %s", host_port);
+        close(fd);
+        fd = -1;
+    }
+    return fd;
+}

@@ -1,0 +1,90 @@
+/* request.h: one request as a handler sees it; nothing of libmicrohttpd shows. */
+#ifndef SERVER_HTTP_REQUEST_H
+#define SERVER_HTTP_REQUEST_H
+
+#include "http/framing.h"
+#include "http/reply.h"
+#include "http/target.h"
+#include "log.h"
+#include "store/store.h"
+#include "work/work.h"
+
+#include <stdatomic.h>
+
+/* What handlers may use, the same for all requests. */
+typedef struct {
+    store *store;
+    work *work;
+    server_log *log;
+    double max_wait_s;
+    atomic_bool draining;
+} api;
+
+typedef struct http_request {
+    char *raw_target; /* as received */
+    target target;
+    header_list headers;
+    framing framing;
+    const struct route *route;
+    char name[65]; /* what stood for {id} or {name} in the path */
+    char *body;    /* NUL-terminated; NULL when empty */
+    size_t body_len, body_capacity;
+    int fd; /* to see whether the client is still there */
+    /* For the access log and the connection's bookkeeping. */
+    char method[16];
+    double started; /* on deadlines_now's clock */
+    int status;     /* of the reply; 0: none was sent */
+    size_t reply_len;
+    char job_id[33];
+    bool begun;              /* the header block has been looked at */
+    bool unread_body;        /* the reply was sent before the whole body was read */
+    problem_details refused; /* status 0: none; otherwise the answer, known before the body was read */
+    http_reply reply;
+} http_request;
+
+/* Seconds of `Prefer: wait=N` (RFC 7240), capped; 0 when there is none. */
+double request_wait(const http_request *rq, double max_wait_s);
+/* True if an Accept header field names the media type with a quality above 0, or a longer list does. */
+bool request_accepts(const http_request *rq, const char *type);
+/* True if the body may be JSON: Content-Type absent, application/json or ...+json. */
+bool request_is_json(const http_request *rq);
+/* The client closed its end: an answer would reach nobody. */
+bool request_client_gone(const http_request *rq);
+
+/* Reads a decimal integer of the query in [least, most]; absent: *out is left. False with a 400. */
+bool request_integer(const http_request *rq, const char *key, int64_t least, int64_t most, int64_t *out,
+                     problem_details *problem);
+
+/* ---- the route table (routes.c) */
+typedef void (*route_handler)(api *context, http_request *rq, http_reply *reply);
+typedef struct route {
+    const char *method, *pattern;
+    const char *const *parameters; /* known query keys, NULL-terminated */
+    route_handler handler;
+} route;
+
+/* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. */
+bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem);
+/* 400 for a query key that the route does not know. */
+bool route_check_parameters(const http_request *rq, problem_details *problem);
+
+/* ---- handlers */
+void jobs_submit(api *context, http_request *rq, http_reply *reply);
+void jobs_list(api *context, http_request *rq, http_reply *reply);
+void jobs_get(api *context, http_request *rq, http_reply *reply);
+void jobs_delete(api *context, http_request *rq, http_reply *reply);
+void results_get(api *context, http_request *rq, http_reply *reply);
+void history_get(api *context, http_request *rq, http_reply *reply);
+void history_get_csv(api *context, http_request *rq, http_reply *reply);
+void service_factors(api *context, http_request *rq, http_reply *reply);
+void service_health(api *context, http_request *rq, http_reply *reply);
+void service_ready(api *context, http_request *rq, http_reply *reply);
+void service_openapi(api *context, http_request *rq, http_reply *reply);
+void service_schema(api *context, http_request *rq, http_reply *reply);
+
+/* Reads the job named in the path; false with a 404 or 500 in reply. */
+bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply);
+/* Fills a reply for a store call that failed, and logs a STORE_ERROR. */
+void reply_store_failure(api *context, store_status status, http_reply *reply);
+
+#endif

@@ -1,0 +1,94 @@
+/* routes.c: the route table. 404, 405 with Allow and unknown query keys all follow from it; HEAD is served by GET. */
+#include "http/problem.h"
+#include "http/request.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const char *const NONE[] = {NULL};
+static const char *const SUBMIT[] = {"validate", NULL};
+static const char *const LIST[] = {"status", "limit", "cursor", "tag", NULL};
+static const char *const RESULT[] = {"fields", NULL};
+static const char *const HISTORY[] = {"after", NULL};
+
+static const route ROUTES[] = {
+    {"POST", "/v1/jobs", SUBMIT, jobs_submit},
+    {"GET", "/v1/jobs", LIST, jobs_list},
+    {"GET", "/v1/jobs/{id}", NONE, jobs_get},
+    {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete},
+    {"GET", "/v1/jobs/{id}/result", RESULT, results_get},
+    {"GET", "/v1/jobs/{id}/history", HISTORY, history_get},
+    {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv},
+    {"GET", "/v1/factors", NONE, service_factors},
+    {"GET", "/healthz", NONE, service_health},
+    {"GET", "/readyz", NONE, service_ready},
+    {"GET", "/openapi.json", NONE, service_openapi},
+    {"GET", "/schemas/{name}", NONE, service_schema},
+};
+static const size_t N_ROUTES = sizeof ROUTES / sizeof ROUTES[0];
+
+/* {id}: 32 hexadecimal digits in lower case. {name}: a file name. */
+static bool placeholder_matches(const char *kind, const char *text, size_t len)
+{
+    if (strncmp(kind, "{id}", 4) == 0)
+        return len == 32 && strspn(text, "0123456789abcdef") >= 32;
+    return len > 0 && len < sizeof((http_request *)0)->name;
+}
+
+/* Compares segment by segment; what stands for a placeholder is copied to name. */
+static bool path_matches(const char *pattern, const char *path, char *name, size_t size)
+{
+    while (*pattern == '/' && *path == '/') {
+        size_t want = strcspn(++pattern, "/"), have = strcspn(++path, "/");
+        if (*pattern == '{') {
+            if (!placeholder_matches(pattern, path, have))
+                return false;
+            snprintf(name, size, "%.*s", (int)have, path);
+        } else if (want != have || memcmp(pattern, path, have) != 0) {
+            return false;
+        }
+        pattern += want;
+        path += have;
+    }
+    return *pattern == '\0' && *path == '\0';
+}
+
+static void allow_also(char *allow, size_t size, const char *method)
+{
+    size_t len = strlen(allow);
+    snprintf(allow + len, size - len, "%s%s%s", len ? ", " : "", method, strcmp(method, "GET") == 0 ? ", HEAD" : "");
+}
+
+bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem)
+{
+    const char *method = strcmp(rq->method, "HEAD") == 0 ? "GET" : rq->method;
+    allow[0] = '\0';
+    for (size_t i = 0; i < N_ROUTES; i++) {
+        if (!path_matches(ROUTES[i].pattern, rq->target.path, rq->name, sizeof rq->name))
+            continue;
+        if (strcmp(ROUTES[i].method, method) == 0) {
+            rq->route = &ROUTES[i];
+            return true;
+        }
+        allow_also(allow, size, ROUTES[i].method);
+    }
+    if (allow[0])
+        return http_problem(problem, 405, "method_not_allowed", "The method is not allowed here",
+                            "%s is not allowed on %.200s, but %s", rq->method, rq->target.path, allow);
+    return http_problem(problem, 404, "not_found", "Not found",
+                        "there is nothing at %.200s: /openapi.json lists what is", rq->target.path);
+}
+
+bool route_check_parameters(const http_request *rq, problem_details *problem)
+{
+    for (size_t i = 0; i < rq->target.count; i++) {
+        const char *const *known = rq->route->parameters;
+        while (*known && strcmp(*known, rq->target.parameters[i].key) != 0)
+            known++;
+        if (!*known)
+            return http_problem(problem, 400, "unknown_parameter", "A query parameter is unknown",
+                                "\"%.100s\" is not a parameter of %s %s", rq->target.parameters[i].key,
+                                rq->route->method, rq->route->pattern);
+    }
+    return true;
+}

@@ -1,0 +1,222 @@
+/* main.c: the daemon from its command line to its exit status.
+ *
+ * exit status: 0 ended by a signal, 1 could not start or failed, 2 wrong usage. */
+#include "codec/codec.h"
+#include "http/http.h"
+#include "log.h"
+#include "options.h"
+#include "store/store.h"
+#include "uzawa.h"
+#include "work/work.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+enum { EXIT_ENDED = 0, EXIT_FAILED = 1, EXIT_USAGE = 2 };
+
+static const double LEASE_S = 60;
+static const double MAX_WAIT_S = 60;
+
+typedef struct {
+    server_log *log;
+    store *store;
+    work *work;
+    http_server *http;
+    sigset_t signals; /* taken by sigwait in main, blocked in every thread */
+} service;
+
+/* METIS installs its own SIGTERM and SIGABRT handlers while it orders and jumps out of them: blocked everywhere, these
+ * signals can't reach it. Threads that libraries started before main inherit nothing of this; see own_signals. */
+static void block_signals(sigset_t *signals)
+{
+    sigemptyset(signals);
+    sigaddset(signals, SIGTERM);
+    sigaddset(signals, SIGINT);
+    sigaddset(signals, SIGHUP);
+    sigaddset(signals, SIGABRT);
+    pthread_sigmask(SIG_BLOCK, signals, NULL);
+    sigset_t internal; /* between the drain's threads */
+    sigemptyset(&internal);
+    sigaddset(&internal, SIGUSR1);
+    pthread_sigmask(SIG_BLOCK, &internal, NULL);
+    signal(SIGPIPE, SIG_IGN);
+}
+
+/* OpenBLAS starts threads when it is loaded, before main: a signal for the process could be delivered to one of them.
+ * The signal mask survives exec, so the program starts itself once more with the signals blocked. */
+static void own_signals(char **argv, sigset_t *signals)
+{
+    sigset_t before;
+    pthread_sigmask(SIG_SETMASK, NULL, &before);
+    block_signals(signals);
+    if (sigismember(&before, SIGTERM) && sigismember(&before, SIGABRT))
+        return;
+    char path[4096];
+    ssize_t len = readlink("/proc/self/exe", path, sizeof path - 1);
+    if (len > 0) {
+        path[len] = '\0';
+        execv(path, argv); /* returns only on failure: then it runs as it is */
+    }
+}
+
+static void raise_descriptor_limit(void)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0)
+        return;
+    limit.rlim_cur = limit.rlim_max;
+    setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
+{
+    int fd = -1;
+    raise_descriptor_limit();
+    if (!codec_init(message, size))
+        return false;
+    uz_process_init(options->workers);
+    s->store = store_open(options->db, message, size);
+    if (!s->store)
+        return false;
+    /* The port is taken before any job runs, so that a second daemon fails without a trace. */
+    fd = http_listen(options->listen, url, url_size, message, size);
+    if (fd < 0)
+        return false;
+    const work_options workers = {.workers = options->workers,
+                                  .max_attempts = options->max_attempts,
+                                  .cache_bytes = options->cache,
+                                  .lease_s = LEASE_S};
+    s->work = work_start(s->store, &workers, s->log, message, size);
+    if (!s->work) {
+        close(fd);
+        return false;
+    }
+    http_parts parts = {.store = s->store, .work = s->work, .log = s->log};
+    const http_options limits = {.max_body = options->max_body,
+                                 .max_connections = options->max_connections,
+                                 .request_deadline_s = options->request_deadline_s,
+                                 .max_wait_s = MAX_WAIT_S};
+    s->http = http_start(fd, &parts, &limits, message, size);
+    return s->http != NULL;
+}
+
+/* Legal at every stage of a start that failed. */
+static void end(service *s)
+{
+    http_stop(s->http);
+    if (s->work) {
+        work_stop(s->work, 0);
+        work_free(s->work);
+    }
+    if (s->store)
+        store_close(s->store);
+    codec_end();
+}
+
+/* ------------------------------------------------------------------- drain */
+
+typedef struct {
+    work *work;
+    double seconds;
+    pthread_t waker; /* told by SIGUSR1 that the work has stopped */
+} drain;
+
+static void *drain_work(void *argument)
+{
+    drain *d = argument;
+    work_stop(d->work, d->seconds);
+    pthread_kill(d->waker, SIGUSR1);
+    return NULL;
+}
+
+/* Lets running jobs end; a second signal asks for it now. The work stops in its own thread, so that this one can take
+ * the signal. */
+static void drain_until_stopped(service *s, double seconds)
+{
+    pthread_t thread;
+    drain d = {.work = s->work, .seconds = seconds, .waker = pthread_self()};
+    sigset_t expected = s->signals;
+    int taken = 0;
+    sigaddset(&expected, SIGUSR1);
+    http_drain(s->http);
+    if (pthread_create(&thread, NULL, drain_work, &d) != 0) {
+        work_stop(s->work, seconds);
+        return;
+    }
+    while (sigwait(&expected, &taken) == 0 && taken != SIGUSR1) {
+        log_write(s->log, LOG_INFO, "drain_cut_short", (log_field[]){{0}});
+        work_stop(s->work, 0);
+    }
+    pthread_join(thread, NULL);
+}
+
+static int wait_for_signal(const service *s)
+{
+    int taken = 0;
+    while (sigwait(&s->signals, &taken) != 0)
+        ;
+    if (taken == SIGABRT) /* somebody wants a core file */
+        abort();
+    return taken;
+}
+
+static int run(service *s, const server_options *options)
+{
+    char url[160], message[512] = "";
+    if (!start(s, options, url, sizeof url, message, sizeof message)) {
+        fprintf(stderr, "uzawad: %s\n", message);
+        end(s);
+        return EXIT_FAILED;
+    }
+    printf("listening on %s\n", url);
+    fflush(stdout);
+    log_write(s->log, LOG_INFO, "started",
+              (log_field[]){LOG_S("url", url),
+                            LOG_S("db", options->db),
+                            LOG_I("workers", options->workers),
+                            LOG_S("version", UZAWAD_VERSION),
+                            {0}});
+    int taken = wait_for_signal(s);
+    log_write(s->log, LOG_INFO, "stopping", (log_field[]){LOG_S("signal", strsignal(taken)), {0}});
+    drain_until_stopped(s, options->drain_s);
+    end(s);
+    log_write(s->log, LOG_INFO, "stopped", (log_field[]){{0}});
+    return EXIT_ENDED;
+}
+
+int main(int argc, char **argv)
+{
+    server_options options;
+    char message[256];
+    switch (options_parse(&options, argc, argv, message, sizeof message)) {
+    case OPTIONS_HELP:
+        options_usage(stdout);
+        return EXIT_ENDED;
+    case OPTIONS_VERSION:
+        printf("uzawad %s\n", UZAWAD_VERSION);
+        return EXIT_ENDED;
+    case OPTIONS_WRONG:
+        fprintf(stderr, "uzawad: %s\n", message);
+        options_usage(stderr);
+        return EXIT_USAGE;
+    case OPTIONS_RUN:
+        break;
+    }
+    service s = {0};
+    own_signals(argv, &s.signals);
+    s.log = log_open(stderr, options.level);
+    if (!s.log) {
+        fprintf(stderr, "uzawad: no memory\n");
+        return EXIT_FAILED;
+    }
+    int status = run(&s, &options);
+    log_close(s.log);
+    return status;
+}

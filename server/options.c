@@ -1,0 +1,195 @@
+#include "options.h"
+
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { LISTEN = 1000, DB, WORKERS, MAX_BODY, CACHE, MAX_ATTEMPTS, DRAIN, CONNECTIONS, LEVEL, DEADLINE, VERSION, HELP };
+
+static const struct option LONG_OPTIONS[] = {
+    {"listen", required_argument, NULL, LISTEN},
+    {"db", required_argument, NULL, DB},
+    {"workers", required_argument, NULL, WORKERS},
+    {"max-body", required_argument, NULL, MAX_BODY},
+    {"cache", required_argument, NULL, CACHE},
+    {"max-attempts", required_argument, NULL, MAX_ATTEMPTS},
+    {"drain-s", required_argument, NULL, DRAIN},
+    {"max-connections", required_argument, NULL, CONNECTIONS},
+    {"log-level", required_argument, NULL, LEVEL},
+    {"request-deadline-s", required_argument, NULL, DEADLINE},
+    {"version", no_argument, NULL, VERSION},
+    {"help", no_argument, NULL, HELP},
+    {NULL, 0, NULL, 0},
+};
+
+void options_usage(FILE *to)
+{
+    fputs(
+        "usage: uzawad [OPTION]...\n"
+        "Solves frictionless contact problems for whoever asks by HTTP.\n"
+        "\n"
+        "  --listen HOST:PORT      where to listen; [::1]:0 works too, port 0 takes a free one (127.0.0.1:8080)\n"
+        "  --db FILE               jobs and results are kept here (./contact.db)\n"
+        "  --workers N             problems solved at once (as many as there are processors)\n"
+        "  --cache BYTES           memory for factors that are kept (1G)\n"
+        "  --max-body BYTES        largest request body (64M)\n"
+        "  --max-connections N     connections open at once (256)\n"
+        "  --request-deadline-s S  time for a request to arrive, plus 1 s per 100 kB of its body (30)\n"
+        "  --max-attempts N        runs of a job whose run ends with the process before it is failed (3)\n"
+        "  --drain-s S             time for running jobs to end after SIGTERM (30)\n"
+        "  --log-level LEVEL       debug, info, warn or error (info)\n"
+        "  --version, --help\n"
+        "\n"
+        "BYTES takes the suffixes K, M and G. When it is ready it prints one line, \"listening on URL\"; the log goes\n"
+        "to standard error, one JSON object a line. SIGTERM and SIGINT end it after a drain, a second one at once:\n"
+        "jobs that were running are run again at the next start.\n"
+        "\n"
+        "exit status: 0 ended by a signal, 1 could not start or failed, 2 wrong usage\n",
+        to);
+}
+
+static bool parse_integer(const char *text, long least, long most, long *out)
+{
+    char *end;
+    errno = 0;
+    long value = strtol(text, &end, 10);
+    if (errno || end == text || *end || value < least || value > most)
+        return false;
+    *out = value;
+    return true;
+}
+
+static bool parse_seconds(const char *text, double least, double *out)
+{
+    char *end;
+    double value = strtod(text, &end);
+    if (end == text || *end || !isfinite(value) || value < least || value > 1e6)
+        return false;
+    *out = value;
+    return true;
+}
+
+/* "64M": a number of bytes, at least 1. */
+static bool parse_bytes(const char *text, size_t *out)
+{
+    static const char SUFFIXES[] = "KMG";
+    char *end;
+    errno = 0;
+    unsigned long long value = strtoull(text, &end, 10);
+    if (errno || end == text || text[0] == '-' || value == 0)
+        return false;
+    const char *suffix = *end ? strchr(SUFFIXES, *end) : NULL;
+    int shift = suffix ? 10 * (int)(suffix - SUFFIXES + 1) : 0;
+    if ((*end && !suffix) || (suffix && end[1]) || value > (SIZE_MAX >> 2) >> shift)
+        return false;
+    *out = (size_t)value << shift;
+    return true;
+}
+
+static bool parse_level(const char *text, log_level *out)
+{
+    static const char *const NAMES[] = {"debug", "info", "warn", "error"};
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
+        if (strcmp(text, NAMES[i]) == 0) {
+            *out = (log_level)i;
+            return true;
+        }
+    return false;
+}
+
+static bool set_integer(int *out, long least, long most, const char *text)
+{
+    long value;
+    if (!parse_integer(text, least, most, &value))
+        return false;
+    *out = (int)value;
+    return true;
+}
+
+static bool set_connections(unsigned *out, const char *text)
+{
+    int value;
+    if (!set_integer(&value, 1, 100000, text))
+        return false;
+    *out = (unsigned)value;
+    return true;
+}
+
+static bool set_option(server_options *out, int option, const char *text)
+{
+    switch (option) {
+    case LISTEN:
+        out->listen = text;
+        return text[0] != '\0';
+    case DB:
+        out->db = text;
+        return text[0] != '\0';
+    case WORKERS:
+        return set_integer(&out->workers, 1, 1024, text);
+    case MAX_BODY:
+        return parse_bytes(text, &out->max_body);
+    case CACHE:
+        return parse_bytes(text, &out->cache);
+    case MAX_ATTEMPTS:
+        return set_integer(&out->max_attempts, 1, 1000, text);
+    case DRAIN:
+        return parse_seconds(text, 0, &out->drain_s);
+    case CONNECTIONS:
+        return set_connections(&out->max_connections, text);
+    case LEVEL:
+        return parse_level(text, &out->level);
+    case DEADLINE:
+        return parse_seconds(text, 0.1, &out->request_deadline_s);
+    default:
+        return false;
+    }
+}
+
+static server_options defaults(void)
+{
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return (server_options){.listen = "127.0.0.1:8080",
+                            .db = "./contact.db",
+                            .workers = cores < 1      ? 1
+                                       : cores > 1024 ? 1024
+                                                      : (int)cores,
+                            .max_attempts = 3,
+                            .max_connections = 256,
+                            .max_body = (size_t)64 << 20,
+                            .cache = (size_t)1 << 30,
+                            .drain_s = 30,
+                            .request_deadline_s = 30,
+                            .level = LOG_INFO};
+}
+
+options_verdict options_parse(server_options *out, int argc, char **argv, char *message, size_t size)
+{
+    int option, index = 0;
+    *out = defaults();
+    opterr = 0;
+    optind = 0; /* glibc: start again, also after an earlier call */
+    while ((option = getopt_long(argc, argv, ":", LONG_OPTIONS, &index)) != -1) {
+        if (option == HELP)
+            return OPTIONS_HELP;
+        if (option == VERSION)
+            return OPTIONS_VERSION;
+        if (option == ':' || option == '?') {
+            snprintf(message, size, option == ':' ? "%s needs a value" : "unknown option %s", argv[optind - 1]);
+            return OPTIONS_WRONG;
+        }
+        if (!set_option(out, option, optarg)) {
+            snprintf(message, size, "--%s does not take \"%s\"", LONG_OPTIONS[index].name, optarg);
+            return OPTIONS_WRONG;
+        }
+    }
+    if (optind < argc) {
+        snprintf(message, size, "unexpected argument \"%s\"", argv[optind]);
+        return OPTIONS_WRONG;
+    }
+    return OPTIONS_RUN;
+}

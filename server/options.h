@@ -1,0 +1,32 @@
+/* options.h: the daemon's command line. */
+#ifndef SERVER_OPTIONS_H
+#define SERVER_OPTIONS_H
+
+#include "log.h"
+
+#include <stddef.h>
+#include <stdio.h>
+
+#define UZAWAD_VERSION "0.1.0"
+
+typedef struct {
+    const char *listen, *db; /* point into argv or to constants */
+    int workers, max_attempts;
+    unsigned max_connections;
+    size_t max_body, cache; /* bytes */
+    double drain_s, request_deadline_s;
+    log_level level;
+} server_options;
+
+typedef enum {
+    OPTIONS_RUN,
+    OPTIONS_HELP,
+    OPTIONS_VERSION,
+    OPTIONS_WRONG /* the reason is in message */
+} options_verdict;
+
+/* Reads argv; *out has the defaults for what is not given. */
+options_verdict options_parse(server_options *out, int argc, char **argv, char *message, size_t size);
+void options_usage(FILE *to);
+
+#endif

@@ -1,0 +1,73 @@
+/* internal.h: what the files of the workers share. */
+#ifndef SERVER_WORK_INTERNAL_H
+#define SERVER_WORK_INTERNAL_H
+
+#include "work/live.h"
+#include "work/work.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+
+/* One thread and the job it runs. */
+typedef struct {
+    work *w;
+    pthread_t thread;
+    char owner[128]; /* who it is to the store: host, process, a random number, worker */
+
+    pthread_mutex_t lock; /* id, live */
+    char id[33];          /* the job that runs now, "" when none */
+    live live;
+
+    atomic_bool cancel; /* somebody wants this job to end with its best answer */
+    atomic_bool lost;   /* the store says the job is not ours any more */
+} worker;
+
+/* Somebody in work_wait. */
+typedef struct waiter {
+    const char *id;
+    bool look; /* the job may have ended: ask the store again */
+    pthread_cond_t changed;
+    struct waiter *next;
+} waiter;
+
+/* Lock order: claim_lock, then a worker's lock. claim_lock, then the store's. No other two are held together. */
+struct work {
+    store *store;
+    server_log *log;
+    uz_cache *cache;
+    work_options options;
+
+    /* A claim and the publishing of its id are one step, so that whoever saw the job running finds its worker. */
+    pthread_mutex_t claim_lock;
+
+    pthread_mutex_t lock; /* everything down to waiters */
+    pthread_cond_t wake;  /* submitted or stopping */
+    pthread_cond_t idle;  /* alive became 0, the drain was shortened, or stopped */
+    pthread_cond_t tick;  /* finished */
+    uint64_t submitted;   /* times work_wake was called: a worker that saw no job waits for another number */
+    int alive;            /* worker threads that have not ended */
+    bool stopping;        /* no more claims */
+    bool finished;        /* the keeper shall stop */
+    bool stopped;         /* every thread was joined */
+    double drain_until;   /* work_clock() */
+    waiter *waiters;
+
+    atomic_bool interrupt; /* the time to drain is over */
+    int n_started;         /* workers to join; set before any other thread may call */
+    bool keeper_started;
+    pthread_t keeper;
+    worker *workers; /* options.workers of them */
+};
+
+/* Decodes, solves and stores one claimed job; takes over its texts and the body. */
+void work_run(worker *me, job *claimed, char *body, size_t body_len);
+
+/* Fills `deadline` with now + seconds on CLOCK_MONOTONIC, which every condition here uses. */
+void work_deadline(struct timespec *deadline, double seconds);
+double work_clock(void); /* seconds, CLOCK_MONOTONIC */
+void work_init_condition(pthread_cond_t *condition);
+
+/* Makes those who wait for this job look again; NULL: all. */
+void work_notify(work *w, const char *id);
+
+#endif

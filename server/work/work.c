@@ -1,0 +1,394 @@
+/* work.c: the threads: workers that claim, a keeper that renews their leases, and those who wait for a job. */
+#include "work/internal.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <time.h>
+#include <unistd.h>
+
+#define CLAIM_RETRY_S 1.0 /* after the store failed */
+
+/* ---- workers */
+
+static void publish(worker *me, const char *id)
+{
+    pthread_mutex_lock(&me->lock);
+    live_reset(&me->live);
+    strcpy(me->id, id);
+    pthread_mutex_unlock(&me->lock);
+}
+
+static store_status claim(worker *me, job *claimed, char **body, size_t *body_len)
+{
+    work *w = me->w;
+    pthread_mutex_lock(&w->claim_lock);
+    store_status status = store_claim(w->store, me->owner, w->options.lease_s, claimed, body, body_len);
+    if (status == STORE_OK) {
+        atomic_store(&me->cancel, false);
+        atomic_store(&me->lost, false);
+        publish(me, claimed->id);
+    }
+    pthread_mutex_unlock(&w->claim_lock);
+    return status;
+}
+
+/* Waits until something was submitted since `seen`; false: stop. After a failure of the store it tries again anyway. */
+static bool wait_for_work(work *w, uint64_t seen, bool store_failed)
+{
+    struct timespec deadline;
+    work_deadline(&deadline, CLAIM_RETRY_S);
+    pthread_mutex_lock(&w->lock);
+    while (!w->stopping && (store_failed || w->submitted == seen)) {
+        if (!store_failed)
+            pthread_cond_wait(&w->wake, &w->lock);
+        else if (pthread_cond_timedwait(&w->wake, &w->lock, &deadline) == ETIMEDOUT)
+            break;
+    }
+    bool go_on = !w->stopping;
+    pthread_mutex_unlock(&w->lock);
+    return go_on;
+}
+
+static uint64_t count_submitted(work *w, bool *stopping)
+{
+    pthread_mutex_lock(&w->lock);
+    uint64_t seen = w->submitted;
+    *stopping = w->stopping;
+    pthread_mutex_unlock(&w->lock);
+    return seen;
+}
+
+static void log_failed_claim(work *w)
+{
+    char cause[256];
+    store_message(w->store, cause, sizeof cause);
+    log_write(w->log, LOG_ERROR, "claim_failed", (log_field[]){LOG_S("cause", cause), {0}});
+}
+
+static void *work_loop(void *arg)
+{
+    worker *me = arg;
+    work *w = me->w;
+    uz_thread_init();
+    for (bool go_on = true, stopping; go_on;) {
+        job claimed;
+        char *body;
+        size_t body_len;
+        uint64_t seen = count_submitted(w, &stopping);
+        if (stopping)
+            break;
+        store_status status = claim(me, &claimed, &body, &body_len);
+        if (status == STORE_OK) {
+            char id[33];
+            strcpy(id, claimed.id);
+            work_run(me, &claimed, body, body_len);
+            publish(me, "");
+            work_notify(w, id);
+            continue;
+        }
+        if (status != STORE_NOT_FOUND)
+            log_failed_claim(w);
+        go_on = wait_for_work(w, seen, status != STORE_NOT_FOUND);
+    }
+    pthread_mutex_lock(&w->lock);
+    if (--w->alive == 0)
+        pthread_cond_broadcast(&w->idle);
+    pthread_mutex_unlock(&w->lock);
+    return NULL;
+}
+
+/* ---- the keeper: a factorization may take longer than a lease and asks nothing meanwhile, so leases are renewed from
+ * a thread of their own */
+
+static void renew(worker *me)
+{
+    char id[33];
+    pthread_mutex_lock(&me->lock);
+    strcpy(id, me->id);
+    int progress = live_progress(&me->live);
+    pthread_mutex_unlock(&me->lock);
+    if (!id[0])
+        return;
+    store_status status = store_renew(me->w->store, id, me->owner, me->w->options.lease_s, progress);
+    if (status != STORE_CONFLICT && status != STORE_NOT_FOUND)
+        return; /* a store that fails now may work before the lease ends */
+    pthread_mutex_lock(&me->lock);
+    if (strcmp(me->id, id) == 0) /* else it ended meanwhile */
+        atomic_store(&me->lost, true);
+    pthread_mutex_unlock(&me->lock);
+}
+
+static void *keep_loop(void *arg)
+{
+    work *w = arg;
+    struct timespec deadline;
+    pthread_mutex_lock(&w->lock);
+    while (!w->finished) {
+        work_deadline(&deadline, w->options.lease_s / 3.0);
+        if (pthread_cond_timedwait(&w->tick, &w->lock, &deadline) != ETIMEDOUT)
+            continue;
+        pthread_mutex_unlock(&w->lock);
+        for (int i = 0; i < w->options.workers; i++)
+            renew(&w->workers[i]);
+        pthread_mutex_lock(&w->lock);
+    }
+    pthread_mutex_unlock(&w->lock);
+    return NULL;
+}
+
+/* ---- starting */
+
+static char *too_many_attempts(void)
+{
+    problem_details problem = {.status = 500, .code = "attempts_exhausted", .title = "Every attempt was cut short"};
+    snprintf(problem.detail, sizeof problem.detail,
+             "The service ended while this job ran, as often as is allowed. Most likely the job needs more memory than "
+             "there is; make it smaller or submit it again.");
+    return codec_encode_problem(&problem);
+}
+
+static bool recover(work *w, char *message, size_t size)
+{
+    int64_t requeued, failed;
+    char cause[256];
+    char *error = too_many_attempts();
+    store_status status =
+        error ? store_recover(w->store, w->options.max_attempts, error, &requeued, &failed) : STORE_ERROR;
+    free(error);
+    if (status != STORE_OK) {
+        store_message(w->store, cause, sizeof cause);
+        snprintf(message, size, "cannot take up the jobs that were left running: %s", cause);
+        return false;
+    }
+    if (requeued + failed > 0)
+        log_write(w->log, LOG_WARN, "recovered",
+                  (log_field[]){LOG_I("requeued", requeued), LOG_I("failed", failed), {0}});
+    return true;
+}
+
+static void name_owners(work *w)
+{
+    char host[65] = "";
+    unsigned random = 0;
+    gethostname(host, sizeof host - 1);
+    if (getrandom(&random, sizeof random, 0) < 0)
+        random = (unsigned)time(NULL);
+    for (int i = 0; i < w->options.workers; i++)
+        snprintf(w->workers[i].owner, sizeof w->workers[i].owner, "%s:%ld:%08x:%d", host, (long)getpid(), random, i);
+}
+
+/* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */
+static void block_signals(sigset_t *before)
+{
+    static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};
+    sigset_t set;
+    sigfillset(&set);
+    for (size_t i = 0; i < sizeof FAULTS / sizeof FAULTS[0]; i++)
+        sigdelset(&set, FAULTS[i]);
+    pthread_sigmask(SIG_SETMASK, &set, before);
+}
+
+static bool start_threads(work *w)
+{
+    sigset_t before;
+    block_signals(&before);
+    bool ok = pthread_create(&w->keeper, NULL, keep_loop, w) == 0;
+    w->keeper_started = ok;
+    pthread_mutex_lock(&w->lock);
+    for (int i = 0; ok && i < w->options.workers; i++) {
+        ok = pthread_create(&w->workers[i].thread, NULL, work_loop, &w->workers[i]) == 0;
+        w->n_started += ok;
+        w->alive += ok;
+    }
+    pthread_mutex_unlock(&w->lock);
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+    return ok;
+}
+
+static work *make_work(store *s, const work_options *options, server_log *log)
+{
+    work *w = calloc(1, sizeof *w);
+    if (!w)
+        return NULL;
+    w->store = s;
+    w->log = log;
+    w->options = *options;
+    w->options.workers = options->workers > 0 ? options->workers : 1;
+    w->options.max_attempts = options->max_attempts > 0 ? options->max_attempts : 3;
+    w->options.lease_s = options->lease_s > 0.0 ? options->lease_s : 30.0;
+    pthread_mutex_init(&w->claim_lock, NULL);
+    pthread_mutex_init(&w->lock, NULL);
+    work_init_condition(&w->wake);
+    work_init_condition(&w->idle);
+    work_init_condition(&w->tick);
+    w->cache = uz_cache_new(options->cache_bytes);
+    w->workers = calloc((size_t)w->options.workers, sizeof *w->workers);
+    for (int i = 0; w->workers && i < w->options.workers; i++) {
+        w->workers[i].w = w;
+        pthread_mutex_init(&w->workers[i].lock, NULL);
+    }
+    return w;
+}
+
+work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size)
+{
+    work *w = make_work(s, options, log);
+    if (!w || !w->cache || !w->workers) {
+        snprintf(message, size, "no memory for the workers");
+        work_free(w);
+        return NULL;
+    }
+    name_owners(w);
+    if (!recover(w, message, size)) {
+        work_free(w);
+        return NULL;
+    }
+    if (!start_threads(w)) {
+        snprintf(message, size, "cannot start %d worker threads", w->options.workers);
+        work_free(w);
+        return NULL;
+    }
+    return w;
+}
+
+/* ---- stopping */
+
+/* Waits until every worker has ended or the time to drain is over; another call may bring that time nearer. */
+static void drain(work *w)
+{
+    struct timespec deadline;
+    while (w->alive > 0 && work_clock() < w->drain_until) {
+        work_deadline(&deadline, w->drain_until - work_clock());
+        pthread_cond_timedwait(&w->idle, &w->lock, &deadline);
+    }
+}
+
+static void join_threads(work *w)
+{
+    for (int i = 0; i < w->n_started; i++)
+        pthread_join(w->workers[i].thread, NULL);
+    pthread_mutex_lock(&w->lock);
+    w->finished = true; /* only now: leases are kept until the last job has ended */
+    pthread_cond_broadcast(&w->tick);
+    pthread_mutex_unlock(&w->lock);
+    if (w->keeper_started)
+        pthread_join(w->keeper, NULL);
+}
+
+void work_stop(work *w, double drain_s)
+{
+    double until = work_clock() + (drain_s > 0.0 ? drain_s : 0.0);
+    pthread_mutex_lock(&w->lock);
+    bool first = !w->stopping;
+    w->drain_until = first || until < w->drain_until ? until : w->drain_until;
+    w->stopping = true;
+    pthread_cond_broadcast(&w->wake);
+    pthread_cond_broadcast(&w->idle);
+    pthread_mutex_unlock(&w->lock);
+    work_notify(w, NULL);
+    pthread_mutex_lock(&w->lock);
+    if (first)
+        drain(w);
+    while (!first && !w->stopped)
+        pthread_cond_wait(&w->idle, &w->lock);
+    pthread_mutex_unlock(&w->lock);
+    if (!first)
+        return;
+    atomic_store(&w->interrupt, true);
+    join_threads(w);
+    pthread_mutex_lock(&w->lock);
+    w->stopped = true;
+    pthread_cond_broadcast(&w->idle);
+    pthread_mutex_unlock(&w->lock);
+}
+
+void work_free(work *w)
+{
+    if (!w)
+        return;
+    work_stop(w, 0.0);
+    for (int i = 0; w->workers && i < w->options.workers; i++) {
+        live_clear(&w->workers[i].live);
+        pthread_mutex_destroy(&w->workers[i].lock);
+    }
+    free(w->workers);
+    uz_cache_free(w->cache);
+    pthread_cond_destroy(&w->tick);
+    pthread_cond_destroy(&w->idle);
+    pthread_cond_destroy(&w->wake);
+    pthread_mutex_destroy(&w->lock);
+    pthread_mutex_destroy(&w->claim_lock);
+    free(w);
+}
+
+/* ---- what the rest of the server asks */
+
+void work_wake(work *w)
+{
+    pthread_mutex_lock(&w->lock);
+    w->submitted++;
+    pthread_cond_signal(&w->wake);
+    pthread_mutex_unlock(&w->lock);
+}
+
+/* The worker that runs the job, with its lock held; NULL: none. */
+static worker *find_worker(work *w, const char *id)
+{
+    for (int i = 0; id[0] && i < w->options.workers; i++) {
+        pthread_mutex_lock(&w->workers[i].lock);
+        if (strcmp(w->workers[i].id, id) == 0)
+            return &w->workers[i];
+        pthread_mutex_unlock(&w->workers[i].lock);
+    }
+    return NULL;
+}
+
+bool work_cancel(work *w, const char *id)
+{
+    pthread_mutex_lock(&w->claim_lock);
+    worker *found = find_worker(w, id);
+    if (found) {
+        atomic_store(&found->cancel, true);
+        pthread_mutex_unlock(&found->lock);
+    }
+    pthread_mutex_unlock(&w->claim_lock);
+    if (!found)
+        work_notify(w, id);
+    return found != NULL;
+}
+
+bool work_live(work *w, const char *id, int64_t after, int *progress, double **rows, int64_t *count)
+{
+    int64_t unused;
+    if (rows)
+        *rows = NULL;
+    if (count)
+        *count = 0;
+    worker *found = find_worker(w, id);
+    if (!found)
+        return false;
+    if (progress)
+        *progress = live_progress(&found->live);
+    bool ok = !rows || live_rows(&found->live, after, rows, count ? count : &unused);
+    pthread_mutex_unlock(&found->lock);
+    return ok;
+}
+
+uz_cache *work_cache(work *w)
+{
+    return w->cache;
+}
+
+size_t work_cache_bytes(const work *w)
+{
+    return w->options.cache_bytes;
+}
+
+int work_workers(const work *w)
+{
+    return w->options.workers;
+}

@@ -1,0 +1,65 @@
+/* work.h: the worker threads between the store and the solver.
+ *
+ * One chain per job: claim -> decode -> uz_solve -> finish (commit) -> tell the waiters. A worker owns the job it runs;
+ * the store decides who owns what, and a job's lease is renewed until it ends. Lock order: work's own, then the
+ * store's; never the other way round (work/internal.h).
+ *
+ * What a finished job leaves in the store (store_get_vector):
+ *   "dim"            1  0 for matrices; 2 or 3 for a scene: how displacements and nodes are grouped
+ *   "reactions"      m  r
+ *   "gaps"           m  g
+ *   "displacements"  d for matrices; nodes x dim, node by node, for a scene
+ *   "nodes"          nodes x dim, coordinates; scenes only
+ *   "contact_nodes"  m, the node of each reaction; scenes only
+ * and a history of CODEC_HISTORY_COLUMNS columns. A vector that a solve did not give is not there.
+ * In the summary timings_s.total covers queue and parse too. */
+#ifndef SERVER_WORK_H
+#define SERVER_WORK_H
+
+#include "log.h"
+#include "store/store.h"
+#include "uzawa.h"
+
+#include <stdbool.h>
+
+typedef struct work work;
+
+typedef struct {
+    int workers;
+    int max_attempts;   /* runs begun before a job that keeps killing the process is failed */
+    size_t cache_bytes; /* factor cache */
+    double lease_s;
+} work_options;
+
+/* Recovers jobs left by a dead process, then starts the threads. NULL on failure with the reason in message. */
+work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size);
+
+/* Tells the workers that a job was submitted. */
+void work_wake(work *w);
+
+/* Asks a running job to stop; false if no worker here runs it. The job ends as dismissed with its best answer so far,
+ * unless it ends of itself first. Call it after every store_dismiss: for a job that does not run it makes those who
+ * wait for it look at the store again. */
+bool work_cancel(work *w, const char *id);
+
+/* Blocks until the job has ended, `seconds` have passed or the service stops; true if it ended (or does not exist). */
+bool work_wait(work *w, const char *id, double seconds);
+
+/* Progress and history of a job that runs now: *rows (freed by the caller) has *count rows of 12 doubles (codec's
+ * columns) with iteration > after. Of a long run rows are left out, evenly; the newest is always there. False if it
+ * does not run here. rows may be NULL when only progress is wanted. */
+bool work_live(work *w, const char *id, int64_t after, int *progress, double **rows, int64_t *count);
+
+uz_cache *work_cache(work *w);
+size_t work_cache_bytes(const work *w);
+int work_workers(const work *w);
+
+/* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to
+ * accepted. Waiters wake at once. Returns when every worker has ended; a factorization cannot be interrupted and is
+ * waited for. May be called again, also from another thread while the first call waits: the earliest end of the drain
+ * counts. */
+void work_stop(work *w, double drain_s);
+/* Stops what still runs. No other call may be in progress. NULL is fine. */
+void work_free(work *w);
+
+#endif
