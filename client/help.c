@@ -1,0 +1,115 @@
+#include "arguments.h"
+
+#include <string.h>
+
+typedef struct {
+    const char *name, *usage, *about, *details;
+} page;
+
+#define OUTCOME_EXITS                                                                                                  \
+    "0 converged, 6 the job failed, 7 ended without converging,\n"                                                     \
+    "8 infeasible, 9 dismissed, 10 --timeout passed (the job goes on).\n"
+
+static const page PAGES[CLIENT_COMMANDS] = {
+    [CLIENT_SUBMIT] = {"submit", "submit FILE [options]", "send a problem, and wait for its answer if told to",
+                       "FILE is a request in JSON, \"-\" is standard input. Prints the job's id, and with --wait its\n"
+                       "summary. A repeat after a lost connection never makes a second job.\n"
+                       "\n"
+                       "  -w, --wait         wait until the job has ended and print the summary\n"
+                       "  -t, --timeout S    with --wait: stop waiting after S seconds\n"
+                       "      --tag WORD     label the job; may be repeated\n"
+                       "  -k, --key KEY      idempotency key (default: random); the same key and file give the\n"
+                       "                     same job\n"
+                       "  -q, --quiet        print the id and nothing else\n"
+                       "  -j, --json         print the job as JSON\n"
+                       "      --progress     show progress on stderr even where it is no terminal\n"
+                       "\n"
+                       "Exit status with --wait: " OUTCOME_EXITS},
+    [CLIENT_STATUS] = {"status", "status ID [--json]", "show a job", "Exit status 0 whatever became of the job.\n"},
+    [CLIENT_WAIT] = {"wait", "wait ID [options]", "wait until a job has ended, then print its summary",
+                     "  -t, --timeout S    stop waiting after S seconds\n"
+                     "  -q, --quiet        print nothing; the exit status tells\n"
+                     "  -j, --json         print the job as JSON\n"
+                     "      --progress     show progress on stderr even where it is no terminal\n"
+                     "\nExit status: " OUTCOME_EXITS},
+    [CLIENT_RESULT] = {"result", "result ID [options]", "fetch displacements, reactions, gaps as JSON",
+                       "      --fields A,B   of displacements, reactions, gaps (default: reactions,gaps)\n"
+                       "  -o, --output FILE  write to FILE, whole or not at all\n"},
+    [CLIENT_HISTORY] = {"history", "history ID [options]", "fetch or draw the convergence history",
+                        "      --csv          as CSV instead of JSON\n"
+                        "      --plot         draw it: log10 of the error bound and of the residual\n"
+                        "      --width N      of the drawing, in characters (default 72)\n"
+                        "      --height N     of the drawing, in lines (default 20)\n"
+                        "      --ascii        draw in plain ASCII (default where the locale is not UTF-8)\n"
+                        "  -o, --output FILE  write to FILE, whole or not at all\n"},
+    [CLIENT_LIST] = {"list", "list [options]", "list jobs, newest first",
+                     "      --status S     accepted, running, successful, failed or dismissed\n"
+                     "      --tag WORD     only jobs with this tag\n"
+                     "  -n, --limit N      at most N jobs (default 20)\n"
+                     "  -j, --json         as JSON\n"},
+    [CLIENT_CANCEL] = {"cancel", "cancel ID", "dismiss a waiting or running job; delete an ended one",
+                       "  -q, --quiet        print nothing\n"
+                       "  -j, --json         print the server's reply\n"},
+    [CLIENT_VERSION] = {"version", "version", "print the version", ""},
+    [CLIENT_HELP] = {"help", "help [COMMAND]", "explain a command", ""},
+};
+
+static const char GENERAL[] =
+    "General options:\n"
+    "  -s, --server URL   the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080)\n"
+    "  -t, --timeout S    give up after S seconds; for wait and submit --wait: stop waiting\n"
+    "      --retry S      keep trying to reach the server for S seconds (default 3; 30 while waiting)\n"
+    "  -h, --help         explain the command\n"
+    "  -V, --version      print the version\n";
+
+static const char EXITS[] = "Exit status:\n"
+                            "   0  done; wait and submit --wait: ended and converged\n"
+                            "   2  the command line is wrong\n"
+                            "   3  the server cannot be reached, or does not answer in time\n"
+                            "   4  the server refused the request; why is on stderr\n"
+                            "   5  the server failed\n"
+                            "   6  the job failed\n"
+                            "   7  the job ended without converging (iteration, time or precision limit, paper rule)\n"
+                            "   8  the problem is infeasible\n"
+                            "   9  the job was dismissed\n"
+                            "  10  the job goes on, but --timeout has passed\n"
+                            "  11  a local file could not be read or written\n";
+
+const char *client_command_name(client_command command)
+{
+    return command < CLIENT_COMMANDS ? PAGES[command].name : "";
+}
+
+bool client_command_find(client_command *out, const char *name)
+{
+    for (int i = 0; i < CLIENT_COMMANDS; i++) {
+        if (strcmp(PAGES[i].name, name) != 0)
+            continue;
+        *out = (client_command)i;
+        return true;
+    }
+    return false;
+}
+
+static void print_overview(FILE *to)
+{
+    fputs("usage: uzawa [--server URL] [--timeout S] COMMAND ...\n"
+          "Solves frictionless contact problems by a contact solver service.\n\nCommands:\n",
+          to);
+    for (int i = 0; i < CLIENT_COMMANDS; i++)
+        fprintf(to, "  %-9s %s\n", PAGES[i].name, PAGES[i].about);
+    fprintf(to, "\n%s\n%s", GENERAL, EXITS);
+}
+
+void client_help_print(FILE *to, client_command command)
+{
+    if (command >= CLIENT_COMMANDS) {
+        print_overview(to);
+        return;
+    }
+    const page *p = &PAGES[command];
+    fprintf(to, "usage: uzawa %s\n%c%s.\n", p->usage, p->about[0] - 'a' + 'A', p->about + 1);
+    if (p->details[0])
+        fprintf(to, "\n%s", p->details);
+    fprintf(to, "\n%s", GENERAL);
+}

@@ -1,0 +1,63 @@
+/* uzawa: the command line client of the contact solver service. It speaks HTTP and nothing else. */
+#include "session.h"
+
+#include <stdlib.h>
+
+typedef client_exit (*command_run)(client_session *);
+
+static const command_run RUN[CLIENT_COMMANDS] = {
+    [CLIENT_SUBMIT] = client_submit, [CLIENT_STATUS] = client_status,   [CLIENT_WAIT] = client_wait,
+    [CLIENT_RESULT] = client_result, [CLIENT_HISTORY] = client_history, [CLIENT_LIST] = client_list,
+    [CLIENT_CANCEL] = client_cancel,
+};
+
+static client_exit complain_usage(const char *message)
+{
+    fprintf(stderr, "uzawa: %s\nusage: uzawa [--server URL] [--timeout S] COMMAND ...; see: uzawa help\n", message);
+    return CLIENT_USAGE;
+}
+
+static client_exit explain(const client_options *options)
+{
+    client_command topic = options->command;
+    if (topic == CLIENT_HELP && options->operand) {
+        if (!client_command_find(&topic, options->operand))
+            return complain_usage("there is no such command");
+    } else if (topic == CLIENT_HELP)
+        topic = CLIENT_COMMANDS;
+    client_help_print(stdout, topic);
+    return CLIENT_OK;
+}
+
+static client_exit run_command(const client_options *options)
+{
+    char message[256];
+    if (options->version || options->command == CLIENT_VERSION) {
+        puts("uzawa " CLIENT_VERSION_TEXT);
+        return CLIENT_OK;
+    }
+    if (options->help || options->command == CLIENT_HELP)
+        return explain(options);
+    client_session session = {
+        .options = options, .out = stdout, .err = stderr, .deadline = client_clock() + options->timeout_s};
+    session.http = client_http_open(options->server, message, sizeof message);
+    if (!session.http)
+        return complain_usage(message);
+    client_exit code = RUN[options->command](&session);
+    client_http_close(session.http);
+    return code;
+}
+
+int main(int argc, char **argv)
+{
+    char message[256];
+    client_options options;
+    if (!client_arguments_parse(&options, argc, argv, getenv("UZAWA_SERVER"), message, sizeof message))
+        return (int)complain_usage(message);
+    client_exit code = run_command(&options);
+    if (fflush(stdout) != 0 || ferror(stdout)) {
+        perror("uzawa: cannot write to standard output");
+        return CLIENT_LOCAL;
+    }
+    return (int)code;
+}

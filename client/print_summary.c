@@ -1,0 +1,223 @@
+#include "report.h"
+#include "files.h"
+
+#include <math.h>
+#include <string.h>
+
+static const char *outcome_in_words(const char *outcome)
+{
+    static const char *const WORDS[][2] = {
+        {"converged", "the certificate meets what was asked for"},
+        {"iteration_limit", "the iterations ran out first; this is the best answer so far"},
+        {"time_limit", "the time ran out first; this is the best answer so far"},
+        {"precision_limit", "double precision holds no more digits here"},
+        {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
+        {"infeasible", "no displacement satisfies all contact conditions"},
+        {"dismissed", "it was dismissed; this is the best answer so far"},
+    };
+    for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
+        if (strcmp(WORDS[i][0], outcome) == 0)
+            return WORDS[i][1];
+    return "";
+}
+
+/* A number for a person; "unknown" where the job has none, since nan looks like an answer. Buffer of 32. */
+static const char *number_in_words(char text[32], const json_t *object, const char *path, int digits)
+{
+    double value = client_json_number(object, path);
+    if (isfinite(value))
+        snprintf(text, 32, "%.*g", digits, value);
+    else
+        snprintf(text, 32, "unknown");
+    return text;
+}
+
+static void label(FILE *to, const char *text)
+{
+    fprintf(to, "%-12s", text);
+}
+
+static void print_outcome(FILE *to, const json_t *summary)
+{
+    const char *outcome = client_json_text(summary, "outcome"), *words = outcome_in_words(outcome);
+    const char *message = client_json_text(summary, "message");
+    label(to, "outcome");
+    client_print_safe(to, outcome);
+    fprintf(to, "%s%s\n", *words ? ": " : "", words);
+    if (*message) {
+        label(to, "");
+        client_print_safe(to, message);
+        fputc('\n', to);
+    }
+}
+
+static void print_count(FILE *to, const json_t *summary, const char *path, const char *one, const char *many)
+{
+    double count = client_json_number(summary, path);
+    if (isfinite(count))
+        fprintf(to, ", %.0f %s", count, fabs(count - 1) < 0.5 ? one : many);
+}
+
+static void print_method(FILE *to, const json_t *summary)
+{
+    label(to, "method");
+    client_print_safe(to, client_json_text(summary, "method"));
+    fputs(", ", to);
+    client_print_safe(to, client_json_text(summary, "operator"));
+    fputs(" operator", to);
+    print_count(to, summary, "iterations", "iteration", "iterations");
+    print_count(to, summary, "restarts", "restart", "restarts");
+    fputc('\n', to);
+}
+
+static void print_problem_size(FILE *to, const json_t *summary)
+{
+    double d = client_json_number(summary, "problem.d"), m = client_json_number(summary, "problem.m");
+    if (!isfinite(d) || !isfinite(m))
+        return;
+    label(to, "problem");
+    client_print_safe(to, client_json_text(summary, "problem.kind"));
+    fprintf(to, ", %.0f unknowns, %.0f contact conditions\n", d, m);
+}
+
+static void print_force(FILE *to, const json_t *summary)
+{
+    const json_t *force = client_json_at(summary, "contact.force");
+    if (!json_is_array(force) || json_array_size(force) == 0)
+        return;
+    fputs(", force (", to);
+    for (size_t i = 0; i < json_array_size(force); i++)
+        fprintf(to, "%s%.6g", i ? ", " : "", json_number_value(json_array_get(force, i)));
+    fputs(")", to);
+}
+
+static void print_contact(FILE *to, const json_t *summary)
+{
+    char text[32], more[32];
+    label(to, "contact");
+    fprintf(to, "%s of %s candidates touch\n", number_in_words(text, summary, "contact.active", 9),
+            number_in_words(more, summary, "contact.candidates", 9));
+    label(to, "reactions");
+    fprintf(to, "sum %s", number_in_words(text, summary, "contact.reaction_sum", 10));
+    print_force(to, summary);
+    if (json_is_number(client_json_at(summary, "contact.max_pressure")))
+        fprintf(to, ", largest pressure %s", number_in_words(text, summary, "contact.max_pressure", 6));
+    fputc('\n', to);
+    label(to, "penetration");
+    fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
+}
+
+static void print_energy(FILE *to, const json_t *summary)
+{
+    char text[32], more[32];
+    if (!json_is_object(client_json_at(summary, "energy")))
+        return;
+    label(to, "energy");
+    fprintf(to, "%s primal, %s dual\n", number_in_words(text, summary, "energy.primal", 11),
+            number_in_words(more, summary, "energy.dual", 11));
+}
+
+static void print_request_met(FILE *to, const json_t *summary)
+{
+    double asked = client_json_number(summary, "requested_error");
+    bool met = strcmp(client_json_text(summary, "outcome"), "converged") == 0;
+    if (!isfinite(asked))
+        fputs("\n", to);
+    else if (asked > 0)
+        fprintf(to, " (asked for %.3g: %s)\n", asked, met ? "met" : "not met");
+    else
+        fprintf(to, " (asked for rounding level: %s)\n", met ? "met" : "not met");
+}
+
+/* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
+static void print_bound(FILE *to, double bound)
+{
+    double digits = floor(-log10(bound));
+    if (bound > 0 && bound < 1 && digits >= 1)
+        fprintf(to,
+                "the exact displacement is within %.2g of this one, relative, in the energy norm:\n%12s"
+                "%.0f digit%s %s certain",
+                bound, "", fmin(digits, 15), digits > 1 ? "s" : "", digits > 1 ? "are" : "is");
+    else
+        fprintf(to, "the exact displacement is within %.2g of this one, relative, in the energy norm", bound);
+}
+
+static void print_certificate(FILE *to, const json_t *summary)
+{
+    const json_t *certificate = client_json_at(summary, "certificate");
+    double relative = client_json_number(certificate, "relative_error");
+    char absolute[32], gap[32], residual[32];
+    double mesh = client_json_number(summary, "discretization_error");
+    if (!json_is_object(certificate))
+        return;
+    label(to, "certificate");
+    if (isfinite(relative))
+        print_bound(to, relative);
+    else
+        fputs("nothing could be certified", to);
+    print_request_met(to, summary);
+    label(to, "");
+    fprintf(to, "absolute %s, duality gap %s, relative KKT residual %s\n",
+            number_in_words(absolute, certificate, "absolute_error", 3), number_in_words(gap, certificate, "gap", 3),
+            number_in_words(residual, certificate, "relative_residual.total", 3));
+    if (isfinite(mesh)) {
+        label(to, "");
+        fprintf(to, "the mesh itself is off by about %.2g\n", mesh);
+    }
+}
+
+static void print_factor(FILE *to, const json_t *summary)
+{
+    const json_t *factor = client_json_at(summary, "factor");
+    double bytes = client_json_number(factor, "bytes");
+    char entries[32], rcond[32];
+    if (!json_is_object(factor))
+        return;
+    label(to, "factor");
+    fprintf(to, "%s, ", json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new");
+    client_print_safe(to, client_json_text(factor, "ordering"));
+    fprintf(to, " ordering, %s entries", number_in_words(entries, factor, "nnz", 15));
+    if (isfinite(bytes))
+        fprintf(to, ", %.3g MB", bytes / 1e6);
+    fprintf(to, ", rcond %s\n", number_in_words(rcond, factor, "rcond", 2));
+}
+
+/* The stages that took at least a hundredth of the whole, in the order in which they ran. */
+static void print_timings(FILE *to, const json_t *summary)
+{
+    static const char *const STAGES[] = {"queue",  "parse",    "assemble", "order",
+                                         "factor", "condense", "iterate",  "certify"};
+    const json_t *timings = client_json_at(summary, "timings_s");
+    double total = client_json_number(timings, "total");
+    const char *before = ": ";
+    char text[32];
+    if (!isfinite(total))
+        return;
+    label(to, "time");
+    fprintf(to, "%s", client_format_seconds(text, sizeof text, total));
+    for (size_t i = 0; i < sizeof STAGES / sizeof *STAGES; i++) {
+        double seconds = client_json_number(timings, STAGES[i]);
+        if (!(seconds >= 0.01 * total) || !(seconds > 0))
+            continue;
+        fprintf(to, "%s%s %s", before, STAGES[i], client_format_seconds(text, sizeof text, seconds));
+        before = ", ";
+    }
+    fputc('\n', to);
+}
+
+void client_print_summary(FILE *to, const json_t *job)
+{
+    const json_t *summary = json_object_get(job, "summary");
+    client_print_job(to, job);
+    if (!json_is_object(summary))
+        return;
+    print_outcome(to, summary);
+    print_problem_size(to, summary);
+    print_method(to, summary);
+    if (json_is_object(json_object_get(summary, "contact")))
+        print_contact(to, summary);
+    print_energy(to, summary);
+    print_certificate(to, summary);
+    print_factor(to, summary);
+    print_timings(to, summary);
+}

@@ -1,0 +1,84 @@
+#include "session.h"
+#include "report.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define PATIENCE_S 3.0
+#define SILENCE_S  60.0
+
+client_exit client_complain(client_session *s, client_exit code, const char *message)
+{
+    fputs("uzawa: ", s->err);
+    client_print_safe(s->err, message);
+    fputc('\n', s->err);
+    return code;
+}
+
+client_request client_request_new(const client_session *s, const char *method, const char *path)
+{
+    double patience = s->options->retry_s < 0 ? PATIENCE_S : s->options->retry_s;
+    return (client_request){.method = method,
+                            .path = path,
+                            .repeatable = true,
+                            .patience_s = patience,
+                            .silence_s = SILENCE_S,
+                            .deadline = s->deadline};
+}
+
+static client_exit exit_of_end(client_http_end end)
+{
+    return end == CLIENT_HTTP_MEMORY ? CLIENT_LOCAL : CLIENT_UNREACHABLE;
+}
+
+client_exit client_ask(client_session *s, client_reply *reply, const client_request *request)
+{
+    client_http_end end = client_http_send(s->http, reply, request);
+    if (end != CLIENT_HTTP_ANSWERED)
+        return client_complain(s, exit_of_end(end), reply->message);
+    if (reply->status >= 200 && reply->status < 300)
+        return CLIENT_OK;
+    json_t *problem = reply->body.data ? json_loadb(reply->body.data, reply->body.len, 0, NULL) : NULL;
+    client_print_problem(s->err, reply->status, problem);
+    json_decref(problem);
+    return reply->status >= 400 && reply->status < 500 ? CLIENT_REFUSED : CLIENT_SERVER_ERROR;
+}
+
+client_exit client_ask_json(client_session *s, json_t **out, const client_request *request)
+{
+    client_reply reply;
+    *out = NULL;
+    client_exit code = client_ask(s, &reply, request);
+    if (code == CLIENT_OK) {
+        json_t *value = reply.body.data ? json_loadb(reply.body.data, reply.body.len, 0, NULL) : NULL;
+        if (json_is_object(value))
+            *out = value;
+        else {
+            json_decref(value);
+            code = client_complain(s, CLIENT_SERVER_ERROR, "the reply is no JSON object; is this the right server?");
+        }
+    }
+    client_reply_clear(&reply);
+    return code;
+}
+
+char *client_job_path(client_session *s, const char *id, const char *suffix)
+{
+    static const char JOBS[] = "/v1/jobs/";
+    client_buffer path = {0};
+    bool ok = client_buffer_append(&path, JOBS, sizeof JOBS - 1) && client_http_append_escaped(&path, id) &&
+              client_buffer_append(&path, suffix, strlen(suffix));
+    if (!ok) {
+        free(path.data);
+        path.data = NULL;
+        client_complain(s, CLIENT_LOCAL, "no memory");
+    }
+    return path.data;
+}
+
+client_exit client_print_json(client_session *s, const json_t *value)
+{
+    bool ok = json_dumpf(value, s->out, JSON_INDENT(2) | JSON_PRESERVE_ORDER) == 0;
+    fputc('\n', s->out);
+    return ok ? CLIENT_OK : CLIENT_LOCAL;
+}

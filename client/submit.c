@@ -1,0 +1,196 @@
+/* submit and wait: the commands that may stay until a job has ended. */
+#include "progress.h"
+#include "report.h"
+#include "session.h"
+#include "tags.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+#define PATIENCE_WAITING_S 30.0 /* a server that restarts is back by then */
+#define GRACE_S            5.0  /* for the reply to the last poll before the deadline */
+#define LONG_POLL_S        30.0
+#define SHORT_POLL_S       1.0 /* while progress is shown */
+#define KEY_BYTES          16
+
+/* Random, so that a repeated request is recognised as the same one and no other. */
+static bool make_key(char key[2 * KEY_BYTES + 1])
+{
+    unsigned char bytes[KEY_BYTES];
+    if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
+        return false;
+    for (size_t i = 0; i < sizeof bytes; i++)
+        snprintf(key + 2 * i, 3, "%02x", bytes[i]);
+    return true;
+}
+
+static double poll_seconds(const client_session *s, const client_progress *progress)
+{
+    double left = fmax(s->deadline - client_clock(), 0);
+    return floor(fmin(progress->shown ? SHORT_POLL_S : LONG_POLL_S, left));
+}
+
+static void set_wait(client_request *request, char *header, size_t size, double seconds)
+{
+    request->silence_s += seconds;
+    if (seconds < 1)
+        return;
+    snprintf(header, size, "Prefer: wait=%.0f", seconds);
+    request->headers[1] = header;
+}
+
+/* One look at the job, which may take a while. *job is replaced only by a newer one. */
+static client_exit poll_job(client_session *s, const char *path, const client_progress *progress, json_t **job)
+{
+    char prefer[40];
+    json_t *newer;
+    client_request request = client_request_new(s, "GET", path);
+    set_wait(&request, prefer, sizeof prefer, poll_seconds(s, progress));
+    request.deadline += GRACE_S;
+    if (s->options->retry_s < 0)
+        request.patience_s = PATIENCE_WAITING_S;
+    client_exit code = client_ask_json(s, &newer, &request);
+    if (newer) {
+        json_decref(*job);
+        *job = newer;
+    }
+    return code;
+}
+
+/* Until *job, which may be NULL at first, has ended. CLIENT_OK says that it has, however. */
+static client_exit wait_for_end(client_session *s, const char *id, json_t **job, client_progress *progress)
+{
+    client_exit code = CLIENT_OK;
+    char *path = client_job_path(s, id, "");
+    if (!path)
+        return CLIENT_LOCAL;
+    while (code == CLIENT_OK && !client_job_ended(*job)) {
+        double asked = client_clock();
+        if (*job && asked >= s->deadline) {
+            code = CLIENT_WAIT_TIMEOUT;
+            break;
+        }
+        code = poll_job(s, path, progress, job);
+        if (code == CLIENT_OK)
+            client_progress_show(progress, *job);
+        /* A server that does not hold the request must not be asked without a pause. */
+        if (code == CLIENT_OK && !client_job_ended(*job) && client_clock() - asked < 0.2)
+            client_sleep(fmin(0.2, s->deadline - client_clock()));
+    }
+    free(path);
+    return code;
+}
+
+static void print_wait_timeout(client_session *s, const char *id)
+{
+    fprintf(s->err, "uzawa: the job has not ended after %g s and goes on; see it with: uzawa wait ",
+            s->options->timeout_s);
+    client_print_safe(s->err, id);
+    fputc('\n', s->err);
+}
+
+/* What the user sees of an ended job; the exit code says how it ended. */
+static client_exit report_end(client_session *s, const json_t *job)
+{
+    const json_t *error = json_object_get(job, "error");
+    client_exit code = client_job_exit(job);
+    if (code == CLIENT_JOB_FAILED || json_is_object(error))
+        client_print_problem(s->err, 0, error);
+    if (s->options->json)
+        return client_print_json(s, job) == CLIENT_OK ? code : CLIENT_LOCAL;
+    if (!s->options->quiet)
+        client_print_summary(s->out, job);
+    return code;
+}
+
+static client_exit wait_and_report(client_session *s, const char *id, json_t **job, client_progress *progress)
+{
+    client_exit code = wait_for_end(s, id, job, progress);
+    client_progress_end(progress);
+    if (code == CLIENT_WAIT_TIMEOUT)
+        print_wait_timeout(s, id);
+    return code == CLIENT_OK ? report_end(s, *job) : code;
+}
+
+client_exit client_wait(client_session *s)
+{
+    json_t *job = NULL;
+    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
+    client_exit code = wait_and_report(s, s->options->operand, &job, &progress);
+    json_decref(job);
+    return code;
+}
+
+/* The request as it will be sent: the file, with the tags of the command line in it. */
+static client_exit load_body(client_session *s, client_buffer *out)
+{
+    char message[512];
+    client_buffer file;
+    *out = (client_buffer){0};
+    if (!client_file_read(&file, s->options->operand, message, sizeof message))
+        return client_complain(s, CLIENT_LOCAL, message);
+    bool ok = client_tags_add(out, &file, s->options->tags, s->options->n_tags);
+    free(file.data);
+    return ok ? CLIENT_OK : client_complain(s, CLIENT_LOCAL, "cannot add the tags: one is not UTF-8, or no memory");
+}
+
+static client_exit post_body(client_session *s, const client_buffer *body, const client_progress *progress,
+                             json_t **job)
+{
+    char key[2 * KEY_BYTES + 1], prefer[40], *header = NULL;
+    client_request request = client_request_new(s, "POST", "/v1/jobs");
+    if (!s->options->key && !make_key(key))
+        return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
+    if (asprintf(&header, "Idempotency-Key: %s", s->options->key ? s->options->key : key) < 0)
+        return client_complain(s, CLIENT_LOCAL, "no memory");
+    request.headers[0] = header;
+    request.body = body->data;
+    request.body_len = body->len;
+    if (s->options->wait) {
+        set_wait(&request, prefer, sizeof prefer, poll_seconds(s, progress));
+        request.deadline += GRACE_S;
+    }
+    client_exit code = client_ask_json(s, job, &request);
+    free(header);
+    return code;
+}
+
+static client_exit report_accepted(client_session *s, const json_t *job)
+{
+    if (s->options->json)
+        return client_print_json(s, job);
+    client_print_safe(s->out, client_json_text(job, "id"));
+    fputc('\n', s->out);
+    return CLIENT_OK;
+}
+
+static client_exit follow(client_session *s, json_t **job, client_progress *progress)
+{
+    char id[128];
+    snprintf(id, sizeof id, "%s", client_json_text(*job, "id"));
+    if (!*id)
+        return client_complain(s, CLIENT_SERVER_ERROR, "the reply names no job; is this the right server?");
+    if (!s->options->wait || (s->options->quiet && !s->options->json))
+        report_accepted(s, *job);
+    if (!s->options->wait)
+        return CLIENT_OK;
+    client_progress_show(progress, *job);
+    return wait_and_report(s, id, job, progress);
+}
+
+client_exit client_submit(client_session *s)
+{
+    json_t *job = NULL;
+    client_buffer body;
+    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
+    client_exit code = load_body(s, &body);
+    if (code == CLIENT_OK)
+        code = post_body(s, &body, &progress, &job);
+    free(body.data);
+    if (code == CLIENT_OK)
+        code = follow(s, &job, &progress);
+    json_decref(job);
+    return code;
+}
