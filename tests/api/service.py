@@ -1,0 +1,266 @@
+"""Starts the real daemon on a free port with a database in a temporary folder, talks to it, and runs test functions.
+
+A test program is a module with functions test_*; it ends in `service.main(globals())` and is called with
+BUILD_DIR [FILTER]. Each test gets a running Service that it may use up: stop() is always called after it. A test that
+needs other options is decorated with @options("--workers", "1"). Raise Skip("why") to skip.
+"""
+import http.client
+import json
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+SCHEMAS = ROOT / "schemas"
+
+try:
+    import jsonschema
+except ImportError:  # then replies are only parsed
+    jsonschema = None
+
+# A problem with a known answer: two springs of stiffness 2 and 1, pulled by 2; the first is stopped at 0.5.
+MATRICES = {"problem": {"kind": "matrices",
+                        "K": "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 2\n2 2 1\n",
+                        "N": "%%MatrixMarket matrix coordinate real general\n1 2 1\n1 1 1\n",
+                        "h": [0.5], "p": [2, 2]}}
+SCENE = {"problem": {"kind": "scene", "model": "plane_stress", "thickness": 5,
+                     "mesh": {"box": {"size": [60, 20], "cells": [30, 10], "element": "quad4"}},
+                     "materials": [{"on": "all", "young": 200e3, "poisson": 0.3}],
+                     "supports": [{"on": "left", "ux": 0, "uy": 0}],
+                     "loads": [{"on": "top", "traction": [0, -0.05]}, {"on": "right", "traction": [0.5, 0]}],
+                     "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]},
+         "solver": {"method": "accelerated_restart", "accuracy": {"relative_error": 1e-6}}}
+# Steps so short that it runs until it is told to stop.
+ENDLESS = {**SCENE, "solver": {"method": "uzawa", "alpha": 1e-9, "max_iterations": 1000000000}}
+
+
+class Skip(Exception):
+    """The test cannot run here."""
+
+
+class Reply:
+    """status, headers (last of each name, in lower case), body (bytes), json (None if it is none)."""
+
+    def __init__(self, status, headers, body):
+        self.status = status
+        self.headers = {name.lower(): value for name, value in headers}
+        self.body = body
+        self.json = None
+        if "json" in self.headers.get("content-type", "") and body:
+            self.json = json.loads(body)
+            validate(self)
+
+    def __repr__(self):
+        return f"{self.status} {self.headers} {self.body[:600]!r}"
+
+
+# What tells which schema a reply must meet: a member that only this kind of object has.
+KINDS = [("factors", "factors.json"), ("rows", "history.json"), ("code", "problem-details.json"),
+         ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json")]
+
+
+def schema_of(reply):
+    if "schema+json" in reply.headers["content-type"] or "openapi" in reply.json or "valid" in reply.json:
+        return None
+    if isinstance(reply.json.get("jobs"), list):
+        return "jobs.json"
+    return next((name for member, name in KINDS if member in reply.json), None)
+
+
+def validate(reply):
+    """Checks a JSON reply against its schema."""
+    name = schema_of(reply)
+    if not name or not jsonschema:
+        return
+    folder = {path.name: json.loads(path.read_text()) for path in SCHEMAS.glob("*.json")}
+    store = {schema.get("$id", name): schema for name, schema in folder.items()}
+    resolver = jsonschema.RefResolver(folder[name].get("$id", name), folder[name], store=store,
+                                      handlers={"": lambda uri: folder[uri.rsplit("/", 1)[-1]]})
+    jsonschema.Draft202012Validator(folder[name], resolver=resolver).validate(reply.json)
+
+
+class Service:
+    """One daemon. Options after --listen and --db; db names another database file."""
+
+    def __init__(self, build, *options, db=None):
+        self.build = pathlib.Path(build)
+        self.folder = tempfile.mkdtemp(prefix="uzawad-")
+        self.db = db or os.path.join(self.folder, "contact.db")
+        self.options = options
+        self.process = None
+
+    def command(self, *options):
+        return [str(self.build / "uzawad"), *options]
+
+    def start(self):
+        self.log_file = open(os.path.join(self.folder, "log"), "ab")
+        self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", "--db", self.db, *self.options),
+                                        stdout=subprocess.PIPE, stderr=self.log_file)
+        line = self.process.stdout.readline().decode()
+        if not line.startswith("listening on http://"):
+            self.process.wait(timeout=30)
+            raise AssertionError(f"no listening line but {line!r}; the log says:\n{self.log()}")
+        self.url = line.split()[-1]
+        self.host, port = self.url[len("http://"):].rsplit(":", 1)
+        self.port = int(port)
+        return self
+
+    def log(self):
+        """The log so far, as text."""
+        with open(os.path.join(self.folder, "log"), encoding="utf-8") as file:
+            return file.read()
+
+    def events(self, event=None):
+        """The log so far, as objects."""
+        lines = [json.loads(line) for line in self.log().splitlines() if line.startswith("{")]
+        return [line for line in lines if event is None or line["event"] == event]
+
+    def terminate(self, timeout=60, number=signal.SIGTERM):
+        """Sends a signal and returns the exit status."""
+        self.process.send_signal(number)
+        return self.process.wait(timeout=timeout)
+
+    def end(self):
+        """Ends it gently and returns the exit status: leaks and races show up then."""
+        for _ in range(2):  # the second signal cuts the drain short
+            if self.process.poll() is None:
+                self.process.send_signal(signal.SIGTERM)
+            try:
+                return self.process.wait(timeout=2)
+            except subprocess.TimeoutExpired:
+                pass
+        return self.process.wait(timeout=60)
+
+    def stop(self):
+        """Ends everything and removes the folder. Whatever happened before."""
+        if self.process and self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        if self.process:
+            self.process.stdout.close()
+            self.log_file.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    # ---- requests
+
+    def request(self, method, path, body=None, headers=None, timeout=60):
+        """One request on a connection of its own. A dict or list becomes JSON."""
+        headers = dict(headers or {})
+        if isinstance(body, (dict, list)):
+            body = json.dumps(body).encode()
+            headers.setdefault("Content-Type", "application/json")
+        connection = http.client.HTTPConnection(self.host, self.port, timeout=timeout)
+        try:
+            connection.request(method, path, body=body, headers=headers)
+            reply = connection.getresponse()
+            return Reply(reply.status, reply.getheaders(), reply.read())
+        finally:
+            connection.close()
+
+    def get(self, path, **headers):
+        return self.request("GET", path, headers={name.replace("_", "-"): value for name, value in headers.items()})
+
+    def post(self, body, headers=None, query=""):
+        return self.request("POST", "/v1/jobs" + query, body, headers)
+
+    def solve(self, body):
+        """Posts a job, waits until it ended, and returns it."""
+        job = self.post(body, {"Prefer": "wait=60"}).json
+        while job["status"] in ("accepted", "running"):
+            job = self.get(f"/v1/jobs/{job['id']}", Prefer="wait=60").json
+        return job
+
+    def wait_status(self, job_id, *statuses, seconds=30):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            job = self.get(f"/v1/jobs/{job_id}").json
+            if job["status"] in statuses:
+                return job
+            time.sleep(0.02)
+        raise AssertionError(f"{job_id} is still {job['status']}, not {statuses}")
+
+    def connect(self, timeout=10):
+        return socket.create_connection((self.host, self.port), timeout=timeout)
+
+    def raw(self, data, timeout=10, half_close=False):
+        """Sends bytes on a new socket and returns (everything that came back, True if the server closed)."""
+        with self.connect(timeout) as connection:
+            try:
+                connection.sendall(data)
+                if half_close:
+                    connection.shutdown(socket.SHUT_WR)
+            except OSError:
+                pass  # the server may have answered and closed already
+            return read_all(connection)
+
+
+def read_all(connection):
+    """Reads until the server closes or nothing comes for the socket's timeout."""
+    data = b""
+    try:
+        while piece := connection.recv(65536):
+            data += piece
+        return data, True
+    except socket.timeout:
+        return data, False
+    except ConnectionResetError:
+        return data, True
+
+
+def check(condition, *what):
+    """assert that stays with python -O, and says what it saw."""
+    if not condition:
+        raise AssertionError(" ".join(str(one) for one in what))
+
+
+def options(*given):
+    """Decorates a test whose service needs options; options(None): the test starts its services itself."""
+    def mark(test):
+        test.options = given
+        return test
+    return mark
+
+
+def run_one(test, build):
+    given = getattr(test, "options", ())
+    service = Service(build, *(option for option in given if option is not None))
+    try:
+        if None not in given:
+            service.start()
+        test(service)
+        if service.process:
+            check(service.end() == 0, "the daemon ended with status", service.process.returncode, service.log())
+        for line in service.log().splitlines() if service.process else ():
+            check("Sanitizer" not in line and "runtime error" not in line, service.log())
+    finally:
+        service.stop()
+
+
+def main(names):
+    """Runs every test_* in names; prints a line for each and exits with 1 if one failed."""
+    if len(sys.argv) < 2:
+        sys.exit("usage: PROGRAM BUILD_DIR [FILTER]")
+    program = pathlib.Path(sys.argv[0]).stem
+    wanted = sys.argv[2] if len(sys.argv) > 2 else ""
+    failed = False
+    for name, test in list(names.items()):
+        if not name.startswith("test_") or wanted not in name[5:]:
+            continue
+        title = f"{program}.{name[5:]}"
+        try:
+            run_one(test, sys.argv[1])
+            print(f"ok {title}", flush=True)
+        except Skip as why:
+            print(f"skip {title}: {why}", flush=True)
+        except Exception:  # noqa: a failing test must not end the others
+            failed = True
+            print("# " + "# ".join(traceback.format_exc().splitlines(True)).rstrip())
+            print(f"not ok {title}", flush=True)
+    sys.exit(1 if failed else 0)

@@ -1,0 +1,160 @@
+/* bench.c: the ratios that the product promises, as medians of paired runs in one process: a contact solve against the
+ * linear solve of the same K. Prints a table and writes JSON. usage: bench OUTPUT.json [name part] */
+#include "bench.h"
+#include "core/clock.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RUNS_MOST 15
+
+typedef struct {
+    FILE *json;
+    int rows;
+    const char *filter;
+} report;
+
+static int compare(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+bench_value bench_summarise(double *samples, int count)
+{
+    qsort(samples, (size_t)count, sizeof *samples, compare);
+    double middle = count % 2 ? samples[count / 2] : 0.5 * (samples[count / 2 - 1] + samples[count / 2]);
+    return (bench_value){middle, samples[0], samples[count - 1], count};
+}
+
+static void print_row(report *out, const char *name, const char *unit, bench_value v, const char *target)
+{
+    printf("%-34s %9.3f  (%.3f .. %.3f, %d runs)  %s %s\n", name, v.median, v.min, v.max, v.runs, unit, target);
+    fprintf(out->json,
+            "%s  {\"name\": \"%s\", \"median\": %.6g, \"min\": %.6g, \"max\": %.6g, \"runs\": %d, \"unit\": \"%s\"}",
+            out->rows++ ? ",\n" : "", name, v.median, v.min, v.max, v.runs, unit);
+    fflush(stdout);
+}
+
+static uz_material *one_material(void)
+{
+    uz_material *m = calloc(1, sizeof *m);
+    strcpy(m->on, "all");
+    m->young = 200e3;
+    m->poisson = 0.3;
+    return m;
+}
+
+uz_scene bench_paper_scene(int64_t nx)
+{
+    uz_scene s;
+    memset(&s, 0, sizeof s);
+    s.model = UZ_PLANE_STRESS;
+    s.thickness = 5.0;
+    s.box = (uz_box){.size = {60.0, 20.0}, .cells = {nx, nx / 3}, .element = "quad4", .dim = 2};
+    s.materials = one_material();
+    s.n_materials = s.n_supports = s.n_contacts = 1;
+    s.n_loads = 2;
+    s.supports = calloc(1, sizeof *s.supports);
+    strcpy(s.supports[0].on, "left");
+    s.supports[0].u[2] = NAN;
+    s.loads = calloc(2, sizeof *s.loads);
+    strcpy(s.loads[0].on, "top");
+    s.loads[0].traction[1] = -0.05;
+    strcpy(s.loads[1].on, "right");
+    s.loads[1].traction[0] = 0.5;
+    s.contacts = calloc(1, sizeof *s.contacts);
+    strcpy(s.contacts[0].on, "bottom");
+    s.contacts[0].normal[1] = 1.0;
+    return s;
+}
+
+static double seconds_of_solve(const uz_problem *problem, const uz_settings *settings, uz_cache *cache)
+{
+    uz_error err;
+    uz_result *result = NULL;
+    double start = uz_seconds();
+    uz_status status = uz_solve(&result, problem, settings, cache, NULL, &err);
+    double seconds = uz_seconds() - start;
+    if (status != UZ_OK || result->summary.outcome != UZ_CONVERGED) {
+        printf("a bench problem did not converge: %s\n", status ? err.message : result->summary.message);
+        exit(1);
+    }
+    uz_result_free(result);
+    return seconds;
+}
+
+/* The better of AMD and METIS, decided once by a run of each. */
+static bench_ordering better_ordering(const uz_csc *K, const double *p)
+{
+    bench_linear amd = bench_cholmod(K, p, BENCH_AMD), metis = bench_cholmod(K, p, BENCH_METIS);
+    return amd.analyze + amd.factorize + amd.solve <= metis.analyze + metis.factorize + metis.solve ? BENCH_AMD
+                                                                                                    : BENCH_METIS;
+}
+
+static void bench_body(report *out, int64_t nx, double relative_error)
+{
+    uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES}, scene = {.kind = UZ_PROBLEM_SCENE};
+    uz_settings settings = uz_settings_default();
+    uz_mesh_info info;
+    uz_error err;
+    double cold[RUNS_MOST], cached[RUNS_MOST], linear_s[RUNS_MOST], contact_s[RUNS_MOST];
+    int runs = nx <= 300 ? 11 : nx <= 600 ? 7 : 5;
+    char name[64];
+    settings.relative_error = relative_error;
+    scene.scene = bench_paper_scene(nx);
+    if (uz_scene_to_qp(&matrices.qp, &info, &scene.scene, &err) != UZ_OK)
+        exit(1);
+    bench_ordering ordering = better_ordering(&matrices.qp.K, matrices.qp.p);
+    uz_cache *cache = uz_cache_new((size_t)4 << 30);
+    seconds_of_solve(&scene, &settings, cache);
+    for (int k = 0; k < runs; k++) {
+        bench_linear linear = bench_cholmod(&matrices.qp.K, matrices.qp.p, ordering);
+        linear_s[k] = linear.analyze + linear.factorize + linear.solve;
+        contact_s[k] = seconds_of_solve(&matrices, &settings, NULL);
+        cold[k] = contact_s[k] / linear_s[k];
+        cached[k] = seconds_of_solve(&scene, &settings, cache) / linear.solve;
+    }
+    snprintf(name, sizeof name, "cold_nx%lld_%.0e", (long long)nx, relative_error);
+    print_row(out, name, "x", bench_summarise(cold, runs), "linear solve (analyse, factorise, solve)");
+    snprintf(name, sizeof name, "cached_nx%lld_%.0e", (long long)nx, relative_error);
+    print_row(out, name, "x", bench_summarise(cached, runs), "one CHOLMOD solve");
+    uz_cache_free(cache);
+    uz_qp_clear(&matrices.qp);
+    uz_mesh_info_clear(&info);
+    uz_scene_clear(&scene.scene);
+}
+
+static void bench_reader(report *out)
+{
+    double writer = 0.0, reader = bench_mm_rate(&writer);
+    print_row(out, "matrix_market_read", "MB/s", (bench_value){reader, reader, reader, 5}, "");
+    print_row(out, "matrix_market_write", "MB/s", (bench_value){writer, writer, writer, 5}, "");
+}
+
+static bool wanted(const report *out, const char *name)
+{
+    return !out->filter || strstr(name, out->filter);
+}
+
+int main(int argc, char **argv)
+{
+    static const int64_t sizes[] = {150, 300, 600};
+    report out = {.filter = argc > 2 ? argv[2] : NULL};
+    if (argc < 2 || !(out.json = fopen(argv[1], "w"))) {
+        fprintf(stderr, "usage: bench OUTPUT.json [name part]\n");
+        return 2;
+    }
+    uz_process_init(2);
+    uz_thread_init();
+    fprintf(out.json, "{\"ratios\": [\n");
+    if (wanted(&out, "matrix_market"))
+        bench_reader(&out);
+    for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {
+        bench_body(&out, sizes[i], 1e-6);
+        bench_body(&out, sizes[i], 1e-8);
+    }
+    fprintf(out.json, "\n]}\n");
+    return fclose(out.json) != 0;
+}

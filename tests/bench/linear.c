@@ -1,0 +1,50 @@
+/* linear.c: what a contact solve is compared with: CHOLMOD's own solve of the same K, as a user of CHOLMOD would
+ * call it, with its supernodal LL' and one CHOLMOD thread (see solver/core/process.c). */
+#include "bench.h"
+#include "core/clock.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <suitesparse/cholmod.h>
+
+static cholmod_sparse view(const uz_csc *K)
+{
+    cholmod_sparse A;
+    memset(&A, 0, sizeof A);
+    A.nrow = A.ncol = (size_t)K->cols;
+    A.nzmax = (size_t)K->ptr[K->cols];
+    A.p = K->ptr;
+    A.i = K->idx;
+    A.x = K->val;
+    A.stype = -1;
+    A.itype = CHOLMOD_LONG;
+    A.xtype = CHOLMOD_REAL;
+    A.sorted = A.packed = 1;
+    return A;
+}
+
+bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering ordering)
+{
+    cholmod_common common;
+    bench_linear t;
+    cholmod_l_start(&common);
+    common.nmethods = 1;
+    common.method[0].ordering = ordering == BENCH_AMD ? CHOLMOD_AMD : CHOLMOD_METIS;
+    cholmod_sparse A = view(K);
+    cholmod_dense *b = cholmod_l_allocate_dense((size_t)K->cols, 1, (size_t)K->cols, CHOLMOD_REAL, &common);
+    memcpy(b->x, p, (size_t)K->cols * sizeof *p);
+    double start = uz_seconds();
+    cholmod_factor *L = cholmod_l_analyze(&A, &common);
+    t.analyze = uz_seconds() - start;
+    start = uz_seconds();
+    cholmod_l_factorize(&A, L, &common);
+    t.factorize = uz_seconds() - start;
+    start = uz_seconds();
+    cholmod_dense *x = cholmod_l_solve(CHOLMOD_A, L, b, &common);
+    t.solve = uz_seconds() - start;
+    cholmod_l_free_dense(&x, &common);
+    cholmod_l_free_dense(&b, &common);
+    cholmod_l_free_factor(&L, &common);
+    cholmod_l_finish(&common);
+    return t;
+}

@@ -1,0 +1,110 @@
+/* store_place.h: for tests, a store in a temporary folder of its own, and the file behind it. */
+#ifndef TESTS_STORE_PLACE_H
+#define TESTS_STORE_PLACE_H
+
+#include "harness.h"
+#include "store/store.h"
+
+#include <sqlite3.h>
+#include <unistd.h>
+
+/* ---- a store in a folder of its own */
+
+typedef struct {
+    char folder[64], path[96];
+    store *s;
+} place;
+
+static inline bool place_open(place *p)
+{
+    char message[400] = "";
+    p->s = store_open(p->path, message, sizeof message);
+    CHECK_MSG(p->s, "%s", message);
+    return p->s != NULL;
+}
+
+static inline bool place_begin(place *p)
+{
+    strcpy(p->folder, "/tmp/test-store-XXXXXX");
+    CHECK(mkdtemp(p->folder));
+    snprintf(p->path, sizeof p->path, "%s/jobs.db", p->folder);
+    return place_open(p);
+}
+
+static inline bool place_reopen(place *p)
+{
+    store_close(p->s);
+    return place_open(p);
+}
+
+static inline void place_end(place *p)
+{
+    char name[128];
+    const char *const suffixes[] = {"", "-wal", "-shm", "-journal"};
+    store_close(p->s);
+    p->s = NULL;
+    for (size_t i = 0; i < sizeof suffixes / sizeof suffixes[0]; i++) {
+        snprintf(name, sizeof name, "%s%s", p->path, suffixes[i]);
+        unlink(name);
+    }
+    CHECK_INT(rmdir(p->folder), 0); /* nothing else is left behind */
+}
+
+static inline store_status submit_text(store *s, const char *body, const char *tags, const char *key, char id[33])
+{
+    job j;
+    bool repeated;
+    store_status status = store_submit(s, body, strlen(body), tags, key, &j, &repeated);
+    strcpy(id, j.id);
+    job_clear(&j);
+    return status;
+}
+
+static inline store_status claim_id(store *s, const char *owner, char id[33])
+{
+    job j;
+    char *body;
+    size_t len;
+    store_status status = store_claim(s, owner, 30.0, &j, &body, &len);
+    strcpy(id, j.id);
+    job_clear(&j);
+    free(body);
+    return status;
+}
+
+static inline job_status status_of(store *s, const char *id)
+{
+    job j;
+    CHECK_INT(store_get(s, id, &j), STORE_OK);
+    job_status status = j.status;
+    job_clear(&j);
+    return status;
+}
+
+static const store_outcome PLAIN_SUCCESS
+    __attribute__((unused)) = {.status = JOB_SUCCESSFUL, .summary = "{\"outcome\": \"converged\"}"};
+
+static inline int64_t rows_in(const char *path, const char *table)
+{
+    char sql[64];
+    sqlite3 *db = NULL;
+    sqlite3_stmt *stmt = NULL;
+    int64_t count = -1;
+    snprintf(sql, sizeof sql, "SELECT count(*) FROM %s", table);
+    if (sqlite3_open_v2(path, &db, SQLITE_OPEN_READONLY, NULL) == SQLITE_OK &&
+        sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW)
+        count = sqlite3_column_int64(stmt, 0);
+    sqlite3_finalize(stmt);
+    sqlite3_close(db);
+    return count;
+}
+
+static inline void change_file(const char *path, const char *sql)
+{
+    sqlite3 *db = NULL;
+    CHECK_INT(sqlite3_open(path, &db), SQLITE_OK);
+    CHECK_INT(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+    sqlite3_close(db);
+}
+
+#endif

@@ -1,0 +1,161 @@
+/* The split that the factor cache needs: a body built once, loads put on it, the key that says when they fit. */
+#include "assembly/assembly.h"
+#include "harness.h"
+#include "scene_fixture.h"
+
+/* Loads another scene on a model built before and compares with building it anew. */
+TEST(load_on_a_kept_body_equals_a_new_body)
+{
+    uz_scene first = paper_scene(5, 3), second = paper_scene(5, 3);
+    uz_body_model model;
+    uz_error err = {0};
+    uz_qp qp;
+    second.supports[0].u[0] = 0.01;
+    second.loads[0].traction[0] = 3;
+    second.n_loads = 1;
+    second.contacts[0].point[1] = -0.25;
+    CHECK(uz_body_model_build(&model, &first, &err) == UZ_OK);
+    CHECK(uz_scene_to_qp(&qp, NULL, &second, NULL) == UZ_OK);
+    double *p = zeros(model.d), *h = zeros(model.m), *fixed = zeros(model.n_fixed);
+    CHECK(uz_body_model_load(p, h, fixed, &model, &second, &err) == UZ_OK);
+    CHECK(memcmp(p, qp.p, (size_t)model.d * sizeof *p) == 0);
+    CHECK(memcmp(h, qp.h, (size_t)model.m * sizeof *h) == 0);
+    CHECK(h[0] == 0.25 && fixed[0] == 0.01 && fixed[1] == 0);
+    double *nodal = zeros(2 * model.mesh.n_nodes);
+    uz_recover_nodal(nodal, &model, p, fixed);
+    CHECK(nodal[0] == 0.01 && nodal[1] == 0 && nodal[2] == p[0] && nodal[12] == 0.01 && nodal[14] == p[10]);
+    uz_recover_nodal(nodal, &model, p, NULL);
+    CHECK(nodal[0] == 0);
+    free(p);
+    free(h);
+    free(fixed);
+    free(nodal);
+    uz_qp_clear(&qp);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&first);
+    uz_scene_clear(&second);
+}
+
+TEST(load_of_another_body_is_refused)
+{
+    uz_scene scene = paper_scene(5, 3);
+    uz_body_model model;
+    uz_error err = {0};
+    double p[64], h[64];
+    CHECK(uz_body_model_build(&model, &scene, &err) == UZ_OK);
+    add_support(&scene, "right", 0, NAN);
+    CHECK(uz_body_model_load(p, h, NULL, &model, &scene, &err) == UZ_ERR_ARGUMENT);
+    scene.n_supports--;
+    memset(&err, 0, sizeof err);
+    add_plane(&scene, "top", 0, 50, 0, -1);
+    CHECK(uz_body_model_load(p, h, NULL, &model, &scene, &err) == UZ_ERR_ARGUMENT);
+    scene.n_contacts = 0;
+    memset(&err, 0, sizeof err);
+    CHECK(uz_body_model_load(p, h, NULL, &model, &scene, &err) == UZ_ERR_ARGUMENT);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+}
+
+/* An equal key does not excuse from checking what is not in it. */
+TEST(load_on_a_kept_body_is_checked)
+{
+    uz_scene scene = paper_scene(5, 3);
+    uz_body_model model = build_body(&scene);
+    uz_error err = {0};
+    double p[64], h[64];
+    scene.supports[0].u[0] = (double)INFINITY;
+    CHECK(uz_body_model_load(p, h, NULL, &model, &scene, &err) == UZ_ERR_NOT_FINITE);
+    CHECK_STR(err.where, "/supports/0/ux");
+    scene.supports[0].u[0] = 0;
+    add_support(&scene, "left", NAN, 1);
+    memset(&err, 0, sizeof err);
+    CHECK(uz_body_model_load(p, h, NULL, &model, &scene, &err) == UZ_ERR_SCENE);
+    CHECK_STR(err.where, "/supports/1/uy");
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+}
+
+TEST(copy_of_mesh_info_is_whole)
+{
+    uz_scene scene = paper_scene(5, 3);
+    uz_body_model model;
+    uz_mesh_info copy;
+    uz_error err = {0};
+    CHECK(uz_body_model_build(&model, &scene, &err) == UZ_OK);
+    CHECK(uz_mesh_info_copy(&copy, &model.info, model.m, &err) == UZ_OK);
+    CHECK(copy.xyz != model.info.xyz && copy.contact_node != model.info.contact_node);
+    CHECK(memcmp(copy.xyz, model.mesh.xyz, (size_t)copy.n_nodes * 2 * sizeof *copy.xyz) == 0);
+    CHECK_INT(copy.contact_node[4], 5);
+    uz_mesh_info_clear(&copy);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+}
+
+/* Does this change of the paper's body change its key? */
+static bool key_differs(const uz_scene *changed)
+{
+    uz_scene base = paper_scene(4, 2);
+    unsigned char *a, *b;
+    size_t na, nb;
+    CHECK(uz_scene_body_key(&a, &na, &base, NULL) == UZ_OK);
+    CHECK(uz_scene_body_key(&b, &nb, changed, NULL) == UZ_OK);
+    const bool differs = na != nb || memcmp(a, b, na) != 0;
+    free(a);
+    free(b);
+    uz_scene_clear(&base);
+    return differs;
+}
+
+#define KEY(change, differs)                                                                                           \
+    do {                                                                                                               \
+        uz_scene s = paper_scene(4, 2);                                                                                \
+        change;                                                                                                        \
+        CHECK_MSG(key_differs(&s) == (differs), "%s", #change);                                                        \
+        uz_scene_clear(&s);                                                                                            \
+    } while (0)
+
+TEST(key_holds_what_the_body_depends_on)
+{
+    KEY(s.model = UZ_PLANE_STRAIN, true);
+    KEY(s.thickness = 6, true);
+    KEY(s.box.size[0] = 61, true);
+    KEY(s.box.origin[1] = 1, true);
+    KEY(s.box.cells[0] = 5, true);
+    KEY(s.materials[0].young = 1, true);
+    KEY(s.materials[0].poisson = 0.2, true);
+    KEY(s.supports[0].u[0] = (double)NAN, true);
+    KEY(memcpy(s.supports[0].on, "right", 6), true);
+    KEY(add_support(&s, "top", 0, (double)NAN), true);
+    KEY(s.contacts[0].normal[0] = 0.1, true);
+    KEY(memcpy(s.contacts[0].on, "right", 6), true);
+    KEY(add_plane(&s, "top", 0, 0, 0, -1), true);
+    KEY(s.n_contacts = 0, true);
+}
+
+TEST(key_leaves_out_what_the_body_does_not_depend_on)
+{
+    KEY(s.supports[0].u[0] = 0.5, false);
+    KEY(s.n_loads = 0, false);
+    KEY(s.loads[0].traction[0] = 9, false);
+    KEY(s.contacts[0].point[1] = -1, false);
+    KEY(s.contacts[0].normal[1] = 7, false);
+    KEY(s.contacts[0].normal[0] = -0.0, false);
+    KEY(s.box.origin[0] = -0.0, false);
+    KEY(s.box.size[2] = 5, false);
+    KEY((s.supports[0].u[1] = (double)NAN, add_support(&s, "left", (double)NAN, 0)), false);
+}
+
+TEST(clears_take_null_and_zero)
+{
+    uz_scene scene = {0};
+    uz_mesh_info info = {0};
+    uz_body_model model = {0};
+    uz_scene_clear(&scene);
+    uz_scene_clear(NULL);
+    uz_mesh_info_clear(&info);
+    uz_mesh_info_clear(NULL);
+    uz_body_model_clear(&model);
+    uz_body_model_clear(NULL);
+    uz_mesh_clear(NULL);
+    CHECK(!scene.supports);
+}

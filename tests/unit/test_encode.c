@@ -1,0 +1,359 @@
+#include "codec/codec.h"
+#include "codec/schema.h"
+#include "codec/text.h"
+#include "harness.h"
+
+/* Reads a reply back through the strict scanner and checks it against its schema. The caller clears *doc. */
+static void read_reply(json_doc *doc, char *reply, const char *schema)
+{
+    char message[256] = "";
+    problem_details problem = {0};
+    schemas *all = schemas_load(message, sizeof message);
+    CHECK_MSG(all, "%s", message);
+    CHECK(reply != NULL);
+    *doc = (json_doc){0};
+    if (reply && json_scan(doc, reply, strlen(reply), &problem) && all)
+        schemas_check(all, schema, doc, &problem);
+    CHECK_MSG(problem.status == 0, "%s: %s %s in %s", schema, problem.pointer, problem.detail, reply);
+    schemas_free(all);
+}
+
+/* The number at "a/b/c" of a document, NaN for null. */
+static double number_at(const json_doc *doc, const char *place)
+{
+    const json_t *value = doc->root;
+    for (const char *at = place; value && *at;) {
+        size_t n = strcspn(at, "/");
+        value = json_object_getn(value, at, n);
+        at += n + (at[n] == '/');
+    }
+    CHECK_MSG(value, "no %s", place);
+    return json_is_null(value) ? (double)NAN : json_real_value(value);
+}
+
+static const char *text_at(const json_doc *doc, const char *key)
+{
+    const char *found = json_string_value(json_object_get(doc->root, key));
+    return found ? found : "";
+}
+
+/* xorshift64*: Vigna 2016. */
+static uint64_t next_random(uint64_t *state)
+{
+    *state ^= *state >> 12;
+    *state ^= *state << 25;
+    *state ^= *state >> 27;
+    return *state * 2685821657736338717u;
+}
+
+TEST(doubles_read_back_from_the_fewest_digits)
+{
+    static const struct {
+        double x;
+        const char *want;
+    } CASES[] = {{0, "0"},
+                 {-0.0, "-0"},
+                 {1, "1"},
+                 {-3, "-3"},
+                 {0.1, "0.1"},
+                 {1e-6, "1e-06"},
+                 {1e22, "1e+22"},
+                 {123456789012345, "123456789012345"},
+                 {0.1 + 0.2, "0.30000000000000004"},
+                 {5e-324, "4.94065645841247e-324"},
+                 {1.7976931348623157e308, "1.7976931348623157e+308"},
+                 {1.0 / 3, "0.3333333333333333"}};
+    char digits[TEXT_DOUBLE];
+    uint64_t state = 42;
+    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
+        text_shortest(digits, CASES[i].x);
+        CHECK_STR(digits, CASES[i].want);
+    }
+    for (int i = 0; i < 20000; i++) {
+        double x;
+        uint64_t bits = next_random(&state);
+        memcpy(&x, &bits, sizeof x);
+        if (!isfinite(x))
+            continue;
+        size_t n = text_shortest(digits, x);
+        CHECK(n == strlen(digits) && n < 25);
+        CHECK_MSG(strtod(digits, NULL) == x, "%s is not %.17g", digits, x);
+    }
+}
+
+TEST(strings_are_escaped)
+{
+    text t = {0};
+    text_string(&t, "a\"b\\c\n\t\x01\x7f \xc3\xa9 \xf0\x9f\x98\x80 \xff \xed\xa0\x80");
+    char *json = text_finish(&t, NULL);
+    CHECK_STR(json, "\"a\\\"b\\\\c\\n\\t\\u0001\\u007f \xc3\xa9 \xf0\x9f\x98\x80 \xef\xbf\xbd "
+                    "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\"");
+    free(json);
+    text_string(&t, NULL);
+    json = text_finish(&t, NULL);
+    CHECK_STR(json, "null");
+    free(json);
+}
+
+TEST(problem)
+{
+    json_doc doc;
+    problem_details problem = {.status = 422, .code = "unknown_key", .title = "T", .detail = "say \"x\"", .line = 3};
+    char *reply = codec_encode_problem(&problem);
+    read_reply(&doc, reply, "problem-details.json");
+    CHECK_STR(text_at(&doc, "type"), "/schemas/problem-details.json#unknown_key");
+    CHECK_STR(text_at(&doc, "detail"), "say \"x\"");
+    CHECK(json_object_get(doc.root, "pointer") != NULL); /* the whole request */
+    CHECK(number_at(&doc, "line") == 3 && number_at(&doc, "status") == 422);
+    json_doc_clear(&doc);
+    free(reply);
+    problem = (problem_details){.status = 404, .code = "not_found"};
+    reply = codec_encode_problem(&problem);
+    read_reply(&doc, reply, "problem-details.json");
+    CHECK(!json_object_get(doc.root, "pointer") && !json_object_get(doc.root, "line"));
+    json_doc_clear(&doc);
+    free(reply);
+}
+
+static uz_summary paper_summary(void)
+{
+    uz_summary s = {.outcome = UZ_CONVERGED,
+                    .method = UZ_METHOD_ACCELERATED_RESTART,
+                    .op = UZ_OPERATOR_CONDENSED,
+                    .ordering = UZ_ORDERING_CAMD,
+                    .d = 660,
+                    .m = 30,
+                    .iterations = 283,
+                    .restarts = 2,
+                    .active = 22,
+                    .reaction_sum = -10.5137,
+                    .max_penetration = 1e-12,
+                    .dim = 2,
+                    .force = {0, 10.5137, 99},
+                    .max_pressure = 0.5,
+                    .alpha = 1060.75,
+                    .lambda_max = 9.427e-4,
+                    .discretization_error = NAN,
+                    .requested_error = 1e-6,
+                    .factor_cached = true,
+                    .factor_nnz = 12345,
+                    .factor_bytes = 98765,
+                    .rcond = 1e-5,
+                    .timings = {1, 2, 3, 4, 5, 6, 7, 8, 9}};
+    s.certificate = (uz_certificate){.relative_error = INFINITY,
+                                     .absolute_error = 1e-10,
+                                     .gap = 1e-20,
+                                     .energy_primal = -3.9608e-3,
+                                     .energy_dual = -3.9609e-3,
+                                     .residual = {1, 2, 3, 4, 5},
+                                     .relative_residual = {6, 7, 8, 9, 10}};
+    return s;
+}
+
+TEST(summary_of_a_scene)
+{
+    static const struct {
+        const char *place;
+        double want;
+    } NUMBERS[] = {{"iterations", 283},
+                   {"restarts", 2},
+                   {"contact/candidates", 30},
+                   {"contact/active", 22},
+                   {"contact/reaction_sum", -10.5137},
+                   {"contact/max_penetration", 1e-12},
+                   {"contact/max_pressure", 0.5},
+                   {"energy/primal", -3.9608e-3},
+                   {"energy/dual", -3.9609e-3},
+                   {"certificate/absolute_error", 1e-10},
+                   {"certificate/gap", 1e-20},
+                   {"certificate/residual/total", 1},
+                   {"certificate/residual/e4", 5},
+                   {"certificate/relative_residual/total", 6},
+                   {"certificate/relative_residual/e1", 7},
+                   {"factor/nnz", 12345},
+                   {"factor/bytes", 98765},
+                   {"factor/rcond", 1e-5},
+                   {"timings_s/queue", 1},
+                   {"timings_s/parse", 2},
+                   {"timings_s/assemble", 3},
+                   {"timings_s/order", 4},
+                   {"timings_s/factor", 5},
+                   {"timings_s/condense", 6},
+                   {"timings_s/iterate", 7},
+                   {"timings_s/certify", 8},
+                   {"timings_s/total", 9},
+                   {"problem/d", 660},
+                   {"problem/m", 30},
+                   {"requested_error", 1e-6},
+                   {"alpha", 1060.75},
+                   {"lambda_max", 9.427e-4}};
+    json_doc doc;
+    uz_summary s = paper_summary();
+    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    read_reply(&doc, reply, "summary.json");
+    for (size_t i = 0; i < sizeof NUMBERS / sizeof NUMBERS[0]; i++)
+        CHECK_MSG(number_at(&doc, NUMBERS[i].place) == NUMBERS[i].want, "%s", NUMBERS[i].place);
+    CHECK(isnan(number_at(&doc, "certificate/relative_error")) && isnan(number_at(&doc, "discretization_error")));
+    CHECK_STR(text_at(&doc, "outcome"), "converged");
+    CHECK_STR(text_at(&doc, "method"), "accelerated_restart");
+    CHECK_STR(text_at(&doc, "operator"), "condensed");
+    CHECK_INT(json_array_size(json_object_get(json_object_get(doc.root, "contact"), "force")), 2);
+    CHECK(json_is_true(json_object_get(json_object_get(doc.root, "factor"), "cached")));
+    json_doc_clear(&doc);
+    free(reply);
+}
+
+TEST(summary_of_matrices)
+{
+    json_doc doc;
+    uz_summary s = paper_summary();
+    s.outcome = UZ_PRECISION_LIMIT;
+    snprintf(s.message, sizeof s.message, "reached 1e-9");
+    char *reply = codec_encode_summary(&s, UZ_PROBLEM_MATRICES);
+    read_reply(&doc, reply, "summary.json");
+    const json_t *contact = json_object_get(doc.root, "contact");
+    CHECK(!json_object_get(contact, "force") && !json_object_get(contact, "max_pressure"));
+    CHECK_STR(text_at(&doc, "outcome"), "precision_limit");
+    CHECK_STR(text_at(&doc, "message"), "reached 1e-9");
+    json_doc_clear(&doc);
+    free(reply);
+}
+
+TEST(every_outcome_fits_the_schema)
+{
+    for (int i = UZ_CONVERGED; i <= UZ_DISMISSED; i++) {
+        json_doc doc;
+        uz_summary s = paper_summary();
+        s.outcome = (uz_outcome)i;
+        char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+        read_reply(&doc, reply, "summary.json");
+        json_doc_clear(&doc);
+        free(reply);
+    }
+}
+
+TEST(jobs)
+{
+    uz_summary s = paper_summary();
+    json_doc doc;
+    job list[2] = {{.id = "0193aa", .status = JOB_SUCCESSFUL, .progress = 100, .attempts = 1, .created = 1769860800.25},
+                   {.id = "0193ab", .status = JOB_FAILED, .created = 1769860799.9996}};
+    list[0].started = list[0].finished = 1769860801;
+    list[0].summary = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    list[0].tags = "[\"demo\"]";
+    list[1].tags = "[]";
+    list[1].error = codec_encode_problem(&(problem_details){.status = 422, .code = "free_body"});
+    char *reply = codec_encode_job(&list[0]);
+    read_reply(&doc, reply, "job.json");
+    CHECK_STR(text_at(&doc, "id"), "0193aa");
+    CHECK_STR(text_at(&doc, "status"), "successful");
+    CHECK_STR(text_at(&doc, "created"), "2026-01-31T12:00:00.250Z");
+    CHECK_INT(json_array_size(json_object_get(doc.root, "links")), 4);
+    json_doc_clear(&doc);
+    free(reply);
+    reply = codec_encode_job(&list[1]);
+    read_reply(&doc, reply, "job.json");
+    CHECK_STR(text_at(&doc, "created"), "2026-01-31T12:00:00.000Z"); /* rounding carries into the second */
+    CHECK(json_is_null(json_object_get(doc.root, "started")) && json_is_null(json_object_get(doc.root, "summary")));
+    CHECK_INT(json_array_size(json_object_get(doc.root, "links")), 1);
+    json_doc_clear(&doc);
+    free(reply);
+    reply = codec_encode_jobs(list, 2, true);
+    read_reply(&doc, reply, "jobs.json");
+    CHECK_STR(text_at(&doc, "next"), "0193ab");
+    json_doc_clear(&doc);
+    free(reply);
+    reply = codec_encode_jobs(NULL, 0, false);
+    read_reply(&doc, reply, "jobs.json");
+    CHECK(json_is_null(json_object_get(doc.root, "next")));
+    json_doc_clear(&doc);
+    free(reply);
+    free(list[0].summary);
+    free(list[1].error);
+}
+
+TEST(service)
+{
+    json_doc doc;
+    uz_cache_entry entries[2] = {{.digest = "ab", .d = 660, .m = 30, .nnz = 7, .hits = 3, .bytes = 100},
+                                 {.digest = "cd", .bytes = 23}};
+    char *reply = codec_encode_factors(entries, 2, 1 << 30);
+    read_reply(&doc, reply, "factors.json");
+    CHECK(number_at(&doc, "bytes") == 123 && number_at(&doc, "max_bytes") == 1 << 30);
+    json_doc_clear(&doc);
+    free(reply);
+    reply = codec_encode_health("ok", (int64_t[5]){1, 2, 3, 4, 5}, 2);
+    read_reply(&doc, reply, "health.json");
+    CHECK(number_at(&doc, "jobs/accepted") == 1 && number_at(&doc, "jobs/dismissed") == 5);
+    json_doc_clear(&doc);
+    free(reply);
+}
+
+TEST(result)
+{
+    json_doc doc;
+    size_t len;
+    uz_summary s = paper_summary();
+    char *summary = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    const double r[2] = {-0.1, 0}, g[2] = {0, NAN}, u[4] = {1, 2, 3, 0.5}, at[2] = {0, 1};
+    codec_result result = {.job_id = "x",
+                           .summary = summary,
+                           .dim = 2,
+                           .m = 2,
+                           .n_u = 4,
+                           .n_nodes = 4,
+                           .reactions = r,
+                           .gaps = g,
+                           .displacements = u,
+                           .nodes = u,
+                           .contact_nodes = at};
+    char *reply = codec_encode_result(&result, &len);
+    CHECK_INT(len, strlen(reply));
+    CHECK(strstr(reply, "\"reactions\":[-0.1,0],\"gaps\":[0,null],\"displacements\":[[1,2],[3,0.5]],\"nodes\":[[1,2],"
+                        "[3,0.5]],\"contact_nodes\":[0,1]}"));
+    read_reply(&doc, reply, "result.json");
+    json_doc_clear(&doc);
+    free(reply);
+    result.dim = 0;
+    result.reactions = NULL;
+    result.nodes = NULL;
+    reply = codec_encode_result(&result, &len);
+    CHECK(strstr(reply, "\"displacements\":[1,2,3,0.5]") && !strstr(reply, "reactions\"") &&
+          !strstr(reply, "nodes\":[["));
+    read_reply(&doc, reply, "result.json");
+    json_doc_clear(&doc);
+    free(reply);
+    free(summary);
+}
+
+TEST(history)
+{
+    json_doc doc;
+    size_t len;
+    double rows[2 * CODEC_HISTORY_COLUMNS];
+    uz_history_row row = {.iteration = 7,
+                          .seconds = 0.5,
+                          .dual_objective = -1,
+                          .residual = {1, 2, 3, 4, 5},
+                          .step_norm = 6,
+                          .error_bound = INFINITY,
+                          .contacts = 8,
+                          .restart = true};
+    codec_history_row(rows, &row);
+    row.error_bound = 0.25;
+    codec_history_row(rows + CODEC_HISTORY_COLUMNS, &row);
+    char *reply = codec_encode_history(rows, 2, &len);
+    CHECK_INT(len, strlen(reply));
+    CHECK(strstr(reply, "\"rows\":[[7,0.5,-1,1,2,3,4,5,6,null,8,1],[7,0.5,-1,1,2,3,4,5,6,0.25,8,1]]"));
+    read_reply(&doc, reply, "history.json");
+    json_doc_clear(&doc);
+    free(reply);
+    reply = codec_encode_history_csv(rows, 2, &len);
+    CHECK_STR(reply, "iteration,seconds,dual_objective,residual_total,e1,e2,e3,e4,step_norm,error_bound,contacts,"
+                     "restart\n7,0.5,-1,1,2,3,4,5,6,inf,8,1\n7,0.5,-1,1,2,3,4,5,6,0.25,8,1\n");
+    free(reply);
+    reply = codec_encode_history(rows, 0, &len);
+    read_reply(&doc, reply, "history.json");
+    json_doc_clear(&doc);
+    free(reply);
+}

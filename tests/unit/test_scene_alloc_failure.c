@@ -1,0 +1,131 @@
+/* Each allocation on the way from a scene to matrices fails once: the call must say so, publish nothing and keep
+ * nothing. Linked with malloc, calloc and realloc wrapped. */
+#include "assembly/assembly.h"
+#include "harness.h"
+#include "scene_fixture.h"
+
+#include <malloc.h>
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *block, size_t size);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+void *__wrap_realloc(void *block, size_t size);
+
+static long countdown = -1; /* allocations until the one that fails; negative: none does */
+
+static bool fails_now(void)
+{
+    return countdown >= 0 && countdown-- == 0;
+}
+
+void *__wrap_malloc(size_t size)
+{
+    return fails_now() ? NULL : __real_malloc(size);
+}
+
+void *__wrap_calloc(size_t count, size_t size)
+{
+    return fails_now() ? NULL : __real_calloc(count, size);
+}
+
+void *__wrap_realloc(void *block, size_t size)
+{
+    return fails_now() ? NULL : __real_realloc(block, size);
+}
+
+typedef uz_status (*attempt)(const uz_scene *scene, uz_error *err);
+
+/* One run whose n-th allocation (from 0) fails. Returns whether it came that far. */
+static bool fail_at(attempt run, const uz_scene *scene, long n)
+{
+    uz_error err = {0};
+    countdown = n;
+    const uz_status status = run(scene, &err);
+    const bool failed = countdown < 0;
+    countdown = -1;
+    CHECK_INT(status, failed ? UZ_ERR_MEMORY : UZ_OK);
+    CHECK_INT(err.status, status);
+    CHECK(!failed || err.message[0] != '\0');
+    return failed;
+}
+
+/* Runs with the 1st, 2nd, ... allocation failing until it succeeds. Returns how many could fail. The allocator keeps
+ * some freed blocks for itself, so a leak is growth with the number of runs: the least block takes 32 bytes. */
+static long fail_each(attempt run, const uz_scene *scene)
+{
+    enum { SETTLE = 16, MEASURED = 64 };
+    for (long n = 0; n < 1000; n++) {
+        bool failed = true;
+        size_t before = 0;
+        for (int i = 0; i < SETTLE + MEASURED; i++) {
+            before = i == SETTLE ? mallinfo2().uordblks : before;
+            failed = fail_at(run, scene, n);
+        }
+        CHECK_MSG(mallinfo2().uordblks < before + 16 * MEASURED, "a leak where allocation %ld fails", n);
+        if (!failed)
+            return n;
+    }
+    return -1;
+}
+
+static uz_status to_qp(const uz_scene *scene, uz_error *err)
+{
+    uz_qp qp;
+    uz_mesh_info info;
+    const uz_status status = uz_scene_to_qp(&qp, &info, scene, err);
+    CHECK((qp.K.ptr != NULL) == (status == UZ_OK) && (info.xyz != NULL) == (status == UZ_OK));
+    uz_qp_clear(&qp);
+    uz_mesh_info_clear(&info);
+    return status;
+}
+
+static uz_status key(const uz_scene *scene, uz_error *err)
+{
+    unsigned char *bytes;
+    size_t len;
+    const uz_status status = uz_scene_body_key(&bytes, &len, scene, err);
+    CHECK((bytes != NULL) == (status == UZ_OK));
+    free(bytes);
+    return status;
+}
+
+static uz_status copy_info(const uz_scene *scene, uz_error *err)
+{
+    static double xyz[8];
+    static int64_t node[1];
+    uz_mesh_info copy, info = {.dim = 2, .n_nodes = 4, .xyz = xyz, .contact_node = node};
+    info.contact_area = info.contact_normal = xyz;
+    (void)scene;
+    const uz_status status = uz_mesh_info_copy(&copy, &info, 1, err);
+    CHECK((copy.xyz != NULL) == (status == UZ_OK));
+    uz_mesh_info_clear(&copy);
+    return status;
+}
+
+TEST(every_allocation_may_fail)
+{
+    uz_scene scene = paper_scene(4, 2);
+    CHECK(fail_each(to_qp, &scene) > 20);
+    CHECK(fail_each(uz_scene_check, &scene) > 20);
+    CHECK(fail_each(key, &scene) >= 2);
+    CHECK_INT(fail_each(copy_info, &scene), 4);
+    uz_scene_clear(&scene);
+}
+
+TEST(error_estimate_without_memory_is_nan)
+{
+    uz_scene scene = paper_scene(4, 2);
+    uz_body_model model = build_body(&scene);
+    double *u = solve_linear(&model, &scene);
+    for (long n = 0; n < 2; n++) {
+        countdown = n;
+        CHECK(isnan(uz_estimate_discretization_error(&model, u)));
+        countdown = -1;
+    }
+    CHECK(uz_estimate_discretization_error(&model, u) > 0);
+    free(u);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+}

@@ -1,0 +1,412 @@
+/* What the store keeps and who may change it: jobs, claims, idempotency keys, results, lists. */
+#include "store_place.h"
+
+/* ---- submit, claim, finish */
+
+TEST(status_names)
+{
+    job_status status = JOB_ACCEPTED;
+    CHECK_STR(job_status_name(JOB_DISMISSED), "dismissed");
+    CHECK_STR(job_status_name((job_status)77), "unknown");
+    CHECK(job_status_parse(&status, "successful") && status == JOB_SUCCESSFUL);
+    CHECK(!job_status_parse(&status, "done") && status == JOB_SUCCESSFUL);
+}
+
+TEST(submit_claim_finish)
+{
+    place p;
+    job j;
+    bool repeated = true;
+    char *body = NULL;
+    size_t len = 0;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(store_submit(p.s, "{\"a\": 1}", 8, "[\"demo\"]", NULL, &j, &repeated), STORE_OK);
+    CHECK(!repeated && strlen(j.id) == 32 && j.status == JOB_ACCEPTED && j.attempts == 0 && j.created > 1e9);
+    CHECK(j.started == 0 && j.finished == 0 && !j.summary && !j.error);
+    CHECK_STR(j.tags, "[\"demo\"]");
+    job_clear(&j);
+    CHECK_INT(store_claim(p.s, "me", 30.0, &j, &body, &len), STORE_OK);
+    CHECK(j.status == JOB_RUNNING && j.attempts == 1 && j.started >= j.created);
+    CHECK(len == 8 && body && strcmp(body, "{\"a\": 1}") == 0);
+    free(body);
+    CHECK_INT(store_renew(p.s, j.id, "me", 30.0, 42), STORE_OK);
+    CHECK_INT(store_finish(p.s, j.id, "me", &PLAIN_SUCCESS), STORE_OK);
+    char id[33];
+    strcpy(id, j.id);
+    job_clear(&j);
+    CHECK_INT(store_get(p.s, id, &j), STORE_OK);
+    CHECK(j.status == JOB_SUCCESSFUL && j.progress == 100 && j.finished >= j.started && !j.error);
+    CHECK_STR(j.summary, PLAIN_SUCCESS.summary);
+    job_clear(&j);
+    CHECK_INT(store_claim(p.s, "me", 30.0, &j, &body, &len), STORE_NOT_FOUND);
+    CHECK(!body && len == 0 && !j.tags);
+    place_end(&p);
+}
+
+TEST(only_the_owner_of_a_running_job_may_change_it)
+{
+    place p;
+    char id[33], other[33];
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(store_finish(p.s, id, "a", &PLAIN_SUCCESS), STORE_CONFLICT); /* not running yet */
+    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+    CHECK_STR(other, id);
+    CHECK_INT(store_renew(p.s, id, "b", 30, 1), STORE_CONFLICT);
+    CHECK_INT(store_release(p.s, id, "b"), STORE_CONFLICT);
+    CHECK_INT(store_finish(p.s, id, "b", &PLAIN_SUCCESS), STORE_CONFLICT);
+    CHECK_INT(status_of(p.s, id), JOB_RUNNING);
+    store_outcome no_end = {.status = JOB_RUNNING};
+    CHECK_INT(store_finish(p.s, id, "a", &no_end), STORE_ERROR);
+    double x = 1.0;
+    store_vector v = {"reactions", 1, &x};
+    store_outcome late = {.status = JOB_FAILED, .error = "{}", .vectors = &v, .n_vectors = 1};
+    CHECK_INT(store_finish(p.s, id, "a", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(store_finish(p.s, id, "a", &late), STORE_CONFLICT); /* one result for each job */
+    double *data;
+    int64_t count;
+    CHECK_INT(store_get_vector(p.s, id, "reactions", &data, &count), STORE_NOT_FOUND);
+    CHECK_INT(status_of(p.s, id), JOB_SUCCESSFUL);
+    const char *nobody = "ffffffffffffffffffffffffffffffff";
+    CHECK_INT(store_finish(p.s, nobody, "a", &PLAIN_SUCCESS), STORE_NOT_FOUND);
+    CHECK_INT(store_renew(p.s, nobody, "a", 1, 1), STORE_NOT_FOUND);
+    CHECK_INT(store_release(p.s, nobody, "a"), STORE_NOT_FOUND);
+    place_end(&p);
+}
+
+TEST(release_does_not_count_the_attempt)
+{
+    place p;
+    char id[33], again[33];
+    job j;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(claim_id(p.s, "a", again), STORE_OK);
+    CHECK_INT(store_release(p.s, id, "a"), STORE_OK);
+    CHECK_INT(store_get(p.s, id, &j), STORE_OK);
+    CHECK(j.status == JOB_ACCEPTED && j.attempts == 0 && j.started == 0 && j.progress == 0);
+    job_clear(&j);
+    CHECK_INT(claim_id(p.s, "b", again), STORE_OK);
+    CHECK_STR(again, id);
+    place_end(&p);
+}
+
+TEST(ids_sort_by_creation_and_go_on_after_a_restart)
+{
+    place p;
+    char last[33] = "", id[33];
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 60; i++) {
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+        CHECK_MSG(strcmp(id, last) > 0, "%s after %s", id, last);
+        CHECK_INT(strspn(id, "0123456789abcdef"), 32);
+        strcpy(last, id);
+        if (i % 20 == 19 && !place_reopen(&p))
+            return;
+    }
+    for (int i = 0; i < 60; i++) { /* oldest first */
+        CHECK_INT(claim_id(p.s, "a", id), STORE_OK);
+        CHECK(i == 0 || strcmp(id, last) > 0);
+        strcpy(last, id);
+    }
+    place_end(&p);
+}
+
+TEST(ids_ascend_when_the_clock_went_back)
+{
+    place p;
+    char id[33];
+    const char *future = "ffffffff0000fffe0000000000000000"; /* as if written far ahead of this clock */
+    sqlite3 *db = NULL;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    store_close(p.s);
+    CHECK_INT(sqlite3_open(p.path, &db), SQLITE_OK);
+    char sql[160];
+    snprintf(sql, sizeof sql, "DELETE FROM request; UPDATE job SET id = '%s'", future);
+    CHECK_INT(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+    sqlite3_close(db);
+    if (!place_open(&p))
+        return;
+    char last[33];
+    strcpy(last, future);
+    for (int i = 0; i < 4; i++) { /* the counter runs over */
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+        CHECK_MSG(strcmp(id, last) > 0, "%s after %s", id, last);
+        strcpy(last, id);
+    }
+    place_end(&p);
+}
+
+/* ---- idempotency */
+
+TEST(idempotency_key)
+{
+    place p;
+    job first, second;
+    bool repeated;
+    char id[33];
+    job_status was;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(store_submit(p.s, "{\"a\": 1}", 8, "[]", "key-1", &first, &repeated), STORE_OK);
+    CHECK(!repeated);
+    CHECK_INT(store_submit(p.s, "{\"a\": 1}", 8, "[]", "key-1", &second, &repeated), STORE_OK);
+    CHECK(repeated);
+    CHECK_STR(second.id, first.id);
+    job_clear(&second);
+    CHECK_INT(store_submit(p.s, "{\"a\": 2}", 8, "[]", "key-1", &second, &repeated), STORE_CONFLICT);
+    CHECK(!repeated && !second.tags && !second.id[0]);
+    CHECK_INT(submit_text(p.s, "{\"a\": 1} ", "[]", "key-1", id), STORE_CONFLICT); /* a longer body */
+    CHECK_INT(submit_text(p.s, "{\"a\": 2}", "[]", "key-2", id), STORE_OK);        /* another key */
+    CHECK(place_reopen(&p));
+    CHECK_INT(submit_text(p.s, "{\"a\": 1}", "[]", "key-1", id), STORE_OK);
+    CHECK_STR(id, first.id);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
+    CHECK_INT(submit_text(p.s, "{\"a\": 3}", "[]", "key-1", id), STORE_OK); /* the key went with the job */
+    CHECK(strcmp(id, first.id) != 0);
+    job_clear(&first);
+    place_end(&p);
+}
+
+/* ---- results and histories */
+
+static double *ramp(int64_t count)
+{
+    double *x = malloc((size_t)count * sizeof *x);
+    for (int64_t i = 0; i < count; i++)
+        x[i] = 0.1 * (double)i - 3.0;
+    return x;
+}
+
+static void check_vector(store *s, const char *id, const char *name, const double *want, int64_t want_count)
+{
+    double *data = NULL;
+    int64_t count = -1;
+    CHECK_INT(store_get_vector(s, id, name, &data, &count), STORE_OK);
+    CHECK_INT(count, want_count);
+    CHECK(data && (want_count == 0 || memcmp(data, want, (size_t)want_count * sizeof *want) == 0));
+    free(data);
+}
+
+TEST(vectors_come_back_bit_for_bit)
+{
+    place p;
+    char id[33], other[33];
+    int64_t large = 300001; /* more than two parts */
+    double *x = ramp(large);
+    double odd[] = {0.0, -0.0, 5e-324, 1.7976931348623157e308, INFINITY, -INFINITY, NAN};
+    store_vector v[] = {{"displacements", large, x}, {"odd", 7, odd}, {"empty", 0, NULL}, {"part", 131072, x}};
+    store_outcome outcome = {.status = JOB_SUCCESSFUL, .summary = "{}", .vectors = v, .n_vectors = 4};
+    if (place_begin(&p)) {
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+        CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+        CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+        CHECK(place_reopen(&p));
+        check_vector(p.s, id, "displacements", x, large);
+        check_vector(p.s, id, "odd", odd, 7);
+        check_vector(p.s, id, "empty", NULL, 0);
+        check_vector(p.s, id, "part", x, 131072);
+        double *data;
+        int64_t count, columns;
+        CHECK_INT(store_get_vector(p.s, id, "gaps", &data, &count), STORE_NOT_FOUND);
+        CHECK(!data && count == 0);
+        CHECK_INT(store_get_history(p.s, id, -1, &data, &count, &columns), STORE_NOT_FOUND);
+        place_end(&p);
+    }
+    free(x);
+}
+
+static void check_history(store *s, const char *id, int64_t after, int64_t want_count)
+{
+    double *rows = NULL;
+    int64_t count = -1, columns = -1;
+    CHECK_INT(store_get_history(s, id, after, &rows, &count, &columns), STORE_OK);
+    CHECK_INT(count, want_count);
+    CHECK_INT(columns, 12);
+    if (count > 0)
+        CHECK(rows[0] == (double)(after + 1) && rows[(count - 1) * 12 + 11] == (double)(after + count) + 0.5);
+    free(rows);
+}
+
+TEST(history_after_an_iteration)
+{
+    place p;
+    char id[33], other[33];
+    int64_t n = 25000; /* three parts */
+    double *rows = calloc((size_t)n * 12, sizeof *rows);
+    for (int64_t i = 0; i < n; i++) {
+        rows[i * 12] = (double)i;
+        rows[i * 12 + 11] = (double)i + 0.5;
+    }
+    store_outcome outcome = {.status = JOB_DISMISSED, .history = rows, .history_rows = n, .history_columns = 12};
+    if (place_begin(&p)) {
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+        CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+        CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+        check_history(p.s, id, -1, n);
+        check_history(p.s, id, 0, n - 1);
+        check_history(p.s, id, 10921, n - 10922); /* the end of a part */
+        check_history(p.s, id, 10922, n - 10923);
+        check_history(p.s, id, n - 2, 1);
+        check_history(p.s, id, n - 1, 0);
+        check_history(p.s, id, INT64_MAX, 0);
+        place_end(&p);
+    }
+    free(rows);
+}
+
+TEST(a_damaged_vector_is_an_error)
+{
+    place p;
+    char id[33], other[33], message[256];
+    double x[4] = {1, 2, 3, 4}, *data;
+    int64_t count;
+    store_vector v = {"gaps", 4, x};
+    store_outcome outcome = {.status = JOB_SUCCESSFUL, .vectors = &v, .n_vectors = 1};
+    const char *const damage[] = {"UPDATE vector SET data = x'00'", "UPDATE vector SET data = zeroblob(24)",
+                                  "UPDATE vector SET data = zeroblob(40)", "UPDATE vector SET version = 2",
+                                  "UPDATE vector SET count = -1"};
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+    CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+    for (size_t i = 0; i < sizeof damage / sizeof damage[0]; i++) {
+        sqlite3 *db = NULL;
+        store_close(p.s);
+        CHECK_INT(sqlite3_open(p.path, &db), SQLITE_OK);
+        CHECK_INT(sqlite3_exec(db, damage[i], NULL, NULL, NULL), SQLITE_OK);
+        sqlite3_close(db);
+        if (!place_open(&p))
+            return;
+        CHECK_INT(store_get_vector(p.s, id, "gaps", &data, &count), STORE_ERROR);
+        CHECK(!data && count == 0);
+        store_message(p.s, message, sizeof message);
+        CHECK(strstr(message, "damaged"));
+    }
+    place_end(&p);
+}
+
+/* ---- dismiss */
+
+TEST(deleting_a_job_deletes_everything_of_it)
+{
+    place p;
+    char id[33], other[33];
+    double x[12] = {0};
+    store_vector v = {"gaps", 12, x};
+    store_outcome outcome = {JOB_SUCCESSFUL, "{}", NULL, &v, 1, x, 1, 12};
+    job_status was;
+    job j;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[\"t\", \"u\"]", "key", id), STORE_OK);
+    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+    CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
+    CHECK_INT(was, JOB_SUCCESSFUL);
+    CHECK_INT(store_get(p.s, id, &j), STORE_NOT_FOUND);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_NOT_FOUND);
+    store_close(p.s);
+    p.s = NULL;
+    const char *const tables[] = {"job", "request", "tag", "vector", "history"};
+    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
+        CHECK_MSG(rows_in(p.path, tables[i]) == 0, "%s has rows left", tables[i]);
+    place_end(&p);
+}
+
+TEST(dismiss_by_state)
+{
+    place p;
+    char id[33], other[33];
+    job_status was = JOB_FAILED;
+    job j;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
+    CHECK_INT(was, JOB_ACCEPTED);
+    CHECK_INT(store_get(p.s, id, &j), STORE_OK);
+    CHECK(j.status == JOB_DISMISSED && j.finished > 0);
+    job_clear(&j);
+    CHECK_INT(claim_id(p.s, "a", other), STORE_NOT_FOUND); /* a dismissed job is not run */
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
+    CHECK_INT(was, JOB_RUNNING);
+    CHECK_INT(status_of(p.s, id), JOB_RUNNING); /* only reported */
+    place_end(&p);
+}
+
+/* ---- lists */
+
+static size_t list_ids(store *s, store_query q, char ids[][33], bool *more)
+{
+    job *jobs = NULL;
+    size_t count = 0;
+    CHECK_INT(store_list(s, &q, &jobs, &count, more), STORE_OK);
+    for (size_t i = 0; i < count; i++) {
+        strcpy(ids[i], jobs[i].id);
+        job_clear(&jobs[i]);
+    }
+    free(jobs);
+    return count;
+}
+
+TEST(list_with_cursor_status_and_tag)
+{
+    place p;
+    char id[10][33], got[10][33], claimed[33];
+    bool more;
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 10; i++) {
+        const char *tags = i % 3 == 0 ? "[\"red\", \"red\", \"a'b\"]" : "[\"blue\"]";
+        CHECK_INT(submit_text(p.s, "{}", tags, NULL, id[i]), STORE_OK);
+    }
+    CHECK_INT(claim_id(p.s, "a", claimed), STORE_OK); /* id[0], red */
+    CHECK_INT(list_ids(p.s, (store_query){.limit = 4}, got, &more), 4);
+    CHECK(more);
+    CHECK_STR(got[0], id[9]);
+    CHECK_STR(got[3], id[6]);
+    CHECK_INT(list_ids(p.s, (store_query){.limit = 6, .before = got[3]}, got, &more), 6);
+    CHECK(!more);
+    CHECK_STR(got[5], id[0]);
+    CHECK_INT(list_ids(p.s, (store_query){.limit = 10, .tag = "red"}, got, &more), 4);
+    CHECK_STR(got[0], id[9]);
+    CHECK_STR(got[3], id[0]);
+    CHECK_INT(list_ids(p.s, (store_query){.limit = 2, .tag = "a'b", .before = id[9]}, got, &more), 2);
+    CHECK(more);
+    CHECK_STR(got[1], id[3]);
+    CHECK_INT(list_ids(p.s, (store_query){.limit = 10, .by_status = true, .status = JOB_RUNNING}, got, &more), 1);
+    CHECK_STR(got[0], id[0]);
+    store_query both = {.limit = 10, .by_status = true, .status = JOB_ACCEPTED, .tag = "red"};
+    CHECK_INT(list_ids(p.s, both, got, &more), 3);
+    CHECK_INT(list_ids(p.s, (store_query){.limit = 10, .tag = "re"}, got, &more), 0);
+    CHECK_INT(list_ids(p.s, (store_query){.limit = 0}, got, &more), 1); /* limits are clamped */
+    int64_t counts[5];
+    CHECK_INT(store_counts(p.s, counts), STORE_OK);
+    CHECK(counts[JOB_ACCEPTED] == 9 && counts[JOB_RUNNING] == 1 && counts[JOB_SUCCESSFUL] == 0);
+    place_end(&p);
+}
+
+TEST(bad_tags_are_an_error_and_leave_nothing)
+{
+    place p;
+    char id[33];
+    int64_t counts[5];
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[\"open", NULL, id), STORE_ERROR);
+    CHECK_INT(store_counts(p.s, counts), STORE_OK);
+    CHECK_INT(counts[JOB_ACCEPTED], 0);
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    place_end(&p);
+}
