@@ -65,12 +65,13 @@ static void put_link(text *t, const char *rel, const char *id, const char *tail)
     text_close(t, '}');
 }
 
+/* A job that was dismissed while it ran may have left its best answer so far. */
 static void put_links(text *t, const job *j)
 {
     text_key(t, "links");
     text_open(t, '[');
     put_link(t, "self", j->id, "");
-    if (j->status == JOB_SUCCESSFUL) {
+    if (j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary)) {
         put_link(t, "result", j->id, "/result");
         put_link(t, "history", j->id, "/history");
         put_link(t, "history_csv", j->id, "/history.csv");

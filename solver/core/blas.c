@@ -2,6 +2,8 @@
 
 #include <cblas.h>
 #include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
 
 /* Dense orders stay far below 2^31: they are bounded by the memory of an n x n array. */
 static int narrow(int64_t n)
@@ -70,6 +72,29 @@ void uz_potrs_lower(int64_t n, const double *L, double *x)
 {
     uz_trsv_lower(n, L, x);
     uz_trsv_lower_t(n, L, x);
+}
+
+int64_t uz_pstrf_lower(int64_t n, double *A, int64_t *pivot, double least)
+{
+    double *work = malloc((size_t)n * 2 * sizeof *work + 1), largest = 0.0;
+    int *order = malloc((size_t)n * sizeof *order + 1), rank = 0;
+    for (int64_t i = 0; i < n; i++)
+        largest = fmax(largest, A[i + i * n]);
+    if (work && order && n > 0)
+        LAPACKE_dpstrf_work(LAPACK_COL_MAJOR, 'L', narrow(n), A, narrow(n), order, &rank, least * largest, work);
+    for (int64_t k = 0; order && k < rank; k++)
+        pivot[k] = order[k] - 1;
+    free(work);
+    free(order);
+    return rank;
+}
+
+void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x)
+{
+    if (n == 0)
+        return;
+    cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), L, narrow(stride), x, 1);
+    cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(stride), x, 1);
 }
 
 bool uz_potri_lower(int64_t n, double *L)

@@ -18,7 +18,12 @@ void uz_trsm_lower(int64_t n, int64_t k, const double *L, double *X);       /* X
 void uz_syrk_lower_t(int64_t n, int64_t k, const double *Z, double *C);     /* C = Z'Z, Z k x n */
 bool uz_potrf_lower(int64_t n, double *A);                  /* A = LL'; false: a pivot is not positive */
 void uz_potrs_lower(int64_t n, const double *L, double *x); /* x = (LL')^-1 x */
-bool uz_potri_lower(int64_t n, double *L);                  /* L -> lower triangle of (LL')^-1 */
+/* Cholesky with complete pivoting of a semidefinite A, P'AP = LL'; pivot[k] is the original index of row k. Returns the
+ * rank: pivots below `least` times the largest count as zero (Higham 1990; LAPACK dpstrf). */
+int64_t uz_pstrf_lower(int64_t n, double *A, int64_t *pivot, double least);
+/* x (n) = (LL')^-1 x with the leading n x n block of an array with `stride` rows. */
+void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x);
+bool uz_potri_lower(int64_t n, double *L); /* L -> lower triangle of (LL')^-1 */
 /* Eigenvalues of the symmetric tridiagonal matrix (d, n; e, n - 1), ascending in d; with vectors in V (n x n). */
 bool uz_stev(int64_t n, double *d, double *e, double *V);
 

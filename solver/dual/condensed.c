@@ -190,24 +190,74 @@ static void response(double *z, const uz_condensed *dense, const double *w)
     uz_trsv_lower(dense->n_b, dense->L_bb, z);
 }
 
-/* z = L_bb'c moves B by c and lets the interior follow with least energy: ||z||^2 is that energy, doubled. */
-static bool push_by_sweeps(uz_case *load, double *target, const double *g, const bool *close)
+/* D_AA, lower triangle, rows and columns in the order of `rows`. */
+static void gather(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m)
 {
-    const uz_condensed *dense = &load->dual->dense;
-    double *weight = load->work2;
-    uz_csc Nb_t;
-    uz_error ignored = {0};
-    if (uz_csc_transpose(&Nb_t, &dense->N_b, &ignored) != UZ_OK)
-        return false;
-    for (int64_t k = 0; k < dense->n_b; k++) {
-        double S_kk = 0.0;
-        for (int64_t j = 0; j <= k; j++)
-            S_kk += dense->L_bb[k + j * dense->n_b] * dense->L_bb[k + j * dense->n_b];
-        weight[k] = 1.0 / S_kk;
+    for (int64_t l = 0; l < count; l++)
+        for (int64_t k = l; k < count; k++)
+            D_AA[k + l * count] = D[rows[k] + rows[l] * m];
+}
+
+enum { PUSH_ROUNDS = 6 };
+
+/* The rows of `in`, listed; their number. */
+static int64_t list_rows(int64_t *rows, const bool *in, int64_t m)
+{
+    int64_t count = 0;
+    for (int64_t i = 0; i < m; i++)
+        if (in[i])
+            rows[count++] = i;
+    return count;
+}
+
+/* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere. D_AA is room for count^2.
+ */
+static bool solve_rows(double *w, double *D_AA, const uz_dual *dual, const double *target, const int64_t *rows,
+                       int64_t count)
+{
+    int64_t m = dual->info.m, *pivot = uz_alloc(count, sizeof *pivot);
+    double *x = uz_alloc(count, sizeof *x);
+    if (pivot && x) {
+        gather(D_AA, dual->dense.D, rows, count, m);
+        int64_t rank = uz_pstrf_lower(count, D_AA, pivot, PIVOT_LEAST);
+        for (int64_t k = 0; k < rank; k++)
+            x[k] = target[rows[pivot[k]]];
+        uz_potrs_leading(rank, count, D_AA, x);
+        memset(w, 0, (size_t)m * sizeof *w);
+        for (int64_t k = 0; k < rank; k++)
+            w[rows[pivot[k]]] = x[k];
     }
-    bool feasible = uz_push_sweeps(load->push, target, &Nb_t, weight, g, close);
-    uz_csc_clear(&Nb_t);
-    uz_trmv_lower_t(dense->n_b, dense->L_bb, load->push);
+    bool ok = pivot && x;
+    free(pivot);
+    free(x);
+    return ok;
+}
+
+/* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
+ * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
+static bool push_rows(uz_case *load, double *w, double *target, const double *g, const bool *close)
+{
+    const uz_dual *dual = load->dual;
+    int64_t m = dual->info.m, *rows = uz_alloc(m, sizeof *rows);
+    bool *in = uz_alloc(m, sizeof *in), feasible = false, ok = rows && in;
+    double *D_AA = ok ? uz_alloc(m * m, sizeof *D_AA) : NULL, scale = 0.0;
+    for (int64_t i = 0; D_AA && i < m; i++) {
+        in[i] = close[i] || g[i] < 0.0;
+        scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
+    }
+    for (int round = 0; D_AA && ok && !feasible && round < PUSH_ROUNDS; round++) {
+        ok = solve_rows(w, D_AA, dual, g, rows, list_rows(rows, in, m));
+        uz_condensed_apply(load, target, w);
+        feasible = ok;
+        for (int64_t i = 0; i < m; i++) {
+            bool wrong = g[i] - target[i] < -1e-11 * scale;
+            feasible = feasible && !wrong;
+            in[i] = in[i] || wrong;
+        }
+    }
+    free(rows);
+    free(in);
+    free(D_AA);
     return feasible;
 }
 
@@ -226,21 +276,15 @@ uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, cons
         memcpy(load->work2, target, (size_t)m * sizeof *target);
         uz_potrs_lower(m, dense->D_chol, load->work2);
         response(z, dense, load->work2);
-    } else if (!push_by_sweeps(load, target, g, close)) {
+    } else if (push_rows(load, load->work2, target, g, close)) {
+        response(z, dense, load->work2);
+    } else {
         return UZ_OK;
     }
     for (int64_t i = 0; i < m; i++)
         complementarity -= r[i] * fmax(0.0, g[i] - target[i]);
     *bound2 = uz_dot(dense->n_b, z, z) + 2.0 * complementarity;
     return UZ_OK;
-}
-
-/* D_AA, lower triangle, rows and columns in the order of `rows`. */
-static void gather(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m)
-{
-    for (int64_t l = 0; l < count; l++)
-        for (int64_t k = l; k < count; k++)
-            D_AA[k + l * count] = D[rows[k] + rows[l] * m];
 }
 
 /* Solves, and once more for the residual: D_AA is the inverse of a stiffness and as badly conditioned. */

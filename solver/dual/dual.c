@@ -28,8 +28,8 @@ uz_operator uz_dual_choose(int64_t d, int64_t m, int64_t n_b, uz_operator asked)
     double n = (double)(n_b > m ? n_b : m);
     if (asked != UZ_OPERATOR_AUTO)
         return asked;
-    return n <= 512 || 2.0 * n * n * n / 30.0 <= 300.0 * 60.0 * (double)d ? UZ_OPERATOR_CONDENSED
-                                                                          : UZ_OPERATOR_FACTORED;
+    return n <= 1024 || 2.0 * n * n * n / 30.0 <= 300.0 * 60.0 * (double)d ? UZ_OPERATOR_CONDENSED
+                                                                           : UZ_OPERATOR_FACTORED;
 }
 
 static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)

@@ -84,7 +84,8 @@ static bool stalled(const uz_iterate *it, double step_norm)
     for (int64_t i = 0; i < it->m; i++)
         size += it->r[i] * it->r[i];
     int64_t patience = it->best_iteration / 2 + 4000;
-    return step_norm <= 4.0 * DBL_EPSILON * sqrt(size) || it->iteration - it->best_iteration > patience;
+    return step_norm <= 4.0 * DBL_EPSILON * sqrt(size) ||
+           (isfinite(it->best_bound) && it->iteration - it->best_iteration > patience);
 }
 
 static bool should_end(uz_end *end, const uz_iterate *it, const uz_method_options *options, double step_norm)
@@ -128,6 +129,8 @@ static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *
     if (options->stopping == UZ_STOP_PAPER)
         it->best_bound = INFINITY;
     uz_status status = uz_iterate_bound(it, load, options->method, err);
+    if (isinf(it->best_bound)) /* nothing could be bounded: the last r is as good as any */
+        memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
     history->rows[history->count - 1].error_bound = it->best_bound;
     return status;
 }

@@ -180,6 +180,22 @@ TEST(tags_leave_what_they_do_not_understand)
     free(same);
 }
 
+/* Every beginning of a request, copied to a block of just that size: a reader past the end is found by the sanitizer.
+ */
+TEST(tags_stay_inside_a_body_that_was_cut)
+{
+    static const char BODY[] = "{\"a\\\"\": [1, {\"b\": \"}\\\\\"}], \"tags\" : [\"z\", \"\\u0061\"] , \"c\": null}";
+    const char *tags[] = {"x"};
+    for (size_t len = 0; len < sizeof BODY; len++) {
+        client_buffer in = {.data = malloc(len ? len : 1), .len = len}, out;
+        memcpy(in.data, BODY, len);
+        CHECK(client_tags_add(&out, &in, tags, 1));
+        CHECK(out.data != NULL);
+        free(in.data);
+        free(out.data);
+    }
+}
+
 TEST(tags_that_are_not_utf8_are_refused)
 {
     const char *bad[] = {"\xff"};

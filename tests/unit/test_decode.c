@@ -265,3 +265,19 @@ TEST(problems_are_read_back)
     CHECK_STR(out.pointer, in.pointer);
     free(json);
 }
+
+TEST(the_data_of_other_tests_is_taken)
+{
+    static const char *const FILES[] = {"tests/data/paper_body.json", "tests/data/paper_body_120.json",
+                                        "tests/data/small_matrices.json"};
+    for (size_t i = 0; i < sizeof FILES / sizeof FILES[0]; i++) {
+        size_t len;
+        char *body = test_read_file(FILES[i], &len);
+        CHECK_MSG(body, "no %s", FILES[i]);
+        if (!body)
+            continue;
+        codec_request r = take(body);
+        codec_request_clear(&r);
+        free(body);
+    }
+}
