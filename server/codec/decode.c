@@ -2,6 +2,7 @@
 #include "codec/decode.h"
 #include "codec/problem.h"
 #include "codec/schema.h"
+#include "codec/text.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,10 +45,10 @@ static bool check_tags(const json_t *tags, problem_details *problem)
     json_t *tag;
     json_array_foreach(tags, i, tag)
     {
-        const char *text = json_string_value(tag);
+        const char *word = json_string_value(tag);
         json_path list = {NULL, "tags", 4, 0}, path = {&list, NULL, 0, i};
         for (size_t k = 0; k < json_string_length(tag); k++)
-            if ((unsigned char)text[k] < 0x20 || text[k] == 0x7f) {
+            if ((unsigned char)word[k] < 0x20 || word[k] == 0x7f) {
                 problem_set(problem, 422, "not_allowed", &path, "/tags/%zu has a control character; tags are words.",
                             i);
                 return false;
@@ -60,7 +61,10 @@ static bool decode_tags(char **out, const json_t *tags, problem_details *problem
 {
     if (!check_tags(tags, problem))
         return false;
-    *out = tags ? json_dumps(tags, JSON_COMPACT) : strdup("[]");
+    text none = {0};
+    if (!tags)
+        text_put(&none, "[]");
+    *out = tags ? json_dumps(tags, JSON_COMPACT) : text_finish(&none, NULL);
     if (!*out)
         problem_set(problem, 503, "out_of_memory", NULL, "There is not enough memory for this request now.");
     return *out != NULL;

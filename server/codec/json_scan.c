@@ -166,7 +166,7 @@ static json_t *lift(scanner *s, json_lifted item)
     json_doc *doc = s->doc;
     if (doc->n_lifted == doc->capacity) {
         size_t capacity = doc->capacity ? 2 * doc->capacity : 8;
-        json_lifted *grown = reallocarray(doc->lifted, capacity, sizeof *grown);
+        json_lifted *grown = room_grow(doc->lifted, capacity, sizeof *grown);
         if (!grown) {
             free(item.numbers);
             free(item.text);

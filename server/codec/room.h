@@ -5,10 +5,16 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-/* Uninitialised room for `count` items of `size` bytes; free with free(). */
+/* Uninitialised room for `count` items of `size` bytes, size > 0; free with free(). */
 static inline void *room_for(size_t count, size_t size)
 {
-    return count > 0 ? reallocarray(NULL, count, size) : malloc(1);
+    return count <= PTRDIFF_MAX / size ? malloc(count > 0 ? count * size : 1) : NULL;
+}
+
+/* Makes a block larger; on failure NULL and the old block stays. */
+static inline void *room_grow(void *block, size_t count, size_t size)
+{
+    return count <= PTRDIFF_MAX / size ? realloc(block, count * size) : NULL;
 }
 
 #endif

@@ -151,8 +151,12 @@ static bool takes_any_number(schema_at at)
 static bool check_lifted_items(const visit *v, const json_lifted *lifted, schema_at items)
 {
     bool good = true;
-    json_t *number = takes_any_number(items) ? NULL : json_real(0);
-    for (int64_t i = 0; number && good && i < lifted->count; i++) {
+    if (takes_any_number(items))
+        return true;
+    json_t *number = json_real(0);
+    if (!number)
+        return visit_no_memory(v);
+    for (int64_t i = 0; good && i < lifted->count; i++) {
         json_path path = {v->path, NULL, 0, (size_t)i};
         json_real_set(number, lifted->numbers[i]);
         good = check(&(visit){v->doc, v->problem, items, number, &path});

@@ -20,6 +20,13 @@ bool visit_refuse(const visit *v, const char *code, const char *format, ...)
     return false;
 }
 
+bool visit_no_memory(const visit *v)
+{
+    if (v->problem)
+        problem_set(v->problem, 503, "out_of_memory", NULL, "There is not enough memory for this request now.");
+    return false;
+}
+
 const char *visit_string(const visit *v, size_t *len)
 {
     const json_lifted *lifted = json_doc_lifted(v->doc, v->value);

@@ -19,6 +19,7 @@ const char *visit_string(const visit *v, size_t *len);
 
 /* Fills v->problem with "PLACE message"; returns false, so that a rule ends in `return visit_refuse(...)`. */
 bool visit_refuse(const visit *v, const char *code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+bool visit_no_memory(const visit *v); /* 503 */
 bool visit_wrong_type(const visit *v, unsigned allowed);
 
 /* The value for a person: a short string or a number as it is, else its type. */

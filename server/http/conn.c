@@ -98,8 +98,8 @@ static bool send_reply(conn *c, struct MHD_Connection *mhd)
     return reply_send(mhd, reply);
 }
 
-/* In the middle of a body libmicrohttpd takes no reply: write it and close. */
-static void send_amid_body(conn *c, const problem_details *problem)
+/* Where libmicrohttpd takes no reply: writes it and closes the connection's sending side. */
+static void send_directly(conn *c, const problem_details *problem)
 {
     http_reply reply = {.close = true};
     reply_problem(&reply, problem);
@@ -109,6 +109,23 @@ static void send_amid_body(conn *c, const problem_details *problem)
         linger(c);
     free(message);
     reply_clear(&reply);
+}
+
+void conn_refuse(conn *c, int status)
+{
+    http_request *rq = c->request;
+    problem_details problem;
+    if (!rq || rq->status)
+        return;
+    if (status == 413 || status == 414 || status == 431)
+        http_problem(&problem, status, "header_too_large", "The header is too large",
+                     "request line and header fields together may have about %d bytes", CONNECTION_MEMORY / 2);
+    else if (status >= 500)
+        http_problem(&problem, status, "http_error", "The request could not be served", "try again later");
+    else
+        http_problem(&problem, status, "bad_request_framing", "The request is malformed or ambiguous",
+                     "the header fields, the body's length or its chunks are malformed, or Host is missing");
+    send_directly(c, &problem);
 }
 
 /* ----------------------------------------------------------------- headers */
@@ -217,7 +234,7 @@ bool conn_body(conn *c, const char *data, size_t size)
                          true);
         return true;
     }
-    send_amid_body(c, &rq->refused);
+    send_directly(c, &rq->refused);
     return false;
 }
 

@@ -7,6 +7,7 @@
 #include "http/request.h"
 
 #include <microhttpd.h>
+#include <pthread.h>
 
 /* Bytes of each connection's buffer: bounds the header block, and is the piece in which a body arrives. */
 #define CONNECTION_MEMORY (64 * 1024)
@@ -20,6 +21,7 @@ struct http_server {
     http_options options;
     struct MHD_Daemon *daemon;
     deadlines *deadlines;
+    pthread_key_t current; /* the conn that this thread serves, once it has a request */
     bool check_layout;
     size_t body_budget;
     atomic_size_t body_bytes; /* reserved now */
@@ -42,6 +44,8 @@ void conn_begin_request(conn *c, const char *raw_target);
 bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const char *version);
 bool conn_body(conn *c, const char *data, size_t size);
 bool conn_answer(conn *c, struct MHD_Connection *mhd);
+/* Answers a request that libmicrohttpd is about to refuse with this status. */
+void conn_refuse(conn *c, int status);
 /* status: of the reply that libmicrohttpd made by itself, 0 if there was none. */
 void conn_end_request(conn *c, unsigned status, bool completed);
 

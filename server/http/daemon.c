@@ -6,6 +6,7 @@
 #include "http/conn.h"
 
 #include <errno.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,10 +34,11 @@ static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_c
 /* The first line has come; `raw` is still as received. What is returned becomes *request_context below. */
 static void *on_target(void *ctx, const char *raw, struct MHD_Connection *mhd)
 {
-    (void)ctx;
+    http_server *server = ctx;
     conn *c = connection_of(mhd);
     if (c)
         conn_begin_request(c, raw);
+    pthread_setspecific(server->current, c);
     return NULL;
 }
 
@@ -72,7 +74,9 @@ static void on_completed(void *ctx, struct MHD_Connection *mhd, void **request_c
         conn_end_request(c, info ? info->http_status : 0, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
 }
 
-/* libmicrohttpd's own complaints, which are about clients. */
+/* libmicrohttpd's messages, from the thread they are about. What it refuses by itself (a header block without end, a
+ * malformed length or chunk) it answers in HTML, in some cases with the head written twice; this message comes before
+ * that answer, so ours is sent first and the connection is closed for writing. */
 __attribute__((format(printf, 2, 0))) static void on_message(void *ctx, const char *format, va_list args)
 {
     http_server *server = ctx;
@@ -80,6 +84,10 @@ __attribute__((format(printf, 2, 0))) static void on_message(void *ctx, const ch
     vsnprintf(text, sizeof text, format, args);
     text[strcspn(text, "\n")] = '\0';
     log_write(server->context.log, LOG_DEBUG, "http_message", (log_field[]){LOG_S("message", text), {0}});
+    conn *c = pthread_getspecific(server->current);
+    const char *code = strstr(text, "HTTP response code is ");
+    if (c && code)
+        conn_refuse(c, atoi(code + strlen("HTTP response code is ")));
 }
 
 /* What a client reads whose request was not complete in time. */
@@ -119,6 +127,7 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
 {
     char *words = make_last_words(options->request_deadline_s);
     http_server *server = calloc(1, sizeof *server);
+    bool has_key = false;
     if (!server || !words)
         goto fail;
     server->context.store = parts->store;
@@ -131,6 +140,9 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     atomic_init(&server->body_bytes, 0);
     /* The tiling of a header block is how 0.9.x parses; later versions refuse by themselves what it finds. */
     server->check_layout = strncmp(MHD_get_version(), "0.9.", 4) == 0;
+    if (pthread_key_create(&server->current, NULL) != 0)
+        goto fail;
+    has_key = true;
     server->deadlines = deadlines_new(words);
     if (!server->deadlines)
         goto fail;
@@ -143,6 +155,8 @@ fail:
     snprintf(message, size, "cannot start the HTTP server: %s", errno ? strerror(errno) : "out of memory");
     if (server)
         deadlines_free(server->deadlines);
+    if (has_key)
+        pthread_key_delete(server->current);
     free(server);
     free(words);
     close(listen_fd);
@@ -160,5 +174,6 @@ void http_stop(http_server *server)
         return;
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
     deadlines_free(server->deadlines);
+    pthread_key_delete(server->current);
     free(server);
 }

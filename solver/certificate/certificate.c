@@ -1,6 +1,7 @@
 #include "certificate/certificate.h"
 
 #include "certificate/residual.h"
+#include "certificate/row_move.h"
 #include "certificate/twofold.h"
 #include "core/alloc.h"
 #include "core/error.h"
@@ -10,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_SWEEPS = 200, CLOSING_SWEEPS = 12 };
+enum { LEAST_ROUNDS = 2, CLOSING_ROUNDS = 8, MAX_ROUNDS = 40 };
 
 /* Twofold arithmetic carries about 100 bits: a violation of the constraints by 2^-80 of their size is rounding. */
 #define NEGLIGIBLE 0x1p-80
@@ -20,6 +21,7 @@ typedef struct {
     uz_csc Nt;          /* d x m */
     double *weight;     /* d: W = diag(K)^-1 */
     double *correction; /* d: v = u + correction */
+    uz_row_move move;   /* m each */
     uz_residuals res;   /* d each */
     int64_t d, m;
 } certifier;
@@ -46,6 +48,7 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, uz_error *err
     bool ok = true;
     for (int k = 0; k < 4; k++)
         ok = (*room[k] = uz_alloc(c->d, sizeof(double))) && ok;
+    ok = uz_row_move_init(&c->move, c->d, c->m) && ok;
     if (!ok || !c->weight || !c->correction)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->d);
     for (int64_t j = 0; j < c->d; j++) {
@@ -61,6 +64,7 @@ static void release(certifier *c)
     uz_csc_clear(&c->Nt);
     free(c->weight);
     free(c->correction);
+    uz_row_move_clear(&c->move);
     free(c->res.e);
     free(c->res.e_u);
     free(c->res.Ku);
@@ -85,44 +89,42 @@ static double compliance(const certifier *c, int64_t i)
     return sum;
 }
 
-/* Moves the correction along W n_i by what takes the gap to zero; `excess` more, relative, so that rounding can't leave
- * it negative. */
-static void move_row(const certifier *c, int64_t i, double gap, double excess)
-{
-    double size = compliance(c, i);
-    for (int64_t k = c->Nt.ptr[i]; size > 0.0 && k < c->Nt.ptr[i + 1]; k++)
-        c->correction[c->Nt.idx[k]] += gap / size * (1.0 + excess) * c->weight[c->Nt.idx[k]] * c->Nt.val[k];
-}
-
 /* Closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g. */
 static bool worth_closing(const certifier *c, const double *r, int64_t i, double gap)
 {
     return r[i] < 0.0 && gap <= -2.0 * r[i] * compliance(c, i);
 }
 
-/* Fills the correction by sweeps over the rows (Kaczmarz 1937; Hildreth 1957 for the inequalities): first towards
- * closed gaps, later, where dependent rows can't all be closed, towards feasible ones only. True when no gap of u + c
- * is negative by more than the rounding of twofold arithmetic. */
-static bool make_feasible(const certifier *c, const double *r, const double *g)
+/* The rows to move in this round and by how much: target_i is the gap to take away, 0 for rows left alone. Returns the
+ * worst violation. */
+static double choose_rows(const certifier *c, const double *r, const double *g, bool closing)
+{
+    double worst = 0.0;
+    for (int64_t i = 0; i < c->m; i++) {
+        double gap = corrected_gap(c, g, i);
+        bool close = closing && worth_closing(c, r, i, fabs(gap));
+        c->move.in[i] = close || gap < 0.0;
+        c->move.target[i] = c->move.in[i] ? gap : 0.0;
+        worst = fmax(worst, -gap);
+    }
+    return worst;
+}
+
+/* Fills the correction round by round: first it closes gaps, later, where dependent rows can't all be closed, it only
+ * lifts penetrating rows. Each round starts from gaps in twofold precision, so what rounding left is moved by the next.
+ * True when no gap of u + c is negative by more than the rounding of twofold arithmetic. */
+static bool make_feasible(certifier *c, const double *r, const double *g)
 {
     double scale = 0.0;
-    bool feasible = false;
     for (int64_t i = 0; i < c->m; i++)
         scale = fmax(scale, fmax(fabs(g[i]), fabs(c->in->h[i])));
-    for (int sweep = 0; !feasible && sweep < MAX_SWEEPS; sweep++) {
-        bool closing = sweep < CLOSING_SWEEPS;
-        feasible = !closing;
-        for (int64_t i = 0; i < c->m; i++) {
-            double gap = corrected_gap(c, g, i);
-            if (closing && worth_closing(c, r, i, fabs(gap))) {
-                move_row(c, i, gap, 0.0);
-            } else if (gap < 0.0) {
-                feasible &= gap >= -NEGLIGIBLE * scale;
-                move_row(c, i, gap, ldexp(DBL_EPSILON, sweep < 40 ? sweep : 40));
-            }
-        }
+    for (int round = 0; round < MAX_ROUNDS; round++) {
+        double worst = choose_rows(c, r, g, round < CLOSING_ROUNDS);
+        if (round >= LEAST_ROUNDS && worst <= NEGLIGIBLE * scale)
+            return true;
+        uz_row_move_solve(&c->move, c->correction, &c->Nt, c->weight);
     }
-    return feasible;
+    return choose_rows(c, r, g, false) <= NEGLIGIBLE * scale;
 }
 
 /* Paper, section 4. */

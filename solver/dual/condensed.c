@@ -8,6 +8,7 @@
 #include "core/blas.h"
 #include "core/error.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -200,6 +201,9 @@ static void gather(double *D_AA, const double *D, const int64_t *rows, int64_t c
 
 enum { PUSH_ROUNDS = 6 };
 
+/* What may be left of a penetration, relative to the largest gap moved: the certificate sees to the rest. */
+#define PUSH_TOLERANCE 1e-9
+
 /* The rows of `in`, listed; their number. */
 static int64_t list_rows(int64_t *rows, const bool *in, int64_t m)
 {
@@ -210,35 +214,50 @@ static int64_t list_rows(int64_t *rows, const bool *in, int64_t m)
     return count;
 }
 
-/* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere. D_AA is room for count^2.
- */
-static bool solve_rows(double *w, double *D_AA, const uz_dual *dual, const double *target, const int64_t *rows,
+enum { REFINEMENTS = 2 };
+
+/* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
+ * inverse of a stiffness and as badly conditioned. Dw (m) in passing. D_AA is room for count^2. */
+static bool solve_rows(double *w, double *Dw, double *D_AA, uz_case *load, const double *target, const int64_t *rows,
                        int64_t count)
 {
-    int64_t m = dual->info.m, *pivot = uz_alloc(count, sizeof *pivot);
+    int64_t m = load->dual->info.m, *pivot = uz_alloc(count, sizeof *pivot);
     double *x = uz_alloc(count, sizeof *x);
-    if (pivot && x) {
-        gather(D_AA, dual->dense.D, rows, count, m);
-        int64_t rank = uz_pstrf_lower(count, D_AA, pivot, PIVOT_LEAST);
-        for (int64_t k = 0; k < rank; k++)
-            x[k] = target[rows[pivot[k]]];
-        uz_potrs_leading(rank, count, D_AA, x);
-        memset(w, 0, (size_t)m * sizeof *w);
-        for (int64_t k = 0; k < rank; k++)
-            w[rows[pivot[k]]] = x[k];
-    }
     bool ok = pivot && x;
+    memset(w, 0, (size_t)m * sizeof *w);
+    memset(Dw, 0, (size_t)m * sizeof *Dw);
+    if (ok) {
+        gather(D_AA, load->dual->dense.D, rows, count, m);
+        int64_t rank = uz_pstrf_lower(count, D_AA, pivot, PIVOT_LEAST);
+        for (int pass = 0; pass <= REFINEMENTS; pass++) {
+            for (int64_t k = 0; k < rank; k++)
+                x[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
+            uz_potrs_leading(rank, count, D_AA, x);
+            for (int64_t k = 0; k < rank; k++)
+                w[rows[pivot[k]]] += x[k];
+            uz_condensed_apply(load, Dw, w);
+        }
+    }
     free(pivot);
     free(x);
     return ok;
+}
+
+/* |D| |w| row by row is at most sqrt(D_ii) times this sum: what rounding leaves of D w is in proportion. */
+static double rounding_sum(const double *D, const double *w, int64_t m)
+{
+    double sum = 0.0;
+    for (int64_t j = 0; j < m; j++)
+        sum += sqrt(D[j + j * m]) * fabs(w[j]);
+    return sum;
 }
 
 /* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
  * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
 static bool push_rows(uz_case *load, double *w, double *target, const double *g, const bool *close)
 {
-    const uz_dual *dual = load->dual;
-    int64_t m = dual->info.m, *rows = uz_alloc(m, sizeof *rows);
+    int64_t m = load->dual->info.m, *rows = uz_alloc(m, sizeof *rows);
+    const double *D = load->dual->dense.D;
     bool *in = uz_alloc(m, sizeof *in), feasible = false, ok = rows && in;
     double *D_AA = ok ? uz_alloc(m * m, sizeof *D_AA) : NULL, scale = 0.0;
     for (int64_t i = 0; D_AA && i < m; i++) {
@@ -246,11 +265,11 @@ static bool push_rows(uz_case *load, double *w, double *target, const double *g,
         scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
     }
     for (int round = 0; D_AA && ok && !feasible && round < PUSH_ROUNDS; round++) {
-        ok = solve_rows(w, D_AA, dual, g, rows, list_rows(rows, in, m));
-        uz_condensed_apply(load, target, w);
+        ok = solve_rows(w, target, D_AA, load, g, rows, list_rows(rows, in, m));
+        double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
         feasible = ok;
         for (int64_t i = 0; i < m; i++) {
-            bool wrong = g[i] - target[i] < -1e-11 * scale;
+            bool wrong = g[i] - target[i] < -PUSH_TOLERANCE * scale - sqrt(D[i + i * m]) * noise;
             feasible = feasible && !wrong;
             in[i] = in[i] || wrong;
         }

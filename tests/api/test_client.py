@@ -99,7 +99,8 @@ def test_history_in_three_forms(server):
     job = run(server, "submit", PAPER, "--wait", "--quiet", code=0).stdout.strip()
     rows = json.loads(run(server, "history", job, code=0).stdout)["rows"]
     lines = run(server, "history", job, "--csv", code=0).stdout.splitlines()
-    check(lines[0].startswith("iteration,seconds,dual_objective,residual_total,e1,e2,e3,e4,step_norm,error_bound"), lines[0])
+    check(lines[0] == "iteration,seconds,dual_objective,residual_total,e1,e2,e3,e4,step_norm,error_bound,contacts,restart",
+          lines[0])
     check(len(lines) == len(rows) + 1, len(lines), len(rows))
     drawing = run(server, "history", job, "--plot", code=0, LC_ALL="C.UTF-8").stdout.splitlines()
     check(len(drawing) == 20 and max(map(len, drawing)) <= 72 and "\u2502" in drawing[1], drawing)

@@ -16,7 +16,8 @@ static void expect(bool condition, const char *what)
     abort();
 }
 
-/* jansson, told to be as strict; its known leniency about NUL bytes is kept away from it. */
+/* jansson, told to be as strict. Two of its ways are kept away from it: it takes some NUL bytes, and it refuses a key
+ * with an escaped one. */
 static bool jansson_takes(const char *text, size_t size)
 {
     json_error_t error;
@@ -37,7 +38,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     json_doc_clear(&doc);
     if (memchr(text, '\0', size))
         expect(no_json || strcmp(problem.code, "json_depth") == 0, "a NUL byte was taken");
-    else if (good)
+    else if (good && !memmem(text, size, "\\u0000", 6))
         expect(jansson_takes(text, size), "taken, but jansson refuses it");
     else if (no_json)
         expect(!jansson_takes(text, size), "refused, but jansson takes it");

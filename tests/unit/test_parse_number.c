@@ -114,9 +114,10 @@ static void check_halfway(double low)
     char *last = exponent;
     while (last[-1] == '0')
         last--;
+    if (last[-1] == '.')
+        return;
     last[-1]--; /* the last digit that is not 0: just below the middle */
-    if (last[-1] != '.')
-        snprintf(last, 700, "%s%s", "999999999999999999999999", tail);
+    snprintf(last, 700, "%s%s", "999999999999999999999999", tail);
     check_text(text, low);
 }
 

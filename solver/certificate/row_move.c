@@ -1,0 +1,112 @@
+#include "certificate/row_move.h"
+
+#include "core/alloc.h"
+
+#include <float.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_STEPS = 400 };
+
+bool uz_row_move_init(uz_row_move *move, int64_t d, int64_t m)
+{
+    memset(move, 0, sizeof *move);
+    move->m = m;
+    move->in = uz_alloc_zero(m, sizeof(bool));
+    move->dofs = uz_alloc_zero(d, sizeof(double));
+    double **room[] = {&move->target, &move->x, &move->residual, &move->direction, &move->image, &move->scale};
+    bool ok = move->in && move->dofs;
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        ok = (*room[k] = uz_alloc_zero(m, sizeof(double))) && ok;
+    return ok;
+}
+
+void uz_row_move_clear(uz_row_move *move)
+{
+    double *room[] = {move->target, move->x, move->residual, move->direction, move->image, move->scale, move->dofs};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    free(move->in);
+    memset(move, 0, sizeof *move);
+}
+
+/* dofs = W N'x over the rows that take part; only dofs of those rows are touched. */
+static void spread(uz_row_move *move, const double *x, const uz_csc *Nt, const double *weight)
+{
+    for (int64_t i = 0; i < move->m; i++)
+        for (int64_t k = Nt->ptr[i]; move->in[i] && k < Nt->ptr[i + 1]; k++)
+            move->dofs[Nt->idx[k]] = 0.0;
+    for (int64_t i = 0; i < move->m; i++)
+        for (int64_t k = Nt->ptr[i]; move->in[i] && k < Nt->ptr[i + 1]; k++)
+            move->dofs[Nt->idx[k]] += weight[Nt->idx[k]] * Nt->val[k] * x[i];
+}
+
+static double row_value(const uz_row_move *move, int64_t i, const uz_csc *Nt)
+{
+    double sum = 0.0;
+    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+        sum += Nt->val[k] * move->dofs[Nt->idx[k]];
+    return sum;
+}
+
+/* scale_i = 1 / (n_i'W n_i), 0 for rows out of play. Returns residual'scale residual of the start x = 0. */
+static double start(uz_row_move *move, const uz_csc *Nt, const double *weight)
+{
+    double rho = 0.0;
+    for (int64_t i = 0; i < move->m; i++) {
+        double size = 0.0;
+        for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+            size += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
+        move->scale[i] = move->in[i] && size > 0.0 ? 1.0 / size : 0.0;
+        move->x[i] = 0.0;
+        move->residual[i] = move->target[i];
+        move->direction[i] = move->scale[i] * move->residual[i];
+        rho += move->residual[i] * move->direction[i];
+    }
+    return rho;
+}
+
+/* image = N W N'direction; returns direction'image. */
+static double apply(uz_row_move *move, const uz_csc *Nt, const double *weight)
+{
+    double curvature = 0.0;
+    spread(move, move->direction, Nt, weight);
+    for (int64_t i = 0; i < move->m; i++) {
+        move->image[i] = move->in[i] ? row_value(move, i, Nt) : 0.0;
+        curvature += move->direction[i] * move->image[i];
+    }
+    return curvature;
+}
+
+/* x and residual after a step along the direction; returns the new residual'scale residual. */
+static double advance(uz_row_move *move, double step)
+{
+    double rho = 0.0;
+    for (int64_t i = 0; i < move->m; i++) {
+        move->x[i] += step * move->direction[i];
+        move->residual[i] -= step * move->image[i];
+        rho += move->residual[i] * move->scale[i] * move->residual[i];
+    }
+    return rho;
+}
+
+void uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const double *weight)
+{
+    double rho = start(move, Nt, weight), stop = rho * DBL_EPSILON * DBL_EPSILON;
+    for (int step = 0; step < MAX_STEPS && rho > stop; step++) {
+        double curvature = apply(move, Nt, weight);
+        if (!(curvature > 0.0))
+            break;
+        double next = advance(move, rho / curvature), beta = next / rho;
+        for (int64_t i = 0; i < move->m; i++)
+            move->direction[i] = move->scale[i] * move->residual[i] + beta * move->direction[i];
+        rho = next;
+    }
+    spread(move, move->x, Nt, weight);
+    for (int64_t i = 0; i < move->m; i++)
+        for (int64_t k = Nt->ptr[i]; move->in[i] && k < Nt->ptr[i + 1]; k++) {
+            int64_t j = Nt->idx[k];
+            c[j] += move->dofs[j];
+            move->dofs[j] = 0.0; /* a dof of several rows is added once */
+        }
+}

@@ -1,0 +1,118 @@
+/* Every allocation of the codec, and of jansson under it, fails once. What comes out then is a whole answer or a clear
+ * refusal, and (under a sanitizer) nothing is left behind. Linked with malloc, calloc and realloc wrapped. */
+#include "codec/codec.h"
+#include "harness.h"
+
+#include <jansson.h>
+#include <stdint.h>
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *block, size_t size);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+void *__wrap_realloc(void *block, size_t size);
+
+static int64_t countdown = -1; /* allocations until one fails; negative: none does */
+
+static bool fails(void)
+{
+    return countdown >= 0 && countdown-- == 0;
+}
+
+void *__wrap_malloc(size_t size)
+{
+    return fails() ? NULL : __real_malloc(size);
+}
+
+void *__wrap_calloc(size_t count, size_t size)
+{
+    return fails() ? NULL : __real_calloc(count, size);
+}
+
+void *__wrap_realloc(void *block, size_t size)
+{
+    return fails() ? NULL : __real_realloc(block, size);
+}
+
+/* Fails the 1st, 2nd, 3rd ... allocation of `attempt` until it gets through; attempt says whether it did, and checks
+ * what it got otherwise. */
+static void exhaust(bool (*attempt)(const char *), const char *argument)
+{
+    enum { MOST = 20000 };
+    int64_t n = 0;
+    bool done = false;
+    json_set_alloc_funcs(malloc, free);
+    for (; n < MOST && !done; n++) {
+        countdown = n;
+        done = attempt(argument);
+        CHECK_MSG(!done || countdown >= 0, "allocation %lld failed without a word", (long long)n);
+        countdown = -1;
+    }
+    CHECK(done && n > 1);
+}
+
+static bool try_init(const char *argument)
+{
+    char message[256] = "";
+    (void)argument;
+    bool good = codec_init(message, sizeof message);
+    countdown = good ? countdown : -1;
+    CHECK(good || message[0]);
+    codec_end();
+    return good;
+}
+
+static bool try_decode(const char *path)
+{
+    codec_request request;
+    problem_details problem;
+    size_t len;
+    int64_t planned = countdown;
+    countdown = -1;
+    char *body = test_read_file(path, &len);
+    countdown = planned;
+    bool good = codec_decode_request(&request, body, len, &problem);
+    if (good)
+        codec_request_clear(&request);
+    else
+        CHECK_MSG(problem.status == 503 && strcmp(problem.code, "out_of_memory") == 0, "%s: %d %s %s", path,
+                  problem.status, problem.code, problem.detail);
+    planned = countdown;
+    countdown = -1;
+    free(body);
+    countdown = planned;
+    return good;
+}
+
+static bool try_encode(const char *argument)
+{
+    static const double rows[40 * CODEC_HISTORY_COLUMNS];
+    size_t len;
+    (void)argument;
+    char *text = codec_encode_history(rows, 40, &len);
+    CHECK(text ? len > 0 : len == 0);
+    free(text);
+    return text != NULL;
+}
+
+TEST(loading)
+{
+    exhaust(try_init, NULL);
+}
+
+TEST(decoding)
+{
+    char message[256];
+    json_set_alloc_funcs(malloc, free);
+    CHECK(codec_init(message, sizeof message));
+    exhaust(try_decode, "tests/data/paper_body.json");
+    exhaust(try_decode, "tests/data/small_matrices.json");
+    exhaust(try_decode, "tests/data/long_vectors.json");
+    codec_end();
+}
+
+TEST(encoding)
+{
+    exhaust(try_encode, NULL);
+}
