@@ -115,7 +115,7 @@ $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 
 $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(BUILD)/obj/tests/harness.o $(PARTS_OBJ) $(BUILD)/libuzawa.a
 	@mkdir -p $(@D)
-	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
+	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -ls __wrap_free tests/unit/$(notdir $@).c),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
 comma := ,
 
 $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a

@@ -9,6 +9,7 @@
 #include "body.h"
 #include "cache/cache.h"
 #include "certificate/certificate.h"
+#include "certificate/infeasible.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -116,6 +117,23 @@ static void balance_request(uz_run *run)
         run->requested = fmin(1.0, 0.1 * summary->discretization_error);
 }
 
+/* The rows that contradict each other, checked by the certificate's code on the original data. */
+static uz_status prove_infeasible(uz_run *run, uz_error *err)
+{
+    uz_result *result = run->result;
+    const uz_csc *N = uz_body_N(run->body, run->problem);
+    double length = uz_gap_length(N, run->h, uz_case_g0(run->load), run->it.gamma);
+    double radius = uz_ray_radius(run->it.ray, N, run->h);
+    if (!(radius > UZ_RAY_FACTOR * length))
+        return UZ_OK;
+    result->ray = uz_alloc(run->m, sizeof *result->ray);
+    if (!result->ray)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for the proof of infeasibility");
+    memcpy(result->ray, run->it.ray, (size_t)run->m * sizeof *result->ray);
+    result->summary.infeasible_radius = radius;
+    return UZ_OK;
+}
+
 enum { MAX_ROUNDS = 8 };
 
 /* The methods stop at their own estimate; only the certificate decides. While it is missed although the estimate was
@@ -126,6 +144,8 @@ static uz_status iterate_until_certified(uz_run *run, uz_error *err)
     bool balance = run->settings->balanced && run->body->is_scene;
     for (int round = 0; round < MAX_ROUNDS; round++) {
         uz_status status = iterate(run, err);
+        if (status == UZ_OK && run->end == UZ_END_RAY)
+            status = prove_infeasible(run, err);
         if (status == UZ_OK)
             status = recover_and_certify(run, err);
         if (status != UZ_OK)
@@ -135,7 +155,7 @@ static uz_status iterate_until_certified(uz_run *run, uz_error *err)
             balance = false;
             run->target = run->requested;
         }
-        if (certificate->relative_error <= run->requested || run->end != UZ_END_TARGET)
+        if (run->result->ray || certificate->relative_error <= run->requested || run->end != UZ_END_TARGET)
             return UZ_OK;
         if (run->it.best_relative <= run->target)
             run->target = 0.25 * run->it.best_relative;
@@ -146,6 +166,8 @@ static uz_status iterate_until_certified(uz_run *run, uz_error *err)
 
 static uz_outcome conclude(const uz_run *run)
 {
+    if (run->result->ray)
+        return UZ_INFEASIBLE;
     if (run->result->summary.certificate.relative_error <= run->requested)
         return UZ_CONVERGED;
     switch (run->end) {

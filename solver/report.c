@@ -132,12 +132,53 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
     return status;
 }
 
+static void blank(double *x, int64_t n)
+{
+    for (int64_t i = 0; x && i < n; i++)
+        x[i] = NAN;
+}
+
+/* There is no answer: nothing that looks like one may be left. */
+static void blank_answer(uz_result *result)
+{
+    uz_summary *s = &result->summary;
+    int64_t n_u = result->mesh.dim > 0 ? result->n_nodes * result->mesh.dim : result->d;
+    blank(result->u, n_u);
+    blank(result->r, result->m);
+    blank(result->g, result->m);
+    blank(s->force, 3);
+    s->reaction_sum = s->max_penetration = s->max_pressure = NAN;
+    s->active = 0;
+    memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
+}
+
+/* The rows with a share in the contradiction. */
+static void explain_infeasible(const uz_result *result, char *text, size_t size)
+{
+    int64_t named = 0, count = 0;
+    size_t at = (size_t)snprintf(text, size, "no displacement meets all contact conditions: these rows contradict:");
+    for (int64_t i = 0; i < result->m; i++) {
+        if (!(result->ray[i] < -1e-9))
+            continue;
+        count++;
+        if (named < 8 && at < size) {
+            at += (size_t)snprintf(text + at, size - at, "%s %lld", named ? "," : "", (long long)i);
+            named++;
+        }
+    }
+    if (count > named && at < size)
+        snprintf(text + at, size - at, " and %lld more", (long long)(count - named));
+}
+
 /* One sentence on an outcome that is not `converged`. */
 static void explain(uz_run *run)
 {
     uz_summary *s = &run->result->summary;
     const char *why = "";
     switch (s->outcome) {
+    case UZ_INFEASIBLE:
+        explain_infeasible(run->result, s->message, sizeof s->message);
+        return;
     case UZ_ITERATION_LIMIT:
         why = "the iterations allowed were used up: raise max_iterations";
         break;
@@ -170,6 +211,8 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
     summary->requested_error = run->requested;
     report_contact(run);
     uz_status status = report_displacements(run, err);
+    if (run->result->ray)
+        blank_answer(run->result);
     explain(run);
     summary->timings.total = uz_seconds() - run->started;
     return status;
@@ -191,6 +234,7 @@ void uz_result_free(uz_result *result)
 {
     if (!result)
         return;
+    free(result->ray);
     free(result->u);
     free(result->r);
     free(result->g);

@@ -289,6 +289,7 @@ typedef struct {
 typedef struct {
     uz_history_row *rows;
     int64_t count, capacity;
+    int64_t stride; /* iterations between rows: 1 until the history is thinned */
 } uz_history;
 
 typedef struct {
@@ -304,6 +305,7 @@ typedef struct {
     double max_pressure; /* scene: max of -r / tributary area; NaN otherwise */
     double alpha, lambda_max;
     double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
+    double infeasible_radius;    /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
     double requested_error;      /* the relative error that `converged` had to meet */
     uz_certificate certificate;
     bool factor_cached;
@@ -317,8 +319,10 @@ typedef struct {
 typedef struct {
     uz_summary summary;
     int64_t d, m, n_nodes;
-    double *u, *r,
-        *g; /* d, m, m. A scene's u is n_nodes x dim by node, supported dofs included: d counts only free ones */
+    double *u;         /* d; a scene's is n_nodes x dim by node, with the supported dofs, which d does not count */
+    double *r;         /* m */
+    double *g;         /* m */
+    double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof; u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_history history;
 } uz_result;

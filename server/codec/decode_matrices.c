@@ -124,34 +124,45 @@ static bool read_stiffness(const reading *r)
     return info.symmetry == UZ_MM_SYMMETRIC || uz_symmetric_lower(K, &err) == UZ_OK || refuse_call(r, &err, "K");
 }
 
-/* A symmetric file gave its lower triangle; N is general, so the other half is added. */
-static bool add_upper_half(const reading *r, uz_csc *A)
+/* Each stored entry, and its mirror image where it lies off the diagonal; returns how many. */
+static int64_t list_both_halves(const uz_csc *A, int64_t *row, int64_t *col, double *val)
 {
-    int64_t nnz = A->ptr[A->cols], count = 0;
-    uz_csc full = {0};
-    uz_error err = {.status = UZ_ERR_MEMORY, .message = "there is not enough memory for this request now"};
-    int64_t *row = room_for((size_t)nnz, 2 * sizeof *row), *col = room_for((size_t)nnz, 2 * sizeof *col);
-    double *val = room_for((size_t)nnz, 2 * sizeof *val);
-    if (!row || !col || !val)
-        goto end;
+    int64_t count = 0;
     for (int64_t j = 0; j < A->cols; j++)
-        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++)
-            for (int mirror = 0; mirror <= (A->idx[k] != j); mirror++, count++) {
+        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
+            int copies = A->idx[k] == j ? 1 : 2;
+            for (int mirror = 0; mirror < copies; mirror++, count++) {
                 row[count] = mirror ? j : A->idx[k];
                 col[count] = mirror ? A->idx[k] : j;
                 val[count] = A->val[k];
             }
-    err.status = UZ_OK;
-    err.status = uz_csc_from_triplets(&full, A->rows, A->cols, count, row, col, val, &err);
-    if (err.status == UZ_OK) {
+        }
+    return count;
+}
+
+/* A symmetric file gave its lower triangle; N is general, so the other half is added. */
+static bool add_upper_half(const reading *r, uz_csc *A)
+{
+    size_t nnz = (size_t)A->ptr[A->cols];
+    uz_csc full = {0};
+    uz_error err = {.status = UZ_OK};
+    int64_t *row = room_for(nnz, 2 * sizeof *row), *col = room_for(nnz, 2 * sizeof *col);
+    double *val = room_for(nnz, 2 * sizeof *val);
+    bool room = row && col && val, good = false;
+    if (room) {
+        int64_t count = list_both_halves(A, row, col, val);
+        good = uz_csc_from_triplets(&full, A->rows, A->cols, count, row, col, val, &err) == UZ_OK;
+    }
+    if (good) {
         uz_csc_clear(A);
         *A = full;
     }
-end:
     free(row);
     free(col);
     free(val);
-    return err.status == UZ_OK || refuse_call(r, &err, "N");
+    if (!room)
+        return refuse_memory(r);
+    return good || refuse_call(r, &err, "N");
 }
 
 static bool no_contacts(const reading *r)

@@ -156,6 +156,16 @@ const double *uz_case_g0(const uz_case *load)
     return load->g0;
 }
 
+const double *uz_case_h(const uz_case *load)
+{
+    return load->h;
+}
+
+const uz_csc *uz_case_N(const uz_case *load)
+{
+    return &load->dual->N;
+}
+
 double uz_case_psi0(const uz_case *load)
 {
     return load->psi0;

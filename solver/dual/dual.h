@@ -65,6 +65,12 @@ uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_p
  * *solved false: this form can't, or D_AA is singular to working precision. CONDENSED only. */
 uz_status uz_case_solve_active(uz_case *load, double *r, bool *solved, const bool *active, uz_error *err);
 
+/* y (m): in, a direction in which the reactions grow; out, scaled to max |y_i| about 1, its nearest vector with N'y = 0
+ * on the rows that take part, cut at 0. A candidate for uz_ray_radius. */
+uz_status uz_case_project_ray(const uz_case *load, double *y, uz_error *err);
+const double *uz_case_h(const uz_case *load);
+const uz_csc *uz_case_N(const uz_case *load);
+
 /* Largest eigenvalue of a symmetric positive semidefinite operator of order m by Lanczos with full
  * reorthogonalisation: Ritz value plus residual bound, relative accuracy `tolerance`. */
 typedef uz_status (*uz_apply)(void *ctx, double *y, const double *x, uz_error *err);

@@ -63,11 +63,22 @@ static bool move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_l
     return ok;
 }
 
+static bool order_natural(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last)
+{
+    for (int64_t k = 0; k < n; k++)
+        perm[k] = k;
+    return move_last(perm, n, last, n_last);
+}
+
+enum { TINY = 4 };
+
 uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,
                    cholmod_common *common, uz_error *err)
 {
-    bool ok;
-    if (*ordering == UZ_ORDERING_CAMD)
+    bool ok = true;
+    if (A->nrow < TINY) /* nothing to reduce, and CAMD reads past the end at n = 1 */
+        ok = order_natural(perm, (int64_t)A->nrow, last, n_last);
+    else if (*ordering == UZ_ORDERING_CAMD)
         ok = order_camd(perm, A, last, n_last, common);
     else if (*ordering == UZ_ORDERING_AMD)
         ok = cholmod_l_amd(A, NULL, 0, (SuiteSparse_long *)perm, common) &&

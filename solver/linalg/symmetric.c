@@ -21,12 +21,18 @@ typedef struct {
     int64_t j, at_k, at_t;
 } pair_walk;
 
+/* The first entry of column j on or below the diagonal; bisection, as it is asked for every unequal pair. */
 static int64_t skip_upper(const uz_csc *A, int64_t j)
 {
-    int64_t k = A->ptr[j];
-    while (k < A->ptr[j + 1] && A->idx[k] < j)
-        k++;
-    return k;
+    int64_t low = A->ptr[j], high = A->ptr[j + 1];
+    while (low < high) {
+        int64_t middle = low + (high - low) / 2;
+        if (A->idx[middle] < j)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return low;
 }
 
 static pair_walk walk_column(const uz_csc *K, const uz_csc *T, int64_t j)

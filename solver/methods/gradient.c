@@ -4,7 +4,7 @@
  * D is applied once per iteration, to r(k+1); D rho follows from D r(k+1) and D r(k), rho being their combination. */
 #include "methods/iterate.h"
 
-#include "core/clock.h"
+#include "certificate/infeasible.h"
 
 #include <float.h>
 #include <math.h>
@@ -122,6 +122,25 @@ static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *op
     return UZ_OK;
 }
 
+/* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
+ * Looked for at powers of two, from the growth since the last one. */
+static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
+    *found = false;
+    if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
+        return UZ_OK;
+    for (int64_t i = 0; i < it->m; i++)
+        it->ray[i] = it->r[i] - it->anchor[i];
+    memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
+    uz_status status = uz_case_project_ray(load, it->ray, err);
+    if (status != UZ_OK)
+        return status;
+    double length = uz_gap_length(uz_case_N(load), uz_case_h(load), uz_case_g0(load), it->gamma);
+    *found = uz_ray_radius(it->ray, uz_case_N(load), uz_case_h(load)) > UZ_RAY_FACTOR * length;
+    return UZ_OK;
+}
+
 /* The answer of the paper's rule is its last r, good or bad; otherwise the last r may still be the best. */
 static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
                         uz_error *err)
@@ -141,14 +160,19 @@ uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     double step_norm = history->count ? history->rows[history->count - 1].step_norm : 0.0;
     bool restart = false;
     uz_status status = history->count ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
-    while (status == UZ_OK && !should_end(end, it, options, step_norm)) {
+    bool ray = false;
+    while (status == UZ_OK && !ray && !should_end(end, it, options, step_norm)) {
         status = step(it, load, options, &step_norm, &restart, err);
         if (status == UZ_OK && options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check) {
             status = uz_iterate_bound(it, load, options->method, err);
             plan_next_check(it);
         }
         if (status == UZ_OK)
+            status = look_for_ray(&ray, it, load, err);
+        if (status == UZ_OK)
             status = uz_iterate_record(it, load, options, history, step_norm, restart, err);
     }
+    if (ray)
+        *end = UZ_END_RAY;
     return status == UZ_OK ? finish(it, load, options, history, err) : status;
 }

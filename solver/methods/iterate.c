@@ -12,7 +12,8 @@
 uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err)
 {
     memset(it, 0, sizeof *it);
-    double **vectors[] = {&it->r, &it->Dr, &it->r_next, &it->Dr_next, &it->rho, &it->Drho, &it->gamma, &it->best_r};
+    double **vectors[] = {&it->r,    &it->Dr,    &it->r_next, &it->Dr_next, &it->rho,
+                          &it->Drho, &it->gamma, &it->best_r, &it->anchor,  &it->ray};
     bool ok = true;
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++) {
         *vectors[k] = uz_alloc_zero(m, sizeof(double));
@@ -33,7 +34,8 @@ uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err
 
 void uz_iterate_clear(uz_iterate *it)
 {
-    double *vectors[] = {it->r, it->Dr, it->r_next, it->Dr_next, it->rho, it->Drho, it->gamma, it->best_r};
+    double *vectors[] = {it->r,    it->Dr,    it->r_next, it->Dr_next, it->rho,
+                         it->Drho, it->gamma, it->best_r, it->anchor,  it->ray};
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++)
         free(vectors[k]);
     free(it->close);

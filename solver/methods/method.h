@@ -6,7 +6,15 @@
 #include "uzawa.h"
 
 /* Why a method returned. */
-typedef enum { UZ_END_TARGET, UZ_END_ITERATIONS, UZ_END_TIME, UZ_END_STALLED, UZ_END_PAPER, UZ_END_CANCELLED } uz_end;
+typedef enum {
+    UZ_END_TARGET,
+    UZ_END_ITERATIONS,
+    UZ_END_TIME,
+    UZ_END_STALLED,
+    UZ_END_PAPER,
+    UZ_END_CANCELLED,
+    UZ_END_RAY /* the reactions grow along a ray that seems to prove the rows contradictory */
+} uz_end;
 
 /* The iterate, kept between calls so that a run can be continued. Vectors of m. */
 typedef struct {
@@ -17,6 +25,8 @@ typedef struct {
     double *rho, *Drho;   /* extrapolated point */
     double *gamma;        /* gap at rho, or at r while a bound is computed */
     bool *close;          /* rows whose gap the pushed answer closes */
+    double *anchor;       /* r at the last power of two, where a ray is looked for */
+    double *ray;          /* UZ_END_RAY: y <= 0, N'y = 0, h'y > 0 */
     double *best_r;       /* the r whose bound is best; its push is kept in the uz_case */
     double best_bound;    /* on the energy-norm error; INFINITY before the first */
     double best_relative; /* the same over the energy norm of the answer */
@@ -48,7 +58,10 @@ uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
 uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                             uz_history *history, uz_error *err);
 
-/* Appends a row; grows by doubling. */
+/* Appends a row; grows by doubling. Beyond UZ_HISTORY_ROWS rows every second one is dropped, again and again: a run of
+ * millions of iterations keeps its course in bounded memory. Row 0 and the last row are always there; iterations tell
+ * which rows are left. */
+enum { UZ_HISTORY_ROWS = 131072 };
 uz_status uz_history_append(uz_history *history, const uz_history_row *row, uz_error *err);
 
 #endif

@@ -4,6 +4,7 @@ A test program is a module with functions test_*; it ends in `service.main(globa
 BUILD_DIR [FILTER]. Each test gets a running Service that it may use up: stop() is always called after it. A test that
 needs other options is decorated with @options("--workers", "1"). Raise Skip("why") to skip.
 """
+import functools
 import http.client
 import json
 import os
@@ -74,16 +75,21 @@ def schema_of(reply):
     return next((name for member, name in KINDS if member in reply.json), None)
 
 
+@functools.lru_cache
+def validator(name):
+    """Checks against schemas/NAME; references between the files resolve as if they were served from one host."""
+    base = "http://localhost/schemas/"
+    store = {base + path.name: {**json.loads(path.read_text()), "$id": base + path.name}
+             for path in SCHEMAS.glob("*.json")}
+    resolver = jsonschema.RefResolver(base + name, store[base + name], store=store)
+    return jsonschema.Draft202012Validator(store[base + name], resolver=resolver)
+
+
 def validate(reply):
     """Checks a JSON reply against its schema."""
     name = schema_of(reply)
-    if not name or not jsonschema:
-        return
-    folder = {path.name: json.loads(path.read_text()) for path in SCHEMAS.glob("*.json")}
-    store = {schema.get("$id", name): schema for name, schema in folder.items()}
-    resolver = jsonschema.RefResolver(folder[name].get("$id", name), folder[name], store=store,
-                                      handlers={"": lambda uri: folder[uri.rsplit("/", 1)[-1]]})
-    jsonschema.Draft202012Validator(folder[name], resolver=resolver).validate(reply.json)
+    if name and jsonschema:
+        validator(name).validate(reply.json)
 
 
 class Service:
@@ -218,6 +224,24 @@ def check(condition, *what):
     """assert that stays with python -O, and says what it saw."""
     if not condition:
         raise AssertionError(" ".join(str(one) for one in what))
+
+
+def expect(reply, status, code=None):
+    check(reply.status == status, "wanted", status, code, "got", reply)
+    if code:
+        check(reply.headers["content-type"] == "application/problem+json", reply)
+        check(reply.json["code"] == code and reply.json["status"] == status, "wanted", code, "got", reply)
+        check(reply.json["title"] and reply.json["detail"], reply)
+    check(reply.headers["x-content-type-options"] == "nosniff" and "date" in reply.headers, reply)
+    return reply
+
+
+def head_of(data):
+    """Status and header fields (lower case) of the first reply in bytes, and its body."""
+    head, _, body = data.partition(b"\r\n\r\n")
+    lines = head.decode("latin-1").split("\r\n")
+    fields = {name.lower(): value.strip() for name, _, value in (line.partition(":") for line in lines[1:])}
+    return int(lines[0].split()[1]) if lines[0] else 0, fields, body
 
 
 def options(*given):

@@ -1,5 +1,5 @@
 /* Every allocation of the codec, and of jansson under it, fails once. What comes out then is a whole answer or a clear
- * refusal, and (under a sanitizer) nothing is left behind. Linked with malloc, calloc and realloc wrapped. */
+ * refusal, and not one block is left behind. Linked with malloc, calloc, realloc and free wrapped. */
 #include "codec/codec.h"
 #include "harness.h"
 
@@ -9,30 +9,47 @@
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t count, size_t size);
 void *__real_realloc(void *block, size_t size);
+void __real_free(void *block);
 void *__wrap_malloc(size_t size);
 void *__wrap_calloc(size_t count, size_t size);
 void *__wrap_realloc(void *block, size_t size);
+void __wrap_free(void *block);
 
 static int64_t countdown = -1; /* allocations until one fails; negative: none does */
+static int64_t blocks;         /* alive */
 
 static bool fails(void)
 {
     return countdown >= 0 && countdown-- == 0;
 }
 
+static void *counted(void *block)
+{
+    blocks += block != NULL;
+    return block;
+}
+
 void *__wrap_malloc(size_t size)
 {
-    return fails() ? NULL : __real_malloc(size);
+    return fails() ? NULL : counted(__real_malloc(size));
 }
 
 void *__wrap_calloc(size_t count, size_t size)
 {
-    return fails() ? NULL : __real_calloc(count, size);
+    return fails() ? NULL : counted(__real_calloc(count, size));
 }
 
 void *__wrap_realloc(void *block, size_t size)
 {
-    return fails() ? NULL : __real_realloc(block, size);
+    void *grown = fails() ? NULL : __real_realloc(block, size);
+    blocks += grown && !block;
+    return grown;
+}
+
+void __wrap_free(void *block)
+{
+    blocks -= block != NULL;
+    __real_free(block);
 }
 
 /* Fails the 1st, 2nd, 3rd ... allocation of `attempt` until it gets through; attempt says whether it did, and checks
@@ -44,10 +61,13 @@ static void exhaust(bool (*attempt)(const char *), const char *argument)
     bool done = false;
     json_set_alloc_funcs(malloc, free);
     for (; n < MOST && !done; n++) {
+        int64_t before = blocks;
         countdown = n;
         done = attempt(argument);
         CHECK_MSG(!done || countdown >= 0, "allocation %lld failed without a word", (long long)n);
         countdown = -1;
+        CHECK_MSG(blocks == before, "allocation %lld failed: %lld blocks left", (long long)n,
+                  (long long)(blocks - before));
     }
     CHECK(done && n > 1);
 }

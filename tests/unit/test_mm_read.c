@@ -47,10 +47,10 @@ static int check_folder(const char *root)
     int present = 0;
     load_verdicts();
     for (int k = 0; k < n_verdicts; k++) {
-        char path[400];
+        char path[512];
         size_t len;
-        snprintf(path, sizeof path, "%s/%s", root, verdicts[k].path);
-        char *text = test_read_file(path, &len);
+        int length = snprintf(path, sizeof path, "%s/%s", root, verdicts[k].path);
+        char *text = length < (int)sizeof path ? test_read_file(path, &len) : NULL;
         if (!text)
             continue;
         present++;
@@ -288,7 +288,7 @@ static void check_shuffled(int64_t rows, int64_t cols, int64_t keep)
         return;
     for (int64_t k = 0; k < total; k++)
         order[k] = k;
-    int length = sprintf(text, GENERAL "%lld %lld %lld\n", (long long)rows, (long long)cols, (long long)keep);
+    int length = sprintf(text, "%s%lld %lld %lld\n", GENERAL, (long long)rows, (long long)cols, (long long)keep);
     for (int64_t k = 0; k < keep; k++) {
         int64_t other = k + random_below(total - k), place = order[other];
         order[other] = order[k];
@@ -371,7 +371,7 @@ TEST(vectors_stand_or_lie_full_or_sparse)
 TEST(what_is_no_vector_is_refused)
 {
     const char *text = ARRAY "% c\n2 2\n1\n2\n3\n4\n", *huge = GENERAL "1000000000 1 1\n5 1 1\n";
-    double *x = (double *)&text;
+    double stale = 0.0, *x = &stale;
     int64_t n = 7;
     uz_error err = {0};
     CHECK_INT(uz_mm_read_vector(&x, &n, text, strlen(text), 0, &err), UZ_ERR_SIZE);

@@ -1,0 +1,73 @@
+/* ray.c: from reactions that grow without end to the rows that contradict each other. */
+#include "dual/dual_private.h"
+
+#include "core/alloc.h"
+#include "core/blas.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_STEPS = 300 };
+
+typedef struct {
+    double *s, *direction, *image; /* d, d, m */
+} least_squares;
+
+/* s = N'y over the rows of the support, which are those with y < 0 or kept zero. */
+static double normal_residual(double *s, const uz_csc *N, const double *y)
+{
+    memset(s, 0, (size_t)N->cols * sizeof *s);
+    uz_csc_gaxpy_t(s, N, 1.0, y);
+    return uz_dot(N->cols, s, s);
+}
+
+/* y -= its part in the range of N_S (rows S only), by CGLS: what is left has N'y = 0 (Paige and Saunders 1982). */
+static void project(least_squares *ls, double *y, const bool *support, const uz_csc *N)
+{
+    double gamma = normal_residual(ls->s, N, y), stop = 1e-32 * gamma;
+    memcpy(ls->direction, ls->s, (size_t)N->cols * sizeof *ls->s);
+    for (int step = 0; step < MAX_STEPS && gamma > stop; step++) {
+        memset(ls->image, 0, (size_t)N->rows * sizeof *ls->image);
+        uz_csc_gaxpy(ls->image, N, 1.0, ls->direction);
+        for (int64_t i = 0; i < N->rows; i++)
+            ls->image[i] = support[i] ? ls->image[i] : 0.0;
+        double square = uz_dot(N->rows, ls->image, ls->image);
+        if (!(square > 0.0))
+            break;
+        uz_axpy(N->rows, -gamma / square, ls->image, y);
+        double next = normal_residual(ls->s, N, y);
+        for (int64_t j = 0; j < N->cols; j++)
+            ls->direction[j] = ls->s[j] + next / gamma * ls->direction[j];
+        gamma = next;
+    }
+}
+
+uz_status uz_case_project_ray(const uz_case *load, double *y, uz_error *err)
+{
+    const uz_csc *N = &load->dual->N;
+    least_squares ls = {uz_alloc(N->cols, sizeof(double)), uz_alloc(N->cols, sizeof(double)),
+                        uz_alloc(N->rows, sizeof(double))};
+    bool *support = uz_alloc(N->rows, sizeof *support);
+    uz_status status = UZ_OK;
+    double largest = 0.0;
+    if (ls.s && ls.direction && ls.image && support) {
+        for (int64_t i = 0; i < N->rows; i++)
+            largest = fmax(largest, -y[i]);
+        for (int64_t i = 0; i < N->rows; i++) {
+            support[i] = largest > 0.0 && y[i] < -1e-6 * largest;
+            y[i] = support[i] ? y[i] / largest : 0.0;
+        }
+        project(&ls, y, support, N);
+        for (int64_t i = 0; i < N->rows; i++)
+            y[i] = fmin(y[i], 0.0);
+    } else {
+        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory to look for contradicting rows");
+    }
+    free(ls.s);
+    free(ls.direction);
+    free(ls.image);
+    free(support);
+    return status;
+}

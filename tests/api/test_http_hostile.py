@@ -1,0 +1,206 @@
+"""Sockets that misbehave: ambiguous framing, bodies without end, clients that trickle, stall or leave."""
+import json
+import socket
+import time
+
+import service
+from service import MATRICES, SCENE, check, expect, head_of, options, read_all
+
+# ----------------------------------------------------------------- framing
+
+POST = b"POST /v1/jobs?validate=true HTTP/1.1\r\nHost: x\r\nContent-Type: application/json\r\n"
+SMUGGLED = b"GET /healthz HTTP/1.1\r\nHost: x\r\n\r\n"
+
+
+def refused(s, data, statuses=(400,), framed=True):
+    """One refusal comes back, nothing after it is served, and the connection closes. framed: the request has a line
+    that libmicrohttpd reads; otherwise it answers by itself, not in JSON."""
+    reply, closed = s.raw(data, timeout=5)
+    status, fields, body = head_of(reply)
+    check(status in statuses and closed, data[:200], "->", status, closed, reply[:300])
+    check(reply.count(b"HTTP/1.1 ") == 1, "a second request was served", data[:200], reply)
+    if framed:
+        check(json.loads(body)["status"] == status and fields["connection"] == "close", reply)
+    return fields, body
+
+
+def test_smuggling(s):
+    for lines in (b"Content-Length: 2\r\nTransfer-Encoding: chunked\r\n",
+                  b"Transfer-Encoding: chunked\r\nContent-Length: 2\r\n",
+                  b"Content-Length: 2\r\nContent-Length: 40\r\n",
+                  b"Content-Length: 2\r\nContent-Length: 2\r\n",
+                  b"Content-Length : 2\r\n",
+                  b"Content-Length\t: 2\r\n",
+                  b"Content-Length: +2\r\n", b"Content-Length: -2\r\n", b"Content-Length: 2,2\r\n",
+                  b"Content-Length: 0x2\r\n", b"Content-Length: 2 2\r\n", b"Content-Length:\r\n",
+                  b"Content-Length: 99999999999999999999999\r\n",
+                  b"Transfer-Encoding: gzip\r\n", b"Transfer-Encoding: gzip, chunked\r\n",
+                  b"Transfer-Encoding: chunked, identity\r\n", b"Transfer-Encoding: xchunked\r\n",
+                  b"Transfer-Encoding: chunked\r\nTransfer-Encoding: chunked\r\n",
+                  b"Transfer-Encoding : chunked\r\n", b"Transfer-Encoding:\x0bchunked\r\n",
+                  b"Host: y\r\nContent-Length: 2\r\n",
+                  b"X: a\0b\r\nContent-Length: 2\r\n",
+                  b"X: a\0\0b: c\r\nContent-Length: 2\r\n",
+                  b"X\0Y: a\r\nContent-Length: 2\r\n",
+                  b"X: a\rb\r\nContent-Length: 2\r\n",
+                  b"X: a\r\n folded\r\nContent-Length: 2\r\n",
+                  b"X: a\nContent-Length: 2\r\n",
+                  b": a\r\nContent-Length: 2\r\n",
+                  b"X[]: a\r\nContent-Length: 2\r\n",
+                  b"no colon\r\nContent-Length: 2\r\n"):
+        refused(s, POST + lines + b"\r\n{}" + SMUGGLED, (400, 413))
+    check(s.get("/healthz").status == 200)
+
+
+def test_malformed_requests(s):
+    for data in (b"GET /healthz HTTP/1.1\r\n\r\n",  # no Host
+                 b"GET /healthz HTTP/1.1\r\nHost: x\r\nHost: x\r\n\r\n",
+                 b"GET /healthz HTTP/1.1\nHost: x\n\n",
+                 b"GET  /healthz HTTP/1.1\r\nHost: x\r\n\r\n",
+                 b"GET /healthz\0 HTTP/1.1\r\nHost: x\r\n\r\n",
+                 b"GET /healthz HTTP/1.0\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+                 b"GET /healthz HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\n\r\nhello"):
+        refused(s, data)
+    for target in (b"/health\xffz", b"healthz", b"/healthz#x", b"*", b"http://x"):  # well framed: it stays open
+        data = b"GET " + target + b" HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n"
+        check(head_of(s.raw(data)[0])[0] == 400, data)
+    refused(s, b"GET /healthz HTTP/2.0\r\nHost: x\r\n\r\n", (400, 505), framed=False)
+    refused(s, b"GET /healthz\r\n\r\n", framed=False)
+    refused(s, b"GET /" + b"y" * 100000 + b" HTTP/1.1\r\nHost: x\r\n\r\n", (414,), framed=False)
+    refused(s, b"GET /healthz HTTP/1.1\r\nHost: x\r\n" + b"X: y\r\n" * 129 + b"\r\n", (431,))
+    refused(s, b"GET /healthz HTTP/1.1\r\nHost: x\r\nX: " + b"y" * 100000 + b"\r\n\r\n", (400, 413, 414, 431))
+    refused(s, POST + b"Expect: cake\r\nContent-Length: 2\r\n\r\n{}", (417,))
+    check(s.get("/healthz").status == 200)
+
+
+def test_pipelining(s):
+    body = json.dumps(MATRICES).encode()
+    one = POST + b"Content-Length: %d\r\n\r\n" % len(body) + body
+    data, _ = s.raw(one + SMUGGLED + one + b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n\r\n")
+    check(data.count(b"HTTP/1.1 200 OK") == 4, data)
+
+
+def chunked(*pieces):
+    return b"".join(b"%x\r\n%s\r\n" % (len(piece), piece) for piece in pieces) + b"0\r\n\r\n"
+
+
+def test_chunked(s):
+    body = json.dumps(SCENE).encode()
+    data, _ = s.raw(POST + b"Transfer-Encoding: chunked\r\nConnection: close\r\n\r\n" +
+                    chunked(*(body[i:i + 7] for i in range(0, len(body), 7))))
+    status, _, answer = head_of(data)
+    check(status == 200 and json.loads(answer) == {"valid": True}, data)
+    for broken in (b"2\r\n{}X0\r\n\r\n", b"zz\r\n{}\r\n0\r\n\r\n", b"-2\r\n{}\r\n0\r\n\r\n",
+                   b"fffffffffffffffff\r\n{}\r\n0\r\n\r\n"):
+        refused(s, POST + b"Transfer-Encoding: chunked\r\n\r\n" + broken + SMUGGLED, (400, 413))
+
+
+def test_connection_ends_early(s):
+    for data in (b"", b"GET", b"GET / HTTP/1.1\r\nHost", POST + b"Content-Length: 100\r\n\r\n{",
+                 POST + b"Transfer-Encoding: chunked\r\n\r\n5\r\nab"):
+        for half_close in (True, False):
+            with s.connect() as c:
+                c.sendall(data)
+                if half_close:
+                    c.shutdown(socket.SHUT_WR)
+                    read_all(c)
+    check(s.get("/healthz").status == 200)
+    check(s.get("/v1/jobs").json["jobs"] == [])
+
+
+# ------------------------------------------------------------ size and time
+
+@options("--max-body", "10K")
+def test_body_too_large(s):
+    big = b" " * 10241
+    for expect_field in (b"", b"Expect: 100-continue\r\n"):
+        # Only the head is sent: the refusal must not wait for the body.
+        with s.connect(timeout=5) as c:
+            c.sendall(POST + expect_field + b"Content-Length: 10241\r\n\r\n")
+            data = c.recv(65536)
+            status, fields, body = head_of(data)
+            check(status == 413 and b"100 Continue" not in data and fields["connection"] == "close", data)
+            check("10240" in json.loads(body)["detail"] and json.loads(body)["code"] == "body_too_large", body)
+    fields, body = refused(s, POST + b"Content-Length: 10241\r\n\r\n" + big, (413,))
+    check(json.loads(body)["code"] == "body_too_large", body)
+    fields, body = refused(s, POST + b"Content-Length: 3000000\r\n\r\n" + b" " * 3000000, (413,))
+    fields, body = refused(s, POST + b"Transfer-Encoding: chunked\r\n\r\n" + chunked(*[b" " * 1000] * 11), (413,))
+    check(json.loads(body)["code"] == "body_too_large" and "10240" in json.loads(body)["detail"], body)
+    refused(s, POST + b"Transfer-Encoding: chunked\r\n\r\n" + b"ffffffff\r\n" + b" " * 3000000, (413,))
+    expect(s.request("POST", "/v1/jobs", b" " * 10240, {"Content-Type": "application/json"}), 400, "json_syntax")
+
+
+def test_expect_continue(s):
+    body = json.dumps(MATRICES).encode()
+    with s.connect(timeout=5) as c:
+        c.sendall(POST + b"Expect: 100-continue\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(body))
+        check(c.recv(100).startswith(b"HTTP/1.1 100 Continue\r\n\r\n"))
+        c.sendall(body)
+        data, _ = read_all(c)
+        check(head_of(data)[0] == 200, data)
+
+
+def test_large_body(s):
+    numbers = [0.1] * 400000
+    body = {"problem": {"kind": "matrices", "K": MATRICES["problem"]["K"], "N": MATRICES["problem"]["N"],
+                        "h": numbers, "p": numbers}}
+    reply = s.post(body, query="?validate=true")
+    check(reply.status == 422, reply)
+
+
+def trickle(c, data, pause):
+    """Sends byte by byte until the server closes; what came back."""
+    try:
+        for i in range(len(data)):
+            c.sendall(data[i:i + 1])
+            time.sleep(pause)
+    except OSError:
+        pass
+    return read_all(c)
+
+
+@options("--request-deadline-s", "1")
+def test_slow_requests(s):
+    for data, answered in ((b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-Slow: " + b"y" * 1000 + b"\r\n\r\n", True),
+                           (b"GET /" + b"y" * 1000 + b" HTTP/1.1\r\n\r\n", False),
+                           (POST + b"Content-Length: 900\r\n\r\n" + b" " * 900, True),
+                           (POST + b"Transfer-Encoding: chunked\r\n\r\n" + b"1\r\n \r\n" * 900, True)):
+        with s.connect(timeout=10) as c:
+            started = time.monotonic()
+            c.sendall(data[:-800])
+            reply, closed = trickle(c, data[-800:], 0.05)
+            took = time.monotonic() - started
+            check(closed and 0.8 < took < 5, data[:60], closed, took, reply)
+            if reply:
+                status, _, body = head_of(reply)
+                check(status == 408 and json.loads(body)["code"] == "request_timeout", reply)
+            check(reply or not answered, data[:60], "ended without a word")
+    check(any(event["end"] == "deadline" for event in s.events("request")), s.log())
+
+
+@options("--request-deadline-s", "1")
+def test_idle_connections_close(s):
+    with s.connect(timeout=10) as c, s.connect(timeout=10) as silent:
+        c.sendall(SMUGGLED)
+        started = time.monotonic()
+        data, closed = read_all(c)
+        check(closed and data.startswith(b"HTTP/1.1 200") and 0.5 < time.monotonic() - started < 5, data)
+        check(read_all(silent) == (b"", True), "a silent connection")
+
+
+@options("--max-connections", "8")
+def test_connection_limit(s):
+    held = [s.connect() for _ in range(8)]
+    time.sleep(0.2)
+    with s.connect(timeout=3) as c:
+        c.sendall(SMUGGLED)
+        data, _ = read_all(c)
+        check(not data.startswith(b"HTTP/1.1 200"), data)
+    for c in held:
+        c.close()
+    time.sleep(0.3)
+    check(s.get("/healthz").status == 200)
+
+
+if __name__ == "__main__":
+    service.main(globals())
