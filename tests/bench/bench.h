@@ -2,8 +2,29 @@
 #ifndef TESTS_BENCH_H
 #define TESTS_BENCH_H
 
+#include "uzawa.h"
+
+#include <stdio.h>
+
 /* Reads a coordinate text of about 100 MB from memory, one thread: the median of 5 runs. *writer_rate (may be NULL) is
  * the rate at which the same matrix is written. 0 where there was no memory or the text was refused. */
 double bench_mm_rate(double *writer_rate);
+
+/* A measured set of values: median, extremes, count. */
+typedef struct {
+    double median, min, max;
+    int runs;
+} bench_value;
+bench_value bench_summarise(double *samples, int count); /* sorts samples */
+
+/* Seconds of CHOLMOD alone on K u = p: analyse + factorise + solve, and one solve with the factor at hand. */
+typedef struct {
+    double analyze, factorize, solve;
+} bench_linear;
+typedef enum { BENCH_AMD, BENCH_METIS } bench_ordering;
+bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering ordering);
+
+/* The paper's body with nx x nx/3 cells. The caller clears it. */
+uz_scene bench_paper_scene(int64_t nx);
 
 #endif
