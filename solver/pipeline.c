@@ -186,8 +186,7 @@ static uz_outcome conclude(const uz_run *run)
 
 static uz_status solve_case(uz_run *run, uz_error *err)
 {
-    double start = uz_seconds(), lambda = uz_dual_describe(run->body->dual).lambda_max;
-    double alpha = run->settings->alpha > 0.0 ? run->settings->alpha : lambda > 0.0 ? 1.0 / lambda : 1.0;
+    double start = uz_seconds();
     uz_status status = make_load(run, err);
     run->result->summary.timings.assemble += uz_seconds() - start;
     start = uz_seconds();
@@ -197,7 +196,7 @@ static uz_status solve_case(uz_run *run, uz_error *err)
         status = uz_case_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
     run->result->summary.timings.iterate += uz_seconds() - start;
     if (status == UZ_OK)
-        status = uz_iterate_init(&run->it, run->m, alpha, err);
+        status = uz_iterate_init(&run->it, run->m, run->settings->alpha, err);
     if (status == UZ_OK)
         status = iterate_until_certified(run, err);
     if (status == UZ_OK)

@@ -57,7 +57,6 @@ void uz_run_take_body(uz_run *run, bool hit)
     run->d = summary->d = run->result->d = dual.d;
     run->m = summary->m = run->result->m = dual.m;
     summary->op = dual.op;
-    summary->lambda_max = dual.lambda_max;
     summary->ordering = factor.ordering;
     summary->factor_cached = hit;
     summary->factor_nnz = factor.nnz;
@@ -207,7 +206,8 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
     summary->method = run->settings->method == UZ_METHOD_AUTO ? UZ_METHOD_ACCELERATED_RESTART : run->settings->method;
     summary->iterations = run->it.iteration;
     summary->restarts = run->it.restarts;
-    summary->alpha = run->it.alpha;
+    summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;
+    summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
     summary->requested_error = run->requested;
     report_contact(run);
     uz_status status = report_displacements(run, err);

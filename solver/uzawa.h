@@ -300,10 +300,10 @@ typedef struct {
     int64_t d, m, iterations, restarts;
     int64_t active; /* rows with r < 0 */
     double reaction_sum, max_penetration;
-    int dim;             /* scene: 2 or 3, else 0 */
-    double force[3];     /* scene: force of the body on the obstacle's normal side, sum of -r n */
-    double max_pressure; /* scene: max of -r / tributary area; NaN otherwise */
-    double alpha, lambda_max;
+    int dim;                     /* scene: 2 or 3, else 0 */
+    double force[3];             /* scene: force of the body on the obstacle's normal side, sum of -r n */
+    double max_pressure;         /* scene: max of -r / tributary area; NaN otherwise */
+    double alpha, lambda_max;    /* NaN where no gradient step was taken */
     double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
     double infeasible_radius;    /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
     double requested_error;      /* the relative error that `converged` had to meet */

@@ -1,6 +1,8 @@
 #include "codec/codec.h"
 #include "codec/text.h"
 
+#include <math.h>
+
 /* A named number inside an object. */
 typedef struct {
     const char *key;
@@ -53,6 +55,13 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
         put_named(t, (named[]){{"max_pressure", s->max_pressure}}, 1);
     }
     text_close(t, '}');
+}
+
+/* The primal one bounds the minimum from above only where a feasible displacement was found, so with a finite gap. */
+static void put_energy(text *t, const uz_certificate *c)
+{
+    double primal = isfinite(c->gap) ? c->energy_primal : INFINITY;
+    put_object(t, "energy", (named[]){{"primal", primal}, {"dual", c->energy_dual}}, 2);
 }
 
 static void put_certificate(text *t, const uz_certificate *c)
@@ -110,9 +119,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind)
     put_count(&t, "restarts", summary->restarts);
     put_problem(&t, summary, scene);
     put_contact(&t, summary, scene);
-    put_object(&t, "energy",
-               (named[]){{"primal", summary->certificate.energy_primal}, {"dual", summary->certificate.energy_dual}},
-               2);
+    put_energy(&t, &summary->certificate);
     put_certificate(&t, &summary->certificate);
     put_named(&t,
               (named[]){{"requested_error", summary->requested_error},

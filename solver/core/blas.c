@@ -102,6 +102,22 @@ bool uz_potri_lower(int64_t n, double *L)
     return n == 0 || LAPACKE_dpotri_work(LAPACK_COL_MAJOR, 'L', narrow(n), L, narrow(n)) == 0;
 }
 
+/* LAPACK multiplies L'L and UU' only: with rows and columns in reverse order L becomes an upper triangle U. */
+void uz_multiply_llt(int64_t n, const double *L, double *A)
+{
+    int64_t last = n * n - 1;
+    for (int64_t j = 0; j < n; j++)
+        for (int64_t i = j; i < n; i++)
+            A[last - (i + j * n)] = L[i + j * n];
+    if (n > 0)
+        LAPACKE_dlauum_work(LAPACK_COL_MAJOR, 'U', narrow(n), A, narrow(n));
+    for (int64_t low = 0, high = last; low < high; low++, high--) {
+        double swap = A[low];
+        A[low] = A[high];
+        A[high] = swap;
+    }
+}
+
 bool uz_stev(int64_t n, double *d, double *e, double *V)
 {
     return LAPACKE_dstev(LAPACK_COL_MAJOR, 'V', narrow(n), d, e, V, narrow(n)) == 0;

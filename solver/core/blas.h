@@ -24,6 +24,8 @@ int64_t uz_pstrf_lower(int64_t n, double *A, int64_t *pivot, double least);
 /* x (n) = (LL')^-1 x with the leading n x n block of an array with `stride` rows. */
 void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x);
 bool uz_potri_lower(int64_t n, double *L); /* L -> lower triangle of (LL')^-1 */
+/* A (lower) = L L', L's strict upper part is not read. n^3/3 flops. */
+void uz_multiply_llt(int64_t n, const double *L, double *A);
 /* Eigenvalues of the symmetric tridiagonal matrix (d, n; e, n - 1), ascending in d; with vectors in V (n x n). */
 bool uz_stev(int64_t n, double *d, double *e, double *V);
 

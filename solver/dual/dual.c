@@ -32,26 +32,24 @@ uz_operator uz_dual_choose(int64_t d, int64_t m, int64_t n_b, uz_operator asked)
                                                                            : UZ_OPERATOR_FACTORED;
 }
 
-static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
+static uz_dual_lazy *lazy_new(void)
 {
-    return uz_case_apply(ctx, y, x, err);
+    uz_dual_lazy *lazy = uz_alloc_zero(1, sizeof *lazy);
+    if (lazy) {
+        pthread_mutex_init(&lazy->mutex, NULL);
+        lazy->lambda_max = NAN;
+    }
+    return lazy;
 }
 
-/* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
-#define LAMBDA_TOLERANCE 1e-4
-
-/* Lanczos applies D only: any K of the right order serves the case. */
-static uz_status estimate_lambda_max(uz_dual *dual, uz_error *err)
+static void lazy_free(uz_dual_lazy *lazy)
 {
-    uz_case *load = NULL;
-    double *zero = uz_alloc_zero(dual->info.d + dual->info.m, sizeof *zero);
-    uz_status status = zero ? uz_case_create(&load, dual, NULL, zero, zero, err)
-                            : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)dual->info.d);
-    if (status == UZ_OK)
-        status = uz_lanczos_max(&dual->info.lambda_max, dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
-    uz_case_free(load);
-    free(zero);
-    return status;
+    if (!lazy)
+        return;
+    pthread_mutex_destroy(&lazy->mutex);
+    free(lazy->D);
+    free(lazy->D_inverse);
+    free(lazy);
 }
 
 uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
@@ -65,7 +63,12 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
     dual->info.d = N->cols;
     dual->info.m = N->rows;
     dual->factor = factor;
-    uz_status status = uz_csc_copy(&dual->N, N, err);
+    dual->lazy = lazy_new();
+    uz_status status = UZ_OK;
+    if (!dual->lazy)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
+    if (status == UZ_OK)
+        status = uz_csc_copy(&dual->N, N, err);
     if (status == UZ_OK)
         status = uz_csc_transpose(&dual->Nt, N, err);
     dual->info.bytes = 48 * (size_t)N->ptr[N->cols];
@@ -73,8 +76,6 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
         status = uz_condensed_create(dual, err);
     if (status == UZ_OK && hooks && hooks->cancelled && hooks->cancelled(hooks->ctx))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
-    if (status == UZ_OK && dual->info.m > 0)
-        status = estimate_lambda_max(dual, err);
     if (status == UZ_OK)
         *out = dual;
     else
@@ -89,6 +90,7 @@ void uz_dual_free(uz_dual *dual)
     uz_csc_clear(&dual->N);
     uz_csc_clear(&dual->Nt);
     uz_condensed_clear(&dual->dense);
+    lazy_free(dual->lazy);
     free(dual);
 }
 
@@ -104,12 +106,14 @@ static bool allocate_load(uz_case *load)
     load->base = uz_alloc_zero(d, sizeof(double));
     load->g0 = uz_alloc_zero(m, sizeof(double));
     load->response = uz_alloc_zero(load->dual->info.op == UZ_OPERATOR_FACTORED ? d : 0, sizeof(double));
+    load->apply_room =
+        uz_alloc_zero(load->dual->info.op == UZ_OPERATOR_CONDENSED ? load->dual->dense.n_b : 0, sizeof(double));
     load->work = uz_alloc_zero(room, sizeof(double));
     load->work2 = uz_alloc_zero(room, sizeof(double));
     load->push = uz_alloc_zero(d, sizeof(double));
     load->kept = uz_alloc_zero(d, sizeof(double));
-    return load->ws && load->base && load->g0 && load->response && load->work && load->work2 && load->push &&
-           load->kept;
+    return load->ws && load->apply_room && load->base && load->g0 && load->response && load->work && load->work2 &&
+           load->push && load->kept;
 }
 
 uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
@@ -143,6 +147,7 @@ void uz_case_free(uz_case *load)
     free(load->base);
     free(load->g0);
     free(load->response);
+    free(load->apply_room);
     free(load->work);
     free(load->work2);
     free(load->push_weight);
@@ -176,9 +181,44 @@ int64_t uz_case_m(const uz_case *load)
     return load->dual->info.m;
 }
 
-double uz_case_lambda_max(const uz_case *load)
+bool uz_case_is_scaled(const uz_case *load)
 {
-    return load->dual->info.lambda_max;
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED && load->dual->dense.scaled;
+}
+
+double uz_dual_known_lambda_max(const uz_dual *dual)
+{
+    pthread_mutex_lock(&dual->lazy->mutex);
+    double value = dual->lazy->lambda_max;
+    pthread_mutex_unlock(&dual->lazy->mutex);
+    return value;
+}
+
+static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
+{
+    return uz_case_apply(ctx, y, x, err);
+}
+
+/* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
+#define LAMBDA_TOLERANCE 1e-4
+
+uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error *err)
+{
+    uz_dual_lazy *lazy = load->dual->lazy;
+    uz_status status = UZ_OK;
+    if (load->dual->info.op == UZ_OPERATOR_CONDENSED)
+        status = uz_condensed_need_operator(load, err);
+    if (status != UZ_OK || !lambda_max)
+        return status;
+    pthread_mutex_lock(&lazy->mutex);
+    if (isnan(lazy->lambda_max))
+        status = uz_lanczos_max(lambda_max, load->dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
+    else
+        *lambda_max = lazy->lambda_max;
+    if (status == UZ_OK)
+        lazy->lambda_max = *lambda_max;
+    pthread_mutex_unlock(&lazy->mutex);
+    return status;
 }
 
 double uz_case_force_norm(uz_case *load, const double *x)
@@ -233,12 +273,12 @@ void uz_case_keep_push(uz_case *load)
     load->has_kept = true;
 }
 
-uz_status uz_case_solve_active(uz_case *load, double *r, bool *solved, const bool *active, uz_error *err)
+uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active, uz_error *err)
 {
     *solved = false;
     if (load->dual->info.op != UZ_OPERATOR_CONDENSED)
         return UZ_OK;
-    return uz_condensed_solve_active(load, r, solved, active, err);
+    return uz_condensed_solve_active(load, r, g, solved, active, err);
 }
 
 uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)

@@ -17,8 +17,7 @@ typedef struct uz_dual uz_dual;
 typedef struct {
     uz_operator op;
     int64_t d, m;
-    double lambda_max; /* of D, Lanczos value plus its residual bound; 0 when m = 0 or D = 0 */
-    size_t bytes;      /* beside K, N and the factor */
+    size_t bytes; /* beside K, N and the factor, with what is made on demand */
 } uz_dual_info;
 
 /* The form that AUTO stands for, from the sizes (n_b: dofs that N touches). */
@@ -40,11 +39,16 @@ void uz_case_free(uz_case *load);
 const double *uz_case_g0(const uz_case *load); /* m: gap of the body without reactions */
 double uz_case_psi0(const uz_case *load);      /* -1/2 p'K^-1 p */
 int64_t uz_case_m(const uz_case *load);
-double uz_case_lambda_max(const uz_case *load);
 /* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
 double uz_case_force_norm(uz_case *load, const double *x);
 /* psi(r) and ||u(r)||_K^2 from r and D r. */
 void uz_case_energies(const uz_case *load, double *psi, double *norm2, const double *r, const double *Dr);
+
+/* Makes what only many applications of D pay for, once per body: the dense D. lambda_max (may be NULL: not wanted): of
+ * D, Lanczos value plus its residual bound; 0 when m = 0 or D = 0. Overwrites what the last apply left. */
+uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error *err);
+/* The value if somebody asked for it, else NaN. */
+double uz_dual_known_lambda_max(const uz_dual *dual);
 
 /* Dr = D r (m). */
 uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
@@ -61,9 +65,13 @@ uz_status uz_case_push(uz_case *load, double *bound2, const double *r, const dou
 void uz_case_keep_push(uz_case *load);
 uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
 
-/* r (m) with D_AA r_A = g0_A on the active rows and 0 elsewhere: the contact problem with these rows as equations.
- * *solved false: this form can't, or D_AA is singular to working precision. CONDENSED only. */
-uz_status uz_case_solve_active(uz_case *load, double *r, bool *solved, const bool *active, uz_error *err);
+/* r (m) with D_AA r_A = g0_A on the active rows and 0 elsewhere: the contact problem with these rows as equations; g
+ * (m) its gaps, 0 on the active rows. *solved false: this form can't, or the system is singular to working precision.
+ * CONDENSED only. */
+uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active, uz_error *err);
+
+/* Whether solve_active needs no D: active set steps are then cheap from the start. */
+bool uz_case_is_scaled(const uz_case *load);
 
 /* y (m): in, a direction in which the reactions grow; out, scaled to max |y_i| about 1, its nearest vector with N'y = 0
  * on the rows that take part, cut at 0. A candidate for uz_ray_radius. */

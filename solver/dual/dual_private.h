@@ -4,18 +4,31 @@
 
 #include "dual/dual.h"
 
+#include <pthread.h>
+
 /* Dense matrices are column-major; symmetric ones and factors use the lower triangle. */
+/* Below this, relative to the largest, a pivot of D is noise. */
+#define UZ_PIVOT_LEAST 1e-11
+
 typedef struct {
     int64_t n_b;       /* dofs that N touches, in the factor's order */
     int64_t *position; /* n_b: their places in the factor's order */
     uz_csc N_b;        /* m x n_b: those columns of N */
     double *L_bb;      /* n_b x n_b: Cholesky factor of the Schur complement S */
-    double *D;         /* m x m */
     double *D_chol;    /* m x m: Cholesky factor of D; NULL when D is singular to working precision or `scaled` */
-    bool scaled;       /* N_b has one entry in each row and column: D = N_b S^-1 N_b' and D^-1 needs no factor */
+    bool scaled;       /* N_b has one entry in each row and column: D = N_b S^-1 N_b', D^-1 = N_b^-T S N_b^-1 */
     int64_t *row_of;   /* scaled: row_of[k] is the row of column k's entry, n_b */
     double *scale;     /* scaled: that entry, n_b */
 } uz_condensed;
+
+/* What is made at the first need, by whoever needs it; pointers are published to cases under the mutex and never
+ * change. */
+typedef struct {
+    pthread_mutex_t mutex;
+    double *D;         /* CONDENSED: m x m */
+    double *D_inverse; /* CONDENSED, scaled: m x m */
+    double lambda_max; /* NaN until known */
+} uz_dual_lazy;
 
 struct uz_dual {
     uz_dual_info info;
@@ -23,6 +36,7 @@ struct uz_dual {
     const uz_factor *factor;
     uz_csc Nt;          /* d x m */
     uz_condensed dense; /* CONDENSED */
+    uz_dual_lazy *lazy;
 };
 
 struct uz_case {
@@ -33,19 +47,27 @@ struct uz_case {
     double *base; /* d: CONDENSED y = L^-1 P p in the factor's order; FACTORED u0 = K^-1 p */
     double *g0;   /* m */
     double psi0;
-    double *response;     /* FACTORED: d, K^-1 N'r of the last apply */
-    double *work, *work2; /* max(d, m, n_b) each */
-    double *push_weight;  /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
-    double *push, *kept;  /* correction: CONDENSED L_bb'c (n_b), FACTORED c (d) */
+    const double *D, *D_inverse; /* CONDENSED: m x m, NULL until needed here */
+    double *response;            /* FACTORED: d, K^-1 N'r of the last apply */
+    double *apply_room;          /* CONDENSED: n_b */
+    double *work, *work2;        /* max(d, m, n_b) each */
+    double *push_weight;         /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
+    double *push, *kept;         /* correction: CONDENSED L_bb'c (n_b), FACTORED c (d) */
     bool has_kept;
 };
 
 uz_status uz_condensed_create(uz_dual *dual, uz_error *err);
 void uz_condensed_clear(uz_condensed *dense);
+/* z (n_b) = L_bb^-1 N_b'w */
+void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
+/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D. */
+void uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m);
 uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err);
 void uz_condensed_apply(const uz_case *load, double *Dr, const double *r);
 uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close);
-uz_status uz_condensed_solve_active(uz_case *load, double *r, bool *solved, const bool *active, uz_error *err);
+uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active,
+                                    uz_error *err);
+uz_status uz_condensed_need_operator(uz_case *load, uz_error *err);
 uz_status uz_condensed_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
 
 uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err);

@@ -149,7 +149,7 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const int64_t *last
     if (started) {
         factor->n = K->rows;
         factor->n_last = n_last;
-        factor->info.ordering = ordering == UZ_ORDERING_AUTO ? UZ_ORDERING_CAMD : ordering;
+        factor->info.ordering = ordering == UZ_ORDERING_AUTO ? UZ_ORDERING_AMD : ordering;
         factor->last = uz_alloc(n_last, sizeof *last);
     }
     if (!started || !factor->last) {

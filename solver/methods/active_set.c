@@ -55,8 +55,10 @@ static double largest(const double *x, int64_t n)
 /* Rows that a projected gradient step would leave in contact. */
 static void guess(pivoting *p, const uz_iterate *it, const double *g0)
 {
-    for (int64_t i = 0; i < it->m; i++)
-        p->active[i] = it->r[i] + it->alpha * (g0[i] - it->Dr[i]) < 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        double gap = g0[i] - it->Dr[i];
+        p->active[i] = it->r[i] < 0.0 ? it->r[i] + it->alpha * gap < 0.0 : gap < 0.0;
+    }
 }
 
 /* A sign is wrong only beyond rounding: weakly active rows must not make the steps chatter. */
@@ -97,9 +99,14 @@ static void exchange(pivoting *p, int64_t m)
 /* The guess's answer as an iterate: r <= 0, D r, and the bound on it. */
 static uz_status take(uz_iterate *it, const pivoting *p, uz_case *load, uz_error *err)
 {
-    for (int64_t i = 0; i < it->m; i++)
+    const double *g0 = uz_case_g0(load);
+    bool cut = false;
+    for (int64_t i = 0; i < it->m; i++) {
+        cut = cut || p->r[i] > 0.0;
         it->r[i] = fmin(0.0, p->r[i]);
-    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+        it->Dr[i] = g0[i] - p->g[i];
+    }
+    uz_status status = cut ? uz_case_apply(load, it->Dr, it->r, err) : UZ_OK;
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     it->tau = 1.0;
@@ -109,13 +116,9 @@ static uz_status take(uz_iterate *it, const pivoting *p, uz_case *load, uz_error
 
 static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_case *load, uz_error *err)
 {
-    const double *g0 = uz_case_g0(load);
-    uz_status status = uz_case_solve_active(load, p->r, solved, p->active, err);
+    uz_status status = uz_case_solve_active(load, p->r, p->g, solved, p->active, err);
     if (status != UZ_OK || !*solved)
         return status;
-    status = uz_case_apply(load, p->g, p->r, err);
-    for (int64_t i = 0; i < it->m; i++)
-        p->g[i] = g0[i] - p->g[i];
     p->r_scale = largest(p->r, it->m);
     p->wrong = count_wrong(p, it->m);
     return status;

@@ -154,12 +154,25 @@ static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *
     return status;
 }
 
+/* alpha = 1 / lambda_max(D) where the user gave none. */
+static uz_status prepare(uz_iterate *it, uz_case *load, uz_error *err)
+{
+    double lambda = 0.0;
+    uz_status status = uz_case_prepare_iterations(load, it->alpha > 0.0 ? NULL : &lambda, err);
+    if (it->alpha <= 0.0)
+        it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
+    return status;
+}
+
 uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                           uz_history *history, uz_error *err)
 {
     double step_norm = history->count ? history->rows[history->count - 1].step_norm : 0.0;
     bool restart = false;
-    uz_status status = history->count ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
+    uz_status status = prepare(it, load, err);
+    if (status == UZ_OK)
+        status = history->count ? uz_case_apply(load, it->Dr, it->r, err)
+                                : uz_iterate_begin(it, load, options, history, err);
     bool ray = false;
     while (status == UZ_OK && !ray && !should_end(end, it, options, step_norm)) {
         status = step(it, load, options, &step_norm, &restart, err);

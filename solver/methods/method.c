@@ -2,7 +2,8 @@
 #include "methods/method.h"
 
 /* Accelerated iterations are cheap and find nearly the right contact set; the active set then ends in a few dense
- * factorizations what they would do in hundreds of products. */
+ * factorizations what they would do in hundreds of products. Where the steps of the active set need no D, they cost
+ * less than forming it: then it starts at once, and D is formed only if it fails. */
 enum { WARM_UP = 32 };
 
 static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
@@ -11,6 +12,11 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     uz_method_options phase = *options;
     phase.method = UZ_METHOD_ACCELERATED_RESTART;
     bool polish = options->stopping == UZ_STOP_CERTIFIED;
+    if (polish && it->iteration == 0 && uz_case_is_scaled(load)) {
+        uz_status status = uz_active_set_run(end, it, load, &phase, history, err);
+        if (status != UZ_OK || *end != UZ_END_STALLED)
+            return status;
+    }
     if (polish && it->iteration + WARM_UP < options->max_iterations)
         phase.max_iterations = it->iteration + WARM_UP;
     uz_status status = uz_gradient_run(end, it, load, &phase, history, err);

@@ -35,6 +35,7 @@ typedef struct {
     uz_method made_by; /* the method that made the best answer */
 } uz_iterate;
 
+/* alpha 0: chosen when the first gradient step needs it. */
 uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err);
 void uz_iterate_clear(uz_iterate *it);
 

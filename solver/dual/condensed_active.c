@@ -1,0 +1,171 @@
+/* condensed_active.c: the contact problem with given rows as equations, and the dense matrices made on demand. */
+#include "dual/dual_private.h"
+
+#include "core/alloc.h"
+#include "core/blas.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* to = scale_k scale_l from_kl at the rows of k and l: from the factor's order to the order of the rows. */
+static void place_rows(double *to, const uz_condensed *dense, const double *from, bool invert_scale)
+{
+    int64_t m = dense->n_b;
+    for (int64_t l = 0; l < m; l++) {
+        double scale_l = invert_scale ? 1.0 / dense->scale[l] : dense->scale[l];
+        for (int64_t k = l; k < m; k++) {
+            double scale_k = invert_scale ? 1.0 / dense->scale[k] : dense->scale[k];
+            int64_t row = dense->row_of[k], column = dense->row_of[l];
+            to[row >= column ? row + column * m : column + row * m] = scale_k * scale_l * from[k + l * m];
+        }
+    }
+}
+
+/* D = N_b S^-1 N_b': the inverse from the factor, then signs and places. */
+static bool form_operator(double *D, double *room, const uz_condensed *dense)
+{
+    memcpy(room, dense->L_bb, (size_t)(dense->n_b * dense->n_b) * sizeof *room);
+    if (!uz_potri_lower(dense->n_b, room))
+        return false;
+    place_rows(D, dense, room, false);
+    return true;
+}
+
+/* D^-1 = N_b^-T S N_b^-1 with S = L_bb L_bb'. */
+static bool form_inverse(double *D_inverse, double *room, const uz_condensed *dense)
+{
+    uz_multiply_llt(dense->n_b, dense->L_bb, room);
+    place_rows(D_inverse, dense, room, true);
+    return true;
+}
+
+typedef bool (*former)(double *out, double *room, const uz_condensed *dense);
+
+/* *slot once and for all; *out is the case's own copy of the pointer. */
+static uz_status need(const double **out, double **slot, uz_case *load, former form, uz_error *err)
+{
+    const uz_condensed *dense = &load->dual->dense;
+    int64_t size = dense->n_b * dense->n_b;
+    uz_status status = UZ_OK;
+    if (*out)
+        return UZ_OK;
+    pthread_mutex_lock(&load->dual->lazy->mutex);
+    if (!*slot) {
+        double *made = uz_alloc(size, sizeof *made), *room = uz_alloc(size, sizeof *room);
+        if (!made || !room)
+            status =
+                uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)dense->n_b);
+        else if (!form(made, room, dense))
+            status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "the Schur complement on the contact is singular");
+        free(room);
+        if (status == UZ_OK)
+            *slot = made;
+        else
+            free(made);
+    }
+    *out = *slot;
+    pthread_mutex_unlock(&load->dual->lazy->mutex);
+    return status;
+}
+
+uz_status uz_condensed_need_operator(uz_case *load, uz_error *err)
+{
+    return need(&load->D, &load->dual->lazy->D, load, form_operator, err);
+}
+
+/* The rows with active == which; their number. */
+static int64_t select_rows(int64_t *rows, const bool *active, bool which, int64_t m)
+{
+    int64_t count = 0;
+    for (int64_t i = 0; i < m; i++)
+        if (active[i] == which)
+            rows[count++] = i;
+    return count;
+}
+
+enum { PASSES = 2 }; /* solve, and once more for the residual */
+
+/* r_A from D_AA r_A = g0_A. */
+static void solve_by_operator(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
+                              int64_t count)
+{
+    int64_t m = load->dual->info.m;
+    double *x = load->work;
+    memset(r, 0, (size_t)m * sizeof *r);
+    memcpy(g, load->g0, (size_t)m * sizeof *g);
+    for (int pass = 0; pass < PASSES; pass++) {
+        for (int64_t k = 0; k < count; k++)
+            x[k] = g[rows[k]];
+        uz_potrs_lower(count, chol, x);
+        for (int64_t k = 0; k < count; k++)
+            r[rows[k]] += x[k];
+        uz_symv_lower(m, load->D, r, load->work2);
+        for (int64_t i = 0; i < m; i++)
+            g[i] = load->g0[i] - load->work2[i];
+    }
+}
+
+/* x at the rows = -(block)^-1 x there. */
+static void solve_block(double *x, double *room, const double *chol, const int64_t *rows, int64_t count)
+{
+    for (int64_t k = 0; k < count; k++)
+        room[k] = x[rows[k]];
+    uz_potrs_lower(count, chol, room);
+    for (int64_t k = 0; k < count; k++)
+        x[rows[k]] = -room[k];
+}
+
+/* With T = D^-1 and x = g0 - g: r = T x, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
+ * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
+ * through the factor: T is badly conditioned, its answer is not yet that of the body. */
+static void solve_by_inverse(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
+                             int64_t count)
+{
+    int64_t m = load->dual->info.m;
+    double *x = load->work, *change = load->work2;
+    memset(r, 0, (size_t)m * sizeof *r);
+    memcpy(g, load->g0, (size_t)m * sizeof *g);
+    for (int pass = 0; pass < PASSES; pass++) {
+        memcpy(x, g, (size_t)m * sizeof *x);
+        for (int64_t k = 0; k < count; k++)
+            x[rows[k]] = 0.0;
+        uz_symv_lower(m, load->D_inverse, x, change);
+        for (int64_t k = 0; k < count; k++)
+            x[rows[k]] = change[rows[k]];
+        solve_block(x, change, chol, rows, count);
+        uz_symv_lower(m, load->D_inverse, x, change);
+        for (int64_t k = 0; k < count; k++)
+            change[rows[k]] = 0.0;
+        for (int64_t i = 0; i < m; i++)
+            r[i] += change[i];
+        uz_condensed_apply(load, change, r);
+        for (int64_t i = 0; i < m; i++)
+            g[i] = load->g0[i] - change[i];
+    }
+}
+
+uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active,
+                                    uz_error *err)
+{
+    bool scaled = load->dual->dense.scaled;
+    int64_t m = load->dual->info.m, count, *rows = uz_alloc(m, sizeof *rows);
+    uz_status status = UZ_OK;
+    if (!rows)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
+    count = select_rows(rows, active, !scaled, m);
+    if (scaled)
+        status = need(&load->D_inverse, &load->dual->lazy->D_inverse, load, form_inverse, err);
+    double *block = uz_alloc(count * count, sizeof *block);
+    if (status == UZ_OK && !block)
+        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)count);
+    if (status == UZ_OK) {
+        uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m);
+        *solved = uz_potrf_lower(count, block);
+        if (*solved)
+            (scaled ? solve_by_inverse : solve_by_operator)(load, r, g, block, rows, count);
+    }
+    free(block);
+    free(rows);
+    return status;
+}

@@ -1,0 +1,124 @@
+/* condensed_push.c: feasible displacements near u(r), on the contact. */
+#include "dual/dual_private.h"
+
+#include "core/alloc.h"
+#include "core/blas.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m)
+{
+    for (int64_t l = 0; l < count; l++)
+        for (int64_t k = l; k < count; k++)
+            D_AA[k + l * count] = D[rows[k] + rows[l] * m];
+}
+
+enum { PUSH_ROUNDS = 6 };
+
+/* What may be left of a penetration, relative to the largest gap moved: the certificate sees to the rest. */
+#define PUSH_TOLERANCE 1e-9
+
+/* The rows of `in`, listed; their number. */
+static int64_t list_rows(int64_t *rows, const bool *in, int64_t m)
+{
+    int64_t count = 0;
+    for (int64_t i = 0; i < m; i++)
+        if (in[i])
+            rows[count++] = i;
+    return count;
+}
+
+enum { REFINEMENTS = 2 };
+
+/* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
+ * inverse of a stiffness and as badly conditioned. Dw (m) in passing. D_AA is room for count^2. */
+static bool solve_rows(double *w, double *Dw, double *D_AA, uz_case *load, const double *target, const int64_t *rows,
+                       int64_t count)
+{
+    int64_t m = load->dual->info.m, *pivot = uz_alloc(count, sizeof *pivot);
+    double *x = uz_alloc(count, sizeof *x);
+    bool ok = pivot && x;
+    memset(w, 0, (size_t)m * sizeof *w);
+    memset(Dw, 0, (size_t)m * sizeof *Dw);
+    if (ok) {
+        uz_gather_lower(D_AA, load->D, rows, count, m);
+        int64_t rank = uz_pstrf_lower(count, D_AA, pivot, UZ_PIVOT_LEAST);
+        for (int pass = 0; pass <= REFINEMENTS; pass++) {
+            for (int64_t k = 0; k < rank; k++)
+                x[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
+            uz_potrs_leading(rank, count, D_AA, x);
+            for (int64_t k = 0; k < rank; k++)
+                w[rows[pivot[k]]] += x[k];
+            uz_condensed_apply(load, Dw, w);
+        }
+    }
+    free(pivot);
+    free(x);
+    return ok;
+}
+
+/* |D| |w| row by row is at most sqrt(D_ii) times this sum: what rounding leaves of D w is in proportion. */
+static double rounding_sum(const double *D, const double *w, int64_t m)
+{
+    double sum = 0.0;
+    for (int64_t j = 0; j < m; j++)
+        sum += sqrt(D[j + j * m]) * fabs(w[j]);
+    return sum;
+}
+
+/* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
+ * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
+static bool push_rows(uz_case *load, double *w, double *target, const double *g, const bool *close)
+{
+    int64_t m = load->dual->info.m, *rows = uz_alloc(m, sizeof *rows);
+    const double *D = load->D;
+    bool *in = uz_alloc(m, sizeof *in), feasible = false, ok = rows && in;
+    double *D_AA = ok ? uz_alloc(m * m, sizeof *D_AA) : NULL, scale = 0.0;
+    for (int64_t i = 0; D_AA && i < m; i++) {
+        in[i] = close[i] || g[i] < 0.0;
+        scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
+    }
+    for (int round = 0; D_AA && ok && !feasible && round < PUSH_ROUNDS; round++) {
+        ok = solve_rows(w, target, D_AA, load, g, rows, list_rows(rows, in, m));
+        double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
+        feasible = ok;
+        for (int64_t i = 0; i < m; i++) {
+            bool wrong = g[i] - target[i] < -PUSH_TOLERANCE * scale - sqrt(D[i + i * m]) * noise;
+            feasible = feasible && !wrong;
+            in[i] = in[i] || wrong;
+        }
+    }
+    free(rows);
+    free(in);
+    free(D_AA);
+    return feasible;
+}
+
+uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close)
+{
+    const uz_condensed *dense = &load->dual->dense;
+    int64_t m = load->dual->info.m;
+    double *target = load->work, *z = load->push, complementarity = 0.0;
+    for (int64_t i = 0; i < m; i++)
+        target[i] = close[i] ? g[i] : fmin(g[i], 0.0);
+    if (dense->scaled) {
+        for (int64_t k = 0; k < m; k++)
+            z[k] = target[dense->row_of[k]] / dense->scale[k];
+        uz_trmv_lower_t(m, dense->L_bb, z);
+    } else if (dense->D_chol) {
+        memcpy(load->work2, target, (size_t)m * sizeof *target);
+        uz_potrs_lower(m, dense->D_chol, load->work2);
+        uz_condensed_response(z, dense, load->work2);
+    } else if (push_rows(load, load->work2, target, g, close)) {
+        uz_condensed_response(z, dense, load->work2);
+    } else {
+        return UZ_OK;
+    }
+    for (int64_t i = 0; i < m; i++)
+        complementarity -= r[i] * fmax(0.0, g[i] - target[i]);
+    *bound2 = uz_dot(dense->n_b, z, z) + 2.0 * complementarity;
+    return UZ_OK;
+}
