@@ -24,7 +24,7 @@ INC  := -Isolver -Iserver -Iclient -I$(BUILD)/gen
 # Package flags are asked for once, when first needed, so that `make deps` works on a bare machine.
 pkg = $(shell pkg-config $(1) 2>/dev/null)
 SERVER_CFLAGS = $(call pkg,--cflags libmicrohttpd jansson sqlite3 libcurl gnutls)
-SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp $(call pkg,--libs gnutls) -lm
+SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp -lsuitesparseconfig $(call pkg,--libs gnutls) -lm
 SERVER_LIBS   = $(call pkg,--libs libmicrohttpd jansson sqlite3) -lz $(SOLVER_LIBS) -lpthread
 CLIENT_LIBS   = $(call pkg,--libs libcurl jansson) -lm
 CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)

@@ -5,6 +5,7 @@
 #include "core/digest.h"
 #include "core/error.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -94,6 +95,8 @@ uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_sett
     uz_body *body = uz_alloc_zero(1, sizeof *body);
     if (!body)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+    pthread_mutex_init(&body->mutex, NULL);
+    body->inverse_bound = NAN;
     double start = uz_seconds();
     uz_status status = UZ_OK;
     body->is_scene = problem->kind == UZ_PROBLEM_SCENE;
@@ -112,10 +115,22 @@ uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_sett
     return status;
 }
 
+double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws)
+{
+    uz_error ignored = {0};
+    pthread_mutex_lock(&body->mutex);
+    if (isnan(body->inverse_bound))
+        uz_factor_inverse_norm(&body->inverse_bound, body->factor, ws, K, &ignored);
+    double bound = body->inverse_bound;
+    pthread_mutex_unlock(&body->mutex);
+    return bound;
+}
+
 void uz_body_free(uz_body *body)
 {
     if (!body)
         return;
+    pthread_mutex_destroy(&body->mutex);
     uz_dual_free(body->dual);
     uz_factor_free(body->factor);
     if (body->is_scene)

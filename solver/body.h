@@ -7,13 +7,17 @@
 #include "factor/factor.h"
 #include "uzawa.h"
 
-/* Immutable once built, shared by threads. */
+#include <pthread.h>
+
+/* Immutable once built, but for what is under the mutex; shared by threads. */
 typedef struct {
     char digest[65];
     bool is_scene;
     uz_body_model model; /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
     uz_factor *factor;
     uz_dual *dual;
+    pthread_mutex_t mutex; /* guards inverse_bound */
+    double inverse_bound;  /* NaN until somebody asks */
     double assemble_s, condense_s;
     size_t bytes;
 } uz_body;
@@ -25,6 +29,10 @@ uz_status uz_body_digest(char digest[65], const uz_problem *problem, const uz_se
 uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                          uz_error *err);
 void uz_body_free(uz_body *body);
+
+/* What the certificate of a body that is used again and again saves by: uz_factor_inverse_norm, made at the first call.
+ * INFINITY when that failed. */
+double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws);
 
 /* The body's matrices: the model's for a scene, the problem's otherwise. */
 const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem);

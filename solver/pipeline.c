@@ -93,6 +93,9 @@ static uz_status recover_and_certify(uz_run *run, uz_error *err)
         .inverse_norm = inverse_norm,
         .ctx = run,
         .rcond = uz_factor_describe(run->body->factor).rcond,
+        .inverse_bound =
+            run->hit ? uz_body_inverse_bound(run->body, uz_body_K(run->body, run->problem), run->ws) : INFINITY,
+        .sharp = 0.5 * run->requested,
     };
     double start = uz_seconds();
     memcpy(result->r, run->it.best_r, (size_t)run->m * sizeof *result->r);

@@ -58,7 +58,7 @@ void uz_run_take_body(uz_run *run, bool hit)
     run->m = summary->m = run->result->m = dual.m;
     summary->op = dual.op;
     summary->ordering = factor.ordering;
-    summary->factor_cached = hit;
+    run->hit = summary->factor_cached = hit;
     summary->factor_nnz = factor.nnz;
     summary->factor_bytes = factor.bytes;
     summary->rcond = factor.rcond;

@@ -10,6 +10,7 @@ typedef struct {
     const uz_problem *problem;
     const uz_settings *settings;
     const uz_hooks *hooks;
+    bool hit;      /* the body came from the cache */
     uz_body *body; /* borrowed from the cache */
     int64_t d, m;
     const double *p, *h; /* d, m */

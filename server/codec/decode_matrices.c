@@ -47,6 +47,15 @@ static bool refuse_size(const reading *r, const char *name, int64_t rows, int64_
     return false;
 }
 
+static bool refuse_shape(const reading *r)
+{
+    json_path top = {NULL, "problem", 7, 0}, path = {&top, "K", 1, 0};
+    problem_set(r->problem, 422, "size_mismatch", &path,
+                "/problem/K is %lld x %lld, but a stiffness matrix is square and not empty.", (long long)r->out->K.rows,
+                (long long)r->out->K.cols);
+    return false;
+}
+
 /* ------------------------------------------------------------- reading */
 
 /* A string value as Matrix Market text. A lifted one is freed by free_text once it is read. */
@@ -120,7 +129,7 @@ static bool read_stiffness(const reading *r)
     if (!read_matrix(r, K, &info, "K"))
         return false;
     if (K->rows != K->cols || K->rows == 0)
-        return refuse_size(r, "K", K->rows, K->cols, "; a stiffness matrix is square and not empty");
+        return refuse_shape(r);
     return info.symmetry == UZ_MM_SYMMETRIC || uz_symmetric_lower(K, &err) == UZ_OK || refuse_call(r, &err, "K");
 }
 

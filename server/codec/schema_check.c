@@ -342,6 +342,8 @@ static bool choose_by_key(const visit *v, const json_t *branches)
         return visit_wrong_type(&here, SCHEMA_STRING);
     visit_refuse(&here, "not_allowed", "must be one of ");
     visit_list(v, names, count);
+    if (v->problem)
+        problem_add(v->problem, ".");
     const char *text = visit_string(&here, &len);
     visit_suggest(&here, text, len, names, count);
     return false;

@@ -2,6 +2,7 @@
 
 #include <stdbool.h>
 #include <stdlib.h>
+#include <sys/mman.h>
 
 static bool bytes_for(int64_t count, size_t size, size_t *bytes)
 {
@@ -12,10 +13,23 @@ static bool bytes_for(int64_t count, size_t size, size_t *bytes)
     return true;
 }
 
+#define HUGE_PAGE ((size_t)2 << 20)
+
+void *uz_malloc_huge(size_t bytes)
+{
+    void *block = NULL;
+    if (bytes < UZ_HUGE_LEAST)
+        return malloc(bytes);
+    if (posix_memalign(&block, HUGE_PAGE, bytes) != 0)
+        return NULL;
+    madvise(block, bytes, MADV_HUGEPAGE); /* a wish: where it is refused, small pages do */
+    return block;
+}
+
 void *uz_alloc(int64_t count, size_t size)
 {
     size_t bytes;
-    return bytes_for(count, size, &bytes) ? malloc(bytes) : NULL;
+    return bytes_for(count, size, &bytes) ? uz_malloc_huge(bytes) : NULL;
 }
 
 void *uz_alloc_zero(int64_t count, size_t size)

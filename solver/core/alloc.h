@@ -10,6 +10,12 @@
 void *uz_alloc(int64_t count, size_t size);
 void *uz_alloc_zero(int64_t count, size_t size);
 
+/* malloc for big blocks: from UZ_HUGE_LEAST bytes on they start on a huge page boundary and ask the kernel for huge
+ * pages. A factor of 200 MB is touched once, page by page: with 4 kB pages a fifth of its time went into page faults.
+ * Free with free(). */
+#define UZ_HUGE_LEAST ((size_t)8 << 20)
+void *uz_malloc_huge(size_t bytes);
+
 /* Grows or shrinks; on failure NULL and the old block stays. */
 void *uz_realloc(void *block, int64_t count, size_t size);
 

@@ -1,6 +1,8 @@
 /* process.c: what BLAS and OpenMP must be told once. */
 #include "uzawa.h"
 
+#include "factor/factor.h"
+
 #include <signal.h>
 
 /* Declared here rather than by the vendors' headers, which differ between compilers and packages. */
@@ -10,6 +12,7 @@ extern void omp_set_max_active_levels(int levels);
 /* OpenBLAS's own threads under several workers oversubscribe the cores (13 times slower was measured). */
 void uz_process_init(int workers)
 {
+    uz_factor_use_huge_pages();
     if (workers > 1)
         openblas_set_num_threads(1);
 }

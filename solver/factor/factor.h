@@ -36,6 +36,11 @@ uz_status uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, do
 uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
                              uz_error *err);
 
+/* *bound >= lambda_max(D_K^1/2 K^-1 D_K^1/2) with D_K = diag(K), except with a probability below 1e-12; so e'K^-1 e is
+ * at most *bound times the sum of e_j^2 / K_jj. Some six linear solves. */
+uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
+                                 uz_error *err);
+
 /* Where dof i stands in the factor's order: position[i], n. */
 const int64_t *uz_factor_position(const uz_factor *factor);
 
@@ -43,5 +48,8 @@ const int64_t *uz_factor_position(const uz_factor *factor);
  * part zero; order[k] is the dof of row k (ascending position), where[k] its position. It is the Cholesky factor of the
  * Schur complement of K on these dofs: checked by the elimination structure, UZ_ERR_INTERNAL if it is not. */
 uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err);
+
+/* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
+void uz_factor_use_huge_pages(void);
 
 #endif
