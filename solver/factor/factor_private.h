@@ -28,4 +28,11 @@ bool uz_cholmod_start(cholmod_common *common);
 uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,
                    cholmod_common *common, uz_error *err);
 
+/* The graph of groups of dofs with equal neighbours (lower triangle, pattern), freed by cholmod_l_free_sparse; NULL: no
+ * memory. A: lower triangle. head[i] (n): the first dof of i's group; groups are numbered in the order of their heads.
+ */
+cholmod_sparse *uz_compress(int64_t *head, const cholmod_sparse *A, cholmod_common *common);
+/* perm (n) from an ordering of the groups: each group's dofs in a row. false: no memory. */
+bool uz_expand(int64_t *perm, const int64_t *group_perm, const int64_t *head, int64_t n, int64_t groups);
+
 #endif

@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { TINY = 4 };
+
 /* Amestoy, Davis, Duff, SIAM J. Matrix Anal. Appl. 17 (1996), with the constraint sets of CAMD. */
 static bool order_camd(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, cholmod_common *common)
 {
@@ -25,7 +27,7 @@ static bool order_camd(int64_t *perm, cholmod_sparse *A, const int64_t *last, in
 /* METIS installs its own handlers for SIGTERM and SIGABRT while it runs and uses the process's rand(): calls are
  * serialised for the whole process and the dispositions put back. The mutex guards METIS's process-wide state, it holds
  * none of ours. Callers block these signals in their threads (see uz_thread_init). */
-static bool order_metis(int64_t *perm, cholmod_sparse *A, cholmod_common *common)
+static bool order_metis(SuiteSparse_long *perm, cholmod_sparse *A, cholmod_common *common)
 {
     static pthread_mutex_t metis_mutex = PTHREAD_MUTEX_INITIALIZER;
     static const int taken[2] = {SIGTERM, SIGABRT};
@@ -33,10 +35,30 @@ static bool order_metis(int64_t *perm, cholmod_sparse *A, cholmod_common *common
     pthread_mutex_lock(&metis_mutex);
     for (int i = 0; i < 2; i++)
         sigaction(taken[i], NULL, &before[i]);
-    bool ok = cholmod_l_metis(A, NULL, 0, 1, (SuiteSparse_long *)perm, common);
+    bool ok = cholmod_l_metis(A, NULL, 0, 1, perm, common);
     for (int i = 0; i < 2; i++)
         sigaction(taken[i], &before[i], NULL);
     pthread_mutex_unlock(&metis_mutex);
+    return ok;
+}
+
+/* AMD or METIS on the graph of nodes. */
+static bool order_groups(int64_t *perm, cholmod_sparse *A, uz_ordering ordering, cholmod_common *common)
+{
+    int64_t n = (int64_t)A->nrow, *head = uz_alloc(n, sizeof *head), *order = uz_alloc(n, sizeof *order);
+    cholmod_sparse *graph = head && order ? uz_compress(head, A, common) : NULL;
+    bool ok = graph != NULL;
+    if (ok && graph->nrow < TINY) {
+        for (int64_t k = 0; k < (int64_t)graph->nrow; k++)
+            order[k] = k;
+    } else if (ok) {
+        ok = ordering == UZ_ORDERING_AMD ? cholmod_l_amd(graph, NULL, 0, order, common)
+                                         : order_metis(order, graph, common);
+    }
+    ok = ok && uz_expand(perm, order, head, n, (int64_t)graph->nrow);
+    cholmod_l_free_sparse(&graph, common);
+    free(head);
+    free(order);
     return ok;
 }
 
@@ -70,8 +92,6 @@ static bool order_natural(int64_t *perm, int64_t n, const int64_t *last, int64_t
     return move_last(perm, n, last, n_last);
 }
 
-enum { TINY = 4 };
-
 uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,
                    cholmod_common *common, uz_error *err)
 {
@@ -80,11 +100,8 @@ uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_
         ok = order_natural(perm, (int64_t)A->nrow, last, n_last);
     else if (*ordering == UZ_ORDERING_CAMD)
         ok = order_camd(perm, A, last, n_last, common);
-    else if (*ordering == UZ_ORDERING_AMD)
-        ok = cholmod_l_amd(A, NULL, 0, (SuiteSparse_long *)perm, common) &&
-             move_last(perm, (int64_t)A->nrow, last, n_last);
     else
-        ok = order_metis(perm, A, common) && move_last(perm, (int64_t)A->nrow, last, n_last);
+        ok = order_groups(perm, A, *ordering, common) && move_last(perm, (int64_t)A->nrow, last, n_last);
     if (ok && common->status >= CHOLMOD_OK)
         return UZ_OK;
     if (common->status == CHOLMOD_OUT_OF_MEMORY || common->status == CHOLMOD_OK)

@@ -144,6 +144,14 @@ class Service:
                 pass
         return self.process.wait(timeout=60)
 
+    def restart(self, number=signal.SIGKILL, timeout=60):
+        """Ends it by a signal and starts it again on the same database; returns the exit status."""
+        status = self.terminate(timeout, number)
+        self.process.stdout.close()
+        self.log_file.close()
+        self.start()
+        return status
+
     def stop(self):
         """Ends everything and removes the folder. Whatever happened before."""
         if self.process and self.process.poll() is None:
