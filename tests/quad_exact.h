@@ -21,14 +21,17 @@ static inline quad quad_abs(quad x)
 
 static inline quad quad_sqrt(quad x)
 {
+    quad unit = 1;
     if (!(x > 0))
         return 0;
+    for (; x > 0x1p400; x *= 0x1p-400) /* into the range of double, for the start */
+        unit *= 0x1p200;
+    for (; x < 0x1p-400; x *= 0x1p400)
+        unit *= 0x1p-200;
     quad root = __builtin_sqrt((double)x);
-    if (!(root > 0)) /* below the range of double */
-        root = 1e-170;
-    for (int k = 0; k < 8; k++)
+    for (int k = 0; k < 3; k++)
         root = (root + x / root) / 2;
-    return root;
+    return unit * root;
 }
 
 static inline quad *quad_zeros(int64_t n)
@@ -249,27 +252,40 @@ static inline bool quad_add_row(quad_exact *x, int64_t *rows, int64_t *count, in
     }
 }
 
-/* The worst penetrating row relative to sqrt(D_ii), -1 where none penetrates beyond rounding. */
+/* The row that penetrates most relative to sqrt(D_ii), -1 where none penetrates beyond the rounding of its own terms:
+ * a row with a wide gap must not hide the penetration of another. *worst: relative to those terms. */
 static inline int64_t quad_worst_row(const quad_exact *x, quad *worst)
 {
-    quad scale = 0;
+    quad reach = 0, deepest = 0;
     int64_t row = -1;
     *worst = 0;
     for (int64_t i = 0; i < x->m; i++)
-        if (x->D[i * x->m + i] > 0) {
-            quad size = quad_abs(x->g0[i]) / quad_sqrt(x->D[i * x->m + i]);
-            scale = size > scale ? size : scale;
-        }
-    for (int64_t i = 0; scale > 0 && i < x->m; i++) {
-        if (!(x->D[i * x->m + i] > 0))
+        reach += quad_sqrt(x->D[i * x->m + i]) * quad_abs(x->r[i]);
+    for (int64_t i = 0; i < x->m; i++) {
+        quad size = quad_sqrt(x->D[i * x->m + i]);
+        if (!(size > 0) || x->g[i] >= 0)
             continue;
-        quad miss = -x->g[i] / quad_sqrt(x->D[i * x->m + i]) / scale;
-        if (miss > *worst) {
-            *worst = miss;
+        quad miss = -x->g[i] / (quad_abs(x->g0[i]) + size * reach);
+        *worst = miss > *worst ? miss : *worst;
+        if (miss > (quad)1e-24 && -x->g[i] / size > deepest) {
+            deepest = -x->g[i] / size;
             row = i;
         }
     }
-    return *worst > (quad)1e-24 ? row : -1;
+    return row;
+}
+
+/* Reactions of the wrong sign enter the violation, relative to the largest. */
+static inline void quad_measure_pull(quad_exact *x)
+{
+    quad largest = 0, pull = 0;
+    for (int64_t i = 0; i < x->m; i++) {
+        quad size = x->r[i] * quad_sqrt(x->D[i * x->m + i]);
+        largest = quad_abs(size) > largest ? quad_abs(size) : largest;
+        pull = size > pull ? size : pull;
+    }
+    if (pull > x->violation * largest)
+        x->violation = pull / largest;
 }
 
 static inline void quad_recover(quad_exact *x)
@@ -316,12 +332,10 @@ static inline bool quad_exact_solve(quad_exact *x, const uz_qp *qp, const bool *
         ok = quad_add_row(x, rows, &count, row);
         quad_solve_rows(x, rows, &count);
     }
-    for (int64_t k = 0; k < count; k++) {
-        quad pull = x->r[rows[k]] * x->D[rows[k] * m + rows[k]] / (quad_abs(x->g0[rows[k]]) + (quad)1e-300);
-        x->violation = pull > x->violation ? pull : x->violation;
+    for (int64_t k = 0; k < count; k++)
         x->active[rows[k]] = true;
-    }
     x->n_active = count;
+    quad_measure_pull(x);
     free(rows);
     if (ok)
         quad_recover(x);
@@ -357,16 +371,13 @@ static inline double quad_error_of_reactions(const quad_exact *x, const double *
     return (double)quad_sqrt(sum);
 }
 
-/* psi(r) in quadruple precision: -1/2 ||u_r||_K^2 + r'h */
+/* psi(r) - psi(r*) = (r - r*)'g* - 1/2 ||u_r - u*||_K^2, and psi(r*) = pi(u*). */
 static inline double quad_dual_objective(const quad_exact *x, const double *r)
 {
-    quad value = -x->energy, *y = quad_zeros(x->m);
-    /* psi(r) - psi(r*) = (r - r*)'g* - 1/2 (r - r*)'D (r - r*), and psi(r*) = pi(u*) */
     double error = quad_error_of_reactions(x, r);
-    value = x->energy - (quad)error * error / 2;
+    quad value = x->energy - (quad)error * error / 2;
     for (int64_t i = 0; i < x->m; i++)
         value += ((quad)r[i] - x->r[i]) * x->g[i];
-    free(y);
     return (double)value;
 }
 

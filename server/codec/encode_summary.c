@@ -127,6 +127,8 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind)
                         {"alpha", summary->alpha},
                         {"lambda_max", summary->lambda_max}},
               4);
+    if (summary->outcome == UZ_INFEASIBLE)
+        put_named(&t, (named[]){{"infeasible_radius", summary->infeasible_radius}}, 1);
     put_factor(&t, summary);
     put_timings(&t, &summary->timings);
     text_close(&t, '}');

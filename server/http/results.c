@@ -78,14 +78,15 @@ static bool has_result(const job *j, http_reply *reply)
 }
 
 typedef struct {
-    double *reactions, *gaps, *displacements, *nodes, *contact_nodes, *dim;
-    int64_t n_reactions, n_gaps, n_u, n_nodes, n_contact_nodes, n_dim;
+    double *reactions, *gaps, *ray, *displacements, *nodes, *contact_nodes, *dim;
+    int64_t n_ray, n_reactions, n_gaps, n_u, n_nodes, n_contact_nodes, n_dim;
 } vectors;
 
 static void vectors_free(vectors *v)
 {
     free(v->reactions);
     free(v->gaps);
+    free(v->ray);
     free(v->displacements);
     free(v->nodes);
     free(v->contact_nodes);
@@ -106,6 +107,8 @@ static store_status fetch_wanted(api *context, const char *id, const wanted *fie
         status = fetch(context, id, "reactions", &v->reactions, &v->n_reactions);
     if (status == STORE_OK && fields->gaps)
         status = fetch(context, id, "gaps", &v->gaps, &v->n_gaps);
+    if (status == STORE_OK && fields->reactions)
+        status = fetch(context, id, "ray", &v->ray, &v->n_ray);
     if (status == STORE_OK && (fields->reactions || fields->gaps))
         status = fetch(context, id, "contact_nodes", &v->contact_nodes, &v->n_contact_nodes);
     if (status == STORE_OK && fields->displacements)
@@ -125,6 +128,7 @@ static void encode_result(const job *j, const vectors *v, http_reply *reply)
                            .n_nodes = v->n_nodes,
                            .reactions = v->reactions,
                            .gaps = v->gaps,
+                           .ray = v->ray,
                            .displacements = v->displacements,
                            .nodes = v->nodes,
                            .contact_nodes = v->contact_nodes};

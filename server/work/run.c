@@ -8,7 +8,7 @@
 #include <time.h>
 
 #define FINISH_ATTEMPTS 5
-#define MAX_VECTORS     6
+#define MAX_VECTORS     7
 
 /* What becomes of the job. */
 typedef enum {
@@ -127,6 +127,7 @@ static bool add_vectors(run *r)
     add_vector(r, "dim", &r->dim, 1);
     add_vector(r, "reactions", result->r, result->m);
     add_vector(r, "gaps", result->g, result->m);
+    add_vector(r, "ray", result->ray, result->m);
     add_vector(r, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
     return !is_scene || add_scene_vectors(r);
 }

@@ -43,6 +43,23 @@ def submit(s, count, headers=None):
     return acknowledged
 
 
+def fetch(s, path):
+    """(status, body) as it came: long arrays are quick to read and slow to check against a schema."""
+    connection = http.client.HTTPConnection(s.host, s.port, timeout=60)
+    try:
+        connection.request("GET", path)
+        reply = connection.getresponse()
+        return reply.status, reply.read()
+    finally:
+        connection.close()
+
+
+def fetch_json(s, path):
+    status, body = fetch(s, path)
+    check(status == 200, path, status, body)
+    return json.loads(body)
+
+
 def counts(s):
     return expect(s.get("/readyz"), 200).json["jobs"]
 
@@ -76,10 +93,12 @@ def check_all_successful(s, acknowledged):
         check(job["status"] == "successful" and job["summary"]["outcome"] == "converged" and job["progress"] == 100, job)
         check(abs(job["summary"]["energy"]["primal"] - energy) <= 1e-8 * abs(energy), energy, job)
         check(job["created"] <= job["started"] <= job["finished"] and job["attempts"] >= 1, job)
-        result = expect(s.get(f"/v1/jobs/{job_id}/result{ALL_FIELDS}"), 200).json
+        result = fetch_json(s, f"/v1/jobs/{job_id}/result{ALL_FIELDS}")
         check(result["job"] == job_id and result["summary"] == job["summary"], job_id)
         check(len(result["reactions"]) == job["summary"]["problem"]["m"] == len(result["gaps"]), job_id)
-        check(expect(s.get(f"/v1/jobs/{job_id}/history"), 200).json["rows"][-1][0] <= job["summary"]["iterations"], job)
+        check(len(result["displacements"]) > 0, job_id)
+        iterations = job["summary"]["iterations"]
+        check(fetch_json(s, f"/v1/jobs/{job_id}/history?after={iterations - 2}")["rows"][-1][0] == iterations, job)
     ended = collections.Counter(event["job"] for event in s.events("job_ended"))
     check(not ended or max(ended.values()) == 1, "ended twice:", ended.most_common(3))
     return jobs
@@ -162,7 +181,7 @@ class Submitters:
 def test_killed_during_submission(s):
     """Each 202 that somebody has read is a promise; a request without an answer may be there or not, once."""
     promised, energies = {}, {}
-    for delay in (0.05, 0.2, 0.4):
+    for delay in (0.03, 0.1, 0.25):
         submitters = Submitters(s, 4)
         time.sleep(delay)
         s.process.kill()
@@ -260,7 +279,7 @@ def test_drain_finishes_what_runs(s):
 def test_terminated_while_metis_orders(s):
     """METIS takes SIGTERM for itself while it runs. The daemon must end in order all the same, each time."""
     ids = []
-    for round_, delay in enumerate((0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4)):
+    for round_, delay in enumerate((0.0, 0.02, 0.04, 0.06, 0.1, 0.14, 0.18, 0.25)):
         # Other meshes each time, so that nothing is cached and both workers order.
         ids += [s.post(scene((240 + 2 * round_ + i, 80), ordering="metis")).json["id"] for i in range(2)]
         time.sleep(delay)
@@ -290,23 +309,21 @@ def test_everything_survives_byte_for_byte(s):
     paths = ["/v1/jobs", "/v1/jobs?tag=a", "/v1/jobs?status=failed"] + [
         f"/v1/jobs/{job_id}{rest}" for job_id in ids
         for rest in ("", "/result", f"/result{ALL_FIELDS}", "/history", "/history.csv", "/history?after=3")]
-    replies = {path: s.get(path) for path in paths}
-    before = {path: (reply.status, reply.body) for path, reply in replies.items()}
+    before = {path: fetch(s, path) for path in paths}
     check(sum(status == 200 for status, _ in before.values()) > 30, [(path, got[0]) for path, got in before.items()])
     for number in (signal.SIGKILL, signal.SIGTERM):
         s.restart(number)
         for path in paths:
-            reply = s.get(path)
-            check((reply.status, reply.body) == before[path], path, "changed:", before[path], reply)
+            check(fetch(s, path) == before[path], path, "changed:", before[path][1][:500], fetch(s, path)[1][:500])
     check_file(s)
 
 
 def test_long_history_survives(s):
     job = s.solve({**scene((60, 20), method="uzawa", stopping="paper", epsilon=1e-9, max_iterations=5000), "tags": []})
-    before = s.get(f"/v1/jobs/{job['id']}/history")
-    check(len(before.json["rows"]) > 1000, len(before.json["rows"]))
+    before = fetch_json(s, f"/v1/jobs/{job['id']}/history")
+    check(len(before["rows"]) > 1000, len(before["rows"]))
     s.restart()
-    check(s.get(f"/v1/jobs/{job['id']}/history").body == before.body, "the history changed")
+    check(fetch_json(s, f"/v1/jobs/{job['id']}/history") == before, "the history changed")
 
 
 def test_database_copied_while_it_ran_is_usable(s):

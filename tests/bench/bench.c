@@ -70,7 +70,9 @@ uz_scene bench_paper_scene(int64_t nx)
     return s;
 }
 
-static double seconds_of_solve(const uz_problem *problem, const uz_settings *settings, uz_cache *cache)
+/* *iterations may be NULL */
+static double seconds_of_solve(const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                               double *iterations)
 {
     uz_error err;
     uz_result *result = NULL;
@@ -81,6 +83,8 @@ static double seconds_of_solve(const uz_problem *problem, const uz_settings *set
         printf("a bench problem did not converge: %s\n", status ? err.message : result->summary.message);
         exit(1);
     }
+    if (iterations)
+        *iterations = (double)result->summary.iterations;
     uz_result_free(result);
     return seconds;
 }
@@ -93,37 +97,90 @@ static bench_ordering better_ordering(const uz_csc *K, const double *p)
                                                                                                     : BENCH_METIS;
 }
 
+typedef struct {
+    uz_problem problem;
+    uz_qp qp;
+    uz_mesh_info info;
+    uz_cache *cache;
+} body;
+
+static void body_begin(body *b, int64_t nx)
+{
+    uz_error err;
+    memset(b, 0, sizeof *b);
+    b->problem.kind = UZ_PROBLEM_SCENE;
+    b->problem.scene = bench_paper_scene(nx);
+    b->cache = uz_cache_new((size_t)4 << 30);
+    if (uz_scene_to_qp(&b->qp, &b->info, &b->problem.scene, &err) != UZ_OK)
+        exit(1);
+}
+
+static void body_end(body *b)
+{
+    uz_cache_free(b->cache);
+    uz_qp_clear(&b->qp);
+    uz_mesh_info_clear(&b->info);
+    uz_scene_clear(&b->problem.scene);
+}
+
 static void bench_body(report *out, int64_t nx, double relative_error)
 {
-    uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES}, scene = {.kind = UZ_PROBLEM_SCENE};
+    uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES};
     uz_settings settings = uz_settings_default();
-    uz_mesh_info info;
-    uz_error err;
-    double cold[RUNS_MOST], cached[RUNS_MOST], linear_s[RUNS_MOST], contact_s[RUNS_MOST];
-    int runs = nx <= 300 ? 11 : nx <= 600 ? 7 : 5;
+    double cold[RUNS_MOST], cached[RUNS_MOST];
+    int runs = nx <= 300 ? 11 : nx <= 600 ? 9 : 5;
     char name[64];
+    body b;
     settings.relative_error = relative_error;
-    scene.scene = bench_paper_scene(nx);
-    if (uz_scene_to_qp(&matrices.qp, &info, &scene.scene, &err) != UZ_OK)
-        exit(1);
-    bench_ordering ordering = better_ordering(&matrices.qp.K, matrices.qp.p);
-    uz_cache *cache = uz_cache_new((size_t)4 << 30);
-    seconds_of_solve(&scene, &settings, cache);
+    body_begin(&b, nx);
+    matrices.qp = b.qp;
+    bench_ordering ordering = better_ordering(&b.qp.K, b.qp.p);
+    for (int k = 0; k < 3; k++)
+        seconds_of_solve(&b.problem, &settings, b.cache, NULL);
     for (int k = 0; k < runs; k++) {
-        bench_linear linear = bench_cholmod(&matrices.qp.K, matrices.qp.p, ordering);
-        linear_s[k] = linear.analyze + linear.factorize + linear.solve;
-        contact_s[k] = seconds_of_solve(&matrices, &settings, NULL);
-        cold[k] = contact_s[k] / linear_s[k];
-        cached[k] = seconds_of_solve(&scene, &settings, cache) / linear.solve;
+        bench_linear linear = bench_cholmod(&b.qp.K, b.qp.p, ordering);
+        double contact = seconds_of_solve(&matrices, &settings, NULL, NULL);
+        cold[k] = contact / (linear.analyze + linear.factorize + linear.solve);
+        cached[k] = seconds_of_solve(&b.problem, &settings, b.cache, NULL) / linear.solve;
     }
     snprintf(name, sizeof name, "cold_nx%lld_%.0e", (long long)nx, relative_error);
     print_row(out, name, "x", bench_summarise(cold, runs), "linear solve (analyse, factorise, solve)");
     snprintf(name, sizeof name, "cached_nx%lld_%.0e", (long long)nx, relative_error);
     print_row(out, name, "x", bench_summarise(cached, runs), "one CHOLMOD solve");
-    uz_cache_free(cache);
-    uz_qp_clear(&matrices.qp);
-    uz_mesh_info_clear(&info);
-    uz_scene_clear(&scene.scene);
+    body_end(&b);
+}
+
+/* What digits cost: solves with the factor cached, in units of one CHOLMOD solve, and the iterations they took. */
+static void bench_accuracy(report *out, uz_method method, double relative_error, body *b)
+{
+    uz_settings settings = uz_settings_default();
+    double samples[RUNS_MOST], iterations = 0.0;
+    char name[64];
+    settings.method = method;
+    settings.relative_error = relative_error;
+    settings.max_iterations = 1000000;
+    for (int k = 0; k < 3; k++)
+        seconds_of_solve(&b->problem, &settings, b->cache, &iterations);
+    for (int k = 0; k < 7; k++) {
+        bench_linear linear = bench_cholmod(&b->qp.K, b->qp.p, BENCH_AMD);
+        samples[k] = seconds_of_solve(&b->problem, &settings, b->cache, &iterations) / linear.solve;
+    }
+    snprintf(name, sizeof name, "accuracy_%s_%.0e", uz_method_name(method), relative_error);
+    print_row(out, name, "x", bench_summarise(samples, 7), "one CHOLMOD solve");
+    strcat(name, "_iterations");
+    print_row(out, name, "", (bench_value){iterations, iterations, iterations, 1}, "");
+}
+
+static void bench_accuracies(report *out)
+{
+    static const double errors[] = {1e-2, 1e-4, 1e-6, 1e-8, 1e-10};
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART};
+    body b;
+    body_begin(&b, 300);
+    for (int m = 0; m < 2; m++)
+        for (int e = 0; e < 5; e++)
+            bench_accuracy(out, methods[m], errors[e], &b);
+    body_end(&b);
 }
 
 static void bench_reader(report *out)
@@ -151,6 +208,8 @@ int main(int argc, char **argv)
     fprintf(out.json, "{\"ratios\": [\n");
     if (wanted(&out, "matrix_market"))
         bench_reader(&out);
+    if (wanted(&out, "accuracy"))
+        bench_accuracies(&out);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {
         bench_body(&out, sizes[i], 1e-6);
         bench_body(&out, sizes[i], 1e-8);

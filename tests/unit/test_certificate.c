@@ -1,0 +1,353 @@
+/* The certificate against the truth: no bound may be below the error of the answer that it bounds. */
+#include "certificate/certificate.h"
+#include "harness.h"
+#include "qp_fixture.h"
+#include "quad_exact.h"
+
+/* e'K^-1 e through a Cholesky factorization in double precision, as accurate as the solver's own. */
+typedef struct {
+    int64_t d;
+    double *L, *room;
+    double rcond;
+} inverse;
+
+static inverse make_inverse(const uz_csc *K)
+{
+    int64_t d = K->cols;
+    inverse f = {d, vector(d * d), vector(d), 0};
+    double least = INFINITY, largest = 0;
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            f.L[K->idx[k] * d + j] = K->val[k];
+    for (int64_t i = 0; i < d; i++)
+        for (int64_t j = 0; j <= i; j++) {
+            double sum = f.L[i * d + j];
+            for (int64_t k = 0; k < j; k++)
+                sum -= f.L[i * d + k] * f.L[j * d + k];
+            f.L[i * d + j] = i == j ? sqrt(sum) : sum / f.L[j * d + j];
+        }
+    for (int64_t i = 0; i < d; i++) {
+        least = fmin(least, f.L[i * d + i]);
+        largest = fmax(largest, f.L[i * d + i]);
+    }
+    f.rcond = (least / largest) * (least / largest);
+    return f;
+}
+
+static void free_inverse(inverse *f)
+{
+    free(f->L);
+    free(f->room);
+}
+
+static uz_status inverse_norm(void *ctx, double *value, const double *e, uz_error *err)
+{
+    inverse *f = ctx;
+    (void)err;
+    *value = 0;
+    for (int64_t i = 0; i < f->d; i++) {
+        double x = e[i];
+        for (int64_t k = 0; k < i; k++)
+            x -= f->L[i * f->d + k] * f->room[k];
+        f->room[i] = x / f->L[i * f->d + i];
+        *value += f->room[i] * f->room[i];
+    }
+    return UZ_OK;
+}
+
+/* One problem, its exact solution and what the certificate needs. */
+typedef struct {
+    uz_qp qp;
+    quad_exact exact;
+    inverse inv;
+    double *u, *r, *g; /* the pair under test */
+} bench;
+
+static bench make_bench(uz_qp qp)
+{
+    bench b = {.qp = qp, .inv = make_inverse(&qp.K), .u = vector(qp.K.cols), .r = vector(qp.N.rows)};
+    b.g = vector(qp.N.rows);
+    return b;
+}
+
+static bool solve_bench(bench *b, const bool *start)
+{
+    bool ok = quad_exact_solve(&b->exact, &b->qp, start);
+    CHECK(ok);
+    CHECK_MSG(b->exact.violation < (quad)1e-22, "the exact solution violates its conditions by %g",
+              (double)b->exact.violation);
+    return ok && b->exact.violation < (quad)1e-22;
+}
+
+static void free_bench(bench *b)
+{
+    quad_exact_free(&b->exact);
+    free_inverse(&b->inv);
+    uz_qp_clear(&b->qp);
+    free(b->u);
+    free(b->r);
+    free(b->g);
+}
+
+static uz_certify_input input_of(bench *b)
+{
+    return (uz_certify_input){.K = &b->qp.K,
+                              .N = &b->qp.N,
+                              .p = b->qp.p,
+                              .h = b->qp.h,
+                              .inverse_norm = inverse_norm,
+                              .ctx = &b->inv,
+                              .rcond = b->inv.rcond,
+                              .inverse_bound = INFINITY};
+}
+
+/* Certifies the pair and checks the bounds. Returns bound / error of u, NaN where that says nothing. */
+static double check_pair(bench *b, const char *what)
+{
+    uz_certify_input in = input_of(b);
+    uz_certificate c;
+    uz_error err = {0};
+    CHECK_INT(uz_certify(&c, b->r, b->g, b->u, &in, &err), UZ_OK);
+    double error_u = quad_error(&b->exact, b->u), error_r = quad_error_of_reactions(&b->exact, b->r);
+    double norm = (double)quad_sqrt(b->exact.norm2);
+    CHECK_MSG(c.absolute_error >= error_u, "%s: d %d m %d: u is off by %.17g, bound %.17g", what, (int)b->exact.d,
+              (int)b->exact.m, error_u, c.absolute_error);
+    CHECK_MSG(c.absolute_error >= error_r, "%s: d %d m %d: u_r is off by %.17g, bound %.17g", what, (int)b->exact.d,
+              (int)b->exact.m, error_r, c.absolute_error);
+    CHECK_MSG(!(c.relative_error * norm < error_u), "%s: relative bound %.17g, true %.17g", what, c.relative_error,
+              error_u / norm);
+    CHECK(c.gap >= 0 && !isnan(c.relative_error) && c.residual.e3 >= 0);
+    for (int64_t i = 0; i < b->exact.m; i++)
+        CHECK(b->r[i] <= 0);
+    double error = fmax(error_u, error_r);
+    return error > 0 ? c.absolute_error / error : NAN;
+}
+
+static void take_exact(bench *b)
+{
+    for (int64_t j = 0; j < b->exact.d; j++)
+        b->u[j] = (double)b->exact.u[j];
+    for (int64_t i = 0; i < b->exact.m; i++)
+        b->r[i] = (double)b->exact.r[i];
+}
+
+/* u and r with errors of relative size `size`; r stays <= 0 and keeps its zeros. */
+static void take_perturbed(bench *b, qp_random *rng, double size, bool keep_zeros)
+{
+    double r_scale = 0;
+    take_exact(b);
+    for (int64_t j = 0; j < b->exact.d; j++)
+        b->u[j] *= 1 + size * random_signed(rng);
+    for (int64_t i = 0; i < b->exact.m; i++)
+        r_scale = fmax(r_scale, fabs(b->r[i]));
+    for (int64_t i = 0; i < b->exact.m; i++) {
+        b->r[i] *= 1 + size * random_signed(rng);
+        if (!keep_zeros)
+            b->r[i] = fmin(0, b->r[i] + size * r_scale * random_signed(rng));
+    }
+}
+
+/* The bounds' ratios to the errors that were seen. */
+typedef struct {
+    double value[8192];
+    int count;
+} ratios;
+
+static void keep_ratio(ratios *all, double ratio)
+{
+    if (!isnan(ratio) && all->count < 8192)
+        all->value[all->count++] = ratio;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double median(ratios *all)
+{
+    qsort(all->value, (size_t)all->count, sizeof *all->value, by_value);
+    return all->count ? all->value[all->count / 2] : NAN;
+}
+
+static void check_many_pairs(bench *b, qp_random *rng, ratios *near)
+{
+    take_exact(b);
+    keep_ratio(near, check_pair(b, "rounded"));
+    for (int digits = 1; digits <= 16; digits += 3) {
+        take_perturbed(b, rng, pow(10, -digits), digits % 2 == 0);
+        double ratio = check_pair(b, "perturbed");
+        if (digits >= 4)
+            keep_ratio(near, ratio);
+    }
+    for (int64_t i = 0; i < b->exact.m; i++)
+        b->r[i] = -10 * random_unit(rng) * (random_unit(rng) < 0.5);
+    check_pair(b, "random r");
+    for (int64_t j = 0; j < b->exact.d; j++)
+        b->u[j] = 5 * random_signed(rng);
+    check_pair(b, "random pair");
+    memset(b->r, 0, (size_t)b->exact.m * sizeof *b->r);
+    memset(b->u, 0, (size_t)b->exact.d * sizeof *b->u);
+    check_pair(b, "zero pair");
+}
+
+static void check_kind(const char *name, qp_kind kind, int problems, double sharp)
+{
+    ratios near = {.count = 0};
+    qp_random rng = {(uint64_t)(kind.d * 1000 + kind.m) + (uint64_t)name[0]};
+    for (int k = 0; k < problems; k++) {
+        qp_kind one = kind;
+        one.d = random_int(&rng, 1, kind.d + 1);
+        one.m = random_int(&rng, kind.m / 2, kind.m + 1);
+        bench b = make_bench(random_qp(&rng, &one));
+        if (solve_bench(&b, NULL))
+            check_many_pairs(&b, &rng, &near);
+        free_bench(&b);
+    }
+    double middle = median(&near);
+    int loose = 0;
+    for (int i = 0; i < near.count; i++)
+        loose += !(near.value[i] < 1e4);
+    printf("# %s: bound / error, median of %d: %.3g, largest %.3g, loose %d\n", name, near.count, middle,
+           near.count ? near.value[near.count - 1] : NAN, loose);
+    CHECK_MSG(median(&near) < sharp, "%s: median ratio %g", name, median(&near));
+}
+
+TEST(independent_rows)
+{
+    check_kind("plain", (qp_kind){.d = 12, .m = 6, .condition = 100}, 60, 10);
+}
+
+TEST(more_rows_than_dofs)
+{
+    check_kind("many rows", (qp_kind){.d = 5, .m = 10, .condition = 100}, 60, 50);
+}
+
+TEST(dependent_rows)
+{
+    check_kind("dependent", (qp_kind){.d = 12, .m = 10, .condition = 100, .dependent = true}, 60, 50);
+}
+
+TEST(badly_scaled_rows)
+{
+    check_kind("scaled", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true}, 60, 50);
+    check_kind("both", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true, .dependent = true}, 60, 50);
+}
+
+TEST(ill_conditioned_stiffness)
+{
+    check_kind("1e6", (qp_kind){.d = 12, .m = 8, .condition = 1e6}, 40, 50);
+    check_kind("1e9", (qp_kind){.d = 12, .m = 8, .condition = 1e9}, 40, 50);
+    check_kind("1e12", (qp_kind){.d = 12, .m = 8, .condition = 1e12}, 40, 50);
+    check_kind("1e12d", (qp_kind){.d = 12, .m = 10, .condition = 1e12, .dependent = true}, 40, 200);
+}
+
+TEST(zero_rows)
+{
+    check_kind("zero row", (qp_kind){.d = 8, .m = 6, .condition = 100, .zero_row = true}, 30, 50);
+}
+
+TEST(no_rows)
+{
+    qp_random rng = {7};
+    qp_kind kind = {.d = 9, .m = 0, .condition = 1e4};
+    ratios near = {.count = 0};
+    bench b = make_bench(random_qp(&rng, &kind));
+    if (solve_bench(&b, NULL))
+        check_many_pairs(&b, &rng, &near);
+    CHECK(median(&near) < 10);
+    free_bench(&b);
+}
+
+/* p and h such that a chosen displacement, active set and reactions are the solution, up to the rounding of p and h:
+ * the exact solution of the rounded problem has the same active set. */
+static uz_qp build_backwards(qp_random *rng, int64_t d, int64_t m, bool *active)
+{
+    qp_kind kind = {.d = d, .m = m, .condition = 1e4};
+    uz_qp qp = random_qp(rng, &kind);
+    double *u = vector(d), *r = vector(m), *Nu = vector(m);
+    for (int64_t j = 0; j < d; j++)
+        u[j] = random_signed(rng);
+    for (int64_t i = 0; i < m; i++) {
+        active[i] = random_unit(rng) < 0.5;
+        r[i] = active[i] ? -0.1 - random_unit(rng) : 0;
+    }
+    uz_csc_gaxpy(Nu, &qp.N, 1, u);
+    for (int64_t i = 0; i < m; i++)
+        qp.h[i] = Nu[i] + (active[i] ? 0 : 0.1 + random_unit(rng));
+    memset(qp.p, 0, (size_t)d * sizeof *qp.p);
+    uz_csc_symv(qp.p, &qp.K, 1, u);
+    uz_csc_gaxpy_t(qp.p, &qp.N, -1, r);
+    free(u);
+    free(r);
+    free(Nu);
+    return qp;
+}
+
+TEST(problems_built_from_their_solution)
+{
+    ratios near = {.count = 0};
+    qp_random rng = {11};
+    for (int k = 0; k < 6; k++) {
+        bool active[40];
+        bench b = make_bench(build_backwards(&rng, 50, random_int(&rng, 10, 41), active));
+        if (solve_bench(&b, active)) {
+            for (int64_t i = 0; i < b.exact.m; i++)
+                CHECK_INT(b.exact.active[i], active[i]);
+            check_many_pairs(&b, &rng, &near);
+        }
+        free_bench(&b);
+    }
+    CHECK_MSG(median(&near) < 50, "median ratio %g", median(&near));
+}
+
+/* Of the pair: u* itself with r = r*: nothing but rounding may be left. */
+TEST(rounded_solution_is_certified_to_rounding)
+{
+    qp_random rng = {13};
+    for (int k = 0; k < 30; k++) {
+        qp_kind kind = {.d = 10, .m = 6, .condition = 100};
+        bench b = make_bench(random_qp(&rng, &kind));
+        if (solve_bench(&b, NULL)) {
+            uz_certify_input in = input_of(&b);
+            uz_certificate c;
+            take_exact(&b);
+            CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+            CHECK_MSG(c.relative_error < 1e-13, "relative error %g", c.relative_error);
+            CHECK_REL(c.energy_primal, (double)b.exact.energy, 1e-12);
+            CHECK_REL(c.energy_norm, (double)quad_sqrt(b.exact.norm2), 1e-13);
+        }
+        free_bench(&b);
+    }
+}
+
+TEST(pulling_reactions_are_cut_and_counted)
+{
+    qp_random rng = {17};
+    qp_kind kind = {.d = 6, .m = 4, .condition = 10};
+    bench b = make_bench(random_qp(&rng, &kind));
+    uz_certify_input in = input_of(&b);
+    uz_certificate c;
+    b.r[0] = 3;
+    b.r[1] = -1;
+    b.r[2] = 4;
+    CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+    CHECK(b.r[0] == 0 && b.r[1] == -1 && b.r[2] == 0);
+    CHECK_REL(c.residual.e3, 5.0, 1e-15);
+    free_bench(&b);
+}
+
+/* Two rows that exclude each other: no feasible displacement, so nothing is bounded. */
+TEST(contradicting_rows_have_no_bound)
+{
+    double K[] = {2}, N[] = {1, -1};
+    uz_qp qp = {csc_from_dense(K, 1, 1, true), csc_from_dense(N, 2, 1, false), vector(1), vector(2)};
+    qp.h[0] = -1;
+    bench b = make_bench(qp);
+    uz_certify_input in = input_of(&b);
+    uz_certificate c;
+    CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+    CHECK(isinf(c.absolute_error) && isinf(c.relative_error) && isinf(c.gap));
+    free_bench(&b);
+}
