@@ -98,8 +98,9 @@ static uz_status recover_and_certify(uz_run *run, uz_error *err)
         .sharp = 0.5 * run->requested,
     };
     double start = uz_seconds();
-    memcpy(result->r, run->it.best_r, (size_t)run->m * sizeof *result->r);
-    uz_status status = uz_case_recover(run->load, run->u, result->r, isfinite(run->it.best_bound), err);
+    uz_status status = uz_case_recover(run->load, run->u, run->it.best_r, isfinite(run->it.best_bound), err);
+    for (int64_t i = 0; i < run->m; i++)
+        result->r[i] = uz_case_row_scale(run->load)[i] * run->it.best_r[i];
     if (status == UZ_OK)
         status = uz_certify(&result->summary.certificate, result->r, result->g, run->u, &input, err);
     result->summary.timings.certify += uz_seconds() - start;
@@ -125,7 +126,12 @@ static uz_status prove_infeasible(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
     const uz_csc *N = uz_body_N(run->body, run->problem);
-    double length = uz_gap_length(N, run->h, uz_case_g0(run->load), run->it.gamma);
+    const double *scale = uz_case_row_scale(run->load), *g0 = uz_case_g0(run->load);
+    for (int64_t i = 0; i < run->m; i++) {
+        run->it.ray[i] *= scale[i];
+        run->it.r_next[i] = g0[i] / scale[i];
+    }
+    double length = uz_gap_length(N, run->h, run->it.r_next, run->it.gamma);
     double radius = uz_ray_radius(run->it.ray, N, run->h);
     if (!(radius > UZ_RAY_FACTOR * length))
         return UZ_OK;

@@ -20,6 +20,7 @@ typedef struct {
     const uz_certify_input *in;
     uz_csc Nt;          /* d x m */
     double *weight;     /* d: W = diag(K)^-1 */
+    double *size;       /* m: see size_rows */
     double *correction; /* d: v = u + correction */
     uz_row_move move;   /* m each */
     uz_residuals res;   /* d each */
@@ -43,13 +44,14 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, uz_error *err
     c->d = in->K->rows;
     c->m = in->N->rows;
     c->weight = uz_alloc(c->d, sizeof(double));
+    c->size = uz_alloc_zero(c->m, sizeof(double));
     c->correction = uz_alloc_zero(c->d, sizeof(double));
     double **room[] = {&c->res.e, &c->res.e_u, &c->res.Ku, &c->res.Kc};
     bool ok = true;
     for (int k = 0; k < 4; k++)
         ok = (*room[k] = uz_alloc(c->d, sizeof(double))) && ok;
     ok = uz_row_move_init(&c->move, c->d, c->m) && ok;
-    if (!ok || !c->weight || !c->correction)
+    if (!ok || !c->weight || !c->size || !c->correction)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->d);
     for (int64_t j = 0; j < c->d; j++) {
         int64_t first = in->K->ptr[j];
@@ -63,6 +65,7 @@ static void release(certifier *c)
 {
     uz_csc_clear(&c->Nt);
     free(c->weight);
+    free(c->size);
     free(c->correction);
     uz_row_move_clear(&c->move);
     free(c->res.e);
@@ -95,8 +98,27 @@ static bool worth_closing(const certifier *c, const double *r, int64_t i, double
     return r[i] < 0.0 && gap <= -2.0 * r[i] * compliance(c, i);
 }
 
+/* What the rounding of a gap is relative to: the displacements and openings of the problem at large, max over rows of
+ * (|h_i| + |n_i|'|u|) / ||n_i||_1, times the ||n_i||_1 of the row. */
+static void size_rows(const certifier *c, const double *u)
+{
+    double length = 0.0;
+    for (int64_t i = 0; i < c->m; i++) {
+        double size = fabs(c->in->h[i]);
+        c->size[i] = 0.0;
+        for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++) {
+            size += fabs(c->Nt.val[k] * u[c->Nt.idx[k]]);
+            c->size[i] += fabs(c->Nt.val[k]);
+        }
+        if (c->size[i] > 0.0)
+            length = fmax(length, size / c->size[i]);
+    }
+    for (int64_t i = 0; i < c->m; i++)
+        c->size[i] *= length;
+}
+
 /* The rows to move in this round and by how much: target_i is the gap to take away, 0 for rows left alone. Returns the
- * worst violation. */
+ * worst violation, relative to the size of its row. */
 static double choose_rows(const certifier *c, const double *r, const double *g, bool closing)
 {
     double worst = 0.0;
@@ -105,7 +127,7 @@ static double choose_rows(const certifier *c, const double *r, const double *g, 
         bool close = closing && worth_closing(c, r, i, fabs(gap));
         c->move.in[i] = close || gap < 0.0;
         c->move.target[i] = c->move.in[i] ? gap : 0.0;
-        worst = fmax(worst, -gap);
+        worst = isnan(gap) ? INFINITY : gap < 0.0 ? fmax(worst, -gap / c->size[i]) : worst;
     }
     return worst;
 }
@@ -113,18 +135,16 @@ static double choose_rows(const certifier *c, const double *r, const double *g, 
 /* Fills the correction round by round: first it closes gaps, later, where dependent rows can't all be closed, it only
  * lifts penetrating rows. Each round starts from gaps in twofold precision, so what rounding left is moved by the next.
  * True when no gap of u + c is negative by more than the rounding of twofold arithmetic. */
-static bool make_feasible(certifier *c, const double *r, const double *g)
+static bool make_feasible(certifier *c, const double *u, const double *r, const double *g)
 {
-    double scale = 0.0;
-    for (int64_t i = 0; i < c->m; i++)
-        scale = fmax(scale, fmax(fabs(g[i]), fabs(c->in->h[i])));
+    size_rows(c, u);
     for (int round = 0; round < MAX_ROUNDS; round++) {
         double worst = choose_rows(c, r, g, round < CLOSING_ROUNDS);
-        if (round >= LEAST_ROUNDS && worst <= NEGLIGIBLE * scale)
+        if (round >= LEAST_ROUNDS && worst <= NEGLIGIBLE)
             return true;
         uz_row_move_solve(&c->move, c->correction, &c->Nt, c->weight);
     }
-    return choose_rows(c, r, g, false) <= NEGLIGIBLE * scale;
+    return choose_rows(c, r, g, false) <= NEGLIGIBLE;
 }
 
 /* Paper, section 4. */
@@ -191,7 +211,7 @@ static uz_status distances(const certifier *c, double *square, double *correctio
     if (!bound_cheaply(c, square, u))
         status = c->in->inverse_norm(c->in->ctx, square, c->res.e, err);
     *square *= trust * trust;
-    *correction_norm = sqrt(fmax(0.0, energy));
+    *correction_norm = isnan(energy) ? INFINITY : sqrt(fmax(0.0, energy));
     return status;
 }
 
@@ -221,7 +241,7 @@ static uz_status measure(certifier *c, uz_certificate *out, const double *u, con
     double square = INFINITY, correction_norm = INFINITY, complementarity = 0.0;
     for (int64_t i = 0; i < c->m; i++)
         g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, u);
-    bool feasible = make_feasible(c, r, g);
+    bool feasible = make_feasible(c, u, r, g);
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, u, c->correction, r, err);
     if (status == UZ_OK && feasible)
         status = distances(c, &square, &correction_norm, u, err);
@@ -230,6 +250,8 @@ static uz_status measure(certifier *c, uz_certificate *out, const double *u, con
     for (int64_t i = 0; i < c->m; i++)
         complementarity -= r[i] * fmax(0.0, corrected_gap(c, g, i));
     out->gap = feasible ? 0.5 * square + complementarity : INFINITY;
+    if (isnan(out->gap)) /* overflow on the way */
+        out->gap = INFINITY;
     energies(c, out, u);
     out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;
     out->relative_error = relative_to_exact(out->absolute_error, out->energy_norm);

@@ -52,6 +52,32 @@ static void lazy_free(uz_dual_lazy *lazy)
     free(lazy);
 }
 
+/* 2^-k with 2^k nearest to the norm of the row (in the ratio's sense); 1 for a row of zeros. */
+static double nearest_scale(double norm)
+{
+    int exponent;
+    if (!(norm > 0.0))
+        return 1.0;
+    if (frexp(norm, &exponent) < M_SQRT1_2)
+        exponent--;
+    return ldexp(1.0, -exponent);
+}
+
+static uz_status scale_rows(uz_dual *dual, uz_error *err)
+{
+    uz_csc *N = &dual->N;
+    dual->row_scale = uz_alloc_zero(N->rows, sizeof(double));
+    if (!dual->row_scale)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)N->rows);
+    for (int64_t k = 0; k < N->ptr[N->cols]; k++)
+        dual->row_scale[N->idx[k]] = hypot(dual->row_scale[N->idx[k]], N->val[k]);
+    for (int64_t i = 0; i < N->rows; i++)
+        dual->row_scale[i] = nearest_scale(dual->row_scale[i]);
+    for (int64_t k = 0; k < N->ptr[N->cols]; k++)
+        N->val[k] *= dual->row_scale[N->idx[k]];
+    return UZ_OK;
+}
+
 uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
                          uz_error *err)
 {
@@ -70,7 +96,9 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
     if (status == UZ_OK)
         status = uz_csc_copy(&dual->N, N, err);
     if (status == UZ_OK)
-        status = uz_csc_transpose(&dual->Nt, N, err);
+        status = scale_rows(dual, err);
+    if (status == UZ_OK)
+        status = uz_csc_transpose(&dual->Nt, &dual->N, err);
     dual->info.bytes = 48 * (size_t)N->ptr[N->cols];
     if (status == UZ_OK && op == UZ_OPERATOR_CONDENSED)
         status = uz_condensed_create(dual, err);
@@ -88,6 +116,7 @@ void uz_dual_free(uz_dual *dual)
     if (!dual)
         return;
     uz_csc_clear(&dual->N);
+    free(dual->row_scale);
     uz_csc_clear(&dual->Nt);
     uz_condensed_clear(&dual->dense);
     lazy_free(dual->lazy);
@@ -99,11 +128,12 @@ uz_dual_info uz_dual_describe(const uz_dual *dual)
     return dual->info;
 }
 
-static bool allocate_load(uz_case *load)
+static bool allocate_case(uz_case *load)
 {
     int64_t d = load->dual->info.d, m = load->dual->info.m, room = d > m ? d : m;
     load->ws = uz_factor_workspace_new();
     load->base = uz_alloc_zero(d, sizeof(double));
+    load->h = uz_alloc_zero(m, sizeof(double));
     load->g0 = uz_alloc_zero(m, sizeof(double));
     load->response = uz_alloc_zero(load->dual->info.op == UZ_OPERATOR_FACTORED ? d : 0, sizeof(double));
     load->apply_room =
@@ -112,8 +142,8 @@ static bool allocate_load(uz_case *load)
     load->work2 = uz_alloc_zero(room, sizeof(double));
     load->push = uz_alloc_zero(d, sizeof(double));
     load->kept = uz_alloc_zero(d, sizeof(double));
-    return load->ws && load->apply_room && load->base && load->g0 && load->response && load->work && load->work2 &&
-           load->push && load->kept;
+    return load->ws && load->apply_room && load->h && load->base && load->g0 && load->response && load->work &&
+           load->work2 && load->push && load->kept;
 }
 
 uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
@@ -125,10 +155,11 @@ uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, co
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
     load->dual = dual;
     load->K = K;
-    load->h = h;
     uz_status status = UZ_OK;
-    if (!allocate_load(load))
+    if (!allocate_case(load))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->info.d);
+    for (int64_t i = 0; status == UZ_OK && i < dual->info.m; i++)
+        load->h[i] = dual->row_scale[i] * h[i];
     if (status == UZ_OK)
         status =
             dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_load(load, p, err) : uz_factored_load(load, p, err);
@@ -145,6 +176,7 @@ void uz_case_free(uz_case *load)
         return;
     uz_factor_workspace_free(load->ws);
     free(load->base);
+    free(load->h);
     free(load->g0);
     free(load->response);
     free(load->apply_room);
@@ -159,6 +191,11 @@ void uz_case_free(uz_case *load)
 const double *uz_case_g0(const uz_case *load)
 {
     return load->g0;
+}
+
+const double *uz_case_row_scale(const uz_case *load)
+{
+    return load->dual->row_scale;
 }
 
 const double *uz_case_h(const uz_case *load)

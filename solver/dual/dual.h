@@ -5,6 +5,9 @@
  * The methods see only this interface: apply, push, recover, and the numbers of uz_case. Behind it stand two forms:
  *   condensed  dense D on the contact, from the trailing block of a factor with the contact dofs last;
  *   factored   one sparse solve per application (Kanno's form).
+ * Rows of N are scaled to a norm of about 1 by powers of two, so that how a caller wrote a condition changes nothing
+ * but exponents; unit normals stay as they are. All m-vectors of this interface are those of the scaled rows.
+ *
  * A uz_dual is immutable once created and shared by threads; a uz_case belongs to one thread. */
 #ifndef UZ_DUAL_H
 #define UZ_DUAL_H
@@ -23,8 +26,9 @@ typedef struct {
 /* The form that AUTO stands for, from the sizes (n_b: dofs that N touches). */
 uz_operator uz_dual_choose(int64_t d, int64_t m, int64_t n_b, uz_operator asked);
 
-/* The factor stays the caller's and must outlive *out; N (m x d) is copied. When op is CONDENSED the factor's last
- * dofs must be the ones that N touches: uz_dual_contact_dofs lists them, ascending; the caller frees *dofs. */
+/* The factor stays the caller's and must outlive *out; N (m x d) is copied, and scaled. When op is CONDENSED the
+ * factor's last dofs must be the ones that N touches: uz_dual_contact_dofs lists them, ascending; the caller frees
+ * *dofs. */
 uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
                          uz_error *err);
 void uz_dual_free(uz_dual *dual);
@@ -78,6 +82,9 @@ bool uz_case_is_scaled(const uz_case *load);
 uz_status uz_case_project_ray(const uz_case *load, double *y, uz_error *err);
 const double *uz_case_h(const uz_case *load);
 const uz_csc *uz_case_N(const uz_case *load);
+/* m: the powers of two by which rows of N and h were multiplied: a gap here is scale x the caller's, a caller's
+ * reaction is scale x the one here. */
+const double *uz_case_row_scale(const uz_case *load);
 
 /* Largest eigenvalue of a symmetric positive semidefinite operator of order m by Lanczos with full
  * reorthogonalisation: Ritz value plus residual bound, relative accuracy `tolerance`. */

@@ -32,7 +32,8 @@ typedef struct {
 
 struct uz_dual {
     uz_dual_info info;
-    uz_csc N; /* m x d */
+    uz_csc N;          /* m x d, rows scaled */
+    double *row_scale; /* m: powers of two */
     const uz_factor *factor;
     uz_csc Nt;          /* d x m */
     uz_condensed dense; /* CONDENSED */
@@ -42,7 +43,7 @@ struct uz_dual {
 struct uz_case {
     const uz_dual *dual;
     const uz_csc *K; /* d x d lower triangle, borrowed */
-    const double *h; /* m, borrowed */
+    double *h;       /* m: scaled */
     uz_factor_workspace *ws;
     double *base; /* d: CONDENSED y = L^-1 P p in the factor's order; FACTORED u0 = K^-1 p */
     double *g0;   /* m */

@@ -17,14 +17,15 @@ static void swap(double **a, double **b)
     *b = t;
 }
 
-/* r(k+1) = min(0, rho + alpha gamma). Returns ||rho - r(k+1)||. */
-static double project(uz_iterate *it, const double *g0)
+/* r(k+1) = min(0, rho + alpha gamma). Returns ||rho - r(k+1)||, in the caller's forces. */
+static double project(uz_iterate *it, const uz_case *load)
 {
+    const double *g0 = uz_case_g0(load), *scale = uz_case_row_scale(load);
     double square = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
         it->gamma[i] = g0[i] - it->Drho[i];
         it->r_next[i] = fmin(0.0, it->rho[i] + it->alpha * it->gamma[i]);
-        double step = it->rho[i] - it->r_next[i];
+        double step = scale[i] * (it->rho[i] - it->r_next[i]);
         square += step * step;
     }
     return sqrt(square);
@@ -107,7 +108,7 @@ static bool should_end(uz_end *end, const uz_iterate *it, const uz_method_option
 static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *options, double *step_norm, bool *restart,
                       uz_error *err)
 {
-    *step_norm = project(it, uz_case_g0(load));
+    *step_norm = project(it, load);
     uz_status status = uz_case_apply(load, it->Dr_next, it->r_next, err);
     it->iteration++;
     *restart = status == UZ_OK && step_too_long(it);

@@ -71,11 +71,11 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_case *load, uz_method by, uz_error
 /* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
 static uz_residual residual(uz_iterate *it, uz_case *load)
 {
-    const double *g0 = uz_case_g0(load);
+    const double *g0 = uz_case_g0(load), *scale = uz_case_row_scale(load);
     uz_residual e = {0};
     double e2 = 0.0, e4 = 0.0, *difference = it->r_next;
     for (int64_t i = 0; i < it->m; i++) {
-        double gap = g0[i] - it->Drho[i], complementarity = gap * it->r[i], penetration = fmin(gap, 0.0);
+        double gap = g0[i] - it->Drho[i], complementarity = gap * it->r[i], penetration = fmin(gap, 0.0) / scale[i];
         difference[i] = it->rho[i] - it->r[i];
         e2 += penetration * penetration;
         e4 += complementarity * complementarity;

@@ -8,7 +8,7 @@ import socket
 import time
 
 import service
-from service import MATRICES, SCENE, check, expect, head_of, options, read_all
+from service import MATRICES, SCENE, check, expect, head_of, read_all
 
 BODY = json.dumps(MATRICES)
 AS_JSON = {"Content-Type": "application/json"}
@@ -117,7 +117,8 @@ def test_not_finite_in_matrix_market(s):
 def test_huge_but_finite_numbers(s):
     """Products that overflow must not end as an answer that says converged."""
     for member, value in (("p", [1e308, 1e308]), ("h", [1e308]), ("p", [1e-320, 1e-320]), ("h", [-1e308]),
-                          ("K", symmetric(2, "1 1 1e308", "2 2 1e308")), ("K", symmetric(2, "1 1 1e-308", "2 2 1e-308")),
+                          ("K", symmetric(2, "1 1 1e308", "2 2 1e308")),
+                          ("K", symmetric(2, "1 1 1e-308", "2 2 1e-308")),
                           ("N", BANNER + "general\n1 2 1\n1 1 1e308\n"),
                           ("N", BANNER + "general\n1 2 1\n1 1 1e-308\n")):
         job = s.solve(matrices(**{member: value}))
@@ -166,7 +167,8 @@ def test_stiffness_not_positive_definite(s):
 
 def test_sizes_that_disagree(s):
     vector = "%%MatrixMarket matrix array real general\n{0} 1\n" + "1\n" * 7
-    refused(s, matrices(N=BANNER + "general\n1 3 1\n1 1 1\n"), 422, "size_mismatch", "/problem/N", says=("1 x 3", "2 x 2"))
+    refused(s, matrices(N=BANNER + "general\n1 3 1\n1 1 1\n"), 422, "size_mismatch", "/problem/N",
+            says=("1 x 3", "2 x 2"))
     refused(s, matrices(N=BANNER + "general\n1 1 1\n1 1 1\n"), 422, "size_mismatch", "/problem/N")
     refused(s, matrices(N=BANNER + "general\n2 1 1\n1 1 1\n"), 422, "size_mismatch", "/problem/N")  # its transpose
     for h in ([], [0.5, 1], [0.5] * 30000, vector.format(7)):
@@ -193,8 +195,9 @@ def test_no_contact_rows(s):
 
 def test_no_contact_takes_no_iteration(s):
     """Where nothing can touch or nothing does, the method that is chosen by itself iterates no more than the others."""
+    upward = [{"on": "right", "traction": [0, 0.5]}]
     for request in (matrices(N=None, h=None), matrices(h=[100]), scene(lambda problem: problem.pop("contacts"), {}),
-                    scene(lambda problem: problem["loads"].pop(0) and problem["loads"][0].update(traction=[0, 0.5]), {})):
+                    scene(lambda problem: problem.update(loads=upward), {})):
         summary, _ = solved(s, request)
         check(summary["iterations"] == 0 and summary["contact"]["active"] == 0, request, summary)
 
@@ -456,7 +459,8 @@ def test_body_of_the_limit(s):
 
 def test_two_content_lengths(s):
     for first, second in ((len(BODY), len(BODY)), (len(BODY), 5), (0, len(BODY))):
-        data, closed = s.raw(HEAD + b"Content-Length: %d\r\nContent-Length: %d\r\n\r\n" % (first, second) + BODY.encode())
+        lines = b"Content-Length: %d\r\nContent-Length: %d\r\n\r\n" % (first, second)
+        data, closed = s.raw(HEAD + lines + BODY.encode())
         status, fields, body = head_of(data)
         check(status == 400 and closed and data.count(b"HTTP/1.1 ") == 1, data)
         check(json.loads(body)["detail"] and "Content-Length" in json.loads(body)["detail"], body)
@@ -464,7 +468,8 @@ def test_two_content_lengths(s):
 
 
 def test_wrong_content_type(s):
-    for wrong in ("text/plain", "application/xml", "application/x-www-form-urlencoded", "multipart/form-data; boundary=x"):
+    for wrong in ("text/plain", "application/xml", "application/x-www-form-urlencoded",
+                  "multipart/form-data; boundary=x"):
         reply = expect(s.request("POST", "/v1/jobs", BODY.encode(), {"Content-Type": wrong}), 415, "content_type")
         check("application/json" in reply.json["detail"], reply)
     is_well(s)

@@ -6,11 +6,10 @@ have the reactions with the opposite sign and were solved by other programs.
 import copy
 import json
 import math
-import os
 
 import service
 from matrices import Matrix, cholesky_solve, dot
-from service import MATRICES, ROOT, Skip, check, expect, options
+from service import MATRICES, ROOT, Skip, check, expect
 
 CASES = ROOT.parent / "shared" / "cases"
 OURS = ROOT / "tests" / "data" / "qp"
@@ -91,6 +90,8 @@ def check_optimality(case, summary, result):
 
 
 def test_small_cases(s):
+    if not OURS.is_dir():
+        raise Skip("tests/data/qp is not here")
     found = sorted(path.parent for path in OURS.glob("*/ref.json"))
     check(len(found) >= 5, f"{OURS} has {len(found)} problems")
     for path in found:

@@ -1,0 +1,203 @@
+/* judge.h: is what a solve claims true?  Answers, bounds and proofs are compared with the exact solution, in quadruple
+ * precision, of the problem in exactly these doubles. */
+#ifndef TESTS_JUDGE_H
+#define TESTS_JUDGE_H
+
+#include "quad_exact.h"
+#include "uzawa.h"
+
+#include <math.h>
+#include <stdio.h>
+
+typedef enum {
+    JUDGED_OK,
+    JUDGED_WRONG,    /* a claim is false: an error above the bound or above the request, a proof that proves nothing */
+    JUDGED_UNCERTAIN /* the reference itself is not exact enough to say */
+} verdict;
+
+/* The problem's own truth. Free with truth_clear. */
+typedef struct {
+    bool definite;   /* K is positive definite; without that nothing else is known */
+    bool feasible;   /* some displacement meets all rows */
+    quad_exact best; /* where both hold */
+    quad norm;       /* ||u*||_K */
+    quad noise;      /* of the reference: about ||error||_K, from the optimality conditions in the original data */
+} truth;
+
+typedef struct {
+    verdict verdict;
+    double certified; /* relative error claimed; NaN: nothing claimed */
+    double error;     /* relative error of u, in truth */
+    double ratio;     /* certified / error; NaN where the answer is exact or nothing is bounded */
+    char why[160];
+} judgement;
+
+static inline bool is_definite(const uz_csc *K)
+{
+    int64_t d = K->cols, stop;
+    quad *L = quad_zeros(d * d);
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            L[K->idx[k] * d + j] = K->val[k];
+    bool definite = quad_cholesky(L, d, NULL, 0, &stop);
+    free(L);
+    return definite;
+}
+
+/* K u - p - N'r and h - N u from the doubles of the problem. */
+static inline void measure_residuals(quad *force, quad *gap, const quad_exact *x)
+{
+    const uz_csc *K = &x->qp->K, *N = &x->qp->N;
+    for (int64_t j = 0; j < x->d; j++)
+        force[j] -= x->qp->p[j];
+    for (int64_t i = 0; i < x->m; i++)
+        gap[i] = x->qp->h[i];
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+            force[K->idx[k]] += K->val[k] * x->u[j];
+            if (K->idx[k] != j)
+                force[j] += K->val[k] * x->u[K->idx[k]];
+        }
+    for (int64_t j = 0; j < N->cols; j++)
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++) {
+            force[j] -= N->val[k] * x->r[N->idx[k]];
+            gap[N->idx[k]] -= N->val[k] * x->u[j];
+        }
+}
+
+/* What would be left to move: the residual force in the norm of K^-1, each gap that should be closed or is negative,
+ * and each pull, in the energy norm of the motion that mends it. */
+static inline quad measure_noise(const quad_exact *x)
+{
+    quad *force = quad_zeros(x->d), *gap = quad_zeros(x->m), square = 0, noise = 0;
+    measure_residuals(force, gap, x);
+    quad_forward(force, x->L, x->d, x->first);
+    for (int64_t j = 0; j < x->d; j++)
+        square += force[j] * force[j];
+    for (int64_t i = 0; i < x->m; i++) {
+        quad size = quad_sqrt(x->D[i * x->m + i]);
+        bool open = !x->active[i] && gap[i] >= 0;
+        noise += open || !(size > 0) ? 0 : quad_abs(gap[i]) / size;
+        noise += x->r[i] > 0 ? x->r[i] * size : 0;
+    }
+    free(force);
+    free(gap);
+    return noise + quad_sqrt(square);
+}
+
+/* start (m, may be NULL): rows that are likely to touch. */
+static inline truth find_truth(const uz_qp *qp, const bool *start)
+{
+    truth t = {.definite = is_definite(&qp->K)};
+    if (!t.definite)
+        return t;
+    t.feasible = quad_exact_solve(&t.best, qp, start);
+    for (int64_t i = 0; i < t.best.m; i++) /* a row without coefficients says 0 <= h */
+        t.feasible = t.feasible && (t.best.D[i * t.best.m + i] > 0 || qp->h[i] >= 0);
+    if (t.feasible) {
+        t.norm = quad_sqrt(t.best.norm2);
+        t.noise = measure_noise(&t.best);
+    }
+    return t;
+}
+
+static inline void truth_clear(truth *t)
+{
+    quad_exact_free(&t->best);
+}
+
+static inline judgement condemn(judgement j, const char *why)
+{
+    j.verdict = JUDGED_WRONG;
+    snprintf(j.why, sizeof j.why, "%s", why);
+    return j;
+}
+
+/* y <= 0 with h'y > radius ||N'y||_1: then h - N u >= 0 can't hold where all |u_j| < radius. */
+static inline bool proves_infeasible(const double *y, double radius, const uz_qp *qp)
+{
+    quad work = 0, slack = 0;
+    for (int64_t i = 0; i < qp->N.rows; i++) {
+        if (!(y[i] <= 0))
+            return false;
+        work += (quad)qp->h[i] * y[i];
+    }
+    for (int64_t j = 0; j < qp->N.cols; j++) {
+        quad sum = 0;
+        for (int64_t k = qp->N.ptr[j]; k < qp->N.ptr[j + 1]; k++)
+            sum += (quad)qp->N.val[k] * y[qp->N.idx[k]];
+        slack += quad_abs(sum);
+    }
+    return isinf(radius) ? work > 0 && !(slack > 0) : work > 0 && work * (1 + (quad)1e-12) >= slack * radius;
+}
+
+static inline judgement judge_infeasible(judgement j, const truth *t, const uz_qp *qp, const uz_result *result)
+{
+    double radius = result->summary.infeasible_radius;
+    if (!result->ray || !proves_infeasible(result->ray, radius, qp))
+        return condemn(j, "infeasible without a proof");
+    for (int64_t k = 0; t->feasible && k < t->best.d; k++)
+        if (quad_abs(t->best.u[k]) >= radius)
+            return j;
+    return t->feasible ? condemn(j, "infeasible, but a displacement within the radius exists") : j;
+}
+
+static inline quad relative(quad error, quad norm)
+{
+    return error > 0 ? (norm > 0 ? error / norm : (quad)INFINITY) : 0;
+}
+
+static inline judgement judge_bounds(judgement j, const truth *t, const uz_result *result, const double *u)
+{
+    const uz_summary *s = &result->summary;
+    const uz_certificate *c = &s->certificate;
+    quad error = quad_error(&t->best, u), error_r = quad_error_of_reactions(&t->best, result->r);
+    quad known = error - t->noise, known_r = error_r - t->noise; /* at least this much, in truth */
+    j.certified = c->relative_error;
+    j.error = (double)relative(error, t->norm);
+    if (error > 2 * t->noise && isfinite(c->relative_error))
+        j.ratio = c->relative_error / j.error;
+    if (isnan(c->relative_error) || isnan(c->absolute_error) || !(c->gap >= 0))
+        return condemn(j, "the certificate is not a number");
+    if (s->outcome == UZ_CONVERGED && !(c->relative_error <= s->requested_error))
+        return condemn(j, "converged, but the certificate misses the request");
+    if (s->outcome == UZ_CONVERGED && relative(known, t->norm) > s->requested_error)
+        return condemn(j, "converged, but the true error is above the request");
+    if (relative(known, t->norm) > c->relative_error)
+        return condemn(j, "the relative bound is below the true error");
+    if (known > c->absolute_error)
+        return condemn(j, "the absolute bound is below the true error");
+    if (known_r > c->absolute_error)
+        return condemn(j, "the absolute bound is below the error of the reactions' displacement");
+    for (int64_t i = 0; i < t->best.m; i++)
+        if (!(result->r[i] <= 0))
+            return condemn(j, "a reaction pulls");
+    return j;
+}
+
+/* The reference is good enough to speak of relative errors of `least` and more. */
+static inline bool is_sharp(const truth *t, double least)
+{
+    return t->noise <= least * t->norm || !(t->noise > 0);
+}
+
+/* u (d): the answer, by dof. */
+static inline judgement judge(const truth *t, const uz_qp *qp, const uz_result *result, const double *u)
+{
+    judgement j = {.verdict = JUDGED_OK, .certified = NAN, .error = NAN, .ratio = NAN};
+    bool claims = result->summary.outcome == UZ_CONVERGED || isfinite(result->summary.certificate.relative_error);
+    if (result->summary.outcome == UZ_INFEASIBLE)
+        return judge_infeasible(j, t, qp, result);
+    if (!t->definite)
+        return claims ? condemn(j, "an answer was certified although K is not positive definite") : j;
+    if (!t->feasible)
+        return claims ? condemn(j, "an answer was certified although the rows contradict") : j;
+    j = judge_bounds(j, t, result, u);
+    if (j.verdict == JUDGED_OK && !is_sharp(t, 1e-18)) {
+        j.verdict = JUDGED_UNCERTAIN;
+        snprintf(j.why, sizeof j.why, "the reference is only exact to %.1e", (double)relative(t->noise, t->norm));
+    }
+    return j;
+}
+
+#endif
