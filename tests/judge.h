@@ -175,10 +175,10 @@ static inline judgement judge_bounds(judgement j, const truth *t, const uz_resul
     return j;
 }
 
-/* The reference is good enough to speak of relative errors of `least` and more. */
-static inline bool is_sharp(const truth *t, double least)
+/* The reference is exact enough to contradict the claim, if it were false by a hundredth. */
+static inline bool is_sharp(const truth *t, const judgement *j)
 {
-    return t->noise <= least * t->norm || !(t->noise > 0);
+    return !(t->noise > 0) || isinf(j->certified) || t->noise <= (quad)0.01 * j->certified * t->norm;
 }
 
 /* u (d): the answer, by dof. */
@@ -193,7 +193,7 @@ static inline judgement judge(const truth *t, const uz_qp *qp, const uz_result *
     if (!t->feasible)
         return claims ? condemn(j, "an answer was certified although the rows contradict") : j;
     j = judge_bounds(j, t, result, u);
-    if (j.verdict == JUDGED_OK && !is_sharp(t, 1e-18)) {
+    if (j.verdict == JUDGED_OK && !is_sharp(t, &j)) {
         j.verdict = JUDGED_UNCERTAIN;
         snprintf(j.why, sizeof j.why, "the reference is only exact to %.1e", (double)relative(t->noise, t->norm));
     }

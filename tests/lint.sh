@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
-# Formatting, static analysis and a syntax pass of both compilers. Prints one "ok" or "not ok" line per check.
+# Formatting, static analysis, a syntax pass of both compilers and the rules of the house that a program can check.
+# Prints one "ok" or "not ok" line per check.
 set -uo pipefail
+cores=$(nproc)
 sources=$(make -s print-sources)
 c_files=$(printf '%s\n' $sources | grep '\.c$')
 includes=$(make -s print-INC)
 cflags=$(make -s print-SERVER_CFLAGS)
+strict="$(make -s print-STD) $(make -s print-WARN)"
 status=0
 check() { # NAME COMMAND...
     local name=$1 out
@@ -15,24 +18,34 @@ check() { # NAME COMMAND...
         status=1
     fi
 }
-syntax() { # COMPILER
-    local file
-    for file in $c_files; do
-        "$1" -fsyntax-only -std=c11 -D_GNU_SOURCE -Wall -Wextra -Wconversion -Wshadow -Werror $includes $cflags -Itests "$file" || return 1
-    done
+each_c_file() { # COMMAND...: with a few files at a time, one process per core
+    printf '%s\n' $c_files | xargs -P "$cores" -n 8 "$@"
 }
 long_files() { # names every source of more than 520 lines
     wc -l $sources | awk '$2 != "total" && $1 > 520 {print; bad = 1} END {exit bad}'
+}
+long_functions() { # names every function of more than 80 lines: its braces stand alone in column one
+    awk 'FNR == 1 {start = 0}
+         /^\{$/ {start = FNR}
+         /^\}$/ && start {if (FNR - start - 1 > 80) {print FILENAME ":" start ": " FNR - start - 1 " lines"; bad = 1} start = 0}
+         END {exit bad}' $c_files
+}
+shell_syntax() {
+    local file bad=0
+    for file in tests/*.sh tests/*/*.sh .ci/run; do bash -n "$file" || bad=1; done
+    return $bad
 }
 only_in() { # HEADER PATTERN: the header is included nowhere but in files that match
     ! grep -ln "include [<\"]$1" $(printf '%s\n' $sources | grep -v '^tests/') | grep -Ev "$2"
 }
 check format clang-format --dry-run -Werror $sources
-check gcc syntax gcc
-check clang syntax clang
-check cppcheck cppcheck --quiet --std=c11 --error-exitcode=1 --inline-suppr --enable=warning,portability \
+check gcc each_c_file gcc -fsyntax-only $strict $includes $cflags -Itests
+check clang each_c_file clang -fsyntax-only $strict $includes $cflags -Itests
+check cppcheck cppcheck -j "$cores" --quiet --std=c11 --error-exitcode=1 --inline-suppr --enable=warning,portability \
     --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes $c_files
 check file_length long_files
+check function_length long_functions
+check shell shell_syntax
 check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'
 check sqlite_only_in_store only_in 'sqlite3' '^server/store/'
 check microhttpd_only_in_http only_in 'microhttpd' '^server/http/'

@@ -117,8 +117,18 @@ static void size_rows(const certifier *c, const double *u)
         c->size[i] *= length;
 }
 
-/* The rows to move in this round and by how much: target_i is the gap to take away, 0 for rows left alone. Returns the
- * worst violation, relative to the size of its row. */
+/* What the rounding of the correction, a vector of doubles, may do to the gap of row i. */
+static double gap_rounding(const certifier *c, int64_t i)
+{
+    double sum = 0.0;
+    for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++)
+        sum += fabs(c->Nt.val[k] * c->correction[c->Nt.idx[k]]);
+    return 4.0 * DBL_EPSILON * sum;
+}
+
+/* The rows to move in this round and by how much: target_i is the gap to take away and a little more, so that the
+ * correction's own rounding leaves the gap open; 0 for rows left alone. Returns the worst violation, relative to the
+ * size of its row. */
 static double choose_rows(const certifier *c, const double *r, const double *g, bool closing)
 {
     double worst = 0.0;
@@ -126,7 +136,7 @@ static double choose_rows(const certifier *c, const double *r, const double *g, 
         double gap = corrected_gap(c, g, i);
         bool close = closing && worth_closing(c, r, i, fabs(gap));
         c->move.in[i] = close || gap < 0.0;
-        c->move.target[i] = c->move.in[i] ? gap : 0.0;
+        c->move.target[i] = c->move.in[i] ? gap - gap_rounding(c, i) : 0.0;
         worst = isnan(gap) ? INFINITY : gap < 0.0 ? fmax(worst, -gap / c->size[i]) : worst;
     }
     return worst;
@@ -201,10 +211,18 @@ static bool bound_cheaply(const certifier *c, double *square, const double *u)
     return *square <= c->in->sharp * c->in->sharp * energy;
 }
 
+/* How much the factor's rounding may falsify the norm of K^-1 e, relative. The factor is that of a matrix within d eps
+ * of K, in practice sqrt(d) eps, and the norm suffers by that times the condition; the estimate of the condition, from
+ * the factor's diagonal, may be short by a few orders. */
+static double doubt(const certifier *c)
+{
+    return 1e4 * DBL_EPSILON * sqrt((double)c->d) / fmax(c->in->rcond, DBL_MIN);
+}
+
 /* ||v - u_r||_K^2 = e'K^-1 e, enlarged by what the factor's own rounding may hide; and ||c||_K. */
 static uz_status distances(const certifier *c, double *square, double *correction_norm, const double *u, uz_error *err)
 {
-    double energy = 0.0, trust = 1.0 + 100.0 * DBL_EPSILON / fmax(c->in->rcond, DBL_MIN);
+    double energy = 0.0, trust = 1.0 + doubt(c);
     for (int64_t j = 0; j < c->d; j++)
         energy += c->correction[j] * c->res.Kc[j];
     uz_status status = UZ_OK;

@@ -107,8 +107,10 @@ class Service:
 
     def start(self):
         self.log_file = open(os.path.join(self.folder, "log"), "ab")
+        suppressions = f"suppressions={ROOT / 'tests' / 'tsan.supp'} {os.environ.get('TSAN_OPTIONS', '')}"
         self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", "--db", self.db, *self.options),
-                                        stdout=subprocess.PIPE, stderr=self.log_file)
+                                        stdout=subprocess.PIPE, stderr=self.log_file,
+                                        env={**os.environ, "TSAN_OPTIONS": suppressions})
         line = self.process.stdout.readline().decode()
         if not line.startswith("listening on http://"):
             self.process.wait(timeout=30)

@@ -60,6 +60,7 @@ typedef struct {
     uz_qp qp;
     quad_exact exact;
     inverse inv;
+    double condition;  /* of K; 0: small */
     double *u, *r, *g; /* the pair under test */
 } bench;
 
@@ -101,6 +102,12 @@ static uz_certify_input input_of(bench *b)
                               .inverse_bound = INFINITY};
 }
 
+/* e'K^-1 e through a factor in double precision is off by about this, relatively, at worst. */
+static double factor_rounding(const bench *b)
+{
+    return b->condition < 1e11 ? 0 : 2.3e-16 * b->condition;
+}
+
 /* Certifies the pair and checks the bounds. Returns bound / error of u, NaN where that says nothing. */
 static double check_pair(bench *b, const char *what)
 {
@@ -108,7 +115,8 @@ static double check_pair(bench *b, const char *what)
     uz_certificate c;
     uz_error err = {0};
     CHECK_INT(uz_certify(&c, b->r, b->g, b->u, &in, &err), UZ_OK);
-    double error_u = quad_error(&b->exact, b->u), error_r = quad_error_of_reactions(&b->exact, b->r);
+    double below = 1 - factor_rounding(b);
+    double error_u = below * quad_error(&b->exact, b->u), error_r = below * quad_error_of_reactions(&b->exact, b->r);
     double norm = (double)quad_sqrt(b->exact.norm2);
     CHECK_MSG(c.absolute_error >= error_u, "%s: d %d m %d: u is off by %.17g, bound %.17g", what, (int)b->exact.d,
               (int)b->exact.m, error_u, c.absolute_error);
@@ -147,15 +155,15 @@ static void take_perturbed(bench *b, qp_random *rng, double size, bool keep_zero
     }
 }
 
-/* The bounds' ratios to the errors that were seen. */
+/* The ratios of bounds to errors that were seen, and how many pairs were left without a bound. */
 typedef struct {
-    double value[8192];
-    int count;
+    double value[16384];
+    int count, pairs, unbounded;
 } ratios;
 
 static void keep_ratio(ratios *all, double ratio)
 {
-    if (!isnan(ratio) && all->count < 8192)
+    if (!isnan(ratio) && all->count < 16384)
         all->value[all->count++] = ratio;
 }
 
@@ -171,81 +179,91 @@ static double median(ratios *all)
     return all->count ? all->value[all->count / 2] : NAN;
 }
 
-static void check_many_pairs(bench *b, qp_random *rng, ratios *near)
+static double check_and_count(bench *b, ratios *all, const char *what)
+{
+    double ratio = check_pair(b, what);
+    all->pairs++;
+    all->unbounded += isinf(ratio);
+    return ratio;
+}
+
+/* Pairs near the solution, where the bound must be sharp, and pairs far from it, where it must hold. */
+static void check_many_pairs(bench *b, qp_random *rng, ratios *all)
 {
     take_exact(b);
-    keep_ratio(near, check_pair(b, "rounded"));
+    keep_ratio(all, check_and_count(b, all, "rounded"));
     for (int digits = 1; digits <= 16; digits += 3) {
-        take_perturbed(b, rng, pow(10, -digits), digits % 2 == 0);
-        double ratio = check_pair(b, "perturbed");
-        if (digits >= 4)
-            keep_ratio(near, ratio);
+        take_perturbed(b, rng, pow(10, -digits), true);
+        keep_ratio(all, check_and_count(b, all, "perturbed"));
+        take_perturbed(b, rng, pow(10, -digits), false);
+        check_and_count(b, all, "perturbed everywhere");
     }
     for (int64_t i = 0; i < b->exact.m; i++)
         b->r[i] = -10 * random_unit(rng) * (random_unit(rng) < 0.5);
-    check_pair(b, "random r");
+    check_and_count(b, all, "random r");
     for (int64_t j = 0; j < b->exact.d; j++)
         b->u[j] = 5 * random_signed(rng);
-    check_pair(b, "random pair");
+    check_and_count(b, all, "random pair");
     memset(b->r, 0, (size_t)b->exact.m * sizeof *b->r);
     memset(b->u, 0, (size_t)b->exact.d * sizeof *b->u);
-    check_pair(b, "zero pair");
+    check_and_count(b, all, "zero pair");
 }
 
-static void check_kind(const char *name, qp_kind kind, int problems, double sharp)
+/* sharp: what the median ratio must stay below; unbounded: the share of pairs that may be left without a bound. */
+static void check_kind(const char *name, qp_kind kind, int problems, double sharp, double unbounded)
 {
-    ratios near = {.count = 0};
+    ratios *all = calloc(1, sizeof *all);
     qp_random rng = {(uint64_t)(kind.d * 1000 + kind.m) + (uint64_t)name[0]};
     for (int k = 0; k < problems; k++) {
         qp_kind one = kind;
         one.d = random_int(&rng, 1, kind.d + 1);
         one.m = random_int(&rng, kind.m / 2, kind.m + 1);
         bench b = make_bench(random_qp(&rng, &one));
+        b.condition = kind.condition;
         if (solve_bench(&b, NULL))
-            check_many_pairs(&b, &rng, &near);
+            check_many_pairs(&b, &rng, all);
         free_bench(&b);
     }
-    double middle = median(&near);
-    int loose = 0;
-    for (int i = 0; i < near.count; i++)
-        loose += !(near.value[i] < 1e4);
-    printf("# %s: bound / error, median of %d: %.3g, largest %.3g, loose %d\n", name, near.count, middle,
-           near.count ? near.value[near.count - 1] : NAN, loose);
-    CHECK_MSG(median(&near) < sharp, "%s: median ratio %g", name, median(&near));
+    double middle = median(all), share = (double)all->unbounded / (double)all->pairs;
+    printf("# %s: bound / error near the solution: median %.3g, 99 of 100 below %.3g; without bound: %.2g %% of %d\n",
+           name, middle, all->value[all->count * 99 / 100], 100 * share, all->pairs);
+    CHECK_MSG(middle < sharp, "%s: median ratio %g", name, middle);
+    CHECK_MSG(share <= unbounded, "%s: %g %% without bound", name, 100 * share);
+    free(all);
 }
 
 TEST(independent_rows)
 {
-    check_kind("plain", (qp_kind){.d = 12, .m = 6, .condition = 100}, 600, 10);
+    check_kind("plain", (qp_kind){.d = 12, .m = 6, .condition = 100}, 300, 10, 0.06);
 }
 
 TEST(more_rows_than_dofs)
 {
-    check_kind("many rows", (qp_kind){.d = 5, .m = 10, .condition = 100}, 600, 50);
+    check_kind("many rows", (qp_kind){.d = 5, .m = 10, .condition = 100}, 300, 50, 0.06);
 }
 
 TEST(dependent_rows)
 {
-    check_kind("dependent", (qp_kind){.d = 12, .m = 10, .condition = 100, .dependent = true}, 600, 50);
+    check_kind("dependent", (qp_kind){.d = 12, .m = 10, .condition = 100, .dependent = true}, 300, 50, 0.06);
 }
 
 TEST(badly_scaled_rows)
 {
-    check_kind("scaled", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true}, 600, 50);
-    check_kind("both", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true, .dependent = true}, 600, 50);
+    check_kind("scaled", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true}, 300, 50, 0.06);
+    check_kind("both", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true, .dependent = true}, 300, 50, 0.06);
 }
 
 TEST(ill_conditioned_stiffness)
 {
-    check_kind("1e6", (qp_kind){.d = 12, .m = 8, .condition = 1e6}, 400, 50);
-    check_kind("1e9", (qp_kind){.d = 12, .m = 8, .condition = 1e9}, 400, 50);
-    check_kind("1e12", (qp_kind){.d = 12, .m = 8, .condition = 1e12}, 400, 50);
-    check_kind("1e12d", (qp_kind){.d = 12, .m = 10, .condition = 1e12, .dependent = true}, 400, 200);
+    check_kind("1e6", (qp_kind){.d = 12, .m = 8, .condition = 1e6}, 300, 50, 0.06);
+    check_kind("1e9", (qp_kind){.d = 12, .m = 8, .condition = 1e9}, 300, 50, 0.06);
+    check_kind("1e12", (qp_kind){.d = 12, .m = 8, .condition = 1e12}, 300, 50, 0.06);
+    check_kind("1e12d", (qp_kind){.d = 12, .m = 10, .condition = 1e12, .dependent = true}, 300, 50, 0.06);
 }
 
 TEST(zero_rows)
 {
-    check_kind("zero row", (qp_kind){.d = 8, .m = 6, .condition = 100, .zero_row = true}, 300, 50);
+    check_kind("zero row", (qp_kind){.d = 8, .m = 6, .condition = 100, .zero_row = true}, 300, 50, 0.06);
 }
 
 TEST(no_rows)

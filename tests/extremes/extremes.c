@@ -1,0 +1,116 @@
+/* extremes.c: prints the table, writes it as JSON, counts. usage: extremes OUTPUT.json [part of a family's name] */
+#include "extremes.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *name_of(char *room, size_t size, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    vsnprintf(room, size, format, args);
+    va_end(args);
+    return room;
+}
+
+bool wants_family(const suite *all, const char *name)
+{
+    return !all->filter || strstr(name, all->filter);
+}
+
+static family *find_family(suite *all, const char *name)
+{
+    for (int k = 0; k < all->n_families; k++)
+        if (strcmp(all->families[k].name, name) == 0)
+            return &all->families[k];
+    family *f = &all->families[all->n_families++];
+    *f = (family){.least_ratio = INFINITY};
+    snprintf(f->name, sizeof f->name, "%s", name);
+    return f;
+}
+
+/* JSON has no NaN and no infinity. */
+static void put_number(FILE *out, const char *key, double value)
+{
+    if (isfinite(value))
+        fprintf(out, ", \"%s\": %.9g", key, value);
+    else
+        fprintf(out, ", \"%s\": null", key);
+}
+
+static void print_number(double value, int digits)
+{
+    char text[32] = "-";
+    if (!isnan(value))
+        snprintf(text, sizeof text, "%.*g", digits, value);
+    printf(" %10s", text);
+}
+
+void add_row(suite *all, const char *family_name, const char *name, const char *how, const char *outcome,
+             const judgement *j, bool missed)
+{
+    family *f = find_family(all, family_name);
+    bool failed = missed || j->verdict != JUDGED_OK, converged = strcmp(outcome, "converged") == 0;
+    const char *said = j->verdict == JUDGED_WRONG       ? "WRONG"
+                       : j->verdict == JUDGED_UNCERTAIN ? "UNCERTAIN"
+                       : missed                         ? "MISSED"
+                                                        : "ok";
+    printf("%-11s %-34s %-9s %-22s", family_name, name, how, outcome);
+    print_number(j->certified, 3);
+    print_number(j->error, 3);
+    print_number(j->ratio, 4);
+    printf("  %s%s%s\n", said, j->why[0] ? ": " : "", j->why);
+    fprintf(all->json, "%s  {\"family\": \"%s\", \"name\": \"%s\", \"way\": \"%s\", \"outcome\": \"%s\"",
+            all->rows ? ",\n" : "", family_name, name, how, outcome);
+    put_number(all->json, "certified", j->certified);
+    put_number(all->json, "true", j->error);
+    put_number(all->json, "ratio", j->ratio);
+    fprintf(all->json, ", \"verdict\": \"%s\"}", said);
+    all->rows++;
+    all->passed += !failed;
+    all->failed += failed;
+    f->rows++;
+    f->failed += failed;
+    f->converged += converged;
+    f->refused += strncmp(outcome, "error ", 6) == 0;
+    f->other += !converged && strncmp(outcome, "error ", 6) != 0;
+    f->worst_error = converged && !isnan(j->error) ? fmax(f->worst_error, j->error) : f->worst_error;
+    f->least_ratio = isnan(j->ratio) ? f->least_ratio : fmin(f->least_ratio, j->ratio);
+}
+
+static void print_families(suite *all)
+{
+    printf("\n%-12s %6s %10s %8s %8s %8s %14s %16s\n", "family", "rows", "converged", "other", "refused", "failed",
+           "largest error", "least bound/true");
+    for (int k = 0; k < all->n_families; k++) {
+        const family *f = &all->families[k];
+        printf("%-12s %6d %10d %8d %8d %8d %14.2g %16.6g\n", f->name, f->rows, f->converged, f->other, f->refused,
+               f->failed, f->worst_error, f->least_ratio);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    static void (*const families[])(suite *) = {
+        run_scenes, run_scene_mixtures, run_stiffnesses, run_rows,
+        run_ranges, run_exhaustive,     run_invariance,  run_generated_problems};
+    suite all = {.filter = argc > 2 ? argv[2] : NULL};
+    if (argc < 2 || !(all.json = fopen(argv[1], "w"))) {
+        fprintf(stderr, "usage: extremes OUTPUT.json [part of a family's name]\n");
+        return 2;
+    }
+    uz_process_init(1);
+    uz_thread_init();
+    setvbuf(stdout, NULL, _IOLBF, 0);
+    printf("%-11s %-34s %-9s %-22s %10s %10s %10s\n", "family", "problem", "way", "outcome", "certified", "true",
+           "ratio");
+    fprintf(all.json, "{\"rows\": [\n");
+    for (size_t k = 0; k < sizeof families / sizeof families[0]; k++)
+        families[k](&all);
+    fprintf(all.json, "\n], \"passed\": %d, \"failed\": %d}\n", all.passed, all.failed);
+    print_families(&all);
+    printf("%d passed, %d failed\n", all.passed, all.failed);
+    return fclose(all.json) != 0 || all.failed > 0 || all.passed == 0;
+}
