@@ -28,11 +28,11 @@ long_functions() { # names every function of more than 80 lines: its braces stan
     awk 'FNR == 1 {start = 0}
          /^\{$/ {start = FNR}
          /^\}$/ && start {if (FNR - start - 1 > 80) {print FILENAME ":" start ": " FNR - start - 1 " lines"; bad = 1} start = 0}
-         END {exit bad}' $c_files
+         END {exit bad}' $sources
 }
 shell_syntax() {
     local file bad=0
-    for file in tests/*.sh tests/*/*.sh .ci/run; do bash -n "$file" || bad=1; done
+    for file in $(find tests .ci -name '*.sh' -o -path '.ci/*'); do bash -n "$file" || bad=1; done
     return $bad
 }
 only_in() { # HEADER PATTERN: the header is included nowhere but in files that match

@@ -53,7 +53,8 @@ typedef struct {
     int dim;
     int64_t m, n_u, n_nodes; /* lengths of reactions and gaps, displacements, nodes (in doubles) */
     const double *reactions, *gaps, *displacements, *nodes, *contact_nodes;
-    const double *ray; /* m: the proof of an infeasible problem */
+    const double *pressure; /* scenes: m, of each reaction */
+    const double *ray;      /* m: the proof of an infeasible problem */
 } codec_result;
 char *codec_encode_result(const codec_result *result, size_t *len);
 

@@ -30,6 +30,7 @@ char *codec_encode_result(const codec_result *result, size_t *len)
     text_raw(&t, result->summary);
     put_vector(&t, "reactions", result->reactions, result->m, 0);
     put_vector(&t, "gaps", result->gaps, result->m, 0);
+    put_vector(&t, "pressure", result->pressure, result->m, 0);
     put_vector(&t, "ray", result->ray, result->m, 0);
     put_vector(&t, "displacements", result->displacements, result->n_u, result->dim);
     put_vector(&t, "nodes", result->nodes, result->n_nodes, result->dim);

@@ -10,7 +10,7 @@
 /* ------------------------------------------------------------------ result */
 
 typedef struct {
-    bool reactions, gaps, displacements;
+    bool reactions, gaps, displacements, pressure;
 } wanted;
 
 static bool want_field(wanted *out, const char *name, size_t len)
@@ -21,6 +21,8 @@ static bool want_field(wanted *out, const char *name, size_t len)
         out->gaps = true;
     else if (token_equal(name, len, "displacements"))
         out->displacements = true;
+    else if (token_equal(name, len, "pressure"))
+        out->pressure = true;
     else
         return token_equal(name, len, "summary");
     return true;
@@ -39,7 +41,7 @@ static bool read_fields(const http_request *rq, wanted *out, problem_details *pr
         if (!want_field(out, at, len))
             return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
                                 "\"%.*s\" is no field of a result: fields is a list of summary, reactions, gaps, "
-                                "displacements, separated by commas",
+                                "pressure, displacements, separated by commas",
                                 (int)(len < 60 ? len : 60), at);
         if (at[len] == '\0')
             return true;
@@ -78,14 +80,15 @@ static bool has_result(const job *j, http_reply *reply)
 }
 
 typedef struct {
-    double *reactions, *gaps, *ray, *displacements, *nodes, *contact_nodes, *dim;
-    int64_t n_ray, n_reactions, n_gaps, n_u, n_nodes, n_contact_nodes, n_dim;
+    double *reactions, *gaps, *pressure, *ray, *displacements, *nodes, *contact_nodes, *dim;
+    int64_t n_pressure, n_ray, n_reactions, n_gaps, n_u, n_nodes, n_contact_nodes, n_dim;
 } vectors;
 
 static void vectors_free(vectors *v)
 {
     free(v->reactions);
     free(v->gaps);
+    free(v->pressure);
     free(v->ray);
     free(v->displacements);
     free(v->nodes);
@@ -109,7 +112,9 @@ static store_status fetch_wanted(api *context, const char *id, const wanted *fie
         status = fetch(context, id, "gaps", &v->gaps, &v->n_gaps);
     if (status == STORE_OK && fields->reactions)
         status = fetch(context, id, "ray", &v->ray, &v->n_ray);
-    if (status == STORE_OK && (fields->reactions || fields->gaps))
+    if (status == STORE_OK && fields->pressure)
+        status = fetch(context, id, "pressure", &v->pressure, &v->n_pressure);
+    if (status == STORE_OK && (fields->reactions || fields->gaps || fields->pressure))
         status = fetch(context, id, "contact_nodes", &v->contact_nodes, &v->n_contact_nodes);
     if (status == STORE_OK && fields->displacements)
         status = fetch(context, id, "displacements", &v->displacements, &v->n_u);
@@ -123,11 +128,14 @@ static void encode_result(const job *j, const vectors *v, http_reply *reply)
     codec_result result = {.job_id = j->id,
                            .summary = j->summary,
                            .dim = v->dim && v->n_dim == 1 ? (int)v->dim[0] : 0,
-                           .m = v->reactions ? v->n_reactions : v->n_gaps,
+                           .m = v->reactions ? v->n_reactions
+                                : v->gaps    ? v->n_gaps
+                                             : v->n_pressure,
                            .n_u = v->n_u,
                            .n_nodes = v->n_nodes,
                            .reactions = v->reactions,
                            .gaps = v->gaps,
+                           .pressure = v->pressure,
                            .ray = v->ray,
                            .displacements = v->displacements,
                            .nodes = v->nodes,

@@ -8,7 +8,7 @@
 #include <time.h>
 
 #define FINISH_ATTEMPTS 5
-#define MAX_VECTORS     7
+#define MAX_VECTORS     8
 
 /* What becomes of the job. */
 typedef enum {
@@ -24,7 +24,7 @@ typedef struct {
     codec_request request;
     uz_result *result;
     char *summary, *error;
-    double dim, *contact_nodes, *history;
+    double dim, *contact_nodes, *pressure, *history;
     store_vector vectors[MAX_VECTORS];
     store_outcome outcome;
 } run;
@@ -115,7 +115,11 @@ static bool add_scene_vectors(run *r)
     for (int64_t i = 0; i < result->m; i++)
         r->contact_nodes[i] = (double)result->mesh.contact_node[i];
     add_vector(r, "contact_nodes", r->contact_nodes, result->m);
-    return true;
+    r->pressure = calloc((size_t)result->m + 1, sizeof *r->pressure);
+    for (int64_t i = 0; r->pressure && i < result->m; i++)
+        r->pressure[i] = (0.0 - result->r[i]) / result->mesh.contact_area[i];
+    add_vector(r, "pressure", r->pressure, result->m);
+    return r->pressure != NULL;
 }
 
 static bool add_vectors(run *r)
@@ -265,6 +269,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     free(r.summary);
     free(r.error);
     free(r.contact_nodes);
+    free(r.pressure);
     free(r.history);
     job_clear(claimed);
 }

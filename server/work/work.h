@@ -11,6 +11,8 @@
  *   "displacements"  d for matrices; nodes x dim, node by node, for a scene
  *   "nodes"          nodes x dim, coordinates; scenes only
  *   "contact_nodes"  m, the node of each reaction; scenes only
+ *   "pressure"       m, reaction over tributary area; scenes only
+ *   "ray"            m, the proof of an infeasible problem
  * and a history of CODEC_HISTORY_COLUMNS columns. A vector that a solve did not give is not there.
  * In the summary timings_s.total covers queue and parse too. */
 #ifndef SERVER_WORK_H

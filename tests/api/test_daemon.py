@@ -157,7 +157,9 @@ def test_access_log(s):
     job = s.solve(MATRICES)
     s.get(f"/v1/jobs/{job['id']}/result?fields=gaps")
     s.get("/no%22thing\\")
-    time.sleep(0.2)
+    end = time.monotonic() + 10  # the line follows the reply
+    while not any(event["path"] == '/no%22thing\\' for event in s.events("request")) and time.monotonic() < end:
+        time.sleep(0.02)
     events = s.events("request")
     result = next(event for event in events if event["path"].endswith("/result"))
     check(result["method"] == "GET" and result["status"] == 200 and result["job"] == job["id"], result)

@@ -127,7 +127,7 @@ static void bench_body(report *out, int64_t nx, double relative_error)
 {
     uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES};
     uz_settings settings = uz_settings_default();
-    double cold[RUNS_MOST], cached[RUNS_MOST];
+    double cold[RUNS_MOST] = {0}, cached[RUNS_MOST] = {0};
     int runs = nx <= 300 ? 11 : nx <= 600 ? 9 : 5;
     char name[64];
     body b;

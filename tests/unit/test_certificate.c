@@ -250,7 +250,8 @@ TEST(dependent_rows)
 TEST(badly_scaled_rows)
 {
     check_kind("scaled", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true}, 300, 50, 0.06);
-    check_kind("both", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true, .dependent = true}, 300, 50, 0.06);
+    check_kind("both", (qp_kind){.d = 12, .m = 8, .condition = 100, .badly_scaled = true, .dependent = true}, 300, 50,
+               0.06);
 }
 
 TEST(ill_conditioned_stiffness)

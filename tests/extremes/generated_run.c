@@ -1,0 +1,33 @@
+/* generated_run.c: the full run of the property tests. */
+#include "extremes.h"
+
+#include "generated.h"
+
+enum { PROBLEMS = 3000 };
+
+static suite *reporting;
+
+static void report(uint64_t seed, const uz_qp *qp, const uz_summary *s, const judgement *j)
+{
+    char name[64];
+    add_row(reporting, "generated",
+            name_of(name, sizeof name, "seed %d, d = %d, m = %d", (int)seed, (int)qp->K.cols, (int)qp->N.rows),
+            uz_method_name(s->method), uz_outcome_name(s->outcome), j, false);
+}
+
+void run_generated_problems(suite *all)
+{
+    generated_tally t = {0};
+    if (!wants_family(all, "generated"))
+        return;
+    for (uint64_t seed = 0; seed < PROBLEMS; seed++)
+        run_generated(&t, seed, report);
+    printf("generated: %d problems, %d solves: %d converged, %d precision_limit, %d iteration_limit, %d infeasible, %d "
+           "refused; as a user asks: %d of %d answered\n",
+           PROBLEMS, (int)t.problems, (int)t.outcome[UZ_CONVERGED], (int)t.outcome[UZ_PRECISION_LIMIT],
+           (int)t.outcome[UZ_ITERATION_LIMIT], (int)t.outcome[UZ_INFEASIBLE], (int)t.refused, (int)t.answered,
+           (int)t.asked);
+    printf("generated: bound / true error of the converged: median %.3g, least %.6g\n", tally_median(&t),
+           t.least_ratio);
+    free(t.ratio);
+}
