@@ -15,7 +15,7 @@ PYTHON ?= /usr/bin/python3
 
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
             libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev
-TEST_PACKAGES := python3 python3-jsonschema curl clang clang-format cppcheck libclang-rt-14-dev
+TEST_PACKAGES := python3 python3-jsonschema curl jq locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev
 
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
@@ -36,8 +36,9 @@ CLIENT_SRC := $(sort $(wildcard client/*.c))
 UNIT_SRC   := $(sort $(wildcard tests/unit/test_*.c))
 FUZZ_SRC   := $(sort $(wildcard tests/fuzz/fuzz_*.c))
 BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
+EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
@@ -50,7 +51,7 @@ UNIT_BIN   := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(UNIT_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all demo run install clean help deps
+.PHONY: all demo run install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
 
 demo: deps ## install what is missing, build, start the daemon, solve the paper's body, show the answer
@@ -121,10 +122,13 @@ comma := ,
 $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs jansson) -lpthread
 
+$(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
+
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz bench
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci bench extremes
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -140,21 +144,31 @@ test-api: all ## the tests that drive the real daemon and client; FILTER=name ru
 test-hygiene: ## formatting, static analysis, both compilers
 	@tests/run.sh $(BUILD) hygiene
 
-asan: ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
-	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/asan OPT="-O1 -g" SAN="-fsanitize=address,undefined -fno-sanitize-recover=all" all unit-bins
-	@tests/run.sh build/asan "unit api"
+# Each sanitizer has a build of its own inside BUILD.
+sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
+# Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
+TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
+TSAN_API  = $(filter-out test_bad_input test_cases test_client_faults test_readme test_reference test_schemas, \
+            $(notdir $(basename $(wildcard tests/api/test_*.py))))
 
-ubsan: ## the C tests under UndefinedBehaviorSanitizer alone
-	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/ubsan OPT="-O1 -g" SAN="-fsanitize=undefined -fno-sanitize-recover=all" all unit-bins
-	@tests/run.sh build/ubsan unit
+asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
+	$(call sanitized,asan,-fsanitize=address$(comma)undefined -fno-sanitize-recover=all) all unit-bins
+	@tests/run.sh $(BUILD)/asan "unit api" "$(FILTER)"
 
-tsan: ## the server's tests under ThreadSanitizer
-	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/tsan OPT="-O1 -g" SAN="-fsanitize=thread" all unit-bins
-	@tests/run.sh build/tsan "unit api" "$(FILTER)"
+ubsan: deps-test ## the C tests under UndefinedBehaviorSanitizer alone
+	$(call sanitized,ubsan,-fsanitize=undefined -fno-sanitize-recover=all) all unit-bins
+	@tests/run.sh $(BUILD)/ubsan unit "$(FILTER)"
 
-fuzz: ## run every fuzz target for FUZZ_SECONDS (default 30) each
-	@$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=build/fuzzing CC=clang OPT="-O1 -g" SAN="-fsanitize=address,undefined,fuzzer-no-link" fuzz-bins
-	@tests/fuzz/run.sh build/fuzzing $${FUZZ_SECONDS:-30}
+tsan: deps-test ## the server's tests under ThreadSanitizer
+	$(call sanitized,tsan,-fsanitize=thread) all unit-bins
+	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT) $(TSAN_API)"
+
+fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
+	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang fuzz-bins
+	@tests/fuzz/run.sh $(BUILD)/fuzzing $${FUZZ_SECONDS:-30}
+
+ci: ## what continuous integration runs: test, asan, tsan, fuzz, and one count over all
+	@.ci/run
 
 .PHONY: fuzz-bins
 fuzz-bins: $(FUZZ_BIN)
@@ -165,6 +179,10 @@ $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(PARTS_OBJ) $(BUILD)/libuzawa.a
 bench: deps ## measured ratios in one run: a table and build/bench.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
 	@$(BUILD)/bench $(BUILD)/bench.json $(FILTER)
+
+extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json
+	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
+	@$(BUILD)/extremes $(BUILD)/extremes.json $(FILTER)
 
 ##@ Style
 .PHONY: format lint

@@ -12,8 +12,10 @@
 static void add_matrix(uz_digest *digest, const uz_csc *A)
 {
     int64_t shape[2] = {A->rows, A->cols};
-    size_t nnz = (size_t)A->ptr[A->cols];
     uz_digest_add(digest, shape, sizeof shape);
+    if (!A->ptr)
+        return;
+    size_t nnz = (size_t)A->ptr[A->cols];
     uz_digest_add(digest, A->ptr, (size_t)(A->cols + 1) * sizeof *A->ptr);
     uz_digest_add(digest, A->idx, nnz * sizeof *A->idx);
     uz_digest_add(digest, A->val, nnz * sizeof *A->val);
@@ -56,6 +58,8 @@ const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem)
 
 const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
 {
+    if (body->no_rows.ptr)
+        return &body->no_rows;
     return body->is_scene ? &body->model.N : &problem->qp.N;
 }
 
@@ -102,6 +106,8 @@ uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_sett
     body->is_scene = problem->kind == UZ_PROBLEM_SCENE;
     if (body->is_scene)
         status = uz_body_model_build(&body->model, &problem->scene, err);
+    else if (problem->qp.N.rows == 0)
+        status = uz_csc_init(&body->no_rows, 0, problem->qp.K.cols, 0, err);
     body->assemble_s = uz_seconds() - start;
     if (status == UZ_OK)
         status = factor_and_condense(body, uz_body_K(body, problem), uz_body_N(body, problem), settings, hooks, err);
@@ -135,5 +141,6 @@ void uz_body_free(uz_body *body)
     uz_factor_free(body->factor);
     if (body->is_scene)
         uz_body_model_clear(&body->model);
+    uz_csc_clear(&body->no_rows);
     free(body);
 }

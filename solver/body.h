@@ -14,6 +14,7 @@ typedef struct {
     char digest[65];
     bool is_scene;
     uz_body_model model; /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
+    uz_csc no_rows;      /* matrices without contacts: 0 x d, as the problem's N may be a zeroed struct */
     uz_factor *factor;
     uz_dual *dual;
     pthread_mutex_t mutex; /* guards inverse_bound */

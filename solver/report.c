@@ -203,7 +203,7 @@ static void explain(uz_run *run)
 uz_status uz_run_report(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
-    summary->method = run->settings->method == UZ_METHOD_AUTO ? UZ_METHOD_ACCELERATED_RESTART : run->settings->method;
+    summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
     summary->iterations = run->it.iteration;
     summary->restarts = run->it.restarts;
     summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;

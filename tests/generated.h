@@ -201,10 +201,10 @@ static inline void tally_add(generated_tally *all, const judgement *j, const uz_
 }
 
 /* Called for each problem that was judged wrong or uncertain. */
-typedef void (*generated_report)(uint64_t seed, const uz_qp *qp, const uz_summary *s, const judgement *j);
+typedef void (*generated_report)(void *ctx, uint64_t seed, const uz_qp *qp, const uz_summary *s, const judgement *j);
 
 /* Solves and judges problem `seed`; every fourth is solved a second time, with its factor from a cache. */
-static inline void run_generated(generated_tally *all, uint64_t seed, generated_report report)
+static inline void run_generated(generated_tally *all, uint64_t seed, generated_report report, void *ctx)
 {
     bool active[GENERATED_MOST];
     uz_problem problem = problem_of(generated_qp(seed, active));
@@ -224,7 +224,7 @@ static inline void run_generated(generated_tally *all, uint64_t seed, generated_
         all->answered += seed % 2 == 0 && t.definite && result->summary.outcome == UZ_CONVERGED;
         tally_add(all, &j, &result->summary);
         if (j.verdict != JUDGED_OK)
-            report(seed, &problem.qp, &result->summary, &j);
+            report(ctx, seed, &problem.qp, &result->summary, &j);
         uz_result_free(result);
     }
     uz_cache_free(cache);

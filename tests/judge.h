@@ -28,6 +28,7 @@ typedef struct {
     verdict verdict;
     double certified; /* relative error claimed; NaN: nothing claimed */
     double error;     /* relative error of u, in truth */
+    double floor;     /* relative error of u* rounded to doubles: no answer in doubles can be expected to be better */
     double ratio;     /* certified / error; NaN where the answer is exact or nothing is bounded */
     char why[160];
 } judgement;
@@ -65,24 +66,27 @@ static inline void measure_residuals(quad *force, quad *gap, const quad_exact *x
         }
 }
 
-/* What would be left to move: the residual force in the norm of K^-1, each gap that should be closed or is negative,
- * and each pull, in the energy norm of the motion that mends it. */
+/* A bound on ||error||_K of the reference up to a small factor. The residual force, the gaps of its active rows and the
+ * pulls are mended by a motion of about their own size. Lifting other rows that penetrate, by a motion of size `lift`,
+ * may open the active ones by as much, and then what their reactions do there enters under a root. */
 static inline quad measure_noise(const quad_exact *x)
 {
-    quad *force = quad_zeros(x->d), *gap = quad_zeros(x->m), square = 0, noise = 0;
+    quad *force = quad_zeros(x->d), *gap = quad_zeros(x->m), square = 0, mend = 0, lift = 0, push = 0;
     measure_residuals(force, gap, x);
     quad_forward(force, x->L, x->d, x->first);
     for (int64_t j = 0; j < x->d; j++)
         square += force[j] * force[j];
     for (int64_t i = 0; i < x->m; i++) {
         quad size = quad_sqrt(x->D[i * x->m + i]);
-        bool open = !x->active[i] && gap[i] >= 0;
-        noise += open || !(size > 0) ? 0 : quad_abs(gap[i]) / size;
-        noise += x->r[i] > 0 ? x->r[i] * size : 0;
+        if (!(size > 0))
+            continue;
+        mend += (x->active[i] ? quad_abs(gap[i]) / size : 0) + (x->r[i] > 0 ? x->r[i] * size : 0);
+        lift += !x->active[i] && gap[i] < 0 ? -gap[i] / size : 0;
+        push += quad_abs(x->r[i]) * size;
     }
     free(force);
     free(gap);
-    return noise + quad_sqrt(square);
+    return mend + quad_sqrt(square) + lift + quad_sqrt(2 * push * lift);
 }
 
 /* start (m, may be NULL): rows that are likely to touch. */
@@ -147,6 +151,18 @@ static inline quad relative(quad error, quad norm)
     return error > 0 ? (norm > 0 ? error / norm : (quad)INFINITY) : 0;
 }
 
+static inline double rounding_floor(const truth *t)
+{
+    double *u = calloc((size_t)t->best.d + 1, sizeof *u);
+    if (!u)
+        abort();
+    for (int64_t j = 0; j < t->best.d; j++)
+        u[j] = (double)t->best.u[j];
+    quad error = quad_error(&t->best, u);
+    free(u);
+    return (double)relative(error, t->norm);
+}
+
 static inline judgement judge_bounds(judgement j, const truth *t, const uz_result *result, const double *u)
 {
     const uz_summary *s = &result->summary;
@@ -155,6 +171,7 @@ static inline judgement judge_bounds(judgement j, const truth *t, const uz_resul
     quad known = error - t->noise, known_r = error_r - t->noise; /* at least this much, in truth */
     j.certified = c->relative_error;
     j.error = (double)relative(error, t->norm);
+    j.floor = rounding_floor(t);
     if (error > 2 * t->noise && isfinite(c->relative_error))
         j.ratio = c->relative_error / j.error;
     if (isnan(c->relative_error) || isnan(c->absolute_error) || !(c->gap >= 0))
@@ -184,7 +201,7 @@ static inline bool is_sharp(const truth *t, const judgement *j)
 /* u (d): the answer, by dof. */
 static inline judgement judge(const truth *t, const uz_qp *qp, const uz_result *result, const double *u)
 {
-    judgement j = {.verdict = JUDGED_OK, .certified = NAN, .error = NAN, .ratio = NAN};
+    judgement j = {.verdict = JUDGED_OK, .certified = NAN, .error = NAN, .floor = NAN, .ratio = NAN};
     bool claims = result->summary.outcome == UZ_CONVERGED || isfinite(result->summary.certificate.relative_error);
     if (result->summary.outcome == UZ_INFEASIBLE)
         return judge_infeasible(j, t, qp, result);

@@ -14,6 +14,12 @@
 
 typedef __float128 quad;
 
+/* Rows that differ by less than the root of this from the span of others, in the norm of K^-1, depend on them. */
+#define QUAD_DEPENDENT ((quad)1e-28)
+
+/* A penetration below this, relative to the terms that it is the difference of, is rounding. */
+#define QUAD_ROUNDING ((quad)1e-31)
+
 static inline quad quad_abs(quad x)
 {
     return x < 0 ? -x : x;
@@ -167,7 +173,7 @@ static inline quad *quad_factor_rows(const quad_exact *x, int64_t *rows, int64_t
         for (int64_t i = 0; i < n; i++)
             for (int64_t j = 0; j < n; j++)
                 A[i * n + j] = x->D[rows[i] * x->m + rows[j]];
-        if (quad_cholesky(A, n, NULL, (quad)1e-26, &stop))
+        if (quad_cholesky(A, n, NULL, QUAD_DEPENDENT, &stop))
             return A;
         free(A);
         memmove(rows + stop, rows + stop + 1, (size_t)(n - stop - 1) * sizeof *rows);
@@ -228,7 +234,7 @@ static inline bool quad_add_row(quad_exact *x, int64_t *rows, int64_t *count, in
             gap -= x->D[q * m + rows[k]] * x->r[rows[k]];
         }
         gap += x->D[q * m + q] * pushed;
-        bool free_to_move = curvature > (quad)1e-26 * x->D[q * m + q];
+        bool free_to_move = curvature > QUAD_DEPENDENT * x->D[q * m + q];
         quad step = free_to_move ? -gap / curvature : -1;
         for (int64_t k = 0; k < n; k++)
             if (w[k] > 0 && (step < 0 || -x->r[rows[k]] < step * w[k])) {
@@ -267,7 +273,7 @@ static inline int64_t quad_worst_row(const quad_exact *x, quad *worst)
             continue;
         quad miss = -x->g[i] / (quad_abs(x->g0[i]) + size * reach);
         *worst = miss > *worst ? miss : *worst;
-        if (miss > (quad)1e-24 && -x->g[i] / size > deepest) {
+        if (miss > QUAD_ROUNDING && -x->g[i] / size > deepest) {
             deepest = -x->g[i] / size;
             row = i;
         }
@@ -328,7 +334,7 @@ static inline bool quad_exact_solve(quad_exact *x, const uz_qp *qp, const bool *
         if (start[i] && x->D[i * m + i] > 0)
             rows[count++] = i;
     quad_drop_pulling(x, rows, &count);
-    while (ok && (row = quad_worst_row(x, &x->violation)) >= 0) {
+    for (int64_t step = 0; ok && step <= 20 * (m + 5) && (row = quad_worst_row(x, &x->violation)) >= 0; step++) {
         ok = quad_add_row(x, rows, &count, row);
         quad_solve_rows(x, rows, &count);
     }

@@ -5,6 +5,8 @@
 #include "core/blas.h"
 #include "core/error.h"
 
+#include <float.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -145,6 +147,30 @@ static void solve_by_inverse(uz_case *load, double *r, double *g, const double *
     }
 }
 
+/* Signs below this, relative to the largest of their kind, are rounding: weakly active rows must not make the steps
+ * chatter. */
+#define NOISE (64.0 * DBL_EPSILON)
+
+static double largest(const double *x, int64_t n)
+{
+    double value = 0.0;
+    for (int64_t i = 0; i < n; i++)
+        value = fmax(value, fabs(x[i]));
+    return value;
+}
+
+static void forgive_rounding(double *r, double *g, const uz_case *load, const bool *active)
+{
+    int64_t m = load->dual->info.m;
+    double r_noise = NOISE * largest(r, m), g_noise = NOISE * largest(load->g0, m);
+    for (int64_t i = 0; i < m; i++) {
+        if (active[i] && r[i] > 0.0 && r[i] <= r_noise)
+            r[i] = 0.0;
+        if (!active[i] && g[i] < 0.0 && g[i] >= -g_noise)
+            g[i] = 0.0;
+    }
+}
+
 uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active,
                                     uz_error *err)
 {
@@ -162,8 +188,10 @@ uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *s
     if (status == UZ_OK) {
         uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m);
         *solved = uz_potrf_lower(count, block);
-        if (*solved)
+        if (*solved) {
             (scaled ? solve_by_inverse : solve_by_operator)(load, r, g, block, rows, count);
+            forgive_rounding(r, g, load, active);
+        }
     }
     free(block);
     free(rows);

@@ -102,6 +102,8 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
     dual->info.bytes = 48 * (size_t)N->ptr[N->cols];
     if (status == UZ_OK && op == UZ_OPERATOR_CONDENSED)
         status = uz_condensed_create(dual, err);
+    if (status == UZ_OK && op == UZ_OPERATOR_FACTORED)
+        status = uz_bounds_create(dual, err);
     if (status == UZ_OK && hooks && hooks->cancelled && hooks->cancelled(hooks->ctx))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
     if (status == UZ_OK)
@@ -119,6 +121,7 @@ void uz_dual_free(uz_dual *dual)
     free(dual->row_scale);
     uz_csc_clear(&dual->Nt);
     uz_condensed_clear(&dual->dense);
+    uz_bounds_clear(&dual->bounds);
     lazy_free(dual->lazy);
     free(dual);
 }
@@ -183,6 +186,7 @@ void uz_case_free(uz_case *load)
     free(load->work);
     free(load->work2);
     free(load->push_weight);
+    uz_bounded_free(load->box);
     free(load->push);
     free(load->kept);
     free(load);
@@ -218,9 +222,14 @@ int64_t uz_case_m(const uz_case *load)
     return load->dual->info.m;
 }
 
-bool uz_case_is_scaled(const uz_case *load)
+bool uz_case_active_set_is_cheap(const uz_case *load)
 {
-    return load->dual->info.op == UZ_OPERATOR_CONDENSED && load->dual->dense.scaled;
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? load->dual->dense.scaled : load->box != NULL;
+}
+
+bool uz_case_guess_active(uz_case *load, bool *active)
+{
+    return load->box && uz_bounded_guess(load, active);
 }
 
 double uz_dual_known_lambda_max(const uz_dual *dual)
@@ -310,12 +319,12 @@ void uz_case_keep_push(uz_case *load)
     load->has_kept = true;
 }
 
-uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active, uz_error *err)
+uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
 {
     *solved = false;
-    if (load->dual->info.op != UZ_OPERATOR_CONDENSED)
-        return UZ_OK;
-    return uz_condensed_solve_active(load, r, g, solved, active, err);
+    if (load->dual->info.op == UZ_OPERATOR_CONDENSED)
+        return uz_condensed_solve_active(load, r, g, solved, active, err);
+    return load->box ? uz_bounded_solve_active(load, r, g, solved, active, err) : UZ_OK;
 }
 
 uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)

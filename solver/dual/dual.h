@@ -70,12 +70,19 @@ void uz_case_keep_push(uz_case *load);
 uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
 
 /* r (m) with D_AA r_A = g0_A on the active rows and 0 elsewhere: the contact problem with these rows as equations; g
- * (m) its gaps, 0 on the active rows. *solved false: this form can't, or the system is singular to working precision.
- * CONDENSED only. */
-uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active, uz_error *err);
+ * (m) its gaps, 0 on the active rows. A reaction above 0 or a gap below 0 is a row guessed wrong: signs that rounding
+ * alone could have made come back as 0. Rows that others make redundant are taken out of `active` (two bounds on one
+ * dof). *solved false: this form can't (FACTORED needs rows with one nonzero entry each), or the system is singular to
+ * working precision, or the rows contradict. */
+uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 
 /* Whether solve_active needs no D: active set steps are then cheap from the start. */
-bool uz_case_is_scaled(const uz_case *load);
+bool uz_case_active_set_is_cheap(const uz_case *load);
+
+/* A guess of the active rows (m) that is better than the signs of the last solve_active (of g0 before the first), for
+ * much less than its cost: FACTORED with one nonzero entry in each row. Successive guesses converge by themselves.
+ * false, `active` untouched: there is none. */
+bool uz_case_guess_active(uz_case *load, bool *active);
 
 /* y (m): in, a direction in which the reactions grow; out, scaled to max |y_i| about 1, its nearest vector with N'y = 0
  * on the rows that take part, cut at 0. A candidate for uz_ray_radius. */

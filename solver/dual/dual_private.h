@@ -21,6 +21,28 @@ typedef struct {
     double *scale;     /* scaled: that entry, n_b */
 } uz_condensed;
 
+/* FACTORED, when every row of N has exactly one nonzero entry: row i is scale_i u_dof. NULL otherwise. */
+typedef struct {
+    int64_t *dof;  /* m */
+    double *scale; /* m */
+} uz_bounds;
+
+/* The same problem as minimize 1/2 u'Ku - p'u, bottom <= u <= top, of one load. */
+typedef struct {
+    double *p;              /* d */
+    double *top, *bottom;   /* d: +-INFINITY where there is none */
+    int64_t *upper, *lower; /* d: the row that says so, the tightest; -1: none */
+    bool contradictory;     /* some bottom lies above its top */
+    int64_t *holder;        /* d: the row that holds the dof in the current guess, -1: free */
+    bool *fixed;            /* d: holder >= 0 */
+    bool has_exact;         /* u and r are those of the last guess, to rounding */
+    double *u, *r;          /* d, m */
+    double *force, *size;   /* d: a residual of equilibrium and what its rounding is in proportion to */
+    double *point;          /* d: where the sweeps ended; energy INFINITY before the first */
+    double point_energy;
+    uz_csc K_upper; /* K's upper triangle: the rows of K */
+} uz_bounded;
+
 /* What is made at the first need, by whoever needs it; pointers are published to cases under the mutex and never
  * change. */
 typedef struct {
@@ -37,6 +59,7 @@ struct uz_dual {
     const uz_factor *factor;
     uz_csc Nt;          /* d x m */
     uz_condensed dense; /* CONDENSED */
+    uz_bounds bounds;   /* FACTORED */
     uz_dual_lazy *lazy;
 };
 
@@ -53,6 +76,7 @@ struct uz_case {
     double *apply_room;          /* CONDENSED: n_b */
     double *work, *work2;        /* max(d, m, n_b) each */
     double *push_weight;         /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
+    uz_bounded *box;             /* FACTORED with bounds, else NULL */
     double *push, *kept;         /* correction: CONDENSED L_bb'c (n_b), FACTORED c (d) */
     bool has_kept;
 };
@@ -75,6 +99,15 @@ uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err);
 uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
 uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_factored_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
+
+uz_status uz_bounds_create(uz_dual *dual, uz_error *err);
+void uz_bounds_clear(uz_bounds *bounds);
+uz_status uz_bounded_create(uz_case *load, const double *p, uz_error *err);
+void uz_bounded_free(uz_bounded *box);
+bool uz_bounded_guess(uz_case *load, bool *active);
+uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
+/* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */
+bool uz_bounded_recover(const uz_case *load, double *u, const double *r);
 
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.

@@ -44,16 +44,26 @@ uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err)
         load->psi0 -= 0.5 * p[j] * load->base[j];
     memcpy(load->g0, load->h, (size_t)m * sizeof *load->g0);
     uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, load->base);
-    return UZ_OK;
+    return load->dual->bounds.dof ? uz_bounded_create(load, p, err) : UZ_OK;
+}
+
+static bool all_zero(const double *x, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++)
+        if (x[i] != 0.0)
+            return false;
+    return true;
 }
 
 uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     memset(load->response, 0, (size_t)dual->info.d * sizeof(double));
+    memset(Dr, 0, (size_t)dual->info.m * sizeof *Dr);
+    if (all_zero(r, dual->info.m))
+        return UZ_OK;
     uz_csc_gaxpy_t(load->response, &dual->N, 1.0, r);
     uz_status status = solve(load, load->response, err);
-    memset(Dr, 0, (size_t)dual->info.m * sizeof *Dr);
     if (status == UZ_OK)
         uz_csc_gaxpy(Dr, &dual->N, 1.0, load->response);
     return status;
@@ -77,9 +87,14 @@ uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const
 
 uz_status uz_factored_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
 {
-    const uz_dual *dual = load->dual;
-    uz_status status = uz_factored_apply(load, load->work, r, err);
-    for (int64_t j = 0; j < dual->info.d; j++)
-        u[j] = load->base[j] + load->response[j] + (with_push ? load->kept[j] : 0.0);
+    int64_t d = load->dual->info.d;
+    uz_status status = UZ_OK;
+    if (!uz_bounded_recover(load, u, r)) {
+        status = uz_factored_apply(load, load->work, r, err);
+        for (int64_t j = 0; j < d; j++)
+            u[j] = load->base[j] + load->response[j];
+    }
+    for (int64_t j = 0; with_push && j < d; j++)
+        u[j] += load->kept[j];
     return status;
 }

@@ -12,7 +12,7 @@ typedef struct {
     uz_ordering ordering; /* the one that was used */
     int64_t n, nnz;       /* of L, lower triangle */
     size_t bytes;
-    double rcond; /* CHOLMOD's estimate from the diagonal of L: (min/max)^2, an upper bound for 1/cond(K) */
+    double rcond; /* min_j L_jj^2 / K_jj: an upper bound for 1 / cond(K) after diagonal scaling */
     double order_s, factor_s;
 } uz_factor_info;
 
@@ -48,6 +48,16 @@ const int64_t *uz_factor_position(const uz_factor *factor);
  * part zero; order[k] is the dof of row k (ascending position), where[k] its position. It is the Cholesky factor of the
  * Schur complement of K on these dofs: checked by the elimination structure, UZ_ERR_INTERNAL if it is not. */
 uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err);
+
+/* The factor of K_FF, F the dofs that are not fixed (n): K (lower triangle) with these dofs held. factor: of K, whose
+ * order is used; ws is borrowed for the object's life. *out is NULL on success when K_FF is not positive definite to
+ * working precision. */
+typedef struct uz_principal uz_principal;
+uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
+                              uz_factor_workspace *ws, uz_error *err);
+void uz_principal_free(uz_principal *part);
+/* x_F = K_FF^-1 x_F in place; x (n) at fixed dofs is neither read nor written. */
+uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err);
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);

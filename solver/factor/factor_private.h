@@ -23,6 +23,9 @@ struct uz_factor_workspace {
 /* Starts a CHOLMOD workspace that never prints, never aborts and gives LL' supernodal factors with 64-bit integers. */
 bool uz_cholmod_start(cholmod_common *common);
 
+/* A dense matrix over an array, column-major. */
+cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns);
+
 /* Fills perm (n) with a fill-reducing ordering of A that keeps `last` at the end. *ordering: what was asked for on
  * entry (not AUTO), what was used on return. */
 uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,

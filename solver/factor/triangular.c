@@ -40,7 +40,7 @@ void uz_factor_unpermute(const uz_factor *factor, double *x, const double *permu
         x[perm[k]] = permuted[k];
 }
 
-static cholmod_dense view_dense(double *x, int64_t rows, int64_t columns)
+cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns)
 {
     cholmod_dense X;
     memset(&X, 0, sizeof X);
@@ -68,8 +68,8 @@ static uz_status substitute(substitution solve, const uz_factor *factor, uz_fact
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %lld columns",
                            (long long)columns);
     }
-    cholmod_dense X = view_dense(x, factor->n, columns),
-                  E = view_dense(ws->panel, (int64_t)factor->L->maxesize, columns);
+    cholmod_dense X = uz_view_dense(x, factor->n, columns),
+                  E = uz_view_dense(ws->panel, (int64_t)factor->L->maxesize, columns);
     if (!solve(factor->L, &X, &E, &ws->common) || ws->common.status != CHOLMOD_OK)
         return uz_fail(err, UZ_ERR_INTERNAL, "", "substitution failed (CHOLMOD status %d)", ws->common.status);
     return UZ_OK;

@@ -11,7 +11,6 @@
 #include "core/clock.h"
 #include "core/error.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +22,6 @@ typedef struct {
     double *r;    /* m: its solution, signs unchecked */
     double *g;    /* m: its gaps */
     int64_t wrong, fewest, patience;
-    double r_scale, g_scale; /* sizes that sign errors are measured against */
 } pivoting;
 
 static bool allocate(pivoting *p, int64_t m)
@@ -44,28 +42,22 @@ static void release(pivoting *p)
     free(p->g);
 }
 
-static double largest(const double *x, int64_t n)
+/* From the start: the operator's own guess, where it has one. Else the rows that a projected gradient step would leave
+ * in contact. */
+static void guess(pivoting *p, const uz_iterate *it, uz_case *load)
 {
-    double value = 0.0;
-    for (int64_t i = 0; i < n; i++)
-        value = fmax(value, fabs(x[i]));
-    return value;
-}
-
-/* Rows that a projected gradient step would leave in contact. */
-static void guess(pivoting *p, const uz_iterate *it, const double *g0)
-{
+    const double *g0 = uz_case_g0(load);
+    if (it->iteration == 0 && uz_case_guess_active(load, p->active))
+        return;
     for (int64_t i = 0; i < it->m; i++) {
         double gap = g0[i] - it->Dr[i];
         p->active[i] = it->r[i] < 0.0 ? it->r[i] + it->alpha * gap < 0.0 : gap < 0.0;
     }
 }
 
-/* A sign is wrong only beyond rounding: weakly active rows must not make the steps chatter. */
 static bool is_wrong(const pivoting *p, int64_t i)
 {
-    const double tolerance = 64.0 * DBL_EPSILON;
-    return p->active[i] ? p->r[i] > tolerance * p->r_scale : p->g[i] < -tolerance * p->g_scale;
+    return p->active[i] ? p->r[i] > 0.0 : p->g[i] < 0.0;
 }
 
 static int64_t count_wrong(pivoting *p, int64_t m)
@@ -76,17 +68,15 @@ static int64_t count_wrong(pivoting *p, int64_t m)
     return wrong;
 }
 
-static void exchange(pivoting *p, int64_t m)
+/* The next guess. The operator's own replaces the exchange of all wrong rows as long as their number comes down. */
+static void exchange(pivoting *p, uz_case *load, int64_t m)
 {
-    bool all = true;
-    if (p->wrong < p->fewest) {
+    bool better = p->wrong < p->fewest, all = better || p->patience > 0;
+    p->patience = better ? PATIENCE : p->patience - 1;
+    if (better)
         p->fewest = p->wrong;
-        p->patience = PATIENCE;
-    } else if (p->patience > 0) {
-        p->patience--;
-    } else {
-        all = false;
-    }
+    if (better && uz_case_guess_active(load, p->active))
+        return;
     for (int64_t i = m - 1; i >= 0; i--) {
         if (!is_wrong(p, i))
             continue;
@@ -119,7 +109,6 @@ static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_case 
     uz_status status = uz_case_solve_active(load, p->r, p->g, solved, p->active, err);
     if (status != UZ_OK || !*solved)
         return status;
-    p->r_scale = largest(p->r, it->m);
     p->wrong = count_wrong(p, it->m);
     return status;
 }
@@ -127,8 +116,8 @@ static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_case 
 static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                        uz_history *history, uz_error *err)
 {
-    *end = UZ_END_STALLED;
-    for (int k = 0; k < MAX_STEPS; k++) {
+    *end = it->best_relative <= options->target ? UZ_END_TARGET : UZ_END_STALLED;
+    for (int k = 0; *end != UZ_END_TARGET && k < MAX_STEPS; k++) {
         bool solved = false;
         if (uz_should_stop(end, it, options))
             return UZ_OK;
@@ -144,7 +133,7 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, 
             *end = UZ_END_TARGET;
         if (*end == UZ_END_TARGET || p->wrong == 0)
             return UZ_OK;
-        exchange(p, it->m);
+        exchange(p, load, it->m);
     }
     return UZ_OK;
 }
@@ -157,8 +146,7 @@ uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz
     if (!allocate(&p, it->m))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)it->m);
     if (status == UZ_OK) {
-        p.g_scale = largest(uz_case_g0(load), it->m);
-        guess(&p, it, uz_case_g0(load));
+        guess(&p, it, load);
         status = steps(&p, end, it, load, options, history, err);
     }
     release(&p);

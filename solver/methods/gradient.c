@@ -168,7 +168,7 @@ static uz_status prepare(uz_iterate *it, uz_case *load, uz_error *err)
 uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                           uz_history *history, uz_error *err)
 {
-    double step_norm = history->count ? history->rows[history->count - 1].step_norm : 0.0;
+    double step_norm = NAN; /* no step of this run yet: what ran before may have made none */
     bool restart = false;
     uz_status status = prepare(it, load, err);
     if (status == UZ_OK)

@@ -12,7 +12,7 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     uz_method_options phase = *options;
     phase.method = UZ_METHOD_ACCELERATED_RESTART;
     bool polish = options->stopping == UZ_STOP_CERTIFIED;
-    if (polish && it->iteration == 0 && uz_case_is_scaled(load)) {
+    if (polish && it->iteration == 0 && uz_case_active_set_is_cheap(load)) {
         uz_status status = uz_active_set_run(end, it, load, &phase, history, err);
         if (status != UZ_OK || *end != UZ_END_STALLED)
             return status;

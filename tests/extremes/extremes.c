@@ -60,12 +60,14 @@ void add_row(suite *all, const char *family_name, const char *name, const char *
     printf("%-11s %-34s %-9s %-22s", family_name, name, how, outcome);
     print_number(j->certified, 3);
     print_number(j->error, 3);
+    print_number(j->floor, 2);
     print_number(j->ratio, 4);
     printf("  %s%s%s\n", said, j->why[0] ? ": " : "", j->why);
     fprintf(all->json, "%s  {\"family\": \"%s\", \"name\": \"%s\", \"way\": \"%s\", \"outcome\": \"%s\"",
             all->rows ? ",\n" : "", family_name, name, how, outcome);
     put_number(all->json, "certified", j->certified);
     put_number(all->json, "true", j->error);
+    put_number(all->json, "floor", j->floor);
     put_number(all->json, "ratio", j->ratio);
     fprintf(all->json, ", \"verdict\": \"%s\"}", said);
     all->rows++;
@@ -91,6 +93,16 @@ static void print_families(suite *all)
     }
 }
 
+static void write_totals(suite *all)
+{
+    fprintf(all->json, "\n], \"generated\": {\"problems\": %d, \"solves\": %d, \"converged\": %d, \"wrong\": %d",
+            all->generated.problems, all->generated.solves, all->generated.converged, all->generated.wrong);
+    fprintf(all->json, ", \"asked\": %d, \"answered\": %d", all->generated.asked, all->generated.answered);
+    put_number(all->json, "ratio_median", all->generated.ratio_median);
+    put_number(all->json, "ratio_least", all->generated.ratio_least);
+    fprintf(all->json, "}, \"passed\": %d, \"failed\": %d}\n", all->passed, all->failed);
+}
+
 int main(int argc, char **argv)
 {
     static void (*const families[])(suite *) = {
@@ -101,15 +113,15 @@ int main(int argc, char **argv)
         fprintf(stderr, "usage: extremes OUTPUT.json [part of a family's name]\n");
         return 2;
     }
-    uz_process_init(1);
+    uz_process_init(2);
     uz_thread_init();
     setvbuf(stdout, NULL, _IOLBF, 0);
-    printf("%-11s %-34s %-9s %-22s %10s %10s %10s\n", "family", "problem", "way", "outcome", "certified", "true",
-           "ratio");
+    printf("%-11s %-34s %-9s %-22s %10s %10s %10s %10s\n", "family", "problem", "way", "outcome", "certified", "true",
+           "floor", "ratio");
     fprintf(all.json, "{\"rows\": [\n");
     for (size_t k = 0; k < sizeof families / sizeof families[0]; k++)
         families[k](&all);
-    fprintf(all.json, "\n], \"passed\": %d, \"failed\": %d}\n", all.passed, all.failed);
+    write_totals(&all);
     print_families(&all);
     printf("%d passed, %d failed\n", all.passed, all.failed);
     return fclose(all.json) != 0 || all.failed > 0 || all.passed == 0;

@@ -39,6 +39,10 @@ typedef struct {
     int rows, passed, failed;
     family families[32];
     int n_families;
+    struct {
+        int problems, solves, converged, wrong, asked, answered;
+        double ratio_median, ratio_least;
+    } generated;
 } suite;
 
 /* One problem in matrices, or one scene, in several ways; both take over and free what they are given. */

@@ -75,7 +75,7 @@ static void run_way(const task *t, const truth *known, way how, uz_cache *cache)
     uz_result *result = NULL;
     uz_error err = {0};
     uz_settings settings = settings_of(how);
-    judgement j = {.verdict = JUDGED_OK, .certified = NAN, .error = NAN, .ratio = NAN};
+    judgement j = {.verdict = JUDGED_OK, .certified = NAN, .error = NAN, .floor = NAN, .ratio = NAN};
     uz_status status = uz_solve(&result, t->problem, &settings, cache, NULL, &err);
     if (status == UZ_OK && t->qp) {
         double *u = by_dof(result, t->model, t->qp->K.cols);

@@ -1,0 +1,167 @@
+/* principal.c: factors of principal submatrices of K: the body with some dofs held.
+ *
+ * The reduced matrix keeps the order of the factor of K, so that its fill is part of that factor's: no ordering is
+ * paid, and the more dofs are held the less is computed. */
+#include "factor/factor_private.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct uz_principal {
+    uz_factor_workspace *ws;
+    cholmod_factor *L; /* NULL when no dof is free */
+    int64_t n_free;
+    int64_t *dof;             /* n_free: which dof each row is, in the factor's order */
+    double *room;             /* n_free */
+    cholmod_dense *X, *Y, *E; /* CHOLMOD's room, kept between solves */
+};
+
+/* place (n): the row of a free dof in the reduced matrix, -1 for the others. */
+static void number_free(uz_principal *part, int64_t *place, const bool *fixed, const uz_factor *factor)
+{
+    const SuiteSparse_long *perm = factor->L->Perm;
+    for (int64_t k = 0; k < factor->n; k++) {
+        int64_t i = perm[k];
+        place[i] = fixed[i] ? -1 : part->n_free;
+        if (!fixed[i])
+            part->dof[part->n_free++] = i;
+    }
+}
+
+/* Counts (values false) or places (values true) the entries of the reduced matrix's upper triangle; next (n_free + 1)
+ * is where each column's next entry goes, or one past its count. */
+static void scatter(cholmod_sparse *A, SuiteSparse_long *next, const uz_csc *K, const int64_t *place, bool values)
+{
+    SuiteSparse_long *index = A ? A->i : NULL;
+    double *value = A ? A->x : NULL;
+    for (int64_t j = 0; j < K->cols; j++) {
+        for (int64_t k = K->ptr[j]; place[j] >= 0 && k < K->ptr[j + 1]; k++) {
+            int64_t a = place[j], b = place[K->idx[k]], column = a > b ? a : b;
+            if (b < 0)
+                continue;
+            if (!values) {
+                next[column + 1]++;
+                continue;
+            }
+            index[next[column]] = a > b ? b : a;
+            value[next[column]++] = K->val[k];
+        }
+    }
+}
+
+/* K_FF in the factor's order, upper triangle, columns unsorted; NULL: no memory. */
+static cholmod_sparse *reduce(const uz_principal *part, const uz_csc *K, const int64_t *place)
+{
+    int64_t n = part->n_free;
+    SuiteSparse_long *next = uz_alloc_zero(n + 1, sizeof *next);
+    cholmod_sparse *A = NULL;
+    if (!next)
+        return NULL;
+    scatter(NULL, next, K, place, false);
+    for (int64_t j = 0; j < n; j++)
+        next[j + 1] += next[j];
+    A = cholmod_l_allocate_sparse((size_t)n, (size_t)n, (size_t)next[n], 0, 1, 1, CHOLMOD_REAL, &part->ws->common);
+    if (A) {
+        memcpy(A->p, next, (size_t)(n + 1) * sizeof *next);
+        scatter(A, next, K, place, true);
+    }
+    free(next);
+    return A;
+}
+
+/* Few flops for each entry of L make supernodes a burden: CHOLMOD_AUTO decides by that ratio. */
+static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A, uz_error *err)
+{
+    cholmod_common *common = &part->ws->common;
+    common->supernodal = CHOLMOD_AUTO;
+    common->method[0].ordering = CHOLMOD_NATURAL;
+    part->L = cholmod_l_analyze(A, common);
+    common->supernodal = CHOLMOD_SUPERNODAL;
+    common->method[0].ordering = CHOLMOD_GIVEN;
+    bool ok = part->L && cholmod_l_factorize(A, part->L, common);
+    int status = common->status;
+    if (status == CHOLMOD_OUT_OF_MEMORY || status == CHOLMOD_TOO_LARGE)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)part->n_free);
+    *positive = status == CHOLMOD_OK && part->L && (int64_t)part->L->minor == part->n_free;
+    if (!*positive && status != CHOLMOD_NOT_POSDEF && !ok)
+        return uz_fail(err, UZ_ERR_INTERNAL, "K", "factorization failed (CHOLMOD status %d)", status);
+    return UZ_OK;
+}
+
+static uz_status build(uz_principal *part, bool *positive, const uz_csc *K, const bool *fixed, const uz_factor *factor,
+                       uz_error *err)
+{
+    int64_t n = factor->n, *place = uz_alloc(n, sizeof *place);
+    uz_status status = UZ_OK;
+    cholmod_sparse *A = NULL;
+    part->dof = uz_alloc(n, sizeof *part->dof);
+    part->room = uz_alloc(n, sizeof *part->room);
+    bool ok = place && part->dof && part->room;
+    *positive = true;
+    if (ok)
+        number_free(part, place, fixed, factor);
+    if (ok && part->n_free > 0) {
+        A = reduce(part, K, place);
+        ok = A != NULL;
+    }
+    if (!ok)
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
+    else if (A)
+        status = factorize(part, positive, A, err);
+    cholmod_l_free_sparse(&A, &part->ws->common);
+    free(place);
+    return status;
+}
+
+uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
+                              uz_factor_workspace *ws, uz_error *err)
+{
+    *out = NULL;
+    uz_principal *part = uz_alloc_zero(1, sizeof *part);
+    bool positive = false;
+    if (!part)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
+    part->ws = ws;
+    uz_status status = build(part, &positive, K, fixed, factor, err);
+    if (status == UZ_OK && positive)
+        *out = part;
+    else
+        uz_principal_free(part);
+    return status;
+}
+
+void uz_principal_free(uz_principal *part)
+{
+    if (!part)
+        return;
+    cholmod_common *common = &part->ws->common;
+    cholmod_l_free_factor(&part->L, common);
+    cholmod_l_free_dense(&part->X, common);
+    cholmod_l_free_dense(&part->Y, common);
+    cholmod_l_free_dense(&part->E, common);
+    free(part->dof);
+    free(part->room);
+    free(part);
+}
+
+uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err)
+{
+    if (part->n_free == 0)
+        return UZ_OK;
+    cholmod_common *common = &part->ws->common;
+    cholmod_dense B = uz_view_dense(part->room, part->n_free, 1);
+    for (int64_t k = 0; k < part->n_free; k++)
+        part->room[k] = x[part->dof[k]];
+    bool ok = cholmod_l_solve2(CHOLMOD_A, part->L, &B, NULL, &part->X, NULL, &part->Y, &part->E, common);
+    if (common->status == CHOLMOD_OUT_OF_MEMORY)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to solve for %lld dofs", (long long)part->n_free);
+    if (!ok || common->status != CHOLMOD_OK)
+        return uz_fail(err, UZ_ERR_INTERNAL, "", "substitution failed (CHOLMOD status %d)", common->status);
+    const double *solution = part->X->x;
+    for (int64_t k = 0; k < part->n_free; k++)
+        x[part->dof[k]] = solution[k];
+    return UZ_OK;
+}
