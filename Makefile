@@ -119,8 +119,10 @@ $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(BUILD)/obj/tests/harness.o $(PAR
 	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -ls __wrap_free tests/unit/$(notdir $@).c),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
 comma := ,
 
+# Ipopt is what obstacle problems are compared with, where it is installed; nothing else needs it.
+$(call obj,tests/bench/ipopt.c): CFLAGS += $(patsubst -I%,-isystem %,$(call pkg,--cflags ipopt))
 $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
-	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs jansson) -lpthread
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs ipopt) $(call pkg,--libs jansson) -lpthread
 
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath

@@ -81,7 +81,7 @@ static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_cs
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, N, err);
     if (status != UZ_OK)
         return status;
-    uz_operator op = uz_dual_choose(K->rows, N->rows, n_b, settings->op);
+    uz_operator op = uz_dual_choose(N, n_b, settings->op);
     status = uz_factor_create(&body->factor, K, dofs, op == UZ_OPERATOR_CONDENSED ? n_b : 0, settings->ordering,
                               settings->memory_limit, hooks, err);
     free(dofs);

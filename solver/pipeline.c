@@ -68,8 +68,8 @@ static uz_status iterate(uz_run *run, uz_error *err)
     return status;
 }
 
-/* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. */
-static uz_status inverse_norm(void *ctx, double *value, const double *e, uz_error *err)
+/* e'K^-1 e = ||L^-1 P e||^2, and e becomes K^-1 e: one linear solve. */
+static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
 {
     uz_run *run = ctx;
     const uz_factor *factor = run->body->factor;
@@ -78,6 +78,9 @@ static uz_status inverse_norm(void *ctx, double *value, const double *e, uz_erro
     double sum = 0.0;
     for (int64_t j = 0; j < run->d; j++)
         sum += run->work[j] * run->work[j];
+    if (status == UZ_OK)
+        status = uz_factor_backward(factor, run->ws, run->work, 1, err);
+    uz_factor_unpermute(factor, e, run->work);
     *value = sum;
     return status;
 }

@@ -21,6 +21,16 @@ check() { # NAME COMMAND...
 each_c_file() { # COMMAND...: with a few files at a time, one process per core
     printf '%s\n' $c_files | xargs -P "$cores" -n 8 "$@"
 }
+tidy() { # the quick checks that find mistakes; those left out see one in correct code here
+    printf '%s\n' $c_files | xargs -P "$cores" -n 8 sh -c 'options=$1; shift; clang-tidy --quiet --warnings-as-errors="*" \
+        --checks="-*,bugprone-*,misc-redundant-expression,readability-misleading-indentation,-bugprone-branch-clone,
+            -bugprone-easily-swappable-parameters,-bugprone-implicit-widening-of-multiplication-result,
+            -bugprone-misplaced-widening-cast,-bugprone-narrowing-conversions,-bugprone-not-null-terminated-result,
+            -bugprone-reserved-identifier,-bugprone-sizeof-expression,-bugprone-suspicious-memory-comparison" \
+        "$@" -- $options 2>&1' tidy "-std=c11 -D_GNU_SOURCE $includes $cflags -Itests" |
+        grep -Ev '^[0-9]+ warnings? (generated|treated as error)'
+    return "${PIPESTATUS[1]}"
+}
 long_files() { # names every source of more than 520 lines
     wc -l $sources | awk '$2 != "total" && $1 > 520 {print; bad = 1} END {exit bad}'
 }
@@ -41,6 +51,7 @@ only_in() { # HEADER PATTERN: the header is included nowhere but in files that m
 check format clang-format --dry-run -Werror $sources
 check gcc each_c_file gcc -fsyntax-only $strict $includes $cflags -Itests
 check clang each_c_file clang -fsyntax-only $strict $includes $cflags -Itests
+check clang_tidy tidy
 check cppcheck cppcheck -j "$cores" --quiet --std=c11 --error-exitcode=1 --inline-suppr --enable=warning,portability \
     --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes $c_files
 check file_length long_files

@@ -12,9 +12,11 @@ trap 'rm -rf "$work"' EXIT
 
 # For builds with a sanitizer: what is known of the libraries, and where in our code it happened.
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp ${TSAN_OPTIONS:-}"
+export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp print_suppressions=0 ${LSAN_OPTIONS:-}"
 export UBSAN_OPTIONS="print_stacktrace=1 ${UBSAN_OPTIONS:-}"
-# A locale with a decimal comma, for the tests that reading and writing numbers do not depend on it.
-if localedef -i de_DE -f UTF-8 "$work/de_DE.UTF-8" >/dev/null 2>&1; then export LOCPATH=$work; fi
+# A locale with a decimal comma, for the C tests that numbers are read and written without it.
+locale=()
+if localedef -i de_DE -f UTF-8 "$work/de_DE.UTF-8" >/dev/null 2>&1; then locale=(env "LOCPATH=$work"); fi
 
 run_one() { # NAME COMMAND...
     local name=$1 out=$work/out status
@@ -40,7 +42,7 @@ for kind in $kinds; do
     case $kind in
     unit) for source in tests/unit/test_*.c; do
               name=$(basename "$source" .c)
-              if wanted "$name"; then run_one "$name" "$build/tests/$name" $filter; fi
+              if wanted "$name"; then run_one "$name" "${locale[@]}" "$build/tests/$name" $filter; fi
           done ;;
     api) for script in tests/api/test_*.py; do
              name=$(basename "$script" .py)

@@ -23,8 +23,8 @@ typedef struct {
     size_t bytes; /* beside K, N and the factor, with what is made on demand */
 } uz_dual_info;
 
-/* The form that AUTO stands for, from the sizes (n_b: dofs that N touches). */
-uz_operator uz_dual_choose(int64_t d, int64_t m, int64_t n_b, uz_operator asked);
+/* The form that AUTO stands for, from the sizes (n_b: dofs that N touches) and whether each row bounds one dof. */
+uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked);
 
 /* The factor stays the caller's and must outlive *out; N (m x d) is copied, and scaled. When op is CONDENSED the
  * factor's last dofs must be the ones that N touches: uz_dual_contact_dofs lists them, ascending; the caller frees

@@ -5,6 +5,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -88,8 +89,9 @@ static uz_status factorize(uz_factor *factor, cholmod_sparse *A, cholmod_common 
     return UZ_OK;
 }
 
-/* Below this the factor's own rounding errors are as large as its smallest pivot: nothing could be certified. */
-#define RCOND_LEAST 1e-16
+/* Below this times n the factor's own rounding errors are as large as its smallest pivot: of a body that is free to
+ * move, rounding was seen to leave up to half of n eps. */
+#define RCOND_LEAST DBL_EPSILON
 
 /* min_j L_jj^2 / K_jj: what elimination left of each diagonal entry. It does not depend on the units of single dofs,
  * and the accuracy of a Cholesky factorization is governed by the condition after diagonal scaling (Demmel 1989; Higham
@@ -122,7 +124,7 @@ static uz_status describe(uz_factor *factor, const cholmod_sparse *A, uz_error *
     info->nnz = (int64_t)factor->L->xsize;
     info->bytes = 8 * factor->L->xsize + 8 * factor->L->ssize + 32 * (size_t)factor->n;
     info->rcond = least_pivot_share(factor, A);
-    if (!(info->rcond >= RCOND_LEAST))
+    if (!(info->rcond >= RCOND_LEAST * (double)factor->n))
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                        "K is singular to working precision (reciprocal condition %.2g): the body can move without "
                        "resistance, or its stiffnesses differ by more than double precision can hold",

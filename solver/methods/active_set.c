@@ -17,11 +17,19 @@
 
 enum { PATIENCE = 3, MAX_STEPS = 400 };
 
+/* What an exchange of all wrong rows is expected to leave of them, before it was tried. */
+#define FAIR_RATE 0.5
+
+typedef enum { GUESS, EXCHANGE, N_MOVES } move;
+
 typedef struct {
     bool *active; /* m: the current guess */
     double *r;    /* m: its solution, signs unchecked */
     double *g;    /* m: its gaps */
     int64_t wrong, fewest, patience;
+    move move;            /* the last one */
+    double rate[N_MOVES]; /* wrong rows after the last move of each kind over those before */
+    int64_t before;       /* wrong rows before it, 0: there was none */
 } pivoting;
 
 static bool allocate(pivoting *p, int64_t m)
@@ -32,6 +40,7 @@ static bool allocate(pivoting *p, int64_t m)
     p->g = uz_alloc_zero(m, sizeof(double));
     p->fewest = m + 1;
     p->patience = PATIENCE;
+    p->rate[EXCHANGE] = FAIR_RATE;
     return p->active && p->r && p->g;
 }
 
@@ -68,15 +77,27 @@ static int64_t count_wrong(pivoting *p, int64_t m)
     return wrong;
 }
 
-/* The next guess. The operator's own replaces the exchange of all wrong rows as long as their number comes down. */
+/* How far the last move brought the number of wrong rows down. */
+static void judge_move(pivoting *p)
+{
+    if (p->before > 0)
+        p->rate[p->move] = (double)p->wrong / (double)p->before;
+    p->before = p->wrong;
+}
+
+/* The next guess: all wrong rows change places, or the operator makes a guess of its own, whichever has done better. */
 static void exchange(pivoting *p, uz_case *load, int64_t m)
 {
     bool better = p->wrong < p->fewest, all = better || p->patience > 0;
+    judge_move(p);
     p->patience = better ? PATIENCE : p->patience - 1;
+    p->move = EXCHANGE;
     if (better)
         p->fewest = p->wrong;
-    if (better && uz_case_guess_active(load, p->active))
+    if (all && p->rate[GUESS] <= p->rate[EXCHANGE] && uz_case_guess_active(load, p->active)) {
+        p->move = GUESS;
         return;
+    }
     for (int64_t i = m - 1; i >= 0; i--) {
         if (!is_wrong(p, i))
             continue;

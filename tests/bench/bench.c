@@ -190,6 +190,21 @@ static void bench_reader(report *out)
     print_row(out, "matrix_market_write", "MB/s", (bench_value){writer, writer, writer, 5}, "");
 }
 
+static void bench_obstacles(report *out)
+{
+    bench_value ratio, milliseconds;
+    bool compared;
+    if (!bench_obstacle(&ratio, &milliseconds, &compared)) {
+        printf("the obstacle problem did not converge to its reference\n");
+        exit(1);
+    }
+    print_row(out, "obstclae", "ms", milliseconds, "");
+    if (compared)
+        print_row(out, "ipopt_over_uzawa_obstclae", "x", ratio, "");
+    else
+        printf("%-34s skipped: no Ipopt (Debian: coinor-libipopt-dev)\n", "ipopt_over_uzawa_obstclae");
+}
+
 static bool wanted(const report *out, const char *name)
 {
     return !out->filter || strstr(name, out->filter);
@@ -210,6 +225,8 @@ int main(int argc, char **argv)
         bench_reader(&out);
     if (wanted(&out, "accuracy"))
         bench_accuracies(&out);
+    if (wanted(&out, "obstclae"))
+        bench_obstacles(&out);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {
         bench_body(&out, sizes[i], 1e-6);
         bench_body(&out, sizes[i], 1e-8);

@@ -24,6 +24,12 @@ typedef struct {
 typedef enum { BENCH_AMD, BENCH_METIS } bench_ordering;
 bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering ordering);
 
+/* Seconds that Ipopt takes to minimize *value = 1/2 u'Ku - p'u over lower <= u <= upper (d each), from the given u.
+ * NAN: it failed, or was not there when this was built. */
+double bench_ipopt(double *u, double *value, const uz_csc *K, const double *p, double *lower, double *upper);
+/* OBSTCLAE: time of Ipopt over ours, and ours. *compared false: there is no Ipopt, and no ratio. false: no answer. */
+bool bench_obstacle(bench_value *ratio, bench_value *milliseconds, bool *compared);
+
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);
 

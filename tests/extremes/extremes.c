@@ -48,15 +48,42 @@ static void print_number(double value, int digits)
     printf(" %10s", text);
 }
 
+/* Not wrong, but doubles could hold the answer that was not given. */
+static bool falls_short(const char *how, const char *outcome, const judgement *j)
+{
+    bool plain = strcmp(how, "default") == 0 || strcmp(how, "cached") == 0;
+    return plain && strstr(outcome, "_limit") && j->floor < 1e-11;
+}
+
+static const char *say(const judgement *j, bool missed, bool is_short)
+{
+    if (j->verdict == JUDGED_WRONG)
+        return "WRONG";
+    if (missed)
+        return "MISSED";
+    return j->verdict == JUDGED_UNCERTAIN ? "uncertain" : is_short ? "short" : "ok";
+}
+
+static void count_row(family *f, const char *outcome, const judgement *j, bool failed, bool is_short)
+{
+    bool converged = strcmp(outcome, "converged") == 0, refused = strncmp(outcome, "error ", 6) == 0;
+    f->rows++;
+    f->failed += failed;
+    f->converged += converged;
+    f->refused += refused;
+    f->other += !converged && !refused;
+    f->is_short += is_short;
+    if (converged && !isnan(j->error))
+        f->worst_error = fmax(f->worst_error, j->error);
+    if (!isnan(j->ratio))
+        f->least_ratio = fmin(f->least_ratio, j->ratio);
+}
+
 void add_row(suite *all, const char *family_name, const char *name, const char *how, const char *outcome,
              const judgement *j, bool missed)
 {
-    family *f = find_family(all, family_name);
-    bool failed = missed || j->verdict != JUDGED_OK, converged = strcmp(outcome, "converged") == 0;
-    const char *said = j->verdict == JUDGED_WRONG       ? "WRONG"
-                       : j->verdict == JUDGED_UNCERTAIN ? "UNCERTAIN"
-                       : missed                         ? "MISSED"
-                                                        : "ok";
+    bool failed = missed || j->verdict == JUDGED_WRONG, is_short = falls_short(how, outcome, j);
+    const char *said = say(j, missed, is_short);
     printf("%-11s %-34s %-9s %-22s", family_name, name, how, outcome);
     print_number(j->certified, 3);
     print_number(j->error, 3);
@@ -73,23 +100,17 @@ void add_row(suite *all, const char *family_name, const char *name, const char *
     all->rows++;
     all->passed += !failed;
     all->failed += failed;
-    f->rows++;
-    f->failed += failed;
-    f->converged += converged;
-    f->refused += strncmp(outcome, "error ", 6) == 0;
-    f->other += !converged && strncmp(outcome, "error ", 6) != 0;
-    f->worst_error = converged && !isnan(j->error) ? fmax(f->worst_error, j->error) : f->worst_error;
-    f->least_ratio = isnan(j->ratio) ? f->least_ratio : fmin(f->least_ratio, j->ratio);
+    count_row(find_family(all, family_name), outcome, j, failed, is_short);
 }
 
 static void print_families(suite *all)
 {
-    printf("\n%-12s %6s %10s %8s %8s %8s %14s %16s\n", "family", "rows", "converged", "other", "refused", "failed",
-           "largest error", "least bound/true");
+    printf("\n%-12s %6s %10s %8s %8s %8s %8s %14s %16s\n", "family", "rows", "converged", "other", "short", "refused",
+           "failed", "largest error", "least bound/true");
     for (int k = 0; k < all->n_families; k++) {
         const family *f = &all->families[k];
-        printf("%-12s %6d %10d %8d %8d %8d %14.2g %16.6g\n", f->name, f->rows, f->converged, f->other, f->refused,
-               f->failed, f->worst_error, f->least_ratio);
+        printf("%-12s %6d %10d %8d %8d %8d %8d %14.2g %16.6g\n", f->name, f->rows, f->converged, f->other, f->is_short,
+               f->refused, f->failed, f->worst_error, f->least_ratio);
     }
 }
 

@@ -21,7 +21,7 @@ typedef enum {
 /* What is owed. */
 typedef enum {
     OWED_TRUTH,  /* any named outcome or error, as long as it is true */
-    OWED_ANSWER, /* converged, by default, cached and active set */
+    OWED_ANSWER, /* converged, by default and cached */
     OWED_ERROR,  /* a refusal with a name */
     OWED_PROOF   /* infeasible, by default */
 } owed;
@@ -30,6 +30,7 @@ typedef enum {
 typedef struct {
     char name[32];
     int rows, converged, other, refused, failed;
+    int is_short;                    /* of `other`: doubles could hold what was asked */
     double worst_error, least_ratio; /* of converged rows; ratio: bound / true error, least of all bounds */
 } family;
 

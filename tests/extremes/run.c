@@ -42,7 +42,7 @@ static bool is_missed(owed what, way how, uz_status status, const uz_result *res
     if (what == OWED_ERROR)
         return status == UZ_OK;
     if (what == OWED_ANSWER)
-        return status != UZ_OK || ((plain || how == WAY_ACTIVE) && result->summary.outcome != UZ_CONVERGED);
+        return status != UZ_OK || (plain && result->summary.outcome != UZ_CONVERGED);
     return what == OWED_PROOF && plain && (status != UZ_OK || result->summary.outcome != UZ_INFEASIBLE);
 }
 

@@ -23,16 +23,23 @@ static bool can_run(uz_method method, uz_operator op)
     return method != UZ_METHOD_ACTIVE_SET || op == UZ_OPERATOR_CONDENSED;
 }
 
-static void check_result(const uz_result *result, const quad_exact *exact, const char *what)
+static void check_bounds(const uz_result *result, const quad_exact *exact, const char *what)
 {
     const uz_summary *s = &result->summary;
     double error = fmax(quad_error(exact, result->u), quad_error_of_reactions(exact, result->r));
+    double noise = 1e-30 * (double)quad_sqrt(exact->norm2); /* of the truth itself */
+    CHECK_MSG(s->certificate.absolute_error >= error - noise, "%s: bound %g, error %g", what,
+              s->certificate.absolute_error, error);
+    CHECK((s->outcome == UZ_CONVERGED) == (s->certificate.relative_error <= s->requested_error));
+}
+
+static void check_result(const uz_result *result, const quad_exact *exact, const char *what)
+{
+    const uz_summary *s = &result->summary;
     CHECK_MSG(s->outcome == UZ_CONVERGED, "%s, %s, %s: %s, %g after %lld", what, uz_method_name(s->method),
               uz_operator_name(s->op), uz_outcome_name(s->outcome), s->certificate.relative_error,
               (long long)s->iterations);
-    CHECK_MSG(s->certificate.absolute_error >= error, "%s: bound %g, error %g", what, s->certificate.absolute_error,
-              error);
-    CHECK(s->certificate.relative_error <= s->requested_error || s->outcome != UZ_CONVERGED);
+    check_bounds(result, exact, what);
 }
 
 /* Solves by every method and operator and compares with the exact solution. Takes the problem over. */
@@ -168,14 +175,34 @@ TEST(weakly_active_rows)
     }
 }
 
+/* Rows of any kind, some of them dependent. What can't be bounded must say so; that has to be rare. */
 TEST(random_problems)
 {
-    for (uint64_t seed = 0; seed < 15; seed++) {
+    int solved = 0, missed = 0;
+    for (uint64_t seed = 0; seed < 100; seed++) {
         qp_random rng = {seed + 100};
         qp_kind kind = {.d = random_int(&rng, 2, 15), .m = random_int(&rng, 1, 8), .condition = 20};
         kind.m = kind.m < kind.d ? kind.m : kind.d;
-        check_every_way(random_qp(&rng, &kind), "random", 100000);
+        uz_problem problem = problem_of(random_qp(&rng, &kind));
+        quad_exact exact;
+        CHECK(quad_exact_solve(&exact, &problem.qp, NULL));
+        for (size_t k = 0; k < COUNT(all_methods) * COUNT(both_operators); k++) {
+            uz_settings settings = settings_for(all_methods[k / 2], both_operators[k % 2]);
+            uz_result *result = can_run(settings.method, settings.op) ? solve_problem(&problem, &settings) : NULL;
+            if (!result)
+                continue;
+            if (result->summary.outcome == UZ_CONVERGED)
+                solved++;
+            else
+                missed++;
+            check_bounds(result, &exact, "random");
+            uz_result_free(result);
+        }
+        quad_exact_free(&exact);
+        uz_problem_clear(&problem);
     }
+    printf("# %d converged, %d did not\n", solved, missed);
+    CHECK(missed <= solved / 100);
 }
 
 TEST(long_steps_are_shortened)
@@ -187,17 +214,14 @@ TEST(long_steps_are_shortened)
     CHECK(quad_exact_solve(&exact, &problem.qp, NULL));
     for (size_t k = 0; k < COUNT(factors) * 3 * 2; k++) {
         uz_settings settings = settings_for(all_methods[1 + k % 3], both_operators[k / 3 % 2]);
-        settings.alpha = 0.1;
         uz_result *first = solve_problem(&problem, &settings);
-        if (first) {
-            double lambda = 0.5; /* of the right size */
-            settings.alpha = factors[k / 6] / lambda;
-            uz_result *result = solve_problem(&problem, &settings);
+        settings.alpha = factors[k / 6] * (first ? first->summary.alpha : NAN);
+        uz_result *result = solve_problem(&problem, &settings);
+        if (result) {
             check_result(result, &exact, "long step");
-            if (factors[k / 6] >= 100)
-                CHECK_MSG(result->summary.alpha < settings.alpha, "alpha %g stayed", settings.alpha);
-            uz_result_free(result);
+            CHECK_MSG(factors[k / 6] < 100 || result->summary.alpha < settings.alpha, "%g stayed", settings.alpha);
         }
+        uz_result_free(result);
         uz_result_free(first);
     }
     quad_exact_free(&exact);

@@ -1,0 +1,192 @@
+/* Each allocation of a solve fails once: the call must say so, publish nothing, keep nothing and free everything.
+ * Linked with malloc, calloc, realloc and free wrapped; CHOLMOD's allocations come through here too. */
+#include "harness.h"
+#include "qp_fixture.h"
+#include "scene_fixture.h"
+
+#include <suitesparse/SuiteSparse_config.h>
+
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t count, size_t size);
+void *__real_realloc(void *block, size_t size);
+void __real_free(void *block);
+void *__wrap_malloc(size_t size);
+void *__wrap_calloc(size_t count, size_t size);
+void *__wrap_realloc(void *block, size_t size);
+void __wrap_free(void *block);
+
+enum { MOST_BLOCKS = 4096, MOST_ALLOCATIONS = 5000 };
+
+/* Blocks that were allocated while watching and not yet freed. */
+static struct {
+    bool watching, failed;
+    long until_failure; /* allocations that still succeed */
+    void *block[MOST_BLOCKS];
+    int live;
+} heap;
+
+static bool fails_now(void)
+{
+    if (!heap.watching || heap.failed)
+        return false;
+    heap.failed = heap.until_failure-- == 0;
+    return heap.failed;
+}
+
+static void *add_block(void *block)
+{
+    if (heap.watching && block && heap.live < MOST_BLOCKS)
+        heap.block[heap.live++] = block;
+    return block;
+}
+
+static void drop_block(const void *block)
+{
+    for (int k = heap.live - 1; k >= 0; k--)
+        if (heap.block[k] == block) {
+            heap.block[k] = heap.block[--heap.live];
+            return;
+        }
+}
+
+void *__wrap_malloc(size_t size)
+{
+    return fails_now() ? NULL : add_block(__real_malloc(size));
+}
+
+void *__wrap_calloc(size_t count, size_t size)
+{
+    return fails_now() ? NULL : add_block(__real_calloc(count, size));
+}
+
+void *__wrap_realloc(void *block, size_t size)
+{
+    if (fails_now())
+        return NULL;
+    void *moved = __real_realloc(block, size);
+    if (moved) {
+        drop_block(block);
+        add_block(moved);
+    }
+    return moved;
+}
+
+void __wrap_free(void *block)
+{
+    drop_block(block);
+    __real_free(block);
+}
+
+/* CHOLMOD allocates through pointers; the first two of them are set by uz_process_init. BLAS is out of reach. */
+__attribute__((constructor)) static void settle_process(void)
+{
+    uz_process_init(2);
+    uz_thread_init();
+    SuiteSparse_config.realloc_func = realloc;
+    SuiteSparse_config.free_func = free;
+}
+
+typedef struct {
+    const char *name;
+    uz_problem problem;
+    uz_settings settings;
+    bool cached; /* through a cache, twice */
+} scenario;
+
+/* Solves once or twice; whether every call ended as it may: with an answer or with UZ_ERR_MEMORY. */
+static void attempt(const scenario *s, long n)
+{
+    uz_cache *cache = s->cached ? uz_cache_new(1 << 30) : NULL;
+    bool no_cache = s->cached && !cache;
+    for (int k = 0; !no_cache && k < (s->cached ? 2 : 1); k++) {
+        uz_result *result = (uz_result *)&heap;
+        uz_error err = {0};
+        bool failed_before = heap.failed;
+        uz_status status = uz_solve(&result, &s->problem, &s->settings, cache, NULL, &err);
+        bool fair = status == UZ_OK || (status == UZ_ERR_MEMORY && heap.failed && !failed_before);
+        CHECK_MSG(fair, "%s: allocation %ld ends in %s: %s", s->name, n, uz_status_name(status), err.message);
+        CHECK_MSG((status == UZ_OK) == (result != NULL), "%s: allocation %ld", s->name, n);
+        CHECK_INT(err.status, status);
+        if (status == UZ_OK)
+            CHECK_MSG(result->summary.outcome == UZ_CONVERGED, "%s: allocation %ld: %s", s->name, n,
+                      uz_outcome_name(result->summary.outcome));
+        uz_result_free(result);
+    }
+    uz_cache_free(cache);
+}
+
+/* The 1st, 2nd, ... allocation fails until none is left that could. Returns how many there were. */
+static long fail_each(const scenario *s)
+{
+    for (long n = 0; n < MOST_ALLOCATIONS; n++) {
+        heap.live = 0;
+        heap.until_failure = n;
+        heap.failed = false;
+        heap.watching = true;
+        attempt(s, n);
+        heap.watching = false;
+        CHECK_MSG(heap.live == 0, "%s: allocation %ld fails and %d blocks leak", s->name, n, heap.live);
+        if (!heap.failed)
+            return n;
+    }
+    return -1;
+}
+
+static void check_scenario(const char *name, uz_problem problem, uz_method method, uz_operator op, uz_ordering ordering,
+                           bool cached)
+{
+    scenario s = {name, problem, uz_settings_default(), cached};
+    s.settings.method = method;
+    s.settings.op = op;
+    s.settings.ordering = ordering;
+    s.settings.relative_error = 1e-4;
+    s.settings.balanced = problem.kind == UZ_PROBLEM_SCENE;
+    long count = fail_each(&s);
+    printf("# %s: %ld allocations\n", name, count);
+    CHECK_MSG(count > 50, "%s: %ld allocations", name, count);
+    uz_problem_clear(&s.problem);
+}
+
+static uz_problem scene_problem(void)
+{
+    return (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(6, 2)};
+}
+
+static uz_problem obstacle_problem(void)
+{
+    qp_random rng = {3};
+    return problem_of(random_obstacle(&rng, 20, 2));
+}
+
+/* Rows that are not those of an identity, two of them alike. */
+static uz_problem dependent_problem(void)
+{
+    qp_random rng = {4};
+    qp_kind kind = {.d = 8, .m = 6, .condition = 10, .dependent = true};
+    return problem_of(random_qp(&rng, &kind));
+}
+
+TEST(scenes)
+{
+    check_scenario("scene", scene_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
+    check_scenario("cached scene", scene_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_CAMD, true);
+    check_scenario("factored scene", scene_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_FACTORED,
+                   UZ_ORDERING_METIS, false);
+}
+
+TEST(matrices)
+{
+    check_scenario("obstacle", obstacle_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AMD, false);
+    check_scenario("iterated obstacle", obstacle_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_CONDENSED,
+                   UZ_ORDERING_AMD, true);
+    check_scenario("sparse active set", obstacle_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_FACTORED, UZ_ORDERING_AMD,
+                   false);
+    check_scenario("cached factored obstacle", obstacle_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_FACTORED,
+                   UZ_ORDERING_AMD, true);
+}
+
+TEST(dependent_rows)
+{
+    check_scenario("dependent rows", dependent_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AMD,
+                   false);
+}
