@@ -79,17 +79,31 @@ void uz_run_take_body(uz_run *run, bool hit)
     summary->timings.condense = run->body->condense_s;
 }
 
+uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err)
+{
+    answer->u = uz_alloc_zero(d, sizeof(double));
+    answer->r = uz_alloc_zero(m, sizeof(double));
+    answer->g = uz_alloc_zero(m, sizeof(double));
+    if (answer->u && answer->r && answer->g)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)d);
+}
+
+void uz_answer_clear(uz_answer *answer)
+{
+    free(answer->u);
+    free(answer->r);
+    free(answer->g);
+    memset(answer, 0, sizeof *answer);
+}
+
 uz_status uz_run_allocate(uz_run *run, uz_error *err)
 {
-    uz_result *result = run->result;
     run->ws = uz_factor_workspace_new();
     run->work = uz_alloc(run->d, sizeof(double));
-    run->u = uz_alloc_zero(run->d, sizeof(double));
-    result->r = uz_alloc_zero(run->m, sizeof(double));
-    result->g = uz_alloc_zero(run->m, sizeof(double));
-    if (run->ws && run->work && run->u && result->r && result->g)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+    if (!run->ws || !run->work)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+    return uz_answer_allocate(&run->answer, run->d, run->m, err);
 }
 
 static void report_contact(uz_run *run)
@@ -124,8 +138,8 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
     uz_result *result = run->result;
     const uz_body_model *model = &run->body->model;
     if (!run->body->is_scene) {
-        result->u = run->u;
-        run->u = NULL;
+        result->u = run->answer.u;
+        run->answer.u = NULL;
         return UZ_OK;
     }
     uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, run->m, err);
@@ -134,7 +148,7 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
     if (!result->u)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)result->n_nodes);
-    uz_recover_nodal(result->u, model, run->u, run->prescribed);
+    uz_recover_nodal(result->u, model, run->answer.u, run->prescribed);
     if (status == UZ_OK)
         report_pressure(run);
     return status;
@@ -194,7 +208,10 @@ static void explain(uz_run *run)
         why = "the time allowed was used up: raise time_limit_s";
         break;
     case UZ_PRECISION_LIMIT:
-        why = "double precision holds no more digits for this method and problem";
+        why = run->end == UZ_END_UNSOLVED
+                  ? "active_set solves with independent rows only, on the condensed operator or "
+                    "with one entry in each row"
+                  : "double precision holds no more digits for this method and problem";
         break;
     case UZ_PAPER_RULE:
         why = "the paper's stopping rule was met; it bounds a force, not an error";
@@ -218,6 +235,9 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
     summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;
     summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
     summary->requested_error = run->requested;
+    run->result->r = run->answer.r;
+    run->result->g = run->answer.g;
+    run->answer.r = run->answer.g = NULL;
     report_contact(run);
     uz_status status = report_displacements(run, err);
     if (run->result->ray)
@@ -234,7 +254,7 @@ void uz_run_end(uz_run *run, uz_cache *cache)
     uz_factor_workspace_free(run->ws);
     uz_cache_release(cache, run->body);
     free(run->owned);
-    free(run->u);
+    uz_answer_clear(&run->answer);
     free(run->work);
     uz_result_free(run->result);
 }

@@ -6,6 +6,14 @@
 #include "methods/method.h"
 #include "uzawa.h"
 
+/* What may become the result. */
+typedef struct {
+    double *u, *r, *g; /* d, m, m */
+    uz_certificate certificate;
+} uz_answer;
+uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err);
+void uz_answer_clear(uz_answer *answer);
+
 typedef struct {
     const uz_problem *problem;
     const uz_settings *settings;
@@ -19,7 +27,8 @@ typedef struct {
     uz_case *load;
     uz_iterate it;
     uz_factor_workspace *ws;
-    double *u, *work;         /* d each */
+    uz_answer answer;
+    double *work;             /* d */
     double started, deadline; /* uz_seconds() */
     double requested;         /* relative error that the certificate must meet */
     double target;            /* relative error at which the method returns */

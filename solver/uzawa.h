@@ -208,7 +208,7 @@ typedef enum {
     UZ_METHOD_UZAWA,               /* Kanno, Algorithm 1 */
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
-    UZ_METHOD_ACTIVE_SET           /* exact, by guessing which rows touch; condensed operator only */
+    UZ_METHOD_ACTIVE_SET           /* exact, by guessing which rows touch: condensed, or rows of one entry */
 } uz_method;
 typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED } uz_operator;
 typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;

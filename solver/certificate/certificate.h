@@ -18,8 +18,9 @@
 
 #include "uzawa.h"
 
-/* *value = e'K^-1 e for e (d), which becomes K^-1 e, within the accuracy of a factorization of K. */
-typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, uz_error *err);
+/* *value = e'K^-1 e for e (d), within the accuracy of a factorization of K. solve: e becomes K^-1 e; else it is left.
+ */
+typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, bool solve, uz_error *err);
 
 typedef struct {
     const uz_csc *K, *N; /* lower triangle; m x d */

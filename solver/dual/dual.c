@@ -242,11 +242,6 @@ int64_t uz_case_m(const uz_case *load)
     return load->dual->info.m;
 }
 
-bool uz_case_active_set_is_cheap(const uz_case *load)
-{
-    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? load->dual->dense.scaled : load->box != NULL;
-}
-
 bool uz_case_guess_active(uz_case *load, bool *active)
 {
     return load->box && uz_bounded_guess(load, active);

@@ -76,9 +76,6 @@ uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_p
  * working precision, or the rows contradict. */
 uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 
-/* Whether solve_active needs no D: active set steps are then cheap from the start. */
-bool uz_case_active_set_is_cheap(const uz_case *load);
-
 /* A guess of the active rows (m) that is better than the signs of the last solve_active (of g0 before the first), for
  * much less than its cost: FACTORED with one nonzero entry in each row. Successive guesses converge by themselves.
  * false, `active` untouched: there is none. */

@@ -143,6 +143,8 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, 
         if (uz_should_stop(end, it, options))
             return UZ_OK;
         uz_status status = solve_guess(p, &solved, it, load, err);
+        if (!solved)
+            *end = UZ_END_UNSOLVED;
         if (status != UZ_OK || !solved)
             return status;
         status = take(it, p, load, err);

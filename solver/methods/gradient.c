@@ -79,17 +79,20 @@ static void plan_next_check(uz_iterate *it)
     it->next_check = it->iteration + (it->iteration < 16 ? 1 : it->iteration / 16);
 }
 
-static bool stalled(const uz_iterate *it, double step_norm)
+/* step_norm is in the units of the problem's own rows, r in those of the scaled ones. */
+static bool stalled(const uz_iterate *it, const uz_case *load, double step_norm)
 {
+    const double *scale = uz_case_row_scale(load);
     double size = 0.0;
     for (int64_t i = 0; i < it->m; i++)
-        size += it->r[i] * it->r[i];
+        size += scale[i] * it->r[i] * (scale[i] * it->r[i]);
     int64_t patience = it->best_iteration / 2 + 4000;
     return step_norm <= 4.0 * DBL_EPSILON * sqrt(size) ||
            (isfinite(it->best_bound) && it->iteration - it->best_iteration > patience);
 }
 
-static bool should_end(uz_end *end, const uz_iterate *it, const uz_method_options *options, double step_norm)
+static bool should_end(uz_end *end, const uz_iterate *it, const uz_case *load, const uz_method_options *options,
+                       double step_norm)
 {
     bool started = it->iteration > 0, paper = options->stopping == UZ_STOP_PAPER;
     if (paper && started && step_norm <= options->epsilon)
@@ -98,7 +101,7 @@ static bool should_end(uz_end *end, const uz_iterate *it, const uz_method_option
         *end = UZ_END_TARGET;
     else if (uz_should_stop(end, it, options))
         return true;
-    else if (!paper && started && stalled(it, step_norm))
+    else if (!paper && started && stalled(it, load, step_norm))
         *end = UZ_END_STALLED;
     else
         return false;
@@ -175,7 +178,7 @@ uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
         status = history->count ? uz_case_apply(load, it->Dr, it->r, err)
                                 : uz_iterate_begin(it, load, options, history, err);
     bool ray = false;
-    while (status == UZ_OK && !ray && !should_end(end, it, options, step_norm)) {
+    while (status == UZ_OK && !ray && !should_end(end, it, load, options, step_norm)) {
         status = step(it, load, options, &step_norm, &restart, err);
         if (status == UZ_OK && options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check) {
             status = uz_iterate_bound(it, load, options->method, err);

@@ -1,10 +1,16 @@
 /* method.c: which engine runs. */
 #include "methods/method.h"
 
-/* Accelerated iterations are cheap and find nearly the right contact set; the active set then ends in a few dense
- * factorizations what they would do in hundreds of products. Where the steps of the active set need no D, they cost
- * less than forming it: then it starts at once, and D is formed only if it fails. */
+/* The active set comes first: on the reference problems it ends in 1 to 10 steps from no contact at all, where
+ * accelerated steps need hundreds, and in the scaled and bounded forms without ever forming D. Where it fails
+ * (dependent rows in the guess, a form that can't) accelerated steps take over, and hand it a better guess once. */
 enum { WARM_UP = 32 };
+
+/* The active set came to nothing: the iterations go on. */
+static bool gave_up(uz_end end)
+{
+    return end == UZ_END_STALLED || end == UZ_END_UNSOLVED;
+}
 
 static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                           uz_history *history, uz_error *err)
@@ -12,9 +18,9 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     uz_method_options phase = *options;
     phase.method = UZ_METHOD_ACCELERATED_RESTART;
     bool polish = options->stopping == UZ_STOP_CERTIFIED;
-    if (polish && it->iteration == 0 && uz_case_active_set_is_cheap(load)) {
+    if (polish && it->iteration == 0) {
         uz_status status = uz_active_set_run(end, it, load, &phase, history, err);
-        if (status != UZ_OK || *end != UZ_END_STALLED)
+        if (status != UZ_OK || !gave_up(*end))
             return status;
     }
     if (polish && it->iteration + WARM_UP < options->max_iterations)
@@ -24,7 +30,7 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
         return status;
     phase.max_iterations = options->max_iterations;
     status = uz_active_set_run(end, it, load, &phase, history, err);
-    if (status != UZ_OK || *end != UZ_END_STALLED)
+    if (status != UZ_OK || !gave_up(*end))
         return status;
     return uz_gradient_run(end, it, load, &phase, history, err);
 }

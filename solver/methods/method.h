@@ -11,6 +11,7 @@ typedef enum {
     UZ_END_ITERATIONS,
     UZ_END_TIME,
     UZ_END_STALLED,
+    UZ_END_UNSOLVED, /* the active set could not solve for its guess: this operator can't, or the rows depend */
     UZ_END_PAPER,
     UZ_END_CANCELLED,
     UZ_END_RAY /* the reactions grow along a ray that seems to prove the rows contradictory */

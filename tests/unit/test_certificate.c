@@ -40,7 +40,7 @@ static void free_inverse(inverse *f)
     free(f->room);
 }
 
-static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
+static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, uz_error *err)
 {
     inverse *f = ctx;
     (void)err;
@@ -52,7 +52,7 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err
         f->room[i] = x / f->L[i * f->d + i];
         *value += f->room[i] * f->room[i];
     }
-    for (int64_t i = f->d - 1; i >= 0; i--) {
+    for (int64_t i = f->d - 1; solve && i >= 0; i--) {
         e[i] = f->room[i] / f->L[i * f->d + i];
         for (int64_t k = 0; k < i; k++)
             f->room[k] -= f->L[i * f->d + k] * e[i];
