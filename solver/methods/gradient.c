@@ -168,6 +168,17 @@ static uz_status prepare(uz_iterate *it, uz_case *load, uz_error *err)
     return status;
 }
 
+/* r may have been changed by another engine, and preparing overwrites what the last apply left. */
+static uz_status resume(uz_iterate *it, uz_case *load, uz_error *err)
+{
+    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    if (it->tau == 1.0) {
+        memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+        memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+    }
+    return status;
+}
+
 uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                           uz_history *history, uz_error *err)
 {
@@ -175,8 +186,7 @@ uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     bool restart = false;
     uz_status status = prepare(it, load, err);
     if (status == UZ_OK)
-        status = history->count ? uz_case_apply(load, it->Dr, it->r, err)
-                                : uz_iterate_begin(it, load, options, history, err);
+        status = history->count ? resume(it, load, err) : uz_iterate_begin(it, load, options, history, err);
     bool ray = false;
     while (status == UZ_OK && !ray && !should_end(end, it, load, options, step_norm)) {
         status = step(it, load, options, &step_norm, &restart, err);

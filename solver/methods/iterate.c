@@ -122,6 +122,17 @@ uz_status uz_iterate_begin(uz_iterate *it, uz_case *load, const uz_method_option
     return status == UZ_OK ? uz_iterate_record(it, load, options, history, 0.0, false, err) : status;
 }
 
+void uz_iterate_go_back(uz_iterate *it)
+{
+    size_t bytes = (size_t)it->m * sizeof *it->r;
+    if (isfinite(it->best_bound))
+        memcpy(it->r, it->best_r, bytes);
+    else
+        memset(it->r, 0, bytes);
+    memcpy(it->anchor, it->r, bytes);
+    it->tau = 1.0;
+}
+
 bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options)
 {
     const uz_hooks *hooks = options->hooks;

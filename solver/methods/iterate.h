@@ -14,6 +14,9 @@ uz_status uz_iterate_begin(uz_iterate *it, uz_case *load, const uz_method_option
 /* Appends the iterate's row to the history and tells the progress hook. Overwrites r_next. */
 uz_status uz_iterate_record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
                             double step_norm, bool restart, uz_error *err);
+/* Goes back to the best answer's r, or to 0 where there is none: guesses that failed may have left r anywhere. D r is
+ * not made. */
+void uz_iterate_go_back(uz_iterate *it);
 /* The limits that every method honours: cancel, iterations, time. */
 bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options);
 

@@ -1,5 +1,5 @@
 /* method.c: which engine runs. */
-#include "methods/method.h"
+#include "methods/iterate.h"
 
 /* The active set comes first: on the reference problems it ends in 1 to 10 steps from no contact at all, where
  * accelerated steps need hundreds, and in the scaled and bounded forms without ever forming D. Where it fails
@@ -22,6 +22,7 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
         uz_status status = uz_active_set_run(end, it, load, &phase, history, err);
         if (status != UZ_OK || !gave_up(*end))
             return status;
+        uz_iterate_go_back(it);
     }
     if (polish && it->iteration + WARM_UP < options->max_iterations)
         phase.max_iterations = it->iteration + WARM_UP;
@@ -32,6 +33,7 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     status = uz_active_set_run(end, it, load, &phase, history, err);
     if (status != UZ_OK || !gave_up(*end))
         return status;
+    uz_iterate_go_back(it);
     return uz_gradient_run(end, it, load, &phase, history, err);
 }
 
