@@ -304,15 +304,17 @@ static uz_status distances(certifier *c, double *square, double *correction_norm
     return status;
 }
 
+/* pi(v) = pi(u) + c'(K u - p) + 1/2 c'K c: that of the feasible v, so that it is an upper bound on the minimum. */
 static void energies(const certifier *c, uz_certificate *out, const double *u)
 {
-    double stiffness = 0.0, load = 0.0;
+    double stiffness = 0.0, load = 0.0, change = 0.0;
     for (int64_t j = 0; j < c->d; j++) {
         stiffness += u[j] * c->res.Ku[j];
         load += u[j] * c->in->p[j];
+        change += c->correction[j] * (c->res.Ku[j] - c->in->p[j] + 0.5 * c->res.Kc[j]);
     }
     out->energy_norm = sqrt(fmax(0.0, stiffness));
-    out->energy_primal = 0.5 * stiffness - load;
+    out->energy_primal = 0.5 * stiffness - load + change;
 }
 
 /* The error over ||u*||_K, which is at least ||v||_K minus the error. */

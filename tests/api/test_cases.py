@@ -194,8 +194,7 @@ def judged_as_matrix(s, name, request, text):
     check(reply.status == 200, name, reply)
     job = s.get(f"/v1/jobs/{reply.json['id']}").json
     u = cholesky_solve(matrix, request["problem"]["p"])
-    diagonal = [abs(matrix.entries.get((i, i), 0.0)) for i in range(matrix.rows)]
-    if u is None or min(diagonal) < 1e-14 * max(diagonal):  # beyond what the factorization takes on
+    if u is None:
         check(job["status"] == "failed" and job["error"]["code"] == "not_positive_definite", name, job)
         return
     check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", name, job)
