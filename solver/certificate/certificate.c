@@ -23,6 +23,7 @@ enum { LEAST_ROUNDS = 2, CLOSING_ROUNDS = 8, MAX_ROUNDS = 40 };
 
 typedef struct {
     const uz_certify_input *in;
+    const double *u;    /* d: the answer */
     uz_csc Nt;          /* d x m */
     double *weight;     /* d: W = diag(K)^-1 */
     double *size;       /* m: see size_rows */
@@ -79,13 +80,10 @@ static void release(certifier *c)
     free(c->res.Kc);
 }
 
-/* g_i(u + c) for g = g(u). */
-static double corrected_gap(const certifier *c, const double *g, int64_t i)
+/* g_i(u + c) */
+static double corrected_gap(const certifier *c, int64_t i)
 {
-    twofold sum = {g[i], 0.0};
-    for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++)
-        twofold_add_product(&sum.hi, &sum.lo, -c->Nt.val[k], c->correction[c->Nt.idx[k]], 0);
-    return sum.hi + sum.lo;
+    return uz_gap_of_row(&c->Nt, i, c->in->h, c->u, c->correction);
 }
 
 /* n_i'W n_i, the compliance of row i when W is taken for K^-1. */
@@ -126,11 +124,11 @@ static double gap_rounding(const certifier *c, int64_t i)
 /* The rows to move in this round and by how much: target_i is the gap to take away and a little more, so that the
  * correction's own rounding leaves the gap open; 0 for rows left alone. Returns the worst violation, relative to the
  * size of its row. */
-static double choose_rows(const certifier *c, const double *r, const double *g, bool closing)
+static double choose_rows(const certifier *c, const double *r, bool closing)
 {
     double worst = 0.0;
     for (int64_t i = 0; i < c->m; i++) {
-        double gap = corrected_gap(c, g, i);
+        double gap = corrected_gap(c, i);
         bool close = closing && worth_closing(c, r, i, fabs(gap));
         c->move.in[i] = close || gap < 0.0;
         c->move.target[i] = c->move.in[i] ? gap - gap_rounding(c, i) : 0.0;
@@ -142,15 +140,15 @@ static double choose_rows(const certifier *c, const double *r, const double *g, 
 /* Rounds of equations from round `first` on: until CLOSING_ROUNDS gaps are closed, later penetrating rows are only
  * lifted. Each round starts from gaps in twofold precision, so what rounding left is moved by the next. True when no
  * gap of u + c is negative by more than the rounding of twofold arithmetic. */
-static bool move_rows(certifier *c, const double *r, const double *g, int first, int last)
+static bool move_rows(certifier *c, const double *r, int first, int last)
 {
     for (int round = first; round < last; round++) {
-        double worst = choose_rows(c, r, g, round < CLOSING_ROUNDS);
+        double worst = choose_rows(c, r, round < CLOSING_ROUNDS);
         if (round >= LEAST_ROUNDS && worst <= NEGLIGIBLE)
             return true;
         uz_row_move_solve(&c->move, c->correction, &c->Nt, c->weight);
     }
-    return choose_rows(c, r, g, false) <= NEGLIGIBLE;
+    return choose_rows(c, r, false) <= NEGLIGIBLE;
 }
 
 /* Squared in the norm of W^-1: the moves that would close the chosen rows one by one, added up. */
@@ -173,20 +171,20 @@ static double correction_size(const certifier *c)
 
 /* Fills the correction. Rows that nearly depend on each other can't all be closed as equations, or only by a correction
  * far larger than the gaps: then they are relaxed one by one, which is slower where rows share dofs. */
-static bool make_feasible(certifier *c, const double *u, const double *r, const double *g)
+static bool make_feasible(certifier *c, const double *r)
 {
-    uz_row_relax relax = {&c->Nt, c->weight, r, g, c->move.x, c->correction};
-    size_rows(c, u);
-    choose_rows(c, r, g, true);
+    uz_row_relax relax = {&c->Nt, c->weight, r, c->in->h, c->u, c->move.x, c->correction};
+    size_rows(c, c->u);
+    choose_rows(c, r, true);
     double expected = STRETCH * sum_of_moves(c);
-    bool feasible = move_rows(c, r, g, 0, CLOSING_ROUNDS);
+    bool feasible = move_rows(c, r, 0, CLOSING_ROUNDS);
     if (feasible && correction_size(c) <= expected)
         return true;
     uz_row_relax_solve(&relax);
-    if (move_rows(c, r, g, CLOSING_ROUNDS, MAX_ROUNDS))
+    if (move_rows(c, r, CLOSING_ROUNDS, MAX_ROUNDS))
         return true;
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
-    return feasible && move_rows(c, r, g, 0, CLOSING_ROUNDS);
+    return feasible && move_rows(c, r, 0, CLOSING_ROUNDS);
 }
 
 /* Paper, section 4. */
@@ -342,15 +340,16 @@ static uz_status measure(certifier *c, uz_certificate *out, const double *u, con
 {
     double square = INFINITY, correction_norm = INFINITY, complementarity = 0.0;
     for (int64_t i = 0; i < c->m; i++)
-        g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, u);
-    bool feasible = make_feasible(c, u, r, g);
+        g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, u, NULL);
+    c->u = u;
+    bool feasible = make_feasible(c, r);
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, u, c->correction, r, err);
     if (status == UZ_OK && feasible)
         status = distances(c, &square, &correction_norm, u, err);
     if (status != UZ_OK)
         return status;
     for (int64_t i = 0; i < c->m; i++)
-        complementarity -= r[i] * fabs(corrected_gap(c, g, i));
+        complementarity -= r[i] * fabs(corrected_gap(c, i));
     energies(c, out, u);
     out->gap = feasible && !has_underflown(c, out, u, square) ? 0.5 * square + complementarity : INFINITY;
     if (isnan(out->gap)) /* overflow on the way */

@@ -77,10 +77,13 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
     return UZ_OK;
 }
 
-double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u)
+double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u, const double *c)
 {
     twofold sum = {h[i], 0.0};
-    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++) {
         twofold_add_product(&sum.hi, &sum.lo, -Nt->val[k], u[Nt->idx[k]], 0);
+        if (c)
+            twofold_add_product(&sum.hi, &sum.lo, -Nt->val[k], c[Nt->idx[k]], 0);
+    }
     return sum.hi + sum.lo;
 }

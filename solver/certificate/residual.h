@@ -12,7 +12,8 @@ typedef struct {
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
                                   const double *c, const double *r, uz_error *err);
 
-/* h_i - n_i'u for row i of N, given as column i of N'. */
-double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u);
+/* h_i - n_i'(u + c) for row i of N, given as column i of N'; c NULL: zero. One twofold sum from the original data: a
+ * gap rounded before c is taken away would hide contradictions as large as its rounding. */
+double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u, const double *c);
 
 #endif

@@ -1,20 +1,12 @@
 #include "certificate/row_relax.h"
 
-#include "certificate/twofold.h"
+#include "certificate/residual.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
 enum { CLOSING_SWEEPS = 200, LIFTING_SWEEPS = 400 };
-
-double uz_relaxed_gap(const uz_row_relax *x, int64_t i)
-{
-    twofold sum = {x->gap[i], 0.0};
-    for (int64_t k = x->Nt->ptr[i]; k < x->Nt->ptr[i + 1]; k++)
-        twofold_add_product(&sum.hi, &sum.lo, -x->Nt->val[k], x->c[x->Nt->idx[k]], 0);
-    return sum.hi + sum.lo;
-}
 
 /* n_i'W n_i, and what the rounding of c may do to the gap of row i. */
 static double row_compliance(const uz_row_relax *x, int64_t i, double *rounding)
@@ -34,7 +26,7 @@ static double sweep(uz_row_relax *x, bool closing)
 {
     double largest = 0.0, rounding;
     for (int64_t i = 0; i < x->Nt->cols; i++) {
-        double compliance = row_compliance(x, i, &rounding), gap = uz_relaxed_gap(x, i);
+        double compliance = row_compliance(x, i, &rounding), gap = uz_gap_of_row(x->Nt, i, x->h, x->u, x->c);
         if (!(compliance > 0.0) || (gap >= 0.0 && !closing))
             continue;
         double change = (gap < 0.0 ? rounding - gap : -gap) / compliance;

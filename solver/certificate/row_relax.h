@@ -9,13 +9,11 @@ typedef struct {
     const uz_csc *Nt;     /* d x m: column i is row i of N */
     const double *weight; /* d: W > 0, diagonal, taken for K^-1 */
     const double *r;      /* m: <= 0 */
-    const double *gap;    /* m: of u */
+    const double *h;      /* m */
+    const double *u;      /* d */
     double *push;         /* m, work: what row i pushes, >= r_i */
     double *c;            /* d: in and out; other dofs than those of rows are left alone */
 } uz_row_relax;
-
-/* Gap of row i of u + c, with the precision of twofold sums. */
-double uz_relaxed_gap(const uz_row_relax *x, int64_t i);
 
 /* From c = 0: approaches the least of 1/2 c'W^-1 c - r'g(u + c) over the feasible u + c, by relaxation of its dual
  * (Hildreth, Naval Res. Logist. Quart. 4 (1957)), then lifts what is left penetrating. Bears rows that depend on each

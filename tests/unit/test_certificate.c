@@ -375,3 +375,19 @@ TEST(contradicting_rows_have_no_bound)
     CHECK(isinf(c.absolute_error) && isinf(c.relative_error) && isinf(c.gap));
     free_bench(&b);
 }
+
+/* u <= a and 300 u >= b contradict by 6e-15, far less than the rounding of a gap of 500 from where u is. */
+TEST(contradictions_are_not_hidden_by_wide_gaps)
+{
+    double K[] = {2}, N[] = {1, -300};
+    uz_qp qp = {csc_from_dense(K, 1, 1, true), csc_from_dense(N, 2, 1, false), vector(1), vector(2)};
+    qp.h[0] = 1479.4566850800898;
+    qp.h[1] = -443837.00552402693;
+    bench b = make_bench(qp);
+    uz_certify_input in = input_of(&b);
+    uz_certificate c;
+    b.u[0] = 955.38379484146287;
+    CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+    CHECK(isinf(c.absolute_error));
+    free_bench(&b);
+}
