@@ -242,6 +242,11 @@ int64_t uz_case_m(const uz_case *load)
     return load->dual->info.m;
 }
 
+bool uz_case_steps_are_small(const uz_case *load)
+{
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED;
+}
+
 bool uz_case_guess_active(uz_case *load, bool *active)
 {
     return load->box && uz_bounded_guess(load, active);

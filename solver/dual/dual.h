@@ -90,6 +90,9 @@ const uz_csc *uz_case_N(const uz_case *load);
  * reaction is scale x the one here. */
 const double *uz_case_row_scale(const uz_case *load);
 
+/* Whether solve_active works on the contact only, so that a step costs little beside a linear solve. */
+bool uz_case_steps_are_small(const uz_case *load);
+
 /* Largest eigenvalue of a symmetric positive semidefinite operator of order m by Lanczos with full
  * reorthogonalisation: Ritz value plus residual bound, relative accuracy `tolerance`. */
 typedef uz_status (*uz_apply)(void *ctx, double *y, const double *x, uz_error *err);
