@@ -36,6 +36,7 @@ static uz_csc grid(int64_t w, int64_t h)
 static uz_status factor_of(uz_factor **out, const uz_csc *K, const int64_t *last, int64_t n_last, uz_ordering ordering,
                            size_t limit, uz_error *err)
 {
+    uz_thread_init(); /* as every caller must: without it CHOLMOD starts a team of OpenMP threads */
     memset(err, 0, sizeof *err);
     *out = (uz_factor *)err; /* must become NULL on failure */
     return uz_factor_create(out, K, last, n_last, ordering, limit, NULL, err);
