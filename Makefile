@@ -116,7 +116,7 @@ $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 
 $(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(BUILD)/obj/tests/harness.o $(PARTS_OBJ) $(BUILD)/libuzawa.a
 	@mkdir -p $(@D)
-	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -ls __wrap_free tests/unit/$(notdir $@).c),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
+	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -lsE '__wrap_free|failing_heap' tests/unit/$(notdir $@).c),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
 comma := ,
 
 # Ipopt is what obstacle problems are compared with, where it is installed; nothing else needs it.

@@ -13,17 +13,13 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/hooks.h"
 #include "methods/method.h"
 #include "solve.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static bool cancelled(const uz_hooks *hooks)
-{
-    return hooks && hooks->cancelled && hooks->cancelled(hooks->ctx);
-}
 
 /* p and h: the problem's own, or assembled from the scene's loads. */
 static uz_status make_load(uz_run *run, uz_error *err)
@@ -256,7 +252,7 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
     uz_status status = uz_run_begin(&run, problem, settings, hooks, err);
     if (status == UZ_OK && problem->kind == UZ_PROBLEM_MATRICES)
         status = uz_qp_check(&problem->qp, err);
-    if (status == UZ_OK && cancelled(hooks))
+    if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
     if (status == UZ_OK)
         status = uz_cache_acquire(&run.body, &hit, cache, problem, settings, hooks, err);

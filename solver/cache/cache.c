@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/hooks.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -104,11 +105,6 @@ static entry *find(uz_cache *cache, const char *digest)
     return NULL;
 }
 
-static bool cancelled(const uz_hooks *hooks)
-{
-    return hooks && hooks->cancelled && hooks->cancelled(hooks->ctx);
-}
-
 /* Sleeps until the table changes, at most 20 ms so that a cancel is seen. */
 static void wait_for_change(uz_cache *cache)
 {
@@ -129,7 +125,7 @@ static uz_status reserve(entry **out, bool *create, uz_cache *cache, const char 
     entry *e;
     *create = false;
     while ((e = find(cache, digest)) && !e->body) {
-        if (cancelled(hooks))
+        if (uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while another job factors the same body");
         wait_for_change(cache);
     }

@@ -86,19 +86,10 @@ static double corrected_gap(const certifier *c, int64_t i)
     return uz_gap_of_row(&c->Nt, i, c->in->h, c->u, c->correction);
 }
 
-/* n_i'W n_i, the compliance of row i when W is taken for K^-1. */
-static double compliance(const certifier *c, int64_t i)
-{
-    double sum = 0.0;
-    for (int64_t k = c->Nt.ptr[i]; k < c->Nt.ptr[i + 1]; k++)
-        sum += c->Nt.val[k] * c->Nt.val[k] * c->weight[c->Nt.idx[k]];
-    return sum;
-}
-
 /* Closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g. */
 static bool worth_closing(const certifier *c, const double *r, int64_t i, double gap)
 {
-    return r[i] < 0.0 && gap <= -2.0 * r[i] * compliance(c, i);
+    return r[i] < 0.0 && gap <= -2.0 * r[i] * uz_row_compliance(&c->Nt, i, c->weight);
 }
 
 /* What the rounding of a gap is relative to: the terms that it is the difference of. Row by row: a wide gap, or a row
@@ -157,7 +148,7 @@ static double sum_of_moves(const certifier *c)
     double sum = 0.0;
     for (int64_t i = 0; i < c->m; i++)
         if (c->move.in[i] && c->move.target[i] != 0.0)
-            sum += c->move.target[i] / compliance(c, i) * c->move.target[i];
+            sum += c->move.target[i] / uz_row_compliance(&c->Nt, i, c->weight) * c->move.target[i];
     return sum;
 }
 

@@ -8,6 +8,14 @@
 
 enum { MAX_STEPS = 400 };
 
+double uz_row_compliance(const uz_csc *Nt, int64_t i, const double *weight)
+{
+    double sum = 0.0;
+    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+        sum += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
+    return sum;
+}
+
 bool uz_row_move_init(uz_row_move *move, int64_t d, int64_t m)
 {
     memset(move, 0, sizeof *move);
@@ -54,9 +62,7 @@ static double start(uz_row_move *move, const uz_csc *Nt, const double *weight)
 {
     double rho = 0.0;
     for (int64_t i = 0; i < move->m; i++) {
-        double size = 0.0;
-        for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
-            size += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
+        double size = uz_row_compliance(Nt, i, weight);
         move->scale[i] = move->in[i] && size > 0.0 ? 1.0 / size : 0.0;
         move->x[i] = 0.0;
         move->residual[i] = move->target[i];

@@ -4,6 +4,9 @@
 
 #include "uzawa.h"
 
+/* n_i'W n_i, the compliance of row i when W (diagonal, weight) is taken for K^-1. Nt: columns are the rows of N. */
+double uz_row_compliance(const uz_csc *Nt, int64_t i, const double *weight);
+
 typedef struct {
     int64_t m;
     bool *in;                                         /* m: rows that take part */

@@ -1,6 +1,7 @@
 #include "certificate/row_relax.h"
 
 #include "certificate/residual.h"
+#include "certificate/row_move.h"
 
 #include <float.h>
 #include <math.h>
@@ -8,15 +9,12 @@
 
 enum { CLOSING_SWEEPS = 200, LIFTING_SWEEPS = 400 };
 
-/* n_i'W n_i, and what the rounding of c may do to the gap of row i. */
-static double row_compliance(const uz_row_relax *x, int64_t i, double *rounding)
+/* What the rounding of c may do to the gap of row i. */
+static double gap_rounding(const uz_row_relax *x, int64_t i)
 {
     double sum = 0.0;
-    *rounding = 0.0;
-    for (int64_t k = x->Nt->ptr[i]; k < x->Nt->ptr[i + 1]; k++) {
-        sum += x->Nt->val[k] * x->Nt->val[k] * x->weight[x->Nt->idx[k]];
-        *rounding += 4.0 * DBL_EPSILON * fabs(x->Nt->val[k] * x->c[x->Nt->idx[k]]);
-    }
+    for (int64_t k = x->Nt->ptr[i]; k < x->Nt->ptr[i + 1]; k++)
+        sum += 4.0 * DBL_EPSILON * fabs(x->Nt->val[k] * x->c[x->Nt->idx[k]]);
     return sum;
 }
 
@@ -24,9 +22,10 @@ static double row_compliance(const uz_row_relax *x, int64_t i, double *rounding)
  * change of c, squared, in the norm of W^-1. */
 static double sweep(uz_row_relax *x, bool closing)
 {
-    double largest = 0.0, rounding;
+    double largest = 0.0;
     for (int64_t i = 0; i < x->Nt->cols; i++) {
-        double compliance = row_compliance(x, i, &rounding), gap = uz_gap_of_row(x->Nt, i, x->h, x->u, x->c);
+        double compliance = uz_row_compliance(x->Nt, i, x->weight), rounding = gap_rounding(x, i),
+               gap = uz_gap_of_row(x->Nt, i, x->h, x->u, x->c);
         if (!(compliance > 0.0) || (gap >= 0.0 && !closing))
             continue;
         double change = (gap < 0.0 ? rounding - gap : -gap) / compliance;

@@ -61,9 +61,3 @@ uz_status uz_fail_line(uz_error *err, uz_status status, int64_t line, const char
     va_end(args);
     return status;
 }
-
-void uz_error_at(uz_error *err, const char *where)
-{
-    if (err && err->status != UZ_OK && !err->where[0])
-        snprintf(err->where, sizeof err->where, "%s", where);
-}

@@ -14,9 +14,6 @@ uz_status uz_fail(uz_error *err, uz_status status, const char *where, const char
 uz_status uz_fail_line(uz_error *err, uz_status status, int64_t line, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
 
-/* Sets `where` of an error that has none yet: the caller knows which input a reader was given. */
-void uz_error_at(uz_error *err, const char *where);
-
 void uz_error_reset(uz_error *err);
 
 #endif

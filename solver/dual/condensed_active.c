@@ -76,12 +76,11 @@ uz_status uz_condensed_need_operator(uz_case *load, uz_error *err)
     return need(&load->D, &load->dual->lazy->D, load, form_operator, err);
 }
 
-/* The rows with active == which; their number. */
-static int64_t select_rows(int64_t *rows, const bool *active, bool which, int64_t m)
+int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
 {
     int64_t count = 0;
     for (int64_t i = 0; i < m; i++)
-        if (active[i] == which)
+        if (in[i] == which)
             rows[count++] = i;
     return count;
 }
@@ -179,7 +178,7 @@ uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *s
     uz_status status = UZ_OK;
     if (!rows)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
-    count = select_rows(rows, active, !scaled, m);
+    count = uz_list_rows(rows, active, !scaled, m);
     if (scaled)
         status = need(&load->D_inverse, &load->dual->lazy->D_inverse, load, form_inverse, err);
     double *block = uz_alloc(count * count, sizeof *block);

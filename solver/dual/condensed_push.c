@@ -21,16 +21,6 @@ enum { PUSH_ROUNDS = 6 };
 /* What may be left of a penetration, relative to the largest gap moved: the certificate sees to the rest. */
 #define PUSH_TOLERANCE 1e-9
 
-/* The rows of `in`, listed; their number. */
-static int64_t list_rows(int64_t *rows, const bool *in, int64_t m)
-{
-    int64_t count = 0;
-    for (int64_t i = 0; i < m; i++)
-        if (in[i])
-            rows[count++] = i;
-    return count;
-}
-
 enum { REFINEMENTS = 2 };
 
 /* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
@@ -82,7 +72,7 @@ static bool push_rows(uz_case *load, double *w, double *target, const double *g,
         scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
     }
     for (int round = 0; D_AA && ok && !feasible && round < PUSH_ROUNDS; round++) {
-        ok = solve_rows(w, target, D_AA, load, g, rows, list_rows(rows, in, m));
+        ok = solve_rows(w, target, D_AA, load, g, rows, uz_list_rows(rows, in, true, m));
         double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
         feasible = ok;
         for (int64_t i = 0; i < m; i++) {

@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/hooks.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -124,7 +125,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
         status = uz_condensed_create(dual, err);
     if (status == UZ_OK && op == UZ_OPERATOR_FACTORED)
         status = uz_bounds_create(dual, err);
-    if (status == UZ_OK && hooks && hooks->cancelled && hooks->cancelled(hooks->ctx))
+    if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
     if (status == UZ_OK)
         *out = dual;
@@ -230,16 +231,6 @@ const double *uz_case_h(const uz_case *load)
 const uz_csc *uz_case_N(const uz_case *load)
 {
     return &load->dual->N;
-}
-
-double uz_case_psi0(const uz_case *load)
-{
-    return load->psi0;
-}
-
-int64_t uz_case_m(const uz_case *load)
-{
-    return load->dual->info.m;
 }
 
 bool uz_case_steps_are_small(const uz_case *load)

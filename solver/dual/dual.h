@@ -41,8 +41,6 @@ uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, co
                          uz_error *err);
 void uz_case_free(uz_case *load);
 const double *uz_case_g0(const uz_case *load); /* m: gap of the body without reactions */
-double uz_case_psi0(const uz_case *load);      /* -1/2 p'K^-1 p */
-int64_t uz_case_m(const uz_case *load);
 /* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
 double uz_case_force_norm(uz_case *load, const double *x);
 /* psi(r) and ||u(r)||_K^2 from r and D r. */

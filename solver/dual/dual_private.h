@@ -85,6 +85,8 @@ uz_status uz_condensed_create(uz_dual *dual, uz_error *err);
 void uz_condensed_clear(uz_condensed *dense);
 /* z (n_b) = L_bb^-1 N_b'w */
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
+/* Lists in `rows` the rows with in == which, ascending; their number. */
+int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m);
 /* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D. */
 void uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m);
 uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err);

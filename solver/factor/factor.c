@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/hooks.h"
 
 #include <float.h>
 #include <math.h>
@@ -132,11 +133,6 @@ static uz_status describe(uz_factor *factor, const cholmod_sparse *A, uz_error *
     return UZ_OK;
 }
 
-static bool cancelled(const uz_hooks *hooks)
-{
-    return hooks && hooks->cancelled && hooks->cancelled(hooks->ctx);
-}
-
 static uz_status build(uz_factor *factor, cholmod_sparse *A, size_t memory_limit, const uz_hooks *hooks,
                        cholmod_common *common, uz_error *err)
 {
@@ -145,7 +141,7 @@ static uz_status build(uz_factor *factor, cholmod_sparse *A, size_t memory_limit
     factor->info.order_s = uz_seconds() - start;
     if (status == UZ_OK)
         status = check_memory(factor, memory_limit, err);
-    if (status == UZ_OK && cancelled(hooks))
+    if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     start = uz_seconds();
     if (status == UZ_OK)

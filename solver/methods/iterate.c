@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/hooks.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -135,8 +136,7 @@ void uz_iterate_go_back(uz_iterate *it)
 
 bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options)
 {
-    const uz_hooks *hooks = options->hooks;
-    if (hooks && hooks->cancelled && hooks->cancelled(hooks->ctx))
+    if (uz_cancelled(options->hooks))
         *end = UZ_END_CANCELLED;
     else if (it->iteration >= options->max_iterations)
         *end = UZ_END_ITERATIONS;

@@ -1,77 +1,11 @@
 /* Every allocation of an operation fails once: the call must say UZ_ERR_MEMORY, publish nothing and leak nothing.
  * Linked with --wrap for malloc, calloc, realloc and free, so that calls from this program's objects come through here.
  */
+#include "failing_heap.h"
 #include "harness.h"
 #include "uzawa.h"
 
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *block, size_t size);
-void __real_free(void *block);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *block, size_t size);
-void __wrap_free(void *block);
-
-enum { MOST_BLOCKS = 4096, MOST_ALLOCATIONS = 100000 };
-
-/* Blocks that were allocated while watching and not yet freed. */
-static struct {
-    bool watching;
-    int until_failure; /* allocations that still succeed; negative: none fails */
-    bool failed;
-    void *block[MOST_BLOCKS];
-    int live;
-} heap;
-
-static bool fails_now(void)
-{
-    if (!heap.watching || heap.until_failure < 0 || heap.failed)
-        return false;
-    heap.failed = heap.until_failure-- == 0;
-    return heap.failed;
-}
-
-static void *add_block(void *block)
-{
-    if (heap.watching && block && heap.live < MOST_BLOCKS)
-        heap.block[heap.live++] = block;
-    return block;
-}
-
-static void drop_block(const void *block)
-{
-    for (int k = heap.live - 1; k >= 0; k--) {
-        if (heap.block[k] == block) {
-            heap.block[k] = heap.block[--heap.live];
-            return;
-        }
-    }
-}
-
-void *__wrap_malloc(size_t size)
-{
-    return fails_now() ? NULL : add_block(__real_malloc(size));
-}
-
-void *__wrap_calloc(size_t count, size_t size)
-{
-    return fails_now() ? NULL : add_block(__real_calloc(count, size));
-}
-
-void *__wrap_realloc(void *block, size_t size)
-{
-    if (fails_now())
-        return NULL;
-    drop_block(block);
-    return add_block(__real_realloc(block, size));
-}
-
-void __wrap_free(void *block)
-{
-    drop_block(block);
-    __real_free(block);
-}
+enum { MOST_ALLOCATIONS = 100000 };
 
 /* Does the work, frees what it got, and returns how the call under test ended. Checks that a failure published
  * nothing. Called once per allocation. */

@@ -1,81 +1,13 @@
 /* Each allocation of a solve fails once: the call must say so, publish nothing, keep nothing and free everything.
  * Linked with malloc, calloc, realloc and free wrapped; CHOLMOD's allocations come through here too. */
+#include "failing_heap.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
 #include <suitesparse/SuiteSparse_config.h>
 
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *block, size_t size);
-void __real_free(void *block);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *block, size_t size);
-void __wrap_free(void *block);
-
-enum { MOST_BLOCKS = 4096, MOST_ALLOCATIONS = 5000 };
-
-/* Blocks that were allocated while watching and not yet freed. */
-static struct {
-    bool watching, failed;
-    long until_failure; /* allocations that still succeed */
-    void *block[MOST_BLOCKS];
-    int live;
-} heap;
-
-static bool fails_now(void)
-{
-    if (!heap.watching || heap.failed)
-        return false;
-    heap.failed = heap.until_failure-- == 0;
-    return heap.failed;
-}
-
-static void *add_block(void *block)
-{
-    if (heap.watching && block && heap.live < MOST_BLOCKS)
-        heap.block[heap.live++] = block;
-    return block;
-}
-
-static void drop_block(const void *block)
-{
-    for (int k = heap.live - 1; k >= 0; k--)
-        if (heap.block[k] == block) {
-            heap.block[k] = heap.block[--heap.live];
-            return;
-        }
-}
-
-void *__wrap_malloc(size_t size)
-{
-    return fails_now() ? NULL : add_block(__real_malloc(size));
-}
-
-void *__wrap_calloc(size_t count, size_t size)
-{
-    return fails_now() ? NULL : add_block(__real_calloc(count, size));
-}
-
-void *__wrap_realloc(void *block, size_t size)
-{
-    if (fails_now())
-        return NULL;
-    void *moved = __real_realloc(block, size);
-    if (moved) {
-        drop_block(block);
-        add_block(moved);
-    }
-    return moved;
-}
-
-void __wrap_free(void *block)
-{
-    drop_block(block);
-    __real_free(block);
-}
+enum { MOST_ALLOCATIONS = 5000 };
 
 /* CHOLMOD allocates through pointers; the first two of them are set by uz_process_init. BLAS is out of reach. */
 __attribute__((constructor)) static void settle_process(void)
