@@ -30,7 +30,7 @@ static uz_status check_settings(const uz_settings *s, uz_error *err)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
     if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
-    if (!is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
+    if (s->method == UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
         !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "method, operator, ordering or stopping is not one of the known ones");
     return UZ_OK;

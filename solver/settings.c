@@ -10,6 +10,7 @@ static const char *const METHODS[] = {
     [UZ_METHOD_ACCELERATED] = "accelerated",
     [UZ_METHOD_ACCELERATED_RESTART] = "accelerated_restart",
     [UZ_METHOD_ACTIVE_SET] = "active_set",
+    [UZ_METHOD_GIVEN] = "given",
 };
 static const char *const OPERATORS[] = {
     [UZ_OPERATOR_AUTO] = "auto",
@@ -27,10 +28,11 @@ static const char *const STOPPINGS[] = {
     [UZ_STOP_PAPER] = "paper",
 };
 static const char *const OUTCOMES[] = {
-    [UZ_CONVERGED] = "converged",   [UZ_ITERATION_LIMIT] = "iteration_limit",
-    [UZ_TIME_LIMIT] = "time_limit", [UZ_PRECISION_LIMIT] = "precision_limit",
-    [UZ_PAPER_RULE] = "paper_rule", [UZ_INFEASIBLE] = "infeasible",
-    [UZ_DISMISSED] = "dismissed",
+    [UZ_CONVERGED] = "converged",       [UZ_ITERATION_LIMIT] = "iteration_limit",
+    [UZ_TIME_LIMIT] = "time_limit",     [UZ_PRECISION_LIMIT] = "precision_limit",
+    [UZ_PAPER_RULE] = "paper_rule",     [UZ_INFEASIBLE] = "infeasible",
+    [UZ_DISMISSED] = "dismissed",       [UZ_VERIFIED] = "verified",
+    [UZ_NOT_VERIFIED] = "not_verified",
 };
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
@@ -76,7 +78,7 @@ const char *uz_outcome_name(uz_outcome value)
 
 bool uz_method_parse(uz_method *out, const char *name)
 {
-    int found = find_name(METHODS, COUNT(METHODS), name);
+    int found = find_name(METHODS, UZ_METHOD_GIVEN, name); /* nobody can ask for an answer that is given */
     if (found >= 0)
         *out = (uz_method)found;
     return found >= 0;

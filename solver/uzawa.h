@@ -194,10 +194,21 @@ uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, u
 uz_status uz_scene_check(const uz_scene *scene, uz_error *err);
 
 typedef enum { UZ_PROBLEM_MATRICES, UZ_PROBLEM_SCENE } uz_problem_kind;
+
+/* One of several loads on the body of a problem. What it leaves out (NULL) is the problem's own. */
+typedef struct {
+    char name[64];  /* unique in its problem */
+    double *p, *h;  /* matrices: d, m */
+    uz_load *loads; /* scenes: in place of all of the scene's loads; an empty list may be non-NULL: no load */
+    int64_t n_loads;
+} uz_load_case;
+
 typedef struct {
     uz_problem_kind kind;
-    uz_qp qp;       /* UZ_PROBLEM_MATRICES */
-    uz_scene scene; /* UZ_PROBLEM_SCENE */
+    uz_qp qp;            /* UZ_PROBLEM_MATRICES */
+    uz_scene scene;      /* UZ_PROBLEM_SCENE */
+    uz_load_case *cases; /* n_cases of them; none: the problem's own load is the only one */
+    int64_t n_cases;
 } uz_problem;
 void uz_problem_clear(uz_problem *problem);
 
@@ -208,7 +219,8 @@ typedef enum {
     UZ_METHOD_UZAWA,               /* Kanno, Algorithm 1 */
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
-    UZ_METHOD_ACTIVE_SET           /* exact, by guessing which rows touch: condensed, or rows of one entry */
+    UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
+    UZ_METHOD_GIVEN                /* results of uz_verify only: the answer is the caller's */
 } uz_method;
 typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED } uz_operator;
 typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;
@@ -250,7 +262,9 @@ typedef enum {
     UZ_PRECISION_LIMIT, /* more was asked than double precision holds here */
     UZ_PAPER_RULE,      /* the paper's stopping rule ended it before the certificate met the request */
     UZ_INFEASIBLE,
-    UZ_DISMISSED
+    UZ_DISMISSED,
+    UZ_VERIFIED,    /* uz_verify: the certificate of the given answer meets the request */
+    UZ_NOT_VERIFIED /* uz_verify: it does not; the bound says how far it reaches */
 } uz_outcome;
 const char *uz_outcome_name(uz_outcome);
 
@@ -316,6 +330,20 @@ typedef struct {
     char message[256]; /* one sentence on the outcome where it is not `converged`; "" otherwise */
 } uz_summary;
 
+/* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.
+ * A start that knows no more than reactions has rho NULL: a warm start. */
+typedef struct {
+    int64_t m;
+    double *r;                           /* m, reactions; a warm start's are cut at 0 */
+    double *rho;                         /* m or NULL: everything else below means something only beside it */
+    double *Dr, *Drho, *best_r, *anchor; /* m */
+    double alpha, tau, best_bound, best_relative;
+    int64_t iteration, restarts, next_check, best_iteration;
+    int32_t phase; /* of `auto`; private to the methods */
+    uz_method method, made_by;
+} uz_state;
+void uz_state_free(uz_state *state);
+
 typedef struct {
     uz_summary summary;
     int64_t d, m, n_nodes;
@@ -325,6 +353,7 @@ typedef struct {
     double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof; u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_history history;
+    uz_state *state; /* where the iterations stood; NULL: nothing to continue */
 } uz_result;
 void uz_result_free(uz_result *result);
 
@@ -333,6 +362,7 @@ typedef struct {
     void *ctx;
     bool (*cancelled)(void *ctx);                           /* may be NULL */
     void (*progress)(void *ctx, const uz_history_row *row); /* may be NULL; after each iteration */
+    void (*begins)(void *ctx, int64_t load_case);           /* may be NULL; before the first iteration of a case */
 } uz_hooks;
 
 /* ------------------------------------------------------------ factor cache */
@@ -353,10 +383,29 @@ uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **entries, size_t *count
 /* ------------------------------------------------------------------ solve */
 
 /* Solves one problem: the pipeline from scene or matrices to a certified result. `cache` may be NULL.
- * The problem is only read. Called from many threads at once with one cache.
- * Prepare each calling thread once with uz_thread_init. */
+ * The problem is only read; one with load cases is for uz_solve_cases. Called from many threads at once with one
+ * cache. Prepare each calling thread once with uz_thread_init. */
 uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
                    const uz_hooks *hooks, uz_error *err);
+
+/* The same for every load case of the problem (its own load where it has none), on one factor, with the right-hand
+ * sides in blocks: *out is n = max(1, n_cases) results, in order; the caller frees each and the array, or all with
+ * uz_results_free. settings->time_limit_s is of all cases together. When time is up or the solve is cancelled, cases
+ * that had no turn are answered with what r = 0 gives, certified as any other.
+ * starts: n, or NULL; starts[i] NULL: from r = 0. A start with rho continues the run it was taken from, bit for bit
+ * where method, operator and problem are the same ones; one without is checked before the first iteration, so that the
+ * solution itself takes none. A start of another m is UZ_ERR_SIZE.
+ * An error is that of the first case that fails as a call (its pointer in err->where: "/cases/3/loads/0/on"). */
+uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
+                         const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+void uz_results_free(uz_result **results, int64_t n);
+
+/* Certifies somebody's answer: u as a uz_result has it (d, or n_nodes x dim with the supported dofs at their values)
+ * and r (m, caller's rows; positive parts are counted as residual e3 and cut for the bound), with residuals, gaps and
+ * energies in twice the working precision. The outcome is UZ_VERIFIED or UZ_NOT_VERIFIED by settings->relative_error;
+ * the result has the given u and r, g(u), no history. A problem with load cases is UZ_ERR_ARGUMENT. */
+uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
+                    const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 
 /* Process-wide settings that a library must not choose alone: BLAS threads. Call once from main before threads start;
  * `workers` is how many threads will call uz_solve at once. */
