@@ -82,8 +82,12 @@ static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_cs
     if (status != UZ_OK)
         return status;
     uz_operator op = uz_dual_choose(N, n_b, settings->op);
-    status = uz_factor_create(&body->factor, K, dofs, op == UZ_OPERATOR_CONDENSED ? n_b : 0, settings->ordering,
-                              settings->memory_limit, hooks, err);
+    uz_analysis *analysis = NULL;
+    status =
+        uz_analysis_create(&analysis, K, dofs, op == UZ_OPERATOR_CONDENSED ? n_b : 0, settings->ordering, hooks, err);
+    if (status == UZ_OK)
+        status = uz_factor_create(&body->factor, K, analysis, settings->memory_limit, hooks, err);
+    uz_analysis_free(analysis);
     free(dofs);
     double start = uz_seconds();
     if (status == UZ_OK)

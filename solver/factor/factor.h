@@ -5,22 +5,34 @@
 
 #include "uzawa.h"
 
+typedef struct uz_analysis uz_analysis;                 /* immutable after creation: shared by any number of factors */
 typedef struct uz_factor uz_factor;                     /* immutable after creation: shared by any number of threads */
 typedef struct uz_factor_workspace uz_factor_workspace; /* one per thread */
 
 typedef struct {
     uz_ordering ordering; /* the one that was used */
     int64_t n, nnz;       /* of L, lower triangle */
+    double flops;         /* of the factorization: additions and multiplications */
     size_t bytes;
-    double rcond; /* min_j L_jj^2 / K_jj: an upper bound for 1 / cond(K) after diagonal scaling */
-    double order_s, factor_s;
+    double rcond;   /* min_j L_jj^2 / K_jj: an upper bound for 1 / cond(K) after diagonal scaling */
+    double order_s; /* what the analysis took, whoever waited for it */
+    double factor_s;
 } uz_factor_info;
 
-/* Factors K (lower triangle, n x n). last: the n_last dofs, ascending, that come after all others in the elimination
- * (Schur complement ordering). memory_limit 0: none. `cancelled` is asked between ordering and factorization, as
- * CHOLMOD itself can't be interrupted. Errors: NOT_SPD names the pivot, LIMIT the predicted bytes. */
-uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const int64_t *last, int64_t n_last, uz_ordering ordering,
-                           size_t memory_limit, const uz_hooks *hooks, uz_error *err);
+/* What the pattern of K (lower triangle, n x n) alone decides: the order of elimination and the supernodes; values are
+ * not read. last: the n_last dofs, ascending, that come after all others in the elimination (Schur complement
+ * ordering). Equal patterns give equal factors, bit for bit, whether an analysis is their own or shared. `cancelled` is
+ * asked once it is there. It may be freed before the factors made from it. */
+uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *last, int64_t n_last,
+                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err);
+void uz_analysis_free(uz_analysis *analysis);
+size_t uz_analysis_bytes(const uz_analysis *analysis);
+
+/* Factors K (lower triangle, n x n), whose pattern must be the one that was analysed. memory_limit 0: none. `cancelled`
+ * is asked before the factorization, as CHOLMOD itself can't be interrupted. Errors: NOT_SPD names the pivot, LIMIT the
+ * predicted bytes, ARGUMENT another size or number of entries than the analysis's. */
+uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
+                           const uz_hooks *hooks, uz_error *err);
 void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
 

@@ -4,13 +4,27 @@
 
 #include "factor/factor.h"
 
+#include <stdatomic.h>
 #include <suitesparse/cholmod.h>
 
-struct uz_factor {
-    cholmod_factor *L;
-    int64_t n, n_last;
+struct uz_analysis {
+    atomic_int holders; /* creator and factors: the last one frees it */
+    cholmod_factor *L;  /* symbolic, supernodal */
+    int64_t n, nnz;     /* of K */
+    int64_t n_last;
     int64_t *last;     /* n_last dofs, ascending */
     int64_t *position; /* n: inverse of L->Perm */
+    uz_ordering ordering;
+    double flops, seconds;
+};
+
+/* Another holder of the same object; ends with uz_analysis_free. */
+uz_analysis *uz_analysis_hold(const uz_analysis *analysis);
+
+struct uz_factor {
+    uz_analysis *analysis;
+    cholmod_factor L; /* the analysis's with numbers: only x and what says so are this factor's own */
+    int64_t n;
     uz_factor_info info;
 };
 
@@ -22,6 +36,9 @@ struct uz_factor_workspace {
 
 /* Starts a CHOLMOD workspace that never prints, never aborts and gives LL' supernodal factors with 64-bit integers. */
 bool uz_cholmod_start(cholmod_common *common);
+
+/* K as CHOLMOD sees it. */
+cholmod_sparse uz_view_lower(const uz_csc *K);
 
 /* A dense matrix over an array, column-major. */
 cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns);

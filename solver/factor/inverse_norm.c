@@ -48,7 +48,7 @@ static uz_status apply_scaled(double *Y, const uz_factor *factor, uz_factor_work
 uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
                                  uz_error *err)
 {
-    const SuiteSparse_long *perm = factor->L->Perm;
+    const SuiteSparse_long *perm = factor->L.Perm;
     uint64_t state = 0x9E3779B97F4A7C15u;
     double *Y = uz_alloc(factor->n * VECTORS, sizeof *Y), *root = uz_alloc(factor->n, sizeof *root);
     uz_status status = UZ_OK;

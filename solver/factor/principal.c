@@ -22,7 +22,7 @@ struct uz_principal {
 /* place (n): the row of a free dof in the reduced matrix, -1 for the others. */
 static void number_free(uz_principal *part, int64_t *place, const bool *fixed, const uz_factor *factor)
 {
-    const SuiteSparse_long *perm = factor->L->Perm;
+    const SuiteSparse_long *perm = factor->L.Perm;
     for (int64_t k = 0; k < factor->n; k++) {
         int64_t i = perm[k];
         place[i] = fixed[i] ? -1 : part->n_free;

@@ -28,14 +28,14 @@ void uz_factor_workspace_free(uz_factor_workspace *ws)
 
 void uz_factor_permute(const uz_factor *factor, double *permuted, const double *x)
 {
-    const SuiteSparse_long *perm = factor->L->Perm;
+    const SuiteSparse_long *perm = factor->L.Perm;
     for (int64_t k = 0; k < factor->n; k++)
         permuted[k] = x[perm[k]];
 }
 
 void uz_factor_unpermute(const uz_factor *factor, double *x, const double *permuted)
 {
-    const SuiteSparse_long *perm = factor->L->Perm;
+    const SuiteSparse_long *perm = factor->L.Perm;
     for (int64_t k = 0; k < factor->n; k++)
         x[perm[k]] = permuted[k];
 }
@@ -59,7 +59,7 @@ typedef int (*substitution)(cholmod_factor *, cholmod_dense *, cholmod_dense *, 
 static uz_status substitute(substitution solve, const uz_factor *factor, uz_factor_workspace *ws, double *x,
                             int64_t columns, uz_error *err)
 {
-    size_t need = factor->L->maxesize * (size_t)columns;
+    size_t need = factor->L.maxesize * (size_t)columns;
     if (need > ws->panel_size || !ws->panel) {
         free(ws->panel);
         ws->panel = uz_alloc((int64_t)need, sizeof *ws->panel);
@@ -69,8 +69,8 @@ static uz_status substitute(substitution solve, const uz_factor *factor, uz_fact
                            (long long)columns);
     }
     cholmod_dense X = uz_view_dense(x, factor->n, columns),
-                  E = uz_view_dense(ws->panel, (int64_t)factor->L->maxesize, columns);
-    if (!solve(factor->L, &X, &E, &ws->common) || ws->common.status != CHOLMOD_OK)
+                  E = uz_view_dense(ws->panel, (int64_t)factor->L.maxesize, columns);
+    if (!solve((cholmod_factor *)&factor->L, &X, &E, &ws->common) || ws->common.status != CHOLMOD_OK)
         return uz_fail(err, UZ_ERR_INTERNAL, "", "substitution failed (CHOLMOD status %d)", ws->common.status);
     return UZ_OK;
 }
@@ -89,12 +89,12 @@ uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, d
 /* rank[k]: the place of position k among the last dofs, -1 for the others. */
 static void rank_last(const uz_factor *factor, int64_t *rank, int64_t *order, int64_t *where)
 {
-    const SuiteSparse_long *perm = factor->L->Perm;
+    const SuiteSparse_long *perm = factor->L.Perm;
     int64_t count = 0;
     for (int64_t k = 0; k < factor->n; k++)
         rank[k] = -1;
-    for (int64_t i = 0; i < factor->n_last; i++)
-        rank[factor->position[factor->last[i]]] = 0;
+    for (int64_t i = 0; i < factor->analysis->n_last; i++)
+        rank[factor->analysis->position[factor->analysis->last[i]]] = 0;
     for (int64_t k = 0; k < factor->n; k++) {
         if (rank[k] < 0)
             continue;
@@ -129,16 +129,16 @@ static bool copy_supernode(double *block, int64_t n_last, const int64_t *rank, c
  * rows of last dofs, which copy_supernode checks. */
 uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err)
 {
-    const cholmod_factor *L = factor->L;
+    const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
     int64_t *rank = uz_alloc(factor->n, sizeof *rank);
     if (!rank)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)factor->n);
     rank_last(factor, rank, order, where);
-    memset(block, 0, (size_t)factor->n_last * (size_t)factor->n_last * sizeof *block);
+    memset(block, 0, (size_t)factor->analysis->n_last * (size_t)factor->analysis->n_last * sizeof *block);
     bool ok = true;
     for (size_t k = 0; ok && k < L->nsuper; k++)
-        ok = copy_supernode(block, factor->n_last, rank, s + pi[k], pi[k + 1] - pi[k], super[k],
+        ok = copy_supernode(block, factor->analysis->n_last, rank, s + pi[k], pi[k + 1] - pi[k], super[k],
                             super[k + 1] - super[k], (const double *)L->x + px[k]);
     free(rank);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_INTERNAL, "", "the contact dofs are not last in the elimination");

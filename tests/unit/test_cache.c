@@ -238,7 +238,7 @@ TEST(cancelled_creator_leaves_the_work_to_a_waiter)
         uz_cache *cache = uz_cache_new(1 << 30);
         uz_problem problem = spring_body(100, round);
         atomic_int refuse = 1;
-        uz_hooks hooks = {&refuse, refuse_once, NULL};
+        uz_hooks hooks = {.ctx = &refuse, .cancelled = refuse_once};
         uz_body *bodies[THREADS];
         int created, failed;
         use_from_threads(cache, &problem, &hooks, bodies, &created, &failed);

@@ -1,5 +1,5 @@
 /* The sparse factor: what it refuses, what its last block is, and what its orderings leave behind. */
-#include "factor/factor.h"
+#include "factor_fixture.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -39,7 +39,7 @@ static uz_status factor_of(uz_factor **out, const uz_csc *K, const int64_t *last
     uz_thread_init(); /* as every caller must: without it CHOLMOD starts a team of OpenMP threads */
     memset(err, 0, sizeof *err);
     *out = (uz_factor *)err; /* must become NULL on failure */
-    return uz_factor_create(out, K, last, n_last, ordering, limit, NULL, err);
+    return factor_by(out, K, last, n_last, ordering, limit, err);
 }
 
 static void check_refused(const uz_csc *K, uz_status want, const char *what)
@@ -139,10 +139,15 @@ TEST(cancelled_before_the_factorization)
     uz_factor *factor;
     uz_error err = {0};
     int asked = 0;
-    uz_hooks hooks = {&asked, always, NULL};
+    uz_hooks hooks = {.ctx = &asked, .cancelled = always};
     uz_csc K = grid(10, 10);
-    CHECK_INT(uz_factor_create(&factor, &K, NULL, 0, UZ_ORDERING_AMD, 0, &hooks, &err), UZ_ERR_CANCELLED);
-    CHECK(factor == NULL && asked == 1);
+    uz_analysis *analysis;
+    CHECK_INT(uz_analysis_create(&analysis, &K, NULL, 0, UZ_ORDERING_AMD, &hooks, &err), UZ_ERR_CANCELLED);
+    CHECK(analysis == NULL && asked == 1);
+    CHECK_INT(uz_analysis_create(&analysis, &K, NULL, 0, UZ_ORDERING_AMD, NULL, &err), UZ_OK);
+    CHECK_INT(uz_factor_create(&factor, &K, analysis, 0, &hooks, &err), UZ_ERR_CANCELLED);
+    CHECK(factor == NULL && asked == 2);
+    uz_analysis_free(analysis);
     uz_csc_clear(&K);
 }
 

@@ -299,7 +299,7 @@ TEST(progress_is_told_once_per_row)
     uz_problem problem = slow_problem();
     for (size_t k = 0; k < COUNT(all_methods); k++) {
         watcher w = {.refuse_after = INT64_MAX, .ascending = true};
-        uz_hooks hooks = {&w, watch_cancel, watch_progress};
+        uz_hooks hooks = {.ctx = &w, .cancelled = watch_cancel, .progress = watch_progress};
         uz_settings settings = settings_for(all_methods[k], UZ_OPERATOR_CONDENSED);
         settings.max_iterations = 300;
         uz_result *result = NULL;
@@ -322,7 +322,7 @@ TEST(cancel)
     int64_t errors = 0, dismissed = 0;
     for (int64_t after = 0; after < 30; after++) {
         watcher w = {.refuse_after = after, .ascending = true};
-        uz_hooks hooks = {&w, watch_cancel, watch_progress};
+        uz_hooks hooks = {.ctx = &w, .cancelled = watch_cancel, .progress = watch_progress};
         uz_settings settings = settings_for(UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_CONDENSED);
         uz_result *result = NULL;
         uz_error err = {0};

@@ -1,5 +1,5 @@
 /* The paper's body against numbers of an independent program: mm, N, MPa. */
-#include "factor/factor.h"
+#include "factor_fixture.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -118,7 +118,7 @@ static probe make_probe(int64_t nx, int64_t ny)
     uz_scene scene = paper_scene(nx, ny);
     uz_error err = {0};
     CHECK(uz_scene_to_qp(&p.qp, &p.info, &scene, &err) == UZ_OK);
-    CHECK(uz_factor_create(&p.factor, &p.qp.K, NULL, 0, UZ_ORDERING_AMD, 0, NULL, &err) == UZ_OK);
+    CHECK(factor_by(&p.factor, &p.qp.K, NULL, 0, UZ_ORDERING_AMD, 0, &err) == UZ_OK);
     uz_scene_clear(&scene);
     return p;
 }

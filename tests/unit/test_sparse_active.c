@@ -1,5 +1,5 @@
 /* The active set on the factored operator: rows that bound single dofs. */
-#include "factor/factor.h"
+#include "factor_fixture.h"
 #include "harness.h"
 #include "obstacle.h"
 #include "qp_fixture.h"
@@ -330,7 +330,7 @@ TEST(principal_submatrices)
         uz_principal *part = NULL;
         CHECK(obstacle_qp(&qp, 30, &err) == UZ_OK);
         int64_t d = qp.K.rows;
-        CHECK(uz_factor_create(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, NULL, &err) == UZ_OK);
+        CHECK(factor_by(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
         uz_factor_workspace *ws = uz_factor_workspace_new();
         bool *fixed = calloc((size_t)d, sizeof *fixed);
         double *x = vector(d), *b = vector(d);
@@ -366,7 +366,7 @@ TEST(principal_submatrix_that_is_not_positive_definite)
     uz_principal *part = NULL;
     bool fixed[25] = {false};
     CHECK(obstacle_qp(&qp, 5, &err) == UZ_OK);
-    CHECK(uz_factor_create(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, NULL, &err) == UZ_OK);
+    CHECK(factor_by(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
     uz_factor_workspace *ws = uz_factor_workspace_new();
     qp.K.val[qp.K.ptr[7]] = -1;
     CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, &err) == UZ_OK && !part);

@@ -1,0 +1,19 @@
+/* factor_fixture.h: a factor in one call, for tests that don't share an analysis. */
+#ifndef TESTS_FACTOR_FIXTURE_H
+#define TESTS_FACTOR_FIXTURE_H
+
+#include "factor/factor.h"
+
+static inline uz_status factor_by(uz_factor **out, const uz_csc *K, const int64_t *last, int64_t n_last,
+                                  uz_ordering ordering, size_t limit, uz_error *err)
+{
+    uz_analysis *analysis;
+    *out = NULL;
+    uz_status status = uz_analysis_create(&analysis, K, last, n_last, ordering, NULL, err);
+    if (status == UZ_OK)
+        status = uz_factor_create(out, K, analysis, limit, NULL, err);
+    uz_analysis_free(analysis);
+    return status;
+}
+
+#endif

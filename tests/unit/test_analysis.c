@@ -1,0 +1,143 @@
+/* One analysis for many factors of one pattern: the same bits as an analysis of their own, in any number of threads. */
+#include "factor_fixture.h"
+#include "harness.h"
+#include "qp_fixture.h"
+#include "scene_fixture.h"
+
+#include <pthread.h>
+
+static const uz_ordering orderings[] = {UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS};
+
+static uz_qp body_of(int64_t nx, double young)
+{
+    uz_scene scene = paper_scene(nx, nx / 3);
+    uz_mesh_info info;
+    uz_error err = {0};
+    uz_qp qp;
+    scene.materials[0].young = young;
+    CHECK(uz_scene_to_qp(&qp, &info, &scene, &err) == UZ_OK);
+    uz_mesh_info_clear(&info);
+    uz_scene_clear(&scene);
+    return qp;
+}
+
+static int64_t touched(int64_t *dofs, const uz_csc *N)
+{
+    int64_t count = 0;
+    for (int64_t j = 0; j < N->cols; j++)
+        if (N->ptr[j + 1] > N->ptr[j])
+            dofs[count++] = j;
+    return count;
+}
+
+/* x = K^-1 b by the factor's own substitutions. */
+static void solve(double *x, const uz_factor *factor, const double *b, int64_t n)
+{
+    uz_factor_workspace *ws = uz_factor_workspace_new();
+    uz_error err;
+    double *y = vector(n);
+    uz_factor_permute(factor, y, b);
+    CHECK(uz_factor_forward(factor, ws, y, 1, &err) == UZ_OK);
+    CHECK(uz_factor_backward(factor, ws, y, 1, &err) == UZ_OK);
+    uz_factor_unpermute(factor, x, y);
+    uz_factor_workspace_free(ws);
+    free(y);
+}
+
+TEST(shared_analysis_gives_the_same_bits)
+{
+    uz_thread_init();
+    for (size_t k = 0; k < sizeof orderings / sizeof orderings[0]; k++) {
+        uz_qp first = body_of(24, 200e3), second = body_of(24, 3.0);
+        int64_t n = second.K.cols, *dofs = calloc((size_t)n, sizeof *dofs), n_last = touched(dofs, &second.N);
+        double *x = vector(n), *y = vector(n);
+        uz_analysis *shared;
+        uz_factor *early, *reused, *fresh;
+        uz_error err;
+        CHECK_INT(uz_analysis_create(&shared, &first.K, dofs, n_last, orderings[k], NULL, &err), UZ_OK);
+        CHECK(uz_analysis_bytes(shared) > 8 * (size_t)n);
+        CHECK_INT(uz_factor_create(&early, &first.K, shared, 0, NULL, &err), UZ_OK);
+        CHECK_INT(uz_factor_create(&reused, &second.K, shared, 0, NULL, &err), UZ_OK);
+        CHECK_INT(factor_by(&fresh, &second.K, dofs, n_last, orderings[k], 0, &err), UZ_OK);
+        uz_factor_free(early);
+        uz_analysis_free(shared); /* the factor lives on */
+        solve(x, reused, second.p, n);
+        solve(y, fresh, second.p, n);
+        CHECK(memcmp(x, y, (size_t)n * sizeof *x) == 0);
+        CHECK(uz_factor_describe(reused).rcond == uz_factor_describe(fresh).rcond);
+        CHECK(uz_factor_describe(reused).flops > (double)n);
+        uz_factor_free(reused);
+        uz_factor_free(fresh);
+        uz_qp_clear(&first);
+        uz_qp_clear(&second);
+        free(dofs);
+        free(x);
+        free(y);
+    }
+}
+
+/* Entries outside the analysed pattern would be lost without a word. */
+TEST(another_pattern_is_refused)
+{
+    uz_qp one = body_of(6, 1.0), other = body_of(9, 1.0);
+    uz_analysis *analysis;
+    uz_factor *factor = (uz_factor *)&one;
+    uz_error err = {0};
+    uz_thread_init();
+    CHECK_INT(uz_analysis_create(&analysis, &one.K, NULL, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
+    CHECK_INT(uz_factor_create(&factor, &other.K, analysis, 0, NULL, &err), UZ_ERR_ARGUMENT);
+    CHECK(factor == NULL);
+    uz_analysis_free(analysis);
+    uz_analysis_free(NULL);
+    uz_qp_clear(&one);
+    uz_qp_clear(&other);
+}
+
+typedef struct {
+    const uz_analysis *analysis;
+    const uz_qp *qp;
+    const double *want;
+} shared_work;
+
+static void *factor_and_compare(void *ctx)
+{
+    const shared_work *work = ctx;
+    int64_t n = work->qp->K.cols;
+    uz_thread_init();
+    for (int k = 0; k < 5; k++) {
+        uz_factor *factor;
+        uz_error err;
+        double *x = vector(n);
+        CHECK(uz_factor_create(&factor, &work->qp->K, work->analysis, 0, NULL, &err) == UZ_OK);
+        solve(x, factor, work->qp->p, n);
+        CHECK(memcmp(x, work->want, (size_t)n * sizeof *x) == 0);
+        uz_factor_free(factor);
+        free(x);
+    }
+    return NULL;
+}
+
+TEST(factors_of_one_analysis_in_threads)
+{
+    enum { THREADS = 4 };
+    pthread_t threads[THREADS];
+    uz_qp qp = body_of(24, 7.0);
+    uz_analysis *analysis;
+    uz_factor *factor;
+    uz_error err;
+    double *want = vector(qp.K.cols);
+    uz_process_init(2);
+    uz_thread_init();
+    CHECK_INT(uz_analysis_create(&analysis, &qp.K, NULL, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
+    CHECK_INT(uz_factor_create(&factor, &qp.K, analysis, 0, NULL, &err), UZ_OK);
+    solve(want, factor, qp.p, qp.K.cols);
+    uz_factor_free(factor);
+    shared_work work = {analysis, &qp, want};
+    for (int t = 0; t < THREADS; t++)
+        CHECK(pthread_create(&threads[t], NULL, factor_and_compare, &work) == 0);
+    for (int t = 0; t < THREADS; t++)
+        pthread_join(threads[t], NULL);
+    uz_analysis_free(analysis);
+    uz_qp_clear(&qp);
+    free(want);
+}
