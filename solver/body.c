@@ -32,8 +32,9 @@ static uz_status add_scene(uz_digest *digest, const uz_scene *scene, uz_error *e
     return status;
 }
 
-uz_status uz_body_digest(char digest[65], const uz_problem *problem, const uz_settings *settings, uz_error *err)
+uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
+    memset(key, 0, sizeof *key);
     uz_digest *state = uz_digest_new();
     if (!state)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
@@ -43,10 +44,11 @@ uz_status uz_body_digest(char digest[65], const uz_problem *problem, const uz_se
     if (problem->kind == UZ_PROBLEM_SCENE) {
         status = add_scene(state, &problem->scene, err);
     } else {
-        add_matrix(state, &problem->qp.K);
+        status = uz_matrix_digest(&key->K, &problem->qp.K, err);
+        uz_digest_add(state, key->K.values, sizeof key->K.values);
         add_matrix(state, &problem->qp.N);
     }
-    if (!uz_digest_end(state, digest) && status == UZ_OK)
+    if (!uz_digest_end(state, key->digest) && status == UZ_OK)
         status = uz_fail(err, UZ_ERR_INTERNAL, "", "hashing failed");
     return status;
 }
@@ -74,21 +76,30 @@ static size_t model_bytes(const uz_body_model *model)
     return csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed) + 32 * nodes;
 }
 
-static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_csc *N, const uz_settings *settings,
-                                     const uz_hooks *hooks, uz_error *err)
+/* The key of K: known for matrices; of a scene's only when there is a cache to look into. */
+static uz_status find_key(uz_matrix_key *K_key, const uz_body_key *key, const uz_body *body, uz_error *err)
 {
+    if (key && !body->is_scene)
+        *K_key = key->K;
+    return key && body->is_scene ? uz_matrix_digest(K_key, &body->model.K, err) : UZ_OK;
+}
+
+static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_csc *N, const uz_body_key *key,
+                                     const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    uz_matrix_key K_key;
     int64_t *dofs = NULL, n_b = 0;
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, N, err);
-    if (status != UZ_OK)
-        return status;
-    uz_operator op = uz_dual_choose(N, n_b, settings->op);
-    uz_analysis *analysis = NULL;
-    status =
-        uz_analysis_create(&analysis, K, dofs, op == UZ_OPERATOR_CONDENSED ? n_b : 0, settings->ordering, hooks, err);
     if (status == UZ_OK)
-        status = uz_factor_create(&body->factor, K, analysis, settings->memory_limit, hooks, err);
-    uz_analysis_free(analysis);
+        status = find_key(&K_key, key, body, err);
+    uz_operator op = UZ_OPERATOR_AUTO;
+    if (status == UZ_OK) {
+        op = uz_dual_choose(N, n_b, settings->op);
+        int64_t n_last = op == UZ_OPERATOR_CONDENSED ? n_b : 0;
+        status = uz_shared_factor_get(&body->shared, cache, &K_key, K, dofs, n_last, settings, hooks, err);
+    }
     free(dofs);
+    body->factor = body->shared.factor;
     double start = uz_seconds();
     if (status == UZ_OK)
         status = uz_dual_create(&body->dual, N, body->factor, op, hooks, err);
@@ -96,15 +107,9 @@ static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_cs
     return status;
 }
 
-uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
-                         uz_error *err)
+/* Matrices without contacts may come with an N that is a zeroed struct. */
+static uz_status take_matrices(uz_body *body, const uz_problem *problem, uz_error *err)
 {
-    *out = NULL;
-    uz_body *body = uz_alloc_zero(1, sizeof *body);
-    if (!body)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
-    pthread_mutex_init(&body->mutex, NULL);
-    body->inverse_bound = NAN;
     double start = uz_seconds();
     uz_status status = UZ_OK;
     body->is_scene = problem->kind == UZ_PROBLEM_SCENE;
@@ -113,11 +118,34 @@ uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_sett
     else if (problem->qp.N.rows == 0)
         status = uz_csc_init(&body->no_rows, 0, problem->qp.K.cols, 0, err);
     body->assemble_s = uz_seconds() - start;
+    return status;
+}
+
+static void describe(uz_body *body)
+{
+    size_t factor = body->shared.item ? 0 : uz_factor_describe(body->factor).bytes;
+    body->bytes = sizeof *body + factor + uz_dual_describe(body->dual).bytes;
+    if (body->is_scene)
+        body->bytes += model_bytes(&body->model);
+    body->reused.ordering = body->shared.analysis_reused;
+    body->reused.factor = body->shared.factor_reused;
+}
+
+uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_body_key *key, const uz_settings *settings,
+                         uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    *out = NULL;
+    uz_body *body = uz_alloc_zero(1, sizeof *body);
+    if (!body)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+    pthread_mutex_init(&body->mutex, NULL);
+    body->inverse_bound = NAN;
+    uz_status status = take_matrices(body, problem, err);
     if (status == UZ_OK)
-        status = factor_and_condense(body, uz_body_K(body, problem), uz_body_N(body, problem), settings, hooks, err);
+        status = factor_and_condense(body, uz_body_K(body, problem), uz_body_N(body, problem), key, settings, cache,
+                                     hooks, err);
     if (status == UZ_OK) {
-        body->bytes = sizeof *body + uz_factor_describe(body->factor).bytes + uz_dual_describe(body->dual).bytes +
-                      (body->is_scene ? model_bytes(&body->model) : 0);
+        describe(body);
         *out = body;
     } else {
         uz_body_free(body);
@@ -142,7 +170,7 @@ void uz_body_free(uz_body *body)
         return;
     pthread_mutex_destroy(&body->mutex);
     uz_dual_free(body->dual);
-    uz_factor_free(body->factor);
+    uz_shared_factor_release(&body->shared);
     if (body->is_scene)
         uz_body_model_clear(&body->model);
     uz_csc_clear(&body->no_rows);

@@ -3,6 +3,7 @@
 #define UZ_BODY_H
 
 #include "assembly/assembly.h"
+#include "cache/parts.h"
 #include "dual/dual.h"
 #include "factor/factor.h"
 #include "uzawa.h"
@@ -11,24 +12,32 @@
 
 /* Immutable once built, but for what is under the mutex; shared by threads. */
 typedef struct {
-    char digest[65];
     bool is_scene;
     uz_body_model model; /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
     uz_csc no_rows;      /* matrices without contacts: 0 x d, as the problem's N may be a zeroed struct */
-    uz_factor *factor;
+    uz_shared_factor shared;
+    const uz_factor *factor; /* shared.factor */
     uz_dual *dual;
     pthread_mutex_t mutex; /* guards inverse_bound */
     double inverse_bound;  /* NaN until somebody asks */
     double assemble_s, condense_s;
-    size_t bytes;
+    uz_reuse reused; /* when it was made */
+    size_t bytes;    /* its own, without a factor that the cache counts */
+    uz_item *item;   /* its place in the cache, or NULL */
 } uz_body;
 
-/* Hex SHA-256 of everything the body is built from, the chosen operator and ordering included. */
-uz_status uz_body_digest(char digest[65], const uz_problem *problem, const uz_settings *settings, uz_error *err);
+/* SHA-256, hex: of everything the body is built from, the chosen operator and ordering included; of K, for matrices (a
+ * scene's K has to be assembled first). */
+typedef struct {
+    char digest[65];
+    uz_matrix_key K;
+} uz_body_key;
+uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_settings *settings, uz_error *err);
 
-/* Assembles (scenes), factors and condenses. */
-uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
-                         uz_error *err);
+/* Assembles (scenes), factors and condenses; with a cache the factor and its analysis are found or kept there, and key
+ * is that of uz_body_digest. */
+uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_body_key *key, const uz_settings *settings,
+                         uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 void uz_body_free(uz_body *body);
 
 /* What the certificate of a body that is used again and again saves by: uz_factor_inverse_norm, made at the first call.

@@ -246,7 +246,7 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
                    const uz_hooks *hooks, uz_error *err)
 {
     uz_run run;
-    bool hit = false;
+    uz_reuse reused = {0};
     *out = NULL;
     uz_error_reset(err);
     uz_status status = uz_run_begin(&run, problem, settings, hooks, err);
@@ -255,9 +255,9 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
     if (status == UZ_OK)
-        status = uz_cache_acquire(&run.body, &hit, cache, problem, settings, hooks, err);
+        status = uz_cache_acquire(&run.body, &reused, cache, problem, settings, hooks, err);
     if (status == UZ_OK) {
-        uz_run_take_body(&run, hit);
+        uz_run_take_body(&run, reused);
         status = solve_case(&run, err);
     }
     if (status == UZ_OK) {

@@ -58,7 +58,7 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
     return UZ_OK;
 }
 
-void uz_run_take_body(uz_run *run, bool hit)
+void uz_run_take_body(uz_run *run, uz_reuse reused)
 {
     uz_summary *summary = &run->result->summary;
     uz_factor_info factor = uz_factor_describe(run->body->factor);
@@ -67,15 +67,16 @@ void uz_run_take_body(uz_run *run, bool hit)
     run->m = summary->m = run->result->m = dual.m;
     summary->op = dual.op;
     summary->ordering = factor.ordering;
-    run->hit = summary->factor_cached = hit;
+    run->hit = summary->factor_cached = reused.op;
+    summary->reused = reused;
     summary->factor_nnz = factor.nnz;
     summary->factor_bytes = factor.bytes;
     summary->rcond = factor.rcond;
-    if (hit)
+    if (run->hit)
         return;
     summary->timings.assemble = run->body->assemble_s;
-    summary->timings.order = factor.order_s;
-    summary->timings.factor = factor.factor_s;
+    summary->timings.order = reused.ordering ? 0.0 : factor.order_s;
+    summary->timings.factor = reused.factor ? 0.0 : factor.factor_s;
     summary->timings.condense = run->body->condense_s;
 }
 

@@ -40,7 +40,7 @@ typedef struct {
 uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                        uz_error *err);
 /* Sizes and timings from the body. */
-void uz_run_take_body(uz_run *run, bool hit);
+void uz_run_take_body(uz_run *run, uz_reuse reused);
 /* Vectors of the solve and of the result. */
 uz_status uz_run_allocate(uz_run *run, uz_error *err);
 /* Fills the summary and the result's u. */

@@ -306,6 +306,12 @@ typedef struct {
     int64_t stride; /* iterations between rows: 1 until the history is thinned */
 } uz_history;
 
+/* What an earlier solve had left in the cache: matrices of a scene; ordering and symbolic analysis (same pattern of K);
+ * factor (same K); operator (same K and N). */
+typedef struct {
+    bool assembly, ordering, factor, op;
+} uz_reuse;
+
 typedef struct {
     uz_outcome outcome;
     uz_method method;
@@ -322,7 +328,8 @@ typedef struct {
     double infeasible_radius;    /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
     double requested_error;      /* the relative error that `converged` had to meet */
     uz_certificate certificate;
-    bool factor_cached;
+    bool factor_cached; /* everything about the body was */
+    uz_reuse reused;
     int64_t factor_nnz;
     size_t factor_bytes;
     double rcond;

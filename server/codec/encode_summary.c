@@ -75,12 +75,29 @@ static void put_certificate(text *t, const uz_certificate *c)
     text_close(t, '}');
 }
 
+static void put_flag(text *t, const char *key, bool value)
+{
+    text_key(t, key);
+    text_bool(t, value);
+}
+
+static void put_reused(text *t, const uz_reuse *reused)
+{
+    text_key(t, "reused");
+    text_open(t, '{');
+    put_flag(t, "assembly", reused->assembly);
+    put_flag(t, "ordering", reused->ordering);
+    put_flag(t, "factor", reused->factor);
+    put_flag(t, "operator", reused->op);
+    text_close(t, '}');
+}
+
 static void put_factor(text *t, const uz_summary *s)
 {
     text_key(t, "factor");
     text_open(t, '{');
-    text_key(t, "cached");
-    text_bool(t, s->factor_cached);
+    put_flag(t, "cached", s->factor_cached);
+    put_reused(t, &s->reused);
     put_word(t, "ordering", uz_ordering_name(s->ordering));
     put_count(t, "nnz", s->factor_nnz);
     put_count(t, "bytes", (int64_t)s->factor_bytes);

@@ -4,9 +4,10 @@
 
 #include "body.h"
 
-/* The body of the problem, from the cache or newly made; *hit tells. cache NULL: newly made, and freed by release.
- * The caller releases *body with the same cache. A waiter whose hooks say cancelled gets UZ_ERR_CANCELLED. */
-uz_status uz_cache_acquire(uz_body **body, bool *hit, uz_cache *cache, const uz_problem *problem,
+/* The body of the problem, from the cache or newly made; *reused tells what of it was there. cache NULL: newly made,
+ * and freed by release. The caller releases *body with the same cache. A waiter whose hooks say cancelled gets
+ * UZ_ERR_CANCELLED. */
+uz_status uz_cache_acquire(uz_body **body, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
                            const uz_settings *settings, const uz_hooks *hooks, uz_error *err);
 void uz_cache_release(uz_cache *cache, uz_body *body);
 

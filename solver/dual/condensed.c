@@ -117,9 +117,11 @@ static uz_status make_operator(uz_dual *dual, uz_error *err)
 uz_status uz_condensed_create(uz_dual *dual, uz_error *err)
 {
     uz_condensed *dense = &dual->dense;
-    int64_t m = dual->info.m, n_b = 0, *order = NULL;
-    uz_status status = uz_dual_contact_dofs(&order, &n_b, &dual->N, err);
-    if (status == UZ_OK && !allocate(dense, n_b))
+    int64_t m = dual->info.m, n_b = 0;
+    uz_factor_last_dofs(dual->factor, &n_b); /* those that N touches, and more when another body's factor is used */
+    int64_t *order = uz_alloc(n_b, sizeof *order);
+    uz_status status = UZ_OK;
+    if (!order || !allocate(dense, n_b))
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense block of order %lld", (long long)n_b);
     if (status == UZ_OK)
         status = uz_factor_last_block(dual->factor, dense->L_bb, order, dense->position, err);

@@ -11,7 +11,7 @@
 #define UZ_PIVOT_LEAST 1e-11
 
 typedef struct {
-    int64_t n_b;       /* dofs that N touches, in the factor's order */
+    int64_t n_b;       /* the last dofs of the factor, those that N touches among them, in its order */
     int64_t *position; /* n_b: their places in the factor's order */
     uz_csc N_b;        /* m x n_b: those columns of N */
     double *L_bb;      /* n_b x n_b: Cholesky factor of the Schur complement S */

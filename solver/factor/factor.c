@@ -139,3 +139,9 @@ const int64_t *uz_factor_position(const uz_factor *factor)
 {
     return factor->analysis->position;
 }
+
+const int64_t *uz_factor_last_dofs(const uz_factor *factor, int64_t *count)
+{
+    *count = factor->analysis->n_last;
+    return factor->analysis->last;
+}

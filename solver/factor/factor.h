@@ -35,6 +35,8 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
                            const uz_hooks *hooks, uz_error *err);
 void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
+/* The dofs that come last, ascending; *count of them. */
+const int64_t *uz_factor_last_dofs(const uz_factor *factor, int64_t *count);
 
 uz_factor_workspace *uz_factor_workspace_new(void); /* NULL: no memory */
 void uz_factor_workspace_free(uz_factor_workspace *ws);

@@ -23,8 +23,10 @@ static uz_body *acquire(uz_cache *cache, const uz_problem *problem, bool *hit)
 {
     uz_settings settings = uz_settings_default();
     uz_body *body = NULL;
+    uz_reuse reused;
     uz_error err = {0};
-    CHECK_MSG(uz_cache_acquire(&body, hit, cache, problem, &settings, NULL, &err) == UZ_OK, "%s", err.message);
+    CHECK_MSG(uz_cache_acquire(&body, &reused, cache, problem, &settings, NULL, &err) == UZ_OK, "%s", err.message);
+    *hit = reused.op;
     return body;
 }
 
@@ -158,11 +160,11 @@ static void *use(void *ctx)
     user *u = ctx;
     uz_settings settings = uz_settings_default();
     uz_error err = {0};
-    bool hit = true;
+    uz_reuse reused = {0};
     uz_thread_init();
     pthread_barrier_wait(u->start);
-    uz_status status = uz_cache_acquire(&u->body, &hit, u->cache, u->problem, &settings, u->hooks, &err);
-    atomic_fetch_add(u->created, status == UZ_OK && !hit);
+    uz_status status = uz_cache_acquire(&u->body, &reused, u->cache, u->problem, &settings, u->hooks, &err);
+    atomic_fetch_add(u->created, status == UZ_OK && !reused.op);
     atomic_fetch_add(u->failed, status != UZ_OK);
     return NULL;
 }
@@ -298,8 +300,10 @@ TEST(solves_from_many_threads)
 
 static void digest_of(char digest[65], const uz_problem *problem, const uz_settings *settings)
 {
+    uz_body_key key;
     uz_error err = {0};
-    CHECK(uz_body_digest(digest, problem, settings, &err) == UZ_OK);
+    CHECK(uz_body_digest(&key, problem, settings, &err) == UZ_OK);
+    memcpy(digest, key.digest, 65);
     CHECK_INT(strlen(digest), 64);
 }
 

@@ -136,6 +136,7 @@ static uz_summary paper_summary(void)
                     .discretization_error = NAN,
                     .requested_error = 1e-6,
                     .factor_cached = true,
+                    .reused = {.ordering = true, .factor = true},
                     .factor_nnz = 12345,
                     .factor_bytes = 98765,
                     .rcond = 1e-5,
@@ -199,6 +200,9 @@ TEST(summary_of_a_scene)
     CHECK_STR(text_at(&doc, "operator"), "condensed");
     CHECK_INT(json_array_size(json_object_get(json_object_get(doc.root, "contact"), "force")), 2);
     CHECK(json_is_true(json_object_get(json_object_get(doc.root, "factor"), "cached")));
+    const json_t *reused = json_object_get(json_object_get(doc.root, "factor"), "reused");
+    CHECK(json_is_false(json_object_get(reused, "assembly")) && json_is_true(json_object_get(reused, "ordering")));
+    CHECK(json_is_true(json_object_get(reused, "factor")) && json_is_false(json_object_get(reused, "operator")));
     json_doc_clear(&doc);
     free(reply);
 }

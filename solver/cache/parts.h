@@ -1,0 +1,32 @@
+/* parts.h: what bodies share: the factor of a K that another contact set was solved with, and the ordering and symbolic
+ * analysis of a pattern whose numbers have changed. */
+#ifndef UZ_PARTS_H
+#define UZ_PARTS_H
+
+#include "cache/table.h"
+#include "factor/factor.h"
+
+/* SHA-256 of a symmetric matrix, hex: of its pattern, and of pattern and values. */
+typedef struct {
+    char pattern[65], values[65];
+} uz_matrix_key;
+uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *K, uz_error *err);
+
+/* A factor and where it belongs. All zero: none. */
+typedef struct {
+    const uz_factor *factor;
+    bool analysis_reused, factor_reused;
+    uz_factor *own; /* without a cache */
+    uz_cache *cache;
+    uz_item *item;
+} uz_shared_factor;
+
+/* Factors K with the dofs `last` (ascending) at the end, or finds a factor of the same K with at least these dofs
+ * there; with an analysis of the same pattern where there is one. cache NULL: made, and freed on release; key is then
+ * not read. Errors: uz_factor_create's. */
+uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,
+                               const int64_t *last, int64_t n_last, const uz_settings *settings, const uz_hooks *hooks,
+                               uz_error *err);
+void uz_shared_factor_release(uz_shared_factor *shared);
+
+#endif

@@ -1,0 +1,37 @@
+/* table.h: reference-counted objects by kind and digest, bounded in bytes, the least recently used first out, with one
+ * creator per object while others wait for it. What the objects are is their owners' business: bodies (cache.h),
+ * factors and analyses (parts.h).
+ *
+ * An object may hold uses of others in the same table and give them back when it is destroyed: nothing is destroyed
+ * under the mutex. */
+#ifndef UZ_TABLE_H
+#define UZ_TABLE_H
+
+#include "uzawa.h"
+
+typedef enum { UZ_ITEM_BODY, UZ_ITEM_FACTOR, UZ_ITEM_ANALYSIS } uz_item_kind;
+typedef struct uz_item uz_item;
+
+/* A use of the item, which the caller gives back with uz_table_release. *create: nobody has it and the caller must
+ * make it, then publish or abandon it. A waiter whose hooks say cancelled gets UZ_ERR_CANCELLED. */
+uz_status uz_table_acquire(uz_item **item, bool *create, uz_cache *cache, uz_item_kind kind, const char digest[65],
+                           const uz_hooks *hooks, uz_error *err);
+/* The creator's two ends. publish: the table owns the object from now on and the caller keeps its use of the item.
+ * abandon: waiters try themselves; the item is gone. */
+void uz_table_publish(uz_cache *cache, uz_item *item, void *object, size_t bytes, void (*destroy)(void *object));
+void uz_table_abandon(uz_cache *cache, uz_item *item);
+/* NULL is fine. */
+void uz_table_release(uz_cache *cache, uz_item *item);
+
+/* A use of the most recently used object of this kind that `fits`, or NULL. fits is called under the mutex. */
+uz_item *uz_table_search(uz_cache *cache, uz_item_kind kind, bool (*fits)(const void *object, void *ctx), void *ctx);
+
+void *uz_item_object(const uz_item *item); /* NULL until it is published */
+const char *uz_item_digest(const uz_item *item);
+
+/* Calls visit for each published object of the kind, most recently used first, under the mutex. */
+void uz_table_visit(uz_cache *cache, uz_item_kind kind,
+                    void (*visit)(const void *object, const char *digest, int64_t hits, size_t bytes, void *ctx),
+                    void *ctx);
+
+#endif

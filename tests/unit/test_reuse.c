@@ -1,0 +1,205 @@
+/* What a solve takes over from earlier ones with a body that is like its own but not the same. */
+#include "harness.h"
+#include "qp_fixture.h"
+#include "scene_fixture.h"
+
+static uz_qp body_of(int64_t nx, double young)
+{
+    uz_scene scene = paper_scene(nx, nx / 3);
+    uz_mesh_info info;
+    uz_error err = {0};
+    uz_qp qp;
+    scene.materials[0].young = young;
+    CHECK(uz_scene_to_qp(&qp, &info, &scene, &err) == UZ_OK);
+    uz_mesh_info_clear(&info);
+    uz_scene_clear(&scene);
+    return qp;
+}
+
+/* Keeps the rows that `keep` names, from the first. */
+static void keep_rows(uz_qp *qp, bool (*keep)(int64_t row))
+{
+    int64_t m = 0, at = 0, *row = calloc((size_t)qp->N.rows, sizeof *row);
+    for (int64_t i = 0; i < qp->N.rows; i++) {
+        row[i] = keep(i) ? m : -1;
+        if (row[i] >= 0)
+            qp->h[m++] = qp->h[i];
+    }
+    for (int64_t j = 0, k = 0; j < qp->N.cols; j++) {
+        for (; k < qp->N.ptr[j + 1]; k++)
+            if (row[qp->N.idx[k]] >= 0) {
+                qp->N.idx[at] = row[qp->N.idx[k]];
+                qp->N.val[at++] = qp->N.val[k];
+            }
+        qp->N.ptr[j + 1] = at;
+    }
+    qp->N.rows = m;
+    free(row);
+}
+
+static bool every_third(int64_t row)
+{
+    return row % 3 == 0;
+}
+
+static bool all_but_every_third(int64_t row)
+{
+    return row % 3 != 0;
+}
+
+static uz_result *solve(uz_cache *cache, uz_qp qp, const uz_settings *settings)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = qp};
+    uz_result *result = NULL;
+    uz_error err = {0};
+    CHECK_MSG(uz_solve(&result, &problem, settings, cache, NULL, &err) == UZ_OK, "%s", err.message);
+    CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+    uz_problem_clear(&problem);
+    return result;
+}
+
+/* Solves with the cache and without; the answers are within the certified errors of both, and `reused` is told. */
+static void check_reuse(uz_cache *cache, uz_qp (*make)(void), bool ordering, bool factor, bool op)
+{
+    uz_settings settings = uz_settings_default();
+    uz_result *with = solve(cache, make(), &settings), *without = solve(NULL, make(), &settings);
+    uz_reuse reused = with->summary.reused;
+    CHECK_INT(reused.ordering, ordering);
+    CHECK_INT(reused.factor, factor);
+    CHECK_INT(reused.op, op);
+    CHECK_INT(with->summary.factor_cached, op);
+    CHECK(!without->summary.reused.ordering && !without->summary.reused.factor && !without->summary.reused.op);
+    CHECK_INT(with->summary.active, without->summary.active);
+    double difference = 0, size = 0;
+    for (int64_t j = 0; j < with->d; j++) {
+        difference = fmax(difference, fabs(with->u[j] - without->u[j]));
+        size = fmax(size, fabs(without->u[j]));
+    }
+    CHECK_MSG(difference <= 1e-7 * size, "differs by %g of %g", difference, size);
+    if (ordering)
+        CHECK(with->summary.timings.order == 0);
+    if (factor)
+        CHECK(with->summary.timings.factor == 0);
+    uz_result_free(with);
+    uz_result_free(without);
+}
+
+static uz_qp whole(void)
+{
+    return body_of(30, 200e3);
+}
+
+static uz_qp softer(void)
+{
+    return body_of(30, 120e3);
+}
+
+static uz_qp other_gaps(void)
+{
+    uz_qp qp = whole();
+    for (int64_t i = 0; i < qp.N.rows; i++)
+        qp.h[i] = 1e-5 * (double)(i % 4);
+    return qp;
+}
+
+static uz_qp fewer_contacts(void)
+{
+    uz_qp qp = whole();
+    keep_rows(&qp, all_but_every_third);
+    return qp;
+}
+
+static uz_qp few_contacts(void)
+{
+    uz_qp qp = whole();
+    keep_rows(&qp, every_third);
+    return qp;
+}
+
+static uz_qp no_contacts(void)
+{
+    uz_qp qp = whole();
+    qp.N.rows = 0;
+    qp.N.ptr[qp.N.cols] = 0;
+    memset(qp.N.ptr, 0, (size_t)(qp.N.cols + 1) * sizeof *qp.N.ptr);
+    return qp;
+}
+
+TEST(what_is_alike_is_reused)
+{
+    uz_cache *cache = uz_cache_new(1 << 30);
+    uz_thread_init();
+    check_reuse(cache, whole, false, false, false);
+    check_reuse(cache, whole, true, true, true);
+    check_reuse(cache, other_gaps, true, true, true);
+    check_reuse(cache, softer, true, false, false);        /* same pattern, other values */
+    check_reuse(cache, fewer_contacts, true, true, false); /* same K, some of its contacts */
+    check_reuse(cache, few_contacts, true, true, false);
+    check_reuse(cache, no_contacts, true, true, false);
+    check_reuse(cache, fewer_contacts, true, true, true);
+    uz_cache_free(cache);
+}
+
+/* A factor with fewer contact dofs at its end can't serve more of them on the contact. */
+TEST(more_contacts_need_another_order)
+{
+    uz_cache *cache = uz_cache_new(1 << 30);
+    uz_thread_init();
+    check_reuse(cache, few_contacts, false, false, false);
+    check_reuse(cache, whole, false, false, false);
+    check_reuse(cache, few_contacts, true, true, true);
+    uz_cache_free(cache);
+}
+
+TEST(every_method_on_a_factor_of_more_contacts)
+{
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET};
+    uz_thread_init();
+    for (size_t k = 0; k < sizeof methods / sizeof methods[0]; k++) {
+        uz_cache *cache = uz_cache_new(1 << 30);
+        uz_settings settings = uz_settings_default();
+        uz_result_free(solve(cache, whole(), &settings));
+        settings.method = methods[k];
+        uz_result *result = solve(cache, fewer_contacts(), &settings);
+        CHECK(result->summary.reused.factor);
+        uz_result_free(result);
+        uz_cache_free(cache);
+    }
+}
+
+TEST(scenes_share_too)
+{
+    uz_cache *cache = uz_cache_new(1 << 30);
+    uz_settings settings = uz_settings_default();
+    uz_thread_init();
+    for (int round = 0; round < 3; round++) {
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(12, 4)};
+        problem.scene.materials[0].young = round < 2 ? 200e3 : 70e3;
+        uz_result *result = NULL;
+        uz_error err = {0};
+        CHECK(uz_solve(&result, &problem, &settings, cache, NULL, &err) == UZ_OK);
+        CHECK_INT(result->summary.reused.assembly, round == 1);
+        CHECK_INT(result->summary.reused.op, round == 1);
+        CHECK_INT(result->summary.reused.ordering, round > 0);
+        uz_result_free(result);
+        uz_problem_clear(&problem);
+    }
+    uz_cache_free(cache);
+}
+
+/* Bodies that share a factor, in a cache that holds nothing: the factor lives as long as one of them is in use. */
+TEST(shared_factors_are_freed_once)
+{
+    uz_cache *cache = uz_cache_new(0);
+    uz_thread_init();
+    check_reuse(cache, whole, false, false, false);
+    check_reuse(cache, whole, false, false, false);
+    check_reuse(cache, fewer_contacts, false, false, false);
+    uz_cache_entry *entries;
+    size_t count = 7;
+    uz_error err;
+    CHECK_INT(uz_cache_list(cache, &entries, &count, &err), UZ_OK);
+    CHECK_INT(count, 0);
+    free(entries);
+    uz_cache_free(cache);
+}
