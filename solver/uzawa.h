@@ -384,7 +384,8 @@ typedef struct {
     int64_t d, m, nnz, hits;
     size_t bytes;
 } uz_cache_entry;
-/* A snapshot, most recently used first; the caller frees *entries with free(). */
+/* A snapshot, most recently used first; the caller frees *entries with free(). A factor that bodies share is counted
+ * in the bytes of the first. */
 uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **entries, size_t *count, uz_error *err);
 
 /* ------------------------------------------------------------------ solve */

@@ -63,6 +63,7 @@ void uz_cache_release(uz_cache *cache, uz_body *body)
 
 typedef struct {
     uz_cache_entry *list;
+    const uz_factor **factors; /* of the entries before */
     size_t count, room;
 } entries;
 
@@ -72,6 +73,16 @@ static void count_one(const void *object, const char *digest, int64_t hits, size
     ((entries *)ctx)->room++;
 }
 
+/* A factor that several bodies share counts for the first of them. */
+static size_t factor_bytes(entries *to, const uz_factor *factor)
+{
+    for (size_t k = 0; k < to->count; k++)
+        if (to->factors[k] == factor)
+            return 0;
+    to->factors[to->count] = factor;
+    return uz_factor_describe(factor).bytes;
+}
+
 static void describe_one(const void *object, const char *digest, int64_t hits, size_t bytes, void *ctx)
 {
     const uz_body *body = object;
@@ -79,27 +90,32 @@ static void describe_one(const void *object, const char *digest, int64_t hits, s
     if (to->count == to->room)
         return; /* came in since they were counted */
     uz_dual_info dual = uz_dual_describe(body->dual);
-    uz_factor_info factor = uz_factor_describe(body->factor);
-    uz_cache_entry *entry = &to->list[to->count++];
+    uz_cache_entry *entry = &to->list[to->count];
     memcpy(entry->digest, digest, sizeof entry->digest);
     entry->d = dual.d;
     entry->m = dual.m;
-    entry->nnz = factor.nnz;
+    entry->nnz = uz_factor_describe(body->factor).nnz;
     entry->hits = hits;
-    entry->bytes = bytes + factor.bytes;
+    entry->bytes = bytes + factor_bytes(to, body->factor);
+    to->count++;
 }
 
 uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **out, size_t *count, uz_error *err)
 {
-    entries found = {NULL, 0, 0};
+    entries found = {0};
     *out = NULL;
     *count = 0;
     uz_error_reset(err);
     uz_table_visit(cache, UZ_ITEM_BODY, count_one, &found);
     found.list = uz_alloc_zero((int64_t)found.room, sizeof *found.list);
-    if (!found.list)
+    found.factors = uz_alloc_zero((int64_t)found.room, sizeof *found.factors);
+    if (!found.list || !found.factors) {
+        free(found.list);
+        free(found.factors);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to list the cache");
+    }
     uz_table_visit(cache, UZ_ITEM_BODY, describe_one, &found);
+    free(found.factors);
     *out = found.list;
     *count = found.count;
     return UZ_OK;

@@ -109,6 +109,28 @@ def test_one_factorization_of_matrices(s):
     check(sum(not job["summary"]["factor"]["cached"] for _, _, job, _ in everything) == 1, everything)
 
 
+def test_bodies_that_are_alike_share(s):
+    """Another material has the pattern, other stops have K: the summary says what was there already."""
+    def reused(K, N, h):
+        problem = {**MATRICES["problem"], "K": K, "N": N, "h": h, "p": [4, 3]}
+        summary = s.solve({"problem": problem})["summary"]
+        check(summary["outcome"] == "converged", summary)
+        return [name for name, was in summary["factor"]["reused"].items() if was]
+
+    def K(scale):
+        entries = "".join(f"{i} {j} {scale * v}\n" for i, j, v in [(1, 1, 2), (2, 1, -1), (2, 2, 3)])
+        return "%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n" + entries
+
+    both = "%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 1\n2 2 1\n"
+    one = "%%MatrixMarket matrix coordinate real general\n1 2 1\n1 2 1\n"
+    check(reused(K(1), both, [0.5, 0.5]) == [])
+    check(reused(K(1), both, [0.1, 0.5]) == ["assembly", "ordering", "factor", "operator"])
+    check(reused(K(3), both, [0.5, 0.5]) == ["ordering"])
+    check(reused(K(3), one, [0.5]) == ["ordering", "factor"])
+    held = expect(s.get("/v1/factors"), 200).json
+    check(len(held["factors"]) == 3 and held["bytes"] == sum(f["bytes"] for f in held["factors"]), held)
+
+
 @options("--workers", "4", "--cache", "2M")
 def test_small_cache_under_load(s):
     """More bodies than there is room for: factors come and go under their users, and no answer changes."""
