@@ -130,7 +130,7 @@ $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci bench extremes
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci bench bench-size extremes
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -181,6 +181,10 @@ $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(PARTS_OBJ) $(BUILD)/libuzawa.a
 bench: deps ## measured ratios in one run: a table and build/bench.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
 	@$(BUILD)/bench $(BUILD)/bench.json $(FILTER)
+
+bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/bench-size.json; minutes
+	@$(MAKE) --no-print-directory -s $(BUILD)/bench
+	@$(BUILD)/bench $(BUILD)/bench-size.json size
 
 extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes

@@ -207,6 +207,23 @@ static void bench_obstacles(report *out)
         printf("%-34s skipped: no Ipopt (Debian: coinor-libipopt-dev)\n", "ipopt_over_uzawa_obstclae");
 }
 
+static void bench_memories(report *out)
+{
+    static const char *const sizes[] = {"300", "600", "900"};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
+        bench_value ratio, megabytes;
+        char name[64];
+        if (!bench_memory(&ratio, &megabytes, sizes[i])) {
+            printf("memory could not be measured at nx = %s\n", sizes[i]);
+            exit(1);
+        }
+        snprintf(name, sizeof name, "memory_nx%s", sizes[i]);
+        print_row(out, name, "x", ratio, "linear solve, peak resident");
+        strcat(name, "_megabytes");
+        print_row(out, name, "MB", megabytes, "");
+    }
+}
+
 static bool wanted(const report *out, const char *name)
 {
     return !out->filter || strstr(name, out->filter);
@@ -224,6 +241,11 @@ int main(int argc, char **argv)
 {
     static const int64_t sizes[] = {150, 300, 600, 900};
     report out = {.filter = argc > 2 ? argv[2] : NULL};
+    if (argc == 4 && strcmp(argv[1], BENCH_MEMORY_FLAG) == 0) {
+        uz_process_init(2);
+        uz_thread_init();
+        return bench_memory_child(argv[2], argv[3]);
+    }
     if (argc < 2 || !(out.json = fopen(argv[1], "w"))) {
         fprintf(stderr, "usage: bench OUTPUT.json [name part]\n");
         return 2;
@@ -231,6 +253,12 @@ int main(int argc, char **argv)
     keep_memory();
     uz_process_init(2);
     uz_thread_init();
+    if (out.filter && strcmp(out.filter, "size") == 0) {
+        fprintf(out.json, "{");
+        bench_sizes(out.json);
+        fprintf(out.json, "}\n");
+        return fclose(out.json) != 0;
+    }
     fprintf(out.json, "{\"ratios\": [\n");
     if (wanted(&out, "matrix_market"))
         bench_reader(&out);
@@ -238,6 +266,8 @@ int main(int argc, char **argv)
         bench_accuracies(&out);
     if (wanted(&out, "obstclae"))
         bench_obstacles(&out);
+    if (wanted(&out, "memory"))
+        bench_memories(&out);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {
         bench_body(&out, sizes[i], 1e-6);
         bench_body(&out, sizes[i], 1e-8);

@@ -30,6 +30,16 @@ double bench_ipopt(double *u, double *value, const uz_csc *K, const double *p, d
 /* OBSTCLAE: time of Ipopt over ours, and ours. *compared false: there is no Ipopt, and no ratio. false: no answer. */
 bool bench_obstacle(bench_value *ratio, bench_value *milliseconds, bool *compared);
 
+/* Peak memory of a cold contact solve over that of the linear solve of the same K with the ordering that takes least,
+ * and that of the contact solve, in processes of their own. problem: cells along the paper's body, as text. */
+bool bench_memory(bench_value *ratio, bench_value *megabytes, const char *problem);
+/* What main does when it is started as `bench BENCH_MEMORY_FLAG what problem`: prints bytes; its exit status. */
+#define BENCH_MEMORY_FLAG "--memory"
+int bench_memory_child(const char *what, const char *problem);
+
+/* Cost against size, 600 to 2,000,000 dofs, printed and as two members of a JSON object. Minutes, and 4 GB. */
+void bench_sizes(FILE *json);
+
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);
 
