@@ -1,7 +1,8 @@
 /* compress.c: the graph of nodes behind a matrix of dofs.
  *
- * Dofs of one node have the same neighbours, and an ordering never gains by separating them. Ordering the graph of
- * groups of such dofs is several times cheaper and gives the same fill (Ashcraft, SIAM J. Sci. Comput. 16 (1995)). */
+ * Dofs of one node have the same neighbours, and an ordering never gains by separating them. Ordering and analysing the
+ * graph of groups of such dofs is several times cheaper and gives the same fill (Ashcraft, SIAM J. Sci. Comput. 16
+ * (1995)). */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -17,9 +18,11 @@ static uint64_t mix(uint64_t x)
     return x ^ (x >> 31);
 }
 
-/* sum[i]: of mix(j) over the neighbours j of i and i itself. Equal sums mean equal neighbourhoods but for a chance of
- * 2^-64, and a wrong guess costs fill, never correctness. */
-static void sum_neighbourhoods(uint64_t *sum, const int64_t *ptr, const int64_t *idx, int64_t n)
+/* sum[i]: of mix(j) over the neighbours j of i and i itself, and something else for the last dofs. Equal sums mean
+ * equal neighbourhoods but for a chance of 2^-64, and a wrong guess costs fill, never correctness: the graph has an
+ * edge for every entry of the matrix. */
+static void sum_neighbourhoods(uint64_t *sum, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
+                               int64_t n_last)
 {
     for (int64_t j = 0; j < n; j++)
         sum[j] = mix((uint64_t)j);
@@ -34,6 +37,8 @@ static void sum_neighbourhoods(uint64_t *sum, const int64_t *ptr, const int64_t 
         }
         sum[j] += total;
     }
+    for (int64_t k = 0; k < n_last; k++)
+        sum[last[k]] += mix(UINT64_MAX);
 }
 
 /* head[i]: the first dof of i's group. */
@@ -47,78 +52,97 @@ static void find_heads(int64_t *head, const uint64_t *sum, const int64_t *ptr, c
                 head[idx[k]] = j;
 }
 
-/* Numbers the groups; number[i] is that of a head, else -1. */
-static int64_t number_groups(int64_t *number, const int64_t *head, int64_t n)
+/* From heads to numbers, in the order of the heads. */
+static int64_t number_groups(int64_t *group, int64_t n)
 {
     int64_t count = 0;
     for (int64_t j = 0; j < n; j++)
-        number[j] = head[j] == j ? count++ : -1;
+        group[j] = group[j] == j ? count++ : group[group[j]];
     return count;
 }
 
-/* Edges between groups are those between their heads. */
-static cholmod_sparse *group_graph(const int64_t *ptr, const int64_t *idx, const int64_t *number, int64_t n,
-                                   int64_t groups, cholmod_common *common)
+/* Counts the edges between groups by the column they belong to, or places them (rows not NULL) at next[column]. An edge
+ * met before in the same group's columns, mostly neighbours, is left out; some come twice all the same. mark: a place
+ * for each group. */
+static void collect_edges(SuiteSparse_long *next, SuiteSparse_long *rows, int64_t *mark, const cholmod_sparse *A,
+                          const int64_t *group, int64_t groups)
 {
-    int64_t entries = 0, at = 0;
-    for (int64_t j = 0; j < n; j++)
-        for (int64_t k = ptr[j]; number[j] >= 0 && k < ptr[j + 1]; k++)
-            entries += number[idx[k]] >= 0;
-    cholmod_sparse *graph =
-        cholmod_l_allocate_sparse((size_t)groups, (size_t)groups, (size_t)entries, 1, 1, -1, CHOLMOD_PATTERN, common);
-    if (!graph)
-        return NULL;
-    SuiteSparse_long *p = graph->p, *i = graph->i;
-    for (int64_t j = 0; j < n; j++) {
-        if (number[j] < 0)
-            continue;
-        p[number[j]] = at;
-        for (int64_t k = ptr[j]; k < ptr[j + 1]; k++)
-            if (number[idx[k]] >= 0)
-                i[at++] = number[idx[k]];
+    const SuiteSparse_long *ptr = A->p, *idx = A->i;
+    for (int64_t g = 0; g < groups; g++)
+        mark[g] = -1;
+    for (int64_t j = 0; j < (int64_t)A->ncol; j++) {
+        int64_t own = group[j];
+        for (int64_t k = ptr[j]; k < ptr[j + 1]; k++) {
+            int64_t other = group[idx[k]], column = other < own ? other : own;
+            if (other == own || mark[other] == own)
+                continue;
+            mark[other] = own;
+            if (rows)
+                rows[next[column]] = other < own ? own : other;
+            next[column]++;
+        }
     }
-    p[groups] = at;
+}
+
+/* Leaves each edge once. graph's columns end where the next begins; mark: a place for each group. */
+static void drop_repeated(cholmod_sparse *graph, int64_t *mark)
+{
+    SuiteSparse_long *ptr = graph->p, *rows = graph->i, at = 0, begin = 0;
+    for (int64_t g = 0; g < (int64_t)graph->ncol; g++)
+        mark[g] = -1;
+    for (int64_t g = 0; g < (int64_t)graph->ncol; g++) {
+        int64_t end = ptr[g + 1];
+        for (int64_t k = begin; k < end; k++) {
+            if (mark[rows[k]] == g)
+                continue;
+            mark[rows[k]] = g;
+            rows[at++] = rows[k];
+        }
+        begin = end;
+        ptr[g + 1] = at;
+    }
+}
+
+static cholmod_sparse *group_graph(const cholmod_sparse *A, const int64_t *group, int64_t groups,
+                                   cholmod_common *common)
+{
+    SuiteSparse_long *next = uz_alloc_zero(groups + 1, sizeof *next), *mark = uz_alloc(groups, sizeof *mark);
+    cholmod_sparse *graph = NULL;
+    int64_t edges = 0;
+    if (next && mark) {
+        collect_edges(next, NULL, mark, A, group, groups);
+        for (int64_t g = 0; g <= groups; g++) { /* from counts to where columns begin */
+            int64_t count = next[g];
+            next[g] = edges;
+            edges += count;
+        }
+        graph =
+            cholmod_l_allocate_sparse((size_t)groups, (size_t)groups, (size_t)edges, 0, 1, -1, CHOLMOD_PATTERN, common);
+    }
+    if (graph) {
+        SuiteSparse_long *ptr = graph->p;
+        collect_edges(next, graph->i, mark, A, group, groups);
+        ptr[0] = 0;
+        for (int64_t g = 0; g < groups; g++) /* each column was filled up to where it ends */
+            ptr[g + 1] = next[g];
+        drop_repeated(graph, mark);
+    }
+    free(next);
+    free(mark);
     return graph;
 }
 
-cholmod_sparse *uz_compress(int64_t *head, const cholmod_sparse *A, cholmod_common *common)
+cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
+                            cholmod_common *common)
 {
     int64_t n = (int64_t)A->ncol;
-    const int64_t *ptr = A->p, *idx = A->i;
     uint64_t *sum = uz_alloc(n, sizeof *sum);
-    int64_t *number = uz_alloc(n, sizeof *number);
     cholmod_sparse *graph = NULL;
-    if (sum && number) {
-        sum_neighbourhoods(sum, ptr, idx, n);
-        find_heads(head, sum, ptr, idx, n);
-        graph = group_graph(ptr, idx, number, n, number_groups(number, head, n), common);
+    if (sum) {
+        sum_neighbourhoods(sum, A->p, A->i, n, last, n_last);
+        find_heads(group, sum, A->p, A->i, n);
+        graph = group_graph(A, group, number_groups(group, n), common);
     }
     free(sum);
-    free(number);
     return graph;
-}
-
-bool uz_expand(int64_t *perm, const int64_t *group_perm, const int64_t *head, int64_t n, int64_t groups)
-{
-    int64_t *first = uz_alloc(groups + 1, sizeof *first), *group = uz_alloc(n, sizeof *group), count = 0;
-    int64_t *place = uz_alloc(groups, sizeof *place);
-    bool ok = first && group && place;
-    for (int64_t j = 0; ok && j < n; j++)
-        group[j] = head[j] == j ? count++ : group[head[j]];
-    for (int64_t k = 0; ok && k < groups; k++) {
-        place[group_perm[k]] = k;
-        first[k + 1] = 0;
-    }
-    for (int64_t j = 0; ok && j < n; j++)
-        first[place[group[j]] + 1]++;
-    if (ok)
-        first[0] = 0;
-    for (int64_t k = 0; ok && k < groups; k++)
-        first[k + 1] += first[k];
-    for (int64_t j = 0; ok && j < n; j++)
-        perm[first[place[group[j]]]++] = j;
-    free(first);
-    free(group);
-    free(place);
-    return ok;
 }

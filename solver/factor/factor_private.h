@@ -43,16 +43,18 @@ cholmod_sparse uz_view_lower(const uz_csc *K);
 /* A dense matrix over an array, column-major. */
 cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns);
 
-/* Fills perm (n) with a fill-reducing ordering of A that keeps `last` at the end. *ordering: what was asked for on
- * entry (not AUTO), what was used on return. */
-uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,
-                   cholmod_common *common, uz_error *err);
+/* The graph of groups of dofs with equal neighbours (lower triangle without diagonal, pattern), freed by
+ * cholmod_l_free_sparse; NULL: no memory. A: lower triangle. The n_last dofs `last` are in groups without others.
+ * group[i] (n): the number of i's group, in the order of their first dofs. */
+cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
+                            cholmod_common *common);
 
-/* The graph of groups of dofs with equal neighbours (lower triangle, pattern), freed by cholmod_l_free_sparse; NULL: no
- * memory. A: lower triangle. head[i] (n): the first dof of i's group; groups are numbered in the order of their heads.
- */
-cholmod_sparse *uz_compress(int64_t *head, const cholmod_sparse *A, cholmod_common *common);
-/* perm (n) from an ordering of the groups: each group's dofs in a row. false: no memory. */
-bool uz_expand(int64_t *perm, const int64_t *group_perm, const int64_t *head, int64_t n, int64_t groups);
+/* Fills perm (nodes) with a fill-reducing ordering of the graph of groups that keeps those of the dofs `last` at the
+ * end. *ordering: what was asked for on entry (not AUTO), what was used on return. */
+uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *group, const int64_t *last, int64_t n_last,
+                   uz_ordering *ordering, cholmod_common *common, uz_error *err);
+
+/* The symbolic supernodal factor of n dofs from that of their groups; NULL: no memory. */
+cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t n, cholmod_common *common);
 
 #endif

@@ -1,4 +1,4 @@
-/* ordering.c: fill-reducing orderings with the contact dofs last. */
+/* ordering.c: fill-reducing orderings of the graph of nodes with those of the contact last. */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -42,26 +42,6 @@ static bool order_metis(SuiteSparse_long *perm, cholmod_sparse *A, cholmod_commo
     return ok;
 }
 
-/* AMD or METIS on the graph of nodes. */
-static bool order_groups(int64_t *perm, cholmod_sparse *A, uz_ordering ordering, cholmod_common *common)
-{
-    int64_t n = (int64_t)A->nrow, *head = uz_alloc(n, sizeof *head), *order = uz_alloc(n, sizeof *order);
-    cholmod_sparse *graph = head && order ? uz_compress(head, A, common) : NULL;
-    bool ok = graph != NULL;
-    if (ok && graph->nrow < TINY) {
-        for (int64_t k = 0; k < (int64_t)graph->nrow; k++)
-            order[k] = k;
-    } else if (ok) {
-        ok = ordering == UZ_ORDERING_AMD ? cholmod_l_amd(graph, NULL, 0, order, common)
-                                         : order_metis(order, graph, common);
-    }
-    ok = ok && uz_expand(perm, order, head, n, (int64_t)graph->nrow);
-    cholmod_l_free_sparse(&graph, common);
-    free(head);
-    free(order);
-    return ok;
-}
-
 /* Moves `last` behind all others and keeps the order within both groups. */
 static bool move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last)
 {
@@ -85,26 +65,47 @@ static bool move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_l
     return ok;
 }
 
-static bool order_natural(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last)
+/* Numbers of the groups of the last dofs, each once. */
+static int64_t list_groups(int64_t *list, const int64_t *group, int64_t groups, const int64_t *last, int64_t n_last)
 {
-    for (int64_t k = 0; k < n; k++)
-        perm[k] = k;
-    return move_last(perm, n, last, n_last);
+    bool *seen = uz_alloc_zero(groups, sizeof *seen);
+    int64_t count = 0;
+    for (int64_t k = 0; seen && k < n_last; k++) {
+        if (!seen[group[last[k]]])
+            list[count++] = group[last[k]];
+        seen[group[last[k]]] = true;
+    }
+    free(seen);
+    return seen ? count : -1;
 }
 
-uz_status uz_order(int64_t *perm, cholmod_sparse *A, const int64_t *last, int64_t n_last, uz_ordering *ordering,
-                   cholmod_common *common, uz_error *err)
+static bool order_by(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering *ordering,
+                     cholmod_common *common)
 {
-    bool ok = true;
-    if (A->nrow < TINY) /* nothing to reduce, and CAMD reads past the end at n = 1 */
-        ok = order_natural(perm, (int64_t)A->nrow, last, n_last);
-    else if (*ordering == UZ_ORDERING_CAMD)
-        ok = order_camd(perm, A, last, n_last, common);
-    else
-        ok = order_groups(perm, A, *ordering, common) && move_last(perm, (int64_t)A->nrow, last, n_last);
+    int64_t n = (int64_t)graph->nrow;
+    if (n < TINY) { /* nothing to reduce, and CAMD reads past the end at n = 1 */
+        for (int64_t k = 0; k < n; k++)
+            perm[k] = k;
+        return move_last(perm, n, last, n_last);
+    }
+    if (*ordering == UZ_ORDERING_CAMD)
+        return order_camd(perm, graph, last, n_last, common);
+    bool ok = *ordering == UZ_ORDERING_AMD ? cholmod_l_amd(graph, NULL, 0, (SuiteSparse_long *)perm, common)
+                                           : order_metis((SuiteSparse_long *)perm, graph, common);
+    return ok && move_last(perm, n, last, n_last);
+}
+
+uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *group, const int64_t *last, int64_t n_last,
+                   uz_ordering *ordering, cholmod_common *common, uz_error *err)
+{
+    int64_t n = (int64_t)graph->nrow, *list = uz_alloc(n_last, sizeof *list), count = -1;
+    if (list)
+        count = list_groups(list, group, n, last, n_last);
+    bool ok = count >= 0 && order_by(perm, graph, list, count, ordering, common);
+    free(list);
     if (ok && common->status >= CHOLMOD_OK)
         return UZ_OK;
     if (common->status == CHOLMOD_OUT_OF_MEMORY || common->status == CHOLMOD_OK)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)A->nrow);
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld nodes", (long long)n);
     return uz_fail(err, UZ_ERR_INTERNAL, "K", "ordering failed (CHOLMOD status %d)", common->status);
 }

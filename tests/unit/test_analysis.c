@@ -141,3 +141,72 @@ TEST(factors_of_one_analysis_in_threads)
     uz_qp_clear(&qp);
     free(want);
 }
+
+/* P K P' as a lower triangle: dof i becomes to[i]. */
+static uz_csc renumber(const uz_csc *K, const int64_t *to)
+{
+    int64_t n = K->cols, nnz = K->ptr[n];
+    uz_csc A, T, B;
+    uz_error err = {0};
+    CHECK(uz_csc_init(&A, n, n, nnz, &err) == UZ_OK);
+    for (int64_t j = 0; j < n; j++) /* counts, then places */
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+            int64_t a = to[j], b = to[K->idx[k]];
+            A.ptr[(a < b ? a : b) + 1]++;
+        }
+    for (int64_t j = 0; j < n; j++)
+        A.ptr[j + 1] += A.ptr[j];
+    for (int64_t j = 0; j < n; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+            int64_t a = to[j], b = to[K->idx[k]], at = A.ptr[a < b ? a : b]++;
+            A.idx[at] = a < b ? b : a;
+            A.val[at] = K->val[k];
+        }
+    memmove(A.ptr + 1, A.ptr, (size_t)n * sizeof *A.ptr);
+    A.ptr[0] = 0;
+    CHECK(uz_csc_transpose(&T, &A, &err) == UZ_OK); /* twice: sorts the columns */
+    CHECK(uz_csc_transpose(&B, &T, &err) == UZ_OK);
+    uz_csc_clear(&A);
+    uz_csc_clear(&T);
+    return B;
+}
+
+/* A body whose dofs come by direction, or in any order, is the same body: dofs of a node that stand far apart in the
+ * numbering are found all the same. */
+TEST(numbering_of_dofs)
+{
+    uz_thread_init();
+    for (int way = 0; way < 2; way++) {
+        uz_qp qp = body_of(24, 200e3);
+        int64_t n = qp.K.cols, *to = calloc((size_t)n, sizeof *to);
+        double *b = vector(n), *x = vector(n), *y = vector(n);
+        uz_factor *own, *other;
+        uz_error err;
+        qp_random rng = {7};
+        for (int64_t i = 0; i < n; i++)
+            to[i] = way == 0 ? i / 2 + (i % 2) * ((n + 1) / 2) : i;
+        for (int64_t i = n - 1; way == 1 && i > 0; i--) {
+            int64_t k = random_int(&rng, 0, i + 1), swap = to[i];
+            to[i] = to[k];
+            to[k] = swap;
+        }
+        uz_csc A = renumber(&qp.K, to);
+        for (int64_t i = 0; i < n; i++)
+            b[to[i]] = qp.p[i];
+        CHECK_INT(factor_by(&own, &qp.K, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
+        CHECK_INT(factor_by(&other, &A, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
+        CHECK_REL((double)uz_factor_describe(other).nnz, (double)uz_factor_describe(own).nnz, 0.15);
+        solve(x, own, qp.p, n);
+        solve(y, other, b, n);
+        for (int64_t i = 0; i < n; i++)
+            CHECK(fabs(y[to[i]] - x[i]) <= 1e-9 * fabs(x[n - 1]));
+        uz_factor_free(own);
+        uz_factor_free(other);
+        uz_csc_clear(&A);
+        uz_qp_clear(&qp);
+        free(to);
+        free(b);
+        free(x);
+        free(y);
+    }
+}

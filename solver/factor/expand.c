@@ -1,0 +1,129 @@
+/* expand.c: from the supernodes of the graph of groups to those of the matrix of dofs.
+ *
+ * A group's dofs are eliminated in a row and meet the same rows below them, so a supernode of groups is one of dofs
+ * with every group written out. */
+#include "factor/factor_private.h"
+
+#include "core/alloc.h"
+
+#include <stdlib.h>
+
+/* first[g] (groups + 1): where group g's dofs begin in `member` (n), ascending within a group. */
+static void list_members(int64_t *first, int64_t *member, const int64_t *group, int64_t n, int64_t groups)
+{
+    for (int64_t g = 0; g <= groups; g++)
+        first[g] = 0;
+    for (int64_t i = 0; i < n; i++)
+        first[group[i] + 1]++;
+    for (int64_t g = 0; g < groups; g++)
+        first[g + 1] += first[g];
+    for (int64_t i = 0; i < n; i++)
+        member[first[group[i]]++] = i;
+    for (int64_t g = groups; g > 0; g--)
+        first[g] = first[g - 1];
+    first[0] = 0;
+}
+
+/* start[k] (groups + 1): the position of the first dof of the k-th group in the order of elimination. */
+static void place_groups(cholmod_factor *L, int64_t *start, const cholmod_factor *G, const int64_t *first,
+                         const int64_t *member)
+{
+    const SuiteSparse_long *order = G->Perm;
+    SuiteSparse_long *perm = L->Perm;
+    int64_t at = 0;
+    for (int64_t k = 0; k < (int64_t)G->n; k++) {
+        start[k] = at;
+        for (int64_t e = first[order[k]]; e < first[order[k] + 1]; e++)
+            perm[at++] = member[e];
+    }
+    start[G->n] = at;
+}
+
+/* The sizes of all supernodes: super, pi, px, and the largest. */
+static void size_supernodes(cholmod_factor *L, const cholmod_factor *G, const int64_t *start)
+{
+    const SuiteSparse_long *from = G->super, *pi = G->pi, *s = G->s;
+    SuiteSparse_long *super = L->super, *rows_begin = L->pi, *values_begin = L->px;
+    L->ssize = L->xsize = L->maxesize = 0;
+    for (size_t k = 0; k <= G->nsuper; k++) {
+        super[k] = start[from[k]];
+        rows_begin[k] = (SuiteSparse_long)L->ssize;
+        values_begin[k] = (SuiteSparse_long)L->xsize;
+        size_t rows = 0, columns = k < G->nsuper ? (size_t)(start[from[k + 1]] - start[from[k]]) : 0;
+        for (int64_t e = pi[k]; k < G->nsuper && e < pi[k + 1]; e++)
+            rows += (size_t)(start[s[e] + 1] - start[s[e]]);
+        L->ssize += rows;
+        L->xsize += rows * columns;
+        L->maxesize = rows - columns > L->maxesize ? rows - columns : L->maxesize;
+    }
+}
+
+static void write_rows(cholmod_factor *L, const cholmod_factor *G, const int64_t *start)
+{
+    const SuiteSparse_long *s = G->s;
+    SuiteSparse_long *rows = L->s;
+    size_t at = 0;
+    for (size_t e = 0; e < G->ssize; e++)
+        for (int64_t i = start[s[e]]; i < start[s[e] + 1]; i++)
+            rows[at++] = i;
+}
+
+/* Counts of the supernodal columns, and the largest block with which one supernode updates another: its rows from the
+ * first in that supernode on, by its rows within it. owner (n) is room. */
+static void count_columns(cholmod_factor *L, int64_t *owner)
+{
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *s = L->s;
+    SuiteSparse_long *count = L->ColCount;
+    L->maxcsize = 1;
+    for (size_t k = 0; k < L->nsuper; k++)
+        for (int64_t j = super[k]; j < super[k + 1]; j++) {
+            owner[j] = (int64_t)k;
+            count[j] = pi[k + 1] - pi[k] - (j - super[k]);
+        }
+    for (size_t k = 0; k < L->nsuper; k++) {
+        int64_t end = pi[k + 1], next;
+        for (int64_t e = pi[k] + super[k + 1] - super[k]; e < end; e = next) {
+            for (next = e + 1; next < end && owner[s[next]] == owner[s[e]]; next++)
+                ;
+            size_t size = (size_t)(next - e) * (size_t)(end - e);
+            L->maxcsize = size > L->maxcsize ? size : L->maxcsize;
+        }
+    }
+}
+
+static bool allocate(cholmod_factor *L, const cholmod_factor *G, cholmod_common *common)
+{
+    L->nsuper = G->nsuper;
+    L->super = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
+    L->pi = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
+    L->px = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
+    L->is_super = L->is_ll = 1;
+    return L->super && L->pi && L->px;
+}
+
+cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t n, cholmod_common *common)
+{
+    int64_t groups = (int64_t)G->n;
+    int64_t *first = uz_alloc(groups + 1, sizeof *first), *start = uz_alloc(groups + 1, sizeof *start);
+    int64_t *room = uz_alloc(n, sizeof *room);
+    cholmod_factor *L = first && start && room ? cholmod_l_allocate_factor((size_t)n, common) : NULL;
+    bool ok = L && allocate(L, G, common);
+    if (ok) {
+        list_members(first, room, group, n, groups);
+        place_groups(L, start, G, first, room);
+        size_supernodes(L, G, start);
+        L->s = cholmod_l_malloc(L->ssize, sizeof(SuiteSparse_long), common);
+        L->ordering = G->ordering;
+        ok = L->s != NULL;
+    }
+    if (ok) {
+        write_rows(L, G, start);
+        count_columns(L, room);
+    }
+    if (!ok)
+        cholmod_l_free_factor(&L, common);
+    free(first);
+    free(start);
+    free(room);
+    return L;
+}
