@@ -73,7 +73,8 @@ static size_t csc_bytes(const uz_csc *A)
 static size_t model_bytes(const uz_body_model *model)
 {
     size_t nodes = (size_t)(model->mesh.n_nodes + model->info.n_nodes);
-    return csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed) + 32 * nodes;
+    return csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed) + 32 * nodes +
+           (model->frame_of ? 8 * nodes : 0);
 }
 
 /* The key of K: known for matrices; of a scene's only when there is a cache to look into. */

@@ -184,11 +184,16 @@ typedef struct {
     int64_t *contact_node;  /* m: the node of each contact row */
     double *contact_area;   /* m: tributary area of each contact node (length x thickness in 2D) */
     double *contact_normal; /* m x dim: unit normal of the obstacle at the contact, pointing towards the body */
+    int64_t n_turned;       /* uz_scene_to_qp only: nodes whose dofs are not along the axes */
+    int64_t *turned_node;   /* n_turned */
+    double *frame;          /* n_turned x dim x dim: row c of a node's matrix is the direction of its dof c */
 } uz_mesh_info;
 void uz_mesh_info_clear(uz_mesh_info *info);
 
-/* Mesh, assembly, boundary conditions: the scene as matrices. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the
- * modes), _NOT_FINITE, with `where` a JSON pointer into the problem. Nothing is factored. */
+/* Mesh, assembly, boundary conditions: the scene as matrices. Their dofs are the free ones, node by node, along x, y,
+ * z; at a node whose first contact has an oblique normal along that normal and tangents (info->frame), so that its row
+ * of N has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
+ * pointer into the problem. Nothing is factored. */
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
 /* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. */
 uz_status uz_scene_check(const uz_scene *scene, uz_error *err);

@@ -6,7 +6,10 @@
  *
  * A dof is a node and a direction. Supported dofs are eliminated; the free ones keep the order of the nodes. A contact
  * row exists for each node of a contact group of which some free dof has a share in the normal; rows come contact by
- * contact, nodes ascending. N is minus the unit normal on those dofs, so that g = h - N u = (x + u - point) . n. */
+ * contact, nodes ascending. N is minus the unit normal on those dofs, so that g = h - N u = (x + u - point) . n.
+ * The directions of a node's free dofs are the axes, but at a node whose first contact row has a normal with a share in
+ * several of them: there one dof is along that normal, the others across, so that the row has one entry. K, N and p are
+ * in these dofs; uz_recover_nodal and uz_restrict_nodal lead to x, y and back. */
 #ifndef UZ_ASSEMBLY_H
 #define UZ_ASSEMBLY_H
 
@@ -19,6 +22,7 @@ typedef struct {
     uz_csc N;       /* m x d */
     uz_csc K_fixed; /* d x n_fixed: what supported dofs do to free ones; p loses K_fixed times the prescribed values */
     int64_t *dof;   /* n_nodes x dim: number of a free dof, or -1 - k for supported dof k */
+    int64_t *frame_of; /* n_nodes: 1 + place in info.turned_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
     double thickness;
@@ -41,7 +45,10 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
 /* nodal (n_nodes x dim) from the free dofs u (d) and the prescribed values (n_fixed; NULL: all zero). */
 void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u, const double *prescribed);
 
-/* Copies what a result shows of the mesh. */
+/* The reverse: the free dofs u (d) of a displacement by node; what it says of supported dofs is left out. */
+void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal);
+
+/* Copies what a result shows of the mesh: not the frames, as a result speaks of x and y only. */
 uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t m, uz_error *err);
 
 /* Estimated ||u - u_h||_E / ||u||_E of the mesh, for nodal displacements n_nodes x dim; NaN when there is no memory or

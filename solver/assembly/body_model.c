@@ -18,6 +18,8 @@ void uz_mesh_info_clear(uz_mesh_info *info)
     free(info->contact_node);
     free(info->contact_area);
     free(info->contact_normal);
+    free(info->turned_node);
+    free(info->frame);
     memset(info, 0, sizeof *info);
 }
 
@@ -32,6 +34,7 @@ void uz_body_model_clear(uz_body_model *model)
     uz_csc_clear(&model->N);
     uz_csc_clear(&model->K_fixed);
     free(model->dof);
+    free(model->frame_of);
     memset(model, 0, sizeof *model);
 }
 
@@ -57,6 +60,8 @@ static uz_status prepare(uz_body_model *model, const uz_scene *scene, uz_error *
     status = uz_number_dofs(model, scene, err);
     if (status == UZ_OK)
         status = uz_check_rigid_modes(model, err);
+    if (status == UZ_OK)
+        status = uz_choose_frames(model, scene, err);
     if (status == UZ_OK)
         status = uz_build_contact_rows(model, scene, err);
     return status;

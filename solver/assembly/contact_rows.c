@@ -5,9 +5,11 @@
 #include "core/error.h"
 #include "scene/scene.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3])
 {
@@ -59,19 +61,37 @@ static void spread_area(double *area, const uz_body_model *model, const uz_group
     }
 }
 
+/* The normal along the node's free dofs. In a turned frame what rounding has left across the normal becomes zero: it
+ * would make a second entry out of noise. */
+static void free_shares(double share[3], const uz_body_model *model, int64_t node, const double normal[3])
+{
+    const int dim = model->mesh.dim;
+    double largest = 0;
+    uz_to_frame(share, model, node, normal);
+    for (int c = 0; c < dim; c++) {
+        if (model->dof[node * dim + c] < 0)
+            share[c] = 0;
+        largest = fmax(largest, fabs(share[c]));
+    }
+    for (int c = 0; c < dim && uz_node_frame(model, node); c++)
+        if (fabs(share[c]) <= 8 * DBL_EPSILON * largest)
+            share[c] = 0;
+}
+
 static void add_row(uz_body_model *model, row_work *work, int64_t row, int64_t node, const double normal[3])
 {
     const int dim = model->mesh.dim;
+    double share[3];
     model->info.contact_node[row] = node;
     model->info.contact_area[row] = work->area[node];
+    memcpy(model->info.contact_normal + row * dim, normal, (size_t)dim * sizeof *normal);
+    free_shares(share, model, node, normal);
     for (int c = 0; c < dim; c++) {
-        const int64_t dof = model->dof[node * dim + c];
-        model->info.contact_normal[row * dim + c] = normal[c];
-        if (dof < 0 || normal[c] == 0)
+        if (share[c] == 0)
             continue;
         work->row[work->count] = row;
-        work->col[work->count] = dof;
-        work->val[work->count++] = -normal[c];
+        work->col[work->count] = model->dof[node * dim + c];
+        work->val[work->count++] = -share[c];
     }
 }
 

@@ -11,12 +11,22 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
  * modes that are left. */
 uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err);
 
-/* mesh, dof -> N, m, info.contact_*. */
+/* mesh, dof -> frame_of, info.turned_node, info.frame: directions of the dofs of contact nodes. */
+uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* The dim x dim matrix of a node whose dofs are turned, its rows their directions; NULL: they are along the axes. */
+const double *uz_node_frame(const uz_body_model *model, int64_t node);
+/* A vector at a node (dim) along the directions of the node's dofs. */
+void uz_to_frame(double out[3], const uz_body_model *model, int64_t node, const double v[3]);
+/* Has the element a node with turned dofs? Its stiffness ke (full, square) then becomes T ke T'. */
+bool uz_is_turned_element(const uz_body_model *model, int64_t element);
+void uz_turn_element(double *ke, const uz_body_model *model, int64_t element);
+
+/* mesh, dof, frames -> N, m, info.contact_*. */
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Does `node` get a row from an obstacle with this unit normal? Only where the normal moves some free dof of it. */
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3]);
 
-/* mesh, dof, elasticity -> K, K_fixed. */
+/* mesh, dof, frames, elasticity -> K, K_fixed. */
 uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
 /* Refuses what uz_build_stiffness would refuse. */
 uz_status uz_check_elements(const uz_body_model *model, uz_error *err);

@@ -1,19 +1,45 @@
-#include "assembly/assembly.h"
+/* recover.c: between the unknowns and displacements by node. */
+#include "assembly/parts.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
 
 #include <string.h>
 
+/* v = Q'v: from the directions of a node's dofs to the axes. */
+static void turn_back(double *v, const double *Q, int dim)
+{
+    double turned[3] = {0};
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            turned[j] += Q[i * dim + j] * v[i];
+    memcpy(v, turned, (size_t)dim * sizeof *v);
+}
+
 void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u, const double *prescribed)
 {
-    const int64_t total = model->mesh.n_nodes * model->mesh.dim;
+    const int dim = model->mesh.dim;
+    const int64_t total = model->mesh.n_nodes * dim;
     for (int64_t i = 0; i < total; i++) {
         const int64_t dof = model->dof[i];
         if (dof >= 0)
             nodal[i] = u[dof];
         else
             nodal[i] = prescribed ? prescribed[-1 - dof] : 0;
+    }
+    for (int64_t i = 0; i < model->info.n_turned; i++)
+        turn_back(nodal + model->info.turned_node[i] * dim, model->info.frame + i * dim * dim, dim);
+}
+
+void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal)
+{
+    const int dim = model->mesh.dim;
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+        double local[3];
+        uz_to_frame(local, model, a, nodal + a * dim);
+        for (int c = 0; c < dim; c++)
+            if (model->dof[a * dim + c] >= 0)
+                u[model->dof[a * dim + c]] = local[c];
     }
 }
 
@@ -28,6 +54,9 @@ static void *duplicate(const void *from, int64_t count, size_t size)
 uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t m, uz_error *err)
 {
     *out = *info;
+    out->n_turned = 0;
+    out->turned_node = NULL;
+    out->frame = NULL;
     out->xyz = duplicate(info->xyz, info->n_nodes * info->dim, sizeof *info->xyz);
     out->contact_node = duplicate(info->contact_node, m, sizeof *info->contact_node);
     out->contact_area = duplicate(info->contact_area, m, sizeof *info->contact_area);

@@ -233,6 +233,12 @@ static void add_entry(uz_csc *A, int64_t row, int64_t column, double value)
 
 static void add_element(uz_body_model *model, const double ke[64], int64_t element)
 {
+    double turned[64];
+    if (uz_is_turned_element(model, element)) {
+        memcpy(turned, ke, sizeof turned);
+        uz_turn_element(turned, model, element);
+        ke = turned;
+    }
     const int64_t *corner = model->mesh.element + element * CORNERS;
     int64_t dof[DOFS];
     for (int a = 0; a < CORNERS; a++)

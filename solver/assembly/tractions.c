@@ -16,12 +16,15 @@ static void add_edge(double *p, const uz_body_model *model, const int64_t ends[2
 {
     const int dim = model->mesh.dim;
     const double half = 0.5 * uz_edge_area(model, ends);
-    for (int end = 0; end < 2; end++)
+    for (int end = 0; end < 2; end++) {
+        double local[3];
+        uz_to_frame(local, model, ends[end], traction);
         for (int c = 0; c < dim; c++) {
             const int64_t dof = model->dof[ends[end] * dim + c];
             if (dof >= 0)
-                p[dof] += half * traction[c];
+                p[dof] += half * local[c];
         }
+    }
 }
 
 void uz_add_tractions(double *p, const uz_body_model *model, const uz_scene *scene)

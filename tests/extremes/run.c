@@ -54,9 +54,8 @@ static double *by_dof(const uz_result *result, const uz_body_model *model, int64
         abort();
     if (!model)
         memcpy(u, result->u, (size_t)d * sizeof *u);
-    for (int64_t k = 0; model && k < model->mesh.n_nodes * model->mesh.dim; k++)
-        if (model->dof[k] >= 0)
-            u[model->dof[k]] = result->u[k];
+    else
+        uz_restrict_nodal(u, model, result->u);
     return u;
 }
 

@@ -257,10 +257,15 @@ TEST(oblique_plane_has_its_gaps)
         CHECK_REL(info.contact_normal[2 * i + 1], 0.8, 1e-15);
         CHECK_REL(info.contact_area[i], i == 0 ? 10.0 : 5.0, 1e-15);
     }
-    double *N = dense_rows(&qp.N);
-    CHECK(fabs(N[0] - 0.6) < 1e-15 && fabs(N[1] + 0.8) < 1e-15);
-    CHECK(fabs(N[8 + 2] - 0.6) < 1e-15 && fabs(N[8 + 3] + 0.8) < 1e-15);
-    CHECK_INT(qp.N.ptr[8], 4);
+    double *N = dense_rows(&qp.N); /* the second dof of both nodes is turned into the normal */
+    CHECK_REL(N[1], -1.0, 1e-15);
+    CHECK_REL(N[8 + 3], -1.0, 1e-15);
+    CHECK_INT(qp.N.ptr[8], 2);
+    CHECK_INT(info.n_turned, 2);
+    CHECK_INT(info.turned_node[1], 2);
+    CHECK_REL(info.frame[4 + 2], -0.6, 1e-15);
+    CHECK_REL(info.frame[4 + 3], 0.8, 1e-15);
+    CHECK(fabs(info.frame[4] * -0.6 + info.frame[5] * 0.8) < 1e-15);
     free(N);
     uz_qp_clear(&qp);
     uz_mesh_info_clear(&info);

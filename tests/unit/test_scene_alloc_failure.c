@@ -109,6 +109,9 @@ TEST(every_allocation_may_fail)
     uz_scene scene = paper_scene(4, 2);
     CHECK(fail_each(to_qp, &scene) > 20);
     CHECK(fail_each(uz_scene_check, &scene) > 20);
+    scene.contacts[0].normal[0] = 1; /* turned dofs */
+    CHECK(fail_each(to_qp, &scene) > 23);
+    CHECK(fail_each(uz_scene_check, &scene) > 23);
     CHECK(fail_each(key, &scene) >= 2);
     CHECK_INT(fail_each(copy_info, &scene), 4);
     uz_scene_clear(&scene);
