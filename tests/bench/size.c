@@ -66,7 +66,8 @@ static double mean_seconds(void (*run)(void *), void *ctx)
 
 static void measure(size_row *row, int64_t cells)
 {
-    uz_problem scene = {.kind = UZ_PROBLEM_SCENE, .scene = bench_paper_scene(cells)};
+    uz_problem scene = {.kind = UZ_PROBLEM_SCENE};
+    scene.scene = bench_paper_scene(cells);
     uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES};
     uz_error err;
     double samples[COLUMNS][RUNS];
@@ -94,7 +95,8 @@ static void measure(size_row *row, int64_t cells)
 /* The slope of log seconds over log d, least squares over the finer half. */
 static double exponent(const size_row rows[SIZES], int column)
 {
-    double n = SIZES - SIZES / 2, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+    int64_t finer = SIZES - SIZES / 2;
+    double n = (double)finer, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
     for (int i = SIZES / 2; i < SIZES; i++) {
         double log_d = log((double)rows[i].d), log_s = log(rows[i].seconds[column]);
         x += log_d;
