@@ -69,6 +69,8 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     summary->ordering = factor.ordering;
     run->hit = summary->factor_cached = reused.op;
     summary->reused = reused;
+    summary->contact_last = factor.contact_last;
+    summary->factor_flops = factor.flops;
     summary->factor_nnz = factor.nnz;
     summary->factor_bytes = factor.bytes;
     summary->rcond = factor.rcond;

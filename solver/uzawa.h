@@ -335,8 +335,10 @@ typedef struct {
     uz_certificate certificate;
     bool factor_cached; /* everything about the body was */
     uz_reuse reused;
+    bool contact_last; /* the dofs that N touches are eliminated after all others */
     int64_t factor_nnz;
     size_t factor_bytes;
+    double factor_flops; /* additions and multiplications */
     double rcond;
     uz_timings timings;
     char message[256]; /* one sentence on the outcome where it is not `converged`; "" otherwise */

@@ -99,9 +99,11 @@ static void put_factor(text *t, const uz_summary *s)
     put_flag(t, "cached", s->factor_cached);
     put_reused(t, &s->reused);
     put_word(t, "ordering", uz_ordering_name(s->ordering));
+    text_key(t, "contact_last");
+    text_bool(t, s->contact_last);
     put_count(t, "nnz", s->factor_nnz);
     put_count(t, "bytes", (int64_t)s->factor_bytes);
-    put_named(t, (named[]){{"rcond", s->rcond}}, 1);
+    put_named(t, (named[]){{"flops", s->factor_flops}, {"rcond", s->rcond}}, 2);
     text_close(t, '}');
 }
 

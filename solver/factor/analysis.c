@@ -42,57 +42,14 @@ cholmod_sparse uz_view_lower(const uz_csc *K)
     return A;
 }
 
-/* To what size and up to which share of zeros small supernodes are merged (Ashcraft and Grimes, ACM TOMS 15 (1989); for
- * CHOLMOD's own numbers see its guide, `nrelax`). Sizes are in columns, and supernodes are counted in groups here. A
- * little more than CHOLMOD's: 7 % more entries, a tenth less time on the paper's body. */
-static void relax_supernodes(cholmod_common *common, int64_t n, int64_t groups)
-{
-    static const size_t columns[3] = {8, 24, 48};
-    static const double zeros[3] = {0.8, 0.15, 0.08};
-    for (int k = 0; k < 3; k++) {
-        common->nrelax[k] = (columns[k] * (size_t)groups + (size_t)n / 2) / (size_t)n;
-        common->zrelax[k] = zeros[k];
-    }
-}
-
-/* Additions and multiplications of the supernodal factorization, filled-in zeros included. */
-static double count_flops(const cholmod_factor *L)
-{
-    const SuiteSparse_long *count = L->ColCount;
-    double flops = 0.0;
-    for (size_t j = 0; j < L->n; j++)
-        flops += (double)count[j] * (double)count[j];
-    return flops;
-}
-
-/* Orders and analyses the graph of groups, and writes the result out for the dofs. */
-static uz_status analyze_groups(uz_analysis *analysis, cholmod_sparse *graph, const int64_t *group,
-                                cholmod_common *common, uz_error *err)
-{
-    int64_t groups = (int64_t)graph->nrow, *perm = uz_alloc(groups, sizeof *perm);
-    if (!perm)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a permutation of %lld nodes", (long long)groups);
-    uz_status status = uz_order(perm, graph, group, analysis->last, analysis->n_last, &analysis->ordering, common, err);
-    if (status == UZ_OK) {
-        relax_supernodes(common, analysis->n, groups);
-        cholmod_factor *G = cholmod_l_analyze_p(graph, (SuiteSparse_long *)perm, NULL, 0, common);
-        analysis->L = G ? uz_expand(G, group, analysis->n, common) : NULL;
-        cholmod_l_free_factor(&G, common);
-        if (!analysis->L)
-            status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to analyse a matrix of %lld dofs (CHOLMOD status %d)",
-                             (long long)analysis->n, common->status);
-    }
-    free(perm);
-    return status;
-}
-
-static uz_status analyze(uz_analysis *analysis, cholmod_sparse *A, cholmod_common *common, uz_error *err)
+static uz_status analyze(uz_analysis *analysis, cholmod_sparse *A, int64_t rows, uz_ordering ordering,
+                         cholmod_common *common, uz_error *err)
 {
     int64_t *group = uz_alloc(analysis->n, sizeof *group);
     cholmod_sparse *graph = group ? uz_compress(group, A, analysis->last, analysis->n_last, common) : NULL;
     uz_status status = UZ_OK;
     if (graph)
-        status = analyze_groups(analysis, graph, group, common, err);
+        status = uz_choose(analysis, graph, group, rows, ordering, common, err);
     else
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld dofs", (long long)analysis->n);
     cholmod_l_free_sparse(&graph, common);
@@ -102,7 +59,6 @@ static uz_status analyze(uz_analysis *analysis, cholmod_sparse *A, cholmod_commo
     const SuiteSparse_long *perm = analysis->L->Perm;
     for (int64_t k = 0; k < analysis->n; k++)
         analysis->position[perm[k]] = k;
-    analysis->flops = count_flops(analysis->L);
     return UZ_OK;
 }
 
@@ -121,8 +77,9 @@ static uz_status begin(uz_analysis *analysis, const uz_csc *K, const int64_t *la
     return UZ_OK;
 }
 
-uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *last, int64_t n_last,
-                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
+/* rows: of N where the contact dofs need not be last, else 0. */
+static uz_status create(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
+                        uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
 {
     *out = NULL;
     if (K->rows != K->cols || K->rows < 1)
@@ -136,10 +93,9 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
     cholmod_sparse A = uz_view_lower(K);
-    analysis->ordering = ordering == UZ_ORDERING_AUTO ? (n_last > 0 ? UZ_ORDERING_CAMD : UZ_ORDERING_AMD) : ordering;
-    uz_status status = begin(analysis, K, last, n_last, err);
+    uz_status status = begin(analysis, K, dofs, n_dofs, err);
     if (status == UZ_OK)
-        status = analyze(analysis, &A, &common, err);
+        status = analyze(analysis, &A, rows, ordering, &common, err);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     cholmod_l_finish(&common);
@@ -149,6 +105,18 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
     else
         uz_analysis_free(analysis);
     return status;
+}
+
+uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *last, int64_t n_last,
+                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
+{
+    return create(out, K, last, n_last, 0, ordering, hooks, err);
+}
+
+uz_status uz_analysis_choose(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
+                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
+{
+    return create(out, K, dofs, n_dofs, rows, ordering, hooks, err);
 }
 
 uz_analysis *uz_analysis_hold(const uz_analysis *analysis)

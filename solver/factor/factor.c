@@ -9,6 +9,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include <suitesparse/SuiteSparse_config.h>
 
 /* The supernodal factor's numbers, before they are allocated. */
@@ -68,8 +69,11 @@ static uz_status describe(uz_factor *factor, const cholmod_sparse *A, uz_error *
     uz_factor_info *info = &factor->info;
     info->n = factor->n;
     info->nnz = (int64_t)factor->L.xsize;
-    info->flops = factor->analysis->flops;
-    info->ordering = factor->analysis->ordering;
+    info->flops = factor->analysis->chosen.flops;
+    info->ordering = factor->analysis->chosen.ordering;
+    info->contact_last = factor->analysis->chosen.contact_last;
+    memcpy(info->considered, factor->analysis->considered, sizeof info->considered);
+    info->n_considered = factor->analysis->n_considered;
     info->order_s = factor->analysis->seconds;
     info->bytes = 8 * factor->L.xsize + 8 * factor->L.ssize + 32 * (size_t)factor->n;
     info->rcond = least_pivot_share(factor, A);

@@ -9,10 +9,23 @@ typedef struct uz_analysis uz_analysis;                 /* immutable after creat
 typedef struct uz_factor uz_factor;                     /* immutable after creation: shared by any number of threads */
 typedef struct uz_factor_workspace uz_factor_workspace; /* one per thread */
 
+/* What an order of elimination costs: entries of the supernodal L, and additions and multiplications of the
+ * factorization, with those of Z (see reach) where the contact is not last. */
+typedef struct {
+    uz_ordering ordering; /* not AUTO */
+    bool contact_last;
+    int64_t nnz;
+    double flops;
+} uz_order_choice;
+enum { UZ_CHOICES = 4 };
+
 typedef struct {
     uz_ordering ordering; /* the one that was used */
+    bool contact_last;    /* false also where nothing had to be last */
     int64_t n, nnz;       /* of L, lower triangle */
-    double flops;         /* of the factorization: additions and multiplications */
+    double flops;
+    uz_order_choice considered[UZ_CHOICES]; /* n_considered; the used one among them */
+    int n_considered;
     size_t bytes;
     double rcond;   /* min_j L_jj^2 / K_jj: an upper bound for 1 / cond(K) after diagonal scaling */
     double order_s; /* what the analysis took, whoever waited for it */
@@ -24,6 +37,10 @@ typedef struct {
  * ordering). Equal patterns give equal factors, bit for bit, whether an analysis is their own or shared. `cancelled` is
  * asked once it is there. It may be freed before the factors made from it. */
 uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *last, int64_t n_last,
+                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err);
+/* The same where N has `rows` rows on the dofs, or combinations of them, that may also be eliminated among the others:
+ * by the flops of both (uz_reach_gram takes the place of uz_factor_last_block). */
+uz_status uz_analysis_choose(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
                              uz_ordering ordering, const uz_hooks *hooks, uz_error *err);
 void uz_analysis_free(uz_analysis *analysis);
 size_t uz_analysis_bytes(const uz_analysis *analysis);

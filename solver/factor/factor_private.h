@@ -14,8 +14,9 @@ struct uz_analysis {
     int64_t n_last;
     int64_t *last;     /* n_last dofs, ascending */
     int64_t *position; /* n: inverse of L->Perm */
-    uz_ordering ordering;
-    double flops, seconds;
+    uz_order_choice chosen, considered[UZ_CHOICES];
+    int n_considered;
+    double seconds;
 };
 
 /* Another holder of the same object; ends with uz_analysis_free. */
@@ -49,10 +50,17 @@ cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns);
 cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
                             cholmod_common *common);
 
-/* Fills perm (nodes) with a fill-reducing ordering of the graph of groups that keeps those of the dofs `last` at the
- * end. *ordering: what was asked for on entry (not AUTO), what was used on return. */
-uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *group, const int64_t *last, int64_t n_last,
-                   uz_ordering *ordering, cholmod_common *common, uz_error *err);
+/* Fills perm (nodes) with a fill-reducing ordering of the graph of groups (not AUTO) that keeps the n_last groups
+ * `last` at the end. */
+uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering ordering,
+                   cholmod_common *common, uz_error *err);
+/* Moves `last` behind all others in perm (n) and keeps the order within both. */
+uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last, uz_error *err);
+
+/* Fills L, chosen and considered of `analysis`. group (n): from uz_compress. rows: see uz_analysis_choose, 0: the
+ * contact has to be last. */
+uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t *group, int64_t rows,
+                    uz_ordering ordering, cholmod_common *common, uz_error *err);
 
 /* The symbolic supernodal factor of n dofs from that of their groups; NULL: no memory. */
 cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t n, cholmod_common *common);

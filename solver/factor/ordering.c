@@ -7,7 +7,6 @@
 #include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { TINY = 4 };
 
@@ -42,69 +41,48 @@ static bool order_metis(SuiteSparse_long *perm, cholmod_sparse *A, cholmod_commo
     return ok;
 }
 
-/* Moves `last` behind all others and keeps the order within both groups. */
-static bool move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last)
+uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last, uz_error *err)
 {
     bool *is_last = uz_alloc_zero(n, sizeof *is_last);
     int64_t *tail = uz_alloc(n_last, sizeof *tail);
     bool ok = is_last && tail;
-    if (ok) {
-        int64_t kept = 0, moved = 0;
-        for (int64_t k = 0; k < n_last; k++)
-            is_last[last[k]] = true;
-        for (int64_t k = 0; k < n; k++) {
-            if (is_last[perm[k]])
-                tail[moved++] = perm[k];
-            else
-                perm[kept++] = perm[k];
-        }
-        memcpy(perm + kept, tail, (size_t)moved * sizeof *tail);
+    int64_t kept = 0, moved = 0;
+    for (int64_t k = 0; ok && k < n_last; k++)
+        is_last[last[k]] = true;
+    for (int64_t k = 0; ok && k < n; k++) {
+        if (is_last[perm[k]])
+            tail[moved++] = perm[k];
+        else
+            perm[kept++] = perm[k];
     }
+    for (int64_t k = 0; k < moved; k++)
+        perm[kept + k] = tail[k];
     free(is_last);
     free(tail);
-    return ok;
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld nodes", (long long)n);
 }
 
-/* Numbers of the groups of the last dofs, each once. */
-static int64_t list_groups(int64_t *list, const int64_t *group, int64_t groups, const int64_t *last, int64_t n_last)
-{
-    bool *seen = uz_alloc_zero(groups, sizeof *seen);
-    int64_t count = 0;
-    for (int64_t k = 0; seen && k < n_last; k++) {
-        if (!seen[group[last[k]]])
-            list[count++] = group[last[k]];
-        seen[group[last[k]]] = true;
-    }
-    free(seen);
-    return seen ? count : -1;
-}
-
-static bool order_by(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering *ordering,
+static bool order_by(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering ordering,
                      cholmod_common *common)
 {
-    int64_t n = (int64_t)graph->nrow;
-    if (n < TINY) { /* nothing to reduce, and CAMD reads past the end at n = 1 */
-        for (int64_t k = 0; k < n; k++)
+    if (graph->nrow < TINY) { /* nothing to reduce, and CAMD reads past the end at n = 1 */
+        for (int64_t k = 0; k < (int64_t)graph->nrow; k++)
             perm[k] = k;
-        return move_last(perm, n, last, n_last);
+        return true;
     }
-    if (*ordering == UZ_ORDERING_CAMD)
+    if (ordering == UZ_ORDERING_CAMD)
         return order_camd(perm, graph, last, n_last, common);
-    bool ok = *ordering == UZ_ORDERING_AMD ? cholmod_l_amd(graph, NULL, 0, (SuiteSparse_long *)perm, common)
-                                           : order_metis((SuiteSparse_long *)perm, graph, common);
-    return ok && move_last(perm, n, last, n_last);
+    return ordering == UZ_ORDERING_AMD ? cholmod_l_amd(graph, NULL, 0, (SuiteSparse_long *)perm, common)
+                                       : order_metis((SuiteSparse_long *)perm, graph, common);
 }
 
-uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *group, const int64_t *last, int64_t n_last,
-                   uz_ordering *ordering, cholmod_common *common, uz_error *err)
+uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering ordering,
+                   cholmod_common *common, uz_error *err)
 {
-    int64_t n = (int64_t)graph->nrow, *list = uz_alloc(n_last, sizeof *list), count = -1;
-    if (list)
-        count = list_groups(list, group, n, last, n_last);
-    bool ok = count >= 0 && order_by(perm, graph, list, count, ordering, common);
-    free(list);
+    int64_t n = (int64_t)graph->nrow;
+    bool ok = order_by(perm, graph, last, n_last, ordering, common);
     if (ok && common->status >= CHOLMOD_OK)
-        return UZ_OK;
+        return uz_move_last(perm, n, last, n_last, err);
     if (common->status == CHOLMOD_OUT_OF_MEMORY || common->status == CHOLMOD_OK)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld nodes", (long long)n);
     return uz_fail(err, UZ_ERR_INTERNAL, "K", "ordering failed (CHOLMOD status %d)", common->status);

@@ -76,6 +76,31 @@ TEST(shared_analysis_gives_the_same_bits)
     }
 }
 
+/* What was tried is told, the used one among it. */
+TEST(choices_are_told)
+{
+    uz_qp qp = body_of(24, 1.0);
+    int64_t *dofs = calloc((size_t)qp.K.cols, sizeof *dofs), n_last = touched(dofs, &qp.N);
+    uz_thread_init();
+    for (size_t k = 0; k < 8; k++) {
+        uz_factor *factor;
+        uz_error err;
+        uz_status status = factor_by(&factor, &qp.K, dofs, k < 4 ? n_last : 0, orderings[k % 4], 0, &err);
+        CHECK_INT(status, UZ_OK);
+        uz_factor_info info = uz_factor_describe(factor);
+        CHECK_INT(info.contact_last, k < 4);
+        CHECK_INT(info.n_considered, 1);
+        CHECK_INT(info.considered[0].ordering, info.ordering);
+        CHECK_INT(info.considered[0].nnz, info.nnz);
+        CHECK(info.considered[0].flops == info.flops && info.flops > (double)info.nnz);
+        uz_ordering own = k < 4 ? UZ_ORDERING_CAMD : UZ_ORDERING_AMD, want = k % 4 == 0 ? own : orderings[k % 4];
+        CHECK_INT(info.ordering, want);
+        uz_factor_free(factor);
+    }
+    uz_qp_clear(&qp);
+    free(dofs);
+}
+
 /* Entries outside the analysed pattern would be lost without a word. */
 TEST(another_pattern_is_refused)
 {
