@@ -46,7 +46,7 @@ TEST(element_holds_constant_strains)
         linear_field(u, G, h);
         CHECK_REL(element_energy(ke, u), exact, 1e-13);
         for (int i = 0; i < 9; i++) /* a rotation: no energy, no force */
-            G[i / 3][i % 3] = i / 3 == i % 3 ? 0 : (i / 3 < i % 3 ? 1 : -1) * (1.0 + i % 3 + i / 3);
+            G[i / 3][i % 3] = i / 3 == i % 3 ? 0 : (i / 3 < i % 3 ? 1 : -1) * (double)(1 + i % 3 + i / 3);
         linear_field(u, G, h);
         CHECK(fabs(element_energy(ke, u)) < 1e-15);
     }
