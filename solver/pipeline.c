@@ -7,13 +7,11 @@
  *     u                    one backward substitution
  *     (u, r) -> bound      certificate, from the original data */
 #include "body.h"
-#include "cache/cache.h"
 #include "certificate/certificate.h"
 #include "certificate/infeasible.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
-#include "core/hooks.h"
 #include "methods/method.h"
 #include "solve.h"
 
@@ -21,14 +19,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* p and h: the problem's own, or assembled from the scene's loads. */
-static uz_status make_load(uz_run *run, uz_error *err)
+/* p and h: the case's or the problem's own, or assembled from the loads of the scene. */
+uz_status uz_run_make_load(uz_run *run, uz_error *err)
 {
     const uz_body *body = run->body;
+    const uz_load_case *load_case = run->load_case;
     if (!body->is_scene) {
-        run->p = run->problem->qp.p;
-        run->h = run->problem->qp.h;
+        run->p = load_case && load_case->p ? load_case->p : run->problem->qp.p;
+        run->h = load_case && load_case->h ? load_case->h : run->problem->qp.h;
         return UZ_OK;
+    }
+    uz_scene scene = run->problem->scene;
+    if (load_case && load_case->loads) {
+        scene.loads = load_case->loads;
+        scene.n_loads = load_case->n_loads;
     }
     run->owned = uz_alloc_zero(run->d + run->m + body->model.n_fixed, sizeof(double));
     if (!run->owned)
@@ -36,8 +40,7 @@ static uz_status make_load(uz_run *run, uz_error *err)
     run->p = run->owned;
     run->h = run->owned + run->d;
     run->prescribed = run->owned + run->d + run->m;
-    return uz_body_model_load(run->owned, run->owned + run->d, run->prescribed, &body->model, &run->problem->scene,
-                              err);
+    return uz_body_model_load(run->owned, run->owned + run->d, run->prescribed, &body->model, &scene, err);
 }
 
 static uz_method_options method_options(const uz_run *run)
@@ -50,6 +53,7 @@ static uz_method_options method_options(const uz_run *run)
         .epsilon = s->epsilon,
         .max_iterations = s->max_iterations,
         .deadline = run->deadline,
+        .again = run->again,
         .hooks = run->hooks,
     };
     return options;
@@ -82,12 +86,10 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
     return status;
 }
 
-/* The answer that r (m, scaled rows) gives, with the kept correction or without, and its certificate. */
-static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_push, uz_error *err)
+uz_certify_input uz_run_certify_input(uz_run *run)
 {
-    const double *scale = uz_case_row_scale(run->load);
     const uz_csc *K = uz_body_K(run->body, run->problem);
-    uz_certify_input input = {
+    return (uz_certify_input){
         .K = K,
         .N = uz_body_N(run->body, run->problem),
         .p = run->p,
@@ -95,9 +97,16 @@ static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double 
         .inverse_norm = inverse_norm,
         .ctx = run,
         .rcond = uz_factor_describe(run->body->factor).rcond,
-        .inverse_bound = run->hit ? uz_body_inverse_bound(run->body, K, run->ws) : INFINITY,
+        .inverse_bound = run->serves_many ? uz_body_inverse_bound(run->body, K, run->ws) : INFINITY,
         .sharp = 0.5 * run->requested,
     };
+}
+
+/* The answer that r (m, scaled rows) gives, with the kept correction or without, and its certificate. */
+static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_push, uz_error *err)
+{
+    const double *scale = uz_case_row_scale(run->load);
+    uz_certify_input input = uz_run_certify_input(run);
     uz_status status = uz_case_recover(run->load, answer->u, r, with_push, err);
     for (int64_t i = 0; i < run->m; i++)
         answer->r[i] = scale[i] * r[i];
@@ -137,7 +146,7 @@ static uz_status recover_and_certify(uz_run *run, uz_error *err)
 }
 
 /* A tenth of what the mesh itself loses: digits beyond that describe the mesh, not the body. */
-static void balance_request(uz_run *run)
+void uz_run_balance_request(uz_run *run)
 {
     uz_summary *summary = &run->result->summary;
     double *nodal = uz_alloc(run->body->model.mesh.n_nodes * run->body->model.mesh.dim, sizeof *nodal);
@@ -189,12 +198,13 @@ static uz_status iterate_until_certified(uz_run *run, uz_error *err)
         if (status != UZ_OK)
             return status;
         if (balance) {
-            balance_request(run);
+            uz_run_balance_request(run);
             balance = false;
             run->target = run->requested;
         }
         if (run->result->ray || certificate->relative_error <= run->requested || run->end != UZ_END_TARGET)
             return UZ_OK;
+        run->again = true;
         if (run->it.best_relative <= run->target)
             run->target = 0.25 * run->it.best_relative;
     }
@@ -222,10 +232,10 @@ static uz_outcome conclude(const uz_run *run)
     }
 }
 
-static uz_status solve_case(uz_run *run, uz_error *err)
+uz_status uz_run_solve(uz_run *run, uz_error *err)
 {
     double start = uz_seconds();
-    uz_status status = make_load(run, err);
+    uz_status status = uz_run_make_load(run, err);
     run->result->summary.timings.assemble += uz_seconds() - start;
     start = uz_seconds();
     if (status == UZ_OK)
@@ -235,35 +245,13 @@ static uz_status solve_case(uz_run *run, uz_error *err)
     run->result->summary.timings.iterate += uz_seconds() - start;
     if (status == UZ_OK)
         status = uz_iterate_init(&run->it, run->m, run->settings->alpha, err);
+    if (status == UZ_OK && run->start)
+        status = uz_iterate_start(&run->it, run->load, run->start, err);
+    if (status == UZ_OK && run->hooks && run->hooks->begins)
+        run->hooks->begins(run->hooks->ctx, run->index);
     if (status == UZ_OK)
         status = iterate_until_certified(run, err);
     if (status == UZ_OK)
         run->result->summary.outcome = conclude(run);
     return status == UZ_OK ? uz_run_report(run, err) : status;
-}
-
-uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
-                   const uz_hooks *hooks, uz_error *err)
-{
-    uz_run run;
-    uz_reuse reused = {0};
-    *out = NULL;
-    uz_error_reset(err);
-    uz_status status = uz_run_begin(&run, problem, settings, hooks, err);
-    if (status == UZ_OK && problem->kind == UZ_PROBLEM_MATRICES)
-        status = uz_qp_check(&problem->qp, err);
-    if (status == UZ_OK && uz_cancelled(hooks))
-        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
-    if (status == UZ_OK)
-        status = uz_cache_acquire(&run.body, &reused, cache, problem, settings, hooks, err);
-    if (status == UZ_OK) {
-        uz_run_take_body(&run, reused);
-        status = solve_case(&run, err);
-    }
-    if (status == UZ_OK) {
-        *out = run.result;
-        run.result = NULL;
-    }
-    uz_run_end(&run, cache);
-    return status;
 }

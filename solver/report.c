@@ -1,7 +1,6 @@
 /* report.c: what a solve leaves behind. */
 #include "solve.h"
 
-#include "cache/cache.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -20,7 +19,7 @@ static bool is_known(const char *name)
     return strcmp(name, "unknown") != 0;
 }
 
-static uz_status check_settings(const uz_settings *s, uz_error *err)
+uz_status uz_check_settings(const uz_settings *s, uz_error *err)
 {
     if (!(s->relative_error >= 0.0 && s->relative_error <= 1.0))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "relative_error must lie in [0, 1], it is %g", s->relative_error);
@@ -44,9 +43,6 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
     run->settings = settings;
     run->hooks = hooks;
     run->started = uz_seconds();
-    uz_status status = check_settings(settings, err);
-    if (status != UZ_OK)
-        return status;
     run->deadline = run->started + settings->time_limit_s;
     run->requested = settings->relative_error > 0.0 ? settings->relative_error : EXACT_RELATIVE_ERROR;
     run->target = settings->balanced ? 1e-2 : run->requested;
@@ -67,7 +63,7 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     run->m = summary->m = run->result->m = dual.m;
     summary->op = dual.op;
     summary->ordering = factor.ordering;
-    run->hit = summary->factor_cached = reused.op;
+    run->hit = run->serves_many = summary->factor_cached = reused.op;
     summary->reused = reused;
     summary->contact_last = factor.contact_last;
     summary->factor_flops = factor.flops;
@@ -219,6 +215,9 @@ static void explain(uz_run *run)
     case UZ_PAPER_RULE:
         why = "the paper's stopping rule was met; it bounds a force, not an error";
         break;
+    case UZ_NOT_VERIFIED:
+        why = "the bound on the error of this answer is larger than asked for";
+        break;
     case UZ_DISMISSED:
         why = "stopped by request";
         break;
@@ -229,14 +228,9 @@ static void explain(uz_run *run)
              s->certificate.relative_error, s->requested_error);
 }
 
-uz_status uz_run_report(uz_run *run, uz_error *err)
+uz_status uz_run_publish(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
-    summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
-    summary->iterations = run->it.iteration;
-    summary->restarts = run->it.restarts;
-    summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;
-    summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
     summary->requested_error = run->requested;
     run->result->r = run->answer.r;
     run->result->g = run->answer.g;
@@ -250,12 +244,25 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
     return status;
 }
 
-void uz_run_end(uz_run *run, uz_cache *cache)
+uz_status uz_run_report(uz_run *run, uz_error *err)
+{
+    uz_summary *summary = &run->result->summary;
+    summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
+    summary->iterations = run->it.iteration;
+    summary->restarts = run->it.restarts;
+    summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;
+    summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
+    uz_status status = UZ_OK;
+    if (!run->result->ray)
+        status = uz_iterate_state(&run->result->state, &run->it, run->load, run->settings->method, err);
+    return status == UZ_OK ? uz_run_publish(run, err) : status;
+}
+
+void uz_run_end(uz_run *run)
 {
     uz_case_free(run->load);
     uz_iterate_clear(&run->it);
     uz_factor_workspace_free(run->ws);
-    uz_cache_release(cache, run->body);
     free(run->owned);
     uz_answer_clear(&run->answer);
     free(run->work);
@@ -271,6 +278,7 @@ void uz_result_free(uz_result *result)
     free(result->r);
     free(result->g);
     free(result->history.rows);
+    uz_state_free(result->state);
     uz_mesh_info_clear(&result->mesh);
     free(result);
 }
@@ -283,5 +291,11 @@ void uz_problem_clear(uz_problem *problem)
         uz_scene_clear(&problem->scene);
     else
         uz_qp_clear(&problem->qp);
+    for (int64_t i = 0; problem->cases && i < problem->n_cases; i++) {
+        free(problem->cases[i].p);
+        free(problem->cases[i].h);
+        free(problem->cases[i].loads);
+    }
+    free(problem->cases);
     memset(problem, 0, sizeof *problem);
 }

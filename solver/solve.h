@@ -1,8 +1,10 @@
-/* solve.h: the state of one solve, shared by pipeline.c (what happens) and report.c (what is told of it). */
+/* solve.h: the state of the solve of one load, shared by pipeline.c (what happens), report.c (what is told of it),
+ * cases.c (several loads on one body) and verify.c. */
 #ifndef UZ_SOLVE_H
 #define UZ_SOLVE_H
 
 #include "body.h"
+#include "certificate/certificate.h"
 #include "methods/method.h"
 #include "uzawa.h"
 
@@ -18,8 +20,12 @@ typedef struct {
     const uz_problem *problem;
     const uz_settings *settings;
     const uz_hooks *hooks;
-    bool hit;      /* the body came from the cache */
-    uz_body *body; /* borrowed from the cache */
+    const uz_load_case *load_case; /* NULL: the problem's own load */
+    int64_t index;                 /* of the case */
+    const uz_state *start;         /* NULL: from r = 0 */
+    bool hit;                      /* the body came from the cache */
+    bool serves_many;              /* it serves more than this case: what makes certificates cheaper pays */
+    uz_body *body;                 /* borrowed */
     int64_t d, m;
     const double *p, *h; /* d, m */
     double *owned;       /* scenes: room of p, h and prescribed */
@@ -32,19 +38,34 @@ typedef struct {
     double started, deadline; /* uz_seconds() */
     double requested;         /* relative error that the certificate must meet */
     double target;            /* relative error at which the method returns */
+    bool again;               /* the method's target was met, the certificate was not */
     uz_end end;
     uz_result *result;
 } uz_run;
 
-/* Checks the settings and makes an empty result. *run is zeroed first: uz_run_end may follow a failure. */
+uz_status uz_check_settings(const uz_settings *settings, uz_error *err);
+/* Makes an empty result. *run is zeroed first: uz_run_end may follow a failure. */
 uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                        uz_error *err);
 /* Sizes and timings from the body. */
 void uz_run_take_body(uz_run *run, uz_reuse reused);
 /* Vectors of the solve and of the result. */
 uz_status uz_run_allocate(uz_run *run, uz_error *err);
+/* p, h and prescribed values of the case. */
+uz_status uz_run_make_load(uz_run *run, uz_error *err);
+/* What a certificate of this load starts from; needs the load and the vectors. */
+uz_certify_input uz_run_certify_input(uz_run *run);
+/* Scenes, `balanced`: the request from the estimated discretization error of answer.u. */
+void uz_run_balance_request(uz_run *run);
+/* From p and h to a certified answer; ends in uz_run_report. */
+uz_status uz_run_solve(uz_run *run, uz_error *err);
 /* Fills the summary and the result's u. */
 uz_status uz_run_report(uz_run *run, uz_error *err);
-void uz_run_end(uz_run *run, uz_cache *cache);
+/* The part of it that is about the answer, whoever made it: u, r and g go to the result. The outcome stands. */
+uz_status uz_run_publish(uz_run *run, uz_error *err);
+void uz_run_end(uz_run *run);
+
+/* The problem's matrices and load cases, as far as they can be checked before anything is computed. */
+uz_status uz_check_problem(const uz_problem *problem, uz_error *err);
 
 #endif

@@ -351,9 +351,12 @@ typedef struct {
     double *r;                           /* m, reactions; a warm start's are cut at 0 */
     double *rho;                         /* m or NULL: everything else below means something only beside it */
     double *Dr, *Drho, *best_r, *anchor; /* m */
-    double alpha, tau, best_bound, best_relative;
+    double alpha, tau;                   /* alpha 0: not chosen yet */
+    double step_norm;                    /* of the last iteration, as in the history; NaN: no step was taken */
+    double best_bound, best_relative;    /* of best_r; INFINITY: nothing was bounded yet */
     int64_t iteration, restarts, next_check, best_iteration;
-    int32_t phase; /* of `auto`; private to the methods */
+    int64_t phase_end; /* iteration at which the phase ends; private to the methods, as is */
+    int32_t phase;     /* of `auto` */
     uz_method method, made_by;
 } uz_state;
 void uz_state_free(uz_state *state);

@@ -58,7 +58,7 @@ static void release(pivoting *p)
 static void guess(pivoting *p, const uz_iterate *it, uz_case *load)
 {
     const double *g0 = uz_case_g0(load);
-    if (it->iteration == 0 && uz_case_guess_active(load, p->active))
+    if (it->iteration == 0 && !it->warm && uz_case_guess_active(load, p->active))
         return;
     for (int64_t i = 0; i < it->m; i++) {
         double gap = g0[i] - it->Dr[i];
@@ -123,6 +123,8 @@ static uz_status take(uz_iterate *it, const pivoting *p, uz_case *load, uz_error
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     it->tau = 1.0;
+    it->step_norm = NAN;
+    it->fresh = false;
     it->iteration++;
     return status == UZ_OK ? uz_iterate_bound(it, load, UZ_METHOD_ACTIVE_SET, err) : status;
 }
@@ -170,7 +172,7 @@ uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz
                             uz_history *history, uz_error *err)
 {
     pivoting p;
-    uz_status status = history->count ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
+    uz_status status = it->begun ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
     if (!allocate(&p, it->m))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)it->m);
     if (status == UZ_OK) {

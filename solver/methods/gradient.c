@@ -145,16 +145,31 @@ static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_err
     return UZ_OK;
 }
 
+/* The bound of a run's last answer is out of turn: a run that goes on from there as if it had not ended must not know
+ * it. */
+static void set_aside(uz_iterate *it)
+{
+    uz_best *before = &it->before;
+    before->kept = true;
+    before->bound = it->best_bound;
+    before->relative = it->best_relative;
+    before->iteration = it->best_iteration;
+    before->made_by = it->made_by;
+    memcpy(before->r, it->best_r, (size_t)it->m * sizeof *it->r);
+}
+
 /* The answer of the paper's rule is its last r, good or bad; otherwise the last r may still be the best. */
 static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
                         uz_error *err)
 {
+    set_aside(it);
     if (options->stopping == UZ_STOP_PAPER)
         it->best_bound = INFINITY;
     uz_status status = uz_iterate_bound(it, load, options->method, err);
     if (isinf(it->best_bound)) /* nothing could be bounded: the last r is as good as any */
         memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
-    history->rows[history->count - 1].error_bound = it->best_bound;
+    if (history->count > 0) /* none in a run that continued another and ended at once */
+        history->rows[history->count - 1].error_bound = it->best_bound;
     return status;
 }
 
@@ -179,17 +194,36 @@ static uz_status resume(uz_iterate *it, uz_case *load, uz_error *err)
     return status;
 }
 
+/* A start with reactions may be the solution: it is bounded before anything is prepared. */
+static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                       uz_error *err)
+{
+    uz_status status = UZ_OK;
+    if (!it->begun && it->warm) {
+        status = uz_iterate_begin(it, load, options, history, err);
+        if (status == UZ_OK && options->stopping == UZ_STOP_CERTIFIED && it->best_relative <= options->target)
+            return UZ_OK;
+    }
+    if (status == UZ_OK)
+        status = prepare(it, load, err);
+    if (status == UZ_OK && !it->begun)
+        return uz_iterate_begin(it, load, options, history, err);
+    if (status == UZ_OK && !it->fresh)
+        status = resume(it, load, err);
+    if (status == UZ_OK && it->warm && it->iteration == 0) /* with the step size it may be bounded better */
+        status = uz_iterate_bound(it, load, options->method, err);
+    return status;
+}
+
 uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                           uz_history *history, uz_error *err)
 {
-    double step_norm = NAN; /* no step of this run yet: what ran before may have made none */
-    bool restart = false;
-    uz_status status = prepare(it, load, err);
-    if (status == UZ_OK)
-        status = history->count ? resume(it, load, err) : uz_iterate_begin(it, load, options, history, err);
-    bool ray = false;
-    while (status == UZ_OK && !ray && !should_end(end, it, load, options, step_norm)) {
-        status = step(it, load, options, &step_norm, &restart, err);
+    bool restart = false, ray = false;
+    uz_status status = begin(it, load, options, history, err);
+    it->before.kept = false;
+    while (status == UZ_OK && !ray && !should_end(end, it, load, options, it->step_norm)) {
+        it->fresh = false;
+        status = step(it, load, options, &it->step_norm, &restart, err);
         if (status == UZ_OK && options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check) {
             status = uz_iterate_bound(it, load, options->method, err);
             plan_next_check(it);
@@ -197,7 +231,7 @@ uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
         if (status == UZ_OK)
             status = look_for_ray(&ray, it, load, err);
         if (status == UZ_OK)
-            status = uz_iterate_record(it, load, options, history, step_norm, restart, err);
+            status = uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
     }
     if (ray)
         *end = UZ_END_RAY;

@@ -13,8 +13,8 @@
 uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err)
 {
     memset(it, 0, sizeof *it);
-    double **vectors[] = {&it->r,    &it->Dr,    &it->r_next, &it->Dr_next, &it->rho,
-                          &it->Drho, &it->gamma, &it->best_r, &it->anchor,  &it->ray};
+    double **vectors[] = {&it->r,     &it->Dr,     &it->r_next, &it->Dr_next, &it->rho,     &it->Drho,
+                          &it->gamma, &it->best_r, &it->anchor, &it->ray,     &it->before.r};
     bool ok = true;
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++) {
         *vectors[k] = uz_alloc_zero(m, sizeof(double));
@@ -30,13 +30,14 @@ uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err
     it->tau = 1.0;
     it->best_bound = INFINITY;
     it->best_relative = INFINITY;
+    it->step_norm = NAN;
     return UZ_OK;
 }
 
 void uz_iterate_clear(uz_iterate *it)
 {
-    double *vectors[] = {it->r,    it->Dr,    it->r_next, it->Dr_next, it->rho,
-                         it->Drho, it->gamma, it->best_r, it->anchor,  it->ray};
+    double *vectors[] = {it->r,     it->Dr,     it->r_next, it->Dr_next, it->rho,     it->Drho,
+                         it->gamma, it->best_r, it->anchor, it->ray,     it->before.r};
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++)
         free(vectors[k]);
     free(it->close);
@@ -120,6 +121,7 @@ uz_status uz_iterate_begin(uz_iterate *it, uz_case *load, const uz_method_option
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     if (status == UZ_OK)
         status = uz_iterate_bound(it, load, UZ_METHOD_ACCELERATED_RESTART, err);
+    it->begun = it->fresh = true;
     return status == UZ_OK ? uz_iterate_record(it, load, options, history, 0.0, false, err) : status;
 }
 
@@ -132,6 +134,8 @@ void uz_iterate_go_back(uz_iterate *it)
         memset(it->r, 0, bytes);
     memcpy(it->anchor, it->r, bytes);
     it->tau = 1.0;
+    it->step_norm = NAN;
+    it->fresh = false;
 }
 
 bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options)

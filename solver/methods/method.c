@@ -12,29 +12,61 @@ static bool gave_up(uz_end end)
     return end == UZ_END_STALLED || end == UZ_END_UNSOLVED;
 }
 
-static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
-                          uz_history *history, uz_error *err)
+/* Where auto stands: kept in the iterate, so that a run can go on from there. */
+enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING };
+
+static uz_status run_phase(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                           uz_history *history, uz_error *err)
 {
     uz_method_options phase = *options;
     phase.method = UZ_METHOD_ACCELERATED_RESTART;
-    bool polish = options->stopping == UZ_STOP_CERTIFIED;
-    if (polish && it->iteration == 0) {
-        uz_status status = uz_active_set_run(end, it, load, &phase, history, err);
-        if (status != UZ_OK || !gave_up(*end))
-            return status;
-        uz_iterate_go_back(it);
-    }
-    if (polish && it->iteration + WARM_UP < options->max_iterations)
-        phase.max_iterations = it->iteration + WARM_UP;
-    uz_status status = uz_gradient_run(end, it, load, &phase, history, err);
-    if (status != UZ_OK || !polish || *end != UZ_END_ITERATIONS || phase.max_iterations == options->max_iterations)
-        return status;
-    phase.max_iterations = options->max_iterations;
-    status = uz_active_set_run(end, it, load, &phase, history, err);
-    if (status != UZ_OK || !gave_up(*end))
-        return status;
-    uz_iterate_go_back(it);
+    if (it->phase == FIRST_GUESS || it->phase == SECOND_GUESS)
+        return uz_active_set_run(end, it, load, &phase, history, err);
+    if (it->phase == WARMING_UP && it->phase_end < options->max_iterations)
+        phase.max_iterations = it->phase_end;
     return uz_gradient_run(end, it, load, &phase, history, err);
+}
+
+/* Is the phase over, but not the run? */
+static bool phase_over(uz_end end, const uz_iterate *it, const uz_method_options *options)
+{
+    if (it->phase == WARMING_UP)
+        return end == UZ_END_ITERATIONS && it->iteration < options->max_iterations;
+    return it->phase != ITERATING && gave_up(end);
+}
+
+static void warm_up(uz_iterate *it)
+{
+    it->phase = WARMING_UP;
+    it->phase_end = it->iteration + WARM_UP;
+}
+
+/* Guesses that came to nothing leave r at the best that was found. */
+static void next_phase(uz_iterate *it)
+{
+    if (it->phase == FIRST_GUESS)
+        warm_up(it);
+    else
+        it->phase++;
+    if (it->phase != SECOND_GUESS)
+        uz_iterate_go_back(it);
+}
+
+static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+                          uz_history *history, uz_error *err)
+{
+    uz_method_options engine = *options;
+    engine.method = UZ_METHOD_ACCELERATED_RESTART;
+    if (options->stopping != UZ_STOP_CERTIFIED)
+        return uz_gradient_run(end, it, load, &engine, history, err);
+    if (options->again)
+        warm_up(it);
+    uz_status status = run_phase(end, it, load, options, history, err);
+    while (status == UZ_OK && phase_over(*end, it, options)) {
+        next_phase(it);
+        status = run_phase(end, it, load, options, history, err);
+    }
+    return status;
 }
 
 uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,

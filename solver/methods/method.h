@@ -17,6 +17,15 @@ typedef enum {
     UZ_END_RAY /* the reactions grow along a ray that seems to prove the rows contradictory */
 } uz_end;
 
+/* The best answer so far, put aside. */
+typedef struct {
+    bool kept;
+    double bound, relative;
+    int64_t iteration;
+    uz_method made_by;
+    double *r; /* m */
+} uz_best;
+
 /* The iterate, kept between calls so that a run can be continued. Vectors of m. */
 typedef struct {
     int64_t m, iteration, restarts, next_check;
@@ -34,11 +43,25 @@ typedef struct {
     int64_t best_iteration;
     double started;    /* uz_seconds() of the first iteration */
     uz_method made_by; /* the method that made the best answer */
+    double step_norm;  /* of the last gradient step; NaN: none */
+    bool warm;         /* r is a caller's */
+    bool begun;        /* there is a row 0, in this run's history or in that of the run it continues */
+    bool fresh;        /* D r and rho are those of r as they stand: nothing is to be made again before the next step */
+    int32_t phase;     /* of auto */
+    int64_t phase_end;
+    uz_best before; /* what was best before the last answer of a run that ended was bounded out of turn */
 } uz_iterate;
 
 /* alpha 0: chosen when the first gradient step needs it. */
 uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err);
 void uz_iterate_clear(uz_iterate *it);
+
+/* Takes over where a run stood, or the reactions of a warm start, before the first call of uz_method_run. What the
+ * state says is checked against this problem: where D r or the bound of its best answer differ, it is that of another
+ * one, and only its reactions are taken. Errors: UZ_ERR_SIZE (another m), _NOT_FINITE, _ARGUMENT. */
+uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start, uz_error *err);
+/* Where the iterate stands, for the caller of the library. */
+uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_case *load, uz_method method, uz_error *err);
 
 typedef struct {
     uz_method method;
@@ -47,10 +70,12 @@ typedef struct {
     double epsilon; /* UZ_STOP_PAPER */
     int64_t max_iterations;
     double deadline; /* uz_seconds() */
+    bool again;      /* the last call met its target, which was not enough */
     const uz_hooks *hooks;
 } uz_method_options;
 
-/* Iterates until an end is reached; appends a row per iteration to history (row 0 is the start). */
+/* Iterates until an end is reached; appends a row per iteration to history (row 0 is the start; a run that continues
+ * another one goes on with the row after that one's last). */
 uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                         uz_history *history, uz_error *err);
 

@@ -1,0 +1,161 @@
+/* cases.c: one body, one or many loads. */
+#include "cache/cache.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "solve.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What all cases of a call share. */
+typedef struct {
+    const uz_problem *problem;
+    const uz_settings *settings;
+    const uz_hooks *hooks;
+    const uz_state *const *starts; /* n, or NULL */
+    int64_t n;
+    uz_body *body; /* borrowed from the cache */
+    uz_reuse reused;
+    double started;
+    uz_result **results; /* n */
+} batch;
+
+/* Says which case an error is about: /loads/0/on becomes /cases/3/loads/0/on. Pointers too long are cut. */
+static void name_case(uz_error *err, int64_t i)
+{
+    char prefix[32];
+    if (!err)
+        return;
+    bool pointer = err->where[0] == '/' || err->where[0] == '\0';
+    size_t length = (size_t)snprintf(prefix, sizeof prefix, "/cases/%lld%s", (long long)i, pointer ? "" : "/");
+    memmove(err->where + length, err->where, sizeof err->where - length);
+    memcpy(err->where, prefix, length);
+    err->where[sizeof err->where - 1] = '\0';
+}
+
+static uz_status check_vector(const double *x, int64_t n, const char *name, uz_error *err)
+{
+    for (int64_t i = 0; x && i < n; i++)
+        if (!isfinite(x[i]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld) is not a finite number (counted from 1)", name,
+                           (long long)i + 1);
+    return UZ_OK;
+}
+
+static uz_status check_case(const uz_load_case *load_case, const uz_problem *problem, uz_error *err)
+{
+    bool scene = problem->kind == UZ_PROBLEM_SCENE;
+    if (scene ? load_case->p || load_case->h : load_case->loads != NULL)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "%s",
+                       scene ? "a load case of a scene has loads, not p or h"
+                             : "a load case of a problem in matrices has p and h, not loads");
+    uz_status status = check_vector(load_case->p, problem->qp.K.cols, "p", err);
+    return status == UZ_OK ? check_vector(load_case->h, problem->qp.N.rows, "h", err) : status;
+}
+
+uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
+{
+    if (problem->n_cases < 0 || (problem->n_cases > 0 && !problem->cases))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "the problem's load cases are missing");
+    uz_status status = problem->kind == UZ_PROBLEM_MATRICES ? uz_qp_check(&problem->qp, err) : UZ_OK;
+    for (int64_t i = 0; status == UZ_OK && i < problem->n_cases; i++) {
+        status = check_case(&problem->cases[i], problem, err);
+        if (status != UZ_OK)
+            name_case(err, i);
+    }
+    return status;
+}
+
+/* The first case carries the cost of the body; for the others it is there. */
+static uz_status solve_one(batch *b, int64_t i, uz_error *err)
+{
+    static const uz_reuse everything = {true, true, true, true};
+    uz_run run;
+    uz_status status = uz_run_begin(&run, b->problem, b->settings, b->hooks, err);
+    run.index = i;
+    run.load_case = b->problem->n_cases > 0 ? &b->problem->cases[i] : NULL;
+    run.start = b->starts ? b->starts[i] : NULL;
+    run.body = b->body;
+    run.deadline = b->started + b->settings->time_limit_s;
+    if (i == 0)
+        run.started = b->started;
+    if (status == UZ_OK) {
+        uz_run_take_body(&run, i > 0 ? everything : b->reused);
+        run.serves_many = run.hit || b->n > 1;
+        status = uz_run_solve(&run, err);
+    }
+    if (status == UZ_OK) {
+        b->results[i] = run.result;
+        run.result = NULL;
+    } else if (b->problem->n_cases > 0) {
+        name_case(err, i);
+    }
+    uz_run_end(&run);
+    return status;
+}
+
+/* Everything that can be refused before anything is computed. */
+static uz_status check(const batch *b, uz_error *err)
+{
+    uz_status status = uz_check_settings(b->settings, err);
+    if (status == UZ_OK)
+        status = uz_check_problem(b->problem, err);
+    if (status == UZ_OK && uz_cancelled(b->hooks))
+        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
+    return status;
+}
+
+static uz_status solve_all(batch *b, uz_cache *cache, uz_error *err)
+{
+    b->started = uz_seconds();
+    uz_status status = check(b, err);
+    if (status == UZ_OK)
+        status = uz_cache_acquire(&b->body, &b->reused, cache, b->problem, b->settings, b->hooks, err);
+    for (int64_t i = 0; status == UZ_OK && i < b->n; i++)
+        status = solve_one(b, i, err);
+    uz_cache_release(cache, b->body);
+    return status;
+}
+
+uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                   const uz_hooks *hooks, uz_error *err)
+{
+    uz_result *result = NULL;
+    batch b = {.problem = problem, .settings = settings, .hooks = hooks, .n = 1, .results = &result};
+    *out = NULL;
+    uz_error_reset(err);
+    if (problem->n_cases > 0)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "a problem with load cases is for uz_solve_cases");
+    uz_status status = solve_all(&b, cache, err);
+    *out = result;
+    return status;
+}
+
+uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
+                         const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
+    batch b = {.problem = problem, .settings = settings, .hooks = hooks, .starts = starts, .n = n};
+    *out = NULL;
+    uz_error_reset(err);
+    b.results = uz_alloc_zero(n, sizeof(uz_result *));
+    if (!b.results)
+        return uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for the results of %lld cases", (long long)n);
+    uz_status status = solve_all(&b, cache, err);
+    if (status == UZ_OK)
+        *out = b.results;
+    else
+        uz_results_free(b.results, n);
+    return status;
+}
+
+void uz_results_free(uz_result **results, int64_t n)
+{
+    for (int64_t i = 0; results && i < n; i++)
+        uz_result_free(results[i]);
+    free(results);
+}

@@ -1,0 +1,233 @@
+/* state.c: a run's iterate as something to keep and go on from.
+ *
+ * Rows here are scaled by powers of two (dual.h); those of a state are the caller's, and the scaling is exact, so that
+ * what comes back is bit for bit what went out. */
+#include "methods/iterate.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void uz_state_free(uz_state *state)
+{
+    if (!state)
+        return;
+    free(state->r);
+    free(state->rho);
+    free(state->Dr);
+    free(state->Drho);
+    free(state->best_r);
+    free(state->anchor);
+    free(state);
+}
+
+/* to = from / scale (forces of the rows) or from x scale (lengths). */
+static void to_scaled_forces(double *to, const double *from, const double *scale, int64_t m)
+{
+    for (int64_t i = 0; i < m; i++)
+        to[i] = from[i] / scale[i];
+}
+
+static void times_scale(double *to, const double *from, const double *scale, int64_t m)
+{
+    for (int64_t i = 0; i < m; i++)
+        to[i] = scale[i] * from[i];
+}
+
+static uz_status check_finite(const double *x, int64_t m, const char *name, uz_error *err)
+{
+    for (int64_t i = 0; i < m; i++)
+        if (!isfinite(x[i]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, "start", "the start's %s(%lld) is not a finite number (from 1)",
+                           name, (long long)i + 1);
+    return UZ_OK;
+}
+
+static uz_status check_numbers(const uz_state *s, uz_error *err)
+{
+    bool counts = s->iteration >= 0 && s->restarts >= 0 && s->next_check >= 0 && s->best_iteration >= 0 &&
+                  s->phase_end >= 0 && s->phase >= 0;
+    bool sizes = s->alpha >= 0.0 && isfinite(s->alpha) && s->tau >= 1.0 && isfinite(s->tau) && s->best_bound >= 0.0 &&
+                 s->best_relative >= 0.0;
+    if (counts && sizes)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_ARGUMENT, "start", "the start's counts, alpha, tau or bounds can't be those of a run");
+}
+
+static uz_status check_state(const uz_state *s, int64_t m, uz_error *err)
+{
+    if (s->m != m)
+        return uz_fail(err, UZ_ERR_SIZE, "start", "the start has %lld rows, the problem %lld", (long long)s->m,
+                       (long long)m);
+    if (!s->r || (s->rho && !(s->Dr && s->Drho && s->best_r && s->anchor)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "start", "the start lacks some of its vectors");
+    const double *vectors[] = {s->r, s->rho, s->Dr, s->Drho, s->best_r, s->anchor};
+    const char *const names[] = {"r", "rho", "D r", "D rho", "best r", "anchor"};
+    uz_status status = UZ_OK;
+    for (int k = 0; status == UZ_OK && k < (s->rho ? 6 : 1); k++)
+        status = check_finite(vectors[k], m, names[k], err);
+    return status == UZ_OK && s->rho ? check_numbers(s, err) : status;
+}
+
+/* How far what another problem's state says may be from what this problem gives: far above rounding, as D r made by the
+ * active set is g0 - g, and far below what another load or body makes of it. */
+#define SAME 1e-5
+
+static bool alike(const double *x, const double *y, int64_t m)
+{
+    double size = 0.0, difference = 0.0;
+    for (int64_t i = 0; i < m; i++) {
+        size = fmax(size, fabs(x[i]));
+        difference = fmax(difference, fabs(x[i] - y[i]));
+    }
+    return difference <= SAME * size;
+}
+
+static void take_vectors(uz_iterate *it, const uz_state *s, const double *scale)
+{
+    to_scaled_forces(it->r, s->r, scale, it->m);
+    to_scaled_forces(it->rho, s->rho, scale, it->m);
+    to_scaled_forces(it->best_r, s->best_r, scale, it->m);
+    to_scaled_forces(it->anchor, s->anchor, scale, it->m);
+    times_scale(it->Dr, s->Dr, scale, it->m);
+    times_scale(it->Drho, s->Drho, scale, it->m);
+}
+
+static void take_numbers(uz_iterate *it, const uz_state *s)
+{
+    it->alpha = s->alpha;
+    it->tau = s->tau;
+    it->step_norm = s->step_norm;
+    it->iteration = s->iteration;
+    it->restarts = s->restarts;
+    it->next_check = s->next_check;
+    it->phase = s->phase;
+    it->phase_end = s->phase_end;
+}
+
+/* Makes the correction of the best answer again, which a state does not have, and its bound with it. *same false: the
+ * bound is another than the state's. Uses r_next and Dr_next. */
+static uz_status bound_best_again(bool *same, uz_iterate *it, uz_case *load, const uz_state *s, uz_error *err)
+{
+    double *r = it->r, *Dr = it->Dr;
+    *same = true;
+    if (isinf(s->best_bound))
+        return UZ_OK;
+    it->r = it->r_next;
+    it->Dr = it->Dr_next;
+    memcpy(it->r, it->best_r, (size_t)it->m * sizeof *r);
+    it->best_bound = INFINITY;
+    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    if (status == UZ_OK)
+        status = uz_iterate_bound(it, load, s->made_by, err);
+    it->r = r;
+    it->Dr = Dr;
+    *same = it->best_bound <= (1.0 + 1e-3) * s->best_bound && s->best_bound <= (1.0 + 1e-3) * it->best_bound;
+    /* what rounding alone leaves of a bound is another number each time */
+    *same = *same || (it->best_relative <= 1e-11 && s->best_relative <= 1e-11);
+    return status;
+}
+
+static uz_status restore(bool *same, uz_iterate *it, uz_case *load, const uz_state *s, uz_error *err)
+{
+    take_vectors(it, s, uz_case_row_scale(load));
+    take_numbers(it, s);
+    uz_status status = uz_case_apply(load, it->Dr_next, it->r, err);
+    *same = status == UZ_OK && alike(it->Dr, it->Dr_next, it->m);
+    if (*same)
+        status = bound_best_again(same, it, load, s, err);
+    if (status != UZ_OK || !*same)
+        return status;
+    it->best_bound = s->best_bound;
+    it->best_relative = s->best_relative;
+    it->best_iteration = s->best_iteration;
+    it->made_by = s->made_by;
+    it->begun = it->fresh = true;
+    return UZ_OK;
+}
+
+/* Nothing but the reactions. */
+static void take_reactions(uz_iterate *it, const uz_state *s, const double *scale, double alpha)
+{
+    for (int64_t i = 0; i < it->m; i++) {
+        it->r[i] = fmin(0.0, s->r[i] / scale[i]);
+        it->warm = it->warm || it->r[i] < 0.0;
+    }
+    memset(it->anchor, 0, (size_t)it->m * sizeof *it->anchor);
+    memset(it->best_r, 0, (size_t)it->m * sizeof *it->best_r);
+    it->alpha = alpha;
+    it->tau = 1.0;
+    it->step_norm = NAN;
+    it->best_bound = it->best_relative = INFINITY;
+    it->iteration = it->restarts = it->next_check = it->best_iteration = it->phase_end = 0;
+    it->phase = 0;
+}
+
+uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start, uz_error *err)
+{
+    double alpha = it->alpha;
+    bool same = false;
+    uz_status status = check_state(start, it->m, err);
+    it->started = uz_seconds();
+    if (status == UZ_OK && start->rho)
+        status = restore(&same, it, load, start, err);
+    if (status == UZ_OK && !same)
+        take_reactions(it, start, uz_case_row_scale(load), alpha);
+    return status;
+}
+
+static bool allocate(uz_state *s, int64_t m)
+{
+    double **room[] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
+    bool ok = true;
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        ok = (*room[k] = uz_alloc(m, sizeof(double))) && ok;
+    return ok;
+}
+
+static void give_vectors(uz_state *s, const uz_iterate *it, const double *scale)
+{
+    times_scale(s->r, it->r, scale, it->m);
+    times_scale(s->rho, it->rho, scale, it->m);
+    times_scale(s->best_r, it->before.kept ? it->before.r : it->best_r, scale, it->m);
+    times_scale(s->anchor, it->anchor, scale, it->m);
+    to_scaled_forces(s->Dr, it->Dr, scale, it->m);
+    to_scaled_forces(s->Drho, it->Drho, scale, it->m);
+}
+
+static void give_numbers(uz_state *s, const uz_iterate *it)
+{
+    const uz_best *before = &it->before;
+    s->m = it->m;
+    s->alpha = it->alpha;
+    s->tau = it->tau;
+    s->step_norm = it->step_norm;
+    s->iteration = it->iteration;
+    s->restarts = it->restarts;
+    s->next_check = it->next_check;
+    s->phase = it->phase;
+    s->phase_end = it->phase_end;
+    s->best_bound = before->kept ? before->bound : it->best_bound;
+    s->best_relative = before->kept ? before->relative : it->best_relative;
+    s->best_iteration = before->kept ? before->iteration : it->best_iteration;
+    s->made_by = before->kept ? before->made_by : it->made_by;
+}
+
+uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_case *load, uz_method method, uz_error *err)
+{
+    *out = NULL;
+    uz_state *s = uz_alloc_zero(1, sizeof *s);
+    if (!s || !allocate(s, it->m)) {
+        uz_state_free(s);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
+    }
+    give_vectors(s, it, uz_case_row_scale(load));
+    give_numbers(s, it);
+    s->method = method;
+    *out = s;
+    return UZ_OK;
+}
