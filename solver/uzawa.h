@@ -122,6 +122,13 @@ uz_status uz_mm_write_vector(char **text, size_t *len, const double *x, int64_t 
  * Returns the bytes used, 0 if there is no number; *value is correctly rounded, +-Inf on overflow. */
 size_t uz_parse_double(double *value, const char *text, size_t len);
 
+/* Writes the shortest decimal that reads back as the finite x (of several the nearest one), in %g's style whatever the
+ * locale. Returns its length, at most 24; out has room for UZ_DOUBLE_ROOM and gets no NUL. */
+enum { UZ_DOUBLE_ROOM = 32 };
+size_t uz_format_double(char *out, double x);
+/* The same for integers: at most 20 digits. */
+size_t uz_format_integer(char *out, uint64_t value);
+
 /* -------------------------------------------------------------- problems */
 
 /* A problem in matrices. K: lower triangle. N: general. p: d. h: m. */

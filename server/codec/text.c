@@ -1,5 +1,6 @@
 #include "codec/text.h"
 #include "codec/json_doc.h"
+#include "uzawa.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -136,18 +137,11 @@ void text_raw(text *t, const char *json)
     text_put(t, json ? json : "null");
 }
 
-/* Whole numbers below 2^53 need no trial; others read back from 15, 16 or 17 digits (Steele and White 1990). */
 size_t text_shortest(char out[TEXT_DOUBLE], double x)
 {
-    int n = 0;
-    if (x == floor(x) && fabs(x) < 1e15 && !(x == 0 && signbit(x)))
-        return (size_t)snprintf(out, TEXT_DOUBLE, "%" PRId64, (int64_t)x);
-    for (int digits = 15; digits <= 17; digits++) {
-        n = snprintf(out, TEXT_DOUBLE, "%.*g", digits, x);
-        if (digits == 17 || strtod(out, NULL) == x)
-            break;
-    }
-    return (size_t)n;
+    size_t length = uz_format_double(out, x);
+    out[length] = '\0';
+    return length;
 }
 
 void text_number(text *t, double value)

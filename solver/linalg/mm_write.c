@@ -5,7 +5,6 @@
 #include "core/error.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,7 +15,7 @@ typedef struct {
 } sheet;
 
 /* The longest line: two 19-digit numbers, a double of 24 characters, two blanks, LF and NUL. */
-enum { LINE_ROOM = 72 };
+enum { LINE_ROOM = 40 + UZ_DOUBLE_ROOM };
 
 static bool sheet_room(sheet *s, size_t more)
 {
@@ -33,61 +32,12 @@ static bool sheet_room(sheet *s, size_t more)
 
 static void put_count(sheet *s, int64_t value)
 {
-    char digits[20];
-    int length = 0;
-    do {
-        digits[length++] = (char)('0' + value % 10);
-        value /= 10;
-    } while (value > 0);
-    while (length > 0)
-        s->bytes[s->length++] = digits[--length];
-}
-
-/* printf writes the locale's decimal point, whatever bytes that is: makes it a '.'. */
-static void use_point(char *number)
-{
-    static const char plain[] = "+-0123456789e";
-    char *mark = number + strspn(number, plain);
-    if (!*mark || *mark == '.')
-        return;
-    char *rest = mark + strcspn(mark, plain);
-    *mark = '.';
-    memmove(mark + 1, rest, strlen(rest) + 1);
-}
-
-static bool reads_back(const char *number, double value)
-{
-    double read;
-    size_t length = strlen(number);
-    return uz_parse_double(&read, number, length) == length && read == value;
-}
-
-/* 17 significant digits always read back; fewer often do. */
-static void put_shortest(sheet *s, double value)
-{
-    char number[LINE_ROOM];
-    for (int digits = 15; digits <= 17; digits++) {
-        snprintf(number, sizeof number, "%.*g", digits, value);
-        use_point(number);
-        if (digits == 17 || reads_back(number, value))
-            break;
-    }
-    size_t length = strlen(number);
-    memcpy(s->bytes + s->length, number, length);
-    s->length += length;
+    s->length += uz_format_integer(s->bytes + s->length, (uint64_t)value);
 }
 
 static void put_number(sheet *s, double value)
 {
-    const double whole_limit = 1e15;
-    if (signbit(value)) {
-        s->bytes[s->length++] = '-';
-        value = -value;
-    }
-    if (value < whole_limit && value == (double)(int64_t)value)
-        put_count(s, (int64_t)value);
-    else
-        put_shortest(s, value);
+    s->length += uz_format_double(s->bytes + s->length, value);
 }
 
 static void put_text(sheet *s, const char *text)

@@ -66,11 +66,10 @@ static double mean_seconds(void (*run)(void *), void *ctx)
 
 static void measure(size_row *row, int64_t cells)
 {
-    uz_problem scene = {.kind = UZ_PROBLEM_SCENE};
-    scene.scene = bench_paper_scene(cells);
-    uz_problem matrices = {.kind = UZ_PROBLEM_MATRICES};
+    uz_problem scene = {.kind = UZ_PROBLEM_SCENE}, matrices = {.kind = UZ_PROBLEM_MATRICES};
     uz_error err;
     double samples[COLUMNS][RUNS];
+    scene.scene = bench_paper_scene(cells);
     if (uz_scene_to_qp(&matrices.qp, NULL, &scene.scene, &err) != UZ_OK) {
         printf("%s\n", err.message);
         exit(1);
@@ -95,9 +94,9 @@ static void measure(size_row *row, int64_t cells)
 /* The slope of log seconds over log d, least squares over the finer half. */
 static double exponent(const size_row rows[SIZES], int column)
 {
-    int64_t finer = SIZES - SIZES / 2;
-    double n = (double)finer, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
-    for (int i = SIZES / 2; i < SIZES; i++) {
+    const int first = SIZES / 2;
+    double n = SIZES - first, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+    for (int i = first; i < SIZES; i++) {
         double log_d = log((double)rows[i].d), log_s = log(rows[i].seconds[column]);
         x += log_d;
         y += log_s;
