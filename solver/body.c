@@ -77,6 +77,13 @@ static size_t model_bytes(const uz_body_model *model)
            (model->frame_of ? 8 * nodes : 0);
 }
 
+/* Each contact dof has a row of its own: the trailing block of a factor with these dofs last is then all of the
+ * operator. Otherwise the contact may stand anywhere in it, whichever is cheaper. */
+static bool is_one_to_one(const uz_csc *N, int64_t n_b)
+{
+    return N->rows == n_b && N->ptr[N->cols] == n_b;
+}
+
 /* The key of K: known for matrices; of a scene's only when there is a cache to look into. */
 static uz_status find_key(uz_matrix_key *K_key, const uz_body_key *key, const uz_body *body, uz_error *err)
 {
@@ -96,8 +103,8 @@ static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_cs
     uz_operator op = UZ_OPERATOR_AUTO;
     if (status == UZ_OK) {
         op = uz_dual_choose(N, n_b, settings->op);
-        int64_t n_last = op == UZ_OPERATOR_CONDENSED ? n_b : 0;
-        status = uz_shared_factor_get(&body->shared, cache, &K_key, K, dofs, n_last, settings, hooks, err);
+        int64_t n_last = op == UZ_OPERATOR_CONDENSED ? n_b : 0, rows = is_one_to_one(N, n_last) ? 0 : N->rows;
+        status = uz_shared_factor_get(&body->shared, cache, &K_key, K, dofs, n_last, rows, settings, hooks, err);
     }
     free(dofs);
     body->factor = body->shared.factor;

@@ -18,8 +18,8 @@ typedef struct {
 typedef struct {
     const uz_matrix_key *key;
     const uz_csc *K;
-    const int64_t *last;
-    int64_t n_last;
+    const int64_t *dofs;
+    int64_t n_dofs, rows;
     const uz_settings *settings;
     const uz_hooks *hooks;
 } wanted;
@@ -44,7 +44,7 @@ uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *K, uz_error *err)
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a digest of K");
 }
 
-/* The key of an object that `first` (a digest), the ordering and the last dofs determine. */
+/* The key of an object that `first` (a digest), the ordering and the contact determine. */
 static uz_status digest_with_order(char digest[65], const char *first, const wanted *w, uz_error *err)
 {
     uz_digest *state = uz_digest_new();
@@ -53,7 +53,8 @@ static uz_status digest_with_order(char digest[65], const char *first, const wan
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
     uz_digest_add(state, first, 64);
     uz_digest_add(state, &ordering, sizeof ordering);
-    uz_digest_add(state, w->last, (size_t)w->n_last * sizeof *w->last);
+    uz_digest_add(state, w->dofs, (size_t)w->n_dofs * sizeof *w->dofs);
+    uz_digest_add(state, &w->rows, sizeof w->rows);
     return uz_digest_end(state, digest) ? UZ_OK : uz_fail(err, UZ_ERR_INTERNAL, "", "hashing failed");
 }
 
@@ -66,7 +67,7 @@ static void destroy_analysis(void *object)
 
 static uz_status analyze(uz_analysis **out, const wanted *w, uz_error *err)
 {
-    return uz_analysis_create(out, w->K, w->last, w->n_last, w->settings->ordering, w->hooks, err);
+    return uz_analysis_choose(out, w->K, w->dofs, w->n_dofs, w->rows, w->settings->ordering, w->hooks, err);
 }
 
 /* The analysis of this pattern: from the table, or made and kept there. */
@@ -124,20 +125,21 @@ static uz_status make_kept(kept_factor **out, bool *analysis_reused, uz_cache *c
     return status;
 }
 
-/* A factor of this K whose last dofs include the wanted ones, and not many more: what is dense is as large as they. */
 static bool fits(const void *object, void *ctx)
 {
     const kept_factor *kept = object;
     const wanted *w = ctx;
-    if (kept->ordering != w->settings->ordering || strcmp(kept->K, w->key->values) != 0)
-        return false;
-    int64_t count, at = 0;
-    const int64_t *last = uz_factor_last_dofs(kept->factor, &count);
-    if (count > 2 * w->n_last + 256)
-        return false;
-    for (int64_t k = 0; k < count && at < w->n_last; k++)
-        at += last[k] == w->last[at];
-    return at == w->n_last;
+    return kept->ordering == w->settings->ordering && strcmp(kept->K, w->key->values) == 0;
+}
+
+/* The contact, and not much else, comes last: what is dense is as large as all that does. */
+static bool fits_best(const void *object, void *ctx)
+{
+    const kept_factor *kept = object;
+    const wanted *w = ctx;
+    int64_t count;
+    uz_factor_last_dofs(kept->factor, &count);
+    return fits(object, ctx) && count <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs);
 }
 
 static uz_status get_shared(uz_shared_factor *out, uz_cache *cache, wanted *w, uz_error *err)
@@ -146,7 +148,9 @@ static uz_status get_shared(uz_shared_factor *out, uz_cache *cache, wanted *w, u
     bool create = false;
     kept_factor *kept = NULL;
     out->cache = cache;
-    out->item = uz_table_search(cache, UZ_ITEM_FACTOR, fits, w);
+    out->item = uz_table_search(cache, UZ_ITEM_FACTOR, fits_best, w);
+    if (!out->item)
+        out->item = uz_table_search(cache, UZ_ITEM_FACTOR, fits, w);
     if (!out->item) {
         uz_status status = digest_with_order(digest, w->key->values, w, err);
         if (status == UZ_OK)
@@ -170,10 +174,10 @@ static uz_status get_shared(uz_shared_factor *out, uz_cache *cache, wanted *w, u
 }
 
 uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,
-                               const int64_t *last, int64_t n_last, const uz_settings *settings, const uz_hooks *hooks,
-                               uz_error *err)
+                               const int64_t *dofs, int64_t n_dofs, int64_t rows, const uz_settings *settings,
+                               const uz_hooks *hooks, uz_error *err)
 {
-    wanted w = {key, K, last, n_last, settings, hooks};
+    wanted w = {key, K, dofs, n_dofs, rows, settings, hooks};
     uz_analysis *analysis = NULL;
     memset(out, 0, sizeof *out);
     if (cache)

@@ -21,12 +21,12 @@ typedef struct {
     uz_item *item;
 } uz_shared_factor;
 
-/* Factors K with the dofs `last` (ascending) at the end, or finds a factor of the same K with at least these dofs
- * there; with an analysis of the same pattern where there is one. cache NULL: made, and freed on release; key is then
- * not read. Errors: uz_factor_create's. */
+/* Finds a factor of K, one that ends with the contact's dofs (ascending) if it can, or makes one that does or that
+ * serves `rows` rows on them as well (uz_analysis_choose), with an analysis of the same pattern where there is one.
+ * cache NULL: made, and freed on release; key is then not read. Errors: uz_factor_create's. */
 uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,
-                               const int64_t *last, int64_t n_last, const uz_settings *settings, const uz_hooks *hooks,
-                               uz_error *err);
+                               const int64_t *dofs, int64_t n_dofs, int64_t rows, const uz_settings *settings,
+                               const uz_hooks *hooks, uz_error *err);
 void uz_shared_factor_release(uz_shared_factor *shared);
 
 #endif

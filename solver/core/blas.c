@@ -97,6 +97,37 @@ void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x)
     cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(stride), x, 1);
 }
 
+void uz_block_trsv(int64_t n, const double *L, int64_t ld, double *x, bool transposed)
+{
+    cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
+                narrow(ld), x, 1);
+}
+
+void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, const double *x, double *y,
+                   bool transposed)
+{
+    if (rows > 0)
+        cblas_dgemv(CblasColMajor, transposed ? CblasTrans : CblasNoTrans, narrow(rows), narrow(columns), -1.0, A,
+                    narrow(ld), x, 1, 1.0, y, 1);
+}
+
+void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx)
+{
+    if (columns == 0)
+        return;
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), narrow(columns), 1.0, L,
+                narrow(ld), X, narrow(ldx));
+    if (rows > 0)
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, narrow(rows), narrow(columns), narrow(n), -1.0, L + n,
+                    narrow(ld), X, narrow(ldx), 1.0, X + n, narrow(ldx));
+}
+
+void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C)
+{
+    if (n > 0)
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k), 1.0, Z, narrow(ld), 0.0, C, narrow(n));
+}
+
 bool uz_potri_lower(int64_t n, double *L)
 {
     return n == 0 || LAPACKE_dpotri_work(LAPACK_COL_MAJOR, 'L', narrow(n), L, narrow(n)) == 0;

@@ -26,6 +26,15 @@ void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x);
 bool uz_potri_lower(int64_t n, double *L); /* L -> lower triangle of (LL')^-1 */
 /* A (lower) = L L', L's strict upper part is not read. n^3/3 flops. */
 void uz_multiply_llt(int64_t n, const double *L, double *A);
+/* Pieces of larger arrays, whose columns are `ld` entries apart: L is n x n lower, A is rows x columns. */
+void uz_block_trsv(int64_t n, const double *L, int64_t ld, double *x, bool transposed); /* x = L^-1 x or L'^-1 x */
+/* y -= A x, or y -= A'x where transposed. */
+void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, const double *x, double *y,
+                   bool transposed);
+/* [X; Y] (columns, ldx) = [L^-1 X; Y - A L^-1 X] with [L; A] (n + rows by n, ld). */
+void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx);
+/* C (n x n) = Z'Z with Z k x n. */
+void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C);
 /* Eigenvalues of the symmetric tridiagonal matrix (d, n; e, n - 1), ascending in d; with vectors in V (n x n). */
 bool uz_stev(int64_t n, double *d, double *e, double *V);
 

@@ -1,7 +1,8 @@
 /* condensed.c: the dual operator as a dense matrix on the contact.
  *
  * With the contact dofs B last, the trailing block L_bb of the factor is the Cholesky factor of the Schur complement S
- * of K on B, and N touches B only:  D = N K^-1 N' = N_b S^-1 N_b' = Z'Z,  Z = L_bb^-1 N_b'. */
+ * of K on B, and N touches B only:  D = N K^-1 N' = N_b S^-1 N_b' = Z'Z,  Z = L_bb^-1 N_b'.
+ * With B anywhere Z = L^-1 P N' is sparse: it lives on the reach of B, and so does all that the contact asks for. */
 #include "dual/dual_private.h"
 
 #include "core/alloc.h"
@@ -70,7 +71,7 @@ static void factor_operator(uz_condensed *dense, const double *D, int64_t m)
     free(chol);
 }
 
-static uz_status multiply_out(uz_condensed *dense, double *D, int64_t m, uz_error *err)
+static uz_status multiply_out(const uz_condensed *dense, double *D, int64_t m, uz_error *err)
 {
     int64_t n_b = dense->n_b;
     double *Z = uz_alloc_zero(n_b * m, sizeof *Z);
@@ -83,53 +84,90 @@ static uz_status multiply_out(uz_condensed *dense, double *D, int64_t m, uz_erro
     uz_trsm_lower(n_b, m, dense->L_bb, Z);
     uz_syrk_lower_t(m, n_b, Z, D);
     free(Z);
-    factor_operator(dense, D, m);
     return UZ_OK;
 }
 
-static bool allocate(uz_condensed *dense, int64_t n_b)
+static bool allocate(uz_condensed *dense, int64_t n_b, bool contact_last)
 {
     int64_t block;
     if (__builtin_mul_overflow(n_b, n_b, &block))
         return false;
     dense->n_b = n_b;
     dense->position = uz_alloc(n_b, sizeof(int64_t));
-    dense->L_bb = uz_alloc(block, sizeof(double));
+    dense->L_bb = contact_last ? uz_alloc(block, sizeof(double)) : NULL;
     dense->row_of = uz_alloc(n_b, sizeof(int64_t));
     dense->scale = uz_alloc(n_b, sizeof(double));
-    return dense->position && dense->L_bb && dense->row_of && dense->scale;
+    return dense->position && (dense->L_bb || !contact_last) && dense->row_of && dense->scale;
 }
 
-/* Where N_b is a scaled permutation D waits until somebody iterates; otherwise every bound needs it. */
+/* Where N_b is a scaled permutation, and the contact last, D waits until somebody iterates; otherwise every bound needs
+ * it. */
 static uz_status make_operator(uz_dual *dual, uz_error *err)
 {
+    uz_condensed *dense = &dual->dense;
     int64_t m = dual->info.m, size;
-    dual->dense.scaled = find_scaled(&dual->dense, m);
-    if (dual->dense.scaled)
+    dense->scaled = !dense->reach && find_scaled(dense, m);
+    if (dense->scaled)
         return UZ_OK;
     bool fits = !__builtin_mul_overflow(m, m, &size);
     dual->lazy->D = fits ? uz_alloc_zero(size, sizeof(double)) : NULL;
     if (!dual->lazy->D)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)m);
-    return multiply_out(&dual->dense, dual->lazy->D, m, err);
+    uz_status status = dense->reach ? uz_reach_gram(dual->lazy->D, dense->reach, &dual->N, err)
+                                    : multiply_out(dense, dual->lazy->D, m, err);
+    if (status == UZ_OK)
+        factor_operator(dense, dual->lazy->D, m);
+    return status;
+}
+
+/* The trailing block of the factor, or the paths that take its place. order (n_b): the contact dofs, in the factor's
+ * order on return where they are last. */
+static uz_status find_contact(uz_condensed *dense, const uz_factor *factor, int64_t *order, uz_error *err)
+{
+    if (dense->L_bb)
+        return uz_factor_last_block(factor, dense->L_bb, order, dense->position, err);
+    for (int64_t k = 0; k < dense->n_b; k++)
+        dense->position[k] = uz_factor_position(factor)[order[k]];
+    return uz_reach_create(&dense->reach, factor, order, dense->n_b, err);
+}
+
+/* order: the dofs at the end of the factor where they include all that N touches: more of them when another body's
+ * factor is used. Otherwise those that N touches. */
+static uz_status list_contact(int64_t **order, int64_t *n_b, bool *last, const uz_dual *dual, uz_error *err)
+{
+    uz_status status = uz_dual_contact_dofs(order, n_b, &dual->N, err);
+    if (status != UZ_OK)
+        return status;
+    int64_t count;
+    const int64_t *dofs = uz_factor_last_dofs(dual->factor, &count);
+    *last = uz_factor_ends_with(dual->factor, *order, *n_b);
+    if (!*last)
+        return UZ_OK;
+    free(*order);
+    *n_b = count;
+    *order = uz_alloc(count, sizeof **order);
+    if (!*order)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld contact dofs", (long long)count);
+    if (count > 0)
+        memcpy(*order, dofs, (size_t)count * sizeof **order);
+    return UZ_OK;
 }
 
 uz_status uz_condensed_create(uz_dual *dual, uz_error *err)
 {
     uz_condensed *dense = &dual->dense;
-    int64_t m = dual->info.m, n_b = 0;
-    uz_factor_last_dofs(dual->factor, &n_b); /* those that N touches, and more when another body's factor is used */
-    int64_t *order = uz_alloc(n_b, sizeof *order);
-    uz_status status = UZ_OK;
-    if (!order || !allocate(dense, n_b))
+    int64_t m = dual->info.m, n_b = 0, *order = NULL;
+    bool last = false;
+    uz_status status = list_contact(&order, &n_b, &last, dual, err);
+    if (status == UZ_OK && !allocate(dense, n_b, last))
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense block of order %lld", (long long)n_b);
     if (status == UZ_OK)
-        status = uz_factor_last_block(dual->factor, dense->L_bb, order, dense->position, err);
+        status = find_contact(dense, dual->factor, order, err);
     if (status == UZ_OK)
         status = restrict_columns(&dense->N_b, &dual->N, order, n_b, err);
     if (status == UZ_OK)
         status = make_operator(dual, err);
-    dual->info.bytes += 8 * (size_t)(n_b * n_b + 2 * m * m);
+    dual->info.bytes += 8 * (size_t)((last ? n_b * n_b : 0) + 2 * m * m);
     free(order);
     return status;
 }
@@ -139,9 +177,28 @@ void uz_condensed_clear(uz_condensed *dense)
     uz_csc_clear(&dense->N_b);
     free(dense->position);
     free(dense->L_bb);
+    uz_reach_free(dense->reach);
     free(dense->D_chol);
     free(dense->row_of);
     free(dense->scale);
+}
+
+/* u_b (n_b) = N's dofs of L'^-1 base: displacements without reactions. x (d) is room. */
+static uz_status displace_contact(double *u_b, double *x, const uz_case *load, uz_error *err)
+{
+    const uz_condensed *dense = &load->dual->dense;
+    uz_status status = UZ_OK;
+    const double *from = load->base;
+    if (dense->reach) {
+        memcpy(x, load->base, (size_t)load->dual->info.d * sizeof *x);
+        status = uz_reach_backward(dense->reach, load->ws, x, err);
+        from = x;
+    }
+    for (int64_t k = 0; k < dense->n_b; k++)
+        u_b[k] = from[dense->position[k]];
+    if (!dense->reach)
+        uz_trsv_lower_t(dense->n_b, dense->L_bb, u_b);
+    return status;
 }
 
 /* y = L^-1 P p is half a linear solve; the other half waits until the reactions are known. */
@@ -155,12 +212,10 @@ uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err)
         return status;
     load->D = dense->scaled ? NULL : dual->lazy->D;
     load->psi0 = -0.5 * uz_dot(dual->info.d, load->base, load->base);
-    for (int64_t k = 0; k < dense->n_b; k++)
-        load->work[k] = load->base[dense->position[k]];
-    uz_trsv_lower_t(dense->n_b, dense->L_bb, load->work);
+    status = displace_contact(load->work, load->work2, load, err);
     memcpy(load->g0, load->h, (size_t)dual->info.m * sizeof *load->g0);
     uz_csc_gaxpy(load->g0, &dense->N_b, -1.0, load->work);
-    return UZ_OK;
+    return status;
 }
 
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w)
@@ -185,16 +240,38 @@ void uz_condensed_apply(const uz_case *load, double *Dr, const double *r)
     uz_csc_gaxpy(Dr, &dense->N_b, 1.0, load->apply_room);
 }
 
+/* x (d) = L^-1 P N'(r + w), in the factor's order, w the kept correction or nothing. */
+static uz_status spread_reactions(double *x, const uz_case *load, const double *r, bool with_push, uz_error *err)
+{
+    const uz_condensed *dense = &load->dual->dense;
+    double *force = load->apply_room; /* n_b */
+    memset(force, 0, (size_t)dense->n_b * sizeof *force);
+    uz_csc_gaxpy_t(force, &dense->N_b, 1.0, r);
+    if (with_push)
+        uz_csc_gaxpy_t(force, &dense->N_b, 1.0, load->kept);
+    memset(x, 0, (size_t)load->dual->info.d * sizeof *x);
+    for (int64_t k = 0; k < dense->n_b; k++)
+        x[dense->position[k]] = force[k];
+    return uz_reach_forward(dense->reach, load->ws, x, err);
+}
+
 uz_status uz_condensed_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     const uz_condensed *dense = &dual->dense;
     double *x = load->work2, *z = load->work;
-    uz_condensed_response(z, dense, r);
-    memcpy(x, load->base, (size_t)dual->info.d * sizeof *x);
-    for (int64_t k = 0; k < dense->n_b; k++)
-        x[dense->position[k]] += z[k] + (with_push ? load->kept[k] : 0.0);
-    uz_status status = uz_factor_backward(dual->factor, load->ws, x, 1, err);
+    uz_status status = UZ_OK;
+    if (dense->reach) {
+        status = spread_reactions(x, load, r, with_push, err);
+        uz_axpy(dual->info.d, 1.0, load->base, x);
+    } else {
+        uz_condensed_response(z, dense, r);
+        memcpy(x, load->base, (size_t)dual->info.d * sizeof *x);
+        for (int64_t k = 0; k < dense->n_b; k++)
+            x[dense->position[k]] += z[k] + (with_push ? load->kept[k] : 0.0);
+    }
+    if (status == UZ_OK)
+        status = uz_factor_backward(dual->factor, load->ws, x, 1, err);
     if (status == UZ_OK)
         uz_factor_unpermute(dual->factor, u, x);
     return status;

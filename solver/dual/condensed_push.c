@@ -87,28 +87,41 @@ static bool push_rows(uz_case *load, double *w, double *target, const double *g,
     return feasible;
 }
 
+/* The correction K^-1 N'w as it is kept, and its square in the energy norm. target (m): D w. */
+static double keep_weights(uz_case *load, const double *w, const double *target)
+{
+    const uz_condensed *dense = &load->dual->dense;
+    if (dense->reach) {
+        memcpy(load->push, w, (size_t)load->dual->info.m * sizeof *w);
+        return fmax(0.0, uz_dot(load->dual->info.m, w, target));
+    }
+    uz_condensed_response(load->push, dense, w);
+    return uz_dot(dense->n_b, load->push, load->push);
+}
+
 uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close)
 {
     const uz_condensed *dense = &load->dual->dense;
     int64_t m = load->dual->info.m;
-    double *target = load->work, *z = load->push, complementarity = 0.0;
+    double *target = load->work, *z = load->push, square = 0.0, complementarity = 0.0;
     for (int64_t i = 0; i < m; i++)
         target[i] = close[i] ? g[i] : fmin(g[i], 0.0);
     if (dense->scaled) {
         for (int64_t k = 0; k < m; k++)
             z[k] = target[dense->row_of[k]] / dense->scale[k];
         uz_trmv_lower_t(m, dense->L_bb, z);
+        square = uz_dot(m, z, z);
     } else if (dense->D_chol) {
         memcpy(load->work2, target, (size_t)m * sizeof *target);
         uz_potrs_lower(m, dense->D_chol, load->work2);
-        uz_condensed_response(z, dense, load->work2);
+        square = keep_weights(load, load->work2, target);
     } else if (push_rows(load, load->work2, target, g, close)) {
-        uz_condensed_response(z, dense, load->work2);
+        square = keep_weights(load, load->work2, target);
     } else {
         return UZ_OK;
     }
     for (int64_t i = 0; i < m; i++)
         complementarity -= r[i] * fmax(0.0, g[i] - target[i]);
-    *bound2 = uz_dot(dense->n_b, z, z) + 2.0 * complementarity;
+    *bound2 = square + 2.0 * complementarity;
     return UZ_OK;
 }

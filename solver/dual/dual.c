@@ -43,7 +43,7 @@ enum { SMALL = 1024, SMALL_BOUNDS = 128 };
  * and 320 ms; on one side of 450 of them: 11 and 12 ms. */
 uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked)
 {
-    int64_t rows = n_b > N->rows ? n_b : N->rows;
+    int64_t rows = N->rows;
     double n = (double)rows, d = (double)N->cols;
     if (asked != UZ_OPERATOR_AUTO)
         return asked;
@@ -164,8 +164,8 @@ static bool allocate_case(uz_case *load)
         uz_alloc_zero(load->dual->info.op == UZ_OPERATOR_CONDENSED ? load->dual->dense.n_b : 0, sizeof(double));
     load->work = uz_alloc_zero(room, sizeof(double));
     load->work2 = uz_alloc_zero(room, sizeof(double));
-    load->push = uz_alloc_zero(d, sizeof(double));
-    load->kept = uz_alloc_zero(d, sizeof(double));
+    load->push = uz_alloc_zero(room, sizeof(double));
+    load->kept = uz_alloc_zero(room, sizeof(double));
     return load->ws && load->apply_room && load->h && load->base && load->g0 && load->response && load->work &&
            load->work2 && load->push && load->kept;
 }

@@ -14,7 +14,8 @@ typedef struct {
     int64_t n_b;       /* the last dofs of the factor, those that N touches among them, in its order */
     int64_t *position; /* n_b: their places in the factor's order */
     uz_csc N_b;        /* m x n_b: those columns of N */
-    double *L_bb;      /* n_b x n_b: Cholesky factor of the Schur complement S */
+    double *L_bb;      /* n_b x n_b: Cholesky factor of the Schur complement S; NULL where the contact is not last */
+    uz_reach *reach;   /* of the contact dofs, where they are not last in the factor; else NULL */
     double *D_chol;    /* m x m: Cholesky factor of D; NULL when D is singular to working precision or `scaled` */
     bool scaled;       /* N_b has one entry in each row and column: D = N_b S^-1 N_b', D^-1 = N_b^-T S N_b^-1 */
     int64_t *row_of;   /* scaled: row_of[k] is the row of column k's entry, n_b */
@@ -77,13 +78,13 @@ struct uz_case {
     double *work, *work2;        /* max(d, m, n_b) each */
     double *push_weight;         /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
     uz_bounded *box;             /* FACTORED with bounds, else NULL */
-    double *push, *kept;         /* correction: CONDENSED L_bb'c (n_b), FACTORED c (d) */
+    double *push, *kept; /* correction: CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
     bool has_kept;
 };
 
 uz_status uz_condensed_create(uz_dual *dual, uz_error *err);
 void uz_condensed_clear(uz_condensed *dense);
-/* z (n_b) = L_bb^-1 N_b'w */
+/* z (n_b) = L_bb^-1 N_b'w; contact last. */
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
 /* Lists in `rows` the rows with in == which, ascending; their number. */
 int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m);

@@ -52,8 +52,10 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
                            const uz_hooks *hooks, uz_error *err);
 void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
-/* The dofs that come last, ascending; *count of them. */
+/* The dofs that come last, ascending; *count of them, 0 where none has to. */
 const int64_t *uz_factor_last_dofs(const uz_factor *factor, int64_t *count);
+/* Are the n dofs (ascending) among those that come last? Always where n = 0. */
+bool uz_factor_ends_with(const uz_factor *factor, const int64_t *dofs, int64_t n);
 
 uz_factor_workspace *uz_factor_workspace_new(void); /* NULL: no memory */
 void uz_factor_workspace_free(uz_factor_workspace *ws);
@@ -79,6 +81,19 @@ const int64_t *uz_factor_position(const uz_factor *factor);
  * part zero; order[k] is the dof of row k (ascending position), where[k] its position. It is the Cholesky factor of the
  * Schur complement of K on these dofs: checked by the elimination structure, UZ_ERR_INTERNAL if it is not. */
 uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err);
+
+/* Solves that begin and end at a few dofs: the supernodes of the dofs and of all that depends on them in the
+ * elimination. Immutable; the factor must outlive it. Vectors (n) are in the factor's order. */
+typedef struct uz_reach uz_reach;
+uz_status uz_reach_create(uz_reach **out, const uz_factor *factor, const int64_t *dofs, int64_t n_dofs, uz_error *err);
+void uz_reach_free(uz_reach *reach);
+/* x = L^-1 x, x zero but at the dofs; it stays zero outside the reach. */
+uz_status uz_reach_forward(const uz_reach *reach, uz_factor_workspace *ws, double *x, uz_error *err);
+/* x = L'^-1 x, but only on the reach; the rest of x is left as it was. */
+uz_status uz_reach_backward(const uz_reach *reach, uz_factor_workspace *ws, double *x, uz_error *err);
+/* D (m x m, lower triangle; the rest zero) = N K^-1 N' = Z'Z with Z = L^-1 P N', for N (m x n) zero but on the dofs of
+ * the reach: all right-hand sides at once, by supernodes, each with those that lead there. */
+uz_status uz_reach_gram(double *D, const uz_reach *reach, const uz_csc *N, uz_error *err);
 
 /* The factor of K_FF, F the dofs that are not fixed (n): K (lower triangle) with these dofs held. factor: of K, whose
  * order is used; ws is borrowed for the object's life. *out is NULL on success when K_FF is not positive definite to

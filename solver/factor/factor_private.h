@@ -62,6 +62,13 @@ uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_
 uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t *group, int64_t rows,
                     uz_ordering ordering, cholmod_common *common, uz_error *err);
 
+/* Additions and multiplications of uz_reach_gram with `rows` rows on n_dofs dofs, by a symbolic factor; below 0: no
+ * memory. */
+double uz_reach_flops(const cholmod_factor *L, const int64_t *dofs, int64_t n_dofs, int64_t rows);
+
+/* Gives ws->panel at least `need` entries. */
+uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err);
+
 /* The symbolic supernodal factor of n dofs from that of their groups; NULL: no memory. */
 cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t n, cholmod_common *common);
 

@@ -56,18 +56,22 @@ cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns)
 
 typedef int (*substitution)(cholmod_factor *, cholmod_dense *, cholmod_dense *, cholmod_common *);
 
+uz_status uz_need_panel(uz_factor_workspace *ws, size_t need, uz_error *err)
+{
+    if (ws->panel && need <= ws->panel_size)
+        return UZ_OK;
+    free(ws->panel);
+    ws->panel = uz_alloc((int64_t)need, sizeof *ws->panel);
+    ws->panel_size = ws->panel ? need : 0;
+    return ws->panel ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution");
+}
+
 static uz_status substitute(substitution solve, const uz_factor *factor, uz_factor_workspace *ws, double *x,
                             int64_t columns, uz_error *err)
 {
-    size_t need = factor->L.maxesize * (size_t)columns;
-    if (need > ws->panel_size || !ws->panel) {
-        free(ws->panel);
-        ws->panel = uz_alloc((int64_t)need, sizeof *ws->panel);
-        ws->panel_size = ws->panel ? need : 0;
-        if (!ws->panel)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %lld columns",
-                           (long long)columns);
-    }
+    uz_status status = uz_need_panel(ws, factor->L.maxesize * (size_t)columns, err);
+    if (status != UZ_OK)
+        return status;
     cholmod_dense X = uz_view_dense(x, factor->n, columns),
                   E = uz_view_dense(ws->panel, (int64_t)factor->L.maxesize, columns);
     if (!solve((cholmod_factor *)&factor->L, &X, &E, &ws->common) || ws->common.status != CHOLMOD_OK)

@@ -140,31 +140,45 @@ TEST(what_is_alike_is_reused)
     uz_cache_free(cache);
 }
 
-/* A factor with fewer contact dofs at its end can't serve more of them on the contact. */
-TEST(more_contacts_need_another_order)
+/* A factor with other dofs at its end serves a contact by the paths of its dofs. */
+TEST(more_contacts_are_found_along_their_paths)
 {
     uz_cache *cache = uz_cache_new(1 << 30);
     uz_thread_init();
     check_reuse(cache, few_contacts, false, false, false);
-    check_reuse(cache, whole, false, false, false);
+    check_reuse(cache, whole, true, true, false);
     check_reuse(cache, few_contacts, true, true, true);
+    check_reuse(cache, softer, false, false, false);
+    uz_cache_free(cache);
+    cache = uz_cache_new(1 << 30);
+    check_reuse(cache, no_contacts, false, false, false);
+    check_reuse(cache, whole, true, true, false);
+    check_reuse(cache, no_contacts, true, true, true);
     uz_cache_free(cache);
 }
 
-TEST(every_method_on_a_factor_of_more_contacts)
+static void check_methods(uz_qp (*first)(void), uz_qp (*second)(void))
 {
     static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET};
     uz_thread_init();
     for (size_t k = 0; k < sizeof methods / sizeof methods[0]; k++) {
         uz_cache *cache = uz_cache_new(1 << 30);
         uz_settings settings = uz_settings_default();
-        uz_result_free(solve(cache, whole(), &settings));
+        uz_result_free(solve(cache, first(), &settings));
         settings.method = methods[k];
-        uz_result *result = solve(cache, fewer_contacts(), &settings);
+        uz_result *result = solve(cache, second(), &settings);
         CHECK(result->summary.reused.factor);
         uz_result_free(result);
         uz_cache_free(cache);
     }
+}
+
+TEST(every_method_on_the_factor_of_another_contact)
+{
+    check_methods(whole, fewer_contacts);
+    check_methods(few_contacts, whole);
+    check_methods(few_contacts, fewer_contacts);
+    check_methods(no_contacts, whole);
 }
 
 TEST(scenes_share_too)

@@ -98,6 +98,14 @@ static uz_problem dependent_problem(void)
     return problem_of(random_qp(&rng, &kind));
 }
 
+/* Fewer rows than dofs that they touch: the contact stays among the other dofs. */
+static uz_problem leaning_problem(void)
+{
+    qp_random rng = {5};
+    qp_kind kind = {.d = 12, .m = 4, .condition = 10};
+    return problem_of(random_qp(&rng, &kind));
+}
+
 TEST(scenes)
 {
     check_scenario("scene", scene_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
@@ -121,4 +129,11 @@ TEST(dependent_rows)
 {
     check_scenario("dependent rows", dependent_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AMD,
                    false);
+}
+
+TEST(leaning_rows)
+{
+    check_scenario("leaning rows", leaning_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AUTO, false);
+    check_scenario("iterated leaning rows", leaning_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_CONDENSED,
+                   UZ_ORDERING_METIS, true);
 }

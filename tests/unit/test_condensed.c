@@ -1,0 +1,162 @@
+/* The dense operator from a factor with the contact last and from one with the contact anywhere: the same numbers. */
+#include "dual/dual.h"
+#include "factor_fixture.h"
+#include "harness.h"
+#include "hex8.h"
+#include "qp_fixture.h"
+
+/* The cube's rows with normals that lean: three dofs in each. `twice`: each row once more, so that D is singular. */
+static uz_qp leaning_cube(int64_t n, bool twice)
+{
+    uz_qp qp;
+    uz_error err = {0};
+    CHECK(hex8_qp(&qp, n, &err) == UZ_OK);
+    int64_t m = qp.N.rows, copies = twice ? 2 : 1, count = 0, row[1000], col[1000];
+    double value[1000], *h = vector(copies * m);
+    for (int64_t j = 0; j < qp.N.cols; j++)
+        for (int64_t k = qp.N.ptr[j]; k < qp.N.ptr[j + 1]; k++)
+            for (int64_t e = 0; e < 3 * copies; e++, count++) {
+                int64_t i = qp.N.idx[k] + e / 3 * m;
+                row[count] = i;
+                col[count] = j - 2 + e % 3;
+                value[count] = e % 3 == 2 ? -0.9 : 0.3 * sin((double)(qp.N.idx[k] + e % 3));
+                h[i] = qp.h[qp.N.idx[k]];
+            }
+    CHECK(count <= 1000);
+    uz_csc_clear(&qp.N);
+    CHECK(uz_csc_from_triplets(&qp.N, copies * m, qp.K.cols, count, row, col, value, &err) == UZ_OK);
+    free(qp.h);
+    qp.h = h;
+    return qp;
+}
+
+typedef struct {
+    uz_factor *factor;
+    uz_dual *dual;
+    uz_case *load;
+} form;
+
+static form form_of(const uz_qp *qp, bool contact_last)
+{
+    form f = {0};
+    int64_t *dofs = NULL, count = 0;
+    uz_error err;
+    CHECK(uz_dual_contact_dofs(&dofs, &count, &qp->N, &err) == UZ_OK);
+    CHECK(factor_by(&f.factor, &qp->K, dofs, contact_last ? count : 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
+    CHECK_INT(uz_factor_describe(f.factor).contact_last, contact_last);
+    CHECK(uz_dual_create(&f.dual, &qp->N, f.factor, UZ_OPERATOR_CONDENSED, NULL, &err) == UZ_OK);
+    CHECK(uz_case_create(&f.load, f.dual, &qp->K, qp->p, qp->h, &err) == UZ_OK);
+    free(dofs);
+    return f;
+}
+
+static void free_form(form *f)
+{
+    uz_case_free(f->load);
+    uz_dual_free(f->dual);
+    uz_factor_free(f->factor);
+}
+
+static void check_close(const double *a, const double *b, int64_t n, double tolerance, const char *what)
+{
+    double worst = 0, size = 0;
+    for (int64_t i = 0; i < n; i++) {
+        worst = fmax(worst, fabs(a[i] - b[i]));
+        size = fmax(size, fabs(b[i]));
+    }
+    CHECK_MSG(worst <= tolerance * size, "%s: differ by %g of %g", what, worst, size);
+}
+
+/* Gaps, the operator, a correction and the displacements, of some r <= 0. */
+static void compare(const uz_qp *qp)
+{
+    int64_t d = qp->K.cols, m = qp->N.rows;
+    form last = form_of(qp, true), any = form_of(qp, false);
+    double *r = vector(m), *Dr = vector(m), *other = vector(m), *g = vector(m), *u = vector(d), *v = vector(d);
+    double bound[2] = {0}, psi[2], norm2[2], lambda[2];
+    bool *close = calloc((size_t)m, sizeof *close);
+    uz_error err;
+    for (int64_t i = 0; i < m; i++) {
+        r[i] = i % 3 == 0 ? -1e-4 * (double)(i % 7) : 0;
+        close[i] = r[i] < 0;
+    }
+    check_close(uz_case_g0(any.load), uz_case_g0(last.load), m, 1e-12, "g0");
+    CHECK(uz_case_prepare_iterations(last.load, &lambda[0], &err) == UZ_OK);
+    CHECK(uz_case_prepare_iterations(any.load, &lambda[1], &err) == UZ_OK);
+    CHECK_REL(lambda[1], lambda[0], 1e-6);
+    CHECK(uz_case_apply(last.load, Dr, r, &err) == UZ_OK && uz_case_apply(any.load, other, r, &err) == UZ_OK);
+    check_close(other, Dr, m, 1e-12, "D r");
+    uz_case_energies(last.load, &psi[0], &norm2[0], r, Dr);
+    uz_case_energies(any.load, &psi[1], &norm2[1], r, other);
+    CHECK_REL(psi[1], psi[0], 1e-12);
+    CHECK_REL(norm2[1], norm2[0], 1e-12);
+    for (int64_t i = 0; i < m; i++)
+        g[i] = uz_case_g0(last.load)[i] - Dr[i];
+    CHECK(uz_case_push(last.load, &bound[0], r, g, close, &err) == UZ_OK);
+    CHECK(uz_case_push(any.load, &bound[1], r, g, close, &err) == UZ_OK);
+    CHECK(isfinite(bound[0]) && bound[0] > 0);
+    CHECK_REL(bound[1], bound[0], 1e-8);
+    uz_case_keep_push(last.load);
+    uz_case_keep_push(any.load);
+    for (int with = 0; with < 2; with++) {
+        CHECK(uz_case_recover(last.load, u, r, with, &err) == UZ_OK);
+        CHECK(uz_case_recover(any.load, v, r, with, &err) == UZ_OK);
+        check_close(v, u, d, 1e-9, with ? "corrected displacements" : "displacements");
+    }
+    free_form(&last);
+    free_form(&any);
+    free(r);
+    free(Dr);
+    free(other);
+    free(g);
+    free(u);
+    free(v);
+    free(close);
+}
+
+TEST(contact_last_and_contact_anywhere)
+{
+    uz_thread_init();
+    for (int twice = 0; twice < 2; twice++) {
+        uz_qp qp = leaning_cube(6, twice);
+        compare(&qp);
+        uz_qp_clear(&qp);
+    }
+}
+
+/* One row for each dof and the contact not last: what the trailing block would say comes from D. */
+TEST(single_dofs_and_contact_anywhere)
+{
+    uz_qp qp;
+    uz_error err = {0};
+    uz_thread_init();
+    CHECK(hex8_qp(&qp, 6, &err) == UZ_OK);
+    compare(&qp);
+    uz_qp_clear(&qp);
+}
+
+/* More dofs than rows: the solver leaves them where they are, and is right. */
+TEST(leaning_normals_are_certified)
+{
+    uz_qp qp = leaning_cube(8, false);
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = qp};
+    uz_settings settings = uz_settings_default();
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACTIVE_SET, UZ_METHOD_ACCELERATED_RESTART};
+    double energy = NAN;
+    uz_thread_init();
+    for (int k = 0; k < 3; k++) {
+        uz_result *result;
+        uz_error err = {0};
+        settings.method = methods[k];
+        CHECK_INT(uz_solve(&result, &problem, &settings, NULL, NULL, &err), UZ_OK);
+        CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+        CHECK_INT(result->summary.op, UZ_OPERATOR_CONDENSED);
+        CHECK(!result->summary.contact_last);
+        CHECK(result->summary.active > 0);
+        if (k > 0)
+            CHECK_REL(result->summary.certificate.energy_dual, energy, 1e-12);
+        energy = result->summary.certificate.energy_dual;
+        uz_result_free(result);
+    }
+    uz_qp_clear(&qp);
+}
