@@ -149,4 +149,31 @@ static inline uz_status hex8_qp(uz_qp *qp, int64_t n, uz_error *err)
     return status;
 }
 
+/* The same rows with normals that lean in both directions: each touches three dofs. */
+static inline uz_status hex8_lean(uz_qp *qp, uz_error *err)
+{
+    int64_t m = qp->N.rows, count = 0, *row = calloc((size_t)(3 * m), sizeof *row),
+            *col = calloc((size_t)(3 * m), sizeof *col);
+    double *value = calloc((size_t)(3 * m), sizeof *value);
+    uz_csc N;
+    if (!row || !col || !value)
+        abort();
+    for (int64_t j = 0; j < qp->N.cols; j++)
+        for (int64_t k = qp->N.ptr[j]; k < qp->N.ptr[j + 1]; k++)
+            for (int64_t axis = 0; axis < 3; axis++, count++) {
+                row[count] = qp->N.idx[k];
+                col[count] = j - 2 + axis;
+                value[count] = axis == 2 ? -0.9 : 0.3 * sin((double)(qp->N.idx[k] + axis));
+            }
+    uz_status status = uz_csc_from_triplets(&N, m, qp->K.cols, count, row, col, value, err);
+    if (status == UZ_OK) {
+        uz_csc_clear(&qp->N);
+        qp->N = N;
+    }
+    free(row);
+    free(col);
+    free(value);
+    return status;
+}
+
 #endif

@@ -224,6 +224,24 @@ static void bench_memories(report *out)
     }
 }
 
+static void bench_cubes(report *out)
+{
+    static const struct {
+        const char *name;
+        int64_t n;
+        bool leaning;
+    } rows[] = {
+        {"cold_hex8_d13005", 16, false}, {"cold_hex8_d101277", 32, false}, {"cold_hex8_leaning_d43125", 24, true}};
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        bench_value ratio;
+        if (!bench_hex8(&ratio, rows[k].n, rows[k].leaning)) {
+            printf("%s did not converge\n", rows[k].name);
+            exit(1);
+        }
+        print_row(out, rows[k].name, "x", ratio, "linear solve (analyse, factorise, solve)");
+    }
+}
+
 static bool wanted(const report *out, const char *name)
 {
     return !out->filter || strstr(name, out->filter);
@@ -268,6 +286,8 @@ int main(int argc, char **argv)
         bench_obstacles(&out);
     if (wanted(&out, "memory"))
         bench_memories(&out);
+    if (wanted(&out, "hex8"))
+        bench_cubes(&out);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {
         bench_body(&out, sizes[i], 1e-6);
         bench_body(&out, sizes[i], 1e-8);

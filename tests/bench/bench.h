@@ -39,6 +39,9 @@ int bench_memory_child(const char *what, const char *problem);
 
 /* Cost against size, 600 to 2,000,000 dofs, printed and as two members of a JSON object. Minutes, and 4 GB. */
 void bench_sizes(FILE *json);
+/* Cold certified solves of the cube of n x n x n bricks, one dof in each row or (leaning) three, in units of CHOLMOD's
+ * linear solve. false: no answer. */
+bool bench_hex8(bench_value *ratio, int64_t n, bool leaning);
 
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);
