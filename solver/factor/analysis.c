@@ -23,7 +23,7 @@ bool uz_cholmod_start(cholmod_common *common)
     return true;
 }
 
-cholmod_sparse uz_view_lower(const uz_csc *K)
+static cholmod_sparse view_lower(const uz_csc *K)
 {
     cholmod_sparse A;
     memset(&A, 0, sizeof A);
@@ -92,7 +92,7 @@ static uz_status create(uz_analysis **out, const uz_csc *K, const int64_t *dofs,
         free(analysis);
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
-    cholmod_sparse A = uz_view_lower(K);
+    cholmod_sparse A = view_lower(K);
     uz_status status = begin(analysis, K, dofs, n_dofs, err);
     if (status == UZ_OK)
         status = analyze(analysis, &A, rows, ordering, &common, err);

@@ -38,9 +38,6 @@ struct uz_factor_workspace {
 /* Starts a CHOLMOD workspace that never prints, never aborts and gives LL' supernodal factors with 64-bit integers. */
 bool uz_cholmod_start(cholmod_common *common);
 
-/* K as CHOLMOD sees it. */
-cholmod_sparse uz_view_lower(const uz_csc *K);
-
 /* A dense matrix over an array, column-major. */
 cholmod_dense uz_view_dense(double *x, int64_t rows, int64_t columns);
 
