@@ -31,11 +31,16 @@ double bench_ipopt(double *u, double *value, const uz_csc *K, const double *p, d
 bool bench_obstacle(bench_value *ratio, bench_value *milliseconds, bool *compared);
 
 /* Peak memory of a cold contact solve over that of the linear solve of the same K with the ordering that takes least,
- * and that of the contact solve, in processes of their own. problem: cells along the paper's body, as text. */
+ * and that of the contact solve, in processes of their own. problem: cells along the paper's body as text, or "hex8_"
+ * and those of a cube. */
 bool bench_memory(bench_value *ratio, bench_value *megabytes, const char *problem);
 /* What main does when it is started as `bench BENCH_MEMORY_FLAG what problem`: prints bytes; its exit status. */
 #define BENCH_MEMORY_FLAG "--memory"
+#define BENCH_CUBE        "hex8_"
 int bench_memory_child(const char *what, const char *problem);
+
+/* Cold solves on an oblique plane over those on a plane along an axis. false: no answer. */
+bool bench_oblique(bench_value *ratio, int64_t cells);
 
 /* Cost against size, 600 to 2,000,000 dofs, printed and as two members of a JSON object. Minutes, and 4 GB. */
 void bench_sizes(FILE *json);

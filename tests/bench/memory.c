@@ -10,14 +10,34 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+/* The cube of bricks where it is there. */
+#if __has_include("hex8.h")
+#include "hex8.h"
+#else
+static uz_status hex8_qp(uz_qp *qp, int64_t n, uz_error *err)
+{
+    (void)qp, (void)n;
+    snprintf(err->message, sizeof err->message, "built without the cube of bricks");
+    return UZ_ERR_UNSUPPORTED;
+}
+#endif
+
+static uz_status paper_qp(uz_qp *qp, int64_t cells, uz_error *err)
+{
+    uz_scene scene = bench_paper_scene(cells);
+    uz_status status = uz_scene_to_qp(qp, NULL, &scene, err);
+    uz_scene_clear(&scene);
+    return status;
+}
+
 static bool matrices_of(uz_qp *qp, const char *problem)
 {
-    uz_scene scene = bench_paper_scene(strtol(problem, NULL, 10));
-    uz_error err;
-    uz_status status = uz_scene_to_qp(qp, NULL, &scene, &err);
+    uz_error err = {0};
+    bool cube = strncmp(problem, BENCH_CUBE, strlen(BENCH_CUBE)) == 0;
+    int64_t n = strtol(problem + (cube ? strlen(BENCH_CUBE) : 0), NULL, 10);
+    uz_status status = cube ? hex8_qp(qp, n, &err) : paper_qp(qp, n, &err);
     if (status != UZ_OK)
         fprintf(stderr, "%s: %s\n", problem, err.message);
-    uz_scene_clear(&scene);
     return status == UZ_OK;
 }
 
