@@ -54,7 +54,9 @@ static inline store_status submit_text(store *s, const char *body, const char *t
 {
     job j;
     bool repeated;
-    store_status status = store_submit(s, body, strlen(body), tags, key, &j, &repeated);
+    store_status status =
+        store_submit(s, &(store_request){.body = body, .body_len = strlen(body), .tags = tags, .idempotency_key = key},
+                     &j, &repeated);
     strcpy(id, j.id);
     job_clear(&j);
     return status;
@@ -82,7 +84,7 @@ static inline job_status status_of(store *s, const char *id)
 }
 
 static const store_outcome PLAIN_SUCCESS
-    __attribute__((unused)) = {.status = JOB_SUCCESSFUL, .summary = "{\"outcome\": \"converged\"}"};
+    __attribute__((unused)) = {.status = JOB_SUCCESSFUL, .whole.summary = "{\"outcome\": \"converged\"}"};
 
 static inline int64_t rows_in(const char *path, const char *table)
 {

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define BUSY_TIMEOUT_MS 5000
-#define JOB_COLUMNS     "id, status, progress, attempts, created, started, finished, tags, summary, error"
+#define JOB_COLUMNS     "id, status, progress, attempts, created, started, finished, tags, summary, error, refines"
 
 static const char *const SQL[QUERY_COUNT] = {
     [QUERY_BEGIN] = "BEGIN IMMEDIATE",
@@ -15,7 +15,8 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_NEWEST_ID] = "SELECT max(id) FROM job",
     [QUERY_FIND_KEY] = "SELECT " JOB_COLUMNS ", length(body) = ?2 AND body = ?3"
                        " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",
-    [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key) VALUES(?1, 0, ?2, ?3, ?4)",
+    [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key, refines)"
+                         " VALUES(?1, 0, ?2, ?3, ?4, ?5)",
     [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body) VALUES(?1, ?2)",
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
@@ -27,9 +28,11 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_FINISH] = "UPDATE job SET status = ?3, finished = ?4, summary = ?5, error = ?6, owner = NULL, lease = 0,"
                      " progress = CASE WHEN ?3 = 2 THEN 100 ELSE progress END"
                      " WHERE id = ?1 AND status = 1 AND owner = ?2",
-    [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data) VALUES(?1, ?2, ?3, ?4, ?5, ?6)",
-    [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, part, version, columns, last, data)"
-                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6)",
+    [QUERY_INSERT_ANSWER] = "INSERT INTO answer(job, number, name, summary) VALUES(?1, ?2, ?3, ?4)",
+    [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data, answer)"
+                            " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+    [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, part, version, columns, last, data, answer)"
+                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)",
     [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - 1, progress = 0, started = 0, owner = NULL,"
                       " lease = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_RECOVER_FAIL] = "UPDATE job SET status = 3, finished = ?2, error = ?3, owner = NULL, lease = 0"
@@ -45,8 +48,13 @@ static const char *const SQL[QUERY_COUNT] = {
                        " WHERE tag.tag = ?4 AND tag.job < ?1 ORDER BY tag.job DESC LIMIT ?2",
     [QUERY_LIST_TAG_STATUS] = "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job"
                               " WHERE tag.tag = ?4 AND tag.job < ?1 AND status = ?3 ORDER BY tag.job DESC LIMIT ?2",
-    [QUERY_VECTOR] = "SELECT version, count, data FROM vector WHERE job = ?1 AND name = ?2 ORDER BY part",
+    [QUERY_VECTOR] = "SELECT version, count, data FROM vector WHERE job = ?1 AND answer = ?3 AND name = ?2"
+                     " ORDER BY part",
+    [QUERY_COUNT_VECTORS] = "SELECT coalesce(sum(count), 0) FROM vector WHERE job = ?1 AND name = ?2 AND part = 0",
+    [QUERY_ANSWERS] = "SELECT number, name, summary FROM answer WHERE job = ?1 AND (?2 IS NULL OR name = ?2)"
+                      " ORDER BY number",
     [QUERY_HISTORY] = "SELECT version, columns, CASE WHEN last > ?2 THEN data END FROM history WHERE job = ?1"
+                      " AND answer = ?3"
                       " ORDER BY part",
     [QUERY_COUNTS] = "SELECT status, count(*) FROM job GROUP BY status",
 };

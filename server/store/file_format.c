@@ -15,11 +15,33 @@
  *     the reader keeps every number it ever wrote.
  *
  * job      what a listing needs, in small rows. Times are Unix seconds, 0: not yet. lease is when the owner's claim
- * ends. request  the body as it was sent; in its own table, so that a listing never reads past it. tag      one row for
- * each tag of a job, so that a filter by tag is a range of an index. vector   a named vector of a result, in parts of
- * bounded size; every part repeats the count of the whole vector. history  rows of a convergence history, in parts;
- * last is the iteration of the part's last row, so that a reader who has seen some rows skips whole parts. Deleting a
- * job deletes its rows in every other table. */
+ * ends. refines is the job whose run this one continues, which may be gone.
+ * request  the body as it was sent; in its own table, so that a listing never reads past it.
+ * tag      one row for each tag of a job, so that a filter by tag is a range of an index.
+ * answer   one row for each load case of an ended job, numbered from 1 in the order of the request.
+ * vector   a named vector of a result, in parts of bounded size; every part repeats the count of the whole vector.
+ *          answer is the number of its load case; 0: of the job, or of all its cases.
+ * history  rows of a convergence history, in parts, by answer like vector; last is the iteration of the part's last
+ *          row, so that a reader who has seen some rows skips whole parts.
+ * Deleting a job deletes its rows in every other table. */
+#define RESULT_TABLES                                                                                                  \
+    "CREATE TABLE answer("                                                                                             \
+    "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"                                                        \
+    "  number INTEGER NOT NULL, name TEXT NOT NULL, summary TEXT NOT NULL,"                                            \
+    "  PRIMARY KEY(job, number), UNIQUE(job, name)"                                                                    \
+    ") STRICT;"                                                                                                        \
+    "CREATE TABLE vector("                                                                                             \
+    "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"                                                        \
+    "  answer INTEGER NOT NULL, name TEXT NOT NULL, part INTEGER NOT NULL, version INTEGER NOT NULL,"                  \
+    "  count INTEGER NOT NULL, data BLOB NOT NULL,"                                                                    \
+    "  PRIMARY KEY(job, answer, name, part)"                                                                           \
+    ") STRICT;"                                                                                                        \
+    "CREATE TABLE history("                                                                                            \
+    "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"                                                        \
+    "  answer INTEGER NOT NULL, part INTEGER NOT NULL, version INTEGER NOT NULL,"                                      \
+    "  columns INTEGER NOT NULL, last REAL NOT NULL, data BLOB NOT NULL,"                                              \
+    "  PRIMARY KEY(job, answer, part)"                                                                                 \
+    ") STRICT;"
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -29,7 +51,8 @@ static const char *const SCHEMA =
     "  created REAL NOT NULL, started REAL NOT NULL DEFAULT 0, finished REAL NOT NULL DEFAULT 0,"
     "  owner TEXT, lease REAL NOT NULL DEFAULT 0,"
     "  tags TEXT NOT NULL, summary TEXT, error TEXT,"
-    "  idempotency_key TEXT UNIQUE"
+    "  idempotency_key TEXT UNIQUE,"
+    "  refines TEXT"
     ") STRICT;"
     "CREATE INDEX job_by_status ON job(status, id);"
     "CREATE TABLE request("
@@ -40,19 +63,7 @@ static const char *const SCHEMA =
     "  tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
-    "CREATE INDEX tag_by_job ON tag(job);"
-    "CREATE TABLE vector("
-    "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
-    "  name TEXT NOT NULL, part INTEGER NOT NULL, version INTEGER NOT NULL,"
-    "  count INTEGER NOT NULL, data BLOB NOT NULL,"
-    "  PRIMARY KEY(job, name, part)"
-    ") STRICT;"
-    "CREATE TABLE history("
-    "  job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
-    "  part INTEGER NOT NULL, version INTEGER NOT NULL,"
-    "  columns INTEGER NOT NULL, last REAL NOT NULL, data BLOB NOT NULL,"
-    "  PRIMARY KEY(job, part)"
-    ") STRICT;";
+    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -63,6 +74,19 @@ const char *file_format_why_unreadable(sqlite3 *db)
         return "the file is not an SQLite database; give the path of a new file instead";
     return db ? sqlite3_errmsg(db) : "no memory";
 }
+
+/* STEPS[n] turns version n into n + 1. Version 2: load cases, and jobs that refine others. The primary keys of the
+ * result tables grew by a column, which SQLite can only do by copying the rows. */
+static const char *const STEPS[FILE_FORMAT_VERSION] = {
+    [0] = NULL,
+    [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
+          "ALTER TABLE vector RENAME TO vector_1; ALTER TABLE history RENAME TO history_1;" RESULT_TABLES
+          "INSERT INTO vector(job, answer, name, part, version, count, data)"
+          " SELECT job, 0, name, part, version, count, data FROM vector_1;"
+          "INSERT INTO history(job, answer, part, version, columns, last, data)"
+          " SELECT job, 0, part, version, columns, last, data FROM history_1;"
+          "DROP TABLE vector_1; DROP TABLE history_1;",
+};
 
 /* The single integer that `sql` yields; false on any error. */
 static bool read_integer(sqlite3 *db, const char *sql, int64_t *value)
@@ -75,44 +99,53 @@ static bool read_integer(sqlite3 *db, const char *sql, int64_t *value)
     return ok;
 }
 
-bool file_format_check(sqlite3 *db, bool *fresh, char *message, size_t size)
+bool file_format_check(sqlite3 *db, int *version, char *message, size_t size)
 {
-    int64_t application = 0, version = 0, objects = 0;
-    *fresh = false;
+    int64_t application = 0, found = 0, objects = 0;
+    *version = 0;
     if (!read_integer(db, "SELECT count(*) FROM sqlite_schema", &objects) ||
-        !read_integer(db, "PRAGMA application_id", &application) ||
-        !read_integer(db, "PRAGMA user_version", &version)) {
+        !read_integer(db, "PRAGMA application_id", &application) || !read_integer(db, "PRAGMA user_version", &found)) {
         snprintf(message, size, "%s", file_format_why_unreadable(db));
         return false;
     }
-    if (objects == 0 && application == 0 && version == 0) {
-        *fresh = true;
+    if (objects == 0 && application == 0 && found == 0)
         return true;
-    }
     if (application != FILE_FORMAT_APPLICATION_ID) {
         snprintf(message, size, "the file is the SQLite database of another program; give the path of a new file");
         return false;
     }
-    if (version != FILE_FORMAT_VERSION) {
-        snprintf(message, size, "the file has format version %lld and this program reads version %d%s",
-                 (long long)version, FILE_FORMAT_VERSION,
-                 version > FILE_FORMAT_VERSION ? ": it was written by a newer program" : "");
+    if (found < 1 || found > FILE_FORMAT_VERSION) {
+        snprintf(message, size, "the file has format version %lld and this program reads versions 1 to %d%s",
+                 (long long)found, FILE_FORMAT_VERSION,
+                 found > FILE_FORMAT_VERSION ? ": it was written by a newer program" : "");
         return false;
     }
+    *version = (int)found;
     return true;
 }
 
-bool file_format_create(sqlite3 *db, char *message, size_t size)
+/* Runs `sql` and sets the version in one transaction. */
+static bool run_step(sqlite3 *db, const char *sql, int version, const char *what, char *message, size_t size)
 {
     char pragmas[128];
     snprintf(pragmas, sizeof pragmas, "PRAGMA application_id = %d; PRAGMA user_version = %d; COMMIT;",
-             FILE_FORMAT_APPLICATION_ID, FILE_FORMAT_VERSION);
+             FILE_FORMAT_APPLICATION_ID, version);
     if (sqlite3_exec(db, "BEGIN IMMEDIATE", NULL, NULL, NULL) == SQLITE_OK &&
-        sqlite3_exec(db, SCHEMA, NULL, NULL, NULL) == SQLITE_OK &&
+        sqlite3_exec(db, sql, NULL, NULL, NULL) == SQLITE_OK &&
         sqlite3_exec(db, pragmas, NULL, NULL, NULL) == SQLITE_OK)
         return true;
-    snprintf(message, size, "cannot create the tables: %s", sqlite3_errmsg(db));
+    snprintf(message, size, "cannot %s: %s", what, sqlite3_errmsg(db));
     if (!sqlite3_get_autocommit(db))
         sqlite3_exec(db, "ROLLBACK", NULL, NULL, NULL);
     return false;
+}
+
+bool file_format_upgrade(sqlite3 *db, int version, char *message, size_t size)
+{
+    if (version == 0)
+        return run_step(db, SCHEMA, FILE_FORMAT_VERSION, "create the tables", message, size);
+    for (; version < FILE_FORMAT_VERSION; version++)
+        if (!run_step(db, STEPS[version], version + 1, "bring the file to the present format", message, size))
+            return false;
+    return true;
 }

@@ -7,17 +7,19 @@
 #include <stddef.h>
 
 #define FILE_FORMAT_APPLICATION_ID 0x757a6177 /* "uzaw" */
-#define FILE_FORMAT_VERSION        1          /* PRAGMA user_version */
+#define FILE_FORMAT_VERSION        2          /* PRAGMA user_version */
 #define FILE_FORMAT_VECTOR_VERSION 1          /* of each row of doubles: 1 is little-endian IEEE 754 binary64 */
 
 /* Why the last read of the file failed, for the person who gave its path. Valid until the next call on db. */
 const char *file_format_why_unreadable(sqlite3 *db);
 
-/* True if the file is empty (*fresh) or ours in a version that this program reads; otherwise the reason in message.
+/* True if the file is empty (*version 0) or ours in a version that this program reads; otherwise the reason in message.
  * Changes nothing, so that a file that belongs to another program stays as it was. */
-bool file_format_check(sqlite3 *db, bool *fresh, char *message, size_t size);
+bool file_format_check(sqlite3 *db, int *version, char *message, size_t size);
 
-/* Creates all tables in one transaction: a crash leaves an empty file, which the next start takes as fresh. */
-bool file_format_create(sqlite3 *db, char *message, size_t size);
+/* Takes a file that file_format_check has passed from `version` to the present one: all tables where it is 0, else the
+ * missing steps. Each step is one transaction that also sets the version: a crash leaves the file as it was before the
+ * step, and the next start goes on from there. On failure nothing of the failed step remains. */
+bool file_format_upgrade(sqlite3 *db, int version, char *message, size_t size);
 
 #endif

@@ -47,8 +47,13 @@ store_status store_read_job(statement *st, job *out);
 /* STORE_CONFLICT if the job exists, else STORE_NOT_FOUND: why an update found nothing to change. */
 store_status store_why_unchanged(connection *c, const char *id);
 
-/* Inserts the vectors and the history of a job that has none. */
-store_status store_insert_vectors(connection *c, const char *id, const store_outcome *outcome);
-store_status store_insert_history(connection *c, const char *id, const store_outcome *outcome);
+/* A copy of the blob in column `at`, NUL-terminated; NULL: no memory. */
+char *store_copy_blob(statement *st, int at, size_t *len);
+
+/* A copy of a text column; NULL for SQL NULL, and *ok false when there is no memory. */
+char *store_copy_text(statement *st, int at, bool *ok);
+
+/* Inserts the vectors, the histories and the cases' answers of a job that has none. */
+store_status store_insert_results(connection *c, const char *id, const store_outcome *outcome);
 
 #endif

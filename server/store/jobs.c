@@ -57,9 +57,7 @@ static store_status run_update(statement *st, const char *id)
 /* ---- submit */
 
 typedef struct {
-    const char *body;
-    size_t body_len;
-    const char *tags, *key;
+    const store_request *request;
     job *out;
     bool repeated;
 } submit_args;
@@ -70,34 +68,36 @@ static store_status find_key(connection *c, submit_args *a)
 {
     store_status status = STORE_NOT_FOUND;
     statement st = statement_begin(c, QUERY_FIND_KEY);
-    bind_text(&st, 1, a->key);
-    bind_integer(&st, 2, (int64_t)a->body_len);
-    bind_blob(&st, 3, a->body, a->body_len);
+    bind_text(&st, 1, a->request->idempotency_key);
+    bind_integer(&st, 2, (int64_t)a->request->body_len);
+    bind_blob(&st, 3, a->request->body, a->request->body_len);
     if (statement_row(&st))
-        status = sqlite3_column_int(st.stmt, 10) ? store_read_job(&st, a->out) : STORE_CONFLICT;
+        status = sqlite3_column_int(st.stmt, 11) ? store_read_job(&st, a->out) : STORE_CONFLICT;
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
 }
 
-static store_status insert_job(connection *c, const submit_args *a, const char *id)
+static store_status insert_job(connection *c, const store_request *r, const char *id)
 {
+    const char *tags = r->tags ? r->tags : "[]";
     statement st = statement_begin(c, QUERY_INSERT_JOB);
     bind_text(&st, 1, id);
     bind_real(&st, 2, store_now());
-    bind_text(&st, 3, a->tags);
-    bind_text(&st, 4, a->key);
+    bind_text(&st, 3, tags);
+    bind_text(&st, 4, r->idempotency_key);
+    bind_text(&st, 5, r->refines);
     store_status status = statement_run(&st);
     if (status != STORE_OK)
         return status;
     st = statement_begin(c, QUERY_INSERT_REQUEST);
     bind_text(&st, 1, id);
-    bind_blob(&st, 2, a->body, a->body_len);
+    bind_blob(&st, 2, r->body, r->body_len);
     status = statement_run(&st);
     if (status != STORE_OK)
         return status;
     st = statement_begin(c, QUERY_INSERT_TAGS);
     bind_text(&st, 1, id);
-    bind_text(&st, 2, a->tags);
+    bind_text(&st, 2, tags);
     return statement_run(&st);
 }
 
@@ -118,27 +118,65 @@ static store_status submit(store *s, connection *c, void *args)
     char id[33];
     job_clear(a->out);
     a->repeated = false;
-    if (a->key) {
+    if (a->request->idempotency_key) {
         store_status status = find_key(c, a);
         a->repeated = status == STORE_OK;
         if (status != STORE_NOT_FOUND)
             return status;
     }
     store_next_id(s, id);
-    store_status status = insert_job(c, a, id);
+    store_status status = insert_job(c, a->request, id);
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 
-store_status store_submit(store *s, const char *body, size_t body_len, const char *tags, const char *idempotency_key,
-                          job *out, bool *repeated)
+store_status store_submit(store *s, const store_request *request, job *out, bool *repeated)
 {
     memset(out, 0, sizeof *out);
-    submit_args a = {body, body_len, tags ? tags : "[]", idempotency_key, out, false};
+    submit_args a = {request, out, false};
     store_status status = store_write(s, submit, &a);
     if (status != STORE_OK)
         job_clear(out);
     *repeated = status == STORE_OK && a.repeated;
     return status;
+}
+
+/* ---- the request as submitted */
+
+char *store_copy_blob(statement *st, int at, size_t *len)
+{
+    size_t size = (size_t)sqlite3_column_bytes(st->stmt, at);
+    const void *data = sqlite3_column_blob(st->stmt, at);
+    char *copy = data || size == 0 ? malloc(size + 1) : NULL;
+    if (!copy)
+        return NULL;
+    if (size > 0)
+        memcpy(copy, data, size);
+    copy[size] = '\0';
+    *len = size;
+    return copy;
+}
+
+/* *body stays NULL where this fails. */
+static store_status read_body(connection *c, const char *id, char **body, size_t *len)
+{
+    statement st = statement_begin(c, QUERY_BODY);
+    bind_text(&st, 1, id);
+    bool found = statement_row(&st);
+    if (found)
+        *body = store_copy_blob(&st, 0, len);
+    store_status ended = statement_end(&st);
+    if (ended != STORE_OK || *body)
+        return ended;
+    strcpy(c->message, "the request of a job is missing, or there is no memory for it");
+    return found ? STORE_ERROR : STORE_NOT_FOUND;
+}
+
+store_status store_get_body(store *s, const char *id, char **body, size_t *len)
+{
+    *body = NULL;
+    *len = 0;
+    connection *c = store_take_reader(s);
+    return store_give_reader(s, c, read_body(c, id, body, len));
 }
 
 /* ---- claim */
@@ -150,29 +188,6 @@ typedef struct {
     char *body;
     size_t body_len;
 } claim_args;
-
-static store_status read_body(connection *c, claim_args *a)
-{
-    store_status status = STORE_ERROR;
-    statement st = statement_begin(c, QUERY_BODY);
-    bind_text(&st, 1, a->out->id);
-    if (statement_row(&st)) {
-        size_t size = (size_t)sqlite3_column_bytes(st.stmt, 0);
-        const void *data = sqlite3_column_blob(st.stmt, 0);
-        a->body = malloc(size + 1);
-        if (a->body && (data || size == 0)) {
-            if (size > 0)
-                memcpy(a->body, data, size);
-            a->body[size] = '\0';
-            a->body_len = size;
-            status = STORE_OK;
-        }
-    }
-    store_status ended = statement_end(&st);
-    if (ended == STORE_OK && status != STORE_OK)
-        strcpy(c->message, "the request of a job is missing, or there is no memory for it");
-    return ended == STORE_OK ? status : ended;
-}
 
 static store_status claim(store *s, connection *c, void *args)
 {
@@ -191,7 +206,10 @@ static store_status claim(store *s, connection *c, void *args)
     store_status ended = statement_end(&st);
     if (ended != STORE_OK)
         status = ended;
-    return status == STORE_OK ? read_body(c, a) : status;
+    if (status != STORE_OK)
+        return status;
+    status = read_body(c, a->out->id, &a->body, &a->body_len);
+    return status == STORE_NOT_FOUND ? STORE_ERROR : status; /* a job without its request is a damaged file */
 }
 
 store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len)
@@ -251,14 +269,10 @@ static store_status finish(store *s, connection *c, void *args)
     bind_text(&st, 2, a->owner);
     bind_integer(&st, 3, a->outcome->status);
     bind_real(&st, 4, store_now());
-    bind_text(&st, 5, a->outcome->summary);
+    bind_text(&st, 5, a->outcome->whole.summary);
     bind_text(&st, 6, a->outcome->error);
     store_status status = run_update(&st, a->id);
-    if (status == STORE_OK)
-        status = store_insert_vectors(c, a->id, a->outcome);
-    if (status == STORE_OK)
-        status = store_insert_history(c, a->id, a->outcome);
-    return status;
+    return status == STORE_OK ? store_insert_results(c, a->id, a->outcome) : status;
 }
 
 store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome)

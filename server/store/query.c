@@ -4,12 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A copy of a text column; NULL for SQL NULL, and *ok false when there is no memory. */
-static char *copy_text(sqlite3_stmt *stmt, int at, bool *ok)
+char *store_copy_text(statement *st, int at, bool *ok)
 {
-    if (sqlite3_column_type(stmt, at) == SQLITE_NULL)
+    if (sqlite3_column_type(st->stmt, at) == SQLITE_NULL)
         return NULL;
-    const char *text = (const char *)sqlite3_column_text(stmt, at);
+    const char *text = (const char *)sqlite3_column_text(st->stmt, at);
     char *copy = text ? strdup(text) : NULL;
     *ok = *ok && copy;
     return copy;
@@ -29,9 +28,12 @@ store_status store_read_job(statement *st, job *out)
     out->created = sqlite3_column_double(row, 4);
     out->started = sqlite3_column_double(row, 5);
     out->finished = sqlite3_column_double(row, 6);
-    out->tags = copy_text(row, 7, &ok);
-    out->summary = copy_text(row, 8, &ok);
-    out->error = copy_text(row, 9, &ok);
+    out->tags = store_copy_text(st, 7, &ok);
+    out->summary = store_copy_text(st, 8, &ok);
+    out->error = store_copy_text(st, 9, &ok);
+    const char *refines = (const char *)sqlite3_column_text(row, 10);
+    if (refines && strlen(refines) < sizeof out->refines)
+        strcpy(out->refines, refines);
     if (ok)
         return STORE_OK;
     job_clear(out);
@@ -92,6 +94,68 @@ store_status store_list(store *s, const store_query *query, job **jobs, size_t *
     *jobs = found;
     *count = n;
     return STORE_OK;
+}
+
+/* ---- the cases of a job */
+
+void store_cases_free(store_case *cases, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        free(cases[i].name);
+        free(cases[i].summary);
+    }
+    free(cases);
+}
+
+static store_status read_case(statement *st, store_case *out)
+{
+    bool ok = true;
+    *out = (store_case){.number = sqlite3_column_int64(st->stmt, 0)};
+    out->name = store_copy_text(st, 1, &ok);
+    out->summary = store_copy_text(st, 2, &ok);
+    if (ok)
+        return STORE_OK;
+    strcpy(st->c->message, "no memory for the cases of a job");
+    return STORE_ERROR;
+}
+
+static store_status read_cases(statement *st, store_case **cases, size_t *count)
+{
+    store_status status = STORE_OK;
+    size_t capacity = 0;
+    while (status == STORE_OK && statement_row(st)) {
+        if (*count == capacity) {
+            capacity = capacity ? 2 * capacity : 16;
+            store_case *grown = realloc(*cases, capacity * sizeof *grown);
+            if (!grown) {
+                strcpy(st->c->message, "no memory for the cases of a job");
+                return STORE_ERROR;
+            }
+            *cases = grown;
+        }
+        status = read_case(st, &(*cases)[(*count)++]);
+    }
+    return status;
+}
+
+store_status store_get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count)
+{
+    *cases = NULL;
+    *count = 0;
+    connection *c = store_take_reader(s);
+    statement st = statement_begin(c, QUERY_ANSWERS);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, name);
+    store_status status = read_cases(&st, cases, count);
+    store_status ended = statement_end(&st);
+    if (ended != STORE_OK)
+        status = ended;
+    if (status != STORE_OK) {
+        store_cases_free(*cases, *count);
+        *cases = NULL;
+        *count = 0;
+    }
+    return store_give_reader(s, c, status);
 }
 
 store_status store_counts(store *s, int64_t counts[5])

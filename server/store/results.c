@@ -45,7 +45,8 @@ static store_status damaged(connection *c)
 /* ---- writing */
 
 /* At least one part, so that an empty vector is not the same as none. */
-static store_status insert_vector(connection *c, const char *id, const store_vector *v, unsigned char *part)
+static store_status insert_vector(connection *c, const char *id, int64_t number, const store_vector *v,
+                                  unsigned char *part)
 {
     store_status status = STORE_OK;
     for (int64_t at = 0, n = 0; status == STORE_OK && (at < v->count || n == 0); at += PART_DOUBLES, n++) {
@@ -59,52 +60,81 @@ static store_status insert_vector(connection *c, const char *id, const store_vec
         bind_integer(&st, 4, FILE_FORMAT_VECTOR_VERSION);
         bind_integer(&st, 5, v->count);
         bind_blob(&st, 6, part, (size_t)count * 8);
+        bind_integer(&st, 7, number);
         status = statement_run(&st);
     }
     return status;
 }
 
-store_status store_insert_vectors(connection *c, const char *id, const store_outcome *outcome)
-{
-    store_status status = STORE_OK;
-    unsigned char *part = malloc(PART_DOUBLES * 8);
-    if (!part)
-        return no_memory(c);
-    for (size_t i = 0; i < outcome->n_vectors && status == STORE_OK; i++)
-        status = insert_vector(c, id, &outcome->vectors[i], part);
-    free(part);
-    return status;
-}
+/* Where rows of a history go. */
+typedef struct {
+    const char *id;
+    int64_t number, part, columns;
+} rows_place;
 
-static store_status insert_rows(connection *c, const char *id, int64_t number, const double *rows, int64_t count,
-                                int64_t columns, unsigned char *part)
+static store_status insert_rows(connection *c, const rows_place *at, const double *rows, int64_t count,
+                                unsigned char *part)
 {
+    int64_t columns = at->columns;
     encode(part, rows, count * columns);
     statement st = statement_begin(c, QUERY_INSERT_HISTORY);
-    bind_text(&st, 1, id);
-    bind_integer(&st, 2, number);
+    bind_text(&st, 1, at->id);
+    bind_integer(&st, 2, at->part);
     bind_integer(&st, 3, FILE_FORMAT_VECTOR_VERSION);
     bind_integer(&st, 4, columns);
     bind_real(&st, 5, count > 0 ? rows[(count - 1) * columns] : -1.0);
     bind_blob(&st, 6, part, (size_t)(count * columns) * 8);
+    bind_integer(&st, 7, at->number);
     return statement_run(&st);
 }
 
-store_status store_insert_history(connection *c, const char *id, const store_outcome *outcome)
+/* A history without rows is one empty part. */
+static store_status insert_history(connection *c, const char *id, int64_t number, const store_answer *answer,
+                                   unsigned char *part)
 {
-    int64_t columns = outcome->history_columns;
-    if (!outcome->history || columns <= 0 || columns > PART_DOUBLES)
-        return STORE_OK;
+    rows_place place = {id, number, 0, answer->history_columns};
     store_status status = STORE_OK;
-    int64_t rows_in_part = PART_DOUBLES / columns;
+    if (!answer->history || place.columns <= 0 || place.columns > PART_DOUBLES)
+        return STORE_OK;
+    int64_t rows_in_part = PART_DOUBLES / place.columns;
+    for (int64_t at = 0; status == STORE_OK && (at < answer->history_rows || place.part == 0); place.part++) {
+        int64_t left = answer->history_rows - at;
+        int64_t count = left < rows_in_part ? left : rows_in_part;
+        status = insert_rows(c, &place, answer->history + at * place.columns, count, part);
+        at += rows_in_part;
+    }
+    return status;
+}
+
+static store_status insert_answer(connection *c, const char *id, int64_t number, const store_answer *answer,
+                                  unsigned char *part)
+{
+    store_status status = STORE_OK;
+    for (size_t i = 0; i < answer->n_vectors && status == STORE_OK; i++)
+        status = insert_vector(c, id, number, &answer->vectors[i], part);
+    return status == STORE_OK ? insert_history(c, id, number, answer, part) : status;
+}
+
+static store_status insert_case(connection *c, const char *id, int64_t number, const store_answer *answer,
+                                unsigned char *part)
+{
+    statement st = statement_begin(c, QUERY_INSERT_ANSWER);
+    bind_text(&st, 1, id);
+    bind_integer(&st, 2, number);
+    bind_text(&st, 3, answer->name);
+    bind_text(&st, 4, answer->summary);
+    store_status status = statement_run(&st);
+    return status == STORE_OK ? insert_answer(c, id, number, answer, part) : status;
+}
+
+store_status store_insert_results(connection *c, const char *id, const store_outcome *outcome)
+{
     unsigned char *part = malloc(PART_DOUBLES * 8);
     if (!part)
         return no_memory(c);
-    for (int64_t at = 0, n = 0; status == STORE_OK && (at < outcome->history_rows || n == 0); at += rows_in_part, n++) {
-        int64_t left = outcome->history_rows - at;
-        status = insert_rows(c, id, n, outcome->history + at * columns, left < rows_in_part ? left : rows_in_part,
-                             columns, part);
-    }
+    store_status status = insert_answer(c, id, 0, &outcome->whole, part);
+    for (size_t i = 0; i < outcome->n_cases && status == STORE_OK; i++)
+        status = insert_case(c, id, (int64_t)i + 1, &outcome->cases[i], part);
     free(part);
     return status;
 }
@@ -141,7 +171,7 @@ static store_status read_vector(statement *st, double **out, int64_t *total)
     return have == *total ? STORE_OK : damaged(st->c);
 }
 
-store_status store_get_vector(store *s, const char *id, const char *name, double **data, int64_t *count)
+store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data, int64_t *count)
 {
     double *x = NULL;
     int64_t total = 0;
@@ -151,6 +181,7 @@ store_status store_get_vector(store *s, const char *id, const char *name, double
     statement st = statement_begin(c, QUERY_VECTOR);
     bind_text(&st, 1, id);
     bind_text(&st, 2, name);
+    bind_integer(&st, 3, number);
     store_status status = read_vector(&st, &x, &total);
     store_status ended = statement_end(&st);
     if (ended != STORE_OK)
@@ -162,6 +193,18 @@ store_status store_get_vector(store *s, const char *id, const char *name, double
     }
     free(x);
     return store_give_reader(s, c, status);
+}
+
+store_status store_count_vectors(store *s, const char *id, const char *name, int64_t *total)
+{
+    *total = 0;
+    connection *c = store_take_reader(s);
+    statement st = statement_begin(c, QUERY_COUNT_VECTORS);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, name);
+    if (statement_row(&st))
+        *total = sqlite3_column_int64(st.stmt, 0);
+    return store_give_reader(s, c, statement_end(&st));
 }
 
 typedef struct {
@@ -202,7 +245,8 @@ static void drop_seen(rows_buffer *rows, int64_t after)
     memmove(rows->x, rows->x + skip, (size_t)rows->count * 8);
 }
 
-store_status store_get_history(store *s, const char *id, int64_t after, double **rows, int64_t *count, int64_t *columns)
+store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
+                               int64_t *columns)
 {
     rows_buffer found = {NULL, 0, 0};
     *rows = NULL;
@@ -211,6 +255,7 @@ store_status store_get_history(store *s, const char *id, int64_t after, double *
     statement st = statement_begin(c, QUERY_HISTORY);
     bind_text(&st, 1, id);
     bind_real(&st, 2, (double)after);
+    bind_integer(&st, 3, number);
     store_status status = read_history(&st, &found);
     store_status ended = statement_end(&st);
     if (ended != STORE_OK)

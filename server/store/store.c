@@ -49,10 +49,10 @@ static bool set_wal(sqlite3 *db, char *message, size_t size)
 
 static bool open_writer(store *s, const char *path, char *message, size_t size)
 {
-    bool fresh;
+    int version;
     return connection_open(&s->writer, path, true, message, size) &&
-           file_format_check(s->writer.db, &fresh, message, size) && set_wal(s->writer.db, message, size) &&
-           (!fresh || file_format_create(s->writer.db, message, size));
+           file_format_check(s->writer.db, &version, message, size) && set_wal(s->writer.db, message, size) &&
+           file_format_upgrade(s->writer.db, version, message, size);
 }
 
 static bool open_readers(store *s, const char *path, char *message, size_t size)

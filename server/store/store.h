@@ -31,9 +31,10 @@ typedef struct {
     int progress; /* 0..100 */
     int attempts; /* runs begun */
     double created, started, finished;
-    char *tags;    /* JSON array of strings, never NULL */
-    char *summary; /* JSON object once it ended with an answer, else NULL */
-    char *error;   /* JSON object (problem details) when it failed, else NULL */
+    char *tags;       /* JSON array of strings, never NULL */
+    char *summary;    /* JSON object once it ended with an answer, else NULL */
+    char *error;      /* JSON object (problem details) when it failed, else NULL */
+    char refines[33]; /* the job whose run this one continues; "": none. It may have been deleted */
 } job;
 void job_clear(job *j); /* frees the texts, zeroes *j; NULL is fine */
 
@@ -47,11 +48,18 @@ void store_message(store *s, char *buffer, size_t size);
  * STORE_FULL, as a full disk is. Not kept in the file. */
 store_status store_limit_bytes(store *s, int64_t bytes);
 
-/* ---- submit: the job is on disk (fsync) before STORE_OK is returned.
- * idempotency_key may be NULL. When the key is known and came with the same body, *out is the earlier job and
- * *repeated is true; with another body STORE_CONFLICT. tags: JSON array text. */
-store_status store_submit(store *s, const char *body, size_t body_len, const char *tags, const char *idempotency_key,
-                          job *out, bool *repeated);
+/* What is submitted. */
+typedef struct {
+    const char *body;
+    size_t body_len;
+    const char *tags;            /* JSON array text; NULL: [] */
+    const char *idempotency_key; /* may be NULL */
+    const char *refines;         /* id, or NULL */
+} store_request;
+
+/* ---- submit: the job is on disk (fsync) before STORE_OK is returned. When the key is known and came with the same
+ * body, *out is the earlier job and *repeated is true; with another body STORE_CONFLICT. */
+store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
 
 /* ---- claim: the oldest accepted job becomes running, attempts + 1, owner and lease set; *body is the request as
  * submitted, freed by the caller. STORE_NOT_FOUND when nothing waits. */
@@ -67,18 +75,26 @@ typedef struct {
     const double *data;
 } store_vector;
 
-/* What a run leaves behind. */
+/* What one load case leaves behind, or a job without cases. */
 typedef struct {
-    job_status status;   /* JOB_SUCCESSFUL, JOB_FAILED or JOB_DISMISSED */
-    const char *summary; /* JSON object or NULL */
-    const char *error;   /* JSON object or NULL */
+    const char *name;    /* of the case, unique in its job */
+    const char *summary; /* JSON object */
     const store_vector *vectors;
     size_t n_vectors;
     const double *history; /* history_rows x history_columns, row by row; NULL when there is none */
     int64_t history_rows, history_columns;
+} store_answer;
+
+/* What a run leaves behind. */
+typedef struct {
+    job_status status;  /* JOB_SUCCESSFUL, JOB_FAILED or JOB_DISMISSED */
+    const char *error;  /* JSON object or NULL */
+    store_answer whole; /* the job's own: name is not used, summary may be NULL. With cases: what they share */
+    const store_answer *cases;
+    size_t n_cases;
 } store_outcome;
 
-/* ---- finish: status, summary, result and history in one transaction. Only the owner of the running job may;
+/* ---- finish: status, summaries, results and histories in one transaction. Only the owner of the running job may;
  * otherwise STORE_CONFLICT and nothing is written: each job gets one result. */
 store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome);
 
@@ -105,11 +121,28 @@ typedef struct {
 /* Newest first; the caller frees with job_clear and free. *more: there are older ones. */
 store_status store_list(store *s, const store_query *query, job **jobs, size_t *count, bool *more);
 
-/* The named vector; *data is freed by the caller. STORE_NOT_FOUND if the result has none of that name. */
-store_status store_get_vector(store *s, const char *id, const char *name, double **data, int64_t *count);
-/* Rows whose first column (iteration) is > after; pass -1 for all. The caller frees *rows. STORE_NOT_FOUND if the job
- * has no stored history; STORE_OK with a count of 0 when it has one but nothing after `after`. */
-store_status store_get_history(store *s, const char *id, int64_t after, double **rows, int64_t *count,
+/* The body as submitted; the caller frees it. */
+store_status store_get_body(store *s, const char *id, char **body, size_t *len);
+
+/* A load case of an ended job. */
+typedef struct {
+    int64_t number; /* from 1, in the order of the request */
+    char *name, *summary;
+} store_case;
+/* The cases of a job, or the one with this name where name is not NULL; the caller frees *cases with
+ * store_cases_free. STORE_OK with a count of 0 where there is none, or no such job. */
+store_status store_get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count);
+void store_cases_free(store_case *cases, size_t count);
+
+/* The named vector of a case, 0: of the job itself; *data is freed by the caller. STORE_NOT_FOUND if the result has
+ * none of that name. */
+store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data,
+                              int64_t *count);
+/* The lengths of all vectors of that name, over the job and its cases. */
+store_status store_count_vectors(store *s, const char *id, const char *name, int64_t *total);
+/* Rows whose first column (iteration) is > after; pass -1 for all. The caller frees *rows. STORE_NOT_FOUND if the case
+ * (0: the job) has no stored history; STORE_OK with a count of 0 when it has one but nothing after `after`. */
+store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
                                int64_t *columns);
 
 /* Jobs in each status, indexed by job_status. */

@@ -21,7 +21,9 @@ TEST(submit_claim_finish)
     size_t len = 0;
     if (!place_begin(&p))
         return;
-    CHECK_INT(store_submit(p.s, "{\"a\": 1}", 8, "[\"demo\"]", NULL, &j, &repeated), STORE_OK);
+    CHECK_INT(
+        store_submit(p.s, &(store_request){.body = "{\"a\": 1}", .body_len = 8, .tags = "[\"demo\"]"}, &j, &repeated),
+        STORE_OK);
     CHECK(!repeated && strlen(j.id) == 32 && j.status == JOB_ACCEPTED && j.attempts == 0 && j.created > 1e9);
     CHECK(j.started == 0 && j.finished == 0 && !j.summary && !j.error);
     CHECK_STR(j.tags, "[\"demo\"]");
@@ -62,12 +64,12 @@ TEST(only_the_owner_of_a_running_job_may_change_it)
     CHECK_INT(store_finish(p.s, id, "a", &no_end), STORE_ERROR);
     double x = 1.0;
     store_vector v = {"reactions", 1, &x};
-    store_outcome late = {.status = JOB_FAILED, .error = "{}", .vectors = &v, .n_vectors = 1};
+    store_outcome late = {.status = JOB_FAILED, .error = "{}", .whole.vectors = &v, .whole.n_vectors = 1};
     CHECK_INT(store_finish(p.s, id, "a", &PLAIN_SUCCESS), STORE_OK);
     CHECK_INT(store_finish(p.s, id, "a", &late), STORE_CONFLICT); /* one result for each job */
     double *data;
     int64_t count;
-    CHECK_INT(store_get_vector(p.s, id, "reactions", &data, &count), STORE_NOT_FOUND);
+    CHECK_INT(store_get_vector(p.s, id, 0, "reactions", &data, &count), STORE_NOT_FOUND);
     CHECK_INT(status_of(p.s, id), JOB_SUCCESSFUL);
     const char *nobody = "ffffffffffffffffffffffffffffffff";
     CHECK_INT(store_finish(p.s, nobody, "a", &PLAIN_SUCCESS), STORE_NOT_FOUND);
@@ -154,13 +156,22 @@ TEST(idempotency_key)
     job_status was;
     if (!place_begin(&p))
         return;
-    CHECK_INT(store_submit(p.s, "{\"a\": 1}", 8, "[]", "key-1", &first, &repeated), STORE_OK);
+    CHECK_INT(store_submit(
+                  p.s, &(store_request){.body = "{\"a\": 1}", .body_len = 8, .tags = "[]", .idempotency_key = "key-1"},
+                  &first, &repeated),
+              STORE_OK);
     CHECK(!repeated);
-    CHECK_INT(store_submit(p.s, "{\"a\": 1}", 8, "[]", "key-1", &second, &repeated), STORE_OK);
+    CHECK_INT(store_submit(
+                  p.s, &(store_request){.body = "{\"a\": 1}", .body_len = 8, .tags = "[]", .idempotency_key = "key-1"},
+                  &second, &repeated),
+              STORE_OK);
     CHECK(repeated);
     CHECK_STR(second.id, first.id);
     job_clear(&second);
-    CHECK_INT(store_submit(p.s, "{\"a\": 2}", 8, "[]", "key-1", &second, &repeated), STORE_CONFLICT);
+    CHECK_INT(store_submit(
+                  p.s, &(store_request){.body = "{\"a\": 2}", .body_len = 8, .tags = "[]", .idempotency_key = "key-1"},
+                  &second, &repeated),
+              STORE_CONFLICT);
     CHECK(!repeated && !second.tags && !second.id[0]);
     CHECK_INT(submit_text(p.s, "{\"a\": 1} ", "[]", "key-1", id), STORE_CONFLICT); /* a longer body */
     CHECK_INT(submit_text(p.s, "{\"a\": 2}", "[]", "key-2", id), STORE_OK);        /* another key */
@@ -189,7 +200,7 @@ static void check_vector(store *s, const char *id, const char *name, const doubl
 {
     double *data = NULL;
     int64_t count = -1;
-    CHECK_INT(store_get_vector(s, id, name, &data, &count), STORE_OK);
+    CHECK_INT(store_get_vector(s, id, 0, name, &data, &count), STORE_OK);
     CHECK_INT(count, want_count);
     CHECK(data && (want_count == 0 || memcmp(data, want, (size_t)want_count * sizeof *want) == 0));
     free(data);
@@ -203,7 +214,7 @@ TEST(vectors_come_back_bit_for_bit)
     double *x = ramp(large);
     double odd[] = {0.0, -0.0, 5e-324, 1.7976931348623157e308, INFINITY, -INFINITY, NAN};
     store_vector v[] = {{"displacements", large, x}, {"odd", 7, odd}, {"empty", 0, NULL}, {"part", 131072, x}};
-    store_outcome outcome = {.status = JOB_SUCCESSFUL, .summary = "{}", .vectors = v, .n_vectors = 4};
+    store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole.summary = "{}", .whole.vectors = v, .whole.n_vectors = 4};
     if (place_begin(&p)) {
         CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
         CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
@@ -215,9 +226,9 @@ TEST(vectors_come_back_bit_for_bit)
         check_vector(p.s, id, "part", x, 131072);
         double *data;
         int64_t count, columns;
-        CHECK_INT(store_get_vector(p.s, id, "gaps", &data, &count), STORE_NOT_FOUND);
+        CHECK_INT(store_get_vector(p.s, id, 0, "gaps", &data, &count), STORE_NOT_FOUND);
         CHECK(!data && count == 0);
-        CHECK_INT(store_get_history(p.s, id, -1, &data, &count, &columns), STORE_NOT_FOUND);
+        CHECK_INT(store_get_history(p.s, id, 0, -1, &data, &count, &columns), STORE_NOT_FOUND);
         place_end(&p);
     }
     free(x);
@@ -227,7 +238,7 @@ static void check_history(store *s, const char *id, int64_t after, int64_t want_
 {
     double *rows = NULL;
     int64_t count = -1, columns = -1;
-    CHECK_INT(store_get_history(s, id, after, &rows, &count, &columns), STORE_OK);
+    CHECK_INT(store_get_history(s, id, 0, after, &rows, &count, &columns), STORE_OK);
     CHECK_INT(count, want_count);
     CHECK_INT(columns, 12);
     if (count > 0)
@@ -245,7 +256,8 @@ TEST(history_after_an_iteration)
         rows[i * 12] = (double)i;
         rows[i * 12 + 11] = (double)i + 0.5;
     }
-    store_outcome outcome = {.status = JOB_DISMISSED, .history = rows, .history_rows = n, .history_columns = 12};
+    store_outcome outcome = {
+        .status = JOB_DISMISSED, .whole.history = rows, .whole.history_rows = n, .whole.history_columns = 12};
     if (place_begin(&p)) {
         CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
         CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
@@ -269,7 +281,7 @@ TEST(a_damaged_vector_is_an_error)
     double x[4] = {1, 2, 3, 4}, *data;
     int64_t count;
     store_vector v = {"gaps", 4, x};
-    store_outcome outcome = {.status = JOB_SUCCESSFUL, .vectors = &v, .n_vectors = 1};
+    store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole.vectors = &v, .whole.n_vectors = 1};
     const char *const damage[] = {"UPDATE vector SET data = x'00'", "UPDATE vector SET data = zeroblob(24)",
                                   "UPDATE vector SET data = zeroblob(40)", "UPDATE vector SET version = 2",
                                   "UPDATE vector SET count = -1"};
@@ -286,7 +298,7 @@ TEST(a_damaged_vector_is_an_error)
         sqlite3_close(db);
         if (!place_open(&p))
             return;
-        CHECK_INT(store_get_vector(p.s, id, "gaps", &data, &count), STORE_ERROR);
+        CHECK_INT(store_get_vector(p.s, id, 0, "gaps", &data, &count), STORE_ERROR);
         CHECK(!data && count == 0);
         store_message(p.s, message, sizeof message);
         CHECK(strstr(message, "damaged"));

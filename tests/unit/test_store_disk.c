@@ -19,13 +19,22 @@ TEST(large_bodies)
     if (place_begin(&p)) {
         memset(body, 'x', size);
         body[size / 2] = '\0'; /* a body is bytes, not a text */
-        CHECK_INT(store_submit(p.s, body, size, "[]", "k", &j, &repeated), STORE_OK);
+        CHECK_INT(store_submit(p.s,
+                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
+                               &j, &repeated),
+                  STORE_OK);
         job_clear(&j);
-        CHECK_INT(store_submit(p.s, body, size, "[]", "k", &j, &repeated), STORE_OK);
+        CHECK_INT(store_submit(p.s,
+                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
+                               &j, &repeated),
+                  STORE_OK);
         CHECK(repeated);
         job_clear(&j);
         body[size - 1] = 'y';
-        CHECK_INT(store_submit(p.s, body, size, "[]", "k", &j, &repeated), STORE_CONFLICT);
+        CHECK_INT(store_submit(p.s,
+                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
+                               &j, &repeated),
+                  STORE_CONFLICT);
         body[size - 1] = 'x';
         CHECK_INT(store_claim(p.s, "a", 1, &j, &back, &len), STORE_OK);
         CHECK(len == size && memcmp(back, body, size) == 0 && back[len] == '\0');
@@ -191,7 +200,8 @@ TEST(a_full_database_is_reported_and_changes_nothing)
     CHECK_INT(store_limit_bytes(p.s, 4 << 20), STORE_OK);
     store_status status = STORE_OK;
     while (status == STORE_OK && accepted < 10) {
-        status = store_submit(p.s, body, sizeof body, "[]", NULL, &j, &repeated);
+        status =
+            store_submit(p.s, &(store_request){.body = body, .body_len = sizeof body, .tags = "[]"}, &j, &repeated);
         if (status == STORE_OK)
             strcpy(id, j.id);
         accepted += status == STORE_OK;
@@ -205,14 +215,16 @@ TEST(a_full_database_is_reported_and_changes_nothing)
     CHECK_INT(counts[JOB_ACCEPTED], 3);
     /* A result that does not fit is reported as such, the job still runs, and space that is freed is used again. */
     store_vector v = {"reactions", 131072, x};
-    store_outcome outcome = {.status = JOB_SUCCESSFUL, .summary = "{}", .vectors = &v, .n_vectors = 1};
+    store_outcome outcome = {
+        .status = JOB_SUCCESSFUL, .whole.summary = "{}", .whole.vectors = &v, .whole.n_vectors = 1};
     CHECK_INT(store_finish(p.s, running, "a", &outcome), STORE_FULL);
     CHECK_INT(status_of(p.s, running), JOB_RUNNING);
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
     CHECK_INT(store_finish(p.s, running, "a", &outcome), STORE_OK);
     CHECK_INT(store_limit_bytes(p.s, 0), STORE_OK);
-    CHECK_INT(store_submit(p.s, body, sizeof body, "[]", NULL, &j, &repeated), STORE_OK);
+    CHECK_INT(store_submit(p.s, &(store_request){.body = body, .body_len = sizeof body, .tags = "[]"}, &j, &repeated),
+              STORE_OK);
     job_clear(&j);
     place_end(&p);
 }
@@ -237,7 +249,8 @@ TEST(a_failing_write_is_reported_as_full)
         store *s = store_open(p.path, message, sizeof message);
         if (!s || submit_text(s, "{}", "[]", NULL, id) != STORE_OK)
             _exit(1);
-        if (store_submit(s, body, 4u << 20, "[]", NULL, &j, &repeated) != STORE_FULL)
+        if (store_submit(s, &(store_request){.body = body, .body_len = 4u << 20, .tags = "[]"}, &j, &repeated) !=
+            STORE_FULL)
             _exit(2);
         if (submit_text(s, "{}", "[]", NULL, id) != STORE_OK) /* it goes on with what fits */
             _exit(3);
@@ -270,7 +283,8 @@ TEST(journal_is_wal_and_is_cut)
     bool repeated;
     if (place_begin(&p)) {
         snprintf(wal, sizeof wal, "%s-wal", p.path);
-        CHECK_INT(store_submit(p.s, body, size, "[]", NULL, &j, &repeated), STORE_OK);
+        CHECK_INT(store_submit(p.s, &(store_request){.body = body, .body_len = size, .tags = "[]"}, &j, &repeated),
+                  STORE_OK);
         job_clear(&j);
         for (int i = 0; i < 3; i++)
             CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);

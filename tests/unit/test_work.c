@@ -138,21 +138,21 @@ TEST(solves_matrices)
     check_part(j.summary, "\"converged\"");
     check_part(j.summary, "\"parse\"");
     job_clear(&j);
-    CHECK_INT(store_get_vector(v.place.s, id, "reactions", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "reactions", &x, &count), STORE_OK);
     CHECK_INT(count, 2);
     if (count == 2)
         CHECK(fabs(x[0] + 1.0) < 1e-7 && fabs(x[1]) < 1e-7);
     free(x);
-    CHECK_INT(store_get_vector(v.place.s, id, "displacements", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "displacements", &x, &count), STORE_OK);
     CHECK_INT(count, 2);
     if (count == 2)
         CHECK(fabs(x[0] - 1.0) < 1e-7 && fabs(x[1] - 0.5) < 1e-7);
     free(x);
-    CHECK_INT(store_get_vector(v.place.s, id, "dim", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "dim", &x, &count), STORE_OK);
     CHECK(count == 1 && x[0] == 0.0);
     free(x);
-    CHECK_INT(store_get_vector(v.place.s, id, "nodes", &x, &count), STORE_NOT_FOUND);
-    CHECK_INT(store_get_history(v.place.s, id, -1, &x, &count, &columns), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "nodes", &x, &count), STORE_NOT_FOUND);
+    CHECK_INT(store_get_history(v.place.s, id, 0, -1, &x, &count, &columns), STORE_OK);
     CHECK(count >= 1 && columns == CODEC_HISTORY_COLUMNS && x[0] == 0.0);
     free(x);
     service_end(&v);
@@ -169,19 +169,19 @@ TEST(solves_a_scene_and_keeps_its_nodes)
     submit(&v, SCENE, id);
     CHECK(work_wait(v.w, id, 20.0));
     CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
-    CHECK_INT(store_get_vector(v.place.s, id, "dim", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "dim", &x, &count), STORE_OK);
     CHECK(count == 1 && x[0] == 2.0);
     free(x);
-    CHECK_INT(store_get_vector(v.place.s, id, "nodes", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "nodes", &x, &count), STORE_OK);
     CHECK_INT(count, 31 * 11 * 2);
     free(x);
-    CHECK_INT(store_get_vector(v.place.s, id, "displacements", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "displacements", &x, &count), STORE_OK);
     CHECK_INT(count, 31 * 11 * 2);
     free(x);
-    CHECK_INT(store_get_vector(v.place.s, id, "contact_nodes", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "contact_nodes", &x, &count), STORE_OK);
     CHECK_INT(count, 30);
     free(x);
-    CHECK_INT(store_get_vector(v.place.s, id, "reactions", &x, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "reactions", &x, &count), STORE_OK);
     CHECK_INT(count, 30);
     for (int64_t i = 0; i < count; i++)
         sum += x[i];
@@ -259,9 +259,9 @@ TEST(a_running_job_shows_its_rows_and_can_be_cancelled)
     check_part(j.summary, "\"dismissed\"");
     check_part(j.summary, "\"certificate\""); /* the best answer so far */
     job_clear(&j);
-    CHECK_INT(store_get_vector(v.place.s, id, "reactions", &rows, &count), STORE_OK);
+    CHECK_INT(store_get_vector(v.place.s, id, 0, "reactions", &rows, &count), STORE_OK);
     free(rows);
-    CHECK_INT(store_get_history(v.place.s, id, -1, &rows, &count, &columns), STORE_OK);
+    CHECK_INT(store_get_history(v.place.s, id, 0, -1, &rows, &count, &columns), STORE_OK);
     free(rows);
     CHECK(!work_cancel(v.w, id));
     CHECK(!work_cancel(v.w, ""));
