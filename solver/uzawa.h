@@ -204,6 +204,8 @@ void uz_mesh_info_clear(uz_mesh_info *info);
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
 /* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. */
 uz_status uz_scene_check(const uz_scene *scene, uz_error *err);
+/* What an answer's vectors measure, without the stiffness matrix: directions, nodes and contact rows m. */
+uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene *scene, uz_error *err);
 
 typedef enum { UZ_PROBLEM_MATRICES, UZ_PROBLEM_SCENE } uz_problem_kind;
 

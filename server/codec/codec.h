@@ -19,19 +19,58 @@ bool codec_init(char *message, size_t size);
 void codec_end(void);
 
 /* ---- requests */
+
+/* Where a run begins: at another job's reactions (job), at given ones (reactions), or at zero (neither). */
+typedef struct {
+    char job[33], case_name[64]; /* "": none */
+    bool continued;              /* the other job's run goes on */
+    double *reactions;           /* n_reactions, or NULL */
+    int64_t n_reactions;
+} codec_start;
+
+/* Somebody's answer. */
+typedef struct {
+    double *u, *r; /* n_u and n_r numbers; u NULL: there is nothing to verify */
+    int64_t n_u, n_r;
+    int columns; /* u came as points of so many numbers; 0: as numbers */
+} codec_answer;
+
 typedef struct {
     uz_problem problem;
     uz_settings settings;
+    codec_start start;
+    codec_answer answer;
     char *tags; /* JSON array text */
 } codec_request;
 
-/* Decodes and checks a POST /v1/jobs body. False: *problem is filled (400 json_syntax, 422 with pointer, ...).
- * Everything that can be known without factoring K is known here. On success the caller clears *out. */
+/* What a body may be: the one that a route takes, or any that the store may hold. */
+typedef enum { CODEC_SOLVE, CODEC_VERIFY, CODEC_STORED } codec_kind;
+
+/* Decodes and checks a body. False: *problem is filled (400 json_syntax, 422 with pointer, ...). Everything that can be
+ * known without factoring K and without the store is known here. On success the caller clears *out. */
+bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem);
+/* The same of a POST /v1/jobs body. */
 bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem);
 void codec_request_clear(codec_request *request);
 
-/* Turns the library's error into problem details: status 422, code = uz_status_name, pointer = "/problem/" + where. */
+/* How many reactions and displacements an answer has (a scene's: dim numbers for each node). False: *problem. */
+bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u, problem_details *problem);
+
+/* The body of a refining job: `old` (a valid request) with the values of a POST /v1/jobs/{id}/refine body, and a start
+ * that continues `id`. malloc'ed; NULL: *problem says why. */
+char *codec_refine(const char *old, size_t old_len, const char *id, const char *body, size_t len, size_t *out_len,
+                   problem_details *problem);
+/* True if a valid stored body is one of POST /v1/verify. */
+bool codec_is_verify(const char *body, size_t len);
+/* True if two valid requests have the same problem and cases, byte by byte. */
+bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len);
+
+/* Turns the library's error into problem details: status 422, code = uz_status_name, pointer = "/problem/" + where, or
+ * where alone if that points elsewhere in the request ("/cases/3/p"). */
 void codec_problem_from_error(problem_details *out, const uz_error *err);
+
+/* The candidate that was probably meant, -1: none is close. */
+int codec_closest(const char *text, const char *const *candidates, size_t count);
 
 /* Reads back what codec_encode_problem wrote (a job's error); members that are missing stay empty. */
 bool codec_decode_problem(problem_details *out, const char *json);
@@ -42,6 +81,19 @@ char *codec_encode_job(const job *j);
 char *codec_encode_jobs(const job *jobs, size_t count,
                         bool more); /* {"jobs": [...], "next": cursor or null, "links": ...} */
 char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind);
+
+/* How many cases of a job ended in each way. */
+#define CODEC_OUTCOMES (UZ_NOT_VERIFIED + 1)
+typedef struct {
+    int64_t count, outcomes[CODEC_OUTCOMES];
+    const char *worst; /* name */
+} codec_cases;
+/* The same with what is known of the run around it. */
+typedef struct {
+    const char *started_from; /* "zero", "warm", "continued"; NULL: not said */
+    const codec_cases *cases; /* a job with cases: `summary` is what they come to together; else NULL */
+} codec_run;
+char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run);
 char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);
 
@@ -50,6 +102,7 @@ char *codec_encode_health(const char *status, const int64_t counts[5], int worke
  * exactly; a NaN or Inf becomes null. */
 typedef struct {
     const char *job_id, *summary; /* summary: JSON text, embedded as it is */
+    const char *case_name;        /* NULL: none */
     int dim;
     int64_t m, n_u, n_nodes; /* lengths of reactions and gaps, displacements, nodes (in doubles) */
     const double *reactions, *gaps, *displacements, *nodes, *contact_nodes;
@@ -58,11 +111,19 @@ typedef struct {
 } codec_result;
 char *codec_encode_result(const codec_result *result, size_t *len);
 
+/* The answers of many cases in one text, case by case, so that only one case's vectors need be there at a time. */
+typedef struct codec_results codec_results;
+codec_results *codec_results_begin(const char *job_id, const char *summary); /* NULL: no memory */
+void codec_results_add(codec_results *all, const codec_result *one);         /* job_id, nodes, contact_nodes unused */
+/* Ends the text and frees `all`; shared: nodes and contact_nodes. NULL: no memory. */
+char *codec_results_end(codec_results *all, const codec_result *shared, size_t *len);
+void codec_results_drop(codec_results *all); /* frees without a text; NULL is fine */
+
 /* The history's columns in order, and rows of doubles in that order. */
 #define CODEC_HISTORY_COLUMNS 12
 extern const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS];
 void codec_history_row(double out[CODEC_HISTORY_COLUMNS], const uz_history_row *row);
-char *codec_encode_history(const double *rows, int64_t count, size_t *len);
+char *codec_encode_history(const char *case_name, const double *rows, int64_t count, size_t *len); /* NULL: no case */
 char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len);
 
 #endif

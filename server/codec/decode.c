@@ -25,16 +25,32 @@ void codec_end(void)
     loaded = NULL;
 }
 
+bool decode_check(const json_doc *doc, const char *schema, problem_details *problem)
+{
+    return schemas_check(loaded, schema, doc, problem);
+}
+
 static int http_status(uz_status status)
 {
     return status == UZ_ERR_MEMORY ? 503 : status == UZ_ERR_INTERNAL || status == UZ_ERR_ARGUMENT ? 500 : 422;
+}
+
+/* Pointers into other members of a request than its problem. */
+static bool points_beside(const char *where)
+{
+    static const char *const MEMBERS[] = {"/cases/", "/solver/", "/answer/"};
+    for (size_t i = 0; i < sizeof MEMBERS / sizeof MEMBERS[0]; i++)
+        if (strncmp(where, MEMBERS[i], strlen(MEMBERS[i])) == 0)
+            return true;
+    return false;
 }
 
 void codec_problem_from_error(problem_details *out, const uz_error *err)
 {
     const char *where = err->where;
     problem_set(out, http_status(err->status), uz_status_name(err->status), NULL, "%s", err->message);
-    snprintf(out->pointer, sizeof out->pointer, "/problem%s%s", where[0] && where[0] != '/' ? "/" : "", where);
+    snprintf(out->pointer, sizeof out->pointer, "%s%s%s", points_beside(where) ? "" : "/problem",
+             where[0] && where[0] != '/' ? "/" : "", where);
     out->line = err->line;
 }
 
@@ -80,19 +96,93 @@ static bool decode_problem(uz_problem *out, json_doc *doc, size_t body_len, prob
                  : decode_matrices(&out->qp, doc, object, body_len, problem);
 }
 
-bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem)
+/* ---- sizes that only the whole request tells */
+
+bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u, problem_details *problem)
+{
+    const uz_problem *p = &request->problem;
+    uz_error err = {.status = UZ_OK};
+    int64_t nodes = 0;
+    int dim = 0;
+    *m = p->qp.N.rows;
+    *n_u = p->qp.K.rows;
+    if (p->kind != UZ_PROBLEM_SCENE)
+        return true;
+    if (uz_scene_sizes(&dim, &nodes, m, &p->scene, &err) != UZ_OK) {
+        codec_problem_from_error(problem, &err);
+        return false;
+    }
+    *n_u = nodes * dim;
+    return true;
+}
+
+static bool check_count(const char *pointer, int64_t have, int64_t want, const char *what, problem_details *problem)
+{
+    if (have == want)
+        return true;
+    problem_set(problem, 422, "size_mismatch", NULL, "%s has %lld numbers, but the problem has %lld %s.", pointer,
+                (long long)have, (long long)want, what);
+    snprintf(problem->pointer, sizeof problem->pointer, "%s", pointer);
+    return false;
+}
+
+/* A point of another size than the scene's would pass as numbers of other nodes. */
+static bool check_columns(const codec_request *request, problem_details *problem)
+{
+    bool scene = request->problem.kind == UZ_PROBLEM_SCENE;
+    int columns = request->answer.columns, dim = request->problem.scene.box.dim;
+    json_path answer = {NULL, "answer", 6, 0}, path = {&answer, "displacements", 13, 0};
+    if (columns == 0 || (scene && columns == dim))
+        return true;
+    problem_set(problem, 422, "size_mismatch", &path, "/answer/displacements has points of %d numbers; %s.", columns,
+                scene ? "this scene has 2 directions" : "a problem in matrices has single numbers");
+    return false;
+}
+
+static bool check_sizes(const codec_request *request, problem_details *problem)
+{
+    const codec_answer *answer = &request->answer;
+    const codec_start *start = &request->start;
+    int64_t m, n_u;
+    if (!answer->u && !start->reactions)
+        return true;
+    if (!codec_request_sizes(request, &m, &n_u, problem))
+        return false;
+    if (start->reactions)
+        return check_count("/solver/warm_start/reactions", start->n_reactions, m, "contact rows", problem);
+    return check_columns(request, problem) &&
+           check_count("/answer/displacements", answer->n_u, n_u, "displacements", problem) &&
+           check_count("/answer/reactions", answer->n_r, m, "contact rows", problem);
+}
+
+static const char *schema_of(codec_kind kind, const json_doc *doc)
+{
+    bool verify = kind == CODEC_VERIFY || (kind == CODEC_STORED && json_object_get(doc->root, "answer"));
+    return verify ? "verify.json" : "request.json";
+}
+
+/* The parts of a checked document, each where the next may need it. */
+static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_details *problem)
+{
+    const json_t *solver = json_object_get(doc->root, "solver"), *answer = json_object_get(doc->root, "answer");
+    decode_settings(&out->settings, solver);
+    return decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
+           decode_problem(&out->problem, doc, len, problem) &&
+           decode_cases(&out->problem, doc, json_object_get(doc->root, "cases"), len, problem) &&
+           decode_start(&out->start, doc, json_object_get(solver, "warm_start"), len, problem) &&
+           (!answer || decode_answer(&out->answer, doc, answer, len, problem));
+}
+
+bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem)
 {
     json_doc doc;
     codec_request request = {.tags = NULL};
     *out = request;
     if (!json_scan(&doc, body, len, problem))
         return false;
-    bool good = schemas_check(loaded, "request.json", &doc, problem) &&
-                decode_tags(&request.tags, json_object_get(doc.root, "tags"), problem) &&
-                decode_problem(&request.problem, &doc, len, problem);
-    if (good)
-        decode_settings(&request.settings, json_object_get(doc.root, "solver"));
+    bool good = decode_check(&doc, schema_of(kind, &doc), problem) && decode_parts(&request, &doc, len, problem);
     json_doc_clear(&doc);
+    good = good && check_sizes(&request, problem);
     if (good)
         *out = request;
     else
@@ -100,11 +190,19 @@ bool codec_decode_request(codec_request *out, const char *body, size_t len, prob
     return good;
 }
 
+bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem)
+{
+    return codec_decode(out, CODEC_SOLVE, body, len, problem);
+}
+
 void codec_request_clear(codec_request *request)
 {
     if (!request)
         return;
     uz_problem_clear(&request->problem);
+    free(request->start.reactions);
+    free(request->answer.u);
+    free(request->answer.r);
     free(request->tags);
-    request->tags = NULL;
+    memset(request, 0, sizeof *request);
 }

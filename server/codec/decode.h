@@ -4,6 +4,7 @@
 #ifndef SERVER_CODEC_DECODE_H
 #define SERVER_CODEC_DECODE_H
 
+#include "codec/codec.h"
 #include "codec/json_doc.h"
 #include "uzawa.h"
 
@@ -11,7 +12,30 @@
  * matrices may take. */
 bool decode_matrices(uz_qp *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem);
 bool decode_scene(uz_scene *out, const json_t *object, problem_details *problem);
+bool decode_loads(uz_load **out, int64_t *n, const json_t *list, problem_details *problem);
+/* The load cases of a decoded problem; list NULL: none. */
+bool decode_cases(uz_problem *problem, json_doc *doc, const json_t *list, size_t body_len, problem_details *details);
+/* object NULL: from zero. */
+bool decode_start(codec_start *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem);
+bool decode_answer(codec_answer *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem);
 /* object NULL: the defaults. */
 void decode_settings(uz_settings *out, const json_t *object);
+
+/* ---- pieces (decode_vector.c). `where` is as in uz_error: the name of a member of /problem, or a pointer. */
+
+/* What one matrix or vector of a request of so many bytes may take. */
+size_t decode_memory_bound(size_t body_len);
+/* A string's bytes, lifted or not; decode_text_done frees them early. */
+const char *decode_text(const json_doc *doc, const json_t *value, size_t *len);
+void decode_text_done(const json_doc *doc, const json_t *value);
+/* The document against a schema file, as schemas_check. */
+bool decode_check(const json_doc *doc, const char *schema, problem_details *problem);
+bool decode_no_memory(problem_details *problem); /* 503; returns false */
+/* An array of numbers, taken out of the document where it was lifted, or Matrix Market text. The caller frees *out. */
+bool decode_vector(double **out, int64_t *n, json_doc *doc, const json_t *value, size_t bound, const char *where,
+                   problem_details *problem);
+/* The same for an array whose items may be points; *columns is their size, 0 for numbers; *n counts numbers. */
+bool decode_points(double **out, int64_t *n, int *columns, json_doc *doc, const json_t *value, size_t bound,
+                   const char *where, problem_details *problem);
 
 #endif

@@ -16,13 +16,6 @@ typedef struct {
     problem_details *problem;
 } reading;
 
-/* A matrix that can be solved has an entry of at least six bytes of text for each unknown, so no honest request comes
- * near this; a size line alone must not fill the machine. */
-static size_t memory_bound(size_t body_len)
-{
-    return ((size_t)64 << 20) + 32 * body_len;
-}
-
 /* ------------------------------------------------------------- failures */
 
 static bool refuse_call(const reading *r, uz_error *err, const char *name)
@@ -58,65 +51,20 @@ static bool refuse_shape(const reading *r)
 
 /* ------------------------------------------------------------- reading */
 
-/* A string value as Matrix Market text. A lifted one is freed by free_text once it is read. */
-static const char *get_text(const json_doc *doc, const json_t *value, size_t *len)
-{
-    const json_lifted *lifted = json_doc_lifted(doc, value);
-    *len = lifted ? lifted->len : json_string_length(value);
-    return lifted ? lifted->text : json_string_value(value);
-}
-
-static void free_text(const json_doc *doc, const json_t *value)
-{
-    json_lifted *lifted = json_doc_lifted(doc, value);
-    if (!lifted)
-        return;
-    free(lifted->text);
-    lifted->text = NULL;
-    lifted->len = 0;
-}
-
 static bool read_matrix(const reading *r, uz_csc *out, uz_mm_info *info, const char *name)
 {
     uz_error err = {.status = UZ_OK};
     const json_t *value = json_object_get(r->object, name);
     size_t len;
-    const char *text = get_text(r->doc, value, &len);
+    const char *text = decode_text(r->doc, value, &len);
     bool good = uz_mm_read(out, info, text, len, r->bound, &err) == UZ_OK;
-    free_text(r->doc, value);
+    decode_text_done(r->doc, value);
     return good || refuse_call(r, &err, name);
-}
-
-static bool copy_numbers(const reading *r, double **out, int64_t *n, const json_t *array)
-{
-    size_t count = json_array_size(array);
-    *out = room_for(count, sizeof **out);
-    if (!*out)
-        return refuse_memory(r);
-    for (size_t i = 0; i < count; i++)
-        (*out)[i] = json_real_value(json_array_get(array, i));
-    *n = (int64_t)count;
-    return true;
 }
 
 static bool read_vector(const reading *r, double **out, int64_t *n, const char *name)
 {
-    uz_error err = {.status = UZ_OK};
-    const json_t *value = json_object_get(r->object, name);
-    json_lifted *lifted = json_doc_lifted(r->doc, value);
-    size_t len;
-    if (lifted && !lifted->is_text) {
-        *out = lifted->numbers;
-        *n = lifted->count;
-        lifted->numbers = NULL;
-        return true;
-    }
-    if (json_is_array(value))
-        return copy_numbers(r, out, n, value);
-    const char *text = get_text(r->doc, value, &len);
-    bool good = uz_mm_read_vector(out, n, text, len, r->bound, &err) == UZ_OK;
-    free_text(r->doc, value);
-    return good || refuse_call(r, &err, name);
+    return decode_vector(out, n, r->doc, json_object_get(r->object, name), r->bound, name, r->problem);
 }
 
 /* ------------------------------------------------------------ matrices */
@@ -218,7 +166,7 @@ static bool read_gaps(const reading *r)
 bool decode_matrices(uz_qp *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem)
 {
     uz_error err = {.status = UZ_OK};
-    reading r = {out, doc, object, memory_bound(body_len), problem};
+    reading r = {out, doc, object, decode_memory_bound(body_len), problem};
     return read_stiffness(&r) && read_load(&r) && read_normals(&r) && read_gaps(&r) &&
            (uz_qp_check(out, &err) == UZ_OK || refuse_call(&r, &err, ""));
 }

@@ -1,4 +1,5 @@
 #include "codec/codec.h"
+#include "codec/problem.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -8,6 +9,11 @@ static void copy_member(char *out, size_t size, const json_t *object, const char
 {
     const char *text = json_string_value(json_object_get(object, key));
     snprintf(out, size, "%s", text ? text : "");
+}
+
+int codec_closest(const char *name, const char *const *candidates, size_t count)
+{
+    return problem_closest(name, strlen(name), candidates, count);
 }
 
 bool codec_decode_problem(problem_details *out, const char *json)

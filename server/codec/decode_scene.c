@@ -79,15 +79,16 @@ static bool decode_supports(uz_scene *out, const json_t *list, problem_details *
     return out->supports != NULL;
 }
 
-static bool decode_loads(uz_scene *out, const json_t *list, problem_details *problem)
+bool decode_loads(uz_load **out, int64_t *n, const json_t *list, problem_details *problem)
 {
-    out->loads = make_room(list, sizeof *out->loads, &out->n_loads, problem);
-    for (int64_t i = 0; i < out->n_loads; i++) {
+    uz_load *loads = make_room(list, sizeof *loads, n, problem);
+    for (int64_t i = 0; i < *n; i++) {
         const json_t *item = json_array_get(list, (size_t)i);
-        get_name(out->loads[i].on, sizeof out->loads[i].on, item, "on", "");
-        get_vector(out->loads[i].traction, json_object_get(item, "traction"), 0);
+        get_name(loads[i].on, sizeof loads[i].on, item, "on", "");
+        get_vector(loads[i].traction, json_object_get(item, "traction"), 0);
     }
-    return out->loads != NULL;
+    *out = loads;
+    return loads != NULL;
 }
 
 static bool refuse_normal(size_t i, problem_details *problem)
@@ -125,6 +126,6 @@ bool decode_scene(uz_scene *out, const json_t *object, problem_details *problem)
     return decode_box(&out->box, json_object_get(json_object_get(object, "mesh"), "box"), problem) &&
            decode_materials(out, json_object_get(object, "materials"), problem) &&
            decode_supports(out, json_object_get(object, "supports"), problem) &&
-           decode_loads(out, json_object_get(object, "loads"), problem) &&
+           decode_loads(&out->loads, &out->n_loads, json_object_get(object, "loads"), problem) &&
            decode_contacts(out, json_object_get(object, "contacts"), problem);
 }

@@ -76,6 +76,8 @@ static void put_links(text *t, const job *j)
         put_link(t, "history", j->id, "/history");
         put_link(t, "history_csv", j->id, "/history.csv");
     }
+    if (j->refines[0])
+        put_link(t, "refines", j->refines, "");
     text_close(t, ']');
 }
 

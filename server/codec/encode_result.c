@@ -3,6 +3,7 @@
 #include "codec/text.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 /* Numbers, or points of `dim` numbers each; nothing for a vector that was not asked for. */
 static void put_vector(text *t, const char *key, const double *x, int64_t n, int dim)
@@ -20,23 +21,91 @@ static void put_vector(text *t, const char *key, const double *x, int64_t n, int
     text_close(t, ']');
 }
 
+static void put_word(text *t, const char *key, const char *value)
+{
+    text_key(t, key);
+    text_string(t, value);
+}
+
+static void put_summary(text *t, const char *summary)
+{
+    text_key(t, "summary");
+    text_raw(t, summary);
+}
+
+/* What each case has of its own. */
+static void put_fields(text *t, const codec_result *result)
+{
+    put_vector(t, "reactions", result->reactions, result->m, 0);
+    put_vector(t, "gaps", result->gaps, result->m, 0);
+    put_vector(t, "pressure", result->pressure, result->m, 0);
+    put_vector(t, "ray", result->ray, result->m, 0);
+    put_vector(t, "displacements", result->displacements, result->n_u, result->dim);
+}
+
+static void put_places(text *t, const codec_result *result)
+{
+    put_vector(t, "nodes", result->nodes, result->n_nodes, result->dim);
+    put_vector(t, "contact_nodes", result->contact_nodes, result->m, 0);
+}
+
 char *codec_encode_result(const codec_result *result, size_t *len)
 {
     text t = {0};
     text_open(&t, '{');
-    text_key(&t, "job");
-    text_string(&t, result->job_id);
-    text_key(&t, "summary");
-    text_raw(&t, result->summary);
-    put_vector(&t, "reactions", result->reactions, result->m, 0);
-    put_vector(&t, "gaps", result->gaps, result->m, 0);
-    put_vector(&t, "pressure", result->pressure, result->m, 0);
-    put_vector(&t, "ray", result->ray, result->m, 0);
-    put_vector(&t, "displacements", result->displacements, result->n_u, result->dim);
-    put_vector(&t, "nodes", result->nodes, result->n_nodes, result->dim);
-    put_vector(&t, "contact_nodes", result->contact_nodes, result->m, 0);
+    put_word(&t, "job", result->job_id);
+    if (result->case_name)
+        put_word(&t, "case", result->case_name);
+    put_summary(&t, result->summary);
+    put_fields(&t, result);
+    put_places(&t, result);
     text_close(&t, '}');
     return text_finish(&t, len);
+}
+
+/* ---- many cases */
+
+struct codec_results {
+    text t;
+};
+
+codec_results *codec_results_begin(const char *job_id, const char *summary)
+{
+    codec_results *all = calloc(1, sizeof *all);
+    if (!all)
+        return NULL;
+    text_open(&all->t, '{');
+    put_word(&all->t, "job", job_id);
+    put_summary(&all->t, summary);
+    text_key(&all->t, "cases");
+    text_open(&all->t, '[');
+    return all;
+}
+
+void codec_results_add(codec_results *all, const codec_result *one)
+{
+    text_open(&all->t, '{');
+    put_word(&all->t, "name", one->case_name);
+    put_summary(&all->t, one->summary);
+    put_fields(&all->t, one);
+    text_close(&all->t, '}');
+}
+
+char *codec_results_end(codec_results *all, const codec_result *shared, size_t *len)
+{
+    text_close(&all->t, ']');
+    put_places(&all->t, shared);
+    text_close(&all->t, '}');
+    char *finished = text_finish(&all->t, len);
+    free(all);
+    return finished;
+}
+
+void codec_results_drop(codec_results *all)
+{
+    if (all)
+        free(all->t.data);
+    free(all);
 }
 
 const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS] = {
@@ -62,10 +131,12 @@ void codec_history_row(double out[CODEC_HISTORY_COLUMNS], const uz_history_row *
         out[i] = values[i];
 }
 
-char *codec_encode_history(const double *rows, int64_t count, size_t *len)
+char *codec_encode_history(const char *case_name, const double *rows, int64_t count, size_t *len)
 {
     text t = {0};
     text_open(&t, '{');
+    if (case_name)
+        put_word(&t, "case", case_name);
     text_key(&t, "columns");
     text_open(&t, '[');
     for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++)

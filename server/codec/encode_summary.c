@@ -125,7 +125,24 @@ static void put_problem(text *t, const uz_summary *s, bool scene)
     text_close(t, '}');
 }
 
+static void put_cases(text *t, const codec_cases *cases)
+{
+    text_key(t, "cases");
+    text_open(t, '{');
+    put_count(t, "count", cases->count);
+    put_word(t, "worst", cases->worst);
+    for (int i = 0; i < CODEC_OUTCOMES; i++)
+        if (cases->outcomes[i] > 0 || i == UZ_CONVERGED)
+            put_count(t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
+    text_close(t, '}');
+}
+
 char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind)
+{
+    return codec_encode_run(summary, kind, &(codec_run){.cases = NULL});
+}
+
+char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run)
 {
     text t = {0};
     bool scene = kind == UZ_PROBLEM_SCENE;
@@ -136,6 +153,10 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind)
     put_word(&t, "operator", uz_operator_name(summary->op));
     put_count(&t, "iterations", summary->iterations);
     put_count(&t, "restarts", summary->restarts);
+    if (run->started_from)
+        put_word(&t, "started_from", run->started_from);
+    if (run->cases)
+        put_cases(&t, run->cases);
     put_problem(&t, summary, scene);
     put_contact(&t, summary, scene);
     put_energy(&t, &summary->certificate);

@@ -12,16 +12,19 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define JSON_MAX_DEPTH     64     /* nested arrays and objects */
-#define JSON_MAX_VALUES    200000 /* each lifted array or string counts as one; about 100 bytes each */
-#define JSON_LIFT_NUMBERS  64     /* an array of more numbers than this, and of nothing else, is lifted */
-#define JSON_LIFT_TEXT_LEN 4096   /* a string of more bytes than this is lifted */
+#define JSON_MAX_DEPTH    64     /* nested arrays and objects */
+#define JSON_MAX_VALUES   200000 /* each lifted array or string counts as one; about 100 bytes each */
+#define JSON_LIFT_NUMBERS 64    /* an array of more numbers than this, and of nothing else, is lifted; and a table of */
+                                /* more rows than this, of the same number of numbers each, at most this many */
+#define JSON_LIFT_TEXT_LEN 4096 /* a string of more bytes than this is lifted */
 
-/* An array of numbers (text NULL) or a decoded string (numbers NULL). Who takes a buffer out sets it to NULL. */
+/* An array of numbers or of rows of numbers (text NULL), or a decoded string (numbers NULL). Who takes a buffer out
+ * sets it to NULL. */
 typedef struct {
-    double *numbers; /* count */
-    int64_t count;
-    char *text; /* len bytes of UTF-8 and a NUL; NUL bytes may stand inside too */
+    double *numbers; /* count, or count x columns row by row */
+    int64_t count;   /* items of the array */
+    int64_t columns; /* numbers in each item of a table; 0: the items are numbers */
+    char *text;      /* len bytes of UTF-8 and a NUL; NUL bytes may stand inside too */
     size_t len;
     bool is_text;
 } json_lifted;

@@ -197,6 +197,35 @@ static int64_t count_numbers(const scanner *s)
     return 0;
 }
 
+/* Counts rows and columns of the array at s->at if it looks like a table of numbers: rows of the same number of
+ * numbers each. rows 0: it does not. As above, this only decides which way to go. */
+static void count_table(const scanner *s, int64_t *rows, int64_t *columns)
+{
+    int64_t in_row = 0, first = 0, found = 0;
+    bool inside = false;
+    *rows = *columns = 0;
+    for (size_t i = s->at + 1; i < s->len; i++) {
+        char c = s->text[i];
+        if (inside ? c == '[' : c == ']')
+            break;
+        if (c == '[') {
+            inside = true;
+            in_row = 1;
+        } else if (c == ']') {
+            inside = false;
+            first = found++ ? first : in_row;
+            if (in_row != first || in_row > JSON_LIFT_NUMBERS)
+                return;
+        } else if (inside && c == ',') {
+            in_row++;
+        } else if (c != ',' && !strchr(inside ? "0123456789-+.eE \n\t\r" : " \n\t\r", c)) {
+            return;
+        }
+    }
+    *rows = inside ? 0 : found;
+    *columns = first;
+}
+
 /* After an item: true if another follows, false at the closing bracket or after a failure. */
 static bool next_item(scanner *s, char close, bool *failed)
 {
@@ -210,15 +239,13 @@ static bool next_item(scanner *s, char close, bool *failed)
     return false;
 }
 
-static json_t *lift_numbers(scanner *s, const json_path *path, int64_t count)
+/* The numbers of the array at s->at, which count_numbers has counted; false when the scan stops. */
+static bool scan_numbers(scanner *s, const json_path *path, double *numbers)
 {
     bool failed = false;
-    double *numbers = room_for((size_t)count, sizeof *numbers);
-    if (!numbers)
-        return stop_memory(s);
     s->at++;
-    for (int64_t i = 0;; i++) {
-        json_path here = {path, NULL, 0, (size_t)i};
+    for (size_t i = 0;; i++) {
+        json_path here = {path, NULL, 0, i};
         int c = peek(s);
         if (c != '-' && !is_digit(s, s->at)) {
             failed = true;
@@ -227,10 +254,40 @@ static json_t *lift_numbers(scanner *s, const json_path *path, int64_t count)
             failed = !scan_number(s, &here, &numbers[i]);
         }
         if (failed || !next_item(s, ']', &failed))
+            return !failed;
+    }
+}
+
+static json_t *lift_numbers(scanner *s, const json_path *path, int64_t count)
+{
+    double *numbers = room_for((size_t)count, sizeof *numbers);
+    if (!numbers)
+        return stop_memory(s);
+    if (scan_numbers(s, path, numbers))
+        return lift(s, (json_lifted){.numbers = numbers, .count = count});
+    free(numbers);
+    return NULL;
+}
+
+static json_t *lift_table(scanner *s, const json_path *path, int64_t rows, int64_t columns)
+{
+    bool failed = false;
+    double *numbers = room_for((size_t)rows, (size_t)columns * sizeof *numbers);
+    if (!numbers)
+        return stop_memory(s);
+    s->at++;
+    for (int64_t i = 0;; i++) {
+        json_path here = {path, NULL, 0, (size_t)i};
+        failed = peek(s) != '[';
+        if (failed)
+            stop_syntax(s, s->at, "a row of numbers was expected");
+        else
+            failed = !scan_numbers(s, &here, numbers + i * columns);
+        if (failed || !next_item(s, ']', &failed))
             break;
     }
     if (!failed)
-        return lift(s, (json_lifted){.numbers = numbers, .count = count});
+        return lift(s, (json_lifted){.numbers = numbers, .count = rows, .columns = columns});
     free(numbers);
     return NULL;
 }
@@ -276,6 +333,10 @@ static json_t *scan_array(scanner *s, const json_path *path)
     int64_t count = count_numbers(s);
     if (count > JSON_LIFT_NUMBERS)
         return lift_numbers(s, path, count);
+    int64_t rows, columns;
+    count_table(s, &rows, &columns);
+    if (rows > JSON_LIFT_NUMBERS)
+        return lift_table(s, path, rows, columns);
     bool failed = false;
     json_t *array = made(s, json_array());
     s->at++;

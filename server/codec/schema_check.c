@@ -148,9 +148,30 @@ static bool takes_any_number(schema_at at)
     return json_is_true(at.node) || (json_object_size(at.node) == 1 && type && (schema_types(at) & SCHEMA_FRACTION));
 }
 
+/* Each row is put into one small array and checked as if it stood there. */
+static bool check_table_rows(const visit *v, const json_lifted *table, schema_at items)
+{
+    json_t *row = json_array();
+    bool good = row != NULL;
+    for (int64_t j = 0; good && j < table->columns; j++)
+        good = json_array_append_new(row, json_real(0)) == 0;
+    if (!good)
+        visit_no_memory(v);
+    for (int64_t i = 0; good && i < table->count; i++) {
+        json_path path = {v->path, NULL, 0, (size_t)i};
+        for (int64_t j = 0; j < table->columns; j++)
+            json_real_set(json_array_get(row, (size_t)j), table->numbers[i * table->columns + j]);
+        good = check(&(visit){v->doc, v->problem, items, row, &path});
+    }
+    json_decref(row);
+    return good;
+}
+
 static bool check_lifted_items(const visit *v, const json_lifted *lifted, schema_at items)
 {
     bool good = true;
+    if (lifted->columns > 0)
+        return check_table_rows(v, lifted, items);
     if (takes_any_number(items))
         return true;
     json_t *number = json_real(0);

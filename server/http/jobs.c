@@ -1,6 +1,7 @@
 /* jobs.c: /v1/jobs and /v1/jobs/{id}. */
 #include "codec/codec.h"
 #include "http/deadlines.h"
+#include "http/jobs.h"
 #include "http/problem.h"
 #include "http/request.h"
 
@@ -38,7 +39,7 @@ bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply)
     return status == STORE_OK;
 }
 
-static bool ended(const job *j)
+bool jobs_ended(const job *j)
 {
     return j->status != JOB_ACCEPTED && j->status != JOB_RUNNING;
 }
@@ -54,14 +55,14 @@ static void wait_for_end(api *context, const http_request *rq, const char *id, d
             return;
 }
 
-/* Waits as the request prefers and reads the job again; *j is replaced. */
-static bool wait_and_reload(api *context, http_request *rq, job *j, http_reply *reply)
+bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply)
 {
-    double seconds = request_wait(rq, context->max_wait_s);
-    if (seconds <= 0 || ended(j))
+    double seconds = request_wait(rq, otherwise, context->max_wait_s);
+    if (seconds <= 0 || jobs_ended(j))
         return true;
     wait_for_end(context, rq, j->id, seconds);
-    snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
+    if (request_wait(rq, -1, context->max_wait_s) >= 0)
+        snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
     char id[sizeof j->id];
     memcpy(id, j->id, sizeof id);
     job_clear(j);
@@ -87,8 +88,8 @@ static void reply_job(api *context, int status, job *j, http_reply *reply)
 
 /* ------------------------------------------------------------------ submit */
 
-/* NULL in *key: none was given. A key is kept as sent: 1 to 255 printable ASCII characters. */
-static bool read_idempotency_key(const http_request *rq, char **key, problem_details *problem)
+/* A key is kept as sent: 1 to 255 printable ASCII characters. */
+bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
 {
     size_t count;
     const header_field *field = header_find(&rq->headers, "Idempotency-Key", &count);
@@ -117,30 +118,34 @@ static bool read_validate(const http_request *rq, bool *only, problem_details *p
     return true;
 }
 
-/* The job is on disk: tell the workers, wait if that was asked for, answer. */
-static void acknowledge(api *context, http_request *rq, job *j, bool repeated, http_reply *reply)
+bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
 {
-    memcpy(rq->job_id, j->id, sizeof rq->job_id);
-    if (!repeated)
-        work_wake(context->work);
-    if (!wait_and_reload(context, rq, j, reply))
-        return;
-    snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", j->id);
-    reply_job(context, ended(j) ? 200 : 202, j, reply);
-}
-
-static void store_and_acknowledge(api *context, http_request *rq, const char *tags, const char *key, http_reply *reply)
-{
-    job j = {0};
     bool repeated = false;
-    store_status status = store_submit(context->store, rq->body, rq->body_len, tags, key, &j, &repeated);
+    store_status status = store_submit(context->store, request, out, &repeated);
     if (status == STORE_CONFLICT)
         reply_refuse(reply, 422, "idempotency_key_reused", "The Idempotency-Key was used for another request",
                      "this key came before with a different body: use a new key for a new job");
     else if (status != STORE_OK)
         reply_store_failure(context, status, reply);
-    else
-        acknowledge(context, rq, &j, repeated, reply);
+    if (status != STORE_OK)
+        return false;
+    memcpy(rq->job_id, out->id, sizeof rq->job_id);
+    if (!repeated)
+        work_wake(context->work);
+    return true;
+}
+
+void jobs_acknowledge(api *context, job *j, http_reply *reply)
+{
+    snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", j->id);
+    reply_job(context, jobs_ended(j) ? 200 : 202, j, reply);
+}
+
+static void submit(api *context, http_request *rq, const store_request *request, http_reply *reply)
+{
+    job j = {0};
+    if (jobs_store(context, rq, request, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
+        jobs_acknowledge(context, &j, reply);
     job_clear(&j);
 }
 
@@ -150,8 +155,9 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     codec_request request = {0};
     char *key = NULL, *tags = NULL;
     bool validate_only;
-    if (!read_validate(rq, &validate_only, &problem) || !read_idempotency_key(rq, &key, &problem) ||
-        !codec_decode_request(&request, rq->body ? rq->body : "", rq->body_len, &problem)) {
+    if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
+        !codec_decode_request(&request, rq->body ? rq->body : "", rq->body_len, &problem) ||
+        !start_check(context, &request, rq, &problem)) {
         reply_problem(reply, &problem);
         goto done;
     }
@@ -161,8 +167,9 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     if (validate_only)
         reply_json(reply, 200, strdup("{\"valid\": true}\n"));
     else
-        store_and_acknowledge(context, rq, tags ? tags : "[]", key, reply);
+        submit(context, rq, &(store_request){rq->body, rq->body_len, tags, key, NULL}, reply);
 done:
+    codec_request_clear(&request);
     free(tags);
     free(key);
 }
@@ -221,7 +228,7 @@ void jobs_list(api *context, http_request *rq, http_reply *reply)
 void jobs_get(api *context, http_request *rq, http_reply *reply)
 {
     job j;
-    if (jobs_load(context, rq, &j, reply) && wait_and_reload(context, rq, &j, reply))
+    if (jobs_load(context, rq, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
         reply_job(context, 200, &j, reply);
     job_clear(&j);
 }

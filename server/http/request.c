@@ -70,7 +70,7 @@ static long field_wait(const header_field *field)
     return -1;
 }
 
-double request_wait(const http_request *rq, double max_wait_s)
+double request_wait(const http_request *rq, double otherwise, double max_wait_s)
 {
     for (size_t i = 0; i < rq->headers.count; i++) {
         const header_field *field = &rq->headers.fields[i];
@@ -80,7 +80,7 @@ double request_wait(const http_request *rq, double max_wait_s)
         if (seconds >= 0)
             return (double)seconds < max_wait_s ? (double)seconds : max_wait_s;
     }
-    return 0;
+    return otherwise < max_wait_s ? otherwise : max_wait_s;
 }
 
 /* True for ";q=0", ";q=0.000" among a media range's parameters. */

@@ -42,8 +42,8 @@ typedef struct http_request {
     http_reply reply;
 } http_request;
 
-/* Seconds of `Prefer: wait=N` (RFC 7240), capped; 0 when there is none. */
-double request_wait(const http_request *rq, double max_wait_s);
+/* Seconds of `Prefer: wait=N` (RFC 7240), or `otherwise` when there is none; capped. */
+double request_wait(const http_request *rq, double otherwise, double max_wait_s);
 /* True if an Accept header field names the media type with a quality above 0, or a longer list does. */
 bool request_accepts(const http_request *rq, const char *type);
 /* True if the body may be JSON: Content-Type absent, application/json or ...+json. */
@@ -73,6 +73,8 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply);
 void jobs_list(api *context, http_request *rq, http_reply *reply);
 void jobs_get(api *context, http_request *rq, http_reply *reply);
 void jobs_delete(api *context, http_request *rq, http_reply *reply);
+void jobs_refine(api *context, http_request *rq, http_reply *reply);
+void verify_submit(api *context, http_request *rq, http_reply *reply);
 void results_get(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);

@@ -1,5 +1,6 @@
-/* results.c: what a job leaves behind: /v1/jobs/{id}/result, /history and /history.csv. */
+/* results.c: what a job leaves behind: /v1/jobs/{id}/result. */
 #include "codec/codec.h"
+#include "http/jobs.h"
 #include "http/problem.h"
 #include "http/request.h"
 
@@ -49,8 +50,7 @@ static bool read_fields(const http_request *rq, wanted *out, problem_details *pr
     }
 }
 
-/* A job without an answer: 409 that says why. */
-static bool has_result(const job *j, http_reply *reply)
+bool results_exist(const job *j, http_reply *reply)
 {
     static const char TITLE[] = "The job has no result";
     problem_details error = {0};
@@ -96,132 +96,215 @@ static void vectors_free(vectors *v)
     free(v->dim);
 }
 
+/* A job, and which of its cases: number 0 is the job itself. */
+typedef struct {
+    const job *j;
+    int64_t number;
+    const char *name, *summary;
+} place;
+
 /* A vector that the result does not have stays NULL. */
-static store_status fetch(api *context, const char *id, const char *name, double **data, int64_t *count)
+static store_status fetch(api *context, const place *at, const char *name, double **data, int64_t *count)
 {
-    store_status status = store_get_vector(context->store, id, name, data, count);
+    store_status status = store_get_vector(context->store, at->j->id, at->number, name, data, count);
     return status == STORE_NOT_FOUND ? STORE_OK : status;
 }
 
-static store_status fetch_wanted(api *context, const char *id, const wanted *fields, vectors *v)
+/* What each case has of its own. */
+static store_status fetch_own(api *context, const place *at, const wanted *fields, vectors *v)
 {
-    store_status status = fetch(context, id, "dim", &v->dim, &v->n_dim);
-    if (status == STORE_OK && fields->reactions)
-        status = fetch(context, id, "reactions", &v->reactions, &v->n_reactions);
+    store_status status = STORE_OK;
+    if (fields->reactions)
+        status = fetch(context, at, "reactions", &v->reactions, &v->n_reactions);
     if (status == STORE_OK && fields->gaps)
-        status = fetch(context, id, "gaps", &v->gaps, &v->n_gaps);
+        status = fetch(context, at, "gaps", &v->gaps, &v->n_gaps);
     if (status == STORE_OK && fields->reactions)
-        status = fetch(context, id, "ray", &v->ray, &v->n_ray);
+        status = fetch(context, at, "ray", &v->ray, &v->n_ray);
     if (status == STORE_OK && fields->pressure)
-        status = fetch(context, id, "pressure", &v->pressure, &v->n_pressure);
-    if (status == STORE_OK && (fields->reactions || fields->gaps || fields->pressure))
-        status = fetch(context, id, "contact_nodes", &v->contact_nodes, &v->n_contact_nodes);
+        status = fetch(context, at, "pressure", &v->pressure, &v->n_pressure);
     if (status == STORE_OK && fields->displacements)
-        status = fetch(context, id, "displacements", &v->displacements, &v->n_u);
-    if (status == STORE_OK && fields->displacements)
-        status = fetch(context, id, "nodes", &v->nodes, &v->n_nodes);
+        status = fetch(context, at, "displacements", &v->displacements, &v->n_u);
     return status;
 }
 
-static void encode_result(const job *j, const vectors *v, http_reply *reply)
+/* What the job has once, for all its cases. */
+static store_status fetch_shared(api *context, const job *j, const wanted *fields, vectors *v)
 {
-    codec_result result = {.job_id = j->id,
-                           .summary = j->summary,
-                           .dim = v->dim && v->n_dim == 1 ? (int)v->dim[0] : 0,
-                           .m = v->reactions ? v->n_reactions
-                                : v->gaps    ? v->n_gaps
-                                             : v->n_pressure,
-                           .n_u = v->n_u,
-                           .n_nodes = v->n_nodes,
-                           .reactions = v->reactions,
-                           .gaps = v->gaps,
-                           .pressure = v->pressure,
-                           .ray = v->ray,
-                           .displacements = v->displacements,
-                           .nodes = v->nodes,
-                           .contact_nodes = v->contact_nodes};
+    const place whole = {.j = j};
+    store_status status = fetch(context, &whole, "dim", &v->dim, &v->n_dim);
+    if (status == STORE_OK && (fields->reactions || fields->gaps || fields->pressure))
+        status = fetch(context, &whole, "contact_nodes", &v->contact_nodes, &v->n_contact_nodes);
+    if (status == STORE_OK && fields->displacements)
+        status = fetch(context, &whole, "nodes", &v->nodes, &v->n_nodes);
+    return status;
+}
+
+static codec_result as_encoded(const place *at, const vectors *own, const vectors *shared)
+{
+    return (codec_result){.job_id = at->j->id,
+                          .summary = at->summary,
+                          .case_name = at->name,
+                          .dim = shared->dim && shared->n_dim == 1 ? (int)shared->dim[0] : 0,
+                          .m = own->reactions  ? own->n_reactions
+                               : own->gaps     ? own->n_gaps
+                               : own->pressure ? own->n_pressure
+                                               : shared->n_contact_nodes,
+                          .n_u = own->n_u,
+                          .n_nodes = shared->n_nodes,
+                          .reactions = own->reactions,
+                          .gaps = own->gaps,
+                          .pressure = own->pressure,
+                          .ray = own->ray,
+                          .displacements = own->displacements,
+                          .nodes = shared->nodes,
+                          .contact_nodes = shared->contact_nodes};
+}
+
+static void reply_one(api *context, const place *at, const wanted *fields, http_reply *reply)
+{
+    vectors own = {0}, shared = {0};
     size_t len = 0;
-    char *text = codec_encode_result(&result, &len);
-    reply_text(reply, 200, "application/json", text, len);
+    store_status status = fetch_shared(context, at->j, fields, &shared);
+    if (status == STORE_OK)
+        status = fetch_own(context, at, fields, &own);
+    if (status == STORE_OK) {
+        codec_result result = as_encoded(at, &own, &shared);
+        char *text = codec_encode_result(&result, &len);
+        reply_text(reply, 200, "application/json", text, len);
+    } else {
+        reply_store_failure(context, status, reply);
+    }
+    vectors_free(&own);
+    vectors_free(&shared);
+}
+
+/* ------------------------------------------------------- many cases in one */
+
+/* Numbers of all cases in one reply, about 20 bytes each: one reply must not fill the machine. openapi.json says so. */
+#define MOST_NUMBERS 4000000
+
+/* False with a 413, or a failure of the store. */
+static bool check_room(api *context, const job *j, const wanted *fields, http_reply *reply)
+{
+    const struct {
+        bool wanted;
+        const char *name;
+    } LIST[] = {{fields->reactions, "reactions"},
+                {fields->gaps, "gaps"},
+                {fields->pressure, "pressure"},
+                {fields->displacements, "displacements"}};
+    int64_t total = 0;
+    for (size_t i = 0; i < sizeof LIST / sizeof LIST[0]; i++) {
+        int64_t count = 0;
+        store_status status =
+            LIST[i].wanted ? store_count_vectors(context->store, j->id, LIST[i].name, &count) : STORE_OK;
+        if (status != STORE_OK) {
+            reply_store_failure(context, status, reply);
+            return false;
+        }
+        total += count;
+    }
+    if (total > MOST_NUMBERS)
+        reply_refuse(
+            reply, 413, "result_too_large", "The result is too large for one reply",
+            "all cases together have %lld numbers, a reply has at most %d: ask for one case with ?case=NAME, or "
+            "for fewer fields",
+            (long long)total, MOST_NUMBERS);
+    return total <= MOST_NUMBERS;
+}
+
+static store_status add_case(api *context, codec_results *all, const place *at, const wanted *fields,
+                             const vectors *shared)
+{
+    vectors own = {0};
+    store_status status = fetch_own(context, at, fields, &own);
+    codec_result one = as_encoded(at, &own, shared);
+    if (status == STORE_OK)
+        codec_results_add(all, &one);
+    vectors_free(&own);
+    return status;
+}
+
+static void reply_cases(api *context, const job *j, const store_case *cases, size_t count, const wanted *fields,
+                        http_reply *reply)
+{
+    vectors shared = {0};
+    size_t len = 0;
+    const place whole = {.j = j, .summary = j->summary};
+    codec_results *all = codec_results_begin(j->id, j->summary);
+    store_status status = fetch_shared(context, j, fields, &shared);
+    for (size_t i = 0; all && status == STORE_OK && i < count; i++)
+        status = add_case(context, all, &(place){j, cases[i].number, cases[i].name, cases[i].summary}, fields, &shared);
+    if (status != STORE_OK) {
+        codec_results_drop(all);
+        reply_store_failure(context, status, reply);
+    } else {
+        codec_result rest = as_encoded(&whole, &(vectors){0}, &shared);
+        char *text = all ? codec_results_end(all, &rest, &len) : NULL;
+        reply_text(reply, 200, "application/json", text, len);
+    }
+    vectors_free(&shared);
+}
+
+/* ------------------------------------------------------------ which of them */
+
+/* The cases of the job, or the one that the query names; *count 0: the job has none and none is named. The caller frees
+ * them. False with a 404, or a failure of the store. */
+static bool load_cases(api *context, const http_request *rq, const job *j, store_case **cases, size_t *count,
+                       http_reply *reply)
+{
+    const char *name = target_value(&rq->target, "case");
+    store_status status = store_get_cases(context->store, j->id, name, cases, count);
+    if (status == STORE_OK && (!name || *count > 0))
+        return true;
+    problem_details problem;
+    if (status == STORE_OK)
+        status = store_get_cases(context->store, j->id, NULL, cases, count);
+    if (status == STORE_OK) {
+        http_problem(&problem, 404, "case_not_found", "Not found", "the job has no case \"%.63s\".", name);
+        cases_suggest(&problem, name, *cases, *count);
+        cases_list(&problem, *cases, *count);
+        reply_problem(reply, &problem);
+    } else {
+        reply_store_failure(context, status, reply);
+    }
+    store_cases_free(*cases, *count);
+    *cases = NULL;
+    *count = 0;
+    return false;
+}
+
+static void reply_result(api *context, const http_request *rq, const job *j, const wanted *fields, http_reply *reply)
+{
+    store_case *cases = NULL;
+    size_t count = 0;
+    if (!load_cases(context, rq, j, &cases, &count, reply))
+        return;
+    if (count == 0)
+        reply_one(context, &(place){.j = j, .summary = j->summary}, fields, reply);
+    else if (target_value(&rq->target, "case"))
+        reply_one(context, &(place){j, cases[0].number, cases[0].name, cases[0].summary}, fields, reply);
+    else if (check_room(context, j, fields, reply))
+        reply_cases(context, j, cases, count, fields, reply);
+    store_cases_free(cases, count);
 }
 
 void results_get(api *context, http_request *rq, http_reply *reply)
 {
     wanted fields;
     problem_details problem;
-    vectors v = {0};
     job j = {0};
     if (!read_fields(rq, &fields, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
-    if (jobs_load(context, rq, &j, reply) && has_result(&j, reply)) {
-        store_status status = fetch_wanted(context, j.id, &fields, &v);
-        if (status == STORE_OK)
-            encode_result(&j, &v, reply);
-        else
-            reply_store_failure(context, status, reply);
-    }
-    vectors_free(&v);
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply))
+        reply_result(context, rq, &j, &fields, reply);
     job_clear(&j);
 }
 
-/* ----------------------------------------------------------------- history */
-
-/* The rows of a running job are with its worker, those of an ended one in the store; a job may end in between, and one
- * that waits has none. */
-static store_status fetch_history(api *context, const job *j, int64_t after, double **rows, int64_t *count)
+void results_reply(api *context, const job *j, http_reply *reply)
 {
-    int64_t columns = 0;
-    *rows = NULL;
-    *count = 0;
-    if (j->status == JOB_RUNNING && work_live(context->work, j->id, after, &(int){0}, rows, count))
-        return STORE_OK;
-    if (j->status == JOB_ACCEPTED)
-        return STORE_OK;
-    store_status status = store_get_history(context->store, j->id, after, rows, count, &columns);
-    if (status == STORE_OK && *count > 0 && columns != CODEC_HISTORY_COLUMNS) {
-        free(*rows);
-        *rows = NULL;
-        *count = 0;
-        return STORE_ERROR;
-    }
-    return status == STORE_NOT_FOUND ? STORE_OK : status;
-}
-
-static void reply_history(api *context, http_request *rq, bool csv, http_reply *reply)
-{
-    int64_t after = -1, count = 0;
-    double *rows = NULL;
-    size_t len = 0;
-    problem_details problem;
-    job j = {0};
-    if (!request_integer(rq, "after", -1, INT64_MAX, &after, &problem)) {
-        reply_problem(reply, &problem);
-        return;
-    }
-    if (!jobs_load(context, rq, &j, reply))
-        return;
-    store_status status = fetch_history(context, &j, after, &rows, &count);
-    if (status != STORE_OK) {
-        reply_store_failure(context, status, reply);
-    } else if (csv) {
-        char *text = codec_encode_history_csv(rows, count, &len);
-        reply_text(reply, 200, "text/csv; charset=utf-8; header=present", text, len);
-    } else {
-        char *text = codec_encode_history(rows, count, &len);
-        reply_text(reply, 200, "application/json", text, len);
-    }
-    free(rows);
-    job_clear(&j);
-}
-
-void history_get(api *context, http_request *rq, http_reply *reply)
-{
-    reply_history(context, rq, request_accepts(rq, "text/csv"), reply);
-}
-
-void history_get_csv(api *context, http_request *rq, http_reply *reply)
-{
-    reply_history(context, rq, true, reply);
+    const wanted fields = {.reactions = true, .gaps = true};
+    reply_one(context, &(place){.j = j, .summary = j->summary}, &fields, reply);
 }

@@ -8,17 +8,19 @@
 static const char *const NONE[] = {NULL};
 static const char *const SUBMIT[] = {"validate", NULL};
 static const char *const LIST[] = {"status", "limit", "cursor", "tag", NULL};
-static const char *const RESULT[] = {"fields", NULL};
-static const char *const HISTORY[] = {"after", NULL};
+static const char *const RESULT[] = {"fields", "case", NULL};
+static const char *const HISTORY[] = {"after", "case", NULL};
 
 static const route ROUTES[] = {
     {"POST", "/v1/jobs", SUBMIT, jobs_submit},
     {"GET", "/v1/jobs", LIST, jobs_list},
     {"GET", "/v1/jobs/{id}", NONE, jobs_get},
     {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete},
+    {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine},
     {"GET", "/v1/jobs/{id}/result", RESULT, results_get},
     {"GET", "/v1/jobs/{id}/history", HISTORY, history_get},
     {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv},
+    {"POST", "/v1/verify", NONE, verify_submit},
     {"GET", "/v1/factors", NONE, service_factors},
     {"GET", "/healthz", NONE, service_health},
     {"GET", "/readyz", NONE, service_ready},

@@ -22,8 +22,9 @@ void live_clear(live *l)
     *l = (live){0};
 }
 
-void live_begin(live *l, const uz_settings *settings)
+void live_begin(live *l, const uz_settings *settings, const uz_problem *problem)
 {
+    l->problem = problem;
     l->paper = settings->stopping == UZ_STOP_PAPER;
     l->max_iterations = settings->max_iterations;
     if (l->paper)
@@ -33,6 +34,20 @@ void live_begin(live *l, const uz_settings *settings)
     else
         l->target = settings->relative_error > TARGET_ROUNDING ? settings->relative_error : TARGET_ROUNDING;
     l->progress = PROGRESS_READ;
+}
+
+void live_case(live *l, int64_t i)
+{
+    l->count = 0;
+    l->stride = 1;
+    l->any = false;
+    l->first = 0.0;
+    l->current = i;
+}
+
+void live_forget_problem(live *l)
+{
+    l->problem = NULL;
 }
 
 static void thin_out(live *l)
@@ -80,8 +95,10 @@ static double share_done(const live *l)
 
 int live_progress(live *l)
 {
-    if (l->any) {
-        int now = PROGRESS_FIRST_ROW + (int)((PROGRESS_LAST_ROW - PROGRESS_FIRST_ROW) * share_done(l));
+    if (l->any || l->current > 0) {
+        double n = l->problem && l->problem->n_cases > 0 ? (double)l->problem->n_cases : 1.0;
+        double share = fmin(1.0, ((double)l->current + (l->any ? share_done(l) : 0.0)) / n);
+        int now = PROGRESS_FIRST_ROW + (int)((PROGRESS_LAST_ROW - PROGRESS_FIRST_ROW) * share);
         l->progress = now > l->progress ? now : l->progress;
     }
     return l->progress;

@@ -21,17 +21,23 @@ typedef struct {
     bool paper;            /* progress by ||rho - r||, else by the certified relative error */
     double first, target;  /* of that measure: at the start (0: none yet) and where the solve ends */
     int64_t max_iterations;
-    int progress; /* the largest reported yet */
+    const uz_problem *problem; /* whose case runs; NULL: none runs */
+    int64_t current;           /* the case that runs */
+    int progress;              /* the largest reported yet */
 } live;
 
 void live_reset(live *l); /* keeps the room; {0} at first */
 void live_clear(live *l);
-/* What is asked for is known: the solve begins. */
-void live_begin(live *l, const uz_settings *settings);
+/* What is asked for is known: the solve begins. The problem must live until live_forget_problem or live_reset. */
+void live_begin(live *l, const uz_settings *settings, const uz_problem *problem);
+/* The next load case begins: rows are its own from here on. */
+void live_case(live *l, int64_t i);
+void live_forget_problem(live *l);
 void live_add(live *l, const uz_history_row *row);
 
 /* 0..100, never less than before: 1 claimed, 5 read, 10 to 95 the iterations on a logarithmic scale of the error, from
- * its first value to the one asked for, or by their share of the largest number allowed where that is more. */
+ * its first value to the one asked for, or by their share of the largest number allowed where that is more; each of n
+ * load cases counts as an nth of that. */
 int live_progress(live *l);
 
 /* The kept rows with iteration > after, and the latest; the caller frees. False: no memory. */

@@ -1,5 +1,7 @@
 /* run.c: one job from its claim to its stored result. */
+#include "work/answers.h"
 #include "work/internal.h"
+#include "work/starts.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -8,7 +10,6 @@
 #include <time.h>
 
 #define FINISH_ATTEMPTS 5
-#define MAX_VECTORS     8
 
 /* What becomes of the job. */
 typedef enum {
@@ -20,12 +21,13 @@ typedef enum {
 typedef struct {
     worker *me;
     job *job;
-    double queue_s, parse_s;
+    double began, queue_s, parse_s; /* began on work_clock */
     codec_request request;
-    uz_result *result;
-    char *summary, *error;
-    double dim, *contact_nodes, *pressure, *history;
-    store_vector vectors[MAX_VECTORS];
+    starts starts;
+    uz_result **results; /* n of them */
+    int64_t n;
+    answers answers;
+    char *error;
     store_outcome outcome;
 } run;
 
@@ -44,6 +46,14 @@ static void note_progress(void *ctx, const uz_history_row *row)
     worker *me = ctx;
     pthread_mutex_lock(&me->lock);
     live_add(&me->live, row);
+    pthread_mutex_unlock(&me->lock);
+}
+
+static void note_case(void *ctx, int64_t load_case)
+{
+    worker *me = ctx;
+    pthread_mutex_lock(&me->lock);
+    live_case(&me->live, load_case);
     pthread_mutex_unlock(&me->lock);
 }
 
@@ -72,13 +82,20 @@ static void fail_from_error(run *r, const uz_error *err)
     fail_from_problem(r, &problem);
 }
 
+static void log_store_failure(const run *r, log_level level, const char *event)
+{
+    char cause[256];
+    store_message(r->me->w->store, cause, sizeof cause);
+    log_write(r->me->w->log, level, event, (log_field[]){LOG_S("job", r->job->id), LOG_S("cause", cause), {0}});
+}
+
 /* ---- decode */
 
 static bool decode_body(run *r, char *body, size_t body_len)
 {
     problem_details problem = {0};
     double start = work_clock();
-    bool ok = codec_decode_request(&r->request, body, body_len, &problem);
+    bool ok = codec_decode(&r->request, CODEC_STORED, body, body_len, &problem);
     free(body);
     r->parse_s = work_clock() - start;
     if (!ok) {
@@ -86,80 +103,42 @@ static bool decode_body(run *r, char *body, size_t body_len)
         return false;
     }
     pthread_mutex_lock(&r->me->lock);
-    live_begin(&r->me->live, &r->request.settings);
+    live_begin(&r->me->live, &r->request.settings, &r->request.problem);
     pthread_mutex_unlock(&r->me->lock);
     return true;
 }
 
+static bool any_dismissed(const run *r)
+{
+    for (int64_t i = 0; r->results && i < r->n; i++)
+        if (r->results[i]->summary.outcome == UZ_DISMISSED)
+            return true;
+    return false;
+}
+
+/* The live view points into the problem. */
+static void clear_request(run *r)
+{
+    pthread_mutex_lock(&r->me->lock);
+    live_forget_problem(&r->me->live);
+    pthread_mutex_unlock(&r->me->lock);
+    codec_request_clear(&r->request);
+}
+
+/* A store that fails now may work when the result is kept: the run begins at zero, and says so. */
+static void load_starts(run *r)
+{
+    store_status status = starts_load(&r->starts, r->me->w->store, &r->request);
+    if (status != STORE_OK)
+        log_store_failure(r, LOG_WARN, "start_not_read");
+}
+
 /* ---- the result as the store keeps it */
 
-static void add_vector(run *r, const char *name, const double *data, int64_t count)
+static void take_results(run *r)
 {
-    if (!data)
-        return;
-    store_vector *v = &r->vectors[r->outcome.n_vectors++];
-    snprintf(v->name, sizeof v->name, "%s", name);
-    v->data = data;
-    v->count = count;
-}
-
-static bool add_scene_vectors(run *r)
-{
-    const uz_result *result = r->result;
-    add_vector(r, "nodes", result->mesh.xyz, result->mesh.n_nodes * result->mesh.dim);
-    if (!result->mesh.contact_node)
-        return true;
-    r->contact_nodes = calloc((size_t)result->m + 1, sizeof *r->contact_nodes);
-    if (!r->contact_nodes)
-        return false;
-    for (int64_t i = 0; i < result->m; i++)
-        r->contact_nodes[i] = (double)result->mesh.contact_node[i];
-    add_vector(r, "contact_nodes", r->contact_nodes, result->m);
-    r->pressure = calloc((size_t)result->m + 1, sizeof *r->pressure);
-    for (int64_t i = 0; r->pressure && i < result->m; i++)
-        r->pressure[i] = (0.0 - result->r[i]) / result->mesh.contact_area[i];
-    add_vector(r, "pressure", r->pressure, result->m);
-    return r->pressure != NULL;
-}
-
-static bool add_vectors(run *r)
-{
-    const uz_result *result = r->result;
-    bool is_scene = r->request.problem.kind == UZ_PROBLEM_SCENE;
-    r->dim = is_scene ? result->mesh.dim : 0;
-    r->outcome.vectors = r->vectors;
-    add_vector(r, "dim", &r->dim, 1);
-    add_vector(r, "reactions", result->r, result->m);
-    add_vector(r, "gaps", result->g, result->m);
-    add_vector(r, "ray", result->ray, result->m);
-    add_vector(r, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
-    return !is_scene || add_scene_vectors(r);
-}
-
-static bool add_history(run *r)
-{
-    const uz_history *history = &r->result->history;
-    r->history = calloc((size_t)history->count + 1, CODEC_HISTORY_COLUMNS * sizeof *r->history);
-    if (!r->history)
-        return false;
-    for (int64_t i = 0; i < history->count; i++)
-        codec_history_row(r->history + i * CODEC_HISTORY_COLUMNS, &history->rows[i]);
-    r->outcome.history = r->history;
-    r->outcome.history_rows = history->count;
-    r->outcome.history_columns = CODEC_HISTORY_COLUMNS;
-    return true;
-}
-
-static void take_result(run *r)
-{
-    uz_summary *summary = &r->result->summary;
-    r->outcome.status = summary->outcome == UZ_DISMISSED ? JOB_DISMISSED : JOB_SUCCESSFUL;
-    summary->timings.queue = r->queue_s;
-    summary->timings.parse = r->parse_s;
-    summary->timings.total += r->queue_s + r->parse_s;
-    r->summary = codec_encode_summary(summary, r->request.problem.kind);
-    r->outcome.summary = r->summary;
-    if (!r->summary || !add_vectors(r) || !add_history(r))
+    r->outcome.status = any_dismissed(r) ? JOB_DISMISSED : JOB_SUCCESSFUL;
+    if (!answers_build(&r->answers, &r->outcome, r->results, &r->request, &r->starts, r->queue_s, r->parse_s))
         set_failed(r, NULL);
 }
 
@@ -173,17 +152,47 @@ static run_end why_stopped(const run *r)
     return atomic_load(&r->me->cancel) ? END_FINISH : END_RELEASE;
 }
 
+static uz_status verify(run *r, const uz_hooks *hooks, uz_error *err)
+{
+    const codec_answer *given = &r->request.answer;
+    r->n = 1;
+    r->results = calloc(1, sizeof(uz_result *));
+    if (!r->results)
+        return err->status = UZ_ERR_MEMORY;
+    uz_status status = uz_verify(&r->results[0], &r->request.problem, given->u, given->r, &r->request.settings,
+                                 r->me->w->cache, hooks, err);
+    if (strcmp(err->where, "u") == 0)
+        strcpy(err->where, "/answer/displacements");
+    else if (strcmp(err->where, "r") == 0)
+        strcpy(err->where, "/answer/reactions");
+    return status;
+}
+
+static uz_status solve_or_verify(run *r, uz_error *err)
+{
+    const uz_problem *problem = &r->request.problem;
+    uz_hooks hooks = {.ctx = r->me, .cancelled = is_cancelled, .progress = note_progress, .begins = note_case};
+    if (r->request.answer.u)
+        return verify(r, &hooks, err);
+    load_starts(r);
+    r->n = problem->n_cases > 0 ? problem->n_cases : 1;
+    uz_status status = uz_solve_cases(&r->results, problem, &r->request.settings,
+                                      (const uz_state *const *)r->starts.states, r->me->w->cache, &hooks, err);
+    if (strstr(err->where, "start")) /* the library's name for what the request calls warm_start */
+        strcpy(err->where, "/solver/warm_start");
+    return status;
+}
+
 static run_end solve(run *r)
 {
     uz_error err = {0};
-    uz_hooks hooks = {.ctx = r->me, .cancelled = is_cancelled, .progress = note_progress};
-    uz_status status = uz_solve(&r->result, &r->request.problem, &r->request.settings, r->me->w->cache, &hooks, &err);
-    bool was_stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && r->result->summary.outcome == UZ_DISMISSED);
+    uz_status status = solve_or_verify(r, &err);
+    bool was_stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && any_dismissed(r));
     run_end end = was_stopped ? why_stopped(r) : END_FINISH;
     if (end != END_FINISH)
         return end;
     if (status == UZ_OK)
-        take_result(r);
+        take_results(r);
     else if (status == UZ_ERR_CANCELLED)
         r->outcome = (store_outcome){.status = JOB_DISMISSED};
     else
@@ -192,13 +201,6 @@ static run_end solve(run *r)
 }
 
 /* ---- store */
-
-static void log_store_failure(const run *r, log_level level, const char *event)
-{
-    char cause[256];
-    store_message(r->me->w->store, cause, sizeof cause);
-    log_write(r->me->w->log, level, event, (log_field[]){LOG_S("job", r->job->id), LOG_S("cause", cause), {0}});
-}
 
 /* Waits longer each time, 0.05 s to 3.2 s, but not at all once the service must end. */
 static void wait_before_retry(const run *r, int attempt)
@@ -228,10 +230,18 @@ static bool store_outcome_of(const run *r)
     return false;
 }
 
+static int64_t count_iterations(const run *r)
+{
+    int64_t sum = 0;
+    for (int64_t i = 0; r->results && i < r->n; i++)
+        sum += r->results[i] ? r->results[i]->summary.iterations : 0;
+    return sum;
+}
+
 static void store_end(run *r, run_end end)
 {
     work *w = r->me->w;
-    const uz_summary *summary = r->result ? &r->result->summary : NULL;
+    const uz_summary *first = r->results && r->results[0] ? &r->results[0]->summary : NULL;
     if (end == END_RELEASE && store_release(w->store, r->job->id, r->me->owner) != STORE_OK)
         log_store_failure(r, LOG_ERROR, "release_failed");
     if (end != END_FINISH) {
@@ -244,32 +254,30 @@ static void store_end(run *r, run_end end)
     log_write(w->log, LOG_INFO, "job_ended",
               (log_field[]){LOG_S("job", r->job->id),
                             LOG_S("status", job_status_name(r->outcome.status)),
-                            LOG_S("outcome", summary ? uz_outcome_name(summary->outcome) : NULL),
-                            LOG_I("iterations", summary ? summary->iterations : 0),
+                            LOG_I("cases", r->n),
+                            LOG_S("outcome", first ? uz_outcome_name(first->outcome) : NULL),
+                            LOG_I("iterations", count_iterations(r)),
                             LOG_N("queue_s", r->queue_s),
                             LOG_N("parse_s", r->parse_s),
-                            LOG_N("total_s", summary ? summary->timings.total : 0.0),
+                            LOG_N("total_s", work_clock() - r->began + r->queue_s),
                             {0}});
 }
 
 void work_run(worker *me, job *claimed, char *body, size_t body_len)
 {
-    run r = {.me = me, .job = claimed};
+    run r = {.me = me, .job = claimed, .began = work_clock()};
     run_end end = END_FINISH;
     double waited = claimed->started - claimed->created; /* by the clock on the wall, which may be set back */
     r.queue_s = waited > 0.0 ? waited : 0.0;
     log_write(me->w->log, LOG_INFO, "job_started",
               (log_field[]){LOG_S("job", claimed->id), LOG_I("attempt", claimed->attempts), {0}});
-    if (decode_body(&r, body, body_len)) {
+    if (decode_body(&r, body, body_len))
         end = solve(&r);
-        codec_request_clear(&r.request);
-    }
     store_end(&r, end);
-    uz_result_free(r.result);
-    free(r.summary);
+    clear_request(&r);
+    uz_results_free(r.results, r.n);
+    starts_clear(&r.starts);
+    answers_clear(&r.answers);
     free(r.error);
-    free(r.contact_nodes);
-    free(r.pressure);
-    free(r.history);
     job_clear(claimed);
 }

@@ -378,6 +378,31 @@ bool work_live(work *w, const char *id, int64_t after, int *progress, double **r
     return ok;
 }
 
+static bool has_case(const uz_problem *problem, const char *name)
+{
+    for (int64_t i = 0; problem && i < problem->n_cases; i++)
+        if (strcmp(problem->cases[i].name, name) == 0)
+            return true;
+    return false;
+}
+
+bool work_live_history(work *w, const char *id, const char *case_name, int64_t after, work_history *out)
+{
+    bool ok = true;
+    *out = (work_history){.rows = NULL};
+    worker *found = find_worker(w, id);
+    if (!found)
+        return false;
+    const live *l = &found->live;
+    if (l->problem && l->current < l->problem->n_cases)
+        snprintf(out->case_name, sizeof out->case_name, "%s", l->problem->cases[l->current].name);
+    out->is_case = case_name && (!l->problem || has_case(l->problem, case_name)); /* NULL: not read yet */
+    if (!case_name || strcmp(case_name, out->case_name) == 0)
+        ok = live_rows(l, after, &out->rows, &out->count);
+    pthread_mutex_unlock(&found->lock);
+    return ok;
+}
+
 uz_cache *work_cache(work *w)
 {
     return w->cache;

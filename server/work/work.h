@@ -13,8 +13,10 @@
  *   "contact_nodes"  m, the node of each reaction; scenes only
  *   "pressure"       m, reaction over tributary area; scenes only
  *   "ray"            m, the proof of an infeasible problem
- * and a history of CODEC_HISTORY_COLUMNS columns. A vector that a solve did not give is not there.
- * In the summary timings_s.total covers queue and parse too. */
+ *   "state"          where the run stood, for one that continues it (state.h)
+ * and a history of CODEC_HISTORY_COLUMNS columns. A vector that a solve did not give is not there. A job with load
+ * cases leaves dim, nodes and contact_nodes once, and the others for each case. In the summary timings_s.total covers
+ * queue and parse too. */
 #ifndef SERVER_WORK_H
 #define SERVER_WORK_H
 
@@ -51,6 +53,16 @@ bool work_wait(work *w, const char *id, double seconds);
  * columns) with iteration > after. Of a long run rows are left out, evenly; the newest is always there. False if it
  * does not run here. rows may be NULL when only progress is wanted. */
 bool work_live(work *w, const char *id, int64_t after, int *progress, double **rows, int64_t *count);
+
+/* The same for a job that may have load cases. */
+typedef struct {
+    char case_name[64]; /* the case that runs now; "": the job has none */
+    bool is_case;       /* the name that was asked for is a case of the job */
+    double *rows;       /* of the case that runs now, if it is the one asked for; freed by the caller */
+    int64_t count;
+} work_history;
+/* case_name NULL: whichever runs. */
+bool work_live_history(work *w, const char *id, const char *case_name, int64_t after, work_history *out);
 
 uz_cache *work_cache(work *w);
 size_t work_cache_bytes(const work *w);

@@ -176,3 +176,20 @@ uz_status uz_scene_check(const uz_scene *scene, uz_error *err)
     uz_body_model_clear(&model);
     return status;
 }
+
+uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene *scene, uz_error *err)
+{
+    uz_body_model model;
+    uz_error_reset(err);
+    *dim = 0;
+    *n_nodes = *m = 0;
+    memset(&model, 0, sizeof model);
+    uz_status status = prepare(&model, scene, err);
+    if (status == UZ_OK) {
+        *dim = model.mesh.dim;
+        *n_nodes = model.mesh.n_nodes;
+        *m = model.m;
+    }
+    uz_body_model_clear(&model);
+    return status;
+}

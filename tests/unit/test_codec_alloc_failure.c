@@ -110,7 +110,7 @@ static bool try_encode(const char *argument)
     static const double rows[40 * CODEC_HISTORY_COLUMNS];
     size_t len;
     (void)argument;
-    char *text = codec_encode_history(rows, 40, &len);
+    char *text = codec_encode_history(NULL, rows, 40, &len);
     CHECK(text ? len > 0 : len == 0);
     free(text);
     return text != NULL;

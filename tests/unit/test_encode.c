@@ -346,7 +346,7 @@ TEST(history)
     codec_history_row(rows, &row);
     row.error_bound = 0.25;
     codec_history_row(rows + CODEC_HISTORY_COLUMNS, &row);
-    char *reply = codec_encode_history(rows, 2, &len);
+    char *reply = codec_encode_history(NULL, rows, 2, &len);
     CHECK_INT(len, strlen(reply));
     CHECK(strstr(reply, "\"rows\":[[7,0.5,-1,1,2,3,4,5,6,null,8,1],[7,0.5,-1,1,2,3,4,5,6,0.25,8,1]]"));
     read_reply(&doc, reply, "history.json");
@@ -356,7 +356,7 @@ TEST(history)
     CHECK_STR(reply, "iteration,seconds,dual_objective,residual_total,e1,e2,e3,e4,step_norm,error_bound,contacts,"
                      "restart\n7,0.5,-1,1,2,3,4,5,6,inf,8,1\n7,0.5,-1,1,2,3,4,5,6,0.25,8,1\n");
     free(reply);
-    reply = codec_encode_history(rows, 0, &len);
+    reply = codec_encode_history(NULL, rows, 0, &len);
     read_reply(&doc, reply, "history.json");
     json_doc_clear(&doc);
     free(reply);

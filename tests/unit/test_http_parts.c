@@ -146,7 +146,7 @@ static double wait_of(const char *value)
 {
     http_request rq = {0};
     set_headers(&rq.headers, (pair[]){{"prefer", value}}, 1);
-    return request_wait(&rq, 60);
+    return request_wait(&rq, 0, 60);
 }
 
 TEST(prefer_wait_is_read)

@@ -21,7 +21,7 @@ static void begin(live *l, double relative_error)
     *l = (live){0};
     live_reset(l);
     CHECK_INT(live_progress(l), 1);
-    live_begin(l, &settings);
+    live_begin(l, &settings, NULL);
     CHECK_INT(live_progress(l), 5);
 }
 
@@ -103,7 +103,7 @@ TEST(progress_by_iterations_and_by_the_step)
     uz_settings settings = settings_for(1e-8);
     begin(&l, 1e-8);
     settings.max_iterations = 100;
-    live_begin(&l, &settings);
+    live_begin(&l, &settings, NULL);
     uz_history_row row = row_at(50, INFINITY);
     live_add(&l, &row);
     CHECK_INT(live_progress(&l), 52);
@@ -111,7 +111,7 @@ TEST(progress_by_iterations_and_by_the_step)
     settings.stopping = UZ_STOP_PAPER;
     settings.epsilon = 1e-6;
     settings.max_iterations = 0;
-    live_begin(&l, &settings);
+    live_begin(&l, &settings, NULL);
     row = row_at(0, 0.0); /* the first step has no length */
     live_add(&l, &row);
     row = row_at(1, 1.0);

@@ -1,0 +1,118 @@
+/* history.c: how a run went: /v1/jobs/{id}/history and /history.csv, also while it goes on. */
+#include "http/jobs.h"
+#include "http/problem.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The rows of one case, or of a job without cases. */
+typedef struct {
+    char case_name[64]; /* "": none */
+    double *rows;
+    int64_t count;
+} found_rows;
+
+static bool refuse_case(http_reply *reply, int status, const char *name, const store_case *cases, size_t count)
+{
+    problem_details problem;
+    if (name)
+        http_problem(&problem, status, "case_not_found", "Not found", "the job has no case \"%.63s\".", name);
+    else
+        http_problem(&problem, status, "case_needed", "Each load case has a history of its own",
+                     "say which one with ?case=NAME.");
+    if (name)
+        cases_suggest(&problem, name, cases, count);
+    cases_list(&problem, cases, count);
+    reply_problem(reply, &problem);
+    return false;
+}
+
+/* The case that the query names in an ended job. False with a reply. */
+static bool find_case(api *context, const job *j, const char *name, int64_t *number, http_reply *reply)
+{
+    store_case *cases = NULL;
+    size_t count = 0, i = 0;
+    store_status status = store_get_cases(context->store, j->id, NULL, &cases, &count);
+    if (status != STORE_OK) {
+        reply_store_failure(context, status, reply);
+        return false;
+    }
+    while (name && i < count && strcmp(cases[i].name, name) != 0)
+        i++;
+    bool good = name ? i < count : count == 0;
+    *number = good && name ? cases[i].number : 0;
+    if (!good)
+        refuse_case(reply, name ? 404 : 400, name, cases, count);
+    store_cases_free(cases, count);
+    return good;
+}
+
+/* Of an ended job, from the store. */
+static bool fetch_stored(api *context, const job *j, const char *name, int64_t after, found_rows *out,
+                         http_reply *reply)
+{
+    int64_t columns = 0, number;
+    if (!find_case(context, j, name, &number, reply))
+        return false;
+    snprintf(out->case_name, sizeof out->case_name, "%s", name ? name : "");
+    store_status status = store_get_history(context->store, j->id, number, after, &out->rows, &out->count, &columns);
+    if (status == STORE_OK && out->count > 0 && columns != CODEC_HISTORY_COLUMNS)
+        status = STORE_ERROR;
+    if (status == STORE_OK || status == STORE_NOT_FOUND)
+        return true;
+    reply_store_failure(context, status, reply);
+    return false;
+}
+
+/* The rows of a running job are with its worker, those of an ended one in the store; a job may end in between, and one
+ * that waits has none. While a job with cases runs, the rows are those of the case that runs; another of its cases has
+ * none to show. False with a reply. */
+static bool fetch(api *context, const job *j, const char *name, int64_t after, found_rows *out, http_reply *reply)
+{
+    work_history live;
+    if (j->status == JOB_ACCEPTED)
+        return true;
+    if (j->status != JOB_RUNNING || !work_live_history(context->work, j->id, name, after, &live))
+        return fetch_stored(context, j, name, after, out, reply);
+    out->rows = live.rows;
+    out->count = live.count;
+    snprintf(out->case_name, sizeof out->case_name, "%s", name ? name : live.case_name);
+    return !name || live.is_case || refuse_case(reply, 404, name, NULL, 0);
+}
+
+static void encode(const found_rows *found, bool csv, http_reply *reply)
+{
+    size_t len = 0;
+    const char *name = found->case_name[0] ? found->case_name : NULL;
+    char *text = csv ? codec_encode_history_csv(found->rows, found->count, &len)
+                     : codec_encode_history(name, found->rows, found->count, &len);
+    reply_text(reply, 200, csv ? "text/csv; charset=utf-8; header=present" : "application/json", text, len);
+}
+
+static void reply_history(api *context, http_request *rq, bool csv, http_reply *reply)
+{
+    int64_t after = -1;
+    found_rows found = {.rows = NULL};
+    problem_details problem;
+    job j = {0};
+    if (!request_integer(rq, "after", -1, INT64_MAX, &after, &problem)) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    if (jobs_load(context, rq, &j, reply) &&
+        fetch(context, &j, target_value(&rq->target, "case"), after, &found, reply))
+        encode(&found, csv, reply);
+    free(found.rows);
+    job_clear(&j);
+}
+
+void history_get(api *context, http_request *rq, http_reply *reply)
+{
+    reply_history(context, rq, request_accepts(rq, "text/csv"), reply);
+}
+
+void history_get_csv(api *context, http_request *rq, http_reply *reply)
+{
+    reply_history(context, rq, true, reply);
+}

@@ -1,0 +1,36 @@
+/* jobs.h: what the handlers of jobs, results, refine and verify share. */
+#ifndef SERVER_HTTP_JOBS_H
+#define SERVER_HTTP_JOBS_H
+
+#include "codec/codec.h"
+#include "http/request.h"
+
+bool jobs_ended(const job *j);
+
+/* Waits as the request prefers, `otherwise` seconds where it does not say, and reads the job again; *j is replaced.
+ * False with a failure in reply. */
+bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply);
+
+/* NULL in *key: none was given; freed by the caller. False with a 400. */
+bool jobs_read_key(const http_request *rq, char **key, problem_details *problem);
+
+/* Stores a request and tells the workers. False with a failure in reply; the caller clears *out. */
+bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply);
+
+/* Answers with the job: 200 where it has ended, else 202, and where it is. */
+void jobs_acknowledge(api *context, job *j, http_reply *reply);
+
+/* What a request says of the job it starts from, against the store. False: *problem. */
+bool start_check(api *context, const codec_request *request, const http_request *rq, problem_details *problem);
+
+/* False with a 409 that says why there is no answer. */
+bool results_exist(const job *j, http_reply *reply);
+/* Answers with the default fields of the result, as GET /v1/jobs/{id}/result does. */
+void results_reply(api *context, const job *j, http_reply *reply);
+
+/* Appends up to some names of cases to the detail, quoted: `Its cases: "a", "b", ... (5 in all).` */
+void cases_list(problem_details *problem, const store_case *cases, size_t count);
+/* Appends `Did you mean "x"?` if a case has a name close to this one. */
+void cases_suggest(problem_details *problem, const char *name, const store_case *cases, size_t count);
+
+#endif

@@ -1,0 +1,103 @@
+/* refine.c: POST /v1/jobs/{id}/refine: a job that goes on where another one stopped. */
+#include "http/jobs.h"
+#include "http/problem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* False with a 409: a job whose only answer is that there is none can't be refined. */
+static bool has_reactions(api *context, const job *j, http_reply *reply)
+{
+    double *r = NULL;
+    int64_t count = 0;
+    bool finite = true;
+    store_status status = store_get_vector(context->store, j->id, 0, "reactions", &r, &count);
+    for (int64_t i = 0; status == STORE_OK && finite && i < count; i++)
+        finite = isfinite(r[i]);
+    free(r);
+    if (status != STORE_OK && status != STORE_NOT_FOUND) /* with cases the job itself has none */
+        reply_store_failure(context, status, reply);
+    else if (!finite)
+        reply_refuse(reply, 409, "no_result", "The job has no result",
+                     "the problem is infeasible: no accuracy makes it feasible");
+    else
+        return true;
+    return false;
+}
+
+/* The pointers of a made request, seen from the request that it was made from. */
+static void point_outside(problem_details *problem)
+{
+    static const char SOLVER[] = "/solver";
+    size_t skip = sizeof SOLVER - 1;
+    if (strncmp(problem->pointer, SOLVER, skip) != 0)
+        return;
+    memmove(problem->pointer, problem->pointer + skip, strlen(problem->pointer + skip) + 1);
+    if (strncmp(problem->detail, SOLVER, skip) == 0)
+        memmove(problem->detail, problem->detail + skip, strlen(problem->detail + skip) + 1);
+}
+
+/* The body of the new job and its tags, checked as any other; NULL in *body: refused. */
+static void make_request(const http_request *rq, const job *old, const char *old_body, size_t old_len, char **body,
+                         size_t *len, char **tags, http_reply *reply)
+{
+    codec_request request = {0};
+    problem_details problem = {0};
+    *body = codec_refine(old_body, old_len, old->id, rq->body ? rq->body : "", rq->body_len, len, &problem);
+    if (*body && codec_decode(&request, CODEC_SOLVE, *body, *len, &problem)) {
+        *tags = request.tags;
+        request.tags = NULL;
+        codec_request_clear(&request);
+        return;
+    }
+    point_outside(&problem);
+    reply_problem(reply, &problem);
+    free(*body);
+    *body = NULL;
+}
+
+static void submit(api *context, http_request *rq, const store_request *request, http_reply *reply)
+{
+    job j = {0};
+    if (jobs_store(context, rq, request, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
+        jobs_acknowledge(context, &j, reply);
+    job_clear(&j);
+}
+
+static void refine(api *context, http_request *rq, const job *old, const char *key, http_reply *reply)
+{
+    char *old_body = NULL, *body = NULL, *tags = NULL;
+    size_t old_len = 0, len = 0;
+    store_status status = store_get_body(context->store, old->id, &old_body, &old_len);
+    if (status != STORE_OK) {
+        reply_store_failure(context, status, reply);
+    } else if (codec_is_verify(old_body, old_len)) {
+        reply_refuse(reply, 409, "not_solved_here", "The job solved nothing",
+                     "it certified an answer that was given to it, and there is no run to continue");
+    } else {
+        make_request(rq, old, old_body, old_len, &body, &len, &tags, reply);
+        free(old_body); /* as large as the new one: not kept while the client waits */
+        old_body = NULL;
+        store_request request = {body, len, tags, key, old->id};
+        if (body)
+            submit(context, rq, &request, reply);
+    }
+    free(old_body);
+    free(body);
+    free(tags);
+}
+
+void jobs_refine(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem = {0};
+    job old = {0};
+    char *key = NULL;
+    if (!jobs_read_key(rq, &key, &problem))
+        reply_problem(reply, &problem);
+    else if (jobs_load(context, rq, &old, reply) && results_exist(&old, reply) && has_reactions(context, &old, reply))
+        refine(context, rq, &old, key, reply);
+    job_clear(&old);
+    free(key);
+}

@@ -1,0 +1,126 @@
+/* start_check.c: "warm_start": {"job": ...} against the store, before the request becomes a job. The other job may
+ * still be deleted before this one runs; the run then begins at zero. */
+#include "http/jobs.h"
+#include "http/problem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* 422 at a member of warm_start. */
+static bool refuse(problem_details *problem, const char *member, const char *code, const char *detail)
+{
+    http_problem(problem, 422, code, "The start cannot be used", "%s", detail);
+    snprintf(problem->pointer, sizeof problem->pointer, "/solver/warm_start/%s", member);
+    return false;
+}
+
+static bool refuse_store(api *context, problem_details *problem)
+{
+    char cause[256];
+    store_message(context->store, cause, sizeof cause);
+    log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
+    return http_problem(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+}
+
+/* The job must have ended with an answer. */
+static bool check_job(api *context, const codec_start *start, problem_details *problem)
+{
+    job other = {0};
+    store_status status = store_get(context->store, start->job, &other);
+    bool ended = status == STORE_OK && jobs_ended(&other), good = ended && other.summary;
+    job_clear(&other);
+    if (good)
+        return true;
+    if (status == STORE_NOT_FOUND)
+        return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: there is no job with this id");
+    if (status != STORE_OK)
+        return refuse_store(context, problem);
+    return refuse(problem, "job", "not_allowed",
+                  ended ? "/solver/warm_start/job: this job ended without an answer"
+                        : "/solver/warm_start/job: this job has not ended");
+}
+
+/* 0 in *number: the job has no cases. */
+static bool find_case(api *context, const codec_start *start, int64_t *number, problem_details *problem)
+{
+    store_case *cases = NULL;
+    size_t count = 0, i = 0;
+    *number = 0;
+    if (store_get_cases(context->store, start->job, NULL, &cases, &count) != STORE_OK)
+        return refuse_store(context, problem);
+    while (i < count && strcmp(cases[i].name, start->case_name) != 0)
+        i++;
+    bool good = i < count || (count == 0 && !start->case_name[0]);
+    if (good && i < count)
+        *number = cases[i].number;
+    else if (!good && start->case_name[0])
+        refuse(problem, "case", "not_allowed", "/solver/warm_start/case: that job has no case of this name.");
+    else if (!good)
+        refuse(problem, "job", "missing_key",
+               "/solver/warm_start/job: that job has load cases: say which one in \"case\".");
+    if (!good) {
+        cases_suggest(problem, start->case_name, cases, count);
+        cases_list(problem, cases, count);
+    }
+    store_cases_free(cases, count);
+    return good;
+}
+
+static bool check_reactions(api *context, const codec_request *request, int64_t number, problem_details *problem)
+{
+    double *r = NULL;
+    int64_t count = 0, m, n_u;
+    char text[160];
+    store_status status = store_get_vector(context->store, request->start.job, number, "reactions", &r, &count);
+    bool finite = status == STORE_OK;
+    for (int64_t i = 0; finite && i < count; i++)
+        finite = isfinite(r[i]);
+    free(r);
+    if (status != STORE_OK && status != STORE_NOT_FOUND)
+        return refuse_store(context, problem);
+    if (!finite)
+        return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: this job ended without reactions");
+    if (!codec_request_sizes(request, &m, &n_u, problem))
+        return false;
+    if (count == m)
+        return true;
+    snprintf(text, sizeof text,
+             "/solver/warm_start/job: that job has %lld contact rows, this problem has %lld: they must be as many",
+             (long long)count, (long long)m);
+    return refuse(problem, "job", "size_mismatch", text);
+}
+
+/* A run that goes on with another problem would be another run. */
+static bool check_same(api *context, const codec_start *start, const http_request *rq, problem_details *problem)
+{
+    char *body = NULL;
+    size_t len = 0;
+    if (start->case_name[0])
+        return refuse(problem, "case", "not_allowed",
+                      "/solver/warm_start/case: a run is continued with all its cases; leave this out");
+    store_status status = store_get_body(context->store, start->job, &body, &len);
+    bool same = status == STORE_OK && codec_same_problem(rq->body, rq->body_len, body, len);
+    free(body);
+    if (same)
+        return true;
+    if (status != STORE_OK && status != STORE_NOT_FOUND)
+        return refuse_store(context, problem);
+    return refuse(problem, "continue", "not_allowed",
+                  "/solver/warm_start/continue: problem and cases are not, byte by byte, those of that job; leave this "
+                  "out to start from its reactions");
+}
+
+bool start_check(api *context, const codec_request *request, const http_request *rq, problem_details *problem)
+{
+    const codec_start *start = &request->start;
+    int64_t number;
+    if (!start->job[0])
+        return true;
+    if (!check_job(context, start, problem))
+        return false;
+    if (start->continued)
+        return check_same(context, start, rq, problem);
+    return find_case(context, start, &number, problem) && check_reactions(context, request, number, problem);
+}

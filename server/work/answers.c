@@ -1,0 +1,201 @@
+#include "work/answers.h"
+#include "work/overall.h"
+#include "work/state.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- vectors */
+
+static void add_vector(answer_parts *to, const char *name, const double *data, int64_t count)
+{
+    if (!data)
+        return;
+    store_vector *v = &to->vectors[to->n_vectors++];
+    snprintf(v->name, sizeof v->name, "%s", name);
+    v->data = data;
+    v->count = count;
+}
+
+/* The mesh is the same for all cases: dim, nodes, contact_nodes. */
+static bool add_places(answers *a, answer_parts *to, const uz_result *result, bool is_scene)
+{
+    a->dim = is_scene ? result->mesh.dim : 0;
+    add_vector(to, "dim", &a->dim, 1);
+    if (!is_scene)
+        return true;
+    add_vector(to, "nodes", result->mesh.xyz, result->mesh.n_nodes * result->mesh.dim);
+    if (!result->mesh.contact_node)
+        return true;
+    a->contact_nodes = calloc((size_t)result->m + 1, sizeof *a->contact_nodes);
+    if (!a->contact_nodes)
+        return false;
+    for (int64_t i = 0; i < result->m; i++)
+        a->contact_nodes[i] = (double)result->mesh.contact_node[i];
+    add_vector(to, "contact_nodes", a->contact_nodes, result->m);
+    return true;
+}
+
+static bool add_pressure(answer_parts *to, const uz_result *result)
+{
+    if (!result->mesh.contact_node)
+        return true;
+    to->pressure = calloc((size_t)result->m + 1, sizeof *to->pressure);
+    for (int64_t i = 0; to->pressure && i < result->m; i++)
+        to->pressure[i] = (0.0 - result->r[i]) / result->mesh.contact_area[i];
+    add_vector(to, "pressure", to->pressure, result->m);
+    return to->pressure != NULL;
+}
+
+/* Without memory for it the run can't be continued, and that is all. */
+static void add_state(answer_parts *to, const uz_result *result)
+{
+    int64_t count = 0;
+    if (result->state)
+        to->state = state_pack(result->state, &count);
+    add_vector(to, STATE_VECTOR, to->state, count);
+}
+
+static bool add_vectors(answer_parts *to, const uz_result *result, bool is_scene)
+{
+    add_vector(to, "reactions", result->r, result->m);
+    add_vector(to, "gaps", result->g, result->m);
+    add_vector(to, "ray", result->ray, result->m);
+    add_vector(to, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
+    add_state(to, result);
+    return !is_scene || add_pressure(to, result);
+}
+
+/* ---- history */
+
+/* Rows of the run that was continued up to where the new ones begin. */
+static int64_t count_earlier(const double *rows, int64_t count, const uz_history *later)
+{
+    int64_t n = 0;
+    double first = later->count > 0 ? (double)later->rows[0].iteration : 1e300;
+    while (n < count && rows[n * CODEC_HISTORY_COLUMNS] < first)
+        n++;
+    return n;
+}
+
+/* Seconds count from the first iteration of the first run; the time between the runs is left out. */
+static bool add_history(answer_parts *to, const uz_history *history, const double *earlier, int64_t earlier_rows)
+{
+    int64_t kept = count_earlier(earlier, earlier_rows, history);
+    double spent = earlier_rows > 0 ? earlier[(earlier_rows - 1) * CODEC_HISTORY_COLUMNS + 1] : 0.0;
+    to->history = calloc((size_t)(kept + history->count) + 1, CODEC_HISTORY_COLUMNS * sizeof *to->history);
+    if (!to->history)
+        return false;
+    if (kept > 0)
+        memcpy(to->history, earlier, (size_t)kept * CODEC_HISTORY_COLUMNS * sizeof *earlier);
+    for (int64_t i = 0; i < history->count; i++) {
+        double *row = to->history + (kept + i) * CODEC_HISTORY_COLUMNS;
+        codec_history_row(row, &history->rows[i]);
+        row[1] += spent;
+    }
+    to->history_rows = kept + history->count;
+    return true;
+}
+
+/* ---- one answer, all answers */
+
+static bool build_one(answers *a, int64_t i, const uz_result *result, const codec_request *request, const starts *from)
+{
+    bool is_scene = request->problem.kind == UZ_PROBLEM_SCENE, has_earlier = from->histories != NULL;
+    answer_parts *parts = &a->parts[i];
+    codec_run run = {.started_from = request->answer.u ? NULL : starts_name(from, i)};
+    parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
+    return parts->summary && add_vectors(parts, result, is_scene) &&
+           add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
+                       has_earlier ? from->rows[i] : 0);
+}
+
+static store_answer as_stored(const answer_parts *parts, const char *name)
+{
+    return (store_answer){.name = name,
+                          .summary = parts->summary,
+                          .vectors = parts->vectors,
+                          .n_vectors = parts->n_vectors,
+                          .history = parts->history,
+                          .history_rows = parts->history_rows,
+                          .history_columns = CODEC_HISTORY_COLUMNS};
+}
+
+static void add_waiting(uz_timings *t, double queue_s, double parse_s)
+{
+    t->queue = queue_s;
+    t->parse = parse_s;
+    t->total += queue_s + parse_s;
+}
+
+static const char *started_from(const starts *from, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++)
+        if (from->states && from->states[i])
+            return starts_name(from, i);
+    return "zero";
+}
+
+static bool build_whole(answers *a, uz_result *const *results, const codec_request *request, const starts *from,
+                        double queue_s, double parse_s)
+{
+    codec_cases counts;
+    uz_summary overall;
+    overall_summary(&overall, &counts, results, &request->problem);
+    add_waiting(&overall.timings, queue_s, parse_s);
+    codec_run run = {.started_from = started_from(from, a->n), .cases = &counts};
+    a->shared.summary = codec_encode_run(&overall, request->problem.kind, &run);
+    return a->shared.summary && add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE);
+}
+
+static bool build_cases(answers *a, store_outcome *outcome, const codec_request *request)
+{
+    a->cases = calloc((size_t)a->n, sizeof *a->cases);
+    if (!a->cases)
+        return false;
+    for (int64_t i = 0; i < a->n; i++)
+        a->cases[i] = as_stored(&a->parts[i], request->problem.cases[i].name);
+    outcome->cases = a->cases;
+    outcome->n_cases = (size_t)a->n;
+    outcome->whole = as_stored(&a->shared, NULL);
+    return true;
+}
+
+bool answers_build(answers *out, store_outcome *outcome, uz_result *const *results, const codec_request *request,
+                   const starts *from, double queue_s, double parse_s)
+{
+    bool has_cases = request->problem.n_cases > 0, ok = true;
+    *out = (answers){.n = has_cases ? request->problem.n_cases : 1};
+    out->parts = calloc((size_t)out->n, sizeof *out->parts);
+    if (!out->parts)
+        return false;
+    if (!has_cases)
+        add_waiting(&results[0]->summary.timings, queue_s, parse_s);
+    for (int64_t i = 0; ok && i < out->n; i++)
+        ok = build_one(out, i, results[i], request, from);
+    if (ok && has_cases)
+        return build_whole(out, results, request, from, queue_s, parse_s) && build_cases(out, outcome, request);
+    ok = ok && add_places(out, &out->parts[0], results[0], request->problem.kind == UZ_PROBLEM_SCENE);
+    outcome->whole = as_stored(&out->parts[0], NULL);
+    return ok;
+}
+
+static void clear_parts(answer_parts *parts)
+{
+    free(parts->summary);
+    free(parts->pressure);
+    free(parts->history);
+    free(parts->state);
+}
+
+void answers_clear(answers *a)
+{
+    for (int64_t i = 0; a->parts && i < a->n; i++)
+        clear_parts(&a->parts[i]);
+    clear_parts(&a->shared);
+    free(a->parts);
+    free(a->cases);
+    free(a->contact_nodes);
+    *a = (answers){.n = 0};
+}

@@ -1,0 +1,102 @@
+#include "work/overall.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* How much an outcome leaves to be wished, 0: nothing. */
+static int badness(uz_outcome outcome)
+{
+    switch (outcome) {
+    case UZ_CONVERGED:
+    case UZ_VERIFIED:
+        return 0;
+    case UZ_PRECISION_LIMIT:
+        return 1;
+    case UZ_PAPER_RULE:
+        return 2;
+    case UZ_ITERATION_LIMIT:
+        return 3;
+    case UZ_NOT_VERIFIED:
+        return 4;
+    case UZ_TIME_LIMIT:
+        return 5;
+    case UZ_DISMISSED:
+        return 6;
+    case UZ_INFEASIBLE:
+        break;
+    }
+    return 7;
+}
+
+/* A bound that is not known counts as the largest. */
+static double bound_of(const uz_result *result)
+{
+    double bound = result->summary.certificate.relative_error;
+    return isnan(bound) ? (double)INFINITY : bound;
+}
+
+static bool is_worse(const uz_result *a, const uz_result *b)
+{
+    int x = badness(a->summary.outcome), y = badness(b->summary.outcome);
+    return x != y ? x > y : bound_of(a) > bound_of(b);
+}
+
+static void add_timings(uz_timings *sum, const uz_timings *t)
+{
+    sum->assemble += t->assemble;
+    sum->order += t->order;
+    sum->factor += t->factor;
+    sum->condense += t->condense;
+    sum->iterate += t->iterate;
+    sum->certify += t->certify;
+    sum->total += t->total;
+}
+
+/* The first case paid for the factor, or found it. */
+static void take_factor(uz_summary *out, const uz_summary *first)
+{
+    out->factor_cached = first->factor_cached;
+    out->factor_nnz = first->factor_nnz;
+    out->factor_bytes = first->factor_bytes;
+    out->rcond = first->rcond;
+}
+
+static void set_message(uz_summary *out, const codec_cases *counts)
+{
+    char own[sizeof out->message];
+    int64_t good = counts->outcomes[UZ_CONVERGED];
+    memcpy(own, out->message, sizeof own);
+    if (good == counts->count)
+        out->message[0] = '\0';
+    else
+        snprintf(out->message, sizeof out->message,
+                 "%" PRId64 " of %" PRId64 " cases converged. The worst is %s%s%.120s", good, counts->count,
+                 counts->worst, own[0] ? ": " : ".", own);
+}
+
+void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *results, const uz_problem *problem)
+{
+    int64_t worst = 0;
+    uz_timings times = {0};
+    double bound = 0.0;
+    *counts = (codec_cases){.count = problem->n_cases};
+    for (int64_t i = 0; i < problem->n_cases; i++) {
+        counts->outcomes[results[i]->summary.outcome]++;
+        worst = is_worse(results[i], results[worst]) ? i : worst;
+        bound = fmax(bound, bound_of(results[i]));
+        add_timings(&times, &results[i]->summary.timings);
+    }
+    *out = results[worst]->summary;
+    counts->worst = problem->cases[worst].name;
+    out->certificate.relative_error = bound;
+    out->timings = times;
+    out->iterations = out->restarts = 0;
+    for (int64_t i = 0; i < problem->n_cases; i++) {
+        out->iterations += results[i]->summary.iterations;
+        out->restarts += results[i]->summary.restarts;
+    }
+    take_factor(out, &results[0]->summary);
+    set_message(out, counts);
+}

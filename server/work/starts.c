@@ -1,0 +1,132 @@
+#include "work/starts.h"
+#include "work/state.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* ---- reading */
+
+static bool all_finite(const double *x, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return false;
+    return true;
+}
+
+/* The state that the job left, or its reactions; *out NULL: neither. */
+static store_status load_state(uz_state **out, store *s, const char *id, int64_t number, bool continued)
+{
+    double *x = NULL;
+    int64_t count = 0;
+    store_status status = STORE_NOT_FOUND;
+    *out = NULL;
+    if (continued)
+        status = store_get_vector(s, id, number, STATE_VECTOR, &x, &count);
+    if (status == STORE_OK)
+        *out = state_unpack(x, count);
+    free(x);
+    if (*out || (status != STORE_OK && status != STORE_NOT_FOUND))
+        return status;
+    status = store_get_vector(s, id, number, "reactions", &x, &count);
+    if (status == STORE_OK && all_finite(x, count)) /* an infeasible problem has none */
+        *out = state_from_reactions(x, count);
+    free(x);
+    return status == STORE_NOT_FOUND ? STORE_OK : status;
+}
+
+/* Rows that belong to another number of columns are left out: they were written by another version. */
+static store_status load_history(double **rows, int64_t *count, store *s, const char *id, int64_t number)
+{
+    int64_t columns = 0;
+    store_status status = store_get_history(s, id, number, -1, rows, count, &columns);
+    if (status == STORE_OK && columns != CODEC_HISTORY_COLUMNS)
+        *count = 0;
+    return status == STORE_NOT_FOUND ? STORE_OK : status;
+}
+
+/* The number of the case that the request names; 0: the job has no cases. */
+static store_status find_number(store *s, const codec_start *start, int64_t *number)
+{
+    store_case *found = NULL;
+    size_t count = 0;
+    *number = 0;
+    if (!start->case_name[0])
+        return STORE_OK;
+    store_status status = store_get_cases(s, start->job, start->case_name, &found, &count);
+    if (status == STORE_OK && count > 0)
+        *number = found[0].number;
+    store_cases_free(found, count);
+    return status;
+}
+
+/* ---- all of them */
+
+static bool make_room(starts *out, int64_t n)
+{
+    out->n = n;
+    out->states = calloc((size_t)n, sizeof *out->states);
+    out->histories = calloc((size_t)n, sizeof *out->histories);
+    out->rows = calloc((size_t)n, sizeof *out->rows);
+    return out->states && out->histories && out->rows;
+}
+
+static store_status load_continued(starts *out, store *s, const codec_request *request)
+{
+    store_status status = STORE_OK;
+    for (int64_t i = 0; i < out->n && status == STORE_OK; i++) {
+        int64_t number = request->problem.n_cases > 0 ? i + 1 : 0;
+        status = load_state(&out->states[i], s, request->start.job, number, true);
+        if (status == STORE_OK && out->states[i] && out->states[i]->rho)
+            status = load_history(&out->histories[i], &out->rows[i], s, request->start.job, number);
+    }
+    return status;
+}
+
+/* Every case from the same reactions. */
+static store_status load_warm(starts *out, store *s, const codec_start *start)
+{
+    uz_state *first = NULL;
+    int64_t number = 0;
+    store_status status = STORE_OK;
+    if (start->reactions)
+        first = state_from_reactions(start->reactions, start->n_reactions);
+    else if ((status = find_number(s, start, &number)) == STORE_OK)
+        status = load_state(&first, s, start->job, number, false);
+    for (int64_t i = 0; first && i < out->n; i++)
+        out->states[i] = i == 0 ? first : state_from_reactions(first->r, first->m);
+    return status;
+}
+
+store_status starts_load(starts *out, store *s, const codec_request *request)
+{
+    const codec_start *start = &request->start;
+    *out = (starts){.n = 0};
+    if (!start->job[0] && !start->reactions)
+        return STORE_OK;
+    if (!make_room(out, request->problem.n_cases > 0 ? request->problem.n_cases : 1)) {
+        starts_clear(out);
+        return STORE_OK; /* without the memory for it the run begins at zero */
+    }
+    return start->continued ? load_continued(out, s, request) : load_warm(out, s, start);
+}
+
+void starts_clear(starts *s)
+{
+    for (int64_t i = 0; i < s->n; i++) {
+        if (s->states)
+            uz_state_free(s->states[i]);
+        if (s->histories)
+            free(s->histories[i]);
+    }
+    free(s->states);
+    free(s->histories);
+    free(s->rows);
+    *s = (starts){.n = 0};
+}
+
+const char *starts_name(const starts *s, int64_t i)
+{
+    const uz_state *state = s->states ? s->states[i] : NULL;
+    return !state ? "zero" : state->rho ? "continued" : "warm";
+}

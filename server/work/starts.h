@@ -1,0 +1,24 @@
+/* starts.h: where a run begins: what an earlier job left in the store, or what the request says. */
+#ifndef SERVER_WORK_STARTS_H
+#define SERVER_WORK_STARTS_H
+
+#include "codec/codec.h"
+#include "store/store.h"
+#include "uzawa.h"
+
+/* For n = max(1, cases) runs. A start that is not there any more is NULL: from zero. */
+typedef struct {
+    int64_t n;
+    uz_state **states;  /* n; NULL: all from zero */
+    double **histories; /* n, the rows of the runs that are continued; NULL: none */
+    int64_t *rows;      /* n */
+} starts;
+
+/* What the store gives of what the request asks for; STORE_OK unless it fails. The caller clears *out. */
+store_status starts_load(starts *out, store *s, const codec_request *request);
+void starts_clear(starts *s);
+
+/* "zero", "warm" or "continued". */
+const char *starts_name(const starts *s, int64_t i);
+
+#endif

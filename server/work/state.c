@@ -1,0 +1,153 @@
+#include "work/state.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The rule for changing this layout: another one gets another STATE_VERSION, and one that is not known is not read.
+ * Numbers come first, in the order of numbers_of, then r, rho, Dr, Drho, best_r and anchor, m each. Counts are below
+ * 2^53, so that a double holds them. */
+enum { STATE_VERSION = 1, STATE_NUMBERS = 16, STATE_VECTORS = 6 };
+
+/* The numbers that methods have in stored states; new ones are added at the end. */
+static const struct {
+    int stored;
+    uz_method method;
+} METHODS[] = {{0, UZ_METHOD_AUTO},
+               {1, UZ_METHOD_UZAWA},
+               {2, UZ_METHOD_ACCELERATED},
+               {3, UZ_METHOD_ACCELERATED_RESTART},
+               {4, UZ_METHOD_ACTIVE_SET}};
+enum { N_METHODS = sizeof METHODS / sizeof METHODS[0] };
+
+static double method_number(uz_method method)
+{
+    for (int i = 0; i < N_METHODS; i++)
+        if (METHODS[i].method == method)
+            return METHODS[i].stored;
+    return -1.0;
+}
+
+static bool find_method(uz_method *out, double number)
+{
+    for (int i = 0; i < N_METHODS; i++)
+        if ((double)METHODS[i].stored == number) {
+            *out = METHODS[i].method;
+            return true;
+        }
+    return false;
+}
+
+static void list_vectors(uz_state *s, double **list[STATE_VECTORS])
+{
+    double **const all[STATE_VECTORS] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
+    memcpy(list, all, sizeof all);
+}
+
+static void numbers_of(double out[STATE_NUMBERS], const uz_state *s)
+{
+    const double all[STATE_NUMBERS] = {STATE_VERSION,
+                                       (double)s->m,
+                                       method_number(s->method),
+                                       method_number(s->made_by),
+                                       s->phase,
+                                       (double)s->phase_end,
+                                       (double)s->iteration,
+                                       (double)s->restarts,
+                                       (double)s->next_check,
+                                       (double)s->best_iteration,
+                                       s->alpha,
+                                       s->tau,
+                                       s->step_norm,
+                                       s->best_bound,
+                                       s->best_relative,
+                                       0.0};
+    memcpy(out, all, sizeof all);
+}
+
+double *state_pack(const uz_state *state, int64_t *count)
+{
+    uz_state s = *state;
+    double **vectors[STATE_VECTORS];
+    *count = STATE_NUMBERS + STATE_VECTORS * s.m;
+    double *x = calloc((size_t)*count, sizeof *x);
+    if (!x)
+        return NULL;
+    numbers_of(x, state);
+    list_vectors(&s, vectors);
+    for (int k = 0; k < STATE_VECTORS; k++)
+        if (*vectors[k] && s.m > 0)
+            memcpy(x + STATE_NUMBERS + k * s.m, *vectors[k], (size_t)s.m * sizeof *x);
+    return x;
+}
+
+/* The number as a count; false if it is none. */
+static bool take_count(int64_t *out, double x)
+{
+    if (!(x >= 0.0) || x > 9007199254740992.0 || x != floor(x))
+        return false;
+    *out = (int64_t)x;
+    return true;
+}
+
+static bool take_numbers(uz_state *s, const double *x)
+{
+    int64_t phase = 0;
+    bool ok = x[0] == STATE_VERSION && find_method(&s->method, x[2]) && find_method(&s->made_by, x[3]) &&
+              take_count(&phase, x[4]) && take_count(&s->phase_end, x[5]) && take_count(&s->iteration, x[6]) &&
+              take_count(&s->restarts, x[7]) && take_count(&s->next_check, x[8]) &&
+              take_count(&s->best_iteration, x[9]) && phase <= INT32_MAX;
+    s->phase = (int32_t)phase;
+    s->alpha = x[10];
+    s->tau = x[11];
+    s->step_norm = x[12];
+    s->best_bound = x[13];
+    s->best_relative = x[14];
+    return ok;
+}
+
+static bool take_vectors(uz_state *s, const double *x)
+{
+    double **vectors[STATE_VECTORS];
+    list_vectors(s, vectors);
+    for (int k = 0; k < STATE_VECTORS; k++) {
+        *vectors[k] = malloc(s->m > 0 ? (size_t)s->m * sizeof(double) : 1);
+        if (!*vectors[k])
+            return false;
+        if (s->m > 0)
+            memcpy(*vectors[k], x + k * s->m, (size_t)s->m * sizeof(double));
+    }
+    return true;
+}
+
+uz_state *state_unpack(const double *x, int64_t count)
+{
+    int64_t m = 0;
+    if (count < STATE_NUMBERS || !take_count(&m, x[1]) || m > (count - STATE_NUMBERS) / STATE_VECTORS ||
+        STATE_NUMBERS + STATE_VECTORS * m != count)
+        return NULL;
+    uz_state *s = calloc(1, sizeof *s);
+    if (!s)
+        return NULL;
+    s->m = m;
+    if (take_numbers(s, x) && take_vectors(s, x + STATE_NUMBERS))
+        return s;
+    uz_state_free(s);
+    return NULL;
+}
+
+uz_state *state_from_reactions(const double *r, int64_t m)
+{
+    uz_state *s = calloc(1, sizeof *s);
+    double *copy = malloc(m > 0 ? (size_t)m * sizeof *copy : 1);
+    if (!s || !copy) {
+        free(s);
+        free(copy);
+        return NULL;
+    }
+    if (m > 0)
+        memcpy(copy, r, (size_t)m * sizeof *copy);
+    s->m = m;
+    s->r = copy;
+    return s;
+}
