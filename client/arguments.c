@@ -12,6 +12,8 @@ typedef enum { FLAG, TEXT, SECONDS, COUNT, TAG } option_kind;
 #define ALL_COMMANDS (IN(CLIENT_COMMANDS) - 1u)
 #define ASKING       (ALL_COMMANDS & ~IN(CLIENT_VERSION) & ~IN(CLIENT_HELP)) /* commands that talk to the server */
 
+#define MAKING (IN(CLIENT_SUBMIT) | IN(CLIENT_REFINE) | IN(CLIENT_VERIFY)) /* commands that make a job */
+
 typedef struct {
     const char *name;
     char letter; /* 0: no short form */
@@ -29,11 +31,15 @@ static const option_rule RULES[] = {
     {"--help", 'h', FLAG, FIELD(help), ALL_COMMANDS, 0, 0},
     {"--version", 'V', FLAG, FIELD(version), ALL_COMMANDS, 0, 0},
     {"--json", 'j', FLAG, FIELD(json), ASKING, 0, 0},
-    {"--wait", 'w', FLAG, FIELD(wait), IN(CLIENT_SUBMIT), 0, 0},
+    {"--wait", 'w', FLAG, FIELD(wait), IN(CLIENT_SUBMIT) | IN(CLIENT_REFINE), 0, 0},
     {"--tag", 0, TAG, FIELD(tags), IN(CLIENT_SUBMIT) | IN(CLIENT_LIST), 0, 0},
-    {"--key", 'k', TEXT, FIELD(key), IN(CLIENT_SUBMIT), 0, 0},
-    {"--quiet", 'q', FLAG, FIELD(quiet), IN(CLIENT_SUBMIT) | IN(CLIENT_WAIT) | IN(CLIENT_CANCEL), 0, 0},
-    {"--progress", 0, FLAG, FIELD(progress), IN(CLIENT_SUBMIT) | IN(CLIENT_WAIT), 0, 0},
+    {"--key", 'k', TEXT, FIELD(key), MAKING, 0, 0},
+    {"--quiet", 'q', FLAG, FIELD(quiet), MAKING | IN(CLIENT_WAIT) | IN(CLIENT_CANCEL), 0, 0},
+    {"--progress", 0, FLAG, FIELD(progress), MAKING | IN(CLIENT_WAIT), 0, 0},
+    {"--accuracy", 'a', TEXT, FIELD(accuracy), IN(CLIENT_REFINE), 0, 0},
+    {"--max-iterations", 0, COUNT, FIELD(max_iterations), IN(CLIENT_REFINE), 0, 1000000000},
+    {"--time-limit", 0, SECONDS, FIELD(time_limit_s), IN(CLIENT_REFINE), 0, 0},
+    {"--case", 'c', TEXT, FIELD(case_name), IN(CLIENT_RESULT) | IN(CLIENT_HISTORY), 0, 0},
     {"--fields", 0, TEXT, FIELD(fields), IN(CLIENT_RESULT), 0, 0},
     {"--output", 'o', TEXT, FIELD(output), IN(CLIENT_RESULT) | IN(CLIENT_HISTORY), 0, 0},
     {"--csv", 0, FLAG, FIELD(csv), IN(CLIENT_HISTORY), 0, 0},
@@ -182,8 +188,9 @@ static bool take_words(parser *p)
 static bool check_operand(parser *p)
 {
     static const char *const WANTED[CLIENT_COMMANDS] = {
-        [CLIENT_SUBMIT] = "FILE", [CLIENT_STATUS] = "ID", [CLIENT_WAIT] = "ID",      [CLIENT_RESULT] = "ID",
-        [CLIENT_HISTORY] = "ID",  [CLIENT_CANCEL] = "ID", [CLIENT_HELP] = "COMMAND",
+        [CLIENT_SUBMIT] = "FILE", [CLIENT_STATUS] = "ID",   [CLIENT_WAIT] = "ID",
+        [CLIENT_REFINE] = "ID",   [CLIENT_VERIFY] = "FILE", [CLIENT_RESULT] = "ID",
+        [CLIENT_HISTORY] = "ID",  [CLIENT_CANCEL] = "ID",   [CLIENT_HELP] = "COMMAND",
     };
     const client_options *o = p->options;
     const char *name = client_command_name(o->command);
@@ -204,6 +211,8 @@ static bool check_combination(parser *p)
             return fail(p, "%s does not take %s", client_command_name(o->command), RULES[i].name);
     if (o->csv + o->plot + o->json > 1)
         return fail(p, "--csv, --plot and --json are alternatives: choose one");
+    if (o->command == CLIENT_REFINE && !o->accuracy)
+        return fail(p, "refine wants --accuracy: a relative error such as 1e-8, or quick, balanced, precise, exact");
     if (o->command == CLIENT_LIST && o->n_tags > 1)
         return fail(p, "list filters by one --tag");
     return true;
@@ -216,6 +225,8 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .server = env_server && *env_server ? env_server : "http://127.0.0.1:8080",
                             .timeout_s = INFINITY,
                             .retry_s = -1,
+                            .time_limit_s = NAN,
+                            .max_iterations = -1,
                             .limit = 20,
                             .width = 72,
                             .height = 20};

@@ -10,6 +10,8 @@ typedef enum {
     CLIENT_SUBMIT,
     CLIENT_STATUS,
     CLIENT_WAIT,
+    CLIENT_REFINE,
+    CLIENT_VERIFY,
     CLIENT_RESULT,
     CLIENT_HISTORY,
     CLIENT_LIST,
@@ -31,7 +33,9 @@ typedef struct {
     const char *tags[CLIENT_MAX_TAGS];
     int n_tags;
     const char *key, *fields, *output, *status;
-    long limit, width, height;
+    const char *case_name, *accuracy;          /* accuracy: a number or a level, as written */
+    double time_limit_s;                       /* NAN: not given */
+    long limit, width, height, max_iterations; /* max_iterations -1: not given */
     bool wait, quiet, json, progress, csv, plot, ascii, help, version;
 } client_options;
 

@@ -3,7 +3,7 @@
 #define CLIENT_EXIT_CODES_H
 
 typedef enum {
-    CLIENT_OK = 0,            /* done; `wait` and `submit --wait`: the answer is certified as asked */
+    CLIENT_OK = 0,            /* done; `wait`, `verify` and --wait: the answer is certified as asked */
     CLIENT_USAGE = 2,         /* the command line is wrong; nothing was sent */
     CLIENT_UNREACHABLE = 3,   /* no connection, or no answer in time */
     CLIENT_REFUSED = 4,       /* the server refused the request (4xx) and said why */

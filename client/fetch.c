@@ -23,6 +23,8 @@ client_exit client_status(client_session *s)
         code = client_print_json(s, job);
     else if (job)
         client_print_summary(s->out, job);
+    if (job && !s->options->json && client_job_ended(job) && code == CLIENT_OK)
+        code = client_show_cases(s, job);
     if (job && !s->options->json && json_is_object(json_object_get(job, "error")))
         client_print_problem(s->out, 0, json_object_get(job, "error"));
     json_decref(job);
@@ -150,18 +152,28 @@ static client_exit deliver(client_session *s, const client_reply *reply)
     return CLIENT_OK;
 }
 
+/* "/v1/jobs/ID/result?a=1&b=2" without the members that are NULL; the caller frees. NULL: no memory, said. */
+static char *path_with_query(client_session *s, const char *suffix, const char *fields, const char *case_name)
+{
+    client_buffer query = {0};
+    char *path = NULL;
+    if (client_buffer_append(&query, suffix, strlen(suffix)) && append_query(&query, "fields", fields) &&
+        append_query(&query, "case", case_name)) {
+        char *first = strchr(query.data, '&');
+        if (first)
+            *first = '?';
+        path = client_job_path(s, s->options->operand, query.data);
+    } else {
+        client_complain(s, CLIENT_LOCAL, "no memory");
+    }
+    free(query.data);
+    return path;
+}
+
 client_exit client_result(client_session *s)
 {
     client_reply reply;
-    client_buffer query = {0};
-    const char *fields = s->options->fields;
-    if (!client_buffer_append(&query, "/result?fields=", 15) ||
-        (fields && !client_http_append_escaped(&query, fields))) {
-        free(query.data);
-        return client_complain(s, CLIENT_LOCAL, "no memory");
-    }
-    char *path = client_job_path(s, s->options->operand, fields ? query.data : "/result");
-    free(query.data);
+    char *path = path_with_query(s, "/result", s->options->fields, s->options->case_name);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);
@@ -177,6 +189,23 @@ static bool locale_is_utf8(void)
 {
     setlocale(LC_CTYPE, "");
     return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
+}
+
+client_exit client_show_cases(client_session *s, const json_t *job)
+{
+    json_t *result = NULL;
+    if (!json_is_object(client_json_at(job, "summary.cases")))
+        return CLIENT_OK;
+    char *path = client_job_path(s, client_json_text(job, "id"), "/result?fields=summary");
+    if (!path)
+        return CLIENT_LOCAL;
+    client_request request = client_request_new(s, "GET", path);
+    client_exit code = client_ask_json(s, &result, &request);
+    if (result)
+        client_print_cases(s->out, result);
+    json_decref(result);
+    free(path);
+    return code;
 }
 
 /* The drawing goes where the data would: to the file or to standard output. */
@@ -210,7 +239,7 @@ client_exit client_history(client_session *s)
 {
     client_reply reply;
     const client_options *o = s->options;
-    char *path = client_job_path(s, o->operand, "/history");
+    char *path = path_with_query(s, "/history", NULL, o->case_name);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);

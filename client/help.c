@@ -32,10 +32,39 @@ static const page PAGES[CLIENT_COMMANDS] = {
                      "  -j, --json         print the job as JSON\n"
                      "      --progress     show progress on stderr even where it is no terminal\n"
                      "\nExit status: " OUTCOME_EXITS},
+    [CLIENT_REFINE] = {"refine", "refine ID --accuracy A [options]",
+                       "go on where an ended job stopped, to a new accuracy",
+                       "Makes a new job and prints its id, and with --wait its summary. The old job stays as it is.\n"
+                       "\n"
+                       "  -a, --accuracy A   a relative error such as 1e-8, or quick, balanced, precise, exact\n"
+                       "      --max-iterations N  counted from the start of the first run\n"
+                       "      --time-limit S  of the new run\n"
+                       "  -w, --wait         wait until the new job has ended and print the summary\n"
+                       "  -t, --timeout S    with --wait: stop waiting after S seconds\n"
+                       "  -k, --key KEY      idempotency key (default: random)\n"
+                       "  -q, --quiet        print the id and nothing else\n"
+                       "  -j, --json         print the job as JSON\n"
+                       "      --progress     show progress on stderr even where it is no terminal\n"
+                       "\n"
+                       "Exit status with --wait: " OUTCOME_EXITS},
+    [CLIENT_VERIFY] = {"verify", "verify FILE [options]", "certify an answer from elsewhere",
+                       "FILE is a problem and an answer in JSON, \"-\" is standard input. Prints what the certificate\n"
+                       "says of the answer.\n"
+                       "\n"
+                       "  -t, --timeout S    stop waiting after S seconds\n"
+                       "  -k, --key KEY      idempotency key (default: random)\n"
+                       "  -q, --quiet        print nothing; the exit status tells\n"
+                       "  -j, --json         print the job as JSON\n"
+                       "      --progress     show progress on stderr even where it is no terminal\n"
+                       "\n"
+                       "Exit status: 0 verified, 6 the job failed, 7 not verified,\n"
+                       "9 dismissed, 10 --timeout passed (the job goes on).\n"},
     [CLIENT_RESULT] = {"result", "result ID [options]", "fetch displacements, reactions, gaps as JSON",
                        "      --fields A,B   of displacements, reactions, gaps (default: reactions,gaps)\n"
+                       "  -c, --case NAME    of this load case alone\n"
                        "  -o, --output FILE  write to FILE, whole or not at all\n"},
     [CLIENT_HISTORY] = {"history", "history ID [options]", "fetch or draw the convergence history",
+                        "  -c, --case NAME    of this load case; needed where the job has some\n"
                         "      --csv          as CSV instead of JSON\n"
                         "      --plot         draw it: log10 of the error bound and of the residual\n"
                         "      --width N      of the drawing, in characters (default 72)\n"
@@ -63,13 +92,14 @@ static const char GENERAL[] =
     "  -V, --version      print the version\n";
 
 static const char EXITS[] = "Exit status:\n"
-                            "   0  done; wait and submit --wait: ended and converged\n"
+                            "   0  done; wait, verify and --wait: ended and certified as asked\n"
                             "   2  the command line is wrong\n"
                             "   3  the server cannot be reached, or does not answer in time\n"
                             "   4  the server refused the request; why is on stderr\n"
                             "   5  the server failed\n"
                             "   6  the job failed\n"
-                            "   7  the job ended without converging (iteration, time or precision limit, paper rule)\n"
+                            "   7  the job ended without converging (iteration, time or precision limit, paper rule),\n"
+                            "      or the answer is not verified\n"
                             "   8  the problem is infeasible\n"
                             "   9  the job was dismissed\n"
                             "  10  the job goes on, but --timeout has passed\n"

@@ -8,7 +8,7 @@ typedef client_exit (*command_run)(client_session *);
 static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_SUBMIT] = client_submit, [CLIENT_STATUS] = client_status,   [CLIENT_WAIT] = client_wait,
     [CLIENT_RESULT] = client_result, [CLIENT_HISTORY] = client_history, [CLIENT_LIST] = client_list,
-    [CLIENT_CANCEL] = client_cancel,
+    [CLIENT_CANCEL] = client_cancel, [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
 };
 
 static client_exit complain_usage(const char *message)

@@ -14,6 +14,8 @@ static const char *outcome_in_words(const char *outcome)
         {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
         {"infeasible", "no displacement satisfies all contact conditions"},
         {"dismissed", "it was dismissed; this is the best answer so far"},
+        {"verified", "the certificate of the given answer meets what was asked for"},
+        {"not_verified", "the certificate of the given answer does not meet what was asked for"},
     };
     for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
         if (strcmp(WORDS[i][0], outcome) == 0)
@@ -58,6 +60,16 @@ static void print_count(FILE *to, const json_t *summary, const char *path, const
         fprintf(to, ", %.0f %s", count, fabs(count - 1) < 0.5 ? one : many);
 }
 
+/* Where it began, unless that was nowhere special. */
+static void print_start(FILE *to, const json_t *summary)
+{
+    const char *from = client_json_text(summary, "started_from");
+    if (strcmp(from, "continued") == 0)
+        fputs(", continued from another job", to);
+    else if (strcmp(from, "warm") == 0)
+        fputs(", from known reactions", to);
+}
+
 static void print_method(FILE *to, const json_t *summary)
 {
     label(to, "method");
@@ -67,6 +79,18 @@ static void print_method(FILE *to, const json_t *summary)
     fputs(" operator", to);
     print_count(to, summary, "iterations", "iteration", "iterations");
     print_count(to, summary, "restarts", "restart", "restarts");
+    print_start(to, summary);
+    fputc('\n', to);
+}
+
+static void print_case_counts(FILE *to, const json_t *summary)
+{
+    char count[32];
+    if (!json_is_object(json_object_get(summary, "cases")))
+        return;
+    label(to, "cases");
+    fprintf(to, "%s; what follows is of the worst: ", number_in_words(count, summary, "cases.count", 9));
+    client_print_safe(to, client_json_text(summary, "cases.worst"));
     fputc('\n', to);
 }
 
@@ -120,7 +144,8 @@ static void print_energy(FILE *to, const json_t *summary)
 static void print_request_met(FILE *to, const json_t *summary)
 {
     double asked = client_json_number(summary, "requested_error");
-    bool met = strcmp(client_json_text(summary, "outcome"), "converged") == 0;
+    bool met = strcmp(client_json_text(summary, "outcome"), "converged") == 0 ||
+               strcmp(client_json_text(summary, "outcome"), "verified") == 0;
     if (!isfinite(asked))
         fputs("\n", to);
     else if (asked > 0)
@@ -212,6 +237,7 @@ void client_print_summary(FILE *to, const json_t *job)
     if (!json_is_object(summary))
         return;
     print_outcome(to, summary);
+    print_case_counts(to, summary);
     print_problem_size(to, summary);
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))
@@ -220,4 +246,47 @@ void client_print_summary(FILE *to, const json_t *job)
     print_certificate(to, summary);
     print_factor(to, summary);
     print_timings(to, summary);
+}
+
+/* ---- load cases */
+
+enum { NAME_WIDTH = 24 };
+
+/* A name, at most NAME_WIDTH characters of it, and padding; UTF-8 counts characters. */
+static void print_name(FILE *to, const char *name)
+{
+    char text[4 * NAME_WIDTH + 1];
+    size_t used = 0;
+    int width = 0;
+    for (; name[used] && used + 4 < sizeof text; used++) {
+        bool begins = ((unsigned char)name[used] & 0xc0) != 0x80;
+        if (begins && width == NAME_WIDTH)
+            break;
+        width += begins;
+        text[used] = name[used];
+    }
+    text[used] = '\0';
+    client_print_safe(to, text);
+    fprintf(to, "%*s", NAME_WIDTH - width, "");
+}
+
+void client_print_cases(FILE *to, const json_t *result)
+{
+    const json_t *cases = json_object_get(result, "cases");
+    char touch[32], iterations[32], error[32];
+    size_t i;
+    json_t *item;
+    fprintf(to, "\n%-*s  %-15s  %10s  %8s  %s\n", NAME_WIDTH, "case", "outcome", "iterations", "contacts",
+            "relative error");
+    json_array_foreach(cases, i, item)
+    {
+        const json_t *summary = json_object_get(item, "summary");
+        print_name(to, client_json_text(item, "name"));
+        fputs("  ", to);
+        client_print_safe(to, client_json_text(summary, "outcome"));
+        fprintf(to, "%*s  %10s  %8s  %s\n", 15 - (int)strlen(client_json_text(summary, "outcome")), "",
+                number_in_words(iterations, summary, "iterations", 9),
+                number_in_words(touch, summary, "contact.active", 9),
+                number_in_words(error, summary, "certificate.relative_error", 3));
+    }
 }

@@ -48,7 +48,8 @@ client_exit client_job_exit(const json_t *job)
         return CLIENT_DISMISSED;
     if (strcmp(status, "failed") == 0)
         return CLIENT_JOB_FAILED;
-    return strcmp(outcome, "converged") == 0 ? CLIENT_OK : CLIENT_NOT_CONVERGED;
+    bool met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0;
+    return met ? CLIENT_OK : CLIENT_NOT_CONVERGED;
 }
 
 const char *client_format_seconds(char *buffer, size_t size, double seconds)

@@ -22,6 +22,8 @@ client_exit client_job_exit(const json_t *job);
 void client_print_job(FILE *to, const json_t *job);
 /* What came of an ended job, about 15 lines. Parts that the job lacks are left out. */
 void client_print_summary(FILE *to, const json_t *job);
+/* A line for each load case of a result. */
+void client_print_cases(FILE *to, const json_t *result);
 /* Problem details (RFC 9457), or a plain line about the status where the reply has none. */
 void client_print_problem(FILE *to, long http_status, const json_t *problem);
 

@@ -28,6 +28,9 @@ client_exit client_ask_json(client_session *s, json_t **out, const client_reques
 /* "/v1/jobs/ID" and what follows; the caller frees. NULL: no memory, said on s->err. */
 char *client_job_path(client_session *s, const char *id, const char *suffix);
 
+/* The cases of an ended job whose summary says that it has some, as a table on s->out; else nothing. */
+client_exit client_show_cases(client_session *s, const json_t *job);
+
 /* Prints JSON on one or many lines for a person or a program. */
 client_exit client_print_json(client_session *s, const json_t *value);
 /* "uzawa: MESSAGE" on s->err; returns `code`. */
@@ -35,6 +38,8 @@ client_exit client_complain(client_session *s, client_exit code, const char *mes
 
 /* The commands. */
 client_exit client_submit(client_session *s);
+client_exit client_refine(client_session *s);
+client_exit client_verify(client_session *s);
 client_exit client_wait(client_session *s);
 client_exit client_status(client_session *s);
 client_exit client_list(client_session *s);

@@ -1,4 +1,4 @@
-/* submit and wait: the commands that may stay until a job has ended. */
+/* submit, refine, verify and wait: the commands that may stay until a job has ended. */
 #include "progress.h"
 #include "report.h"
 #include "session.h"
@@ -100,9 +100,11 @@ static client_exit report_end(client_session *s, const json_t *job)
         client_print_problem(s->err, 0, error);
     if (s->options->json)
         return client_print_json(s, job) == CLIENT_OK ? code : CLIENT_LOCAL;
-    if (!s->options->quiet)
-        client_print_summary(s->out, job);
-    return code;
+    if (s->options->quiet)
+        return code;
+    client_print_summary(s->out, job);
+    client_exit shown = client_show_cases(s, job);
+    return shown == CLIENT_OK ? code : shown;
 }
 
 static client_exit wait_and_report(client_session *s, const char *id, json_t **job, client_progress *progress)
@@ -136,11 +138,17 @@ static client_exit load_body(client_session *s, client_buffer *out)
     return ok ? CLIENT_OK : client_complain(s, CLIENT_LOCAL, "cannot add the tags: one is not UTF-8, or no memory");
 }
 
-static client_exit post_body(client_session *s, const client_buffer *body, const client_progress *progress,
-                             json_t **job)
+/* A certificate is wanted at once. */
+static bool stays(const client_session *s)
+{
+    return s->options->wait || s->options->command == CLIENT_VERIFY;
+}
+
+static client_exit post_body(client_session *s, const char *path, const client_buffer *body,
+                             const client_progress *progress, json_t **job)
 {
     char key[2 * KEY_BYTES + 1], prefer[40], *header = NULL;
-    client_request request = client_request_new(s, "POST", "/v1/jobs");
+    client_request request = client_request_new(s, "POST", path);
     if (!s->options->key && !make_key(key))
         return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
     if (asprintf(&header, "Idempotency-Key: %s", s->options->key ? s->options->key : key) < 0)
@@ -148,7 +156,7 @@ static client_exit post_body(client_session *s, const client_buffer *body, const
     request.headers[0] = header;
     request.body = body->data;
     request.body_len = body->len;
-    if (s->options->wait) {
+    if (stays(s)) {
         set_wait(&request, prefer, sizeof prefer, poll_seconds(s, progress));
         request.deadline += GRACE_S;
     }
@@ -169,28 +177,84 @@ static client_exit report_accepted(client_session *s, const json_t *job)
 static client_exit follow(client_session *s, json_t **job, client_progress *progress)
 {
     char id[128];
-    snprintf(id, sizeof id, "%s", client_json_text(*job, "id"));
+    const char *of_result = client_json_text(*job, "job"); /* verify answers with a result */
+    snprintf(id, sizeof id, "%s", *of_result ? of_result : client_json_text(*job, "id"));
     if (!*id)
         return client_complain(s, CLIENT_SERVER_ERROR, "the reply names no job; is this the right server?");
-    if (!s->options->wait || (s->options->quiet && !s->options->json))
+    if (*of_result) {
+        json_decref(*job);
+        *job = NULL;
+        return wait_and_report(s, id, job, progress);
+    }
+    bool quiet = s->options->quiet && !s->options->json && s->options->command != CLIENT_VERIFY;
+    if (!stays(s) || quiet)
         report_accepted(s, *job);
-    if (!s->options->wait)
+    if (!stays(s))
         return CLIENT_OK;
     client_progress_show(progress, *job);
     return wait_and_report(s, id, job, progress);
 }
 
-client_exit client_submit(client_session *s)
+/* Sends the body, which it frees, and stays if it was told to. */
+static client_exit post_and_follow(client_session *s, const char *path, client_buffer *body)
 {
     json_t *job = NULL;
-    client_buffer body;
     client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
-    client_exit code = load_body(s, &body);
-    if (code == CLIENT_OK)
-        code = post_body(s, &body, &progress, &job);
-    free(body.data);
+    client_exit code = post_body(s, path, body, &progress, &job);
+    free(body->data);
     if (code == CLIENT_OK)
         code = follow(s, &job, &progress);
     json_decref(job);
+    return code;
+}
+
+static client_exit send_file(client_session *s, const char *path)
+{
+    client_buffer body;
+    client_exit code = load_body(s, &body);
+    return code == CLIENT_OK ? post_and_follow(s, path, &body) : code;
+}
+
+client_exit client_submit(client_session *s)
+{
+    return send_file(s, "/v1/jobs");
+}
+
+client_exit client_verify(client_session *s)
+{
+    return send_file(s, "/v1/verify");
+}
+
+/* {"accuracy": {"relative_error": 1e-8}} or {"accuracy": "exact"}, and the limits that were given. NULL: no memory. */
+static char *refine_body(const client_options *o)
+{
+    char *end;
+    double error = strtod(o->accuracy, &end);
+    bool number = *end == '\0' && isfinite(error);
+    json_t *body = number ? json_pack("{s:{s:f}}", "accuracy", "relative_error", error)
+                          : json_pack("{s:s}", "accuracy", o->accuracy);
+    bool ok = body != NULL;
+    if (ok && o->max_iterations >= 0)
+        ok = json_object_set_new(body, "max_iterations", json_integer(o->max_iterations)) == 0;
+    if (ok && isfinite(o->time_limit_s))
+        ok = json_object_set_new(body, "time_limit_s", json_real(o->time_limit_s)) == 0;
+    char *text = ok ? json_dumps(body, JSON_COMPACT) : NULL;
+    json_decref(body);
+    return text;
+}
+
+client_exit client_refine(client_session *s)
+{
+    char *path = client_job_path(s, s->options->operand, "/refine"), *text = refine_body(s->options);
+    client_exit code = CLIENT_LOCAL;
+    if (path && text) {
+        client_buffer body = {.data = text, .len = strlen(text)};
+        code = post_and_follow(s, path, &body);
+        text = NULL;
+    } else if (path) {
+        client_complain(s, code, "no memory, or the accuracy is not UTF-8");
+    }
+    free(text);
+    free(path);
     return code;
 }

@@ -202,7 +202,7 @@ static int64_t count_numbers(const scanner *s)
 static void count_table(const scanner *s, int64_t *rows, int64_t *columns)
 {
     int64_t in_row = 0, first = 0, found = 0;
-    bool inside = false;
+    bool inside = false, digits = false; /* digits: the row is not empty */
     *rows = *columns = 0;
     for (size_t i = s->at + 1; i < s->len; i++) {
         char c = s->text[i];
@@ -210,17 +210,19 @@ static void count_table(const scanner *s, int64_t *rows, int64_t *columns)
             break;
         if (c == '[') {
             inside = true;
+            digits = false;
             in_row = 1;
         } else if (c == ']') {
             inside = false;
             first = found++ ? first : in_row;
-            if (in_row != first || in_row > JSON_LIFT_NUMBERS)
+            if (in_row != first || in_row > JSON_LIFT_NUMBERS || !digits)
                 return;
         } else if (inside && c == ',') {
             in_row++;
         } else if (c != ',' && !strchr(inside ? "0123456789-+.eE \n\t\r" : " \n\t\r", c)) {
             return;
         }
+        digits = digits || (c >= '0' && c <= '9');
     }
     *rows = inside ? 0 : found;
     *columns = first;

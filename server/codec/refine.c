@@ -3,7 +3,6 @@
 #include "codec/codec.h"
 #include "codec/decode.h"
 #include "codec/problem.h"
-#include "codec/room.h"
 #include "codec/schema.h"
 #include "codec/text.h"
 
@@ -48,18 +47,14 @@ static size_t value_end(const char *json, size_t len, size_t at)
     return at;
 }
 
-/* A key may be written with escapes. */
+/* A key may be written with escapes, at most six bytes for each of its own. */
 static bool key_is(const char *json, size_t from, size_t to, const char *key)
 {
-    char plain[16];
-    size_t inside = to - from - 2, room = strlen(key);
-    if (inside > 6 * room || room >= sizeof plain)
+    char plain[64];
+    size_t inside = to - from - 2, wanted = strlen(key);
+    if (inside > 6 * wanted || inside > sizeof plain)
         return false;
-    char *decoded = room_for(inside + 1, 1);
-    size_t len = decoded ? json_text_decode(decoded, json + from + 1, inside) : 0;
-    bool same = decoded && len == room && memcmp(decoded, key, len) == 0;
-    free(decoded);
-    return same;
+    return json_text_decode(plain, json + from + 1, inside) == wanted && memcmp(plain, key, wanted) == 0;
 }
 
 /* The value of a member of the outermost object. */
@@ -110,17 +105,44 @@ static bool set_start(json_t *solver, const char *id)
     return false;
 }
 
+/* Writes a small value: jansson's own writer leaves bytes out when it finds no memory for them. Keys are of the schema,
+ * so that nothing in them needs an escape. */
+static void put_value(text *t, const json_t *value)
+{
+    const char *key;
+    json_t *member;
+    if (json_is_object(value)) {
+        text_open(t, '{');
+        json_object_foreach((json_t *)value, key, member)
+        {
+            text_key(t, key);
+            put_value(t, member);
+        }
+        text_close(t, '}');
+    } else if (json_is_string(value)) {
+        text_string(t, json_string_value(value));
+    } else if (json_is_boolean(value)) {
+        text_bool(t, json_is_true(value));
+    } else {
+        text_number(t, json_real_value(value));
+    }
+}
+
 /* The old object with the values of `change`; a rule that may stop short of the accuracy goes. */
 static char *write_solver(json_t *solver, const json_t *change, const char *id)
 {
     static const char *const KEYS[] = {"accuracy", "max_iterations", "time_limit_s"};
+    text t = {0};
     bool ok = json_is_object(solver) && set_text(solver, "stopping", "certified") && set_start(solver, id);
     for (size_t i = 0; ok && i < sizeof KEYS / sizeof KEYS[0]; i++) {
         json_t *value = json_object_get(change, KEYS[i]);
         ok = !value || json_object_set(solver, KEYS[i], value) == 0;
     }
     json_object_del(solver, "epsilon");
-    return ok ? json_dumps(solver, JSON_COMPACT | JSON_REAL_PRECISION(17)) : NULL;
+    if (ok)
+        put_value(&t, solver);
+    t.failed = t.failed || !ok;
+    return text_finish(&t, NULL);
 }
 
 /* Reads the old solver, which may be absent, and writes the new one; NULL: no memory. */

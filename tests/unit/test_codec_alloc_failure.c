@@ -64,7 +64,8 @@ static void exhaust(bool (*attempt)(const char *), const char *argument)
         int64_t before = blocks;
         countdown = n;
         done = attempt(argument);
-        CHECK_MSG(!done || countdown >= 0, "allocation %lld failed without a word", (long long)n);
+        CHECK_MSG(!done || countdown >= 0, "%s: allocation %lld failed without a word", argument ? argument : "",
+                  (long long)n);
         countdown = -1;
         CHECK_MSG(blocks == before, "allocation %lld failed: %lld blocks left", (long long)n,
                   (long long)(blocks - before));
@@ -92,7 +93,7 @@ static bool try_decode(const char *path)
     countdown = -1;
     char *body = test_read_file(path, &len);
     countdown = planned;
-    bool good = codec_decode_request(&request, body, len, &problem);
+    bool good = codec_decode(&request, CODEC_STORED, body, len, &problem);
     if (good)
         codec_request_clear(&request);
     else
@@ -116,6 +117,32 @@ static bool try_encode(const char *argument)
     return text != NULL;
 }
 
+static bool try_refine(const char *old)
+{
+    static const char CHANGE[] = "{\"accuracy\": \"exact\"}";
+    problem_details problem = {0};
+    size_t len;
+    char *made = codec_refine(old, strlen(old), "id", CHANGE, sizeof CHANGE - 1, &len, &problem);
+    CHECK(made ? len > strlen(old) && strstr(made, "exact") : problem.status == 503 && len == 0);
+    free(made);
+    return made != NULL;
+}
+
+static bool try_results(const char *argument)
+{
+    static const double r[100];
+    const codec_result one = {.case_name = "a", .summary = "{}", .m = 100, .reactions = r};
+    size_t len;
+    (void)argument;
+    codec_results *all = codec_results_begin("id", "{}");
+    if (!all)
+        return false;
+    codec_results_add(all, &one);
+    char *text = codec_results_end(all, &one, &len);
+    free(text);
+    return text != NULL;
+}
+
 TEST(loading)
 {
     exhaust(try_init, NULL);
@@ -129,10 +156,15 @@ TEST(decoding)
     exhaust(try_decode, "tests/data/paper_body.json");
     exhaust(try_decode, "tests/data/small_matrices.json");
     exhaust(try_decode, "tests/data/long_vectors.json");
+    exhaust(try_decode, "tests/data/cases.json");
+    exhaust(try_decode, "tests/data/verify.json");
+    exhaust(try_refine, "{\"problem\": 1, \"solver\": {\"method\": \"uzawa\"}}");
+    exhaust(try_refine, "{\"problem\": 1}");
     codec_end();
 }
 
 TEST(encoding)
 {
+    exhaust(try_results, NULL);
     exhaust(try_encode, NULL);
 }

@@ -193,6 +193,56 @@ TEST(long_arrays_are_lifted)
     free(lifted);
 }
 
+/* "[first,[0,1],[1,2],...]" of `rows` rows; the caller frees. */
+static char *table(int rows, const char *first)
+{
+    char *text = malloc(32 * (size_t)rows + 64), *at = text + sprintf(text, "[%s", first);
+    for (int i = 1; i < rows; i++)
+        at += sprintf(at, ",[%d, %d]", i, i + 1);
+    strcpy(at, "]");
+    return text;
+}
+
+TEST(long_tables_are_lifted)
+{
+    json_doc doc;
+    problem_details problem;
+    char *longest = table(JSON_LIFT_NUMBERS, "[0,1]"), *lifted = table(JSON_LIFT_NUMBERS + 1, "[0,1]");
+    CHECK_INT(scan(&doc, longest, &problem), 0);
+    CHECK_INT(doc.n_lifted, 0);
+    json_doc_clear(&doc);
+    CHECK_INT(scan(&doc, lifted, &problem), 0);
+    const json_lifted *item = json_doc_lifted(&doc, doc.root);
+    CHECK(item && !item->is_text && item->count == JSON_LIFT_NUMBERS + 1 && item->columns == 2);
+    for (int i = 0; item && i < item->count; i++)
+        CHECK(item->numbers[2 * i] == i && item->numbers[2 * i + 1] == i + 1);
+    json_doc_clear(&doc);
+    free(longest);
+    free(lifted);
+}
+
+/* What only looks like a table at first is read as any array, or refused as one. */
+TEST(tables_that_are_none)
+{
+    static const struct {
+        const char *first;
+        int status;
+    } CASES[] = {{"[0]", 0},       {"[0,1,2]", 0},   {"[]", 0},     {"[ ]", 0},      {"5", 0},
+                 {"[0,[1]]", 0},   {"[0,\"x\"]", 0}, {"[0,]", 400}, {"[0 1]", 400},  {"[,0]", 400},
+                 {"[0,1],,", 400}, {"[0,1e]", 400},  {"[0,1", 400}, {"[0,1]]", 400}, {"[1e999,0]", 422}};
+    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
+        json_doc doc;
+        problem_details problem;
+        char *text = table(JSON_LIFT_NUMBERS + 2, CASES[i].first);
+        CHECK_MSG(scan(&doc, text, &problem) == CASES[i].status, "%s: %d %s", CASES[i].first, problem.status,
+                  problem.detail);
+        if (problem.status == 0)
+            CHECK_MSG(doc.n_lifted == 0 && json_array_size(doc.root) == JSON_LIFT_NUMBERS + 2, "%s", CASES[i].first);
+        json_doc_clear(&doc);
+        free(text);
+    }
+}
+
 TEST(malformed_number_arrays)
 {
     static const char *const TAILS[] = {",]",   ",1 2]", ",01]", ",1.]", ",1e]", ",-]",

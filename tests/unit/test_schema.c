@@ -135,3 +135,23 @@ TEST(lengths_count_characters)
     CHECK(!fits("{\"maxLength\": 2}", "\"\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\"", &problem));
     CHECK(fits("{\"minLength\": 3}", "\"a\\u0000b\"", &problem));
 }
+
+TEST(lifted_tables)
+{
+    problem_details problem;
+    char rows[2048] = "[[1,2]";
+    for (int i = 0; i < 99; i++)
+        strcat(rows, i == 70 ? ",[2,-1]" : ",[1,2]");
+    strcat(rows, "]");
+    CHECK(fits("{\"type\": \"array\", \"minItems\": 100, \"maxItems\": 100,"
+               " \"items\": {\"type\": \"array\", \"minItems\": 2, \"items\": {\"type\": \"number\"}}}",
+               rows, &problem));
+    CHECK(!fits("{\"items\": {\"items\": {\"type\": \"number\", \"minimum\": 0}}}", rows, &problem));
+    CHECK_STR(problem.pointer, "/71/1");
+    CHECK_STR(problem.code, "out_of_range");
+    CHECK(!fits("{\"items\": {\"maxItems\": 1}}", rows, &problem));
+    CHECK_STR(problem.pointer, "/0");
+    CHECK(!fits("{\"items\": {\"type\": \"number\"}}", rows, &problem));
+    CHECK_STR(problem.code, "wrong_type");
+    CHECK(!fits("{\"maxItems\": 99}", rows, &problem));
+}

@@ -39,7 +39,7 @@ TEST(submit_claim_finish)
     job_clear(&j);
     CHECK_INT(store_get(p.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_SUCCESSFUL && j.progress == 100 && j.finished >= j.started && !j.error);
-    CHECK_STR(j.summary, PLAIN_SUCCESS.summary);
+    CHECK_STR(j.summary, PLAIN_SUCCESS.whole.summary);
     job_clear(&j);
     CHECK_INT(store_claim(p.s, "me", 30.0, &j, &body, &len), STORE_NOT_FOUND);
     CHECK(!body && len == 0 && !j.tags);
@@ -314,7 +314,7 @@ TEST(deleting_a_job_deletes_everything_of_it)
     char id[33], other[33];
     double x[12] = {0};
     store_vector v = {"gaps", 12, x};
-    store_outcome outcome = {JOB_SUCCESSFUL, "{}", NULL, &v, 1, x, 1, 12};
+    store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole = {NULL, "{}", &v, 1, x, 1, 12}};
     job_status was;
     job j;
     if (!place_begin(&p))
