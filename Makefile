@@ -97,6 +97,9 @@ $(BUILD)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests) -c -o $@ $<
 
+# Contraction only saves roundings there; the twofold arithmetic of certificates must never have it.
+$(call obj,solver/factor/blocked.c): CFLAGS += -ffp-contract=fast
+
 $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS)
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) -c -o $@ $<

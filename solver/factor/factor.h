@@ -69,6 +69,15 @@ uz_status uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, do
 uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
                              uz_error *err);
 
+/* The same for blocks of UZ_LANES vectors that stand side by side: entry k of vector l at X[k * UZ_LANES + l], n rows,
+ * one block after the other. An answer depends neither on what the other lanes hold nor on the lane. Permutations are
+ * of one block. */
+enum { UZ_LANES = 8 };
+void uz_factor_permute_lanes(const uz_factor *factor, double *permuted, const double *X);
+void uz_factor_unpermute_lanes(const uz_factor *factor, double *X, const double *permuted);
+uz_status uz_factor_forward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
+uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
+
 /* *bound >= lambda_max(D_K^1/2 K^-1 D_K^1/2) with D_K = diag(K), except with a probability below 1e-12; so e'K^-1 e is
  * at most *bound times the sum of e_j^2 / K_jj. Some six linear solves. */
 uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,

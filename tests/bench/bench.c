@@ -257,6 +257,18 @@ static void bench_oblique_planes(report *out)
     }
 }
 
+static void bench_cases(report *out, int64_t nx)
+{
+    bench_value ratio;
+    char name[64];
+    if (!bench_load_cases(&ratio, nx)) {
+        printf("the load cases did not converge\n");
+        exit(1);
+    }
+    snprintf(name, sizeof name, "100_load_cases_nx%lld", (long long)nx);
+    print_row(out, name, "x", ratio, "one CHOLMOD solve (target: 60)");
+}
+
 static bool wanted(const report *out, const char *name)
 {
     return !out->filter || strstr(name, out->filter);
@@ -305,6 +317,8 @@ int main(int argc, char **argv)
         bench_memories(&out);
     if (wanted(&out, "hex8"))
         bench_cubes(&out);
+    for (int64_t nx = 300; wanted(&out, "load_cases") && nx <= 600; nx += 300)
+        bench_cases(&out, nx);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {
         bench_body(&out, sizes[i], 1e-6);
         bench_body(&out, sizes[i], 1e-8);

@@ -47,6 +47,9 @@ void bench_sizes(FILE *json);
 /* Cold certified solves of the cube of n x n x n bricks, one dof in each row or (leaning) three, in units of CHOLMOD's
  * linear solve. false: no answer. */
 bool bench_hex8(bench_value *ratio, int64_t n, bool leaning);
+/* 100 load cases of the paper's body with nx x nx/3 cells, certified 1e-8: their time over that of one CHOLMOD solve
+ * of one right-hand side, both with the factor at hand. false: no answer. */
+bool bench_load_cases(bench_value *ratio, int64_t nx);
 
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);

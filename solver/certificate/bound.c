@@ -1,0 +1,119 @@
+#include "certificate/bound.h"
+
+#include <float.h>
+#include <math.h>
+
+#define TWOFOLD_ROUNDING 0x1p-98
+
+double uz_bound_norm(const double *x, int64_t n)
+{
+    double scale = 0.0, sum = 0.0;
+    for (int64_t i = 0; i < n; i++)
+        scale = fmax(scale, fabs(x[i]));
+    for (int64_t i = 0; scale > 0.0 && i < n; i++)
+        sum += (x[i] / scale) * (x[i] / scale);
+    return scale * sqrt(sum);
+}
+
+/* Paper, section 4. */
+static void residuals(uz_residual *a, const uz_bound_terms *t, const double *r, const double *g, int64_t m)
+{
+    double e2 = 0.0, e4 = 0.0;
+    for (int64_t i = 0; i < m; i++) {
+        if (g[i] < 0.0)
+            e2 = hypot(e2, g[i]);
+        if (g[i] * r[i] != 0.0)
+            e4 = hypot(e4, g[i] * r[i]);
+    }
+    a->e1 = t->e1;
+    a->e2 = e2;
+    a->e3 = t->positive_part;
+    a->e4 = e4;
+    a->total = hypot(hypot(a->e1, a->e2), hypot(a->e3, a->e4));
+}
+
+static double ratio(double value, double scale)
+{
+    if (value == 0.0)
+        return 0.0;
+    return scale > 0.0 ? value / scale : INFINITY;
+}
+
+/* ||h - g|| = ||N u|| */
+static double reach(const double *g, const double *h, int64_t m)
+{
+    double scale = 0.0, sum = 0.0;
+    for (int64_t i = 0; i < m; i++)
+        scale = fmax(scale, fabs(h[i] - g[i]));
+    for (int64_t i = 0; scale > 0.0 && i < m; i++)
+        sum += ((h[i] - g[i]) / scale) * ((h[i] - g[i]) / scale);
+    return scale * sqrt(sum);
+}
+
+/* Force by ||p|| (by the reactions where there is no load), length by the size of h and N u, energy by |psi|. */
+static void scale_residuals(uz_certificate *out, const uz_bound_terms *t, const double *r, const double *g,
+                            const double *h, int64_t m)
+{
+    double force = t->force > 0.0 ? t->force : uz_bound_norm(r, m);
+    const uz_residual *a = &out->residual;
+    uz_residual *b = &out->relative_residual;
+    b->e1 = ratio(a->e1, force);
+    b->e2 = ratio(a->e2, fmax(uz_bound_norm(h, m), reach(g, h, m)));
+    b->e3 = ratio(a->e3, force);
+    b->e4 = ratio(a->e4, fabs(out->energy_dual));
+    b->total = hypot(hypot(b->e1, b->e2), hypot(b->e3, b->e4));
+}
+
+double uz_bound_doubt(double spread, double rcond, int64_t d)
+{
+    return DBL_EPSILON * sqrt((double)d) * (8.0 * spread + 1.0 / fmax(rcond, DBL_MIN));
+}
+
+double uz_bound_noise(double spread, double sum)
+{
+    return TWOFOLD_ROUNDING * sqrt((1.0 + spread) * sum);
+}
+
+double uz_bound_enlarge(double square, double doubt, double noise)
+{
+    double norm = sqrt(square);
+    if (norm > 0.0)
+        norm = doubt < 0.5 ? norm / (1.0 - doubt) + noise : INFINITY;
+    return norm * norm;
+}
+
+/* The error over ||u*||_K, which is at least ||v||_K minus the error. */
+static double relative_to_exact(double error, double norm)
+{
+    if (error == 0.0)
+        return 0.0;
+    return norm > error ? error / (norm - error) : INFINITY;
+}
+
+/* Below this energy the squares of its rounding errors leave the range of double, and a bound would be zero for
+ * nothing. Above it they keep all of the digits that matter. */
+#define ENERGY_LEAST 0x1p-850
+
+static bool has_underflown(const uz_certificate *out, const uz_bound_terms *t)
+{
+    return t->anything && fmax(out->energy_norm * out->energy_norm, 0x1p106 * t->square) < ENERGY_LEAST;
+}
+
+/* pi(v) = pi(u) + c'(K u - p) + 1/2 c'K c: that of the feasible v, so that it is an upper bound on the minimum. */
+void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasible, const double *r, const double *g,
+                       const double *h, int64_t m)
+{
+    double correction_norm = INFINITY;
+    if (feasible && !isnan(t->correction_energy))
+        correction_norm = sqrt(fmax(0.0, t->correction_energy));
+    out->energy_norm = sqrt(fmax(0.0, t->stiffness));
+    out->energy_primal = 0.5 * t->stiffness - t->load + t->change;
+    out->gap = feasible && !has_underflown(out, t) ? 0.5 * t->square + t->complementarity : INFINITY;
+    if (isnan(out->gap)) /* overflow on the way */
+        out->gap = INFINITY;
+    out->energy_dual = out->energy_primal - out->gap;
+    out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;
+    out->relative_error = relative_to_exact(out->absolute_error, out->energy_norm);
+    residuals(&out->residual, t, r, g, m);
+    scale_residuals(out, t, r, g, h, m);
+}

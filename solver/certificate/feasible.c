@@ -1,0 +1,136 @@
+/* feasible.c: a displacement without penetration, near a given one. */
+#include "certificate/feasible.h"
+
+#include "certificate/residual.h"
+#include "certificate/row_relax.h"
+#include "core/alloc.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LEAST_ROUNDS = 2, CLOSING_ROUNDS = 8, MAX_ROUNDS = 40 };
+
+/* Twofold arithmetic carries about 100 bits: a violation of the constraints by 2^-80 of their size is rounding. */
+#define NEGLIGIBLE 0x1p-80
+
+/* Corrections up to this many times as large, squared, as the moves of single rows are taken. */
+#define STRETCH 64.0
+
+bool uz_feasible_init(uz_feasible *c, const uz_csc *Nt, const double *weight)
+{
+    memset(c, 0, sizeof *c);
+    c->Nt = Nt;
+    c->weight = weight;
+    c->d = Nt->rows;
+    c->m = Nt->cols;
+    c->size = uz_alloc_zero(c->m, sizeof(double));
+    c->correction = uz_alloc_zero(c->d, sizeof(double));
+    return uz_row_move_init(&c->move, c->d, c->m) && c->size && c->correction;
+}
+
+void uz_feasible_clear(uz_feasible *c)
+{
+    free(c->size);
+    free(c->correction);
+    uz_row_move_clear(&c->move);
+}
+
+double uz_feasible_gap(const uz_feasible *c, int64_t i)
+{
+    return uz_gap_of_row(c->Nt, i, c->h, c->u, c->correction);
+}
+
+/* Closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g. */
+static bool worth_closing(const uz_feasible *c, const double *r, int64_t i, double gap)
+{
+    return r[i] < 0.0 && gap <= -2.0 * r[i] * uz_row_compliance(c->Nt, i, c->weight);
+}
+
+/* What the rounding of a gap is relative to: the terms that it is the difference of. Row by row: a wide gap, or a row
+ * of large coefficients, must not excuse the penetration of another row. */
+static void size_rows(const uz_feasible *c, const double *u)
+{
+    for (int64_t i = 0; i < c->m; i++) {
+        c->size[i] = fabs(c->h[i]);
+        for (int64_t k = c->Nt->ptr[i]; k < c->Nt->ptr[i + 1]; k++)
+            c->size[i] += fabs(c->Nt->val[k] * u[c->Nt->idx[k]]);
+    }
+}
+
+/* What the rounding of the correction, a vector of doubles, may do to the gap of row i. */
+static double gap_rounding(const uz_feasible *c, int64_t i)
+{
+    double sum = 0.0;
+    for (int64_t k = c->Nt->ptr[i]; k < c->Nt->ptr[i + 1]; k++)
+        sum += fabs(c->Nt->val[k] * c->correction[c->Nt->idx[k]]);
+    return 4.0 * DBL_EPSILON * sum;
+}
+
+/* The rows to move in this round and by how much: target_i is the gap to take away and a little more, so that the
+ * correction's own rounding leaves the gap open; 0 for rows left alone. Returns the worst violation, relative to the
+ * size of its row. */
+static double choose_rows(const uz_feasible *c, const double *r, bool closing)
+{
+    double worst = 0.0;
+    for (int64_t i = 0; i < c->m; i++) {
+        double gap = uz_feasible_gap(c, i);
+        bool close = closing && worth_closing(c, r, i, fabs(gap));
+        c->move.in[i] = close || gap < 0.0;
+        c->move.target[i] = c->move.in[i] ? gap - gap_rounding(c, i) : 0.0;
+        worst = isnan(gap) ? INFINITY : gap < 0.0 ? fmax(worst, -gap / c->size[i]) : worst;
+    }
+    return worst;
+}
+
+/* Rounds of equations from round `first` on: until CLOSING_ROUNDS gaps are closed, later penetrating rows are only
+ * lifted. Each round starts from gaps in twofold precision, so what rounding left is moved by the next. True when no
+ * gap of u + c is negative by more than the rounding of twofold arithmetic. */
+static bool move_rows(uz_feasible *c, const double *r, int first, int last)
+{
+    for (int round = first; round < last; round++) {
+        double worst = choose_rows(c, r, round < CLOSING_ROUNDS);
+        if (round >= LEAST_ROUNDS && worst <= NEGLIGIBLE)
+            return true;
+        uz_row_move_solve(&c->move, c->correction, c->Nt, c->weight);
+    }
+    return choose_rows(c, r, false) <= NEGLIGIBLE;
+}
+
+/* Squared in the norm of W^-1: the moves that would close the chosen rows one by one, added up. */
+static double sum_of_moves(const uz_feasible *c)
+{
+    double sum = 0.0;
+    for (int64_t i = 0; i < c->m; i++)
+        if (c->move.in[i] && c->move.target[i] != 0.0)
+            sum += c->move.target[i] / uz_row_compliance(c->Nt, i, c->weight) * c->move.target[i];
+    return sum;
+}
+
+static double correction_size(const uz_feasible *c)
+{
+    double sum = 0.0;
+    for (int64_t j = 0; j < c->d; j++)
+        sum += c->correction[j] / c->weight[j] * c->correction[j];
+    return sum;
+}
+
+/* Rows that nearly depend on each other can't all be closed as equations, or only by a correction
+ * far larger than the gaps: then they are relaxed one by one, which is slower where rows share dofs. */
+bool uz_make_feasible(uz_feasible *c, const double *r)
+{
+    uz_row_relax relax = {c->Nt, c->weight, r, c->h, c->u, c->move.x, c->correction};
+    memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
+    size_rows(c, c->u);
+    choose_rows(c, r, true);
+    double expected = STRETCH * sum_of_moves(c);
+    bool feasible = move_rows(c, r, 0, CLOSING_ROUNDS);
+    if (feasible && correction_size(c) <= expected)
+        return true;
+    uz_row_relax_solve(&relax);
+    if (move_rows(c, r, CLOSING_ROUNDS, MAX_ROUNDS))
+        return true;
+    memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
+    return feasible && move_rows(c, r, 0, CLOSING_ROUNDS);
+}

@@ -1,0 +1,29 @@
+/* feasible.h: the feasible v = u + c of a certificate. */
+#ifndef UZ_FEASIBLE_H
+#define UZ_FEASIBLE_H
+
+#include "certificate/row_move.h"
+#include "uzawa.h"
+
+typedef struct {
+    const uz_csc *Nt;     /* d x m: column i is row i of N */
+    const double *weight; /* d: W = diag(K)^-1 */
+    const double *h;      /* m */
+    const double *u;      /* d: the answer; it and h are set before each use */
+    double *size;         /* m: what the rounding of a gap is relative to */
+    double *correction;   /* d: c */
+    uz_row_move move;     /* m each */
+    int64_t d, m;
+} uz_feasible;
+
+/* Nt and weight are borrowed. false: no memory; uz_feasible_clear may follow. */
+bool uz_feasible_init(uz_feasible *f, const uz_csc *Nt, const double *weight);
+void uz_feasible_clear(uz_feasible *f);
+
+/* Fills the correction: it lifts the negative gaps of u and closes those of the rows where r (m, <= 0) makes that worth
+ * while. true: no gap of u + c is negative by more than the rounding of twofold arithmetic. */
+bool uz_make_feasible(uz_feasible *f, const double *r);
+/* g_i(u + c) */
+double uz_feasible_gap(const uz_feasible *f, int64_t i);
+
+#endif

@@ -1,0 +1,217 @@
+/* blocked.c: substitutions for UZ_LANES right-hand sides at once.
+ *
+ * Each vector of the block is a lane: entry k of lane l stands at X[k * UZ_LANES + l], so that a row of the block is
+ * one cache line and every entry of L is read once for all lanes. The lanes go through the same operations in the same
+ * order whatever the others hold: the answer to a right-hand side depends neither on its neighbours nor on its place.
+ * Compiled with contraction to fused multiply-add allowed (see the Makefile): here it only saves roundings. */
+#include "factor/factor_private.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Four lanes are what a register holds; a row of the block is two of them. */
+typedef double lanes __attribute__((vector_size(32), aligned(8)));
+enum { HALVES = UZ_LANES / 4 };
+_Static_assert(HALVES == 2, "the loops below are written for two registers a row");
+
+enum { PANEL = 4 }; /* columns of L at a time: their lanes stay in registers */
+
+/* One supernode: rows x cols values, column-major; its rows of the block are gathered in b. */
+typedef struct {
+    const double *L;
+    int64_t rows, cols;
+    lanes *b; /* rows x HALVES */
+} panel_of;
+
+/* b_i -= L_ij b_j for rows of one column. */
+static inline __attribute__((always_inline)) void take_column(lanes *b, const double *L, int64_t j, int64_t first,
+                                                              int64_t last)
+{
+    for (int64_t i = first; i < last; i++) {
+        b[2 * i] -= L[i] * b[2 * j];
+        b[2 * i + 1] -= L[i] * b[2 * j + 1];
+    }
+}
+
+/* The same for PANEL columns from j on. */
+static inline __attribute__((always_inline)) void take_panel(lanes *b, const double *L, int64_t rows, int64_t j)
+{
+    const double *L0 = L, *L1 = L0 + rows, *L2 = L1 + rows, *L3 = L2 + rows;
+    const lanes x0 = b[2 * j], x1 = b[2 * j + 2], x2 = b[2 * j + 4], x3 = b[2 * j + 6];
+    const lanes y0 = b[2 * j + 1], y1 = b[2 * j + 3], y2 = b[2 * j + 5], y3 = b[2 * j + 7];
+    for (int64_t i = j + PANEL; i < rows; i++) {
+        const double l0 = L0[i], l1 = L1[i], l2 = L2[i], l3 = L3[i];
+        b[2 * i] = b[2 * i] - l0 * x0 - l1 * x1 - l2 * x2 - l3 * x3;
+        b[2 * i + 1] = b[2 * i + 1] - l0 * y0 - l1 * y1 - l2 * y2 - l3 * y3;
+    }
+}
+
+/* b = L^-1 b on the columns, and what that takes from the rows below. */
+static inline __attribute__((always_inline)) void eliminate(const panel_of *s)
+{
+    lanes *b = s->b;
+    for (int64_t j = 0; j < s->cols; j += PANEL) {
+        int64_t width = s->cols - j < PANEL ? s->cols - j : PANEL;
+        const double *L = s->L + j * s->rows;
+        for (int64_t k = 0; k < width; k++) {
+            b[2 * (j + k)] /= L[j + k + k * s->rows];
+            b[2 * (j + k) + 1] /= L[j + k + k * s->rows];
+            take_column(b, L + k * s->rows, j + k, j + k + 1, width == PANEL ? j + width : s->rows);
+        }
+        if (width == PANEL)
+            take_panel(b, L, s->rows, j);
+    }
+}
+
+/* b_j -= L_ij b_i summed over rows. */
+static inline __attribute__((always_inline)) void gather_column(lanes *b, const double *L, int64_t j, int64_t first,
+                                                                int64_t last)
+{
+    lanes x = b[2 * j], y = b[2 * j + 1];
+    for (int64_t i = first; i < last; i++) {
+        x -= L[i] * b[2 * i];
+        y -= L[i] * b[2 * i + 1];
+    }
+    b[2 * j] = x;
+    b[2 * j + 1] = y;
+}
+
+/* The same for PANEL columns from j on, over the rows below them. */
+static inline __attribute__((always_inline)) void gather_panel(lanes *b, const double *L, int64_t rows, int64_t j)
+{
+    const double *L0 = L, *L1 = L0 + rows, *L2 = L1 + rows, *L3 = L2 + rows;
+    lanes x0 = b[2 * j], x1 = b[2 * j + 2], x2 = b[2 * j + 4], x3 = b[2 * j + 6];
+    lanes y0 = b[2 * j + 1], y1 = b[2 * j + 3], y2 = b[2 * j + 5], y3 = b[2 * j + 7];
+    for (int64_t i = j + PANEL; i < rows; i++) {
+        const lanes x = b[2 * i], y = b[2 * i + 1];
+        x0 -= L0[i] * x;
+        x1 -= L1[i] * x;
+        x2 -= L2[i] * x;
+        x3 -= L3[i] * x;
+        y0 -= L0[i] * y;
+        y1 -= L1[i] * y;
+        y2 -= L2[i] * y;
+        y3 -= L3[i] * y;
+    }
+    b += 2 * j;
+    b[0] = x0;
+    b[1] = y0;
+    b[2] = x1;
+    b[3] = y1;
+    b[4] = x2;
+    b[5] = y2;
+    b[6] = x3;
+    b[7] = y3;
+}
+
+/* b = L'^-1 b on the columns, the rows below being known. */
+static inline __attribute__((always_inline)) void substitute_back(const panel_of *s)
+{
+    lanes *b = s->b;
+    int64_t rest = s->cols % PANEL, width = rest > 0 ? rest : PANEL;
+    for (int64_t j = s->cols - width; j >= 0; j -= PANEL, width = PANEL) {
+        const double *L = s->L + j * s->rows;
+        if (width == PANEL)
+            gather_panel(b, L, s->rows, j);
+        for (int64_t k = width - 1; k >= 0; k--) {
+            gather_column(b, L + k * s->rows, j + k, j + k + 1, width == PANEL ? j + width : s->rows);
+            b[2 * (j + k)] /= L[j + k + k * s->rows];
+            b[2 * (j + k) + 1] /= L[j + k + k * s->rows];
+        }
+    }
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2,fma"))) static void eliminate_fused(const panel_of *s)
+{
+    eliminate(s);
+}
+
+__attribute__((target("avx2,fma"))) static void substitute_back_fused(const panel_of *s)
+{
+    substitute_back(s);
+}
+#endif
+
+static void eliminate_any(const panel_of *s)
+{
+    eliminate(s);
+}
+
+static void substitute_back_any(const panel_of *s)
+{
+    substitute_back(s);
+}
+
+typedef void (*panel_step)(const panel_of *s);
+
+static panel_step best_step(bool forward)
+{
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return forward ? eliminate_fused : substitute_back_fused;
+#endif
+    return forward ? eliminate_any : substitute_back_any;
+}
+
+/* Rows of the block to and from room. */
+static void gather_rows(double *to, const double *from, const SuiteSparse_long *rows, int64_t count)
+{
+    for (int64_t i = 0; i < count; i++)
+        memcpy(to + i * UZ_LANES, from + rows[i] * UZ_LANES, UZ_LANES * sizeof *to);
+}
+
+static void scatter_rows(double *to, const double *from, const SuiteSparse_long *rows, int64_t count)
+{
+    for (int64_t i = 0; i < count; i++)
+        memcpy(to + rows[i] * UZ_LANES, from + i * UZ_LANES, UZ_LANES * sizeof *to);
+}
+
+static uz_status substitute(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err)
+{
+    const cholmod_factor *L = factor->L;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
+    int64_t most = 0, count = (int64_t)L->nsuper;
+    panel_step step = best_step(forward);
+    for (int64_t k = 0; k < count; k++)
+        most = pi[k + 1] - pi[k] > most ? pi[k + 1] - pi[k] : most;
+    double *room = uz_alloc(most, UZ_LANES * sizeof *room);
+    if (!room)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a substitution with %d columns", UZ_LANES);
+    for (int64_t at = 0; at < count; at++) {
+        int64_t k = forward ? at : count - 1 - at;
+        const SuiteSparse_long *rows = s + pi[k];
+        panel_of panel = {(const double *)L->x + px[k], pi[k + 1] - pi[k], super[k + 1] - super[k], (lanes *)room};
+        for (int64_t block = 0; block < blocks; block++) { /* while this part of L is in the processor's cache */
+            double *x = X + block * factor->n * UZ_LANES;
+            gather_rows(room, x, rows, panel.rows);
+            step(&panel);
+            scatter_rows(x, room, rows, forward ? panel.rows : panel.cols);
+        }
+    }
+    free(room);
+    return UZ_OK;
+}
+
+uz_status uz_factor_forward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err)
+{
+    return substitute(factor, X, blocks, true, err);
+}
+
+uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err)
+{
+    return substitute(factor, X, blocks, false, err);
+}
+
+void uz_factor_permute_lanes(const uz_factor *factor, double *permuted, const double *X)
+{
+    gather_rows(permuted, X, factor->L->Perm, factor->n);
+}
+
+void uz_factor_unpermute_lanes(const uz_factor *factor, double *X, const double *permuted)
+{
+    scatter_rows(X, permuted, factor->L->Perm, factor->n);
+}
