@@ -1,4 +1,5 @@
 /* cases.c: one body, one or many loads. */
+#include "block.h"
 #include "cache/cache.h"
 #include "core/alloc.h"
 #include "core/clock.h"
@@ -71,31 +72,99 @@ uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
 }
 
 /* The first case carries the cost of the body; for the others it is there. */
-static uz_status solve_one(batch *b, int64_t i, uz_error *err)
+static uz_status open_case(uz_run *run, const batch *b, int64_t i, uz_error *err)
 {
     static const uz_reuse everything = {true, true, true, true};
-    uz_run run;
-    uz_status status = uz_run_begin(&run, b->problem, b->settings, b->hooks, err);
-    run.index = i;
-    run.load_case = b->problem->n_cases > 0 ? &b->problem->cases[i] : NULL;
-    run.start = b->starts ? b->starts[i] : NULL;
-    run.body = b->body;
-    run.deadline = b->started + b->settings->time_limit_s;
+    uz_status status = uz_run_begin(run, b->problem, b->settings, b->hooks, err);
+    run->index = i;
+    run->load_case = b->problem->n_cases > 0 ? &b->problem->cases[i] : NULL;
+    run->start = b->starts ? b->starts[i] : NULL;
+    run->body = b->body;
+    run->deadline = b->started + b->settings->time_limit_s;
     if (i == 0)
-        run.started = b->started;
+        run->started = b->started;
+    if (status != UZ_OK)
+        return status;
+    uz_run_take_body(run, i > 0 ? everything : b->reused);
+    run->serves_many = run->hit || b->n > 1;
+    return UZ_OK;
+}
+
+/* The result goes to its place, or the error is named. */
+static uz_status close_case(uz_run *run, const batch *b, uz_status status, uz_error *err)
+{
     if (status == UZ_OK) {
-        uz_run_take_body(&run, i > 0 ? everything : b->reused);
-        run.serves_many = run.hit || b->n > 1;
-        status = uz_run_solve(&run, err);
-    }
-    if (status == UZ_OK) {
-        b->results[i] = run.result;
-        run.result = NULL;
+        b->results[run->index] = run->result;
+        run->result = NULL;
     } else if (b->problem->n_cases > 0) {
-        name_case(err, i);
+        name_case(err, run->index);
     }
+    return status;
+}
+
+static uz_status solve_one(const batch *b, int64_t i, uz_error *err)
+{
+    uz_run run;
+    uz_status status = open_case(&run, b, i, err);
+    if (status == UZ_OK)
+        status = uz_run_solve(&run, err);
+    status = close_case(&run, b, status, err);
     uz_run_end(&run);
     return status;
+}
+
+/* How many lanes go through the factor at a time: twice as many as one pass over K certifies, where there are so many
+ * cases. */
+static int64_t blocks_for(const batch *b)
+{
+    return b->n > UZ_LANES ? 2 : 1;
+}
+
+static uz_status solve_block(const batch *b, uz_block *block, int64_t first, int64_t count, uz_error *err)
+{
+    uz_run *runs = uz_block_runs(block);
+    int64_t open = 0, failed = first;
+    uz_status status = UZ_OK;
+    for (; status == UZ_OK && open < count; open++)
+        status = open_case(&runs[open], b, first + open, err);
+    if (status == UZ_OK)
+        status = uz_block_solve(block, count, &failed, err);
+    for (int64_t k = 0; k < open; k++) {
+        if (status == UZ_OK)
+            close_case(&runs[k], b, status, err);
+        else if (runs[k].index == failed && b->problem->n_cases > 0)
+            name_case(err, failed);
+        uz_run_end(&runs[k]);
+    }
+    return status;
+}
+
+static uz_status solve_in_blocks(const batch *b, uz_error *err)
+{
+    uz_block *block = NULL;
+    int64_t width = blocks_for(b) * UZ_LANES;
+    uz_status status = uz_block_create(&block, b->body, b->problem, blocks_for(b), err);
+    for (int64_t i = 0; status == UZ_OK && i < b->n; i += width)
+        status = solve_block(b, block, i, b->n - i < width ? b->n - i : width, err);
+    uz_block_free(block);
+    return status;
+}
+
+/* What the results take that this call returns, and while it works the vectors of a block. */
+static uz_status check_memory(const batch *b, uz_error *err)
+{
+    uz_dual_info dual = uz_dual_describe(b->body->dual);
+    const uz_mesh *mesh = &b->body->model.mesh;
+    double nodal = b->body->is_scene ? (double)(mesh->n_nodes * mesh->dim) : (double)dual.d;
+    double lanes = 7.0 * (double)(blocks_for(b) * UZ_LANES) * (double)dual.d;
+    double each = (b->body->is_scene ? 2.0 : 1.0) * nodal + 8.0 * (double)dual.m;
+    double bytes = (double)b->body->bytes + 8.0 * ((double)b->n * each + lanes);
+    if (b->n == 1 || b->settings->memory_limit == 0 || bytes <= (double)b->settings->memory_limit)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_LIMIT, "/cases",
+                   "the body and the results of %lld load cases take %.0f bytes, %zu are allowed: send fewer cases at "
+                   "a time",
+                   (long long)b->n, bytes, b->settings->memory_limit);
 }
 
 /* Everything that can be refused before anything is computed. */
@@ -115,7 +184,12 @@ static uz_status solve_all(batch *b, uz_cache *cache, uz_error *err)
     uz_status status = check(b, err);
     if (status == UZ_OK)
         status = uz_cache_acquire(&b->body, &b->reused, cache, b->problem, b->settings, b->hooks, err);
-    for (int64_t i = 0; status == UZ_OK && i < b->n; i++)
+    if (status == UZ_OK)
+        status = check_memory(b, err);
+    bool in_blocks = status == UZ_OK && b->n > 1 && uz_dual_describe(b->body->dual).op == UZ_OPERATOR_CONDENSED;
+    if (in_blocks)
+        status = solve_in_blocks(b, err);
+    for (int64_t i = 0; status == UZ_OK && !in_blocks && i < b->n; i++)
         status = solve_one(b, i, err);
     uz_cache_release(cache, b->body);
     return status;

@@ -20,7 +20,7 @@
 #include <string.h>
 
 /* p and h: the case's or the problem's own, or assembled from the loads of the scene. */
-uz_status uz_run_make_load(uz_run *run, uz_error *err)
+static uz_status make_load(uz_run *run, uz_error *err)
 {
     const uz_body *body = run->body;
     const uz_load_case *load_case = run->load_case;
@@ -41,6 +41,20 @@ uz_status uz_run_make_load(uz_run *run, uz_error *err)
     run->h = run->owned + run->d;
     run->prescribed = run->owned + run->d + run->m;
     return uz_body_model_load(run->owned, run->owned + run->d, run->prescribed, &body->model, &scene, err);
+}
+
+uz_status uz_run_make_load(uz_run *run, uz_error *err)
+{
+    double start = uz_seconds();
+    uz_status status = make_load(run, err);
+    run->result->summary.timings.assemble += uz_seconds() - start;
+    return status;
+}
+
+static void tell_begin(const uz_run *run)
+{
+    if (run->hooks && run->hooks->begins)
+        run->hooks->begins(run->hooks->ctx, run->index);
 }
 
 static uz_method_options method_options(const uz_run *run)
@@ -68,13 +82,28 @@ static uz_status iterate(uz_run *run, uz_error *err)
     return status;
 }
 
+/* Room for linear solves, made when the first is needed: cases of a block may need none. */
+static uz_status need_workspace(uz_run *run, uz_error *err)
+{
+    if (!run->ws)
+        run->ws = uz_factor_workspace_new();
+    if (!run->work)
+        run->work = uz_alloc(run->d, sizeof(double));
+    if (run->ws && run->work)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+}
+
 /* e'K^-1 e = ||L^-1 P e||^2: half a linear solve; the other half makes e K^-1 e. */
 static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, uz_error *err)
 {
     uz_run *run = ctx;
     const uz_factor *factor = run->body->factor;
+    uz_status status = need_workspace(run, err);
+    if (status != UZ_OK)
+        return status;
     uz_factor_permute(factor, run->work, e);
-    uz_status status = uz_factor_forward(factor, run->ws, run->work, 1, err);
+    status = uz_factor_forward(factor, run->ws, run->work, 1, err);
     double sum = 0.0;
     for (int64_t j = 0; j < run->d; j++)
         sum += run->work[j] * run->work[j];
@@ -86,10 +115,13 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
     return status;
 }
 
-uz_certify_input uz_run_certify_input(uz_run *run)
+uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *err)
 {
     const uz_csc *K = uz_body_K(run->body, run->problem);
-    return (uz_certify_input){
+    uz_status status = need_workspace(run, err);
+    if (status != UZ_OK)
+        return status;
+    *input = (uz_certify_input){
         .K = K,
         .N = uz_body_N(run->body, run->problem),
         .p = run->p,
@@ -100,14 +132,17 @@ uz_certify_input uz_run_certify_input(uz_run *run)
         .inverse_bound = run->serves_many ? uz_body_inverse_bound(run->body, K, run->ws) : INFINITY,
         .sharp = 0.5 * run->requested,
     };
+    return UZ_OK;
 }
 
 /* The answer that r (m, scaled rows) gives, with the kept correction or without, and its certificate. */
 static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_push, uz_error *err)
 {
     const double *scale = uz_case_row_scale(run->load);
-    uz_certify_input input = uz_run_certify_input(run);
-    uz_status status = uz_case_recover(run->load, answer->u, r, with_push, err);
+    uz_certify_input input;
+    uz_status status = uz_run_certify_input(&input, run, err);
+    if (status == UZ_OK)
+        status = uz_case_recover(run->load, answer->u, r, with_push, err);
     for (int64_t i = 0; i < run->m; i++)
         answer->r[i] = scale[i] * r[i];
     if (status == UZ_OK)
@@ -133,14 +168,10 @@ static uz_status try_last_reactions(uz_run *run, uz_error *err)
     return status;
 }
 
-static uz_status recover_and_certify(uz_run *run, uz_error *err)
+uz_status uz_run_certify(uz_run *run, uz_error *err)
 {
     double start = uz_seconds();
     uz_status status = certify_reactions(run, &run->answer, run->it.best_r, isfinite(run->it.best_bound), err);
-    bool missed = run->answer.certificate.relative_error > run->requested;
-    if (status == UZ_OK && missed && run->end != UZ_END_TARGET && run->end != UZ_END_PAPER)
-        status = try_last_reactions(run, err);
-    run->result->summary.certificate = run->answer.certificate;
     run->result->summary.timings.certify += uz_seconds() - start;
     return status;
 }
@@ -181,35 +212,54 @@ static uz_status prove_infeasible(uz_run *run, uz_error *err)
     return UZ_OK;
 }
 
+uz_status uz_run_iterate(uz_run *run, uz_error *err)
+{
+    uz_status status = iterate(run, err);
+    return status == UZ_OK && run->end == UZ_END_RAY ? prove_infeasible(run, err) : status;
+}
+
+/* Is the certified answer the one to give? Otherwise the target of the next round is set. */
+static uz_status judge(bool *done, uz_run *run, uz_error *err)
+{
+    const uz_certificate *certificate = &run->answer.certificate;
+    bool missed = certificate->relative_error > run->requested;
+    double start = uz_seconds();
+    uz_status status = UZ_OK;
+    if (missed && run->end != UZ_END_TARGET && run->end != UZ_END_PAPER)
+        status = try_last_reactions(run, err);
+    run->result->summary.timings.certify += uz_seconds() - start;
+    if (run->settings->balanced && run->body->is_scene && !run->again) {
+        uz_run_balance_request(run);
+        run->target = run->requested;
+    }
+    *done = run->result->ray || certificate->relative_error <= run->requested || run->end != UZ_END_TARGET;
+    run->again = true;
+    if (!*done && run->it.best_relative <= run->target)
+        run->target = 0.25 * run->it.best_relative;
+    return status;
+}
+
 enum { MAX_ROUNDS = 8 };
 
 /* The methods stop at their own estimate; only the certificate decides. While it is missed although the estimate was
  * met, the estimate is asked for more. */
 static uz_status iterate_until_certified(uz_run *run, uz_error *err)
 {
-    uz_certificate *certificate = &run->result->summary.certificate;
-    bool balance = run->settings->balanced && run->body->is_scene;
-    for (int round = 0; round < MAX_ROUNDS; round++) {
-        uz_status status = iterate(run, err);
-        if (status == UZ_OK && run->end == UZ_END_RAY)
-            status = prove_infeasible(run, err);
+    bool done = false;
+    uz_status status = judge(&done, run, err);
+    for (int round = 1; status == UZ_OK && !done && round < MAX_ROUNDS; round++) {
+        if (run->in_block)
+            tell_begin(run);
+        status = uz_run_iterate(run, err);
         if (status == UZ_OK)
-            status = recover_and_certify(run, err);
-        if (status != UZ_OK)
-            return status;
-        if (balance) {
-            uz_run_balance_request(run);
-            balance = false;
-            run->target = run->requested;
-        }
-        if (run->result->ray || certificate->relative_error <= run->requested || run->end != UZ_END_TARGET)
-            return UZ_OK;
-        run->again = true;
-        if (run->it.best_relative <= run->target)
-            run->target = 0.25 * run->it.best_relative;
+            status = uz_run_certify(run, err);
+        if (status == UZ_OK)
+            status = judge(&done, run, err);
     }
-    run->end = UZ_END_STALLED;
-    return UZ_OK;
+    if (!done)
+        run->end = UZ_END_STALLED;
+    run->result->summary.certificate = run->answer.certificate;
+    return status;
 }
 
 static uz_outcome conclude(const uz_run *run)
@@ -232,26 +282,39 @@ static uz_outcome conclude(const uz_run *run)
     }
 }
 
-uz_status uz_run_solve(uz_run *run, uz_error *err)
+uz_status uz_run_start(uz_run *run, uz_error *err)
 {
-    double start = uz_seconds();
-    uz_status status = uz_run_make_load(run, err);
-    run->result->summary.timings.assemble += uz_seconds() - start;
-    start = uz_seconds();
-    if (status == UZ_OK)
-        status = uz_run_allocate(run, err);
-    if (status == UZ_OK)
-        status = uz_case_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
-    run->result->summary.timings.iterate += uz_seconds() - start;
+    uz_status status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
         status = uz_iterate_init(&run->it, run->m, run->settings->alpha, err);
     if (status == UZ_OK && run->start)
         status = uz_iterate_start(&run->it, run->load, run->start, err);
-    if (status == UZ_OK && run->hooks && run->hooks->begins)
-        run->hooks->begins(run->hooks->ctx, run->index);
     if (status == UZ_OK)
-        status = iterate_until_certified(run, err);
+        tell_begin(run);
+    return status;
+}
+
+uz_status uz_run_finish(uz_run *run, uz_error *err)
+{
+    uz_status status = iterate_until_certified(run, err);
+    if (status != UZ_OK)
+        return status;
+    run->result->summary.outcome = conclude(run);
+    return uz_run_report(run, err);
+}
+
+uz_status uz_run_solve(uz_run *run, uz_error *err)
+{
+    uz_status status = uz_run_make_load(run, err);
+    double start = uz_seconds();
     if (status == UZ_OK)
-        run->result->summary.outcome = conclude(run);
-    return status == UZ_OK ? uz_run_report(run, err) : status;
+        status = uz_case_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
+    if (status == UZ_OK)
+        status = uz_run_start(run, err);
+    run->result->summary.timings.iterate += uz_seconds() - start;
+    if (status == UZ_OK)
+        status = uz_run_iterate(run, err);
+    if (status == UZ_OK)
+        status = uz_run_certify(run, err);
+    return status == UZ_OK ? uz_run_finish(run, err) : status;
 }

@@ -38,6 +38,7 @@ typedef struct {
     double started, deadline; /* uz_seconds() */
     double requested;         /* relative error that the certificate must meet */
     double target;            /* relative error at which the method returns */
+    bool in_block;            /* other cases began before this one ended */
     bool again;               /* the method's target was met, the certificate was not */
     uz_end end;
     uz_result *result;
@@ -49,16 +50,18 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
                        uz_error *err);
 /* Sizes and timings from the body. */
 void uz_run_take_body(uz_run *run, uz_reuse reused);
-/* Vectors of the solve and of the result. */
-uz_status uz_run_allocate(uz_run *run, uz_error *err);
 /* p, h and prescribed values of the case. */
 uz_status uz_run_make_load(uz_run *run, uz_error *err);
-/* What a certificate of this load starts from; needs the load and the vectors. */
-uz_certify_input uz_run_certify_input(uz_run *run);
+/* What a certificate of this load starts from; needs the load. */
+uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *err);
 /* Scenes, `balanced`: the request from the estimated discretization error of answer.u. */
 void uz_run_balance_request(uz_run *run);
-/* From p and h to a certified answer; ends in uz_run_report. */
+/* From p and h to a certified answer; ends in uz_run_report. It is make_load, the creation of run->load, and these: */
 uz_status uz_run_solve(uz_run *run, uz_error *err);
+uz_status uz_run_start(uz_run *run, uz_error *err);   /* vectors, the given start, the hook */
+uz_status uz_run_iterate(uz_run *run, uz_error *err); /* until the method's own estimate is met, or it ends */
+uz_status uz_run_certify(uz_run *run, uz_error *err); /* the best answer */
+uz_status uz_run_finish(uz_run *run, uz_error *err);  /* further rounds where the certificate asks for them */
 /* Fills the summary and the result's u. */
 uz_status uz_run_report(uz_run *run, uz_error *err);
 /* The part of it that is about the answer, whoever made it: u, r and g go to the result. The outcome stands. */

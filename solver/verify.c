@@ -60,8 +60,10 @@ static uz_status certify(uz_run *run, const double *r, uz_error *err)
     uz_answer *answer = &run->answer;
     if (run->settings->balanced && run->body->is_scene)
         uz_run_balance_request(run);
-    uz_certify_input input = uz_run_certify_input(run);
-    uz_status status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
+    uz_certify_input input;
+    uz_status status = uz_run_certify_input(&input, run, err);
+    if (status == UZ_OK)
+        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
     run->result->summary.certificate = answer->certificate;
     if (run->m > 0)
         memcpy(answer->r, r, (size_t)run->m * sizeof *r);
@@ -73,7 +75,7 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     uz_summary *summary = &run->result->summary;
     uz_status status = uz_run_make_load(run, err);
     if (status == UZ_OK)
-        status = uz_run_allocate(run, err);
+        status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
         status = take_answer(run, u, r, err);
     double start = uz_seconds();

@@ -183,39 +183,37 @@ void uz_condensed_clear(uz_condensed *dense)
     free(dense->scale);
 }
 
-/* u_b (n_b) = N's dofs of L'^-1 base: displacements without reactions. x (d) is room. */
-static uz_status displace_contact(double *u_b, double *x, const uz_case *load, uz_error *err)
+/* g0 from y = L^-1 P p, whose entry k stands at y[k stride]. x (d) is room where the contact is not last. */
+uz_status uz_condensed_begin(uz_case *load, const double *y, int64_t stride, double *x, uz_error *err)
 {
-    const uz_condensed *dense = &load->dual->dense;
+    const uz_dual *dual = load->dual;
+    const uz_condensed *dense = &dual->dense;
+    double *u_b = load->work; /* displacements of the contact without reactions */
     uz_status status = UZ_OK;
-    const double *from = load->base;
-    if (dense->reach) {
-        memcpy(x, load->base, (size_t)load->dual->info.d * sizeof *x);
+    load->D = dense->scaled ? NULL : dual->lazy->D;
+    for (int64_t k = 0; dense->reach && k < dual->info.d; k++)
+        x[k] = y[k * stride];
+    if (dense->reach)
         status = uz_reach_backward(dense->reach, load->ws, x, err);
-        from = x;
-    }
     for (int64_t k = 0; k < dense->n_b; k++)
-        u_b[k] = from[dense->position[k]];
+        u_b[k] = dense->reach ? x[dense->position[k]] : y[dense->position[k] * stride];
     if (!dense->reach)
         uz_trsv_lower_t(dense->n_b, dense->L_bb, u_b);
+    memcpy(load->g0, load->h, (size_t)dual->info.m * sizeof *load->g0);
+    uz_csc_gaxpy(load->g0, &dense->N_b, -1.0, u_b);
     return status;
 }
 
 /* y = L^-1 P p is half a linear solve; the other half waits until the reactions are known. */
 uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err)
 {
-    const uz_dual *dual = load->dual;
-    const uz_condensed *dense = &dual->dense;
-    uz_factor_permute(dual->factor, load->base, p);
-    uz_status status = uz_factor_forward(dual->factor, load->ws, load->base, 1, err);
+    const uz_factor *factor = load->dual->factor;
+    uz_factor_permute(factor, load->base, p);
+    uz_status status = uz_factor_forward(factor, load->ws, load->base, 1, err);
     if (status != UZ_OK)
         return status;
-    load->D = dense->scaled ? NULL : dual->lazy->D;
-    load->psi0 = -0.5 * uz_dot(dual->info.d, load->base, load->base);
-    status = displace_contact(load->work, load->work2, load, err);
-    memcpy(load->g0, load->h, (size_t)dual->info.m * sizeof *load->g0);
-    uz_csc_gaxpy(load->g0, &dense->N_b, -1.0, load->work);
-    return status;
+    load->psi0 = -0.5 * uz_dot(load->dual->info.d, load->base, load->base);
+    return uz_condensed_begin(load, load->base, 1, load->work2, err);
 }
 
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w)
@@ -240,8 +238,8 @@ void uz_condensed_apply(const uz_case *load, double *Dr, const double *r)
     uz_csc_gaxpy(Dr, &dense->N_b, 1.0, load->apply_room);
 }
 
-/* x (d) = L^-1 P N'(r + w), in the factor's order, w the kept correction or nothing. */
-static uz_status spread_reactions(double *x, const uz_case *load, const double *r, bool with_push, uz_error *err)
+/* x (d) = L^-1 P N'(r + w) by the paths, w the kept correction or nothing. */
+static uz_status spread_along_reach(double *x, const uz_case *load, const double *r, bool with_push, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
     double *force = load->apply_room; /* n_b */
@@ -255,24 +253,37 @@ static uz_status spread_reactions(double *x, const uz_case *load, const double *
     return uz_reach_forward(dense->reach, load->ws, x, err);
 }
 
+uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_case *load, const double *r,
+                                     bool with_push, uz_error *err)
+{
+    const uz_condensed *dense = &load->dual->dense;
+    double *z = load->work;
+    if (dense->reach) {
+        uz_status status = spread_along_reach(x, load, r, with_push, err);
+        for (int64_t k = 0; k < load->dual->info.d; k++)
+            y[k * stride] += x[k];
+        return status;
+    }
+    uz_condensed_response(z, dense, r);
+    for (int64_t k = 0; k < dense->n_b; k++)
+        y[dense->position[k] * stride] += z[k] + (with_push ? load->kept[k] : 0.0);
+    return UZ_OK;
+}
+
 uz_status uz_condensed_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
 {
     const uz_dual *dual = load->dual;
-    const uz_condensed *dense = &dual->dense;
-    double *x = load->work2, *z = load->work;
-    uz_status status = UZ_OK;
-    if (dense->reach) {
-        status = spread_reactions(x, load, r, with_push, err);
-        uz_axpy(dual->info.d, 1.0, load->base, x);
-    } else {
-        uz_condensed_response(z, dense, r);
-        memcpy(x, load->base, (size_t)dual->info.d * sizeof *x);
-        for (int64_t k = 0; k < dense->n_b; k++)
-            x[dense->position[k]] += z[k] + (with_push ? load->kept[k] : 0.0);
-    }
+    int64_t d = dual->info.d;
+    double *own = load->base ? NULL : uz_alloc(d, sizeof *own), *x = load->base ? load->work2 : own;
+    if (!x)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld dofs", (long long)d);
+    for (int64_t k = 0; k < d; k++)
+        x[k] = load->base ? load->base[k] : load->lane[k * UZ_LANES];
+    uz_status status = uz_condensed_add_reactions(x, 1, u, load, r, with_push, err); /* u is room */
     if (status == UZ_OK)
         status = uz_factor_backward(dual->factor, load->ws, x, 1, err);
     if (status == UZ_OK)
         uz_factor_unpermute(dual->factor, u, x);
+    free(own);
     return status;
 }

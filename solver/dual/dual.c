@@ -152,26 +152,28 @@ uz_dual_info uz_dual_describe(const uz_dual *dual)
     return dual->info;
 }
 
-static bool allocate_case(uz_case *load)
+/* What a case in a block does without, it takes from the block. */
+static bool allocate_vectors(uz_case *load, bool whole)
 {
-    int64_t d = load->dual->info.d, m = load->dual->info.m, room = d > m ? d : m;
+    bool condensed = load->dual->info.op == UZ_OPERATOR_CONDENSED;
+    int64_t d = load->dual->info.d, m = load->dual->info.m, n_b = condensed ? load->dual->dense.n_b : 0;
+    int64_t contact = m > n_b ? m : n_b, room = whole && d > contact ? d : contact;
     load->ws = uz_factor_workspace_new();
-    load->base = uz_alloc_zero(d, sizeof(double));
+    load->base = whole ? uz_alloc_zero(d, sizeof(double)) : NULL;
     load->h = uz_alloc_zero(m, sizeof(double));
     load->g0 = uz_alloc_zero(m, sizeof(double));
-    load->response = uz_alloc_zero(load->dual->info.op == UZ_OPERATOR_FACTORED ? d : 0, sizeof(double));
-    load->apply_room =
-        uz_alloc_zero(load->dual->info.op == UZ_OPERATOR_CONDENSED ? load->dual->dense.n_b : 0, sizeof(double));
+    load->response = uz_alloc_zero(condensed ? 0 : d, sizeof(double));
+    load->apply_room = uz_alloc_zero(n_b, sizeof(double));
     load->work = uz_alloc_zero(room, sizeof(double));
     load->work2 = uz_alloc_zero(room, sizeof(double));
-    load->push = uz_alloc_zero(room, sizeof(double));
-    load->kept = uz_alloc_zero(room, sizeof(double));
-    return load->ws && load->apply_room && load->h && load->base && load->g0 && load->response && load->work &&
-           load->work2 && load->push && load->kept;
+    load->push = uz_alloc_zero(condensed ? contact : d, sizeof(double));
+    load->kept = uz_alloc_zero(condensed ? contact : d, sizeof(double));
+    return load->ws && load->apply_room && load->h && (load->base || !whole) && load->g0 && load->response &&
+           load->work && load->work2 && load->push && load->kept;
 }
 
-uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
-                         uz_error *err)
+uz_status uz_case_allocate(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
+                           uz_error *err)
 {
     *out = NULL;
     uz_case *load = uz_alloc_zero(1, sizeof *load);
@@ -179,11 +181,22 @@ uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, co
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
     load->dual = dual;
     load->K = K;
-    uz_status status = UZ_OK;
-    if (!allocate_case(load))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->info.d);
-    for (int64_t i = 0; status == UZ_OK && i < dual->info.m; i++)
+    if (!allocate_vectors(load, whole)) {
+        uz_case_free(load);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->info.d);
+    }
+    for (int64_t i = 0; i < dual->info.m; i++)
         load->h[i] = dual->row_scale[i] * h[i];
+    *out = load;
+    return UZ_OK;
+}
+
+uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
+                         uz_error *err)
+{
+    *out = NULL;
+    uz_case *load = NULL;
+    uz_status status = uz_case_allocate(&load, dual, K, h, true, err);
     if (status == UZ_OK)
         status =
             dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_load(load, p, err) : uz_factored_load(load, p, err);

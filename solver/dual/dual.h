@@ -46,6 +46,22 @@ double uz_case_force_norm(uz_case *load, const double *x);
 /* psi(r) and ||u(r)||_K^2 from r and D r. */
 void uz_case_energies(const uz_case *load, double *psi, double *norm2, const double *r, const double *Dr);
 
+/* CONDENSED only: up to blocks * UZ_LANES loads (lanes, see factor.h) with one pass over the factor. One thread. */
+typedef struct uz_case_block uz_case_block;
+uz_status uz_case_block_create(uz_case_block **out, const uz_dual *dual, int64_t blocks, uz_error *err);
+void uz_case_block_free(uz_case_block *block);
+/* blocks x d x UZ_LANES: p of load l of block b, entry j, at ((b * d) + j) * UZ_LANES + l. Filled by the caller, lanes
+ * without a load with zeros, before uz_case_block_load; kept. */
+double *uz_case_block_loads(uz_case_block *block);
+uz_status uz_case_block_load(uz_case_block *block, uz_error *err);
+/* The case of lane 0 .. blocks * UZ_LANES - 1, until the next uz_case_block_load. h (m) as in uz_case_create. */
+uz_status uz_case_create_in_block(uz_case **out, const uz_case_block *block, int64_t lane, const uz_csc *K,
+                                  const double *h, uz_error *err);
+/* uz_case_recover for the cases of lanes 0 .. count - 1, r[lane] (m): displacements laid out as the loads are. */
+uz_status uz_case_block_recover(uz_case_block *block, uz_case *const *loads, const double *const *r,
+                                const bool *with_push, int64_t count, uz_error *err);
+const double *uz_case_block_displacements(const uz_case_block *block);
+
 /* Makes what only many applications of D pay for, once per body: the dense D. lambda_max (may be NULL: not wanted): of
  * D, Lanczos value plus its residual bound; 0 when m = 0 or D = 0. Overwrites what the last apply left. */
 uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error *err);

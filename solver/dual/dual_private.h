@@ -69,13 +69,14 @@ struct uz_case {
     const uz_csc *K; /* d x d lower triangle, borrowed */
     double *h;       /* m: scaled */
     uz_factor_workspace *ws;
-    double *base; /* d: CONDENSED y = L^-1 P p in the factor's order; FACTORED u0 = K^-1 p */
-    double *g0;   /* m */
+    const double *lane; /* CONDENSED in a block: in place of base, with a stride of UZ_LANES */
+    double *base;       /* d: CONDENSED y = L^-1 P p in the factor's order; FACTORED u0 = K^-1 p */
+    double *g0;         /* m */
     double psi0;
     const double *D, *D_inverse; /* CONDENSED: m x m, NULL until needed here */
     double *response;            /* FACTORED: d, K^-1 N'r of the last apply */
     double *apply_room;          /* CONDENSED: n_b */
-    double *work, *work2;        /* max(d, m, n_b) each */
+    double *work, *work2;        /* max(d, m, n_b) each; in a block max(m, n_b) */
     double *push_weight;         /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
     uz_bounded *box;             /* FACTORED with bounds, else NULL */
     double *push, *kept; /* correction: CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
@@ -91,6 +92,14 @@ int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m);
 /* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D. */
 void uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m);
 uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err);
+/* g0 from y = L^-1 P p, whose entry k stands at y[k stride]; x (d) is room. */
+uz_status uz_condensed_begin(uz_case *load, const double *y, int64_t stride, double *x, uz_error *err);
+/* y (d, the same) += L^-1 P N'r and, with_push, the kept correction; x (d) is room. */
+uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_case *load, const double *r,
+                                     bool with_push, uz_error *err);
+/* A case with everything but its load. whole: with room for vectors of d. */
+uz_status uz_case_allocate(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
+                           uz_error *err);
 void uz_condensed_apply(const uz_case *load, double *Dr, const double *r);
 uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active,

@@ -172,7 +172,7 @@ static void scatter_rows(double *to, const double *from, const SuiteSparse_long 
 
 static uz_status substitute(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err)
 {
-    const cholmod_factor *L = factor->L;
+    const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
     int64_t most = 0, count = (int64_t)L->nsuper;
     panel_step step = best_step(forward);
@@ -208,10 +208,10 @@ uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t b
 
 void uz_factor_permute_lanes(const uz_factor *factor, double *permuted, const double *X)
 {
-    gather_rows(permuted, X, factor->L->Perm, factor->n);
+    gather_rows(permuted, X, factor->L.Perm, factor->n);
 }
 
 void uz_factor_unpermute_lanes(const uz_factor *factor, double *X, const double *permuted)
 {
-    scatter_rows(X, permuted, factor->L->Perm, factor->n);
+    scatter_rows(X, permuted, factor->L.Perm, factor->n);
 }

@@ -1,0 +1,364 @@
+#include "certificate/lanes.h"
+
+#include "certificate/bound.h"
+#include "certificate/certificate.h"
+#include "certificate/feasible.h"
+#include "certificate/residual.h"
+#include "certificate/twofold.h"
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Half of a row of lanes: what a register holds. */
+typedef double lanes __attribute__((vector_size(32), aligned(8)));
+typedef int64_t lane_bits __attribute__((vector_size(32), aligned(8)));
+enum { WIDTH = UZ_CERTIFY_LANES, HALVES = WIDTH / 4 };
+
+/* Sums over the dofs, for each lane. */
+typedef struct {
+    lanes stiffness, load, change, correction_energy, e_square, weighted, noise, force, sizes, residuals;
+} sums;
+
+struct uz_lane_certifier {
+    const uz_csc *K, *N;
+    double rcond, inverse_bound;
+    double *weight;       /* d */
+    int64_t n_b;          /* dofs that N touches */
+    int64_t *dof;         /* n_b */
+    int64_t *place;       /* d: of a dof among them, -1: it is not */
+    double *weight_b;     /* n_b */
+    uz_csc Nt_b;          /* n_b x m */
+    uz_csc K_b;           /* d x n_b: the columns of K at these dofs, both triangles */
+    uz_feasible feasible; /* on n_b dofs */
+    double *u_b;          /* n_b */
+    double *c;            /* n_b x WIDTH: corrections */
+    double *Kc;           /* d x WIDTH; rows that no contact dof couples to stay 0 */
+    double *r;            /* m x WIDTH */
+    double *hi, *lo;      /* d x WIDTH: zero between calls */
+    sums sum[HALVES];
+};
+
+/* Lists the entries of K in the columns of contact dofs; their number. row: NULL: counts only. */
+static int64_t list_columns(const uz_lane_certifier *c, int64_t *row, int64_t *column, double *value)
+{
+    const uz_csc *K = c->K;
+    int64_t count = 0;
+    for (int64_t j = 0; j < K->cols; j++) {
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+            const int64_t i = K->idx[k], ends[2][2] = {{i, c->place[j]}, {j, i == j ? -1 : c->place[i]}};
+            for (int side = 0; side < 2; side++) {
+                if (ends[side][1] < 0)
+                    continue;
+                if (row) {
+                    row[count] = ends[side][0];
+                    column[count] = ends[side][1];
+                    value[count] = K->val[k];
+                }
+                count++;
+            }
+        }
+    }
+    return count;
+}
+
+static uz_status extract_columns(uz_lane_certifier *c, uz_error *err)
+{
+    int64_t count = list_columns(c, NULL, NULL, NULL);
+    int64_t *row = uz_alloc(count, sizeof *row), *column = uz_alloc(count, sizeof *column);
+    double *value = uz_alloc(count, sizeof *value);
+    uz_status status = UZ_OK;
+    if (row && column && value) {
+        list_columns(c, row, column, value);
+        status = uz_csc_from_triplets(&c->K_b, c->K->cols, c->n_b, count, row, column, value, err);
+    } else {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->K->cols);
+    }
+    free(row);
+    free(column);
+    free(value);
+    return status;
+}
+
+static uz_status compress(uz_lane_certifier *c, uz_error *err)
+{
+    const uz_csc *N = c->N;
+    uz_csc Nt;
+    for (int64_t j = 0; j < c->K->cols; j++) {
+        c->place[j] = N->rows > 0 && N->ptr[j + 1] > N->ptr[j] ? c->n_b : -1;
+        if (c->place[j] >= 0)
+            c->dof[c->n_b++] = j;
+    }
+    uz_status status = uz_csc_transpose(&Nt, N, err);
+    if (status != UZ_OK)
+        return status;
+    for (int64_t k = 0; k < Nt.ptr[Nt.cols]; k++)
+        Nt.idx[k] = c->place[Nt.idx[k]];
+    Nt.rows = c->n_b;
+    c->Nt_b = Nt;
+    for (int64_t k = 0; k < c->n_b; k++)
+        c->weight_b[k] = c->weight[c->dof[k]];
+    return extract_columns(c, err);
+}
+
+static bool allocate(uz_lane_certifier *c)
+{
+    int64_t d = c->K->cols, m = c->N->rows;
+    c->weight = uz_alloc(d, sizeof(double));
+    c->dof = uz_alloc(d, sizeof(int64_t));
+    c->place = uz_alloc(d, sizeof(int64_t));
+    c->weight_b = uz_alloc(d, sizeof(double));
+    c->u_b = uz_alloc(d, sizeof(double));
+    c->r = uz_alloc_zero(m, WIDTH * sizeof(double));
+    c->Kc = uz_alloc_zero(d, WIDTH * sizeof(double));
+    c->hi = uz_alloc_zero(d, WIDTH * sizeof(double));
+    c->lo = uz_alloc_zero(d, WIDTH * sizeof(double));
+    return c->weight && c->dof && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo;
+}
+
+uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double rcond,
+                                   double inverse_bound, uz_error *err)
+{
+    *out = NULL;
+    uz_lane_certifier *c = uz_alloc_zero(1, sizeof *c);
+    if (!c)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify");
+    c->K = K;
+    c->N = N;
+    c->rcond = rcond;
+    c->inverse_bound = inverse_bound;
+    bool ok = allocate(c);
+    uz_status status = UZ_OK;
+    if (ok) {
+        uz_certify_weights(c->weight, K);
+        status = compress(c, err);
+    }
+    if (ok && status == UZ_OK) {
+        c->c = uz_alloc_zero(c->n_b, WIDTH * sizeof(double));
+        ok = uz_feasible_init(&c->feasible, &c->Nt_b, c->weight_b) && c->c;
+    }
+    if (status == UZ_OK && !ok)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)K->cols);
+    if (status == UZ_OK)
+        *out = c;
+    else
+        uz_lane_certifier_free(c);
+    return status;
+}
+
+void uz_lane_certifier_free(uz_lane_certifier *c)
+{
+    if (!c)
+        return;
+    uz_feasible_clear(&c->feasible);
+    uz_csc_clear(&c->Nt_b);
+    uz_csc_clear(&c->K_b);
+    free(c->weight);
+    free(c->dof);
+    free(c->place);
+    free(c->weight_b);
+    free(c->u_b);
+    free(c->c);
+    free(c->Kc);
+    free(c->r);
+    free(c->hi);
+    free(c->lo);
+    free(c);
+}
+
+/* hi + lo += a x, lane by lane: twofold_add_product of twofold.h. */
+static inline __attribute__((always_inline)) void add_product(lanes *hi, lanes *lo, double a, const lanes *x, int fused)
+{
+    const lanes product = a * *x;
+    lanes error;
+    for (int l = 0; l < 4; l++)
+        error[l] = fused ? __builtin_fma(a, (*x)[l], -product[l]) : product_error_split(a, (*x)[l], product[l]);
+    const lanes sum = *hi + product;
+    const lanes back = sum - *hi;
+    const lanes kept = sum - back;
+    *lo += ((*hi - kept) + (product - back)) + error;
+    *hi = sum;
+}
+
+/* hi + lo -= x */
+static inline __attribute__((always_inline)) void subtract(lanes *hi, lanes *lo, const lanes *x)
+{
+    const lanes sum = *hi - *x;
+    const lanes back = sum - *hi;
+    const lanes kept = sum - back;
+    *lo += (*hi - kept) + (-*x - back);
+    *hi = sum;
+}
+
+/* sum += |x| */
+static inline __attribute__((always_inline)) void add_magnitude(lanes *sum, const lanes *x)
+{
+    *sum += (lanes)((lane_bits)*x & INT64_MAX);
+}
+
+/* Row j is complete: what it adds to the sums. hi + lo: (K u)_j, lost. */
+static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *c, int half, int64_t j, lanes *hi,
+                                                             lanes *lo, const lanes *u, const lanes *p, int fused)
+{
+    sums *s = &c->sum[half];
+    const uz_csc *N = c->N;
+    const int64_t b = c->place[j];
+    const double weight = c->weight[j], stiff = 1.0 / weight;
+    const lanes Ku = *hi + *lo, Kc = ((const lanes *)c->Kc)[j * HALVES + half];
+    lanes forces = {0.0};
+    add_magnitude(&forces, &Ku);
+    add_magnitude(&forces, p);
+    subtract(hi, lo, p);
+    if (b >= 0) {
+        const lanes moved = ((const lanes *)c->c)[b * HALVES + half];
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+            add_product(hi, lo, -N->val[k], (const lanes *)c->r + N->idx[k] * HALVES + half, fused);
+        s->change += moved * (Ku - *p + 0.5 * Kc);
+        s->correction_energy += moved * Kc;
+        add_magnitude(&s->sizes, &moved);
+    }
+    const lanes e_u = *hi + *lo;
+    const lanes e = e_u + Kc;
+    s->stiffness += *u * Ku;
+    s->load += *u * *p;
+    s->force += *p * *p;
+    s->e_square += e_u * e_u;
+    s->weighted += weight * e * e;
+    s->noise += stiff * *u * *u + weight * forces * forces;
+    add_magnitude(&s->sizes, u);
+    add_magnitude(&s->sizes, &e_u);
+    add_magnitude(&s->residuals, &e_u);
+}
+
+/* One pass over the lower triangle. When column j is done so is row j: the columns before it have added their part. */
+static inline __attribute__((always_inline)) void pass(uz_lane_certifier *c, const double *U, const double *P,
+                                                       int fused)
+{
+    const uz_csc *K = c->K;
+    const lanes *u = (const lanes *)U, *p = (const lanes *)P, zero = {0.0};
+    lanes *hi = (lanes *)c->hi, *lo = (lanes *)c->lo;
+    for (int64_t j = 0; j < K->cols; j++) {
+        const int64_t at = j * HALVES;
+        const lanes u0 = u[at], u1 = u[at + 1];
+        lanes hi0 = hi[at], lo0 = lo[at], hi1 = hi[at + 1], lo1 = lo[at + 1];
+        int64_t k = K->ptr[j];
+        if (k < K->ptr[j + 1] && K->idx[k] == j) {
+            add_product(&hi0, &lo0, K->val[k], &u0, fused);
+            add_product(&hi1, &lo1, K->val[k++], &u1, fused);
+        }
+        for (; k < K->ptr[j + 1]; k++) {
+            const int64_t i = K->idx[k] * HALVES;
+            const double a = K->val[k];
+            add_product(&hi0, &lo0, a, u + i, fused);
+            add_product(&hi1, &lo1, a, u + i + 1, fused);
+            add_product(hi + i, lo + i, a, &u0, fused);
+            add_product(hi + i + 1, lo + i + 1, a, &u1, fused);
+        }
+        hi[at] = hi[at + 1] = lo[at] = lo[at + 1] = zero;
+        finish_row(c, 0, j, &hi0, &lo0, &u0, p + at, fused);
+        finish_row(c, 1, j, &hi1, &lo1, &u1, p + at + 1, fused);
+    }
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2,fma"))) static void pass_fused(uz_lane_certifier *c, const double *U, const double *P)
+{
+    pass(c, U, P, 1);
+}
+#endif
+
+static void pass_split(uz_lane_certifier *c, const double *U, const double *P)
+{
+    pass(c, U, P, 0);
+}
+
+static void run_pass(uz_lane_certifier *c, const double *U, const double *P)
+{
+    memset(c->sum, 0, sizeof c->sum);
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        pass_fused(c, U, P);
+        return;
+    }
+#endif
+    pass_split(c, U, P);
+}
+
+/* Kc of a lane: zero but for the rows that contact dofs couple to. */
+static void couple(uz_lane_certifier *c, int lane)
+{
+    const uz_csc *A = &c->K_b;
+    for (int64_t k = 0; k < A->ptr[A->cols]; k++)
+        c->Kc[A->idx[k] * WIDTH + lane] = 0.0;
+    for (int64_t b = 0; b < A->cols; b++)
+        for (int64_t k = A->ptr[b]; k < A->ptr[b + 1]; k++)
+            c->Kc[A->idx[k] * WIDTH + lane] += A->val[k] * c->c[b * WIDTH + lane];
+}
+
+/* What a lane's answer has to do with the contact: gaps, correction, reactions. *complementarity: -r'g(v). */
+static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U,
+                         double *complementarity)
+{
+    uz_feasible *f = &c->feasible;
+    for (int64_t b = 0; b < c->n_b; b++)
+        c->u_b[b] = U[c->dof[b] * WIDTH + lane];
+    for (int64_t i = 0; i < f->m; i++) {
+        a->g[i] = uz_gap_of_row(&c->Nt_b, i, a->h, c->u_b, NULL);
+        c->r[i * WIDTH + lane] = a->r[i];
+    }
+    f->u = c->u_b;
+    f->h = a->h;
+    bool feasible = uz_make_feasible(f, a->r);
+    for (int64_t b = 0; b < c->n_b; b++)
+        c->c[b * WIDTH + lane] = f->correction[b];
+    couple(c, lane);
+    *complementarity = 0.0;
+    for (int64_t i = 0; i < f->m; i++)
+        *complementarity -= a->r[i] * fabs(uz_feasible_gap(f, i));
+    return feasible;
+}
+
+/* Where squares leave the range of double, uz_certify, which scales them, has the word. */
+static bool within_range(double sizes, double residuals, double force)
+{
+    bool plain = residuals == 0.0 || residuals > 1e-130;
+    return plain && sizes < 1e130 && residuals < 1e130 && (force == 0.0 || (force > 1e-260 && force < 1e260));
+}
+
+static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *a, bool feasible, uz_bound_terms *terms)
+{
+    const sums *s = &c->sum[lane / 4];
+    const int l = lane % 4;
+    const double square = c->inverse_bound * s->weighted[l];
+    bool sharp = square <= a->sharp * a->sharp * s->stiffness[l];
+    if (!feasible || !sharp || !within_range(s->sizes[l], s->residuals[l], s->force[l]))
+        return;
+    terms->stiffness = s->stiffness[l];
+    terms->load = s->load[l];
+    terms->change = s->change[l];
+    terms->correction_energy = s->correction_energy[l];
+    terms->e1 = sqrt(s->e_square[l]);
+    terms->force = sqrt(s->force[l]);
+    terms->anything = s->sizes[l] > 0.0;
+    terms->square = uz_bound_enlarge(square, uz_bound_doubt(c->inverse_bound, c->rcond, c->K->cols),
+                                     uz_bound_noise(c->inverse_bound, s->noise[l]));
+    memset(&a->certificate, 0, sizeof a->certificate);
+    uz_bound_conclude(&a->certificate, terms, feasible, a->r, a->g, a->h, c->feasible.m);
+    a->certified = true;
+}
+
+void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, const double *U, const double *P)
+{
+    uz_bound_terms terms[WIDTH] = {{0}};
+    bool feasible[WIDTH] = {false};
+    for (int l = 0; l < count; l++) {
+        terms[l].positive_part = uz_certify_cut(answers[l].r, c->feasible.m);
+        answers[l].certified = false;
+        feasible[l] = prepare_lane(c, l, &answers[l], U, &terms[l].complementarity);
+    }
+    run_pass(c, U, P);
+    for (int l = 0; l < count; l++)
+        conclude_lane(c, l, &answers[l], feasible[l], &terms[l]);
+}

@@ -1,0 +1,33 @@
+/* lanes.h: certificates of several answers on one body, with one pass over K for UZ_CERTIFY_LANES of them.
+ *
+ * What a certificate prepares from K and N alone is made once, and what touches the contact only is done on the contact
+ * only. Needs the bound on K^-1: an answer that it is too blunt for is left to uz_certify. */
+#ifndef UZ_CERTIFY_LANES_H
+#define UZ_CERTIFY_LANES_H
+
+#include "uzawa.h"
+
+enum { UZ_CERTIFY_LANES = 8 };
+
+typedef struct uz_lane_certifier uz_lane_certifier; /* one thread */
+
+/* K and N are borrowed. rcond, inverse_bound: see uz_certify_input. */
+uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double rcond,
+                                   double inverse_bound, uz_error *err);
+void uz_lane_certifier_free(uz_lane_certifier *certifier);
+
+typedef struct {
+    double *r;       /* m: cut at 0 */
+    double *g;       /* m: out */
+    const double *h; /* m */
+    double sharp;    /* see uz_certify_input */
+    uz_certificate certificate;
+    bool certified; /* false: certificate is not filled */
+} uz_lane_answer;
+
+/* U, P (d x UZ_CERTIFY_LANES): entry j of answer l at U[j * UZ_CERTIFY_LANES + l]. count <= UZ_CERTIFY_LANES answers;
+ * the other lanes hold finite numbers. A certificate does not depend on its neighbours or its lane. */
+void uz_certify_lanes(uz_lane_certifier *certifier, uz_lane_answer *answers, int count, const double *U,
+                      const double *P);
+
+#endif

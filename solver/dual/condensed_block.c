@@ -1,0 +1,116 @@
+/* condensed_block.c: several loads with one pass over the factor, and their displacements with another. */
+#include "dual/dual_private.h"
+
+#include "core/alloc.h"
+#include "core/blas.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct uz_case_block {
+    const uz_dual *dual;
+    int64_t blocks;
+    double *P, *U; /* blocks x d x UZ_LANES: loads and displacements, in the order of the dofs */
+    double *Y;     /* the same in the factor's order: L^-1 P p */
+    double *X;     /* room */
+    double *room;  /* d */
+};
+
+uz_status uz_case_block_create(uz_case_block **out, const uz_dual *dual, int64_t blocks, uz_error *err)
+{
+    *out = NULL;
+    uz_case_block *block = uz_alloc_zero(1, sizeof *block);
+    int64_t d = dual->info.d;
+    bool ok = block != NULL;
+    for (int k = 0; ok && k < 4; k++) {
+        double **room[] = {&block->P, &block->U, &block->Y, &block->X};
+        ok = (*room[k] = uz_alloc_zero(blocks * d, UZ_LANES * sizeof(double))) != NULL;
+    }
+    ok = ok && (block->room = uz_alloc(d, sizeof(double))) != NULL;
+    if (ok) {
+        block->dual = dual;
+        block->blocks = blocks;
+        *out = block;
+        return UZ_OK;
+    }
+    uz_case_block_free(block);
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld loads on %lld dofs", (long long)(blocks * UZ_LANES),
+                   (long long)d);
+}
+
+void uz_case_block_free(uz_case_block *block)
+{
+    if (!block)
+        return;
+    free(block->P);
+    free(block->U);
+    free(block->Y);
+    free(block->X);
+    free(block->room);
+    free(block);
+}
+
+double *uz_case_block_loads(uz_case_block *block)
+{
+    return block->P;
+}
+
+const double *uz_case_block_displacements(const uz_case_block *block)
+{
+    return block->U;
+}
+
+/* Where a lane's entry 0 stands. */
+static int64_t lane_start(const uz_case_block *block, int64_t lane)
+{
+    return lane / UZ_LANES * block->dual->info.d * UZ_LANES + lane % UZ_LANES;
+}
+
+uz_status uz_case_block_load(uz_case_block *block, uz_error *err)
+{
+    const uz_factor *factor = block->dual->factor;
+    const int64_t size = block->dual->info.d * UZ_LANES;
+    for (int64_t b = 0; b < block->blocks; b++)
+        uz_factor_permute_lanes(factor, block->Y + b * size, block->P + b * size);
+    return uz_factor_forward_lanes(factor, block->Y, block->blocks, err);
+}
+
+uz_status uz_case_create_in_block(uz_case **out, const uz_case_block *block, int64_t lane, const uz_csc *K,
+                                  const double *h, uz_error *err)
+{
+    const uz_dual *dual = block->dual;
+    uz_case *load = NULL;
+    *out = NULL;
+    uz_status status = uz_case_allocate(&load, dual, K, h, false, err);
+    if (status != UZ_OK)
+        return status;
+    load->lane = block->Y + lane_start(block, lane);
+    double square = 0.0;
+    for (int64_t k = 0; k < dual->info.d; k++)
+        square += load->lane[k * UZ_LANES] * load->lane[k * UZ_LANES];
+    load->psi0 = -0.5 * square;
+    status = uz_condensed_begin(load, load->lane, UZ_LANES, block->room, err);
+    if (status == UZ_OK)
+        *out = load;
+    else
+        uz_case_free(load);
+    return status;
+}
+
+uz_status uz_case_block_recover(uz_case_block *block, uz_case *const *loads, const double *const *r,
+                                const bool *with_push, int64_t count, uz_error *err)
+{
+    const uz_dual *dual = block->dual;
+    const int64_t size = dual->info.d * UZ_LANES;
+    uz_status status = UZ_OK;
+    memcpy(block->X, block->Y, (size_t)(block->blocks * size) * sizeof *block->X);
+    for (int64_t lane = 0; status == UZ_OK && lane < count; lane++)
+        status = uz_condensed_add_reactions(block->X + lane_start(block, lane), UZ_LANES, block->room, loads[lane],
+                                            r[lane], with_push[lane] && loads[lane]->has_kept, err);
+    if (status == UZ_OK)
+        status = uz_factor_backward_lanes(dual->factor, block->X, block->blocks, err);
+    for (int64_t b = 0; status == UZ_OK && b < block->blocks; b++)
+        uz_factor_unpermute_lanes(dual->factor, block->U + b * size, block->X + b * size);
+    return status;
+}
