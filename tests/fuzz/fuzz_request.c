@@ -34,15 +34,39 @@ static void check_problem(const problem_details *problem)
     free(text);
 }
 
+/* A request made of a valid one is valid, has the same problem and tags, and goes on where the other stopped. */
+static void check_refined(const char *body, size_t size, const codec_request *old)
+{
+    static const char ID[] = "0123456789abcdef0123456789abcdef", CHANGE[] = "{\"accuracy\": \"quick\"}";
+    codec_request request;
+    problem_details problem = {0};
+    size_t len;
+    char *made = codec_refine(body, size, ID, CHANGE, sizeof CHANGE - 1, &len, &problem);
+    if (!made || !codec_same_problem(body, size, made, len) ||
+        !codec_decode(&request, CODEC_SOLVE, made, len, &problem))
+        abort();
+    if (!request.start.continued || strcmp(request.start.job, ID) != 0 || strcmp(request.tags, old->tags) != 0 ||
+        request.settings.relative_error != 1e-2 || request.settings.method != old->settings.method ||
+        request.problem.n_cases != old->problem.n_cases)
+        abort();
+    codec_request_clear(&request);
+    free(made);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
+    const char *body = (const char *)data;
     codec_request request;
     problem_details problem;
-    if (!codec_decode_request(&request, (const char *)data, size, &problem))
+    if (!codec_decode(&request, CODEC_STORED, body, size, &problem)) {
         check_problem(&problem);
-    else if (!request.tags || (request.problem.kind == UZ_PROBLEM_MATRICES && !request.problem.qp.p))
+        return 0;
+    }
+    if (!request.tags || (request.problem.kind == UZ_PROBLEM_MATRICES && !request.problem.qp.p) ||
+        codec_is_verify(body, size) != (request.answer.u != NULL))
         abort();
-    else
-        codec_request_clear(&request);
+    if (!request.answer.u)
+        check_refined(body, size, &request);
+    codec_request_clear(&request);
     return 0;
 }
