@@ -418,19 +418,27 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
 /* The same for every load case of the problem (its own load where it has none), on one factor, with the right-hand
  * sides in blocks: *out is n = max(1, n_cases) results, in order; the caller frees each and the array, or all with
  * uz_results_free. settings->time_limit_s is of all cases together. When time is up or the solve is cancelled, cases
- * that had no turn are answered with what r = 0 gives, certified as any other.
- * starts: n, or NULL; starts[i] NULL: from r = 0. A start with rho continues the run it was taken from, bit for bit
- * where method, operator and problem are the same ones; one without is checked before the first iteration, so that the
- * solution itself takes none. A start of another m is UZ_ERR_SIZE.
- * An error is that of the first case that fails as a call (its pointer in err->where: "/cases/3/loads/0/on"). */
+ * that had no turn are answered with what r = 0 gives, certified as any other. settings->memory_limit counts the
+ * results too. The first case's timings have those of the body; for the others it is cached. Of several cases none
+ * depends on its neighbours or its place, bit for bit; one alone differs from one of several by rounding. starts: n, or
+ * NULL; starts[i] NULL: from r = 0. A start with rho continues the run it was taken from, bit for bit where method,
+ * operator and problem are the same ones (and the number of cases is 1 for both or for neither): its history begins
+ * with the row after that run's last, and may have no rows; alpha is the state's. Where D r or the bound in it are not
+ * those of this problem it counts as one without rho. A start without rho is checked before the first iteration, so
+ * that the solution itself takes none. A start of another m is UZ_ERR_SIZE, one that is not finite UZ_ERR_NOT_FINITE,
+ * one that no run can have left UZ_ERR_ARGUMENT. An error is that of the first case that fails as a call (its pointer
+ * in err->where: "/cases/3/loads/0/on",
+ * "/cases/3/p", "/cases/3/start"). The hook `begins` is called again for a case that goes on after others began. */
 uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 void uz_results_free(uz_result **results, int64_t n);
 
-/* Certifies somebody's answer: u as a uz_result has it (d, or n_nodes x dim with the supported dofs at their values)
- * and r (m, caller's rows; positive parts are counted as residual e3 and cut for the bound), with residuals, gaps and
- * energies in twice the working precision. The outcome is UZ_VERIFIED or UZ_NOT_VERIFIED by settings->relative_error;
- * the result has the given u and r, g(u), no history. A problem with load cases is UZ_ERR_ARGUMENT. */
+/* Certifies somebody's answer: u as a uz_result has it (d, or n_nodes x dim) and r (m, caller's rows; positive parts
+ * are counted as residual e3 and cut for the bound), with residuals, gaps and energies in twice the working precision.
+ * The outcome is UZ_VERIFIED or UZ_NOT_VERIFIED by settings->relative_error, or by `balanced`; the result has the given
+ * u and r, g(u), no history and no state. Supported dofs of a nodal u must have exactly the values that the scene gives
+ * them: UZ_ERR_SCENE names the first node that has not, `where` is "u". UZ_ERR_NOT_FINITE: where "u" or "r". A problem
+ * with load cases is UZ_ERR_ARGUMENT. */
 uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
                     const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 

@@ -3,6 +3,7 @@
 #include "certificate/bound.h"
 #include "certificate/feasible.h"
 #include "certificate/residual.h"
+#include "certificate/twofold.h"
 #include "core/alloc.h"
 #include "core/error.h"
 
@@ -139,6 +140,25 @@ static void add_up(const certifier *c, uz_bound_terms *t, const double *u)
     t->force = uz_bound_norm(p, c->d);
 }
 
+static void add_dot(twofold *sum, double factor, const double *x, const double *y, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++)
+        twofold_add_product(&sum->hi, &sum->lo, factor * x[i], y[i], 0);
+}
+
+/* u'Ku = u'e_u + u'p + r'N u with e_u = K u - p - N'r, which is known in twofold precision, and N u = h - g. */
+static void sharpen_energies(const certifier *c, uz_bound_terms *t, const double *u, const double *r, const double *g)
+{
+    twofold load = {0.0, 0.0};
+    add_dot(&load, 1.0, u, c->in->p, c->d);
+    twofold stiffness = load;
+    add_dot(&stiffness, 1.0, u, c->res.e_u, c->d);
+    add_dot(&stiffness, 1.0, r, c->in->h, c->m);
+    add_dot(&stiffness, -1.0, r, g, c->m);
+    t->load = load.hi + load.lo;
+    t->stiffness = stiffness.hi + stiffness.lo;
+}
+
 static uz_status measure(certifier *c, uz_certificate *out, const double *u, const double *r, double *g,
                          double positive_part, uz_error *err)
 {
@@ -153,6 +173,8 @@ static uz_status measure(certifier *c, uz_certificate *out, const double *u, con
     if (status != UZ_OK)
         return status;
     add_up(c, &terms, u);
+    if (c->in->twofold_energies && isfinite(terms.stiffness) && isfinite(terms.load))
+        sharpen_energies(c, &terms, u, r, g);
     if (feasible)
         status = distance(c, &terms.square, u, err);
     for (int64_t i = 0; i < c->m; i++)

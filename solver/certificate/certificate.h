@@ -30,7 +30,8 @@ typedef struct {
     double rcond;         /* of K: how far inverse_norm may be trusted */
     double inverse_bound; /* e'K^-1 e <= inverse_bound sum e_j^2 / K_jj; INFINITY: unknown. Spares inverse_norm where it
                              is sharp enough: */
-    double sharp;         /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
+    bool twofold_energies; /* u'Ku and u'p in twofold precision too: what is shown, not what is bounded, needs it */
+    double sharp;          /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
 } uz_certify_input;
 
 /* u (d): the answer to certify. r (m): <= 0, else its positive part counts as e3 and r is cut at 0. g (m): out, the
