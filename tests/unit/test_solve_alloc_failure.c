@@ -137,3 +137,100 @@ TEST(leaning_rows)
     check_scenario("iterated leaning rows", leaning_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_CONDENSED,
                    UZ_ORDERING_METIS, true);
 }
+
+/* Several loads; every second one goes on from an earlier run. */
+static void attempt_cases(const uz_problem *problem, const uz_settings *settings, const uz_state *const *starts, long n)
+{
+    uz_result **results = (uz_result **)&heap;
+    uz_error err = {0};
+    uz_status status = uz_solve_cases(&results, problem, settings, starts, NULL, NULL, &err);
+    bool fair = status == UZ_OK || (status == UZ_ERR_MEMORY && heap.failed);
+    CHECK_MSG(fair, "cases: allocation %ld ends in %s: %s", n, uz_status_name(status), err.message);
+    CHECK((status == UZ_OK) == (results != NULL));
+    for (int64_t i = 0; results && i < problem->n_cases; i++)
+        CHECK_INT(results[i]->summary.outcome, UZ_CONVERGED);
+    uz_results_free(results, problem->n_cases);
+}
+
+static void attempt_verification(const uz_problem *problem, const uz_settings *settings, const uz_result *answer,
+                                 long n)
+{
+    uz_result *result = (uz_result *)&heap;
+    uz_error err = {0};
+    uz_status status = uz_verify(&result, problem, answer->u, answer->r, settings, NULL, NULL, &err);
+    bool fair = status == UZ_OK || (status == UZ_ERR_MEMORY && heap.failed);
+    CHECK_MSG(fair, "verification: allocation %ld ends in %s: %s", n, uz_status_name(status), err.message);
+    CHECK((status == UZ_OK) == (result != NULL));
+    if (result)
+        CHECK_INT(result->summary.outcome, UZ_VERIFIED);
+    uz_result_free(result);
+}
+
+static void begin_watching(long n)
+{
+    heap.live = 0;
+    heap.until_failure = n;
+    heap.failed = false;
+    heap.watching = true;
+}
+
+/* True when an allocation failed, so that there may be more. */
+static bool end_watching(const char *name, long n)
+{
+    heap.watching = false;
+    CHECK_MSG(heap.live == 0, "%s: allocation %ld fails and %d blocks leak", name, n, heap.live);
+    return heap.failed;
+}
+
+static void check_cases(uz_operator op, uz_method method, int64_t count)
+{
+    uz_problem problem = scene_problem();
+    uz_settings settings = uz_settings_default();
+    const uz_state *starts[16] = {NULL};
+    uz_result *earlier = NULL;
+    long n = 0;
+    settings.op = op;
+    settings.method = method;
+    settings.max_iterations = 3;
+    CHECK_INT(uz_solve(&earlier, &problem, &settings, NULL, NULL, NULL), UZ_OK);
+    settings.max_iterations = 100000;
+    settings.relative_error = 1e-6;
+    problem.cases = calloc((size_t)count, sizeof *problem.cases);
+    problem.n_cases = count;
+    for (int64_t i = 1; i < count; i += 2)
+        starts[i] = earlier->state;
+    for (bool more = true; more && n < MOST_ALLOCATIONS; n++) {
+        begin_watching(n);
+        attempt_cases(&problem, &settings, starts, n);
+        more = end_watching("cases", n);
+    }
+    printf("# %lld cases, %s: %ld allocations\n", (long long)count, uz_operator_name(op), n);
+    CHECK(n > 100 && n < MOST_ALLOCATIONS);
+    uz_result_free(earlier);
+    uz_problem_clear(&problem);
+}
+
+TEST(load_cases)
+{
+    check_cases(UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 10);
+    check_cases(UZ_OPERATOR_FACTORED, UZ_METHOD_ACCELERATED_RESTART, 2);
+}
+
+TEST(verification)
+{
+    uz_problem problem = scene_problem();
+    uz_settings settings = uz_settings_default();
+    uz_result *answer = NULL;
+    long n = 0;
+    CHECK_INT(uz_solve(&answer, &problem, &settings, NULL, NULL, NULL), UZ_OK);
+    settings.relative_error = 1e-6;
+    for (bool more = true; more && n < MOST_ALLOCATIONS; n++) {
+        begin_watching(n);
+        attempt_verification(&problem, &settings, answer, n);
+        more = end_watching("verification", n);
+    }
+    printf("# verification: %ld allocations\n", n);
+    CHECK(n > 50 && n < MOST_ALLOCATIONS);
+    uz_result_free(answer);
+    uz_problem_clear(&problem);
+}
