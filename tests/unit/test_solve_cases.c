@@ -1,8 +1,5 @@
 /* Several loads on one body: the answers are those of the loads one by one, certified one by one, and none depends on
  * its neighbours. */
-#include "certificate/certificate.h"
-#include "certificate/lanes.h"
-#include "factor/factor.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "quad_exact.h"
@@ -222,97 +219,6 @@ TEST(bounds_hold_for_every_case)
         check_bounds(&problem, (int64_t)(seed % 4) * 7);
         check_bounds(&problem, 20000);
         uz_problem_clear(&problem);
-    }
-}
-
-typedef struct {
-    uz_factor *factor;
-    uz_factor_workspace *ws;
-    double bound, rcond;
-} linear;
-
-static linear factor_of(const uz_csc *K)
-{
-    linear x = {.ws = uz_factor_workspace_new()};
-    uz_error err = {0};
-    CHECK_INT(uz_factor_create(&x.factor, K, NULL, 0, UZ_ORDERING_AMD, 0, NULL, &err), UZ_OK);
-    CHECK_INT(uz_factor_inverse_norm(&x.bound, x.factor, x.ws, K, &err), UZ_OK);
-    x.rcond = uz_factor_describe(x.factor).rcond;
-    return x;
-}
-
-static uz_status no_solve(void *ctx, double *value, double *e, bool solve, uz_error *err)
-{
-    (void)ctx, (void)value, (void)e, (void)solve, (void)err;
-    return UZ_ERR_INTERNAL;
-}
-
-/* Certificates in lanes of answers that are off by anything: the bounds hold, and are those of uz_certify. */
-static void check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng)
-{
-    int64_t d = qp->K.cols, m = qp->N.rows;
-    linear f = factor_of(&qp->K);
-    uz_lane_certifier *certifier = NULL;
-    uz_lane_answer answers[UZ_CERTIFY_LANES];
-    double *U = vector(d * UZ_CERTIFY_LANES), *P = vector(d * UZ_CERTIFY_LANES), *u = vector(d);
-    CHECK_INT(uz_lane_certifier_create(&certifier, &qp->K, &qp->N, f.rcond, f.bound, NULL), UZ_OK);
-    for (int l = 0; l < UZ_CERTIFY_LANES; l++) {
-        double size = pow(10, -2.0 * l);
-        answers[l] = (uz_lane_answer){.r = vector(m), .g = vector(m), .h = qp->h, .sharp = INFINITY};
-        for (int64_t i = 0; i < m; i++)
-            answers[l].r[i] = (double)exact->r[i] * (1 + size * random_signed(rng)) + 1e-3 * size * random_signed(rng);
-        for (int64_t j = 0; j < d; j++) {
-            U[j * UZ_CERTIFY_LANES + l] = (double)exact->u[j] + size * random_signed(rng);
-            P[j * UZ_CERTIFY_LANES + l] = qp->p[j];
-        }
-    }
-    double *r = vector(m), *g = vector(m);
-    for (int l = 0; l < UZ_CERTIFY_LANES; l++) {
-        uz_certify_input in = {&qp->K, &qp->N, qp->p, qp->h, no_solve, NULL, f.rcond, f.bound, INFINITY};
-        uz_certificate one;
-        memcpy(r, answers[l].r, (size_t)m * sizeof *r);
-        uz_certify_lanes(certifier, answers, UZ_CERTIFY_LANES, U, P);
-        for (int64_t j = 0; j < d; j++)
-            u[j] = U[j * UZ_CERTIFY_LANES + l];
-        CHECK_INT(uz_certify(&one, r, g, u, &in, NULL), UZ_OK);
-        const uz_certificate *c = &answers[l].certificate;
-        CHECK(answers[l].certified == isfinite(one.absolute_error));
-        if (!answers[l].certified)
-            continue;
-        CHECK_MSG(c->absolute_error >= quad_error(exact, u), "lane %d: off by %.17g, bound %.17g", l,
-                  quad_error(exact, u), c->absolute_error);
-        CHECK(c->absolute_error >= quad_error_of_reactions(exact, r));
-        CHECK_REL(c->absolute_error, one.absolute_error, 1e-9);
-        CHECK_REL(c->energy_primal, one.energy_primal, 1e-12);
-        CHECK_REL(c->residual.e1, one.residual.e1, 1e-9);
-        CHECK_REL(c->residual.total, one.residual.total, 1e-9);
-        CHECK_REL(c->relative_residual.total, one.relative_residual.total, 1e-9);
-        CHECK(memcmp(g, answers[l].g, (size_t)m * sizeof *g) == 0);
-    }
-    for (int l = 0; l < UZ_CERTIFY_LANES; l++) {
-        free(answers[l].r);
-        free(answers[l].g);
-    }
-    double *mine[] = {U, P, u, r, g};
-    for (int k = 0; k < 5; k++)
-        free(mine[k]);
-    uz_lane_certifier_free(certifier);
-    uz_factor_workspace_free(f.ws);
-    uz_factor_free(f.factor);
-}
-
-TEST(certificates_in_lanes_are_those_of_single_answers)
-{
-    for (uint64_t seed = 0; seed < 40; seed++) {
-        qp_random rng = {seed + 300};
-        qp_kind kind = {
-            .d = random_int(&rng, 1, 30), .m = random_int(&rng, 1, 10), .condition = pow(10, (double)(seed % 6))};
-        uz_qp qp = random_qp(&rng, &kind);
-        quad_exact exact;
-        if (quad_exact_solve(&exact, &qp, NULL))
-            check_lanes(&qp, &exact, &rng);
-        quad_exact_free(&exact);
-        uz_qp_clear(&qp);
     }
 }
 
