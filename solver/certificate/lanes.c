@@ -172,7 +172,7 @@ void uz_lane_certifier_free(uz_lane_certifier *c)
 static inline __attribute__((always_inline)) void add_product(lanes *hi, lanes *lo, double a, const lanes *x, int fused)
 {
     const lanes product = a * *x;
-    lanes error;
+    lanes error = {0.0};
     for (int l = 0; l < 4; l++)
         error[l] = fused ? __builtin_fma(a, (*x)[l], -product[l]) : product_error_split(a, (*x)[l], product[l]);
     const lanes sum = *hi + product;
