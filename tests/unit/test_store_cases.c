@@ -8,7 +8,7 @@
 /* Finishes a new job with n cases named "c0", "c1", ...: reactions {i, i + 1}, a history of one row. */
 static void finish_cases(place *p, char id[33], size_t n)
 {
-    char other[33], names[4][8];
+    char other[33], names[4][24];
     double r[4][2], rows[4][12], nodes[3] = {7, 8, 9};
     store_vector reactions[4], shared = {"nodes", 3, nodes};
     store_answer cases[4];
@@ -130,8 +130,8 @@ TEST(a_refining_job_outlives_the_one_it_refines)
     place p;
     char old[33], id[33], *body = NULL;
     size_t len = 0;
-    job j;
-    bool repeated;
+    job j = {0};
+    bool repeated = false;
     job_status was;
     if (!place_begin(&p))
         return;
@@ -211,7 +211,7 @@ static bool begin_old(place *p, const char *rows)
 static void check_old_job(place *p)
 {
     static const char ID[] = "00000000000000000000000000000001";
-    job j;
+    job j = {0};
     double *x = NULL;
     int64_t n = 0, columns = 0;
     CHECK_INT(store_get(p->s, ID, &j), STORE_OK);
@@ -231,7 +231,7 @@ TEST(a_file_of_format_1_is_taken_over)
 {
     place p;
     char id[33];
-    job j;
+    job j = {0};
     bool repeated = false;
     if (!begin_old(&p, FORMAT_1_ROWS) || !place_open(&p))
         return;

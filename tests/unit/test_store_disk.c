@@ -14,8 +14,8 @@ TEST(large_bodies)
     place p;
     size_t size = 64u << 20, len;
     char *body = malloc(size), *back = NULL;
-    job j;
-    bool repeated;
+    job j = {0};
+    bool repeated = false;
     if (place_begin(&p)) {
         memset(body, 'x', size);
         body[size / 2] = '\0'; /* a body is bytes, not a text */
@@ -88,7 +88,7 @@ TEST(recover_fails_a_job_that_used_up_its_attempts)
     place p;
     char id[33], again[33];
     int64_t requeued, failed;
-    job j;
+    job j = {0};
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
@@ -190,8 +190,8 @@ TEST(a_full_database_is_reported_and_changes_nothing)
     static const char body[1u << 20];
     static const double x[131072];
     int64_t counts[5];
-    job j;
-    bool repeated;
+    job j = {0};
+    bool repeated = false;
     int accepted = 0;
     if (!place_begin(&p))
         return;
@@ -242,8 +242,8 @@ TEST(a_failing_write_is_reported_as_full)
         struct rlimit limit = {1u << 20, 1u << 20};
         char message[300], id[33];
         char *body = calloc(1, 4u << 20);
-        job j;
-        bool repeated;
+        job j = {0};
+        bool repeated = false;
         signal(SIGXFSZ, SIG_IGN);
         setrlimit(RLIMIT_FSIZE, &limit);
         store *s = store_open(p.path, message, sizeof message);
@@ -279,8 +279,8 @@ TEST(journal_is_wal_and_is_cut)
     struct stat st;
     size_t size = 40u << 20;
     char *body = calloc(1, size);
-    job j;
-    bool repeated;
+    job j = {0};
+    bool repeated = false;
     if (place_begin(&p)) {
         snprintf(wal, sizeof wal, "%s-wal", p.path);
         CHECK_INT(store_submit(p.s, &(store_request){.body = body, .body_len = size, .tags = "[]"}, &j, &repeated),
@@ -318,7 +318,7 @@ static void *race(void *arg)
             r->problems += status != STORE_NOT_FOUND;
             return NULL;
         }
-        job j;
+        job j = {0};
         r->problems += store_get(r->s, r->ids[r->count], &j) != STORE_OK || j.status != JOB_RUNNING;
         job_clear(&j);
         r->problems += store_renew(r->s, r->ids[r->count], r->owner, 30, 50) != STORE_OK;
