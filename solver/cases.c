@@ -5,6 +5,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "semicoercive/semicoercive.h"
 #include "solve.h"
 
 #include <math.h>
@@ -195,8 +196,8 @@ static uz_status solve_all(batch *b, uz_cache *cache, uz_error *err)
     return status;
 }
 
-uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
-                   const uz_hooks *hooks, uz_error *err)
+uz_status uz_solve_regular(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                           const uz_hooks *hooks, uz_error *err)
 {
     uz_result *result = NULL;
     batch b = {.problem = problem, .settings = settings, .hooks = hooks, .n = 1, .results = &result};
@@ -206,6 +207,47 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "a problem with load cases is for uz_solve_cases");
     uz_status status = solve_all(&b, cache, err);
     *out = result;
+    return status;
+}
+
+/* One case as a problem of its own, which borrows all it has. */
+static uz_problem problem_of_case(const uz_problem *problem, int64_t i)
+{
+    uz_problem one = *problem;
+    one.cases = NULL;
+    one.n_cases = 0;
+    if (problem->n_cases == 0)
+        return one;
+    const uz_load_case *load_case = &problem->cases[i];
+    if (load_case->p)
+        one.qp.p = load_case->p;
+    if (load_case->h)
+        one.qp.h = load_case->h;
+    if (load_case->loads) {
+        one.scene.loads = load_case->loads;
+        one.scene.n_loads = load_case->n_loads;
+    }
+    return one;
+}
+
+/* Cases that the ordinary way refused or could not certify, because only the obstacle holds the body: each by itself.
+ */
+static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status refused, uz_error *err)
+{
+    uz_status status = refused;
+    for (int64_t i = 0; i < b->n; i++) {
+        uz_problem one = problem_of_case(b->problem, i);
+        if (!uz_may_be_semicoercive(refused, b->results[i], &one))
+            continue;
+        if (b->hooks && b->hooks->begins)
+            b->hooks->begins(b->hooks->ctx, i);
+        status = uz_solve_semicoercive(&b->results[i], &one, b->settings, cache, b->hooks, refused, b->started, err);
+        if (status == UZ_OK)
+            continue;
+        if (b->problem->n_cases > 0 && status != refused)
+            name_case(err, i);
+        return status;
+    }
     return status;
 }
 
@@ -220,10 +262,26 @@ uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_s
     if (!b.results)
         return uz_fail(err, UZ_ERR_MEMORY, "/cases", "no memory for the results of %lld cases", (long long)n);
     uz_status status = solve_all(&b, cache, err);
+    status = solve_held_by_obstacle(&b, cache, status, err);
     if (status == UZ_OK)
         *out = b.results;
     else
         uz_results_free(b.results, n);
+    return status;
+}
+
+uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                   const uz_hooks *hooks, uz_error *err)
+{
+    uz_result **results = NULL;
+    *out = NULL;
+    uz_error_reset(err);
+    if (problem->n_cases > 0)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "a problem with load cases is for uz_solve_cases");
+    uz_status status = uz_solve_cases(&results, problem, settings, NULL, cache, hooks, err);
+    if (status == UZ_OK)
+        *out = results[0];
+    free(results);
     return status;
 }
 

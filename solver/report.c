@@ -35,6 +35,11 @@ uz_status uz_check_settings(const uz_settings *s, uz_error *err)
     return UZ_OK;
 }
 
+double uz_requested_error(const uz_settings *settings)
+{
+    return settings->relative_error > 0.0 ? settings->relative_error : EXACT_RELATIVE_ERROR;
+}
+
 uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                        uz_error *err)
 {
@@ -44,7 +49,7 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
     run->hooks = hooks;
     run->started = uz_seconds();
     run->deadline = run->started + settings->time_limit_s;
-    run->requested = settings->relative_error > 0.0 ? settings->relative_error : EXACT_RELATIVE_ERROR;
+    run->requested = uz_requested_error(settings);
     run->target = settings->balanced ? 1e-2 : run->requested;
     run->result = uz_alloc_zero(1, sizeof *run->result);
     if (!run->result)
@@ -108,14 +113,13 @@ static void report_contact(uz_run *run)
 }
 
 /* Force and pressure on the body: the obstacle pushes along its normal by -r. */
-static void report_pressure(uz_run *run)
+void uz_report_pressure(uz_result *result)
 {
-    uz_result *result = run->result;
     uz_summary *summary = &result->summary;
     const uz_mesh_info *mesh = &result->mesh;
     summary->dim = mesh->dim;
     summary->max_pressure = 0.0;
-    for (int64_t i = 0; i < run->m; i++) {
+    for (int64_t i = 0; i < result->m; i++) {
         for (int axis = 0; axis < mesh->dim; axis++)
             summary->force[axis] -= result->r[i] * mesh->contact_normal[i * mesh->dim + axis];
         if (mesh->contact_area[i] > 0.0)
@@ -140,7 +144,7 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
                        (long long)result->n_nodes);
     uz_recover_nodal(result->u, model, run->answer.u, run->prescribed);
     if (status == UZ_OK)
-        report_pressure(run);
+        uz_report_pressure(result);
     return status;
 }
 
@@ -150,8 +154,7 @@ static void blank(double *x, int64_t n)
         x[i] = NAN;
 }
 
-/* There is no answer: nothing that looks like one may be left. */
-static void blank_answer(uz_result *result)
+void uz_blank_answer(uz_result *result)
 {
     uz_summary *s = &result->summary;
     int64_t n_u = result->mesh.dim > 0 ? result->n_nodes * result->mesh.dim : result->d;
@@ -182,14 +185,13 @@ static void explain_infeasible(const uz_result *result, char *text, size_t size)
         snprintf(text + at, size - at, " and %lld more", (long long)(count - named));
 }
 
-/* One sentence on an outcome that is not `converged`. */
-static void explain(uz_run *run)
+void uz_explain_outcome(uz_result *result, bool unsolved)
 {
-    uz_summary *s = &run->result->summary;
+    uz_summary *s = &result->summary;
     const char *why = "";
     switch (s->outcome) {
     case UZ_INFEASIBLE:
-        explain_infeasible(run->result, s->message, sizeof s->message);
+        explain_infeasible(result, s->message, sizeof s->message);
         return;
     case UZ_ITERATION_LIMIT:
         why = "the iterations allowed were used up: raise max_iterations";
@@ -198,10 +200,9 @@ static void explain(uz_run *run)
         why = "the time allowed was used up: raise time_limit_s";
         break;
     case UZ_PRECISION_LIMIT:
-        why = run->end == UZ_END_UNSOLVED
-                  ? "active_set solves with independent rows only, on the condensed operator or "
-                    "with one entry in each row"
-                  : "double precision holds no more digits for this method and problem";
+        why = unsolved ? "active_set solves with independent rows only, on the condensed operator or "
+                         "with one entry in each row"
+                       : "double precision holds no more digits for this method and problem";
         break;
     case UZ_PAPER_RULE:
         why = "the paper's stopping rule was met; it bounds a force, not an error";
@@ -238,8 +239,8 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
     report_contact(run);
     uz_status status = report_displacements(run, err);
     if (run->result->ray)
-        blank_answer(run->result);
-    explain(run);
+        uz_blank_answer(run->result);
+    uz_explain_outcome(run->result, run->end == UZ_END_UNSOLVED);
     summary->timings.total = total_time(run);
     return status;
 }

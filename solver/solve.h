@@ -71,4 +71,20 @@ void uz_run_end(uz_run *run);
 /* The problem's matrices and load cases, as far as they can be checked before anything is computed. */
 uz_status uz_check_problem(const uz_problem *problem, uz_error *err);
 
+/* The relative error that a certificate has to meet, before `balanced` knows better. */
+double uz_requested_error(const uz_settings *settings);
+/* Scenes: the summary's force and pressure on the body, from r and the mesh: the obstacle pushes along its normal by
+ * -r.
+ */
+void uz_report_pressure(uz_result *result);
+/* There is no answer: nothing that looks like one may be left. */
+void uz_blank_answer(uz_result *result);
+/* The summary's message: one sentence on an outcome that is not `converged`. unsolved: the active set could not solve
+ * for its guess. */
+void uz_explain_outcome(uz_result *result, bool unsolved);
+
+/* uz_solve for a K that is positive definite; others are refused. */
+uz_status uz_solve_regular(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
+                           const uz_hooks *hooks, uz_error *err);
+
 #endif

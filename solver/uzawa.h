@@ -326,6 +326,14 @@ typedef struct {
     bool assembly, ordering, factor, op;
 } uz_reuse;
 
+/* A body that only the obstacle holds: K is singular, and the load presses the body on. */
+typedef struct {
+    int64_t free_modes; /* motions without stiffness, the null space of K; 0: the body is held by its supports */
+    int64_t held;       /* rows proved to be in contact, on which the answer's uniqueness and its bound rest */
+    int64_t held_by[8]; /* the first of them */
+    int64_t rounds;     /* regularized problems solved to find them */
+} uz_semicoercive;
+
 typedef struct {
     uz_outcome outcome;
     uz_method method;
@@ -342,6 +350,7 @@ typedef struct {
     double infeasible_radius;    /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
     double requested_error;      /* the relative error that `converged` had to meet */
     uz_certificate certificate;
+    uz_semicoercive semicoercive;
     bool factor_cached; /* everything about the body was */
     uz_reuse reused;
     bool contact_last; /* the dofs that N touches are eliminated after all others */

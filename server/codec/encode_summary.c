@@ -107,6 +107,23 @@ static void put_factor(text *t, const uz_summary *s)
     text_close(t, '}');
 }
 
+/* Of a body that only the obstacle holds. */
+static void put_semicoercive(text *t, const uz_semicoercive *s)
+{
+    const int64_t most = (int64_t)(sizeof s->held_by / sizeof s->held_by[0]);
+    text_key(t, "semicoercive");
+    text_open(t, '{');
+    put_count(t, "free_modes", s->free_modes);
+    put_count(t, "rounds", s->rounds);
+    put_count(t, "held", s->held);
+    text_key(t, "held_by_rows");
+    text_open(t, '[');
+    for (int64_t i = 0; i < s->held && i < most; i++)
+        text_integer(t, s->held_by[i]);
+    text_close(t, ']');
+    text_close(t, '}');
+}
+
 static void put_timings(text *t, const uz_timings *s)
 {
     const named list[] = {{"queue", s->queue},     {"parse", s->parse},     {"assemble", s->assemble},
@@ -169,6 +186,8 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
               4);
     if (summary->outcome == UZ_INFEASIBLE)
         put_named(&t, (named[]){{"infeasible_radius", summary->infeasible_radius}}, 1);
+    if (summary->semicoercive.free_modes > 0)
+        put_semicoercive(&t, &summary->semicoercive);
     put_factor(&t, summary);
     put_timings(&t, &summary->timings);
     text_close(&t, '}');

@@ -26,18 +26,31 @@ typedef struct {
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
     double thickness;
+    int64_t n_modes;      /* motions that only obstacles hold; 0: the supports hold the body */
+    double *modes;        /* d x n_modes: displacements of the free dofs, one motion after the other */
     double elasticity[9]; /* 3 x 3, row by row: stress (xx, yy, xy) from strain (xx, yy, 2 xy) */
 } uz_body_model;
 
 /* Mesh, supports, stiffness, contact normals. Checks what it reads; loads and values are checked by _load.
  * Errors: UZ_ERR_SCENE, _FREE_BODY, _NOT_FINITE, _MEMORY. */
 uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_error *err);
+/* The same for a body that obstacles may hold: K is then singular and has `modes` for null space. Refuses with
+ * UZ_ERR_FREE_BODY only what no obstacle stands in the way of; whether the load presses the body on is the load's
+ * matter. */
+uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz_error *err);
 void uz_body_model_clear(uz_body_model *model);
 
 /* p (d), h (m) and the prescribed values of the supported dofs (n_fixed; NULL: not wanted) of a scene whose body is
  * `model` (same uz_scene_body_key). On failure the outputs are undefined. */
 uz_status uz_body_model_load(double *p, double *h, double *prescribed, const uz_body_model *model,
                              const uz_scene *scene, uz_error *err);
+
+/* The motion with these coefficients (n_modes) in words: "translation along +y". */
+void uz_name_motion(char *text, size_t size, const uz_body_model *model, const double *y);
+
+/* Does the load p (d) press a body of _build_held on its obstacles, in every mode that nothing else holds?
+ * UZ_ERR_FREE_BODY at "/loads" names the motion by which the body leaves them, or could at no cost. */
+uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error *err);
 
 /* Bytes that determine the body and nothing else: scenes with equal keys have the same model. Freed by the caller. */
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err);

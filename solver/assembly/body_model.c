@@ -35,6 +35,7 @@ void uz_body_model_clear(uz_body_model *model)
     uz_csc_clear(&model->K_fixed);
     free(model->dof);
     free(model->frame_of);
+    free(model->modes);
     memset(model, 0, sizeof *model);
 }
 
@@ -48,8 +49,8 @@ static void describe_mesh(uz_body_model *model, const uz_scene *scene)
     uz_elasticity(model->elasticity, scene->model, scene->materials[0].young, scene->materials[0].poisson);
 }
 
-/* Everything but the stiffness. */
-static uz_status prepare(uz_body_model *model, const uz_scene *scene, uz_error *err)
+/* Everything but the stiffness. held: obstacles may hold the body where supports don't. */
+static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held, uz_error *err)
 {
     uz_status status = uz_mesh_from_box(&model->mesh, &scene->box, err);
     if (status == UZ_OK)
@@ -58,24 +59,36 @@ static uz_status prepare(uz_body_model *model, const uz_scene *scene, uz_error *
         return status;
     describe_mesh(model, scene);
     status = uz_number_dofs(model, scene, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK && !held)
         status = uz_check_rigid_modes(model, err);
     if (status == UZ_OK)
         status = uz_choose_frames(model, scene, err);
     if (status == UZ_OK)
         status = uz_build_contact_rows(model, scene, err);
+    if (status == UZ_OK && held)
+        status = uz_rigid_modes(&model->modes, &model->n_modes, model, err);
     return status;
 }
 
-uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_error *err)
+static uz_status build(uz_body_model *out, const uz_scene *scene, bool held, uz_error *err)
 {
     memset(out, 0, sizeof *out);
-    uz_status status = prepare(out, scene, err);
+    uz_status status = prepare(out, scene, held, err);
     if (status == UZ_OK)
         status = uz_build_stiffness(out, err);
     if (status != UZ_OK)
         uz_body_model_clear(out);
     return status;
+}
+
+uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_error *err)
+{
+    return build(out, scene, false, err);
+}
+
+uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz_error *err)
+{
+    return build(out, scene, true, err);
 }
 
 static uz_status check_finite(const double *x, int64_t n, const char *where, uz_error *err)
@@ -166,11 +179,13 @@ uz_status uz_scene_check(const uz_scene *scene, uz_error *err)
     double *p = NULL, *h = NULL;
     uz_error_reset(err);
     memset(&model, 0, sizeof model);
-    uz_status status = prepare(&model, scene, err);
+    uz_status status = prepare(&model, scene, true, err);
     if (status == UZ_OK)
         status = uz_check_elements(&model, err);
     if (status == UZ_OK)
         status = new_load(&p, &h, &model, scene, err);
+    if (status == UZ_OK)
+        status = uz_check_pressed(&model, p, err);
     free(p);
     free(h);
     uz_body_model_clear(&model);
@@ -184,7 +199,7 @@ uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene 
     *dim = 0;
     *n_nodes = *m = 0;
     memset(&model, 0, sizeof model);
-    uz_status status = prepare(&model, scene, err);
+    uz_status status = prepare(&model, scene, true, err);
     if (status == UZ_OK) {
         *dim = model.mesh.dim;
         *n_nodes = model.mesh.n_nodes;

@@ -10,6 +10,10 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
 /* mesh, dof: does every connected part stay in place under its supports alone? UZ_ERR_FREE_BODY names the rigid-body
  * modes that are left. */
 uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err);
+/* mesh, dof, m, info.contact_* -> *modes: d x *count, one after the other, orthonormal for each part: the motions that
+ * supports leave free but for obstacles. UZ_ERR_FREE_BODY names those that no obstacle stands in the way of. The caller
+ * frees *modes, NULL when there are none. */
+uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err);
 
 /* mesh, dof -> frame_of, info.turned_node, info.frame: directions of the dofs of contact nodes. */
 uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error *err);

@@ -7,6 +7,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "semicoercive/pressed.h"
 
 #include <float.h>
 #include <math.h>
@@ -23,6 +24,12 @@ typedef struct {
     int rank;
     double held[MODES][MODES]; /* rank orthonormal rows: combinations of q that supports forbid */
 } part;
+
+/* The connected parts of a mesh. */
+typedef struct {
+    int64_t count, *of; /* of: n_nodes */
+    part *list;
+} body_parts;
 
 /* Representative of a node's part; halves the path on its way. */
 static int64_t find_root(int64_t *parent, int64_t a)
@@ -171,45 +178,186 @@ static int free_modes(double mode[MODES][MODES], const part *p)
     return n;
 }
 
-static uz_status refuse(const part *p, int64_t n_parts, uz_error *err)
+static void name_modes(char *names, size_t size, const part *p)
 {
-    char names[300] = "", which[96] = "", name[96];
+    char name[96];
     double mode[MODES][MODES];
     const int n = free_modes(mode, p);
+    names[0] = '\0';
     for (int i = 0; i < n; i++) {
         const size_t used = strlen(names);
         name_mode(name, sizeof name, p, mode[i]);
-        snprintf(names + used, sizeof names - used, "%s%s", i ? ", " : "", name);
+        snprintf(names + used, size - used, "%s%s", i ? ", " : "", name);
     }
+}
+
+static uz_status refuse(const part *p, int64_t n_parts, const char *who, uz_error *err)
+{
+    char names[300], which[96] = "";
+    name_modes(names, sizeof names, p);
     if (n_parts > 1)
         snprintf(which, sizeof which, " of the part with node %lld", (long long)p->node);
-    return uz_fail(err, UZ_ERR_FREE_BODY, "/supports",
-                   "the supports leave %s%s free; hold it by further supports (an obstacle does not count as one)",
-                   names, which);
+    return uz_fail(err, UZ_ERR_FREE_BODY, "/supports", "%s leave %s%s free; hold it by further supports", who, names,
+                   which);
+}
+
+static void clear_parts(body_parts *all)
+{
+    free(all->list);
+    free(all->of);
+}
+
+/* The parts, and what supports hold of them. clear_parts also after a failure. */
+static uz_status find_parts(body_parts *all, const uz_body_model *model, uz_error *err)
+{
+    *all = (body_parts){0};
+    all->of = uz_alloc(model->mesh.n_nodes, sizeof *all->of);
+    all->count = all->of ? number_parts(all->of, &model->mesh) : -1;
+    all->list = all->count >= 0 ? uz_alloc_zero(all->count, sizeof *all->list) : NULL;
+    if (!all->list)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)model->mesh.n_nodes);
+    measure_parts(all->list, all->count, all->of, &model->mesh);
+    hold_parts(all->list, all->of, model);
+    return UZ_OK;
 }
 
 uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
 {
-    const uz_mesh *mesh = &model->mesh;
-    uz_status status = UZ_ERR_MEMORY;
-    part *parts = NULL;
-    int64_t n_parts = -1, *part_of = uz_alloc(mesh->n_nodes, sizeof *part_of);
-    if (part_of)
-        n_parts = number_parts(part_of, mesh);
-    if (n_parts >= 0)
-        parts = uz_alloc_zero(n_parts, sizeof *parts);
-    if (!parts) {
-        uz_fail(err, status, "", "no memory for the parts of %lld nodes", (long long)mesh->n_nodes);
-        goto done;
+    body_parts all;
+    uz_status status = find_parts(&all, model, err);
+    for (int64_t i = 0; status == UZ_OK && i < all.count; i++)
+        if (all.list[i].rank < MODES)
+            status = refuse(&all.list[i], all.count, "the supports", err);
+    clear_parts(&all);
+    return status;
+}
+
+/* Place of a node in its part: from the centre, over the size. */
+static void place_in_part(double place[DIM], const part *p, const uz_mesh *mesh, int64_t node)
+{
+    for (int c = 0; c < DIM; c++)
+        place[c] = (mesh->xyz[node * DIM + c] - part_centre(p, c)) / part_size(p);
+}
+
+/* An obstacle stands in the way of one combination of the motions of its part, from one side. */
+static void hold_by_contacts(body_parts *all, const uz_body_model *model)
+{
+    for (int64_t i = 0; i < model->m; i++) {
+        const int64_t node = model->info.contact_node[i];
+        const double *n = model->info.contact_normal + i * DIM;
+        part *p = &all->list[all->of[node]];
+        double at[DIM];
+        place_in_part(at, p, &model->mesh, node);
+        const double row[MODES] = {n[0], n[1], n[1] * at[0] - n[0] * at[1]};
+        extend(p->held, &p->rank, row);
     }
-    measure_parts(parts, n_parts, part_of, mesh);
-    hold_parts(parts, part_of, model);
-    status = UZ_OK;
-    for (int64_t i = 0; i < n_parts && status == UZ_OK; i++)
-        if (parts[i].rank < MODES)
-            status = refuse(&parts[i], n_parts, err);
-done:
-    free(parts);
-    free(part_of);
+}
+
+/* Displacements of the free dofs (d) for the motion q of part i. */
+static void move_part(double *z, const body_parts *all, int64_t i, const double q[MODES], const uz_body_model *model)
+{
+    const part *p = &all->list[i];
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+        if (all->of[a] != i)
+            continue;
+        double at[DIM];
+        place_in_part(at, p, &model->mesh, a);
+        const double u[3] = {q[0] - q[2] * at[1], q[1] + q[2] * at[0], 0};
+        double local[3];
+        uz_to_frame(local, model, a, u);
+        for (int c = 0; c < DIM; c++)
+            if (model->dof[a * DIM + c] >= 0)
+                z[model->dof[a * DIM + c]] = local[c];
+    }
+}
+
+uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err)
+{
+    body_parts all;
+    double *z = NULL, mode[MODES][MODES];
+    int64_t n = 0;
+    *modes = NULL;
+    *count = 0;
+    uz_status status = find_parts(&all, model, err);
+    for (int64_t i = 0; status == UZ_OK && i < all.count; i++)
+        n += MODES - all.list[i].rank;
+    if (status == UZ_OK && n > 0 && !(z = uz_alloc_zero(n * model->d, sizeof *z)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
+    for (int64_t i = 0, at = 0; status == UZ_OK && i < all.count; i++) {
+        const int own = free_modes(mode, &all.list[i]);
+        for (int k = 0; k < own; k++)
+            move_part(z + (at++) * model->d, &all, i, mode[k], model);
+    }
+    if (status == UZ_OK)
+        hold_by_contacts(&all, model);
+    for (int64_t i = 0; status == UZ_OK && i < all.count; i++)
+        if (all.list[i].rank < MODES)
+            status = refuse(&all.list[i], all.count, model->m > 0 ? "the supports and obstacles" : "the supports", err);
+    clear_parts(&all);
+    if (status == UZ_OK) {
+        *modes = z;
+        *count = n;
+    } else {
+        free(z);
+    }
+    return status;
+}
+
+/* "translation along +y", "rotation about (30, 0), clockwise". */
+static void name_direction(char *text, size_t size, const part *p, const double q[MODES])
+{
+    name_mode(text, size, p, q);
+    const size_t used = strlen(text);
+    const char axis = used > 0 ? text[used - 1] : '\0';
+    if (axis == 'x' || axis == 'y')
+        snprintf(text + used - 1, size - used + 1, "%c%c", q[axis == 'x' ? 0 : 1] < 0 ? '-' : '+', axis);
+    else if (fabs(q[2]) > 1e-7 * hypot(q[0], q[1]))
+        snprintf(text + used, size - used, ", %s", q[2] < 0 ? "clockwise" : "counterclockwise");
+}
+
+void uz_name_motion(char *text, size_t size, const uz_body_model *model, const double *y)
+{
+    body_parts all;
+    double mode[MODES][MODES], largest = 0;
+    snprintf(text, size, "a rigid motion");
+    if (find_parts(&all, model, NULL) == UZ_OK)
+        for (int64_t i = 0, at = 0; i < all.count; i++) {
+            double q[MODES] = {0, 0, 0};
+            const int own = free_modes(mode, &all.list[i]);
+            for (int k = 0; k < own; k++, at++)
+                for (int c = 0; c < MODES; c++)
+                    q[c] += y[at] * mode[k][c];
+            const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+            if (length <= largest)
+                continue;
+            largest = length;
+            name_direction(text, size, &all.list[i], q);
+            const size_t used = strlen(text);
+            if (all.count > 1)
+                snprintf(text + used, size - used, " of the part with node %lld", (long long)all.list[i].node);
+        }
+    clear_parts(&all);
+}
+
+/* Loads this small beside those that balance in a mode are rounding. */
+#define BALANCED 1e-9
+
+uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error *err)
+{
+    uz_pressing how = UZ_PRESSED_ON;
+    char motion[200];
+    double *y = uz_alloc_zero(model->n_modes, sizeof *y);
+    if (!y)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)model->n_modes);
+    uz_status status = uz_load_on_modes(&how, y, model->modes, model->n_modes, &model->N, p, BALANCED, true, err);
+    if (status == UZ_OK && how != UZ_PRESSED_ON) {
+        uz_name_motion(motion, sizeof motion, model, y);
+        status = uz_fail(err, UZ_ERR_FREE_BODY, "/loads",
+                         how == UZ_PUSHED_AWAY
+                             ? "the loads push the body away: %s; no obstacle or support stands in its way"
+                             : "the loads do not press the body on: %s costs nothing; only an obstacle could hold it",
+                         motion);
+    }
+    free(y);
     return status;
 }

@@ -175,6 +175,18 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     return status;
 }
 
+uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering, size_t memory_limit,
+                          const uz_hooks *hooks, uz_error *err)
+{
+    uz_analysis *analysis = NULL;
+    *out = NULL;
+    uz_status status = uz_analysis_create(&analysis, K, NULL, 0, ordering, hooks, err);
+    if (status == UZ_OK)
+        status = uz_factor_create(out, K, analysis, memory_limit, hooks, err);
+    uz_analysis_free(analysis);
+    return status;
+}
+
 void uz_factor_free(uz_factor *factor)
 {
     if (!factor)

@@ -50,6 +50,9 @@ size_t uz_analysis_bytes(const uz_analysis *analysis);
  * predicted bytes, ARGUMENT another size or number of entries than the analysis's. */
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
                            const uz_hooks *hooks, uz_error *err);
+/* Both at once, with nothing that has to come last. */
+uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering, size_t memory_limit,
+                          const uz_hooks *hooks, uz_error *err);
 void uz_factor_free(uz_factor *factor);
 uz_factor_info uz_factor_describe(const uz_factor *factor);
 /* The dofs that come last, ascending; *count of them, 0 where none has to. */

@@ -152,11 +152,23 @@ def test_stiffness_not_symmetric(s):
 
 
 def test_stiffness_not_positive_definite(s):
+    solvers = ({}, {"operator": "factored"}, {"operator": "condensed", "method": "uzawa"})
+    # The row of N reaches dof 0 only, and what is singular at dof 1 stays so.
     for entries in (("1 1 2", "2 2 -1"), ("1 1 2", "2 2 0"), ("1 1 2",), (), ("1 1 1", "2 1 2", "2 2 1"),
-                    ("1 1 1", "2 1 1", "2 2 1"), ("1 1 -1", "2 2 -1"), ("1 1 1", "2 1 1", "2 2 0.9999999999999999")):
-        for solver in ({}, {"operator": "factored"}, {"operator": "condensed", "method": "uzawa"}):
+                    ("1 1 -1", "2 2 -1"), ("1 1 1", "2 1 1", "2 2 0.999999")):
+        for solver in solvers:
             fails(s, {**matrices(K=symmetric(2, *entries)), "solver": solver}, "not_positive_definite", "/problem/K",
                   says=("K is ",))
+    # Semidefinite, and the row reaches its null vector (1, -1): the load must press it on.
+    for corner in ("1", "0.9999999999999999"):
+        K = symmetric(2, "1 1 1", "2 1 1", f"2 2 {corner}")
+        for solver in solvers:
+            fails(s, {**matrices(K=K), "solver": solver}, "free_body", "/problem/K", says=("costs nothing", "dof 1"))
+            fails(s, {**matrices(K=K, p=[1, 2]), "solver": solver}, "free_body", "/problem/p", says=("pushes", "dof 0"))
+            summary, result = solved(s, {**matrices(K=K, p=[3, 2]), "solver": solver})
+            check(summary["semicoercive"] == {"free_modes": 1, "rounds": summary["semicoercive"]["rounds"], "held": 1,
+                                              "held_by_rows": [0]}, summary)
+            check(abs(result["displacements"][1] - 1.5) < 1e-7 and abs(result["reactions"][0] + 1) < 1e-7, result)
     free = matrices(K=symmetric(1, "1 1 -4"), N=None, h=None, p=[1])
     fails(s, free, "not_positive_definite", "/problem/K", says=("dof 0",))
     fails(s, {**free, "problem": {**free["problem"], "K": symmetric(1, "1 1 0")}}, "not_positive_definite",
@@ -321,13 +333,20 @@ def test_values_out_of_range(s):
 
 def test_unsupported_body(s):
     both, rotation = ("translation along x", "translation along y"), "rotation"
-    for supports, modes in (([], (*both, rotation)), ([{"on": "left", "ux": 0}], both[1:]),
-                            ([{"on": "bottom", "uy": 0}], both[:1])):
+    for supports, modes, beside in (([], (*both, rotation), both[:1]), ([{"on": "left", "ux": 0}], both[1:], ()),
+                                    ([{"on": "bottom", "uy": 0}], both[:1], both[:1])):
         def change(problem, supports=supports):
             problem["supports"] = supports
-        fails(s, scene(change), "free_body", "/problem/supports", says=modes)
         fails(s, scene(lambda problem, c=change: (c(problem), problem.pop("contacts"))), "free_body",
               "/problem/supports", says=modes)
+        if beside:  # the obstacle holds the others
+            fails(s, scene(change), "free_body", "/problem/supports", says=beside)
+            continue
+        summary, _ = solved(s, scene(change))
+        check(summary["semicoercive"]["free_modes"] == 1 and summary["semicoercive"]["held"] > 0, summary)
+        check(abs(summary["contact"]["force"][1] - 15) < 1e-4, summary)  # 60 x 5 x 0.05
+        fails(s, scene(lambda problem, c=change: (c(problem), problem["loads"][0].update(traction=[0, 0.05]))),
+              "free_body", "/problem/loads", says=("translation along +y",))
     job = s.solve(scene(lambda problem: problem.update(supports=[{"on": "bottom", "uy": 0}, {"on": "left", "ux": 0}],
                                                        contacts=[])))
     check(job["status"] == "successful", job)

@@ -207,6 +207,26 @@ TEST(summary_of_a_scene)
     free(reply);
 }
 
+TEST(summary_of_a_body_held_by_contact)
+{
+    json_doc doc;
+    uz_summary s = paper_summary();
+    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    read_reply(&doc, reply, "summary.json");
+    CHECK(!json_object_get(doc.root, "semicoercive"));
+    json_doc_clear(&doc);
+    free(reply);
+    s.semicoercive = (uz_semicoercive){.free_modes = 2, .held = 9, .held_by = {3, 5, 6, 7, 8, 9, 10, 12}, .rounds = 4};
+    reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    read_reply(&doc, reply, "summary.json");
+    CHECK(number_at(&doc, "semicoercive/free_modes") == 2 && number_at(&doc, "semicoercive/held") == 9);
+    CHECK(number_at(&doc, "semicoercive/rounds") == 4);
+    json_t *rows = json_object_get(json_object_get(doc.root, "semicoercive"), "held_by_rows");
+    CHECK(json_array_size(rows) == 8 && json_number_value(json_array_get(rows, 7)) == 12);
+    json_doc_clear(&doc);
+    free(reply);
+}
+
 TEST(summary_of_matrices)
 {
     json_doc doc;

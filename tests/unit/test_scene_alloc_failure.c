@@ -55,7 +55,7 @@ static bool fail_at(attempt run, const uz_scene *scene, long n)
  * some freed blocks for itself, so a leak is growth with the number of runs: the least block takes 32 bytes. */
 static long fail_each(attempt run, const uz_scene *scene)
 {
-    enum { SETTLE = 16, MEASURED = 64 };
+    enum { SETTLE = 64, MEASURED = 256 };
     for (long n = 0; n < 1000; n++) {
         bool failed = true;
         size_t before = 0;

@@ -234,3 +234,22 @@ TEST(verification)
     uz_result_free(answer);
     uz_problem_clear(&problem);
 }
+
+/* Held by the obstacle only: a block on rollers, and two free-free pairs of dofs. */
+TEST(semicoercive)
+{
+    uz_scene rolled = box_scene(6, 2, 3, 1);
+    add_support(&rolled, "left", 0, (double)NAN);
+    add_load(&rolled, "top", 0, -1);
+    add_plane(&rolled, "bottom", 0, 0, 0, 1);
+    check_scenario("rolled scene", (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = rolled}, UZ_METHOD_AUTO,
+                   UZ_OPERATOR_AUTO, UZ_ORDERING_AMD, false);
+    static const double K[16] = {1, -1, 0, 0, -1, 1, 0, 0, 0, 0, 1, -1, 0, 0, -1, 1};
+    static const double N[12] = {1, 0, 0, 0, 0, -1, 1, 0, 0, 0, 0, 1};
+    uz_qp qp = {.p = vector(4), .h = vector(3)};
+    qp.K = csc_from_dense(K, 4, 4, true);
+    qp.N = csc_from_dense(N, 3, 4, false);
+    for (int64_t j = 0; j < 4; j++)
+        qp.p[j] = 1 + (double)j;
+    check_scenario("floating springs", problem_of(qp), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AMD, true);
+}

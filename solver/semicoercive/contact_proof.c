@@ -1,0 +1,239 @@
+#include "semicoercive/contact_proof.h"
+
+#include "certificate/residual.h"
+#include "certificate/row_move.h"
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* N z may miss e_i by this much before z is no use. */
+static const double WITNESS_ROUNDING = 1e-10;
+
+typedef struct {
+    const uz_contact_claim *claim;
+    int64_t d, m;
+    bool *open;        /* m: surely */
+    double *z, *image; /* d, m: z and N z; zero but for the dofs and rows that are listed */
+    double *Kz;        /* d */
+    int64_t *dof, n_dof, *row, n_row;
+    double *force; /* d: K u - p - N'r in twofold precision */
+    uz_row_move move;
+} prover;
+
+static void find_open_rows(prover *x)
+{
+    const uz_contact_claim *claim = x->claim;
+    for (int64_t i = 0; i < x->m && isfinite(claim->inverse_bound); i++) {
+        double gap = uz_gap_of_row(claim->Nt, i, claim->of->h, claim->u, NULL);
+        double reach = claim->error * sqrt(claim->inverse_bound * uz_row_compliance(claim->Nt, i, claim->inverse));
+        x->open[i] = gap > 2.0 * reach;
+    }
+}
+
+/* 1: row k says no more than row i; -1: it points the other way; 0: neither, as far as doubles can tell. */
+static int side_of(const prover *x, int64_t k, int64_t i)
+{
+    const uz_csc *Nt = x->claim->Nt;
+    const double *h = x->claim->of->h;
+    const int64_t a = Nt->ptr[k], b = Nt->ptr[i], n = Nt->ptr[i + 1] - b;
+    if (Nt->ptr[k + 1] - a != n || n == 0)
+        return 0;
+    const double ratio = Nt->val[a] / Nt->val[b];
+    for (int64_t q = 0; q < n; q++)
+        if (Nt->idx[a + q] != Nt->idx[b + q] || (n > 1 && Nt->val[a + q] != ratio * Nt->val[b + q]))
+            return 0;
+    if (ratio < 0.0)
+        return -1;
+    double margin = ratio == 1.0 ? 0.0 : 4.0 * DBL_EPSILON * ratio * fabs(h[i]);
+    return ratio > 0.0 && h[k] - ratio * h[i] >= margin ? 1 : 0;
+}
+
+/* Whatever z does to row k, it does no harm to a proof for row i. */
+static bool is_harmless(const prover *x, int64_t k, int64_t i)
+{
+    return k != i && (x->open[k] || side_of(x, k, i) != 0);
+}
+
+/* Is moving dof j, which row i pushes by `value`, no matter of other rows? A row that is moved the other way does no
+ * harm but may spoil the proof by its reaction. */
+static bool is_own_dof(const prover *x, int64_t j, int64_t i, double value)
+{
+    const uz_csc *N = x->claim->of->N;
+    for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++) {
+        const int64_t k = N->idx[q];
+        bool away = N->val[q] * value <= 0.0 && !(x->claim->r[k] < 0.0);
+        if (k != i && !away && !is_harmless(x, k, i))
+            return false;
+    }
+    return value != 0.0;
+}
+
+static uz_status prepare(prover *x, const uz_contact_claim *claim, uz_error *err)
+{
+    const uz_csc *N = claim->of->N;
+    *x = (prover){.claim = claim, .d = N->cols, .m = N->rows};
+    x->open = uz_alloc_zero(x->m, sizeof(bool));
+    x->dof = uz_alloc_zero(x->d, sizeof(int64_t));
+    x->row = uz_alloc_zero(x->m, sizeof(int64_t));
+    x->z = uz_alloc_zero(x->d, sizeof(double));
+    x->Kz = uz_alloc_zero(x->d, sizeof(double));
+    x->image = uz_alloc_zero(x->m, sizeof(double));
+    x->force = uz_alloc_zero(x->d, sizeof(double));
+    double *zero = uz_alloc_zero(x->d, sizeof(double)), *spare = uz_alloc_zero(3 * x->d, sizeof(double));
+    bool ok = x->open && x->dof && x->row && x->z && x->Kz && x->image && x->force && zero && spare;
+    uz_status status = UZ_OK;
+    if (!uz_row_move_init(&x->move, x->d, x->m) || !ok) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to prove contact on %lld dofs", (long long)x->d);
+    } else {
+        uz_residuals res = {.e = spare, .e_u = x->force, .Ku = spare + x->d, .Kc = spare + 2 * x->d};
+        status = uz_equilibrium_residual(&res, claim->of->K, N, claim->of->p, claim->u, zero, claim->r, err);
+        find_open_rows(x);
+    }
+    free(zero);
+    free(spare);
+    return status;
+}
+
+static void release(prover *x)
+{
+    void *room[] = {x->open, x->dof, x->row, x->z, x->Kz, x->image, x->force};
+    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+        free(room[i]);
+    uz_row_move_clear(&x->move);
+}
+
+/* z on the dofs that row i need not share. */
+static bool witness_by_own_dofs(prover *x, int64_t i)
+{
+    const uz_csc *Nt = x->claim->Nt;
+    double sum = 0.0;
+    for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++) {
+        const int64_t j = Nt->idx[q];
+        if (!is_own_dof(x, j, i, Nt->val[q]))
+            continue;
+        x->dof[x->n_dof++] = j;
+        x->z[j] = x->claim->inverse[j] * Nt->val[q];
+        sum += x->z[j] * Nt->val[q];
+    }
+    for (int64_t k = 0; k < x->n_dof; k++)
+        x->z[x->dof[k]] /= sum;
+    return x->n_dof > 0 && isnormal(sum);
+}
+
+/* N z = e_i on all rows that count, z of least W^-1 norm. */
+static void witness_by_equations(prover *x, int64_t i)
+{
+    for (int64_t k = 0; k < x->n_dof; k++)
+        x->z[x->dof[k]] = 0.0;
+    for (int64_t k = 0; k < x->m; k++) {
+        x->move.in[k] = x->claim->Nt->ptr[k + 1] > x->claim->Nt->ptr[k] && !is_harmless(x, k, i);
+        x->move.target[k] = k == i;
+    }
+    uz_row_move_solve(&x->move, x->z, x->claim->Nt, x->claim->inverse);
+    x->n_dof = 0;
+    for (int64_t j = 0; j < x->d; j++)
+        if (x->z[j] != 0.0)
+            x->dof[x->n_dof++] = j;
+}
+
+/* image = N z, and the rows where it is not zero. */
+static void apply_rows(prover *x)
+{
+    const uz_csc *N = x->claim->of->N;
+    x->n_row = 0;
+    for (int64_t k = 0; k < x->n_dof; k++)
+        for (int64_t q = N->ptr[x->dof[k]]; q < N->ptr[x->dof[k] + 1]; q++) {
+            if (x->image[N->idx[q]] == 0.0)
+                x->row[x->n_row++] = N->idx[q];
+            x->image[N->idx[q]] += N->val[q] * x->z[x->dof[k]];
+            if (x->image[N->idx[q]] == 0.0)
+                x->image[N->idx[q]] = DBL_MIN; /* stays listed, once */
+        }
+}
+
+/* z'K z + sum of R (N z)^2 */
+static double energy(prover *x)
+{
+    const uz_csc *K = x->claim->of->K;
+    double sum = 0.0;
+    for (int64_t k = 0; k < x->n_dof; k++) {
+        const int64_t j = x->dof[k];
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            sum += (K->idx[q] == j ? 1.0 : 2.0) * K->val[q] * x->z[j] * x->z[K->idx[q]];
+    }
+    for (int64_t k = 0; k < x->n_row; k++)
+        sum += x->claim->weight[x->row[k]] * x->image[x->row[k]] * x->image[x->row[k]];
+    return fmax(sum, 0.0);
+}
+
+/* How far z is from what row k wants of it. */
+static double miss_of(const prover *x, int64_t k, int64_t i)
+{
+    double image = x->image[k];
+    if (k == i)
+        return isnan(image) ? INFINITY : fabs(image - 1.0);
+    if (isnan(image))
+        return INFINITY;
+    bool away = image <= 0.0 && !(x->claim->r[k] < 0.0);
+    return away || is_harmless(x, k, i) ? 0.0 : fabs(image);
+}
+
+static uz_contact_verdict judge(prover *x, int64_t i)
+{
+    const uz_contact_claim *claim = x->claim;
+    double value = 0.0, slack = 0.0, size = sqrt(energy(x));
+    for (int64_t k = 0; k < x->n_dof; k++) {
+        double share = x->z[x->dof[k]] * x->force[x->dof[k]];
+        value += share;
+        slack += fabs(share);
+    }
+    for (int64_t k = 0; k < x->n_row; k++) {
+        const int64_t j = x->row[k];
+        double gap = claim->weight[j] > 0.0 ? uz_gap_of_row(claim->Nt, j, claim->of->h, claim->u, NULL) : 0.0;
+        double push = claim->r[j] - claim->weight[j] * gap;
+        value += x->image[j] * push;
+        slack += fabs(x->image[j] * push) + 1e16 * miss_of(x, j, i) * fabs(push);
+    }
+    if (!(value < 0.0))
+        return UZ_CONTACT_DENIED;
+    slack *= 16.0 * DBL_EPSILON;
+    return value + size * (1.0 + 1e-9) * claim->error + slack < 0.0 ? UZ_CONTACT_PROVED : UZ_CONTACT_TOO_COARSE;
+}
+
+/* Leaves z and image zero again. */
+static uz_contact_verdict prove_row(prover *x, bool *provable, int64_t i)
+{
+    double miss = 0.0;
+    x->n_dof = 0;
+    if (!witness_by_own_dofs(x, i))
+        witness_by_equations(x, i);
+    apply_rows(x);
+    for (int64_t k = 0; k < x->n_row; k++)
+        miss = fmax(miss, miss_of(x, x->row[k], i));
+    *provable = x->image[i] != 0.0 && miss <= WITNESS_ROUNDING;
+    uz_contact_verdict verdict = *provable ? judge(x, i) : UZ_CONTACT_NO_WITNESS;
+    for (int64_t k = 0; k < x->n_dof; k++)
+        x->z[x->dof[k]] = 0.0;
+    for (int64_t k = 0; k < x->n_row; k++)
+        x->image[x->row[k]] = 0.0;
+    return verdict;
+}
+
+uz_status uz_prove_contact(uz_contact_verdict *verdict, bool *provable, const uz_contact_claim *claim, uz_error *err)
+{
+    prover x;
+    *verdict = UZ_CONTACT_PROVED;
+    uz_status status = prepare(&x, claim, err);
+    for (int64_t i = 0; i < x.m && status == UZ_OK; i++) {
+        if (!(claim->weight[i] > 0.0))
+            continue;
+        uz_contact_verdict of_row = prove_row(&x, &provable[i], i);
+        *verdict = of_row > *verdict ? of_row : *verdict;
+    }
+    release(&x);
+    return status;
+}

@@ -1,0 +1,318 @@
+#include "semicoercive/null_space.h"
+
+#include "core/alloc.h"
+#include "core/blas.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A shift of this many d eps: enough for the rounding of a matrix that was assembled in doubles. */
+static const double SHIFTS = 16.0;
+
+/* A direction with this share of the augmented energy from K or less is one of its null space. */
+static const double NULL_SHARE = 1e-9;
+
+enum { FIRST_BLOCK = 8, ITERATIONS = 6 };
+
+/* Adds delta diag(K) in place. False: a diagonal entry is negative, or zero beside others in its column. */
+static bool shift_diagonal(uz_csc *K, double delta)
+{
+    for (int64_t j = 0; j < K->cols; j++) {
+        int64_t first = K->ptr[j];
+        if (first == K->ptr[j + 1] || K->idx[first] != j || !(K->val[first] > 0.0))
+            return false;
+        K->val[first] *= 1.0 + delta;
+    }
+    return true;
+}
+
+/* K without the dofs that have no stiffness at all: rows and columns of zeros, which a semidefinite K may have. */
+static uz_status without_empty(uz_csc *out, const uz_csc *K, uz_error *err)
+{
+    int64_t n = 0, nnz = 0, *number = uz_alloc(K->cols, sizeof *number);
+    bool *used = uz_alloc_zero(K->cols, sizeof *used);
+    uz_status status = UZ_OK;
+    if (!number || !used) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)K->cols);
+        goto done;
+    }
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            if (K->val[q] != 0.0) {
+                used[j] = used[K->idx[q]] = true;
+                nnz++;
+            }
+    for (int64_t j = 0; j < K->cols; j++)
+        number[j] = used[j] ? n++ : -1;
+    status = uz_csc_init(out, n, n, nnz, err);
+    for (int64_t j = 0, at = 0; status == UZ_OK && j < K->cols; j++) {
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            if (K->val[q] != 0.0) {
+                out->idx[at] = number[K->idx[q]];
+                out->val[at++] = K->val[q];
+            }
+        if (used[j])
+            out->ptr[number[j] + 1] = at;
+    }
+done:
+    free(number);
+    free(used);
+    return status;
+}
+
+uz_status uz_check_semidefinite(const uz_csc *K, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+{
+    uz_csc shifted = {0};
+    uz_factor *factor = NULL;
+    uz_status status = without_empty(&shifted, K, err);
+    if (status == UZ_OK && shifted.cols > 0) {
+        if (shift_diagonal(&shifted, SHIFTS * DBL_EPSILON * (double)shifted.cols))
+            status = uz_factor_plain(&factor, &shifted, settings->ordering, settings->memory_limit, hooks, err);
+        else
+            status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "K is not positive semidefinite: see its diagonal");
+    }
+    uz_factor_free(factor);
+    uz_csc_clear(&shifted);
+    return status;
+}
+
+/* A block of b vectors, d x b. */
+typedef struct {
+    const uz_csc *K, *K_R, *N, *Nt;
+    const double *weight;
+    const uz_factor *factor;
+    uz_factor_workspace *ws;
+    int64_t d, m, b;
+    double *X, *Y;     /* d x b; Y: K_R X, or K X */
+    double *B;         /* b x b */
+    int64_t *pivot;    /* b */
+    double *row, *dof; /* m, d */
+} block;
+
+static uint64_t next_random(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u; /* Knuth's MMIX generator */
+    return *state >> 11;
+}
+
+static bool allocate(block *x, int64_t b)
+{
+    x->b = b;
+    x->X = uz_alloc_zero(x->d * b, sizeof(double));
+    x->Y = uz_alloc_zero(x->d * b, sizeof(double));
+    x->B = uz_alloc_zero(b * b, sizeof(double));
+    x->pivot = uz_alloc_zero(b, sizeof(int64_t));
+    x->row = uz_alloc_zero(x->m, sizeof(double));
+    x->dof = uz_alloc_zero(x->d, sizeof(double));
+    return x->X && x->Y && x->B && x->pivot && x->row && x->dof;
+}
+
+static void release(block *x)
+{
+    void *room[] = {x->X, x->Y, x->B, x->pivot, x->row, x->dof};
+    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+        free(room[i]);
+    x->X = x->Y = x->B = x->row = x->dof = NULL;
+    x->pivot = NULL;
+}
+
+/* x (d) = K_R^-1 N'row. */
+static uz_status solve_rows(block *s, double *x, uz_error *err)
+{
+    memset(x, 0, (size_t)s->d * sizeof *x);
+    uz_csc_gaxpy(x, s->Nt, 1.0, s->row);
+    uz_factor_permute(s->factor, s->dof, x);
+    uz_status status = uz_factor_forward(s->factor, s->ws, s->dof, 1, err);
+    if (status == UZ_OK)
+        status = uz_factor_backward(s->factor, s->ws, s->dof, 1, err);
+    uz_factor_unpermute(s->factor, x, s->dof);
+    return status;
+}
+
+static uz_status start(block *s, uz_error *err)
+{
+    uint64_t seed = 1;
+    uz_status status = UZ_OK;
+    for (int64_t c = 0; c < s->b && status == UZ_OK; c++) {
+        for (int64_t i = 0; i < s->m; i++)
+            s->row[i] = s->weight[i] > 0.0 ? ((double)next_random(&seed) * 0x1p-53 - 0.5) * sqrt(s->weight[i]) : 0.0;
+        status = solve_rows(s, s->X + c * s->d, err);
+    }
+    return status;
+}
+
+/* Orthonormal in the norm of K_R; Y = K_R X. Vectors that others span are dropped. */
+static void orthonormalise(block *s)
+{
+    const int64_t d = s->d;
+    int64_t kept = 0;
+    for (int64_t c = 0; c < s->b; c++) {
+        double *x = s->X + kept * d, *y = s->Y + kept * d, before = 0.0, norm2 = 0.0;
+        memmove(x, s->X + c * d, (size_t)d * sizeof *x);
+        for (int twice = 0; twice < 2; twice++) {
+            memset(y, 0, (size_t)d * sizeof *y);
+            uz_csc_symv(y, s->K_R, 1.0, x);
+            if (twice == 0)
+                before = uz_dot(d, x, y);
+            for (int64_t j = 0; j < kept; j++)
+                uz_axpy(d, -uz_dot(d, s->Y + j * d, x), s->X + j * d, x);
+        }
+        memset(y, 0, (size_t)d * sizeof *y);
+        uz_csc_symv(y, s->K_R, 1.0, x);
+        norm2 = uz_dot(d, x, y);
+        if (!(norm2 > 1e-20 * before))
+            continue;
+        double scale = 1.0 / sqrt(norm2);
+        for (int64_t j = 0; j < d; j++) {
+            x[j] *= scale;
+            y[j] *= scale;
+        }
+        kept++;
+    }
+    s->b = kept;
+}
+
+/* X = K_R^-1 N'R N X */
+static uz_status iterate(block *s, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    for (int64_t c = 0; c < s->b && status == UZ_OK; c++) {
+        memset(s->row, 0, (size_t)s->m * sizeof *s->row);
+        uz_csc_gaxpy(s->row, s->N, 1.0, s->X + c * s->d);
+        for (int64_t i = 0; i < s->m; i++)
+            s->row[i] *= s->weight[i];
+        status = solve_rows(s, s->X + c * s->d, err);
+    }
+    return status;
+}
+
+/* B = X'K X, b x b, row by row. */
+static void project(block *s)
+{
+    const int64_t n = s->b, d = s->d;
+    for (int64_t c = 0; c < n; c++) {
+        memset(s->Y + c * d, 0, (size_t)d * sizeof *s->Y);
+        uz_csc_symv(s->Y + c * d, s->K, 1.0, s->X + c * d);
+        for (int64_t i = 0; i <= c; i++)
+            s->B[i * n + c] = s->B[c * n + i] = uz_dot(d, s->X + i * d, s->Y + c * d);
+    }
+}
+
+static void swap_rows(block *s, int64_t a, int64_t b)
+{
+    const int64_t n = s->b, row = s->pivot[a];
+    s->pivot[a] = s->pivot[b];
+    s->pivot[b] = row;
+    for (int64_t i = 0; i < n && a != b; i++) {
+        double t = s->B[a * n + i];
+        s->B[a * n + i] = s->B[b * n + i];
+        s->B[b * n + i] = t;
+    }
+    for (int64_t i = 0; i < n && a != b; i++) {
+        double t = s->B[i * n + a];
+        s->B[i * n + a] = s->B[i * n + b];
+        s->B[i * n + b] = t;
+    }
+}
+
+/* Cholesky factorization of B with complete pivoting (Higham 2002, section 10.3), L in the lower triangle. The rank:
+ * pivots below NULL_SHARE count as zero, as X is orthonormal in the norm of K_R. */
+static int64_t factor_projection(block *s)
+{
+    const int64_t n = s->b;
+    for (int64_t i = 0; i < n; i++)
+        s->pivot[i] = i;
+    for (int64_t j = 0; j < n; j++) {
+        int64_t best = j;
+        for (int64_t i = j + 1; i < n; i++)
+            best = s->B[i * n + i] > s->B[best * n + best] ? i : best;
+        if (!(s->B[best * n + best] > NULL_SHARE))
+            return j;
+        swap_rows(s, j, best);
+        const double root = sqrt(s->B[j * n + j]);
+        s->B[j * n + j] = root;
+        for (int64_t i = j + 1; i < n; i++)
+            s->B[i * n + j] /= root;
+        for (int64_t i = j + 1; i < n; i++)
+            for (int64_t c = j + 1; c < n; c++)
+                s->B[i * n + c] -= s->B[i * n + j] * s->B[c * n + j];
+    }
+    return n;
+}
+
+/* The combination of X that column `free_column` of the pivoted factor leaves without energy: L11'x = -L21'e, x = 1
+ * there. */
+static void null_vector(double *z, const block *s, int64_t rank, int64_t free_column)
+{
+    const int64_t n = s->b;
+    double x[2 * UZ_NULL_MOST] = {0};
+    for (int64_t i = rank - 1; i >= 0; i--) {
+        double sum = -s->B[free_column * n + i];
+        for (int64_t j = i + 1; j < rank; j++)
+            sum -= s->B[j * n + i] * x[j];
+        x[i] = sum / s->B[i * n + i];
+    }
+    x[free_column] = 1.0;
+    memset(z, 0, (size_t)s->d * sizeof *z);
+    for (int64_t i = 0; i < n; i++)
+        if (x[i] != 0.0)
+            uz_axpy(s->d, x[i], s->X + s->pivot[i] * s->d, z);
+    double largest = 0.0;
+    for (int64_t j = 0; j < s->d; j++)
+        largest = fmax(largest, fabs(z[j]));
+    for (int64_t j = 0; largest > 0.0 && j < s->d; j++)
+        z[j] /= largest;
+}
+
+/* The null vectors in a block of b; *k may be all of them. */
+static uz_status search(block *s, double **Z, int64_t *k, int64_t b, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    if (!allocate(s, b))
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for the null space of %lld dofs", (long long)s->d);
+    status = start(s, err);
+    for (int i = 0; i < ITERATIONS && status == UZ_OK; i++) {
+        orthonormalise(s);
+        status = iterate(s, err);
+    }
+    if (status != UZ_OK)
+        return status;
+    orthonormalise(s);
+    project(s);
+    int64_t rank = factor_projection(s);
+    *k = s->b - rank;
+    *Z = uz_alloc_zero(*k * s->d, sizeof **Z);
+    if (!*Z)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld null vectors", (long long)*k);
+    for (int64_t c = 0; c < *k; c++)
+        null_vector(*Z + c * s->d, s, rank, rank + c);
+    return UZ_OK;
+}
+
+uz_status uz_null_space(double **Z, int64_t *k, const uz_csc *K, const uz_csc *K_R, const uz_csc *N, const uz_csc *Nt,
+                        const double *weight, const uz_factor *factor, uz_error *err)
+{
+    block s = {.K = K, .K_R = K_R, .N = N, .Nt = Nt, .weight = weight, .factor = factor, .d = K->cols, .m = N->rows};
+    *Z = NULL;
+    *k = 0;
+    s.ws = uz_factor_workspace_new();
+    uz_status status = s.ws ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for the null space");
+    for (int64_t b = FIRST_BLOCK; status == UZ_OK; b *= 2) {
+        free(*Z);
+        *Z = NULL;
+        b = b < s.m ? b : s.m; /* N'R N has no larger rank */
+        status = search(&s, Z, k, b, err);
+        release(&s);
+        if (*k < b || b == s.m || b > UZ_NULL_MOST)
+            break;
+    }
+    uz_factor_workspace_free(s.ws);
+    if (status != UZ_OK || *k > UZ_NULL_MOST) {
+        free(*Z);
+        *Z = NULL;
+    }
+    return status;
+}

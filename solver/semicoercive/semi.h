@@ -1,0 +1,49 @@
+/* semi.h: the state of one semicoercive solve, shared by semicoercive.c (what happens) and outcome.c (what is told). */
+#ifndef UZ_SEMI_H
+#define UZ_SEMI_H
+
+#include "assembly/assembly.h"
+#include "semicoercive/augment.h"
+
+typedef struct {
+    const uz_problem *problem;
+    const uz_settings *settings;
+    const uz_hooks *hooks;
+    uz_cache *cache, *own_cache; /* own: for the rounds, where the caller has none */
+    bool is_scene;
+    uz_body_model model;       /* scenes */
+    double *load, *prescribed; /* scenes: d + m, and n_fixed */
+    uz_singular of;
+    int64_t d, m;
+    uz_csc Nt;
+    double *inverse;    /* d: uz_row_stiffness */
+    double *stiffness;  /* m: the same; weights of phase 2 */
+    double *soft;       /* m: weights of phase 1 */
+    double *weight;     /* m: weights of the last solve */
+    double *target;     /* m */
+    bool *active;       /* m: rows that pressed in the last round */
+    bool *provable;     /* m: rows of which nobody knows that they can't be proved to be in contact */
+    double *null_space; /* matrices: d x k */
+    const double *Z;    /* d x k; NULL: there are too many null vectors */
+    int64_t k;
+    uz_result *last; /* of the last augmented problem */
+    double absolute; /* bound on ||u - u*||_K where `proved` */
+    bool proved;
+    int64_t rounds;
+    double started, deadline; /* uz_seconds() */
+    double assemble_s;
+    double requested;
+    double discretization_error; /* NaN: not estimated */
+} uz_semi;
+
+/* ||x||_K, and sum of weight (N x)^2 beside its square. */
+double uz_semi_energy(const uz_semi *s, const double *u, const double *g, double *springs);
+
+/* Makes s->last the result of the problem itself: its certificate from the original data, names, sums. `ended`: how the
+ * last augmented problem did. */
+uz_status uz_semi_conclude(uz_semi *s, uz_error *err);
+
+/* UZ_ERR_FREE_BODY, if the load does not press the body on. strict: also where a motion only costs nothing. */
+uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err);
+
+#endif
