@@ -135,19 +135,23 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *e
     return UZ_OK;
 }
 
+uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
+{
+    uz_certify_input input;
+    uz_status status = uz_run_certify_input(&input, run, err);
+    if (status == UZ_OK)
+        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
+    return status;
+}
+
 /* The answer that r (m, scaled rows) gives, with the kept correction or without, and its certificate. */
 static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_push, uz_error *err)
 {
     const double *scale = uz_case_row_scale(run->load);
-    uz_certify_input input;
-    uz_status status = uz_run_certify_input(&input, run, err);
-    if (status == UZ_OK)
-        status = uz_case_recover(run->load, answer->u, r, with_push, err);
+    uz_status status = uz_case_recover(run->load, answer->u, r, with_push, err);
     for (int64_t i = 0; i < run->m; i++)
         answer->r[i] = scale[i] * r[i];
-    if (status == UZ_OK)
-        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
-    return status;
+    return status == UZ_OK ? uz_run_certify_answer(run, answer, err) : status;
 }
 
 /* A method keeps the answer that it could bound best. Where rows nearly depend on each other its own bounds fail
@@ -159,7 +163,8 @@ static uz_status try_last_reactions(uz_run *run, uz_error *err)
     uz_status status = uz_answer_allocate(&last, run->d, run->m, err);
     if (status == UZ_OK)
         status = certify_reactions(run, &last, run->it.r, false, err);
-    if (status == UZ_OK && last.certificate.relative_error < run->answer.certificate.relative_error) {
+    bool exact = run->end == UZ_END_SOLVED && isinf(run->answer.certificate.relative_error);
+    if (status == UZ_OK && (exact || last.certificate.relative_error < run->answer.certificate.relative_error)) {
         uz_answer swap = run->answer;
         run->answer = last;
         last = swap;
@@ -201,9 +206,11 @@ static uz_status prove_infeasible(uz_run *run, uz_error *err)
         run->it.r_next[i] = g0[i] / scale[i];
     }
     double length = uz_gap_length(N, run->h, run->it.r_next, run->it.gamma);
-    double radius = uz_ray_radius(run->it.ray, N, run->h);
-    if (!(radius > UZ_RAY_FACTOR * length))
+    double radius;
+    if (!uz_ray_proves(&radius, run->it.ray, N, run->h, length)) {
+        run->end = UZ_END_BLURRED;
         return UZ_OK;
+    }
     result->ray = uz_alloc(run->m, sizeof *result->ray);
     if (!result->ray)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for the proof of infeasibility");
@@ -218,20 +225,30 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
     return status == UZ_OK && run->end == UZ_END_RAY ? prove_infeasible(run, err) : status;
 }
 
-/* Is the certified answer the one to give? Otherwise the target of the next round is set. */
-static uz_status judge(bool *done, uz_run *run, uz_error *err)
+/* Where the method can't do better, but the request is missed. */
+static uz_status improve(uz_run *run, uz_error *err)
 {
-    const uz_certificate *certificate = &run->answer.certificate;
-    bool missed = certificate->relative_error > run->requested;
+    bool missed = run->answer.certificate.relative_error > run->requested;
     double start = uz_seconds();
     uz_status status = UZ_OK;
     if (missed && run->end != UZ_END_TARGET && run->end != UZ_END_PAPER)
         status = try_last_reactions(run, err);
+    if (status == UZ_OK)
+        status = uz_run_refine(run, err);
     run->result->summary.timings.certify += uz_seconds() - start;
+    bool found_ray = run->end == UZ_END_RAY && !run->result->ray;
+    return status == UZ_OK && found_ray ? prove_infeasible(run, err) : status;
+}
+
+/* Is the certified answer the one to give? Otherwise the target of the next round is set. */
+static uz_status judge(bool *done, uz_run *run, uz_error *err)
+{
+    const uz_certificate *certificate = &run->answer.certificate;
     if (run->settings->balanced && run->body->is_scene && !run->again) {
         uz_run_balance_request(run);
         run->target = run->requested;
     }
+    uz_status status = improve(run, err);
     *done = run->result->ray || certificate->relative_error <= run->requested || run->end != UZ_END_TARGET;
     run->again = true;
     if (!*done && run->it.best_relative <= run->target)

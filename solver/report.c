@@ -185,7 +185,7 @@ static void explain_infeasible(const uz_result *result, char *text, size_t size)
         snprintf(text + at, size - at, " and %lld more", (long long)(count - named));
 }
 
-void uz_explain_outcome(uz_result *result, bool unsolved)
+void uz_explain_outcome(uz_result *result, uz_end end)
 {
     uz_summary *s = &result->summary;
     const char *why = "";
@@ -200,9 +200,10 @@ void uz_explain_outcome(uz_result *result, bool unsolved)
         why = "the time allowed was used up: raise time_limit_s";
         break;
     case UZ_PRECISION_LIMIT:
-        why = unsolved ? "active_set solves with independent rows only, on the condensed operator or "
-                         "with one entry in each row"
-                       : "double precision holds no more digits for this method and problem";
+        why = end == UZ_END_UNSOLVED
+                  ? "active_set solves on the condensed operator, with one entry in each row, or with few rows"
+              : end == UZ_END_BLURRED ? "rows contradict each other by less than rounding can tell from touching"
+                                      : "double precision holds no more digits for this method and problem";
         break;
     case UZ_PAPER_RULE:
         why = "the paper's stopping rule was met; it bounds a force, not an error";
@@ -240,7 +241,7 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
     uz_status status = report_displacements(run, err);
     if (run->result->ray)
         uz_blank_answer(run->result);
-    uz_explain_outcome(run->result, run->end == UZ_END_UNSOLVED);
+    uz_explain_outcome(run->result, run->end);
     summary->timings.total = total_time(run);
     return status;
 }

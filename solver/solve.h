@@ -62,6 +62,10 @@ uz_status uz_run_start(uz_run *run, uz_error *err);   /* vectors, the given star
 uz_status uz_run_iterate(uz_run *run, uz_error *err); /* until the method's own estimate is met, or it ends */
 uz_status uz_run_certify(uz_run *run, uz_error *err); /* the best answer */
 uz_status uz_run_finish(uz_run *run, uz_error *err);  /* further rounds where the certificate asks for them */
+/* Fills answer->certificate and answer->g from answer->u and answer->r (caller's rows), from the original data. */
+uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err);
+/* Iterative refinement of run->answer while its certificate misses the request and gets better. */
+uz_status uz_run_refine(uz_run *run, uz_error *err);
 /* Fills the summary and the result's u. */
 uz_status uz_run_report(uz_run *run, uz_error *err);
 /* The part of it that is about the answer, whoever made it: u, r and g go to the result. The outcome stands. */
@@ -79,9 +83,8 @@ double uz_requested_error(const uz_settings *settings);
 void uz_report_pressure(uz_result *result);
 /* There is no answer: nothing that looks like one may be left. */
 void uz_blank_answer(uz_result *result);
-/* The summary's message: one sentence on an outcome that is not `converged`. unsolved: the active set could not solve
- * for its guess. */
-void uz_explain_outcome(uz_result *result, bool unsolved);
+/* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */
+void uz_explain_outcome(uz_result *result, uz_end end);
 
 /* uz_solve for a K that is positive definite; others are refused. */
 uz_status uz_solve_regular(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,

@@ -340,7 +340,8 @@ typedef struct {
     uz_operator op;
     uz_ordering ordering;
     int64_t d, m, iterations, restarts;
-    int64_t active; /* rows with r < 0 */
+    int64_t refinements; /* corrections by the residual of the original data that made the certificate better */
+    int64_t active;      /* rows with r < 0 */
     double reaction_sum, max_penetration;
     int dim;                     /* scene: 2 or 3, else 0 */
     double force[3];             /* scene: force of the body on the obstacle's normal side, sum of -r n */

@@ -170,6 +170,7 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     put_word(&t, "operator", uz_operator_name(summary->op));
     put_count(&t, "iterations", summary->iterations);
     put_count(&t, "restarts", summary->restarts);
+    put_count(&t, "refinements", summary->refinements);
     if (run->started_from)
         put_word(&t, "started_from", run->started_from);
     if (run->cases)

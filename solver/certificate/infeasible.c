@@ -2,16 +2,19 @@
 
 #include "certificate/twofold.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
-/* h'y is positive beyond the rounding of its own sum. */
-#define RAY_NOISE 1e-12
+/* h'y is positive beyond what the rounding of each h_i may do to it. Its own sum is exact to far less. */
+#define RAY_NOISE (8.0 * DBL_EPSILON)
 
-double uz_ray_radius(const double *y, const uz_csc *N, const double *h)
+/* The radius, and whether N'y is no more than the rounding of y in each dof. */
+static double measure_ray(bool *rounded, const double *y, const uz_csc *N, const double *h)
 {
     twofold work = {0};
     double size = 0.0, residual = 0.0;
+    *rounded = true;
     for (int64_t i = 0; i < N->rows; i++) {
         if (!(y[i] <= 0.0))
             return 0.0;
@@ -20,14 +23,31 @@ double uz_ray_radius(const double *y, const uz_csc *N, const double *h)
     }
     for (int64_t j = 0; j < N->cols; j++) {
         twofold sum = {0};
-        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+        double terms = 0.0;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++) {
             twofold_add_product(&sum.hi, &sum.lo, N->val[k], y[N->idx[k]], 0);
+            terms += fabs(N->val[k] * y[N->idx[k]]);
+        }
         residual += fabs(sum.hi + sum.lo);
+        *rounded = *rounded && fabs(sum.hi + sum.lo) <= 4.0 * DBL_EPSILON * terms;
     }
     double proven = work.hi + work.lo;
     if (!(proven > RAY_NOISE * size))
         return 0.0;
     return residual > 0.0 ? proven / residual : INFINITY;
+}
+
+double uz_ray_radius(const double *y, const uz_csc *N, const double *h)
+{
+    bool rounded;
+    return measure_ray(&rounded, y, N, h);
+}
+
+bool uz_ray_proves(double *radius, const double *y, const uz_csc *N, const double *h, double length)
+{
+    bool rounded;
+    *radius = measure_ray(&rounded, y, N, h);
+    return *radius > (rounded ? UZ_RAY_ROUNDED : UZ_RAY_FACTOR) * length;
 }
 
 double uz_gap_length(const uz_csc *N, const double *h, const double *g, double *row_room)

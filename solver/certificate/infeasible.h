@@ -16,7 +16,12 @@ double uz_ray_radius(const double *y, const uz_csc *N, const double *h);
  * Rows of zeros don't count. */
 double uz_gap_length(const uz_csc *N, const double *h, const double *g, double *row_room);
 
-/* A radius this many times the problem's own lengths is a proof. */
-#define UZ_RAY_FACTOR 1e6
+/* Whether y is a proof that a user can rely on. A radius of UZ_RAY_FACTOR times the problem's own lengths is one. Where
+ * all that is left of N'y is the rounding of y's doubles, the rows of the ray depend on each other as far as doubles
+ * can say, and UZ_RAY_ROUNDED lengths do: the contradiction h'y is then about that many times the rounding of N'u. So
+ * rows that contradict each other by 1e-13 of the lengths are told from those that touch. length: uz_gap_length. */
+#define UZ_RAY_FACTOR  1e6
+#define UZ_RAY_ROUNDED 100.0
+bool uz_ray_proves(double *radius, const double *y, const uz_csc *N, const double *h, double length);
 
 #endif

@@ -1,9 +1,12 @@
 #include "core/blas.h"
 
+#include "core/alloc.h"
+
 #include <cblas.h>
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Dense orders stay far below 2^31: they are bounded by the memory of an n x n array. */
 static int narrow(int64_t n)
@@ -50,19 +53,6 @@ void uz_trmv_lower_t(int64_t n, const double *L, double *x)
         cblas_dtrmv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
 }
 
-void uz_trsm_lower(int64_t n, int64_t k, const double *L, double *X)
-{
-    if (n > 0 && k > 0)
-        cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), narrow(k), 1.0, L,
-                    narrow(n), X, narrow(n));
-}
-
-void uz_syrk_lower_t(int64_t n, int64_t k, const double *Z, double *C)
-{
-    if (n > 0 && k > 0)
-        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k), 1.0, Z, narrow(k), 0.0, C, narrow(n));
-}
-
 bool uz_potrf_lower(int64_t n, double *A)
 {
     return n == 0 || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(n), A, narrow(n)) == 0;
@@ -74,27 +64,17 @@ void uz_potrs_lower(int64_t n, const double *L, double *x)
     uz_trsv_lower_t(n, L, x);
 }
 
-int64_t uz_pstrf_lower(int64_t n, double *A, int64_t *pivot, double least)
+void uz_trsv_leading(int64_t n, int64_t stride, const double *L, double *x, bool transposed)
 {
-    double *work = malloc((size_t)n * 2 * sizeof *work + 1), largest = 0.0;
-    int *order = malloc((size_t)n * sizeof *order + 1), rank = 0;
-    for (int64_t i = 0; i < n; i++)
-        largest = fmax(largest, A[i + i * n]);
-    if (work && order && n > 0)
-        LAPACKE_dpstrf_work(LAPACK_COL_MAJOR, 'L', narrow(n), A, narrow(n), order, &rank, least * largest, work);
-    for (int64_t k = 0; order && k < rank; k++)
-        pivot[k] = order[k] - 1;
-    free(work);
-    free(order);
-    return rank;
+    if (n > 0)
+        cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
+                    narrow(stride), x, 1);
 }
 
 void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x)
 {
-    if (n == 0)
-        return;
-    cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), L, narrow(stride), x, 1);
-    cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(stride), x, 1);
+    uz_trsv_leading(n, stride, L, x, false);
+    uz_trsv_leading(n, stride, L, x, true);
 }
 
 void uz_block_trsv(int64_t n, const double *L, int64_t ld, double *x, bool transposed)
@@ -128,25 +108,169 @@ void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *
         cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k), 1.0, Z, narrow(ld), 0.0, C, narrow(n));
 }
 
-bool uz_potri_lower(int64_t n, double *L)
+/* Columns of a panel whose update of an n x n block takes about PANEL_FLOPS. */
+#define PANEL_FLOPS 2e8
+enum { LEAST_PANEL = 16, MOST_PANEL = 256 };
+
+static int64_t panel_width(int64_t n)
 {
-    return n == 0 || LAPACKE_dpotri_work(LAPACK_COL_MAJOR, 'L', narrow(n), L, narrow(n)) == 0;
+    double width = PANEL_FLOPS / ((double)n * (double)n);
+    return width < LEAST_PANEL ? LEAST_PANEL : width > MOST_PANEL ? MOST_PANEL : (int64_t)width;
 }
 
-/* LAPACK multiplies L'L and UU' only: with rows and columns in reverse order L becomes an upper triangle U. */
-void uz_multiply_llt(int64_t n, const double *L, double *A)
+/* Rows and columns i < k change places in the lower triangle. */
+static void swap_rows(int64_t n, double *A, int64_t i, int64_t k)
 {
-    int64_t last = n * n - 1;
-    for (int64_t j = 0; j < n; j++)
-        for (int64_t i = j; i < n; i++)
-            A[last - (i + j * n)] = L[i + j * n];
-    if (n > 0)
-        LAPACKE_dlauum_work(LAPACK_COL_MAJOR, 'U', narrow(n), A, narrow(n));
-    for (int64_t low = 0, high = last; low < high; low++, high--) {
-        double swap = A[low];
-        A[low] = A[high];
-        A[high] = swap;
+    double diagonal = A[i + i * n];
+    A[i + i * n] = A[k + k * n];
+    A[k + k * n] = diagonal;
+    cblas_dswap(narrow(i), A + i, narrow(n), A + k, narrow(n));
+    cblas_dswap(narrow(k - i - 1), A + i + 1 + i * n, 1, A + k + (i + 1) * n, narrow(n));
+    cblas_dswap(narrow(n - k - 1), A + k + 1 + i * n, 1, A + k + 1 + k * n, 1);
+}
+
+/* Column j of L, of a panel that begins with column k: what is right of it has not seen the panel's columns yet,
+ * squares has those of each row added up. false: the largest pivot left is not above `stop`. */
+static bool pivot_column(int64_t n, double *A, int64_t *pivot, double *squares, int64_t k, int64_t j, double stop)
+{
+    int64_t best = j;
+    for (int64_t i = j; i < n; i++) {
+        double last = j > k ? A[i + (j - 1) * n] : 0.0;
+        squares[i] += last * last;
+        if (A[i + i * n] - squares[i] > A[best + best * n] - squares[best])
+            best = i;
     }
+    double left = A[best + best * n] - squares[best];
+    if (!(left > stop))
+        return false;
+    if (best != j) {
+        int64_t index = pivot[j];
+        swap_rows(n, A, j, best);
+        squares[best] = squares[j];
+        pivot[j] = pivot[best];
+        pivot[best] = index;
+    }
+    A[j + j * n] = sqrt(left);
+    cblas_dgemv(CblasColMajor, CblasNoTrans, narrow(n - j - 1), narrow(j - k), -1.0, A + j + 1 + k * n, narrow(n),
+                A + j + k * n, narrow(n), 1.0, A + j + 1 + j * n, 1);
+    cblas_dscal(narrow(n - j - 1), 1.0 / A[j + j * n], A + j + 1 + j * n, 1);
+    return true;
+}
+
+enum { PIVOTED_PANEL = 64 };
+
+int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least, const uz_leave *leave)
+{
+    int64_t width = panel_width(n) < PIVOTED_PANEL ? panel_width(n) : PIVOTED_PANEL;
+    double *squares = uz_alloc(n, sizeof *squares), largest = 0.0;
+    for (int64_t i = 0; i < n; i++) {
+        pivot[i] = i;
+        largest = fmax(largest, A[i + i * n]);
+    }
+    int64_t rank = squares ? 0 : -1, end = squares ? n : 0;
+    for (int64_t k = 0; k < end && rank == k && !uz_leave_is_over(leave); k += width) {
+        int64_t next = k + width < n ? k + width : n;
+        memset(squares, 0, (size_t)n * sizeof *squares);
+        while (rank < next && pivot_column(n, A, pivot, squares, k, rank, least * largest))
+            rank++;
+        if (rank == next && next < n)
+            cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, narrow(n - next), narrow(next - k), -1.0,
+                        A + next + k * n, narrow(n), 1.0, A + next + next * n, narrow(n));
+    }
+    free(squares);
+    return rank;
+}
+
+bool uz_trsm_lower_while(int64_t n, int64_t k, const double *L, double *X, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    for (int64_t j = 0; j < k && n > 0; j += width) {
+        if (uz_leave_is_over(leave))
+            return false;
+        cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n),
+                    narrow(k - j < width ? k - j : width), 1.0, L, narrow(n), X + j * n, narrow(n));
+    }
+    return true;
+}
+
+bool uz_syrk_lower_t_while(int64_t n, int64_t k, const double *Z, double *C, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    if (n > 0 && k == 0)
+        memset(C, 0, (size_t)(n * n) * sizeof *C);
+    for (int64_t j = 0; j < k && n > 0; j += width) {
+        if (uz_leave_is_over(leave))
+            return false;
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k - j < width ? k - j : width), 1.0, Z + j,
+                    narrow(k), j > 0 ? 1.0 : 0.0, C, narrow(n));
+    }
+    return true;
+}
+
+/* Right-looking (Golub and Van Loan, Matrix Computations, 4.2): factor a panel, take it away from what is right of it.
+ */
+bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = n - k < width ? n - k : width, rest = n - k - b;
+        double *top = A + k + k * n, *below = top + b, *right = below + b * n;
+        if (uz_leave_is_over(leave) || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(b), top, narrow(n)) != 0)
+            return false;
+        if (rest == 0)
+            break;
+        cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, narrow(rest), narrow(b), 1.0, top,
+                    narrow(n), below, narrow(n));
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, narrow(rest), narrow(b), -1.0, below, narrow(n), 1.0,
+                    right, narrow(n));
+    }
+    return true;
+}
+
+bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    memset(A, 0, (size_t)(n * n) * sizeof *A);
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = n - k < width ? n - k : width, rows = n - k;
+        if (uz_leave_is_over(leave))
+            return false;
+        for (int64_t j = 0; j < b; j++) {
+            memset(panel + j * rows, 0, (size_t)j * sizeof *panel);
+            memcpy(panel + j + j * rows, L + k + j + (k + j) * n, (size_t)(rows - j) * sizeof *panel);
+        }
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, narrow(rows), narrow(b), 1.0, panel, narrow(rows), 1.0,
+                    A + k + k * n, narrow(n));
+    }
+    return true;
+}
+
+/* X = L^-1 by panels of columns, then X'X by panels of rows of X. */
+bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    memset(A, 0, (size_t)(n * n) * sizeof *A);
+    memset(X, 0, (size_t)(n * n) * sizeof *X);
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = n - k < width ? n - k : width, rows = n - k;
+        if (uz_leave_is_over(leave))
+            return false;
+        for (int64_t j = k; j < k + b; j++) {
+            if (!(L[j + j * n] > 0.0))
+                return false;
+            X[j + j * n] = 1.0;
+        }
+        cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(rows), narrow(b), 1.0,
+                    L + k + k * n, narrow(n), X + k + k * n, narrow(n));
+    }
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = n - k < width ? n - k : width;
+        if (uz_leave_is_over(leave))
+            return false;
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(k + b), narrow(b), 1.0, X + k, narrow(n), 1.0, A,
+                    narrow(n));
+    }
+    return true;
 }
 
 bool uz_stev(int64_t n, double *d, double *e, double *V)

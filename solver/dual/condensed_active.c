@@ -25,26 +25,26 @@ static void place_rows(double *to, const uz_condensed *dense, const double *from
 }
 
 /* D = N_b S^-1 N_b': the inverse from the factor, then signs and places. */
-static bool form_operator(double *D, double *room, const uz_condensed *dense)
+static bool form_operator(double *D, double *room, const uz_condensed *dense, const uz_leave *leave)
 {
-    memcpy(room, dense->L_bb, (size_t)(dense->n_b * dense->n_b) * sizeof *room);
-    if (!uz_potri_lower(dense->n_b, room))
+    if (!uz_invert_llt_while(dense->n_b, dense->L_bb, room, D, leave))
         return false;
     place_rows(D, dense, room, false);
     return true;
 }
 
 /* D^-1 = N_b^-T S N_b^-1 with S = L_bb L_bb'. */
-static bool form_inverse(double *D_inverse, double *room, const uz_condensed *dense)
+static bool form_inverse(double *D_inverse, double *room, const uz_condensed *dense, const uz_leave *leave)
 {
-    uz_multiply_llt(dense->n_b, dense->L_bb, room);
+    if (!uz_multiply_llt_while(dense->n_b, dense->L_bb, room, D_inverse, leave))
+        return false;
     place_rows(D_inverse, dense, room, true);
     return true;
 }
 
-typedef bool (*former)(double *out, double *room, const uz_condensed *dense);
+typedef bool (*former)(double *out, double *room, const uz_condensed *dense, const uz_leave *leave);
 
-/* *slot once and for all; *out is the case's own copy of the pointer. */
+/* *slot once and for all; *out is the case's own copy of the pointer, NULL where there was no leave to make it. */
 static uz_status need(const double **out, double **slot, uz_case *load, former form, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
@@ -58,10 +58,10 @@ static uz_status need(const double **out, double **slot, uz_case *load, former f
         if (!made || !room)
             status =
                 uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)dense->n_b);
-        else if (!form(made, room, dense))
+        else if (!form(made, room, dense, &load->leave) && !uz_leave_is_over(&load->leave))
             status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "the Schur complement on the contact is singular");
         free(room);
-        if (status == UZ_OK)
+        if (status == UZ_OK && !uz_leave_is_over(&load->leave))
             *slot = made;
         else
             free(made);
@@ -170,6 +170,16 @@ static void forgive_rounding(double *r, double *g, const uz_case *load, const bo
     }
 }
 
+/* Rows are independent where the compliance that each keeps when those before it are held stands out from the rounding
+ * of D: a pivot that is noise makes reactions that are noise, of the right signs often enough. */
+static bool are_independent(const double *chol, const double *D, const int64_t *rows, int64_t count, int64_t m)
+{
+    for (int64_t k = 0; k < count; k++)
+        if (!(chol[k + k * count] * chol[k + k * count] > UZ_DEPENDENT * D[rows[k] + rows[k] * m]))
+            return false;
+    return true;
+}
+
 uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active,
                                     uz_error *err)
 {
@@ -181,12 +191,14 @@ uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *s
     count = uz_list_rows(rows, active, !scaled, m);
     if (scaled)
         status = need(&load->D_inverse, &load->dual->lazy->D_inverse, load, form_inverse, err);
+    bool formed = scaled ? load->D_inverse != NULL : load->D != NULL;
     double *block = uz_alloc(count * count, sizeof *block);
     if (status == UZ_OK && !block)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)count);
-    if (status == UZ_OK) {
+    if (status == UZ_OK && formed) {
         uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m);
-        *solved = uz_potrf_lower(count, block);
+        *solved = uz_potrf_lower_while(count, block, &load->leave) &&
+                  (scaled || are_independent(block, load->D, rows, count, m));
         if (*solved) {
             (scaled ? solve_by_inverse : solve_by_operator)(load, r, g, block, rows, count);
             forgive_rounding(r, g, load, active);

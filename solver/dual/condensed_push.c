@@ -35,8 +35,9 @@ static bool solve_rows(double *w, double *Dw, double *D_AA, uz_case *load, const
     memset(Dw, 0, (size_t)m * sizeof *Dw);
     if (ok) {
         uz_gather_lower(D_AA, load->D, rows, count, m);
-        int64_t rank = uz_pstrf_lower(count, D_AA, pivot, UZ_PIVOT_LEAST);
-        for (int pass = 0; pass <= REFINEMENTS; pass++) {
+        int64_t rank = uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, &load->leave);
+        ok = rank >= 0;
+        for (int pass = 0; ok && pass <= REFINEMENTS; pass++) {
             for (int64_t k = 0; k < rank; k++)
                 x[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
             uz_potrs_leading(rank, count, D_AA, x);
@@ -71,7 +72,7 @@ static bool push_rows(uz_case *load, double *w, double *target, const double *g,
         in[i] = close[i] || g[i] < 0.0;
         scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
     }
-    for (int round = 0; D_AA && ok && !feasible && round < PUSH_ROUNDS; round++) {
+    for (int round = 0; D_AA && ok && !feasible && round < PUSH_ROUNDS && !uz_leave_is_over(&load->leave); round++) {
         ok = solve_rows(w, target, D_AA, load, g, rows, uz_list_rows(rows, in, true, m));
         double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
         feasible = ok;

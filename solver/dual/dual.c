@@ -106,6 +106,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
     uz_dual *dual = uz_alloc_zero(1, sizeof *dual);
     if (!dual)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
+    uz_leave leave = {hooks, INFINITY};
     dual->info.op = op;
     dual->info.d = N->cols;
     dual->info.m = N->rows;
@@ -122,7 +123,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
         status = uz_csc_transpose(&dual->Nt, &dual->N, err);
     dual->info.bytes = 48 * (size_t)N->ptr[N->cols];
     if (status == UZ_OK && op == UZ_OPERATOR_CONDENSED)
-        status = uz_condensed_create(dual, err);
+        status = uz_condensed_create(dual, &leave, err);
     if (status == UZ_OK && op == UZ_OPERATOR_FACTORED)
         status = uz_bounds_create(dual, err);
     if (status == UZ_OK && uz_cancelled(hooks))
@@ -181,6 +182,7 @@ uz_status uz_case_allocate(uz_case **out, const uz_dual *dual, const uz_csc *K, 
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
     load->dual = dual;
     load->K = K;
+    load->leave.deadline = INFINITY;
     if (!allocate_vectors(load, whole)) {
         uz_case_free(load);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->info.d);
@@ -226,6 +228,11 @@ void uz_case_free(uz_case *load)
     free(load);
 }
 
+void uz_case_set_leave(uz_case *load, const uz_leave *leave)
+{
+    load->leave = *leave;
+}
+
 const double *uz_case_g0(const uz_case *load)
 {
     return load->g0;
@@ -251,9 +258,19 @@ bool uz_case_steps_are_small(const uz_case *load)
     return load->dual->info.op == UZ_OPERATOR_CONDENSED;
 }
 
+bool uz_case_rows_may_depend(const uz_case *load)
+{
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? !load->dual->dense.scaled : !load->box;
+}
+
 bool uz_case_guess_active(uz_case *load, bool *active)
 {
     return load->box && uz_bounded_guess(load, active);
+}
+
+bool uz_case_crossed_bounds(const uz_case *load, double *y)
+{
+    return load->box && uz_bounded_crossed(load, y);
 }
 
 double uz_dual_known_lambda_max(const uz_dual *dual)
@@ -266,6 +283,9 @@ double uz_dual_known_lambda_max(const uz_dual *dual)
 
 static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
 {
+    const uz_case *load = ctx;
+    if (uz_leave_is_over(&load->leave))
+        return UZ_ERR_CANCELLED;
     return uz_case_apply(ctx, y, x, err);
 }
 
@@ -288,7 +308,7 @@ uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error
     if (status == UZ_OK)
         lazy->lambda_max = *lambda_max;
     pthread_mutex_unlock(&lazy->mutex);
-    return status;
+    return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 
 double uz_case_force_norm(uz_case *load, const double *x)
@@ -323,6 +343,24 @@ uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *er
     if (load->dual->info.op != UZ_OPERATOR_CONDENSED)
         return uz_factored_apply(load, Dr, r, err);
     uz_condensed_apply(load, Dr, r);
+    return UZ_OK;
+}
+
+uz_status uz_case_column(uz_case *load, double *column, int64_t i, uz_error *err)
+{
+    int64_t m = load->dual->info.m;
+    if (!load->D) {
+        double *unit = uz_alloc_zero(m, sizeof *unit);
+        if (!unit)
+            return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a column of %lld contacts", (long long)m);
+        unit[i] = 1.0;
+        uz_status status = uz_case_apply(load, column, unit, err);
+        free(unit);
+        return status;
+    }
+    for (int64_t k = 0; k < i; k++)
+        column[k] = load->D[i + k * m];
+    memcpy(column + i, load->D + i + i * m, (size_t)(m - i) * sizeof *column);
     return UZ_OK;
 }
 

@@ -12,8 +12,13 @@
 #ifndef UZ_DUAL_H
 #define UZ_DUAL_H
 
+#include "core/hooks.h"
 #include "factor/factor.h"
 #include "uzawa.h"
+
+/* A row whose compliance D_ii falls to this part of itself when others are held depends on them: what is left is the
+ * rounding of D. */
+#define UZ_DEPENDENT 1e-13
 
 typedef struct uz_dual uz_dual;
 
@@ -40,6 +45,10 @@ typedef struct uz_case uz_case;
 uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
                          uz_error *err);
 void uz_case_free(uz_case *load);
+/* How long dense work of n^3 on this case may go on; without: for ever. Where it is over solve_active comes back not
+ * solved, and preparing leaves D to be applied by its factors and lambda_max 0: nothing is wrong, and whoever asks next
+ * finds that it is over. */
+void uz_case_set_leave(uz_case *load, const uz_leave *leave);
 const double *uz_case_g0(const uz_case *load); /* m: gap of the body without reactions */
 /* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
 double uz_case_force_norm(uz_case *load, const double *x);
@@ -71,6 +80,10 @@ double uz_dual_known_lambda_max(const uz_dual *dual);
 /* Dr = D r (m). */
 uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
 
+/* Column i of D (m): row i's own reaction as every row feels it. CONDENSED reads D, FACTORED costs a sparse solve.
+ * Overwrites what the last apply left. */
+uz_status uz_case_column(uz_case *load, double *column, int64_t i, uz_error *err);
+
 /* A feasible displacement near u(r), and what it proves.
  * Given r <= 0, the r of the last apply, and g = g0 - D r, builds a displacement correction that closes the gap of the
  * rows that `close` names and lifts every penetrating row, and keeps it. *bound2 = ||c||_K^2 - 2 r'g(v), so that
@@ -98,6 +111,9 @@ bool uz_case_guess_active(uz_case *load, bool *active);
 /* y (m): in, a direction in which the reactions grow; out, scaled to max |y_i| about 1, its nearest vector with N'y = 0
  * on the rows that take part, cut at 0. A candidate for uz_ray_radius. */
 uz_status uz_case_project_ray(const uz_case *load, double *y, uz_error *err);
+/* y (m): the ray of two bounds on one dof that cross; false, y untouched: none do, or rows bound more than a dof each.
+ */
+bool uz_case_crossed_bounds(const uz_case *load, double *y);
 const double *uz_case_h(const uz_case *load);
 const uz_csc *uz_case_N(const uz_case *load);
 /* m: the powers of two by which rows of N and h were multiplied: a gap here is scale x the caller's, a caller's
@@ -106,6 +122,9 @@ const double *uz_case_row_scale(const uz_case *load);
 
 /* Whether solve_active works on the contact only, so that a step costs little beside a linear solve. */
 bool uz_case_steps_are_small(const uz_case *load);
+
+/* Whether solve_active may fail because rows depend on each other, or can't be had: false where each bounds a dof. */
+bool uz_case_rows_may_depend(const uz_case *load);
 
 /* Largest eigenvalue of a symmetric positive semidefinite operator of order m by Lanczos with full
  * reorthogonalisation: Ritz value plus residual bound, relative accuracy `tolerance`. */

@@ -2,6 +2,7 @@
 #ifndef UZ_DUAL_PRIVATE_H
 #define UZ_DUAL_PRIVATE_H
 
+#include "core/hooks.h"
 #include "dual/dual.h"
 
 #include <pthread.h>
@@ -81,9 +82,10 @@ struct uz_case {
     uz_bounded *box;             /* FACTORED with bounds, else NULL */
     double *push, *kept; /* correction: CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
     bool has_kept;
+    uz_leave leave; /* of the run: asked inside dense work of n^3 */
 };
 
-uz_status uz_condensed_create(uz_dual *dual, uz_error *err);
+uz_status uz_condensed_create(uz_dual *dual, const uz_leave *leave, uz_error *err);
 void uz_condensed_clear(uz_condensed *dense);
 /* z (n_b) = L_bb^-1 N_b'w; contact last. */
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
@@ -116,6 +118,7 @@ uz_status uz_bounds_create(uz_dual *dual, uz_error *err);
 void uz_bounds_clear(uz_bounds *bounds);
 uz_status uz_bounded_create(uz_case *load, const double *p, uz_error *err);
 void uz_bounded_free(uz_bounded *box);
+bool uz_bounded_crossed(const uz_case *load, double *y);
 bool uz_bounded_guess(uz_case *load, bool *active);
 uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 /* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */

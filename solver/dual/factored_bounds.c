@@ -110,6 +110,23 @@ void uz_bounded_free(uz_bounded *box)
     free(box);
 }
 
+/* a u <= h_a and b u <= h_b with a > 0 > b: y = (b, -a) has N'y = a b - b a = 0 exactly. */
+bool uz_bounded_crossed(const uz_case *load, double *y)
+{
+    const uz_bounded *box = load->box;
+    const uz_bounds *bounds = &load->dual->bounds;
+    for (int64_t j = 0; j < load->dual->info.d; j++) {
+        int64_t a = box->upper[j], b = box->lower[j];
+        if (a < 0 || b < 0 || !(box->bottom[j] > box->top[j]))
+            continue;
+        memset(y, 0, (size_t)load->dual->info.m * sizeof *y);
+        y[a] = bounds->scale[b];
+        y[b] = -bounds->scale[a];
+        return true;
+    }
+    return false;
+}
+
 static double clip(double x, double least, double most)
 {
     return fmin(most, fmax(least, x));

@@ -4,12 +4,13 @@
  * drop rows that pull and add rows that penetrate, all at once. For a general positive definite D these steps may
  * cycle, so the number of wrong rows is watched: when it has not come down for a few steps, one row at a time is
  * exchanged, the last wrong one (Murty 1974), until it does: block principal pivoting (Judice and Pires, Comput. Oper.
- * Res. 21 (1994)), which terminates. */
+ * Res. 21 (1994)), which terminates. Where a guess holds rows that depend on each other, or only single exchanges
+ * are left, exchange.h solves from that guess, if it can. */
 #include "methods/iterate.h"
 
 #include "core/alloc.h"
-#include "core/clock.h"
 #include "core/error.h"
+#include "methods/exchange.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,7 +18,7 @@
 
 /* Where steps are small they go on to the exact answer after the target is met: there the certificate of a cached body
  * is cheaper by half a linear solve, which is more than the steps cost. */
-enum { PATIENCE = 3, MAX_STEPS = 400, EXTRA_STEPS = 12 };
+enum { PATIENCE = 3, MAX_STEPS = 400, EXTRA_STEPS = 12, FEW_ROWS = 1024 };
 
 /* What an exchange of all wrong rows is expected to leave of them, before it was tried. */
 #define FAIR_RATE 0.5
@@ -138,6 +139,62 @@ static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_case 
     return status;
 }
 
+/* Only single exchanges are left. Each costs a factorization here, and a small part of one where factors are updated.
+ */
+static bool is_stuck(const pivoting *p)
+{
+    return p->wrong >= p->fewest && p->patience == 0;
+}
+
+/* Where each row that joins costs a linear solve, and they are not few, the iterations do better. */
+static bool may_exchange(const uz_iterate *it, const uz_case *load)
+{
+    return uz_case_rows_may_depend(load) && (uz_case_steps_are_small(load) || it->m <= FEW_ROWS);
+}
+
+/* Solves exactly from the guess, whatever rows depend on each other. */
+static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load,
+                                   const uz_method_options *options, uz_history *history, uz_error *err)
+{
+    static const uz_end ends[] = {[UZ_EXCHANGE_SOLVED] = UZ_END_SOLVED,
+                                  [UZ_EXCHANGE_BLURRED] = UZ_END_BLURRED,
+                                  [UZ_EXCHANGE_RAY] = UZ_END_RAY,
+                                  [UZ_EXCHANGE_STOPPED] = UZ_END_STALLED};
+    uz_leave leave = {options->hooks, options->deadline};
+    uz_exchange_end exchanged;
+    int64_t n = options->max_iterations - it->iteration;
+    uz_status status = uz_exchange_run(&exchanged, &n, p->r, p->g, it->ray, p->active, NULL, load, &leave, err);
+    if (status != UZ_OK)
+        return status;
+    *end = ends[exchanged];
+    it->iteration += n > 0 ? n - 1 : 0; /* take counts one */
+    if (exchanged == UZ_EXCHANGE_STOPPED && uz_should_stop(end, it, options))
+        return UZ_OK;
+    status = take(it, p, load, err);
+    if (status == UZ_OK)
+        status = uz_iterate_record(it, load, options, history, 0.0, false, err);
+    return status;
+}
+
+/* One step: the answer of the guess, and the next guess. *over: a wrong guess is not left, or none can be solved. */
+static uz_status step(pivoting *p, bool *over, uz_end *end, uz_iterate *it, uz_case *load,
+                      const uz_method_options *options, uz_history *history, uz_error *err)
+{
+    bool solved = false;
+    uz_status status = solve_guess(p, &solved, it, load, err);
+    *over = !solved;
+    if (status != UZ_OK || !solved)
+        return status; /* too little time is found by whoever goes on */
+    status = take(it, p, load, err);
+    if (status == UZ_OK)
+        status = uz_iterate_record(it, load, options, history, 0.0, false, err);
+    if (p->wrong == 0)
+        *end = UZ_END_SOLVED;
+    else if (it->best_relative <= options->target)
+        *end = UZ_END_TARGET;
+    return status;
+}
+
 static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                        uz_history *history, uz_error *err)
 {
@@ -145,26 +202,29 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, 
     if (*end == UZ_END_TARGET)
         return UZ_OK;
     int extra = uz_case_steps_are_small(load) ? EXTRA_STEPS : 0;
-    for (int k = 0; k < MAX_STEPS; k++) {
-        bool solved = false;
+    bool over = false;
+    for (int k = 0; k < MAX_STEPS && !over; k++) {
         if (uz_should_stop(end, it, options))
             return UZ_OK;
-        uz_status status = solve_guess(p, &solved, it, load, err);
-        if (!solved)
-            *end = UZ_END_UNSOLVED;
-        if (status != UZ_OK || !solved)
+        uz_status status = step(p, &over, end, it, load, options, history, err);
+        if (status != UZ_OK || *end == UZ_END_SOLVED)
             return status;
-        status = take(it, p, load, err);
-        if (status == UZ_OK)
-            status = uz_iterate_record(it, load, options, history, 0.0, false, err);
-        if (status != UZ_OK)
-            return status;
-        if (it->best_relative <= options->target)
-            *end = UZ_END_TARGET;
-        if (p->wrong == 0 || (*end == UZ_END_TARGET && extra-- == 0))
+        if (*end == UZ_END_TARGET && (over || extra-- == 0))
             return UZ_OK;
-        exchange(p, load, it->m);
+        if (is_stuck(p) && may_exchange(it, load))
+            return solve_by_exchange(p, end, it, load, options, history, err);
+        if (!over)
+            exchange(p, load, it->m);
     }
+    if (uz_should_stop(end, it, options))
+        return UZ_OK;
+    if (over && uz_case_crossed_bounds(load, it->ray)) {
+        *end = UZ_END_RAY;
+        return UZ_OK;
+    }
+    if (may_exchange(it, load))
+        return solve_by_exchange(p, end, it, load, options, history, err);
+    *end = over ? UZ_END_UNSOLVED : UZ_END_STALLED;
     return UZ_OK;
 }
 

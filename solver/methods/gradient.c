@@ -141,7 +141,8 @@ static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_err
     if (status != UZ_OK)
         return status;
     double length = uz_gap_length(uz_case_N(load), uz_case_h(load), uz_case_g0(load), it->gamma);
-    *found = uz_ray_radius(it->ray, uz_case_N(load), uz_case_h(load)) > UZ_RAY_FACTOR * length;
+    double radius;
+    *found = uz_ray_proves(&radius, it->ray, uz_case_N(load), uz_case_h(load), length);
     return UZ_OK;
 }
 

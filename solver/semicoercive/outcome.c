@@ -186,7 +186,7 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     if (result->ray)
         uz_blank_answer(result);
     summary->message[0] = '\0';
-    uz_explain_outcome(result, false);
+    uz_explain_outcome(result, UZ_END_STALLED);
     if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT)
         snprintf(summary->message, sizeof summary->message,
                  "no rows could be proved to hold the body, which no support does: it may be balanced on the edge of "

@@ -106,6 +106,30 @@ static uz_problem leaning_problem(void)
     return problem_of(random_qp(&rng, &kind));
 }
 
+/* A chain on a spring so weak that only refinement brings what is asked for, with every bound written twice, the second
+ * time up to rounding. */
+static uz_problem weak_problem(void)
+{
+    enum { D = 12 };
+    double *K = vector(D * D), *N = vector(2 * D * D);
+    uz_qp qp = {.p = vector(D), .h = vector(2 * D)};
+    for (int64_t j = 0; j < D; j++) {
+        K[j * D + j] = j == 0 ? 1 + 1e-12 : j + 1 < D ? 2 : 1;
+        if (j > 0)
+            K[j * D + j - 1] = K[(j - 1) * D + j] = -1;
+        N[j * D + j] = 1;
+        N[(D + j) * D + j] = 0.3;
+        qp.h[j] = 0.5;
+        qp.h[D + j] = 0.15;
+        qp.p[j] = j % 4 == 3 ? -1 : 1;
+    }
+    qp.K = csc_from_dense(K, D, D, true);
+    qp.N = csc_from_dense(N, 2 * D, D, false);
+    free(K);
+    free(N);
+    return problem_of(qp);
+}
+
 TEST(scenes)
 {
     check_scenario("scene", scene_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
@@ -128,6 +152,9 @@ TEST(matrices)
 TEST(dependent_rows)
 {
     check_scenario("dependent rows", dependent_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AMD,
+                   false);
+    check_scenario("refined", weak_problem(), UZ_METHOD_ACTIVE_SET, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AMD, false);
+    check_scenario("exchanged", dependent_problem(), UZ_METHOD_ACTIVE_SET, UZ_OPERATOR_FACTORED, UZ_ORDERING_AMD,
                    false);
 }
 

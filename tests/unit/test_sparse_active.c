@@ -236,7 +236,7 @@ TEST(bounds_that_contradict)
     uz_result_free(result);
     settings = settings_for(UZ_METHOD_ACTIVE_SET);
     result = solve_problem(&problem, &settings);
-    CHECK(result && result->summary.outcome != UZ_CONVERGED && isinf(result->summary.certificate.relative_error));
+    CHECK(result && result->summary.outcome == UZ_INFEASIBLE && isinf(result->summary.infeasible_radius));
     uz_result_free(result);
     uz_problem_clear(&problem);
 }
@@ -284,7 +284,7 @@ TEST(no_contact)
     check_both(qp, 0, "no contact");
 }
 
-TEST(rows_with_several_entries_are_left_to_the_iterations)
+TEST(few_rows_with_several_entries_are_exchanged)
 {
     qp_random rng = {1};
     uz_qp qp = random_qp(&rng, &(qp_kind){.d = 30, .m = 20, .condition = 100});
@@ -295,8 +295,8 @@ TEST(rows_with_several_entries_are_left_to_the_iterations)
     uz_result_free(result);
     settings = settings_for(UZ_METHOD_ACTIVE_SET);
     result = solve_problem(&problem, &settings);
-    CHECK(result && result->summary.outcome == UZ_PRECISION_LIMIT);
-    CHECK(result && strstr(result->summary.message, "one entry in each row"));
+    CHECK(result && result->summary.outcome == UZ_CONVERGED);
+    CHECK(result && result->summary.iterations <= 2 * 20);
     uz_result_free(result);
     uz_problem_clear(&problem);
 }
