@@ -92,6 +92,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     const work_options workers = {.workers = options->workers,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
+                                  .solve_bytes = options->memory,
                                   .lease_s = LEASE_S};
     s->work = work_start(s->store, &workers, s->log, message, size);
     if (!s->work) {

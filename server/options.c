@@ -1,5 +1,7 @@
 #include "options.h"
 
+#include "memory.h"
+
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
@@ -9,7 +11,21 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { LISTEN = 1000, DB, WORKERS, MAX_BODY, CACHE, MAX_ATTEMPTS, DRAIN, CONNECTIONS, LEVEL, DEADLINE, VERSION, HELP };
+enum {
+    LISTEN = 1000,
+    DB,
+    WORKERS,
+    MAX_BODY,
+    CACHE,
+    MAX_ATTEMPTS,
+    DRAIN,
+    CONNECTIONS,
+    LEVEL,
+    DEADLINE,
+    MEMORY,
+    VERSION,
+    HELP
+};
 
 static const struct option LONG_OPTIONS[] = {
     {"listen", required_argument, NULL, LISTEN},
@@ -17,6 +33,7 @@ static const struct option LONG_OPTIONS[] = {
     {"workers", required_argument, NULL, WORKERS},
     {"max-body", required_argument, NULL, MAX_BODY},
     {"cache", required_argument, NULL, CACHE},
+    {"memory", required_argument, NULL, MEMORY},
     {"max-attempts", required_argument, NULL, MAX_ATTEMPTS},
     {"drain-s", required_argument, NULL, DRAIN},
     {"max-connections", required_argument, NULL, CONNECTIONS},
@@ -37,6 +54,8 @@ void options_usage(FILE *to)
         "  --db FILE               jobs and results are kept here (./contact.db)\n"
         "  --workers N             problems solved at once (as many as there are processors)\n"
         "  --cache BYTES           memory for factors that are kept (1G)\n"
+        "  --memory BYTES          memory that one problem may take (80 % of what the machine or its control group\n"
+        "                          has, less the cache, divided by the workers)\n"
         "  --max-body BYTES        largest request body (64M)\n"
         "  --max-connections N     connections open at once (256)\n"
         "  --request-deadline-s S  time for a request to arrive, plus 1 s per 100 kB of its body (30)\n"
@@ -135,6 +154,8 @@ static bool set_option(server_options *out, int option, const char *text)
         return parse_bytes(text, &out->max_body);
     case CACHE:
         return parse_bytes(text, &out->cache);
+    case MEMORY:
+        return parse_bytes(text, &out->memory);
     case MAX_ATTEMPTS:
         return set_integer(&out->max_attempts, 1, 1000, text);
     case DRAIN:
@@ -187,6 +208,8 @@ options_verdict options_parse(server_options *out, int argc, char **argv, char *
             return OPTIONS_WRONG;
         }
     }
+    if (out->memory == 0)
+        out->memory = memory_share(memory_available(), out->cache, out->workers);
     if (optind < argc) {
         snprintf(message, size, "unexpected argument \"%s\"", argv[optind]);
         return OPTIONS_WRONG;

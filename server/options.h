@@ -14,6 +14,7 @@ typedef struct {
     int workers, max_attempts;
     unsigned max_connections;
     size_t max_body, cache; /* bytes */
+    size_t memory;          /* of one solve, bytes */
     double drain_s, request_deadline_s;
     log_level level;
 } server_options;

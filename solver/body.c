@@ -41,6 +41,7 @@ uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_s
     int choices[3] = {(int)problem->kind, (int)settings->op, (int)settings->ordering};
     uz_status status = UZ_OK;
     uz_digest_add(state, choices, sizeof choices);
+    uz_digest_add(state, &settings->memory_limit, sizeof settings->memory_limit);
     if (problem->kind == UZ_PROBLEM_SCENE) {
         status = add_scene(state, &problem->scene, err);
     } else {
@@ -77,13 +78,6 @@ static size_t model_bytes(const uz_body_model *model)
            (model->frame_of ? 8 * nodes : 0);
 }
 
-/* Each contact dof has a row of its own: the trailing block of a factor with these dofs last is then all of the
- * operator. Otherwise the contact may stand anywhere in it, whichever is cheaper. */
-static bool is_one_to_one(const uz_csc *N, int64_t n_b)
-{
-    return N->rows == n_b && N->ptr[N->cols] == n_b;
-}
-
 /* The key of K: known for matrices; of a scene's only when there is a cache to look into. */
 static uz_status find_key(uz_matrix_key *K_key, const uz_body_key *key, const uz_body *body, uz_error *err)
 {
@@ -92,38 +86,37 @@ static uz_status find_key(uz_matrix_key *K_key, const uz_body_key *key, const uz
     return key && body->is_scene ? uz_matrix_digest(K_key, &body->model.K, err) : UZ_OK;
 }
 
-static uz_status factor_and_condense(uz_body *body, const uz_csc *K, const uz_csc *N, const uz_body_key *key,
-                                     const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+/* The fewest bytes that a box of this many cells can be solved with: told before the mesh is made. */
+static uz_status refuse_large_box(const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
-    uz_matrix_key K_key;
-    int64_t *dofs = NULL, n_b = 0;
-    uz_status status = uz_dual_contact_dofs(&dofs, &n_b, N, err);
-    if (status == UZ_OK)
-        status = find_key(&K_key, key, body, err);
-    uz_operator op = UZ_OPERATOR_AUTO;
-    if (status == UZ_OK) {
-        op = uz_dual_choose(N, n_b, settings->op);
-        int64_t n_last = op == UZ_OPERATOR_CONDENSED ? n_b : 0, rows = is_one_to_one(N, n_last) ? 0 : N->rows;
-        status = uz_shared_factor_get(&body->shared, cache, &K_key, K, dofs, n_last, rows, settings, hooks, err);
+    const uz_box *box = &problem->scene.box;
+    double nodes = 1.0, entries = 1.0;
+    if (settings->memory_limit == 0 || problem->kind != UZ_PROBLEM_SCENE)
+        return UZ_OK;
+    for (int axis = 0; axis < box->dim; axis++) {
+        nodes *= (double)box->cells[axis] + 1.0;
+        entries *= 3.0; /* a node and its neighbours in a row */
     }
-    free(dofs);
-    body->factor = body->shared.factor;
-    double start = uz_seconds();
-    if (status == UZ_OK)
-        status = uz_dual_create(&body->dual, N, body->factor, op, hooks, err);
-    body->condense_s = uz_seconds() - start;
-    return status;
+    double dofs = nodes * box->dim, least = dofs * (8.0 * (entries * box->dim) + 200.0);
+    if (least <= (double)settings->memory_limit)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_LIMIT, "/mesh",
+                   "%.0f nodes take at least %.3g bytes, and the limit is %zu: use a coarser "
+                   "mesh or raise the limit",
+                   nodes, least, settings->memory_limit);
 }
 
 /* Matrices without contacts may come with an N that is a zeroed struct. */
-static uz_status take_matrices(uz_body *body, const uz_problem *problem, uz_error *err)
+static uz_status take_matrices(uz_body *body, const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
     double start = uz_seconds();
     uz_status status = UZ_OK;
     body->is_scene = problem->kind == UZ_PROBLEM_SCENE;
     if (body->is_scene)
+        status = refuse_large_box(problem, settings, err);
+    if (status == UZ_OK && body->is_scene)
         status = uz_body_model_build(&body->model, &problem->scene, err);
-    else if (problem->qp.N.rows == 0)
+    else if (status == UZ_OK && problem->qp.N.rows == 0)
         status = uz_csc_init(&body->no_rows, 0, problem->qp.K.cols, 0, err);
     body->assemble_s = uz_seconds() - start;
     return status;
@@ -131,8 +124,8 @@ static uz_status take_matrices(uz_body *body, const uz_problem *problem, uz_erro
 
 static void describe(uz_body *body)
 {
-    size_t factor = body->shared.item ? 0 : uz_factor_describe(body->factor).bytes;
-    body->bytes = sizeof *body + factor + uz_dual_describe(body->dual).bytes;
+    size_t form = body->krylov ? uz_krylov_describe(body->krylov).bytes : uz_factor_describe(body->factor).bytes;
+    body->bytes = sizeof *body + (body->shared.item ? 0 : form) + uz_dual_describe(body->dual).bytes;
     if (body->is_scene)
         body->bytes += model_bytes(&body->model);
     body->reused.ordering = body->shared.analysis_reused;
@@ -142,16 +135,18 @@ static void describe(uz_body *body)
 uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_body_key *key, const uz_settings *settings,
                          uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
+    uz_matrix_key K_key;
     *out = NULL;
     uz_body *body = uz_alloc_zero(1, sizeof *body);
     if (!body)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
     pthread_mutex_init(&body->mutex, NULL);
     body->inverse_bound = NAN;
-    uz_status status = take_matrices(body, problem, err);
+    uz_status status = take_matrices(body, problem, settings, err);
     if (status == UZ_OK)
-        status = factor_and_condense(body, uz_body_K(body, problem), uz_body_N(body, problem), key, settings, cache,
-                                     hooks, err);
+        status = find_key(&K_key, key, body, err);
+    if (status == UZ_OK)
+        status = uz_body_make_operator(body, problem, &K_key, settings, cache, hooks, err);
     if (status == UZ_OK) {
         describe(body);
         *out = body;
@@ -179,6 +174,7 @@ void uz_body_free(uz_body *body)
     pthread_mutex_destroy(&body->mutex);
     uz_dual_free(body->dual);
     uz_shared_factor_release(&body->shared);
+    uz_krylov_free(body->krylov);
     if (body->is_scene)
         uz_body_model_clear(&body->model);
     uz_csc_clear(&body->no_rows);

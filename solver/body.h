@@ -4,6 +4,7 @@
 
 #include "assembly/assembly.h"
 #include "cache/parts.h"
+#include "cost.h"
 #include "dual/dual.h"
 #include "factor/factor.h"
 #include "uzawa.h"
@@ -16,18 +17,20 @@ typedef struct {
     uz_body_model model; /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
     uz_csc no_rows;      /* matrices without contacts: 0 x d, as the problem's N may be a zeroed struct */
     uz_shared_factor shared;
-    const uz_factor *factor; /* shared.factor */
+    const uz_factor *factor; /* shared.factor; NULL: matrix_free */
+    uz_krylov *krylov;       /* matrix_free, else NULL */
     uz_dual *dual;
     pthread_mutex_t mutex; /* guards inverse_bound */
     double inverse_bound;  /* NaN until somebody asks */
     double assemble_s, condense_s;
-    uz_reuse reused; /* when it was made */
-    size_t bytes;    /* its own, without a factor that the cache counts */
-    uz_item *item;   /* its place in the cache, or NULL */
+    uz_cost_plan plan; /* which form of the operator, and why */
+    uz_reuse reused;   /* when it was made */
+    size_t bytes;      /* its own, without a factor that the cache counts */
+    uz_item *item;     /* its place in the cache, or NULL */
 } uz_body;
 
-/* SHA-256, hex: of everything the body is built from, the chosen operator and ordering included; of K, for matrices (a
- * scene's K has to be assembled first). */
+/* SHA-256, hex: of everything the body is built from, the asked operator, ordering and memory limit included; of K, for
+ * matrices (a scene's K has to be assembled first). */
 typedef struct {
     char digest[65];
     uz_matrix_key K;
@@ -38,6 +41,10 @@ uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_s
  * is that of uz_body_digest. */
 uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_body_key *key, const uz_settings *settings,
                          uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+/* The part of it that follows the assembly: the form of the operator by predicted cost and memory, and what it needs.
+ * key: of K; read only where there is a cache. UZ_ERR_LIMIT with the predicted bytes where no form fits. */
+uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const uz_matrix_key *key,
+                                const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 void uz_body_free(uz_body *body);
 
 /* What the certificate of a body that is used again and again saves by: uz_factor_inverse_norm, made at the first call.

@@ -77,7 +77,9 @@ static uz_status iterate(uz_run *run, uz_error *err)
 {
     uz_method_options options = method_options(run);
     double start = uz_seconds();
-    uz_status status = uz_method_run(&run->end, &run->it, run->load, &options, &run->result->history, err);
+    uz_status status = uz_case_aim(run->load, run->target, run->hooks, run->deadline, err);
+    if (status == UZ_OK)
+        status = uz_method_run(&run->end, &run->it, run->load, &options, &run->result->history, err);
     run->result->summary.timings.iterate += uz_seconds() - start;
     return status;
 }
@@ -99,6 +101,8 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
 {
     uz_run *run = ctx;
     const uz_factor *factor = run->body->factor;
+    if (!factor)
+        return uz_case_inverse_norm(run->load, value, e, err);
     uz_status status = need_workspace(run, err);
     if (status != UZ_OK)
         return status;
@@ -128,8 +132,9 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *e
         .h = run->h,
         .inverse_norm = inverse_norm,
         .ctx = run,
-        .rcond = uz_factor_describe(run->body->factor).rcond,
-        .inverse_bound = run->serves_many ? uz_body_inverse_bound(run->body, K, run->ws) : INFINITY,
+        .rcond = run->result->summary.rcond,
+        .inverse_bound =
+            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws) : INFINITY,
         .sharp = 0.5 * run->requested,
     };
     return UZ_OK;

@@ -59,10 +59,20 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
     return UZ_OK;
 }
 
+/* What stands in the factor's place: no entries of L, but bytes and a condition. */
+static uz_factor_info describe_factor(const uz_body *body)
+{
+    if (body->factor)
+        return uz_factor_describe(body->factor);
+    uz_krylov_info krylov = uz_krylov_describe(body->krylov);
+    return (uz_factor_info){
+        .bytes = krylov.bytes, .rcond = krylov.rcond, .factor_s = krylov.create_s + krylov.spectrum_s};
+}
+
 void uz_run_take_body(uz_run *run, uz_reuse reused)
 {
     uz_summary *summary = &run->result->summary;
-    uz_factor_info factor = uz_factor_describe(run->body->factor);
+    uz_factor_info factor = describe_factor(run->body);
     uz_dual_info dual = uz_dual_describe(run->body->dual);
     run->d = summary->d = run->result->d = dual.d;
     run->m = summary->m = run->result->m = dual.m;
@@ -81,6 +91,37 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     summary->timings.order = reused.ordering ? 0.0 : factor.order_s;
     summary->timings.factor = reused.factor ? 0.0 : factor.factor_s;
     summary->timings.condense = run->body->condense_s;
+}
+
+static double csc_bytes(const uz_csc *A)
+{
+    return A->ptr ? 8.0 * (double)(A->cols + 1) + 16.0 * (double)A->ptr[A->cols] : 0.0;
+}
+
+/* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
+#define RUN_VECTORS 10.0
+
+/* A cached body has spared the setup, of prediction and of what is measured alike. */
+static void report_cost(uz_run *run)
+{
+    const uz_cost_plan *plan = &run->body->plan;
+    const uz_timings *t = &run->result->summary.timings;
+    uz_cost *cost = &run->result->summary.cost;
+    cost->n_considered = plan->count;
+    for (int k = 0; k < plan->count; k++) {
+        const uz_cost_estimate *form = &plan->form[k];
+        double seconds = form->case_s + (run->hit ? 0.0 : form->setup_s);
+        cost->considered[k] = (uz_cost_option){form->op, seconds, form->bytes, form->fits};
+        if (k != plan->chosen)
+            continue;
+        cost->seconds = seconds;
+        cost->bytes = form->bytes;
+        cost->flops = form->flops;
+    }
+    cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
+    cost->actual_bytes = (double)run->body->bytes + (run->load ? (double)uz_case_bytes(run->load) : 0.0) +
+                         (run->body->is_scene ? 0.0 : csc_bytes(&run->problem->qp.K) + csc_bytes(&run->problem->qp.N)) +
+                         8.0 * RUN_VECTORS * (double)run->d;
 }
 
 uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err)
@@ -242,6 +283,7 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
     if (run->result->ray)
         uz_blank_answer(run->result);
     uz_explain_outcome(run->result, run->end);
+    report_cost(run);
     summary->timings.total = total_time(run);
     return status;
 }

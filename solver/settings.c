@@ -16,6 +16,7 @@ static const char *const OPERATORS[] = {
     [UZ_OPERATOR_AUTO] = "auto",
     [UZ_OPERATOR_CONDENSED] = "condensed",
     [UZ_OPERATOR_FACTORED] = "factored",
+    [UZ_OPERATOR_MATRIX_FREE] = "matrix_free",
 };
 static const char *const ORDERINGS[] = {
     [UZ_ORDERING_AUTO] = "auto",

@@ -236,7 +236,7 @@ typedef enum {
     UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
     UZ_METHOD_GIVEN                /* results of uz_verify only: the answer is the caller's */
 } uz_method;
-typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED } uz_operator;
+typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE } uz_operator;
 typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;
 typedef enum { UZ_STOP_CERTIFIED, UZ_STOP_PAPER } uz_stopping;
 
@@ -251,7 +251,7 @@ typedef struct {
     double alpha;           /* step size; 0: 1 / lambda_max(D) */
     int64_t max_iterations; /* >= 0 */
     double time_limit_s;    /* of the whole solve; INFINITY: none */
-    size_t memory_limit;    /* bytes for matrices and factor; 0: none */
+    size_t memory_limit; /* bytes for all of a solve; 0: none. AUTO goes on without a factor where one does not fit */
 } uz_settings;
 /* auto, certified 1e-8, 100000 iterations, no time limit. */
 uz_settings uz_settings_default(void);
@@ -334,6 +334,21 @@ typedef struct {
     int64_t rounds;     /* regularized problems solved to find them */
 } uz_semicoercive;
 
+/* What one form of the operator was expected to take. */
+typedef struct {
+    uz_operator op;
+    double seconds, bytes;
+    bool fits; /* the memory limit */
+} uz_cost_option;
+
+/* What a solve was expected to take after assembly, and what it took. bytes: matrices, factor and vectors together. */
+typedef struct {
+    double seconds, bytes, flops;
+    double actual_seconds, actual_bytes;
+    uz_cost_option considered[3];
+    int n_considered;
+} uz_cost;
+
 typedef struct {
     uz_outcome outcome;
     uz_method method;
@@ -359,6 +374,7 @@ typedef struct {
     size_t factor_bytes;
     double factor_flops; /* additions and multiplications */
     double rcond;
+    uz_cost cost;
     uz_timings timings;
     char message[256]; /* one sentence on the outcome where it is not `converged`; "" otherwise */
 } uz_summary;

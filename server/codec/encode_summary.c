@@ -132,6 +132,27 @@ static void put_timings(text *t, const uz_timings *s)
     put_object(t, "timings_s", list, sizeof list / sizeof list[0]);
 }
 
+static void put_cost(text *t, const uz_cost *c)
+{
+    text_key(t, "cost");
+    text_open(t, '{');
+    put_object(t, "predicted", (named[]){{"seconds", c->seconds}, {"bytes", c->bytes}, {"flops", c->flops}}, 3);
+    put_object(t, "actual", (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}}, 2);
+    text_key(t, "considered");
+    text_open(t, '[');
+    for (int k = 0; k < c->n_considered; k++) {
+        const uz_cost_option *form = &c->considered[k];
+        text_open(t, '{');
+        put_word(t, "operator", uz_operator_name(form->op));
+        put_named(t, (named[]){{"seconds", form->seconds}, {"bytes", form->bytes}}, 2);
+        text_key(t, "fits");
+        text_bool(t, form->fits);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+    text_close(t, '}');
+}
+
 static void put_problem(text *t, const uz_summary *s, bool scene)
 {
     text_key(t, "problem");
@@ -190,6 +211,7 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     if (summary->semicoercive.free_modes > 0)
         put_semicoercive(&t, &summary->semicoercive);
     put_factor(&t, summary);
+    put_cost(&t, &summary->cost);
     put_timings(&t, &summary->timings);
     text_close(&t, '}');
     return text_finish(&t, NULL);

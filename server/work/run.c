@@ -186,6 +186,7 @@ static uz_status solve_or_verify(run *r, uz_error *err)
 static run_end solve(run *r)
 {
     uz_error err = {0};
+    r->request.settings.memory_limit = r->me->w->options.solve_bytes;
     uz_status status = solve_or_verify(r, &err);
     bool was_stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && any_dismissed(r));
     run_end end = was_stopped ? why_stopped(r) : END_FINISH;

@@ -32,6 +32,7 @@ typedef struct {
     int workers;
     int max_attempts;   /* runs begun before a job that keeps killing the process is failed */
     size_t cache_bytes; /* factor cache */
+    size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
     double lease_s;
 } work_options;
 

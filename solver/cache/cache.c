@@ -76,11 +76,11 @@ static void count_one(const void *object, const char *digest, int64_t hits, size
 /* A factor that several bodies share counts for the first of them. */
 static size_t factor_bytes(entries *to, const uz_factor *factor)
 {
+    to->factors[to->count] = factor;
     for (size_t k = 0; k < to->count; k++)
         if (to->factors[k] == factor)
             return 0;
-    to->factors[to->count] = factor;
-    return uz_factor_describe(factor).bytes;
+    return factor ? uz_factor_describe(factor).bytes : 0;
 }
 
 static void describe_one(const void *object, const char *digest, int64_t hits, size_t bytes, void *ctx)
@@ -94,7 +94,7 @@ static void describe_one(const void *object, const char *digest, int64_t hits, s
     memcpy(entry->digest, digest, sizeof entry->digest);
     entry->d = dual.d;
     entry->m = dual.m;
-    entry->nnz = uz_factor_describe(body->factor).nnz;
+    entry->nnz = body->factor ? uz_factor_describe(body->factor).nnz : 0;
     entry->hits = hits;
     entry->bytes = bytes + factor_bytes(to, body->factor);
     to->count++;

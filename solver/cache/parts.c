@@ -20,7 +20,9 @@ typedef struct {
     const uz_csc *K;
     const int64_t *dofs;
     int64_t n_dofs, rows;
-    const uz_settings *settings;
+    uz_ordering ordering;
+    uz_factor_accept accept;
+    void *ctx;
     const uz_hooks *hooks;
 } wanted;
 
@@ -48,7 +50,7 @@ uz_status uz_matrix_digest(uz_matrix_key *key, const uz_csc *K, uz_error *err)
 static uz_status digest_with_order(char digest[65], const char *first, const wanted *w, uz_error *err)
 {
     uz_digest *state = uz_digest_new();
-    int ordering = (int)w->settings->ordering;
+    int ordering = (int)w->ordering;
     if (!state)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
     uz_digest_add(state, first, 64);
@@ -67,7 +69,7 @@ static void destroy_analysis(void *object)
 
 static uz_status analyze(uz_analysis **out, const wanted *w, uz_error *err)
 {
-    return uz_analysis_choose(out, w->K, w->dofs, w->n_dofs, w->rows, w->settings->ordering, w->hooks, err);
+    return uz_analysis_choose(out, w->K, w->dofs, w->n_dofs, w->rows, w->ordering, w->hooks, err);
 }
 
 /* The analysis of this pattern: from the table, or made and kept there. */
@@ -103,7 +105,9 @@ static void destroy_factor(void *object)
 
 static uz_status factorize(uz_factor **out, const uz_analysis *analysis, const wanted *w, uz_error *err)
 {
-    return uz_factor_create(out, w->K, analysis, w->settings->memory_limit, w->hooks, err);
+    uz_factor_info predicted = uz_analysis_describe(analysis);
+    uz_status status = w->accept(w->ctx, &predicted, err);
+    return status == UZ_OK ? uz_factor_create(out, w->K, analysis, 0, w->hooks, err) : status;
 }
 
 static uz_status make_kept(kept_factor **out, bool *analysis_reused, uz_cache *cache, const wanted *w, uz_error *err)
@@ -112,7 +116,7 @@ static uz_status make_kept(kept_factor **out, bool *analysis_reused, uz_cache *c
     kept_factor *kept = uz_alloc_zero(1, sizeof *kept);
     if (!kept)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache entry");
-    kept->ordering = w->settings->ordering;
+    kept->ordering = w->ordering;
     memcpy(kept->K, w->key->values, sizeof kept->K);
     uz_status status = get_analysis(&analysis, analysis_reused, cache, w, err);
     if (status == UZ_OK)
@@ -129,7 +133,7 @@ static bool fits(const void *object, void *ctx)
 {
     const kept_factor *kept = object;
     const wanted *w = ctx;
-    return kept->ordering == w->settings->ordering && strcmp(kept->K, w->key->values) == 0;
+    return kept->ordering == w->ordering && strcmp(kept->K, w->key->values) == 0;
 }
 
 /* The contact, and not much else, comes last: what is dense is as large as all that does. */
@@ -167,17 +171,25 @@ static uz_status get_shared(uz_shared_factor *out, uz_cache *cache, wanted *w, u
             uz_table_publish(cache, out->item, kept, uz_factor_describe(kept->factor).bytes, destroy_factor);
     }
     kept = uz_item_object(out->item);
+    if (!create) {
+        uz_factor_info there = uz_factor_describe(kept->factor);
+        uz_status status = w->accept(w->ctx, &there, err);
+        if (status != UZ_OK) {
+            uz_table_release(cache, out->item);
+            out->item = NULL;
+            return status;
+        }
+        out->analysis_reused = out->factor_reused = true;
+    }
     out->factor = kept->factor;
-    out->factor_reused = !create;
-    out->analysis_reused |= !create;
     return UZ_OK;
 }
 
 uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,
-                               const int64_t *dofs, int64_t n_dofs, int64_t rows, const uz_settings *settings,
-                               const uz_hooks *hooks, uz_error *err)
+                               const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering,
+                               uz_factor_accept accept, void *ctx, const uz_hooks *hooks, uz_error *err)
 {
-    wanted w = {key, K, dofs, n_dofs, rows, settings, hooks};
+    wanted w = {key, K, dofs, n_dofs, rows, ordering, accept, ctx, hooks};
     uz_analysis *analysis = NULL;
     memset(out, 0, sizeof *out);
     if (cache)

@@ -21,12 +21,15 @@ typedef struct {
     uz_item *item;
 } uz_shared_factor;
 
+/* Asked before a factor is made, or one that is there is taken: what it returns, if not UZ_OK, ends the call. */
+typedef uz_status (*uz_factor_accept)(void *ctx, const uz_factor_info *predicted, uz_error *err);
+
 /* Finds a factor of K, one that ends with the contact's dofs (ascending) if it can, or makes one that does or that
  * serves `rows` rows on them as well (uz_analysis_choose), with an analysis of the same pattern where there is one.
  * cache NULL: made, and freed on release; key is then not read. Errors: uz_factor_create's. */
 uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,
-                               const int64_t *dofs, int64_t n_dofs, int64_t rows, const uz_settings *settings,
-                               const uz_hooks *hooks, uz_error *err);
+                               const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering,
+                               uz_factor_accept accept, void *ctx, const uz_hooks *hooks, uz_error *err);
 void uz_shared_factor_release(uz_shared_factor *shared);
 
 #endif

@@ -1,4 +1,4 @@
-/* dual.c: the one door to both forms of the operator. */
+/* dual.c: the one door to all forms of the operator. */
 #include "dual/dual_private.h"
 
 #include "core/alloc.h"
@@ -21,8 +21,7 @@ uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, 
     return UZ_OK;
 }
 
-/* One entry in each row; false also where there is no memory to tell. */
-static bool bounds_dofs(const uz_csc *N)
+bool uz_dual_bounds_dofs(const uz_csc *N)
 {
     int64_t nnz = N->ptr[N->cols];
     bool *seen = nnz == N->rows ? uz_alloc_zero(N->rows, sizeof *seen) : NULL, single = seen != NULL;
@@ -47,7 +46,7 @@ uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked)
     double n = (double)rows, d = (double)N->cols;
     if (asked != UZ_OPERATOR_AUTO)
         return asked;
-    bool bounds = rows > SMALL_BOUNDS && bounds_dofs(N), dense = 2.0 * n * n * n / 30.0 <= 300.0 * 60.0 * d;
+    bool bounds = rows > SMALL_BOUNDS && uz_dual_bounds_dofs(N), dense = 2.0 * n * n * n / 30.0 <= 300.0 * 60.0 * d;
     if (bounds)
         return dense && 2 * n_b <= N->cols ? UZ_OPERATOR_CONDENSED : UZ_OPERATOR_FACTORED;
     return rows <= SMALL || dense ? UZ_OPERATOR_CONDENSED : UZ_OPERATOR_FACTORED;
@@ -99,8 +98,8 @@ static uz_status scale_rows(uz_dual *dual, uz_error *err)
     return UZ_OK;
 }
 
-uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
-                         uz_error *err)
+static uz_status create(uz_dual **out, const uz_csc *N, const uz_factor *factor, const uz_krylov *krylov,
+                        uz_operator op, const uz_hooks *hooks, uz_error *err)
 {
     *out = NULL;
     uz_dual *dual = uz_alloc_zero(1, sizeof *dual);
@@ -111,6 +110,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
     dual->info.d = N->cols;
     dual->info.m = N->rows;
     dual->factor = factor;
+    dual->krylov = krylov;
     dual->lazy = lazy_new();
     uz_status status = UZ_OK;
     if (!dual->lazy)
@@ -124,7 +124,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
     dual->info.bytes = 48 * (size_t)N->ptr[N->cols];
     if (status == UZ_OK && op == UZ_OPERATOR_CONDENSED)
         status = uz_condensed_create(dual, &leave, err);
-    if (status == UZ_OK && op == UZ_OPERATOR_FACTORED)
+    if (status == UZ_OK && op != UZ_OPERATOR_CONDENSED)
         status = uz_bounds_create(dual, err);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
@@ -133,6 +133,18 @@ uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor
     else
         uz_dual_free(dual);
     return status;
+}
+
+uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
+                         uz_error *err)
+{
+    return create(out, N, factor, NULL, op, hooks, err);
+}
+
+uz_status uz_dual_create_free(uz_dual **out, const uz_csc *N, const uz_krylov *krylov, const uz_hooks *hooks,
+                              uz_error *err)
+{
+    return create(out, N, NULL, krylov, UZ_OPERATOR_MATRIX_FREE, hooks, err);
 }
 
 void uz_dual_free(uz_dual *dual)
@@ -223,6 +235,7 @@ void uz_case_free(uz_case *load)
     free(load->work2);
     free(load->push_weight);
     uz_bounded_free(load->box);
+    uz_inexact_free(load->inexact);
     free(load->push);
     free(load->kept);
     free(load);
@@ -231,6 +244,16 @@ void uz_case_free(uz_case *load)
 void uz_case_set_leave(uz_case *load, const uz_leave *leave)
 {
     load->leave = *leave;
+}
+
+size_t uz_case_bytes(const uz_case *load)
+{
+    const uz_dual_info *info = &load->dual->info;
+    size_t d = (size_t)info->d, m = (size_t)info->m, vectors = info->op == UZ_OPERATOR_CONDENSED ? 5 : 7;
+    size_t bytes = 8 * (vectors * d + 2 * m);
+    if (load->box)
+        bytes += 8 * (10 * d + m);
+    return bytes + (load->inexact ? 8 * 8 * d : 0);
 }
 
 const double *uz_case_g0(const uz_case *load)
@@ -260,7 +283,9 @@ bool uz_case_steps_are_small(const uz_case *load)
 
 bool uz_case_rows_may_depend(const uz_case *load)
 {
-    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? !load->dual->dense.scaled : !load->box;
+    if (load->dual->info.op == UZ_OPERATOR_CONDENSED)
+        return !load->dual->dense.scaled;
+    return !load->box && !load->inexact; /* each row that joins would cost an inexact solve */
 }
 
 bool uz_case_guess_active(uz_case *load, bool *active)
@@ -301,12 +326,16 @@ uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error
     if (status != UZ_OK || !lambda_max)
         return status;
     pthread_mutex_lock(&lazy->mutex);
+    if (load->inexact)
+        load->inexact->tight = 0.1 * LAMBDA_TOLERANCE;
     if (isnan(lazy->lambda_max))
         status = uz_lanczos_max(lambda_max, load->dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
     else
         *lambda_max = lazy->lambda_max;
     if (status == UZ_OK)
         lazy->lambda_max = *lambda_max;
+    if (load->inexact)
+        load->inexact->tight = UZ_CHANGE_KEPT;
     pthread_mutex_unlock(&lazy->mutex);
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }

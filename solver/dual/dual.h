@@ -2,9 +2,10 @@
  *
  *     psi(r) = psi0 + r'g0 - 1/2 r'D r,   gap g(u(r)) = g0 - D r,   K u(r) = p + N'r
  *
- * The methods see only this interface: apply, push, recover, and the numbers of uz_case. Behind it stand two forms:
+ * The methods see only this interface: apply, push, recover, and the numbers of uz_case. Behind it stand three forms:
  *   condensed  dense D on the contact, from the trailing block of a factor with the contact dofs last;
- *   factored   one sparse solve per application (Kanno's form).
+ *   factored   one sparse solve per application (Kanno's form);
+ *   matrix_free  the same by conjugate gradients, without a factor: every answer carries a bound on what is left.
  * Rows of N are scaled to a norm of about 1 by powers of two, so that how a caller wrote a condition changes nothing
  * but exponents; unit normals stay as they are. All m-vectors of this interface are those of the scaled rows.
  *
@@ -14,6 +15,7 @@
 
 #include "core/hooks.h"
 #include "factor/factor.h"
+#include "krylov/krylov.h"
 #include "uzawa.h"
 
 /* A row whose compliance D_ii falls to this part of itself when others are held depends on them: what is left is the
@@ -28,14 +30,21 @@ typedef struct {
     size_t bytes; /* beside K, N and the factor, with what is made on demand */
 } uz_dual_info;
 
-/* The form that AUTO stands for, from the sizes (n_b: dofs that N touches) and whether each row bounds one dof. */
+/* The form that AUTO stands for, among those with a factor, from the sizes (n_b: dofs that N touches) and whether
+ * each row bounds one dof. */
 uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked);
+
+/* Whether each row has one entry: it bounds a dof. False also where there is no memory to tell. */
+bool uz_dual_bounds_dofs(const uz_csc *N);
 
 /* The factor stays the caller's and must outlive *out; N (m x d) is copied, and scaled. When op is CONDENSED the
  * factor's last dofs must be the ones that N touches: uz_dual_contact_dofs lists them, ascending; the caller frees
  * *dofs. */
 uz_status uz_dual_create(uz_dual **out, const uz_csc *N, const uz_factor *factor, uz_operator op, const uz_hooks *hooks,
                          uz_error *err);
+/* The matrix-free form: krylov takes the factor's place. */
+uz_status uz_dual_create_free(uz_dual **out, const uz_csc *N, const uz_krylov *krylov, const uz_hooks *hooks,
+                              uz_error *err);
 void uz_dual_free(uz_dual *dual);
 uz_dual_info uz_dual_describe(const uz_dual *dual);
 uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err);
@@ -49,6 +58,14 @@ void uz_case_free(uz_case *load);
  * solved, and preparing leaves D to be applied by its factors and lambda_max 0: nothing is wrong, and whoever asks next
  * finds that it is over. */
 void uz_case_set_leave(uz_case *load, const uz_leave *leave);
+/* What the case holds now, but for a factor of the free dofs, which comes and goes. */
+size_t uz_case_bytes(const uz_case *load);
+/* What the answers will be needed for: a relative error in the energy norm, and who may end inner iterations (hooks are
+ * borrowed). Called before the methods run, and again when the aim gets smaller. MATRIX_FREE solves no better than
+ * that: without a call to 1e-10. The other forms solve as well as they can. */
+uz_status uz_case_aim(uz_case *load, double relative_error, const uz_hooks *hooks, double deadline, uz_error *err);
+/* MATRIX_FREE: *value >= e'K^-1 e, sharp where time allows; e (d) becomes K^-1 e, about. */
+uz_status uz_case_inverse_norm(uz_case *load, double *value, double *e, uz_error *err);
 const double *uz_case_g0(const uz_case *load); /* m: gap of the body without reactions */
 /* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
 double uz_case_force_norm(uz_case *load, const double *x);

@@ -1,4 +1,4 @@
-/* dual_private.h: what the two forms of the operator share. */
+/* dual_private.h: what the forms of the operator share. */
 #ifndef UZ_DUAL_PRIVATE_H
 #define UZ_DUAL_PRIVATE_H
 
@@ -42,8 +42,24 @@ typedef struct {
     double *force, *size;   /* d: a residual of equilibrium and what its rounding is in proportion to */
     double *point;          /* d: where the sweeps ended; energy INFINITY before the first */
     double point_energy;
-    uz_csc K_upper; /* K's upper triangle: the rows of K */
 } uz_bounded;
+
+/* Share of a change of the response that an application of D may leave unsolved. */
+#define UZ_CHANGE_KEPT 0.01
+
+/* MATRIX_FREE: how well the equations of a load are solved. Slacks are bounds in the energy norm. */
+typedef struct {
+    uz_cg cg;   /* of the whole body */
+    double *p;  /* d */
+    double aim; /* relative */
+    const uz_hooks *hooks;
+    double deadline;
+    double base_slack; /* of base = K^-1 p */
+    double slack;      /* of what the last apply or solve_active left */
+    double tight;      /* relative accuracy of a change of the response */
+    double coarse;     /* accuracy at which the next guess of the active rows is judged */
+    double *right;     /* d: a right-hand side */
+} uz_inexact;
 
 /* What is made at the first need, by whoever needs it; pointers are published to cases under the mutex and never
  * change. */
@@ -56,12 +72,13 @@ typedef struct {
 
 struct uz_dual {
     uz_dual_info info;
-    uz_csc N;          /* m x d, rows scaled */
-    double *row_scale; /* m: powers of two */
-    const uz_factor *factor;
-    uz_csc Nt;          /* d x m */
-    uz_condensed dense; /* CONDENSED */
-    uz_bounds bounds;   /* FACTORED */
+    uz_csc N;                /* m x d, rows scaled */
+    double *row_scale;       /* m: powers of two */
+    const uz_factor *factor; /* NULL: MATRIX_FREE */
+    const uz_krylov *krylov; /* MATRIX_FREE */
+    uz_csc Nt;               /* d x m */
+    uz_condensed dense;      /* CONDENSED */
+    uz_bounds bounds;        /* FACTORED */
     uz_dual_lazy *lazy;
 };
 
@@ -82,7 +99,8 @@ struct uz_case {
     uz_bounded *box;             /* FACTORED with bounds, else NULL */
     double *push, *kept; /* correction: CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
     bool has_kept;
-    uz_leave leave; /* of the run: asked inside dense work of n^3 */
+    uz_inexact *inexact; /* MATRIX_FREE, else NULL */
+    uz_leave leave;      /* of the run: asked inside dense work of n^3 */
 };
 
 uz_status uz_condensed_create(uz_dual *dual, const uz_leave *leave, uz_error *err);
@@ -120,9 +138,25 @@ uz_status uz_bounded_create(uz_case *load, const double *p, uz_error *err);
 void uz_bounded_free(uz_bounded *box);
 bool uz_bounded_crossed(const uz_case *load, double *y);
 bool uz_bounded_guess(uz_case *load, bool *active);
+/* Steps of it: holds the dofs of the active rows at their bounds, the others at 0 or where they were (keep); force = K
+ * u
+ * - p and size = |K| |u| + |p|, what its rounding is in proportion to; r from what holds the dofs, `active` the rows
+ * that do; the gaps. */
+void uz_bounded_hold(uz_bounded *box, const uz_bounds *bounds, const bool *active, bool keep, int64_t d, int64_t m);
+void uz_bounded_balance(uz_bounded *box, const uz_csc *K);
+void uz_bounded_react(uz_bounded *box, bool *active, const uz_bounds *bounds, int64_t d, int64_t m);
+void uz_bounded_measure_gaps(double *g, const uz_case *load, const bool *active);
 uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 /* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */
 bool uz_bounded_recover(const uz_case *load, double *u, const double *r);
+
+/* Makes load->base and load->response what `factored` makes them, within the aim. */
+uz_status uz_inexact_create(uz_case *load, const double *p, uz_error *err);
+void uz_inexact_free(uz_inexact *inexact);
+uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
+/* Solves for the free dofs of box->u, those held standing at their bounds: r, g, active as uz_case_solve_active. A
+ * guess that is seen to be wrong at a looser tolerance is not solved to the end. */
+uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *active, uz_error *err);
 
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.

@@ -19,7 +19,7 @@ static uz_status weigh(uz_case *load, uz_error *err)
     return UZ_OK;
 }
 
-/* x = K^-1 x, through load->work2. */
+/* x = K^-1 x, through load->work2. MATRIX_FREE never comes here. */
 static uz_status solve(uz_case *load, double *x, uz_error *err)
 {
     const uz_factor *factor = load->dual->factor;
@@ -34,10 +34,13 @@ static uz_status solve(uz_case *load, double *x, uz_error *err)
 uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err)
 {
     int64_t d = load->dual->info.d, m = load->dual->info.m;
-    memcpy(load->base, p, (size_t)d * sizeof *p);
     uz_status status = weigh(load, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK && load->dual->krylov) {
+        status = uz_inexact_create(load, p, err);
+    } else if (status == UZ_OK) {
+        memcpy(load->base, p, (size_t)d * sizeof *p);
         status = solve(load, load->base, err);
+    }
     if (status != UZ_OK)
         return status;
     for (int64_t j = 0; j < d; j++)
@@ -58,6 +61,8 @@ static bool all_zero(const double *x, int64_t n)
 uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
 {
     const uz_dual *dual = load->dual;
+    if (load->inexact)
+        return uz_inexact_apply(load, Dr, r, err);
     memset(load->response, 0, (size_t)dual->info.d * sizeof(double));
     memset(Dr, 0, (size_t)dual->info.m * sizeof *Dr);
     if (all_zero(r, dual->info.m))
@@ -81,7 +86,8 @@ uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const
     uz_csc_symv(Kc, load->K, 1.0, c);
     for (int64_t j = 0; j < dual->info.d; j++)
         square += c[j] * Kc[j];
-    *bound2 = fmax(0.0, square) + 2.0 * complementarity;
+    double distance = sqrt(fmax(0.0, square)) + (load->inexact ? load->inexact->slack : 0.0);
+    *bound2 = distance * distance + 2.0 * complementarity;
     return UZ_OK;
 }
 

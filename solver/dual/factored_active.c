@@ -7,7 +7,7 @@
 #include <string.h>
 
 /* Which row holds each dof. Of several rows on a dof the tightest counts; a dof is not held from both sides. */
-static void hold(uz_bounded *box, const uz_bounds *bounds, const bool *active, int64_t d, int64_t m)
+void uz_bounded_hold(uz_bounded *box, const uz_bounds *bounds, const bool *active, bool keep, int64_t d, int64_t m)
 {
     for (int64_t j = 0; j < d; j++)
         box->holder[j] = -1;
@@ -22,23 +22,28 @@ static void hold(uz_bounded *box, const uz_bounds *bounds, const bool *active, i
     }
     for (int64_t j = 0; j < d; j++) {
         box->fixed[j] = box->holder[j] >= 0;
-        box->u[j] = !box->fixed[j] ? 0.0 : bounds->scale[box->holder[j]] > 0.0 ? box->top[j] : box->bottom[j];
+        double free = keep ? box->u[j] : 0.0;
+        box->u[j] = !box->fixed[j] ? free : bounds->scale[box->holder[j]] > 0.0 ? box->top[j] : box->bottom[j];
     }
 }
 
 /* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to. */
-static void balance(uz_bounded *box, const uz_csc *K)
+void uz_bounded_balance(uz_bounded *box, const uz_csc *K)
 {
-    const uz_csc *parts[2] = {&box->K_upper, K};
     for (int64_t j = 0; j < K->cols; j++) {
-        double force = -box->p[j], size = fabs(box->p[j]);
-        for (int part = 0; part < 2; part++) { /* the diagonal comes last in the one and is left out of the other */
-            const uz_csc *A = parts[part];
-            for (int64_t k = A->ptr[j] + part; k < A->ptr[j + 1]; k++) {
-                double term = A->val[k] * box->u[A->idx[k]];
-                force += term;
-                size += fabs(term);
-            }
+        box->force[j] = -box->p[j];
+        box->size[j] = fabs(box->p[j]);
+    }
+    for (int64_t j = 0; j < K->cols; j++) {
+        /* Rows above have added their terms; the diagonal comes first in a sorted column. */
+        double u = box->u[j], own = K->val[K->ptr[j]] * u, force = box->force[j] + own, size = box->size[j] + fabs(own);
+        for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
+            int64_t i = K->idx[k];
+            double below = K->val[k] * u, across = K->val[k] * box->u[i];
+            box->force[i] += below;
+            box->size[i] += fabs(below);
+            force += across;
+            size += fabs(across);
         }
         box->force[j] = force;
         box->size[j] = size;
@@ -54,7 +59,7 @@ static uz_status solve_free(uz_case *load, bool *solved, uz_error *err)
     uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, load->ws, err);
     *solved = part != NULL;
     for (int pass = 0; part && status == UZ_OK && pass < PASSES; pass++) {
-        balance(box, load->K);
+        uz_bounded_balance(box, load->K);
         status = uz_principal_solve(box->force, part, err);
         for (int64_t j = 0; status == UZ_OK && j < load->K->cols; j++)
             box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
@@ -69,7 +74,7 @@ static uz_status solve_free(uz_case *load, bool *solved, uz_error *err)
 
 /* r from what holds the dofs; `active` becomes the rows that do. A dof whose bounds meet is held from the side that it
  * leans on. */
-static void react(uz_bounded *box, bool *active, const uz_bounds *bounds, int64_t d, int64_t m)
+void uz_bounded_react(uz_bounded *box, bool *active, const uz_bounds *bounds, int64_t d, int64_t m)
 {
     memset(box->r, 0, (size_t)m * sizeof *box->r);
     memset(active, 0, (size_t)m * sizeof *active);
@@ -86,7 +91,7 @@ static void react(uz_bounded *box, bool *active, const uz_bounds *bounds, int64_
     }
 }
 
-static void measure_gaps(double *g, const uz_case *load, const bool *active)
+void uz_bounded_measure_gaps(double *g, const uz_case *load, const bool *active)
 {
     const uz_bounds *bounds = &load->dual->bounds;
     for (int64_t i = 0; i < load->dual->info.m; i++) {
@@ -104,13 +109,21 @@ uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *sol
     if (box->contradictory)
         return UZ_OK;
     box->has_exact = false;
-    hold(box, &dual->bounds, active, dual->info.d, dual->info.m);
-    uz_status status = solve_free(load, solved, err);
+    uz_bounded_hold(box, &dual->bounds, active, load->inexact != NULL, dual->info.d, dual->info.m);
+    uz_status status = UZ_OK;
+    if (load->inexact) {
+        status = uz_inexact_solve_active(load, r, g, active, err);
+        *solved = status == UZ_OK;
+    } else {
+        status = solve_free(load, solved, err);
+    }
     if (status != UZ_OK || !*solved)
         return status;
-    balance(box, load->K);
-    react(box, active, &dual->bounds, dual->info.d, dual->info.m);
-    measure_gaps(g, load, active);
+    if (!load->inexact) {
+        uz_bounded_balance(box, load->K);
+        uz_bounded_react(box, active, &dual->bounds, dual->info.d, dual->info.m);
+        uz_bounded_measure_gaps(g, load, active);
+    }
     memcpy(r, box->r, (size_t)dual->info.m * sizeof *r);
     box->has_exact = true;
     return UZ_OK;

@@ -92,7 +92,8 @@ uz_status uz_bounded_create(uz_case *load, const double *p, uz_error *err)
     memcpy(box->p, p, (size_t)d * sizeof *p);
     box->point_energy = INFINITY;
     find_tightest(box, &load->dual->bounds, load->h, d, m);
-    return uz_csc_transpose(&box->K_upper, load->K, err);
+    memcpy(box->u, load->base, (size_t)d * sizeof *box->u);
+    return UZ_OK;
 }
 
 void uz_bounded_free(uz_bounded *box)
@@ -106,7 +107,6 @@ void uz_bounded_free(uz_bounded *box)
     free(box->lower);
     free(box->holder);
     free(box->fixed);
-    uz_csc_clear(&box->K_upper);
     free(box);
 }
 
@@ -132,26 +132,14 @@ static double clip(double x, double least, double most)
     return fmin(most, fmax(least, x));
 }
 
-/* (p - K u)_j */
-static double pull(const uz_bounded *box, const uz_csc *K, const double *u, int64_t j)
-{
-    const uz_csc *U = &box->K_upper;
-    double sum = box->p[j];
-    for (int64_t k = U->ptr[j]; k < U->ptr[j + 1]; k++)
-        sum -= U->val[k] * u[U->idx[k]];
-    for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) /* sorted: the diagonal, in both, comes first */
-        sum -= K->val[k] * u[K->idx[k]];
-    return sum;
-}
-
 /* pi(u), and force = p - K u in passing. */
 static double energy(uz_bounded *box, const uz_csc *K, const double *u)
 {
     double sum = 0.0;
-    for (int64_t j = 0; j < K->cols; j++) {
-        box->force[j] = pull(box, K, u, j);
+    memcpy(box->force, box->p, (size_t)K->cols * sizeof *box->p);
+    uz_csc_symv(box->force, K, -1.0, u);
+    for (int64_t j = 0; j < K->cols; j++)
         sum -= 0.5 * u[j] * (box->p[j] + box->force[j]);
-    }
     return sum;
 }
 
@@ -161,13 +149,29 @@ static double energy(uz_bounded *box, const uz_csc *K, const double *u)
 #define OVERRELAXATION 1.9
 enum { SWEEPS = 6 };
 
+/* x += (K without its diagonal)_ij times u_j for i > j */
+static void push_down(double *x, const uz_csc *K, int64_t j, double u)
+{
+    for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++)
+        x[K->idx[k]] += K->val[k] * u;
+}
+
+/* Dof after dof, each by the row of K that its column of the lower triangle holds one part of; above (d) adds up the
+ * other part: of the new values on the way down, of the old ones on the way up. */
 static void sweep(uz_bounded *box, const uz_csc *K, bool backwards)
 {
-    double *u = box->point;
+    double *u = box->point, *above = box->size;
+    memset(above, 0, (size_t)K->cols * sizeof *above);
+    for (int64_t j = 0; backwards && j < K->cols; j++)
+        push_down(above, K, j, u[j]);
     for (int64_t k = 0; k < K->cols; k++) {
         int64_t j = backwards ? K->cols - 1 - k : k;
-        double step = OVERRELAXATION * pull(box, K, u, j) / K->val[K->ptr[j]];
-        u[j] = clip(u[j] + step, box->bottom[j], box->top[j]);
+        double pull = box->p[j] - above[j];
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            pull -= K->val[q] * u[K->idx[q]];
+        u[j] = clip(u[j] + OVERRELAXATION * pull / K->val[K->ptr[j]], box->bottom[j], box->top[j]);
+        if (!backwards)
+            push_down(above, K, j, u[j]);
     }
 }
 

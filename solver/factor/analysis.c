@@ -141,6 +141,23 @@ void uz_analysis_free(uz_analysis *analysis)
 }
 
 /* Perm, ColCount and position; super, pi and px; the row indices. */
+uz_factor_info uz_analysis_describe(const uz_analysis *analysis)
+{
+    const cholmod_factor *L = analysis->L;
+    uz_factor_info info = {
+        .ordering = analysis->chosen.ordering,
+        .contact_last = analysis->chosen.contact_last,
+        .n = analysis->n,
+        .nnz = (int64_t)L->xsize,
+        .flops = analysis->chosen.flops,
+        .n_considered = analysis->n_considered,
+        .bytes = 8 * L->xsize + 8 * L->ssize + 32 * (size_t)analysis->n,
+        .order_s = analysis->seconds,
+    };
+    memcpy(info.considered, analysis->considered, sizeof info.considered);
+    return info;
+}
+
 size_t uz_analysis_bytes(const uz_analysis *analysis)
 {
     const cholmod_factor *L = analysis->L;

@@ -146,3 +146,14 @@ cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64
     free(sum);
     return graph;
 }
+
+bool uz_group_dofs(int64_t *head, const uz_csc *K)
+{
+    uint64_t *sum = uz_alloc(K->cols, sizeof *sum);
+    if (sum) {
+        sum_neighbourhoods(sum, K->ptr, K->idx, K->cols, NULL, 0);
+        find_heads(head, sum, K->ptr, K->idx, K->cols);
+    }
+    free(sum);
+    return sum != NULL;
+}

@@ -118,15 +118,7 @@ static double least_pivot_share(const uz_factor *factor, const uz_csc *K)
 static uz_status describe(uz_factor *factor, const uz_csc *K, uz_error *err)
 {
     uz_factor_info *info = &factor->info;
-    info->n = factor->n;
-    info->nnz = (int64_t)factor->L.xsize;
-    info->flops = factor->analysis->chosen.flops;
-    info->ordering = factor->analysis->chosen.ordering;
-    info->contact_last = factor->analysis->chosen.contact_last;
-    memcpy(info->considered, factor->analysis->considered, sizeof info->considered);
-    info->n_considered = factor->analysis->n_considered;
-    info->order_s = factor->analysis->seconds;
-    info->bytes = 8 * factor->L.xsize + 8 * factor->L.ssize + 32 * (size_t)factor->n;
+    *info = uz_analysis_describe(factor->analysis);
     info->rcond = least_pivot_share(factor, K);
     if (!(info->rcond >= RCOND_LEAST * (double)factor->n))
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",

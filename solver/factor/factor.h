@@ -44,6 +44,8 @@ uz_status uz_analysis_choose(uz_analysis **out, const uz_csc *K, const int64_t *
                              uz_ordering ordering, const uz_hooks *hooks, uz_error *err);
 void uz_analysis_free(uz_analysis *analysis);
 size_t uz_analysis_bytes(const uz_analysis *analysis);
+/* What a factor made from it will be: everything but rcond and factor_s. */
+uz_factor_info uz_analysis_describe(const uz_analysis *analysis);
 
 /* Factors K (lower triangle, n x n), whose pattern must be the one that was analysed. memory_limit 0: none. `cancelled`
  * is asked before the factorization, as CHOLMOD itself can't be interrupted. Errors: NOT_SPD names the pivot, LIMIT the
@@ -116,6 +118,10 @@ uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *f
 void uz_principal_free(uz_principal *part);
 /* x_F = K_FF^-1 x_F in place; x (n) at fixed dofs is neither read nor written. */
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err);
+
+/* head[i] (n): the first dof of i's group: dofs with the same neighbours in K (lower triangle), as those of a node
+ * have. false: no memory. */
+bool uz_group_dofs(int64_t *head, const uz_csc *K);
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);

@@ -9,6 +9,7 @@ typedef struct {
     const uz_problem *problem;
     const uz_settings *settings;
     const uz_hooks *hooks;
+    uz_settings with_factor;     /* the settings, but for an operator without a factor */
     uz_cache *cache, *own_cache; /* own: for the rounds, where the caller has none */
     bool is_scene;
     uz_body_model model;       /* scenes */

@@ -57,6 +57,19 @@ static uz_status build_scene(uz_semi *s, uz_error *err)
     return status;
 }
 
+/* Null spaces and the noise of augmented matrices are bounded with a factor: nothing else will do. */
+static uz_status keep_a_factor(uz_semi *s, uz_error *err)
+{
+    int64_t *dofs = NULL, n_b = 0;
+    if (s->with_factor.op != UZ_OPERATOR_AUTO && s->with_factor.op != UZ_OPERATOR_MATRIX_FREE)
+        return UZ_OK;
+    uz_status status = uz_dual_contact_dofs(&dofs, &n_b, s->of.N, err);
+    if (status == UZ_OK)
+        s->with_factor.op = uz_dual_choose(s->of.N, n_b, UZ_OPERATOR_AUTO);
+    free(dofs);
+    return status;
+}
+
 static uz_status prepare(uz_semi *s, uz_error *err)
 {
     const uz_qp *qp = &s->problem->qp;
@@ -68,6 +81,9 @@ static uz_status prepare(uz_semi *s, uz_error *err)
         return status;
     s->d = s->of.K->cols;
     s->m = s->of.N->rows;
+    status = keep_a_factor(s, err);
+    if (status != UZ_OK)
+        return status;
     double **room[] = {&s->stiffness, &s->soft, &s->weight, &s->target};
     bool ok = (s->inverse = uz_alloc_zero(s->d, sizeof(double))) != NULL;
     for (int i = 0; i < 4; i++)
@@ -429,7 +445,8 @@ uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, cons
                                 uz_cache *cache, const uz_hooks *hooks, uz_status refused, double started,
                                 uz_error *err)
 {
-    uz_semi s = {.problem = problem, .settings = settings, .hooks = hooks, .cache = cache};
+    uz_semi s = {.problem = problem, .with_factor = *settings, .hooks = hooks, .cache = cache};
+    s.settings = &s.with_factor;
     uz_error own = {0};
     s.is_scene = problem->kind == UZ_PROBLEM_SCENE;
     s.started = started;

@@ -15,6 +15,7 @@ typedef enum {
     WAY_CACHED,   /* as default, a second time with its factor from the cache */
     WAY_FACTORED, /* accelerated_restart by sparse solves, 1e-6, few iterations */
     WAY_ACTIVE,   /* active_set, 1e-8 */
+    WAY_FREE,     /* matrix_free, 1e-8: may refuse matrices that a factorization takes */
     WAYS
 } way;
 

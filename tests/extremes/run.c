@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const WAY_NAMES[WAYS] = {"default", "exact", "cached", "factored", "active"};
+static const char *const WAY_NAMES[WAYS] = {"default", "exact", "cached", "factored", "active", "free"};
 
 static uz_settings settings_of(way how)
 {
@@ -17,6 +17,10 @@ static uz_settings settings_of(way how)
         s.relative_error = 0;
     if (how == WAY_ACTIVE)
         s.method = UZ_METHOD_ACTIVE_SET;
+    if (how == WAY_FREE) {
+        s.op = UZ_OPERATOR_MATRIX_FREE;
+        s.max_iterations = 2000;
+    }
     if (how == WAY_FACTORED) {
         s.method = UZ_METHOD_ACCELERATED_RESTART;
         s.op = UZ_OPERATOR_FACTORED;
@@ -41,6 +45,8 @@ static bool is_missed(owed what, way how, uz_status status, const uz_result *res
         return true;
     if (what == OWED_ERROR)
         return status == UZ_OK;
+    if (how == WAY_FREE && status == UZ_ERR_NOT_SPD)
+        return false;
     if (what == OWED_ANSWER)
         return status != UZ_OK || (plain && result->summary.outcome != UZ_CONVERGED);
     return what == OWED_PROOF && plain && (status != UZ_OK || result->summary.outcome != UZ_INFEASIBLE);
@@ -120,6 +126,7 @@ static void run_ways(const task *t)
         run_way(t, &known, WAY_CACHED, cache);
         run_way(t, &known, WAY_FACTORED, NULL);
         run_way(t, &known, WAY_ACTIVE, NULL);
+        run_way(t, &known, WAY_FREE, NULL);
     }
     truth_clear(&known);
     uz_cache_free(cache);

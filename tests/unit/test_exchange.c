@@ -105,7 +105,7 @@ TEST(rows_that_touch_without_pressing)
 /* u_1 <= 1 and -u_1 <= -1 - overlap, on unit springs, among other rows. */
 static uz_qp overlapping(int64_t others, double overlap, double cosine)
 {
-    int64_t d = others + 2, m = others + 2;
+    int64_t d = others + 2, m = d;
     double *K = vector(d * d), *N = vector(m * d);
     uz_qp qp = {.p = vector(d), .h = vector(m)};
     for (int64_t j = 0; j < d; j++) {

@@ -149,6 +149,17 @@ TEST(matrices)
                    UZ_ORDERING_AMD, true);
 }
 
+/* Large enough for coarse levels. */
+TEST(matrix_free)
+{
+    uz_problem fine = scene_problem();
+    fine.scene.box.cells[0] = 30;
+    fine.scene.box.cells[1] = 20;
+    check_scenario("matrix-free scene", fine, UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO, false);
+    check_scenario("matrix-free rows", dependent_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, UZ_ORDERING_AUTO,
+                   true);
+}
+
 TEST(dependent_rows)
 {
     check_scenario("dependent rows", dependent_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AMD,

@@ -410,14 +410,14 @@ TEST(errors_say_which_case)
 
 TEST(results_count_as_memory)
 {
-    uz_problem problem = scene_with_cases(40);
+    enum { CASES = 200 };
+    uz_problem problem = scene_with_cases(CASES);
     uz_settings settings = uz_settings_default();
     uz_result **results = solve_cases(&problem, &settings, NULL);
-    size_t u = (size_t)length_of_u(results[0]) * sizeof(double);
-    settings.memory_limit = results[0]->summary.factor_bytes + 40 * u; /* the factor fits, the results don't */
-    uz_results_free(results, 40);
+    settings.memory_limit = (size_t)results[0]->summary.cost.bytes + 1000; /* the body fits, the results don't */
+    uz_results_free(results, CASES);
     check_refused(&problem, &settings, NULL, UZ_ERR_LIMIT, "/cases");
     settings.memory_limit = 1 << 30;
-    uz_results_free(solve_cases(&problem, &settings, NULL), 40);
+    uz_results_free(solve_cases(&problem, &settings, NULL), CASES);
     uz_problem_clear(&problem);
 }

@@ -1,0 +1,13 @@
+/* memory.h: how much memory this process may use. */
+#ifndef SERVER_MEMORY_H
+#define SERVER_MEMORY_H
+
+#include <stddef.h>
+
+/* Bytes of the machine, or of the control group (version 2 or 1) where that allows less. */
+size_t memory_available(void);
+
+/* What one of `workers` solves may take: 80 % of all, less the cache, divided; at least 64 MB. */
+size_t memory_share(size_t available, size_t cache, int workers);
+
+#endif

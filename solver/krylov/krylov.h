@@ -1,0 +1,134 @@
+/* krylov.h: linear solves with K without a factor of it: conjugate gradients, preconditioned by multigrid of smoothed
+ * aggregates (Vanek, Mandel, Brezina, Computing 56 (1996)), and a bound on the spectrum that makes their residuals
+ * bounds on their errors.
+ *
+ * With M the preconditioner and 0 < lambda <= lambda_min(M^-1 K):
+ *
+ *     e'K^-1 e <= e'M^-1 e / lambda                                  for any e, at the price of one cycle;
+ *     e'K^-1 e  = w'(e + s) + s'K^-1 s,  s = e - K w                 for any w, as sharp as w is good.
+ *
+ * Nothing here keeps a pointer to K: it is handed to every call, so that an object may outlive the K it was made of as
+ * long as the next one has the same numbers. */
+#ifndef UZ_KRYLOV_H
+#define UZ_KRYLOV_H
+
+#include "uzawa.h"
+
+#include <math.h>
+
+/* ----------------------------------------------------------- nodes and modes */
+
+enum { UZ_MODES_MOST = 6 };
+
+/* Which dofs move together, and what K hardly resists: the near-null space that coarse levels must have. */
+typedef struct {
+    int count;       /* modes, at most UZ_MODES_MOST */
+    int64_t n_nodes; /* groups of dofs */
+    int32_t *node;   /* n: group of each dof */
+    float *value;    /* n x count, row by row */
+    double strong;   /* couplings weaker than this, relative to the diagonal, form no aggregates; coarser levels, whose
+                        matrices are fuller, halve it each (Vanek, Mandel, Brezina 1996, (5.2)) */
+} uz_modes;
+/* From the matrix alone: nodes are groups of dofs with the same neighbours, the modes move all dofs that have the same
+ * place in their groups alike (translations, where dofs are displacements). */
+uz_status uz_modes_of_matrix(uz_modes *out, const uz_csc *K, uz_error *err);
+/* Rigid-body modes. xyz: n_nodes x dim; dof: n_nodes x dim, the dof of a node's displacement along each axis, or
+ * negative; n dofs in all. */
+uz_status uz_modes_of_body(uz_modes *out, const double *xyz, const int64_t *dof, int64_t n_nodes, int dim, int64_t n,
+                           uz_error *err);
+void uz_modes_clear(uz_modes *modes);
+
+/* ---------------------------------------------------------------- multigrid */
+
+typedef struct uz_multigrid uz_multigrid;           /* immutable after creation */
+typedef struct uz_multigrid_room uz_multigrid_room; /* one per thread */
+
+/* A symmetric positive definite V-cycle for K (lower triangle), or for K_FF where held (n, NULL: none) marks the dofs
+ * that are not in F: vectors are then n long, and what they hold at held dofs is ignored and returned as 0.
+ * Errors: NOT_SPD where a diagonal entry or the coarsest matrix shows it; LIMIT where memory_limit (0: none) would be
+ * passed; CANCELLED. */
+uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
+                              size_t memory_limit, const uz_hooks *hooks, uz_error *err);
+void uz_multigrid_free(uz_multigrid *mg);
+size_t uz_multigrid_bytes(const uz_multigrid *mg);
+int uz_multigrid_levels(const uz_multigrid *mg);
+uz_multigrid_room *uz_multigrid_room_new(const uz_multigrid *mg); /* NULL: no memory */
+void uz_multigrid_room_free(uz_multigrid_room *room);
+/* z = M^-1 r (n); z and r do not overlap. */
+uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
+                             const double *r, uz_error *err);
+/* A bound on lambda_max(diag(K)^-1 M). */
+double uz_multigrid_most(const uz_multigrid *mg);
+
+/* ------------------------------------------------------- conjugate gradients */
+
+/* The room of a solve; made for one multigrid, used by one thread. */
+typedef struct {
+    const uz_multigrid *mg;
+    const bool *held; /* as the multigrid's */
+    uz_multigrid_room *room;
+    int64_t n;
+    double *r, *z, *p, *q; /* n each */
+} uz_cg;
+uz_status uz_cg_init(uz_cg *cg, const uz_multigrid *mg, const bool *held, int64_t n, uz_error *err);
+void uz_cg_clear(uz_cg *cg);
+
+typedef struct {
+    double absolute, relative; /* of sqrt(r'M^-1 r): stop at the larger of absolute and relative times the first one */
+    int64_t max_iterations;
+    const uz_hooks *hooks; /* asked in each iteration; may be NULL */
+    double deadline;       /* uz_seconds() */
+} uz_cg_stop;
+
+typedef struct {
+    int64_t iterations;
+    double first, last; /* sqrt(r'M^-1 r) at the start, and of the true residual at the end */
+    bool met;           /* the tolerance was reached; false: limit, cancel, deadline, or rounding */
+} uz_cg_info;
+
+/* x (n): in, a start; out, nearer to K^-1 b. At held dofs x is neither read nor written. The residual of the x that is
+ * returned stands in cg->r, M^-1 times it in cg->z. UZ_ERR_NOT_SPD: some p'K p was not positive. */
+uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, const double *b, const uz_cg_stop *stop,
+                      uz_error *err);
+
+/* ---------------------------------------------------------------- the whole */
+
+typedef struct uz_krylov uz_krylov; /* immutable after creation: shared by any number of threads */
+
+typedef struct {
+    int levels;
+    size_t bytes;
+    double lambda;      /* <= lambda_min(M^-1 K), but for a probability below 1e-12 */
+    double rcond;       /* estimate of lambda_min(diag(K)^-1 K), rather too small */
+    double create_s;    /* seconds of the multigrid */
+    double spectrum_s;  /* and of the bounds */
+    int64_t iterations; /* that the bound on the spectrum took */
+} uz_krylov_info;
+
+/* Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD also where K is singular to
+ * working precision. */
+uz_status uz_krylov_create(uz_krylov **out, const uz_csc *K, uz_modes *modes, size_t memory_limit,
+                           const uz_hooks *hooks, uz_error *err);
+void uz_krylov_free(uz_krylov *krylov);
+uz_krylov_info uz_krylov_describe(const uz_krylov *krylov);
+const uz_multigrid *uz_krylov_multigrid(const uz_krylov *krylov);
+const uz_modes *uz_krylov_modes(const uz_krylov *krylov);
+
+/* *value >= e'K^-1 e, and sharp to a hundredth unless hooks or the deadline cut it short; e (n) becomes K^-1 e, about.
+ * cg: of the whole multigrid. */
+uz_status uz_krylov_inverse_norm(double *value, double *e, const uz_krylov *krylov, uz_cg *cg, const uz_csc *K,
+                                 const uz_hooks *hooks, double deadline, uz_error *err);
+
+/* The root of what rounding may have made negative; INFINITY of what is no number, so that overflow never looks like 0.
+ */
+static inline double uz_root(double square)
+{
+    if (isnan(square))
+        return INFINITY;
+    return square > 0.0 ? sqrt(square) : 0.0;
+}
+
+/* Predicted bytes of a uz_krylov for a matrix of n dofs and nnz entries in its lower triangle. */
+double uz_krylov_predict_bytes(int64_t n, int64_t nnz, int modes);
+
+#endif

@@ -1,0 +1,68 @@
+"""The memory that one solve may take: what does not fit with a factor goes on without one, what fits in no form is
+refused, and the daemon lives through both. usage: test_memory.py BUILD_DIR [FILTER]
+"""
+import copy
+
+import service
+from service import SCENE, check, expect, options
+
+
+def plate(cells, **solver):
+    body = copy.deepcopy(SCENE)
+    body["problem"]["mesh"]["box"]["cells"] = cells
+    body["solver"] = {"accuracy": {"relative_error": 1e-8}, **solver}
+    return body
+
+
+def forms(summary):
+    return {form["operator"]: form for form in summary["cost"]["considered"]}
+
+
+def failed(s, body):
+    job = s.solve(body)
+    check(job["status"] == "failed", job)
+    return job["error"]
+
+
+@options("--memory", "10M")
+def test_factor_does_not_fit(s):
+    job = s.solve(plate([120, 40]))
+    check(job["status"] == "successful", job)
+    summary = job["summary"]
+    check(summary["outcome"] == "converged" and summary["operator"] == "matrix_free", summary)
+    check(summary["certificate"]["relative_error"] <= 1e-8, summary["certificate"])
+    check(abs(summary["contact"]["reaction_sum"] + 10.54546589) < 1e-6, summary["contact"])
+    check(summary["contact"]["active"] == 88, summary["contact"])
+    considered = forms(summary)
+    check(considered["matrix_free"]["fits"] and not considered["condensed"]["fits"], considered)
+    check(considered["condensed"]["bytes"] > 10 << 20 >= summary["cost"]["actual"]["bytes"], summary["cost"])
+    # What is small keeps its factor.
+    check(s.solve(plate([30, 10]))["summary"]["operator"] == "condensed")
+
+
+@options("--memory", "10M")
+def test_no_form_fits(s):
+    for body in plate([240, 80]), plate([2000, 2000]), plate([120, 40], operator="condensed"):
+        error = failed(s, body)
+        check(error["code"] == "memory_limit" and "bytes" in error["detail"], error)
+    check("matrix_free" in failed(s, plate([120, 40], operator="condensed"))["detail"])
+    expect(s.get("/healthz"), 200)
+    check(s.solve(plate([30, 10]))["status"] == "successful")
+
+
+def test_by_name(s):
+    job = s.solve(plate([60, 20], operator="matrix_free"))
+    summary = job["summary"]
+    check(summary["outcome"] == "converged" and summary["operator"] == "matrix_free", summary)
+    check(list(forms(summary)) == ["matrix_free"], summary["cost"])
+    cost = s.solve(plate([60, 20]))["summary"]["cost"]
+    check(cost["predicted"]["seconds"] > 0 and cost["predicted"]["flops"] > 0, cost)
+    check(cost["predicted"]["bytes"] >= cost["actual"]["bytes"] > 0, cost)
+    # The reply says the same of the body once it is cached, but for the setup that was spared.
+    again = s.solve(plate([60, 20]))["summary"]["cost"]
+    check(again["predicted"]["bytes"] == cost["predicted"]["bytes"], again)
+    check(again["predicted"]["seconds"] < cost["predicted"]["seconds"], cost, again)
+
+
+if __name__ == "__main__":
+    service.main(globals())

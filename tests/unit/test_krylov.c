@@ -1,0 +1,370 @@
+/* Multigrid and conjugate gradients against a factor of the same matrix, in two and three dimensions. */
+#include "brick.h"
+#include "factor/factor.h"
+#include "harness.h"
+#include "krylov/krylov.h"
+#include "qp_fixture.h"
+#include "scene_fixture.h"
+
+/* A matrix, its modes, and both ways to solve with it. */
+typedef struct {
+    uz_csc K;
+    uz_krylov *krylov;
+    uz_krylov_info info;
+    uz_cg cg;
+    uz_factor *factor;
+    uz_factor_workspace *ws;
+} pair;
+
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_process_init(2);
+}
+
+/* Takes K and the modes. False where the matrix was refused, with *err. */
+static bool open_pair(pair *p, uz_csc *K, uz_modes *modes, uz_error *err)
+{
+    memset(p, 0, sizeof *p);
+    p->K = *K;
+    memset(K, 0, sizeof *K);
+    if (uz_krylov_create(&p->krylov, &p->K, modes, 0, NULL, err) != UZ_OK)
+        return false;
+    p->info = uz_krylov_describe(p->krylov);
+    CHECK(uz_cg_init(&p->cg, uz_krylov_multigrid(p->krylov), NULL, p->K.cols, err) == UZ_OK);
+    CHECK(uz_factor_plain(&p->factor, &p->K, UZ_ORDERING_AUTO, 0, NULL, err) == UZ_OK);
+    p->ws = uz_factor_workspace_new();
+    return true;
+}
+
+static void close_pair(pair *p)
+{
+    uz_cg_clear(&p->cg);
+    uz_krylov_free(p->krylov);
+    uz_factor_workspace_free(p->ws);
+    uz_factor_free(p->factor);
+    uz_csc_clear(&p->K);
+}
+
+static pair open_plane(uz_scene scene, bool with_mesh)
+{
+    pair p;
+    uz_error err = {0};
+    uz_modes modes;
+    uz_body_model model = build_body(&scene);
+    uz_status status = with_mesh
+                           ? uz_modes_of_body(&modes, model.info.xyz, model.dof, model.mesh.n_nodes, 2, model.d, &err)
+                           : uz_modes_of_matrix(&modes, &model.K, &err);
+    CHECK(status == UZ_OK);
+    CHECK_INT(modes.count, with_mesh ? 3 : 2);
+    CHECK_MSG(open_pair(&p, &model.K, &modes, &err), "%s", err.message);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&scene);
+    return p;
+}
+
+static pair open_brick(const int64_t cells[3], const double size[3], double poisson)
+{
+    pair p;
+    uz_error err = {0};
+    uz_modes modes;
+    brick b = brick_make(cells, size, poisson, true);
+    CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
+    CHECK_MSG(open_pair(&p, &b.K, &modes, &err), "%s", err.message);
+    brick_free(&b);
+    return p;
+}
+
+/* x = K^-1 x */
+static void solve_exactly(const pair *p, double *x)
+{
+    uz_error err = {0};
+    double *y = vector(p->K.cols);
+    uz_factor_permute(p->factor, y, x);
+    CHECK(uz_factor_forward(p->factor, p->ws, y, 1, &err) == UZ_OK);
+    CHECK(uz_factor_backward(p->factor, p->ws, y, 1, &err) == UZ_OK);
+    uz_factor_unpermute(p->factor, x, y);
+    free(y);
+}
+
+static double dot(const double *x, const double *y, int64_t n)
+{
+    double sum = 0.0;
+    for (int64_t i = 0; i < n; i++)
+        sum += x[i] * y[i];
+    return sum;
+}
+
+static double *random_vector(int64_t n, uint64_t seed)
+{
+    qp_random rng = {seed};
+    double *x = vector(n);
+    for (int64_t i = 0; i < n; i++)
+        x[i] = random_signed(&rng);
+    return x;
+}
+
+static void apply(const pair *p, double *z, const double *r)
+{
+    uz_error err = {0};
+    CHECK(uz_multigrid_apply(p->cg.mg, &p->K, p->cg.room, z, r, &err) == UZ_OK);
+}
+
+/* x'M^-1 y = y'M^-1 x, and x'M^-1 x > 0. */
+static void check_definite(const pair *p)
+{
+    int64_t n = p->K.cols;
+    double *x = random_vector(n, 1), *y = random_vector(n, 2), *Mx = vector(n), *My = vector(n);
+    apply(p, Mx, x);
+    apply(p, My, y);
+    CHECK_REL(dot(x, My, n), dot(y, Mx, n), 1e-9);
+    CHECK(dot(x, Mx, n) > 0.0 && dot(y, My, n) > 0.0);
+    free(x);
+    free(y);
+    free(Mx);
+    free(My);
+}
+
+/* e'K^-1 e <= e'M^-1 e / lambda: of a random e, and of the residuals that conjugate gradients find hardest, where it
+ * must also be sharp within `slack`. */
+static void check_bound(pair *p, double slack)
+{
+    int64_t n = p->K.cols;
+    double *b = random_vector(n, 3), *x = vector(n), *w = vector(n), worst = 0.0;
+    uz_error err = {0};
+    for (int64_t steps = 0; steps <= 40; steps += 4) {
+        uz_cg_stop stop = {.max_iterations = steps, .deadline = INFINITY};
+        uz_cg_info info;
+        memset(x, 0, (size_t)n * sizeof *x);
+        CHECK(uz_cg_solve(&info, x, &p->cg, &p->K, b, &stop, &err) == UZ_OK);
+        memcpy(w, p->cg.r, (size_t)n * sizeof *w);
+        solve_exactly(p, w);
+        double exact = dot(w, p->cg.r, n), bound = dot(p->cg.z, p->cg.r, n) / p->info.lambda;
+        CHECK_MSG(exact <= bound, "%g > %g after %lld steps", exact, bound, (long long)steps);
+        worst = fmax(worst, exact / bound);
+    }
+    CHECK_MSG(worst > slack, "the bound is %g times too large", 1.0 / worst);
+    free(b);
+    free(x);
+    free(w);
+}
+
+static void check_norm(pair *p)
+{
+    int64_t n = p->K.cols;
+    double *e = random_vector(n, 4), *w = vector(n), value = 0.0;
+    uz_error err = {0};
+    memcpy(w, e, (size_t)n * sizeof *w);
+    solve_exactly(p, w);
+    double exact = dot(e, w, n);
+    CHECK(uz_krylov_inverse_norm(&value, e, p->krylov, &p->cg, &p->K, NULL, INFINITY, &err) == UZ_OK);
+    CHECK_MSG(value >= exact * (1.0 - 1e-12) && value <= 1.02 * exact, "%.17g for %.17g", value, exact);
+    free(e);
+    free(w);
+}
+
+/* The solution to 1e-8 in the energy norm, and how many iterations it took. */
+static int64_t check_solution(pair *p)
+{
+    int64_t n = p->K.cols;
+    double *b = vector(n), *x = vector(n), *exact = vector(n), *Ke = vector(n);
+    uz_error err = {0};
+    uz_cg_info info;
+    uz_cg_stop stop = {.relative = 1e-8 * sqrt(p->info.lambda), .max_iterations = 2000, .deadline = INFINITY};
+    for (int64_t j = 0; j < n; j++)
+        b[j] = exact[j] = 1.0;
+    solve_exactly(p, exact);
+    CHECK(uz_cg_solve(&info, x, &p->cg, &p->K, b, &stop, &err) == UZ_OK);
+    CHECK(info.met);
+    double norm2 = dot(b, exact, n);
+    for (int64_t j = 0; j < n; j++)
+        exact[j] -= x[j];
+    uz_csc_symv(Ke, &p->K, 1.0, exact);
+    double error = sqrt(dot(Ke, exact, n) / norm2);
+    CHECK_MSG(error <= 2e-8, "%g", error);
+    free(b);
+    free(x);
+    free(exact);
+    free(Ke);
+    return info.iterations;
+}
+
+static void check_pair(pair *p, double slack, int64_t most)
+{
+    CHECK(p->info.levels > 1);
+    check_definite(p);
+    check_bound(p, slack);
+    check_norm(p);
+    int64_t iterations = check_solution(p);
+    CHECK_MSG(iterations <= most, "%lld iterations, lambda %g", (long long)iterations, p->info.lambda);
+}
+
+static uz_scene stretched(double width, double height, int64_t nx, int64_t ny, double poisson)
+{
+    uz_scene scene = paper_scene(nx, ny);
+    scene.box.size[0] = width;
+    scene.box.size[1] = height;
+    scene.materials[0].poisson = poisson;
+    scene.model = UZ_PLANE_STRAIN;
+    return scene;
+}
+
+TEST(plane_bodies_take_the_same_iterations_on_every_mesh)
+{
+    for (int64_t nx = 60; nx <= 120; nx += 30) {
+        pair p = open_plane(paper_scene(nx, nx / 3), true);
+        check_pair(&p, 0.2, 18);
+        close_pair(&p);
+    }
+}
+
+TEST(plane_bodies_known_by_their_matrix_alone)
+{
+    pair p = open_plane(paper_scene(60, 20), false);
+    check_pair(&p, 0.1, 40);
+    close_pair(&p);
+}
+
+TEST(slender_bodies)
+{
+    pair p = open_plane(stretched(600, 20, 300, 10, 0.3), true);
+    check_definite(&p);
+    check_bound(&p, 0.1);
+    check_norm(&p);
+    close_pair(&p);
+}
+
+TEST(stretched_elements)
+{
+    pair p = open_plane(stretched(200, 20, 40, 40, 0.3), true);
+    check_pair(&p, 0.05, 200);
+    close_pair(&p);
+}
+
+TEST(nearly_incompressible)
+{
+    pair p = open_plane(stretched(60, 20, 60, 20, 0.4999), true);
+    check_pair(&p, 0.001, 1000); /* 40 steps do not find the worst direction */
+    close_pair(&p);
+}
+
+TEST(solid_bodies)
+{
+    pair p = open_brick((int64_t[]){9, 9, 9}, (double[]){1, 1, 1}, 0.3);
+    check_pair(&p, 0.2, 20);
+    close_pair(&p);
+    p = open_brick((int64_t[]){12, 12, 3}, (double[]){10, 10, 1}, 0.3);
+    check_pair(&p, 0.05, 60);
+    close_pair(&p);
+}
+
+TEST(modes_of_a_free_body_meet_no_resistance)
+{
+    brick b = brick_make((int64_t[]){2, 2, 2}, (double[]){1, 2, 3}, 0.3, false);
+    uz_modes modes;
+    uz_error err = {0};
+    CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
+    CHECK_INT(modes.count, 6);
+    double *x = vector(b.d);
+    for (int c = 0; c < modes.count; c++) {
+        double *Kx = vector(b.d), energy, size = 0.0;
+        for (int64_t i = 0; i < b.d; i++) {
+            x[i] = (double)modes.value[i * modes.count + c];
+            size += x[i] * x[i] * b.K.val[b.K.ptr[i]];
+        }
+        uz_csc_symv(Kx, &b.K, 1.0, x);
+        energy = dot(x, Kx, b.d);
+        CHECK_MSG(fabs(energy) <= 1e-12 * size && size > 0.0, "mode %d has the energy %g of %g", c, energy, size);
+        free(Kx);
+    }
+    free(x);
+    uz_modes_clear(&modes);
+    brick_free(&b);
+}
+
+static uz_status refusal(brick *b, bool with_mesh, uz_error *err)
+{
+    uz_modes modes;
+    uz_krylov *krylov = NULL;
+    uz_status status = with_mesh ? uz_modes_of_body(&modes, b->xyz, b->dof, b->n_nodes, 3, b->d, err)
+                                 : uz_modes_of_matrix(&modes, &b->K, err);
+    CHECK(status == UZ_OK);
+    status = uz_krylov_create(&krylov, &b->K, &modes, 0, NULL, err);
+    CHECK(krylov == NULL);
+    uz_krylov_free(krylov);
+    return status;
+}
+
+TEST(free_and_indefinite_bodies_are_refused)
+{
+    for (int with_mesh = 0; with_mesh < 2; with_mesh++) {
+        brick b = brick_make((int64_t[]){8, 8, 8}, (double[]){1, 1, 1}, 0.3, false);
+        uz_error err = {0};
+        CHECK_INT(refusal(&b, with_mesh, &err), UZ_ERR_NOT_SPD);
+        CHECK(err.status == UZ_ERR_NOT_SPD && err.message[0] != '\0');
+        brick_free(&b);
+    }
+    brick b = brick_make((int64_t[]){8, 8, 8}, (double[]){1, 1, 1}, 0.3, true);
+    uz_error err = {0};
+    for (int64_t k = b.K.ptr[400]; k < b.K.ptr[401]; k++)
+        b.K.val[k] *= k == b.K.ptr[400] ? 0.1 : 1.0; /* a diagonal entry that its neighbours outweigh */
+    CHECK_INT(refusal(&b, true, &err), UZ_ERR_NOT_SPD);
+    b.K.val[b.K.ptr[7]] = -1.0;
+    memset(&err, 0, sizeof err);
+    CHECK_INT(refusal(&b, true, &err), UZ_ERR_NOT_SPD);
+    CHECK(strstr(err.message, "dof 7 ") != NULL);
+    brick_free(&b);
+}
+
+/* With held dofs the cycle is that of the body without them: they stay at 0, the rest is solved. */
+TEST(held_dofs)
+{
+    uz_scene scene = paper_scene(60, 20);
+    pair p = open_plane(scene, true);
+    int64_t n = p.K.cols;
+    bool *held = calloc((size_t)n, sizeof *held);
+    double *b = random_vector(n, 5), *x = vector(n), *r = vector(n);
+    uz_multigrid *mg = NULL;
+    uz_cg cg;
+    uz_cg_info info;
+    uz_error err = {0};
+    for (int64_t j = 0; j < n; j++) {
+        held[j] = j % 7 == 0 || (j > n / 2 && j < n / 2 + 40);
+        x[j] = held[j] ? 5.0 : 0.0;
+    }
+    CHECK(uz_multigrid_create(&mg, &p.K, uz_krylov_modes(p.krylov), held, 0, NULL, &err) == UZ_OK);
+    CHECK(uz_cg_init(&cg, mg, held, n, &err) == UZ_OK);
+    uz_cg_stop stop = {.relative = 1e-10, .max_iterations = 200, .deadline = INFINITY};
+    CHECK(uz_cg_solve(&info, x, &cg, &p.K, b, &stop, &err) == UZ_OK);
+    CHECK(info.met && info.iterations < 30);
+    memcpy(r, b, (size_t)n * sizeof *r);
+    for (int64_t j = 0; j < n; j++) {
+        CHECK(!held[j] || (x[j] == 5.0 && cg.z[j] == 0.0));
+        x[j] = held[j] ? 0.0 : x[j];
+    }
+    uz_csc_symv(r, &p.K, -1.0, x);
+    double left = 0.0, right = 0.0;
+    for (int64_t j = 0; j < n; j++) {
+        left += held[j] ? 0.0 : r[j] * r[j];
+        right += b[j] * b[j];
+    }
+    CHECK_MSG(left <= 1e-14 * right, "%g of %g", left, right);
+    uz_cg_clear(&cg);
+    uz_multigrid_free(mg);
+    free(held);
+    free(b);
+    free(x);
+    free(r);
+    close_pair(&p);
+}
+
+TEST(memory_is_bounded)
+{
+    brick b = brick_make((int64_t[]){9, 9, 9}, (double[]){1, 1, 1}, 0.3, true);
+    uz_modes modes;
+    uz_krylov *krylov = NULL;
+    uz_error err = {0};
+    CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
+    CHECK_INT(uz_krylov_create(&krylov, &b.K, &modes, 100000, NULL, &err), UZ_ERR_LIMIT);
+    CHECK(krylov == NULL && strstr(err.message, "100000") != NULL);
+    brick_free(&b);
+}

@@ -1,0 +1,326 @@
+/* Whole solves without a factor: the answers of the other forms, bounds that hold at every accuracy, and the memory
+ * rule that chooses this form. */
+#include "harness.h"
+#include "qp_fixture.h"
+#include "scene_fixture.h"
+
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_process_init(2);
+}
+
+static uz_settings settings_for(uz_operator op, uz_method method, double relative_error)
+{
+    uz_settings s = uz_settings_default();
+    s.op = op;
+    s.method = method;
+    s.relative_error = relative_error;
+    return s;
+}
+
+static uz_problem scene_problem(int64_t nx, int64_t ny)
+{
+    return (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(nx, ny)};
+}
+
+/* The scene as matrices: nothing is known of its mesh. */
+static uz_problem matrix_problem(int64_t nx, int64_t ny)
+{
+    uz_scene scene = paper_scene(nx, ny);
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES};
+    uz_mesh_info info = {0};
+    uz_error err = {0};
+    CHECK(uz_scene_to_qp(&problem.qp, &info, &scene, &err) == UZ_OK);
+    uz_mesh_info_clear(&info);
+    uz_scene_clear(&scene);
+    return problem;
+}
+
+static double distance(const uz_csc *K, const double *u, const double *v)
+{
+    double *e = vector(K->cols), *Ke = vector(K->cols), sum = 0.0;
+    for (int64_t j = 0; j < K->cols; j++)
+        e[j] = u[j] - v[j];
+    uz_csc_symv(Ke, K, 1.0, e);
+    for (int64_t j = 0; j < K->cols; j++)
+        sum += e[j] * Ke[j];
+    free(e);
+    free(Ke);
+    return sqrt(fmax(0.0, sum));
+}
+
+/* Solves matrices both ways; the bound of the answer without a factor must cover its distance from the exact one. */
+static void check_against_factor(const uz_problem *problem, uz_method method, double relative_error)
+{
+    uz_settings exactly = settings_for(UZ_OPERATOR_AUTO, UZ_METHOD_AUTO, 1e-11);
+    uz_settings freely = settings_for(UZ_OPERATOR_MATRIX_FREE, method, relative_error);
+    uz_result *exact = solve_problem(problem, &exactly), *got = solve_problem(problem, &freely);
+    if (!exact || !got)
+        return;
+    const uz_certificate *c = &got->summary.certificate;
+    double slack = exact->summary.certificate.absolute_error, error = distance(&problem->qp.K, got->u, exact->u);
+    CHECK_INT(got->summary.outcome, UZ_CONVERGED);
+    CHECK_INT(got->summary.op, UZ_OPERATOR_MATRIX_FREE);
+    CHECK_INT(got->summary.factor_nnz, 0);
+    CHECK(c->relative_error <= relative_error);
+    CHECK_MSG(error <= c->absolute_error + slack, "%g: error %g, certified %g", relative_error, error,
+              c->absolute_error);
+    /* Within its own share of rounding the bound is not far off either. */
+    CHECK_MSG(c->absolute_error <= 20.0 * (error + slack) + 1e-11 * c->energy_norm, "certified %g for an error of %g",
+              c->absolute_error, error);
+    CHECK(c->energy_dual <= exact->summary.certificate.energy_primal + 1e-12 * fabs(c->energy_primal));
+    CHECK(c->energy_primal >= exact->summary.certificate.energy_dual - 1e-12 * fabs(c->energy_primal));
+    uz_result_free(exact);
+    uz_result_free(got);
+}
+
+TEST(every_accuracy_is_certified)
+{
+    uz_problem problem = matrix_problem(60, 20);
+    const double asked[] = {1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10};
+    for (size_t k = 0; k < sizeof asked / sizeof asked[0]; k++)
+        check_against_factor(&problem, UZ_METHOD_AUTO, asked[k]);
+    uz_problem_clear(&problem);
+}
+
+TEST(iterations_with_inner_iterations)
+{
+    uz_problem problem = matrix_problem(45, 15);
+    check_against_factor(&problem, UZ_METHOD_ACCELERATED_RESTART, 1e-3);
+    check_against_factor(&problem, UZ_METHOD_ACCELERATED_RESTART, 1e-7);
+    uz_problem_clear(&problem);
+}
+
+/* Inner solves within the rule hardly show: the bound is met at the same check of it as with a factor, or the next. */
+TEST(inner_tolerances_cost_no_outer_iterations)
+{
+    uz_problem problem = scene_problem(60, 20);
+    uz_settings freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_ACCELERATED_RESTART, 1e-6);
+    uz_settings factored = settings_for(UZ_OPERATOR_FACTORED, UZ_METHOD_ACCELERATED_RESTART, 1e-6);
+    uz_result *a = solve_problem(&problem, &freely), *b = solve_problem(&problem, &factored);
+    CHECK_INT(a->summary.outcome, UZ_CONVERGED);
+    CHECK_MSG(a->summary.iterations <= b->summary.iterations + b->summary.iterations / 4, "%lld, factored %lld",
+              (long long)a->summary.iterations, (long long)b->summary.iterations);
+    CHECK_REL(a->summary.reaction_sum, b->summary.reaction_sum, 1e-4);
+    uz_result_free(a);
+    uz_result_free(b);
+    uz_problem_clear(&problem);
+}
+
+TEST(reference_values_of_the_paper)
+{
+    uz_problem problem = scene_problem(60, 20);
+    uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-10);
+    uz_result *result = solve_problem(&problem, &s);
+    CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+    CHECK_INT(result->summary.active, 44);
+    CHECK_REL(result->summary.certificate.energy_primal, -3.9620174378e-3, 1e-9);
+    CHECK_REL(result->summary.reaction_sum, -10.53866779, 1e-8);
+    CHECK(result->summary.iterations < 12);
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
+TEST(obstacles)
+{
+    qp_random rng = {11};
+    for (int k = 0; k < 3; k++) {
+        uz_problem problem = problem_of(random_obstacle(&rng, 1600, 1 + k));
+        check_against_factor(&problem, UZ_METHOD_AUTO, 1e-8);
+        uz_problem_clear(&problem);
+    }
+}
+
+TEST(general_rows)
+{
+    qp_random rng = {12};
+    for (int k = 0; k < 4; k++) {
+        qp_kind kind = {.d = 30, .m = 12, .condition = 1e3, .dependent = false};
+        uz_problem problem = problem_of(random_qp(&rng, &kind));
+        check_against_factor(&problem, UZ_METHOD_AUTO, 1e-8);
+        uz_problem_clear(&problem);
+    }
+}
+
+TEST(no_contact_and_no_load)
+{
+    uz_problem problem = matrix_problem(60, 20);
+    uz_csc none = {0};
+    uz_csc_clear(&problem.qp.N);
+    free(problem.qp.h);
+    problem.qp.h = NULL;
+    problem.qp.N = none;
+    uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-8);
+    check_against_factor(&problem, UZ_METHOD_AUTO, 1e-8);
+    memset(problem.qp.p, 0, (size_t)problem.qp.K.cols * sizeof *problem.qp.p);
+    uz_result *result = solve_problem(&problem, &s);
+    CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+    for (int64_t j = 0; j < result->d; j++)
+        CHECK(result->u[j] == 0.0);
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
+/* Two planes that a body cannot be between. */
+TEST(contradictions_are_proved)
+{
+    uz_problem problem = matrix_problem(40, 16);
+    uz_qp *qp = &problem.qp;
+    int64_t m = qp->N.rows, d = qp->N.cols, nnz = qp->N.ptr[d];
+    int64_t *row = calloc((size_t)(2 * nnz), sizeof *row), *column = calloc((size_t)(2 * nnz), sizeof *column), at = 0;
+    double *value = calloc((size_t)(2 * nnz), sizeof *value), *h = calloc((size_t)(2 * m), sizeof *h);
+    uz_csc both = {0};
+    uz_error err = {0};
+    for (int64_t j = 0; j < d; j++)
+        for (int64_t k = qp->N.ptr[j]; k < qp->N.ptr[j + 1]; k++)
+            for (int side = 0; side < 2; side++) {
+                row[at] = qp->N.idx[k] + side * m;
+                column[at] = j;
+                value[at++] = side ? -qp->N.val[k] : qp->N.val[k];
+            }
+    for (int64_t i = 0; i < m; i++)
+        h[m + i] = -qp->h[i] - 1.0; /* at least 1 beyond what the first allows */
+    CHECK(uz_csc_from_triplets(&both, 2 * m, d, at, row, column, value, &err) == UZ_OK);
+    uz_csc_clear(&qp->N);
+    qp->N = both;
+    free(qp->h);
+    qp->h = h;
+    uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
+    s.max_iterations = 3000;
+    uz_result *result = solve_problem(&problem, &s);
+    CHECK_INT(result->summary.outcome, UZ_INFEASIBLE);
+    CHECK(result->ray != NULL);
+    uz_result_free(result);
+    free(row);
+    free(column);
+    free(value);
+    uz_problem_clear(&problem);
+}
+
+TEST(a_cached_body_serves_other_matrices_of_the_same_numbers)
+{
+    uz_cache *cache = uz_cache_new((size_t)1 << 30);
+    uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-8);
+    double first = 0.0;
+    for (int k = 0; k < 2; k++) {
+        uz_problem problem = matrix_problem(60, 20); /* freed between the solves */
+        uz_result *result = NULL;
+        uz_error err = {0};
+        CHECK_MSG(uz_solve(&result, &problem, &s, cache, NULL, &err) == UZ_OK, "%s", err.message);
+        CHECK_INT(result->summary.factor_cached, k == 1);
+        CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+        first = k == 0 ? result->summary.reaction_sum : first;
+        CHECK(result->summary.reaction_sum == first);
+        uz_result_free(result);
+        uz_problem_clear(&problem);
+    }
+    uz_cache_free(cache);
+}
+
+/* ------------------------------------------------------------------ limits */
+
+static bool cancelled_at_third(void *ctx)
+{
+    return ++*(int *)ctx >= 3;
+}
+
+TEST(inner_iterations_end_when_told_to)
+{
+    uz_problem problem = scene_problem(60, 20);
+    uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_ACCELERATED_RESTART, 1e-8);
+    uz_result *result = NULL;
+    uz_error err = {0};
+    int asked = 0;
+    uz_hooks hooks = {.ctx = &asked, .cancelled = cancelled_at_third};
+    CHECK_INT(uz_solve(&result, &problem, &s, NULL, &hooks, &err), UZ_ERR_CANCELLED);
+    CHECK(result == NULL);
+    s.max_iterations = 3;
+    result = solve_problem(&problem, &s);
+    CHECK_INT(result->summary.outcome, UZ_ITERATION_LIMIT);
+    CHECK(result->summary.certificate.relative_error > 1e-8);
+    uz_result_free(result);
+    s.max_iterations = 100000;
+    s.time_limit_s = 0.0;
+    result = solve_problem(&problem, &s);
+    CHECK_INT(result->summary.outcome, UZ_TIME_LIMIT);
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
+static const uz_cost_option *considered(const uz_summary *s, uz_operator op)
+{
+    for (int k = 0; k < s->cost.n_considered; k++)
+        if (s->cost.considered[k].op == op)
+            return &s->cost.considered[k];
+    return NULL;
+}
+
+TEST(what_does_not_fit_goes_on_without_a_factor)
+{
+    uz_problem problem = scene_problem(90, 30);
+    uz_settings s = settings_for(UZ_OPERATOR_AUTO, UZ_METHOD_AUTO, 1e-8);
+    uz_result *direct = solve_problem(&problem, &s);
+    const uz_cost_option *with = considered(&direct->summary, UZ_OPERATOR_CONDENSED);
+    const uz_cost_option *without = considered(&direct->summary, UZ_OPERATOR_MATRIX_FREE);
+    CHECK_INT(direct->summary.op, UZ_OPERATOR_CONDENSED);
+    CHECK(with && without && with->fits && without->fits && without->bytes < with->bytes);
+    s.memory_limit = (size_t)(0.5 * (with->bytes + without->bytes));
+    uz_result *freely = solve_problem(&problem, &s);
+    CHECK_INT(freely->summary.op, UZ_OPERATOR_MATRIX_FREE);
+    CHECK_INT(freely->summary.outcome, UZ_CONVERGED);
+    CHECK_REL(freely->summary.reaction_sum, direct->summary.reaction_sum, 1e-6);
+    CHECK(!considered(&freely->summary, UZ_OPERATOR_CONDENSED)->fits);
+    CHECK(freely->summary.cost.actual_bytes <= (double)s.memory_limit);
+    uz_result_free(freely);
+    uz_result_free(direct);
+    uz_problem_clear(&problem);
+}
+
+static void check_refused(const uz_problem *problem, uz_operator op, size_t limit)
+{
+    uz_settings s = settings_for(op, UZ_METHOD_AUTO, 1e-8);
+    uz_result *result = NULL;
+    uz_error err = {0};
+    s.memory_limit = limit;
+    CHECK_INT(uz_solve(&result, problem, &s, NULL, NULL, &err), UZ_ERR_LIMIT);
+    CHECK(result == NULL);
+    CHECK_MSG(strstr(err.message, "bytes") != NULL, "%s", err.message);
+    uz_result_free(result);
+}
+
+TEST(what_fits_in_no_form_is_refused)
+{
+    uz_problem problem = scene_problem(90, 30);
+    uz_settings s = settings_for(UZ_OPERATOR_AUTO, UZ_METHOD_AUTO, 1e-8);
+    uz_result *result = solve_problem(&problem, &s);
+    double with = considered(&result->summary, UZ_OPERATOR_CONDENSED)->bytes;
+    double without = considered(&result->summary, UZ_OPERATOR_MATRIX_FREE)->bytes;
+    check_refused(&problem, UZ_OPERATOR_AUTO, (size_t)(0.95 * without));
+    check_refused(&problem, UZ_OPERATOR_MATRIX_FREE, (size_t)(0.95 * without));
+    check_refused(&problem, UZ_OPERATOR_CONDENSED, (size_t)(0.5 * (with + without)));
+    check_refused(&problem, UZ_OPERATOR_FACTORED, (size_t)(0.5 * (with + without)));
+    check_refused(&problem, UZ_OPERATOR_AUTO, 100000); /* less than the mesh */
+    check_refused(&problem, UZ_OPERATOR_AUTO, 1);
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
+/* Bytes are counted, so the prediction must cover them and not by far. */
+TEST(predicted_bytes_cover_what_is_used)
+{
+    for (int64_t nx = 60; nx <= 120; nx += 30)
+        for (int k = 0; k < 3; k++) {
+            const uz_operator forms[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE};
+            uz_problem problem = scene_problem(nx, nx / 3);
+            uz_settings s = settings_for(forms[k], UZ_METHOD_AUTO, 1e-6);
+            uz_result *result = solve_problem(&problem, &s);
+            const uz_cost *cost = &result->summary.cost;
+            CHECK_MSG(cost->bytes >= cost->actual_bytes && cost->bytes <= 2.5 * cost->actual_bytes,
+                      "%s at %lld: %g predicted, %g counted", uz_operator_name(forms[k]), (long long)nx, cost->bytes,
+                      cost->actual_bytes);
+            CHECK(cost->seconds > 0.0 && cost->flops > 0.0 && cost->actual_seconds > 0.0);
+            CHECK_INT(cost->n_considered, forms[k] == UZ_OPERATOR_MATRIX_FREE ? 1 : 3);
+            uz_result_free(result);
+            uz_problem_clear(&problem);
+        }
+}

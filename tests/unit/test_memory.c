@@ -1,0 +1,28 @@
+/* What a solve may take of the machine. */
+#include "harness.h"
+#include "memory.h"
+#include "options.h"
+
+#include <stdio.h>
+
+TEST(share_of_a_worker)
+{
+    const size_t G = (size_t)1 << 30;
+    CHECK_INT(memory_share(10 * G, 2 * G, 3), 2 * G);
+    CHECK_INT(memory_share(10 * G, 0, 1), 8 * G);
+    CHECK_INT(memory_share(G, 2 * G, 4), (size_t)64 << 20);
+    CHECK_INT(memory_share(0, 0, 0), (size_t)64 << 20);
+    CHECK(memory_available() > 0);
+}
+
+TEST(option)
+{
+    server_options options;
+    char message[256], *given[] = {"uzawad", "--memory", "3M", NULL}, *none[] = {"uzawad", NULL};
+    char *wrong[] = {"uzawad", "--memory", "0", NULL};
+    CHECK_INT(options_parse(&options, 3, given, message, sizeof message), OPTIONS_RUN);
+    CHECK_INT(options.memory, 3 << 20);
+    CHECK_INT(options_parse(&options, 1, none, message, sizeof message), OPTIONS_RUN);
+    CHECK_INT(options.memory, memory_share(memory_available(), options.cache, options.workers));
+    CHECK_INT(options_parse(&options, 3, wrong, message, sizeof message), OPTIONS_WRONG);
+}
