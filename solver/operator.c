@@ -7,13 +7,38 @@
 #include <math.h>
 #include <stdlib.h>
 
+/* Modes at a node whose dofs are along its normal and tangents. Held directions are axes there and have no share. */
+static void turn_modes(uz_modes *modes, const uz_body_model *model)
+{
+    const int dim = model->mesh.dim, count = modes->count;
+    for (int64_t t = 0; t < model->info.n_turned; t++) {
+        const int64_t *dof = model->dof + model->info.turned_node[t] * dim;
+        const double *Q = model->info.frame + t * dim * dim;
+        for (int k = 0; k < count; k++) {
+            double along[3] = {0}, turned[3] = {0};
+            for (int c = 0; c < dim; c++)
+                along[c] = dof[c] >= 0 ? (double)modes->value[dof[c] * count + k] : 0.0;
+            for (int c = 0; c < dim; c++)
+                for (int axis = 0; axis < dim; axis++)
+                    turned[c] += Q[c * dim + axis] * along[axis];
+            for (int c = 0; c < dim; c++)
+                if (dof[c] >= 0)
+                    modes->value[dof[c] * count + k] = (float)turned[c];
+        }
+    }
+}
+
 /* The near-null space: rigid-body modes where the mesh is known. */
 static uz_status find_modes(uz_modes *modes, const uz_body *body, const uz_csc *K, uz_error *err)
 {
     const uz_body_model *model = &body->model;
-    return body->is_scene ? uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim,
-                                             model->d, err)
-                          : uz_modes_of_matrix(modes, K, err);
+    if (!body->is_scene)
+        return uz_modes_of_matrix(modes, K, err);
+    uz_status status =
+        uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim, model->d, err);
+    if (status == UZ_OK)
+        turn_modes(modes, model);
+    return status;
 }
 
 /* What the operator is made of. */

@@ -1,5 +1,6 @@
 /* Whole solves without a factor: the answers of the other forms, bounds that hold at every accuracy, and the memory
  * rule that chooses this form. */
+#include "cache/cache.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -92,6 +93,30 @@ TEST(iterations_with_inner_iterations)
 }
 
 /* Inner solves within the rule hardly show: the bound is met at the same check of it as with a factor, or the next. */
+/* The least eigenvalue of the preconditioned matrix, with the obstacle's normal along (tilt, 1). */
+static double conditioning(double tilt)
+{
+    uz_problem problem = scene_problem(60, 20);
+    uz_settings freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
+    uz_body *body = NULL;
+    uz_reuse reused;
+    uz_error err = {0};
+    problem.scene.contacts[0].normal[0] = tilt;
+    CHECK_MSG(uz_cache_acquire(&body, &reused, NULL, &problem, &freely, NULL, &err) == UZ_OK, "%s", err.message);
+    double lambda = uz_krylov_describe(body->krylov).lambda;
+    CHECK_INT(body->model.info.n_turned > 0, tilt != 0);
+    uz_cache_release(NULL, body);
+    uz_problem_clear(&problem);
+    return lambda;
+}
+
+/* Dofs of contact nodes that are turned into normal and tangents take their rigid-body modes with them. */
+TEST(oblique_planes_are_preconditioned_as_well)
+{
+    double straight = conditioning(0), oblique = conditioning(1);
+    CHECK_MSG(oblique > 0.7 * straight, "lambda %g beside %g", oblique, straight);
+}
+
 TEST(inner_tolerances_cost_no_outer_iterations)
 {
     uz_problem problem = scene_problem(60, 20);
