@@ -168,11 +168,20 @@ def test_unlike_jobs_at_once(s):
 
 # ---------------------------------------------------------------- cancel and wait
 
+def wait_for_rows(s, job_id):
+    """Until the job iterates."""
+    s.wait_status(job_id, "running")
+    deadline = time.monotonic() + 20
+    while not expect(s.get(f"/v1/jobs/{job_id}/history"), 200).json["rows"]:
+        check(time.monotonic() < deadline, "no iteration yet", job_id)
+        time.sleep(0.005)
+
+
 @options("--workers", "2")
 def test_cancel_queued_and_running(s):
     ids = [s.post(ENDLESS).json["id"] for _ in range(CLIENTS)]
     for job_id in ids[:2]:
-        s.wait_status(job_id, "running")
+        wait_for_rows(s, job_id)  # before the first there is no answer to keep
     check(all(s.get(f"/v1/jobs/{job_id}").json["status"] == "accepted" for job_id in ids[2:]), "more than two run")
     after = s.post(MATRICES).json["id"]
 
