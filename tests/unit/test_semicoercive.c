@@ -2,6 +2,11 @@
  * references are analytic, or every active set there is. */
 #include "semicoercive_fixture.h"
 
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_thread_init();
+}
+
 /* A block on the floor at y = -gap, its left side on rollers: nothing else holds it from moving up or down. */
 static uz_scene rolled_block(int64_t nx, int64_t ny, double gap, double push)
 {

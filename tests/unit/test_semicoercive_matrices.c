@@ -1,6 +1,11 @@
 /* Matrices whose K is singular: solved where the load presses the body on, refused by name where it does not. */
 #include "semicoercive_fixture.h"
 
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_thread_init();
+}
+
 /* ------------------------------------------------------------------ matrices */
 
 TEST(two_floating_blocks_are_solved_when_both_are_pressed)

@@ -7,6 +7,11 @@
 
 #include <stdint.h>
 
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_thread_init();
+}
+
 static void add_cases(uz_problem *problem, int64_t n)
 {
     problem->cases = calloc((size_t)n, sizeof *problem->cases);

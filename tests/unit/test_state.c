@@ -3,6 +3,11 @@
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_thread_init();
+}
+
 static uz_result *solve_from(const uz_problem *problem, const uz_settings *settings, const uz_state *start,
                              const uz_hooks *hooks)
 {

@@ -4,6 +4,11 @@
 #include "quad_exact.h"
 #include "scene_fixture.h"
 
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_thread_init();
+}
+
 static uz_result *verify(const uz_problem *problem, const double *u, const double *r, double relative_error)
 {
     uz_settings settings = uz_settings_default();
