@@ -230,6 +230,12 @@ static uz_problem problem_of_case(const uz_problem *problem, int64_t i)
     return one;
 }
 
+/* Other refusals are about the body, which all cases share. */
+static bool is_about_load(const uz_error *err)
+{
+    return strcmp(err->where, "p") == 0 || strncmp(err->where, "/loads", 6) == 0;
+}
+
 /* Cases that the ordinary way refused or could not certify, because only the obstacle holds the body: each by itself.
  */
 static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status refused, uz_error *err)
@@ -244,7 +250,7 @@ static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status ref
         status = uz_solve_semicoercive(&b->results[i], &one, b->settings, cache, b->hooks, refused, b->started, err);
         if (status == UZ_OK)
             continue;
-        if (b->problem->n_cases > 0 && status != refused)
+        if (b->problem->n_cases > 0 && err && is_about_load(err))
             name_case(err, i);
         return status;
     }

@@ -221,3 +221,44 @@ TEST(every_method_gives_the_certified_answer)
         uz_problem_clear(&problem);
     }
 }
+
+/* -------------------------------------------------------------------- load cases */
+
+static uz_load_case pushing(const char *name, double push)
+{
+    uz_load_case one = {.n_loads = 1};
+    snprintf(one.name, sizeof one.name, "%s", name);
+    one.loads = calloc(1, sizeof *one.loads);
+    if (!one.loads)
+        abort();
+    snprintf(one.loads->on, sizeof one.loads->on, "top");
+    one.loads->traction[1] = push;
+    return one;
+}
+
+/* Each load is solved by itself; the one that does not press the body on is named. */
+TEST(load_cases_of_a_floating_block)
+{
+    uz_problem problem = problem_in(rolled_block(12, 4, 0, -1));
+    uz_settings settings = uz_settings_default();
+    uz_result **results = NULL;
+    uz_error err = {0};
+    problem.n_cases = 3;
+    problem.cases = calloc(3, sizeof *problem.cases);
+    if (!problem.cases)
+        abort();
+    for (int k = 0; k < 3; k++)
+        problem.cases[k] = pushing(k == 0 ? "a" : k == 1 ? "b" : "c", -1.0 - k);
+    CHECK_MSG(uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+    for (int64_t k = 0; results && k < 3; k++) {
+        CHECK_STR(uz_outcome_name(results[k]->summary.outcome), "converged");
+        CHECK_REL(results[k]->summary.force[1], 300.0 * (double)(k + 1), 1e-7);
+    }
+    uz_results_free(results, 3);
+    problem.cases[1].loads->traction[1] = 1;
+    CHECK_INT(uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, &err), UZ_ERR_FREE_BODY);
+    CHECK(results == NULL);
+    CHECK_STR(err.where, "/cases/1/loads");
+    CHECK(strstr(err.message, "translation along +y"));
+    uz_problem_clear(&problem);
+}
