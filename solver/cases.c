@@ -5,6 +5,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "methods/method.h"
 #include "semicoercive/semicoercive.h"
 #include "solve.h"
 
@@ -231,9 +232,27 @@ static uz_problem problem_of_case(const uz_problem *problem, int64_t i)
 }
 
 /* Other refusals are about the body, which all cases share. */
-static bool is_about_load(const uz_error *err)
+static bool is_about_case(const uz_error *err)
 {
-    return strcmp(err->where, "p") == 0 || strncmp(err->where, "/loads", 6) == 0;
+    return strcmp(err->where, "p") == 0 || strcmp(err->where, "start") == 0 || strncmp(err->where, "/loads", 6) == 0;
+}
+
+/* A body that the ordinary way refused had no iteration to go on from a start; it is checked all the same. */
+static uz_status check_start(const batch *b, int64_t i, uz_error *err)
+{
+    int64_t m = b->problem->qp.N.rows, n_nodes;
+    int dim;
+    uz_error own = {0};
+    uz_status status = UZ_OK;
+    if (!b->starts || !b->starts[i])
+        return UZ_OK;
+    if (b->problem->kind == UZ_PROBLEM_SCENE)
+        status = uz_scene_sizes(&dim, &n_nodes, &m, &b->problem->scene, &own);
+    if (status == UZ_OK)
+        status = uz_state_check(b->starts[i], m, &own);
+    if (status != UZ_OK && err)
+        *err = own; /* in place of the refusal */
+    return status;
 }
 
 /* Cases that the ordinary way refused or could not certify, because only the obstacle holds the body: each by itself.
@@ -247,10 +266,13 @@ static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status ref
             continue;
         if (b->hooks && b->hooks->begins)
             b->hooks->begins(b->hooks->ctx, i);
-        status = uz_solve_semicoercive(&b->results[i], &one, b->settings, cache, b->hooks, refused, b->started, err);
+        status = check_start(b, i, err);
+        if (status == UZ_OK)
+            status =
+                uz_solve_semicoercive(&b->results[i], &one, b->settings, cache, b->hooks, refused, b->started, err);
         if (status == UZ_OK)
             continue;
-        if (b->problem->n_cases > 0 && err && is_about_load(err))
+        if (b->problem->n_cases > 0 && err && is_about_case(err))
             name_case(err, i);
         return status;
     }

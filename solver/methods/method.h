@@ -62,6 +62,8 @@ void uz_iterate_clear(uz_iterate *it);
  * state says is checked against this problem: where D r or the bound of its best answer differ, it is that of another
  * one, and only its reactions are taken. Errors: UZ_ERR_SIZE (another m), _NOT_FINITE, _ARGUMENT. */
 uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start, uz_error *err);
+/* Can it be the state of a run on m contacts? Errors as above. */
+uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err);
 /* Where the iterate stands, for the caller of the library. */
 uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_case *load, uz_method method, uz_error *err);
 

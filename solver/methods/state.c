@@ -58,7 +58,7 @@ static uz_status check_numbers(const uz_state *s, uz_error *err)
     return uz_fail(err, UZ_ERR_ARGUMENT, "start", "the start's counts, alpha, tau or bounds can't be those of a run");
 }
 
-static uz_status check_state(const uz_state *s, int64_t m, uz_error *err)
+uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err)
 {
     if (s->m != m)
         return uz_fail(err, UZ_ERR_SIZE, "start", "the start has %lld rows, the problem %lld", (long long)s->m,
@@ -171,7 +171,7 @@ uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start,
 {
     double alpha = it->alpha;
     bool same = false;
-    uz_status status = check_state(start, it->m, err);
+    uz_status status = uz_state_check(start, it->m, err);
     it->started = uz_seconds();
     if (status == UZ_OK && start->rho)
         status = restore(&same, it, load, start, err);
