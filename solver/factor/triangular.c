@@ -81,12 +81,16 @@ static uz_status substitute(substitution solve, const uz_factor *factor, uz_fact
 
 uz_status uz_factor_forward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns, uz_error *err)
 {
+    if (columns == 1)
+        return uz_single_substitute(factor, ws, x, true, err);
     return substitute(cholmod_l_super_lsolve, factor, ws, x, columns, err);
 }
 
 uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, double *x, int64_t columns,
                              uz_error *err)
 {
+    if (columns == 1)
+        return uz_single_substitute(factor, ws, x, false, err);
     return substitute(cholmod_l_super_ltsolve, factor, ws, x, columns, err);
 }
 
