@@ -9,10 +9,14 @@ double uz_bound_norm(const double *x, int64_t n)
 {
     double scale = 0.0, sum = 0.0;
     for (int64_t i = 0; i < n; i++)
-        scale = fmax(scale, fabs(x[i]));
-    for (int64_t i = 0; scale > 0.0 && i < n; i++)
+        scale = fabs(x[i]) > scale ? fabs(x[i]) : scale;
+    bool safe = scale > 0x1p-400 && scale < 0x1p400; /* squares, and sums of 2^63 of them, are in range */
+    double unit = safe ? 1.0 : scale;
+    for (int64_t i = 0; safe && i < n; i++)
+        sum += x[i] * x[i];
+    for (int64_t i = 0; !safe && scale > 0.0 && i < n; i++)
         sum += (x[i] / scale) * (x[i] / scale);
-    return scale * sqrt(sum);
+    return unit * sqrt(sum);
 }
 
 /* Paper, section 4. */

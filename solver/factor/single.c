@@ -10,6 +10,8 @@
 
 #include "core/error.h"
 
+#include <string.h>
+
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
 enum { PANEL = 4 }; /* columns of L at a time */
@@ -190,11 +192,13 @@ uz_status uz_single_substitute(const uz_factor *factor, uz_factor_workspace *ws,
         int64_t k = forward ? at : count - 1 - at;
         const SuiteSparse_long *row = s + pi[k];
         panel_of panel = {(const double *)L->x + px[k], pi[k + 1] - pi[k], super[k + 1] - super[k], ws->panel};
-        int64_t changed = forward ? panel.rows : panel.cols;
-        for (int64_t i = 0; i < panel.rows; i++)
+        double *own = x + super[k]; /* the first rows of a supernode are its columns */
+        memcpy(panel.b, own, (size_t)panel.cols * sizeof *own);
+        for (int64_t i = panel.cols; i < panel.rows; i++)
             panel.b[i] = x[row[i]];
         step(&panel);
-        for (int64_t i = 0; i < changed; i++)
+        memcpy(own, panel.b, (size_t)panel.cols * sizeof *own);
+        for (int64_t i = panel.cols; forward && i < panel.rows; i++)
             x[row[i]] = panel.b[i];
     }
     return status;
