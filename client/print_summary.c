@@ -104,6 +104,18 @@ static void print_problem_size(FILE *to, const json_t *summary)
     fprintf(to, ", %.0f unknowns, %.0f contact conditions\n", d, m);
 }
 
+/* A body that its supports leave free to move. */
+static void print_held(FILE *to, const json_t *summary)
+{
+    double modes = client_json_number(summary, "semicoercive.free_modes");
+    char held[32];
+    if (!isfinite(modes))
+        return;
+    label(to, "supports");
+    fprintf(to, "only the obstacle holds it: %.0f free motion%s, stopped by %s rows proved to be in contact\n", modes,
+            modes > 1 ? "s" : "", number_in_words(held, summary, "semicoercive.held", 9));
+}
+
 static void print_force(FILE *to, const json_t *summary)
 {
     const json_t *force = client_json_at(summary, "contact.force");
@@ -191,6 +203,14 @@ static void print_certificate(FILE *to, const json_t *summary)
     }
 }
 
+/* In place of a factor. */
+static void print_levels(FILE *to, const json_t *factor)
+{
+    double bytes = client_json_number(factor, "bytes");
+    fprintf(to, "none: coarse levels of %.3g MB, %s\n", isfinite(bytes) ? bytes / 1e6 : 0.0,
+            json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new");
+}
+
 static void print_factor(FILE *to, const json_t *summary)
 {
     const json_t *factor = client_json_at(summary, "factor");
@@ -199,6 +219,10 @@ static void print_factor(FILE *to, const json_t *summary)
     if (!json_is_object(factor))
         return;
     label(to, "factor");
+    if (strcmp(client_json_text(summary, "operator"), "matrix_free") == 0) {
+        print_levels(to, factor);
+        return;
+    }
     fprintf(to, "%s, ", json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new");
     client_print_safe(to, client_json_text(factor, "ordering"));
     fprintf(to, " ordering, %s entries", number_in_words(entries, factor, "nnz", 15));
@@ -239,6 +263,7 @@ void client_print_summary(FILE *to, const json_t *job)
     print_outcome(to, summary);
     print_case_counts(to, summary);
     print_problem_size(to, summary);
+    print_held(to, summary);
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))
         print_contact(to, summary);

@@ -118,6 +118,8 @@ void client_print_problem(FILE *to, long http_status, const json_t *problem)
     fputs("uzawa: ", to);
     client_print_safe(to, *detail ? detail : *title ? title : without_reply(http_status));
     fputc('\n', to);
+    if (strcmp(code, "case_needed") == 0)
+        fputs("  here: --case NAME\n", to);
     if (*pointer || line > 0) {
         fputs("  at ", to);
         client_print_safe(to, pointer);

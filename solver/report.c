@@ -292,6 +292,7 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
     summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
+    summary->origin = run->it.origin;
     summary->iterations = run->it.iteration;
     summary->restarts = run->it.restarts;
     summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;

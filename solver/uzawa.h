@@ -349,8 +349,13 @@ typedef struct {
     int n_considered;
 } uz_cost;
 
+/* Where the iterations began. A state that is not one of this problem gives no more than its reactions, and a body that
+ * only the obstacle holds begins at zero whatever was given. */
+typedef enum { UZ_FROM_ZERO, UZ_FROM_REACTIONS, UZ_FROM_STATE } uz_origin;
+
 typedef struct {
     uz_outcome outcome;
+    uz_origin origin;
     uz_method method;
     uz_operator op;
     uz_ordering ordering;

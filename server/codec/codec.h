@@ -66,8 +66,9 @@ bool codec_is_verify(const char *body, size_t len);
 bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len);
 
 /* Turns the library's error into problem details: status 422, code = uz_status_name, pointer = "/problem/" + where, or
- * where alone if that points elsewhere in the request ("/cases/3/p"). */
-void codec_problem_from_error(problem_details *out, const uz_error *err);
+ * where alone if that points elsewhere in the request ("/cases/3/p"). What a request of this kind has no member for is
+ * about its problem as a whole: "K" of a scene is "/problem" (or its mesh, if it is too large), "/cases/3/K" is "/problem/K". */
+void codec_problem_from_error(problem_details *out, const uz_error *err, uz_problem_kind kind);
 
 /* The candidate that was probably meant, -1: none is close. */
 int codec_closest(const char *text, const char *const *candidates, size_t count);

@@ -35,19 +35,48 @@ static int http_status(uz_status status)
     return status == UZ_ERR_MEMORY ? 503 : status == UZ_ERR_INTERNAL || status == UZ_ERR_ARGUMENT ? 500 : 422;
 }
 
-/* Pointers into other members of a request than its problem. */
+/* Members of a request beside its problem. */
 static bool points_beside(const char *where)
 {
-    static const char *const MEMBERS[] = {"/cases/", "/solver/", "/answer/"};
-    for (size_t i = 0; i < sizeof MEMBERS / sizeof MEMBERS[0]; i++)
-        if (strncmp(where, MEMBERS[i], strlen(MEMBERS[i])) == 0)
+    static const char *const MEMBERS[] = {"/cases", "/solver", "/answer"};
+    for (size_t i = 0; i < sizeof MEMBERS / sizeof MEMBERS[0]; i++) {
+        size_t len = strlen(MEMBERS[i]);
+        if (strncmp(where, MEMBERS[i], len) == 0 && (where[len] == '/' || where[len] == '\0'))
             return true;
+    }
     return false;
 }
 
-void codec_problem_from_error(problem_details *out, const uz_error *err)
+/* A load case of a request has loads, p and h; an error about anything else of it is one of the body that all cases
+ * share. Returns `where` without the case. */
+static const char *leave_case(const char *where)
 {
-    const char *where = err->where;
+    static const char CASES[] = "/cases/";
+    if (strncmp(where, CASES, sizeof CASES - 1) != 0)
+        return where;
+    const char *rest = where + sizeof CASES - 1;
+    rest += strspn(rest, "0123456789");
+    bool own = *rest == '\0' || strncmp(rest, "/loads", 6) == 0 || strcmp(rest, "/p") == 0 || strcmp(rest, "/h") == 0;
+    return own ? where : rest;
+}
+
+/* The library names the matrices that it makes of a scene, and no request of a scene has them. Too large they are
+ * because of the mesh. */
+static const char *leave_matrix(const char *where, uz_status status)
+{
+    static const char *const NAMES[] = {"K", "N", "p", "h"};
+    const char *name = where + (where[0] == '/');
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
+        if (strcmp(name, NAMES[i]) == 0)
+            return status == UZ_ERR_LIMIT ? "/mesh" : "";
+    return where;
+}
+
+void codec_problem_from_error(problem_details *out, const uz_error *err, uz_problem_kind kind)
+{
+    const char *where = leave_case(err->where);
+    if (kind == UZ_PROBLEM_SCENE)
+        where = leave_matrix(where, err->status);
     problem_set(out, http_status(err->status), uz_status_name(err->status), NULL, "%s", err->message);
     snprintf(out->pointer, sizeof out->pointer, "%s%s%s", points_beside(where) ? "" : "/problem",
              where[0] && where[0] != '/' ? "/" : "", where);
@@ -109,7 +138,7 @@ bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u,
     if (p->kind != UZ_PROBLEM_SCENE)
         return true;
     if (uz_scene_sizes(&dim, &nodes, m, &p->scene, &err) != UZ_OK) {
-        codec_problem_from_error(problem, &err);
+        codec_problem_from_error(problem, &err, p->kind);
         return false;
     }
     *n_u = nodes * dim;

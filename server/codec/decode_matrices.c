@@ -22,7 +22,7 @@ static bool refuse_call(const reading *r, uz_error *err, const char *name)
 {
     if (!err->where[0])
         snprintf(err->where, sizeof err->where, "%s", name);
-    codec_problem_from_error(r->problem, err);
+    codec_problem_from_error(r->problem, err, UZ_PROBLEM_MATRICES);
     return false;
 }
 

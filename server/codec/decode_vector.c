@@ -70,7 +70,7 @@ bool decode_vector(double **out, int64_t *n, json_doc *doc, const json_t *value,
     if (good)
         return true;
     snprintf(err.where, sizeof err.where, "%s", where);
-    codec_problem_from_error(problem, &err);
+    codec_problem_from_error(problem, &err, UZ_PROBLEM_MATRICES);
     return false;
 }
 

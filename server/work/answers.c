@@ -100,11 +100,18 @@ static bool add_history(answer_parts *to, const uz_history *history, const doubl
 
 /* ---- one answer, all answers */
 
+/* What the solver made of the start that it was given, which may be less than what the request asked for. */
+static const char *origin_name(uz_origin origin)
+{
+    return origin == UZ_FROM_STATE ? "continued" : origin == UZ_FROM_REACTIONS ? "warm" : "zero";
+}
+
 static bool build_one(answers *a, int64_t i, const uz_result *result, const codec_request *request, const starts *from)
 {
-    bool is_scene = request->problem.kind == UZ_PROBLEM_SCENE, has_earlier = from->histories != NULL;
+    bool is_scene = request->problem.kind == UZ_PROBLEM_SCENE;
+    bool has_earlier = from->histories != NULL && result->summary.origin == UZ_FROM_STATE;
     answer_parts *parts = &a->parts[i];
-    codec_run run = {.started_from = request->answer.u ? NULL : starts_name(from, i)};
+    codec_run run = {.started_from = request->answer.u ? NULL : origin_name(result->summary.origin)};
     parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
     return parts->summary && add_vectors(parts, result, is_scene) &&
            add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
@@ -129,22 +136,23 @@ static void add_waiting(uz_timings *t, double queue_s, double parse_s)
     t->total += queue_s + parse_s;
 }
 
-static const char *started_from(const starts *from, int64_t n)
+/* Of all cases: that of the first which did not begin at zero. */
+static const char *started_from(uz_result *const *results, int64_t n)
 {
-    for (int64_t i = 0; i < n; i++)
-        if (from->states && from->states[i])
-            return starts_name(from, i);
-    return "zero";
+    int64_t i = 0;
+    while (i + 1 < n && results[i]->summary.origin == UZ_FROM_ZERO)
+        i++;
+    return origin_name(results[i]->summary.origin);
 }
 
-static bool build_whole(answers *a, uz_result *const *results, const codec_request *request, const starts *from,
-                        double queue_s, double parse_s)
+static bool build_whole(answers *a, uz_result *const *results, const codec_request *request, double queue_s,
+                        double parse_s)
 {
     codec_cases counts;
     uz_summary overall;
     overall_summary(&overall, &counts, results, &request->problem);
     add_waiting(&overall.timings, queue_s, parse_s);
-    codec_run run = {.started_from = started_from(from, a->n), .cases = &counts};
+    codec_run run = {.started_from = started_from(results, a->n), .cases = &counts};
     a->shared.summary = codec_encode_run(&overall, request->problem.kind, &run);
     return a->shared.summary && add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE);
 }
@@ -175,7 +183,7 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
     for (int64_t i = 0; ok && i < out->n; i++)
         ok = build_one(out, i, results[i], request, from);
     if (ok && has_cases)
-        return build_whole(out, results, request, from, queue_s, parse_s) && build_cases(out, outcome, request);
+        return build_whole(out, results, request, queue_s, parse_s) && build_cases(out, outcome, request);
     ok = ok && add_places(out, &out->parts[0], results[0], request->problem.kind == UZ_PROBLEM_SCENE);
     outcome->whole = as_stored(&out->parts[0], NULL);
     return ok;

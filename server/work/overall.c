@@ -54,10 +54,13 @@ static void add_timings(uz_timings *sum, const uz_timings *t)
     sum->total += t->total;
 }
 
-/* The first case paid for the factor, or found it. */
+/* The first case paid for the factor, or found it; its cost has the setup. */
 static void take_factor(uz_summary *out, const uz_summary *first)
 {
     out->factor_cached = first->factor_cached;
+    out->reused = first->reused;
+    out->cost = first->cost;
+    out->factor_flops = first->factor_flops;
     out->factor_nnz = first->factor_nnz;
     out->factor_bytes = first->factor_bytes;
     out->rcond = first->rcond;
@@ -92,10 +95,11 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
     counts->worst = problem->cases[worst].name;
     out->certificate.relative_error = bound;
     out->timings = times;
-    out->iterations = out->restarts = 0;
+    out->iterations = out->restarts = out->refinements = 0;
     for (int64_t i = 0; i < problem->n_cases; i++) {
         out->iterations += results[i]->summary.iterations;
         out->restarts += results[i]->summary.restarts;
+        out->refinements += results[i]->summary.refinements;
     }
     take_factor(out, &results[0]->summary);
     set_message(out, counts);

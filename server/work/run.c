@@ -78,7 +78,7 @@ static void fail_from_problem(run *r, const problem_details *problem)
 static void fail_from_error(run *r, const uz_error *err)
 {
     problem_details problem = {0};
-    codec_problem_from_error(&problem, err);
+    codec_problem_from_error(&problem, err, r->request.problem.kind);
     fail_from_problem(r, &problem);
 }
 
@@ -152,6 +152,22 @@ static run_end why_stopped(const run *r)
     return atomic_load(&r->me->cancel) ? END_FINISH : END_RELEASE;
 }
 
+/* What the library can't know: who may do something about it, and how. */
+static void add_remedy(uz_error *err, const char *remedy)
+{
+    size_t used = strlen(err->message);
+    snprintf(err->message + used, sizeof err->message - used, "%s", remedy);
+}
+
+/* A free body may have an answer, and one that this service itself found. */
+static void explain_unverified(uz_error *err, const uz_problem *problem)
+{
+    bool touches = problem->kind == UZ_PROBLEM_SCENE ? problem->scene.n_contacts > 0 : problem->qp.N.rows > 0;
+    if (touches && (err->status == UZ_ERR_FREE_BODY || err->status == UZ_ERR_NOT_SPD))
+        add_remedy(err, ". An answer is verified only where the supports alone hold the body; one that the obstacle "
+                        "holds can be solved here: its summary has a certificate");
+}
+
 static uz_status verify(run *r, const uz_hooks *hooks, uz_error *err)
 {
     const codec_answer *given = &r->request.answer;
@@ -165,6 +181,7 @@ static uz_status verify(run *r, const uz_hooks *hooks, uz_error *err)
         strcpy(err->where, "/answer/displacements");
     else if (strcmp(err->where, "r") == 0)
         strcpy(err->where, "/answer/reactions");
+    explain_unverified(err, &r->request.problem);
     return status;
 }
 
@@ -188,6 +205,8 @@ static run_end solve(run *r)
     uz_error err = {0};
     r->request.settings.memory_limit = r->me->w->options.solve_bytes;
     uz_status status = solve_or_verify(r, &err);
+    if (status == UZ_ERR_LIMIT)
+        add_remedy(&err, " (the limit is the daemon's option --memory)");
     bool was_stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && any_dismissed(r));
     run_end end = was_stopped ? why_stopped(r) : END_FINISH;
     if (end != END_FINISH)

@@ -124,9 +124,3 @@ void starts_clear(starts *s)
     free(s->rows);
     *s = (starts){.n = 0};
 }
-
-const char *starts_name(const starts *s, int64_t i)
-{
-    const uz_state *state = s->states ? s->states[i] : NULL;
-    return !state ? "zero" : state->rho ? "continued" : "warm";
-}

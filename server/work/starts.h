@@ -18,7 +18,4 @@ typedef struct {
 store_status starts_load(starts *out, store *s, const codec_request *request);
 void starts_clear(starts *s);
 
-/* "zero", "warm" or "continued". */
-const char *starts_name(const starts *s, int64_t i);
-
 #endif

@@ -177,6 +177,7 @@ uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start,
         status = restore(&same, it, load, start, err);
     if (status == UZ_OK && !same)
         take_reactions(it, start, uz_case_row_scale(load), alpha);
+    it->origin = same ? UZ_FROM_STATE : UZ_FROM_REACTIONS;
     return status;
 }
 

@@ -44,6 +44,7 @@ def test_factor_does_not_fit(s):
 def test_no_form_fits(s):
     for body in plate([240, 80]), plate([2000, 2000]), plate([120, 40], operator="condensed"):
         error = failed(s, body)
+        check(error["pointer"].startswith("/problem/mesh") and "--memory" in error["detail"], error)
         check(error["code"] == "memory_limit" and "bytes" in error["detail"], error)
     check("matrix_free" in failed(s, plate([120, 40], operator="condensed"))["detail"])
     expect(s.get("/healthz"), 200)

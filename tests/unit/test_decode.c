@@ -235,22 +235,55 @@ TEST(library_errors_become_problems)
 {
     problem_details problem;
     uz_error err = {.status = UZ_ERR_SCENE, .where = "/contacts/0/on", .message = "no group \"x\""};
-    codec_problem_from_error(&problem, &err);
+    codec_problem_from_error(&problem, &err, UZ_PROBLEM_MATRICES);
     CHECK_INT(problem.status, 422);
     CHECK_STR(problem.code, "bad_scene");
     CHECK_STR(problem.pointer, "/problem/contacts/0/on");
     CHECK_STR(problem.detail, "no group \"x\"");
     err = (uz_error){.status = UZ_ERR_NOT_SPD, .where = "K", .line = 7, .message = "pivot"};
-    codec_problem_from_error(&problem, &err);
+    codec_problem_from_error(&problem, &err, UZ_PROBLEM_MATRICES);
     CHECK_STR(problem.pointer, "/problem/K");
     CHECK_INT(problem.line, 7);
     err = (uz_error){.status = UZ_ERR_MEMORY};
-    codec_problem_from_error(&problem, &err);
+    codec_problem_from_error(&problem, &err, UZ_PROBLEM_MATRICES);
     CHECK_INT(problem.status, 503);
     CHECK_STR(problem.pointer, "/problem");
     err = (uz_error){.status = UZ_ERR_INTERNAL};
-    codec_problem_from_error(&problem, &err);
+    codec_problem_from_error(&problem, &err, UZ_PROBLEM_MATRICES);
     CHECK_INT(problem.status, 500);
+}
+
+/* Every pointer is one of a member that the request can have. */
+TEST(library_errors_point_into_the_request)
+{
+    static const struct {
+        const char *where, *of_matrices, *of_scene;
+    } ROWS[] = {{"", "/problem", "/problem"},
+                {"K", "/problem/K", "/problem"},
+                {"p", "/problem/p", "/problem"},
+                {"/loads", "/problem/loads", "/problem/loads"},
+                {"/cases", "/cases", "/cases"},
+                {"/casesx", "/problem/casesx", "/problem/casesx"},
+                {"/cases/12", "/cases/12", "/cases/12"},
+                {"/cases/12/h", "/cases/12/h", "/cases/12/h"},
+                {"/cases/12/K", "/problem/K", "/problem"},
+                {"/cases/12/supports", "/problem/supports", "/problem/supports"},
+                {"/cases/12/loads/0/on", "/cases/12/loads/0/on", "/cases/12/loads/0/on"},
+                {"/solver/warm_start", "/solver/warm_start", "/solver/warm_start"},
+                {"/answer/reactions", "/answer/reactions", "/answer/reactions"}};
+    for (size_t i = 0; i < sizeof ROWS / sizeof ROWS[0]; i++) {
+        problem_details problem;
+        uz_error err = {.status = UZ_ERR_NOT_SPD};
+        snprintf(err.where, sizeof err.where, "%s", ROWS[i].where);
+        codec_problem_from_error(&problem, &err, UZ_PROBLEM_MATRICES);
+        CHECK_STR(problem.pointer, ROWS[i].of_matrices);
+        codec_problem_from_error(&problem, &err, UZ_PROBLEM_SCENE);
+        CHECK_STR(problem.pointer, ROWS[i].of_scene);
+    }
+    problem_details problem;
+    uz_error err = {.status = UZ_ERR_LIMIT, .where = "K"};
+    codec_problem_from_error(&problem, &err, UZ_PROBLEM_SCENE);
+    CHECK_STR(problem.pointer, "/problem/mesh");
 }
 
 TEST(problems_are_read_back)

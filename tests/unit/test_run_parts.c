@@ -113,7 +113,11 @@ static void make_three(three *t, const uz_outcome outcomes[3], const double boun
         s->iterations = 10 * (i + 1);
         s->restarts = i;
         s->active = i;
+        s->refinements = 2;
         s->factor_cached = i > 0;
+        s->reused = (uz_reuse){.assembly = i > 0, .ordering = true, .factor = i > 0, .op = i > 0};
+        s->factor_flops = i > 0 ? 0 : 7;
+        s->cost.actual_seconds = 8 - i;
         s->timings = (uz_timings){.factor = i == 0 ? 4 : 0, .iterate = 1, .total = 2};
         snprintf(s->message, sizeof s->message, "message %d", i);
         t->list[i] = &t->results[i];
@@ -133,6 +137,8 @@ TEST(the_worst_case_speaks_for_all)
     CHECK_INT(s.outcome, UZ_ITERATION_LIMIT);
     CHECK(s.certificate.relative_error == 1e-3 && s.iterations == 60 && s.restarts == 3 && s.active == 1);
     CHECK(s.timings.factor == 4 && s.timings.iterate == 3 && s.timings.total == 6 && !s.factor_cached);
+    CHECK(s.reused.ordering && !s.reused.assembly && !s.reused.factor && !s.reused.op && s.factor_flops == 7);
+    CHECK(s.cost.actual_seconds == 8 && s.refinements == 6);
     CHECK_STR(counts.worst, "case 1");
     CHECK(counts.count == 3 && counts.outcomes[UZ_CONVERGED] == 2 && counts.outcomes[UZ_ITERATION_LIMIT] == 1);
     CHECK_STR(s.message, "2 of 3 cases converged. The worst is case 1: message 1");

@@ -370,6 +370,8 @@ TEST(a_state_of_another_problem_is_a_warm_start)
         CHECK_INT(warm->summary.outcome, UZ_CONVERGED);
         CHECK_INT(warm->summary.active, cold->summary.active);
         CHECK(warm->history.count > 0 && warm->history.rows[0].iteration == 0);
+        CHECK_INT(cold->summary.origin, UZ_FROM_ZERO);
+        CHECK_INT(warm->summary.origin, UZ_FROM_REACTIONS);
         uz_result_free(from);
         uz_result_free(cold);
         uz_result_free(warm);

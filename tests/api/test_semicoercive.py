@@ -1,0 +1,123 @@
+"""Bodies that only the obstacle holds, as a client sees them. usage: test_semicoercive.py BUILD_DIR [FILTER]"""
+import copy
+import json
+import subprocess
+
+import service
+from service import SCENE, check, expect
+
+WAIT = {"Prefer": "wait=60"}
+K = "%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 1\n2 1 -1\n2 2 1\n"
+N = "%%MatrixMarket matrix coordinate real general\n1 2 1\n1 2 1\n"
+
+
+def block(load=-0.05, **more):
+    """A block on a plane with a roller at its left side: nothing but the plane holds it along y."""
+    body = copy.deepcopy(SCENE)
+    body["problem"].update(supports=[{"on": "left", "ux": 0}], loads=[{"on": "top", "traction": [0, load]}])
+    return {**body, "solver": {}, **more}
+
+
+def chain(*p):
+    """Two springs' ends that nothing but one row of N holds."""
+    return {"problem": {"kind": "matrices", "K": K, "N": N, "h": [0.5], "p": list(p)}}
+
+
+def ended(s, body, status="successful"):
+    job = expect(s.post(body, WAIT), 200).json
+    check(job["status"] == status, job)
+    return job
+
+
+def error_of(s, body):
+    return ended(s, body, "failed")["error"]
+
+
+# ---------------------------------------------------------------- solved
+
+def test_a_pressed_block(s):
+    summary = ended(s, block())["summary"]
+    check(summary["outcome"] == "converged" and summary["certificate"]["relative_error"] <= 1e-8, summary)
+    semi, force = summary["semicoercive"], summary["contact"]["force"]
+    check(semi["free_modes"] == 1 and semi["held"] > 0 and 0 < len(semi["held_by_rows"]) <= 8, semi)
+    scene = SCENE["problem"]
+    pressed = 0.05 * scene["mesh"]["box"]["size"][0] * scene.get("thickness", 1)
+    check(abs(force[0]) < 1e-6 * pressed and abs(force[1] - pressed) < 1e-6 * pressed, force)
+
+
+def test_matrices(s):
+    job = ended(s, chain(1, 1))
+    result = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=displacements,reactions"), 200).json
+    check(job["summary"]["semicoercive"]["free_modes"] == 1, job["summary"])
+    for have, want in zip(result["displacements"] + result["reactions"], (1.5, 0.5, -2)):
+        check(abs(have - want) < 1e-7, result)
+
+
+def test_an_ordinary_body_says_nothing_of_it(s):
+    check("semicoercive" not in ended(s, SCENE)["summary"], "semicoercive")
+
+
+# ---------------------------------------------------------------- refused
+
+def test_the_motion_is_named(s):
+    error = error_of(s, block(0.05))
+    check(error["code"] == "free_body" and error["pointer"] == "/problem/loads", error)
+    check("translation along +y" in error["detail"], error)
+    error = error_of(s, chain(-1, -1))
+    check(error["code"] == "free_body" and error["pointer"] == "/problem/p" and "dof 0" in error["detail"], error)
+    error = error_of(s, block(problem={**block()["problem"], "contacts": []}))
+    check(error["pointer"] == "/problem/supports" and "translation along y" in error["detail"], error)
+
+
+def test_it_cannot_be_verified(s):
+    for body in block(), chain(1, 1):
+        job = ended(s, body)["id"]
+        result = expect(s.get(f"/v1/jobs/{job}/result?fields=displacements,reactions"), 200).json
+        answer = {field: result[field] for field in ("displacements", "reactions")}
+        reply = expect(s.request("POST", "/v1/verify", {"problem": body["problem"], "answer": answer}, WAIT), 422).json
+        check("verified only where the supports alone hold the body" in reply["detail"], reply)
+
+
+# ---------------------------------------------------------------- starts
+
+def test_where_it_began_is_true(s):
+    """Its rounds begin at zero whatever was given, and the summary and the history say so."""
+    first = ended(s, block())["id"]
+    warm = ended(s, block(solver={"warm_start": {"job": first}}))
+    check(warm["summary"]["started_from"] == "zero", warm["summary"])
+    refined = expect(s.request("POST", f"/v1/jobs/{first}/refine", {"accuracy": "exact"}, WAIT), 200).json
+    check(refined["status"] == "successful" and refined["summary"]["started_from"] == "zero", refined)
+    whole = ended(s, block(solver={"accuracy": "exact"}))["id"]
+    rows = [[row[0] for row in expect(s.get(f"/v1/jobs/{job}/history"), 200).json["rows"]] for job in (refined["id"], whole)]
+    check(rows[0] == rows[1], rows)
+
+
+# ---------------------------------------------------------------- the client
+
+def client(s, *words, text=None):
+    return subprocess.run([str(s.build / "uzawa"), "--server", f"http://{s.host}:{s.port}", *words],
+                          input=text, capture_output=True, text=True, timeout=60)
+
+
+def test_client(s):
+    done = client(s, "submit", "-", "--wait", text=json.dumps(block()))
+    check(done.returncode == 0 and "only the obstacle holds it: 1 free motion" in done.stdout, done)
+    done = client(s, "submit", "-", "--wait", text=json.dumps(block(0.05)))
+    check(done.returncode == 6 and "translation along +y" in done.stderr and "/problem/loads" in done.stderr, done)
+
+
+def test_client_without_a_factor(s):
+    body = {**copy.deepcopy(SCENE), "solver": {"operator": "matrix_free"}}
+    done = client(s, "submit", "-", "--wait", text=json.dumps(body))
+    check(done.returncode == 0 and "none: coarse levels of" in done.stdout and "0 entries" not in done.stdout, done)
+
+
+def test_client_names_its_own_option(s):
+    loads = [{"name": "a", "loads": []}, {"name": "b", "loads": block()["problem"]["loads"]}]
+    done = client(s, "submit", "-", "--wait", "--quiet", text=json.dumps({**copy.deepcopy(SCENE), "cases": loads}))
+    done = client(s, "history", done.stdout.strip())
+    check(done.returncode == 4 and "--case NAME" in done.stderr and '"b"' in done.stderr, done)
+
+
+if __name__ == "__main__":
+    service.main(globals())
