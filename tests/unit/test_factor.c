@@ -197,58 +197,6 @@ TEST(solves_are_accurate)
     }
 }
 
-/* One right-hand side goes through another code than several do. y (n x 2): column 0 alone is what it is beside 1, up
- * to rounding. */
-static void check_single(const uz_csc *K, uz_ordering ordering, uint64_t seed)
-{
-    int64_t n = K->cols;
-    uz_factor *factor;
-    uz_error err;
-    uz_factor_workspace *ws = uz_factor_workspace_new();
-    double *one = vector(n), *two = vector(2 * n);
-    qp_random rng = {seed};
-    CHECK_INT(factor_of(&factor, K, NULL, 0, ordering, 0, &err), UZ_OK);
-    for (int forward = 1; forward >= 0; forward--) {
-        double size = 0, difference = 0;
-        for (int64_t i = 0; i < 2 * n; i++)
-            two[i] = random_signed(&rng);
-        memcpy(one, two, (size_t)n * sizeof *one);
-        CHECK_INT((forward ? uz_factor_forward : uz_factor_backward)(factor, ws, one, 1, &err), UZ_OK);
-        CHECK_INT((forward ? uz_factor_forward : uz_factor_backward)(factor, ws, two, 2, &err), UZ_OK);
-        for (int64_t i = 0; i < n; i++) {
-            size = fmax(size, fabs(two[i]));
-            difference = fmax(difference, fabs(one[i] - two[i]));
-        }
-        CHECK_MSG(difference <= 1e-14 * size, "order %d, forward %d: %g of %g", (int)n, forward, difference, size);
-    }
-    uz_factor_workspace_free(ws);
-    uz_factor_free(factor);
-    free(one);
-    free(two);
-}
-
-/* Full matrices are one supernode of every width, grids many of few columns. */
-TEST(one_right_hand_side_is_solved_as_among_several)
-{
-    for (int64_t n = 1; n <= 37; n++) {
-        double *K = vector(n * n);
-        qp_random rng = {(uint64_t)n};
-        for (int64_t i = 0; i < n; i++)
-            for (int64_t j = 0; j <= i; j++)
-                K[i * n + j] = K[j * n + i] = i == j ? (double)n : random_signed(&rng);
-        uz_csc full = csc_from_dense(K, n, n, true);
-        check_single(&full, UZ_ORDERING_AMD, (uint64_t)n);
-        uz_csc_clear(&full);
-        free(K);
-    }
-    for (int64_t w = 2; w <= 38; w += 6) {
-        uz_csc K = grid(w, 41 - w);
-        for (size_t k = 0; k < 3; k++)
-            check_single(&K, orderings[k], (uint64_t)w);
-        uz_csc_clear(&K);
-    }
-}
-
 /* The Schur complement of dense K on `last`, by elimination of the others one by one. */
 static double *schur_complement(const double *K, int64_t n, const int64_t *last, int64_t n_last)
 {
