@@ -67,7 +67,8 @@ bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len
 
 /* Turns the library's error into problem details: status 422, code = uz_status_name, pointer = "/problem/" + where, or
  * where alone if that points elsewhere in the request ("/cases/3/p"). What a request of this kind has no member for is
- * about its problem as a whole: "K" of a scene is "/problem" (or its mesh, if it is too large), "/cases/3/K" is "/problem/K". */
+ * about its problem as a whole: "K" of a scene is "/problem" (or its mesh, if it is too large), "/cases/3/K" is
+ * "/problem/K". */
 void codec_problem_from_error(problem_details *out, const uz_error *err, uz_problem_kind kind);
 
 /* The candidate that was probably meant, -1: none is close. */
