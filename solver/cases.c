@@ -262,7 +262,7 @@ static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status ref
     uz_status status = refused;
     for (int64_t i = 0; i < b->n; i++) {
         uz_problem one = problem_of_case(b->problem, i);
-        if (!uz_may_be_semicoercive(refused, b->results[i], &one))
+        if (!uz_may_be_semicoercive(refused, b->results[i], &one, b->settings))
             continue;
         if (b->hooks && b->hooks->begins)
             b->hooks->begins(b->hooks->ctx, i);

@@ -251,6 +251,7 @@ typedef struct {
     double alpha;           /* step size; 0: 1 / lambda_max(D) */
     int64_t max_iterations; /* >= 0 */
     double time_limit_s;    /* of the whole solve; INFINITY: none */
+    bool semidefinite;      /* matrices: K is meant to be singular, its eigenvalues within rounding of 0 being 0 */
     size_t memory_limit; /* bytes for all of a solve; 0: none. AUTO goes on without a factor where one does not fit */
 } uz_settings;
 /* auto, certified 1e-8, 100000 iterations, no time limit. */

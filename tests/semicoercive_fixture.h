@@ -160,6 +160,7 @@ static inline uz_status attempt(uz_result **result, const uz_problem *problem, c
 static inline void expect_refusal(const uz_problem *problem, uz_status status, const char *where, const char *says)
 {
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     uz_result *result = NULL;
     uz_error err;
     uz_status got = attempt(&result, problem, &settings, &err);

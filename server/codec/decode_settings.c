@@ -47,5 +47,6 @@ void decode_settings(uz_settings *out, const json_t *object)
     s.alpha = number_or(object, "alpha", s.alpha);
     s.max_iterations = (int64_t)number_or(object, "max_iterations", (double)s.max_iterations);
     s.time_limit_s = number_or(object, "time_limit_s", s.time_limit_s);
+    s.semidefinite = json_is_true(json_object_get(object, "semidefinite"));
     *out = s;
 }

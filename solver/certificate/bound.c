@@ -8,8 +8,13 @@
 double uz_bound_norm(const double *x, int64_t n)
 {
     double scale = 0.0, sum = 0.0;
-    for (int64_t i = 0; i < n; i++)
+    bool number = true;
+    for (int64_t i = 0; i < n; i++) {
         scale = fabs(x[i]) > scale ? fabs(x[i]) : scale;
+        number = number && x[i] == x[i];
+    }
+    if (!number) /* comparisons pass over it */
+        return NAN;
     bool safe = scale > 0x1p-400 && scale < 0x1p400; /* squares, and sums of 2^63 of them, are in range */
     double unit = safe ? 1.0 : scale;
     for (int64_t i = 0; safe && i < n; i++)
@@ -113,7 +118,8 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
     out->energy_norm = sqrt(fmax(0.0, t->stiffness));
     out->energy_primal = 0.5 * t->stiffness - t->load + t->change;
     out->gap = feasible && !has_underflown(out, t) ? 0.5 * t->square + t->complementarity : INFINITY;
-    if (isnan(out->gap)) /* overflow on the way */
+    bool number = !isnan(t->stiffness) && !isnan(t->load) && !isnan(t->change) && !isnan(t->square);
+    if (isnan(out->gap) || !number) /* overflow on the way; fmax would make 0 of it */
         out->gap = INFINITY;
     out->energy_dual = out->energy_primal - out->gap;
     out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;

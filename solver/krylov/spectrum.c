@@ -285,11 +285,24 @@ const uz_modes *uz_krylov_modes(const uz_krylov *krylov)
 #define SHARP 0.1
 enum { NORM_STEPS_MOST = 400 };
 
+/* The power of two below the largest entry; 1 where all are zero, or not all are numbers. */
+static double largest_power(const double *x, int64_t n)
+{
+    double largest = 0.0;
+    int exponent;
+    for (int64_t j = 0; j < n; j++)
+        largest = fmax(largest, fabs(x[j]));
+    if (!(largest > 0.0) || isinf(largest))
+        return 1.0;
+    frexp(largest, &exponent);
+    return ldexp(1.0, exponent - 1);
+}
+
 uz_status uz_krylov_inverse_norm(double *value, double *e, const uz_krylov *krylov, uz_cg *cg, const uz_csc *K,
                                  const uz_hooks *hooks, double deadline, uz_error *err)
 {
     int64_t n = cg->n;
-    double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0;
+    double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0, unit = largest_power(e, n);
     uz_cg_stop stop = {.relative = SHARP * sqrt(krylov->info.lambda),
                        .max_iterations = NORM_STEPS_MOST,
                        .hooks = hooks,
@@ -298,12 +311,16 @@ uz_status uz_krylov_inverse_norm(double *value, double *e, const uz_krylov *kryl
     *value = INFINITY;
     if (!w)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)n);
+    for (int64_t j = 0; j < n; j++) /* squares of forces stay in range; what is left is exact */
+        e[j] /= unit;
     uz_status status = uz_cg_solve(&info, w, cg, K, e, &stop, err);
     for (int64_t j = 0; j < n; j++)
         sum += w[j] * (e[j] + cg->r[j]);
     if (status == UZ_OK) {
-        *value = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / krylov->info.lambda;
-        memcpy(e, w, (size_t)n * sizeof *e);
+        double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / krylov->info.lambda;
+        *value = scaled * unit * unit;
+        for (int64_t j = 0; j < n; j++)
+            e[j] = unit * w[j];
     }
     free(w);
     return status;

@@ -30,10 +30,13 @@ static const double HARD[] = {0.25, 1e-2, 1e-4};
 /* A pivot this many d eps large may be what rounding left of a zero. */
 static const double DOUBTFUL = 1e3;
 
-bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz_problem *problem)
+bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz_problem *problem,
+                            const uz_settings *settings)
 {
     if (problem->kind == UZ_PROBLEM_SCENE)
         return refused == UZ_ERR_FREE_BODY;
+    if (!settings->semidefinite)
+        return false;
     if (problem->qp.N.rows < 1 || refused != UZ_OK)
         return refused == UZ_ERR_NOT_SPD && problem->qp.N.rows > 0;
     const uz_summary *s = &result->summary;

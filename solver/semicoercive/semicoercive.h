@@ -12,9 +12,11 @@
 #include "uzawa.h"
 
 /* The ordinary way refused a problem with this status, or (UZ_OK) has this result: is there a chance that only the
- * obstacle holds the body? A singular K is refused, unless rounding made its zero pivots positive: then little or
- * nothing could be certified. */
-bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz_problem *problem);
+ * obstacle holds the body? Of a scene the null space of K is known from its mesh. Of matrices nobody can tell an
+ * eigenvalue of 0 from a small or a negative one in double precision, so somebody has to say what K is meant to be:
+ * then a refused K, or one of which little or nothing could be certified as rounding made its zero pivots positive. */
+bool uz_may_be_semicoercive(uz_status refused, const uz_result *result, const uz_problem *problem,
+                            const uz_settings *settings);
 
 /* As uz_solve; started: uz_seconds() of its begin, from which the time limit counts. *err holds the refusal of the
  * ordinary way; it stays where this way has nothing better to say: K is not even semidefinite, or rows don't reach its

@@ -159,10 +159,12 @@ def test_stiffness_not_positive_definite(s):
         for solver in solvers:
             fails(s, {**matrices(K=symmetric(2, *entries)), "solver": solver}, "not_positive_definite", "/problem/K",
                   says=("K is ",))
-    # Semidefinite, and the row reaches its null vector (1, -1): the load must press it on.
+    # Semidefinite, if somebody says so, and the row reaches its null vector (1, -1): the load must press it on.
     for corner in ("1", "0.9999999999999999"):
         K = symmetric(2, "1 1 1", "2 1 1", f"2 2 {corner}")
         for solver in solvers:
+            fails(s, {**matrices(K=K, p=[3, 2]), "solver": solver}, "not_positive_definite", "/problem/K")
+            solver = {**solver, "semidefinite": True}
             fails(s, {**matrices(K=K), "solver": solver}, "free_body", "/problem/K", says=("costs nothing", "dof 1"))
             fails(s, {**matrices(K=K, p=[1, 2]), "solver": solver}, "free_body", "/problem/p", says=("pushes", "dof 0"))
             summary, result = solved(s, {**matrices(K=K, p=[3, 2]), "solver": solver})

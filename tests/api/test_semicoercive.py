@@ -20,7 +20,7 @@ def block(load=-0.05, **more):
 
 def chain(*p):
     """Two springs' ends that nothing but one row of N holds."""
-    return {"problem": {"kind": "matrices", "K": K, "N": N, "h": [0.5], "p": list(p)}}
+    return {"problem": {"kind": "matrices", "K": K, "N": N, "h": [0.5], "p": list(p)}, "solver": {"semidefinite": True}}
 
 
 def ended(s, body, status="successful"):

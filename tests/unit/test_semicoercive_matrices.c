@@ -12,6 +12,7 @@ TEST(two_floating_blocks_are_solved_when_both_are_pressed)
 {
     uz_problem problem = problem_of(two_blocks((double[]){1, 0.01}));
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
         const uz_summary *s = &result->summary;
@@ -68,6 +69,7 @@ static uz_qp random_chains(qp_random *rng)
 static bool check_against_all(const uz_problem *problem, uint64_t seed, bool *existed)
 {
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     uz_result *result = NULL;
     uz_error err;
     exhaustive exact = search_all(&problem->qp);
@@ -115,6 +117,7 @@ TEST(stiffness_of_zeros_is_held_by_its_row)
 {
     uz_problem problem = problem_of((uz_qp){.p = vector(1), .h = vector(1)});
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     problem.qp.K = csc_from_dense((double[]){0}, 1, 1, true);
     problem.qp.N = csc_from_dense((double[]){1}, 1, 1, false);
     problem.qp.p[0] = 1;
@@ -169,6 +172,7 @@ TEST(contradicting_rows_of_a_floating_body_are_infeasible)
     static const double K[4] = {1, -1, -1, 1}, N[4] = {1, 0, -1, 0};
     uz_problem problem = dense_problem(K, N, 2, 2, 0.1, -1);
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {
         CHECK_STR(uz_outcome_name(result->summary.outcome), "infeasible");
@@ -203,6 +207,7 @@ TEST(cancel_is_honoured_in_every_phase)
 {
     uz_problem problem = problem_of(two_blocks((double[]){1, 0.5}));
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     int dismissed = 0, refused = 0, calls = 0, left;
     do {
         uz_result *result = NULL;
@@ -228,6 +233,7 @@ TEST(factors_of_the_regular_problems_are_cached)
 {
     uz_problem problem = problem_of(two_blocks((double[]){1, 0.5}));
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     uz_cache *cache = uz_cache_new(1 << 28);
     double energy[2] = {0, 0};
     for (int k = 0; k < 2; k++) {
@@ -247,6 +253,7 @@ TEST(units_change_exponents_only)
 {
     uz_result *results[2] = {NULL, NULL};
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     for (int k = 0; k < 2; k++) {
         uz_qp qp = two_blocks((double[]){1, 0.5});
         for (int64_t q = 0; k == 1 && q < qp.K.ptr[qp.K.cols]; q++)

@@ -68,6 +68,7 @@ static void check_scenario(const char *name, uz_problem problem, uz_method metho
                            bool cached)
 {
     scenario s = {name, problem, uz_settings_default(), cached};
+    s.settings.semidefinite = true; /* heard only where K is singular */
     s.settings.method = method;
     s.settings.op = op;
     s.settings.ordering = ordering;
