@@ -109,7 +109,7 @@ void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *
 }
 
 /* Columns of a panel whose update of an n x n block takes about PANEL_FLOPS. */
-#define PANEL_FLOPS 2e8
+#define PANEL_FLOPS 5e7
 enum { LEAST_PANEL = 16, MOST_PANEL = 256 };
 
 static int64_t panel_width(int64_t n)

@@ -15,6 +15,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import traceback
 
@@ -85,11 +86,16 @@ def validator(name):
     return jsonschema.Draft202012Validator(store[base + name], resolver=resolver)
 
 
+# jsonschema keeps where it is in a schema in the validator: not for several threads at once.
+VALIDATING = threading.Lock()
+
+
 def validate(reply):
     """Checks a JSON reply against its schema."""
     name = schema_of(reply)
     if name and jsonschema:
-        validator(name).validate(reply.json)
+        with VALIDATING:
+            validator(name).validate(reply.json)
 
 
 class Service:

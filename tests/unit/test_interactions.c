@@ -203,6 +203,7 @@ TEST(a_start_that_fits_no_run_is_refused_on_a_body_without_supports)
     uz_state states[] = {{.m = 2, .r = two}, {.m = 1, .r = &bad}, {.m = 1, .r = &zero}};
     static const uz_status expected[] = {UZ_ERR_SIZE, UZ_ERR_NOT_FINITE, UZ_OK};
     uz_settings settings = uz_settings_default();
+    settings.semidefinite = true;
     problem.qp.K.val[0] = 0;
     problem.qp.p[0] = problem.qp.h[0] = 1;
     for (int k = 0; k < 3; k++) {
