@@ -10,11 +10,16 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { PLACED = 64 }; /* columns between questions whether to go on: their entries go all over memory */
+
 /* to = scale_k scale_l from_kl at the rows of k and l: from the factor's order to the order of the rows. */
-static void place_rows(double *to, const uz_condensed *dense, const double *from, bool invert_scale)
+static bool place_rows(double *to, const uz_condensed *dense, const double *from, bool invert_scale,
+                       const uz_leave *leave)
 {
     int64_t m = dense->n_b;
     for (int64_t l = 0; l < m; l++) {
+        if (l % PLACED == 0 && uz_leave_is_over(leave))
+            return false;
         double scale_l = invert_scale ? 1.0 / dense->scale[l] : dense->scale[l];
         for (int64_t k = l; k < m; k++) {
             double scale_k = invert_scale ? 1.0 / dense->scale[k] : dense->scale[k];
@@ -22,6 +27,7 @@ static void place_rows(double *to, const uz_condensed *dense, const double *from
             to[row >= column ? row + column * m : column + row * m] = scale_k * scale_l * from[k + l * m];
         }
     }
+    return true;
 }
 
 /* D = N_b S^-1 N_b': the inverse from the factor, then signs and places. */
@@ -29,8 +35,7 @@ static bool form_operator(double *D, double *room, const uz_condensed *dense, co
 {
     if (!uz_invert_llt_while(dense->n_b, dense->L_bb, room, D, leave))
         return false;
-    place_rows(D, dense, room, false);
-    return true;
+    return place_rows(D, dense, room, false, leave);
 }
 
 /* D^-1 = N_b^-T S N_b^-1 with S = L_bb L_bb'. */
@@ -38,8 +43,7 @@ static bool form_inverse(double *D_inverse, double *room, const uz_condensed *de
 {
     if (!uz_multiply_llt_while(dense->n_b, dense->L_bb, room, D_inverse, leave))
         return false;
-    place_rows(D_inverse, dense, room, true);
-    return true;
+    return place_rows(D_inverse, dense, room, true, leave);
 }
 
 typedef bool (*former)(double *out, double *room, const uz_condensed *dense, const uz_leave *leave);
