@@ -17,7 +17,8 @@ void uz_trsv_lower(int64_t n, const double *L, double *x);                  /* x
 void uz_trsv_lower_t(int64_t n, const double *L, double *x);                /* x = L'^-1 x */
 void uz_trmv_lower_t(int64_t n, const double *L, double *x);                /* x = L'x */
 bool uz_potrf_lower(int64_t n, double *A); /* A = LL'; false: a pivot is not positive */
-/* The same by panels of some 5e7 flops (a few milliseconds), between which leave is asked: false also where it was over. */
+/* The same by panels of some 5e7 flops (a few milliseconds), between which leave is asked: false also where it was
+ * over. */
 bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave);
 void uz_potrs_lower(int64_t n, const double *L, double *x); /* x = (LL')^-1 x */
 /* Cholesky with complete pivoting of a semidefinite A, P'AP = LL', by panels; pivot[k] is the original index of row k.
