@@ -145,33 +145,125 @@ uz_status uz_symmetric_lower(uz_csc *K, uz_error *err);
 
 /* A scene: what a person says about a body. Plain data; strings are group names.
  * Numbers that a scene leaves out are NaN where the text says so. */
-typedef enum { UZ_PLANE_STRESS, UZ_PLANE_STRAIN } uz_model;
+typedef enum { UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC /* x is the radius */, UZ_SOLID } uz_model;
+
+/* How a stiffness is integrated where plain displacement elements lock. */
+typedef enum {
+    UZ_FORMULATION_AUTO,         /* mean dilatation where Poisson's ratio asks for it, else standard */
+    UZ_FORMULATION_STANDARD,     /* full integration of the displacement's own strain */
+    UZ_FORMULATION_BBAR,         /* quad4, hex8: mean dilatation (B-bar), for nearly incompressible material */
+    UZ_FORMULATION_INCOMPATIBLE, /* quad4, hex8: incompatible modes, for bending */
+    UZ_FORMULATIONS              /* how many */
+} uz_formulation;
+
+/* Nodes of each in VTK order. */
+typedef enum { UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8, UZ_TET4, UZ_HEX8, UZ_TET10, UZ_ELEMENT_KINDS } uz_element_kind;
+const char *uz_element_name(uz_element_kind kind); /* "quad4"; never NULL */
+bool uz_element_parse(uz_element_kind *out, const char *name);
+int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */
+int uz_element_node_count(uz_element_kind kind); /* 3 to 10 */
+
 typedef struct {
     double origin[3], size[3];
     int64_t cells[3];
-    char element[16]; /* "quad4" */
-    int dim;          /* 2 */
+    double grading[3]; /* last cell over first cell along each axis, > 0; 1 (or 0: not given): all equal */
+    char element[16];  /* "quad4", "hex8", ... */
+    int dim;           /* 2 or 3 */
 } uz_box;
+
+/* A named part of a mesh as somebody gave it: by nodes, by edges or faces, or by elements. */
+typedef struct {
+    char name[64];
+    int64_t n_nodes, *node;
+    int64_t n_faces, *face_first, *face_node; /* nodes of face i: face_node[face_first[i]..face_first[i + 1]) */
+    int64_t n_elements, *element;
+} uz_given_group;
+
+/* A mesh in numbers: of a request, or read from a file. Elements of all kinds are numbered together. */
+typedef struct {
+    int dim;
+    int64_t n_nodes;
+    double *xyz; /* n_nodes x dim */
+    int64_t n_elements;
+    unsigned char *kind;   /* n_elements: uz_element_kind */
+    int64_t *first, *node; /* nodes of element e: node[first[e]..first[e + 1]); first has n_elements + 1 */
+    uz_given_group *groups;
+    int64_t n_groups;
+} uz_given_mesh;
+void uz_given_mesh_clear(uz_given_mesh *mesh);
+
+/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary; physical groups become groups. Nodes and elements are
+ * numbered from 0 in the order of the file; only the elements of the highest dimension are elements, the others are
+ * edges and faces of groups. A flat mesh (all z equal) is plane. max_bytes (0: none) bounds what the result may take.
+ * Errors: UZ_ERR_FORMAT with the line, _UNSUPPORTED, _NOT_FINITE, _LIMIT, _MEMORY.
+ * Source: Gmsh reference manual, section "Gmsh file formats". */
+uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
+
 typedef struct {
     char on[64];
     double young, poisson;
+    double density;   /* mass per volume: 0 where no gravity asks for it */
+    double expansion; /* strain per unit of temperature */
 } uz_material;
+
+typedef enum {
+    UZ_SUPPORT_COMPONENTS, /* u along the axes */
+    UZ_SUPPORT_NORMAL,     /* u along one direction: a symmetry plane, a slide */
+    UZ_SUPPORT_SPRING      /* elastic ground along the axes */
+} uz_support_kind;
+typedef struct {
+    uz_support_kind kind;
+    char on[64];
+    double u[3];             /* components; NaN: that direction is free */
+    double normal[3], value; /* normal: u . normal / ||normal|| = value */
+    double spring[3];        /* force per length, of the whole group, spread over it by area; >= 0 */
+} uz_support;
+
+typedef enum {
+    UZ_LOAD_TRACTION,    /* v: force per area on edges or faces */
+    UZ_LOAD_PRESSURE,    /* value: force per area against the outward normal */
+    UZ_LOAD_FORCE,       /* v: the sum, spread over edges or faces by area; over nodes equally */
+    UZ_LOAD_BODY_FORCE,  /* v: force per volume of elements */
+    UZ_LOAD_GRAVITY,     /* v: acceleration; times the density of each material */
+    UZ_LOAD_NODE_FORCE,  /* v: at `node` */
+    UZ_LOAD_TEMPERATURE, /* value: rise of temperature of elements */
+    UZ_LOAD_KINDS
+} uz_load_kind;
+typedef struct {
+    uz_load_kind kind;
+    char on[64];
+    int64_t node;
+    double v[3], value;
+} uz_load;
+
+typedef enum {
+    UZ_OBSTACLE_PLANE,    /* half space: point, normal (out of the obstacle) */
+    UZ_OBSTACLE_ROUND,    /* circle (2D) or sphere (3D): point is the centre, radius, inside */
+    UZ_OBSTACLE_CYLINDER, /* 3D: point on the axis, normal is the axis, radius, inside */
+    UZ_OBSTACLE_POLYLINE, /* 2D: n_x points (x[i], y[i]), the obstacle on the right of the line as it goes on */
+    UZ_OBSTACLE_HEIGHT,   /* z over x (2D: n_y = 0, z has n_x) or over x and y (z[j * n_x + i]): the obstacle below */
+    UZ_OBSTACLE_BODY      /* the group `with` of another part of the mesh */
+} uz_obstacle_kind;
 typedef struct {
     char on[64];
-    double u[3];
-} uz_support; /* NaN: that direction is free */
-typedef struct {
-    char on[64];
-    double traction[3];
-} uz_load; /* force per area on the edges of a group */
-typedef struct {
-    char on[64];
+    uz_obstacle_kind kind;
     double point[3], normal[3];
-} uz_contact; /* rigid half space; normal points out of the obstacle */
+    double radius;
+    bool inside; /* the body is within: a hole, a bowl */
+    int64_t n_x, n_y;
+    double *x, *y, *z;
+    char with[64];
+} uz_contact;
+
+typedef enum { UZ_MESH_BOX, UZ_MESH_GIVEN } uz_mesh_source;
+
 typedef struct {
     uz_model model;
-    double thickness;
+    uz_formulation formulation;
+    double thickness; /* plane models */
+    uz_mesh_source source;
     uz_box box;
+    uz_given_mesh given;
     uz_material *materials;
     int64_t n_materials;
     uz_support *supports;
@@ -180,6 +272,7 @@ typedef struct {
     int64_t n_loads;
     uz_contact *contacts;
     int64_t n_contacts;
+    bool all_candidates; /* contact rows also for nodes that surely cannot touch */
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);
 

@@ -36,7 +36,7 @@ static inline void add_support(uz_scene *scene, const char *on, double ux, doubl
 static inline void add_load(uz_scene *scene, const char *on, double tx, double ty)
 {
     uz_load *load = &scene->loads[scene->n_loads++];
-    *load = (uz_load){.traction = {tx, ty}};
+    *load = (uz_load){.v = {tx, ty}};
     snprintf(load->on, sizeof load->on, "%s", on);
 }
 

@@ -85,7 +85,7 @@ bool decode_loads(uz_load **out, int64_t *n, const json_t *list, problem_details
     for (int64_t i = 0; i < *n; i++) {
         const json_t *item = json_array_get(list, (size_t)i);
         get_name(loads[i].on, sizeof loads[i].on, item, "on", "");
-        get_vector(loads[i].traction, json_object_get(item, "traction"), 0);
+        get_vector(loads[i].v, json_object_get(item, "traction"), 0);
     }
     *out = loads;
     return loads != NULL;

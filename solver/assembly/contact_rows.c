@@ -54,10 +54,12 @@ typedef struct {
 /* A consistent constant pressure gives each end of an edge half of its area. */
 static void spread_area(double *area, const uz_body_model *model, const uz_group *group)
 {
-    for (int64_t e = 0; e < group->n_edges; e++) {
-        const double half = 0.5 * uz_edge_area(model, group->edge + 2 * e);
-        area[group->edge[2 * e]] += half;
-        area[group->edge[2 * e + 1]] += half;
+    for (int64_t e = 0; e < group->n_faces; e++) {
+        int64_t ends[UZ_FACE_NODES];
+        uz_mesh_face(ends, &model->mesh, group->face[e]);
+        const double half = 0.5 * uz_edge_area(model, ends);
+        area[ends[0]] += half;
+        area[ends[1]] += half;
     }
 }
 

@@ -23,7 +23,7 @@ typedef struct {
 static void evaluate(element_state *state, const uz_body_model *model, const double *nodal, int64_t element)
 {
     double xy[8], u[8], grad[4][2];
-    const int64_t *corner = model->mesh.element + element * CORNERS;
+    const int64_t *corner = model->mesh.node + element * CORNERS;
     uz_element_corners(xy, &model->mesh, element);
     for (int a = 0; a < CORNERS; a++)
         for (int c = 0; c < 2; c++)
@@ -61,7 +61,7 @@ static void average_at_nodes(double *sum, double *volume, const uz_body_model *m
     element_state state;
     for (int64_t e = 0; e < model->mesh.n_elements; e++) {
         evaluate(&state, model, nodal, e);
-        add_to_nodes(sum, volume, &state, model->mesh.element + e * CORNERS);
+        add_to_nodes(sum, volume, &state, model->mesh.node + e * CORNERS);
     }
     for (int64_t a = 0; a < model->mesh.n_nodes; a++)
         for (int s = 0; s < STRESSES && volume[a] > 0; s++)
@@ -102,7 +102,7 @@ double uz_estimate_discretization_error(const uz_body_model *model, const double
         average_at_nodes(average, volume, model, nodal);
         for (int64_t e = 0; e < model->mesh.n_elements; e++) {
             evaluate(&state, model, nodal, e);
-            add_energies(&eta2, &energy2, model, &state, average, model->mesh.element + e * CORNERS);
+            add_energies(&eta2, &energy2, model, &state, average, model->mesh.node + e * CORNERS);
         }
     }
     free(average);

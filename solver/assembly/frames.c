@@ -53,18 +53,21 @@ static void turn_lines(double *ke, int lines, int line, int step, const double *
 
 bool uz_is_turned_element(const uz_body_model *model, int64_t element)
 {
-    const int corners = model->mesh.nodes_per_element;
+    int corners;
+    const int64_t *corner = uz_mesh_element(&model->mesh, element, &corners);
     bool turned = false;
     for (int a = 0; model->frame_of && a < corners; a++)
-        turned = turned || model->frame_of[model->mesh.element[element * corners + a]] > 0;
+        turned = turned || model->frame_of[corner[a]] > 0;
     return turned;
 }
 
 void uz_turn_element(double *ke, const uz_body_model *model, int64_t element)
 {
-    const int dim = model->mesh.dim, corners = model->mesh.nodes_per_element, n = dim * corners;
+    int corners;
+    const int64_t *corner = uz_mesh_element(&model->mesh, element, &corners);
+    const int dim = model->mesh.dim, n = dim * corners;
     for (int a = 0; a < corners; a++) {
-        const double *Q = uz_node_frame(model, model->mesh.element[element * corners + a]);
+        const double *Q = uz_node_frame(model, corner[a]);
         if (!Q)
             continue;
         turn_lines(ke + a * dim * n, n, 1, n, Q, dim);

@@ -44,18 +44,18 @@ static int64_t find_root(int64_t *parent, int64_t a)
 /* part_of[node] = number of its connected part, parts numbered by their first node. Returns how many, -1: no memory. */
 static int64_t number_parts(int64_t *part_of, const uz_mesh *mesh)
 {
-    const int corners = mesh->nodes_per_element;
     int64_t count = 0;
     int64_t *parent = uz_alloc(mesh->n_nodes, sizeof *parent);
     if (!parent)
         return -1;
     for (int64_t a = 0; a < mesh->n_nodes; a++)
         parent[a] = a;
-    for (int64_t i = 0; i < mesh->n_elements * corners; i++) {
-        int64_t a = find_root(parent, mesh->element[i]);
-        int64_t b = find_root(parent, mesh->element[i - i % corners]);
-        parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
-    }
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        for (int64_t i = mesh->first[e] + 1; i < mesh->first[e + 1]; i++) {
+            int64_t a = find_root(parent, mesh->node[i]);
+            int64_t b = find_root(parent, mesh->node[mesh->first[e]]);
+            parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
+        }
     for (int64_t a = 0; a < mesh->n_nodes; a++)
         part_of[a] = parent[a] == a ? count++ : part_of[find_root(parent, a)];
     free(parent);

@@ -37,14 +37,14 @@ static int64_t fill_incidence(neighbours *n)
     const int64_t corners = mesh->n_elements * CORNERS;
     int64_t most = 0;
     for (int64_t i = 0; i < corners; i++)
-        n->start[mesh->element[i] + 1]++;
+        n->start[mesh->node[i] + 1]++;
     for (int64_t a = 0; a < mesh->n_nodes; a++) {
         most = n->start[a + 1] > most ? n->start[a + 1] : most;
         n->start[a + 1] += n->start[a];
     }
     /* Filling from the back leaves start[a + 1] at the beginning of node a, one place too far: shifted back below. */
     for (int64_t i = corners - 1; i >= 0; i--)
-        n->around[--n->start[mesh->element[i] + 1]] = i / CORNERS;
+        n->around[--n->start[mesh->node[i] + 1]] = i / CORNERS;
     memmove(n->start, n->start + 1, (size_t)mesh->n_nodes * sizeof *n->start);
     n->start[mesh->n_nodes] = corners;
     return most;
@@ -78,7 +78,7 @@ static void gather(neighbours *n, int64_t node)
     const uz_mesh *mesh = &n->model->mesh;
     n->n_near = 0;
     for (int64_t i = n->start[node]; i < n->start[node + 1]; i++) {
-        const int64_t *corner = mesh->element + n->around[i] * CORNERS;
+        const int64_t *corner = mesh->node + n->around[i] * CORNERS;
         for (int k = 0; k < CORNERS; k++)
             if (n->seen[corner[k]] != node + 1) {
                 n->seen[corner[k]] = node + 1;
@@ -174,7 +174,7 @@ done:
 void uz_element_corners(double xy[8], const uz_mesh *mesh, int64_t element)
 {
     const double w = mesh->cell[0], h = mesh->cell[1], rectangle[8] = {0, 0, w, 0, w, h, 0, h};
-    const int64_t *corner = mesh->element + element * CORNERS;
+    const int64_t *corner = mesh->node + element * CORNERS;
     if (mesh->uniform) {
         memcpy(xy, rectangle, sizeof rectangle);
         return;
@@ -201,7 +201,7 @@ static uz_status check_range(const double ke[64], int64_t element, uz_error *err
 static uz_status element_stiffness(double ke[64], const uz_body_model *model, int64_t element, uz_error *err)
 {
     double xy[8];
-    const int64_t *corner = model->mesh.element + element * CORNERS;
+    const int64_t *corner = model->mesh.node + element * CORNERS;
     uz_element_corners(xy, &model->mesh, element);
     if (!uz_quad4_stiffness(ke, xy, model->elasticity, model->thickness))
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/elements",
@@ -239,7 +239,7 @@ static void add_element(uz_body_model *model, const double ke[64], int64_t eleme
         uz_turn_element(turned, model, element);
         ke = turned;
     }
-    const int64_t *corner = model->mesh.element + element * CORNERS;
+    const int64_t *corner = model->mesh.node + element * CORNERS;
     int64_t dof[DOFS];
     for (int a = 0; a < CORNERS; a++)
         for (int c = 0; c < DIM; c++)

@@ -31,7 +31,10 @@ void uz_add_tractions(double *p, const uz_body_model *model, const uz_scene *sce
 {
     for (int64_t i = 0; i < scene->n_loads; i++) {
         const uz_group *group = uz_mesh_group(&model->mesh, scene->loads[i].on, "", NULL);
-        for (int64_t e = 0; group && e < group->n_edges; e++)
-            add_edge(p, model, group->edge + 2 * e, scene->loads[i].traction);
+        for (int64_t e = 0; group && e < group->n_faces; e++) {
+            int64_t ends[UZ_FACE_NODES];
+            uz_mesh_face(ends, &model->mesh, group->face[e]);
+            add_edge(p, model, ends, scene->loads[i].v);
+        }
     }
 }

@@ -87,53 +87,55 @@ static void fill_nodes(double *xyz, const uz_box *box)
         }
 }
 
-static void fill_elements(int64_t *element, const uz_box *box)
+static void fill_elements(uz_mesh *mesh, const uz_box *box)
 {
     const int64_t row = box->cells[0] + 1;
+    int64_t *node = mesh->node;
     for (int64_t j = 0; j < box->cells[1]; j++)
         for (int64_t i = 0; i < box->cells[0]; i++) {
             int64_t first = j * row + i;
-            *element++ = first;
-            *element++ = first + 1;
-            *element++ = first + row + 1;
-            *element++ = first + row;
+            *node++ = first;
+            *node++ = first + 1;
+            *node++ = first + row + 1;
+            *node++ = first + row;
         }
+    for (int64_t e = 0; e <= mesh->n_elements; e++)
+        mesh->first[e] = CORNERS * e;
+    memset(mesh->kind, UZ_QUAD4, (size_t)mesh->n_elements);
 }
 
-/* A side of the box as nodes first, first + stride, ... with `n` edges; `reversed` where the body would otherwise be
- * on the right of its edges. */
+/* A side of the box: nodes first, first + stride, ..., and the sides numbered `side` of `n` elements from `element` on,
+ * `step` apart. */
 typedef struct {
     const char *name;
-    int64_t first, stride, n;
-    bool reversed;
-} side;
+    int64_t first, stride, n, element, step;
+    int side;
+} box_side;
 
-static uz_status fill_side(uz_group *group, const side *s, uz_error *err)
+static uz_status fill_side(uz_group *group, const box_side *s, uz_error *err)
 {
-    group->kind = UZ_GROUP_EDGES;
+    group->kind = UZ_GROUP_FACES;
     snprintf(group->name, sizeof group->name, "%s", s->name);
     group->node = uz_alloc(s->n + 1, sizeof *group->node);
-    group->edge = uz_alloc(2 * s->n, sizeof *group->edge);
-    if (!group->node || !group->edge)
+    group->face = uz_alloc(s->n, sizeof *group->face);
+    if (!group->node || !group->face)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the side \"%s\" of a box", s->name);
     group->n_nodes = s->n + 1;
-    group->n_edges = s->n;
+    group->n_faces = s->n;
     for (int64_t i = 0; i <= s->n; i++)
         group->node[i] = s->first + i * s->stride;
-    for (int64_t i = 0; i < s->n; i++) {
-        group->edge[2 * i] = s->reversed ? group->node[s->n - i] : group->node[i];
-        group->edge[2 * i + 1] = s->reversed ? group->node[s->n - i - 1] : group->node[i + 1];
-    }
+    for (int64_t i = 0; i < s->n; i++)
+        group->face[i] = (uz_face){s->element + i * s->step, s->side};
     return UZ_OK;
 }
 
 static uz_status fill_groups(uz_mesh *mesh, const uz_box *box, uz_error *err)
 {
     const int64_t nx = box->cells[0], ny = box->cells[1], row = nx + 1;
-    const side sides[SIDES] = {{"left", 0, row, ny, true},
-                               {"right", nx, row, ny, false},
-                               {"bottom", 0, 1, nx, false},
-                               {"top", ny * row, 1, nx, true}};
+    const box_side sides[SIDES] = {{"left", 0, row, ny, 0, nx, 3},
+                                   {"right", nx, row, ny, nx - 1, nx, 1},
+                                   {"bottom", 0, 1, nx, 0, 1, 0},
+                                   {"top", ny * row, 1, nx, (ny - 1) * nx, 1, 2}};
     uz_status status = UZ_OK;
     mesh->groups = uz_alloc_zero(SIDES + 1, sizeof *mesh->groups);
     if (!mesh->groups)
@@ -142,6 +144,7 @@ static uz_status fill_groups(uz_mesh *mesh, const uz_box *box, uz_error *err)
     for (int i = 0; i < SIDES && status == UZ_OK; i++)
         status = fill_side(&mesh->groups[i], &sides[i], err);
     mesh->groups[SIDES].kind = UZ_GROUP_ELEMENTS;
+    mesh->groups[SIDES].everything = true;
     snprintf(mesh->groups[SIDES].name, sizeof mesh->groups[SIDES].name, "all");
     return status;
 }
@@ -149,8 +152,6 @@ static uz_status fill_groups(uz_mesh *mesh, const uz_box *box, uz_error *err)
 static uz_status fill(uz_mesh *mesh, const uz_box *box, uz_error *err)
 {
     mesh->dim = DIM;
-    mesh->kind = UZ_QUAD4;
-    mesh->nodes_per_element = CORNERS;
     mesh->n_nodes = (box->cells[0] + 1) * (box->cells[1] + 1);
     mesh->n_elements = box->cells[0] * box->cells[1];
     mesh->uniform = true;
@@ -158,11 +159,13 @@ static uz_status fill(uz_mesh *mesh, const uz_box *box, uz_error *err)
     for (int axis = 0; axis < DIM; axis++)
         mesh->cell[axis] = box->size[axis] / (double)box->cells[axis];
     mesh->xyz = uz_alloc(mesh->n_nodes * DIM, sizeof *mesh->xyz);
-    mesh->element = uz_alloc(mesh->n_elements * CORNERS, sizeof *mesh->element);
-    if (!mesh->xyz || !mesh->element)
+    mesh->kind = uz_alloc(mesh->n_elements, sizeof *mesh->kind);
+    mesh->first = uz_alloc(mesh->n_elements + 1, sizeof *mesh->first);
+    mesh->node = uz_alloc(mesh->n_elements * CORNERS, sizeof *mesh->node);
+    if (!mesh->xyz || !mesh->kind || !mesh->first || !mesh->node)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a mesh of %lld nodes", (long long)mesh->n_nodes);
     fill_nodes(mesh->xyz, box);
-    fill_elements(mesh->element, box);
+    fill_elements(mesh, box);
     return fill_groups(mesh, box, err);
 }
 

@@ -5,7 +5,6 @@
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { POINTER = 96 };
@@ -156,7 +155,7 @@ static uz_status check_boundary(const uz_mesh *mesh, const char *on, const char 
     const uz_group *group = uz_mesh_group(mesh, on, pointer_to(where, list, i, "on"), err);
     if (!group)
         return UZ_ERR_SCENE;
-    if (group->kind != UZ_GROUP_EDGES)
+    if (group->kind != UZ_GROUP_FACES)
         return uz_fail(err, UZ_ERR_SCENE, where, "\"%s\" is the whole body, not a part of its boundary; %s",
                        group->name, remedy);
     return UZ_OK;
@@ -201,7 +200,7 @@ static uz_status check_load(const uz_scene *scene, const uz_mesh *mesh, int64_t 
 {
     uz_status status = check_boundary(mesh, scene->loads[i].on, "loads", i,
                                       "a traction is a force per area of boundary: name the sides that it pulls", err);
-    return status == UZ_OK ? check_vector(scene->loads[i].traction, mesh->dim, "loads", i, "traction", err) : status;
+    return status == UZ_OK ? check_vector(scene->loads[i].v, mesh->dim, "loads", i, "traction", err) : status;
 }
 
 uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
@@ -212,15 +211,4 @@ uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_err
     for (int64_t i = 0; i < scene->n_contacts && status == UZ_OK; i++)
         status = check_vector(scene->contacts[i].point, mesh->dim, "contacts", i, "obstacle/plane/point", err);
     return status;
-}
-
-void uz_scene_clear(uz_scene *scene)
-{
-    if (!scene)
-        return;
-    free(scene->materials);
-    free(scene->supports);
-    free(scene->loads);
-    free(scene->contacts);
-    memset(scene, 0, sizeof *scene);
 }

@@ -12,11 +12,14 @@ void uz_mesh_clear(uz_mesh *mesh)
         return;
     for (int64_t i = 0; mesh->groups && i < mesh->n_groups; i++) {
         free(mesh->groups[i].node);
-        free(mesh->groups[i].edge);
+        free(mesh->groups[i].face);
+        free(mesh->groups[i].element);
     }
     free(mesh->groups);
     free(mesh->xyz);
-    free(mesh->element);
+    free(mesh->kind);
+    free(mesh->first);
+    free(mesh->node);
     memset(mesh, 0, sizeof *mesh);
 }
 
@@ -41,10 +44,36 @@ const uz_group *uz_mesh_group(const uz_mesh *mesh, const char *name, const char 
 
 int64_t uz_group_node_count(const uz_mesh *mesh, const uz_group *group)
 {
-    return group->kind == UZ_GROUP_ELEMENTS ? mesh->n_nodes : group->n_nodes;
+    return group->everything ? mesh->n_nodes : group->n_nodes;
 }
 
 int64_t uz_group_node_at(const uz_group *group, int64_t i)
 {
-    return group->kind == UZ_GROUP_ELEMENTS ? i : group->node[i];
+    return group->everything ? i : group->node[i];
+}
+
+int64_t uz_group_element_count(const uz_mesh *mesh, const uz_group *group)
+{
+    return group->everything ? mesh->n_elements : group->n_elements;
+}
+
+int64_t uz_group_element_at(const uz_group *group, int64_t i)
+{
+    return group->everything ? i : group->element[i];
+}
+
+const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count)
+{
+    *count = (int)(mesh->first[element + 1] - mesh->first[element]);
+    return mesh->node + mesh->first[element];
+}
+
+int uz_mesh_face(int64_t node[UZ_FACE_NODES], const uz_mesh *mesh, uz_face face)
+{
+    const int *local;
+    const int64_t *of = mesh->node + mesh->first[face.element];
+    const int count = uz_element_side(&local, (uz_element_kind)mesh->kind[face.element], face.side);
+    for (int i = 0; i < count; i++)
+        node[i] = of[local[i]];
+    return count;
 }

@@ -64,9 +64,9 @@ uz_scene bench_paper_scene(int64_t nx)
     s.supports[0].u[2] = NAN;
     s.loads = calloc(2, sizeof *s.loads);
     strcpy(s.loads[0].on, "top");
-    s.loads[0].traction[1] = -0.05;
+    s.loads[0].v[1] = -0.05;
     strcpy(s.loads[1].on, "right");
-    s.loads[1].traction[0] = 0.5;
+    s.loads[1].v[0] = 0.5;
     s.contacts = calloc(1, sizeof *s.contacts);
     strcpy(s.contacts[0].on, "bottom");
     s.contacts[0].normal[1] = 1.0;

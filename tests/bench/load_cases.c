@@ -22,8 +22,8 @@ static bool add_cases(uz_problem *problem)
         c->n_loads = 2;
         memcpy(c->loads, problem->scene.loads, 2 * sizeof *c->loads);
         snprintf(c->name, sizeof c->name, "%d", i);
-        c->loads[0].traction[1] *= 1.0 + 0.5 * sin(0.37 * i);
-        c->loads[1].traction[0] *= 1.0 + 0.5 * cos(0.11 * i);
+        c->loads[0].v[1] *= 1.0 + 0.5 * sin(0.37 * i);
+        c->loads[1].v[0] *= 1.0 + 0.5 * cos(0.11 * i);
     }
     return problem->cases != NULL;
 }

@@ -157,7 +157,7 @@ static void in_metres(suite *all, uz_scene scene)
         s->contacts[0].point[c] *= 1e-3;
         s->supports[0].u[c] *= 1e-3;
         for (int64_t k = 0; k < s->n_loads; k++)
-            s->loads[k].traction[c] *= 1e6;
+            s->loads[k].v[c] *= 1e6;
     }
     if (uz_scene_to_qp(&m, NULL, s, NULL) != UZ_OK)
         abort();

@@ -26,7 +26,7 @@ static void scale_loads(uz_scene *s, double factor)
 {
     for (int64_t k = 0; k < s->n_loads; k++)
         for (int c = 0; c < 2; c++)
-            s->loads[k].traction[c] *= factor;
+            s->loads[k].v[c] *= factor;
 }
 
 static void run_young(suite *all)
@@ -146,7 +146,7 @@ static void run_fraction(suite *all)
     s.supports[0].u[1] = -1;
     run_scene(all, "fraction", "pressed: all nodes touch", s, OWED_ANSWER);
     s = hanging_block(0);
-    s.loads[0].traction[0] = 0;
+    s.loads[0].v[0] = 0;
     run_scene(all, "fraction", "no load: all gaps are zero", s, OWED_ANSWER);
     s = body();
     s.n_contacts = 0;

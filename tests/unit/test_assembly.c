@@ -33,7 +33,7 @@ static double *plain_stiffness(const uz_body_model *model)
     const int64_t n = model->mesh.n_nodes * 2;
     double ke[64], xy[8], *full = zeros(n * n);
     for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        const int64_t *corner = model->mesh.element + 4 * e;
+        const int64_t *corner = model->mesh.node + 4 * e;
         for (int i = 0; i < 8; i++)
             xy[i] = model->mesh.xyz[2 * corner[i / 2] + i % 2];
         CHECK(uz_quad4_stiffness(ke, xy, model->elasticity, model->thickness));
@@ -238,8 +238,8 @@ TEST(change_of_units_only_rescales)
     m.box.size[0] = 0.06, m.box.size[1] = 0.02;
     m.thickness = 0.005;
     m.materials[0].young = 200e9;
-    m.loads[0].traction[1] = -0.05e6;
-    m.loads[1].traction[0] = 0.5e6;
+    m.loads[0].v[1] = -0.05e6;
+    m.loads[1].v[0] = 0.5e6;
     CHECK(uz_scene_to_qp(&a, NULL, &mm, NULL) == UZ_OK && uz_scene_to_qp(&b, NULL, &m, NULL) == UZ_OK);
     CHECK_INT(a.K.ptr[a.K.cols], b.K.ptr[b.K.cols]);
     for (int64_t q = 0; q < a.K.ptr[a.K.cols]; q++) /* N/mm and N/m */

@@ -11,7 +11,7 @@ TEST(load_on_a_kept_body_equals_a_new_body)
     uz_error err = {0};
     uz_qp qp;
     second.supports[0].u[0] = 0.01;
-    second.loads[0].traction[0] = 3;
+    second.loads[0].v[0] = 3;
     second.n_loads = 1;
     second.contacts[0].point[1] = -0.25;
     CHECK(uz_body_model_build(&model, &first, &err) == UZ_OK);
@@ -136,7 +136,7 @@ TEST(key_leaves_out_what_the_body_does_not_depend_on)
 {
     KEY(s.supports[0].u[0] = 0.5, false);
     KEY(s.n_loads = 0, false);
-    KEY(s.loads[0].traction[0] = 9, false);
+    KEY(s.loads[0].v[0] = 9, false);
     KEY(s.contacts[0].point[1] = -1, false);
     KEY(s.contacts[0].normal[1] = 7, false);
     KEY(s.contacts[0].normal[0] = -0.0, false);

@@ -414,7 +414,7 @@ static void side(uz_scene *s)
 }
 static void traction(uz_scene *s)
 {
-    s->loads[0].traction[0] = 9;
+    s->loads[0].v[0] = 9;
 }
 static void no_load(uz_scene *s)
 {

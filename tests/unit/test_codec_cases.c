@@ -69,7 +69,7 @@ TEST(cases_of_a_scene)
     CHECK_INT(r.problem.n_cases, 2);
     if (r.problem.n_cases == 2) {
         const uz_load_case *c = r.problem.cases;
-        CHECK(c[0].n_loads == 1 && c[0].loads && c[0].loads[0].traction[1] == -2);
+        CHECK(c[0].n_loads == 1 && c[0].loads && c[0].loads[0].v[1] == -2);
         CHECK(c[1].n_loads == 0 && c[1].loads); /* no load, not the scene's own */
     }
     codec_request_clear(&r);

@@ -60,7 +60,7 @@ TEST(scene)
     CHECK(isnan(s->supports[1].u[0]) && s->supports[1].u[1] == 0);
     CHECK_STR(s->supports[1].on, "top");
     CHECK_INT(s->n_loads, 1);
-    CHECK(s->loads[0].traction[0] == 0.5 && s->loads[0].traction[1] == -0.25 && s->loads[0].traction[2] == 0);
+    CHECK(s->loads[0].v[0] == 0.5 && s->loads[0].v[1] == -0.25 && s->loads[0].v[2] == 0);
     CHECK_INT(s->n_contacts, 1);
     CHECK(s->contacts[0].point[1] == 2 && s->contacts[0].normal[1] == 3);
     CHECK_STR(r.tags, "[\"a\",\"\xc3\xa9\"]");

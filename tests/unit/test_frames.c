@@ -237,9 +237,10 @@ TEST(recovering_and_restricting_are_inverse)
 /* One brick whose nodes are all contact nodes; node a has the directions of mask bits held. */
 static uz_body_model brick(int64_t element[8], int64_t dof[24], const int *held)
 {
-    static uz_group all = {.name = "all", .kind = UZ_GROUP_ELEMENTS};
+    static int64_t first[2] = {0, 8};
+    static uz_group all = {.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
     uz_body_model model = {0};
-    model.mesh = (uz_mesh){.dim = 3, .n_nodes = 8, .n_elements = 1, .nodes_per_element = 8, .element = element};
+    model.mesh = (uz_mesh){.dim = 3, .n_nodes = 8, .n_elements = 1, .first = first, .node = element};
     model.mesh.groups = &all;
     model.mesh.n_groups = 1;
     model.dof = dof;

@@ -315,8 +315,8 @@ TEST(units_change_nothing_but_exponents)
     scene->box.size[1] = 0.02;
     scene->thickness = 0.005;
     scene->materials[0].young = 200e9;
-    scene->loads[0].traction[1] = -0.05e6;
-    scene->loads[1].traction[0] = 0.5e6;
+    scene->loads[0].v[1] = -0.05e6;
+    scene->loads[1].v[0] = 0.5e6;
     uz_settings settings = paper_settings(UZ_METHOD_ACCELERATED_RESTART, 0);
     uz_result *a = solve_problem(&mm, &settings), *b = solve_problem(&si, &settings);
     if (a && b) {

@@ -101,9 +101,9 @@ TEST(loads_are_checked)
 {
     REFUSED(rename_to(s.loads[1].on, "core"), UZ_ERR_SCENE, "/loads/1/on", "left, right, bottom, top, all");
     REFUSED(rename_to(s.loads[1].on, "all"), UZ_ERR_SCENE, "/loads/1/on", "name the sides");
-    REFUSED(s.loads[1].traction[1] = (double)NAN, UZ_ERR_NOT_FINITE, "/loads/1/traction/1", "finite");
-    REFUSED(s.loads[0].traction[0] = (double)INFINITY, UZ_ERR_NOT_FINITE, "/loads/0/traction/0", "finite");
-    REFUSED(s.loads[1].traction[0] = 1.7e308, UZ_ERR_NOT_FINITE, "/loads", "overflow");
+    REFUSED(s.loads[1].v[1] = (double)NAN, UZ_ERR_NOT_FINITE, "/loads/1/traction/1", "finite");
+    REFUSED(s.loads[0].v[0] = (double)INFINITY, UZ_ERR_NOT_FINITE, "/loads/0/traction/0", "finite");
+    REFUSED(s.loads[1].v[0] = 1.7e308, UZ_ERR_NOT_FINITE, "/loads", "overflow");
 }
 
 TEST(contacts_are_checked)
@@ -163,11 +163,12 @@ TEST(free_modes_do_not_depend_on_units)
 static uz_body_model two_squares(void)
 {
     static double xyz[16] = {0, 0, 1, 0, 1, 1, 0, 1, 5, 0, 6, 0, 6, 1, 5, 1};
-    static int64_t element[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+    static int64_t element[8] = {0, 1, 2, 3, 4, 5, 6, 7}, first[3] = {0, 4, 8};
     uz_body_model model = {0};
-    model.mesh = (uz_mesh){.dim = 2, .n_nodes = 8, .n_elements = 2, .nodes_per_element = 4};
+    model.mesh = (uz_mesh){.dim = 2, .n_nodes = 8, .n_elements = 2};
     model.mesh.xyz = xyz;
-    model.mesh.element = element;
+    model.mesh.first = first;
+    model.mesh.node = element;
     return model;
 }
 
@@ -205,20 +206,22 @@ TEST(box_numbers_nodes_row_by_row)
 {
     uz_box box = {.origin = {1, 2}, .size = {6, 4}, .cells = {3, 2}, .element = "quad4", .dim = 2};
     const int64_t nodes[4][4] = {{0, 4, 8}, {3, 7, 11}, {0, 1, 2, 3}, {8, 9, 10, 11}};
-    const int64_t first_edge[4][2] = {{8, 4}, {3, 7}, {0, 1}, {11, 10}};
+    const int64_t first_edge[4][2] = {{4, 0}, {3, 7}, {0, 1}, {9, 8}};
     const char *names[5] = {"left", "right", "bottom", "top", "all"};
     uz_mesh mesh;
     CHECK(uz_mesh_from_box(&mesh, &box, NULL) == UZ_OK);
     CHECK(mesh.n_nodes == 12 && mesh.n_elements == 6 && mesh.n_groups == 5);
     CHECK(mesh.xyz[0] == 1 && mesh.xyz[1] == 2 && mesh.xyz[22] == 7 && mesh.xyz[23] == 6);
     CHECK(mesh.xyz[2] == 3 && mesh.xyz[3] == 2);
-    CHECK(mesh.element[4] == 1 && mesh.element[5] == 2 && mesh.element[6] == 6 && mesh.element[7] == 5);
+    CHECK(mesh.node[4] == 1 && mesh.node[5] == 2 && mesh.node[6] == 6 && mesh.node[7] == 5);
     for (int g = 0; g < 4; g++) {
         const uz_group *group = uz_mesh_group(&mesh, names[g], "", NULL);
         CHECK_INT(group->n_nodes, g < 2 ? 3 : 4);
         CHECK(memcmp(group->node, nodes[g], (size_t)group->n_nodes * sizeof *group->node) == 0);
-        CHECK(memcmp(group->edge, first_edge[g], sizeof first_edge[g]) == 0);
-        CHECK_INT(group->n_edges, group->n_nodes - 1);
+        int64_t ends[UZ_FACE_NODES];
+        CHECK_INT(uz_mesh_face(ends, &mesh, group->face[0]), 2);
+        CHECK(memcmp(ends, first_edge[g], sizeof first_edge[g]) == 0);
+        CHECK_INT(group->n_faces, group->n_nodes - 1);
     }
     const uz_group *all = uz_mesh_group(&mesh, names[4], "", NULL);
     CHECK_INT(uz_group_node_count(&mesh, all), 12);

@@ -232,7 +232,7 @@ static uz_load_case pushing(const char *name, double push)
     if (!one.loads)
         abort();
     snprintf(one.loads->on, sizeof one.loads->on, "top");
-    one.loads->traction[1] = push;
+    one.loads->v[1] = push;
     return one;
 }
 
@@ -255,7 +255,7 @@ TEST(load_cases_of_a_floating_block)
         CHECK_REL(results[k]->summary.force[1], 300.0 * (double)(k + 1), 1e-7);
     }
     uz_results_free(results, 3);
-    problem.cases[1].loads->traction[1] = 1;
+    problem.cases[1].loads->v[1] = 1;
     CHECK_INT(uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, &err), UZ_ERR_FREE_BODY);
     CHECK(results == NULL);
     CHECK_STR(err.where, "/cases/1/loads");

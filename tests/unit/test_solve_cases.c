@@ -30,8 +30,8 @@ static uz_problem scene_with_cases(int64_t n)
         c->n_loads = 2;
         c->loads = calloc(2, sizeof *c->loads);
         memcpy(c->loads, problem.scene.loads, 2 * sizeof *c->loads);
-        c->loads[0].traction[1] *= 1 + 0.5 * sin((double)i);
-        c->loads[1].traction[0] *= 1 + 0.5 * cos((double)i);
+        c->loads[0].v[1] *= 1 + 0.5 * sin((double)i);
+        c->loads[1].v[0] *= 1 + 0.5 * cos((double)i);
     }
     return problem;
 }

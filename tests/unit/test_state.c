@@ -363,7 +363,7 @@ TEST(a_state_of_another_problem_is_a_warm_start)
         uz_settings settings = uz_settings_default(), first = settings;
         settings.method = first.method = trial % 2 ? UZ_METHOD_ACCELERATED_RESTART : UZ_METHOD_AUTO;
         first.max_iterations = trial < 2 ? 3 : 100000;
-        other.scene.loads[0].traction[1] = trial % 2 ? -0.07 : -0.05;
+        other.scene.loads[0].v[1] = trial % 2 ? -0.07 : -0.05;
         other.scene.materials[0].young = trial % 2 ? 200e3 : 70e3;
         uz_result *from = solve_from(&other, &first, NULL, NULL), *cold = solve_from(&problem, &settings, NULL, NULL);
         uz_result *warm = solve_from(&problem, &settings, from->state, NULL);
@@ -390,7 +390,7 @@ TEST(a_neighbouring_load_is_a_good_start)
         for (int k = 1; k <= 9; k++) {
             uz_settings settings = uz_settings_default();
             settings.method = methods[mo];
-            other.scene.loads[1].traction[0] = 0.5 * (1 + 0.01 * k);
+            other.scene.loads[1].v[0] = 0.5 * (1 + 0.01 * k);
             uz_result *from = solve_from(&other, &settings, NULL, NULL);
             uz_result *cold = solve_from(&problem, &settings, NULL, NULL);
             uz_state start = {.m = from->m, .r = from->r};
