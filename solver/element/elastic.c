@@ -1,0 +1,82 @@
+/* elastic.c: isotropic linear elasticity of the four models (Timoshenko and Goodier, "Theory of Elasticity", ch. 1 and
+ * 2; temperature: ch. 13). */
+#include "element/element.h"
+
+#include <string.h>
+
+uz_lame uz_lame_of(uz_model model, double young, double poisson)
+{
+    const double third = model == UZ_PLANE_STRESS ? 1 - poisson : 1 - 2 * poisson;
+    return (uz_lame){.lambda = young * poisson / ((1 + poisson) * third), .mu = young / (2 * (1 + poisson))};
+}
+
+int uz_stress_count(uz_model model)
+{
+    return model == UZ_SOLID ? 6 : model == UZ_AXISYMMETRIC ? 4 : 3;
+}
+
+/* Direct components come first. */
+static int direct_count(uz_model model)
+{
+    return model == UZ_SOLID || model == UZ_AXISYMMETRIC ? 3 : 2;
+}
+
+static double trace(uz_model model, const double *v)
+{
+    return model == UZ_SOLID || model == UZ_AXISYMMETRIC ? v[0] + v[1] + v[2] : v[0] + v[1];
+}
+
+void uz_elastic_matrix(double *C, uz_model model, uz_lame lame)
+{
+    const int n = uz_stress_count(model), direct = direct_count(model);
+    memset(C, 0, (size_t)(n * n) * sizeof *C);
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; i < direct && j < direct; j++)
+            C[n * i + j] = lame.lambda;
+        C[n * i + i] += i < direct ? 2 * lame.mu : lame.mu;
+    }
+}
+
+void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain)
+{
+    const int n = uz_stress_count(model), direct = direct_count(model);
+    const double mean = lame.lambda * trace(model, strain);
+    for (int i = 0; i < n; i++)
+        stress[i] = i < direct ? mean + 2 * lame.mu * strain[i] : lame.mu * strain[i];
+}
+
+/* Deviator and trace apart, so that a large lambda cancels nothing: with n directions and t = trace(s),
+ * s' C^-1 s = t^2 / (n (n lambda + 2 mu)) + (s_dev . s_dev) / (2 mu). */
+double uz_complementary(uz_model model, uz_lame lame, const double *stress)
+{
+    const int n = uz_stress_count(model), direct = direct_count(model);
+    const double sum = trace(model, stress);
+    double deviator = 0;
+    for (int i = 0; i < direct; i++)
+        deviator += (stress[i] - sum / direct) * (stress[i] - sum / direct);
+    for (int i = direct; i < n; i++)
+        deviator += 2 * stress[i] * stress[i];
+    return sum * sum / (direct * (direct * lame.lambda + 2 * lame.mu)) + deviator / (2 * lame.mu);
+}
+
+/* Of Lame's own lambda, not that of plane stress. */
+static double poisson_of(uz_lame lame)
+{
+    return lame.lambda / (2 * (lame.lambda + lame.mu));
+}
+
+void uz_thermal_strain(double *strain, uz_model model, uz_lame lame, double free_strain)
+{
+    const int n = uz_stress_count(model), direct = direct_count(model);
+    const double each = model == UZ_PLANE_STRAIN ? (1 + poisson_of(lame)) * free_strain : free_strain;
+    for (int i = 0; i < n; i++)
+        strain[i] = i < direct ? each : 0;
+}
+
+double uz_stress_zz(uz_model model, uz_lame lame, const double *stress, double free_strain)
+{
+    if (model != UZ_PLANE_STRAIN)
+        return 0;
+    const double poisson = poisson_of(lame), young = 2 * lame.mu * (1 + poisson);
+    return poisson * (stress[0] + stress[1]) - young * free_strain;
+}

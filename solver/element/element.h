@@ -1,0 +1,180 @@
+/* element.h: one finite element: shape functions, stiffness, strain, loads, and one of its sides.
+ *
+ * Pure functions on one element: nothing here allocates, prints or knows a mesh. Every element is isoparametric with
+ * its nodes in VTK order (scene/mesh.h); displacements, forces and coordinates of an element are by node: x0 y0 [z0] x1
+ * y1 ..., dim = 2 or 3 per node.
+ *
+ * Strain and stress, shear strains doubled (gamma = 2 epsilon):
+ *   plane stress, plane strain   3: xx yy xy
+ *   axisymmetric                 4: rr zz hoop rz   (x is the radius, y the axis; integrals are over the whole ring)
+ *   solid                        6: xx yy zz xy yz zx
+ *
+ * Reference coordinates ("local points"): tri and tet the unit simplex with node 0 at the origin and node 1, 2, 3 at
+ * the unit point of axis 0, 1, 2; quad and hex [-1, 1]^dim. A local point is an array of 3; what dim does not need is
+ * not read.
+ *
+ * Sources: Zienkiewicz and Taylor, "The Finite Element Method", vol. 1 (isoparametric elements, axisymmetric strain);
+ * Hughes, "The Finite Element Method", ch. 3 and 4.5; those of the formulations stand beside them. */
+#ifndef UZ_ELEMENT_ELEMENT_H
+#define UZ_ELEMENT_ELEMENT_H
+
+#include "uzawa.h"
+
+enum {
+    UZ_ELEMENT_NODES = 10,   /* most nodes of an element */
+    UZ_ELEMENT_DOFS = 30,    /* most displacements */
+    UZ_ELEMENT_STRESSES = 6, /* most components of stress */
+    UZ_ELEMENT_GAUSS = 9,    /* most integration points */
+    UZ_ELEMENT_INTERNAL = 9, /* most internal parameters (incompatible modes) */
+    UZ_SIDE_NODES = 6,       /* most nodes of a side */
+    UZ_SIDE_GAUSS = 7        /* most integration points of a side */
+};
+
+/* ---------------------------------------------------------------- material */
+
+/* Isotropic linear elasticity of a model: stress = lambda trace(strain) I + 2 mu strain, over the strains that the
+ * model has. In plane stress lambda is E nu / (1 - nu^2), in the others Lame's own E nu / ((1 + nu)(1 - 2 nu)). */
+typedef struct {
+    double lambda, mu;
+} uz_lame;
+
+uz_lame uz_lame_of(uz_model model, double young, double poisson);
+
+/* Components of stress of a model: 3, 4 or 6. */
+int uz_stress_count(uz_model model);
+
+/* C, n x n row by row with n = uz_stress_count(model): stress = C strain. */
+void uz_elastic_matrix(double *C, uz_model model, uz_lame lame);
+/* stress = C strain; the two may be the same array. */
+void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain);
+/* stress' C^-1 stress, twice the complementary energy per volume. */
+double uz_complementary(uz_model model, uz_lame lame, const double *stress);
+
+/* The strain of a free body whose temperature rose, `free_strain` = expansion * rise: that in each direct component.
+ * In plane strain (1 + nu) times it, for what the held third direction adds. */
+void uz_thermal_strain(double *strain, uz_model model, uz_lame lame, double free_strain);
+
+/* The third direct stress of a plane model: 0 in plane stress, in plane strain nu (xx + yy) - E free_strain. */
+double uz_stress_zz(uz_model model, uz_lame lame, const double *stress, double free_strain);
+
+/* --------------------------------------------------------- reference element */
+
+/* Reference coordinates of the element's nodes: [node][3]. */
+const double (*uz_element_local_nodes(uz_element_kind kind))[3];
+
+/* Values of the shape functions at a local point; N has one per node. */
+void uz_element_shape(double *N, uz_element_kind kind, const double point[3]);
+
+/* Gauss rule of the stiffness: how many points, and the g-th of them with its weight (the reference volume is their
+ * sum). The fewest that leave no deformation without stiffness; a ring of tri3 needs three where a plane one needs one.
+ * tri3 1 (ring: 3), tri6 3, quad4 2 x 2, quad8 3 x 3, tet4 1, tet10 4, hex8 2 x 2 x 2. */
+int uz_element_gauss_count(uz_element_kind kind, uz_model model);
+double uz_element_gauss(double point[3], uz_element_kind kind, uz_model model, int g);
+
+/* ------------------------------------------------------------------ element */
+
+typedef struct {
+    uz_element_kind kind;
+    uz_model model;
+    uz_formulation formulation; /* as uz_resolve_formulation gave it: never UZ_FORMULATION_AUTO */
+    uz_lame lame;
+    double thickness;  /* plane models; not read by the others */
+    const double *xyz; /* nodes x dim, the true coordinates: differences to the first node are taken here */
+} uz_element;
+
+/* What this element does for `asked`. AUTO: mean dilatation for quad4 and hex8 from Poisson's ratio 0.4 on, plane
+ * stress excepted, where nothing locks; else standard. BBAR is STANDARD for other kinds and in plane stress,
+ * INCOMPATIBLE is STANDARD for other kinds and for rings (axisymmetric). */
+uz_formulation uz_resolve_formulation(uz_formulation asked, uz_element_kind kind, uz_model model, double poisson);
+
+/* What is wrong with an element's shape. */
+typedef enum {
+    UZ_SHAPE_GOOD,
+    UZ_SHAPE_INVERTED,       /* the Jacobian is negative somewhere: nodes in the wrong order, or not convex */
+    UZ_SHAPE_DEGENERATE,     /* it vanishes to rounding, or is not a number: nodes coincide or are in a line or plane */
+    UZ_SHAPE_MIDDLES,        /* the corners alone are good: a node between two of them is too far off */
+    UZ_SHAPE_NEGATIVE_RADIUS /* axisymmetric: a node has x < 0 */
+} uz_shape_fault;
+/* For a message, after "element 3 ": "is inverted or not convex", ... Never NULL. */
+const char *uz_shape_fault_text(uz_shape_fault fault);
+
+/* Is the Jacobian positive at nodes, centre and Gauss points? It is measured against the product of its rows' lengths,
+ * so that neither units nor flat elements matter. Everything below needs a good shape. */
+uz_shape_fault uz_element_check(const uz_element *element);
+
+/* Derivatives by x, y [, z] of the shape functions at a local point: grad[node][direction]. Returns the Jacobian's
+ * determinant. */
+double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3]);
+
+/* Volume per reference volume at a local point whose Jacobian's determinant is det: det times thickness, 2 pi r or 1.
+ * So volume = sum over g of weight * uz_element_measure. */
+double uz_element_measure(const uz_element *element, const double point[3], double det);
+/* Volume by the Gauss rule of the stiffness. */
+double uz_element_volume(const uz_element *element);
+
+/* Stiffness ke, n x n with n = nodes x dim, both triangles and exactly symmetric, in the element's formulation. Its
+ * null space is the rigid motions: 3 in a plane, 1 of a ring, 6 of a solid. Checks the shape first; ke is then zero
+ * and not to be used. */
+uz_shape_fault uz_element_stiffness(double *ke, const uz_element *element);
+
+/* f += integral N' b over the volume: b (dim) is force per volume, constant. */
+void uz_element_add_body_force(double *f, const uz_element *element, const double *b);
+/* f += integral B' C strain: the nodal forces that a thermal strain, constant in the element, asks for. */
+void uz_element_add_thermal_load(double *f, const uz_element *element, const double *thermal_strain);
+
+/* ------------------------------------------------------- strain and stress */
+
+/* A deformed element, once per element and displacement; then strains at as many points as wanted. Refers to the
+ * element and to u, which must outlive it. */
+typedef struct {
+    const uz_element *element;
+    const double *u;                      /* nodes x dim */
+    double dilatation;                    /* BBAR: the mean over the volume */
+    double internal[UZ_ELEMENT_INTERNAL]; /* INCOMPATIBLE: mode m along c is internal[m * dim + c] */
+    double centre[3][3], centre_det;      /* INCOMPATIBLE: Jacobian's inverse at the centre, [x][local], and det */
+} uz_element_motion;
+void uz_element_move(uz_element_motion *motion, const uz_element *element, const double *u);
+
+/* Total strain at a local point, as the stiffness takes it: u' K u = sum over Gauss points of weight * measure *
+ * strain' C strain. On the axis of a ring, where the hoop strain u_r / r has no value, it is that of rr. The stress is
+ * uz_elastic_stress of the strain less the thermal strain. */
+void uz_element_strain(double *strain, const uz_element_motion *motion, const double point[3]);
+
+/* -------------------------------------------------------------------- sides */
+
+/* A side: an edge of 2 or 3 nodes (dim 2), a face of 3, 4 or 6 (dim 3). Nodes as uz_element_side gives them: seen from
+ * outside a face runs counter-clockwise, an edge has the element on its left; the normal points out of the element.
+ * Local points: edges s in [-1, 1]; triangles the unit simplex; quadrilaterals [-1, 1]^2. */
+typedef struct {
+    int dim, nodes;
+    uz_model model;
+    double thickness;  /* plane models */
+    const double *xyz; /* nodes x dim, in the side's order, true coordinates */
+} uz_side;
+
+void uz_side_shape(double *N, const uz_side *side, const double point[2]);
+/* Reference coordinates of the nodes: [node][2]. */
+const double (*uz_side_local_nodes(const uz_side *side))[2];
+/* Gauss rule that integrates the mass matrix of an undistorted side exactly: edges 2 or 3 points, faces 3, 4 or 7. */
+int uz_side_gauss_count(const uz_side *side);
+double uz_side_gauss(double point[2], const uz_side *side, int g);
+
+/* Outward area vector per reference area at a local point: unit normal times area, with thickness or 2 pi r.
+ * area[dim]. */
+void uz_side_area_vector(double *area, const uz_side *side, const double point[2]);
+double uz_side_area(const uz_side *side);
+
+/* w[node] = integral of its shape function over the area: the weights of a constant traction. They sum to the area. At
+ * the corners of a straight tri6 face they are 0. */
+void uz_side_weights(double *w, const uz_side *side);
+/* M, nodes x nodes: integral N N' over the area. */
+void uz_side_mass(double *M, const uz_side *side);
+
+/* f (nodes x dim) += integral N' t over the area: t (dim) constant, force per area. */
+void uz_side_add_traction(double *f, const uz_side *side, const double *t);
+/* The same with t given at the nodes (nodes x dim) and interpolated. */
+void uz_side_add_nodal_traction(double *f, const uz_side *side, const double *t);
+/* f += integral -N' p n: pressure p (nodes), given at the nodes, against the outward normal. */
+void uz_side_add_pressure(double *f, const uz_side *side, const double *pressure);
+
+#endif

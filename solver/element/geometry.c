@@ -1,0 +1,310 @@
+/* geometry.c: from reference coordinates to the element as it lies: Jacobians, derivatives, volumes, and whether its
+ * shape is one that can be integrated. */
+#include "element/element_private.h"
+
+#include "scene/mesh.h"
+
+#include <float.h>
+#include <math.h>
+
+#define PI 3.14159265358979323846
+
+/* The sine of the least angle, in the sense of Hadamard's inequality, that is more than rounding. */
+#define FLAT (64 * DBL_EPSILON)
+
+void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEMENT_NODES][3])
+{
+    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const double *first = element->xyz;
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            J[i][j] = 0;
+    for (int a = 1; a < nodes; a++)
+        for (int j = 0; j < dim; j++) {
+            const double from_first = element->xyz[a * dim + j] - first[j];
+            for (int i = 0; i < dim; i++)
+                J[i][j] += local[a][i] * from_first;
+        }
+}
+
+double uz_invert_jacobian(double inverse[3][3], double J[3][3], int dim)
+{
+    double det;
+    if (dim == 2) {
+        det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
+        inverse[0][0] = J[1][1] / det;
+        inverse[0][1] = -J[0][1] / det;
+        inverse[1][0] = -J[1][0] / det;
+        inverse[1][1] = J[0][0] / det;
+        return det;
+    }
+    double cofactor[3][3]; /* of J[i][j] */
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int p = (i + 1) % 3, q = (i + 2) % 3, s = (j + 1) % 3, t = (j + 2) % 3;
+            cofactor[i][j] = J[p][s] * J[q][t] - J[p][t] * J[q][s];
+        }
+    det = J[0][0] * cofactor[0][0] + J[0][1] * cofactor[0][1] + J[0][2] * cofactor[0][2];
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            inverse[j][i] = cofactor[i][j] / det;
+    return det;
+}
+
+double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3])
+{
+    double local[UZ_ELEMENT_NODES][3], J[3][3], inverse[3][3];
+    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    uz_local_gradients(local, element->kind, point);
+    uz_jacobian(J, element, local);
+    const double det = uz_invert_jacobian(inverse, J, dim);
+    for (int a = 0; a < nodes; a++)
+        for (int j = 0; j < dim; j++) {
+            grad[a][j] = 0;
+            for (int i = 0; i < dim; i++)
+                grad[a][j] += inverse[j][i] * local[a][i];
+        }
+    return det;
+}
+
+double uz_ring_radius(double *largest, const uz_element *element, const double *N)
+{
+    double radius = 0;
+    const int nodes = uz_element_node_count(element->kind);
+    *largest = 0;
+    for (int a = 0; a < nodes; a++) {
+        radius += N[a] * element->xyz[2 * a];
+        *largest = fmax(*largest, fabs(element->xyz[2 * a]));
+    }
+    return radius;
+}
+
+double uz_element_measure(const uz_element *element, const double point[3], double det)
+{
+    double N[UZ_ELEMENT_NODES], largest;
+    if (element->model == UZ_SOLID)
+        return det;
+    if (element->model != UZ_AXISYMMETRIC)
+        return det * element->thickness;
+    uz_element_shape(N, element->kind, point);
+    return det * 2 * PI * uz_ring_radius(&largest, element, N);
+}
+
+void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g)
+{
+    double largest;
+    const double weight = uz_element_gauss(state->point, element->kind, element->model, g);
+    state->det = uz_element_gradients(state->grad, element, state->point);
+    uz_element_shape(state->N, element->kind, state->point);
+    state->radius = 0;
+    state->volume = weight * state->det;
+    if (element->model == UZ_AXISYMMETRIC) {
+        state->radius = uz_ring_radius(&largest, element, state->N);
+        state->volume *= 2 * PI * state->radius;
+    } else if (element->model != UZ_SOLID) {
+        state->volume *= element->thickness;
+    }
+}
+
+double uz_element_volume(const uz_element *element)
+{
+    double volume = 0;
+    const int count = uz_element_gauss_count(element->kind, element->model);
+    for (int g = 0; g < count; g++) {
+        uz_gauss_state state;
+        uz_gauss_state_at(&state, element, g);
+        volume += state.volume;
+    }
+    return volume;
+}
+
+double uz_mean_gradients(double mean[UZ_ELEMENT_NODES][3], const uz_element *element)
+{
+    double volume = 0;
+    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_gauss_count(element->kind, element->model);
+    for (int a = 0; a < nodes; a++)
+        mean[a][0] = mean[a][1] = mean[a][2] = 0;
+    for (int g = 0; g < count; g++) {
+        uz_gauss_state state;
+        uz_gauss_state_at(&state, element, g);
+        volume += state.volume;
+        for (int a = 0; a < nodes; a++) {
+            for (int j = 0; j < dim; j++)
+                mean[a][j] += state.volume * state.grad[a][j];
+            if (element->model == UZ_AXISYMMETRIC)
+                mean[a][0] += state.volume * state.N[a] / state.radius;
+        }
+    }
+    for (int a = 0; a < nodes; a++)
+        for (int j = 0; j < dim; j++)
+            mean[a][j] /= volume;
+    return volume;
+}
+
+double uz_centre_jacobian(double inverse[3][3], const uz_element *element)
+{
+    static const double CENTRE[3] = {0, 0, 0};
+    double local[UZ_ELEMENT_NODES][3], J[3][3];
+    uz_local_gradients(local, element->kind, CENTRE);
+    uz_jacobian(J, element, local);
+    return uz_invert_jacobian(inverse, J, uz_element_dim(element->kind));
+}
+
+void uz_mode_gradients(double grad[3][3], double centre[3][3], double centre_det, int dim, const double point[3],
+                       double det)
+{
+    for (int m = 0; m < dim; m++)
+        for (int j = 0; j < dim; j++)
+            grad[m][j] = centre_det / det * -2 * point[m] * centre[j][m];
+}
+
+/* ------------------------------------------------------------------- loads */
+
+void uz_element_add_body_force(double *f, const uz_element *element, const double *b)
+{
+    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_gauss_count(element->kind, element->model);
+    for (int g = 0; g < count; g++) {
+        uz_gauss_state state;
+        uz_gauss_state_at(&state, element, g);
+        for (int a = 0; a < nodes; a++)
+            for (int c = 0; c < dim; c++)
+                f[a * dim + c] += state.volume * state.N[a] * b[c];
+    }
+}
+
+/* What node a feels of a stress: its three (two) forces per volume, B_a' stress. */
+static void node_force(double force[3], const uz_gauss_state *state, int a, uz_model model, const double *s)
+{
+    const double *g = state->grad[a];
+    if (model == UZ_SOLID) {
+        force[0] = g[0] * s[0] + g[1] * s[3] + g[2] * s[5];
+        force[1] = g[1] * s[1] + g[0] * s[3] + g[2] * s[4];
+        force[2] = g[2] * s[2] + g[1] * s[4] + g[0] * s[5];
+        return;
+    }
+    const double shear = model == UZ_AXISYMMETRIC ? s[3] : s[2];
+    force[0] = g[0] * s[0] + g[1] * shear;
+    force[1] = g[1] * s[1] + g[0] * shear;
+    if (model == UZ_AXISYMMETRIC)
+        force[0] += state->N[a] / state->radius * s[2];
+}
+
+/* A constant stress does the same work on the mean dilatation as on the strain itself, and none on incompatible modes:
+ * so the plain B serves every formulation. */
+void uz_element_add_thermal_load(double *f, const uz_element *element, const double *thermal_strain)
+{
+    double stress[UZ_ELEMENT_STRESSES], force[3];
+    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_gauss_count(element->kind, element->model);
+    uz_elastic_stress(stress, element->model, element->lame, thermal_strain);
+    for (int g = 0; g < count; g++) {
+        uz_gauss_state state;
+        uz_gauss_state_at(&state, element, g);
+        for (int a = 0; a < nodes; a++) {
+            node_force(force, &state, a, element->model, stress);
+            for (int c = 0; c < dim; c++)
+                f[a * dim + c] += state.volume * force[c];
+        }
+    }
+}
+
+/* ------------------------------------------------------------------- check */
+
+/* det against the product of the rows' lengths: a sine, whatever units and aspect ratio. */
+static uz_shape_fault check_point(const uz_element *element, const double point[3])
+{
+    double local[UZ_ELEMENT_NODES][3], J[3][3], inverse[3][3], lengths = 1;
+    const int dim = uz_element_dim(element->kind);
+    uz_local_gradients(local, element->kind, point);
+    uz_jacobian(J, element, local);
+    for (int i = 0; i < dim; i++)
+        lengths *= dim == 2 ? hypot(J[i][0], J[i][1]) : hypot(hypot(J[i][0], J[i][1]), J[i][2]);
+    const double det = uz_invert_jacobian(inverse, J, dim);
+    if (det > FLAT * lengths)
+        return UZ_SHAPE_GOOD;
+    return det < -FLAT * lengths ? UZ_SHAPE_INVERTED : UZ_SHAPE_DEGENERATE;
+}
+
+static uz_shape_fault worse(uz_shape_fault a, uz_shape_fault b)
+{
+    return a == UZ_SHAPE_INVERTED || b == UZ_SHAPE_GOOD ? a : b;
+}
+
+static uz_shape_fault check_jacobian(const uz_element *element)
+{
+    static const double CENTRE[3] = {0, 0, 0};
+    const uz_element_kind kind = element->kind;
+    const int nodes = uz_element_node_count(kind), count = uz_element_gauss_count(kind, element->model);
+    uz_shape_fault fault = check_point(element, uz_element_local_nodes(kind)[0]);
+    if (kind == UZ_TRI3 || kind == UZ_TET4) /* the Jacobian is constant */
+        return fault;
+    if (kind == UZ_QUAD8 || kind == UZ_HEX8)
+        fault = worse(fault, check_point(element, CENTRE));
+    for (int a = 1; a < nodes; a++)
+        fault = worse(fault, check_point(element, uz_element_local_nodes(kind)[a]));
+    for (int g = 0; g < count && kind != UZ_QUAD4; g++) { /* that of quad4 is linear: least at a corner */
+        double point[3];
+        uz_element_gauss(point, kind, element->model, g);
+        fault = worse(fault, check_point(element, point));
+    }
+    return fault;
+}
+
+/* A node on the axis may have a rounding error of a mesh's generator for a radius. Between good nodes the quadratic
+ * radius of a curved side may still be negative. */
+static bool has_negative_radius(const uz_element *element)
+{
+    double N[UZ_ELEMENT_NODES], largest;
+    const uz_element_kind kind = element->kind;
+    const int nodes = uz_element_node_count(kind), count = uz_element_gauss_count(kind, element->model);
+    for (int a = 0; a < nodes; a++) {
+        uz_element_shape(N, kind, uz_element_local_nodes(kind)[a]);
+        if (uz_ring_radius(&largest, element, N) < -UZ_AXIS * largest)
+            return true;
+    }
+    for (int g = 0; g < count; g++) {
+        double point[3];
+        uz_element_gauss(point, kind, element->model, g);
+        uz_element_shape(N, kind, point);
+        if (uz_ring_radius(&largest, element, N) <= 0)
+            return true;
+    }
+    return false;
+}
+
+/* The element of the corners alone. */
+static uz_element_kind linear_kind(uz_element_kind kind)
+{
+    return kind == UZ_TRI6 ? UZ_TRI3 : kind == UZ_QUAD8 ? UZ_QUAD4 : kind == UZ_TET10 ? UZ_TET4 : kind;
+}
+
+uz_shape_fault uz_element_check(const uz_element *element)
+{
+    uz_shape_fault fault = check_jacobian(element);
+    uz_element corners = *element;
+    corners.kind = linear_kind(element->kind);
+    if (fault != UZ_SHAPE_GOOD)
+        return corners.kind != element->kind && check_jacobian(&corners) == UZ_SHAPE_GOOD ? UZ_SHAPE_MIDDLES : fault;
+    if (element->model == UZ_AXISYMMETRIC && has_negative_radius(element))
+        return UZ_SHAPE_NEGATIVE_RADIUS;
+    return UZ_SHAPE_GOOD;
+}
+
+const char *uz_shape_fault_text(uz_shape_fault fault)
+{
+    switch (fault) {
+    case UZ_SHAPE_GOOD:
+        return "has a good shape";
+    case UZ_SHAPE_INVERTED:
+        return "is inverted or not convex";
+    case UZ_SHAPE_DEGENERATE:
+        return "has no area or volume, or an angle of 0 or 180 degrees";
+    case UZ_SHAPE_MIDDLES:
+        return "has a node between two corners that is too far from their middle";
+    case UZ_SHAPE_NEGATIVE_RADIUS:
+        return "reaches across the axis: x is the radius and must not be negative";
+    }
+    return "has an unknown fault";
+}

@@ -1,0 +1,85 @@
+/* motion.c: the strain of a deformed element, as its stiffness takes it. */
+#include "element/element_private.h"
+
+#include "scene/mesh.h"
+
+#include <string.h>
+
+void uz_element_move(uz_element_motion *motion, const uz_element *element, const double *u)
+{
+    memset(motion, 0, sizeof *motion);
+    motion->element = element;
+    motion->u = u;
+    if (element->formulation == UZ_FORMULATION_BBAR) {
+        double mean[UZ_ELEMENT_NODES][3];
+        const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+        uz_mean_gradients(mean, element);
+        for (int a = 0; a < nodes; a++)
+            for (int c = 0; c < dim; c++)
+                motion->dilatation += mean[a][c] * u[a * dim + c];
+    } else if (element->formulation == UZ_FORMULATION_INCOMPATIBLE) {
+        motion->centre_det = uz_centre_jacobian(motion->centre, element);
+        uz_internal_parameters(motion->internal, element, u);
+    }
+}
+
+/* H[c][j] += sum of value[a * dim + c] grad[a][j]: the gradient of a displacement. */
+static void add_gradient(double H[3][3], double grad[][3], const double *value, int count, int dim)
+{
+    for (int a = 0; a < count; a++)
+        for (int c = 0; c < dim; c++)
+            for (int j = 0; j < dim; j++)
+                H[c][j] += value[a * dim + c] * grad[a][j];
+}
+
+/* u_r / r; at the axis, where it tends to that, the radial strain. */
+static double hoop_strain(const uz_element *element, const double *u, const double point[3], double radial)
+{
+    double N[UZ_ELEMENT_NODES], largest, displacement = 0;
+    const int nodes = uz_element_node_count(element->kind);
+    uz_element_shape(N, element->kind, point);
+    const double radius = uz_ring_radius(&largest, element, N);
+    for (int a = 0; a < nodes; a++)
+        displacement += N[a] * u[2 * a];
+    return radius > UZ_AXIS * largest ? displacement / radius : radial;
+}
+
+/* An n-th of what the dilatation lacks of its mean goes to each of n direct strains, n as in stiffness.c. */
+static void set_dilatation(double *strain, int n, double dilatation)
+{
+    double own = 0;
+    for (int i = 0; i < n; i++)
+        own += strain[i];
+    for (int i = 0; i < n; i++)
+        strain[i] += (dilatation - own) / n;
+}
+
+void uz_element_strain(double *strain, const uz_element_motion *motion, const double point[3])
+{
+    double grad[UZ_ELEMENT_NODES][3], H[3][3] = {{0}};
+    const uz_element *element = motion->element;
+    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const double det = uz_element_gradients(grad, element, point);
+    add_gradient(H, grad, motion->u, nodes, dim);
+    if (element->formulation == UZ_FORMULATION_INCOMPATIBLE) {
+        double mode[3][3], centre[3][3];
+        memcpy(centre, motion->centre, sizeof centre);
+        uz_mode_gradients(mode, centre, motion->centre_det, dim, point, det);
+        add_gradient(H, mode, motion->internal, dim, dim);
+    }
+    strain[0] = H[0][0];
+    strain[1] = H[1][1];
+    if (element->model == UZ_SOLID) {
+        strain[2] = H[2][2];
+        strain[3] = H[0][1] + H[1][0];
+        strain[4] = H[1][2] + H[2][1];
+        strain[5] = H[2][0] + H[0][2];
+    } else if (element->model == UZ_AXISYMMETRIC) {
+        strain[2] = hoop_strain(element, motion->u, point, H[0][0]);
+        strain[3] = H[0][1] + H[1][0];
+    } else {
+        strain[2] = H[0][1] + H[1][0];
+    }
+    if (element->formulation == UZ_FORMULATION_BBAR)
+        set_dilatation(strain, element->model == UZ_PLANE_STRAIN ? 2 : 3, motion->dilatation);
+}

@@ -1,0 +1,218 @@
+/* stiffness.c: element stiffness in every formulation.
+ *
+ * For an isotropic material B'CB need not be formed. With g_a the gradient of shape function a, the energy density is
+ *     lambda (div u)^2 + 2 mu epsilon : epsilon,
+ * and its second derivatives are lambda g_a,i g_b,j + mu (g_a,j g_b,i + delta_ij g_a . g_b): all of it follows from
+ *     S[a,i][b,j] = integral g_a,i g_b,j,
+ * one symmetric rank-one update per Gauss point. A ring adds the hoop strain u_r / r, with h_a = N_a / r: 2 mu h_a h_b
+ * between radial displacements, and h_a to what div u takes of the radial one.
+ *
+ * Mean dilatation (B-bar; Hughes, "Generalization of selective integration procedures to anisotropic and nonlinear
+ * media", Int. J. Numer. Meth. Engng 15 (1980)): in div u, and with an n-th of the difference in each direct strain,
+ * the dilatation is replaced by its mean over the volume. The energy is then
+ *     (lambda + 2 mu / n) (mean div u)^2 + 2 mu epsilon : epsilon - (2 mu / n) (div u)^2,
+ * that is -2 mu / n in lambda's place, and one more rank-one update. n is 3; in plane strain 2, so that the third
+ * direction keeps its strain of zero.
+ *
+ * Incompatible modes are further shape functions without nodes (element_private.h), condensed at once. */
+#include "element/element_private.h"
+
+#include "scene/mesh.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { MOST = 33 /* hex8: 24 displacements and 9 internal parameters */ };
+
+uz_formulation uz_resolve_formulation(uz_formulation asked, uz_element_kind kind, uz_model model, double poisson)
+{
+    const bool has_choice = kind == UZ_QUAD4 || kind == UZ_HEX8;
+    if (!has_choice)
+        return UZ_FORMULATION_STANDARD;
+    switch (asked) {
+    case UZ_FORMULATION_AUTO:
+        return model != UZ_PLANE_STRESS && poisson >= 0.4 ? UZ_FORMULATION_BBAR : UZ_FORMULATION_STANDARD;
+    case UZ_FORMULATION_BBAR:
+        return model != UZ_PLANE_STRESS ? UZ_FORMULATION_BBAR : UZ_FORMULATION_STANDARD;
+    case UZ_FORMULATION_INCOMPATIBLE:
+        return model != UZ_AXISYMMETRIC ? UZ_FORMULATION_INCOMPATIBLE : UZ_FORMULATION_STANDARD;
+    case UZ_FORMULATION_STANDARD:
+    case UZ_FORMULATIONS:
+        break;
+    }
+    return UZ_FORMULATION_STANDARD;
+}
+
+/* K += weight v v', lower triangle of the leading size x size, rows MOST apart. */
+static void add_product(double *K, int size, double weight, const double *v)
+{
+    for (int i = 0; i < size; i++) {
+        const double scaled = weight * v[i];
+        for (int j = 0; j <= i; j++)
+            K[i * MOST + j] += scaled * v[j];
+    }
+}
+
+/* From S to stiffness in place, blocks of dim x dim: K_ij = lambda S_ij + mu (S_ji + delta_ij trace S). Each block of
+ * the lower triangle is complete in S but those of the diagonal, which are symmetric. */
+static void finish_blocks(double *S, int size, int dim, double lambda, double mu)
+{
+    for (int a = 0; a < size; a += dim)
+        for (int b = 0; b <= a; b += dim) {
+            double block[3][3], trace = 0;
+            for (int i = 0; i < dim; i++) {
+                for (int j = 0; j < dim; j++)
+                    block[i][j] = a == b && j > i ? S[(a + j) * MOST + b + i] : S[(a + i) * MOST + b + j];
+                trace += block[i][i];
+            }
+            for (int i = 0; i < dim; i++)
+                for (int j = 0; j < dim; j++)
+                    S[(a + i) * MOST + b + j] = lambda * block[i][j] + mu * (block[j][i] + (i == j ? trace : 0));
+        }
+}
+
+/* The shape functions' gradients as one vector, then those of the modes if there are any. Returns its length. */
+static int flatten(double *v, double grad[][3], int count, int dim)
+{
+    int size = 0;
+    for (int a = 0; a < count; a++)
+        for (int i = 0; i < dim; i++)
+            v[size++] = grad[a][i];
+    return size;
+}
+
+static double mean_direction_count(uz_model model)
+{
+    return model == UZ_PLANE_STRAIN ? 2 : 3;
+}
+
+/* What a ring adds at a point: lambda with the whole dilatation, and the hoop strain. */
+static void add_ring(double *K, const uz_element *element, const uz_gauss_state *state, const double *gradients,
+                     int size, double lambda)
+{
+    double dilatation[UZ_ELEMENT_DOFS], hoop[UZ_ELEMENT_DOFS];
+    for (int i = 0; i < size; i++) {
+        hoop[i] = i % 2 == 0 ? state->N[i / 2] / state->radius : 0;
+        dilatation[i] = gradients[i] + hoop[i];
+    }
+    add_product(K, size, lambda * state->volume, dilatation);
+    add_product(K, size, 2 * element->lame.mu * state->volume, hoop);
+}
+
+/* The mean dilatation's share of the energy. */
+static void add_mean(double *K, const uz_element *element, double modulus)
+{
+    double mean[UZ_ELEMENT_NODES][3], v[UZ_ELEMENT_DOFS];
+    const double volume = uz_mean_gradients(mean, element);
+    const int size = flatten(v, mean, uz_element_node_count(element->kind), uz_element_dim(element->kind));
+    add_product(K, size, modulus * volume, v);
+}
+
+/* Lower triangle, with the internal parameters last; rows MOST apart. Returns the size. */
+static int integrate(double *K, const uz_element *element)
+{
+    double S[MOST * MOST], centre[3][3], mode[3][3], v[MOST], centre_det = 1;
+    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
+    const int count = uz_element_gauss_count(element->kind, element->model), dofs = nodes * dim;
+    const bool modes = element->formulation == UZ_FORMULATION_INCOMPATIBLE;
+    const bool mean = element->formulation == UZ_FORMULATION_BBAR, ring = element->model == UZ_AXISYMMETRIC;
+    const int size = dofs + (modes ? dim * dim : 0);
+    const double share = 2 * element->lame.mu / mean_direction_count(element->model);
+    const double lambda = mean ? -share : element->lame.lambda;
+    memset(S, 0, (size_t)(size * MOST) * sizeof *S);
+    memset(K, 0, (size_t)(size * MOST) * sizeof *K);
+    if (modes)
+        centre_det = uz_centre_jacobian(centre, element);
+    for (int g = 0; g < count; g++) {
+        uz_gauss_state state;
+        uz_gauss_state_at(&state, element, g);
+        flatten(v, state.grad, nodes, dim);
+        if (modes) {
+            uz_mode_gradients(mode, centre, centre_det, dim, state.point, state.det);
+            flatten(v + dofs, mode, dim, dim);
+        }
+        add_product(S, size, state.volume, v);
+        if (ring)
+            add_ring(K, element, &state, v, dofs, lambda);
+    }
+    finish_blocks(S, size, dim, ring ? 0 : lambda, element->lame.mu);
+    for (int i = 0; i < size; i++)
+        for (int j = 0; j <= i; j++)
+            K[i * MOST + j] += S[i * MOST + j];
+    if (mean)
+        add_mean(K, element, element->lame.lambda + share);
+    return size;
+}
+
+/* A = L L' in place of the trailing block, that of the internal parameters. */
+static void factor_internal(double *K, int dofs, int size)
+{
+    for (int i = dofs; i < size; i++)
+        for (int j = dofs; j <= i; j++) {
+            double sum = K[i * MOST + j];
+            for (int k = dofs; k < j; k++)
+                sum -= K[i * MOST + k] * K[j * MOST + k];
+            K[i * MOST + j] = i == j ? sqrt(sum) : sum / K[j * MOST + j];
+        }
+}
+
+/* L^-1 times the coupling, in its place. */
+static void solve_coupling(double *K, int dofs, int size)
+{
+    for (int i = dofs; i < size; i++)
+        for (int j = 0; j < dofs; j++) {
+            double sum = K[i * MOST + j];
+            for (int k = dofs; k < i; k++)
+                sum -= K[i * MOST + k] * K[k * MOST + j];
+            K[i * MOST + j] = sum / K[i * MOST + i];
+        }
+}
+
+/* The internal parameters are those of least energy: K_uu - K_ua A^-1 K_au. */
+static void condense(double *K, int dofs, int size)
+{
+    factor_internal(K, dofs, size);
+    solve_coupling(K, dofs, size);
+    for (int k = dofs; k < size; k++)
+        for (int i = 0; i < dofs; i++)
+            for (int j = 0; j <= i; j++)
+                K[i * MOST + j] -= K[k * MOST + i] * K[k * MOST + j];
+}
+
+void uz_internal_parameters(double internal[UZ_ELEMENT_INTERNAL], const uz_element *element, const double *u)
+{
+    double K[MOST * MOST];
+    const int dim = uz_element_dim(element->kind), dofs = uz_element_node_count(element->kind) * dim;
+    const int size = integrate(K, element), count = size - dofs;
+    factor_internal(K, dofs, size);
+    for (int i = 0; i < count; i++) { /* L y = - coupling u */
+        const double *row = K + (dofs + i) * MOST;
+        double sum = 0;
+        for (int j = 0; j < dofs; j++)
+            sum -= row[j] * u[j];
+        for (int k = 0; k < i; k++)
+            sum -= row[dofs + k] * internal[k];
+        internal[i] = sum / row[dofs + i];
+    }
+    for (int i = count - 1; i >= 0; i--) { /* L' internal = y */
+        for (int k = i + 1; k < count; k++)
+            internal[i] -= K[(dofs + k) * MOST + dofs + i] * internal[k];
+        internal[i] /= K[(dofs + i) * MOST + dofs + i];
+    }
+}
+
+uz_shape_fault uz_element_stiffness(double *ke, const uz_element *element)
+{
+    double K[MOST * MOST];
+    const int dofs = uz_element_node_count(element->kind) * uz_element_dim(element->kind);
+    memset(ke, 0, (size_t)(dofs * dofs) * sizeof *ke);
+    const uz_shape_fault fault = uz_element_check(element);
+    if (fault != UZ_SHAPE_GOOD)
+        return fault;
+    const int size = integrate(K, element);
+    condense(K, dofs, size);
+    for (int i = 0; i < dofs; i++)
+        for (int j = 0; j <= i; j++)
+            ke[dofs * i + j] = ke[dofs * j + i] = K[i * MOST + j];
+    return UZ_SHAPE_GOOD;
+}
