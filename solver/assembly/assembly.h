@@ -1,20 +1,41 @@
 /* assembly.h: from a scene to matrices, split where the factor cache needs it.
  *
- *   body   what K and N depend on: mesh, materials, thickness, model, which dofs are supported, contact groups and
- *          normals. Built once, then only read, by many threads at a time.
- *   load   what one case adds: tractions, prescribed values, positions of the obstacles: p and h.
+ *   body   what K and N depend on: mesh, materials, thickness, model, which dofs are supported, springs, contact groups
+ *          and normals. Built once, then only read, by many threads at a time.
+ *   load   what one case adds: loads, prescribed values, positions of plane obstacles: p and h.
  *
- * A dof is a node and a direction. Supported dofs are eliminated; the free ones keep the order of the nodes. A contact
- * row exists for each node of a contact group of which some free dof has a share in the normal; rows come contact by
- * contact, nodes ascending. N is minus the unit normal on those dofs, so that g = h - N u = (x + u - point) . n.
- * The directions of a node's free dofs are the axes, but at a node whose first contact row has a normal with a share in
- * several of them: there one dof is along that normal, the others across, so that the row has one entry. K, N and p are
- * in these dofs; uz_recover_nodal and uz_restrict_nodal lead to x, y and back. */
+ * A dof is a node and a direction. Supported dofs are eliminated; the free ones keep the order of the nodes. In a body
+ * of revolution the radial dofs on the axis are held at 0. A contact row exists for each node of a contact group of
+ * which some free dof has a share in the normal; rows come contact by contact, nodes ascending. N is minus the unit
+ * normal on those dofs, so that g = h - N u = gap(x) + u . n; against another part of the body u is the node's less that
+ * of the point of the face that it meets, whose nodes have shares in the row too.
+ * The directions of a node's dofs are the axes, but where a support holds an inclined direction, which is then a dof,
+ * and at a node whose first contact row has a normal with a share in several free dofs: there one dof is along that
+ * normal, the others across, so that an obstacle's row has one entry. K, N and p are in these dofs; uz_recover_nodal and
+ * uz_restrict_nodal lead to x, y, z and back. */
 #ifndef UZ_ASSEMBLY_H
 #define UZ_ASSEMBLY_H
 
+#include "element/element.h"
 #include "scene/mesh.h"
 #include "uzawa.h"
+
+/* A material as the elements need it. */
+typedef struct {
+    uz_lame lame;
+    double poisson, density, expansion;
+} uz_body_material;
+
+/* Where the nodes of one contact's group stand to its obstacle, before anything moves. A plane needs none of this. */
+typedef struct {
+    int64_t n;       /* nodes of the group; 0: a plane */
+    double *gap;     /* n; INFINITY: the node has no place on the obstacle, so no row */
+    double *normal;  /* n x dim: unit normals of the obstacle, towards the body */
+    int64_t *first;  /* another part of the body, else NULL: n + 1, into node and weight */
+    int64_t *node;   /* the nodes of the face that each node meets ... */
+    double *weight;  /* ... and their shares in the point that it meets: each sum is 1 */
+    int64_t *face;   /* n: which face of the group `with` */
+} uz_contact_sites;
 
 typedef struct {
     int64_t d, m, n_fixed;
@@ -25,11 +46,27 @@ typedef struct {
     int64_t *frame_of; /* n_nodes: 1 + place in info.turned_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
+    uz_model kind;
+    uz_formulation formulation; /* as the scene asks for it */
     double thickness;
-    int64_t n_modes;      /* motions that only obstacles hold; 0: the supports hold the body */
-    double *modes;        /* d x n_modes: displacements of the free dofs, one motion after the other */
-    double elasticity[9]; /* 3 x 3, row by row: stress (xx, yy, xy) from strain (xx, yy, 2 xy) */
+    uz_body_material *materials; /* n_materials */
+    int64_t n_materials;
+    int32_t *material_of; /* n_elements; NULL: all are of materials[0] */
+    double *spring;       /* n_nodes x dim: stiffness of the ground along the axes; NULL: no springs */
+    uz_contact_sites *sites; /* n_sites: one per contact of the scene */
+    int64_t n_sites;
+    int64_t n_pair_rows; /* contact rows against another part of the body */
+    int64_t n_modes;     /* motions that only obstacles hold; 0: the supports hold the body */
+    double *modes;       /* d x n_modes: displacements of the free dofs, one motion after the other */
 } uz_body_model;
+
+/* Element e as solver/element takes it; xyz is room for its coordinates. */
+void uz_body_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], const uz_body_model *model, int64_t e);
+/* Its material. */
+const uz_body_material *uz_element_material(const uz_body_model *model, int64_t e);
+/* A face of it; node gets its nodes. */
+void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_FACE_NODES], const uz_body_model *model,
+                  uz_face face);
 
 /* Mesh, supports, stiffness, contact normals. Checks what it reads; loads and values are checked by _load.
  * Errors: UZ_ERR_SCENE, _FREE_BODY, _NOT_FINITE, _MEMORY. */
@@ -60,6 +97,12 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
 
 /* The reverse: the free dofs u (d) of a displacement by node; what it says of supported dofs is left out. */
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal);
+
+/* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included. */
+uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* f (n_nodes x dim) = the elements' stiffness times the displacements, element by element: what the nodes need to stay
+ * where they are. Less the loads and the springs' -k u it is what supports and obstacles do. */
+uz_status uz_internal_forces(double *f, const uz_body_model *model, const double *nodal, uz_error *err);
 
 /* Copies what a result shows of the mesh: not the frames, as a result speaks of x and y only. */
 uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t m, uz_error *err);

@@ -1,7 +1,6 @@
 /* body_model.c: the chain from a scene to matrices. */
 #include "assembly/parts.h"
 
-#include "assembly/quad4.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "scene/scene.h"
@@ -18,9 +17,24 @@ void uz_mesh_info_clear(uz_mesh_info *info)
     free(info->contact_node);
     free(info->contact_area);
     free(info->contact_normal);
+    free(info->contact_of);
+    free(info->contact_face);
     free(info->turned_node);
     free(info->frame);
     memset(info, 0, sizeof *info);
+}
+
+static void clear_sites(uz_body_model *model)
+{
+    for (int64_t k = 0; model->sites && k < model->n_sites; k++) {
+        free(model->sites[k].gap);
+        free(model->sites[k].normal);
+        free(model->sites[k].first);
+        free(model->sites[k].node);
+        free(model->sites[k].weight);
+        free(model->sites[k].face);
+    }
+    free(model->sites);
 }
 
 void uz_body_model_clear(uz_body_model *model)
@@ -36,17 +50,19 @@ void uz_body_model_clear(uz_body_model *model)
     free(model->dof);
     free(model->frame_of);
     free(model->modes);
+    free(model->materials);
+    free(model->material_of);
+    free(model->spring);
+    clear_sites(model);
     memset(model, 0, sizeof *model);
 }
 
-static void describe_mesh(uz_body_model *model, const uz_scene *scene)
+static void describe_mesh(uz_body_model *model)
 {
     model->info.dim = model->mesh.dim;
     model->info.n_nodes = model->mesh.n_nodes;
     model->info.n_elements = model->mesh.n_elements;
     model->info.xyz = model->mesh.xyz;
-    model->thickness = scene->thickness;
-    uz_elasticity(model->elasticity, scene->model, scene->materials[0].young, scene->materials[0].poisson);
 }
 
 /* Everything but the stiffness. held: obstacles may hold the body where supports don't. */
@@ -57,10 +73,16 @@ static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held,
         status = uz_scene_check_body(scene, &model->mesh, err);
     if (status != UZ_OK)
         return status;
-    describe_mesh(model, scene);
-    status = uz_number_dofs(model, scene, err);
+    describe_mesh(model);
+    status = uz_take_materials(model, scene, err);
+    if (status == UZ_OK)
+        status = uz_number_dofs(model, scene, err);
+    if (status == UZ_OK)
+        status = uz_spread_springs(model, scene, err);
     if (status == UZ_OK && !held)
         status = uz_check_rigid_modes(model, err);
+    if (status == UZ_OK)
+        status = uz_find_sites(model, scene, err);
     if (status == UZ_OK)
         status = uz_choose_frames(model, scene, err);
     if (status == UZ_OK)
@@ -109,8 +131,9 @@ static uz_status fill_load(double *p, double *h, double *prescribed, const uz_bo
         status = check_finite(h, model->m, "/contacts", err);
     if (status != UZ_OK)
         return status;
-    memset(p, 0, (size_t)model->d * sizeof *p);
-    uz_add_tractions(p, model, scene);
+    status = uz_load_vector(p, model, scene, err);
+    if (status != UZ_OK)
+        return status;
     uz_csc_gaxpy(p, &model->K_fixed, -1, prescribed);
     return check_finite(p, model->d, "/loads", err);
 }

@@ -14,31 +14,81 @@
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3])
 {
     const int dim = model->mesh.dim;
+    const double least = uz_node_frame(model, node) ? UZ_DEPENDENT : 0;
+    double share[3];
+    uz_free_shares(share, model, node, normal);
     for (int c = 0; c < dim; c++)
-        if (normal[c] != 0 && model->dof[node * dim + c] >= 0)
+        if (fabs(share[c]) > least)
             return true;
     return false;
 }
 
-/* The obstacle's normal and the group that can touch it. The scene was checked. */
-static const uz_group *read_contact(double normal[3], const uz_mesh *mesh, const uz_contact *contact, uz_error *err)
+bool uz_contact_normal(double normal[3], const uz_body_model *model, const uz_scene *scene, int64_t k, int64_t i)
 {
-    const uz_group *group = uz_mesh_group(mesh, contact->on, "/contacts", err);
-    uz_unit_normal(normal, contact->normal, mesh->dim);
-    return group;
+    const int dim = model->mesh.dim;
+    const uz_contact_sites *sites = model->sites ? &model->sites[k] : NULL;
+    if (!sites || sites->n == 0)
+        return uz_unit_normal(normal, scene->contacts[k].normal, dim);
+    normal[2] = 0;
+    memcpy(normal, sites->normal + i * dim, (size_t)dim * sizeof *normal);
+    return isfinite(sites->gap[i]);
 }
 
-static uz_status count_rows(int64_t *rows, const uz_body_model *model, const uz_scene *scene, uz_error *err)
-{
+/* A node of a contact's group on its obstacle. */
+typedef struct {
+    int64_t contact, place; /* the place-th of its group */
+    int64_t node;
     double normal[3];
-    *rows = 0;
+    int masters; /* nodes of the face that it meets: 0 on an obstacle */
+    const int64_t *master;
+    const double *weight;
+} site;
+
+/* Does the site move any free dof? *exists: does the node have a place on the obstacle at all? */
+static bool find_site(site *s, bool *exists, const uz_body_model *model, const uz_scene *scene, const uz_group *group,
+                      int64_t contact, int64_t place)
+{
+    *s = (site){.contact = contact, .place = place, .node = uz_group_node_at(group, place)};
+    const uz_contact_sites *sites = model->sites ? &model->sites[contact] : NULL;
+    *exists = uz_contact_normal(s->normal, model, scene, contact, place);
+    if (!*exists)
+        return false;
+    if (sites && sites->first) {
+        s->masters = (int)(sites->first[place + 1] - sites->first[place]);
+        s->master = sites->node + sites->first[place];
+        s->weight = sites->weight + sites->first[place];
+    }
+    bool moves = uz_is_contact_row(model, s->node, s->normal);
+    for (int j = 0; j < s->masters && !moves; j++)
+        moves = uz_is_contact_row(model, s->master[j], s->normal);
+    return moves;
+}
+
+/* The group that can touch. The scene was checked. */
+static const uz_group *contact_group(const uz_mesh *mesh, const uz_contact *contact, uz_error *err)
+{
+    return uz_mesh_group(mesh, contact->on, "/contacts", err);
+}
+
+/* How many rows, and at most how many entries. */
+static uz_status count_rows(int64_t *entries, uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    const int dim = model->mesh.dim;
+    bool exists;
+    site s;
+    *entries = model->m = model->n_pair_rows = 0;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
-        const uz_group *group = read_contact(normal, &model->mesh, &scene->contacts[k], err);
+        const uz_group *group = contact_group(&model->mesh, &scene->contacts[k], err);
         if (!group)
             return UZ_ERR_SCENE;
-        for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++)
-            *rows += uz_is_contact_row(model, uz_group_node_at(group, i), normal);
-        if (*rows > UZ_SCENE_MAX_DOFS)
+        for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++) {
+            if (!find_site(&s, &exists, model, scene, group, k, i))
+                continue;
+            model->m++;
+            model->n_pair_rows += s.masters > 0;
+            *entries += dim * (1 + s.masters);
+        }
+        if (model->m > UZ_SCENE_MAX_DOFS)
             return uz_fail(err, UZ_ERR_SCENE, "/contacts", "more than %d contact candidates; use fewer contacts",
                            UZ_SCENE_MAX_DOFS);
     }
@@ -51,79 +101,80 @@ typedef struct {
     double *val, *area;
 } row_work;
 
-/* A consistent constant pressure gives each end of an edge half of its area. */
+/* What a consistent constant pressure gives each node of a face. */
 static void spread_area(double *area, const uz_body_model *model, const uz_group *group)
 {
     for (int64_t e = 0; e < group->n_faces; e++) {
-        int64_t ends[UZ_FACE_NODES];
-        uz_mesh_face(ends, &model->mesh, group->face[e]);
-        const double half = 0.5 * uz_edge_area(model, ends);
-        area[ends[0]] += half;
-        area[ends[1]] += half;
+        uz_side side;
+        int64_t node[UZ_FACE_NODES];
+        double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
+        uz_body_side(&side, xyz, node, model, group->face[e]);
+        uz_side_weights(w, &side);
+        for (int a = 0; a < side.nodes; a++)
+            area[node[a]] += w[a];
     }
 }
 
-/* The normal along the node's free dofs. In a turned frame what rounding has left across the normal becomes zero: it
- * would make a second entry out of noise. */
-static void free_shares(double share[3], const uz_body_model *model, int64_t node, const double normal[3])
-{
-    const int dim = model->mesh.dim;
-    double largest = 0;
-    uz_to_frame(share, model, node, normal);
-    for (int c = 0; c < dim; c++) {
-        if (model->dof[node * dim + c] < 0)
-            share[c] = 0;
-        largest = fmax(largest, fabs(share[c]));
-    }
-    for (int c = 0; c < dim && uz_node_frame(model, node); c++)
-        if (fabs(share[c]) <= 8 * DBL_EPSILON * largest)
-            share[c] = 0;
-}
-
-static void add_row(uz_body_model *model, row_work *work, int64_t row, int64_t node, const double normal[3])
+/* `factor` times the normal on the free dofs of a node. */
+static void add_entries(row_work *work, const uz_body_model *model, int64_t row, int64_t node, const double normal[3],
+                        double factor)
 {
     const int dim = model->mesh.dim;
     double share[3];
-    model->info.contact_node[row] = node;
-    model->info.contact_area[row] = work->area[node];
-    memcpy(model->info.contact_normal + row * dim, normal, (size_t)dim * sizeof *normal);
-    free_shares(share, model, node, normal);
+    uz_free_shares(share, model, node, normal);
     for (int c = 0; c < dim; c++) {
-        if (share[c] == 0)
+        if (share[c] == 0 || factor == 0)
             continue;
         work->row[work->count] = row;
         work->col[work->count] = model->dof[node * dim + c];
-        work->val[work->count++] = -share[c];
+        work->val[work->count++] = factor * share[c];
     }
 }
 
-static void add_contact(uz_body_model *model, row_work *work, int64_t *row, const uz_group *group,
-                        const double normal[3])
+static void add_row(uz_body_model *model, row_work *work, int64_t row, const site *s)
+{
+    const int dim = model->mesh.dim;
+    uz_mesh_info *info = &model->info;
+    info->contact_node[row] = s->node;
+    info->contact_area[row] = work->area[s->node];
+    info->contact_of[row] = s->contact;
+    info->contact_face[row] = s->masters > 0 ? model->sites[s->contact].face[s->place] : -1;
+    memcpy(info->contact_normal + row * dim, s->normal, (size_t)dim * sizeof *s->normal);
+    add_entries(work, model, row, s->node, s->normal, -1);
+    for (int j = 0; j < s->masters; j++)
+        add_entries(work, model, row, s->master[j], s->normal, s->weight[j]);
+}
+
+static void add_contact(uz_body_model *model, row_work *work, int64_t *row, const uz_scene *scene,
+                        const uz_group *group, int64_t k)
 {
     const int64_t count = uz_group_node_count(&model->mesh, group);
+    bool exists;
+    site s;
     spread_area(work->area, model, group);
-    for (int64_t i = 0; i < count; i++) {
-        const int64_t node = uz_group_node_at(group, i);
-        if (uz_is_contact_row(model, node, normal))
-            add_row(model, work, (*row)++, node, normal);
-        work->area[node] = 0;
-    }
+    for (int64_t i = 0; i < count; i++)
+        if (find_site(&s, &exists, model, scene, group, k, i))
+            add_row(model, work, (*row)++, &s);
+    for (int64_t i = 0; i < count; i++)
+        work->area[uz_group_node_at(group, i)] = 0;
 }
 
-static bool alloc_rows(uz_body_model *model, row_work *work)
+static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries)
 {
     const int dim = model->mesh.dim;
     uz_mesh_info *info = &model->info;
     info->contact_node = uz_alloc(model->m, sizeof *info->contact_node);
     info->contact_area = uz_alloc(model->m, sizeof *info->contact_area);
     info->contact_normal = uz_alloc(model->m * dim, sizeof *info->contact_normal);
+    info->contact_of = uz_alloc(model->m, sizeof *info->contact_of);
+    info->contact_face = uz_alloc(model->m, sizeof *info->contact_face);
     work->count = 0;
-    work->row = uz_alloc(model->m * dim, sizeof *work->row);
-    work->col = uz_alloc(model->m * dim, sizeof *work->col);
-    work->val = uz_alloc(model->m * dim, sizeof *work->val);
+    work->row = uz_alloc(entries, sizeof *work->row);
+    work->col = uz_alloc(entries, sizeof *work->col);
+    work->val = uz_alloc(entries, sizeof *work->val);
     work->area = uz_alloc_zero(model->mesh.n_nodes, sizeof *work->area);
-    return info->contact_node && info->contact_area && info->contact_normal && work->row && work->col && work->val &&
-           work->area;
+    return info->contact_node && info->contact_area && info->contact_normal && info->contact_of &&
+           info->contact_face && work->row && work->col && work->val && work->area;
 }
 
 static void free_work(row_work *work)
@@ -137,80 +188,120 @@ static void free_work(row_work *work)
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     row_work work;
-    double normal[3];
-    int64_t row = 0;
-    uz_status status = count_rows(&model->m, model, scene, err);
+    int64_t row = 0, entries;
+    uz_status status = count_rows(&entries, model, scene, err);
     if (status != UZ_OK)
         return status;
-    if (!alloc_rows(model, &work)) {
+    if (!alloc_rows(model, &work, entries)) {
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
         goto done;
     }
-    for (int64_t k = 0; k < scene->n_contacts; k++) {
-        const uz_group *group = read_contact(normal, &model->mesh, &scene->contacts[k], err);
-        add_contact(model, &work, &row, group, normal);
-    }
+    for (int64_t k = 0; k < scene->n_contacts; k++)
+        add_contact(model, &work, &row, scene, contact_group(&model->mesh, &scene->contacts[k], err), k);
     status = uz_csc_from_triplets(&model->N, model->m, model->d, work.count, work.row, work.col, work.val, err);
 done:
     free_work(&work);
     return status;
 }
 
-/* (x + u - point) . n with the prescribed displacements in u and zero for the free ones. The sum is also given in
- * absolute values: the size against which a rounding error is small. */
-static double gap_at(double *scale, const uz_body_model *model, int64_t node, const double *prescribed,
-                     const double point[3], const double normal[3])
+/* ------------------------------------------------------------------ gaps */
+
+/* What supports give a node (dim), along the axes; free dofs are where they were. */
+static void prescribed_at(double u[3], const uz_body_model *model, int64_t node, const double *prescribed)
 {
     const int dim = model->mesh.dim;
-    double gap = 0;
-    *scale = 0;
     for (int c = 0; c < dim; c++) {
         const int64_t dof = model->dof[node * dim + c];
-        const double x = model->mesh.xyz[node * dim + c], u = dof < 0 ? prescribed[-1 - dof] : 0;
-        gap += ((x - point[c]) + u) * normal[c];
-        *scale += (fabs(x) + fabs(point[c]) + fabs(u)) * fabs(normal[c]);
+        u[c] = dof < 0 ? prescribed[-1 - dof] : 0;
+    }
+    uz_from_frame(u, model, node);
+}
+
+/* The gap of a site with the prescribed displacements and zero for the free ones: (x + u - point) . n of a plane. The
+ * sum is also given in absolute values: the size against which a rounding error is small. */
+static double gap_at(double *scale, const uz_body_model *model, const uz_contact *contact, const site *s,
+                     const double *prescribed)
+{
+    const int dim = model->mesh.dim;
+    const uz_contact_sites *sites = model->sites ? &model->sites[s->contact] : NULL;
+    const bool plane = !sites || sites->n == 0;
+    double gap = plane ? 0 : sites->gap[s->place], u[3];
+    prescribed_at(u, model, s->node, prescribed);
+    *scale = 0;
+    for (int c = 0; c < dim; c++) {
+        const double x = model->mesh.xyz[s->node * dim + c], from = plane ? contact->point[c] : 0;
+        gap += ((plane ? x - from : 0) + u[c]) * s->normal[c];
+        *scale += (fabs(x) + fabs(from) + fabs(u[c])) * fabs(s->normal[c]);
+    }
+    for (int j = 0; j < s->masters; j++) {
+        prescribed_at(u, model, s->master[j], prescribed);
+        for (int c = 0; c < dim; c++) {
+            gap -= s->weight[j] * u[c] * s->normal[c];
+            *scale += fabs(s->weight[j] * u[c] * s->normal[c]);
+        }
     }
     return gap;
 }
 
 /* A node without a row cannot give way: it must be outside, up to what is surely rounding or of no consequence. */
-static uz_status check_held(const uz_body_model *model, int64_t contact, int64_t node, double gap, double scale,
-                            uz_error *err)
+static uz_status check_held(const uz_body_model *model, const site *s, double gap, double scale, uz_error *err)
 {
-    char where[96];
-    const double *x = model->mesh.xyz + node * model->mesh.dim;
+    char where[96], at[96];
+    const double *x = model->mesh.xyz + s->node * model->mesh.dim;
     if (gap >= -1e-9 * model->mesh.extent - 1e-13 * scale)
         return UZ_OK;
-    snprintf(where, sizeof where, "/contacts/%lld", (long long)contact);
+    snprintf(where, sizeof where, "/contacts/%lld", (long long)s->contact);
+    if (model->mesh.dim == 2)
+        snprintf(at, sizeof at, "(%g, %g)", x[0], x[1]);
+    else
+        snprintf(at, sizeof at, "(%g, %g, %g)", x[0], x[1], x[2]);
     return uz_fail(err, UZ_ERR_SCENE, where,
-                   "node %lld at (%g, %g) is held by a support %g inside the obstacle and cannot give way; "
+                   "node %lld at %s is held by a support %g inside the obstacle and cannot give way; "
                    "move the obstacle, or let the node move along its normal",
-                   (long long)node, x[0], x[1], -gap);
+                   (long long)s->node, at, -gap);
+}
+
+static uz_status other_body(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", "the scene's contacts are not those of this body");
+}
+
+static uz_status contact_gaps(double *h, int64_t *row, const double *prescribed, const uz_body_model *model,
+                              const uz_scene *scene, int64_t k, uz_error *err)
+{
+    const uz_group *group = contact_group(&model->mesh, &scene->contacts[k], err);
+    const int64_t count = group ? uz_group_node_count(&model->mesh, group) : 0;
+    uz_status status = group ? UZ_OK : UZ_ERR_SCENE;
+    if (model->sites && model->sites[k].n > 0 && model->sites[k].n != count)
+        return other_body(err);
+    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
+        bool exists;
+        double scale;
+        site s;
+        const bool moves = find_site(&s, &exists, model, scene, group, k, i);
+        const double gap = exists ? gap_at(&scale, model, &scene->contacts[k], &s, prescribed) : 0;
+        if (!exists)
+            continue;
+        if (!moves)
+            status = check_held(model, &s, gap, scale, err);
+        else if (*row == model->m)
+            return other_body(err);
+        else
+            h[(*row)++] = gap;
+    }
+    return status;
 }
 
 uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_model *model, const uz_scene *scene,
                           uz_error *err)
 {
-    double normal[3], scale;
     int64_t row = 0;
     uz_status status = UZ_OK;
-    for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++) {
-        const uz_group *group = read_contact(normal, &model->mesh, &scene->contacts[k], err);
-        const int64_t count = group ? uz_group_node_count(&model->mesh, group) : 0;
-        if (!group)
-            return UZ_ERR_SCENE;
-        for (int64_t i = 0; i < count && status == UZ_OK; i++) {
-            const int64_t node = uz_group_node_at(group, i);
-            const double gap = gap_at(&scale, model, node, prescribed, scene->contacts[k].point, normal);
-            if (!uz_is_contact_row(model, node, normal))
-                status = check_held(model, k, node, gap, scale, err);
-            else if (row == model->m)
-                return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", "the scene's contacts are not those of this body");
-            else
-                h[row++] = gap;
-        }
-    }
+    if (model->n_sites > 0 && model->n_sites != scene->n_contacts)
+        return other_body(err);
+    for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++)
+        status = contact_gaps(h, &row, prescribed, model, scene, k, err);
     if (status == UZ_OK && row != model->m)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", "the scene's contacts are not those of this body");
+        return other_body(err);
     return status;
 }

@@ -3,20 +3,103 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-/* Marks the dofs of one support with -1. */
+/* Along one axis? Which, and on which side of zero. */
+static int single_axis(double *sign, const double n[3], int dim)
+{
+    int axis = -1, shares = 0;
+    for (int c = 0; c < dim; c++)
+        if (n[c] != 0) {
+            shares++;
+            axis = c;
+        }
+    if (shares != 1)
+        return -1;
+    *sign = n[axis] < 0 ? -1 : 1;
+    return axis;
+}
+
+void uz_support_values(double u[3], const uz_support *support, int dim)
+{
+    double n[3], sign;
+    int axis;
+    for (int c = 0; c < 3; c++)
+        u[c] = support->kind == UZ_SUPPORT_COMPONENTS && c < dim ? support->u[c] : NAN;
+    if (support->kind != UZ_SUPPORT_NORMAL || !uz_unit_normal(n, support->normal, dim))
+        return;
+    axis = single_axis(&sign, n, dim);
+    if (axis >= 0)
+        u[axis] = sign * support->value;
+}
+
+bool uz_support_is_inclined(double n[3], const uz_support *support, int dim)
+{
+    double sign;
+    return support->kind == UZ_SUPPORT_NORMAL && uz_unit_normal(n, support->normal, dim) &&
+           single_axis(&sign, n, dim) < 0;
+}
+
+bool uz_is_on_axis(const uz_body_model *model, int64_t node)
+{
+    const uz_mesh *mesh = &model->mesh;
+    return model->kind == UZ_AXISYMMETRIC && fabs(mesh->xyz[node * mesh->dim]) <= 1e-12 * mesh->extent;
+}
+
+/* Marks the dofs that one support holds along axes with -1. */
 static void mark_support(uz_body_model *model, const uz_support *support, const uz_group *group)
 {
     const int dim = model->mesh.dim;
     const int64_t count = uz_group_node_count(&model->mesh, group);
+    double u[3];
+    uz_support_values(u, support, dim);
     for (int64_t i = 0; i < count; i++)
         for (int c = 0; c < dim; c++)
-            if (!isnan(support->u[c]))
+            if (!isnan(u[c]))
                 model->dof[uz_group_node_at(group, i) * dim + c] = -1;
+}
+
+static void mark_axis_of_rotation(uz_body_model *model)
+{
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->kind == UZ_AXISYMMETRIC; a++)
+        if (uz_is_on_axis(model, a))
+            model->dof[a * model->mesh.dim] = -1;
+}
+
+/* Turns the nodes of an inclined support so that what it holds is one of their dofs, unless it is held already. */
+static uz_status mark_inclined(uz_body_model *model, const uz_group *group, const double n[3], uz_error *err)
+{
+    const int64_t count = uz_group_node_count(&model->mesh, group);
+    uz_status status = uz_reserve_frames(model, count, err);
+    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
+        const int64_t node = uz_group_node_at(group, i);
+        const int held = uz_hold_direction(model, node, n);
+        if (held >= 0)
+            model->dof[node * model->mesh.dim + held] = -1;
+    }
+    return status;
+}
+
+static uz_status mark_all(uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    double n[3];
+    mark_axis_of_rotation(model);
+    for (int inclined = 0; inclined < 2; inclined++) /* axes first: they stay what they are */
+        for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++) {
+            const uz_group *group = uz_mesh_group(&model->mesh, scene->supports[i].on, "/supports", err);
+            if (!group)
+                return UZ_ERR_SCENE;
+            if (!inclined)
+                mark_support(model, &scene->supports[i], group);
+            else if (uz_support_is_inclined(n, &scene->supports[i], model->mesh.dim))
+                status = mark_inclined(model, group, n, err);
+        }
+    return status;
 }
 
 static void number(uz_body_model *model)
@@ -33,75 +116,11 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
     model->dof = uz_alloc_zero(mesh->n_nodes * mesh->dim, sizeof *model->dof);
     if (!model->dof)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the numbers of %lld nodes", (long long)mesh->n_nodes);
-    for (int64_t i = 0; i < scene->n_supports; i++) {
-        const uz_group *group = uz_mesh_group(mesh, scene->supports[i].on, "/supports", err);
-        if (!group)
-            return UZ_ERR_SCENE;
-        mark_support(model, &scene->supports[i], group);
-    }
+    uz_status status = mark_all(model, scene, err);
+    if (status != UZ_OK)
+        return status;
     number(model);
     if (model->d == 0)
         return uz_fail(err, UZ_ERR_SCENE, "/supports", "the supports hold every node: nothing is left to move");
     return UZ_OK;
-}
-
-typedef struct {
-    const uz_body_model *model;
-    const uz_scene *scene;
-    double *value;   /* n_fixed */
-    int64_t *source; /* n_fixed: 1 + the support that gave it, 0: none yet */
-} prescription;
-
-static uz_status contradiction(const prescription *p, int64_t support, int64_t node, int c, int64_t fixed,
-                               uz_error *err)
-{
-    char where[96];
-    const char axis = "xyz"[c];
-    const int64_t earlier = p->source[fixed] - 1;
-    snprintf(where, sizeof where, "/supports/%lld/u%c", (long long)support, axis);
-    return uz_fail(err, UZ_ERR_SCENE, where,
-                   "node %lld, where \"%.63s\" meets \"%.63s\", is given u%c = %g here and %g by support %lld; "
-                   "leave one of them out or make them agree",
-                   (long long)node, p->scene->supports[support].on, p->scene->supports[earlier].on, axis,
-                   p->scene->supports[support].u[c], p->value[fixed], (long long)earlier);
-}
-
-static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, uz_error *err)
-{
-    const int64_t dof = p->model->dof[node * p->model->mesh.dim + c];
-    const double value = p->scene->supports[support].u[c];
-    if (dof >= 0)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", "the scene's supports are not those of this body");
-    const int64_t fixed = -1 - dof;
-    if (p->source[fixed] && p->value[fixed] != value)
-        return contradiction(p, support, node, c, fixed, err);
-    p->value[fixed] = value;
-    if (!p->source[fixed])
-        p->source[fixed] = support + 1;
-    return UZ_OK;
-}
-
-static uz_status prescribe_group(prescription *p, int64_t support, uz_error *err)
-{
-    const uz_mesh *mesh = &p->model->mesh;
-    const uz_group *group = uz_mesh_group(mesh, p->scene->supports[support].on, "/supports", err);
-    uz_status status = group ? UZ_OK : UZ_ERR_SCENE;
-    const int64_t count = group ? uz_group_node_count(mesh, group) : 0;
-    for (int c = 0; c < mesh->dim; c++)
-        for (int64_t i = 0; i < count && status == UZ_OK; i++)
-            if (!isnan(p->scene->supports[support].u[c]))
-                status = prescribe(p, support, uz_group_node_at(group, i), c, err);
-    return status;
-}
-
-uz_status uz_prescribed_values(double *value, const uz_body_model *model, const uz_scene *scene, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    prescription p = {model, scene, value, uz_alloc_zero(model->n_fixed, sizeof *p.source)};
-    if (!p.source)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
-    for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
-        status = prescribe_group(&p, i, err);
-    free(p.source);
-    return status;
 }

@@ -1,11 +1,14 @@
-/* frames.c: directions of the dofs of contact nodes.
+/* frames.c: directions of the dofs of nodes.
  *
- * A rigid obstacle bounds one displacement of a node, that along its normal. Where this is not an axis, the node's free
- * dofs are turned into the normal and tangents, so that the row of N has one entry and the contact one dof per node.
+ * A support along an inclined normal holds one displacement of a node, a rigid obstacle bounds one. Where this is not
+ * an axis, the node's free dofs are turned into the normal and tangents, so that the held direction is a dof, or the row
+ * of N has one entry and the contact one dof per node. Supports turn first, one after the other; a contact turns what
+ * they have left.
  * With n the normal on the node's free directions, of unit length there, k its largest component and s the sign of n_k,
  *     H = I - w w' / (1 + |n_k|),   w = n + s e_k,   H e_k = -s n
  * (Householder; Golub and Van Loan, Matrix Computations, 5.1) has n as its k-th row up to the sign, and for others the
- * unit vectors of supported directions, where w is zero, and tangents near the remaining axes. */
+ * unit vectors of supported directions, where w is zero, and tangents near the remaining axes. A node that is turned
+ * again has H times its frame. */
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
@@ -16,8 +19,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { GLOBAL = -1 }; /* frame_of of a node whose first contact leaves its dofs along the axes */
 
 const double *uz_node_frame(const uz_body_model *model, int64_t node)
 {
@@ -36,6 +37,29 @@ void uz_to_frame(double out[3], const uz_body_model *model, int64_t node, const 
             sum += Q[i * dim + j] * v[j];
         out[i] = Q ? sum : v[i];
     }
+}
+
+void uz_from_frame(double v[3], const uz_body_model *model, int64_t node)
+{
+    const int dim = model->mesh.dim;
+    const double *Q = uz_node_frame(model, node);
+    double turned[3] = {0};
+    if (!Q)
+        return;
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            turned[j] += Q[i * dim + j] * v[i];
+    memcpy(v, turned, (size_t)dim * sizeof *v);
+}
+
+void uz_free_shares(double share[3], const uz_body_model *model, int64_t node, const double n[3])
+{
+    const int dim = model->mesh.dim;
+    const bool turned = uz_node_frame(model, node) != NULL;
+    uz_to_frame(share, model, node, n);
+    for (int c = 0; c < dim; c++)
+        if (model->dof[node * dim + c] < 0 || (turned && fabs(share[c]) <= 16 * DBL_EPSILON))
+            share[c] = 0;
 }
 
 /* ke = T ke or ke T' on the entries that stand `step` apart, for the block of one node: lines of the other index. */
@@ -75,27 +99,22 @@ void uz_turn_element(double *ke, const uz_body_model *model, int64_t element)
     }
 }
 
-/* The normal on the free directions of a node, of unit length. Returns how many axes it has a share in. */
-static int free_normal(double out[3], const uz_body_model *model, int64_t node, const double normal[3])
+/* A unit vector along the free dofs of a node: zero for held ones, and where rounding has left a share of a turned
+ * dof. Returns the length of what is left of n before it is scaled to 1; 0: nothing is. */
+static double free_direction(double out[3], const uz_body_model *model, int64_t node, const double n[3])
 {
     const int dim = model->mesh.dim;
     double length = 0;
-    int axes = 0;
-    for (int c = 0; c < dim; c++) {
-        out[c] = model->dof[node * dim + c] >= 0 ? normal[c] : 0;
+    uz_free_shares(out, model, node, n);
+    for (int c = 0; c < dim; c++)
         length = hypot(length, out[c]);
-        axes += out[c] != 0;
-    }
-    for (int c = 0; c < dim && axes > 0; c++)
+    for (int c = 0; c < dim && length > 0; c++)
         out[c] /= length;
-    return axes;
+    return length;
 }
 
-static void fill_frame(double *Q, const double n[3], int dim)
+static void fill_frame(double *Q, const double n[3], int k, int dim)
 {
-    int k = 0;
-    for (int c = 1; c < dim; c++)
-        k = fabs(n[c]) > fabs(n[k]) ? c : k;
     double w[3] = {n[0], n[1], n[2]};
     w[k] += copysign(1, n[k]);
     for (int i = 0; i < dim; i++)
@@ -103,26 +122,86 @@ static void fill_frame(double *Q, const double n[3], int dim)
             Q[i * dim + j] = i == k ? n[j] : (i == j) - w[i] * w[j] / fabs(w[k]);
 }
 
-static void choose_frame(uz_body_model *model, int64_t node, const double normal[3])
+/* Turns the node's free dofs so that one of them is along n, a unit vector along its present ones with a share in
+ * several: Q = H Q. */
+static void turn_node(uz_body_model *model, int64_t node, const double n[3], int k)
 {
     const int dim = model->mesh.dim;
     uz_mesh_info *info = &model->info;
-    double n[3] = {0};
-    if (model->frame_of[node] != 0 || !uz_is_contact_row(model, node, normal))
+    double H[9] = {0}, Q[9] = {0};
+    fill_frame(H, n, k, dim);
+    if (model->frame_of[node] <= 0) {
+        memcpy(info->frame + info->n_turned * dim * dim, H, (size_t)(dim * dim) * sizeof *H);
+        info->turned_node[info->n_turned] = node;
+        model->frame_of[node] = ++info->n_turned;
         return;
-    model->frame_of[node] = GLOBAL;
-    if (free_normal(n, model, node, normal) < 2)
-        return;
-    fill_frame(info->frame + info->n_turned * dim * dim, n, dim);
-    info->turned_node[info->n_turned] = node;
-    model->frame_of[node] = ++info->n_turned;
+    }
+    double *frame = info->frame + (model->frame_of[node] - 1) * dim * dim;
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            for (int l = 0; l < dim; l++)
+                Q[i * dim + j] += H[i * dim + l] * frame[l * dim + j];
+    memcpy(frame, Q, (size_t)(dim * dim) * sizeof *Q);
 }
 
-/* Most nodes that can be turned: 0 where every normal is an axis. */
+/* The dof with the largest share; *shares: how many have one. */
+static int largest_share(int *shares, const double n[3], int dim)
+{
+    int k = 0;
+    *shares = 0;
+    for (int c = 0; c < dim; c++) {
+        k = fabs(n[c]) > fabs(n[k]) ? c : k;
+        *shares += n[c] != 0;
+    }
+    return k;
+}
+
+int uz_hold_direction(uz_body_model *model, int64_t node, const double normal[3])
+{
+    double n[3] = {0};
+    int shares;
+    if (free_direction(n, model, node, normal) <= UZ_DEPENDENT)
+        return -1;
+    const int k = largest_share(&shares, n, model->mesh.dim);
+    if (shares > 1)
+        turn_node(model, node, n, k);
+    return k;
+}
+
+static void choose_frame(uz_body_model *model, bool *chosen, int64_t node, const double normal[3])
+{
+    double n[3] = {0};
+    int shares;
+    if (chosen[node] || !uz_is_contact_row(model, node, normal))
+        return;
+    chosen[node] = true;
+    free_direction(n, model, node, normal);
+    const int k = largest_share(&shares, n, model->mesh.dim);
+    if (shares > 1)
+        turn_node(model, node, n, k);
+}
+
+uz_status uz_reserve_frames(uz_body_model *model, int64_t more, uz_error *err)
+{
+    const int dim = model->mesh.dim;
+    uz_mesh_info *info = &model->info;
+    const int64_t most = info->n_turned + more < model->mesh.n_nodes ? info->n_turned + more : model->mesh.n_nodes;
+    if (!model->frame_of)
+        model->frame_of = uz_alloc_zero(model->mesh.n_nodes, sizeof *model->frame_of);
+    int64_t *node = model->frame_of ? uz_realloc(info->turned_node, most, sizeof *node) : NULL;
+    info->turned_node = node ? node : info->turned_node;
+    double *frame = node ? uz_realloc(info->frame, most * dim * dim, sizeof *frame) : NULL;
+    info->frame = frame ? frame : info->frame;
+    if (!frame)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the directions of %lld nodes", (long long)most);
+    return UZ_OK;
+}
+
+/* Most nodes that contacts can turn: 0 where every normal is an axis and no support has turned a node. */
 static uz_status count_candidates(int64_t *most, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const int dim = model->mesh.dim;
-    bool oblique = false;
+    bool oblique = model->info.n_turned > 0;
     *most = 0;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
         double normal[3];
@@ -133,31 +212,31 @@ static uz_status count_candidates(int64_t *most, const uz_body_model *model, con
         uz_unit_normal(normal, scene->contacts[k].normal, dim);
         for (int c = 0; c < dim; c++)
             axes += normal[c] != 0;
-        oblique = oblique || axes > 1;
+        oblique = oblique || axes > 1 || scene->contacts[k].kind != UZ_OBSTACLE_PLANE;
         *most += uz_group_node_count(&model->mesh, group);
     }
-    *most = !oblique ? 0 : *most < model->mesh.n_nodes ? *most : model->mesh.n_nodes;
+    *most = oblique ? *most : 0;
     return UZ_OK;
 }
 
 uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
-    const int dim = model->mesh.dim;
     int64_t most;
     uz_status status = count_candidates(&most, model, scene, err);
     if (status != UZ_OK || most == 0)
         return status;
-    model->frame_of = uz_alloc_zero(model->mesh.n_nodes, sizeof *model->frame_of);
-    model->info.turned_node = uz_alloc(most, sizeof *model->info.turned_node);
-    model->info.frame = uz_alloc(most * dim * dim, sizeof *model->info.frame);
-    if (!model->frame_of || !model->info.turned_node || !model->info.frame)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the directions of %lld contact nodes", (long long)most);
-    for (int64_t k = 0; k < scene->n_contacts; k++) {
-        double normal[3];
+    bool *chosen = uz_alloc_zero(model->mesh.n_nodes, sizeof *chosen);
+    if (!chosen)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the directions of %lld nodes", (long long)most);
+    status = uz_reserve_frames(model, most, err);
+    for (int64_t k = 0; status == UZ_OK && k < scene->n_contacts; k++) {
         const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "/contacts", err);
-        uz_unit_normal(normal, scene->contacts[k].normal, dim);
-        for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++)
-            choose_frame(model, uz_group_node_at(group, i), normal);
+        for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++) {
+            double normal[3];
+            if (uz_contact_normal(normal, model, scene, k, i))
+                choose_frame(model, chosen, uz_group_node_at(group, i), normal);
+        }
     }
-    return UZ_OK;
+    free(chosen);
+    return status;
 }

@@ -4,47 +4,74 @@
 
 #include "assembly/assembly.h"
 
-/* mesh -> dof, d, n_fixed. UZ_ERR_SCENE where nothing is left to move. */
+/* Unit vectors that differ less from the span of others add nothing to it. */
+#define UZ_DEPENDENT 1e-9
+
+/* Scene -> kind, formulation, thickness, materials, material_of. UZ_ERR_SCENE names an element without material. */
+uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_error *err);
+
+/* mesh -> dof, d, n_fixed, and the frames that inclined supports ask for. UZ_ERR_SCENE where nothing is left to move. */
 uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* What a support gives along the axes, NaN where nothing; of a support along a normal that is an axis, too. */
+void uz_support_values(double u[3], const uz_support *support, int dim);
+/* Is it along a normal that is no axis? n becomes the unit normal. */
+bool uz_support_is_inclined(double n[3], const uz_support *support, int dim);
+/* Does the node stand on the axis of revolution? */
+bool uz_is_on_axis(const uz_body_model *model, int64_t node);
+/* n_fixed values; two supports that contradict each other: UZ_ERR_SCENE. */
+uz_status uz_prescribed_values(double *value, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+
+/* mesh -> spring. */
+uz_status uz_spread_springs(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* share (n_nodes) += what each node of the group has of a total of 1: by area of faces, else equally. */
+uz_status uz_spread_over_group(double *share, const uz_body_model *model, const uz_group *group, const char *where,
+                               uz_error *err);
 
 /* mesh, dof: does every connected part stay in place under its supports alone? UZ_ERR_FREE_BODY names the rigid-body
  * modes that are left. */
 uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err);
-/* mesh, dof, m, info.contact_* -> *modes: d x *count, one after the other, orthonormal for each part: the motions that
- * supports leave free but for obstacles. UZ_ERR_FREE_BODY names those that no obstacle stands in the way of. The caller
- * frees *modes, NULL when there are none. */
+/* mesh, dof, spring, N, m, info.contact_* -> *modes: d x *count, one after the other, orthonormal for each part: the
+ * motions that supports leave free but for obstacles. UZ_ERR_FREE_BODY names those that no obstacle stands in the way
+ * of. The caller frees *modes, NULL when there are none. */
 uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err);
 
+/* Room for `more` turned nodes. */
+uz_status uz_reserve_frames(uz_body_model *model, int64_t more, uz_error *err);
+/* Which dof of the node is along n? Its free dofs are turned where none is; -1: held dofs span n already. */
+int uz_hold_direction(uz_body_model *model, int64_t node, const double n[3]);
 /* mesh, dof -> frame_of, info.turned_node, info.frame: directions of the dofs of contact nodes. */
 uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* The dim x dim matrix of a node whose dofs are turned, its rows their directions; NULL: they are along the axes. */
 const double *uz_node_frame(const uz_body_model *model, int64_t node);
-/* A vector at a node (dim) along the directions of the node's dofs. */
+/* A vector at a node (dim) along the directions of the node's dofs, and back in place. */
 void uz_to_frame(double out[3], const uz_body_model *model, int64_t node, const double v[3]);
+void uz_from_frame(double v[3], const uz_body_model *model, int64_t node);
+/* A unit vector along the free dofs of a node: 0 for held ones, and where a turned dof has a share by rounding only. */
+void uz_free_shares(double share[3], const uz_body_model *model, int64_t node, const double n[3]);
 /* Has the element a node with turned dofs? Its stiffness ke (full, square) then becomes T ke T'. */
 bool uz_is_turned_element(const uz_body_model *model, int64_t element);
 void uz_turn_element(double *ke, const uz_body_model *model, int64_t element);
 
-/* mesh, dof, frames -> N, m, info.contact_*. */
+/* mesh -> sites: where the nodes stand to obstacles that are no planes. */
+uz_status uz_find_sites(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* Unit normal (dim) of contact k at the i-th node of its group; false: the node has no place on the obstacle. */
+bool uz_contact_normal(double normal[3], const uz_body_model *model, const uz_scene *scene, int64_t k, int64_t i);
+/* mesh, dof, frames, sites -> N, m, n_pair_rows, info.contact_*. */
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Does `node` get a row from an obstacle with this unit normal? Only where the normal moves some free dof of it. */
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3]);
-
-/* mesh, dof, frames, elasticity -> K, K_fixed. */
-uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
-/* Refuses what uz_build_stiffness would refuse. */
-uz_status uz_check_elements(const uz_body_model *model, uz_error *err);
-/* Corner coordinates of an element, relative to its first corner. */
-void uz_element_corners(double xy[8], const uz_mesh *mesh, int64_t element);
-
-/* n_fixed values; two supports that contradict each other: UZ_ERR_SCENE. */
-uz_status uz_prescribed_values(double *value, const uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* Area of the boundary that an edge stands for: length x thickness. */
-double uz_edge_area(const uz_body_model *model, const int64_t ends[2]);
-/* p += the scene's tractions. */
-void uz_add_tractions(double *p, const uz_body_model *model, const uz_scene *scene);
 /* h; a supported node inside an obstacle: UZ_ERR_SCENE. */
 uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_model *model, const uz_scene *scene,
                           uz_error *err);
+
+/* mesh, dof -> K, K_fixed with their patterns, all values zero. */
+uz_status uz_build_pattern(uz_body_model *model, uz_error *err);
+/* mesh, dof, frames, materials, spring -> K, K_fixed. */
+uz_status uz_build_stiffness(uz_body_model *model, uz_error *err);
+/* Refuses what uz_build_stiffness would refuse. */
+uz_status uz_check_elements(const uz_body_model *model, uz_error *err);
+
+/* p (d) = the scene's loads on the free dofs. */
+uz_status uz_load_vector(double *p, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 #endif

@@ -6,16 +6,6 @@
 
 #include <string.h>
 
-/* v = Q'v: from the directions of a node's dofs to the axes. */
-static void turn_back(double *v, const double *Q, int dim)
-{
-    double turned[3] = {0};
-    for (int i = 0; i < dim; i++)
-        for (int j = 0; j < dim; j++)
-            turned[j] += Q[i * dim + j] * v[i];
-    memcpy(v, turned, (size_t)dim * sizeof *v);
-}
-
 void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u, const double *prescribed)
 {
     const int dim = model->mesh.dim;
@@ -28,7 +18,7 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
             nodal[i] = prescribed ? prescribed[-1 - dof] : 0;
     }
     for (int64_t i = 0; i < model->info.n_turned; i++)
-        turn_back(nodal + model->info.turned_node[i] * dim, model->info.frame + i * dim * dim, dim);
+        uz_from_frame(nodal + model->info.turned_node[i] * dim, model, model->info.turned_node[i]);
 }
 
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal)
@@ -61,7 +51,10 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
     out->contact_node = duplicate(info->contact_node, m, sizeof *info->contact_node);
     out->contact_area = duplicate(info->contact_area, m, sizeof *info->contact_area);
     out->contact_normal = duplicate(info->contact_normal, m * info->dim, sizeof *info->contact_normal);
-    if (out->xyz && out->contact_node && out->contact_area && out->contact_normal)
+    out->contact_of = duplicate(info->contact_of, m, sizeof *info->contact_of);
+    out->contact_face = duplicate(info->contact_face, m, sizeof *info->contact_face);
+    if (out->xyz && out->contact_node && out->contact_area && out->contact_normal && out->contact_of &&
+        out->contact_face)
         return UZ_OK;
     uz_mesh_info_clear(out);
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the coordinates of %lld nodes", (long long)info->n_nodes);

@@ -1,299 +1,216 @@
-/* rigid_modes.c: which rigid-body motions the supports leave to each connected part of the body.
- *
- * A small motion of a plane part is q = (translation x, translation y, rotation times size), about its centre. A
- * supported dof forbids one combination of the three: u_x = q0 - q2 (y - cy)/size, u_y = q1 + q2 (x - cx)/size. The
- * part stays in place when these combinations span all of q. */
+/* rigid_modes.c: which rigid-body motions supports and springs leave to the parts of the body, and whether obstacles,
+ * or parts that are held, stand in the way of those. */
 #include "assembly/parts.h"
 
+#include "assembly/body_parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "semicoercive/pressed.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { DIM = 2, MODES = 3 };
-static const double DEPENDENT = 1e-9; /* a unit row that differs less from the span of others adds nothing */
-
-typedef struct {
-    int64_t node; /* one of its nodes */
-    double low[DIM], high[DIM];
-    int rank;
-    double held[MODES][MODES]; /* rank orthonormal rows: combinations of q that supports forbid */
-} part;
-
-/* The connected parts of a mesh. */
-typedef struct {
-    int64_t count, *of; /* of: n_nodes */
-    part *list;
-} body_parts;
-
-/* Representative of a node's part; halves the path on its way. */
-static int64_t find_root(int64_t *parent, int64_t a)
+static void name_modes(char *names, size_t size, const uz_parts *parts, const uz_part *p)
 {
-    while (parent[a] != a) {
-        parent[a] = parent[parent[a]];
-        a = parent[a];
-    }
-    return a;
-}
-
-/* part_of[node] = number of its connected part, parts numbered by their first node. Returns how many, -1: no memory. */
-static int64_t number_parts(int64_t *part_of, const uz_mesh *mesh)
-{
-    int64_t count = 0;
-    int64_t *parent = uz_alloc(mesh->n_nodes, sizeof *parent);
-    if (!parent)
-        return -1;
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        parent[a] = a;
-    for (int64_t e = 0; e < mesh->n_elements; e++)
-        for (int64_t i = mesh->first[e] + 1; i < mesh->first[e + 1]; i++) {
-            int64_t a = find_root(parent, mesh->node[i]);
-            int64_t b = find_root(parent, mesh->node[mesh->first[e]]);
-            parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
-        }
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        part_of[a] = parent[a] == a ? count++ : part_of[find_root(parent, a)];
-    free(parent);
-    return count;
-}
-
-/* v minus its projection on the rows, twice for accuracy; returns the length of what is left. */
-static double reject(double v[MODES], double rows[][MODES], int n)
-{
-    for (int twice = 0; twice < 2; twice++)
-        for (int i = 0; i < n; i++) {
-            double dot = v[0] * rows[i][0] + v[1] * rows[i][1] + v[2] * rows[i][2];
-            for (int k = 0; k < MODES; k++)
-                v[k] -= dot * rows[i][k];
-        }
-    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
-/* Appends v to the orthonormal rows unless they span it already. */
-static void extend(double rows[][MODES], int *n, const double v[MODES])
-{
-    double rest[MODES] = {v[0], v[1], v[2]};
-    if (*n == MODES)
-        return;
-    double length = reject(rest, rows, *n);
-    if (length <= DEPENDENT)
-        return;
-    for (int k = 0; k < MODES; k++)
-        rows[*n][k] = rest[k] / length;
-    (*n)++;
-}
-
-static double part_size(const part *p)
-{
-    double size = 0.5 * hypot(p->high[0] - p->low[0], p->high[1] - p->low[1]);
-    return size > 0 ? size : 1;
-}
-
-static double part_centre(const part *p, int axis)
-{
-    return 0.5 * p->low[axis] + 0.5 * p->high[axis];
-}
-
-static void hold(part *p, const double *x, int axis)
-{
-    const double across = (x[1 - axis] - part_centre(p, 1 - axis)) / part_size(p);
-    const double row[MODES] = {axis == 0 ? 1 : 0, axis == 1 ? 1 : 0, axis == 0 ? -across : across};
-    extend(p->held, &p->rank, row);
-}
-
-static void measure_parts(part *parts, int64_t n_parts, const int64_t *part_of, const uz_mesh *mesh)
-{
-    for (int64_t i = 0; i < n_parts; i++)
-        for (int c = 0; c < DIM; c++) {
-            parts[i].low[c] = DBL_MAX;
-            parts[i].high[c] = -DBL_MAX;
-        }
-    for (int64_t a = mesh->n_nodes - 1; a >= 0; a--) {
-        part *p = &parts[part_of[a]];
-        p->node = a;
-        for (int c = 0; c < DIM; c++) {
-            p->low[c] = fmin(p->low[c], mesh->xyz[a * DIM + c]);
-            p->high[c] = fmax(p->high[c], mesh->xyz[a * DIM + c]);
-        }
-    }
-}
-
-static void hold_parts(part *parts, const int64_t *part_of, const uz_body_model *model)
-{
-    for (int64_t a = 0; a < model->mesh.n_nodes; a++)
-        for (int c = 0; c < DIM; c++)
-            if (model->dof[a * DIM + c] < 0)
-                hold(&parts[part_of[a]], &model->mesh.xyz[a * DIM], c);
-}
-
-/* What is zero but for rounding reads as zero. */
-static double tidy(double value, double scale)
-{
-    return fabs(value) > 1e-9 * scale ? value : 0;
-}
-
-static void name_mode(char *text, size_t size, const part *p, const double q[MODES])
-{
-    const double length = hypot(q[0], q[1]);
-    if (fabs(q[2]) <= 1e-7 * length) {
-        const double x = tidy(q[0] / length, 1), y = tidy(q[1] / length, 1);
-        if (x == 0 || y == 0)
-            snprintf(text, size, "translation along %s", y == 0 ? "x" : "y");
-        else
-            snprintf(text, size, "translation along (%.6g, %.6g)", x, y);
-        return;
-    }
-    /* The point that stays where it is. */
-    const double L = part_size(p);
-    const double x = part_centre(p, 0) - tidy(q[1] / q[2], 1) * L, y = part_centre(p, 1) + tidy(q[0] / q[2], 1) * L;
-    snprintf(text, size, "rotation about (%.6g, %.6g)", tidy(x, L), tidy(y, L));
-}
-
-/* Orthonormal modes that no support holds, translations first. Returns how many. */
-static int free_modes(double mode[MODES][MODES], const part *p)
-{
-    static const double axis[MODES][MODES] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    double rows[MODES][MODES];
-    int n = p->rank;
-    memcpy(rows, p->held, sizeof rows);
-    for (int k = 0; k < MODES; k++)
-        extend(rows, &n, axis[k]);
-    memcpy(mode, rows[p->rank], (size_t)(n - p->rank) * sizeof rows[0]);
-    n -= p->rank;
-    /* Two modes are a plane: turn them so that the first one does not rotate. */
-    const double spin = n == 2 ? hypot(mode[0][2], mode[1][2]) : 0;
-    if (spin > 0) {
-        const double c = mode[1][2] / spin, s = mode[0][2] / spin;
-        for (int k = 0; k < MODES; k++) {
-            const double still = c * mode[0][k] - s * mode[1][k], turning = s * mode[0][k] + c * mode[1][k];
-            mode[0][k] = still;
-            mode[1][k] = turning;
-        }
-    }
-    return n;
-}
-
-static void name_modes(char *names, size_t size, const part *p)
-{
-    char name[96];
-    double mode[MODES][MODES];
-    const int n = free_modes(mode, p);
+    char name[160];
+    double mode[UZ_MOTIONS][UZ_MOTIONS];
+    const int n = uz_free_motions(mode, parts, p);
     names[0] = '\0';
     for (int i = 0; i < n; i++) {
         const size_t used = strlen(names);
-        name_mode(name, sizeof name, p, mode[i]);
+        uz_name_part_motion(name, sizeof name, parts, p, mode[i], false);
         snprintf(names + used, size - used, "%s%s", i ? ", " : "", name);
     }
 }
 
-static uz_status refuse(const part *p, int64_t n_parts, const char *who, uz_error *err)
+static uz_status refuse(const uz_parts *parts, const uz_part *p, const char *who, uz_error *err)
 {
     char names[300], which[96] = "";
-    name_modes(names, sizeof names, p);
-    if (n_parts > 1)
+    name_modes(names, sizeof names, parts, p);
+    if (parts->count > 1)
         snprintf(which, sizeof which, " of the part with node %lld", (long long)p->node);
     return uz_fail(err, UZ_ERR_FREE_BODY, "/supports", "%s leave %s%s free; hold it by further supports", who, names,
                    which);
 }
 
-static void clear_parts(body_parts *all)
+static uz_status refuse_first(const uz_parts *parts, const char *who, uz_error *err)
 {
-    free(all->list);
-    free(all->of);
-}
-
-/* The parts, and what supports hold of them. clear_parts also after a failure. */
-static uz_status find_parts(body_parts *all, const uz_body_model *model, uz_error *err)
-{
-    *all = (body_parts){0};
-    all->of = uz_alloc(model->mesh.n_nodes, sizeof *all->of);
-    all->count = all->of ? number_parts(all->of, &model->mesh) : -1;
-    all->list = all->count >= 0 ? uz_alloc_zero(all->count, sizeof *all->list) : NULL;
-    if (!all->list)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)model->mesh.n_nodes);
-    measure_parts(all->list, all->count, all->of, &model->mesh);
-    hold_parts(all->list, all->of, model);
+    for (int64_t i = 0; i < parts->count; i++)
+        if (parts->list[i].rank < parts->motions)
+            return refuse(parts, &parts->list[i], who, err);
     return UZ_OK;
 }
 
 uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
 {
-    body_parts all;
-    uz_status status = find_parts(&all, model, err);
-    for (int64_t i = 0; status == UZ_OK && i < all.count; i++)
-        if (all.list[i].rank < MODES)
-            status = refuse(&all.list[i], all.count, "the supports", err);
-    clear_parts(&all);
+    uz_parts parts;
+    uz_status status = uz_find_parts(&parts, model, err);
+    if (status == UZ_OK)
+        status = refuse_first(&parts, "the supports", err);
+    uz_parts_clear(&parts);
     return status;
 }
 
-/* Place of a node in its part: from the centre, over the size. */
-static void place_in_part(double place[DIM], const part *p, const uz_mesh *mesh, int64_t node)
-{
-    for (int c = 0; c < DIM; c++)
-        place[c] = (mesh->xyz[node * DIM + c] - part_centre(p, c)) / part_size(p);
-}
-
 /* An obstacle stands in the way of one combination of the motions of its part, from one side. */
-static void hold_by_contacts(body_parts *all, const uz_body_model *model)
+static void hold_by_obstacles(uz_parts *parts, const uz_body_model *model)
 {
-    for (int64_t i = 0; i < model->m; i++) {
-        const int64_t node = model->info.contact_node[i];
-        const double *n = model->info.contact_normal + i * DIM;
-        part *p = &all->list[all->of[node]];
-        double at[DIM];
-        place_in_part(at, p, &model->mesh, node);
-        const double row[MODES] = {n[0], n[1], n[1] * at[0] - n[0] * at[1]};
-        extend(p->held, &p->rank, row);
-    }
+    for (int64_t i = 0; i < model->m; i++)
+        uz_hold_part(parts, &model->mesh, model->info.contact_node[i],
+                     model->info.contact_normal + i * model->mesh.dim);
 }
 
 /* Displacements of the free dofs (d) for the motion q of part i. */
-static void move_part(double *z, const body_parts *all, int64_t i, const double q[MODES], const uz_body_model *model)
+static void move_part(double *z, const uz_parts *parts, int64_t i, const double q[UZ_MOTIONS],
+                      const uz_body_model *model)
 {
-    const part *p = &all->list[i];
+    const int dim = model->mesh.dim;
     for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
-        if (all->of[a] != i)
+        double u[3], local[3];
+        if (parts->of[a] != i)
             continue;
-        double at[DIM];
-        place_in_part(at, p, &model->mesh, a);
-        const double u[3] = {q[0] - q[2] * at[1], q[1] + q[2] * at[0], 0};
-        double local[3];
+        uz_move_node(u, parts, i, &model->mesh, a, q);
         uz_to_frame(local, model, a, u);
-        for (int c = 0; c < DIM; c++)
-            if (model->dof[a * DIM + c] >= 0)
-                z[model->dof[a * DIM + c]] = local[c];
+        for (int c = 0; c < dim; c++)
+            if (model->dof[a * dim + c] >= 0)
+                z[model->dof[a * dim + c]] = local[c];
     }
+}
+
+/* Every motion that is left, as columns of z (d x n). */
+static uz_status fill_modes(double **out, int64_t *count, const uz_parts *parts, const uz_body_model *model,
+                            uz_error *err)
+{
+    double mode[UZ_MOTIONS][UZ_MOTIONS], *z = NULL;
+    int64_t n = 0, at = 0;
+    for (int64_t i = 0; i < parts->count; i++)
+        n += parts->motions - parts->list[i].rank;
+    if (n > 0 && !(z = uz_alloc_zero(n * model->d, sizeof *z)))
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
+    for (int64_t i = 0; i < parts->count; i++) {
+        const int own = uz_free_motions(mode, parts, &parts->list[i]);
+        for (int k = 0; k < own && at < n; k++)
+            move_part(z + (at++) * model->d, parts, i, mode[k], model);
+    }
+    *out = z;
+    *count = n;
+    return UZ_OK;
+}
+
+/* -------------------------------------------------------------- parts that lean on parts */
+
+/* rows (m x n) = N Z, each of length 1 or 0. */
+static void rows_on_modes(double *rows, const uz_body_model *model, const double *z, int64_t n)
+{
+    const uz_csc *N = &model->N;
+    for (int64_t k = 0; k < n; k++)
+        for (int64_t j = 0; j < model->d; j++)
+            for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+                rows[N->idx[q] * n + k] += N->val[q] * z[k * model->d + j];
+    for (int64_t i = 0; i < model->m; i++) {
+        double square = 0;
+        for (int64_t k = 0; k < n; k++)
+            square += rows[i * n + k] * rows[i * n + k];
+        for (int64_t k = 0; k < n; k++)
+            rows[i * n + k] *= square > UZ_DEPENDENT * UZ_DEPENDENT ? 1 / sqrt(square) : 0;
+    }
+}
+
+/* v minus its projection on the rank orthonormal rows of basis, scaled to length 1; false: nothing is left. */
+static bool reject_rows(double *v, const double *basis, int64_t rank, int64_t n)
+{
+    double square = 0;
+    for (int twice = 0; twice < 2; twice++)
+        for (int64_t i = 0; i < rank; i++) {
+            double dot = 0;
+            for (int64_t k = 0; k < n; k++)
+                dot += v[k] * basis[i * n + k];
+            for (int64_t k = 0; k < n; k++)
+                v[k] -= dot * basis[i * n + k];
+        }
+    for (int64_t k = 0; k < n; k++)
+        square += v[k] * v[k];
+    if (square <= UZ_DEPENDENT * UZ_DEPENDENT)
+        return false;
+    for (int64_t k = 0; k < n; k++)
+        v[k] /= sqrt(square);
+    return true;
+}
+
+/* What of part i moves in the null space, rows rank .. n of basis: the rest of its motions counts as held. */
+static void keep_free(uz_parts *parts, int64_t i, const double *basis, int64_t rank, int64_t n, int64_t first)
+{
+    double mode[UZ_MOTIONS][UZ_MOTIONS], free_rows[UZ_MOTIONS][UZ_MOTIONS];
+    uz_part *p = &parts->list[i];
+    const int own = uz_free_motions(mode, parts, p);
+    int moving = 0;
+    for (int64_t r = rank; r < n; r++) {
+        double q[UZ_MOTIONS] = {0};
+        for (int k = 0; k < own; k++)
+            for (int c = 0; c < UZ_MOTIONS; c++)
+                q[c] += basis[r * n + first + k] * mode[k][c];
+        uz_extend_rows(free_rows, &moving, q);
+    }
+    int total = moving;
+    for (int k = 0; k < parts->motions; k++)
+        uz_extend_rows(free_rows, &total, parts->unit[k]);
+    p->rank = total - moving;
+    memcpy(p->held, free_rows[moving], (size_t)p->rank * sizeof free_rows[0]);
+}
+
+/* The rows of N together hold what they span of all modes; what is left goes back to the parts. Gram and Schmidt, as
+ * there are few modes. basis: n x n. */
+static void hold_jointly(uz_parts *parts, double *basis, const double *rows, int64_t m, int64_t n)
+{
+    int64_t rank = 0, all, first = 0;
+    for (int64_t i = 0; i < m && rank < n; i++) {
+        memcpy(basis + rank * n, rows + i * n, (size_t)n * sizeof *basis);
+        rank += reject_rows(basis + rank * n, basis, rank, n);
+    }
+    all = rank;
+    for (int64_t k = 0; k < n && all < n; k++) {
+        memset(basis + all * n, 0, (size_t)n * sizeof *basis);
+        basis[all * n + k] = 1;
+        all += reject_rows(basis + all * n, basis, all, n);
+    }
+    for (int64_t i = 0; i < parts->count; i++) {
+        const int own = parts->motions - parts->list[i].rank;
+        keep_free(parts, i, basis, rank, all, first);
+        first += own;
+    }
+}
+
+static uz_status hold_by_bodies(uz_parts *parts, const uz_body_model *model, const double *z, int64_t n, uz_error *err)
+{
+    double *rows = uz_alloc_zero(model->m * n, sizeof *rows), *basis = uz_alloc(n * n, sizeof *basis);
+    const bool ok = rows && basis;
+    if (ok) {
+        rows_on_modes(rows, model, z, n);
+        hold_jointly(parts, basis, rows, model->m, n);
+    }
+    free(rows);
+    free(basis);
+    return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
 }
 
 uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err)
 {
-    body_parts all;
-    double *z = NULL, mode[MODES][MODES];
+    uz_parts parts;
+    double *z = NULL;
     int64_t n = 0;
     *modes = NULL;
     *count = 0;
-    uz_status status = find_parts(&all, model, err);
-    for (int64_t i = 0; status == UZ_OK && i < all.count; i++)
-        n += MODES - all.list[i].rank;
-    if (status == UZ_OK && n > 0 && !(z = uz_alloc_zero(n * model->d, sizeof *z)))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)n);
-    for (int64_t i = 0, at = 0; status == UZ_OK && i < all.count; i++) {
-        const int own = free_modes(mode, &all.list[i]);
-        for (int k = 0; k < own; k++)
-            move_part(z + (at++) * model->d, &all, i, mode[k], model);
-    }
+    uz_status status = uz_find_parts(&parts, model, err);
     if (status == UZ_OK)
-        hold_by_contacts(&all, model);
-    for (int64_t i = 0; status == UZ_OK && i < all.count; i++)
-        if (all.list[i].rank < MODES)
-            status = refuse(&all.list[i], all.count, model->m > 0 ? "the supports and obstacles" : "the supports", err);
-    clear_parts(&all);
+        status = fill_modes(&z, &n, &parts, model, err);
+    if (status == UZ_OK && n > 0 && model->n_pair_rows > 0)
+        status = hold_by_bodies(&parts, model, z, n, err);
+    else if (status == UZ_OK)
+        hold_by_obstacles(&parts, model);
+    if (status == UZ_OK)
+        status = refuse_first(&parts, model->m > 0 ? "the supports and obstacles" : "the supports", err);
+    uz_parts_clear(&parts);
     if (status == UZ_OK) {
         *modes = z;
         *count = n;
@@ -303,40 +220,29 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
     return status;
 }
 
-/* "translation along +y", "rotation about (30, 0), clockwise". */
-static void name_direction(char *text, size_t size, const part *p, const double q[MODES])
-{
-    name_mode(text, size, p, q);
-    const size_t used = strlen(text);
-    const char axis = used > 0 ? text[used - 1] : '\0';
-    if (axis == 'x' || axis == 'y')
-        snprintf(text + used - 1, size - used + 1, "%c%c", q[axis == 'x' ? 0 : 1] < 0 ? '-' : '+', axis);
-    else if (fabs(q[2]) > 1e-7 * hypot(q[0], q[1]))
-        snprintf(text + used, size - used, ", %s", q[2] < 0 ? "clockwise" : "counterclockwise");
-}
-
 void uz_name_motion(char *text, size_t size, const uz_body_model *model, const double *y)
 {
-    body_parts all;
-    double mode[MODES][MODES], largest = 0;
+    uz_parts parts;
+    double mode[UZ_MOTIONS][UZ_MOTIONS], largest = 0;
     snprintf(text, size, "a rigid motion");
-    if (find_parts(&all, model, NULL) == UZ_OK)
-        for (int64_t i = 0, at = 0; i < all.count; i++) {
-            double q[MODES] = {0, 0, 0};
-            const int own = free_modes(mode, &all.list[i]);
+    if (uz_find_parts(&parts, model, NULL) == UZ_OK)
+        for (int64_t i = 0, at = 0; i < parts.count; i++) {
+            double q[UZ_MOTIONS] = {0}, square = 0;
+            const int own = uz_free_motions(mode, &parts, &parts.list[i]);
             for (int k = 0; k < own; k++, at++)
-                for (int c = 0; c < MODES; c++)
+                for (int c = 0; c < UZ_MOTIONS; c++)
                     q[c] += y[at] * mode[k][c];
-            const double length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
-            if (length <= largest)
+            for (int c = 0; c < UZ_MOTIONS; c++)
+                square += q[c] * q[c];
+            if (square <= largest)
                 continue;
-            largest = length;
-            name_direction(text, size, &all.list[i], q);
+            largest = square;
+            uz_name_part_motion(text, size, &parts, &parts.list[i], q, true);
             const size_t used = strlen(text);
-            if (all.count > 1)
-                snprintf(text + used, size - used, " of the part with node %lld", (long long)all.list[i].node);
+            if (parts.count > 1)
+                snprintf(text + used, size - used, " of the part with node %lld", (long long)parts.list[i].node);
         }
-    clear_parts(&all);
+    uz_parts_clear(&parts);
 }
 
 /* Loads this small beside those that balance in a mode are rounding. */
@@ -345,7 +251,7 @@ void uz_name_motion(char *text, size_t size, const uz_body_model *model, const d
 uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error *err)
 {
     uz_pressing how = UZ_PRESSED_ON;
-    char motion[200];
+    char motion[240];
     double *y = uz_alloc_zero(model->n_modes, sizeof *y);
     if (!y)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rigid-body modes", (long long)model->n_modes);
@@ -354,8 +260,10 @@ uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error
         uz_name_motion(motion, sizeof motion, model, y);
         status = uz_fail(err, UZ_ERR_FREE_BODY, "/loads",
                          how == UZ_PUSHED_AWAY
-                             ? "the loads push the body away: %s; no obstacle or support stands in its way"
-                             : "the loads do not press the body on: %s costs nothing; only an obstacle could hold it",
+                             ? "the loads push the body away: %s; no obstacle or support stands in its way. Hold it by "
+                               "a support or a spring, turn the load, or add the obstacle"
+                             : "the loads do not press the body on: %s costs nothing; only an obstacle could hold it. "
+                               "Hold it by a support or a spring, or press it on",
                          motion);
     }
     free(y);

@@ -1,6 +1,5 @@
 /* Stiffness and loads of whole bodies against plain assembly and against theory. */
 #include "assembly/parts.h"
-#include "assembly/quad4.h"
 #include "harness.h"
 #include "scene_fixture.h"
 
@@ -31,12 +30,14 @@ static void distort(uz_mesh *mesh, double by)
 static double *plain_stiffness(const uz_body_model *model)
 {
     const int64_t n = model->mesh.n_nodes * 2;
-    double ke[64], xy[8], *full = zeros(n * n);
+    double ke[64], xy[3 * UZ_ELEMENT_NODES], *full = zeros(n * n);
     for (int64_t e = 0; e < model->mesh.n_elements; e++) {
         const int64_t *corner = model->mesh.node + 4 * e;
+        uz_element element;
+        uz_body_element(&element, xy, model, e);
         for (int i = 0; i < 8; i++)
             xy[i] = model->mesh.xyz[2 * corner[i / 2] + i % 2];
-        CHECK(uz_quad4_stiffness(ke, xy, model->elasticity, model->thickness));
+        CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
         for (int i = 0; i < 8; i++)
             for (int j = 0; j < 8; j++)
                 full[(2 * corner[i / 2] + i % 2) * n + 2 * corner[j / 2] + j % 2] += ke[8 * i + j];

@@ -1,0 +1,209 @@
+#include "assembly/body_parts.h"
+
+#include "assembly/parts.h"
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Representative of a node's part; halves the path on its way. */
+static int64_t find_root(int64_t *parent, int64_t a)
+{
+    while (parent[a] != a) {
+        parent[a] = parent[parent[a]];
+        a = parent[a];
+    }
+    return a;
+}
+
+/* part_of[node] = number of its connected part, parts numbered by their first node. Returns how many, -1: no memory. */
+static int64_t number_parts(int64_t *part_of, const uz_mesh *mesh)
+{
+    int64_t count = 0;
+    int64_t *parent = uz_alloc(mesh->n_nodes, sizeof *parent);
+    if (!parent)
+        return -1;
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        parent[a] = a;
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        for (int64_t i = mesh->first[e] + 1; i < mesh->first[e + 1]; i++) {
+            int64_t a = find_root(parent, mesh->node[i]);
+            int64_t b = find_root(parent, mesh->node[mesh->first[e]]);
+            parent[a > b ? a : b] = a > b ? b : a; /* the lesser node leads, so a root is met before its followers */
+        }
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        part_of[a] = parent[a] == a ? count++ : part_of[find_root(parent, a)];
+    free(parent);
+    return count;
+}
+
+/* v minus its projection on the rows, twice for accuracy; returns the length of what is left. */
+static double reject(double v[UZ_MOTIONS], double rows[][UZ_MOTIONS], int n)
+{
+    double square = 0;
+    for (int twice = 0; twice < 2; twice++)
+        for (int i = 0; i < n; i++) {
+            double dot = 0;
+            for (int k = 0; k < UZ_MOTIONS; k++)
+                dot += v[k] * rows[i][k];
+            for (int k = 0; k < UZ_MOTIONS; k++)
+                v[k] -= dot * rows[i][k];
+        }
+    for (int k = 0; k < UZ_MOTIONS; k++)
+        square += v[k] * v[k];
+    return sqrt(square);
+}
+
+void uz_extend_rows(double rows[][UZ_MOTIONS], int *n, const double v[UZ_MOTIONS])
+{
+    double rest[UZ_MOTIONS];
+    if (*n == UZ_MOTIONS)
+        return;
+    memcpy(rest, v, sizeof rest);
+    double length = reject(rest, rows, *n);
+    if (length <= UZ_DEPENDENT)
+        return;
+    for (int k = 0; k < UZ_MOTIONS; k++)
+        rows[*n][k] = rest[k] / length;
+    (*n)++;
+}
+
+double uz_part_size(const uz_part *p)
+{
+    double size = 0;
+    for (int c = 0; c < 3; c++)
+        size = hypot(size, p->high[c] - p->low[c]);
+    return size > 0 ? 0.5 * size : 1;
+}
+
+double uz_part_centre(const uz_part *p, int axis)
+{
+    return 0.5 * p->low[axis] + 0.5 * p->high[axis];
+}
+
+/* Place of a node in its part: from the centre, over the size. */
+static void place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh, int64_t node)
+{
+    for (int c = 0; c < 3; c++)
+        place[c] = c < mesh->dim ? (mesh->xyz[node * mesh->dim + c] - uz_part_centre(p, c)) / uz_part_size(p) : 0;
+}
+
+static void cross(double out[3], const double a[3], const double b[3])
+{
+    for (int c = 0; c < 3; c++)
+        out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+}
+
+void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n)
+{
+    uz_part *p = &parts->list[parts->of[node]];
+    double at[3], row[UZ_MOTIONS] = {0}, allowed[UZ_MOTIONS] = {0};
+    if (p->rank == parts->motions)
+        return;
+    place_in_part(at, p, mesh, node);
+    memcpy(row, n, (size_t)mesh->dim * sizeof *n);
+    cross(row + 3, at, row);
+    for (int k = 0; k < parts->motions; k++)
+        for (int c = 0; c < UZ_MOTIONS; c++)
+            allowed[c] += parts->unit[k][c] * row[c];
+    uz_extend_rows(p->held, &p->rank, allowed);
+}
+
+void uz_move_node(double u[3], const uz_parts *parts, int64_t i, const uz_mesh *mesh, int64_t node,
+                  const double q[UZ_MOTIONS])
+{
+    double at[3];
+    place_in_part(at, &parts->list[i], mesh, node);
+    cross(u, q + 3, at);
+    for (int c = 0; c < 3; c++)
+        u[c] += q[c];
+}
+
+static void measure_parts(uz_parts *parts, const uz_mesh *mesh)
+{
+    for (int64_t i = 0; i < parts->count; i++)
+        for (int c = 0; c < mesh->dim; c++) {
+            parts->list[i].low[c] = DBL_MAX;
+            parts->list[i].high[c] = -DBL_MAX;
+        }
+    for (int64_t a = mesh->n_nodes - 1; a >= 0; a--) {
+        uz_part *p = &parts->list[parts->of[a]];
+        p->node = a;
+        for (int c = 0; c < mesh->dim; c++) {
+            p->low[c] = fmin(p->low[c], mesh->xyz[a * mesh->dim + c]);
+            p->high[c] = fmax(p->high[c], mesh->xyz[a * mesh->dim + c]);
+        }
+    }
+}
+
+/* A held dof is a direction that supports hold; a spring holds its axes as stiffness. */
+static void hold_by_supports(uz_parts *parts, const uz_body_model *model)
+{
+    static const double axis[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const int dim = model->mesh.dim;
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++)
+        for (int c = 0; c < dim; c++) {
+            const double *Q = uz_node_frame(model, a);
+            if (model->dof[a * dim + c] < 0)
+                uz_hold_part(parts, &model->mesh, a, Q ? Q + c * dim : axis[c]);
+            if (model->spring && model->spring[a * dim + c] > 0)
+                uz_hold_part(parts, &model->mesh, a, axis[c]);
+        }
+}
+
+static void name_motions(uz_parts *parts, const uz_body_model *model)
+{
+    static const int plane[] = {0, 1, 5}, revolution[] = {1}, space[] = {0, 1, 2, 3, 4, 5};
+    const bool axisymmetric = model->kind == UZ_AXISYMMETRIC;
+    const int *which = parts->dim == 3 ? space : axisymmetric ? revolution : plane;
+    parts->motions = parts->dim == 3 ? 6 : axisymmetric ? 1 : 3;
+    for (int k = 0; k < parts->motions; k++)
+        parts->unit[k][which[k]] = 1;
+}
+
+void uz_parts_clear(uz_parts *parts)
+{
+    free(parts->list);
+    free(parts->of);
+}
+
+uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err)
+{
+    *parts = (uz_parts){.dim = model->mesh.dim};
+    name_motions(parts, model);
+    parts->of = uz_alloc(model->mesh.n_nodes, sizeof *parts->of);
+    parts->count = parts->of ? number_parts(parts->of, &model->mesh) : -1;
+    parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;
+    if (!parts->list)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the parts of %lld nodes", (long long)model->mesh.n_nodes);
+    measure_parts(parts, &model->mesh);
+    hold_by_supports(parts, model);
+    return UZ_OK;
+}
+
+/* Translations are orthogonal to what is held and to every rotation; the rest is left for motions that rotate. */
+int uz_free_motions(double mode[UZ_MOTIONS][UZ_MOTIONS], const uz_parts *parts, const uz_part *p)
+{
+    double rows[UZ_MOTIONS][UZ_MOTIONS];
+    const int translations = parts->motions == 1 ? 1 : parts->dim;
+    int n = p->rank, found;
+    memcpy(rows, p->held, sizeof rows);
+    for (int k = translations; k < parts->motions; k++)
+        uz_extend_rows(rows, &n, parts->unit[k]);
+    const int before = n;
+    for (int k = 0; k < translations; k++)
+        uz_extend_rows(rows, &n, parts->unit[k]);
+    found = n - before;
+    memmove(rows[p->rank], rows[before], (size_t)found * sizeof rows[0]);
+    n = p->rank + found;
+    for (int k = parts->motions - 1; k >= translations; k--)
+        uz_extend_rows(rows, &n, parts->unit[k]);
+    for (int k = 0; k < translations; k++) /* what rounding has hidden */
+        uz_extend_rows(rows, &n, parts->unit[k]);
+    n -= p->rank;
+    memcpy(mode, rows[p->rank], (size_t)n * sizeof rows[0]);
+    return n;
+}

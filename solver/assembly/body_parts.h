@@ -1,0 +1,52 @@
+/* body_parts.h: the connected parts of a body, and how each can move as a whole.
+ *
+ * A small rigid motion is q = (translation t, rotation w times size) about the centre of its part:
+ *     u(x) = t + w x (x - centre) / size.
+ * In the plane only t_x, t_y and w_z are there, in a body of revolution only t_y, along its axis. A support that holds
+ * the direction n at x forbids one combination of q, the row (n, (x - centre) / size x n). A part stays in place when
+ * these rows span all of its motions. */
+#ifndef UZ_ASSEMBLY_BODY_PARTS_H
+#define UZ_ASSEMBLY_BODY_PARTS_H
+
+#include "assembly/assembly.h"
+
+enum { UZ_MOTIONS = 6 };
+
+typedef struct {
+    int64_t node; /* one of its nodes */
+    double low[3], high[3];
+    int rank;
+    double held[UZ_MOTIONS][UZ_MOTIONS]; /* rank orthonormal rows: combinations of q that are forbidden */
+} uz_part;
+
+typedef struct {
+    int dim;
+    int motions;                    /* 3 in the plane, 1 of revolution, 6 in space */
+    double unit[UZ_MOTIONS][UZ_MOTIONS]; /* motions of them: unit vectors of q, translations first */
+    int64_t count, *of;             /* of: n_nodes, the part of each node */
+    uz_part *list;                  /* count, by their first nodes */
+} uz_parts;
+
+/* The parts, and what supports and springs hold of them. uz_parts_clear also after a failure. */
+uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err);
+void uz_parts_clear(uz_parts *parts);
+
+double uz_part_size(const uz_part *p);
+double uz_part_centre(const uz_part *p, int axis);
+
+/* Appends v to the orthonormal rows unless they span it already. */
+void uz_extend_rows(double rows[][UZ_MOTIONS], int *n, const double v[UZ_MOTIONS]);
+/* The direction n (dim) at a node is held. */
+void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n);
+/* Displacement of a node of part i that moves by q. */
+void uz_move_node(double u[3], const uz_parts *parts, int64_t i, const uz_mesh *mesh, int64_t node,
+                  const double q[UZ_MOTIONS]);
+/* Orthonormal motions that nothing holds, translations first. Returns how many. */
+int uz_free_motions(double mode[UZ_MOTIONS][UZ_MOTIONS], const uz_parts *parts, const uz_part *p);
+
+/* A motion in words: "translation along x", "rotation about (30, 0)"; directed: "translation along +x", "rotation about
+ * (30, 0), clockwise". */
+void uz_name_part_motion(char *text, size_t size, const uz_parts *parts, const uz_part *p, const double q[UZ_MOTIONS],
+                         bool directed);
+
+#endif

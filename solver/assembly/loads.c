@@ -1,0 +1,134 @@
+/* loads.c: the scene's loads as forces of the nodes. What falls on a supported dof goes into the support. */
+#include "assembly/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    const uz_body_model *model;
+    const uz_load *load;
+    double *f; /* n_nodes x dim */
+} loading;
+
+static void add_to_nodes(const loading *x, const double *f, const int64_t *node, int count)
+{
+    const int dim = x->model->mesh.dim;
+    for (int i = 0; i < count * dim; i++)
+        x->f[node[i / dim] * dim + i % dim] += f[i];
+}
+
+static void load_faces(const loading *x, const uz_group *group)
+{
+    for (int64_t i = 0; i < group->n_faces; i++) {
+        uz_side side;
+        int64_t node[UZ_FACE_NODES];
+        double xyz[3 * UZ_FACE_NODES], f[3 * UZ_FACE_NODES] = {0}, pressure[UZ_FACE_NODES];
+        uz_body_side(&side, xyz, node, x->model, group->face[i]);
+        for (int a = 0; a < side.nodes; a++)
+            pressure[a] = x->load->value;
+        if (x->load->kind == UZ_LOAD_PRESSURE)
+            uz_side_add_pressure(f, &side, pressure);
+        else
+            uz_side_add_traction(f, &side, x->load->v);
+        add_to_nodes(x, f, node, side.nodes);
+    }
+}
+
+/* Body force, gravity or temperature on one element. */
+static void load_element(const loading *x, int64_t e)
+{
+    uz_element element;
+    double xyz[3 * UZ_ELEMENT_NODES], f[UZ_ELEMENT_DOFS] = {0}, b[3], strain[UZ_ELEMENT_STRESSES];
+    const uz_body_material *material = uz_element_material(x->model, e);
+    int count;
+    const int64_t *node = uz_mesh_element(&x->model->mesh, e, &count);
+    uz_body_element(&element, xyz, x->model, e);
+    if (x->load->kind == UZ_LOAD_TEMPERATURE) {
+        uz_thermal_strain(strain, element.model, element.lame, material->expansion * x->load->value);
+        uz_element_add_thermal_load(f, &element, strain);
+    } else {
+        for (int c = 0; c < 3; c++)
+            b[c] = x->load->v[c] * (x->load->kind == UZ_LOAD_GRAVITY ? material->density : 1);
+        uz_element_add_body_force(f, &element, b);
+    }
+    add_to_nodes(x, f, node, count);
+}
+
+static uz_status load_sum(const loading *x, const uz_group *group, const char *where, uz_error *err)
+{
+    const int dim = x->model->mesh.dim;
+    double *share = uz_alloc_zero(x->model->mesh.n_nodes, sizeof *share);
+    if (!share)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force on %lld nodes", (long long)group->n_nodes);
+    uz_status status = uz_spread_over_group(share, x->model, group, where, err);
+    for (int64_t a = 0; a < x->model->mesh.n_nodes && status == UZ_OK; a++)
+        for (int c = 0; c < dim; c++)
+            x->f[a * dim + c] += share[a] * x->load->v[c];
+    free(share);
+    return status;
+}
+
+static uz_status load_node(const loading *x, const char *where, uz_error *err)
+{
+    const uz_mesh *mesh = &x->model->mesh;
+    if (x->load->node < 0 || x->load->node >= mesh->n_nodes)
+        return uz_fail(err, UZ_ERR_SCENE, where, "there is no node %lld; this mesh has 0 to %lld",
+                       (long long)x->load->node, (long long)mesh->n_nodes - 1);
+    for (int c = 0; c < mesh->dim; c++)
+        x->f[x->load->node * mesh->dim + c] += x->load->v[c];
+    return UZ_OK;
+}
+
+static uz_status add_load(const loading *x, const char *where, uz_error *err)
+{
+    const uz_mesh *mesh = &x->model->mesh;
+    if (x->load->kind == UZ_LOAD_NODE_FORCE)
+        return load_node(x, where, err);
+    const uz_group *group = uz_mesh_group(mesh, x->load->on, where, err);
+    if (!group)
+        return UZ_ERR_SCENE;
+    switch (x->load->kind) {
+    case UZ_LOAD_TRACTION:
+    case UZ_LOAD_PRESSURE:
+        load_faces(x, group);
+        return UZ_OK;
+    case UZ_LOAD_FORCE:
+        return load_sum(x, group, where, err);
+    default:
+        for (int64_t i = 0; i < uz_group_element_count(mesh, group); i++)
+            load_element(x, uz_group_element_at(group, i));
+        return UZ_OK;
+    }
+}
+
+uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    memset(f, 0, (size_t)(model->mesh.n_nodes * model->mesh.dim) * sizeof *f);
+    for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
+        const loading x = {model, &scene->loads[i], f};
+        char where[96];
+        snprintf(where, sizeof where, "/loads/%lld/%s", (long long)i,
+                 scene->loads[i].kind == UZ_LOAD_NODE_FORCE ? "node" : "on");
+        status = add_load(&x, where, err);
+    }
+    return status;
+}
+
+uz_status uz_load_vector(double *p, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    double *f = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *f);
+    if (!f)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes",
+                       (long long)model->mesh.n_nodes);
+    uz_status status = uz_nodal_loads(f, model, scene, err);
+    if (status == UZ_OK)
+        uz_restrict_nodal(p, model, f);
+    free(f);
+    return status;
+}

@@ -1,0 +1,168 @@
+/* pattern.c: where K and K_fixed have entries: node by node, from the elements around it. Neither a list of triplets nor
+ * a sort of one is needed. */
+#include "assembly/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Elements around each node, and a scratch list of the nodes around one node. */
+typedef struct {
+    const uz_body_model *model;
+    int64_t *start;  /* n_nodes + 1, into around */
+    int64_t *around; /* as many as the elements have nodes */
+    int64_t *seen;   /* n_nodes: 1 + the last node whose neighbours it was counted among */
+    int64_t *near;   /* neighbours of the node at hand, itself included, ascending; most_near of them */
+    int64_t n_near;
+} neighbours;
+
+static void neighbours_clear(neighbours *n)
+{
+    free(n->start);
+    free(n->around);
+    free(n->seen);
+    free(n->near);
+}
+
+/* Returns the most neighbours, each counted once for every element that it shares. */
+static int64_t fill_incidence(neighbours *n)
+{
+    const uz_mesh *mesh = &n->model->mesh;
+    const int64_t corners = mesh->first[mesh->n_elements];
+    int64_t most = 0;
+    for (int64_t i = 0; i < corners; i++)
+        n->start[mesh->node[i] + 1]++;
+    for (int64_t a = 0; a < mesh->n_nodes; a++) {
+        most = n->start[a + 1] > most ? n->start[a + 1] : most;
+        n->start[a + 1] += n->start[a];
+    }
+    /* Filling from the back leaves start[a + 1] at the beginning of node a, one place too far: shifted back below. */
+    for (int64_t e = mesh->n_elements - 1; e >= 0; e--)
+        for (int64_t i = mesh->first[e + 1] - 1; i >= mesh->first[e]; i--)
+            n->around[--n->start[mesh->node[i] + 1]] = e;
+    memmove(n->start, n->start + 1, (size_t)mesh->n_nodes * sizeof *n->start);
+    n->start[mesh->n_nodes] = corners;
+    return most * UZ_ELEMENT_NODES;
+}
+
+static bool neighbours_init(neighbours *n, const uz_body_model *model)
+{
+    const uz_mesh *mesh = &model->mesh;
+    memset(n, 0, sizeof *n);
+    n->model = model;
+    n->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *n->start);
+    n->around = uz_alloc(mesh->first[mesh->n_elements], sizeof *n->around);
+    n->seen = uz_alloc_zero(mesh->n_nodes, sizeof *n->seen);
+    if (!n->start || !n->around || !n->seen)
+        return false;
+    n->near = uz_alloc(fill_incidence(n) + 1, sizeof *n->near);
+    return n->near != NULL;
+}
+
+/* Keeps the list ascending: it is short, and mostly comes in order. */
+static void insert_near(neighbours *n, int64_t node)
+{
+    int64_t i = n->n_near++;
+    for (; i > 0 && n->near[i - 1] > node; i--)
+        n->near[i] = n->near[i - 1];
+    n->near[i] = node;
+}
+
+static void gather(neighbours *n, int64_t node)
+{
+    const uz_mesh *mesh = &n->model->mesh;
+    n->n_near = 0;
+    for (int64_t i = n->start[node]; i < n->start[node + 1]; i++)
+        for (int64_t k = mesh->first[n->around[i]]; k < mesh->first[n->around[i] + 1]; k++)
+            if (n->seen[mesh->node[k]] != node + 1) {
+                n->seen[mesh->node[k]] = node + 1;
+                insert_near(n, mesh->node[k]);
+            }
+}
+
+/* Free dofs >= first among the neighbours; written to out unless it is NULL. Returns how many. */
+static int64_t free_rows(int64_t *out, const neighbours *n, int64_t first)
+{
+    const int dim = n->model->mesh.dim;
+    int64_t count = 0;
+    for (int64_t i = 0; i < n->n_near; i++)
+        for (int c = 0; c < dim; c++) {
+            const int64_t row = n->model->dof[n->near[i] * dim + c];
+            if (row < first || row < 0)
+                continue;
+            if (out)
+                out[count] = row;
+            count++;
+        }
+    return count;
+}
+
+/* One column of K (rows from the diagonal on) or of K_fixed (all free rows) per dof: first how many entries it has ...
+ */
+static void count_columns(neighbours *n, int64_t *ptr, int64_t *ptr_fixed)
+{
+    const int dim = n->model->mesh.dim;
+    for (int64_t a = 0; a < n->model->mesh.n_nodes; a++) {
+        gather(n, a);
+        for (int c = 0; c < dim; c++) {
+            const int64_t column = n->model->dof[a * dim + c];
+            *(column >= 0 ? &ptr[column + 1] : &ptr_fixed[-column]) = free_rows(NULL, n, column);
+        }
+    }
+}
+
+/* ... then which. */
+static void fill_columns(uz_body_model *model, neighbours *n)
+{
+    const uz_csc *K = &model->K, *K_fixed = &model->K_fixed;
+    const int dim = model->mesh.dim;
+    memset(n->seen, 0, (size_t)model->mesh.n_nodes * sizeof *n->seen);
+    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+        gather(n, a);
+        for (int c = 0; c < dim; c++) {
+            const int64_t column = model->dof[a * dim + c];
+            free_rows(column >= 0 ? K->idx + K->ptr[column] : K_fixed->idx + K_fixed->ptr[-1 - column], n, column);
+        }
+    }
+}
+
+static void accumulate(int64_t *ptr, int64_t columns)
+{
+    for (int64_t j = 0; j < columns; j++)
+        ptr[j + 1] += ptr[j];
+}
+
+static uz_status init_matrix(uz_csc *A, int64_t rows, int64_t cols, const int64_t *ptr, uz_error *err)
+{
+    uz_status status = uz_csc_init(A, rows, cols, ptr[cols], err);
+    if (status == UZ_OK)
+        memcpy(A->ptr, ptr, (size_t)(cols + 1) * sizeof *ptr);
+    return status;
+}
+
+uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
+{
+    neighbours n;
+    uz_status status = UZ_ERR_MEMORY;
+    int64_t *ptr = uz_alloc_zero(model->d + 1, sizeof *ptr);
+    int64_t *ptr_fixed = uz_alloc_zero(model->n_fixed + 1, sizeof *ptr_fixed);
+    if (!neighbours_init(&n, model) || !ptr || !ptr_fixed) {
+        uz_fail(err, status, "", "no memory for the pattern of %lld unknowns", (long long)model->d);
+        goto done;
+    }
+    count_columns(&n, ptr, ptr_fixed);
+    accumulate(ptr, model->d);
+    accumulate(ptr_fixed, model->n_fixed);
+    status = init_matrix(&model->K, model->d, model->d, ptr, err);
+    if (status == UZ_OK)
+        status = init_matrix(&model->K_fixed, model->d, model->n_fixed, ptr_fixed, err);
+    if (status == UZ_OK)
+        fill_columns(model, &n);
+done:
+    free(ptr);
+    free(ptr_fixed);
+    neighbours_clear(&n);
+    return status;
+}

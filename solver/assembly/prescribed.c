@@ -1,0 +1,147 @@
+/* prescribed.c: what supported dofs are given.
+ *
+ * A support along n says n . u = v. At a node of several supports the held dofs are an orthonormal basis of what their
+ * normals span (dofs.c), made in this order, so that each n has a share in the dofs before and in one that is its own,
+ * whose value follows; or in those before only, and then v must be what they make of it. */
+#include "assembly/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double AGREE = 1e-9; /* values that differ less, beside what they are made of, are the same */
+
+typedef struct {
+    const uz_body_model *model;
+    const uz_scene *scene;
+    double *value;   /* n_fixed */
+    int64_t *source; /* n_fixed: 1 + the support that gave it, 0: none yet */
+} prescription;
+
+static uz_status other_body(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", "the scene's supports are not those of this body");
+}
+
+static uz_status contradiction(const prescription *p, int64_t support, int64_t node, int c, double value,
+                               int64_t fixed, uz_error *err)
+{
+    char where[96];
+    const char axis = "xyz"[c];
+    const int64_t earlier = p->source[fixed] - 1;
+    const bool normal = p->scene->supports[support].kind == UZ_SUPPORT_NORMAL;
+    snprintf(where, sizeof where, normal ? "/supports/%lld/u" : "/supports/%lld/u%c", (long long)support, axis);
+    return uz_fail(err, UZ_ERR_SCENE, where,
+                   "node %lld, where \"%.63s\" meets \"%.63s\", is given u%c = %g here and %g by support %lld; "
+                   "leave one of them out or make them agree",
+                   (long long)node, p->scene->supports[support].on, p->scene->supports[earlier].on, axis, value,
+                   p->value[fixed], (long long)earlier);
+}
+
+static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, double value, uz_error *err)
+{
+    const int64_t dof = p->model->dof[node * p->model->mesh.dim + c];
+    if (dof >= 0)
+        return other_body(err);
+    const int64_t fixed = -1 - dof;
+    if (c == 0 && value != 0 && uz_is_on_axis(p->model, node))
+        return uz_fail(err, UZ_ERR_SCENE, "/supports",
+                       "node %lld of \"%.63s\" is on the axis of rotation and cannot leave it: ux = %g must be 0",
+                       (long long)node, p->scene->supports[support].on, value);
+    if (p->source[fixed] && p->value[fixed] != value)
+        return contradiction(p, support, node, c, value, fixed, err);
+    p->value[fixed] = value;
+    if (!p->source[fixed])
+        p->source[fixed] = support + 1;
+    return UZ_OK;
+}
+
+static uz_status prescribe_axes(prescription *p, int64_t support, const uz_group *group, uz_error *err)
+{
+    const uz_mesh *mesh = &p->model->mesh;
+    const int64_t count = uz_group_node_count(mesh, group);
+    uz_status status = UZ_OK;
+    double u[3];
+    uz_support_values(u, &p->scene->supports[support], mesh->dim);
+    for (int c = 0; c < mesh->dim; c++)
+        for (int64_t i = 0; i < count && status == UZ_OK && !isnan(u[c]); i++)
+            status = prescribe(p, support, uz_group_node_at(group, i), c, u[c], err);
+    return status;
+}
+
+/* What the dofs given so far make of n . u at a node. Returns the held dof that n has its own share in, -1: none. */
+static int own_share(double *known, double *size, double share[3], const prescription *p, int64_t node,
+                     const double n[3])
+{
+    const int dim = p->model->mesh.dim;
+    int own = -1;
+    uz_to_frame(share, p->model, node, n);
+    *known = *size = 0;
+    for (int c = 0; c < dim; c++) {
+        const int64_t dof = p->model->dof[node * dim + c];
+        if (dof < 0 && (p->source[-1 - dof] || (c == 0 && uz_is_on_axis(p->model, node)))) {
+            *known += share[c] * p->value[-1 - dof];
+            *size += fabs(share[c] * p->value[-1 - dof]);
+        } else if (fabs(share[c]) > UZ_DEPENDENT && (own < 0 || fabs(share[c]) > fabs(share[own]))) {
+            own = c;
+        }
+    }
+    return own;
+}
+
+static uz_status prescribe_along(prescription *p, int64_t support, int64_t node, const double n[3], uz_error *err)
+{
+    char where[96];
+    double known, size, share[3];
+    const double value = p->scene->supports[support].value;
+    const int own = own_share(&known, &size, share, p, node, n);
+    if (own >= 0) {
+        const int64_t dof = p->model->dof[node * p->model->mesh.dim + own];
+        if (dof >= 0)
+            return other_body(err);
+        p->value[-1 - dof] = (value - known) / share[own];
+        p->source[-1 - dof] = support + 1;
+        return UZ_OK;
+    }
+    if (fabs(value - known) <= AGREE * (fabs(value) + size))
+        return UZ_OK;
+    snprintf(where, sizeof where, "/supports/%lld/u", (long long)support);
+    return uz_fail(err, UZ_ERR_SCENE, where,
+                   "node %lld of \"%.63s\" is given %g along this normal and %g by its other supports; leave one of "
+                   "them out or make them agree",
+                   (long long)node, p->scene->supports[support].on, value, known);
+}
+
+static uz_status prescribe_group(prescription *p, int64_t support, bool inclined, uz_error *err)
+{
+    const uz_mesh *mesh = &p->model->mesh;
+    double n[3];
+    const uz_group *group = uz_mesh_group(mesh, p->scene->supports[support].on, "/supports", err);
+    uz_status status = group ? UZ_OK : UZ_ERR_SCENE;
+    const int64_t count = group ? uz_group_node_count(mesh, group) : 0;
+    if (group && !inclined)
+        return prescribe_axes(p, support, group, err);
+    if (!uz_support_is_inclined(n, &p->scene->supports[support], mesh->dim))
+        return status;
+    for (int64_t i = 0; i < count && status == UZ_OK; i++)
+        status = prescribe_along(p, support, uz_group_node_at(group, i), n, err);
+    return status;
+}
+
+uz_status uz_prescribed_values(double *value, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    prescription p = {model, scene, value, uz_alloc_zero(model->n_fixed, sizeof *p.source)};
+    if (!p.source)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld supported dofs", (long long)model->n_fixed);
+    memset(value, 0, (size_t)model->n_fixed * sizeof *value);
+    for (int inclined = 0; inclined < 2; inclined++)
+        for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
+            status = prescribe_group(&p, i, inclined != 0, err);
+    free(p.source);
+    return status;
+}
