@@ -113,6 +113,15 @@ uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz
     return build(out, scene, true, err);
 }
 
+uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err)
+{
+    memset(out, 0, sizeof *out);
+    uz_status status = prepare(out, scene, true, err);
+    if (status != UZ_OK)
+        uz_body_model_clear(out);
+    return status;
+}
+
 static uz_status check_finite(const double *x, int64_t n, const char *where, uz_error *err)
 {
     for (int64_t i = 0; i < n; i++)

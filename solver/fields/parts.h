@@ -1,0 +1,72 @@
+/* parts.h: what the fields of an answer are made from. */
+#ifndef UZ_FIELDS_PARTS_H
+#define UZ_FIELDS_PARTS_H
+
+#include "assembly/assembly.h"
+#include "element/element.h"
+#include "uzawa.h"
+
+enum { UZ_FIELD_COMPONENTS = 6 }; /* most components of a stress */
+
+/* A scene's body as far as fields need it. */
+typedef struct {
+    const uz_scene *scene;
+    const uz_body_model *model; /* mesh and contact rows; neither K nor N is read */
+    int components;             /* of a stress: 4 or 6 */
+    int32_t *material;          /* n_elements: which of the scene's */
+    double *rise;               /* n_elements: of temperature; NULL: none has any */
+} uz_field_body;
+
+/* Borrows scene and model. UZ_ERR_MEMORY; the caller clears *out in every case. */
+uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz_body_model *model, uz_error *err);
+void uz_field_body_clear(uz_field_body *body);
+
+/* One element, moved by u. It refers to itself: not to be copied. */
+typedef struct {
+    uz_element element;
+    uz_element_motion motion;
+    uz_lame lame;
+    double young, poisson;
+    double free_strain; /* expansion times rise of temperature */
+    double xyz[UZ_ELEMENT_DOFS], u[UZ_ELEMENT_DOFS];
+} uz_field_element;
+void uz_field_element_at(uz_field_element *out, const uz_field_body *body, const double *u, int64_t element);
+
+/* Stress and strain (tensors, components of uz_fields) at a local point of it. */
+typedef struct {
+    double stress[UZ_FIELD_COMPONENTS], strain[UZ_FIELD_COMPONENTS];
+} uz_field_state;
+void uz_field_state_at(uz_field_state *out, const uz_field_element *element, const double point[3]);
+
+/* Nodal averages, n_nodes x components each; either may be NULL. UZ_ERR_CANCELLED, _MEMORY. */
+uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,
+                           const uz_hooks *hooks, uz_error *err);
+
+/* At the Gauss points of every element: which element, where (x dim), stress (x components). */
+int64_t uz_field_gauss_count(const uz_field_body *body);
+uz_status uz_field_gauss(double *element, double *point, double *stress, const uz_field_body *body, const double *u,
+                         const uz_hooks *hooks, uz_error *err);
+
+/* uz_fields_compute on a body that is there. */
+uz_status uz_fields_of_body(uz_fields *out, const uz_field_body *body, const uz_field_source *answer, unsigned which,
+                            const uz_hooks *hooks, uz_error *err);
+
+/* Of a stress with 4 or 6 components: the largest first. */
+void uz_principal(double principal[3], const double *stress, int components);
+double uz_von_mises(const double *stress, int components);
+
+/* Pressure of each contact row from the reactions r (m): see contact_pressure.c. NaN where the contact has no area. */
+uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
+                              uz_error *err);
+/* Which of the scene's contacts each row belongs to. */
+void uz_contact_of_rows(int64_t *contact, const uz_body_model *model, const uz_scene *scene);
+
+/* A side of the mesh as element.h wants it; its nodes (in its order). */
+typedef struct {
+    uz_side side;
+    int64_t node[UZ_FACE_NODES];
+    double xyz[UZ_SIDE_NODES * 3];
+} uz_field_side;
+void uz_field_side_at(uz_field_side *out, const uz_mesh *mesh, const uz_scene *scene, uz_face face);
+
+#endif

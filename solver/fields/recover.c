@@ -1,0 +1,210 @@
+/* recover.c: stress and strain at nodes.
+ *
+ * Derivatives of a finite element solution are most accurate at certain points of each element (Barlow, Int. J. Numer.
+ * Meth. Engng 10 (1976) 243-251): the Gauss points of one order less than the element's. From there they are continued
+ * over the element by the polynomial that the points determine, and averaged at the nodes. */
+#include "fields/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hooks.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { POINTS = 8, BETWEEN_QUESTIONS = 1024 };
+
+/* The points of a kind, and what each of them gives to each node. */
+typedef struct {
+    int points;
+    double point[POINTS][3];
+    double share[UZ_ELEMENT_NODES][POINTS];
+} recovery;
+
+static bool is_simplex(uz_element_kind kind)
+{
+    return kind == UZ_TRI3 || kind == UZ_TRI6 || kind == UZ_TET4 || kind == UZ_TET10;
+}
+
+static bool is_linear_simplex(uz_element_kind kind)
+{
+    return kind == UZ_TRI3 || kind == UZ_TET4;
+}
+
+/* One point in the middle: strain is constant. */
+static void plan_constant(recovery *plan, uz_element_kind kind)
+{
+    const int dim = uz_element_dim(kind);
+    plan->points = 1;
+    for (int c = 0; c < dim; c++)
+        plan->point[0][c] = 1.0 / (dim + 1);
+    for (int a = 0; a < uz_element_node_count(kind); a++)
+        plan->share[a][0] = 1;
+}
+
+/* dim + 1 points, each at barycentric coordinates (high, low, low[, low]): what is linear in them. */
+static void plan_simplex(recovery *plan, uz_element_kind kind)
+{
+    const int dim = uz_element_dim(kind), points = dim + 1;
+    const double low = dim == 2 ? 1.0 / 6 : (5 - sqrt(5)) / 20, high = 1 - dim * low;
+    const double(*node)[3] = uz_element_local_nodes(kind);
+    plan->points = points;
+    for (int k = 0; k < points; k++)
+        for (int c = 0; c < dim; c++)
+            plan->point[k][c] = k == c + 1 ? high : low;
+    for (int a = 0; a < uz_element_node_count(kind); a++) {
+        double rest = 1;
+        for (int c = 0; c < dim; c++) {
+            rest -= node[a][c];
+            plan->share[a][c + 1] = (node[a][c] - low) / (high - low);
+        }
+        plan->share[a][0] = (rest - low) / (high - low);
+    }
+}
+
+/* 2^dim Gauss points at +-1/sqrt(3): what is linear along each axis. */
+static void plan_box(recovery *plan, uz_element_kind kind)
+{
+    const int dim = uz_element_dim(kind);
+    const double(*node)[3] = uz_element_local_nodes(kind);
+    plan->points = 1 << dim;
+    for (int k = 0; k < plan->points; k++)
+        for (int c = 0; c < dim; c++)
+            plan->point[k][c] = (k >> c & 1 ? 1 : -1) / sqrt(3);
+    for (int a = 0; a < uz_element_node_count(kind); a++)
+        for (int k = 0; k < plan->points; k++) {
+            double share = 1;
+            for (int c = 0; c < dim; c++)
+                share *= 0.5 * (1 + 3 * plan->point[k][c] * node[a][c]);
+            plan->share[a][k] = share;
+        }
+}
+
+static void make_plan(recovery *plan, uz_element_kind kind)
+{
+    memset(plan, 0, sizeof *plan);
+    if (is_linear_simplex(kind))
+        plan_constant(plan, kind);
+    else if (is_simplex(kind))
+        plan_simplex(plan, kind);
+    else
+        plan_box(plan, kind);
+}
+
+/* sum[node] += volume x what the points give to that node. */
+static void add_to_nodes(double *sum, const recovery *plan, double value[POINTS][UZ_FIELD_COMPONENTS],
+                         const int64_t *node, int nodes, int components, double volume)
+{
+    for (int a = 0; sum && a < nodes; a++)
+        for (int c = 0; c < components; c++) {
+            double at_node = 0;
+            for (int k = 0; k < plan->points; k++)
+                at_node += plan->share[a][k] * value[k][c];
+            sum[node[a] * components + c] += volume * at_node;
+        }
+}
+
+static void add_element(double *stress, double *strain, double *volume, const recovery *plan, const uz_field_body *body,
+                        const double *u, int64_t element)
+{
+    uz_field_element at;
+    uz_field_state state;
+    double sigma[POINTS][UZ_FIELD_COMPONENTS], epsilon[POINTS][UZ_FIELD_COMPONENTS];
+    int nodes;
+    const int64_t *node = uz_mesh_element(&body->model->mesh, element, &nodes);
+    uz_field_element_at(&at, body, u, element);
+    for (int k = 0; k < plan->points; k++) {
+        uz_field_state_at(&state, &at, plan->point[k]);
+        memcpy(sigma[k], state.stress, sizeof sigma[k]);
+        memcpy(epsilon[k], state.strain, sizeof epsilon[k]);
+    }
+    const double size = uz_element_volume(&at.element);
+    for (int a = 0; a < nodes; a++)
+        volume[node[a]] += size;
+    add_to_nodes(stress, plan, sigma, node, nodes, body->components, size);
+    add_to_nodes(strain, plan, epsilon, node, nodes, body->components, size);
+}
+
+static void divide(double *sum, const double *volume, int64_t n_nodes, int components)
+{
+    for (int64_t a = 0; sum && a < n_nodes; a++)
+        for (int c = 0; c < components; c++)
+            sum[a * components + c] = volume[a] > 0 ? sum[a * components + c] / volume[a] : NAN;
+}
+
+uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,
+                           const uz_hooks *hooks, uz_error *err)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    const size_t bytes = (size_t)(mesh->n_nodes * body->components) * sizeof(double);
+    recovery plan[UZ_ELEMENT_KINDS];
+    uz_status status = UZ_OK;
+    double *volume = uz_alloc_zero(mesh->n_nodes, sizeof *volume);
+    if (!volume)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at %lld nodes", (long long)mesh->n_nodes);
+    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
+        make_plan(&plan[kind], (uz_element_kind)kind);
+    if (stress)
+        memset(stress, 0, bytes);
+    if (strain)
+        memset(strain, 0, bytes);
+    for (int64_t e = 0; status == UZ_OK && e < mesh->n_elements; e++) {
+        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
+        else
+            add_element(stress, strain, volume, &plan[mesh->kind[e]], body, u, e);
+    }
+    divide(stress, volume, mesh->n_nodes, body->components);
+    divide(strain, volume, mesh->n_nodes, body->components);
+    free(volume);
+    return status;
+}
+
+/* ---- Gauss points */
+
+int64_t uz_field_gauss_count(const uz_field_body *body)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    int64_t count = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        count += uz_element_gauss_count((uz_element_kind)mesh->kind[e], body->scene->model);
+    return count;
+}
+
+static void place_of(double *x, const uz_field_element *at, int dim, const double point[3])
+{
+    double N[UZ_ELEMENT_NODES];
+    uz_element_shape(N, at->element.kind, point);
+    for (int c = 0; c < dim; c++) {
+        x[c] = 0;
+        for (int a = 0; a < uz_element_node_count(at->element.kind); a++)
+            x[c] += N[a] * at->xyz[a * dim + c];
+    }
+}
+
+uz_status uz_field_gauss(double *element, double *point, double *stress, const uz_field_body *body, const double *u,
+                         const uz_hooks *hooks, uz_error *err)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    const int components = body->components;
+    uz_field_element at;
+    uz_field_state state;
+    double local[3];
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
+        uz_field_element_at(&at, body, u, e);
+        const int count = uz_element_gauss_count(at.element.kind, at.element.model);
+        for (int g = 0; g < count; g++) {
+            uz_element_gauss(local, at.element.kind, at.element.model, g);
+            uz_field_state_at(&state, &at, local);
+            *element++ = (double)e;
+            place_of(point, &at, mesh->dim, local);
+            point += mesh->dim;
+            memcpy(stress, state.stress, (size_t)components * sizeof *stress);
+            stress += components;
+        }
+    }
+    return UZ_OK;
+}
