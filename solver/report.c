@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "fields/evaluate.h"
 
 #include <float.h>
 #include <math.h>
@@ -154,19 +155,15 @@ static void report_contact(uz_run *run)
     }
 }
 
-/* Force and pressure on the body: the obstacle pushes along its normal by -r. */
-void uz_report_pressure(uz_result *result)
+/* The scene with the loads of the case. */
+static uz_scene scene_of_case(const uz_run *run)
 {
-    uz_summary *summary = &result->summary;
-    const uz_mesh_info *mesh = &result->mesh;
-    summary->dim = mesh->dim;
-    summary->max_pressure = 0.0;
-    for (int64_t i = 0; i < result->m; i++) {
-        for (int axis = 0; axis < mesh->dim; axis++)
-            summary->force[axis] -= result->r[i] * mesh->contact_normal[i * mesh->dim + axis];
-        if (mesh->contact_area[i] > 0.0)
-            summary->max_pressure = fmax(summary->max_pressure, -result->r[i] / mesh->contact_area[i]);
+    uz_scene scene = run->problem->scene;
+    if (run->load_case && run->load_case->loads) {
+        scene.loads = run->load_case->loads;
+        scene.n_loads = run->load_case->n_loads;
     }
+    return scene;
 }
 
 static uz_status report_displacements(uz_run *run, uz_error *err)
@@ -185,9 +182,8 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)result->n_nodes);
     uz_recover_nodal(result->u, model, run->answer.u, run->prescribed);
-    if (status == UZ_OK)
-        uz_report_pressure(result);
-    return status;
+    const uz_scene scene = scene_of_case(run);
+    return status == UZ_OK ? uz_evaluate(result, model, &scene, err) : status;
 }
 
 static void blank(double *x, int64_t n)
@@ -203,6 +199,10 @@ void uz_blank_answer(uz_result *result)
     blank(result->u, n_u);
     blank(result->r, result->m);
     blank(result->g, result->m);
+    blank(result->pressure, result->m);
+    uz_evaluation_free(result->evaluation);
+    result->evaluation = NULL;
+    s->evaluation = NULL;
     blank(s->force, 3);
     s->reaction_sum = s->max_penetration = s->max_pressure = NAN;
     s->active = 0;
@@ -357,6 +357,8 @@ void uz_result_free(uz_result *result)
     free(result->u);
     free(result->r);
     free(result->g);
+    free(result->pressure);
+    uz_evaluation_free(result->evaluation);
     free(result->history.rows);
     uz_state_free(result->state);
     uz_mesh_info_clear(&result->mesh);

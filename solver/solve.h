@@ -77,10 +77,6 @@ uz_status uz_check_problem(const uz_problem *problem, uz_error *err);
 
 /* The relative error that a certificate has to meet, before `balanced` knows better. */
 double uz_requested_error(const uz_settings *settings);
-/* Scenes: the summary's force and pressure on the body, from r and the mesh: the obstacle pushes along its normal by
- * -r.
- */
-void uz_report_pressure(uz_result *result);
 /* There is no answer: nothing that looks like one may be left. */
 void uz_blank_answer(uz_result *result);
 /* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */

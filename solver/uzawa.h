@@ -449,6 +449,38 @@ typedef struct {
  * only the obstacle holds begins at zero whatever was given. */
 typedef enum { UZ_FROM_ZERO, UZ_FROM_REACTIONS, UZ_FROM_STATE } uz_origin;
 
+/* What acts on the body at a group: force by direction and moment about the origin (plane: moment[2] alone). Rings: the
+ * force along y; that along x is its sum around the ring, and there is no moment. */
+typedef struct {
+    char on[64];
+    double force[3], moment[3];
+} uz_resultant;
+
+/* Something that makes small deformation on a fixed contact geometry doubtful. */
+typedef struct {
+    char code[24];     /* "large_rotation", ... */
+    double value;      /* what was found, without unit */
+    char message[160]; /* one sentence */
+} uz_warning;
+
+/* Scenes: what the answer comes to. */
+typedef struct {
+    double strain_energy; /* with that of springs */
+    double contact_area;  /* tributary area of the rows with r < 0 */
+    int64_t peak_node;    /* where max_pressure is; -1: no pressure */
+    double peak_at[3];
+    int64_t n_contacts, n_supports;
+    uz_resultant *contacts,
+        *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
+    uz_resultant loads; /* all of them; on is "" */
+    /* What the forces and moments (about the middle of the body, by its extent) leave over, relative to the sum of
+     * their sizes. */
+    double imbalance;
+    int n_warnings;
+    uz_warning warnings[4];
+} uz_evaluation;
+void uz_evaluation_free(uz_evaluation *evaluation);
+
 typedef struct {
     uz_outcome outcome;
     uz_origin origin;
@@ -461,7 +493,7 @@ typedef struct {
     double reaction_sum, max_penetration;
     int dim;                     /* scene: 2 or 3, else 0 */
     double force[3];             /* scene: force of the body on the obstacle's normal side, sum of -r n */
-    double max_pressure;         /* scene: max of -r / tributary area; NaN otherwise */
+    double max_pressure;         /* scene: the largest of the result's pressure; NaN otherwise */
     double alpha, lambda_max;    /* NaN where no gradient step was taken */
     double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
     double infeasible_radius;    /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
@@ -477,7 +509,8 @@ typedef struct {
     double rcond;
     uz_cost cost;
     uz_timings timings;
-    char message[256]; /* one sentence on the outcome where it is not `converged`; "" otherwise */
+    char message[256];               /* one sentence on the outcome where it is not `converged`; "" otherwise */
+    const uz_evaluation *evaluation; /* scenes with an answer: the result's own; else NULL */
 } uz_summary;
 
 /* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.
@@ -503,8 +536,10 @@ typedef struct {
     double *u;         /* d; a scene's is n_nodes x dim by node, with the supported dofs, which d does not count */
     double *r;         /* m */
     double *g;         /* m */
+    double *pressure;  /* scene: m, as UZ_FIELD_PRESSURE; else NULL */
     double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof; u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
+    uz_evaluation *evaluation;
     uz_history history;
     uz_state *state; /* where the iterations stood; NULL: nothing to continue */
 } uz_result;

@@ -108,8 +108,9 @@ typedef struct {
     int dim;
     int64_t m, n_u, n_nodes; /* lengths of reactions and gaps, displacements, nodes (in doubles) */
     const double *reactions, *gaps, *displacements, *nodes, *contact_nodes;
-    const double *pressure; /* scenes: m, of each reaction */
-    const double *ray;      /* m: the proof of an infeasible problem */
+    const double *pressure;  /* scenes: m, of each reaction */
+    const double *ray;       /* m: the proof of an infeasible problem */
+    const uz_fields *fields; /* scenes: what was computed; its pressure is not written. NULL: nothing */
 } codec_result;
 char *codec_encode_result(const codec_result *result, size_t *len);
 

@@ -33,6 +33,42 @@ static void put_summary(text *t, const char *summary)
     text_raw(t, summary);
 }
 
+/* Names of the components, then the fields that have them. */
+static void put_components(text *t, const uz_fields *f)
+{
+    const char *const *names = uz_field_components(f->dim);
+    if (!f->stress && !f->strain && !f->gauss_stress)
+        return;
+    text_key(t, "components");
+    text_open(t, '[');
+    for (int c = 0; c < f->components; c++)
+        text_string(t, names[c]);
+    text_close(t, ']');
+}
+
+static void put_gauss(text *t, const uz_fields *f)
+{
+    if (!f->gauss_stress)
+        return;
+    text_key(t, "stress_gauss");
+    text_open(t, '{');
+    put_vector(t, "elements", f->gauss_element, f->n_points, 0);
+    put_vector(t, "points", f->gauss_point, f->n_points * f->dim, f->dim);
+    put_vector(t, "stress", f->gauss_stress, f->n_points * f->components, f->components);
+    text_close(t, '}');
+}
+
+static void put_computed(text *t, const uz_fields *f)
+{
+    put_components(t, f);
+    put_vector(t, "contact_status", f->contact_status, f->m, 0);
+    put_vector(t, "stress", f->stress, f->n_nodes * f->components, f->components);
+    put_vector(t, "principal", f->principal, f->n_nodes * 3, 3);
+    put_vector(t, "von_mises", f->von_mises, f->n_nodes, 0);
+    put_vector(t, "strain", f->strain, f->n_nodes * f->components, f->components);
+    put_gauss(t, f);
+}
+
 /* What each case has of its own. */
 static void put_fields(text *t, const codec_result *result)
 {
@@ -41,6 +77,8 @@ static void put_fields(text *t, const codec_result *result)
     put_vector(t, "pressure", result->pressure, result->m, 0);
     put_vector(t, "ray", result->ray, result->m, 0);
     put_vector(t, "displacements", result->displacements, result->n_u, result->dim);
+    if (result->fields)
+        put_computed(t, result->fields);
 }
 
 static void put_places(text *t, const codec_result *result)

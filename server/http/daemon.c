@@ -4,6 +4,7 @@
  * at when its header block has come (begin), fed with its body (take_body), answered (answer) and ended
  * (on_completed). All of this happens in the connection's own thread. */
 #include "http/conn.h"
+#include "http/fields.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -143,8 +144,9 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     if (pthread_key_create(&server->current, NULL) != 0)
         goto fail;
     has_key = true;
+    server->context.fields = field_slots_new(work_workers(parts->work));
     server->deadlines = deadlines_new(words);
-    if (!server->deadlines)
+    if (!server->deadlines || !server->context.fields)
         goto fail;
     server->daemon = start_daemon(server, listen_fd, options);
     if (!server->daemon)
@@ -153,8 +155,10 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     return server;
 fail:
     snprintf(message, size, "cannot start the HTTP server: %s", errno ? strerror(errno) : "out of memory");
-    if (server)
+    if (server) {
         deadlines_free(server->deadlines);
+        field_slots_free(server->context.fields);
+    }
     if (has_key)
         pthread_key_delete(server->current);
     free(server);
@@ -174,6 +178,7 @@ void http_stop(http_server *server)
         return;
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
     deadlines_free(server->deadlines);
+    field_slots_free(server->context.fields);
     pthread_key_delete(server->current);
     free(server);
 }

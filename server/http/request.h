@@ -16,6 +16,7 @@ typedef struct {
     store *store;
     work *work;
     server_log *log;
+    struct field_slots *fields; /* turns of replies that are computed: fields.h */
     double max_wait_s;
     atomic_bool draining;
 } api;
@@ -76,6 +77,7 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply);
 void jobs_refine(api *context, http_request *rq, http_reply *reply);
 void verify_submit(api *context, http_request *rq, http_reply *reply);
 void results_get(api *context, http_request *rq, http_reply *reply);
+void results_get_vtu(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);

@@ -1,5 +1,6 @@
 /* results.c: what a job leaves behind: /v1/jobs/{id}/result. */
 #include "codec/codec.h"
+#include "http/fields.h"
 #include "http/jobs.h"
 #include "http/problem.h"
 #include "http/request.h"
@@ -10,44 +11,22 @@
 
 /* ------------------------------------------------------------------ result */
 
-typedef struct {
-    bool reactions, gaps, displacements, pressure;
-} wanted;
+/* What the store has, and what is computed from it. */
+#define STORED ((unsigned)(UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_DISPLACEMENTS | UZ_FIELD_PRESSURE))
+#define COMPUTED                                                                                                       \
+    ((unsigned)(UZ_FIELD_CONTACT_STATUS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES |                  \
+                UZ_FIELD_STRAIN | UZ_FIELD_STRESS_GAUSS))
+static const unsigned BY_DEFAULT = UZ_FIELD_REACTIONS | UZ_FIELD_GAPS;
+static const unsigned BY_ROW = UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_PRESSURE | UZ_FIELD_CONTACT_STATUS;
+static const unsigned BY_NODE =
+    UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES | UZ_FIELD_STRAIN;
 
-static bool want_field(wanted *out, const char *name, size_t len)
+static bool read_fields(const http_request *rq, field_list *out, unsigned otherwise, unsigned allowed,
+                        problem_details *problem)
 {
-    if (token_equal(name, len, "reactions"))
-        out->reactions = true;
-    else if (token_equal(name, len, "gaps"))
-        out->gaps = true;
-    else if (token_equal(name, len, "displacements"))
-        out->displacements = true;
-    else if (token_equal(name, len, "pressure"))
-        out->pressure = true;
-    else
-        return token_equal(name, len, "summary");
-    return true;
-}
-
-static bool read_fields(const http_request *rq, wanted *out, problem_details *problem)
-{
-    const char *at = target_value(&rq->target, "fields");
-    memset(out, 0, sizeof *out);
-    if (!at) {
-        out->reactions = out->gaps = true;
-        return true;
-    }
-    for (;;) {
-        size_t len = strcspn(at, ",");
-        if (!want_field(out, at, len))
-            return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                                "\"%.*s\" is no field of a result: fields is a list of summary, reactions, gaps, "
-                                "pressure, displacements, separated by commas",
-                                (int)(len < 60 ? len : 60), at);
-        if (at[len] == '\0')
-            return true;
-        at += len + 1;
-    }
+    const char *text = target_value(&rq->target, "fields");
+    *out = (field_list){.which = otherwise};
+    return !text || fields_parse(out, text, allowed, problem);
 }
 
 bool results_exist(const job *j, http_reply *reply)
@@ -111,35 +90,36 @@ static store_status fetch(api *context, const place *at, const char *name, doubl
 }
 
 /* What each case has of its own. */
-static store_status fetch_own(api *context, const place *at, const wanted *fields, vectors *v)
+static store_status fetch_own(api *context, const place *at, const field_list *fields, vectors *v)
 {
     store_status status = STORE_OK;
-    if (fields->reactions)
+    if (fields->which & UZ_FIELD_REACTIONS)
         status = fetch(context, at, "reactions", &v->reactions, &v->n_reactions);
-    if (status == STORE_OK && fields->gaps)
+    if (status == STORE_OK && fields->which & UZ_FIELD_GAPS)
         status = fetch(context, at, "gaps", &v->gaps, &v->n_gaps);
-    if (status == STORE_OK && fields->reactions)
+    if (status == STORE_OK && fields->which & UZ_FIELD_REACTIONS)
         status = fetch(context, at, "ray", &v->ray, &v->n_ray);
-    if (status == STORE_OK && fields->pressure)
+    if (status == STORE_OK && fields->which & UZ_FIELD_PRESSURE)
         status = fetch(context, at, "pressure", &v->pressure, &v->n_pressure);
-    if (status == STORE_OK && fields->displacements)
+    if (status == STORE_OK && fields->which & UZ_FIELD_DISPLACEMENTS)
         status = fetch(context, at, "displacements", &v->displacements, &v->n_u);
     return status;
 }
 
 /* What the job has once, for all its cases. */
-static store_status fetch_shared(api *context, const job *j, const wanted *fields, vectors *v)
+static store_status fetch_shared(api *context, const job *j, const field_list *fields, vectors *v)
 {
     const place whole = {.j = j};
     store_status status = fetch(context, &whole, "dim", &v->dim, &v->n_dim);
-    if (status == STORE_OK && (fields->reactions || fields->gaps || fields->pressure))
+    if (status == STORE_OK && fields->which & BY_ROW)
         status = fetch(context, &whole, "contact_nodes", &v->contact_nodes, &v->n_contact_nodes);
-    if (status == STORE_OK && fields->displacements)
+    if (status == STORE_OK && (fields->nodes || fields->which & BY_NODE))
         status = fetch(context, &whole, "nodes", &v->nodes, &v->n_nodes);
     return status;
 }
 
-static codec_result as_encoded(const place *at, const vectors *own, const vectors *shared)
+/* computed: may be NULL. */
+static codec_result as_encoded(const place *at, const vectors *own, const vectors *shared, const uz_fields *computed)
 {
     return (codec_result){.job_id = at->j->id,
                           .summary = at->summary,
@@ -155,12 +135,28 @@ static codec_result as_encoded(const place *at, const vectors *own, const vector
                           .gaps = own->gaps,
                           .pressure = own->pressure,
                           .ray = own->ray,
+                          .fields = computed,
                           .displacements = own->displacements,
                           .nodes = shared->nodes,
                           .contact_nodes = shared->contact_nodes};
 }
 
-static void reply_one(api *context, const place *at, const wanted *fields, http_reply *reply)
+/* Fields that the store does not have, of one case. False with a reply. */
+static bool compute_one(api *context, const http_request *rq, const place *at, const field_list *fields,
+                        uz_fields *computed, http_reply *reply)
+{
+    field_reader reader;
+    bool done = true;
+    if (!(fields->which & COMPUTED))
+        return true;
+    done = fields_open(&reader, context, rq, at->j, reply) &&
+           fields_of_case(computed, &reader, at->number, fields->which & COMPUTED, reply);
+    fields_close(&reader);
+    return done;
+}
+
+static void encode_one(api *context, const place *at, const field_list *fields, const uz_fields *computed,
+                       http_reply *reply)
 {
     vectors own = {0}, shared = {0};
     size_t len = 0;
@@ -168,7 +164,7 @@ static void reply_one(api *context, const place *at, const wanted *fields, http_
     if (status == STORE_OK)
         status = fetch_own(context, at, fields, &own);
     if (status == STORE_OK) {
-        codec_result result = as_encoded(at, &own, &shared);
+        codec_result result = as_encoded(at, &own, &shared, computed);
         char *text = codec_encode_result(&result, &len);
         reply_text(reply, 200, "application/json", text, len);
     } else {
@@ -178,72 +174,125 @@ static void reply_one(api *context, const place *at, const wanted *fields, http_
     vectors_free(&shared);
 }
 
+static void reply_one(api *context, const http_request *rq, const place *at, const field_list *fields,
+                      http_reply *reply)
+{
+    uz_fields computed = {.dim = 0};
+    if (compute_one(context, rq, at, fields, &computed, reply))
+        encode_one(context, at, fields, &computed, reply);
+    uz_fields_clear(&computed);
+}
+
 /* ------------------------------------------------------- many cases in one */
 
 /* Numbers of all cases in one reply, about 20 bytes each: one reply must not fill the machine. openapi.json says so. */
 #define MOST_NUMBERS 4000000
 
-/* False with a 413, or a failure of the store. */
-static bool check_room(api *context, const job *j, const wanted *fields, http_reply *reply)
+static bool refuse_large(int64_t total, http_reply *reply)
 {
-    const struct {
-        bool wanted;
-        const char *name;
-    } LIST[] = {{fields->reactions, "reactions"},
-                {fields->gaps, "gaps"},
-                {fields->pressure, "pressure"},
-                {fields->displacements, "displacements"}};
-    int64_t total = 0;
-    for (size_t i = 0; i < sizeof LIST / sizeof LIST[0]; i++) {
+    reply_refuse(reply, 413, "result_too_large", "The result is too large for one reply",
+                 "all cases together have %lld numbers, a reply has at most %d: ask for one case with ?case=NAME, or "
+                 "for fewer fields",
+                 (long long)total, MOST_NUMBERS);
+    return false;
+}
+
+/* False with a 413, or a failure of the store. Numbers that are computed are counted with the first case of which they
+ * are: `more`. */
+static bool check_room(api *context, const job *j, const field_list *fields, int64_t more, http_reply *reply)
+{
+    int64_t total = more;
+    for (unsigned bit = 1; bit <= STORED; bit <<= 1) {
         int64_t count = 0;
-        store_status status =
-            LIST[i].wanted ? store_count_vectors(context->store, j->id, LIST[i].name, &count) : STORE_OK;
+        store_status status = fields->which & STORED & bit
+                                  ? store_count_vectors(context->store, j->id, uz_field_name((uz_field)bit), &count)
+                                  : STORE_OK;
         if (status != STORE_OK) {
             reply_store_failure(context, status, reply);
             return false;
         }
         total += count;
     }
-    if (total > MOST_NUMBERS)
-        reply_refuse(
-            reply, 413, "result_too_large", "The result is too large for one reply",
-            "all cases together have %lld numbers, a reply has at most %d: ask for one case with ?case=NAME, or "
-            "for fewer fields",
-            (long long)total, MOST_NUMBERS);
-    return total <= MOST_NUMBERS;
+    return total <= MOST_NUMBERS || refuse_large(total, reply);
 }
 
-static store_status add_case(api *context, codec_results *all, const place *at, const wanted *fields,
-                             const vectors *shared)
+static int64_t count_numbers(const uz_fields *f)
 {
+    const int64_t k = f->components;
+    return (f->contact_status ? f->m : 0) +
+           f->n_nodes * ((f->stress ? k : 0) + (f->strain ? k : 0) + (f->principal ? 3 : 0) + (f->von_mises ? 1 : 0)) +
+           f->n_points * (1 + f->dim + k);
+}
+
+/* All cases of a job in one reply. */
+typedef struct {
+    api *context;
+    const job *j;
+    const store_case *cases;
+    size_t count;
+    const field_list *fields;
+    vectors shared;
+    field_reader reader; /* where something is computed */
+    codec_results *all;
+} many;
+
+/* False with a reply. */
+static bool add_case(many *of, size_t i, http_reply *reply)
+{
+    const place at = {of->j, of->cases[i].number, of->cases[i].name, of->cases[i].summary};
+    const unsigned which = of->fields->which & COMPUTED;
     vectors own = {0};
-    store_status status = fetch_own(context, at, fields, &own);
-    codec_result one = as_encoded(at, &own, shared);
-    if (status == STORE_OK)
-        codec_results_add(all, &one);
+    uz_fields computed = {.dim = 0};
+    bool done = !which || fields_of_case(&computed, &of->reader, at.number, which, reply);
+    if (done && which && i == 0)
+        done = check_room(of->context, of->j, of->fields, (int64_t)of->count * count_numbers(&computed), reply);
+    store_status status = done ? fetch_own(of->context, &at, of->fields, &own) : STORE_OK;
+    if (status != STORE_OK) {
+        reply_store_failure(of->context, status, reply);
+        done = false;
+    }
+    codec_result one = as_encoded(&at, &own, &of->shared, &computed);
+    if (done)
+        codec_results_add(of->all, &one);
     vectors_free(&own);
-    return status;
+    uz_fields_clear(&computed);
+    return done;
 }
 
-static void reply_cases(api *context, const job *j, const store_case *cases, size_t count, const wanted *fields,
-                        http_reply *reply)
+static bool add_cases(many *of, http_reply *reply)
 {
-    vectors shared = {0};
+    for (size_t i = 0; i < of->count; i++)
+        if (!add_case(of, i, reply))
+            return false;
+    return true;
+}
+
+static void encode_cases(many *of, http_reply *reply)
+{
+    const place whole = {.j = of->j, .summary = of->j->summary};
     size_t len = 0;
-    const place whole = {.j = j, .summary = j->summary};
-    codec_results *all = codec_results_begin(j->id, j->summary);
-    store_status status = fetch_shared(context, j, fields, &shared);
-    for (size_t i = 0; all && status == STORE_OK && i < count; i++)
-        status = add_case(context, all, &(place){j, cases[i].number, cases[i].name, cases[i].summary}, fields, &shared);
-    if (status != STORE_OK) {
-        codec_results_drop(all);
-        reply_store_failure(context, status, reply);
+    of->all = codec_results_begin(of->j->id, of->j->summary);
+    if (!of->all) {
+        reply_no_memory(reply);
+    } else if (!add_cases(of, reply)) {
+        codec_results_drop(of->all);
     } else {
-        codec_result rest = as_encoded(&whole, &(vectors){0}, &shared);
-        char *text = all ? codec_results_end(all, &rest, &len) : NULL;
+        codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL);
+        char *text = codec_results_end(of->all, &rest, &len);
         reply_text(reply, 200, "application/json", text, len);
     }
-    vectors_free(&shared);
+}
+
+static void reply_cases(many *of, const http_request *rq, http_reply *reply)
+{
+    store_status status = fetch_shared(of->context, of->j, of->fields, &of->shared);
+    if (status != STORE_OK)
+        reply_store_failure(of->context, status, reply);
+    else if (!(of->fields->which & COMPUTED) || fields_open(&of->reader, of->context, rq, of->j, reply))
+        encode_cases(of, reply);
+    if (of->fields->which & COMPUTED)
+        fields_close(&of->reader);
+    vectors_free(&of->shared);
 }
 
 /* ------------------------------------------------------------ which of them */
@@ -274,27 +323,28 @@ static bool load_cases(api *context, const http_request *rq, const job *j, store
     return false;
 }
 
-static void reply_result(api *context, const http_request *rq, const job *j, const wanted *fields, http_reply *reply)
+static void reply_result(api *context, const http_request *rq, const job *j, const field_list *fields,
+                         http_reply *reply)
 {
     store_case *cases = NULL;
     size_t count = 0;
     if (!load_cases(context, rq, j, &cases, &count, reply))
         return;
     if (count == 0)
-        reply_one(context, &(place){.j = j, .summary = j->summary}, fields, reply);
+        reply_one(context, rq, &(place){.j = j, .summary = j->summary}, fields, reply);
     else if (target_value(&rq->target, "case"))
-        reply_one(context, &(place){j, cases[0].number, cases[0].name, cases[0].summary}, fields, reply);
-    else if (check_room(context, j, fields, reply))
-        reply_cases(context, j, cases, count, fields, reply);
+        reply_one(context, rq, &(place){j, cases[0].number, cases[0].name, cases[0].summary}, fields, reply);
+    else if (check_room(context, j, fields, 0, reply))
+        reply_cases(&(many){.context = context, .j = j, .cases = cases, .count = count, .fields = fields}, rq, reply);
     store_cases_free(cases, count);
 }
 
 void results_get(api *context, http_request *rq, http_reply *reply)
 {
-    wanted fields;
+    field_list fields;
     problem_details problem;
     job j = {0};
-    if (!read_fields(rq, &fields, &problem)) {
+    if (!read_fields(rq, &fields, BY_DEFAULT, STORED | COMPUTED, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
@@ -305,6 +355,59 @@ void results_get(api *context, http_request *rq, http_reply *reply)
 
 void results_reply(api *context, const job *j, http_reply *reply)
 {
-    const wanted fields = {.reactions = true, .gaps = true};
-    reply_one(context, &(place){.j = j, .summary = j->summary}, &fields, reply);
+    const field_list fields = {.which = BY_DEFAULT};
+    encode_one(context, &(place){.j = j, .summary = j->summary}, &fields, NULL, reply);
+}
+
+/* --------------------------------------------------------------------- vtu */
+
+static const unsigned IN_VTU = (STORED | COMPUTED | UZ_FIELD_MATERIALS) & ~(unsigned)UZ_FIELD_STRESS_GAUSS;
+static const unsigned VTU_BY_DEFAULT = UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_VON_MISES |
+                                       UZ_FIELD_PRESSURE | UZ_FIELD_GAPS | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_MATERIALS;
+
+static void refuse_all_cases(const store_case *cases, size_t count, http_reply *reply)
+{
+    problem_details problem;
+    http_problem(&problem, 400, "case_needed", "Each load case has a file of its own",
+                 "say which one with ?case=NAME.");
+    cases_list(&problem, cases, count);
+    reply_problem(reply, &problem);
+}
+
+static void write_vtu(api *context, const http_request *rq, const job *j, int64_t number, unsigned which,
+                      http_reply *reply)
+{
+    field_reader reader;
+    char *text = NULL;
+    size_t len = 0;
+    if (fields_open(&reader, context, rq, j, reply) && fields_vtu(&text, &len, &reader, number, which, reply))
+        reply_text(reply, 200, "application/xml", text, len);
+    fields_close(&reader);
+}
+
+static void reply_vtu(api *context, const http_request *rq, const job *j, unsigned which, http_reply *reply)
+{
+    store_case *cases = NULL;
+    size_t count = 0;
+    if (!load_cases(context, rq, j, &cases, &count, reply))
+        return;
+    if (count > 0 && !target_value(&rq->target, "case"))
+        refuse_all_cases(cases, count, reply);
+    else
+        write_vtu(context, rq, j, count > 0 ? cases[0].number : 0, which, reply);
+    store_cases_free(cases, count);
+}
+
+void results_get_vtu(api *context, http_request *rq, http_reply *reply)
+{
+    field_list fields;
+    problem_details problem;
+    job j = {0};
+    if (!read_fields(rq, &fields, VTU_BY_DEFAULT, IN_VTU, &problem)) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply))
+        reply_vtu(context, rq, &j, fields.which, reply);
+    job_clear(&j);
 }

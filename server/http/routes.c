@@ -18,6 +18,7 @@ static const route ROUTES[] = {
     {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete},
     {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine},
     {"GET", "/v1/jobs/{id}/result", RESULT, results_get},
+    {"GET", "/v1/jobs/{id}/result.vtu", RESULT, results_get_vtu},
     {"GET", "/v1/jobs/{id}/history", HISTORY, history_get},
     {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv},
     {"POST", "/v1/verify", NONE, verify_submit},

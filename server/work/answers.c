@@ -37,17 +37,6 @@ static bool add_places(answers *a, answer_parts *to, const uz_result *result, bo
     return true;
 }
 
-static bool add_pressure(answer_parts *to, const uz_result *result)
-{
-    if (!result->mesh.contact_node)
-        return true;
-    to->pressure = calloc((size_t)result->m + 1, sizeof *to->pressure);
-    for (int64_t i = 0; to->pressure && i < result->m; i++)
-        to->pressure[i] = (0.0 - result->r[i]) / result->mesh.contact_area[i];
-    add_vector(to, "pressure", to->pressure, result->m);
-    return to->pressure != NULL;
-}
-
 /* Without memory for it the run can't be continued, and that is all. */
 static void add_state(answer_parts *to, const uz_result *result)
 {
@@ -57,14 +46,14 @@ static void add_state(answer_parts *to, const uz_result *result)
     add_vector(to, STATE_VECTOR, to->state, count);
 }
 
-static bool add_vectors(answer_parts *to, const uz_result *result, bool is_scene)
+static void add_vectors(answer_parts *to, const uz_result *result, bool is_scene)
 {
     add_vector(to, "reactions", result->r, result->m);
     add_vector(to, "gaps", result->g, result->m);
     add_vector(to, "ray", result->ray, result->m);
     add_vector(to, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
+    add_vector(to, "pressure", result->pressure, result->m);
     add_state(to, result);
-    return !is_scene || add_pressure(to, result);
 }
 
 /* ---- history */
@@ -113,7 +102,8 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     answer_parts *parts = &a->parts[i];
     codec_run run = {.started_from = request->answer.u ? NULL : origin_name(result->summary.origin)};
     parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
-    return parts->summary && add_vectors(parts, result, is_scene) &&
+    add_vectors(parts, result, is_scene);
+    return parts->summary &&
            add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
                        has_earlier ? from->rows[i] : 0);
 }
@@ -192,7 +182,6 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
 static void clear_parts(answer_parts *parts)
 {
     free(parts->summary);
-    free(parts->pressure);
     free(parts->history);
     free(parts->state);
 }

@@ -12,7 +12,7 @@
 /* What one case, or the job, leaves; owns everything but the vectors that are the result's own. */
 typedef struct {
     char *summary;
-    double *pressure, *history, *state;
+    double *history, *state;
     store_vector vectors[ANSWER_VECTORS];
     size_t n_vectors;
     int64_t history_rows;

@@ -109,8 +109,9 @@ void uz_vtu_array(uz_vtu *vtu, const char *name, uz_vtu_type type, const void *d
         const char *name;
         size_t size;
     } TYPES[] = {{"Float64", sizeof(double)}, {"Int64", sizeof(int64_t)}, {"UInt8", 1}};
-    put(vtu, "        <DataArray type=\"%s\" Name=\"%s\" NumberOfComponents=\"%d\"", TYPES[type].name, name,
-        components);
+    put(vtu, "        <DataArray type=\"%s\" Name=\"%s\"", TYPES[type].name, name);
+    if (components > 1)
+        put(vtu, " NumberOfComponents=\"%d\"", components);
     for (int c = 0; labels && c < components; c++)
         put(vtu, " ComponentName%d=\"%s\"", c, labels[c]);
     put(vtu, " format=\"binary\">");

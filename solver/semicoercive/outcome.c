@@ -3,6 +3,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "fields/evaluate.h"
 #include "semicoercive/pressed.h"
 #include "semicoercive/semi.h"
 #include "solve.h"
@@ -155,9 +156,7 @@ static uz_status describe_scene(uz_semi *s, uz_error *err)
     result->u = nodal;
     result->n_nodes = mesh->n_nodes;
     uz_status status = uz_mesh_info_copy(&result->mesh, &s->model.info, s->m, err);
-    if (status == UZ_OK)
-        uz_report_pressure(result);
-    return status;
+    return status == UZ_OK ? uz_evaluate(result, &s->model, &s->problem->scene, err) : status;
 }
 
 static uz_outcome outcome_of(const uz_semi *s)

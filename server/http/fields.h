@@ -1,0 +1,40 @@
+/* fields.h: what an answer means, computed from the stored request and the stored answer when somebody asks. */
+#ifndef SERVER_HTTP_FIELDS_H
+#define SERVER_HTTP_FIELDS_H
+
+#include "codec/codec.h"
+#include "http/request.h"
+
+/* How many replies may be computed at a time; others wait for their turn, each in its connection's thread. */
+typedef struct field_slots field_slots;
+field_slots *field_slots_new(int count); /* NULL: no memory */
+void field_slots_free(field_slots *slots);
+
+/* A job's problem, opened for as many of its cases as wanted. */
+typedef struct {
+    api *context;
+    const http_request *rq;
+    const job *j;
+    codec_request request;
+    bool has_slot, is_open;
+} field_reader;
+
+/* Waits for a turn and decodes the stored request. False with a 409 for a problem in matrices, a 503 where no turn came
+ * in time, or a failure of the store. fields_close in every case. */
+bool fields_open(field_reader *reader, api *context, const http_request *rq, const job *j, http_reply *reply);
+void fields_close(field_reader *reader);
+
+/* Case number 0: the job has none. `which`: uz_field bits. False with a reply. */
+bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply);
+bool fields_vtu(char **text, size_t *len, const field_reader *reader, int64_t number, unsigned which,
+                http_reply *reply);
+
+/* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits). False with a 400
+ * that has the list. */
+typedef struct {
+    unsigned which;
+    bool nodes;
+} field_list;
+bool fields_parse(field_list *out, const char *text, unsigned allowed, problem_details *problem);
+
+#endif

@@ -1,0 +1,13 @@
+/* evaluate.h: what an answer to a scene comes to, for its summary. */
+#ifndef UZ_FIELDS_EVALUATE_H
+#define UZ_FIELDS_EVALUATE_H
+
+#include "assembly/assembly.h"
+#include "uzawa.h"
+
+/* Fills result->pressure, result->evaluation and the summary's force, max_pressure and evaluation from result->u, r and
+ * mesh. scene: with the loads of the case; model: its body. Takes time in proportion to the contact, the supports and
+ * loads, and one look at each edge of the mesh. UZ_ERR_MEMORY. */
+uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err);
+
+#endif
