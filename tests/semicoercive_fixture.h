@@ -15,14 +15,15 @@ __attribute__((constructor)) static void settle_process(void)
 
 /* ---------------------------------------------------------------- the reference */
 
-/* Gauss elimination with partial pivoting of the n x n system A x = b, row by row. False: singular. */
-static inline bool quad_eliminate(quad *A, quad *b, int64_t n)
+/* Gauss elimination with partial pivoting of the n x n system A x = b, row by row. False: singular, a pivot is less
+ * than `least`. */
+static inline bool quad_eliminate(quad *A, quad *b, int64_t n, double least)
 {
     for (int64_t k = 0; k < n; k++) {
         int64_t best = k;
         for (int64_t i = k + 1; i < n; i++)
             best = quad_abs(A[i * n + k]) > quad_abs(A[best * n + k]) ? i : best;
-        if (quad_abs(A[best * n + k]) < 1e-20)
+        if (quad_abs(A[best * n + k]) < least)
             return false;
         for (int64_t j = 0; j < n && best != k; j++) {
             quad t = A[k * n + j];
@@ -49,6 +50,7 @@ static inline bool quad_eliminate(quad *A, quad *b, int64_t n)
 
 typedef struct {
     int64_t d, m;
+    double least;  /* smaller pivots are zero */
     double *K, *N; /* dense, row by row */
     quad u[64];
     bool exists; /* some active set meets the KKT conditions, and gives one u only */
@@ -74,7 +76,7 @@ static inline bool try_set(exhaustive *x, const uz_qp *qp, unsigned set)
             b[k] = qp->h[rows[k - x->d]];
         }
     }
-    if (!quad_eliminate(A, b, n))
+    if (!quad_eliminate(A, b, n, x->least))
         return false;
     bool strict = true;
     for (int64_t k = x->d; k < n; k++) {
@@ -97,9 +99,10 @@ static inline bool try_set(exhaustive *x, const uz_qp *qp, unsigned set)
     return true;
 }
 
-static inline exhaustive search_all(const uz_qp *qp)
+/* least: what rounding may have left of a zero in the entries of K. */
+static inline exhaustive search_all_above(const uz_qp *qp, double least)
 {
-    exhaustive x = {.d = qp->K.cols, .m = qp->N.rows};
+    exhaustive x = {.d = qp->K.cols, .m = qp->N.rows, .least = least};
     x.K = dense_symmetric(&qp->K);
     x.N = vector(x.m * x.d);
     for (int64_t j = 0; j < x.d; j++)
@@ -109,6 +112,11 @@ static inline exhaustive search_all(const uz_qp *qp)
         if (try_set(&x, qp, set))
             break;
     return x;
+}
+
+static inline exhaustive search_all(const uz_qp *qp)
+{
+    return search_all_above(qp, 1e-20);
 }
 
 static inline void exhaustive_free(exhaustive *x)

@@ -1,5 +1,5 @@
-/* box.c: the mesh of a rectangle. */
-#include "scene/mesh.h"
+/* box.c: the mesh of a rectangle or a cuboid: what may be asked for, where its grid lines are, its nodes. */
+#include "scene/box.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
@@ -8,8 +8,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { DIM = 2, CORNERS = 4, SIDES = 4 };
 
 static uz_status fail_at(uz_error *err, uz_status status, const char *key, int i, const char *message)
 {
@@ -20,153 +18,210 @@ static uz_status fail_at(uz_error *err, uz_status status, const char *key, int i
 
 static uz_status check_kind(const uz_box *box, uz_error *err)
 {
-    if (box->dim != DIM)
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/size", "a box of %d dimensions; only 2 are built", box->dim);
-    if (strncmp(box->element, "quad4", sizeof box->element) != 0)
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/element", "no element \"%.15s\" in a box; use quad4",
-                       box->element);
+    char name[sizeof box->element + 1] = "";
+    uz_element_kind kind;
+    if (box->dim != 2 && box->dim != 3)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/size", "a box of %d dimensions; only 2 and 3 are built", box->dim);
+    memcpy(name, box->element, sizeof box->element);
+    if (!uz_element_parse(&kind, name) || uz_element_dim(kind) != box->dim)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/element", "no element \"%.15s\" in a box of %d dimensions; use %s",
+                       name, box->dim, box->dim == 2 ? "quad4, quad8, tri3 or tri6" : "hex8, tet4 or tet10");
     return UZ_OK;
 }
 
 static uz_status check_lengths(const uz_box *box, uz_error *err)
 {
-    for (int i = 0; i < DIM; i++) {
+    for (int i = 0; i < box->dim; i++) {
         if (!isfinite(box->origin[i]))
             return fail_at(err, UZ_ERR_NOT_FINITE, "origin", i, "the origin is not a finite number");
         if (!isfinite(box->size[i]))
             return fail_at(err, UZ_ERR_NOT_FINITE, "size", i, "the size is not a finite number");
         if (box->size[i] <= 0)
             return fail_at(err, UZ_ERR_SCENE, "size", i, "the size of a box must be positive");
+        if (!isfinite(box->grading[i]))
+            return fail_at(err, UZ_ERR_NOT_FINITE, "grading", i, "the grading is not a finite number");
+        if (box->grading[i] < 0)
+            return fail_at(err, UZ_ERR_SCENE, "grading", i,
+                           "the grading is the size of the last cell over that of the first: it must be positive");
     }
     return UZ_OK;
 }
 
+/* Nodes of a lattice of two points a cell that quad8 has not: the centres of its cells. */
+static int64_t missing_nodes(const uz_box *box, uz_element_kind kind)
+{
+    return kind == UZ_QUAD8 ? box->cells[0] * box->cells[1] : 0;
+}
+
 static uz_status check_cells(const uz_box *box, uz_error *err)
 {
-    int64_t dofs = DIM;
-    for (int i = 0; i < DIM; i++) {
+    const uz_element_kind kind = uz_box_element(box);
+    const int order = uz_box_order(kind);
+    int64_t dofs = box->dim;
+    for (int i = 0; i < box->dim; i++) {
         if (box->cells[i] < 1)
             return fail_at(err, UZ_ERR_SCENE, "cells", i, "a box needs at least one cell in each direction");
         if (box->cells[i] >= UZ_SCENE_MAX_DOFS)
             return fail_at(err, UZ_ERR_SCENE, "cells", i, "too many cells");
-        if (__builtin_mul_overflow(dofs, box->cells[i] + 1, &dofs) || dofs > UZ_SCENE_MAX_DOFS)
-            return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
-                           "the box would have more than %d unknowns; use fewer cells", UZ_SCENE_MAX_DOFS);
+        if (__builtin_mul_overflow(dofs, order * box->cells[i] + 1, &dofs))
+            dofs = INT64_MAX / (2 * UZ_SCENE_MAX_DOFS);
     }
+    if (dofs - box->dim * missing_nodes(box, kind) > UZ_SCENE_MAX_DOFS)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
+                       "the box would have more than %d unknowns; use fewer cells", UZ_SCENE_MAX_DOFS);
     return UZ_OK;
+}
+
+static bool is_graded(const uz_box *box, int axis)
+{
+    return box->grading[axis] != 0 && box->grading[axis] != 1 && box->cells[axis] > 1;
+}
+
+/* The share of the whole that lies before the i-th of cells + 1 grid lines. Cells grow by the factor
+ * q = grading^(1 / (cells - 1)), so that it is (q^i - 1) / (q^cells - 1). */
+static double share_before(const uz_box *box, int axis, int64_t i)
+{
+    const double n = (double)box->cells[axis];
+    if (!is_graded(box, axis))
+        return (double)i / n;
+    const double growth = log(box->grading[axis]) / (n - 1);
+    return i == box->cells[axis] ? 1 : expm1((double)i * growth) / expm1(n * growth);
 }
 
 /* i-th of cells + 1 grid lines; both ends are exact up to one rounding. */
 static double grid_line(const uz_box *box, int axis, int64_t i)
 {
-    return box->origin[axis] + box->size[axis] * ((double)i / (double)box->cells[axis]);
+    return box->origin[axis] + box->size[axis] * share_before(box, axis, i);
 }
 
 /* Far from the origin of the axes, double precision may put two grid lines on one place. */
 static uz_status check_spacing(const uz_box *box, uz_error *err)
 {
-    for (int axis = 0; axis < DIM; axis++) {
-        double cell = box->size[axis] / (double)box->cells[axis];
+    for (int axis = 0; axis < box->dim; axis++) {
+        const int64_t n = box->cells[axis];
+        double first = share_before(box, axis, 1), last = 1 - share_before(box, axis, n - 1);
+        double cell = box->size[axis] * (is_graded(box, axis) ? fmin(first, last) : 1 / (double)n);
         double reach = fabs(box->origin[axis]) + box->size[axis];
         if (!isfinite(reach))
             return fail_at(err, UZ_ERR_NOT_FINITE, "size", axis, "the box reaches beyond the largest number");
         if (!(cell > 1e-10 * reach))
-            return fail_at(err, UZ_ERR_SCENE, "origin", axis,
+            return fail_at(err, UZ_ERR_SCENE, is_graded(box, axis) ? "grading" : "origin", axis,
                            "the cells are too small for their distance from zero to be told apart; "
                            "move the origin or use fewer cells");
     }
     return UZ_OK;
 }
 
-static void fill_nodes(double *xyz, const uz_box *box)
+/* ---- nodes: points of a lattice of `order` steps a cell, x fastest */
+
+uz_element_kind uz_box_element(const uz_box *box)
 {
-    for (int64_t j = 0; j <= box->cells[1]; j++)
-        for (int64_t i = 0; i <= box->cells[0]; i++) {
-            *xyz++ = grid_line(box, 0, i);
-            *xyz++ = grid_line(box, 1, j);
-        }
+    char name[sizeof box->element + 1] = "";
+    uz_element_kind kind = UZ_QUAD4;
+    memcpy(name, box->element, sizeof box->element);
+    uz_element_parse(&kind, name);
+    return kind;
 }
 
-static void fill_elements(uz_mesh *mesh, const uz_box *box)
+int uz_box_order(uz_element_kind kind)
 {
-    const int64_t row = box->cells[0] + 1;
-    int64_t *node = mesh->node;
-    for (int64_t j = 0; j < box->cells[1]; j++)
-        for (int64_t i = 0; i < box->cells[0]; i++) {
-            int64_t first = j * row + i;
-            *node++ = first;
-            *node++ = first + 1;
-            *node++ = first + row + 1;
-            *node++ = first + row;
-        }
-    for (int64_t e = 0; e <= mesh->n_elements; e++)
-        mesh->first[e] = CORNERS * e;
-    memset(mesh->kind, UZ_QUAD4, (size_t)mesh->n_elements);
+    return kind == UZ_TRI6 || kind == UZ_QUAD8 || kind == UZ_TET10 ? 2 : 1;
 }
 
-/* A side of the box: nodes first, first + stride, ..., and the sides numbered `side` of `n` elements from `element` on,
- * `step` apart. */
-typedef struct {
-    const char *name;
-    int64_t first, stride, n, element, step;
-    int side;
-} box_side;
-
-static uz_status fill_side(uz_group *group, const box_side *s, uz_error *err)
+int64_t uz_box_node(const uz_box *box, uz_element_kind kind, const int64_t at[3])
 {
-    group->kind = UZ_GROUP_FACES;
-    snprintf(group->name, sizeof group->name, "%s", s->name);
-    group->node = uz_alloc(s->n + 1, sizeof *group->node);
-    group->face = uz_alloc(s->n, sizeof *group->face);
-    if (!group->node || !group->face)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the side \"%s\" of a box", s->name);
-    group->n_nodes = s->n + 1;
-    group->n_faces = s->n;
-    for (int64_t i = 0; i <= s->n; i++)
-        group->node[i] = s->first + i * s->stride;
-    for (int64_t i = 0; i < s->n; i++)
-        group->face[i] = (uz_face){s->element + i * s->step, s->side};
-    return UZ_OK;
+    const int order = uz_box_order(kind);
+    const int64_t row = order * box->cells[0] + 1;
+    if (kind == UZ_QUAD8) {
+        const int64_t pair = row + box->cells[0] + 1; /* a row of corners and middles, and one of middles above it */
+        return at[1] % 2 ? at[1] / 2 * pair + row + at[0] / 2 : at[1] / 2 * pair + at[0];
+    }
+    return (at[2] * (order * box->cells[1] + 1) + at[1]) * row + at[0];
 }
 
-static uz_status fill_groups(uz_mesh *mesh, const uz_box *box, uz_error *err)
+/* A point of the lattice along one axis: a grid line, or the middle between two. */
+static double lattice_line(const uz_box *box, int axis, int order, int64_t i)
 {
-    const int64_t nx = box->cells[0], ny = box->cells[1], row = nx + 1;
-    const box_side sides[SIDES] = {{"left", 0, row, ny, 0, nx, 3},
-                                   {"right", nx, row, ny, nx - 1, nx, 1},
-                                   {"bottom", 0, 1, nx, 0, 1, 0},
-                                   {"top", ny * row, 1, nx, (ny - 1) * nx, 1, 2}};
-    uz_status status = UZ_OK;
-    mesh->groups = uz_alloc_zero(SIDES + 1, sizeof *mesh->groups);
-    if (!mesh->groups)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the groups of a box");
-    mesh->n_groups = SIDES + 1;
-    for (int i = 0; i < SIDES && status == UZ_OK; i++)
-        status = fill_side(&mesh->groups[i], &sides[i], err);
-    mesh->groups[SIDES].kind = UZ_GROUP_ELEMENTS;
-    mesh->groups[SIDES].everything = true;
-    snprintf(mesh->groups[SIDES].name, sizeof mesh->groups[SIDES].name, "all");
-    return status;
+    if (order == 1 || i % 2 == 0)
+        return grid_line(box, axis, i / order);
+    if (!is_graded(box, axis))
+        return box->origin[axis] + box->size[axis] * ((double)i / (double)(order * box->cells[axis]));
+    return 0.5 * (grid_line(box, axis, i / 2) + grid_line(box, axis, i / 2 + 1));
+}
+
+/* The lattice along each axis, once: logarithms for every node would take longer than all the rest. */
+static double *lattice_lines(const uz_box *box, int axis, int order)
+{
+    const int64_t count = axis < box->dim ? order * box->cells[axis] + 1 : 1;
+    double *line = uz_alloc(count, sizeof *line);
+    for (int64_t i = 0; line && axis < box->dim && i < count; i++)
+        line[i] = lattice_line(box, axis, order, i);
+    return line;
+}
+
+static void place_nodes(uz_mesh *mesh, const uz_box *box, uz_element_kind kind, double *const line[3])
+{
+    const int order = uz_box_order(kind);
+    const int64_t end[3] = {order * box->cells[0], order * box->cells[1], box->dim == 3 ? order * box->cells[2] : 0};
+    double *xyz = mesh->xyz;
+    for (int64_t k = 0; k <= end[2]; k++)
+        for (int64_t j = 0; j <= end[1]; j++)
+            for (int64_t i = 0; i <= end[0]; i++) {
+                if (kind == UZ_QUAD8 && i % 2 && j % 2)
+                    continue;
+                *xyz++ = line[0][i];
+                *xyz++ = line[1][j];
+                if (box->dim == 3)
+                    *xyz++ = line[2][k];
+            }
+}
+
+static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_element_kind kind, uz_error *err)
+{
+    double *line[3];
+    for (int axis = 0; axis < 3; axis++)
+        line[axis] = lattice_lines(box, axis, uz_box_order(kind));
+    const bool room = line[0] && line[1] && line[2];
+    if (room)
+        place_nodes(mesh, box, kind, line);
+    for (int axis = 0; axis < 3; axis++)
+        free(line[axis]);
+    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grid lines of a box");
+}
+
+/* ---- the whole */
+
+static void measure(uz_mesh *mesh, const uz_box *box, uz_element_kind kind)
+{
+    int64_t cells = 1, nodes = 1;
+    mesh->dim = box->dim;
+    mesh->uniform = kind == UZ_QUAD4 || kind == UZ_HEX8;
+    for (int axis = 0; axis < box->dim; axis++) {
+        cells *= box->cells[axis];
+        nodes *= uz_box_order(kind) * box->cells[axis] + 1;
+        mesh->cell[axis] = box->size[axis] / (double)box->cells[axis];
+        mesh->extent = axis == 0 ? box->size[0] : hypot(mesh->extent, box->size[axis]);
+        mesh->uniform = mesh->uniform && !is_graded(box, axis);
+    }
+    mesh->n_nodes = nodes - missing_nodes(box, kind);
+    mesh->n_elements = cells * uz_box_parts(kind);
 }
 
 static uz_status fill(uz_mesh *mesh, const uz_box *box, uz_error *err)
 {
-    mesh->dim = DIM;
-    mesh->n_nodes = (box->cells[0] + 1) * (box->cells[1] + 1);
-    mesh->n_elements = box->cells[0] * box->cells[1];
-    mesh->uniform = true;
-    mesh->extent = hypot(box->size[0], box->size[1]);
-    for (int axis = 0; axis < DIM; axis++)
-        mesh->cell[axis] = box->size[axis] / (double)box->cells[axis];
-    mesh->xyz = uz_alloc(mesh->n_nodes * DIM, sizeof *mesh->xyz);
+    const uz_element_kind kind = uz_box_element(box);
+    measure(mesh, box, kind);
+    mesh->xyz = uz_alloc(mesh->n_nodes * box->dim, sizeof *mesh->xyz);
     mesh->kind = uz_alloc(mesh->n_elements, sizeof *mesh->kind);
     mesh->first = uz_alloc(mesh->n_elements + 1, sizeof *mesh->first);
-    mesh->node = uz_alloc(mesh->n_elements * CORNERS, sizeof *mesh->node);
+    mesh->node = uz_alloc(mesh->n_elements * uz_element_node_count(kind), sizeof *mesh->node);
     if (!mesh->xyz || !mesh->kind || !mesh->first || !mesh->node)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a mesh of %lld nodes", (long long)mesh->n_nodes);
-    fill_nodes(mesh->xyz, box);
-    fill_elements(mesh, box);
-    return fill_groups(mesh, box, err);
+    uz_status status = fill_nodes(mesh, box, kind, err);
+    if (status != UZ_OK)
+        return status;
+    uz_box_fill_elements(mesh, box, kind);
+    return uz_box_fill_groups(mesh, box, kind, err);
 }
 
 uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err)

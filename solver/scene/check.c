@@ -53,10 +53,14 @@ static uz_status check_counts(const uz_scene *scene, uz_error *err)
     return UZ_OK;
 }
 
-static uz_status check_model(const uz_scene *scene, uz_error *err)
+static uz_status check_model(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
-    if (scene->model != UZ_PLANE_STRESS && scene->model != UZ_PLANE_STRAIN)
-        return uz_fail(err, UZ_ERR_SCENE, "/model", "unknown model; use plane_stress or plane_strain");
+    if (scene->model > UZ_SOLID)
+        return uz_fail(err, UZ_ERR_SCENE, "/model",
+                       "unknown model; use plane_stress, plane_strain, axisymmetric or solid");
+    if (uz_model_dim(scene->model) != mesh->dim)
+        return uz_fail(err, UZ_ERR_SCENE, "/model", "a mesh in %d dimensions needs the model %s", mesh->dim,
+                       mesh->dim == 3 ? "solid" : "plane_stress, plane_strain or axisymmetric");
     if (!isfinite(scene->thickness))
         return uz_fail(err, UZ_ERR_NOT_FINITE, "/thickness", "the thickness is not a finite number");
     if (scene->thickness <= 0)
@@ -188,7 +192,7 @@ static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mes
 
 uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
-    uz_status status = check_model(scene, err);
+    uz_status status = check_model(scene, mesh, err);
     if (status == UZ_OK)
         status = check_materials(scene, mesh, err);
     if (status == UZ_OK)

@@ -25,6 +25,7 @@ typedef struct {
     int64_t n_nodes, *node;
     int64_t n_faces;
     uz_face *face;                /* faces only */
+    int64_t n_inner;              /* how many of them lie between two elements: `face` names the first of the two */
     int64_t n_elements, *element; /* elements only, ascending */
 } uz_group;
 
@@ -37,14 +38,30 @@ typedef struct {
     int64_t *node;
     bool uniform; /* every element is a box of size `cell` and of one kind: they share one stiffness matrix */
     double cell[3];
-    double extent; /* diagonal of the bounding box */
+    double extent;    /* diagonal of the bounding box */
+    int64_t n_unused; /* nodes of a file that no element uses: left out, and the others numbered anew in their order */
     uz_group *groups;
     int64_t n_groups;
 } uz_mesh;
 
-/* Nodes x fastest, row by row from the bottom; elements likewise. Groups: left, right, bottom, top, all.
+/* Nodes x fastest, row by row from the bottom, with the middles of edges in their places; elements by cells likewise.
+ * A cell is one quad4, quad8 or hex8, two tri3 or tri6, six tet4 or tet10. Groups: left and right (x), bottom and top
+ * (y), in 3D back (lowest z) and front (highest z); all. `uniform` where all cells are equal and of one element.
  * Errors: UZ_ERR_SCENE or _NOT_FINITE at "/mesh/box/...". */
 uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err);
+
+/* A mesh in numbers, checked: everything in range and finite, no element degenerate, inverted, concave at a corner or
+ * there twice, no node without an element (those of a file are left out). Groups of one name become one: of elements if
+ * any of them has some, else of faces, else of nodes. Added to them: "all", and "boundary" (the faces that belong to
+ * one element only, by element) if no group is called so. dim: what the scene's model asks for.
+ * Errors: UZ_ERR_SCENE or _NOT_FINITE at "/mesh/nodes/...", "/mesh/elements/...", "/mesh/groups/..." or "/mesh/gmsh".
+ */
+uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, uz_error *err);
+
+/* The mesh of a scene, whatever it comes from. */
+uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err);
+/* Dimensions of the bodies that a model is for: 2 or 3. */
+int uz_model_dim(uz_model model);
 void uz_mesh_clear(uz_mesh *mesh);
 
 /* The nodes of an element; *count of them. */
@@ -57,6 +74,9 @@ int uz_mesh_face(int64_t node[UZ_FACE_NODES], const uz_mesh *mesh, uz_face face)
 /* Sides of an element; the local nodes of one of them, corners first: [2] or [3] in 2D, [3], [4] or [6] in 3D. */
 int uz_element_side_count(uz_element_kind kind);
 int uz_element_side(const int **local, uz_element_kind kind, int side);
+/* How many nodes of an element, and of each side of it, are corners. They come first. */
+int uz_element_corner_count(uz_element_kind kind);
+int uz_face_corner_count(uz_element_kind kind);
 
 /* The group of that name, or NULL with UZ_ERR_SCENE at `where`, listing the names that there are. */
 const uz_group *uz_mesh_group(const uz_mesh *mesh, const char *name, const char *where, uz_error *err);

@@ -92,7 +92,7 @@ TEST(tilted_body_is_that_of_the_exhaustive_search)
     CHECK(uz_body_model_build_held(&model, &scene, &err) == UZ_OK);
     uz_qp qp = {.K = model.K, .N = model.N, .p = vector(model.d), .h = vector(model.m)};
     CHECK(uz_body_model_load(qp.p, qp.h, NULL, &model, &scene, &err) == UZ_OK);
-    exhaustive exact = search_all(&qp);
+    exhaustive exact = search_all_above(&qp, 1e-6); /* K's entries are of 1e6 and rounded */
     CHECK(exact.exists && exact.strict && exact.set != 0x7f);
     uz_result *result = solve_problem(&problem, &settings);
     if (result) {

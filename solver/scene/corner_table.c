@@ -1,0 +1,168 @@
+#include "scene/corner_table.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* An item of a bucket while it is sorted: the corners after the lowest one, ascending, -1 beyond them. */
+typedef struct {
+    int64_t corner[UZ_MOST_CORNERS - 1];
+    uz_face item;
+} sort_entry;
+
+static void sort_nodes(int64_t *node, int count)
+{
+    for (int i = 1; i < count; i++) {
+        const int64_t moved = node[i];
+        int j = i;
+        for (; j > 0 && node[j - 1] > moved; j--)
+            node[j] = node[j - 1];
+        node[j] = moved;
+    }
+}
+
+/* The corners of a side or of a whole element, ascending, -1 beyond them. */
+static void sorted_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh, uz_face item)
+{
+    const uz_element_kind kind = (uz_element_kind)mesh->kind[item.element];
+    const int64_t *node = mesh->node + mesh->first[item.element];
+    const int *local = NULL;
+    const int count = item.side < 0 ? uz_element_corner_count(kind) : uz_face_corner_count(kind);
+    if (item.side >= 0)
+        uz_element_side(&local, kind, item.side);
+    for (int i = 0; i < UZ_MOST_CORNERS; i++)
+        corner[i] = i >= count ? -1 : local ? node[local[i]] : node[i];
+    sort_nodes(corner, count);
+}
+
+static int compare_corners(const int64_t *a, const int64_t *b)
+{
+    for (int i = 0; i < UZ_MOST_CORNERS - 1; i++)
+        if (a[i] != b[i])
+            return a[i] < b[i] ? -1 : 1;
+    return 0;
+}
+
+static int compare_entries(const void *a, const void *b)
+{
+    const sort_entry *x = a, *y = b;
+    const int order = compare_corners(x->corner, y->corner);
+    if (order)
+        return order;
+    if (x->item.element != y->item.element)
+        return x->item.element < y->item.element ? -1 : 1;
+    return (x->item.side > y->item.side) - (x->item.side < y->item.side);
+}
+
+/* Calls for every item: counts it into start[lowest + 1], or, if `place`, puts it where start[lowest] says. */
+static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, bool place)
+{
+    int64_t corner[UZ_MOST_CORNERS];
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const int last = sides ? uz_element_side_count((uz_element_kind)mesh->kind[e]) - 1 : -1;
+        for (int s = sides ? 0 : -1; s <= last; s++) {
+            sorted_corners(corner, mesh, (uz_face){e, s});
+            if (place)
+                table->item[table->start[corner[0]]++] = (uz_face){e, s};
+            else
+                table->start[corner[0] + 1]++;
+        }
+    }
+}
+
+static void sort_bucket(uz_corner_table *table, const uz_mesh *mesh, int64_t from, int64_t end, sort_entry *entry)
+{
+    int64_t corner[UZ_MOST_CORNERS];
+    for (int64_t i = from; i < end; i++) {
+        sorted_corners(corner, mesh, table->item[i]);
+        memcpy(entry[i - from].corner, corner + 1, sizeof entry->corner);
+        entry[i - from].item = table->item[i];
+    }
+    qsort(entry, (size_t)(end - from), sizeof *entry, compare_entries);
+    for (int64_t i = from; i < end; i++) {
+        table->item[i] = entry[i - from].item;
+        table->same[i] = i > from && compare_corners(entry[i - from].corner, entry[i - from - 1].corner) == 0;
+    }
+}
+
+static int64_t largest_bucket(const uz_corner_table *table, int64_t n_nodes)
+{
+    int64_t largest = 0;
+    for (int64_t i = 0; i < n_nodes; i++)
+        if (table->start[i + 1] - table->start[i] > largest)
+            largest = table->start[i + 1] - table->start[i];
+    return largest;
+}
+
+static uz_status sort_buckets(uz_corner_table *table, const uz_mesh *mesh, uz_error *err)
+{
+    sort_entry *entry = uz_alloc(largest_bucket(table, mesh->n_nodes), sizeof *entry);
+    if (!entry)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare %lld elements", (long long)mesh->n_elements);
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        sort_bucket(table, mesh, table->start[i], table->start[i + 1], entry);
+    free(entry);
+    return UZ_OK;
+}
+
+uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool sides, uz_error *err)
+{
+    memset(out, 0, sizeof *out);
+    out->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *out->start);
+    if (out->start) {
+        walk_items(out, mesh, sides, false);
+        for (int64_t i = 0; i < mesh->n_nodes; i++)
+            out->start[i + 1] += out->start[i];
+        out->count = out->start[mesh->n_nodes];
+        out->item = uz_alloc(out->count, sizeof *out->item);
+        out->same = uz_alloc(out->count, sizeof *out->same);
+    }
+    uz_status status = UZ_OK;
+    if (!out->start || !out->item || !out->same) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare %lld elements", (long long)mesh->n_elements);
+    } else {
+        walk_items(out, mesh, sides, true);
+        memmove(out->start + 1, out->start, (size_t)mesh->n_nodes * sizeof *out->start); /* placing moved each on */
+        out->start[0] = 0;
+        status = sort_buckets(out, mesh, err);
+    }
+    if (status != UZ_OK)
+        uz_corner_table_clear(out);
+    return status;
+}
+
+void uz_corner_table_clear(uz_corner_table *table)
+{
+    free(table->start);
+    free(table->item);
+    free(table->same);
+    memset(table, 0, sizeof *table);
+}
+
+int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, int64_t *corner, int count)
+{
+    int64_t wanted[UZ_MOST_CORNERS], there[UZ_MOST_CORNERS];
+    sort_nodes(corner, count);
+    for (int i = 0; i < UZ_MOST_CORNERS; i++)
+        wanted[i] = i < count ? corner[i] : -1;
+    int64_t low = table->start[corner[0]], high = table->start[corner[0] + 1], end = high;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        sorted_corners(there, mesh, table->item[middle]);
+        if (compare_corners(there + 1, wanted + 1) < 0)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    if (low == end)
+        return -1;
+    sorted_corners(there, mesh, table->item[low]);
+    return compare_corners(there + 1, wanted + 1) == 0 ? low : -1;
+}
+
+bool uz_corner_table_shared(const uz_corner_table *table, int64_t place)
+{
+    return place + 1 < table->count && table->same[place + 1];
+}

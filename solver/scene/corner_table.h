@@ -1,0 +1,27 @@
+/* corner_table.h: which elements, or sides of elements, have the same corners.
+ *
+ * Items are put into buckets by their lowest corner, and sorted within a bucket by the others: n log n whatever the
+ * mesh, where a hash table has a worst case that a mesh can be made for. */
+#ifndef UZ_SCENE_CORNER_TABLE_H
+#define UZ_SCENE_CORNER_TABLE_H
+
+#include "scene/mesh.h"
+
+enum { UZ_MOST_CORNERS = 8 };
+
+typedef struct {
+    int64_t *start;      /* n_nodes + 1: the bucket of node i is item[start[i]..start[i + 1]) */
+    uz_face *item;       /* sides; or whole elements, whose `side` is -1; equal ones by element */
+    unsigned char *same; /* has the item before it the same corners? */
+    int64_t count;
+} uz_corner_table;
+
+uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool sides, uz_error *err);
+void uz_corner_table_clear(uz_corner_table *table);
+
+/* Place of the first item with these corners, which are sorted here; -1 if there is none. Nodes must be in range. */
+int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, int64_t *corner, int count);
+/* Is the item at this place, the first of its corners, followed by another of the same? */
+bool uz_corner_table_shared(const uz_corner_table *table, int64_t place);
+
+#endif

@@ -1,0 +1,24 @@
+/* given.h: the steps of uz_mesh_from_given. */
+#ifndef UZ_SCENE_GIVEN_H
+#define UZ_SCENE_GIVEN_H
+
+#include "scene/mesh.h"
+
+enum { UZ_POINTER = 96 };
+
+/* Most groups of a mesh. */
+#define UZ_MESH_MAX_GROUPS 4096
+
+/* Where a person finds an element: "/mesh/elements/quad4/3", or "/mesh/gmsh". */
+void uz_given_element_place(char where[UZ_POINTER], const uz_given_mesh *given, int64_t element);
+/* An element for a message: "element 12 (quad4 with nodes 4, 7, 9, 3)". */
+enum { UZ_ELEMENT_TEXT = 160 };
+void uz_given_element_text(char text[UZ_ELEMENT_TEXT], const uz_given_mesh *given, int64_t element);
+
+/* Kinds, node numbers, coordinates, shapes of all elements. */
+uz_status uz_given_check(const uz_given_mesh *given, uz_error *err);
+
+/* The groups of a mesh whose nodes and elements are there. new_node: the number of each given node, -1: left out. */
+uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err);
+
+#endif

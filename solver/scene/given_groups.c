@@ -1,0 +1,404 @@
+/* given_groups.c: named parts of a given mesh, and the two that every mesh has: "all" and "boundary". */
+#include "scene/given.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "scene/corner_table.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What the groups are made from. */
+typedef struct {
+    uz_mesh *mesh;
+    const uz_given_mesh *given;
+    const int64_t *new_node;
+    uz_corner_table sides;
+    uz_error *err;
+} group_work;
+
+/* A growing list of numbers. */
+typedef struct {
+    int64_t *value, count, room;
+} number_list;
+
+static uz_status no_memory(const group_work *work)
+{
+    return uz_fail(work->err, UZ_ERR_MEMORY, "", "no memory for the groups of a mesh");
+}
+
+static bool append(number_list *list, int64_t value)
+{
+    if (list->count == list->room) {
+        const int64_t room = 2 * list->room + 64;
+        int64_t *grown = uz_realloc(list->value, room, sizeof *grown);
+        if (!grown)
+            return false;
+        list->value = grown;
+        list->room = room;
+    }
+    list->value[list->count++] = value;
+    return true;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Sorts the list and leaves each number once. */
+static void sort_unique(number_list *list)
+{
+    int64_t kept = 0;
+    if (list->count > 1)
+        qsort(list->value, (size_t)list->count, sizeof *list->value, ascending);
+    for (int64_t i = 0; i < list->count; i++)
+        if (i == 0 || list->value[i] != list->value[kept - 1])
+            list->value[kept++] = list->value[i];
+    list->count = kept;
+}
+
+/* ---- where a group is in the request */
+
+/* "/mesh/groups/NAME/key/i", the name escaped as RFC 6901 asks; i < 0: without it. */
+static void group_place(char where[UZ_POINTER], const uz_given_mesh *given, const uz_given_group *group,
+                        const char *key, int64_t i)
+{
+    enum { LONGEST = 44 };
+    char name[2 * sizeof group->name] = "", item[24] = "";
+    size_t used = 0;
+    for (size_t k = 0; k < sizeof group->name && group->name[k]; k++) {
+        const char c = group->name[k];
+        used += (size_t)snprintf(name + used, sizeof name - used, c == '~' ? "~0" : c == '/' ? "~1" : "%c", c);
+    }
+    for (used = used > LONGEST ? LONGEST : used; used > 0 && ((unsigned char)name[used] & 0xc0) == 0x80; used--)
+        ; /* a character is not cut in two */
+    name[used] = '\0';
+    if (i >= 0)
+        snprintf(item, sizeof item, "/%lld", (long long)i);
+    if (given->from_file)
+        snprintf(where, UZ_POINTER, "/mesh/gmsh");
+    else
+        snprintf(where, UZ_POINTER, "/mesh/groups/%s/%s%s", name, key, item);
+}
+
+static const char *face_key(const group_work *work)
+{
+    return work->mesh->dim == 2 ? "edges" : "faces";
+}
+
+/* ---- faces */
+
+static uz_status refuse_face(const group_work *work, const uz_given_group *group, int64_t i, const char *what)
+{
+    char where[UZ_POINTER], nodes[UZ_ELEMENT_TEXT] = "";
+    int used = 0;
+    for (int64_t q = group->face_first[i]; q < group->face_first[i + 1] && used < UZ_ELEMENT_TEXT; q++)
+        used += snprintf(nodes + used, (size_t)(UZ_ELEMENT_TEXT - used), "%s%lld", used ? ", " : "",
+                         (long long)group->face_node[q]);
+    group_place(where, work->given, group, face_key(work), i);
+    return uz_fail(work->err, UZ_ERR_SCENE, where, "the %s with nodes %s of the group \"%s\" %s",
+                   work->mesh->dim == 2 ? "edge" : "face", nodes, group->name, what);
+}
+
+/* Corners among so many nodes of a face; 0: no face has so many. */
+static int corners_among(int64_t nodes, int dim)
+{
+    if (dim == 2)
+        return nodes == 2 || nodes == 3 ? 2 : 0;
+    return nodes == 3 || nodes == 6 ? 3 : nodes == 4 ? 4 : 0;
+}
+
+/* Are the middles that came with a face those of the element's side? */
+static bool middles_agree(const group_work *work, uz_face face, const int64_t *node, int64_t count)
+{
+    int64_t there[UZ_FACE_NODES];
+    const int has = uz_mesh_face(there, work->mesh, face);
+    for (int64_t i = 0; i < count; i++) {
+        bool found = false;
+        for (int k = 0; k < has; k++)
+            found = found || there[k] == node[i];
+        if (!found)
+            return false;
+    }
+    return true;
+}
+
+/* The side of an element that a given face is. */
+static uz_status match_face(uz_face *out, bool *inner, const group_work *work, const uz_given_group *group, int64_t i)
+{
+    int64_t node[UZ_FACE_NODES], corner[UZ_MOST_CORNERS];
+    const int64_t count = group->face_first[i + 1] - group->face_first[i];
+    const int corners = corners_among(count, work->mesh->dim);
+    if (corners == 0)
+        return refuse_face(work, group, i,
+                           work->mesh->dim == 2 ? "has not 2 nodes, nor 3 with the one in its middle"
+                                                : "has not 3 or 4 corners, nor 3 with the middles of its edges");
+    for (int k = 0; k < count; k++) {
+        const int64_t given = group->face_node[group->face_first[i] + k];
+        if (given < 0 || given >= work->given->n_nodes)
+            return refuse_face(work, group, i, "has a node that is not there; nodes are numbered from 0");
+        node[k] = work->new_node[given];
+        if (node[k] < 0)
+            return refuse_face(work, group, i, "belongs to no element; a group holds sides of elements");
+    }
+    memcpy(corner, node, (size_t)corners * sizeof *corner);
+    const int64_t place = uz_corner_table_find(&work->sides, work->mesh, corner, corners);
+    if (place < 0)
+        return refuse_face(work, group, i, "belongs to no element; a group holds sides of elements");
+    *out = work->sides.item[place];
+    *inner = uz_corner_table_shared(&work->sides, place);
+    if (!middles_agree(work, *out, node, count))
+        return refuse_face(work, group, i, "has other nodes in the middle of its edges than the element there");
+    return UZ_OK;
+}
+
+/* Of a face that occurs again, which happens where groups of one name overlap, the first one stays. code: a number
+ * of each face. */
+static bool drop_repeated(uz_group *group, const number_list *code)
+{
+    number_list sorted = {uz_alloc(code->count, sizeof *code->value), code->count, code->count};
+    int64_t kept = 0;
+    if (!sorted.value)
+        return false;
+    memcpy(sorted.value, code->value, (size_t)code->count * sizeof *code->value);
+    sort_unique(&sorted);
+    unsigned char *seen = uz_alloc_zero(sorted.count, sizeof *seen);
+    for (int64_t i = 0; seen && sorted.count < code->count && i < code->count; i++) {
+        const int64_t *at =
+            bsearch(&code->value[i], sorted.value, (size_t)sorted.count, sizeof *sorted.value, ascending);
+        if (!seen[at - sorted.value]++)
+            group->face[kept++] = group->face[i];
+    }
+    if (seen && sorted.count < code->count)
+        group->n_faces = kept;
+    const bool done = seen != NULL;
+    free(seen);
+    free(sorted.value);
+    return done;
+}
+
+/* ---- one name */
+
+/* Everything that is given under one name. */
+typedef struct {
+    number_list nodes, faces, elements; /* faces: element * UZ_SIDE_STEP + side */
+    int64_t n_inner;
+} named_parts;
+
+enum { UZ_SIDE_STEP = 8 };
+
+static uz_status collect_nodes(named_parts *parts, const group_work *work, const uz_given_group *group)
+{
+    char where[UZ_POINTER];
+    for (int64_t i = 0; i < group->n_nodes; i++) {
+        const int64_t given = group->node[i];
+        group_place(where, work->given, group, "nodes", i);
+        if (given < 0 || given >= work->given->n_nodes)
+            return uz_fail(work->err, UZ_ERR_SCENE, where,
+                           "the group \"%s\" asks for node %lld, but there are only 0 to %lld", group->name,
+                           (long long)given, (long long)work->given->n_nodes - 1);
+        if (work->new_node[given] >= 0 && !append(&parts->nodes, work->new_node[given]))
+            return no_memory(work);
+    }
+    return UZ_OK;
+}
+
+static uz_status collect_faces(named_parts *parts, const group_work *work, const uz_given_group *group)
+{
+    for (int64_t i = 0; i < group->n_faces; i++) {
+        int64_t node[UZ_FACE_NODES];
+        uz_face face = {0, 0};
+        bool inner = false;
+        const uz_status status = match_face(&face, &inner, work, group, i);
+        if (status != UZ_OK)
+            return status;
+        const int count = uz_mesh_face(node, work->mesh, face);
+        bool room = append(&parts->faces, face.element * UZ_SIDE_STEP + face.side);
+        for (int k = 0; k < count && room; k++)
+            room = append(&parts->nodes, node[k]);
+        if (!room)
+            return no_memory(work);
+        parts->n_inner += inner;
+    }
+    return UZ_OK;
+}
+
+static uz_status collect_elements(named_parts *parts, const group_work *work, const uz_given_group *group)
+{
+    char where[UZ_POINTER];
+    for (int64_t i = 0; i < group->n_elements; i++) {
+        const int64_t e = group->element[i];
+        int count;
+        group_place(where, work->given, group, "elements", i);
+        if (e < 0 || e >= work->mesh->n_elements)
+            return uz_fail(work->err, UZ_ERR_SCENE, where,
+                           "the group \"%s\" asks for element %lld, but there are only 0 to %lld", group->name,
+                           (long long)e, (long long)work->mesh->n_elements - 1);
+        const int64_t *node = uz_mesh_element(work->mesh, e, &count);
+        bool room = append(&parts->elements, e);
+        for (int k = 0; k < count && room; k++)
+            room = append(&parts->nodes, node[k]);
+        if (!room)
+            return no_memory(work);
+    }
+    return UZ_OK;
+}
+
+static uz_status collect(named_parts *parts, const group_work *work, const uz_given_group *group)
+{
+    uz_status status = collect_nodes(parts, work, group);
+    if (status == UZ_OK)
+        status = collect_faces(parts, work, group);
+    return status == UZ_OK ? collect_elements(parts, work, group) : status;
+}
+
+/* Gives the lists to the group. */
+static uz_status finish_group(uz_group *out, named_parts *parts, const group_work *work)
+{
+    sort_unique(&parts->nodes);
+    sort_unique(&parts->elements);
+    out->kind = parts->elements.count ? UZ_GROUP_ELEMENTS : parts->faces.count ? UZ_GROUP_FACES : UZ_GROUP_NODES;
+    out->node = parts->nodes.value;
+    out->n_nodes = parts->nodes.count;
+    parts->nodes = (number_list){NULL, 0, 0};
+    if (out->kind == UZ_GROUP_ELEMENTS) {
+        out->element = parts->elements.value;
+        out->n_elements = parts->elements.count;
+        parts->elements = (number_list){NULL, 0, 0};
+    }
+    if (out->kind != UZ_GROUP_FACES)
+        return UZ_OK;
+    out->face = uz_alloc(parts->faces.count, sizeof *out->face);
+    if (!out->face)
+        return no_memory(work);
+    for (int64_t i = 0; i < parts->faces.count; i++)
+        out->face[out->n_faces++] =
+            (uz_face){parts->faces.value[i] / UZ_SIDE_STEP, (int)(parts->faces.value[i] % UZ_SIDE_STEP)};
+    out->n_inner = parts->n_inner;
+    return drop_repeated(out, &parts->faces) ? UZ_OK : no_memory(work);
+}
+
+/* The group of all that is given under the name of group i, unless an earlier one had it. */
+static uz_status add_named(const group_work *work, int64_t i)
+{
+    uz_mesh *mesh = work->mesh;
+    const uz_given_group *groups = work->given->groups;
+    named_parts parts = {0};
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < i; k++)
+        if (strcmp(groups[k].name, groups[i].name) == 0)
+            return UZ_OK;
+    for (int64_t k = i; k < work->given->n_groups && status == UZ_OK; k++)
+        if (strcmp(groups[k].name, groups[i].name) == 0)
+            status = collect(&parts, work, &groups[k]);
+    if (status == UZ_OK) {
+        uz_group *out = &mesh->groups[mesh->n_groups++];
+        snprintf(out->name, sizeof out->name, "%s", groups[i].name);
+        status = finish_group(out, &parts, work);
+    }
+    free(parts.nodes.value);
+    free(parts.faces.value);
+    free(parts.elements.value);
+    return status;
+}
+
+/* ---- the groups that every mesh has */
+
+/* The faces that belong to one element only, in the order of their elements. */
+static uz_status collect_boundary(named_parts *parts, const group_work *work)
+{
+    const uz_corner_table *sides = &work->sides;
+    for (int64_t i = 0; i < sides->count; i++) {
+        int64_t node[UZ_FACE_NODES];
+        if (sides->same[i] || uz_corner_table_shared(sides, i))
+            continue;
+        const int count = uz_mesh_face(node, work->mesh, sides->item[i]);
+        bool room = append(&parts->faces, sides->item[i].element * UZ_SIDE_STEP + sides->item[i].side);
+        for (int k = 0; k < count && room; k++)
+            room = append(&parts->nodes, node[k]);
+        if (!room)
+            return no_memory(work);
+    }
+    sort_unique(&parts->faces);
+    return UZ_OK;
+}
+
+static uz_status add_boundary(const group_work *work)
+{
+    uz_mesh *mesh = work->mesh;
+    named_parts parts = {0};
+    uz_status status = collect_boundary(&parts, work);
+    if (status == UZ_OK) {
+        uz_group *out = &mesh->groups[mesh->n_groups++];
+        snprintf(out->name, sizeof out->name, "boundary");
+        status = finish_group(out, &parts, work);
+    }
+    free(parts.nodes.value);
+    free(parts.faces.value);
+    free(parts.elements.value);
+    return status;
+}
+
+static uz_group *find_group(uz_mesh *mesh, const char *name)
+{
+    for (int64_t i = 0; i < mesh->n_groups; i++)
+        if (strcmp(mesh->groups[i].name, name) == 0)
+            return &mesh->groups[i];
+    return NULL;
+}
+
+/* Whoever calls a group "all" may mean nothing less. */
+static uz_status add_all(const group_work *work)
+{
+    uz_mesh *mesh = work->mesh;
+    uz_group *all = find_group(mesh, "all");
+    if (all && all->n_elements < mesh->n_elements)
+        return uz_fail(work->err, UZ_ERR_SCENE, work->given->from_file ? "/mesh/gmsh" : "/mesh/groups/all",
+                       "a group called \"all\" is not all elements of the mesh; give it another name");
+    if (!all)
+        all = &mesh->groups[mesh->n_groups++];
+    free(all->node);
+    free(all->face);
+    free(all->element);
+    *all = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
+    return UZ_OK;
+}
+
+static uz_status check_groups(const uz_given_mesh *given, uz_error *err)
+{
+    char where[UZ_POINTER];
+    if (given->n_groups > UZ_MESH_MAX_GROUPS)
+        return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups",
+                       "%lld groups; at most %d are allowed", (long long)given->n_groups, UZ_MESH_MAX_GROUPS);
+    for (int64_t i = 0; i < given->n_groups; i++) {
+        const uz_given_group *group = &given->groups[i];
+        snprintf(where, sizeof where, "/mesh/groups");
+        if (!group->name[0] || strnlen(group->name, sizeof group->name) == sizeof group->name)
+            return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : where,
+                           "the name of a group has 1 to %zu bytes", sizeof group->name - 1);
+    }
+    return UZ_OK;
+}
+
+uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err)
+{
+    group_work work = {.mesh = mesh, .given = given, .new_node = new_node, .err = err};
+    uz_status status = check_groups(given, err);
+    if (status != UZ_OK)
+        return status;
+    mesh->groups = uz_alloc_zero(given->n_groups + 2, sizeof *mesh->groups);
+    if (!mesh->groups)
+        return no_memory(&work);
+    status = uz_corner_table_build(&work.sides, mesh, true, err);
+    for (int64_t i = 0; i < given->n_groups && status == UZ_OK; i++)
+        status = add_named(&work, i);
+    if (status == UZ_OK && !find_group(mesh, "boundary"))
+        status = add_boundary(&work);
+    if (status == UZ_OK)
+        status = add_all(&work);
+    uz_corner_table_clear(&work.sides);
+    return status;
+}
