@@ -610,6 +610,23 @@ void uz_fields_clear(uz_fields *fields);
 uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                        const uz_hooks *hooks, uz_error *err);
 
+/* ---------------------------------------------------------------- pictures */
+
+/* How a deformed body is drawn. */
+typedef struct {
+    int width;         /* of the picture in pixels, 200 to 4000; 0: 900 */
+    double factor;     /* displacements are drawn this many times as large; 0: chosen so that they show */
+    uz_field colour;   /* UZ_FIELD_DISPLACEMENTS (their length) or UZ_FIELD_VON_MISES */
+    const char *title; /* may be NULL */
+} uz_picture;
+
+/* The deformed body in colour over its undeformed outline, the obstacles (plane models), an arrow for the contact force
+ * at each node that touches (at most some 80 of them), a colour bar: as SVG, with the body's colours as a PNG image in
+ * it, so that the size does not grow with the mesh. Solids are seen from the front, the right and above.
+ * *svg is NUL-terminated, the caller frees it. Errors: those of uz_fields_compute, _ARGUMENT. */
+uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
+                              const uz_picture *how, const uz_hooks *hooks, uz_error *err);
+
 /* ------------------------------------------------------------ factor cache */
 
 /* Thread-safe, bounded in bytes, least recently used first out. Entries in use are never freed under their user. */

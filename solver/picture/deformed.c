@@ -1,0 +1,150 @@
+/* deformed.c: a picture of an answer. */
+#include "core/alloc.h"
+#include "core/error.h"
+#include "picture/scenery.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+enum { LEGEND = 48, WIDTH = 900 };
+
+static const char STYLE[] =
+    "<style>text{font:12px system-ui,sans-serif;fill:#333}.title{font-weight:600}path{fill:none}"
+    ".before{stroke:#9aa0a8;stroke-dasharray:4 3}.obstacle{stroke:#555;stroke-width:2}.ticks{stroke:#888}"
+    ".push{stroke:#c2255c;stroke-width:1.5}</style>\n";
+
+/* Lengths of the displacements, or the stress, by node. */
+static uz_status make_values(double **out, uz_scenery *scenery, const uz_field_body *body, uz_field colour,
+                             const uz_hooks *hooks, uz_error *err)
+{
+    const uz_mesh *mesh = &scenery->model->mesh;
+    uz_fields fields;
+    const unsigned which = colour == UZ_FIELD_VON_MISES ? UZ_FIELD_VON_MISES : UZ_FIELD_DISPLACEMENTS;
+    uz_status status = uz_fields_of_body(&fields, body, scenery->answer, which, hooks, err);
+    if (status != UZ_OK)
+        return status;
+    if (which == UZ_FIELD_VON_MISES) {
+        *out = fields.von_mises;
+        fields.von_mises = NULL;
+    } else {
+        *out = uz_alloc_zero(mesh->n_nodes, sizeof **out);
+    }
+    uz_fields_clear(&fields);
+    if (!*out)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the colours of %lld nodes", (long long)mesh->n_nodes);
+    for (int64_t i = 0; which != UZ_FIELD_VON_MISES && i < mesh->n_nodes * mesh->dim; i++)
+        (*out)[i / mesh->dim] = hypot((*out)[i / mesh->dim], scenery->answer->u[i]);
+    return UZ_OK;
+}
+
+static void measure_values(uz_scenery *scenery, uz_field colour)
+{
+    scenery->low = INFINITY;
+    scenery->high = -INFINITY;
+    for (int64_t a = 0; a < scenery->model->mesh.n_nodes; a++) {
+        scenery->low = fmin(scenery->low, scenery->value[a]);
+        scenery->high = fmax(scenery->high, scenery->value[a]);
+    }
+    scenery->what = colour == UZ_FIELD_VON_MISES ? "von Mises stress" : "displacement";
+}
+
+static void put_head(uz_buffer *svg, const uz_scenery *scenery, const char *title)
+{
+    const int height = scenery->height + LEGEND;
+    uz_buffer_print(svg,
+                    "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
+                    "role=\"img\">\n<title>",
+                    scenery->width, height, scenery->width, height);
+    uz_buffer_put_escaped(svg, title ? title : "deformed body");
+    uz_buffer_print(svg, "</title>\n%s<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n", STYLE, scenery->width,
+                    height);
+}
+
+static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_hooks *hooks, uz_error *err)
+{
+    uz_raster raster;
+    uz_status status = uz_raster_init(&raster, scenery->width, scenery->height, err);
+    if (status == UZ_OK)
+        status = uz_scenery_paint(&raster, scenery, hooks, err);
+    if (status == UZ_OK) {
+        uz_buffer_print(svg, "<image width=\"%d\" height=\"%d\" href=\"data:image/png;base64,", scenery->width,
+                        scenery->height);
+        status = uz_raster_put_png(svg, &raster, err);
+        uz_buffer_print(svg, "\"/>\n");
+    }
+    uz_raster_clear(&raster);
+    return status;
+}
+
+static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *body, const uz_picture *how,
+                      const uz_hooks *hooks, uz_error *err)
+{
+    double *value = NULL;
+    uz_status status = make_values(&value, scenery, body, how->colour, hooks, err);
+    scenery->value = value;
+    if (status == UZ_OK) {
+        measure_values(scenery, how->colour);
+        status = uz_scenery_fit(scenery, err);
+    }
+    if (status == UZ_OK) {
+        put_head(svg, scenery, how->title);
+        uz_buffer_print(svg, "<svg width=\"%d\" height=\"%d\">\n", scenery->width, scenery->height);
+        uz_scenery_put_outline(svg, scenery);
+        status = put_body(svg, scenery, hooks, err);
+    }
+    if (status == UZ_OK) {
+        uz_scenery_put_obstacles(svg, scenery);
+        uz_scenery_put_arrows(svg, scenery);
+        uz_buffer_print(svg, "</svg>\n");
+        uz_scenery_put_legend(svg, scenery, how->title);
+        uz_buffer_print(svg, "</svg>\n");
+    }
+    free(value);
+    return status;
+}
+
+static uz_status check(const uz_field_source *answer, const uz_body_model *model, const uz_picture *how, uz_error *err)
+{
+    const int64_t n_u = model->mesh.n_nodes * model->mesh.dim;
+    if (how->width != 0 && (how->width < 200 || how->width > 4000))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a picture must lie in 200 to 4000, it is %d",
+                       how->width);
+    if (!(how->factor >= 0 && isfinite(how->factor)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the factor of the displacements must not be negative");
+    if (how->colour != UZ_FIELD_DISPLACEMENTS && how->colour != UZ_FIELD_VON_MISES)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a picture shows displacements or von_mises");
+    if (!answer->u || answer->n_u != n_u || (model->m > 0 && (!answer->r || answer->m != model->m)))
+        return uz_fail(err, UZ_ERR_SIZE, "u", "a picture needs %lld displacements and %lld reactions", (long long)n_u,
+                       (long long)model->m);
+    return UZ_OK;
+}
+
+uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
+                              const uz_picture *how, const uz_hooks *hooks, uz_error *err)
+{
+    uz_body_model model;
+    uz_field_body body = {.scene = scene};
+    uz_buffer text = {0};
+    uz_error_reset(err);
+    *svg = NULL;
+    *len = 0;
+    uz_status status = uz_body_model_outline(&model, scene, err);
+    if (status == UZ_OK)
+        status = check(answer, &model, how, err);
+    if (status == UZ_OK)
+        status = uz_field_body_init(&body, scene, &model, err);
+    if (status == UZ_OK) {
+        uz_scenery scenery = {.scene = scene,
+                              .model = &model,
+                              .answer = answer,
+                              .factor = how->factor,
+                              .width = how->width ? how->width : WIDTH};
+        status = draw(&text, &scenery, &body, how, hooks, err);
+    }
+    if (status == UZ_OK)
+        status = uz_buffer_finish(svg, len, &text, err);
+    uz_buffer_drop(&text);
+    uz_field_body_clear(&body);
+    uz_body_model_clear(&model);
+    return status;
+}

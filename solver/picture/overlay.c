@@ -1,0 +1,192 @@
+/* overlay.c: what stands around the body: its outline before, obstacles, contact forces, the legend. */
+#include "picture/scenery.h"
+#include "scene/corner_table.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { MOST_OUTLINE = 20000, MOST_ARROWS = 80, ARROW = 55, TICK = 9 };
+
+void uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery)
+{
+    const uz_mesh *mesh = &scenery->model->mesh;
+    uz_corner_table sides;
+    if (mesh->dim != 2 || uz_corner_table_build(&sides, mesh, true, NULL) != UZ_OK)
+        return; /* a picture without it is still one */
+    uz_buffer_print(svg, "<path class=\"before\" d=\"");
+    for (int64_t i = 0, drawn = 0; i < sides.count && drawn < MOST_OUTLINE; i++) {
+        int64_t node[UZ_FACE_NODES];
+        if (sides.same[i] || uz_corner_table_shared(&sides, i))
+            continue;
+        uz_mesh_face(node, mesh, sides.item[i]);
+        const uz_raster_point a = uz_scenery_node(scenery, node[0], 0), b = uz_scenery_node(scenery, node[1], 0);
+        uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1f", a.x, a.y, b.x, b.y);
+        drawn++;
+    }
+    uz_buffer_print(svg, "\"/>\n");
+    uz_corner_table_clear(&sides);
+}
+
+/* One stroke of an obstacle's border with the obstacle on its right, and ticks into it. */
+typedef struct {
+    uz_buffer *svg, ticks;
+    uz_raster_point last;
+    bool started;
+    double travelled; /* since the last tick */
+} border;
+
+static void border_to(border *b, uz_raster_point p)
+{
+    const double reach = 1e4; /* far outside of every picture, and short enough to print */
+    p.x = fmin(fmax(p.x, -reach), reach);
+    p.y = fmin(fmax(p.y, -reach), reach);
+    uz_buffer_print(b->svg, "%c%.1f %.1f", b->started ? 'L' : 'M', p.x, p.y);
+    const double dx = p.x - b->last.x, dy = p.y - b->last.y, length = b->started ? hypot(dx, dy) : 0;
+    if (length > 0) {
+        double at = TICK - b->travelled;
+        for (; at <= length; at += TICK) {
+            const double x = b->last.x + at * dx / length, y = b->last.y + at * dy / length;
+            /* Right of the way on the paper, where y points down, is (-dy, dx); the tick leans back. */
+            uz_buffer_print(&b->ticks, "M%.1f %.1fl%.1f %.1f", x, y, (-dy - dx) / length * 0.7 * TICK,
+                            (dx - dy) / length * 0.7 * TICK);
+        }
+        b->travelled = length - (at - TICK);
+    }
+    b->last = p;
+    b->started = true;
+}
+
+/* The line through `point` along `way`, well beyond the picture. */
+static void border_line(border *b, const uz_scenery *scenery, const double point[2], const double way[2])
+{
+    const uz_raster_point p = uz_scenery_point(scenery, point);
+    const double length = hypot(way[0], way[1]), reach = 2.0 * (scenery->width + scenery->height);
+    const double dx = way[0] / length, dy = -way[1] / length;
+    /* The part of it that is nearest to the middle of the picture. */
+    const double along = (0.5 * scenery->width - p.x) * dx + (0.5 * scenery->height - p.y) * dy;
+    for (int side = -1; side <= 1; side += 2)
+        border_to(b, (uz_raster_point){.x = p.x + (along + side * reach / 2) * dx,
+                                       .y = p.y + (along + side * reach / 2) * dy});
+}
+
+static void border_circle(border *b, const uz_scenery *scenery, const uz_contact *contact)
+{
+    enum { STEPS = 720 };
+    for (int i = 0; i <= STEPS; i++) {
+        /* Clockwise the disc is on the right; for a hole the other way. */
+        const double angle = (contact->inside ? 2 : -2) * 3.14159265358979 * i / STEPS;
+        const double x[2] = {contact->point[0] + contact->radius * cos(angle),
+                             contact->point[1] + contact->radius * sin(angle)};
+        border_to(b, uz_scenery_point(scenery, x));
+    }
+}
+
+/* Points given by two arrays, going on straight (a polyline) or flat (a table) beyond their ends. */
+static void border_points(border *b, const uz_scenery *scenery, const double *x, const double *y, int64_t n, bool flat)
+{
+    const double far = 10 * scenery->extent;
+    for (int64_t i = -1; i <= n; i++) {
+        const int64_t k = i < 0 ? 0 : i < n ? i : n - 1, near = i < 0 ? 1 : n - 2;
+        double at[2] = {x[k], y[k]};
+        if (k != i) {
+            double way[2] = {x[k] - x[near], flat ? 0 : y[k] - y[near]};
+            const double length = hypot(way[0], way[1]);
+            at[0] += far * way[0] / length;
+            at[1] += far * way[1] / length;
+        }
+        border_to(b, uz_scenery_point(scenery, at));
+    }
+}
+
+static void put_obstacle(uz_buffer *svg, const uz_scenery *scenery, const uz_contact *contact)
+{
+    border b = {.svg = svg};
+    uz_buffer_print(svg, "<path class=\"obstacle\" d=\"");
+    if (contact->kind == UZ_OBSTACLE_PLANE)
+        border_line(&b, scenery, contact->point, (const double[2]){contact->normal[1], -contact->normal[0]});
+    else if (contact->kind == UZ_OBSTACLE_ROUND)
+        border_circle(&b, scenery, contact);
+    else if (contact->kind == UZ_OBSTACLE_POLYLINE)
+        border_points(&b, scenery, contact->x, contact->y, contact->n_x, false);
+    else if (contact->kind == UZ_OBSTACLE_HEIGHT)
+        border_points(&b, scenery, contact->x, contact->z, contact->n_x, true);
+    uz_buffer_print(svg, "\"/><path class=\"ticks\" d=\"");
+    uz_buffer_put(svg, b.ticks.data, b.ticks.len);
+    svg->failed = svg->failed || b.ticks.failed;
+    uz_buffer_drop(&b.ticks);
+    uz_buffer_print(svg, "\"/>\n");
+}
+
+void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
+{
+    for (int64_t k = 0; scenery->model->mesh.dim == 2 && k < scenery->scene->n_contacts; k++)
+        if (scenery->scene->contacts[k].kind != UZ_OBSTACLE_BODY)
+            put_obstacle(svg, scenery, &scenery->scene->contacts[k]);
+}
+
+/* Force per area where there is one, so that arrows follow the pressure and not the mesh. */
+static double push_of(const uz_scenery *scenery, int64_t row)
+{
+    const double area = scenery->model->info.contact_area[row];
+    return area > 0 ? -scenery->answer->r[row] / area : 0;
+}
+
+static void put_arrow(uz_buffer *svg, const uz_scenery *scenery, int64_t row, double length)
+{
+    const uz_mesh_info *info = &scenery->model->info;
+    const double *n = info->contact_normal + row * info->dim;
+    const uz_raster_point tip = uz_scenery_node(scenery, info->contact_node[row], scenery->factor);
+    double dx = 0, dy = 0;
+    for (int c = 0; c < info->dim; c++) {
+        dx += scenery->axes[0][c] * n[c];
+        dy -= scenery->axes[1][c] * n[c];
+    }
+    const double head = fmin(6, 0.4 * length);
+    uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1fM%.1f %.1fL%.1f %.1fL%.1f %.1f", tip.x - length * dx, tip.y - length * dy,
+                    tip.x, tip.y, tip.x - head * (dx + 0.5 * dy), tip.y - head * (dy - 0.5 * dx), tip.x, tip.y,
+                    tip.x - head * (dx - 0.5 * dy), tip.y - head * (dy + 0.5 * dx));
+}
+
+void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
+{
+    const int64_t m = scenery->model->m;
+    double largest = 0;
+    int64_t pushing = 0, seen = 0;
+    for (int64_t i = 0; i < m; i++) {
+        largest = fmax(largest, push_of(scenery, i));
+        pushing += push_of(scenery, i) > 0;
+    }
+    if (!(largest > 0))
+        return;
+    const int64_t every = (pushing + MOST_ARROWS - 1) / MOST_ARROWS;
+    uz_buffer_print(svg, "<path class=\"push\" d=\"");
+    for (int64_t i = 0; i < m; i++)
+        if (push_of(scenery, i) > 0 && seen++ % every == 0)
+            put_arrow(svg, scenery, i, ARROW * push_of(scenery, i) / largest);
+    uz_buffer_print(svg, "\"/>\n");
+}
+
+void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title)
+{
+    enum { BAR = 220, STOPS = 8 };
+    const int y = scenery->height + 12, x = scenery->width - BAR - 20;
+    uz_buffer_print(svg, "<defs><linearGradient id=\"scale\">");
+    for (int i = 0; i <= STOPS; i++) {
+        unsigned char rgb[3];
+        uz_colour(rgb, (double)i / STOPS);
+        uz_buffer_print(svg, "<stop offset=\"%g\" stop-color=\"#%02x%02x%02x\"/>", (double)i / STOPS, rgb[0], rgb[1],
+                        rgb[2]);
+    }
+    uz_buffer_print(svg,
+                    "</linearGradient></defs>\n<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"12\" "
+                    "fill=\"url(#scale)\"/>\n",
+                    x, y, BAR);
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\">%.4g</text><text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.4g</text>",
+                    x, y + 26, scenery->low, x + BAR, y + 26, scenery->high);
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", x + BAR / 2, y + 26,
+                    scenery->what);
+    uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", y + 10);
+    uz_buffer_put_escaped(svg, title ? title : "");
+    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements drawn %.6g times as large</text>\n", y + 26,
+                    scenery->factor);
+}
