@@ -27,27 +27,29 @@ void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEM
         }
 }
 
+static double determinant(double J[3][3], int dim)
+{
+    if (dim == 2)
+        return J[0][0] * J[1][1] - J[0][1] * J[1][0];
+    return J[0][0] * (J[1][1] * J[2][2] - J[1][2] * J[2][1]) + J[0][1] * (J[1][2] * J[2][0] - J[1][0] * J[2][2]) +
+           J[0][2] * (J[1][0] * J[2][1] - J[1][1] * J[2][0]);
+}
+
 double uz_invert_jacobian(double inverse[3][3], double J[3][3], int dim)
 {
-    double det;
+    const double det = determinant(J, dim), scale = 1 / det;
     if (dim == 2) {
-        det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
-        inverse[0][0] = J[1][1] / det;
-        inverse[0][1] = -J[0][1] / det;
-        inverse[1][0] = -J[1][0] / det;
-        inverse[1][1] = J[0][0] / det;
+        inverse[0][0] = J[1][1] * scale;
+        inverse[0][1] = -J[0][1] * scale;
+        inverse[1][0] = -J[1][0] * scale;
+        inverse[1][1] = J[0][0] * scale;
         return det;
     }
-    double cofactor[3][3]; /* of J[i][j] */
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++) {
             const int p = (i + 1) % 3, q = (i + 2) % 3, s = (j + 1) % 3, t = (j + 2) % 3;
-            cofactor[i][j] = J[p][s] * J[q][t] - J[p][t] * J[q][s];
+            inverse[j][i] = (J[p][s] * J[q][t] - J[p][t] * J[q][s]) * scale;
         }
-    det = J[0][0] * cofactor[0][0] + J[0][1] * cofactor[0][1] + J[0][2] * cofactor[0][2];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            inverse[j][i] = cofactor[i][j] / det;
     return det;
 }
 
@@ -95,10 +97,9 @@ void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g)
     double largest;
     const double weight = uz_element_gauss(state->point, element->kind, element->model, g);
     state->det = uz_element_gradients(state->grad, element, state->point);
-    uz_element_shape(state->N, element->kind, state->point);
-    state->radius = 0;
     state->volume = weight * state->det;
     if (element->model == UZ_AXISYMMETRIC) {
+        uz_element_shape(state->N, element->kind, state->point);
         state->radius = uz_ring_radius(&largest, element, state->N);
         state->volume *= 2 * PI * state->radius;
     } else if (element->model != UZ_SOLID) {
@@ -168,6 +169,7 @@ void uz_element_add_body_force(double *f, const uz_element *element, const doubl
     for (int g = 0; g < count; g++) {
         uz_gauss_state state;
         uz_gauss_state_at(&state, element, g);
+        uz_element_shape(state.N, element->kind, state.point);
         for (int a = 0; a < nodes; a++)
             for (int c = 0; c < dim; c++)
                 f[a * dim + c] += state.volume * state.N[a] * b[c];
@@ -215,13 +217,13 @@ void uz_element_add_thermal_load(double *f, const uz_element *element, const dou
 /* det against the product of the rows' lengths: a sine, whatever units and aspect ratio. */
 static uz_shape_fault check_point(const uz_element *element, const double point[3])
 {
-    double local[UZ_ELEMENT_NODES][3], J[3][3], inverse[3][3], lengths = 1;
+    double local[UZ_ELEMENT_NODES][3], J[3][3], lengths = 1;
     const int dim = uz_element_dim(element->kind);
     uz_local_gradients(local, element->kind, point);
     uz_jacobian(J, element, local);
     for (int i = 0; i < dim; i++)
-        lengths *= dim == 2 ? hypot(J[i][0], J[i][1]) : hypot(hypot(J[i][0], J[i][1]), J[i][2]);
-    const double det = uz_invert_jacobian(inverse, J, dim);
+        lengths *= sqrt(J[i][0] * J[i][0] + J[i][1] * J[i][1] + (dim == 3 ? J[i][2] * J[i][2] : 0));
+    const double det = determinant(J, dim);
     if (det > FLAT * lengths)
         return UZ_SHAPE_GOOD;
     return det < -FLAT * lengths ? UZ_SHAPE_INVERTED : UZ_SHAPE_DEGENERATE;
