@@ -281,9 +281,9 @@ void uz_scene_clear(uz_scene *scene);
 typedef struct {
     int dim;
     int64_t n_nodes, n_elements;
-    double *xyz;            /* n_nodes x dim, row by row */
-    int64_t *contact_node;  /* m: the node of each contact row */
-    double *contact_area;   /* m: tributary area of each contact node (length x thickness in 2D; of a ring all around) */
+    double *xyz;           /* n_nodes x dim, row by row */
+    int64_t *contact_node; /* m: the node of each contact row */
+    double *contact_area;  /* m: tributary area of each contact node (length x thickness in 2D; of a ring all around) */
     double *contact_normal; /* m x dim: unit normal of the obstacle at the contact, pointing towards the body */
     int64_t *contact_of;    /* m: which contact of the scene */
     int64_t *contact_face;  /* m: against another part of the body, which face of the group `with`; else -1 */

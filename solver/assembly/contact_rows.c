@@ -173,8 +173,8 @@ static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries)
     work->col = uz_alloc(entries, sizeof *work->col);
     work->val = uz_alloc(entries, sizeof *work->val);
     work->area = uz_alloc_zero(model->mesh.n_nodes, sizeof *work->area);
-    return info->contact_node && info->contact_area && info->contact_normal && info->contact_of &&
-           info->contact_face && work->row && work->col && work->val && work->area;
+    return info->contact_node && info->contact_area && info->contact_normal && info->contact_of && info->contact_face &&
+           work->row && work->col && work->val && work->area;
 }
 
 static void free_work(row_work *work)

@@ -116,6 +116,10 @@ static uz_status check(const uz_field_source *answer, const uz_body_model *model
     if (!answer->u || answer->n_u != n_u || (model->m > 0 && (!answer->r || answer->m != model->m)))
         return uz_fail(err, UZ_ERR_SIZE, "u", "a picture needs %lld displacements and %lld reactions", (long long)n_u,
                        (long long)model->m);
+    for (int64_t i = 0; i < n_u; i++)
+        if (!isfinite(answer->u[i]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacement %lld is not finite: there is no answer",
+                           (long long)i);
     return UZ_OK;
 }
 

@@ -1,0 +1,194 @@
+/* Pictures of answers: what is drawn where, and that nothing is lost when something fails. */
+#include "harness.h"
+#include "picture/raster.h"
+#include "scene_fixture.h"
+
+#include <png.h>
+
+/* A scene and its answer. */
+typedef struct {
+    uz_problem problem;
+    uz_result *result;
+    uz_field_source source;
+} solved;
+
+static solved solve_scene(uz_scene scene)
+{
+    solved s = {.problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene}};
+    uz_settings settings = uz_settings_default();
+    uz_error err = {0};
+    CHECK_MSG(uz_solve(&s.result, &s.problem, &settings, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+    s.source = (uz_field_source){.u = s.result->u,
+                                 .r = s.result->r,
+                                 .g = s.result->g,
+                                 .n_u = s.result->n_nodes * s.result->mesh.dim,
+                                 .m = s.result->m};
+    return s;
+}
+
+static void drop(solved *s)
+{
+    uz_result_free(s->result);
+    uz_problem_clear(&s->problem);
+}
+
+static char *draw(const solved *s, uz_picture how)
+{
+    char *svg = NULL;
+    size_t len = 0;
+    uz_error err = {0};
+    CHECK_MSG(uz_picture_deformed(&svg, &len, &s->problem.scene, &s->source, &how, NULL, &err) == UZ_OK, "%s",
+              err.message);
+    CHECK(svg && strlen(svg) == len);
+    return svg;
+}
+
+static int digit(char c)
+{
+    static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    const char *at = c ? strchr(DIGITS, c) : NULL;
+    return at ? (int)(at - DIGITS) : -1;
+}
+
+/* The pixels of the PNG inside a picture. */
+static unsigned char *pixels_of(const char *svg, int *width, int *height)
+{
+    const char *at = strstr(svg, "base64,");
+    unsigned char *file = calloc(strlen(svg), 1), *pixels = NULL;
+    size_t n = 0;
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    for (at = at ? at + 7 : ""; digit(at[0]) >= 0; at += 4) {
+        const int v = digit(at[0]) << 18 | digit(at[1]) << 12 | (digit(at[2]) & 63) << 6 | (digit(at[3]) & 63);
+        file[n++] = (unsigned char)(v >> 16);
+        file[n++] = (unsigned char)(v >> 8);
+        file[n++] = (unsigned char)v;
+    }
+    CHECK(png_image_begin_read_from_memory(&image, file, n));
+    image.format = PNG_FORMAT_RGBA;
+    pixels = calloc(PNG_IMAGE_SIZE(image), 1);
+    CHECK(png_image_finish_read(&image, NULL, pixels, 0, NULL));
+    *width = (int)image.width;
+    *height = (int)image.height;
+    png_image_free(&image);
+    free(file);
+    return pixels;
+}
+
+/* How many pens are put down in the path that begins here. */
+static int count_moves(const char *path)
+{
+    int n = 0;
+    for (path = strstr(path, " d=\"") + 4; *path != '"'; path++)
+        n += *path == 'M';
+    return n;
+}
+
+/* The 60 x 20 body at 13.33 pixels a millimetre, less the margins; held on the left, pulled to the right. */
+TEST(colours_stand_where_the_body_is)
+{
+    solved s = solve_scene(paper_scene(30, 10));
+    int width, height;
+    unsigned char low[3], high[3];
+    char *svg = draw(&s, (uz_picture){.colour = UZ_FIELD_DISPLACEMENTS, .title = "a < b & \"c\""});
+    unsigned char *pixels = pixels_of(svg, &width, &height);
+    CHECK_INT(width, 900);
+    CHECK(height > 300 && height < 450);
+    uz_colour(low, 0);
+    uz_colour(high, 1);
+    long left = 0, right = 0, drawn = 0;
+    for (int64_t i = 0; i < (int64_t)width * height; i++) {
+        const unsigned char *p = pixels + 4 * i;
+        const int x = (int)(i % width);
+        drawn += p[3] == 255;
+        left += p[3] && x < 70 && abs(p[0] - low[0]) < 12 && abs(p[1] - low[1]) < 25 && abs(p[2] - low[2]) < 25;
+        right += p[3] && x > 820 && abs(p[0] - high[0]) < 60 && abs(p[1] - high[1]) < 30 && abs(p[2] - high[2]) < 30;
+        CHECK(p[3] == 0 || (x >= 49 && x <= 851));
+    }
+    CHECK_MSG(left > 1000 && right > 500, "%ld and %ld pixels", left, right);
+    /* Aspect 3: the body fills a third of its width squared. */
+    CHECK_MSG(fabs((double)drawn / (800 * 800 / 3.0) - 1) < 0.15, "%ld pixels", drawn);
+    CHECK(strstr(svg, "a &lt; b &amp; &quot;c&quot;") && !strstr(svg, "a < b"));
+    free(pixels);
+    free(svg);
+    drop(&s);
+}
+
+TEST(an_arrow_for_each_node_that_touches_and_the_obstacle)
+{
+    solved s = solve_scene(paper_scene(30, 10));
+    char *svg = draw(&s, (uz_picture){.colour = UZ_FIELD_VON_MISES, .factor = 100});
+    const char *push = strstr(svg, "class=\"push\""), *obstacle = strstr(svg, "class=\"obstacle\"");
+    CHECK(push && obstacle && strstr(svg, "von Mises stress") && strstr(svg, "drawn 100 times"));
+    /* Each arrow has a shaft and a head: two moves. */
+    CHECK_INT(push ? count_moves(push) : 0, 2 * (int)s.result->summary.active);
+    free(svg);
+    svg = draw(&s, (uz_picture){.colour = UZ_FIELD_DISPLACEMENTS, .width = 300});
+    CHECK(strstr(svg, "viewBox=\"0 0 300 "));
+    free(svg);
+    drop(&s);
+}
+
+/* Tall, flat, far from the origin, not deformed at all, in other units: always a picture of bounded size. */
+TEST(any_body_fits)
+{
+    const double size[4][2] = {{1e-6, 1e3}, {1e3, 1e-6}, {1e-9, 1e-9}, {60, 20}};
+    for (int i = 0; i < 4; i++) {
+        uz_scene scene = box_scene(size[i][0], size[i][1], 4, 4);
+        scene.box.origin[0] = 5 * size[i][0];
+        add_support(&scene, "left", 0, 0);
+        if (i != 3)
+            add_load(&scene, "right", 0, -1);
+        add_plane(&scene, "bottom", 0, i == 2 ? -1 : 0, 1, 1);
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = scene};
+        double *u = calloc(50, sizeof *u), *r = calloc(4, sizeof *r);
+        const uz_field_source source = {.u = u, .r = r, .n_u = 50, .m = 4};
+        char *svg = NULL;
+        size_t len = 0;
+        const uz_picture how = {.colour = UZ_FIELD_DISPLACEMENTS};
+        for (int k = 0; i != 3 && k < 50; k++)
+            u[k] = 1e-3 * size[i][1] * (k % 7);
+        uz_error err = {0};
+        CHECK_MSG(uz_picture_deformed(&svg, &len, &scene, &source, &how, NULL, &err) == UZ_OK, "%s", err.message);
+        CHECK_MSG(len > 1000 && len < 600000, "%zu bytes", len);
+        /* Around the image, whose letters mean nothing. */
+        char *image = svg ? strstr(svg, "base64,") : NULL, *after = image ? strstr(image, "\"/>") : NULL;
+        CHECK(after && !strstr(after, "nan") && !strstr(after, "inf"));
+        if (image)
+            *image = '\0';
+        CHECK(svg && !strstr(svg, "nan") && !strstr(svg, "inf"));
+        free(svg);
+        free(u);
+        free(r);
+        uz_problem_clear(&problem);
+    }
+}
+
+static bool cancel(void *ctx)
+{
+    return ++*(int *)ctx > 0;
+}
+
+TEST(what_cannot_be_drawn_is_refused)
+{
+    solved s = solve_scene(paper_scene(30, 10));
+    char *svg = (char *)1;
+    size_t len = 1;
+    int asked = 0;
+    const uz_hooks hooks = {.ctx = &asked, .cancelled = cancel};
+    const uz_picture good = {.colour = UZ_FIELD_VON_MISES}, wide = {.colour = UZ_FIELD_VON_MISES, .width = 5000},
+                     strange = {.colour = UZ_FIELD_GAPS}, negative = {.colour = UZ_FIELD_VON_MISES, .factor = -1};
+    CHECK_INT(uz_picture_deformed(&svg, &len, &s.problem.scene, &s.source, &wide, NULL, NULL), UZ_ERR_ARGUMENT);
+    CHECK(!svg && len == 0);
+    CHECK_INT(uz_picture_deformed(&svg, &len, &s.problem.scene, &s.source, &strange, NULL, NULL), UZ_ERR_ARGUMENT);
+    CHECK_INT(uz_picture_deformed(&svg, &len, &s.problem.scene, &s.source, &negative, NULL, NULL), UZ_ERR_ARGUMENT);
+    CHECK_INT(uz_picture_deformed(&svg, &len, &s.problem.scene, &s.source, &good, &hooks, NULL), UZ_ERR_CANCELLED);
+    CHECK(asked > 0);
+    s.source.n_u--;
+    CHECK_INT(uz_picture_deformed(&svg, &len, &s.problem.scene, &s.source, &good, NULL, NULL), UZ_ERR_SIZE);
+    s.source.n_u++;
+    s.result->u[17] = NAN;
+    const uz_picture plain = {.colour = UZ_FIELD_DISPLACEMENTS};
+    CHECK_INT(uz_picture_deformed(&svg, &len, &s.problem.scene, &s.source, &plain, NULL, NULL), UZ_ERR_NOT_FINITE);
+    CHECK(!svg);
+    drop(&s);
+}
