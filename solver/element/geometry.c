@@ -6,25 +6,34 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #define PI 3.14159265358979323846
 
 /* The sine of the least angle, in the sense of Hadamard's inequality, that is more than rounding. */
 #define FLAT (64 * DBL_EPSILON)
 
-void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEMENT_NODES][3])
+/* Positions are taken from the first node, so that an element far from the origin keeps its digits. Inlined for each
+ * dim, whose loops the compiler then unrolls. */
+static inline void add_nodes(double J[3][3], const double *xyz, double local[UZ_ELEMENT_NODES][3], int nodes, int dim)
 {
-    const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    const double *first = element->xyz;
-    for (int i = 0; i < dim; i++)
-        for (int j = 0; j < dim; j++)
-            J[i][j] = 0;
     for (int a = 1; a < nodes; a++)
         for (int j = 0; j < dim; j++) {
-            const double from_first = element->xyz[a * dim + j] - first[j];
+            const double from_first = xyz[a * dim + j] - xyz[j];
             for (int i = 0; i < dim; i++)
                 J[i][j] += local[a][i] * from_first;
         }
+}
+
+void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEMENT_NODES][3])
+{
+    double sum[3][3] = {{0}};
+    const int nodes = uz_element_node_count(element->kind);
+    if (uz_element_dim(element->kind) == 2)
+        add_nodes(sum, element->xyz, local, nodes, 2);
+    else
+        add_nodes(sum, element->xyz, local, nodes, 3);
+    memcpy(J, sum, sizeof sum);
 }
 
 static double determinant(double J[3][3], int dim)
