@@ -50,6 +50,14 @@ uz_formulation uz_resolve_formulation(uz_formulation asked, uz_element_kind kind
     return UZ_FORMULATION_STANDARD;
 }
 
+/* The lower triangle of a size x size matrix, rows MOST apart. */
+static void clear_lower(double *K, int size)
+{
+    for (int i = 0; i < size; i++)
+        for (int j = 0; j <= i; j++)
+            K[i * MOST + j] = 0;
+}
+
 /* K += weight v v', lower triangle of the leading size x size, rows MOST apart. */
 static void add_product(double *K, int size, double weight, const double *v)
 {
@@ -126,8 +134,8 @@ static int integrate(double *K, const uz_element *element)
     const int size = dofs + (modes ? dim * dim : 0);
     const double share = 2 * element->lame.mu / mean_direction_count(element->model);
     const double lambda = mean ? -share : element->lame.lambda;
-    memset(S, 0, (size_t)(size * MOST) * sizeof *S);
-    memset(K, 0, (size_t)(size * MOST) * sizeof *K);
+    clear_lower(S, size);
+    clear_lower(K, size);
     if (modes)
         centre_det = uz_centre_jacobian(centre, element);
     for (int g = 0; g < count; g++) {

@@ -171,7 +171,18 @@ TEST(rubber_tube_does_not_lock_with_mean_dilatation)
     CHECK_REL(tube(UZ_HEX8, UZ_SOLID, UZ_FORMULATION_INCOMPATIBLE, 0.4999), 1.0, 1e-2);
     CHECK(tube(UZ_QUAD4, UZ_PLANE_STRAIN, UZ_FORMULATION_STANDARD, 0.4999) < 0.5);
     CHECK(tube(UZ_HEX8, UZ_SOLID, UZ_FORMULATION_STANDARD, 0.4999) < 0.5);
-    CHECK_REL(tube(UZ_QUAD8, UZ_PLANE_STRAIN, UZ_FORMULATION_STANDARD, 0.3), 1.0, 1e-3);
+}
+
+/* Curved sides and faces, pressed: the body is the tube itself but for the third order. */
+TEST(quadratic_elements_follow_the_tube)
+{
+    const uz_formulation s = UZ_FORMULATION_STANDARD;
+    CHECK_REL(tube(UZ_QUAD8, UZ_PLANE_STRAIN, s, 0.3), 1.0, 1e-4);
+    CHECK_REL(tube(UZ_TRI6, UZ_PLANE_STRAIN, s, 0.3), 1.0, 1e-3);
+    CHECK_REL(tube(UZ_TET10, UZ_SOLID, s, 0.3), 1.0, 2e-3);
+    CHECK_REL(tube(UZ_QUAD8, UZ_AXISYMMETRIC, s, 0.3), 1.0, 1e-4);
+    CHECK_REL(tube(UZ_TRI6, UZ_AXISYMMETRIC, s, 0.3), 1.0, 1e-3);
+    CHECK_REL(tube(UZ_TRI3, UZ_AXISYMMETRIC, s, 0.3), 1.0, 2e-2);
 }
 
 /* ------------------------------------------------- beams of one layer
