@@ -276,6 +276,8 @@ typedef struct {
     bool all_candidates; /* contact rows also for nodes that surely cannot touch */
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);
+/* Dimensions of the bodies that its model is for: 2 or 3. */
+int uz_scene_dim(const uz_scene *scene);
 
 /* Where a scene's unknowns live. */
 typedef struct {
