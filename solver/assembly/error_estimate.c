@@ -28,7 +28,7 @@ typedef struct {
     const uz_body_model *model;
     const double *nodal;
     const double *free_strain; /* n_elements: of the temperature; NULL: none */
-    int64_t *place; /* of each node of each element; NULL: the place is the node */
+    int64_t *place;            /* of each node of each element; NULL: the place is the node */
     int64_t count;
     double *sum, *volume; /* count x STRESSES, count */
 } averaging;
