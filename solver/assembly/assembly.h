@@ -34,7 +34,7 @@ typedef struct {
     int64_t *first; /* another part of the body, else NULL: n + 1, into node and weight */
     int64_t *node;  /* the nodes of the face that each node meets ... */
     double *weight; /* ... and their shares in the point that it meets: each sum is 1 */
-    int64_t *face;  /* n: which face of the group `with` */
+    uz_face *face;  /* n: of the group `with` */
 } uz_contact_sites;
 
 typedef struct {
@@ -75,8 +75,6 @@ uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_erro
  * UZ_ERR_FREE_BODY only what no obstacle stands in the way of; whether the load presses the body on is the load's
  * matter. */
 uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz_error *err);
-/* Everything but the matrices: mesh, dofs and contact rows, for what is computed from an answer that is there. */
-uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err);
 void uz_body_model_clear(uz_body_model *model);
 
 /* p (d), h (m) and the prescribed values of the supported dofs (n_fixed; NULL: not wanted) of a scene whose body is
@@ -100,6 +98,15 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
 /* The reverse: the free dofs u (d) of a displacement by node; what it says of supported dofs is left out. */
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal);
 
+/* The component of a vector at a node (dim) along its dof c; "x", "y", "z" or "its normal"; and what turning a vector
+ * of this size may have left of it by rounding: 0 where the dofs are along the axes. */
+double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v);
+const char *uz_dof_name(const uz_body_model *model, int64_t node, int c);
+double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v);
+
+/* Bytes of all that the model holds. */
+size_t uz_body_model_bytes(const uz_body_model *model);
+
 /* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included.
  */
 uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
@@ -114,5 +121,11 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
  * nothing is strained. Zienkiewicz and Zhu, "A simple error estimator and adaptive procedure for practical engineering
  * analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared with its own nodal averages. */
 double uz_estimate_discretization_error(const uz_body_model *model, const double *nodal);
+/* The same with the temperatures of the scene's loads, whose strain has no stress. */
+double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene, const double *nodal);
+
+/* *out: n_elements, expansion times rise of temperature by the scene's loads; NULL where there are no such loads. The
+ * caller frees it. */
+uz_status uz_free_strains(double **out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 #endif
