@@ -1,5 +1,5 @@
 /* Fields against what theory says of the answers they are made from. */
-#include "element/element.h"
+#include "assembly/parts.h"
 #include "fields/parts.h"
 #include "fields_fixture.h"
 
@@ -48,13 +48,14 @@ static void loose_init(loose_body *b, uz_element_kind kind, uz_model model, doub
     mesh->groups[0] = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
     b->material = (uz_material){.on = "all", .young = 200e3, .poisson = 0.3, .expansion = 1e-5};
     b->scene = (uz_scene){.model = model, .thickness = 2, .materials = &b->material, .n_materials = 1};
+    CHECK(uz_take_materials(&b->model, &b->scene, NULL) == UZ_OK);
     CHECK(uz_field_body_init(&b->body, &b->scene, &b->model, NULL) == UZ_OK);
 }
 
 static void loose_clear(loose_body *b)
 {
     uz_field_body_clear(&b->body);
-    uz_mesh_clear(&b->model.mesh);
+    uz_body_model_clear(&b->model);
 }
 
 static double largest(const double *x, int64_t n)
