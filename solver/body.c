@@ -66,18 +66,6 @@ const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
     return body->is_scene ? &body->model.N : &problem->qp.N;
 }
 
-static size_t csc_bytes(const uz_csc *A)
-{
-    return 8 * (size_t)(A->cols + 1) + 16 * (size_t)A->ptr[A->cols];
-}
-
-static size_t model_bytes(const uz_body_model *model)
-{
-    size_t nodes = (size_t)(model->mesh.n_nodes + model->info.n_nodes);
-    return csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed) + 32 * nodes +
-           (model->frame_of ? 8 * nodes : 0);
-}
-
 /* The key of K: known for matrices; of a scene's only when there is a cache to look into. */
 static uz_status find_key(uz_matrix_key *K_key, const uz_body_key *key, const uz_body *body, uz_error *err)
 {
@@ -127,7 +115,7 @@ static void describe(uz_body *body)
     size_t form = body->krylov ? uz_krylov_describe(body->krylov).bytes : uz_factor_describe(body->factor).bytes;
     body->bytes = sizeof *body + (body->shared.item ? 0 : form) + uz_dual_describe(body->dual).bytes;
     if (body->is_scene)
-        body->bytes += model_bytes(&body->model);
+        body->bytes += uz_body_model_bytes(&body->model);
     body->reused.ordering = body->shared.analysis_reused;
     body->reused.factor = body->shared.factor_reused;
 }

@@ -7,25 +7,41 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Modes at a node whose dofs are along its normal and tangents. Held directions are axes there and have no share. */
-static void turn_modes(uz_modes *modes, const uz_body_model *model)
+/* Modes at a node whose dofs are along its normal and tangents. `axes` has them along the axes: it numbers all of a
+ * turned node's dofs, also those that are held. */
+static void turn_modes(uz_modes *modes, const uz_modes *axes, const uz_body_model *model)
 {
     const int dim = model->mesh.dim, count = modes->count;
     for (int64_t t = 0; t < model->info.n_turned; t++) {
         const int64_t *dof = model->dof + model->info.turned_node[t] * dim;
         const double *Q = model->info.frame + t * dim * dim;
-        for (int k = 0; k < count; k++) {
-            double along[3] = {0}, turned[3] = {0};
-            for (int c = 0; c < dim; c++)
-                along[c] = dof[c] >= 0 ? (double)modes->value[dof[c] * count + k] : 0.0;
-            for (int c = 0; c < dim; c++)
+        for (int c = 0; c < dim; c++)
+            for (int k = 0; k < count && dof[c] >= 0; k++) {
+                double turned = 0.0;
                 for (int axis = 0; axis < dim; axis++)
-                    turned[c] += Q[c * dim + axis] * along[axis];
-            for (int c = 0; c < dim; c++)
-                if (dof[c] >= 0)
-                    modes->value[dof[c] * count + k] = (float)turned[c];
-        }
+                    turned += Q[c * dim + axis] * (double)axes->value[(t * dim + axis) * count + k];
+                modes->value[dof[c] * count + k] = (float)turned;
+            }
     }
+}
+
+/* Their modes along the axes. */
+static uz_status modes_of_turned(uz_modes *axes, const uz_body_model *model, uz_error *err)
+{
+    const int dim = model->mesh.dim;
+    const int64_t total = model->mesh.n_nodes * dim;
+    int64_t *number = uz_alloc(total, sizeof *number);
+    if (!number)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the modes of %lld dofs", (long long)total);
+    for (int64_t i = 0; i < total; i++)
+        number[i] = -1;
+    for (int64_t t = 0; t < model->info.n_turned; t++)
+        for (int c = 0; c < dim; c++)
+            number[model->info.turned_node[t] * dim + c] = t * dim + c;
+    uz_status status = uz_modes_of_body(axes, model->info.xyz, number, model->mesh.n_nodes, dim,
+                                        model->info.n_turned * dim, err);
+    free(number);
+    return status;
 }
 
 /* The near-null space: rigid-body modes where the mesh is known. */
@@ -36,8 +52,16 @@ static uz_status find_modes(uz_modes *modes, const uz_body *body, const uz_csc *
         return uz_modes_of_matrix(modes, K, err);
     uz_status status =
         uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim, model->d, err);
-    if (status == UZ_OK)
-        turn_modes(modes, model);
+    if (status != UZ_OK || model->info.n_turned == 0)
+        return status;
+    uz_modes axes;
+    status = modes_of_turned(&axes, model, err);
+    if (status == UZ_OK) {
+        turn_modes(modes, &axes, model);
+        uz_modes_clear(&axes);
+    } else {
+        uz_modes_clear(modes);
+    }
     return status;
 }
 

@@ -28,11 +28,13 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
     int dim = model->mesh.dim;
     uz_restrict_nodal(run->answer.u, model, u);
     for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
-        int64_t dof = model->dof[i];
-        if (dof < 0 && u[i] != run->prescribed[-1 - dof])
+        int64_t dof = model->dof[i], node = i / dim;
+        double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
+        double rounding = uz_dof_rounding(model, node, u + node * dim);
+        if (dof < 0 && !(fabs(given - run->prescribed[-1 - dof]) <= rounding))
             return uz_fail(err, UZ_ERR_SCENE, "u",
-                           "node %lld is supported: its displacement along %c must be %.17g, it is given as %.17g",
-                           (long long)(i / dim), "xyz"[i % dim], run -> prescribed[-1 - dof], u[i]);
+                           "node %lld is supported: its displacement along %s must be %.17g, it is given as %.17g",
+                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), run->prescribed[-1 - dof], given);
     }
     return UZ_OK;
 }

@@ -100,6 +100,15 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
 /* The reverse: the free dofs u (d) of a displacement by node; what it says of supported dofs is left out. */
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal);
 
+/* The component of a vector at a node (dim) along its dof c; "x", "y", "z" or "its normal"; and what turning a vector
+ * of this size may have left of it by rounding: 0 where the dofs are along the axes. */
+double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v);
+const char *uz_dof_name(const uz_body_model *model, int64_t node, int c);
+double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v);
+
+/* Bytes of all that the model holds. */
+size_t uz_body_model_bytes(const uz_body_model *model);
+
 /* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included. */
 uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* f (n_nodes x dim) = the elements' stiffness times the displacements, element by element: what the nodes need to stay

@@ -2,7 +2,9 @@
  * if uz_body_model_build gives them the same model. Whoever makes the body depend on something new adds it here. */
 #include "assembly/assembly.h"
 
+#include "assembly/parts.h"
 #include "core/alloc.h"
+#include "core/digest.h"
 #include "core/error.h"
 #include "scene/scene.h"
 
@@ -53,15 +55,65 @@ static void put_name(key_buffer *key, const char *name, size_t size)
     put(key, name, len);
 }
 
+static void put_doubles(key_buffer *key, const double *x, int64_t n)
+{
+    put_int(key, x ? n : -1);
+    for (int64_t i = 0; x && i < n; i++)
+        put_double(key, x[i]);
+}
+
 static void put_box(key_buffer *key, const uz_box *box)
 {
     put_int(key, box->dim);
     put_name(key, box->element, sizeof box->element);
     for (int c = 0; c < box->dim && c < 3; c++) {
+        const double grading = box->grading[c];
         put_double(key, box->origin[c]);
         put_double(key, box->size[c]);
         put_int(key, box->cells[c]);
+        put_double(key, grading == 0 ? 1 : grading);
     }
+}
+
+static void add_array(uz_digest *digest, const void *array, int64_t count, size_t size)
+{
+    const int64_t n = array ? count : 0;
+    uz_digest_add(digest, &n, sizeof n);
+    if (n > 0)
+        uz_digest_add(digest, array, (size_t)n * size);
+}
+
+static void add_given_group(uz_digest *digest, const uz_given_group *group)
+{
+    const int64_t faces = group->n_faces;
+    add_array(digest, group->name, (int64_t)strnlen(group->name, sizeof group->name), 1);
+    add_array(digest, group->node, group->n_nodes, sizeof *group->node);
+    add_array(digest, group->face_first, faces > 0 ? faces + 1 : 0, sizeof *group->face_first);
+    add_array(digest, group->face_node, faces > 0 ? group->face_first[faces] : 0, sizeof *group->face_node);
+    add_array(digest, group->element, group->n_elements, sizeof *group->element);
+}
+
+/* A mesh in numbers is as large as a request may be: its digest stands for it. */
+static void put_given(key_buffer *key, const uz_given_mesh *mesh)
+{
+    char hex[65] = "";
+    uz_digest *digest = uz_digest_new();
+    if (!digest) {
+        key->failed = true;
+        return;
+    }
+    add_array(digest, mesh->xyz, mesh->n_nodes * mesh->dim, sizeof *mesh->xyz);
+    add_array(digest, mesh->kind, mesh->n_elements, sizeof *mesh->kind);
+    add_array(digest, mesh->first, mesh->n_elements + 1, sizeof *mesh->first);
+    add_array(digest, mesh->node, mesh->first ? mesh->first[mesh->n_elements] : 0, sizeof *mesh->node);
+    for (int64_t i = 0; i < mesh->n_groups; i++)
+        add_given_group(digest, &mesh->groups[i]);
+    if (!uz_digest_end(digest, hex))
+        key->failed = true;
+    put_int(key, mesh->dim);
+    put_int(key, mesh->n_groups);
+    put_int(key, mesh->from_file);
+    put(key, hex, sizeof hex);
 }
 
 static void put_materials(key_buffer *key, const uz_scene *scene)
@@ -71,14 +123,18 @@ static void put_materials(key_buffer *key, const uz_scene *scene)
         put_name(key, scene->materials[i].on, sizeof scene->materials[i].on);
         put_double(key, scene->materials[i].young);
         put_double(key, scene->materials[i].poisson);
+        put_double(key, scene->materials[i].density); /* not in K, but kept with the body */
+        put_double(key, scene->materials[i].expansion);
     }
 }
 
 static int directions_held(const uz_support *support, int dim)
 {
     int mask = 0;
-    for (int c = 0; c < dim && c < 3; c++)
-        if (!isnan(support->u[c]))
+    double u[3];
+    uz_support_values(u, support, dim);
+    for (int c = 0; c < dim; c++)
+        if (!isnan(u[c]))
             mask |= 1 << c;
     return mask;
 }
@@ -89,8 +145,24 @@ static int by_group(const void *a, const void *b)
     return strncmp((*left)->on, (*right)->on, sizeof(*left)->on);
 }
 
+/* What stands in no axis's way: springs, and inclined normals, which turn nodes in their order. */
+static void put_inclined_and_springs(key_buffer *key, const uz_scene *scene, int dim)
+{
+    double n[3] = {0};
+    for (int64_t i = 0; i < scene->n_supports; i++) {
+        const uz_support *support = &scene->supports[i];
+        const bool inclined = uz_support_is_inclined(n, support, dim);
+        if (!inclined && support->kind != UZ_SUPPORT_SPRING)
+            continue;
+        put_int(key, support->kind);
+        put_name(key, support->on, sizeof support->on);
+        put_doubles(key, inclined ? n : support->spring, dim);
+    }
+    put_int(key, -1);
+}
+
 /* Which directions each group is held in: neither the values nor the order of the supports matter. */
-static void put_supports(key_buffer *key, const uz_scene *scene)
+static void put_supports(key_buffer *key, const uz_scene *scene, int dim)
 {
     const uz_support **sorted = uz_alloc(scene->n_supports, sizeof *sorted);
     if (!sorted) {
@@ -104,39 +176,69 @@ static void put_supports(key_buffer *key, const uz_scene *scene)
         const uz_support *first = sorted[i];
         int mask = 0;
         for (; i < scene->n_supports && by_group(&first, &sorted[i]) == 0; i++)
-            mask |= directions_held(sorted[i], scene->box.dim);
+            mask |= directions_held(sorted[i], dim);
         put_name(key, first->on, sizeof first->on);
         put_int(key, mask);
     }
     put_int(key, -1);
     free(sorted);
+    put_inclined_and_springs(key, scene, dim);
 }
 
-static void put_contacts(key_buffer *key, const uz_scene *scene)
+/* How long the lists of points of an obstacle are: x, y, z. */
+static void point_counts(int64_t n[3], const uz_contact *contact)
+{
+    const bool height = contact->kind == UZ_OBSTACLE_HEIGHT;
+    n[0] = contact->n_x;
+    n[1] = height ? contact->n_y : contact->n_x;
+    n[2] = contact->n_x * (contact->n_y > 0 ? contact->n_y : 1);
+}
+
+/* Of a plane only the normal: where it is, is the load's matter. Of others the normals of the rows depend on all. */
+static void put_contacts(key_buffer *key, const uz_scene *scene, int dim)
 {
     put_int(key, scene->n_contacts);
+    put_int(key, scene->all_candidates);
     for (int64_t i = 0; i < scene->n_contacts; i++) {
+        const uz_contact *contact = &scene->contacts[i];
         double normal[3];
-        uz_unit_normal(normal, scene->contacts[i].normal, scene->box.dim > 3 ? 3 : scene->box.dim);
-        put_name(key, scene->contacts[i].on, sizeof scene->contacts[i].on);
-        for (int c = 0; c < 3; c++)
-            put_double(key, normal[c]);
+        int64_t n[3];
+        uz_unit_normal(normal, contact->normal, dim);
+        put_name(key, contact->on, sizeof contact->on);
+        put_doubles(key, normal, 3);
+        put_int(key, contact->kind);
+        if (contact->kind == UZ_OBSTACLE_PLANE)
+            continue;
+        point_counts(n, contact);
+        put_doubles(key, contact->point, 3);
+        put_double(key, contact->radius);
+        put_int(key, contact->inside);
+        put_doubles(key, contact->x, n[0]);
+        put_doubles(key, contact->y, n[1]);
+        put_doubles(key, contact->z, n[2]);
+        put_name(key, contact->with, sizeof contact->with);
     }
 }
 
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
-    static const char format[] = "uzawa body 1";
+    static const char format[] = "uzawa body 2";
     key_buffer key = {NULL, 0, 0, false};
+    const int dim = uz_model_dim(scene->model);
     *out = NULL;
     *len = 0;
     put(&key, format, sizeof format);
     put_int(&key, (int64_t)scene->model);
     put_double(&key, scene->thickness);
-    put_box(&key, &scene->box);
+    put_int(&key, scene->formulation);
+    put_int(&key, scene->source);
+    if (scene->source == UZ_MESH_GIVEN)
+        put_given(&key, &scene->given);
+    else
+        put_box(&key, &scene->box);
     put_materials(&key, scene);
-    put_supports(&key, scene);
-    put_contacts(&key, scene);
+    put_supports(&key, scene, dim);
+    put_contacts(&key, scene, dim);
     if (key.failed) {
         free(key.bytes);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the key of a body");

@@ -57,6 +57,28 @@ void uz_body_model_clear(uz_body_model *model)
     memset(model, 0, sizeof *model);
 }
 
+static size_t csc_bytes(const uz_csc *A)
+{
+    return A->ptr ? 8 * (size_t)(A->cols + 1) + 16 * (size_t)A->ptr[A->cols] : 0;
+}
+
+size_t uz_body_model_bytes(const uz_body_model *model)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const size_t nodes = (size_t)mesh->n_nodes, elements = (size_t)mesh->n_elements, rows = (size_t)model->m;
+    const size_t dim = (size_t)mesh->dim;
+    size_t bytes = csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed);
+    bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
+    bytes += 8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
+    bytes += (size_t)model->info.n_turned * 8 * (1 + dim * dim) + rows * 8 * (4 + dim);
+    for (int64_t k = 0; k < model->n_sites; k++) {
+        const uz_contact_sites *s = &model->sites[k];
+        const size_t n = (size_t)s->n;
+        bytes += n * 8 * (1 + dim) + (s->first ? 16 * n + 16 * (size_t)s->first[n] : 0);
+    }
+    return bytes + (size_t)model->d * (size_t)model->n_modes * 8;
+}
+
 static void describe_mesh(uz_body_model *model)
 {
     model->info.dim = model->mesh.dim;

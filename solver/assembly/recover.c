@@ -4,6 +4,8 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
+#include <float.h>
+#include <math.h>
 #include <string.h>
 
 void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u, const double *prescribed)
@@ -31,6 +33,33 @@ void uz_restrict_nodal(double *u, const uz_body_model *model, const double *noda
             if (model->dof[a * dim + c] >= 0)
                 u[model->dof[a * dim + c]] = local[c];
     }
+}
+
+double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v)
+{
+    double local[3];
+    uz_to_frame(local, model, node, v);
+    return local[c];
+}
+
+/* A held axis stays an axis when its node is turned. */
+static bool is_axis(const double *Q, int c, int dim)
+{
+    return !Q || Q[c * dim + c] == 1;
+}
+
+const char *uz_dof_name(const uz_body_model *model, int64_t node, int c)
+{
+    static const char *const axes[] = {"x", "y", "z"};
+    return is_axis(uz_node_frame(model, node), c, model->mesh.dim) ? axes[c] : "the normal of its support";
+}
+
+double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v)
+{
+    double size = 0;
+    for (int c = 0; c < model->mesh.dim; c++)
+        size += fabs(v[c]);
+    return uz_node_frame(model, node) ? 8 * DBL_EPSILON * size : 0;
 }
 
 static void *duplicate(const void *from, int64_t count, size_t size)

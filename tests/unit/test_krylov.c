@@ -206,6 +206,7 @@ static uz_scene stretched(double width, double height, int64_t nx, int64_t ny, d
     scene.box.size[1] = height;
     scene.materials[0].poisson = poisson;
     scene.model = UZ_PLANE_STRAIN;
+    scene.formulation = UZ_FORMULATION_STANDARD;
     return scene;
 }
 

@@ -1,0 +1,42 @@
+/* projection.h: contact between two deformable bodies, node to segment (2D) or face (3D).
+ *
+ * Each node of one body (the slave, group `on`) is projected on the faces of the other (the master, group `with`). The
+ * foot x_m is the closest point; it has weights w_j at the nodes of its face (shape functions there, sum 1), and the
+ * linear gap is
+ *
+ *     g(u) = gap + normal . (u_s - sum_j w_j u_mj) >= 0          for sliding that is small against a face
+ *
+ * The normal is that of the face itself at the foot, not one interpolated from averages at nodes: then x_s - x_m is
+ * gap times normal, so that g is the distance to first order for every motion, rotations of both bodies together
+ * leave it as it is, and the two contact forces have one line of action (no moment is left over). Where the foot is on
+ * an edge or a corner between faces of the master the normal is along x_s - x_m, by the same token; where the node is
+ * on that edge itself, the mean of the faces' normals, at corners weighted by their angles (Baerentzen and Aanaes,
+ * "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11 (2005) 243-253). */
+#ifndef UZ_OBSTACLE_PROJECTION_H
+#define UZ_OBSTACLE_PROJECTION_H
+
+#include "scene/mesh.h"
+
+/* A node beyond the border of the master has no row when it is outside by more than this part of the face's size. */
+#define UZ_OVERHANG 0.05
+
+/* One contact row. */
+typedef struct {
+    int64_t node; /* of the slave */
+    uz_face face; /* of the master */
+    int count;    /* nodes of the face, in the order of uz_mesh_face */
+    int64_t master[UZ_FACE_NODES];
+    double weight[UZ_FACE_NODES];
+    double local[2];  /* of the foot: edges in [-1, 1]; triangles x, y >= 0, x + y <= 1; quadrilaterals in [-1, 1]^2 */
+    double normal[3]; /* unit, out of the master; the third is 0 in 2D */
+    double gap;       /* (x_s - x_m) . normal; < 0: the bodies overlap */
+} uz_contact_pair;
+
+/* The rows of all nodes of `on` that face `with`, in the order of the nodes (ascending). O((n + f) log f) for n nodes
+ * and f faces. `index` is the contact's place in the scene, for pointers. The caller frees *out with free().
+ * Errors: UZ_ERR_SCENE ("/contacts/i/with": not faces; "/contacts/i/on": a node of the master itself, or no node that
+ * faces it), UZ_ERR_MEMORY. */
+uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
+                           const uz_group *with, int64_t index, uz_error *err);
+
+#endif

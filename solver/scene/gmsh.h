@@ -1,0 +1,120 @@
+/* gmsh.h: a Gmsh file while it is read. Private to uz_gmsh_read.
+ *
+ * Source of the formats: Gmsh reference manual, sections "MSH file format" (4.1) and "MSH file format version 2". */
+#ifndef UZ_SCENE_GMSH_H
+#define UZ_SCENE_GMSH_H
+
+#include "uzawa.h"
+
+/* ---- the text (gmsh_text.c) */
+
+typedef struct {
+    const char *begin, *at, *end;
+    int64_t line; /* 1-based, of `at`; not counted within binary data */
+    bool binary;  /* numbers are bytes, but for those that say *_text */
+    uz_error *err;
+} gmsh_text;
+
+/* Fails at the line, or in a binary file at the byte, that the text has come to. */
+uz_status gmsh_fail(const gmsh_text *text, uz_status status, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+/* Fails at a place that was passed before. */
+uz_status gmsh_fail_at(const gmsh_text *text, const gmsh_text *place, uz_status status, const char *format, ...)
+    __attribute__((format(printf, 4, 5)));
+
+/* A number: 4 bytes, 8 bytes without a sign, 8 bytes, or a word. `what` is what it should be, for the message. */
+uz_status gmsh_int(gmsh_text *text, int64_t *value, const char *what);
+uz_status gmsh_size(gmsh_text *text, int64_t *value, const char *what);
+uz_status gmsh_real(gmsh_text *text, double *value);
+/* Words also in a binary file. */
+uz_status gmsh_int_text(gmsh_text *text, int64_t *value, const char *what);
+uz_status gmsh_real_text(gmsh_text *text, double *value);
+/* A text in double quotes: at most 63 bytes of UTF-8 without control characters. */
+uz_status gmsh_quoted(gmsh_text *text, char out[64]);
+
+/* How many bytes are left. */
+size_t gmsh_left(const gmsh_text *text);
+/* A count of items that take at least so many bytes each: refused if the file is too short for them. */
+uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const char *what);
+
+enum { GMSH_NAME = 48 };
+/* Moves behind the line "$name"; name "" at the end of the text. */
+uz_status gmsh_section(gmsh_text *text, char name[GMSH_NAME]);
+/* Moves behind the end of the current line, on which there is nothing more. */
+uz_status gmsh_end_line(gmsh_text *text);
+/* Requires "$Endname". */
+uz_status gmsh_section_end(gmsh_text *text, const char *name);
+/* Moves behind "$Endname" without looking at what is before it. */
+uz_status gmsh_skip_section(gmsh_text *text, const char *name);
+
+/* ---- what a file says */
+
+/* What elements of one entity (4.1), or with one physical tag (2.2), belong to. */
+typedef struct {
+    int dim;
+    int64_t tag, first, count; /* physical[first..first + count) */
+    bool used;
+} gmsh_part;
+
+typedef struct {
+    int dim;
+    int64_t tag;
+    char name[64];
+} gmsh_name;
+
+typedef struct {
+    gmsh_text text;
+    int version; /* 22 or 41 */
+    size_t max_bytes;
+
+    int64_t n_nodes;
+    double *xyz;      /* n_nodes x 3 */
+    int64_t *tag;     /* n_nodes */
+    int64_t *by_tag;  /* dense: index of tag low_tag + i, -1: none; else the nodes sorted by tag */
+    int64_t n_by_tag; /* dense: how many */
+    int64_t low_tag;
+    bool dense;
+
+    int64_t n_elements, element_room, place_room;
+    unsigned char *type; /* Gmsh's number of the element type */
+    int64_t *part_tag;   /* entity (4.1) or physical tag (2.2); 0: none */
+    int64_t *first;      /* n_elements + 1 */
+    int64_t *node;       /* from 0 */
+    gmsh_text elements_at;
+
+    gmsh_part *parts;
+    int64_t n_parts, part_room;
+    int64_t *physical, n_physical, physical_room;
+    gmsh_name *names;
+    int64_t n_names;
+    bool entities_read;
+} gmsh_file;
+
+/* Makes room for one more item behind `count`; false: no memory. */
+bool gmsh_grow(void **list, int64_t count, int64_t *room, size_t size);
+uz_status gmsh_no_memory(const gmsh_file *file);
+
+/* ---- sections: each starts behind its "$Name" line and ends before "$EndName" */
+uz_status gmsh_read_names(gmsh_file *file);
+uz_status gmsh_read_entities(gmsh_file *file, bool partitioned);
+uz_status gmsh_read_nodes(gmsh_file *file);
+uz_status gmsh_read_elements(gmsh_file *file);
+
+/* Index of the node with that tag, -1: there is none. */
+int64_t gmsh_find_node(const gmsh_file *file, int64_t tag);
+
+/* ---- elements of Gmsh */
+
+/* What is known of a type: nodes 0: unknown. kind -1: it cannot be an element of a body. */
+typedef struct {
+    int dim, nodes, kind;
+    const char *name, *remedy; /* remedy: of types that are not read */
+} gmsh_type;
+gmsh_type gmsh_type_of(int64_t type);
+
+/* ---- the mesh of what was read (gmsh_groups.c: its groups) */
+uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file);
+/* new_element: the number of each element of the file in the mesh, -1: it is none of its elements. */
+uz_status gmsh_make_groups(uz_given_mesh *out, gmsh_file *file, int dim, const int64_t *new_element);
+
+#endif
