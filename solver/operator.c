@@ -38,8 +38,8 @@ static uz_status modes_of_turned(uz_modes *axes, const uz_body_model *model, uz_
     for (int64_t t = 0; t < model->info.n_turned; t++)
         for (int c = 0; c < dim; c++)
             number[model->info.turned_node[t] * dim + c] = t * dim + c;
-    uz_status status = uz_modes_of_body(axes, model->info.xyz, number, model->mesh.n_nodes, dim,
-                                        model->info.n_turned * dim, err);
+    uz_status status =
+        uz_modes_of_body(axes, model->info.xyz, number, model->mesh.n_nodes, dim, model->info.n_turned * dim, err);
     free(number);
     return status;
 }

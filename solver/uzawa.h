@@ -276,6 +276,8 @@ typedef struct {
     bool all_candidates; /* contact rows also for nodes that surely cannot touch */
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);
+/* Dimensions of the bodies that its model is for: 2 or 3. */
+int uz_scene_dim(const uz_scene *scene);
 
 /* Where a scene's unknowns live. */
 typedef struct {
@@ -286,7 +288,7 @@ typedef struct {
     double *contact_area;   /* m: tributary area of each contact node (length x thickness in 2D; of a ring all around) */
     double *contact_normal; /* m x dim: unit normal of the obstacle at the contact, pointing towards the body */
     int64_t *contact_of;    /* m: which contact of the scene */
-    int64_t *contact_face;  /* m: against another part of the body, which face of the group `with`; else -1 */
+    int64_t *contact_face;  /* m x 2: element and side that the node meets of another part of the body, else -1, -1 */
     int64_t n_turned;       /* uz_scene_to_qp only: nodes whose dofs are not along the axes */
     int64_t *turned_node;   /* n_turned */
     double *frame;          /* n_turned x dim x dim: row c of a node's matrix is the direction of its dof c */

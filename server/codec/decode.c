@@ -72,12 +72,21 @@ static const char *leave_matrix(const char *where, uz_status status)
     return where;
 }
 
+/* The library reads two formats of text and has one status for both. */
+static const char *code_of(const uz_error *err)
+{
+    const bool gmsh = strcmp(err->where, "/mesh/gmsh") == 0;
+    if (gmsh && err->status == UZ_ERR_FORMAT)
+        return "gmsh_syntax";
+    return gmsh && err->status == UZ_ERR_UNSUPPORTED ? "gmsh_unsupported" : uz_status_name(err->status);
+}
+
 void codec_problem_from_error(problem_details *out, const uz_error *err, uz_problem_kind kind)
 {
     const char *where = leave_case(err->where);
     if (kind == UZ_PROBLEM_SCENE)
         where = leave_matrix(where, err->status);
-    problem_set(out, http_status(err->status), uz_status_name(err->status), NULL, "%s", err->message);
+    problem_set(out, http_status(err->status), code_of(err), NULL, "%s", err->message);
     snprintf(out->pointer, sizeof out->pointer, "%s%s%s", points_beside(where) ? "" : "/problem",
              where[0] && where[0] != '/' ? "/" : "", where);
     out->line = err->line;
@@ -121,7 +130,7 @@ static bool decode_problem(uz_problem *out, json_doc *doc, size_t body_len, prob
     const char *kind = json_string_value(json_object_get(object, "kind"));
     bool scene = strcmp(kind, "scene") == 0;
     out->kind = scene ? UZ_PROBLEM_SCENE : UZ_PROBLEM_MATRICES;
-    return scene ? decode_scene(&out->scene, object, problem)
+    return scene ? decode_scene(&out->scene, doc, object, body_len, problem)
                  : decode_matrices(&out->qp, doc, object, body_len, problem);
 }
 
@@ -159,12 +168,14 @@ static bool check_count(const char *pointer, int64_t have, int64_t want, const c
 static bool check_columns(const codec_request *request, problem_details *problem)
 {
     bool scene = request->problem.kind == UZ_PROBLEM_SCENE;
-    int columns = request->answer.columns, dim = request->problem.scene.box.dim;
+    int columns = request->answer.columns, dim = uz_scene_dim(&request->problem.scene);
     json_path answer = {NULL, "answer", 6, 0}, path = {&answer, "displacements", 13, 0};
     if (columns == 0 || (scene && columns == dim))
         return true;
     problem_set(problem, 422, "size_mismatch", &path, "/answer/displacements has points of %d numbers; %s.", columns,
-                scene ? "this scene has 2 directions" : "a problem in matrices has single numbers");
+                !scene     ? "a problem in matrices has single numbers"
+                : dim == 2 ? "this scene has 2 directions"
+                           : "this scene has 3 directions");
     return false;
 }
 

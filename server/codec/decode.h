@@ -11,8 +11,13 @@
 /* Takes big vectors out of the document and frees big texts as soon as they are read. body_len bounds what the
  * matrices may take. */
 bool decode_matrices(uz_qp *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem);
-bool decode_scene(uz_scene *out, const json_t *object, problem_details *problem);
-bool decode_loads(uz_load **out, int64_t *n, const json_t *list, problem_details *problem);
+bool decode_scene(uz_scene *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem);
+/* dim: numbers in a vector; list_at: where the list is in the request. */
+bool decode_loads(uz_load **out, int64_t *n, const json_t *list, int dim, const json_path *list_at,
+                  problem_details *problem);
+/* A scene's mesh (not a box) and contacts (decode_mesh.c, decode_contacts.c); out->model is there. */
+bool decode_mesh(uz_scene *out, json_doc *doc, const json_t *mesh, size_t body_len, problem_details *problem);
+bool decode_contacts(uz_scene *out, json_doc *doc, const json_t *list, size_t body_len, problem_details *problem);
 /* The load cases of a decoded problem; list NULL: none. */
 bool decode_cases(uz_problem *problem, json_doc *doc, const json_t *list, size_t body_len, problem_details *details);
 /* object NULL: from zero. */
@@ -31,6 +36,17 @@ void decode_text_done(const json_doc *doc, const json_t *value);
 /* The document against a schema file, as schemas_check. */
 bool decode_check(const json_doc *doc, const char *schema, problem_details *problem);
 bool decode_no_memory(problem_details *problem); /* 503; returns false */
+/* Room for the items of a list that may be absent, zeroed; NULL: *problem. */
+void *decode_room(const json_t *list, size_t size, int64_t *count, problem_details *problem);
+/* A group's name; a longer one, which no mesh has, is cut. */
+void decode_name(char *out, size_t size, const json_t *object, const char *key, const char *otherwise);
+/* The vector `key` of an object into out[0..dim), `otherwise` in what is absent and 0 beyond dim; false if it has not
+ * dim numbers. */
+bool decode_components(double out[3], const json_t *object, const char *key, double otherwise, int dim,
+                       const json_path *object_at, problem_details *problem);
+/* The same, and false if it is zero; what: "it must point out of the obstacle". */
+bool decode_direction(double out[3], const json_t *object, const char *key, int dim, const json_path *object_at,
+                      const char *what, problem_details *problem);
 /* An array of numbers, taken out of the document where it was lifted, or Matrix Market text. The caller frees *out. */
 bool decode_vector(double **out, int64_t *n, json_doc *doc, const json_t *value, size_t bound, const char *where,
                    problem_details *problem);

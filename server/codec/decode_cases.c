@@ -101,8 +101,10 @@ static bool take_case(uz_problem *p, int64_t i, json_doc *doc, const json_t *ite
     uz_load_case *out = &p->cases[i];
     if (!take_name(out->name, json_object_get(item, "name"), &path, problem))
         return false;
+    json_path loads = {&path, "loads", 5, 0};
     if (p->kind == UZ_PROBLEM_SCENE)
-        return decode_loads(&out->loads, &out->n_loads, json_object_get(item, "loads"), problem);
+        return decode_loads(&out->loads, &out->n_loads, json_object_get(item, "loads"), uz_scene_dim(&p->scene), &loads,
+                            problem);
     return take_vector(&out->p, doc, item, "p", i, p->qp.K.rows, bound, problem) &&
            take_vector(&out->h, doc, item, "h", i, p->qp.N.rows, bound, problem);
 }

@@ -1,3 +1,4 @@
+/* decode_scene.c: model, box, materials, supports and loads of a scene. */
 #include "codec/decode.h"
 #include "codec/problem.h"
 
@@ -8,124 +9,216 @@
 
 static const double MAX_CELLS = 1e7; /* keeps a tiny request from asking for a mesh that fills the machine */
 
-/* Fills out[0..3) from a pair, 0 beyond it; an absent value leaves `otherwise` everywhere. */
-static void get_vector(double out[3], const json_t *value, double otherwise)
-{
-    for (size_t i = 0; i < 3; i++)
-        out[i] = value ? json_real_value(json_array_get(value, i)) : otherwise;
-}
+/* ---- pieces */
 
-static void get_name(char *out, size_t size, const json_t *object, const char *key, const char *otherwise)
+void decode_name(char *out, size_t size, const json_t *object, const char *key, const char *otherwise)
 {
     const char *text = json_string_value(json_object_get(object, key));
     snprintf(out, size, "%s", text ? text : otherwise);
 }
 
-static bool decode_box(uz_box *out, const json_t *box, problem_details *problem)
-{
-    double cells[3];
-    get_vector(out->origin, json_object_get(box, "origin"), 0);
-    get_vector(out->size, json_object_get(box, "size"), 0);
-    get_vector(cells, json_object_get(box, "cells"), 0);
-    get_name(out->element, sizeof out->element, box, "element", "quad4");
-    out->dim = 2;
-    for (int i = 0; i < 3; i++)
-        out->cells[i] = (int64_t)cells[i];
-    if (cells[0] * cells[1] <= MAX_CELLS)
-        return true;
-    json_path top = {NULL, "problem", 7, 0}, mesh = {&top, "mesh", 4, 0}, here = {&mesh, "box", 3, 0};
-    json_path path = {&here, "cells", 5, 0};
-    problem_set(problem, 422, "out_of_range", &path,
-                "/problem/mesh/box/cells makes %.15g cells; at most %.0f are allowed.", cells[0] * cells[1], MAX_CELLS);
-    return false;
-}
-
-/* Room for the items of a list that may be absent. */
-static void *make_room(const json_t *list, size_t size, int64_t *count, problem_details *problem)
+void *decode_room(const json_t *list, size_t size, int64_t *count, problem_details *problem)
 {
     void *room = calloc(json_array_size(list) + 1, size);
     *count = room ? (int64_t)json_array_size(list) : 0;
     if (!room)
-        problem_set(problem, 503, "out_of_memory", NULL, "There is not enough memory for this request now.");
+        decode_no_memory(problem);
     return room;
 }
 
+static bool refuse_length(const json_path *at, size_t have, int dim, problem_details *problem)
+{
+    problem_set(problem, 422, "out_of_range", at, "A vector must have %d numbers here, not %zu: the model is %s.", dim,
+                have, dim == 3 ? "solid" : "one in the plane");
+    return false;
+}
+
+bool decode_components(double out[3], const json_t *object, const char *key, double otherwise, int dim,
+                       const json_path *object_at, problem_details *problem)
+{
+    const json_t *value = json_object_get(object, key);
+    json_path at = {object_at, key, strlen(key), 0};
+    if (value && json_array_size(value) != (size_t)dim)
+        return refuse_length(&at, json_array_size(value), dim, problem);
+    for (int i = 0; i < 3; i++) {
+        const double given = value ? json_real_value(json_array_get(value, (size_t)i)) : otherwise;
+        out[i] = i < dim ? given : 0;
+    }
+    return true;
+}
+
+bool decode_direction(double out[3], const json_t *object, const char *key, int dim, const json_path *object_at,
+                      const char *what, problem_details *problem)
+{
+    json_path at = {object_at, key, strlen(key), 0};
+    char pointer[128];
+    if (!decode_components(out, object, key, 0, dim, object_at, problem))
+        return false;
+    if (out[0] != 0 || out[1] != 0 || out[2] != 0)
+        return true;
+    json_path_write(pointer, sizeof pointer, &at);
+    problem_set(problem, 422, "out_of_range", &at, "%s is zero; %s.", pointer, what);
+    return false;
+}
+
+static double get_number(const json_t *object, const char *key, double otherwise)
+{
+    const json_t *value = json_object_get(object, key);
+    return value ? json_real_value(value) : otherwise;
+}
+
+/* ---- mesh */
+
+static bool decode_box(uz_scene *out, const json_t *box, problem_details *problem)
+{
+    json_path top = {NULL, "problem", 7, 0}, mesh = {&top, "mesh", 4, 0}, here = {&mesh, "box", 3, 0};
+    json_path path = {&here, "cells", 5, 0};
+    const int dim = uz_scene_dim(out);
+    double cells[3], count = 1;
+    if (!decode_components(out->box.origin, box, "origin", 0, dim, &here, problem) ||
+        !decode_components(out->box.size, box, "size", 0, dim, &here, problem) ||
+        !decode_components(cells, box, "cells", 0, dim, &here, problem) ||
+        !decode_components(out->box.grading, box, "grading", 1, dim, &here, problem))
+        return false;
+    decode_name(out->box.element, sizeof out->box.element, box, "element", dim == 3 ? "hex8" : "quad4");
+    out->source = UZ_MESH_BOX;
+    out->box.dim = dim;
+    for (int i = 0; i < 3; i++) {
+        out->box.cells[i] = (int64_t)cells[i];
+        count *= i < dim ? cells[i] : 1;
+    }
+    if (count <= MAX_CELLS)
+        return true;
+    problem_set(problem, 422, "out_of_range", &path,
+                "/problem/mesh/box/cells makes %.15g cells; at most %.0f are allowed.", count, MAX_CELLS);
+    return false;
+}
+
+/* ---- lists */
+
 static bool decode_materials(uz_scene *out, const json_t *list, problem_details *problem)
 {
-    out->materials = make_room(list, sizeof *out->materials, &out->n_materials, problem);
+    out->materials = decode_room(list, sizeof *out->materials, &out->n_materials, problem);
     for (int64_t i = 0; i < out->n_materials; i++) {
         const json_t *item = json_array_get(list, (size_t)i);
         uz_material *to = &out->materials[i];
-        get_name(to->on, sizeof to->on, item, "on", "");
-        to->young = json_real_value(json_object_get(item, "young"));
-        to->poisson = json_real_value(json_object_get(item, "poisson"));
+        decode_name(to->on, sizeof to->on, item, "on", "");
+        to->young = get_number(item, "young", 0);
+        to->poisson = get_number(item, "poisson", 0);
+        to->density = get_number(item, "density", 0);
+        to->expansion = get_number(item, "expansion", 0);
     }
     return out->materials != NULL;
 }
 
-static bool decode_supports(uz_scene *out, const json_t *list, problem_details *problem)
+static bool decode_support(uz_support *to, const json_t *item, int dim, const json_path *at, problem_details *problem)
 {
     static const char *const KEYS[3] = {"ux", "uy", "uz"};
-    out->supports = make_room(list, sizeof *out->supports, &out->n_supports, problem);
+    decode_name(to->on, sizeof to->on, item, "on", "");
+    for (int c = 0; c < 3; c++)
+        to->u[c] = get_number(item, KEYS[c], (double)NAN);
+    if (json_object_get(item, "normal")) {
+        to->kind = UZ_SUPPORT_NORMAL;
+        to->value = get_number(item, "u", 0);
+        return decode_direction(to->normal, item, "normal", dim, at, "it must be the direction that is held", problem);
+    }
+    if (json_object_get(item, "spring")) {
+        to->kind = UZ_SUPPORT_SPRING;
+        return decode_components(to->spring, item, "spring", 0, dim, at, problem);
+    }
+    to->kind = UZ_SUPPORT_COMPONENTS;
+    return true;
+}
+
+static bool decode_supports(uz_scene *out, const json_t *list, problem_details *problem)
+{
+    json_path top = {NULL, "problem", 7, 0}, here = {&top, "supports", 8, 0};
+    out->supports = decode_room(list, sizeof *out->supports, &out->n_supports, problem);
     for (int64_t i = 0; i < out->n_supports; i++) {
-        const json_t *item = json_array_get(list, (size_t)i);
-        uz_support *to = &out->supports[i];
-        get_name(to->on, sizeof to->on, item, "on", "");
-        for (int c = 0; c < 3; c++) {
-            const json_t *u = json_object_get(item, KEYS[c]);
-            to->u[c] = u ? json_real_value(u) : (double)NAN;
-        }
+        json_path at = {&here, NULL, 0, (size_t)i};
+        if (!decode_support(&out->supports[i], json_array_get(list, (size_t)i), uz_scene_dim(out), &at, problem))
+            return false;
     }
     return out->supports != NULL;
 }
 
-bool decode_loads(uz_load **out, int64_t *n, const json_t *list, problem_details *problem)
+/* ---- loads */
+
+static const struct {
+    const char *key;
+    uz_load_kind kind;
+    bool vector;
+} LOADS[] = {{"traction", UZ_LOAD_TRACTION, true}, {"pressure", UZ_LOAD_PRESSURE, false},
+             {"force", UZ_LOAD_FORCE, true},       {"body_force", UZ_LOAD_BODY_FORCE, true},
+             {"gravity", UZ_LOAD_GRAVITY, true},   {"temperature", UZ_LOAD_TEMPERATURE, false}};
+
+static bool decode_load(uz_load *to, const json_t *item, int dim, const json_path *at, problem_details *problem)
 {
-    uz_load *loads = make_room(list, sizeof *loads, n, problem);
-    for (int64_t i = 0; i < *n; i++) {
-        const json_t *item = json_array_get(list, (size_t)i);
-        get_name(loads[i].on, sizeof loads[i].on, item, "on", "");
-        get_vector(loads[i].v, json_object_get(item, "traction"), 0);
+    const json_t *node = json_object_get(item, "node");
+    decode_name(to->on, sizeof to->on, item, "on", "");
+    for (size_t k = 0; k < sizeof LOADS / sizeof LOADS[0]; k++) {
+        if (!json_object_get(item, LOADS[k].key))
+            continue;
+        to->kind = LOADS[k].kind;
+        to->value = LOADS[k].vector ? 0 : get_number(item, LOADS[k].key, 0);
+        if (LOADS[k].vector && !decode_components(to->v, item, LOADS[k].key, 0, dim, at, problem))
+            return false;
+    }
+    if (node) {
+        const double number = json_real_value(node);
+        to->kind = UZ_LOAD_NODE_FORCE;
+        to->node = number < 1e15 ? (int64_t)number : INT64_MAX; /* no mesh has that one */
+    }
+    return true;
+}
+
+bool decode_loads(uz_load **out, int64_t *n, const json_t *list, int dim, const json_path *list_at,
+                  problem_details *problem)
+{
+    bool good = true;
+    uz_load *loads = decode_room(list, sizeof *loads, n, problem);
+    for (int64_t i = 0; i < *n && good; i++) {
+        json_path at = {list_at, NULL, 0, (size_t)i};
+        good = decode_load(&loads[i], json_array_get(list, (size_t)i), dim, &at, problem);
     }
     *out = loads;
-    return loads != NULL;
+    return loads != NULL && good;
 }
 
-static bool refuse_normal(size_t i, problem_details *problem)
+/* ---- the whole */
+
+static uz_model model_of(const char *name)
 {
-    json_path top = {NULL, "problem", 7, 0}, list = {&top, "contacts", 8, 0}, item = {&list, NULL, 0, i};
-    json_path obstacle = {&item, "obstacle", 8, 0}, plane = {&obstacle, "plane", 5, 0};
-    json_path path = {&plane, "normal", 6, 0};
-    problem_set(problem, 422, "out_of_range", &path,
-                "/problem/contacts/%zu/obstacle/plane/normal is zero; it must point out of the obstacle.", i);
-    return false;
+    static const char *const NAMES[] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
+        if (strcmp(name, NAMES[i]) == 0)
+            return (uz_model)i;
+    return UZ_PLANE_STRESS;
 }
 
-static bool decode_contacts(uz_scene *out, const json_t *list, problem_details *problem)
+static uz_formulation formulation_of(const json_t *object)
 {
-    out->contacts = make_room(list, sizeof *out->contacts, &out->n_contacts, problem);
-    for (int64_t i = 0; i < out->n_contacts; i++) {
-        const json_t *item = json_array_get(list, (size_t)i);
-        const json_t *plane = json_object_get(json_object_get(item, "obstacle"), "plane");
-        uz_contact *to = &out->contacts[i];
-        get_name(to->on, sizeof to->on, item, "on", "");
-        get_vector(to->point, json_object_get(plane, "point"), 0);
-        get_vector(to->normal, json_object_get(plane, "normal"), 0);
-        if (to->normal[0] == 0 && to->normal[1] == 0)
-            return refuse_normal((size_t)i, problem);
-    }
-    return out->contacts != NULL;
+    static const char *const NAMES[] = {"auto", "standard", "bbar", "incompatible_modes"};
+    const char *name = json_string_value(json_object_get(object, "formulation"));
+    for (size_t i = 0; name && i < sizeof NAMES / sizeof NAMES[0]; i++)
+        if (strcmp(name, NAMES[i]) == 0)
+            return (uz_formulation)i;
+    return UZ_FORMULATION_AUTO;
 }
 
-bool decode_scene(uz_scene *out, const json_t *object, problem_details *problem)
+bool decode_scene(uz_scene *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem)
 {
-    const char *model = json_string_value(json_object_get(object, "model"));
-    const json_t *thickness = json_object_get(object, "thickness");
-    out->model = strcmp(model, "plane_strain") == 0 ? UZ_PLANE_STRAIN : UZ_PLANE_STRESS;
-    out->thickness = thickness ? json_real_value(thickness) : 1;
-    return decode_box(&out->box, json_object_get(json_object_get(object, "mesh"), "box"), problem) &&
+    const json_t *mesh = json_object_get(object, "mesh"), *box = json_object_get(mesh, "box");
+    const char *candidates = json_string_value(json_object_get(object, "candidates"));
+    json_path top = {NULL, "problem", 7, 0}, loads = {&top, "loads", 5, 0};
+    out->model = model_of(json_string_value(json_object_get(object, "model")));
+    out->formulation = formulation_of(object);
+    out->thickness = get_number(object, "thickness", 1);
+    out->all_candidates = candidates && strcmp(candidates, "all") == 0;
+    return (box ? decode_box(out, box, problem) : decode_mesh(out, doc, mesh, body_len, problem)) &&
            decode_materials(out, json_object_get(object, "materials"), problem) &&
            decode_supports(out, json_object_get(object, "supports"), problem) &&
-           decode_loads(&out->loads, &out->n_loads, json_object_get(object, "loads"), problem) &&
-           decode_contacts(out, json_object_get(object, "contacts"), problem);
+           decode_loads(&out->loads, &out->n_loads, json_object_get(object, "loads"), uz_scene_dim(out), &loads,
+                        problem) &&
+           decode_contacts(out, doc, json_object_get(object, "contacts"), body_len, problem);
 }

@@ -20,6 +20,8 @@ static const struct {
     {"not_allowed", "A value is not one of those allowed"},
     {"matrix_market_syntax", "A Matrix Market text is malformed"},
     {"matrix_market_unsupported", "A kind of matrix that is not solved here"},
+    {"gmsh_syntax", "A Gmsh file is malformed"},
+    {"gmsh_unsupported", "A kind of Gmsh file or element that is not read here"},
     {"size_mismatch", "Shapes do not agree"},
     {"not_finite", "A value is not finite"},
     {"not_symmetric", "The stiffness matrix is not symmetric"},

@@ -2,8 +2,8 @@
  *
  * A part of JSON Schema 2020-12: type, const, enum, minimum, maximum, exclusiveMinimum, exclusiveMaximum, minLength,
  * maxLength, items, minItems, maxItems, uniqueItems, properties, additionalProperties, required, dependentRequired,
- * minProperties, oneOf, anyOf, if/then/else, $ref (within a file or to another), $defs, boolean schemas, annotations.
- * A schema with any other keyword is refused when it is loaded, so that nothing is silently not checked.
+ * minProperties, maxProperties, oneOf, anyOf, if/then/else, $ref (within a file or to another), $defs, boolean schemas,
+ * annotations. A schema with any other keyword is refused when it is loaded, so that nothing is silently not checked.
  *
  * oneOf and anyOf must be decidable by looking at one place (the type of the value, or one required key with a const),
  * so that an error always names the culprit and not the union. */

@@ -1,5 +1,6 @@
 /* Checking: one rule per keyword, in the order of the table, until the first violation. */
 #include "codec/problem.h"
+#include "codec/schema_numbers.h"
 #include "codec/schema_visit.h"
 
 #include <string.h>
@@ -140,17 +141,10 @@ static bool rule_max_items(const visit *v, const json_t *argument)
     return n <= most || visit_refuse(v, "out_of_range", "must have at most %.15g items, not %.15g.", most, n);
 }
 
-/* True if any number satisfies the schema, so that a million of them need not be looked at one by one. */
-static bool takes_any_number(schema_at at)
-{
-    at = schema_resolve(at);
-    const json_t *type = json_object_get(at.node, "type");
-    return json_is_true(at.node) || (json_object_size(at.node) == 1 && type && (schema_types(at) & SCHEMA_FRACTION));
-}
-
 /* Each row is put into one small array and checked as if it stood there. */
 static bool check_table_rows(const visit *v, const json_lifted *table, schema_at items)
 {
+    const schema_numbers numbers = schema_row_numbers(items);
     json_t *row = json_array();
     bool good = row != NULL;
     for (int64_t j = 0; good && j < table->columns; j++)
@@ -159,6 +153,9 @@ static bool check_table_rows(const visit *v, const json_lifted *table, schema_at
         visit_no_memory(v);
     for (int64_t i = 0; good && i < table->count; i++) {
         json_path path = {v->path, NULL, 0, (size_t)i};
+        /* the rows are of one size: what holds for the first one holds for others whose numbers are in range */
+        if (i > 0 && schema_numbers_fit(numbers, table->numbers + i * table->columns, table->columns))
+            continue;
         for (int64_t j = 0; j < table->columns; j++)
             json_real_set(json_array_get(row, (size_t)j), table->numbers[i * table->columns + j]);
         good = check(&(visit){v->doc, v->problem, items, row, &path});
@@ -172,13 +169,14 @@ static bool check_lifted_items(const visit *v, const json_lifted *lifted, schema
     bool good = true;
     if (lifted->columns > 0)
         return check_table_rows(v, lifted, items);
-    if (takes_any_number(items))
-        return true;
+    const schema_numbers numbers = schema_plain_numbers(items);
     json_t *number = json_real(0);
     if (!number)
         return visit_no_memory(v);
     for (int64_t i = 0; good && i < lifted->count; i++) {
         json_path path = {v->path, NULL, 0, (size_t)i};
+        if (schema_numbers_fit(numbers, lifted->numbers + i, 1))
+            continue;
         json_real_set(number, lifted->numbers[i]);
         good = check(&(visit){v->doc, v->problem, items, number, &path});
     }
@@ -306,6 +304,13 @@ static bool rule_min_properties(const visit *v, const json_t *argument)
     return false;
 }
 
+static bool rule_max_properties(const visit *v, const json_t *argument)
+{
+    double n = (double)json_object_size(v->value), most = json_number_value(argument);
+    return !json_is_object(v->value) || n <= most ||
+           visit_refuse(v, "not_allowed", "has %.15g keys, but at most %.15g of them go together.", n, most);
+}
+
 static bool rule_properties(const visit *v, const json_t *argument)
 {
     const char *key;
@@ -431,6 +436,7 @@ static const struct {
     {"required", SHAPE_NONE, rule_required},
     {"dependentRequired", SHAPE_NONE, rule_dependent_required},
     {"minProperties", SHAPE_NONE, rule_min_properties},
+    {"maxProperties", SHAPE_NONE, rule_max_properties},
     {"properties", SHAPE_MAP, rule_properties},
     {"oneOf", SHAPE_LIST, rule_choice},
     {"anyOf", SHAPE_LIST, rule_choice},

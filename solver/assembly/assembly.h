@@ -7,12 +7,12 @@
  * A dof is a node and a direction. Supported dofs are eliminated; the free ones keep the order of the nodes. In a body
  * of revolution the radial dofs on the axis are held at 0. A contact row exists for each node of a contact group of
  * which some free dof has a share in the normal; rows come contact by contact, nodes ascending. N is minus the unit
- * normal on those dofs, so that g = h - N u = gap(x) + u . n; against another part of the body u is the node's less that
- * of the point of the face that it meets, whose nodes have shares in the row too.
- * The directions of a node's dofs are the axes, but where a support holds an inclined direction, which is then a dof,
- * and at a node whose first contact row has a normal with a share in several free dofs: there one dof is along that
- * normal, the others across, so that an obstacle's row has one entry. K, N and p are in these dofs; uz_recover_nodal and
- * uz_restrict_nodal lead to x, y, z and back. */
+ * normal on those dofs, so that g = h - N u = gap(x) + u . n; against another part of the body u is the node's less
+ * that of the point of the face that it meets, whose nodes have shares in the row too. The directions of a node's dofs
+ * are the axes, but where a support holds an inclined direction, which is then a dof, and at a node whose first contact
+ * row has a normal with a share in several free dofs: there one dof is along that normal, the others across, so that an
+ * obstacle's row has one entry. K, N and p are in these dofs; uz_recover_nodal and uz_restrict_nodal lead to x, y, z
+ * and back. */
 #ifndef UZ_ASSEMBLY_H
 #define UZ_ASSEMBLY_H
 
@@ -28,13 +28,13 @@ typedef struct {
 
 /* Where the nodes of one contact's group stand to its obstacle, before anything moves. A plane needs none of this. */
 typedef struct {
-    int64_t n;       /* nodes of the group; 0: a plane */
-    double *gap;     /* n; INFINITY: the node has no place on the obstacle, so no row */
-    double *normal;  /* n x dim: unit normals of the obstacle, towards the body */
-    int64_t *first;  /* another part of the body, else NULL: n + 1, into node and weight */
-    int64_t *node;   /* the nodes of the face that each node meets ... */
-    double *weight;  /* ... and their shares in the point that it meets: each sum is 1 */
-    int64_t *face;   /* n: which face of the group `with` */
+    int64_t n;      /* nodes of the group; 0: a plane */
+    double *gap;    /* n; INFINITY: the node has no place on the obstacle, so no row */
+    double *normal; /* n x dim: unit normals of the obstacle, towards the body */
+    int64_t *first; /* another part of the body, else NULL: n + 1, into node and weight */
+    int64_t *node;  /* the nodes of the face that each node meets ... */
+    double *weight; /* ... and their shares in the point that it meets: each sum is 1 */
+    uz_face *face;  /* n: of the group `with` */
 } uz_contact_sites;
 
 typedef struct {
@@ -51,8 +51,8 @@ typedef struct {
     double thickness;
     uz_body_material *materials; /* n_materials */
     int64_t n_materials;
-    int32_t *material_of; /* n_elements; NULL: all are of materials[0] */
-    double *spring;       /* n_nodes x dim: stiffness of the ground along the axes; NULL: no springs */
+    int32_t *material_of;    /* n_elements; NULL: all are of materials[0] */
+    double *spring;          /* n_nodes x dim: stiffness of the ground along the axes; NULL: no springs */
     uz_contact_sites *sites; /* n_sites: one per contact of the scene */
     int64_t n_sites;
     int64_t n_pair_rows; /* contact rows against another part of the body */
@@ -109,7 +109,8 @@ double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v
 /* Bytes of all that the model holds. */
 size_t uz_body_model_bytes(const uz_body_model *model);
 
-/* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included. */
+/* The forces of the scene's loads on the nodes, along the axes: f, n_nodes x dim, temperature's B' C strain included.
+ */
 uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* f (n_nodes x dim) = the elements' stiffness times the displacements, element by element: what the nodes need to stay
  * where they are. Less the loads and the springs' -k u it is what supports and obstacles do. */

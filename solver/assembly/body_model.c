@@ -69,7 +69,8 @@ size_t uz_body_model_bytes(const uz_body_model *model)
     const size_t dim = (size_t)mesh->dim;
     size_t bytes = csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed);
     bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
-    bytes += 8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
+    bytes +=
+        8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
     bytes += (size_t)model->info.n_turned * 8 * (1 + dim * dim) + rows * 8 * (4 + dim);
     for (int64_t k = 0; k < model->n_sites; k++) {
         const uz_contact_sites *s = &model->sites[k];
@@ -87,29 +88,12 @@ static void describe_mesh(uz_body_model *model)
     model->info.xyz = model->mesh.xyz;
 }
 
-/* What is assembled so far: boxes of quad4 in plane models, one material, supports by component, tractions, planes. */
-static uz_status check_assembled(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    bool good = scene->source == UZ_MESH_BOX && mesh->uniform && mesh->kind[0] == UZ_QUAD4;
-    good = good && scene->model <= UZ_PLANE_STRAIN && scene->formulation <= UZ_FORMULATION_STANDARD;
-    good = good && scene->n_materials == 1 && !scene->all_candidates;
-    for (int64_t i = 0; good && i < scene->n_supports; i++)
-        good = scene->supports[i].kind == UZ_SUPPORT_COMPONENTS;
-    for (int64_t i = 0; good && i < scene->n_loads; i++)
-        good = scene->loads[i].kind == UZ_LOAD_TRACTION;
-    for (int64_t i = 0; good && i < scene->n_contacts; i++)
-        good = scene->contacts[i].kind == UZ_OBSTACLE_PLANE;
-    return good ? UZ_OK : uz_fail(err, UZ_ERR_UNSUPPORTED, "", "this scene cannot be assembled yet");
-}
-
 /* Everything but the stiffness. held: obstacles may hold the body where supports don't. */
 static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held, uz_error *err)
 {
     uz_status status = uz_mesh_from_scene(&model->mesh, scene, err);
     if (status == UZ_OK)
         status = uz_scene_check_body(scene, &model->mesh, err);
-    if (status == UZ_OK)
-        status = check_assembled(scene, &model->mesh, err);
     if (status != UZ_OK)
         return status;
     describe_mesh(model);

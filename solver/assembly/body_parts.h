@@ -21,10 +21,10 @@ typedef struct {
 
 typedef struct {
     int dim;
-    int motions;                    /* 3 in the plane, 1 of revolution, 6 in space */
+    int motions;                         /* 3 in the plane, 1 of revolution, 6 in space */
     double unit[UZ_MOTIONS][UZ_MOTIONS]; /* motions of them: unit vectors of q, translations first */
-    int64_t count, *of;             /* of: n_nodes, the part of each node */
-    uz_part *list;                  /* count, by their first nodes */
+    int64_t count, *of;                  /* of: n_nodes, the part of each node */
+    uz_part *list;                       /* count, by their first nodes */
 } uz_parts;
 
 /* The parts, and what supports and springs hold of them. uz_parts_clear also after a failure. */

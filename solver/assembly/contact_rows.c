@@ -138,7 +138,11 @@ static void add_row(uz_body_model *model, row_work *work, int64_t row, const sit
     info->contact_node[row] = s->node;
     info->contact_area[row] = work->area[s->node];
     info->contact_of[row] = s->contact;
-    info->contact_face[row] = s->masters > 0 ? model->sites[s->contact].face[s->place] : -1;
+    info->contact_face[2 * row] = info->contact_face[2 * row + 1] = -1;
+    if (s->masters > 0) {
+        info->contact_face[2 * row] = model->sites[s->contact].face[s->place].element;
+        info->contact_face[2 * row + 1] = model->sites[s->contact].face[s->place].side;
+    }
     memcpy(info->contact_normal + row * dim, s->normal, (size_t)dim * sizeof *s->normal);
     add_entries(work, model, row, s->node, s->normal, -1);
     for (int j = 0; j < s->masters; j++)
@@ -167,14 +171,14 @@ static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries)
     info->contact_area = uz_alloc(model->m, sizeof *info->contact_area);
     info->contact_normal = uz_alloc(model->m * dim, sizeof *info->contact_normal);
     info->contact_of = uz_alloc(model->m, sizeof *info->contact_of);
-    info->contact_face = uz_alloc(model->m, sizeof *info->contact_face);
+    info->contact_face = uz_alloc(2 * model->m, sizeof *info->contact_face);
     work->count = 0;
     work->row = uz_alloc(entries, sizeof *work->row);
     work->col = uz_alloc(entries, sizeof *work->col);
     work->val = uz_alloc(entries, sizeof *work->val);
     work->area = uz_alloc_zero(model->mesh.n_nodes, sizeof *work->area);
-    return info->contact_node && info->contact_area && info->contact_normal && info->contact_of &&
-           info->contact_face && work->row && work->col && work->val && work->area;
+    return info->contact_node && info->contact_area && info->contact_normal && info->contact_of && info->contact_face &&
+           work->row && work->col && work->val && work->area;
 }
 
 static void free_work(row_work *work)

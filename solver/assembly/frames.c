@@ -1,14 +1,13 @@
 /* frames.c: directions of the dofs of nodes.
  *
  * A support along an inclined normal holds one displacement of a node, a rigid obstacle bounds one. Where this is not
- * an axis, the node's free dofs are turned into the normal and tangents, so that the held direction is a dof, or the row
- * of N has one entry and the contact one dof per node. Supports turn first, one after the other; a contact turns what
- * they have left.
- * With n the normal on the node's free directions, of unit length there, k its largest component and s the sign of n_k,
- *     H = I - w w' / (1 + |n_k|),   w = n + s e_k,   H e_k = -s n
- * (Householder; Golub and Van Loan, Matrix Computations, 5.1) has n as its k-th row up to the sign, and for others the
- * unit vectors of supported directions, where w is zero, and tangents near the remaining axes. A node that is turned
- * again has H times its frame. */
+ * an axis, the node's free dofs are turned into the normal and tangents, so that the held direction is a dof, or the
+ * row of N has one entry and the contact one dof per node. Supports turn first, one after the other; a contact turns
+ * what they have left. With n the normal on the node's free directions, of unit length there, k its largest component
+ * and s the sign of n_k, H = I - w w' / (1 + |n_k|),   w = n + s e_k,   H e_k = -s n (Householder; Golub and Van Loan,
+ * Matrix Computations, 5.1) has n as its k-th row up to the sign, and for others the unit vectors of supported
+ * directions, where w is zero, and tangents near the remaining axes. A node that is turned again has H times its frame.
+ */
 #include "assembly/parts.h"
 
 #include "core/alloc.h"

@@ -124,8 +124,7 @@ uz_status uz_load_vector(double *p, const uz_body_model *model, const uz_scene *
 {
     double *f = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *f);
     if (!f)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes",
-                       (long long)model->mesh.n_nodes);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the loads of %lld nodes", (long long)model->mesh.n_nodes);
     uz_status status = uz_nodal_loads(f, model, scene, err);
     if (status == UZ_OK)
         uz_restrict_nodal(p, model, f);

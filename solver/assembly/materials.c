@@ -53,7 +53,7 @@ const uz_body_material *uz_element_material(const uz_body_model *model, int64_t 
 /* Elements that are all one box share its corners, so that all have the same stiffness to the last bit. */
 static void fill_box(double *xyz, const uz_mesh *mesh, uz_element_kind kind)
 {
-    const double (*local)[3] = uz_element_local_nodes(kind);
+    const double(*local)[3] = uz_element_local_nodes(kind);
     const int count = uz_element_node_count(kind);
     for (int a = 0; a < count; a++)
         for (int c = 0; c < mesh->dim; c++)
@@ -72,13 +72,13 @@ void uz_body_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], cons
     else
         for (int a = 0; a < count; a++)
             memcpy(xyz + a * mesh->dim, mesh->xyz + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *xyz);
-    *element = (uz_element){.kind = kind,
-                            .model = model->kind,
-                            .formulation =
-                                uz_resolve_formulation(model->formulation, kind, model->kind, material->poisson),
-                            .lame = material->lame,
-                            .thickness = model->thickness,
-                            .xyz = xyz};
+    *element =
+        (uz_element){.kind = kind,
+                     .model = model->kind,
+                     .formulation = uz_resolve_formulation(model->formulation, kind, model->kind, material->poisson),
+                     .lame = material->lame,
+                     .thickness = model->thickness,
+                     .xyz = xyz};
 }
 
 void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_FACE_NODES], const uz_body_model *model,
@@ -88,5 +88,6 @@ void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_
     const int count = uz_mesh_face(node, mesh, face);
     for (int a = 0; a < count; a++)
         memcpy(xyz + a * mesh->dim, mesh->xyz + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *xyz);
-    *side = (uz_side){.dim = mesh->dim, .nodes = count, .model = model->kind, .thickness = model->thickness, .xyz = xyz};
+    *side =
+        (uz_side){.dim = mesh->dim, .nodes = count, .model = model->kind, .thickness = model->thickness, .xyz = xyz};
 }

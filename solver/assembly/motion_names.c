@@ -63,9 +63,9 @@ void uz_name_part_motion(char *text, size_t size, const uz_parts *parts, const u
     name_vector(point, sizeof point, x, parts->dim);
     if (parts->dim == 2) {
         snprintf(text, size, "rotation about %s%s", point,
-                 !directed    ? ""
+                 !directed  ? ""
                  : q[5] < 0 ? ", clockwise"
-                              : ", counterclockwise");
+                            : ", counterclockwise");
         return;
     }
     const double along = fabs(q[0] * q[3] + q[1] * q[4] + q[2] * q[5]);

@@ -10,7 +10,8 @@
 /* Scene -> kind, formulation, thickness, materials, material_of. UZ_ERR_SCENE names an element without material. */
 uz_status uz_take_materials(uz_body_model *model, const uz_scene *scene, uz_error *err);
 
-/* mesh -> dof, d, n_fixed, and the frames that inclined supports ask for. UZ_ERR_SCENE where nothing is left to move. */
+/* mesh -> dof, d, n_fixed, and the frames that inclined supports ask for. UZ_ERR_SCENE where nothing is left to move.
+ */
 uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* What a support gives along the axes, NaN where nothing; of a support along a normal that is an axis, too. */
 void uz_support_values(double u[3], const uz_support *support, int dim);

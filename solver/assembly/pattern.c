@@ -1,5 +1,5 @@
-/* pattern.c: where K and K_fixed have entries: node by node, from the elements around it. Neither a list of triplets nor
- * a sort of one is needed. */
+/* pattern.c: where K and K_fixed have entries: node by node, from the elements around it. Neither a list of triplets
+ * nor a sort of one is needed. */
 #include "assembly/parts.h"
 
 #include "core/alloc.h"

@@ -27,8 +27,8 @@ static uz_status other_body(uz_error *err)
     return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", "the scene's supports are not those of this body");
 }
 
-static uz_status contradiction(const prescription *p, int64_t support, int64_t node, int c, double value,
-                               int64_t fixed, uz_error *err)
+static uz_status contradiction(const prescription *p, int64_t support, int64_t node, int c, double value, int64_t fixed,
+                               uz_error *err)
 {
     char where[96];
     const char axis = "xyz"[c];

@@ -81,7 +81,7 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
     out->contact_area = duplicate(info->contact_area, m, sizeof *info->contact_area);
     out->contact_normal = duplicate(info->contact_normal, m * info->dim, sizeof *info->contact_normal);
     out->contact_of = duplicate(info->contact_of, m, sizeof *info->contact_of);
-    out->contact_face = duplicate(info->contact_face, m, sizeof *info->contact_face);
+    out->contact_face = duplicate(info->contact_face, 2 * m, sizeof *info->contact_face);
     if (out->xyz && out->contact_node && out->contact_area && out->contact_normal && out->contact_of &&
         out->contact_face)
         return UZ_OK;

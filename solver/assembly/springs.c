@@ -64,8 +64,8 @@ uz_status uz_spread_springs(uz_body_model *model, const uz_scene *scene, uz_erro
     double *share = uz_alloc(model->mesh.n_nodes, sizeof *share);
     model->spring = uz_alloc_zero(model->mesh.n_nodes * model->mesh.dim, sizeof *model->spring);
     if (!share || !model->spring)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the springs of %lld nodes",
-                         (long long)model->mesh.n_nodes);
+        status =
+            uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the springs of %lld nodes", (long long)model->mesh.n_nodes);
     for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
         if (scene->supports[i].kind == UZ_SUPPORT_SPRING)
             status = add_springs(model, share, &scene->supports[i], err);

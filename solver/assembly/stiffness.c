@@ -99,9 +99,8 @@ uz_status uz_check_elements(const uz_body_model *model, uz_error *err)
 {
     double ke[DOFS * DOFS];
     uz_status status = UZ_OK;
-    const int64_t distinct = model->mesh.uniform && model->kind != UZ_AXISYMMETRIC && !model->material_of
-                                 ? 1
-                                 : model->mesh.n_elements;
+    const int64_t distinct =
+        model->mesh.uniform && model->kind != UZ_AXISYMMETRIC && !model->material_of ? 1 : model->mesh.n_elements;
     bool *known = uz_alloc_zero(model->n_materials, sizeof *known);
     if (!known)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld materials", (long long)model->n_materials);

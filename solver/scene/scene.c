@@ -1,4 +1,5 @@
 /* scene.c: what a scene owns. */
+#include "scene/mesh.h"
 #include "scene/scene.h"
 
 #include <stdlib.h>
@@ -37,4 +38,9 @@ void uz_scene_clear(uz_scene *scene)
     free(scene->loads);
     free(scene->contacts);
     memset(scene, 0, sizeof *scene);
+}
+
+int uz_scene_dim(const uz_scene *scene)
+{
+    return uz_model_dim(scene->model);
 }
