@@ -157,15 +157,11 @@ static double turn_of(const uz_contact *contact, const double v[3])
 }
 
 /* Of the face that a node meets: its longest distance between corners. */
-static double size_of_face(const doubts *d, int64_t k, const uz_contact_sites *sites, int64_t place)
+static double size_of_face(const uz_mesh *mesh, uz_face face)
 {
-    const uz_mesh *mesh = &d->model->mesh;
-    const uz_group *group = uz_mesh_group(mesh, d->scene->contacts[k].with, "", NULL);
     int64_t node[UZ_FACE_NODES];
     double largest = 0;
-    if (!group || sites->face[place] < 0 || sites->face[place] >= group->n_faces)
-        return INFINITY;
-    const int count = uz_mesh_face(node, mesh, group->face[sites->face[place]]);
+    const int count = uz_mesh_face(node, mesh, face);
     for (int a = 0; a < count; a++)
         for (int b = 0; b < a; b++)
             largest = fmax(
@@ -182,7 +178,7 @@ static void look_at_row(const doubts *d, double *turn, double *part, int64_t row
     relative_motion(v, d, row, sites, place);
     *turn = fmax(*turn, turn_of(&d->scene->contacts[k], v));
     if (sites && sites->first)
-        *part = fmax(*part, length(v) / size_of_face(d, k, sites, place));
+        *part = fmax(*part, length(v) / size_of_face(&d->model->mesh, sites->face[place]));
 }
 
 static void look_at_contact(const doubts *d)
