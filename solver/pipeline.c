@@ -19,6 +19,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* The scene with the loads of the case; it borrows all it has. */
+static uz_scene scene_of_case(const uz_run *run)
+{
+    uz_scene scene = run->problem->scene;
+    if (run->load_case && run->load_case->loads) {
+        scene.loads = run->load_case->loads;
+        scene.n_loads = run->load_case->n_loads;
+    }
+    return scene;
+}
+
 /* p and h: the case's or the problem's own, or assembled from the loads of the scene. */
 static uz_status make_load(uz_run *run, uz_error *err)
 {
@@ -29,11 +40,7 @@ static uz_status make_load(uz_run *run, uz_error *err)
         run->h = load_case && load_case->h ? load_case->h : run->problem->qp.h;
         return UZ_OK;
     }
-    uz_scene scene = run->problem->scene;
-    if (load_case && load_case->loads) {
-        scene.loads = load_case->loads;
-        scene.n_loads = load_case->n_loads;
-    }
+    uz_scene scene = scene_of_case(run);
     run->owned = uz_alloc_zero(run->d + run->m + body->model.n_fixed, sizeof(double));
     if (!run->owned)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
@@ -194,7 +201,8 @@ void uz_run_balance_request(uz_run *run)
     if (!nodal)
         return; /* the request stays at what it was, which is stricter */
     uz_recover_nodal(nodal, &run->body->model, run->answer.u, run->prescribed);
-    summary->discretization_error = uz_estimate_discretization_error(&run->body->model, nodal);
+    const uz_scene scene = scene_of_case(run);
+    summary->discretization_error = uz_estimate_mesh_error(&run->body->model, &scene, nodal);
     free(nodal);
     if (summary->discretization_error > 0.0)
         run->requested = fmin(1.0, 0.1 * summary->discretization_error);

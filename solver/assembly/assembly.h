@@ -123,5 +123,11 @@ uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t
  * nothing is strained. Zienkiewicz and Zhu, "A simple error estimator and adaptive procedure for practical engineering
  * analysis", Int. J. Numer. Meth. Engng 24 (1987) 337-357: the stress is compared with its own nodal averages. */
 double uz_estimate_discretization_error(const uz_body_model *model, const double *nodal);
+/* The same with the temperatures of the scene's loads, whose strain has no stress. */
+double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene, const double *nodal);
+
+/* *out: n_elements, expansion times rise of temperature by the scene's loads; NULL where there are no such loads. The
+ * caller frees it. */
+uz_status uz_free_strains(double **out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 #endif

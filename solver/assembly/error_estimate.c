@@ -27,7 +27,8 @@ typedef struct {
 typedef struct {
     const uz_body_model *model;
     const double *nodal;
-    int64_t *place; /* of each node of each element; NULL: the place is the node */
+    const double *free_strain; /* n_elements: of the temperature; NULL: none */
+    int64_t *place;            /* of each node of each element; NULL: the place is the node */
     int64_t count;
     double *sum, *volume; /* count x STRESSES, count */
 } averaging;
@@ -36,9 +37,11 @@ static void evaluate(element_state *s, const averaging *x, int64_t e)
 {
     const uz_mesh *mesh = &x->model->mesh;
     uz_element_motion motion;
-    double grad[NODES][3];
+    double grad[NODES][3], thermal[STRESSES] = {0}, elastic[STRESSES];
     const int64_t *node = uz_mesh_element(mesh, e, &s->nodes);
     uz_body_element(&s->element, s->xyz, x->model, e);
+    if (x->free_strain)
+        uz_thermal_strain(thermal, s->element.model, s->element.lame, x->free_strain[e]);
     for (int i = 0; i < s->nodes * mesh->dim; i++)
         s->u[i] = x->nodal[node[i / mesh->dim] * mesh->dim + i % mesh->dim];
     uz_element_move(&motion, &s->element, s->u);
@@ -49,7 +52,9 @@ static void evaluate(element_state *s, const averaging *x, int64_t e)
         const double det = uz_element_gradients(grad, &s->element, s->point[g]);
         s->weight[g] = weight * uz_element_measure(&s->element, s->point[g], det);
         uz_element_strain(s->strain[g], &motion, s->point[g]);
-        uz_elastic_stress(s->stress[g], s->element.model, s->element.lame, s->strain[g]);
+        for (int c = 0; c < s->stresses; c++)
+            elastic[c] = s->strain[g][c] - thermal[c];
+        uz_elastic_stress(s->stress[g], s->element.model, s->element.lame, elastic);
     }
 }
 
@@ -156,7 +161,7 @@ static void average_at_nodes(averaging *x)
 /* Adds one element's share of eta^2 and of ||u_h||^2. */
 static void add_energies(double *eta2, double *energy2, const averaging *x, const element_state *s, int64_t e)
 {
-    double N[NODES], jump[STRESSES];
+    double N[NODES], jump[STRESSES], whole[STRESSES];
     for (int g = 0; g < s->points; g++) {
         double work = 0;
         uz_element_shape(N, s->element.kind, s->point[g]);
@@ -164,8 +169,10 @@ static void add_energies(double *eta2, double *energy2, const averaging *x, cons
             jump[c] = -s->stress[g][c];
             for (int a = 0; a < s->nodes; a++)
                 jump[c] += N[a] * x->sum[place_of(x, e, a) * STRESSES + c];
-            work += s->stress[g][c] * s->strain[g][c];
         }
+        uz_elastic_stress(whole, s->element.model, s->element.lame, s->strain[g]); /* ||u_h|| knows no temperature */
+        for (int c = 0; c < s->stresses; c++)
+            work += whole[c] * s->strain[g][c];
         *eta2 += s->weight[g] * uz_complementary(s->element.model, s->element.lame, jump);
         *energy2 += s->weight[g] * work;
     }
@@ -213,24 +220,40 @@ static bool make_places(averaging *x)
     return ok;
 }
 
+static double estimate(averaging *x)
+{
+    element_state s;
+    double eta2 = 0, energy2 = 0;
+    if (make_places(x)) {
+        x->sum = uz_alloc_zero(x->count * STRESSES, sizeof *x->sum);
+        x->volume = uz_alloc_zero(x->count, sizeof *x->volume);
+    }
+    if (x->sum && x->volume) {
+        average_at_nodes(x);
+        for (int64_t e = 0; e < x->model->mesh.n_elements; e++) {
+            evaluate(&s, x, e);
+            add_energies(&eta2, &energy2, x, &s, e);
+        }
+    }
+    free(x->sum);
+    free(x->volume);
+    free(x->place);
+    return energy2 > 0 ? sqrt(eta2 / (energy2 + eta2)) : NAN;
+}
+
 double uz_estimate_discretization_error(const uz_body_model *model, const double *nodal)
 {
     averaging x = {.model = model, .nodal = nodal};
-    element_state s;
-    double eta2 = 0, energy2 = 0;
-    if (make_places(&x)) {
-        x.sum = uz_alloc_zero(x.count * STRESSES, sizeof *x.sum);
-        x.volume = uz_alloc_zero(x.count, sizeof *x.volume);
-    }
-    if (x.sum && x.volume) {
-        average_at_nodes(&x);
-        for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-            evaluate(&s, &x, e);
-            add_energies(&eta2, &energy2, &x, &s, e);
-        }
-    }
-    free(x.sum);
-    free(x.volume);
-    free(x.place);
-    return energy2 > 0 ? sqrt(eta2 / (energy2 + eta2)) : NAN;
+    return estimate(&x);
+}
+
+double uz_estimate_mesh_error(const uz_body_model *model, const uz_scene *scene, const double *nodal)
+{
+    double *free_strain = NULL;
+    if (uz_free_strains(&free_strain, model, scene, NULL) != UZ_OK)
+        return NAN;
+    averaging x = {.model = model, .nodal = nodal, .free_strain = free_strain};
+    const double error = estimate(&x);
+    free(free_strain);
+    return error;
 }

@@ -131,3 +131,27 @@ uz_status uz_load_vector(double *p, const uz_body_model *model, const uz_scene *
     free(f);
     return status;
 }
+
+uz_status uz_free_strains(double **out, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    double *strain = NULL;
+    *out = NULL;
+    for (int64_t i = 0; i < scene->n_loads; i++) {
+        const uz_load *load = &scene->loads[i];
+        if (load->kind != UZ_LOAD_TEMPERATURE)
+            continue;
+        const uz_group *group = uz_mesh_group(&model->mesh, load->on, "/loads", err);
+        if (!strain && group)
+            strain = uz_alloc_zero(model->mesh.n_elements, sizeof *strain);
+        if (!strain || !group) {
+            free(strain);
+            return !group ? UZ_ERR_SCENE : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for temperatures");
+        }
+        for (int64_t k = 0; k < uz_group_element_count(&model->mesh, group); k++) {
+            const int64_t e = uz_group_element_at(group, k);
+            strain[e] += uz_element_material(model, e)->expansion * load->value;
+        }
+    }
+    *out = strain;
+    return UZ_OK;
+}

@@ -404,7 +404,7 @@ static void balance_request(uz_semi *s)
     if (!nodal)
         return; /* the request stays at what it was, which is stricter */
     uz_recover_nodal(nodal, &s->model, s->last->u, s->prescribed);
-    double error = uz_estimate_discretization_error(&s->model, nodal);
+    double error = uz_estimate_mesh_error(&s->model, &s->problem->scene, nodal);
     free(nodal);
     s->discretization_error = error;
     if (error > 0.0)

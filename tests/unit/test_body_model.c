@@ -132,6 +132,103 @@ TEST(key_holds_what_the_body_depends_on)
     KEY(s.n_contacts = 0, true);
 }
 
+static void hold_along(uz_scene *s, double nx, double ny)
+{
+    add_support(s, "right", (double)NAN, (double)NAN);
+    uz_support *support = &s->supports[s->n_supports - 1];
+    support->kind = UZ_SUPPORT_NORMAL;
+    support->normal[0] = nx;
+    support->normal[1] = ny;
+}
+
+static void make_round(uz_scene *s, double radius)
+{
+    s->contacts[0].kind = UZ_OBSTACLE_ROUND;
+    s->contacts[0].point[1] = -radius;
+    s->contacts[0].radius = radius;
+}
+
+TEST(key_holds_supports_obstacles_and_meshes_of_all_kinds)
+{
+    KEY(s.formulation = UZ_FORMULATION_INCOMPATIBLE, true);
+    KEY(s.box.grading[0] = 2, true);
+    KEY(s.box.grading[0] = 1, false);
+    KEY(s.materials[0].density = 1, true);
+    KEY(s.materials[0].expansion = 1, true);
+    KEY(hold_along(&s, 1, 1), true);
+    KEY(hold_along(&s, 1, 0), true);
+    KEY((s.supports[0].kind = UZ_SUPPORT_SPRING, s.supports[0].spring[0] = 3), true);
+    KEY(make_round(&s, 1), true);
+    KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, memcpy(s.contacts[0].with, "top", 4)), true);
+    KEY(s.source = UZ_MESH_GIVEN, true);
+    KEY(s.all_candidates = true, true);
+}
+
+static bool same_key(const uz_scene *a, const uz_scene *b)
+{
+    unsigned char *x, *y;
+    size_t n, m;
+    CHECK(uz_scene_body_key(&x, &n, a, NULL) == UZ_OK && uz_scene_body_key(&y, &m, b, NULL) == UZ_OK);
+    const bool same = n == m && memcmp(x, y, n) == 0;
+    free(x);
+    free(y);
+    return same;
+}
+
+TEST(keys_of_obstacles_and_meshes_differ_in_each_number)
+{
+    double x[3] = {0, 1, 2}, y[3] = {0, 1, 0}, xyz[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+    int64_t first[2] = {0, 4}, node[4] = {0, 1, 2, 3}, of_group[1] = {2};
+    unsigned char kind[1] = {UZ_QUAD4};
+    uz_given_group group = {.name = "corner", .n_nodes = 1, .node = of_group};
+    uz_scene a = paper_scene(4, 2), b;
+    make_round(&a, 1);
+    b = a;
+    uz_contact contact = a.contacts[0], *owned = a.contacts;
+    b.contacts = &contact;
+    CHECK(same_key(&a, &b));
+    contact.radius = 2;
+    CHECK(!same_key(&a, &b));
+    contact = a.contacts[0];
+    contact.point[0] = 1;
+    CHECK(!same_key(&a, &b));
+    contact = a.contacts[0];
+    contact.inside = true;
+    CHECK(!same_key(&a, &b));
+    contact = (uz_contact){.kind = UZ_OBSTACLE_POLYLINE, .on = "bottom", .n_x = 3, .x = x, .y = y};
+    uz_contact other = contact;
+    double moved[3] = {0, 1, 0.1};
+    a.contacts = &other;
+    CHECK(same_key(&a, &b));
+    other.y = moved;
+    CHECK(!same_key(&a, &b));
+    other = contact;
+    uz_given_mesh mesh = {.dim = 2,
+                          .n_nodes = 4,
+                          .xyz = xyz,
+                          .n_elements = 1,
+                          .kind = kind,
+                          .first = first,
+                          .node = node,
+                          .groups = &group,
+                          .n_groups = 1};
+    a.source = b.source = UZ_MESH_GIVEN;
+    a.given = b.given = mesh;
+    CHECK(same_key(&a, &b));
+    double bent[8] = {0, 0, 1, 0, 1, 1.5, 0, 1};
+    b.given.xyz = bent;
+    CHECK(!same_key(&a, &b));
+    b.given.xyz = xyz;
+    int64_t of_other[1] = {3};
+    uz_given_group corner = group;
+    corner.node = of_other;
+    b.given.groups = &corner;
+    CHECK(!same_key(&a, &b));
+    a.contacts = owned;
+    a.given = (uz_given_mesh){0};
+    uz_scene_clear(&a);
+}
+
 TEST(key_leaves_out_what_the_body_does_not_depend_on)
 {
     KEY(s.supports[0].u[0] = 0.5, false);

@@ -1,6 +1,7 @@
 /* Each allocation on the way from a scene to matrices fails once: the call must say so, publish nothing and keep
  * nothing. Linked with malloc, calloc and realloc wrapped. */
 #include "assembly/assembly.h"
+#include "body_fixture.h"
 #include "harness.h"
 #include "scene_fixture.h"
 
@@ -104,6 +105,28 @@ static uz_status copy_info(const uz_scene *scene, uz_error *err)
     return status;
 }
 
+static uz_status estimate(const uz_scene *scene, uz_error *err)
+{
+    const long asked = countdown;
+    countdown = -1;
+    uz_body_model model = build_body(scene);
+    double *u = zeros(3 * model.mesh.n_nodes), *f = zeros(3 * model.mesh.n_nodes);
+    u[5] = 1;
+    countdown = asked;
+    uz_status status = isnan(uz_estimate_mesh_error(&model, scene, u)) ? UZ_ERR_MEMORY : UZ_OK;
+    if (status != UZ_OK)
+        snprintf(err->message, sizeof err->message, "no estimate");
+    err->status = status;
+    if (status == UZ_OK)
+        status = uz_internal_forces(f, &model, u, err);
+    if (status == UZ_OK)
+        status = uz_nodal_loads(f, &model, scene, err);
+    free(u);
+    free(f);
+    uz_body_model_clear(&model);
+    return status;
+}
+
 TEST(every_allocation_may_fail)
 {
     uz_scene scene = paper_scene(4, 2);
@@ -115,6 +138,43 @@ TEST(every_allocation_may_fail)
     CHECK(fail_each(key, &scene) >= 2);
     CHECK_INT(fail_each(copy_info, &scene), 4);
     uz_scene_clear(&scene);
+}
+
+/* Springs, inclined supports, two materials, a mesh in numbers and every kind of load. */
+static uz_scene rich_scene(void)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){2, 1, 1}, (int64_t[3]){2, 1, 1});
+    s.n_materials = 0;
+    for (int k = 0; k < 2; k++) {
+        uz_material *material = &s.materials[s.n_materials++];
+        *material = (uz_material){.on = "a", .young = 1e3, .poisson = 0.45, .density = 1, .expansion = 1e-5};
+        material->on[0] = (char)('a' + k);
+    }
+    body_give_mesh(&s, NULL);
+    for (int k = 0; k < 2; k++) {
+        uz_given_group *group = &s.given.groups[s.given.n_groups++];
+        group->name[0] = (char)('a' + k);
+        group->n_elements = 1;
+        group->element = body_room(1, sizeof *group->element);
+        group->element[0] = k;
+    }
+    body_hold_normal(&s, "left", (double[3]){1, 1, 0}, 1e-3);
+    body_spring(&s, "right", 3, 4, 5);
+    body_load(&s, UZ_LOAD_TEMPERATURE, "a", 20, 0, 0);
+    body_load(&s, UZ_LOAD_FORCE, "top", 1, -2, 3);
+    body_load(&s, UZ_LOAD_GRAVITY, "b", 1, -2, 3);
+    body_plane(&s, "bottom", (double[3]){0, -1, 0}, (double[3]){0.1, 1, 0});
+    return s;
+}
+
+TEST(every_allocation_for_supports_and_materials_may_fail)
+{
+    uz_scene s = rich_scene();
+    CHECK(fail_each(to_qp, &s) > 30);
+    CHECK(fail_each(uz_scene_check, &s) > 30);
+    CHECK(fail_each(key, &s) >= 3);
+    CHECK(fail_each(estimate, &s) >= 6);
+    uz_scene_clear(&s);
 }
 
 TEST(error_estimate_without_memory_is_nan)

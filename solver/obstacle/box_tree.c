@@ -1,0 +1,222 @@
+#include "obstacle/box_tree.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* LEAF things at most share a leaf. Halving 2^62 things takes fewer than MOST_LEVELS levels. */
+enum { LEAF = 4, MOST_LEVELS = 64 };
+
+/* A node and the range of items below it. */
+typedef struct {
+    int64_t node, first, end;
+} part;
+
+static part half_of(part whole, int side)
+{
+    const int64_t middle = whole.first + (whole.end - whole.first) / 2;
+    return (part){2 * whole.node + side, side ? middle : whole.first, side ? whole.end : middle};
+}
+
+/* The middle of a box along an axis; of one that reaches to infinity its finite end. */
+static double centre(const double *box, int dim, int64_t item, int axis)
+{
+    const double low = box[2 * dim * item + axis], high = box[2 * dim * item + dim + axis];
+    if (isfinite(low) && isfinite(high))
+        return 0.5 * low + 0.5 * high;
+    return isfinite(low) ? low : isfinite(high) ? high : 0;
+}
+
+/* Order of the items along an axis, equal ones by number. */
+typedef struct {
+    const double *box;
+    int dim, axis;
+} order;
+
+static bool precedes(const order *by, int64_t a, int64_t b)
+{
+    const double x = centre(by->box, by->dim, a, by->axis), y = centre(by->box, by->dim, b, by->axis);
+    return x < y || (x == y && a < b);
+}
+
+static void swap(int64_t *a, int64_t *b)
+{
+    const int64_t kept = *a;
+    *a = *b;
+    *b = kept;
+}
+
+/* Hoare's FIND (CACM 4 (1961) 321) with the middle item for pivot: items before `place` precede those from it on. */
+static void split_at(int64_t *item, int64_t first, int64_t end, int64_t place, const order *by)
+{
+    int64_t low = first, high = end - 1;
+    while (low < high) {
+        const int64_t pivot = item[low + (high - low) / 2];
+        int64_t i = low, j = high;
+        while (i <= j) {
+            while (precedes(by, item[i], pivot))
+                i++;
+            while (precedes(by, pivot, item[j]))
+                j--;
+            if (i <= j)
+                swap(&item[i++], &item[j--]);
+        }
+        if (place <= j)
+            high = j;
+        else if (place >= i)
+            low = i;
+        else
+            return;
+    }
+}
+
+static int widest_axis(const uz_box_tree *tree, const double *box, part of)
+{
+    int widest = 0;
+    double most = -1;
+    for (int axis = 0; axis < tree->dim; axis++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t i = of.first; i < of.end; i++) {
+            const double at = centre(box, tree->dim, tree->item[i], axis);
+            low = fmin(low, at);
+            high = fmax(high, at);
+        }
+        if (high - low > most) {
+            most = high - low;
+            widest = axis;
+        }
+    }
+    return widest;
+}
+
+static void enclose(double *into, const double *box, int dim)
+{
+    for (int c = 0; c < dim; c++) {
+        into[c] = fmin(into[c], box[c]);
+        into[dim + c] = fmax(into[dim + c], box[dim + c]);
+    }
+}
+
+static void build_node(uz_box_tree *tree, const double *box, part of)
+{
+    const int dim = tree->dim;
+    double *own = tree->box + 2 * dim * of.node;
+    for (int c = 0; c < dim; c++) {
+        own[c] = INFINITY;
+        own[dim + c] = -INFINITY;
+    }
+    for (int64_t i = of.first; i < of.end; i++)
+        enclose(own, box + 2 * dim * tree->item[i], dim);
+    if (of.end - of.first > LEAF) {
+        const order by = {box, dim, widest_axis(tree, box, of)};
+        split_at(tree->item, of.first, of.end, half_of(of, 0).end, &by);
+        build_node(tree, box, half_of(of, 0));
+        build_node(tree, box, half_of(of, 1));
+    }
+}
+
+uz_status uz_box_tree_init(uz_box_tree *out, int64_t n, int dim, const double *box, uz_error *err)
+{
+    *out = (uz_box_tree){.dim = dim, .n = n, .levels = 1};
+    for (int64_t most = n; most > LEAF; most = most - most / 2)
+        out->levels++;
+    out->item = uz_alloc(n, sizeof *out->item);
+    out->box = uz_alloc(2 * dim * ((int64_t)1 << out->levels), sizeof *out->box);
+    if (!out->item || !out->box) {
+        uz_box_tree_clear(out);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a search tree of %lld boxes", (long long)n);
+    }
+    for (int64_t i = 0; i < n; i++)
+        out->item[i] = i;
+    if (n > 0)
+        build_node(out, box, (part){1, 0, n});
+    return UZ_OK;
+}
+
+void uz_box_tree_clear(uz_box_tree *tree)
+{
+    free(tree->item);
+    free(tree->box);
+    memset(tree, 0, sizeof *tree);
+}
+
+static double box_distance(const uz_box_tree *tree, int64_t node, const double *x)
+{
+    const double *low = tree->box + 2 * tree->dim * node, *high = low + tree->dim;
+    double sum = 0;
+    for (int c = 0; c < tree->dim; c++) {
+        const double off = fmax(fmax(low[c] - x[c], x[c] - high[c]), 0);
+        sum += off * off;
+    }
+    return sum;
+}
+
+int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_distance *distance, const void *ctx)
+{
+    struct {
+        part of;
+        double distance;
+    } stack[MOST_LEVELS];
+    int64_t found = -1;
+    double best = INFINITY;
+    int depth = 0;
+    stack[depth].of = (part){1, 0, tree->n};
+    stack[depth++].distance = 0;
+    while (tree->n > 0 && depth-- > 0) {
+        const part of = stack[depth].of;
+        if (stack[depth].distance > best)
+            continue;
+        if (of.end - of.first > LEAF) {
+            const part halves[2] = {half_of(of, 0), half_of(of, 1)};
+            const double far[2] = {box_distance(tree, halves[0].node, x), box_distance(tree, halves[1].node, x)};
+            const int later = far[1] < far[0] ? 0 : 1;
+            stack[depth].of = halves[later];
+            stack[depth++].distance = far[later];
+            stack[depth].of = halves[1 - later];
+            stack[depth++].distance = far[1 - later];
+            continue;
+        }
+        for (int64_t i = of.first; i < of.end; i++) {
+            const double d = distance(ctx, tree->item[i], x);
+            if (d < best || (d == best && tree->item[i] < found)) {
+                best = d;
+                found = tree->item[i];
+            }
+        }
+    }
+    return found;
+}
+
+static bool node_meets(const uz_box_tree *tree, int64_t node, const double *box)
+{
+    const double *low = tree->box + 2 * tree->dim * node, *high = low + tree->dim;
+    for (int c = 0; c < tree->dim; c++)
+        if (low[c] > box[tree->dim + c] || box[c] > high[c])
+            return false;
+    return true;
+}
+
+bool uz_box_tree_meet(const uz_box_tree *tree, const double *box, uz_item_visit *visit, void *ctx)
+{
+    part stack[MOST_LEVELS];
+    int depth = 0;
+    if (tree->n > 0)
+        stack[depth++] = (part){1, 0, tree->n};
+    while (depth > 0) {
+        const part of = stack[--depth];
+        if (!node_meets(tree, of.node, box))
+            continue;
+        if (of.end - of.first > LEAF) {
+            stack[depth++] = half_of(of, 1);
+            stack[depth++] = half_of(of, 0);
+            continue;
+        }
+        for (int64_t i = of.first; i < of.end; i++)
+            if (visit(ctx, tree->item[i]))
+                return true;
+    }
+    return false;
+}

@@ -1,0 +1,251 @@
+/* line.c: the gap to a polyline, the obstacle on its right. */
+#include "core/alloc.h"
+#include "core/error.h"
+#include "obstacle/shapes.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static double dot(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1];
+}
+
+static double cross(const double *a, const double *b)
+{
+    return a[0] * b[1] - a[1] * b[0];
+}
+
+/* Where piece i begins and ends, in lengths along its tangent from `origin`. */
+typedef struct {
+    const double *origin, *tangent;
+    double first, last;
+} piece;
+
+static piece piece_of(const uz_line *line, int64_t i)
+{
+    const double *p = line->point + 2 * (i > 0 ? i - 1 : 0), *t = line->tangent + 2 * i;
+    if (i == 0)
+        return (piece){p, t, -INFINITY, 0};
+    if (i == line->n)
+        return (piece){p, t, 0, INFINITY};
+    return (piece){p, t, 0, hypot(p[2] - p[0], p[3] - p[1])};
+}
+
+/* The closest point of a piece: the number of a point of the line, or -1 within the piece. */
+static int64_t closest(double foot[2], const uz_line *line, int64_t i, const double x[2])
+{
+    const piece p = piece_of(line, i);
+    const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, along = dot(off, p.tangent);
+    const double rounding = 4 * DBL_EPSILON * (fabs(x[0]) + fabs(x[1]));
+    int64_t corner = -1;
+    if (along <= p.first + rounding)
+        corner = i - 1;
+    else if (along >= p.last - rounding)
+        corner = i;
+    for (int c = 0; c < 2; c++)
+        foot[c] = corner >= 0 ? line->point[2 * corner + c] : p.origin[c] + along * p.tangent[c];
+    return corner;
+}
+
+/* Pieces are numbered in the tree without the half lines that a closed line has not. */
+static int64_t piece_number(const uz_line *line, int64_t item)
+{
+    return item + (line->closed ? 1 : 0);
+}
+
+static double distance_to(const void *ctx, int64_t item, const double *x)
+{
+    const uz_line *line = ctx;
+    const int64_t i = piece_number(line, item);
+    double foot[2];
+    if (closest(foot, line, i, x) < 0) {
+        const piece p = piece_of(line, i);
+        const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]}, height = cross(p.tangent, off);
+        return height * height;
+    }
+    return (x[0] - foot[0]) * (x[0] - foot[0]) + (x[1] - foot[1]) * (x[1] - foot[1]);
+}
+
+static void gap_to_piece(uz_gap *out, const uz_line *line, int64_t i, const double x[2])
+{
+    const piece p = piece_of(line, i);
+    out->normal[0] = -p.tangent[1];
+    out->normal[1] = p.tangent[0];
+    const double off[2] = {x[0] - p.origin[0], x[1] - p.origin[1]};
+    out->gap = dot(off, out->normal);
+    out->curvature = 0;
+}
+
+/* The pieces that meet at a point. */
+static void pieces_at(int64_t pair[2], const uz_line *line, int64_t corner)
+{
+    pair[0] = line->closed && corner == 0 ? line->n - 1 : corner;
+    pair[1] = line->closed && corner == line->n - 1 ? 1 : corner + 1;
+}
+
+/* From a corner: inside or outside by the sum of both normals, which is on the outer side of any corner. */
+static void gap_to_corner(uz_gap *out, const uz_line *line, int64_t corner, const double x[2])
+{
+    int64_t pair[2];
+    pieces_at(pair, line, corner);
+    const double *a = line->tangent + 2 * pair[0], *b = line->tangent + 2 * pair[1];
+    const double turn = cross(a, b), *at = line->point + 2 * corner;
+    if (fabs(turn) <= UZ_SAME_DIRECTION) {
+        gap_to_piece(out, line, pair[0], x);
+        return;
+    }
+    const double off[2] = {x[0] - at[0], x[1] - at[1]}, mean[2] = {-a[1] - b[1], a[0] + b[0]};
+    const double distance = hypot(off[0], off[1]), length = hypot(mean[0], mean[1]);
+    const double size = fabs(x[0]) + fabs(x[1]), sign = dot(off, mean) < 0 ? -1 : 1;
+    const bool on = distance <= 4 * DBL_EPSILON * size;
+    for (int c = 0; c < 2; c++)
+        out->normal[c] = on ? mean[c] / length : sign * off[c] / distance;
+    out->gap = on ? dot(off, out->normal) : sign * distance;
+    out->curvature = on ? (turn < 0 ? INFINITY : -INFINITY) : sign / distance;
+}
+
+void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
+{
+    const int64_t item = uz_box_tree_nearest(&line->tree, x, distance_to, line);
+    const int64_t i = piece_number(line, item < 0 ? 0 : item), corner = closest(out->foot, line, i, x);
+    out->foot[2] = out->normal[2] = 0;
+    if (corner < 0)
+        gap_to_piece(out, line, i, x);
+    else
+        gap_to_corner(out, line, corner, x);
+}
+
+static void box_of(double box[4], const uz_line *line, int64_t i)
+{
+    const piece p = piece_of(line, i);
+    for (int c = 0; c < 2; c++) {
+        const double a = p.tangent[c] == 0 ? p.origin[c] : p.origin[c] + p.first * p.tangent[c];
+        const double b = p.tangent[c] == 0 ? p.origin[c] : p.origin[c] + p.last * p.tangent[c];
+        const double end = i > 0 && i < line->n ? p.origin[2 + c] : a;
+        box[c] = fmin(fmin(a, b), end);
+        box[2 + c] = fmax(fmax(a, b), end);
+    }
+}
+
+static void set_tangents(uz_line *line, const double *ends)
+{
+    const int64_t n = line->n;
+    for (int64_t i = 1; i < n; i++) {
+        const double *a = line->point + 2 * i - 2, *b = a + 2, length = hypot(b[0] - a[0], b[1] - a[1]);
+        for (int c = 0; c < 2; c++)
+            line->tangent[2 * i + c] = (b[c] - a[c]) / length;
+    }
+    memcpy(line->tangent, ends ? ends : line->tangent + 2, 2 * sizeof *ends);
+    memcpy(line->tangent + 2 * n, ends ? ends + 2 : line->tangent + 2 * n - 2, 2 * sizeof *ends);
+}
+
+static uz_status build_tree(uz_line *line, uz_error *err)
+{
+    const int64_t items = line->n + 1 - (line->closed ? 2 : 0);
+    double *box = uz_alloc(items, 4 * sizeof *box);
+    if (!box)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a polyline of %lld points", (long long)line->n);
+    for (int64_t i = 0; i < items; i++)
+        box_of(box + 4 * i, line, piece_number(line, i));
+    const uz_status status = uz_box_tree_init(&line->tree, items, 2, box, err);
+    free(box);
+    return status;
+}
+
+uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y, const double *ends, double scale,
+                       uz_error *err)
+{
+    *out = (uz_line){.n = n, .closed = !ends && x[0] == x[n - 1] && y[0] == y[n - 1]};
+    out->point = uz_alloc(n, 2 * sizeof *out->point);
+    out->tangent = uz_alloc(n < INT64_MAX ? n + 1 : -1, 2 * sizeof *out->tangent);
+    if (!out->point || !out->tangent) {
+        uz_line_clear(out);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a polyline of %lld points", (long long)n);
+    }
+    for (int64_t i = 0; i < n; i++) {
+        out->point[2 * i] = x[i] * scale;
+        out->point[2 * i + 1] = y[i] * scale;
+    }
+    set_tangents(out, ends);
+    const uz_status status = build_tree(out, err);
+    if (status != UZ_OK)
+        uz_line_clear(out);
+    return status;
+}
+
+void uz_line_clear(uz_line *line)
+{
+    free(line->point);
+    free(line->tangent);
+    uz_box_tree_clear(&line->tree);
+    memset(line, 0, sizeof *line);
+}
+
+/* ------------------------------------------------------- lines that cross themselves */
+
+/* Neighbours share a point, where they may only fold back; parallel pieces meet where they lie on one another. */
+static bool fold_back(const piece *a, const piece *b)
+{
+    return dot(a->tangent, b->tangent) < 0 && fabs(cross(a->tangent, b->tangent)) <= UZ_SAME_DIRECTION;
+}
+
+static bool overlap(const piece *a, const piece *b, const double between[2])
+{
+    if (fabs(cross(between, a->tangent)) > UZ_SAME_DIRECTION * hypot(between[0], between[1]))
+        return false;
+    const double sign = dot(a->tangent, b->tangent) < 0 ? -1 : 1, from = dot(between, a->tangent);
+    const double low = from + (sign > 0 ? b->first : -b->last), high = from + (sign > 0 ? b->last : -b->first);
+    return low <= a->last && high >= a->first;
+}
+
+static bool meet(const uz_line *line, int64_t i, int64_t j)
+{
+    const piece a = piece_of(line, i), b = piece_of(line, j);
+    const double between[2] = {b.origin[0] - a.origin[0], b.origin[1] - a.origin[1]};
+    const double turn = cross(a.tangent, b.tangent);
+    if (j == i + 1 || (line->closed && i == 1 && j == line->n - 1))
+        return fold_back(&a, &b);
+    if (fabs(turn) <= UZ_SAME_DIRECTION)
+        return overlap(&a, &b, between);
+    const double s = cross(between, b.tangent) / turn, t = cross(between, a.tangent) / turn;
+    return s >= a.first && s <= a.last && t >= b.first && t <= b.last;
+}
+
+typedef struct {
+    const uz_line *line;
+    int64_t i, found;
+    int64_t left; /* pairs that may still be looked at */
+} crossing;
+
+static bool visit_pair(void *ctx, int64_t item)
+{
+    crossing *search = ctx;
+    const int64_t j = piece_number(search->line, item);
+    if (j <= search->i)
+        return false;
+    if (search->left-- <= 0)
+        return true;
+    if (!meet(search->line, search->i, j))
+        return false;
+    search->found = j;
+    return true;
+}
+
+bool uz_line_crosses(int64_t pair[2], const uz_line *line)
+{
+    crossing search = {.line = line, .found = -1, .left = UZ_LINE_PAIRS * line->n};
+    for (int64_t item = 0; item < line->tree.n && search.left > 0; item++) {
+        double box[4];
+        search.i = piece_number(line, item);
+        box_of(box, line, search.i);
+        if (uz_box_tree_meet(&line->tree, box, visit_pair, &search) && search.found >= 0) {
+            pair[0] = search.i;
+            pair[1] = search.found;
+            return true;
+        }
+    }
+    return false;
+}

@@ -1,0 +1,43 @@
+/* shapes.h: the obstacles that are made of many pieces. Their coordinates are the caller's times a power of two that
+ * brings them near 1, so that squares neither overflow nor vanish. */
+#ifndef UZ_OBSTACLE_SHAPES_H
+#define UZ_OBSTACLE_SHAPES_H
+
+#include "obstacle/box_tree.h"
+#include "obstacle/obstacle.h"
+
+/* Two directions closer than this are one: a corner of less is rounding. */
+#define UZ_SAME_DIRECTION 1e-12
+
+/* A polyline. Piece 0 is the half line that ends at the first point, piece i leads from point i - 1 to point i, piece
+ * n begins at the last point. A closed line has neither of the half lines, and its last point is its first. */
+typedef struct {
+    int64_t n;
+    bool closed;
+    double *point;   /* n x 2 */
+    double *tangent; /* (n + 1) x 2, unit */
+    uz_box_tree tree;
+} uz_line;
+
+/* ends: unit directions of the half lines before and beyond; NULL: those of the first and last segment, or closed if
+ * the last point is the first. scale: of the coordinates. Error: UZ_ERR_MEMORY. */
+uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y, const double *ends, double scale,
+                       uz_error *err);
+void uz_line_clear(uz_line *line);
+void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2]);
+/* A pair of pieces that cross, touch, or fold back on one another; false: there is none. Looks at no more pairs than
+ * UZ_LINE_PAIRS per point: long segments side by side may all be near one another. */
+#define UZ_LINE_PAIRS 1000
+bool uz_line_crosses(int64_t pair[2], const uz_line *line);
+
+/* A table of heights over a grid, n_x and n_y >= 2. */
+typedef struct {
+    int64_t n_x, n_y;
+    double *x, *y, *z; /* z: n_y x n_x */
+    uz_box_tree tree;  /* of (n_x + 1) x (n_y + 1) cells: the first and last of each row and column are endless */
+} uz_table;
+uz_status uz_table_init(uz_table *out, const uz_contact *contact, double scale, uz_error *err);
+void uz_table_clear(uz_table *table);
+void uz_table_gap(uz_gap *out, const uz_table *table, const double x[3]);
+
+#endif
