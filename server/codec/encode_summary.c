@@ -42,6 +42,65 @@ static void put_residual(text *t, const char *key, const uz_residual *e)
     put_object(t, key, (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
 }
 
+static void put_peak(text *t, const uz_evaluation *e, int dim)
+{
+    put_named(t, (named[]){{"area", e->contact_area}}, 1);
+    text_key(t, "max_pressure_at");
+    if (e->peak_node < 0) {
+        text_raw(t, NULL);
+        return;
+    }
+    text_open(t, '{');
+    put_count(t, "node", e->peak_node);
+    text_key(t, "x");
+    text_numbers(t, e->peak_at, dim);
+    text_close(t, '}');
+}
+
+static void put_resultant(text *t, const uz_resultant *r, int dim)
+{
+    text_open(t, '{');
+    if (r->on[0])
+        put_word(t, "on", r->on);
+    text_key(t, "force");
+    text_numbers(t, r->force, dim);
+    text_key(t, "moment");
+    text_numbers(t, dim == 2 ? r->moment + 2 : r->moment, dim == 2 ? 1 : 3);
+    text_close(t, '}');
+}
+
+static void put_resultants(text *t, const char *key, const uz_resultant *list, int64_t count, int dim)
+{
+    text_key(t, key);
+    text_open(t, '[');
+    for (int64_t i = 0; i < count; i++)
+        put_resultant(t, &list[i], dim);
+    text_close(t, ']');
+}
+
+/* Scenes: what acts on the body, and what makes the answer doubtful. */
+static void put_evaluation(text *t, const uz_evaluation *e, int dim)
+{
+    text_key(t, "resultants");
+    text_open(t, '{');
+    put_resultants(t, "contacts", e->contacts, e->n_contacts, dim);
+    put_resultants(t, "supports", e->supports, e->n_supports, dim);
+    text_key(t, "loads");
+    put_resultant(t, &e->loads, dim);
+    put_named(t, (named[]){{"imbalance", e->imbalance}}, 1);
+    text_close(t, '}');
+    text_key(t, "warnings");
+    text_open(t, '[');
+    for (int i = 0; i < e->n_warnings; i++) {
+        text_open(t, '{');
+        put_word(t, "code", e->warnings[i].code);
+        put_word(t, "message", e->warnings[i].message);
+        put_named(t, (named[]){{"value", e->warnings[i].value}}, 1);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
 static void put_contact(text *t, const uz_summary *s, bool scene)
 {
     text_key(t, "contact");
@@ -53,15 +112,18 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
         text_key(t, "force");
         text_numbers(t, s->force, s->dim);
         put_named(t, (named[]){{"max_pressure", s->max_pressure}}, 1);
+        if (s->evaluation)
+            put_peak(t, s->evaluation, s->dim);
     }
     text_close(t, '}');
 }
 
 /* The primal one bounds the minimum from above only where a feasible displacement was found, so with a finite gap. */
-static void put_energy(text *t, const uz_certificate *c)
+static void put_energy(text *t, const uz_certificate *c, const uz_evaluation *e)
 {
     double primal = isfinite(c->gap) ? c->energy_primal : INFINITY;
-    put_object(t, "energy", (named[]){{"primal", primal}, {"dual", c->energy_dual}}, 2);
+    const named list[] = {{"primal", primal}, {"dual", c->energy_dual}, {"strain", e ? e->strain_energy : NAN}};
+    put_object(t, "energy", list, e ? 3 : 2);
 }
 
 static void put_certificate(text *t, const uz_certificate *c)
@@ -198,8 +260,10 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
         put_cases(&t, run->cases);
     put_problem(&t, summary, scene);
     put_contact(&t, summary, scene);
-    put_energy(&t, &summary->certificate);
+    put_energy(&t, &summary->certificate, summary->evaluation);
     put_certificate(&t, &summary->certificate);
+    if (summary->evaluation)
+        put_evaluation(&t, summary->evaluation, summary->dim);
     put_named(&t,
               (named[]){{"requested_error", summary->requested_error},
                         {"discretization_error", summary->discretization_error},

@@ -11,10 +11,8 @@
  */
 #include "fields/parts.h"
 
-#include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "scene/scene.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,22 +25,9 @@ typedef struct {
     bool *has_row;
 } pressure_work;
 
-void uz_contact_of_rows(int64_t *contact, const uz_body_model *model, const uz_scene *scene)
+static bool is_quadratic(const uz_side *side)
 {
-    int64_t row = 0;
-    for (int64_t k = 0; k < scene->n_contacts; k++) {
-        double normal[3];
-        const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
-        uz_unit_normal(normal, scene->contacts[k].normal, model->mesh.dim);
-        for (int64_t i = 0; group && i < uz_group_node_count(&model->mesh, group) && row < model->m; i++)
-            if (uz_is_contact_row(model, uz_group_node_at(group, i), normal))
-                contact[row++] = k;
-    }
-}
-
-static bool is_quadratic(const uz_field_side *side)
-{
-    return side->side.dim == 2 ? side->side.nodes == 3 : side->side.nodes == 6;
+    return side->dim == 2 ? side->nodes == 3 : side->nodes == 6;
 }
 
 static bool need_ends(pressure_work *w, int64_t n_nodes)
@@ -53,15 +38,15 @@ static bool need_ends(pressure_work *w, int64_t n_nodes)
 }
 
 /* Middle j of a side lies between its corners j and j + 1. */
-static void add_side(pressure_work *w, const uz_field_side *at)
+static void add_side(pressure_work *w, const uz_side *side, const int64_t *node)
 {
-    double weight[UZ_SIDE_NODES];
-    const int corners = is_quadratic(at) ? at->side.dim : at->side.nodes;
-    uz_side_weights(weight, &at->side);
+    double weight[UZ_FACE_NODES];
+    const int corners = is_quadratic(side) ? side->dim : side->nodes;
+    uz_side_weights(weight, side);
     for (int a = 0; a < corners; a++)
-        w->area[at->node[a]] += weight[a];
-    for (int j = 0; j < at->side.nodes - corners; j++) {
-        const int64_t middle = at->node[corners + j], ends[2] = {at->node[j], at->node[(j + 1) % corners]};
+        w->area[node[a]] += weight[a];
+    for (int j = 0; j < side->nodes - corners; j++) {
+        const int64_t middle = node[corners + j], ends[2] = {node[j], node[(j + 1) % corners]};
         for (int k = 0; k < 2; k++) {
             w->area[ends[k]] += 0.5 * weight[corners + j];
             w->end[2 * middle + k] = 1 + ends[k];
@@ -69,14 +54,16 @@ static void add_side(pressure_work *w, const uz_field_side *at)
     }
 }
 
-static bool add_sides(pressure_work *w, const uz_mesh *mesh, const uz_scene *scene, const uz_group *group)
+static bool add_sides(pressure_work *w, const uz_body_model *model, const uz_group *group)
 {
-    uz_field_side side;
+    uz_side side;
+    double xyz[3 * UZ_FACE_NODES];
+    int64_t node[UZ_FACE_NODES];
     for (int64_t f = 0; f < group->n_faces; f++) {
-        uz_field_side_at(&side, mesh, scene, group->face[f]);
-        if (is_quadratic(&side) && !need_ends(w, mesh->n_nodes))
+        uz_body_side(&side, xyz, node, model, group->face[f]);
+        if (is_quadratic(&side) && !need_ends(w, model->mesh.n_nodes))
             return false;
-        add_side(w, &side);
+        add_side(w, &side, node);
     }
     return true;
 }
@@ -133,7 +120,7 @@ static bool press(double *pressure, pressure_work *w, const uz_body_model *model
     const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
     if (!group)
         return true;
-    if (!add_sides(w, &model->mesh, scene, group))
+    if (!add_sides(w, model, group))
         return false;
     for (int64_t i = first; i < last; i++)
         add_reaction(w, model->info.contact_node[i], r[i]);
@@ -149,10 +136,8 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
     const int64_t m = model->m, n_nodes = model->mesh.n_nodes;
     pressure_work w = {uz_alloc_zero(n_nodes, sizeof *w.area), uz_alloc_zero(n_nodes, sizeof *w.force), NULL,
                        uz_alloc_zero(n_nodes, sizeof *w.has_row)};
-    int64_t *contact = uz_alloc_zero(m, sizeof *contact);
-    bool done = w.area && w.force && w.has_row && contact;
-    if (done)
-        uz_contact_of_rows(contact, model, scene);
+    const int64_t *contact = model->info.contact_of;
+    bool done = w.area && w.force && w.has_row;
     for (int64_t first = 0, last; done && first < m; first = last) {
         for (last = first; last < m && contact[last] == contact[first];)
             last++;
@@ -162,6 +147,5 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
     free(w.force);
     free(w.end);
     free(w.has_row);
-    free(contact);
     return done ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)m);
 }

@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "fields/balance.h"
 #include "fields/parts.h"
 
 #include <math.h>
@@ -73,5 +74,6 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (status != UZ_OK)
         return status;
     evaluate_contact(result, result->evaluation);
-    return UZ_OK;
+    uz_find_doubts(result->evaluation, model, scene, result->u, result->r);
+    return uz_balance_forces(result->evaluation, model, scene, result->u, result->r, err);
 }

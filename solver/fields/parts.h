@@ -13,7 +13,6 @@ typedef struct {
     const uz_scene *scene;
     const uz_body_model *model; /* mesh and contact rows; neither K nor N is read */
     int components;             /* of a stress: 4 or 6 */
-    int32_t *material;          /* n_elements: which of the scene's */
     double *rise;               /* n_elements: of temperature; NULL: none has any */
 } uz_field_body;
 
@@ -25,10 +24,9 @@ void uz_field_body_clear(uz_field_body *body);
 typedef struct {
     uz_element element;
     uz_element_motion motion;
-    uz_lame lame;
-    double young, poisson;
+    const uz_body_material *material;
     double free_strain; /* expansion times rise of temperature */
-    double xyz[UZ_ELEMENT_DOFS], u[UZ_ELEMENT_DOFS];
+    double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
 } uz_field_element;
 void uz_field_element_at(uz_field_element *out, const uz_field_body *body, const double *u, int64_t element);
 
@@ -58,15 +56,4 @@ double uz_von_mises(const double *stress, int components);
 /* Pressure of each contact row from the reactions r (m): see contact_pressure.c. NaN where the contact has no area. */
 uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
                               uz_error *err);
-/* Which of the scene's contacts each row belongs to. */
-void uz_contact_of_rows(int64_t *contact, const uz_body_model *model, const uz_scene *scene);
-
-/* A side of the mesh as element.h wants it; its nodes (in its order). */
-typedef struct {
-    uz_side side;
-    int64_t node[UZ_FACE_NODES];
-    double xyz[UZ_SIDE_NODES * 3];
-} uz_field_side;
-void uz_field_side_at(uz_field_side *out, const uz_mesh *mesh, const uz_scene *scene, uz_face face);
-
 #endif

@@ -172,14 +172,16 @@ int64_t uz_field_gauss_count(const uz_field_body *body)
     return count;
 }
 
-static void place_of(double *x, const uz_field_element *at, int dim, const double point[3])
+static void place_of(double *x, const uz_mesh *mesh, int64_t element, const double point[3])
 {
     double N[UZ_ELEMENT_NODES];
-    uz_element_shape(N, at->element.kind, point);
-    for (int c = 0; c < dim; c++) {
+    int nodes;
+    const int64_t *node = uz_mesh_element(mesh, element, &nodes);
+    uz_element_shape(N, (uz_element_kind)mesh->kind[element], point);
+    for (int c = 0; c < mesh->dim; c++) {
         x[c] = 0;
-        for (int a = 0; a < uz_element_node_count(at->element.kind); a++)
-            x[c] += N[a] * at->xyz[a * dim + c];
+        for (int a = 0; a < nodes; a++)
+            x[c] += N[a] * mesh->xyz[node[a] * mesh->dim + c];
     }
 }
 
@@ -200,7 +202,7 @@ uz_status uz_field_gauss(double *element, double *point, double *stress, const u
             uz_element_gauss(local, at.element.kind, at.element.model, g);
             uz_field_state_at(&state, &at, local);
             *element++ = (double)e;
-            place_of(point, &at, mesh->dim, local);
+            place_of(point, mesh, e, local);
             point += mesh->dim;
             memcpy(stress, state.stress, (size_t)components * sizeof *stress);
             stress += components;

@@ -74,7 +74,7 @@ static void put_materials(writing *w)
         return;
     }
     for (int64_t e = 0; e < n; e++)
-        material[e] = w->body->material[e];
+        material[e] = w->body->model->material_of ? w->body->model->material_of[e] : 0;
     uz_vtu_open(&w->vtu, "CellData");
     uz_vtu_array(&w->vtu, uz_field_name(UZ_FIELD_MATERIALS), UZ_VTU_INT64, material, n, 1, NULL);
     uz_vtu_close(&w->vtu, "CellData");

@@ -1,7 +1,7 @@
 /* Fields against what theory says of the answers they are made from. */
-#include "element/element.h"
+#include "assembly/parts.h"
 #include "fields/parts.h"
-#include "fields_fixture.h"
+#include "scene_fixture.h"
 
 #include "core/random.h"
 
@@ -12,6 +12,17 @@ typedef struct {
     uz_field_body body;
     uz_material material;
 } loose_body;
+
+/* u = G x at every node of a mesh, G dim x dim row by row. */
+static double *linear_motion(const uz_mesh *mesh, const double *G)
+{
+    const int dim = mesh->dim;
+    double *u = zeros(mesh->n_nodes * dim);
+    for (int64_t i = 0; i < mesh->n_nodes * dim; i++)
+        for (int j = 0; j < dim; j++)
+            u[i] += G[i % dim * dim + j] * mesh->xyz[i / dim * dim + j];
+    return u;
+}
 
 /* nodes of the reference element, moved a little and scaled by `size`. */
 static void shake(double *xyz, uz_element_kind kind, uz_model model, double size)
@@ -48,13 +59,14 @@ static void loose_init(loose_body *b, uz_element_kind kind, uz_model model, doub
     mesh->groups[0] = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
     b->material = (uz_material){.on = "all", .young = 200e3, .poisson = 0.3, .expansion = 1e-5};
     b->scene = (uz_scene){.model = model, .thickness = 2, .materials = &b->material, .n_materials = 1};
+    CHECK(uz_take_materials(&b->model, &b->scene, NULL) == UZ_OK);
     CHECK(uz_field_body_init(&b->body, &b->scene, &b->model, NULL) == UZ_OK);
 }
 
 static void loose_clear(loose_body *b)
 {
     uz_field_body_clear(&b->body);
-    uz_mesh_clear(&b->model.mesh);
+    uz_body_model_clear(&b->model);
 }
 
 static double largest(const double *x, int64_t n)
@@ -81,7 +93,7 @@ static void check_uniform(uz_element_kind kind, uz_model model, double size)
     loose_body b;
     loose_init(&b, kind, model, size);
     const int dim = b.model.mesh.dim, nodes = (int)b.model.mesh.n_nodes, k = b.body.components;
-    double *u = linear_motion(&b.model.mesh, dim == 2 ? PLANE : SPACE, NULL);
+    double *u = linear_motion(&b.model.mesh, dim == 2 ? PLANE : SPACE);
     double strain[6], stress[6];
     if (dim == 2) {
         memcpy(strain, (double[6]){2e-3, 5e-4, 0, -1e-3, 0, 0}, sizeof strain);
@@ -126,7 +138,7 @@ TEST(a_ring_has_its_hoop_stress)
         loose_body b;
         loose_init(&b, (uz_element_kind)kind, UZ_AXISYMMETRIC, 1);
         const int nodes = (int)b.model.mesh.n_nodes;
-        double *u = linear_motion(&b.model.mesh, (double[4]){1e-3, 0, 0, -2e-3}, NULL);
+        double *u = linear_motion(&b.model.mesh, (double[4]){1e-3, 0, 0, -2e-3});
         double stress[6], *got = zeros(nodes * 4), *strain = zeros(nodes * 4);
         hooke(stress, (double[6]){1e-3, -2e-3, 1e-3}, 200e3, 0.3);
         CHECK(uz_field_recover(got, strain, &b.body, u, NULL, NULL) == UZ_OK);
@@ -182,7 +194,7 @@ static void check_heated(uz_model model, bool free_to_grow, const double stress[
     uz_field_body_clear(&b.body);
     CHECK(uz_field_body_init(&b.body, &b.scene, &b.model, NULL) == UZ_OK);
     const double growth = !free_to_grow ? 0 : model == UZ_PLANE_STRAIN ? 1.3e-3 : 1e-3;
-    double *u = linear_motion(&b.model.mesh, (double[4]){growth, 0, 0, growth}, NULL), got[16], strain[16];
+    double *u = linear_motion(&b.model.mesh, (double[4]){growth, 0, 0, growth}), got[16], strain[16];
     CHECK(uz_field_recover(got, strain, &b.body, u, NULL, NULL) == UZ_OK);
     for (int i = 0; i < 16; i++)
         CHECK_MSG(fabs(got[i] - stress[i % 4]) <= 1e-9, "model %d: %d is %g, not %g", model, i % 4, got[i],
@@ -241,7 +253,7 @@ TEST(gauss_points_carry_the_elements_own_stress)
         const bool solid = uz_element_dim((uz_element_kind)kind) == 3;
         loose_init(&b, (uz_element_kind)kind, solid ? UZ_SOLID : UZ_PLANE_STRAIN, 1);
         static const double PLANE[4] = {1e-3, 0, 0, 0}, SPACE[9] = {1e-3};
-        double *u = linear_motion(&b.model.mesh, solid ? SPACE : PLANE, NULL), stress[6];
+        double *u = linear_motion(&b.model.mesh, solid ? SPACE : PLANE), stress[6];
         const int64_t n = uz_field_gauss_count(&b.body);
         const int k = b.body.components, dim = b.model.mesh.dim;
         double *element = zeros(n), *point = zeros(n * dim), *got = zeros(n * k);

@@ -1,0 +1,211 @@
+/* warnings.c: does the answer fit the assumptions it was computed under? Strains and rotations are taken to be small,
+ * normals and the places where bodies meet to be those of the undeformed body. */
+#include "fields/balance.h"
+
+#include "fields/parts.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* A rotation by w makes strains of w^2 / 2 that are not there: at 0.1 half a per cent. */
+static const double MOST_ROTATION = 0.1, MOST_STRAIN = 0.05;
+/* Sliding by s on a curvature k turns the normal by s k. */
+static const double MOST_TURN = 0.1;
+/* Of a face of the other body, in parts of its size. */
+static const double MOST_FACE = 0.5;
+
+typedef struct {
+    const uz_body_model *model;
+    const uz_scene *scene;
+    const double *u, *r;
+    uz_evaluation *out;
+} doubts;
+
+__attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const char *code, double value,
+                                                       const char *format, ...)
+{
+    enum { MOST = sizeof out->warnings / sizeof out->warnings[0] };
+    va_list args;
+    if (out->n_warnings == MOST)
+        return;
+    uz_warning *w = &out->warnings[out->n_warnings++];
+    w->value = value;
+    snprintf(w->code, sizeof w->code, "%s", code);
+    va_start(args, format);
+    vsnprintf(w->message, sizeof w->message, format, args);
+    va_end(args);
+}
+
+/* ---- strain and rotation */
+
+static double squared_distance(const double *x, const double *y, int dim)
+{
+    double sum = 0;
+    for (int c = 0; c < dim; c++)
+        sum += (x[c] - y[c]) * (x[c] - y[c]);
+    return sum;
+}
+
+/* The largest change of u over a distance between neighbours: a cheap look that sees every strain and rotation. */
+static double largest_slope(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const int dim = mesh->dim;
+    double largest = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        int nodes;
+        const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+        for (int a = 1; a < nodes; a++)
+            for (int other = 0; other<a; other += a> 1 ? a - 1 : 1) { /* the first node and the one before */
+                const int64_t i = node[a] * dim, j = node[other] * dim;
+                const double du = squared_distance(d->u + i, d->u + j, dim);
+                if (du > largest * squared_distance(mesh->xyz + i, mesh->xyz + j, dim))
+                    largest = du / squared_distance(mesh->xyz + i, mesh->xyz + j, dim);
+            }
+    }
+    return sqrt(largest);
+}
+
+/* |curl u| / 2 from the gradients at a point. */
+static double rotation_at(const uz_field_element *at, const double point[3])
+{
+    double grad[UZ_ELEMENT_NODES][3], G[3][3] = {{0}};
+    const int dim = uz_element_dim(at->element.kind);
+    uz_element_gradients(grad, &at->element, point);
+    for (int a = 0; a < uz_element_node_count(at->element.kind); a++)
+        for (int i = 0; i < dim; i++)
+            for (int j = 0; j < dim; j++)
+                G[i][j] += at->u[a * dim + i] * grad[a][j];
+    const double x = G[2][1] - G[1][2], y = G[0][2] - G[2][0], z = G[1][0] - G[0][1];
+    return 0.5 * sqrt(x * x + y * y + z * z);
+}
+
+static void look_at_elements(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const uz_field_body body = {.scene = d->scene, .model = d->model, .components = mesh->dim == 2 ? 4 : 6};
+    double rotation = 0, strain = 0, principal[3];
+    int64_t turned = 0, strained = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        uz_field_element at;
+        uz_field_state state;
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+        const bool box = kind == UZ_QUAD4 || kind == UZ_QUAD8 || kind == UZ_HEX8;
+        const double middle = box ? 0 : 1.0 / (mesh->dim + 1), point[3] = {middle, middle, middle};
+        uz_field_element_at(&at, &body, d->u, e);
+        uz_field_state_at(&state, &at, point);
+        uz_principal(principal, state.strain, body.components);
+        const double here = fmax(fabs(principal[0]), fabs(principal[2])), turn = rotation_at(&at, point);
+        if (here > strain) {
+            strain = here;
+            strained = e;
+        }
+        if (turn > rotation) {
+            rotation = turn;
+            turned = e;
+        }
+    }
+    if (rotation > MOST_ROTATION)
+        warn(d->out, "large_rotation", rotation,
+             "element %lld turns by %.2g rad; small rotations were assumed, and beyond %g they are not small",
+             (long long)turned, rotation, MOST_ROTATION);
+    if (strain > MOST_STRAIN)
+        warn(d->out, "large_strain", strain,
+             "element %lld is strained by %.2g; small strains were assumed, and beyond %g they are not small",
+             (long long)strained, strain, MOST_STRAIN);
+}
+
+/* ---- sliding */
+
+/* Where a row's other side is: nothing moves but the node, or the nodes of a face do too. */
+static void relative_motion(double v[3], const doubts *d, int64_t row, const uz_contact_sites *sites, int64_t place)
+{
+    const int dim = d->model->mesh.dim;
+    const double *n = d->model->info.contact_normal + row * dim;
+    double along = 0;
+    memset(v, 0, 3 * sizeof *v);
+    for (int c = 0; c < dim; c++) {
+        v[c] = d->u[d->model->info.contact_node[row] * dim + c];
+        for (int64_t j = sites && sites->first ? sites->first[place] : 0;
+             sites && sites->first && j < sites->first[place + 1]; j++)
+            v[c] -= sites->weight[j] * d->u[sites->node[j] * dim + c];
+        along += v[c] * n[c];
+    }
+    for (int c = 0; c < dim; c++)
+        v[c] -= along * n[c];
+}
+
+static double length(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* By how much sliding v turns the normal of the obstacle. */
+static double turn_of(const uz_contact *contact, const double v[3])
+{
+    double along = 0, axis = 0;
+    if (contact->kind != UZ_OBSTACLE_ROUND && contact->kind != UZ_OBSTACLE_CYLINDER)
+        return 0;
+    for (int c = 0; c < 3 && contact->kind == UZ_OBSTACLE_CYLINDER; c++) {
+        along += v[c] * contact->normal[c];
+        axis += contact->normal[c] * contact->normal[c];
+    }
+    const double across = length(v) * length(v) - (axis > 0 ? along * along / axis : 0);
+    return sqrt(fmax(0, across)) / contact->radius;
+}
+
+/* Of the face that a node meets: its longest distance between corners. */
+static double size_of_face(const uz_mesh *mesh, uz_face face)
+{
+    int64_t node[UZ_FACE_NODES];
+    double largest = 0;
+    const int count = uz_mesh_face(node, mesh, face);
+    for (int a = 0; a < count; a++)
+        for (int b = 0; b < a; b++)
+            largest = fmax(
+                largest, squared_distance(mesh->xyz + node[a] * mesh->dim, mesh->xyz + node[b] * mesh->dim, mesh->dim));
+    return sqrt(largest);
+}
+
+static void look_at_row(const doubts *d, double *turn, double *part, int64_t row, int64_t k, int64_t place)
+{
+    const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
+    double v[3];
+    if (!(d->r[row] < 0))
+        return;
+    relative_motion(v, d, row, sites, place);
+    *turn = fmax(*turn, turn_of(&d->scene->contacts[k], v));
+    if (sites && sites->first)
+        *part = fmax(*part, length(v) / size_of_face(&d->model->mesh, sites->face[place]));
+}
+
+static void look_at_contact(const doubts *d)
+{
+    const uz_mesh_info *info = &d->model->info;
+    double turn = 0, part = 0;
+    int64_t row = 0;
+    for (int64_t k = 0; k < d->scene->n_contacts; k++) {
+        const uz_group *group = uz_mesh_group(&d->model->mesh, d->scene->contacts[k].on, "", NULL);
+        const int64_t count = group ? uz_group_node_count(&d->model->mesh, group) : 0;
+        for (int64_t i = 0; i < count && row < d->model->m && info->contact_of[row] == k; i++)
+            if (info->contact_node[row] == uz_group_node_at(group, i))
+                look_at_row(d, &turn, &part, row++, k, i);
+    }
+    if (turn > MOST_TURN)
+        warn(d->out, "large_sliding", turn,
+             "a node slides so far on a round obstacle that the normal, which was kept, turns by %.2g rad", turn);
+    if (part > MOST_FACE)
+        warn(d->out, "sliding_off_face", part,
+             "a node slides by %.2g of the face of the other body that it was set against", part);
+}
+
+void uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
+                    const double *r)
+{
+    const doubts d = {model, scene, u, r, out};
+    if (largest_slope(&d) > 0.25 * fmin(MOST_STRAIN, MOST_ROTATION))
+        look_at_elements(&d);
+    look_at_contact(&d);
+}

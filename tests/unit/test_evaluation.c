@@ -1,0 +1,278 @@
+/* What the summary of a scene says of its answer: resultants and their balance, energy, pressure, doubts. */
+#include "body_fixture.h"
+#include "core/random.h"
+
+static const char *const ELEMENTS[] = {"tri3", "quad4", "tri6", "quad8", "tet4", "hex8", "tet10"};
+enum { N_ELEMENTS = 7, FIRST_SOLID = 4 };
+
+static void clear(uz_scene *scene, uz_result *result)
+{
+    uz_result_free(result);
+    uz_scene_clear(scene);
+}
+
+/* Sum of what acts: forces, and moments about the origin. */
+static void add_up(double force[3], double moment[3], const uz_evaluation *e)
+{
+    for (int c = 0; c < 3; c++) {
+        force[c] = e->loads.force[c];
+        moment[c] = e->loads.moment[c];
+        for (int64_t i = 0; i < e->n_contacts; i++) {
+            force[c] += e->contacts[i].force[c];
+            moment[c] += e->contacts[i].moment[c];
+        }
+        for (int64_t i = 0; i < e->n_supports; i++) {
+            force[c] += e->supports[i].force[c];
+            moment[c] += e->supports[i].moment[c];
+        }
+    }
+}
+
+/* A block 2 x 1 [x 1], pressed on a plane by a uniform pressure q, free to spread. */
+static uz_scene pressed(uz_model model, const char *element, double q)
+{
+    const double size[3] = {2, 1, 1}, zero[3] = {0}, up[3] = {0, 1, 0};
+    uz_scene s = body_scene(model, element, size, (int64_t[3]){4, 2, 2});
+    s.thickness = 0.5;
+    body_plane(&s, "bottom", zero, up);
+    body_load(&s, UZ_LOAD_PRESSURE, "top", q, 0, 0);
+    if (model != UZ_AXISYMMETRIC)
+        body_hold(&s, "left", 0, NAN, NAN);
+    if (model == UZ_SOLID)
+        body_hold(&s, "back", NAN, NAN, 0);
+    return s;
+}
+
+static void check_pressed(uz_model model, const char *element)
+{
+    uz_scene s = pressed(model, element, 7);
+    uz_result *result = body_solve(&s, 0);
+    const uz_evaluation *e = result->evaluation;
+    const double area = model == UZ_AXISYMMETRIC ? 4 * M_PI : model == UZ_SOLID ? 2 : 1;
+    for (int64_t i = 0; i < result->m; i++)
+        CHECK_MSG(fabs(result->pressure[i] - 7) <= 1e-6, "%s %d: pressure %g", element, model, result->pressure[i]);
+    CHECK(fabs(result->summary.max_pressure - 7) <= 1e-6);
+    CHECK(e->peak_node >= 0 && e->peak_at[1] == 0);
+    CHECK(fabs(e->contacts[0].force[1] - 7 * area) <= 1e-7 * area);
+    CHECK(fabs(e->loads.force[1] + 7 * area) <= 1e-11 * area);
+    CHECK(fabs(e->supports[0].force[0]) <= 1e-6);
+    CHECK_MSG(e->imbalance <= 1e-8, "%s %d: %g", element, model, e->imbalance);
+    CHECK_INT(e->n_warnings, 0);
+    /* 1/2 stress strain volume: in plane strain and in a slice held in z with 1 - nu^2 for the held direction */
+    const double held = model == UZ_PLANE_STRAIN ? 1 - 0.09 : 1;
+    CHECK_REL(e->strain_energy, 0.5 * 49 / 200e3 * area * held, 1e-7);
+    clear(&s, result);
+}
+
+TEST(a_uniform_pressure_is_found_on_every_side)
+{
+    for (int i = 0; i < N_ELEMENTS; i++) {
+        if (i >= FIRST_SOLID) {
+            check_pressed(UZ_SOLID, ELEMENTS[i]);
+            continue;
+        }
+        check_pressed(UZ_PLANE_STRESS, ELEMENTS[i]);
+        check_pressed(UZ_PLANE_STRAIN, ELEMENTS[i]);
+        check_pressed(UZ_AXISYMMETRIC, ELEMENTS[i]);
+    }
+}
+
+static double between(uint64_t *random, double low, double high)
+{
+    return low + (high - low) * uz_uniform(random);
+}
+
+/* Loads of all kinds, supports of all kinds, an oblique obstacle. */
+static uz_scene mixed(uint64_t *random, int element)
+{
+    const bool solid = element >= FIRST_SOLID;
+    const double size[3] = {3, 2, 1.5};
+    uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRAIN, ELEMENTS[element], size, (int64_t[3]){3, 2, 2});
+    for (int c = 0; c < 3; c++)
+        s.box.origin[c] = between(random, -50, 50);
+    s.materials[0].young = 2e3;
+    s.materials[0].density = 2;
+    s.materials[0].expansion = 1e-5;
+    const double n[3] = {between(random, 0.2, 1), between(random, 0.2, 1), solid ? between(random, 0.2, 1) : 0};
+    body_hold_normal(&s, "left", n, between(random, -1e-3, 1e-3));
+    body_hold(&s, "left", NAN, 0, NAN);
+    if (solid)
+        body_hold(&s, "left", NAN, NAN, 1e-4);
+    body_hold(&s, "right", between(random, -1e-4, 1e-4), NAN, NAN);
+    body_spring(&s, "right", 1e4, 3e4, solid ? 2e4 : 0);
+    body_load(&s, UZ_LOAD_TRACTION, "right", between(random, -9, 9), between(random, -9, 9), solid ? 3 : 0);
+    body_load(&s, UZ_LOAD_PRESSURE, "top", between(random, 5, 30), 0, 0);
+    body_load(&s, UZ_LOAD_FORCE, "bottom", between(random, -9, 9), between(random, -9, 9), solid ? 4 : 0);
+    body_load(&s, UZ_LOAD_GRAVITY, "all", 0, -9.81, 0);
+    body_load(&s, UZ_LOAD_BODY_FORCE, "all", 1, 2, solid ? 3 : 0);
+    body_load(&s, UZ_LOAD_TEMPERATURE, "all", between(random, -50, 50), 0, 0);
+    body_load(&s, UZ_LOAD_NODE_FORCE, "", 5, -4, 0)->node = 7;
+    const double point[3] = {s.box.origin[0], s.box.origin[1] - 0.002, s.box.origin[2]},
+                 oblique[3] = {5e-4, 1, solid ? 2e-4 : 0};
+    body_plane(&s, "bottom", point, oblique);
+    return s;
+}
+
+TEST(forces_and_moments_balance)
+{
+    uint64_t random = 3;
+    int touching = 0;
+    for (int i = 0; i < 4 * N_ELEMENTS; i++) {
+        uz_scene s = mixed(&random, i % N_ELEMENTS);
+        uz_result *result = body_solve(&s, 1e-10);
+        const uz_evaluation *e = result->evaluation;
+        double force[3], moment[3], size = 0, lever = 0;
+        touching += result->summary.active > 0;
+        add_up(force, moment, e);
+        for (int64_t k = 0; k < e->n_supports; k++) {
+            size += body_most(e->supports[k].force, 3);
+            lever += body_most(e->supports[k].moment, 3);
+        }
+        CHECK_MSG(e->imbalance <= 1e-8, "%s: %g", s.box.element, e->imbalance);
+        CHECK_MSG(body_most(force, 3) <= 1e-7 * size, "%s: force %g of %g", s.box.element, body_most(force, 3), size);
+        CHECK_MSG(body_most(moment, 3) <= 1e-7 * (lever + 100 * size), "%s: moment %g of %g", s.box.element,
+                  body_most(moment, 3), lever);
+        clear(&s, result);
+    }
+    CHECK_MSG(touching > N_ELEMENTS, "%d touch", touching);
+}
+
+/* A support acts along its own directions alone. */
+TEST(each_support_has_its_own_share)
+{
+    const double size[3] = {2, 1, 0}, oblique[3] = {3, 4, 0};
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", size, (int64_t[3]){4, 2, 0});
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "bottom", NAN, 0, NAN);
+    body_hold_normal(&s, "right", oblique, 0);
+    body_load(&s, UZ_LOAD_TRACTION, "top", 5, -20, 0);
+    uz_result *result = body_solve(&s, 0);
+    const uz_evaluation *e = result->evaluation;
+    CHECK(e->supports[0].force[0] != 0 && e->supports[0].force[1] == 0);
+    CHECK(e->supports[1].force[1] != 0 && e->supports[1].force[0] == 0);
+    CHECK_REL(e->supports[2].force[1], e->supports[2].force[0] * 4 / 3, 1e-12);
+    CHECK(fabs(e->supports[2].force[0]) > 1e-3);
+    CHECK(e->imbalance < 1e-10);
+    clear(&s, result);
+}
+
+TEST(a_body_on_springs)
+{
+    const double size[3] = {2, 1, 0};
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", size, (int64_t[3]){4, 2, 0});
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_spring(&s, "bottom", 0, 50, 0);
+    body_load(&s, UZ_LOAD_TRACTION, "top", 0, -3, 0);
+    uz_result *result = body_solve(&s, 1e-10);
+    const uz_evaluation *e = result->evaluation;
+    CHECK_REL(e->supports[1].force[1], 6.0, 1e-9);
+    CHECK_REL(e->supports[1].moment[2], 6.0, 1e-9);
+    CHECK(e->imbalance < 1e-10);
+    CHECK(e->strain_energy > 0.5 * 6 * 6 / 50); /* the springs' and a little of the body's */
+    CHECK_REL(e->strain_energy, 0.5 * 6 * 6 / 50, 1e-3);
+    clear(&s, result);
+}
+
+/* Free growth stores nothing; held warmth stores 1/2 stress strain. */
+TEST(energy_of_warmth)
+{
+    for (int held = 0; held < 2; held++) {
+        const double size[3] = {2, 1, 0};
+        uz_scene s = body_scene(UZ_PLANE_STRESS, "quad8", size, (int64_t[3]){3, 2, 0});
+        s.materials[0].expansion = 1e-5;
+        body_hold(&s, "left", 0, NAN, NAN);
+        body_hold(&s, "bottom", NAN, 0, NAN);
+        if (held)
+            body_hold(&s, "right", 0, NAN, NAN);
+        body_load(&s, UZ_LOAD_TEMPERATURE, "all", 100, 0, 0);
+        uz_result *result = body_solve(&s, 0);
+        const double whole = 0.5 * 200e3 * 1e-3 * 1e-3 * 2;
+        CHECK_MSG(fabs(result->evaluation->strain_energy - held * whole) <= 1e-9 * whole, "%g",
+                  result->evaluation->strain_energy);
+        CHECK(result->evaluation->imbalance < 1e-12);
+        clear(&s, result);
+    }
+}
+
+static const uz_warning *warning(const uz_result *result, const char *code)
+{
+    for (int i = 0; i < result->evaluation->n_warnings; i++)
+        if (strcmp(result->evaluation->warnings[i].code, code) == 0)
+            return &result->evaluation->warnings[i];
+    return NULL;
+}
+
+/* A cantilever bent to a slope at its end, and a strip pulled to a strain. */
+TEST(large_deformation_is_doubted)
+{
+    const double size[3] = {10, 0.5, 0};
+    for (int i = 0; i < 2; i++) {
+        uz_scene s = body_scene(UZ_PLANE_STRESS, "quad8", size, (int64_t[3]){20, 2, 0});
+        const double slope = i == 0 ? 0.05 : 0.2, inertia = 0.5 * 0.5 * 0.5 / 12;
+        body_hold(&s, "left", 0, 0, NAN);
+        body_load(&s, UZ_LOAD_FORCE, "right", 0, -slope * 2 * 200e3 * inertia / 100, 0);
+        uz_result *result = body_solve(&s, 1e-8);
+        const uz_warning *w = warning(result, "large_rotation");
+        CHECK_INT(w != NULL, i);
+        if (w) {
+            CHECK_REL(w->value, slope, 0.02);
+            CHECK(strstr(w->message, "rad") != NULL);
+        }
+        CHECK(!warning(result, "large_strain"));
+        clear(&s, result);
+    }
+    for (int i = 0; i < 2; i++) {
+        uz_scene s = body_scene(UZ_PLANE_STRESS, "tri3", size, (int64_t[3]){20, 2, 0});
+        const double strain = i == 0 ? 0.04 : 0.06;
+        body_hold(&s, "left", 0, NAN, NAN);
+        body_hold(&s, "bottom", NAN, 0, NAN);
+        body_load(&s, UZ_LOAD_TRACTION, "right", strain * 200e3, 0, 0);
+        uz_result *result = body_solve(&s, 1e-8);
+        const uz_warning *w = warning(result, "large_strain");
+        CHECK_INT(w != NULL, i);
+        if (w)
+            CHECK_REL(w->value, strain, 1e-6);
+        CHECK(!warning(result, "large_rotation"));
+        clear(&s, result);
+    }
+}
+
+TEST(units_leave_the_digits)
+{
+    uint64_t random = 11, again = 11;
+    uz_scene mm = mixed(&random, 1), m = mixed(&again, 1);
+    const double k = 0.0009765625; /* a power of two near 1/1000: the digits stay the same */
+    for (int c = 0; c < 3; c++) {
+        m.box.origin[c] *= k;
+        m.box.size[c] *= k;
+        m.contacts[0].point[c] *= k;
+    }
+    m.thickness *= k;
+    m.materials[0].young /= k * k;
+    m.materials[0].density /= k * k * k;
+    for (int64_t i = 0; i < m.n_supports; i++)
+        for (int c = 0; c < 3; c++) {
+            m.supports[i].u[c] *= k;
+            m.supports[i].spring[c] /= k;
+        }
+    m.supports[0].value *= k;
+    for (int64_t i = 0; i < m.n_loads; i++) {
+        const double stress = 1 / (k * k), volume = stress / k;
+        const double factor = m.loads[i].kind == UZ_LOAD_TRACTION || m.loads[i].kind == UZ_LOAD_PRESSURE ? stress
+                              : m.loads[i].kind == UZ_LOAD_BODY_FORCE                                    ? volume
+                                                                                                         : 1;
+        for (int c = 0; c < 3; c++)
+            m.loads[i].v[c] *= factor;
+        if (m.loads[i].kind == UZ_LOAD_PRESSURE)
+            m.loads[i].value *= factor;
+    }
+    uz_result *a = body_solve(&mm, 1e-10), *b = body_solve(&m, 1e-10);
+    CHECK_REL(b->evaluation->strain_energy, a->evaluation->strain_energy * k, 1e-13);
+    for (int64_t i = 0; i < a->evaluation->n_supports; i++)
+        for (int c = 0; c < 2; c++) {
+            const double x = a->evaluation->supports[i].force[c], y = b->evaluation->supports[i].force[c];
+            CHECK_MSG(fabs(x - y) <= 1e-10 * fabs(x), "support %d: %.17g %.17g", (int)i, x, y);
+        }
+    clear(&mm, a);
+    clear(&m, b);
+}
