@@ -75,6 +75,8 @@ uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_erro
  * UZ_ERR_FREE_BODY only what no obstacle stands in the way of; whether the load presses the body on is the load's
  * matter. */
 uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz_error *err);
+/* Everything but the matrices: mesh, dofs and contact rows, for what is computed from an answer that is there. */
+uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err);
 void uz_body_model_clear(uz_body_model *model);
 
 /* p (d), h (m) and the prescribed values of the supported dofs (n_fixed; NULL: not wanted) of a scene whose body is
