@@ -22,8 +22,7 @@ static uz_status make_sites(uz_contact_sites *sites, const uz_mesh *mesh, int64_
     return UZ_OK;
 }
 
-/* A component that is zero but for rounding becomes zero, as those of planes do. */
-static void put_normal(uz_contact_sites *sites, int64_t i, const double normal[3], int dim)
+void uz_put_normal(uz_contact_sites *sites, int64_t i, const double normal[3], int dim)
 {
     double unit[3];
     if (uz_unit_normal(unit, normal, dim))
@@ -42,7 +41,7 @@ static uz_status find_on_obstacle(uz_contact_sites *sites, const uz_body_model *
         if (status != UZ_OK)
             break;
         sites->gap[i] = at.gap;
-        put_normal(sites, i, at.normal, mesh->dim);
+        uz_put_normal(sites, i, at.normal, mesh->dim);
     }
     uz_obstacle_free(obstacle);
     return status;
@@ -63,7 +62,9 @@ uz_status uz_find_sites(uz_body_model *model, const uz_scene *scene, uz_error *e
         if (contact->kind == UZ_OBSTACLE_PLANE)
             continue;
         status = make_sites(&model->sites[k], &model->mesh, uz_group_node_count(&model->mesh, group), err);
-        if (status == UZ_OK)
+        if (status == UZ_OK && contact->kind == UZ_OBSTACLE_BODY)
+            status = uz_find_pairs(&model->sites[k], model, group, contact, k, err);
+        else if (status == UZ_OK)
             status = find_on_obstacle(&model->sites[k], model, group, contact, k, err);
     }
     return status;
