@@ -185,7 +185,7 @@ static inline void theory_punch(theory_table *t, const char *element, int cells)
 static inline void theory_tube(theory_table *t, uz_model model, const char *element, int cells)
 {
     const bool ring = model == UZ_AXISYMMETRIC;
-    uz_scene s = theory_scene(model, element, cells, ring ? 1 : 2 * cells, 0);
+    uz_scene s = theory_scene(model, element, cells, ring ? 2 : 2 * cells, 0);
     body_give_mesh(&s, NULL);
     for (int64_t a = 0; a < s.given.n_nodes; a++) {
         double *x = s.given.xyz + 2 * a;
