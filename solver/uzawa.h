@@ -595,12 +595,12 @@ typedef struct {
     int64_t n_u, m;
 } uz_field_source;
 
-/* The scene has the loads of the case that
- * was solved (temperature makes strain without stress). Nodal stress: that at the points of each element where it is
- * most accurate, continued to its nodes by least squares (Hinton and Campbell, Int. J. Numer. Meth. Engng 8 (1974)
- * 461-480), averaged over the elements around the node by their volume, of all materials alike; the jumps between
- * materials are in gauss_stress. Errors: those of uz_scene_check, _SIZE where the answer is not one of this scene,
- * _CANCELLED. */
+/* The scene has the loads of the case that was solved (temperature makes strain without stress). Nodal stress: that at
+ * the points of each element where it is most accurate, continued to its nodes (Hinton and Campbell, Int. J. Numer.
+ * Meth. Engng 8 (1974) 461-480) and averaged over the elements around the node by volume; of linear elements fitted to
+ * the middles of those around (Zienkiewicz and Zhu, ibid. 33 (1992) 1331-1364). Where materials meet their values are
+ * averaged by volume: the jump is in gauss_stress. Errors: those of uz_scene_check, _SIZE where the answer is not one
+ * of this scene, _CANCELLED. */
 uz_status uz_fields_compute(uz_fields *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                             const uz_hooks *hooks, uz_error *err);
 void uz_fields_clear(uz_fields *fields);
