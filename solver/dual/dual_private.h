@@ -109,8 +109,9 @@ void uz_condensed_clear(uz_condensed *dense);
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
 /* Lists in `rows` the rows with in == which, ascending; their number. */
 int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m);
-/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D. */
-void uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m);
+/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D; false: no leave to go on. */
+bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m,
+                     const uz_leave *leave);
 uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err);
 /* g0 from y = L^-1 P p, whose entry k stands at y[k stride]; x (d) is room. */
 uz_status uz_condensed_begin(uz_case *load, const double *y, int64_t stride, double *x, uz_error *err);
