@@ -15,6 +15,7 @@
 #include "methods/method.h"
 #include "solve.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -230,10 +231,12 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
     return status == UZ_OK && run->end == UZ_END_RAY ? prove_infeasible(run, err) : status;
 }
 
-/* Where the method can't do better, but the request is missed. */
+/* Where the method can't do better, but the request is missed. A run that was told to stop has an answer with a bound:
+ * another certificate would cost as much again. */
 static uz_status improve(uz_run *run, uz_error *err)
 {
-    bool missed = run->answer.certificate.relative_error > run->requested;
+    bool told = run->end == UZ_END_CANCELLED || run->end == UZ_END_TIME,
+         missed = run->answer.certificate.relative_error > (told ? DBL_MAX : run->requested);
     double start = uz_seconds();
     uz_status status = UZ_OK;
     if (missed && run->end != UZ_END_TARGET && run->end != UZ_END_PAPER)

@@ -227,11 +227,10 @@ int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least,
     for (int64_t k = 0; k < end && rank == k; k += width) {
         int64_t next = least_of(k + width, n);
         memset(squares, 0, (size_t)n * sizeof *squares);
-        while (rank < next && !uz_leave_is_over(leave) &&
-               pivot_column(n, A, pivot, squares, k, rank, least * largest))
+        while (rank < next && !uz_leave_is_over(leave) && pivot_column(n, A, pivot, squares, k, rank, least * largest))
             rank++;
-        if (rank == next && !syrk_while(n - next, next - k, -1.0, A + next + k * n, n, false, 1.0, A + next + next * n,
-                                        n, leave))
+        if (rank == next &&
+            !syrk_while(n - next, next - k, -1.0, A + next + k * n, n, false, 1.0, A + next + next * n, n, leave))
             break;
     }
     free(squares);

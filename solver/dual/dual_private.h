@@ -155,9 +155,9 @@ bool uz_bounded_recover(const uz_case *load, double *u, const double *r);
 uz_status uz_inexact_create(uz_case *load, const double *p, uz_error *err);
 void uz_inexact_free(uz_inexact *inexact);
 uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
-/* Solves for the free dofs of box->u, those held standing at their bounds: r, g, active as uz_case_solve_active. A
- * guess that is seen to be wrong at a looser tolerance is not solved to the end. */
-uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *active, uz_error *err);
+/* Solves for the free dofs of box->u, those held standing at their bounds: r, g, solved, active as
+ * uz_case_solve_active. A guess that is seen to be wrong at a looser tolerance is not solved to the end. */
+uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.

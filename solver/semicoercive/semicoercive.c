@@ -179,8 +179,8 @@ static uz_status find_null_space(uz_semi *s, uz_error *err)
     if (status == UZ_OK)
         status = uz_cache_acquire(&body, &reused, s->cache, &augmented, s->settings, s->hooks, err);
     if (status == UZ_OK)
-        status =
-            uz_null_space(&s->null_space, &s->k, s->of.K, &augmented.qp.K, s->of.N, &s->Nt, s->soft, body->factor, err);
+        status = uz_null_space(&s->null_space, &s->k, s->of.K, &augmented.qp.K, s->of.N, &s->Nt, s->soft, body->factor,
+                               s->hooks, err);
     s->Z = s->null_space;
     uz_cache_release(s->cache, body);
     uz_augmented_clear(&augmented);
