@@ -12,6 +12,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/hooks.h"
 #include "methods/method.h"
 #include "solve.h"
 
@@ -302,8 +303,10 @@ static uz_outcome conclude(const uz_run *run)
         return UZ_DISMISSED;
     case UZ_END_PAPER:
         return UZ_PAPER_RULE;
-    default:
-        return UZ_PRECISION_LIMIT;
+    default: /* the certificate or the refinement may have been cut short */
+        return uz_cancelled(run->hooks)        ? UZ_DISMISSED
+               : uz_seconds() >= run->deadline ? UZ_TIME_LIMIT
+                                               : UZ_PRECISION_LIMIT;
     }
 }
 

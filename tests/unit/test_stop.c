@@ -1,0 +1,187 @@
+/* Solves that are told to stop at any of their questions, on every route: what comes back is the best answer so far,
+ * with a bound that holds. */
+#include "harness.h"
+#include "membrane.h"
+#include "obstacle.h"
+#include "uzawa.h"
+
+#include <stdio.h>
+
+__attribute__((constructor)) static void settle_process(void)
+{
+    uz_process_init(2);
+    uz_thread_init();
+}
+
+typedef struct {
+    const char *name;
+    membrane kind; /* n 0: the obstacle problem, bounds from both sides on 24 x 24 dofs */
+    uz_operator op;
+    uz_method method;
+    int64_t cases;
+} route;
+
+static const route routes[] = {
+    {"rows of one entry", {30, 400, 0, 0, 0}, UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 0},
+    {"rows of two entries", {30, 400, 1, 0, 0}, UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 0},
+    {"a row again", {30, 400, 0, 1, 0}, UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 0},
+    {"iterations", {30, 400, 0, 0, 0}, UZ_OPERATOR_CONDENSED, UZ_METHOD_ACCELERATED_RESTART, 0},
+    {"exchange", {20, 150, 1, 1, 0}, UZ_OPERATOR_FACTORED, UZ_METHOD_ACTIVE_SET, 0},
+    {"sparse solves", {20, 150, 1, 0, 0}, UZ_OPERATOR_FACTORED, UZ_METHOD_AUTO, 0},
+    {"bounds", {0}, UZ_OPERATOR_FACTORED, UZ_METHOD_AUTO, 0},
+    {"matrix free", {60, 1500, 0, 0, 0}, UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 0},
+    {"matrix free iterations", {20, 150, 1, 0, 0}, UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 0},
+    {"load cases", {20, 150, 0, 0, 0}, UZ_OPERATOR_CONDENSED, UZ_METHOD_AUTO, 11},
+    {"held by the obstacle", {16, 100, 0, 0, 1}, UZ_OPERATOR_AUTO, UZ_METHOD_AUTO, 0},
+};
+enum { ROUTES = sizeof routes / sizeof routes[0], SIDE = 24, STOPS = 40 };
+
+typedef struct {
+    bool began;
+    int64_t asked, stop_at; /* since it began; -1: never */
+} pause;
+
+static void note_begin(void *ctx, int64_t load_case)
+{
+    (void)load_case;
+    ((pause *)ctx)->began = true;
+}
+
+static bool ask(void *ctx)
+{
+    pause *p = ctx;
+    if (p->began)
+        p->asked++;
+    return p->stop_at >= 0 && p->asked > p->stop_at;
+}
+
+static int64_t count_results(const uz_problem *problem)
+{
+    return problem->n_cases > 0 ? problem->n_cases : 1;
+}
+
+static void make_problem(uz_problem *problem, const route *r)
+{
+    uz_error err = {0};
+    *problem = (uz_problem){.kind = UZ_PROBLEM_MATRICES};
+    uz_status status =
+        r->kind.n > 0 ? membrane_qp(&problem->qp, &r->kind, &err) : obstacle_qp(&problem->qp, SIDE, &err);
+    CHECK_MSG(status == UZ_OK, "%s: %s", r->name, err.message);
+    problem->cases = r->cases > 0 ? calloc((size_t)r->cases, sizeof *problem->cases) : NULL;
+    for (int64_t i = 0; problem->cases && i < r->cases; i++) {
+        snprintf(problem->cases[i].name, sizeof problem->cases[i].name, "%lld", (long long)i);
+        problem->cases[i].p = calloc((size_t)problem->qp.K.cols, sizeof(double));
+        membrane_load(problem->cases[i].p, r->kind.n, i);
+        problem->n_cases = i + 1;
+    }
+}
+
+static uz_settings settings_of(const route *r)
+{
+    uz_settings settings = uz_settings_default();
+    settings.method = r->method;
+    settings.op = r->op;
+    settings.semidefinite = r->kind.loose;
+    return settings;
+}
+
+/* ||u - v||_K */
+static double distance(const uz_csc *K, const double *u, const double *v)
+{
+    double square = 0.0, *e = calloc((size_t)K->cols, sizeof *e), *Ke = calloc((size_t)K->cols, sizeof *Ke);
+    for (int64_t j = 0; j < K->cols; j++)
+        e[j] = u[j] - v[j];
+    uz_csc_symv(Ke, K, 1.0, e);
+    for (int64_t j = 0; j < K->cols; j++)
+        square += e[j] * Ke[j];
+    free(e);
+    free(Ke);
+    return sqrt(fmax(0.0, square));
+}
+
+/* Certified, and the bound holds: `exact` is an answer with a bound of its own. */
+static void check_bound(const char *name, int64_t at, const uz_csc *K, const uz_result *got, const uz_result *exact)
+{
+    const uz_certificate *c = &got->summary.certificate;
+    CHECK_MSG(!isnan(c->relative_error) && !isnan(c->absolute_error), "%s, stopped at %lld: no bound", name,
+              (long long)at);
+    for (int64_t j = 0; j < got->d; j++)
+        if (!isfinite(got->u[j])) {
+            CHECK_MSG(false, "%s, stopped at %lld: u(%lld) is not finite", name, (long long)at, (long long)j);
+            return;
+        }
+    double error = distance(K, got->u, exact->u),
+           allowed = c->absolute_error + exact->summary.certificate.absolute_error;
+    CHECK_MSG(error <= allowed, "%s, stopped at %lld: error %g, bound %g", name, (long long)at, error, allowed);
+}
+
+static void stop_at(const route *r, const uz_problem *problem, uz_result *const *exact, int64_t at)
+{
+    uz_settings settings = settings_of(r);
+    uz_result **results = NULL;
+    uz_error err = {0};
+    pause p = {.stop_at = at};
+    uz_hooks hooks = {.ctx = &p, .cancelled = ask, .begins = note_begin};
+    uz_status status = uz_solve_cases(&results, problem, &settings, NULL, NULL, &hooks, &err);
+    bool refused = r->kind.loose && status == UZ_ERR_CANCELLED; /* before a first round there is no answer */
+    CHECK_MSG(status == UZ_OK || refused, "%s, stopped at %lld: %s %s", r->name, (long long)at, uz_status_name(status),
+              err.message);
+    for (int64_t i = 0; status == UZ_OK && i < count_results(problem); i++) {
+        uz_outcome outcome = results[i]->summary.outcome;
+        CHECK_MSG(outcome == UZ_DISMISSED || outcome == UZ_CONVERGED, "%s, stopped at %lld: %s", r->name, (long long)at,
+                  uz_outcome_name(outcome));
+        check_bound(r->name, at, &problem->qp.K, results[i], exact[i]);
+    }
+    uz_results_free(results, count_results(problem));
+}
+
+static void stop_everywhere(const route *r)
+{
+    uz_problem problem;
+    uz_settings settings = settings_of(r);
+    uz_result **exact = NULL;
+    uz_error err = {0};
+    pause whole = {.stop_at = -1};
+    uz_hooks hooks = {.ctx = &whole, .cancelled = ask, .begins = note_begin};
+    make_problem(&problem, r);
+    uz_status status = uz_solve_cases(&exact, &problem, &settings, NULL, NULL, &hooks, &err);
+    CHECK_MSG(status == UZ_OK, "%s: %s", r->name, err.message);
+    for (int64_t i = 0; status == UZ_OK && i < count_results(&problem); i++)
+        CHECK_MSG(exact[i]->summary.outcome == UZ_CONVERGED, "%s: %s", r->name,
+                  uz_outcome_name(exact[i]->summary.outcome));
+    printf("# %s: %lld questions\n", r->name, (long long)whole.asked);
+    int64_t step = whole.asked / STOPS + 1;
+    for (int64_t at = 0; status == UZ_OK && at < whole.asked; at += step)
+        stop_at(r, &problem, exact, at);
+    CHECK(whole.asked > 3);
+    uz_results_free(exact, count_results(&problem));
+    uz_problem_clear(&problem);
+}
+
+TEST(a_solve_stops_at_any_question_with_a_certified_answer)
+{
+    for (int k = 0; k < ROUTES; k++)
+        stop_everywhere(&routes[k]);
+}
+
+/* The time of the whole solve is over when the iterations begin. */
+TEST(without_time_there_is_a_certified_answer)
+{
+    for (int k = 0; k < ROUTES; k++) {
+        uz_problem problem;
+        uz_settings settings = settings_of(&routes[k]);
+        uz_result **results = NULL;
+        uz_error err = {0};
+        make_problem(&problem, &routes[k]);
+        settings.time_limit_s = 0.0;
+        uz_status status = uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, &err);
+        CHECK_MSG(status == UZ_OK, "%s: %s", routes[k].name, err.message);
+        for (int64_t i = 0; status == UZ_OK && i < count_results(&problem); i++) {
+            CHECK_MSG(results[i]->summary.outcome == UZ_TIME_LIMIT, "%s: %s", routes[k].name,
+                      uz_outcome_name(results[i]->summary.outcome));
+            CHECK(!isnan(results[i]->summary.certificate.relative_error));
+        }
+        uz_results_free(results, count_results(&problem));
+        uz_problem_clear(&problem);
+    }
+}
