@@ -4,6 +4,7 @@
 #include "core/clock.h"
 #include "core/digest.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -66,15 +67,10 @@ const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
     return body->is_scene ? &body->model.N : &problem->qp.N;
 }
 
-static size_t csc_bytes(const uz_csc *A)
-{
-    return 8 * (size_t)(A->cols + 1) + 16 * (size_t)A->ptr[A->cols];
-}
-
 static size_t model_bytes(const uz_body_model *model)
 {
     size_t nodes = (size_t)(model->mesh.n_nodes + model->info.n_nodes);
-    return csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed) + 32 * nodes +
+    return uz_csc_bytes(&model->K) + uz_csc_bytes(&model->N) + uz_csc_bytes(&model->K_fixed) + 32 * nodes +
            (model->frame_of ? 8 * nodes : 0);
 }
 
