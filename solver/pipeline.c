@@ -124,6 +124,7 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *err)
 {
     const uz_csc *K = uz_body_K(run->body, run->problem);
+    const uz_leave leave = {run->hooks, run->deadline};
     uz_status status = need_workspace(run, err);
     if (status != UZ_OK)
         return status;
@@ -136,7 +137,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *e
         .ctx = run,
         .rcond = run->result->summary.rcond,
         .inverse_bound =
-            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws) : INFINITY,
+            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws, &leave) : INFINITY,
         .sharp = 0.5 * run->requested,
     };
     return UZ_OK;

@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/blas.h"
 #include "core/error.h"
+#include "core/lock.h"
 
 #include <float.h>
 #include <math.h>
@@ -58,7 +59,8 @@ static uz_status need(const double **out, double **slot, uz_case *load, former f
     uz_status status = UZ_OK;
     if (*out)
         return UZ_OK;
-    pthread_mutex_lock(&load->dual->lazy->mutex);
+    if (!uz_lock_while(&load->dual->lazy->making, &load->leave))
+        return UZ_OK;
     if (!*slot) {
         double *made = uz_alloc(size, sizeof *made), *room = uz_alloc(size, sizeof *room);
         if (!made || !room)
@@ -73,7 +75,7 @@ static uz_status need(const double **out, double **slot, uz_case *load, former f
             free(made);
     }
     *out = *slot;
-    pthread_mutex_unlock(&load->dual->lazy->mutex);
+    pthread_mutex_unlock(&load->dual->lazy->making);
     return status;
 }
 

@@ -61,10 +61,11 @@ typedef struct {
     double *right;     /* d: a right-hand side */
 } uz_inexact;
 
-/* What is made at the first need, by whoever needs it; pointers are published to cases under the mutex and never
- * change. */
+/* What is made at the first need, by whoever needs it, under the mutex `making`; pointers are published to cases under
+ * it and never change. It may be held for seconds: see uz_lock_while. lambda_max is written under both and may be read
+ * under either. Order: making, known. */
 typedef struct {
-    pthread_mutex_t mutex;
+    pthread_mutex_t making, known;
     double *D;         /* CONDENSED: m x m */
     double *D_inverse; /* CONDENSED, scaled: m x m */
     double lambda_max; /* NaN until known */

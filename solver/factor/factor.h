@@ -85,9 +85,10 @@ uz_status uz_factor_forward_lanes(const uz_factor *factor, double *X, int64_t bl
 uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
 
 /* *bound >= lambda_max(D_K^1/2 K^-1 D_K^1/2) with D_K = diag(K), except with a probability below 1e-12; so e'K^-1 e is
- * at most *bound times the sum of e_j^2 / K_jj. Some six linear solves. */
+ * at most *bound times the sum of e_j^2 / K_jj. Some six linear solves, between which leave (NULL: for ever) is asked:
+ * UZ_ERR_CANCELLED. */
 uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
-                                 uz_error *err);
+                                 const uz_leave *leave, uz_error *err);
 
 /* Where dof i stands in the factor's order: position[i], n. */
 const int64_t *uz_factor_position(const uz_factor *factor);

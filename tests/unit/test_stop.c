@@ -3,6 +3,7 @@
 #include "harness.h"
 #include "membrane.h"
 #include "obstacle.h"
+#include "core/lock.h"
 #include "uzawa.h"
 
 #include <stdio.h>
@@ -184,4 +185,60 @@ TEST(without_time_there_is_a_certified_answer)
         uz_results_free(results, count_results(&problem));
         uz_problem_clear(&problem);
     }
+}
+
+/* What a stopped run leaves in the cache is right: the next run on the body finds the lambda_max of a run that had all
+ * the time. */
+TEST(a_stopped_run_leaves_no_wrong_eigenvalue_behind)
+{
+    route r = {"iterations", {12, 60, 1, 0, 0}, UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_ACCELERATED_RESTART, 0};
+    uz_problem problem;
+    uz_settings settings = settings_of(&r);
+    uz_result *whole = NULL;
+    uz_error err = {0};
+    pause count = {.stop_at = -1};
+    uz_hooks counting = {.ctx = &count, .cancelled = ask, .begins = note_begin};
+    make_problem(&problem, &r);
+    settings.max_iterations = 1;
+    CHECK(uz_solve(&whole, &problem, &settings, NULL, &counting, &err) == UZ_OK);
+    printf("# %lld questions to the first iteration\n", (long long)count.asked);
+    for (int64_t at = 0; whole && at < count.asked; at++) {
+        uz_cache *cache = uz_cache_new((size_t)1 << 28);
+        pause p = {.stop_at = at};
+        uz_hooks hooks = {.ctx = &p, .cancelled = ask, .begins = note_begin};
+        uz_result *stopped = NULL, *next = NULL;
+        CHECK(uz_solve(&stopped, &problem, &settings, cache, &hooks, &err) == UZ_OK);
+        CHECK(uz_solve(&next, &problem, &settings, cache, NULL, &err) == UZ_OK);
+        if (next)
+            CHECK_MSG(fabs(next->summary.lambda_max - whole->summary.lambda_max) <= 1e-3 * whole->summary.lambda_max,
+                      "stopped at %lld: lambda_max %g, is %g", (long long)at, next->summary.lambda_max,
+                      whole->summary.lambda_max);
+        uz_result_free(stopped);
+        uz_result_free(next);
+        uz_cache_free(cache);
+    }
+    uz_result_free(whole);
+    uz_problem_clear(&problem);
+}
+
+static void *hold(void *mutex)
+{
+    pthread_mutex_lock(mutex);
+    return NULL;
+}
+
+/* Another thread works under the lock and does not end: who waits is told to stop all the same. */
+TEST(who_waits_for_anothers_work_can_be_stopped)
+{
+    pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+    pthread_t other;
+    pause p = {.began = true, .stop_at = 3};
+    uz_hooks hooks = {.ctx = &p, .cancelled = ask};
+    uz_leave leave = {&hooks, INFINITY}, late = {NULL, 0.0};
+    CHECK(uz_lock_while(&mutex, &leave) && pthread_mutex_unlock(&mutex) == 0);
+    CHECK_INT(p.asked, 0);
+    CHECK(pthread_create(&other, NULL, hold, &mutex) == 0 && pthread_join(other, NULL) == 0);
+    CHECK(!uz_lock_while(&mutex, &leave));
+    CHECK_INT(p.asked, 4);
+    CHECK(!uz_lock_while(&mutex, &late));
 }
