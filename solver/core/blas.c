@@ -144,7 +144,11 @@ static bool syrk_while(int64_t n, int64_t k, double alpha, const double *A, int6
                        double *C, int64_t ldc, const uz_leave *leave)
 {
     CBLAS_TRANSPOSE left = transposed ? CblasTrans : CblasNoTrans, right = transposed ? CblasNoTrans : CblasTrans;
-    int64_t width = panel_width(n), step = transposed ? lda : 1;
+    double most = PANEL_FLOPS / fmax(1.0, (double)n * (double)k);
+    int64_t width = most < LEAST_PANEL ? LEAST_PANEL
+                    : most < (double)n ? (int64_t)most
+                                       : n,
+            step = transposed ? lda : 1;
     for (int64_t j = 0; j < n; j += width) {
         int64_t b = least_of(n - j, width), below = n - j - b;
         const double *A_j = A + j * step;
