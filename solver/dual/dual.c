@@ -320,6 +320,23 @@ static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_err
 /* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
 #define LAMBDA_TOLERANCE 1e-4
 
+/* Kept for the body's other runs, unless applications may have been cut short: then 0. Under `making`. */
+static uz_status find_lambda_max(uz_case *load, double *lambda_max, uz_error *err)
+{
+    uz_dual_lazy *lazy = load->dual->lazy;
+    uz_inexact_probe(load, true, 0.1 * LAMBDA_TOLERANCE);
+    uz_status status = uz_lanczos_max(lambda_max, load->dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
+    uz_inexact_probe(load, false, 0.0);
+    if (status != UZ_OK || uz_leave_is_over(&load->leave)) {
+        *lambda_max = 0.0;
+        return status;
+    }
+    pthread_mutex_lock(&lazy->known);
+    lazy->lambda_max = *lambda_max;
+    pthread_mutex_unlock(&lazy->known);
+    return UZ_OK;
+}
+
 uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error *err)
 {
     uz_dual_lazy *lazy = load->dual->lazy;
@@ -332,19 +349,10 @@ uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error
         return status;
     if (!uz_lock_while(&lazy->making, &load->leave))
         return UZ_OK;
-    if (load->inexact)
-        load->inexact->tight = 0.1 * LAMBDA_TOLERANCE;
     if (isnan(lazy->lambda_max))
-        status = uz_lanczos_max(lambda_max, load->dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
+        status = find_lambda_max(load, lambda_max, err);
     else
         *lambda_max = lazy->lambda_max;
-    if (status == UZ_OK && !uz_leave_is_over(&load->leave)) { /* else applications may have been cut short */
-        pthread_mutex_lock(&lazy->known);
-        lazy->lambda_max = *lambda_max;
-        pthread_mutex_unlock(&lazy->known);
-    }
-    if (load->inexact)
-        load->inexact->tight = UZ_CHANGE_KEPT;
     pthread_mutex_unlock(&lazy->making);
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }

@@ -57,6 +57,7 @@ typedef struct {
     double base_slack; /* of base = K^-1 p */
     double slack;      /* of what the last apply or solve_active left */
     double tight;      /* relative accuracy of a change of the response */
+    bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
     double coarse;     /* accuracy at which the next guess of the active rows is judged */
     double *right;     /* d: a right-hand side */
 } uz_inexact;
@@ -155,6 +156,9 @@ bool uz_bounded_recover(const uz_case *load, double *u, const double *r);
 /* Makes load->base and load->response what `factored` makes them, within the aim. */
 uz_status uz_inexact_create(uz_case *load, const double *p, uz_error *err);
 void uz_inexact_free(uz_inexact *inexact);
+/* Between begin true and false D is applied to vectors of about one size, which is not that of reactions, to this
+ * relative accuracy. Overwrites the response. */
+void uz_inexact_probe(uz_case *load, bool begin, double accuracy);
 uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
 /* Solves for the free dofs of box->u, those held standing at their bounds: r, g, solved, active as
  * uz_case_solve_active. A guess that is seen to be wrong at a looser tolerance is not solved to the end. */

@@ -242,3 +242,43 @@ TEST(who_waits_for_anothers_work_can_be_stopped)
     CHECK_INT(p.asked, 4);
     CHECK(!uz_lock_while(&mutex, &late));
 }
+
+/* Whatever question it was stopped at, a run goes on from its state and converges. */
+static void continue_from(const route *r, int64_t at)
+{
+    uz_problem problem;
+    uz_settings settings = settings_of(r);
+    uz_result **stopped = NULL, **next = NULL;
+    uz_error err = {0};
+    pause p = {.stop_at = at};
+    uz_hooks hooks = {.ctx = &p, .cancelled = ask, .begins = note_begin};
+    make_problem(&problem, r);
+    for (int64_t e = 0; e < problem.qp.K.ptr[problem.qp.K.cols]; e++) /* a step of 1 is not by chance about right */
+        problem.qp.K.val[e] *= 1e8;
+    for (int64_t j = 0; j < problem.qp.K.cols; j++)
+        problem.qp.p[j] *= 1e8;
+    uz_status status = uz_solve_cases(&stopped, &problem, &settings, NULL, NULL, &hooks, &err);
+    CHECK_MSG(status == UZ_OK && stopped[0]->state, "%s: %s", r->name, err.message);
+    if (stopped && stopped[0]->state) {
+        const uz_state *start = stopped[0]->state;
+        settings.max_iterations = 2000;
+        status = uz_solve_cases(&next, &problem, &settings, &start, NULL, NULL, &err);
+        CHECK_MSG(status == UZ_OK && next[0]->summary.outcome == UZ_CONVERGED, "%s, stopped at %lld, goes on to: %s",
+                  r->name, (long long)at, next ? uz_outcome_name(next[0]->summary.outcome) : err.message);
+    }
+    uz_results_free(stopped, 1);
+    uz_results_free(next, 1);
+    uz_problem_clear(&problem);
+}
+
+TEST(a_run_goes_on_from_where_it_was_stopped)
+{
+    static const route iterated[] = {
+        {"dense", {12, 60, 1, 0, 0}, UZ_OPERATOR_CONDENSED, UZ_METHOD_ACCELERATED_RESTART, 0},
+        {"sparse", {12, 60, 1, 0, 0}, UZ_OPERATOR_FACTORED, UZ_METHOD_ACCELERATED_RESTART, 0},
+        {"matrix free", {12, 60, 1, 0, 0}, UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 0},
+    };
+    for (size_t k = 0; k < sizeof iterated / sizeof iterated[0]; k++)
+        for (int64_t at = 0; at < 60; at++)
+            continue_from(&iterated[k], at);
+}
