@@ -119,8 +119,8 @@ void uz_inexact_probe(uz_case *load, bool begin, double accuracy)
         return;
     x->probing = begin;
     x->tight = begin ? accuracy : UZ_CHANGE_KEPT;
-    if (begin) /* of another size: no start for what comes */
-        memset(load->response, 0, (size_t)load->dual->info.d * sizeof *load->response);
+    /* Of another size than what comes: no start for it. */
+    memset(load->response, 0, (size_t)load->dual->info.d * sizeof *load->response);
 }
 
 uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err)

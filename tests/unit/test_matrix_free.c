@@ -381,3 +381,28 @@ TEST(units_do_not_decide)
             uz_problem_clear(&problem);
         }
 }
+
+/* psi(r) along the way is that of the problem, from the first row on. */
+TEST(the_dual_objective_of_the_history_is_that_of_the_other_forms)
+{
+    membrane kind = {8, 28, true, false, false};
+    uz_settings settings = uz_settings_default();
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES};
+    uz_result *results[2] = {NULL, NULL};
+    static const uz_operator forms[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_MATRIX_FREE};
+    uz_error err = {0};
+    CHECK(membrane_qp(&problem.qp, &kind, &err) == UZ_OK);
+    settings.method = UZ_METHOD_ACCELERATED_RESTART;
+    for (int k = 0; k < 2; k++) {
+        settings.op = forms[k];
+        results[k] = solve_problem(&problem, &settings);
+    }
+    if (results[0] && results[1]) {
+        const uz_history *dense = &results[0]->history, *history = &results[1]->history;
+        CHECK_REL(history->rows[0].dual_objective, dense->rows[0].dual_objective, 1e-9);
+        CHECK_REL(history->rows[history->count - 1].dual_objective, results[1]->summary.certificate.energy_dual, 1e-7);
+    }
+    uz_result_free(results[0]);
+    uz_result_free(results[1]);
+    uz_problem_clear(&problem);
+}
