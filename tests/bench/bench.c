@@ -274,15 +274,17 @@ static void bench_stops(report *out)
 {
     const char *row;
     for (int k = 0; (row = bench_stop_name(k)) != NULL; k++) {
-        bench_value between, to_return;
+        bench_value between, work, to_return;
         char name[64];
         if (out->filter && !strstr(row, out->filter))
             continue;
-        if (!bench_stop(&between, &to_return, k)) {
+        if (!bench_stop(&between, &work, &to_return, k)) {
             printf("%s gave no answer\n", row);
             exit(1);
         }
         print_row(out, row, "ms", between, "longest between two questions (target: 50)");
+        snprintf(name, sizeof name, "%s_work", row);
+        print_row(out, name, "ms", work, "the same, of the processor's time");
         snprintf(name, sizeof name, "%s_return", row);
         print_row(out, name, "ms", to_return, "from \"stop\" to the return");
     }

@@ -7,36 +7,51 @@
 #include "core/clock.h"
 
 #include <string.h>
+#include <time.h>
 
 enum { RUNS = 5, OBSTACLE_SIDE = 98 };
 
 typedef struct {
     bool began;
-    double last, longest;     /* uz_seconds() of the last question; between two */
-    int64_t asked, stop_at;   /* questions since it began; the one that is answered "stop", -1: none */
-    double stopped, returned; /* uz_seconds() of that answer, and of the return */
+    double last, longest;        /* uz_seconds() of the last question; between two */
+    double last_work, most_work; /* the same in processor_seconds() */
+    int64_t asked, stop_at;      /* questions since it began; the one that is answered "stop", -1: none */
+    double stopped, returned;    /* uz_seconds() of that answer, and of the return */
 } watch;
+
+/* Seconds of processor that this thread has had: what other programs take is not in it. */
+static double processor_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
 
 static void note_begin(void *ctx, int64_t load_case)
 {
     watch *w = ctx;
     (void)load_case;
-    if (!w->began)
+    if (!w->began) {
         w->last = uz_seconds();
+        w->last_work = processor_seconds();
+    }
     w->began = true;
 }
 
 static bool note_question(void *ctx)
 {
     watch *w = ctx;
-    double now = uz_seconds();
+    double now = uz_seconds(), work = processor_seconds();
     if (!w->began)
         return false;
+    if (work - w->last_work > w->most_work)
+        w->most_work = work - w->last_work;
     if (now - w->last > w->longest)
         w->longest = now - w->last;
     bool stop = w->asked++ == w->stop_at || w->stopped > 0.0;
     if (stop && w->stopped == 0.0)
         w->stopped = now;
+    w->last_work = processor_seconds();
     w->last = uz_seconds(); /* what asking takes is not the solve's */
     return stop;
 }
@@ -106,7 +121,7 @@ static bool make_problem(uz_problem *problem, const row *r)
 }
 
 /* One solve to the end, and one that is told to stop after a share of the questions of the first. */
-static bool run_pair(double *longest, double *to_return, const row *r, double share)
+static bool run_pair(double *longest, double *work, double *to_return, const row *r, double share)
 {
     uz_problem problem;
     uz_settings settings = uz_settings_default();
@@ -118,19 +133,21 @@ static bool run_pair(double *longest, double *to_return, const row *r, double sh
     cut.stop_at = (int64_t)((double)whole.asked * share);
     ok = ok && solve(&cut, &problem, &settings);
     *longest = 1e3 * whole.longest;
+    *work = 1e3 * whole.most_work;
     *to_return = cut.stopped > 0.0 ? 1e3 * (cut.returned - cut.stopped) : NAN;
     uz_problem_clear(&problem);
     return ok && cut.stopped > 0.0;
 }
 
-bool bench_stop(bench_value *between, bench_value *to_return, int which)
+bool bench_stop(bench_value *between, bench_value *work, bench_value *to_return, int which)
 {
-    double longest[RUNS], returned[RUNS];
+    double longest[RUNS], worked[RUNS], returned[RUNS];
     bool ok = true;
     for (int k = 0; ok && k < RUNS; k++)
-        ok = run_pair(&longest[k], &returned[k], &rows[which], (k + 0.5) / RUNS);
+        ok = run_pair(&longest[k], &worked[k], &returned[k], &rows[which], (k + 0.5) / RUNS);
     if (ok) {
         *between = bench_summarise(longest, RUNS);
+        *work = bench_summarise(worked, RUNS);
         *to_return = bench_summarise(returned, RUNS);
     }
     return ok;
