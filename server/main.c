@@ -6,6 +6,7 @@
 #include "log.h"
 #include "options.h"
 #include "store/store.h"
+#include "store/uploads.h"
 #include "uzawa.h"
 #include "work/work.h"
 
@@ -85,6 +86,9 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     s->store = store_open(options->db, message, size);
     if (!s->store)
         return false;
+    store_limit_uploads(s->store, &(upload_limits){.one = (int64_t)options->max_upload,
+                                                   .all = (int64_t)options->uploads,
+                                                   .keep_s = options->upload_days * 86400});
     /* The port is taken before any job runs, so that a second daemon fails without a trace. */
     fd = http_listen(options->listen, url, url_size, message, size);
     if (fd < 0)
@@ -101,6 +105,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     }
     http_parts parts = {.store = s->store, .work = s->work, .log = s->log};
     const http_options limits = {.max_body = options->max_body,
+                                 .max_upload = options->max_upload,
                                  .max_connections = options->max_connections,
                                  .request_deadline_s = options->request_deadline_s,
                                  .max_wait_s = MAX_WAIT_S};

@@ -23,6 +23,9 @@ enum {
     LEVEL,
     DEADLINE,
     MEMORY,
+    MAX_UPLOAD,
+    UPLOADS,
+    UPLOAD_DAYS,
     VERSION,
     HELP
 };
@@ -39,6 +42,9 @@ static const struct option LONG_OPTIONS[] = {
     {"max-connections", required_argument, NULL, CONNECTIONS},
     {"log-level", required_argument, NULL, LEVEL},
     {"request-deadline-s", required_argument, NULL, DEADLINE},
+    {"max-upload", required_argument, NULL, MAX_UPLOAD},
+    {"uploads", required_argument, NULL, UPLOADS},
+    {"upload-days", required_argument, NULL, UPLOAD_DAYS},
     {"version", no_argument, NULL, VERSION},
     {"help", no_argument, NULL, HELP},
     {NULL, 0, NULL, 0},
@@ -57,6 +63,10 @@ void options_usage(FILE *to)
         "  --memory BYTES          memory that one problem may take (80 % of what the machine or its control group\n"
         "                          has, less the cache, divided by the workers)\n"
         "  --max-body BYTES        largest request body (64M)\n"
+        "  --max-upload BYTES      largest upload, after decompression (1G)\n"
+        "  --uploads BYTES         all uploads together, in the folder FILE-uploads; those that no job uses make\n"
+        "                          room (10G)\n"
+        "  --upload-days D         an upload that no job uses is deleted so long after it was last used (30)\n"
         "  --max-connections N     connections open at once (256)\n"
         "  --request-deadline-s S  time for a request to arrive, plus 1 s per 100 kB of its body (30)\n"
         "  --max-attempts N        runs of a job whose run ends with the process before it is failed (3)\n"
@@ -160,6 +170,12 @@ static bool set_option(server_options *out, int option, const char *text)
         return set_integer(&out->max_attempts, 1, 1000, text);
     case DRAIN:
         return parse_seconds(text, 0, &out->drain_s);
+    case MAX_UPLOAD:
+        return parse_bytes(text, &out->max_upload);
+    case UPLOADS:
+        return parse_bytes(text, &out->uploads);
+    case UPLOAD_DAYS:
+        return parse_seconds(text, 0, &out->upload_days);
     case CONNECTIONS:
         return set_connections(&out->max_connections, text);
     case LEVEL:
@@ -183,6 +199,9 @@ static server_options defaults(void)
                             .max_connections = 256,
                             .max_body = (size_t)64 << 20,
                             .cache = (size_t)1 << 30,
+                            .max_upload = (size_t)1 << 30,
+                            .uploads = (size_t)10 << 30,
+                            .upload_days = 30,
                             .drain_s = 30,
                             .request_deadline_s = 30,
                             .level = LOG_INFO};

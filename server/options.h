@@ -13,8 +13,10 @@ typedef struct {
     const char *listen, *db; /* point into argv or to constants */
     int workers, max_attempts;
     unsigned max_connections;
-    size_t max_body, cache; /* bytes */
-    size_t memory;          /* of one solve, bytes */
+    size_t max_body, cache;     /* bytes */
+    size_t memory;              /* of one solve, bytes */
+    size_t max_upload, uploads; /* bytes of one upload, and of all */
+    double upload_days;         /* one that no job uses is kept so long */
     double drain_s, request_deadline_s;
     log_level level;
 } server_options;

@@ -202,14 +202,19 @@ static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_
            (!answer || decode_answer(&out->answer, doc, answer, len, problem));
 }
 
-bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem)
+bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
+                       problem_details *problem)
 {
     json_doc doc;
     codec_request request = {.tags = NULL};
     *out = request;
     if (!json_scan(&doc, body, len, problem))
         return false;
+    doc.store = uploads;
     bool good = decode_check(&doc, schema_of(kind, &doc), problem) && decode_parts(&request, &doc, len, problem);
+    request.uploads = doc.uploads;
+    request.n_uploads = doc.n_uploads;
+    doc.uploads = NULL;
     json_doc_clear(&doc);
     good = good && check_sizes(&request, problem);
     if (good)
@@ -219,9 +224,23 @@ bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t 
     return good;
 }
 
+bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem)
+{
+    return codec_decode_with(out, kind, body, len, NULL, problem);
+}
+
 bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem)
 {
     return codec_decode(out, CODEC_SOLVE, body, len, problem);
+}
+
+void codec_request_strip(codec_request *request)
+{
+    codec_request kept = {.tags = request->tags, .uploads = request->uploads, .n_uploads = request->n_uploads};
+    request->tags = NULL;
+    request->uploads = NULL;
+    codec_request_clear(request);
+    *request = kept;
 }
 
 void codec_request_clear(codec_request *request)
@@ -233,5 +252,6 @@ void codec_request_clear(codec_request *request)
     free(request->answer.u);
     free(request->answer.r);
     free(request->tags);
+    free(request->uploads);
     memset(request, 0, sizeof *request);
 }

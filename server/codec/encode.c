@@ -177,6 +177,31 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
     return text_finish(&t, NULL);
 }
 
+char *codec_encode_upload(const upload_info *info)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "id");
+    text_string(&t, info->id);
+    text_key(&t, "bytes");
+    text_integer(&t, info->bytes);
+    put_time(&t, "created", info->created);
+    put_time(&t, "used", info->used);
+    text_key(&t, "used_by");
+    text_integer(&t, info->jobs);
+    text_key(&t, "links");
+    text_open(&t, '[');
+    text_open(&t, '{');
+    text_key(&t, "rel");
+    text_string(&t, "self");
+    text_key(&t, "href");
+    text_format(&t, "\"/v1/uploads/%s\"", info->id);
+    text_close(&t, '}');
+    text_close(&t, ']');
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers)
 {
     text t = {0};

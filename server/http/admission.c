@@ -20,11 +20,18 @@ static bool check_body(const http_server *server, const http_request *rq, proble
     if (!takes_body && (rq->framing.chunked || rq->framing.length > 0))
         return http_problem(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
                             rq->route->method, rq->route->pattern);
-    if (rq->framing.length > server->options.max_body)
+    size_t limit = rq->route->streamed ? server->options.max_upload : server->options.max_body;
+    if (rq->framing.length > limit)
         return http_problem(problem, 413, "body_too_large", "The request body is too large",
                             "the body has %llu bytes, the limit of this server is %zu",
-                            (unsigned long long)rq->framing.length, server->options.max_body);
+                            (unsigned long long)rq->framing.length, limit);
     return true;
+}
+
+static bool is_gzip(const header_field *coding)
+{
+    return token_equal(coding->value, coding->value_len, "gzip") ||
+           token_equal(coding->value, coding->value_len, "x-gzip");
 }
 
 static bool check_type(const http_request *rq, problem_details *problem)
@@ -32,9 +39,13 @@ static bool check_type(const http_request *rq, problem_details *problem)
     const header_field *coding = header_find(&rq->headers, "Content-Encoding", NULL);
     if (strcmp(rq->route->method, "POST") != 0)
         return true;
-    if (coding && !token_equal(coding->value, coding->value_len, "identity"))
+    if (coding && !token_equal(coding->value, coding->value_len, "identity") &&
+        !(rq->route->streamed && is_gzip(coding)))
         return http_problem(problem, 415, "content_encoding", "The content coding is not supported",
-                            "send the body without Content-Encoding");
+                            rq->route->streamed ? "send the body as it is, or with Content-Encoding: gzip"
+                                                : "send the body without Content-Encoding");
+    if (rq->route->streamed)
+        return true;
     if (!request_is_json(rq))
         return http_problem(problem, 415, "content_type", "The body must be JSON",
                             "send the header field Content-Type: application/json");

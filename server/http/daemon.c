@@ -134,6 +134,7 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.work = parts->work;
     server->context.log = parts->log;
     server->context.max_wait_s = options->max_wait_s;
+    server->context.max_upload = (int64_t)options->max_upload;
     atomic_init(&server->context.draining, false);
     server->options = *options;
     server->body_budget = BODY_BUDGET(options->max_body);

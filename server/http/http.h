@@ -23,6 +23,7 @@ typedef struct {
 
 typedef struct {
     size_t max_body;           /* bytes of one request's body */
+    size_t max_upload;         /* bytes of one upload, as it is sent and after decompression */
     unsigned max_connections;  /* open at once */
     double request_deadline_s; /* for a whole request, without the allowance for its body's length */
     double max_wait_s;         /* cap of Prefer: wait */

@@ -118,6 +118,16 @@ static bool read_validate(const http_request *rq, bool *only, problem_details *p
     return true;
 }
 
+store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key)
+{
+    return (store_request){.body = body,
+                           .body_len = len,
+                           .tags = request->tags,
+                           .idempotency_key = key,
+                           .uploads = (const char(*)[65])request->uploads,
+                           .n_uploads = request->n_uploads};
+}
+
 bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
 {
     bool repeated = false;
@@ -125,6 +135,9 @@ bool jobs_store(api *context, http_request *rq, const store_request *request, jo
     if (status == STORE_CONFLICT)
         reply_refuse(reply, 422, "idempotency_key_reused", "The Idempotency-Key was used for another request",
                      "this key came before with a different body: use a new key for a new job");
+    else if (status == STORE_NOT_FOUND)
+        reply_refuse(reply, 422, "unknown_upload", "An upload is not there",
+                     "an upload that the request names was deleted meanwhile: send it again");
     else if (status != STORE_OK)
         reply_store_failure(context, status, reply);
     if (status != STORE_OK)
@@ -153,24 +166,23 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem = {0};
     codec_request request = {0};
-    char *key = NULL, *tags = NULL;
+    char *key = NULL;
     bool validate_only;
     if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
-        !codec_decode_request(&request, rq->body ? rq->body : "", rq->body_len, &problem) ||
+        !codec_decode_with(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
         !start_check(context, &request, rq, &problem)) {
         reply_problem(reply, &problem);
         goto done;
     }
-    tags = request.tags;
-    request.tags = NULL;
-    codec_request_clear(&request); /* the worker decodes again: nothing decoded waits here while the client does */
+    codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
     if (validate_only)
         reply_json(reply, 200, strdup("{\"valid\": true}\n"));
-    else
-        submit(context, rq, &(store_request){rq->body, rq->body_len, tags, key, NULL}, reply);
+    else {
+        store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
+        submit(context, rq, &stored, reply);
+    }
 done:
     codec_request_clear(&request);
-    free(tags);
     free(key);
 }
 

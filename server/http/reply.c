@@ -7,6 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+#include <unistd.h>
 
 #define MAX_FIELDS 12
 
@@ -21,6 +23,9 @@ static void clear_body(http_reply *reply)
 {
     if (!reply->body_is_static)
         free(reply->body);
+    if (reply->has_file)
+        close(reply->fd);
+    reply->has_file = false;
     reply->body = NULL;
     reply->len = 0;
     reply->body_is_static = false;
@@ -58,6 +63,17 @@ void reply_text(http_reply *reply, int status, const char *type, char *text, siz
     reply->len = len;
 }
 
+void reply_file(http_reply *reply, int status, const char *type, int fd, size_t len)
+{
+    clear_body(reply);
+    reply->status = status;
+    reply->type = type;
+    reply->has_file = true;
+    reply->fd = fd;
+    reply->offset = 0;
+    reply->len = len;
+}
+
 void reply_json(http_reply *reply, int status, char *text)
 {
     reply_text(reply, status, JSON_TYPE, text, text ? strlen(text) : 0);
@@ -89,7 +105,7 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
     out[n++] = (field){"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"};
     out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache" : "no-store"};
-    if (reply->body)
+    if (reply->body || reply->has_file)
         out[n++] = (field){"Content-Type", reply->type};
     if (reply->location[0])
         out[n++] = (field){"Location", reply->location};
@@ -104,26 +120,51 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
     return n;
 }
 
+/* Owns what the body was. */
+static struct MHD_Response *make_response(http_reply *reply)
+{
+    struct MHD_Response *response;
+    if (reply->has_file) {
+        response = MHD_create_response_from_fd_at_offset64(reply->len, reply->fd, reply->offset);
+        reply->has_file = !response;
+        return response;
+    }
+    bool copy_is_needed = reply->body_is_static || !reply->body;
+    response = MHD_create_response_from_buffer(reply->len, reply->body,
+                                               copy_is_needed ? MHD_RESPMEM_PERSISTENT : MHD_RESPMEM_MUST_FREE);
+    if (response)
+        reply->body = NULL;
+    return response;
+}
+
 bool reply_send(struct MHD_Connection *connection, http_reply *reply)
 {
     field fields[MAX_FIELDS];
     char number[16];
     bool sent = false;
-    bool copy_is_needed = reply->body_is_static || !reply->body;
-    struct MHD_Response *response = MHD_create_response_from_buffer(
-        reply->len, reply->body, copy_is_needed ? MHD_RESPMEM_PERSISTENT : MHD_RESPMEM_MUST_FREE);
+    size_t n = list_fields(fields, reply, number);
+    struct MHD_Response *response = make_response(reply);
     if (!response)
         goto done;
-    size_t n = list_fields(fields, reply, number);
     bool complete = true;
     for (size_t i = 0; i < n; i++)
         complete = complete && MHD_add_response_header(response, fields[i].name, fields[i].value) == MHD_YES;
-    reply->body = NULL; /* the response owns it */
     sent = complete && MHD_queue_response(connection, (unsigned)reply->status, response) == MHD_YES;
     MHD_destroy_response(response);
 done:
     reply_clear(reply);
     return sent;
+}
+
+/* What libmicrohttpd adds to the replies that it sends (RFC 9110, section 6.6.1). */
+static void put_date(FILE *out)
+{
+    static const char DAYS[] = "SunMonTueWedThuFriSat", MONTHS[] = "JanFebMarAprMayJunJulAugSepOctNovDec";
+    struct tm t;
+    time_t now = time(NULL);
+    if (gmtime_r(&now, &t))
+        fprintf(out, "Date: %.3s, %02d %.3s %04d %02d:%02d:%02d GMT\r\n", DAYS + 3 * t.tm_wday, t.tm_mday,
+                MONTHS + 3 * t.tm_mon, t.tm_year + 1900, t.tm_hour, t.tm_min, t.tm_sec);
 }
 
 char *reply_message(const http_reply *reply)
@@ -136,6 +177,7 @@ char *reply_message(const http_reply *reply)
         return NULL;
     size_t n = list_fields(fields, reply, number);
     fprintf(out, "HTTP/1.1 %d %s\r\n", reply->status, MHD_get_reason_phrase_for((unsigned)reply->status));
+    put_date(out);
     for (size_t i = 0; i < n; i++)
         fprintf(out, "%s: %s\r\n", fields[i].name, fields[i].value);
     fprintf(out, "Content-Length: %zu\r\n\r\n%.*s", reply->len, (int)reply->len, reply->body ? reply->body : "");

@@ -16,13 +16,18 @@ typedef struct {
     bool cacheable;    /* the same for everybody until the daemon is replaced */
     bool close;        /* the connection ends with this reply */
     int retry_after_s; /* 0: none */
-    char location[64], preference_applied[32], allow[64];
+    bool has_file;     /* the body is the file fd, len bytes of it from offset on; body is NULL */
+    int fd;
+    size_t offset;
+    char location[96], preference_applied[32], allow[64];
 } http_reply;
 
 /* Takes ownership of text; NULL becomes a 500. */
 void reply_json(http_reply *reply, int status, char *text);
 void reply_text(http_reply *reply, int status, const char *type, char *text, size_t len);
 /* Keeps what stands in the other members (allow, retry_after_s, ...). */
+/* Takes ownership of fd. */
+void reply_file(http_reply *reply, int status, const char *type, int fd, size_t len);
 void reply_problem(http_reply *reply, const problem_details *problem);
 void reply_refuse(http_reply *reply, int status, const char *code, const char *title, const char *format, ...)
     __attribute__((format(printf, 5, 6)));

@@ -7,6 +7,7 @@
 #include "http/target.h"
 #include "log.h"
 #include "store/store.h"
+#include "store/uploads.h"
 #include "work/work.h"
 
 #include <stdatomic.h>
@@ -17,6 +18,7 @@ typedef struct {
     work *work;
     server_log *log;
     double max_wait_s;
+    int64_t max_upload; /* bytes, decompressed */
     atomic_bool draining;
 } api;
 
@@ -26,10 +28,11 @@ typedef struct http_request {
     header_list headers;
     framing framing;
     const struct route *route;
-    char name[65]; /* what stood for {id} or {name} in the path */
-    char *body;    /* NUL-terminated; NULL when empty */
-    size_t body_len, body_capacity;
-    int fd; /* to see whether the client is still there */
+    char name[65];                  /* what stood for {id} or {name} in the path */
+    char *body;                     /* NUL-terminated; NULL when empty */
+    size_t body_len, body_capacity; /* body_len: as received, also of a body that is streamed */
+    upload_writer *upload;          /* where the body of a streamed route goes */
+    int fd;                         /* to see whether the client is still there */
     /* For the access log and the connection's bookkeeping. */
     char method[16];
     double started; /* on deadlines_now's clock */
@@ -61,6 +64,7 @@ typedef struct route {
     const char *method, *pattern;
     const char *const *parameters; /* known query keys, NULL-terminated */
     route_handler handler;
+    bool streamed; /* the body is bytes of any type that go to disk as they come */
 } route;
 
 /* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. */
@@ -76,6 +80,9 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply);
 void jobs_refine(api *context, http_request *rq, http_reply *reply);
 void verify_submit(api *context, http_request *rq, http_reply *reply);
 void results_get(api *context, http_request *rq, http_reply *reply);
+void uploads_create(api *context, http_request *rq, http_reply *reply);
+void uploads_get(api *context, http_request *rq, http_reply *reply);
+void uploads_delete(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);

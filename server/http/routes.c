@@ -12,28 +12,33 @@ static const char *const RESULT[] = {"fields", "case", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};
 
 static const route ROUTES[] = {
-    {"POST", "/v1/jobs", SUBMIT, jobs_submit},
-    {"GET", "/v1/jobs", LIST, jobs_list},
-    {"GET", "/v1/jobs/{id}", NONE, jobs_get},
-    {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete},
-    {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine},
-    {"GET", "/v1/jobs/{id}/result", RESULT, results_get},
-    {"GET", "/v1/jobs/{id}/history", HISTORY, history_get},
-    {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv},
-    {"POST", "/v1/verify", NONE, verify_submit},
-    {"GET", "/v1/factors", NONE, service_factors},
-    {"GET", "/healthz", NONE, service_health},
-    {"GET", "/readyz", NONE, service_ready},
-    {"GET", "/openapi.json", NONE, service_openapi},
-    {"GET", "/schemas/{name}", NONE, service_schema},
+    {"POST", "/v1/jobs", SUBMIT, jobs_submit, false},
+    {"GET", "/v1/jobs", LIST, jobs_list, false},
+    {"GET", "/v1/jobs/{id}", NONE, jobs_get, false},
+    {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete, false},
+    {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine, false},
+    {"GET", "/v1/jobs/{id}/result", RESULT, results_get, false},
+    {"GET", "/v1/jobs/{id}/history", HISTORY, history_get, false},
+    {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv, false},
+    {"POST", "/v1/verify", NONE, verify_submit, false},
+    {"POST", "/v1/uploads", NONE, uploads_create, true},
+    {"GET", "/v1/uploads/{digest}", NONE, uploads_get, false},
+    {"DELETE", "/v1/uploads/{digest}", NONE, uploads_delete, false},
+    {"GET", "/v1/factors", NONE, service_factors, false},
+    {"GET", "/healthz", NONE, service_health, false},
+    {"GET", "/readyz", NONE, service_ready, false},
+    {"GET", "/openapi.json", NONE, service_openapi, false},
+    {"GET", "/schemas/{name}", NONE, service_schema, false},
 };
 static const size_t N_ROUTES = sizeof ROUTES / sizeof ROUTES[0];
 
-/* {id}: 32 hexadecimal digits in lower case. {name}: a file name. */
+/* {id}: 32 hexadecimal digits in lower case. {digest}: 64 of them. {name}: a file name. */
 static bool placeholder_matches(const char *kind, const char *text, size_t len)
 {
     if (strncmp(kind, "{id}", 4) == 0)
         return len == 32 && strspn(text, "0123456789abcdef") >= 32;
+    if (strncmp(kind, "{digest}", 8) == 0)
+        return len == 64 && strspn(text, "0123456789abcdef") >= 64;
     return len > 0 && len < sizeof((http_request *)0)->name;
 }
 

@@ -57,6 +57,16 @@ static const char *const SQL[QUERY_COUNT] = {
                       " AND answer = ?3"
                       " ORDER BY part",
     [QUERY_COUNTS] = "SELECT status, count(*) FROM job GROUP BY status",
+    [QUERY_UPLOAD] = "SELECT bytes, created, used, (SELECT count(*) FROM upload_use WHERE upload = id) FROM upload"
+                     " WHERE id = ?1",
+    [QUERY_INSERT_UPLOAD] = "INSERT OR IGNORE INTO upload(id, bytes, created, used) VALUES(?1, ?2, ?3, ?3)",
+    [QUERY_TOUCH_UPLOAD] = "UPDATE upload SET used = ?2 WHERE id = ?1",
+    [QUERY_USE_UPLOAD] = "INSERT OR IGNORE INTO upload_use(upload, job) VALUES(?1, ?2)",
+    [QUERY_DELETE_UPLOAD] = "DELETE FROM upload WHERE id = ?1"
+                            " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = ?1)",
+    [QUERY_IDLE_UPLOAD] = "SELECT id, bytes FROM upload WHERE used < ?1"
+                          " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = id) ORDER BY used LIMIT 1",
+    [QUERY_UPLOAD_BYTES] = "SELECT coalesce(sum(bytes), 0) FROM upload",
 };
 
 /* Settings of every connection. secure_delete FAST: freed pages are not rewritten only to blank them. */

@@ -101,6 +101,28 @@ static store_status insert_job(connection *c, const store_request *r, const char
     return statement_run(&st);
 }
 
+/* STORE_NOT_FOUND where one is not there. */
+static store_status use_uploads(connection *c, const store_request *r, const char *id)
+{
+    store_status status = STORE_OK;
+    for (size_t i = 0; i < r->n_uploads && status == STORE_OK; i++) {
+        statement st = statement_begin(c, QUERY_TOUCH_UPLOAD);
+        bind_text(&st, 1, r->uploads[i]);
+        bind_real(&st, 2, store_now());
+        status = statement_run(&st);
+        if (status == STORE_OK && connection_changes(c) == 0)
+            return STORE_NOT_FOUND;
+        st = statement_begin(c, QUERY_USE_UPLOAD);
+        bind_text(&st, 1, r->uploads[i]);
+        bind_text(&st, 2, id);
+        if (status == STORE_OK)
+            status = statement_run(&st);
+        else
+            statement_end(&st);
+    }
+    return status;
+}
+
 static store_status read_by_id(connection *c, const char *id, job *out)
 {
     store_status status = STORE_NOT_FOUND;
@@ -126,6 +148,8 @@ static store_status submit(store *s, connection *c, void *args)
     }
     store_next_id(s, id);
     store_status status = insert_job(c, a->request, id);
+    if (status == STORE_OK)
+        status = use_uploads(c, a->request, id);
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 

@@ -55,10 +55,13 @@ typedef struct {
     const char *tags;            /* JSON array text; NULL: [] */
     const char *idempotency_key; /* may be NULL */
     const char *refines;         /* id, or NULL */
+    const char (*uploads)[65];   /* n_uploads ids of uploads that the body names */
+    size_t n_uploads;
 } store_request;
 
 /* ---- submit: the job is on disk (fsync) before STORE_OK is returned. When the key is known and came with the same
- * body, *out is the earlier job and *repeated is true; with another body STORE_CONFLICT. */
+ * body, *out is the earlier job and *repeated is true; with another body STORE_CONFLICT. STORE_NOT_FOUND: an upload is
+ * not there (any more). */
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
 
 /* ---- claim: the oldest accepted job becomes running, attempts + 1, owner and lease set; *body is the request as

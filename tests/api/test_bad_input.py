@@ -282,6 +282,7 @@ def test_wrong_types(s):
         refused(s, {**MATRICES, "solver": wrong}, 422, "wrong_type", "/solver")
     for wrong in (None, True, {}, 1):
         refused(s, {**MATRICES, "tags": wrong}, 422, "wrong_type", "/tags")
+    for wrong in (None, True, 1):
         refused(s, {"problem": {**MATRICES["problem"], "p": wrong}}, 422, "wrong_type", "/problem/p")
     for wrong in (None, True, [1], 1, {"x": 1}):
         reply = s.post({**MATRICES, "problem": {**MATRICES["problem"], "K": wrong}})
