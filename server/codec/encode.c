@@ -86,6 +86,8 @@ static void put_links(text *t, const job *j)
         put_link(t, "history", j->id, "/history");
         put_link(t, "history_csv", j->id, "/history.csv");
     }
+    if (j->status == JOB_ACCEPTED || j->status == JOB_RUNNING)
+        put_link(t, "events", j->id, "/events");
     if (j->refines[0])
         put_link(t, "refines", j->refines, "");
     text_close(t, ']');
@@ -173,6 +175,21 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
     text_integer(&t, (int64_t)bytes);
     text_key(&t, "max_bytes");
     text_integer(&t, (int64_t)max_bytes);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_progress(int progress, const double *row)
+{
+    static const int SHOWN[] = {0, 2, 3, 9, 10}; /* columns of the history */
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "progress");
+    text_integer(&t, progress);
+    for (size_t i = 0; row && i < sizeof SHOWN / sizeof SHOWN[0]; i++) {
+        text_key(&t, CODEC_HISTORY_NAMES[SHOWN[i]]);
+        text_number(&t, row[SHOWN[i]]);
+    }
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }

@@ -95,8 +95,8 @@ static bool send_reply(conn *c, struct MHD_Connection *mhd)
 {
     http_reply *reply = &c->request->reply;
     note_reply(c->request, reply);
-    deadline_set(c->deadline,
-                 deadlines_now() + c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE, false);
+    double allowed = c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE;
+    deadline_set(c->deadline, reply->source.read ? INFINITY : deadlines_now() + allowed, false);
     return reply_send(mhd, reply);
 }
 

@@ -134,6 +134,8 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.work = parts->work;
     server->context.log = parts->log;
     server->context.max_wait_s = options->max_wait_s;
+    server->context.max_streams = MOST_STREAMS(options->max_connections);
+    atomic_init(&server->context.streams, 0);
     server->context.max_upload = (int64_t)options->max_upload;
     atomic_init(&server->context.draining, false);
     server->options = *options;
@@ -173,6 +175,7 @@ void http_stop(http_server *server)
 {
     if (!server)
         return;
+    http_drain(server);              /* event streams end */
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
     deadlines_free(server->deadlines);
     pthread_key_delete(server->current);

@@ -26,6 +26,9 @@ static void clear_body(http_reply *reply)
     if (reply->has_file)
         close(reply->fd);
     reply->has_file = false;
+    if (reply->source.read)
+        reply->source.free(reply->source.ctx);
+    reply->source.read = NULL;
     reply->body = NULL;
     reply->len = 0;
     reply->body_is_static = false;
@@ -74,6 +77,14 @@ void reply_file(http_reply *reply, int status, const char *type, int fd, size_t 
     reply->len = len;
 }
 
+void reply_stream(http_reply *reply, int status, const char *type, reply_source source)
+{
+    clear_body(reply);
+    reply->status = status;
+    reply->type = type;
+    reply->source = source;
+}
+
 void reply_json(http_reply *reply, int status, char *text)
 {
     reply_text(reply, status, JSON_TYPE, text, text ? strlen(text) : 0);
@@ -105,7 +116,7 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
     out[n++] = (field){"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"};
     out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache" : "no-store"};
-    if (reply->body || reply->has_file)
+    if (reply->body || reply->has_file || reply->source.read)
         out[n++] = (field){"Content-Type", reply->type};
     if (reply->location[0])
         out[n++] = (field){"Location", reply->location};
@@ -120,6 +131,40 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
     return n;
 }
 
+static ssize_t read_source(void *ctx, uint64_t position, char *out, size_t size)
+{
+    const reply_source *source = ctx;
+    ptrdiff_t n = source->read(source->ctx, out, size);
+    (void)position;
+    return n == REPLY_STREAM_ENDS     ? MHD_CONTENT_READER_END_OF_STREAM
+           : n == REPLY_STREAM_BREAKS ? MHD_CONTENT_READER_END_WITH_ERROR
+                                      : (ssize_t)n;
+}
+
+static void free_source(void *ctx)
+{
+    reply_source *source = ctx;
+    source->free(source->ctx);
+    free(source);
+}
+
+#define STREAM_PIECE 16384 /* bytes asked for at once */
+
+static struct MHD_Response *make_stream(http_reply *reply)
+{
+    reply_source *source = malloc(sizeof *source);
+    if (!source)
+        return NULL;
+    *source = reply->source;
+    struct MHD_Response *response =
+        MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, STREAM_PIECE, read_source, source, free_source);
+    if (response)
+        reply->source.read = NULL;
+    else
+        free(source);
+    return response;
+}
+
 /* Owns what the body was. */
 static struct MHD_Response *make_response(http_reply *reply)
 {
@@ -129,6 +174,8 @@ static struct MHD_Response *make_response(http_reply *reply)
         reply->has_file = !response;
         return response;
     }
+    if (reply->source.read)
+        return make_stream(reply);
     bool copy_is_needed = reply->body_is_static || !reply->body;
     response = MHD_create_response_from_buffer(reply->len, reply->body,
                                                copy_is_needed ? MHD_RESPMEM_PERSISTENT : MHD_RESPMEM_MUST_FREE);

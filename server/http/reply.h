@@ -7,6 +7,15 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+/* A body that comes piece by piece. read blocks until it has written 1 to `size` bytes, and returns how many, or that
+ * there are no more, or that there are no more although there should be. It is called in the connection's thread. */
+enum { REPLY_STREAM_ENDS = -1, REPLY_STREAM_BREAKS = -2 };
+typedef struct {
+    ptrdiff_t (*read)(void *ctx, char *out, size_t size);
+    void (*free)(void *ctx);
+    void *ctx;
+} reply_source;
+
 typedef struct {
     int status;
     const char *type; /* media type of body */
@@ -19,6 +28,7 @@ typedef struct {
     bool has_file;     /* the body is the file fd, len bytes of it from offset on; body is NULL */
     int fd;
     size_t offset;
+    reply_source source; /* read NULL: none; then body is NULL */
     char location[96], preference_applied[32], allow[64];
 } http_reply;
 
@@ -28,6 +38,8 @@ void reply_text(http_reply *reply, int status, const char *type, char *text, siz
 /* Keeps what stands in the other members (allow, retry_after_s, ...). */
 /* Takes ownership of fd. */
 void reply_file(http_reply *reply, int status, const char *type, int fd, size_t len);
+/* Takes ownership of source.ctx, also where it fails. */
+void reply_stream(http_reply *reply, int status, const char *type, reply_source source);
 void reply_problem(http_reply *reply, const problem_details *problem);
 void reply_refuse(http_reply *reply, int status, const char *code, const char *title, const char *format, ...)
     __attribute__((format(printf, 5, 6)));

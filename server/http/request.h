@@ -18,7 +18,9 @@ typedef struct {
     work *work;
     server_log *log;
     double max_wait_s;
-    int64_t max_upload; /* bytes, decompressed */
+    int64_t max_upload;   /* bytes, decompressed */
+    unsigned max_streams; /* event streams open at once */
+    atomic_uint streams;
     atomic_bool draining;
 } api;
 
@@ -83,6 +85,7 @@ void results_get(api *context, http_request *rq, http_reply *reply);
 void uploads_create(api *context, http_request *rq, http_reply *reply);
 void uploads_get(api *context, http_request *rq, http_reply *reply);
 void uploads_delete(api *context, http_request *rq, http_reply *reply);
+void events_get(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);

@@ -18,6 +18,7 @@ static const route ROUTES[] = {
     {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete, false},
     {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine, false},
     {"GET", "/v1/jobs/{id}/result", RESULT, results_get, false},
+    {"GET", "/v1/jobs/{id}/events", NONE, events_get, false},
     {"GET", "/v1/jobs/{id}/history", HISTORY, history_get, false},
     {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv, false},
     {"POST", "/v1/verify", NONE, verify_submit, false},
