@@ -106,6 +106,8 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     http_parts parts = {.store = s->store, .work = s->work, .log = s->log};
     const http_options limits = {.max_body = options->max_body,
                                  .max_upload = options->max_upload,
+                                 .cors = options->cors,
+                                 .n_cors = options->n_cors,
                                  .max_connections = options->max_connections,
                                  .request_deadline_s = options->request_deadline_s,
                                  .max_wait_s = MAX_WAIT_S};
@@ -224,5 +226,6 @@ int main(int argc, char **argv)
     }
     int status = run(&s, &options);
     log_close(s.log);
+    options_clear(&options);
     return status;
 }

@@ -23,6 +23,7 @@ enum {
     LEVEL,
     DEADLINE,
     MEMORY,
+    CORS,
     MAX_UPLOAD,
     UPLOADS,
     UPLOAD_DAYS,
@@ -45,6 +46,7 @@ static const struct option LONG_OPTIONS[] = {
     {"max-upload", required_argument, NULL, MAX_UPLOAD},
     {"uploads", required_argument, NULL, UPLOADS},
     {"upload-days", required_argument, NULL, UPLOAD_DAYS},
+    {"cors", required_argument, NULL, CORS},
     {"version", no_argument, NULL, VERSION},
     {"help", no_argument, NULL, HELP},
     {NULL, 0, NULL, 0},
@@ -68,6 +70,9 @@ void options_usage(FILE *to)
         "                          room (10G)\n"
         "  --upload-days D         an upload that no job uses is deleted so long after it was last used (30)\n"
         "  --max-connections N     connections open at once (256)\n"
+        "  --cors ORIGIN           pages of this origin (https://host[:port], or * for all) may use the service from "
+        "a\n"
+        "                          browser; may be given several times (none)\n"
         "  --request-deadline-s S  time for a request to arrive, plus 1 s per 100 kB of its body (30)\n"
         "  --max-attempts N        runs of a job whose run ends with the process before it is failed (3)\n"
         "  --drain-s S             time for running jobs to end after SIGTERM (30)\n"
@@ -149,6 +154,28 @@ static bool set_connections(unsigned *out, const char *text)
     return true;
 }
 
+/* "https://host[:port]" as a browser sends it, or "*". */
+static bool add_origin(server_options *out, const char *text)
+{
+    const char *host = strstr(text, "://");
+    bool fits = host && (strncmp(text, "http://", 7) == 0 || strncmp(text, "https://", 8) == 0);
+    if (strcmp(text, "*") != 0 && (!fits || !host[3] || strchr(host + 3, '/')))
+        return false;
+    const char **grown = realloc(out->cors, (out->n_cors + 1) * sizeof *grown);
+    if (!grown)
+        return false;
+    out->cors = grown;
+    out->cors[out->n_cors++] = text;
+    return true;
+}
+
+void options_clear(server_options *options)
+{
+    free(options->cors);
+    options->cors = NULL;
+    options->n_cors = 0;
+}
+
 static bool set_option(server_options *out, int option, const char *text)
 {
     switch (option) {
@@ -170,6 +197,8 @@ static bool set_option(server_options *out, int option, const char *text)
         return set_integer(&out->max_attempts, 1, 1000, text);
     case DRAIN:
         return parse_seconds(text, 0, &out->drain_s);
+    case CORS:
+        return add_origin(out, text);
     case MAX_UPLOAD:
         return parse_bytes(text, &out->max_upload);
     case UPLOADS:

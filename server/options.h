@@ -17,6 +17,8 @@ typedef struct {
     size_t memory;              /* of one solve, bytes */
     size_t max_upload, uploads; /* bytes of one upload, and of all */
     double upload_days;         /* one that no job uses is kept so long */
+    const char **cors;          /* n_cors origins; allocated, the texts are argv's */
+    size_t n_cors;
     double drain_s, request_deadline_s;
     log_level level;
 } server_options;
@@ -30,6 +32,8 @@ typedef enum {
 
 /* Reads argv; *out has the defaults for what is not given. */
 options_verdict options_parse(server_options *out, int argc, char **argv, char *message, size_t size);
+/* Frees what options_parse allocated, whatever it returned. */
+void options_clear(server_options *options);
 void options_usage(FILE *to);
 
 #endif

@@ -4,11 +4,26 @@
 
 #include <string.h>
 
-/* A page of another site must not submit or delete through its visitor's browser. Programs send no such header. */
+void cors_find(http_server *server, http_request *rq)
+{
+    const api *context = &server->context;
+    const header_field *origin = header_find(&rq->headers, "Origin", NULL);
+    rq->reply.cors = context->n_cors > 0;
+    for (size_t i = 0; origin && i < context->n_cors && !rq->reply.cors_origin; i++) {
+        const char *one = context->cors[i];
+        if (strcmp(one, "*") == 0 ||
+            (strlen(one) == origin->value_len && memcmp(one, origin->value, origin->value_len) == 0))
+            rq->reply.cors_origin = one;
+    }
+}
+
+/* A page of another site must not submit or delete through its visitor's browser, unless its origin is one that may
+ * use the service. Programs send no such header. */
 static bool check_site(const http_request *rq, problem_details *problem)
 {
     const header_field *site = header_find(&rq->headers, "Sec-Fetch-Site", NULL);
-    if (!site || !token_equal(site->value, site->value_len, "cross-site") || strcmp(rq->route->method, "GET") == 0)
+    if (!site || !token_equal(site->value, site->value_len, "cross-site") || strcmp(rq->route->method, "GET") == 0 ||
+        rq->reply.cors_origin)
         return true;
     return http_problem(problem, 403, "cross_site", "Requests from other sites are refused",
                         "a browser sent this for a page of another site");

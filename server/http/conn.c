@@ -1,4 +1,5 @@
 #include "http/conn.h"
+#include "http/negotiate.h"
 #include "http/problem.h"
 #include "http/uploads.h"
 
@@ -103,7 +104,7 @@ static bool send_reply(conn *c, struct MHD_Connection *mhd)
 /* Where libmicrohttpd takes no reply: writes it and closes the connection's sending side. */
 static void send_directly(conn *c, const problem_details *problem)
 {
-    http_reply reply = {.close = true};
+    http_reply reply = {.close = true, .cors = c->request->reply.cors, .cors_origin = c->request->reply.cors_origin};
     reply_problem(&reply, problem);
     note_reply(c->request, &reply);
     char *message = reply_message(&reply);
@@ -180,6 +181,7 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
     http_request *rq = c->request;
     rq->begun = true;
     bool framed = read_framing(c, mhd, method, version);
+    cors_find(c->server, rq);
     if (framed && admit(c->server, rq) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
         deadline_set(c->deadline,
                      rq->started + c->server->options.request_deadline_s + (double)rq->framing.length / SLOWEST_RATE,
@@ -268,6 +270,7 @@ bool conn_answer(conn *c, struct MHD_Connection *mhd)
         reply_problem(&rq->reply, &rq->refused);
     else
         rq->route->handler(&c->server->context, rq, &rq->reply);
+    negotiate(rq, &rq->reply);
     return send_reply(c, mhd);
 }
 

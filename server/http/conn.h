@@ -54,5 +54,7 @@ void conn_end_request(conn *c, unsigned status, bool completed);
 /* admission.c: everything that can be refused before the body is read; false with rq->refused and the header fields of
  * rq->reply. */
 bool admit(http_server *server, http_request *rq);
+/* Sets what the reply says to pages of other origins. */
+void cors_find(http_server *server, http_request *rq);
 
 #endif

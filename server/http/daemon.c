@@ -134,6 +134,8 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.work = parts->work;
     server->context.log = parts->log;
     server->context.max_wait_s = options->max_wait_s;
+    server->context.cors = options->cors;
+    server->context.n_cors = options->n_cors;
     server->context.max_streams = MOST_STREAMS(options->max_connections);
     atomic_init(&server->context.streams, 0);
     server->context.max_upload = (int64_t)options->max_upload;

@@ -240,6 +240,7 @@ void jobs_list(api *context, http_request *rq, http_reply *reply)
 void jobs_get(api *context, http_request *rq, http_reply *reply)
 {
     job j;
+    reply->tag_by_body = true;
     if (jobs_load(context, rq, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
         reply_job(context, 200, &j, reply);
     job_clear(&j);

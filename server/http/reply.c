@@ -10,7 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#define MAX_FIELDS 12
+#define MAX_FIELDS 24
 
 static const char JSON_TYPE[] = "application/json";
 static const char PROBLEM_TYPE[] = "application/problem+json";
@@ -32,6 +32,18 @@ static void clear_body(http_reply *reply)
     reply->body = NULL;
     reply->len = 0;
     reply->body_is_static = false;
+}
+
+void reply_drop_body(http_reply *reply)
+{
+    clear_body(reply);
+}
+
+void reply_replace_body(http_reply *reply, char *body, size_t len)
+{
+    clear_body(reply);
+    reply->body = body;
+    reply->len = len;
 }
 
 void reply_clear(http_reply *reply)
@@ -108,14 +120,63 @@ void reply_refuse(http_reply *reply, int status, const char *code, const char *t
     reply_problem(reply, &problem);
 }
 
-/* The header fields of a reply; number needs 16 bytes that outlive the list. */
-static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *number)
+/* Texts of header fields; they outlive the list of these. */
+typedef struct {
+    char number[16], tag[REPLY_TAG + 2], vary[64];
+} field_texts;
+
+static void write_texts(field_texts *out, const http_reply *reply)
+{
+    const char *const vary[] = {reply->varies_by_coding ? "Accept-Encoding" : NULL,
+                                reply->varies_by_type ? "Accept" : NULL, reply->cors ? "Origin" : NULL};
+    snprintf(out->number, sizeof out->number, "%d", reply->retry_after_s);
+    snprintf(out->tag, sizeof out->tag, "\"%s\"", reply->tag);
+    out->vary[0] = '\0';
+    for (size_t i = 0, used = 0; i < sizeof vary / sizeof vary[0]; i++)
+        if (vary[i])
+            used += (size_t)snprintf(out->vary + used, sizeof out->vary - used, "%s%s", used ? ", " : "", vary[i]);
+}
+
+/* What a page of another origin may do and see (WHATWG Fetch, CORS protocol). */
+static size_t list_cors(field *out, const http_reply *reply)
 {
     size_t n = 0;
-    snprintf(number, 16, "%d", reply->retry_after_s);
+    if (!reply->cors_origin)
+        return 0;
+    out[n++] = (field){"Access-Control-Allow-Origin", reply->cors_origin};
+    if (!reply->preflight) {
+        out[n++] =
+            (field){"Access-Control-Expose-Headers", "Content-Range, ETag, Location, Preference-Applied, Retry-After"};
+        return n;
+    }
+    out[n++] = (field){"Access-Control-Allow-Methods", reply->allow};
+    out[n++] = (field){"Access-Control-Allow-Headers",
+                       "Authorization, Content-Encoding, Content-Type, Idempotency-Key, If-None-Match, If-Range, "
+                       "Last-Event-ID, Prefer, Range"};
+    out[n++] = (field){"Access-Control-Max-Age", "600"};
+    return n;
+}
+
+/* The header fields of a reply. */
+static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, field_texts *texts)
+{
+    size_t n = 0;
+    write_texts(texts, reply);
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
     out[n++] = (field){"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"};
-    out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache" : "no-store"};
+    out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache"
+                                        : reply->tag[0]  ? "private, no-cache"
+                                                         : "no-store"};
+    if (reply->tag[0])
+        out[n++] = (field){"ETag", texts->tag};
+    if (texts->vary[0])
+        out[n++] = (field){"Vary", texts->vary};
+    if (reply->takes_ranges)
+        out[n++] = (field){"Accept-Ranges", "bytes"};
+    if (reply->content_range[0])
+        out[n++] = (field){"Content-Range", reply->content_range};
+    if (reply->gzip)
+        out[n++] = (field){"Content-Encoding", "gzip"};
     if (reply->body || reply->has_file || reply->source.read)
         out[n++] = (field){"Content-Type", reply->type};
     if (reply->location[0])
@@ -125,7 +186,8 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
     if (reply->allow[0])
         out[n++] = (field){"Allow", reply->allow};
     if (reply->retry_after_s > 0)
-        out[n++] = (field){"Retry-After", number};
+        out[n++] = (field){"Retry-After", texts->number};
+    n += list_cors(out + n, reply);
     if (reply->close)
         out[n++] = (field){"Connection", "close"};
     return n;
@@ -187,9 +249,9 @@ static struct MHD_Response *make_response(http_reply *reply)
 bool reply_send(struct MHD_Connection *connection, http_reply *reply)
 {
     field fields[MAX_FIELDS];
-    char number[16];
+    field_texts texts;
     bool sent = false;
-    size_t n = list_fields(fields, reply, number);
+    size_t n = list_fields(fields, reply, &texts);
     struct MHD_Response *response = make_response(reply);
     if (!response)
         goto done;
@@ -217,12 +279,13 @@ static void put_date(FILE *out)
 char *reply_message(const http_reply *reply)
 {
     field fields[MAX_FIELDS];
-    char number[16], *text = NULL;
+    field_texts texts;
+    char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (!out)
         return NULL;
-    size_t n = list_fields(fields, reply, number);
+    size_t n = list_fields(fields, reply, &texts);
     fprintf(out, "HTTP/1.1 %d %s\r\n", reply->status, MHD_get_reason_phrase_for((unsigned)reply->status));
     put_date(out);
     for (size_t i = 0; i < n; i++)

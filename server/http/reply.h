@@ -16,21 +16,35 @@ typedef struct {
     void *ctx;
 } reply_source;
 
+#define REPLY_TAG 48 /* room for an entity tag without its quotes, in any coding, and a NUL */
+
 typedef struct {
     int status;
     const char *type; /* media type of body */
     char *body;       /* malloc'ed unless body_is_static */
     size_t len;
     bool body_is_static;
-    bool cacheable;    /* the same for everybody until the daemon is replaced */
-    bool close;        /* the connection ends with this reply */
-    int retry_after_s; /* 0: none */
-    bool has_file;     /* the body is the file fd, len bytes of it from offset on; body is NULL */
+    bool cacheable;      /* the same for everybody until the daemon is replaced */
+    bool close;          /* the connection ends with this reply */
+    int retry_after_s;   /* 0: none */
+    char tag[REPLY_TAG]; /* names the representation, "": no name */
+    bool tag_by_body;    /* the name follows from the body: negotiate makes it */
+    bool takes_ranges;   /* a part of it may be asked for */
+    bool varies_by_coding, varies_by_type;
+    bool gzip; /* body is compressed */
+    char content_range[80];
+    const char *cors_origin; /* a page of this origin may read the reply; NULL: none; lives as long as the server */
+    bool cors, preflight;    /* replies depend on the origin; this one says what may be asked */
+    bool has_file;           /* the body is the file fd, len bytes of it from offset on; body is NULL */
     int fd;
     size_t offset;
     reply_source source; /* read NULL: none; then body is NULL */
     char location[96], preference_applied[32], allow[64];
 } http_reply;
+
+void reply_drop_body(http_reply *reply);
+/* Takes ownership of body. */
+void reply_replace_body(http_reply *reply, char *body, size_t len);
 
 /* Takes ownership of text; NULL becomes a 500. */
 void reply_json(http_reply *reply, int status, char *text);

@@ -18,7 +18,9 @@ typedef struct {
     work *work;
     server_log *log;
     double max_wait_s;
-    int64_t max_upload;   /* bytes, decompressed */
+    int64_t max_upload;      /* bytes, decompressed */
+    const char *const *cors; /* n_cors origins whose pages may use the service; "*": all */
+    size_t n_cors;
     unsigned max_streams; /* event streams open at once */
     atomic_uint streams;
     atomic_bool draining;
@@ -51,6 +53,8 @@ typedef struct http_request {
 double request_wait(const http_request *rq, double otherwise, double max_wait_s);
 /* True if an Accept header field names the media type with a quality above 0, or a longer list does. */
 bool request_accepts(const http_request *rq, const char *type);
+/* True if Accept-Encoding names gzip, or all that it does not name, with a quality above 0. */
+bool request_takes_gzip(const http_request *rq);
 /* True if the body may be JSON: Content-Type absent, application/json or ...+json. */
 bool request_is_json(const http_request *rq);
 /* The client closed its end: an answer would reach nobody. */
@@ -70,6 +74,7 @@ typedef struct route {
 } route;
 
 /* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. */
+/* With rq->reply.cors, OPTIONS is answered on every path that there is. */
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem);
 /* 400 for a query key that the route does not know. */
 bool route_check_parameters(const http_request *rq, problem_details *problem);

@@ -1,6 +1,8 @@
 /* results.c: what a job leaves behind: /v1/jobs/{id}/result. */
 #include "codec/codec.h"
 #include "http/jobs.h"
+#include "http/negotiate.h"
+#include "options.h"
 #include "http/problem.h"
 #include "http/request.h"
 
@@ -12,6 +14,8 @@
 
 typedef struct {
     bool reactions, gaps, displacements, pressure;
+    bool part;           /* only entries from .. from + count - 1 of each */
+    int64_t from, count; /* an entry is a contact row, or a node (of matrices: a dof) */
 } wanted;
 
 static bool want_field(wanted *out, const char *name, size_t len)
@@ -48,6 +52,16 @@ static bool read_fields(const http_request *rq, wanted *out, problem_details *pr
             return true;
         at += len + 1;
     }
+}
+
+/* A part of every field: from, and how many. */
+static bool read_part(const http_request *rq, wanted *out, problem_details *problem)
+{
+    out->from = 0;
+    out->count = INT64_MAX;
+    out->part = target_value(&rq->target, "from") || target_value(&rq->target, "count");
+    return request_integer(rq, "from", 0, INT64_MAX, &out->from, problem) &&
+           request_integer(rq, "count", 0, INT64_MAX, &out->count, problem);
 }
 
 bool results_exist(const job *j, http_reply *reply)
@@ -139,25 +153,52 @@ static store_status fetch_shared(api *context, const job *j, const wanted *field
     return status;
 }
 
-static codec_result as_encoded(const place *at, const vectors *own, const vectors *shared)
+/* Leaves entries lo .. lo + *n - 1 of *x, each of `size` numbers; *n numbers before and after. */
+static void cut(const double **x, int64_t *n, int64_t size, const wanted *fields)
 {
-    return (codec_result){.job_id = at->j->id,
-                          .summary = at->summary,
-                          .case_name = at->name,
-                          .dim = shared->dim && shared->n_dim == 1 ? (int)shared->dim[0] : 0,
-                          .m = own->reactions  ? own->n_reactions
-                               : own->gaps     ? own->n_gaps
-                               : own->pressure ? own->n_pressure
-                                               : shared->n_contact_nodes,
-                          .n_u = own->n_u,
-                          .n_nodes = shared->n_nodes,
-                          .reactions = own->reactions,
-                          .gaps = own->gaps,
-                          .pressure = own->pressure,
-                          .ray = own->ray,
-                          .displacements = own->displacements,
-                          .nodes = shared->nodes,
-                          .contact_nodes = shared->contact_nodes};
+    int64_t entries = *n / size, lo = fields->from < entries ? fields->from : entries;
+    int64_t left = fields->count < entries - lo ? fields->count : entries - lo;
+    if (*x)
+        *x += lo * size;
+    *n = left * size;
+}
+
+static void cut_all(codec_result *r, const wanted *fields)
+{
+    const double **rows[] = {&r->gaps, &r->pressure, &r->ray, &r->contact_nodes, &r->reactions};
+    int64_t size = r->dim > 0 ? r->dim : 1, m = r->m;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        r->m = m;
+        cut(rows[i], &r->m, 1, fields);
+    }
+    cut(&r->displacements, &r->n_u, size, fields);
+    cut(&r->nodes, &r->n_nodes, size, fields);
+    r->part = true;
+    r->from = fields->from;
+}
+
+static codec_result as_encoded(const place *at, const vectors *own, const vectors *shared, const wanted *fields)
+{
+    codec_result r = {.job_id = at->j->id,
+                      .summary = at->summary,
+                      .case_name = at->name,
+                      .dim = shared->dim && shared->n_dim == 1 ? (int)shared->dim[0] : 0,
+                      .m = own->reactions  ? own->n_reactions
+                           : own->gaps     ? own->n_gaps
+                           : own->pressure ? own->n_pressure
+                                           : shared->n_contact_nodes,
+                      .n_u = own->n_u,
+                      .n_nodes = shared->n_nodes,
+                      .reactions = own->reactions,
+                      .gaps = own->gaps,
+                      .pressure = own->pressure,
+                      .ray = own->ray,
+                      .displacements = own->displacements,
+                      .nodes = shared->nodes,
+                      .contact_nodes = shared->contact_nodes};
+    if (fields->part)
+        cut_all(&r, fields);
+    return r;
 }
 
 static void reply_one(api *context, const place *at, const wanted *fields, http_reply *reply)
@@ -168,7 +209,7 @@ static void reply_one(api *context, const place *at, const wanted *fields, http_
     if (status == STORE_OK)
         status = fetch_own(context, at, fields, &own);
     if (status == STORE_OK) {
-        codec_result result = as_encoded(at, &own, &shared);
+        codec_result result = as_encoded(at, &own, &shared, fields);
         char *text = codec_encode_result(&result, &len);
         reply_text(reply, 200, "application/json", text, len);
     } else {
@@ -184,7 +225,7 @@ static void reply_one(api *context, const place *at, const wanted *fields, http_
 #define MOST_NUMBERS 4000000
 
 /* False with a 413, or a failure of the store. */
-static bool check_room(api *context, const job *j, const wanted *fields, http_reply *reply)
+static bool check_room(api *context, const job *j, size_t cases, const wanted *fields, http_reply *reply)
 {
     const struct {
         bool wanted;
@@ -202,7 +243,9 @@ static bool check_room(api *context, const job *j, const wanted *fields, http_re
             reply_store_failure(context, status, reply);
             return false;
         }
-        total += count;
+        /* an entry has at most 3 numbers */
+        int64_t most = fields->part && fields->count < MOST_NUMBERS ? 3 * (int64_t)cases * fields->count : count;
+        total += most < count ? most : count;
     }
     if (total > MOST_NUMBERS)
         reply_refuse(
@@ -218,7 +261,7 @@ static store_status add_case(api *context, codec_results *all, const place *at, 
 {
     vectors own = {0};
     store_status status = fetch_own(context, at, fields, &own);
-    codec_result one = as_encoded(at, &own, shared);
+    codec_result one = as_encoded(at, &own, shared, fields);
     if (status == STORE_OK)
         codec_results_add(all, &one);
     vectors_free(&own);
@@ -239,7 +282,7 @@ static void reply_cases(api *context, const job *j, const store_case *cases, siz
         codec_results_drop(all);
         reply_store_failure(context, status, reply);
     } else {
-        codec_result rest = as_encoded(&whole, &(vectors){0}, &shared);
+        codec_result rest = as_encoded(&whole, &(vectors){0}, &shared, fields);
         char *text = all ? codec_results_end(all, &rest, &len) : NULL;
         reply_text(reply, 200, "application/json", text, len);
     }
@@ -284,9 +327,21 @@ static void reply_result(api *context, const http_request *rq, const job *j, con
         reply_one(context, &(place){.j = j, .summary = j->summary}, fields, reply);
     else if (target_value(&rq->target, "case"))
         reply_one(context, &(place){j, cases[0].number, cases[0].name, cases[0].summary}, fields, reply);
-    else if (check_room(context, j, fields, reply))
+    else if (check_room(context, j, count, fields, reply))
         reply_cases(context, j, cases, count, fields, reply);
     store_cases_free(cases, count);
+}
+
+/* The answer of an ended job never changes: its name follows from which one it is and what is asked of it. */
+static bool is_known(const http_request *rq, const job *j, http_reply *reply)
+{
+    char finished[32];
+    snprintf(finished, sizeof finished, "%.6f", j->finished);
+    const char *const parts[] = {UZAWAD_VERSION, j->id, finished, rq->raw_target};
+    const size_t lens[] = {strlen(parts[0]), strlen(parts[1]), strlen(parts[2]), strlen(parts[3])};
+    tag_make(reply->tag, parts, lens, 4);
+    reply->takes_ranges = true;
+    return reply_unchanged(rq, reply);
 }
 
 void results_get(api *context, http_request *rq, http_reply *reply)
@@ -294,11 +349,11 @@ void results_get(api *context, http_request *rq, http_reply *reply)
     wanted fields;
     problem_details problem;
     job j = {0};
-    if (!read_fields(rq, &fields, &problem)) {
+    if (!read_fields(rq, &fields, &problem) || !read_part(rq, &fields, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply))
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !is_known(rq, &j, reply))
         reply_result(context, rq, &j, &fields, reply);
     job_clear(&j);
 }

@@ -8,7 +8,7 @@
 static const char *const NONE[] = {NULL};
 static const char *const SUBMIT[] = {"validate", NULL};
 static const char *const LIST[] = {"status", "limit", "cursor", "tag", NULL};
-static const char *const RESULT[] = {"fields", "case", NULL};
+static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};
 
 static const route ROUTES[] = {
@@ -67,6 +67,15 @@ static void allow_also(char *allow, size_t size, const char *method)
     snprintf(allow + len, size - len, "%s%s%s", len ? ", " : "", method, strcmp(method, "GET") == 0 ? ", HEAD" : "");
 }
 
+static void answer_options(api *context, http_request *rq, http_reply *reply)
+{
+    (void)context;
+    (void)rq;
+    reply->status = 204; /* the header fields say it all */
+    reply->preflight = true;
+}
+static const route OPTIONS = {"OPTIONS", "every path", NONE, answer_options, false};
+
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem)
 {
     const char *method = strcmp(rq->method, "HEAD") == 0 ? "GET" : rq->method;
@@ -79,6 +88,11 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
             return true;
         }
         allow_also(allow, size, ROUTES[i].method);
+    }
+    if (allow[0] && rq->reply.cors && strcmp(method, "OPTIONS") == 0) {
+        allow_also(allow, size, method);
+        rq->route = &OPTIONS;
+        return true;
     }
     if (allow[0])
         return http_problem(problem, 405, "method_not_allowed", "The method is not allowed here",
