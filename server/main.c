@@ -89,6 +89,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     store_limit_uploads(s->store, &(upload_limits){.one = (int64_t)options->max_upload,
                                                    .all = (int64_t)options->uploads,
                                                    .keep_s = options->upload_days * 86400});
+    store_limit_queue(s->store, options->max_queue);
     /* The port is taken before any job runs, so that a second daemon fails without a trace. */
     fd = http_listen(options->listen, url, url_size, message, size);
     if (fd < 0)
@@ -97,7 +98,10 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
                                   .solve_bytes = options->memory,
-                                  .lease_s = LEASE_S};
+                                  .lease_s = LEASE_S,
+                                  .retention = {.keep_s = options->keep_days * 86400,
+                                                .keep_jobs = options->keep_jobs,
+                                                .keep_bytes = (int64_t)options->keep_bytes}};
     s->work = work_start(s->store, &workers, s->log, message, size);
     if (!s->work) {
         close(fd);

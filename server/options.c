@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <getopt.h>
+#include <limits.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -24,6 +25,10 @@ enum {
     DEADLINE,
     MEMORY,
     CORS,
+    KEEP_DAYS,
+    KEEP_JOBS,
+    KEEP_BYTES,
+    MAX_QUEUE,
     MAX_UPLOAD,
     UPLOADS,
     UPLOAD_DAYS,
@@ -46,6 +51,10 @@ static const struct option LONG_OPTIONS[] = {
     {"max-upload", required_argument, NULL, MAX_UPLOAD},
     {"uploads", required_argument, NULL, UPLOADS},
     {"upload-days", required_argument, NULL, UPLOAD_DAYS},
+    {"keep-days", required_argument, NULL, KEEP_DAYS},
+    {"keep-jobs", required_argument, NULL, KEEP_JOBS},
+    {"keep-bytes", required_argument, NULL, KEEP_BYTES},
+    {"max-queue", required_argument, NULL, MAX_QUEUE},
     {"cors", required_argument, NULL, CORS},
     {"version", no_argument, NULL, VERSION},
     {"help", no_argument, NULL, HELP},
@@ -70,6 +79,10 @@ void options_usage(FILE *to)
         "                          room (10G)\n"
         "  --upload-days D         an upload that no job uses is deleted so long after it was last used (30)\n"
         "  --max-connections N     connections open at once (256)\n"
+        "  --max-queue N           jobs that may wait; one more is answered 503 (no limit)\n"
+        "  --keep-days D, --keep-jobs N, --keep-bytes BYTES\n"
+        "                          ended jobs that are older, more, or larger together than that are deleted, the\n"
+        "                          oldest first (no limit)\n"
         "  --cors ORIGIN           pages of this origin (https://host[:port], or * for all) may use the service from "
         "a\n"
         "                          browser; may be given several times (none)\n"
@@ -197,6 +210,14 @@ static bool set_option(server_options *out, int option, const char *text)
         return set_integer(&out->max_attempts, 1, 1000, text);
     case DRAIN:
         return parse_seconds(text, 0, &out->drain_s);
+    case KEEP_DAYS:
+        return parse_seconds(text, 0, &out->keep_days);
+    case KEEP_JOBS:
+        return parse_integer(text, 0, LONG_MAX, &out->keep_jobs);
+    case KEEP_BYTES:
+        return parse_bytes(text, &out->keep_bytes);
+    case MAX_QUEUE:
+        return parse_integer(text, 0, LONG_MAX, &out->max_queue);
     case CORS:
         return add_origin(out, text);
     case MAX_UPLOAD:

@@ -17,6 +17,9 @@ typedef struct {
     size_t memory;              /* of one solve, bytes */
     size_t max_upload, uploads; /* bytes of one upload, and of all */
     double upload_days;         /* one that no job uses is kept so long */
+    double keep_days;           /* ended jobs; 0: no limit */
+    long keep_jobs, max_queue;  /* 0: no limit */
+    size_t keep_bytes;          /* 0: no limit */
     const char **cors;          /* n_cors origins; allocated, the texts are argv's */
     size_t n_cors;
     double drain_s, request_deadline_s;

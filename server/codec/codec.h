@@ -44,6 +44,8 @@ typedef struct {
     char *tags;          /* JSON array text */
     char (*uploads)[65]; /* n_uploads ids of the uploads that it names, each once */
     size_t n_uploads;
+    int priority;         /* -10..10 */
+    double queue_limit_s; /* 0: none */
 } codec_request;
 
 /* What a body may be: the one that a route takes, or any that the store may hold. */
@@ -58,7 +60,7 @@ bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, si
 /* The same of a POST /v1/jobs body. */
 bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem);
 void codec_request_clear(codec_request *request);
-/* Frees the problem and all numbers, and leaves what the store keeps beside the body: tags and uploads. */
+/* Frees the problem and all numbers, and leaves what the store keeps beside the body. */
 void codec_request_strip(codec_request *request);
 
 /* How many reactions and displacements an answer has (a scene's: dim numbers for each node). False: *problem. */

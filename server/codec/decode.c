@@ -195,6 +195,8 @@ static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_
 {
     const json_t *solver = json_object_get(doc->root, "solver"), *answer = json_object_get(doc->root, "answer");
     decode_settings(&out->settings, solver);
+    out->priority = (int)json_real_value(json_object_get(doc->root, "priority")); /* 0 where there is none */
+    out->queue_limit_s = json_real_value(json_object_get(doc->root, "queue_limit_s"));
     return decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
            decode_problem(&out->problem, doc, len, problem) &&
            decode_cases(&out->problem, doc, json_object_get(doc->root, "cases"), len, problem) &&
@@ -236,7 +238,11 @@ bool codec_decode_request(codec_request *out, const char *body, size_t len, prob
 
 void codec_request_strip(codec_request *request)
 {
-    codec_request kept = {.tags = request->tags, .uploads = request->uploads, .n_uploads = request->n_uploads};
+    codec_request kept = {.tags = request->tags,
+                          .uploads = request->uploads,
+                          .n_uploads = request->n_uploads,
+                          .priority = request->priority,
+                          .queue_limit_s = request->queue_limit_s};
     request->tags = NULL;
     request->uploads = NULL;
     codec_request_clear(request);

@@ -107,6 +107,8 @@ static void put_job(text *t, const job *j)
     put_time(t, "finished", j->finished);
     text_key(t, "attempts");
     text_integer(t, j->attempts);
+    text_key(t, "priority");
+    text_integer(t, j->priority);
     text_key(t, "tags");
     text_raw(t, j->tags ? j->tags : "[]");
     text_key(t, "summary");

@@ -19,6 +19,10 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
         reply->retry_after_s = 60;
         reply_refuse(reply, 507, "storage_full", "The disk is full",
                      "nothing was stored: delete ended jobs or free disk space, then try again");
+    } else if (status == STORE_BUSY) {
+        reply->retry_after_s = 10;
+        reply_refuse(reply, 503, "queue_full", "Too many jobs wait",
+                     "as many jobs wait as this server lets (its option --max-queue): try again later");
     } else if (status == STORE_CONFLICT) {
         reply_refuse(reply, 409, "conflict", "The job's state does not allow this",
                      "the job changed meanwhile: look at its status and try again");
@@ -72,8 +76,7 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
     return status == STORE_OK;
 }
 
-/* A running job's progress lives in the worker; the store has the one of the last lease. */
-static void freshen(api *context, job *j)
+void jobs_freshen(api *context, job *j)
 {
     int progress;
     if (j->status == JOB_RUNNING && work_live(context->work, j->id, -1, &progress, NULL, NULL))
@@ -82,7 +85,7 @@ static void freshen(api *context, job *j)
 
 static void reply_job(api *context, int status, job *j, http_reply *reply)
 {
-    freshen(context, j);
+    jobs_freshen(context, j);
     reply_json(reply, status, codec_encode_job(j));
 }
 
@@ -125,7 +128,9 @@ store_request jobs_request(const codec_request *request, const char *body, size_
                            .tags = request->tags,
                            .idempotency_key = key,
                            .uploads = (const char(*)[65])request->uploads,
-                           .n_uploads = request->n_uploads};
+                           .n_uploads = request->n_uploads,
+                           .priority = request->priority,
+                           .queue_limit_s = request->queue_limit_s};
 }
 
 bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
@@ -186,56 +191,7 @@ done:
     free(key);
 }
 
-/* -------------------------------------------------------------- list, read */
-
-static bool is_id(const char *text)
-{
-    return strlen(text) == 32 && strspn(text, "0123456789abcdef") == 32;
-}
-
-static bool read_query(const http_request *rq, store_query *query, problem_details *problem)
-{
-    int64_t limit = 50;
-    const char *status = target_value(&rq->target, "status");
-    memset(query, 0, sizeof *query);
-    query->tag = target_value(&rq->target, "tag");
-    query->before = target_value(&rq->target, "cursor");
-    query->by_status = status != NULL;
-    if (status && !job_status_parse(&query->status, status))
-        return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "status must be accepted, running, successful, failed or dismissed");
-    if (query->before && !is_id(query->before))
-        return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "cursor must be the \"next\" of an earlier page");
-    if (!request_integer(rq, "limit", 1, 1000, &limit, problem))
-        return false;
-    query->limit = (int)limit;
-    return true;
-}
-
-void jobs_list(api *context, http_request *rq, http_reply *reply)
-{
-    store_query query;
-    problem_details problem;
-    job *jobs = NULL;
-    size_t count = 0;
-    bool more = false;
-    if (!read_query(rq, &query, &problem)) {
-        reply_problem(reply, &problem);
-        return;
-    }
-    store_status status = store_list(context->store, &query, &jobs, &count, &more);
-    if (status != STORE_OK) {
-        reply_store_failure(context, status, reply);
-        return;
-    }
-    for (size_t i = 0; i < count; i++)
-        freshen(context, &jobs[i]);
-    reply_json(reply, 200, codec_encode_jobs(jobs, count, more));
-    for (size_t i = 0; i < count; i++)
-        job_clear(&jobs[i]);
-    free(jobs);
-}
+/* -------------------------------------------------------------------- read */
 
 void jobs_get(api *context, http_request *rq, http_reply *reply)
 {

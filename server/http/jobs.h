@@ -6,6 +6,8 @@
 #include "http/request.h"
 
 bool jobs_ended(const job *j);
+/* A running job's progress lives in the worker; the store has the one of the last lease. */
+void jobs_freshen(api *context, job *j);
 
 /* Waits as the request prefers, `otherwise` seconds where it does not say, and reads the job again; *j is replaced.
  * False with a failure in reply. */

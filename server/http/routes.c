@@ -7,7 +7,7 @@
 
 static const char *const NONE[] = {NULL};
 static const char *const SUBMIT[] = {"validate", NULL};
-static const char *const LIST[] = {"status", "limit", "cursor", "tag", NULL};
+static const char *const LIST[] = {"status", "limit", "cursor", "tag", "since", "until", "order", NULL};
 static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};
 
@@ -85,6 +85,7 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
             continue;
         if (strcmp(ROUTES[i].method, method) == 0) {
             rq->route = &ROUTES[i];
+            allow[0] = '\0';
             return true;
         }
         allow_also(allow, size, ROUTES[i].method);

@@ -13,10 +13,11 @@
 /* Lock order: none of these is taken while another is held, except message under writer_lock, and any under
  * upload_lock. */
 struct store {
-    pthread_mutex_t writer_lock; /* writer, last_ms, sequence */
+    pthread_mutex_t writer_lock; /* writer, last_ms, sequence, max_queue */
     connection writer;           /* the only one that writes and checkpoints */
     uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
     unsigned sequence;
+    int64_t max_queue; /* 0: no limit */
 
     pthread_mutex_t readers_lock; /* readers_free */
     pthread_cond_t reader_free;

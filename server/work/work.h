@@ -34,6 +34,7 @@ typedef struct {
     size_t cache_bytes; /* factor cache */
     size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
     double lease_s;
+    store_retention retention; /* of ended jobs */
 } work_options;
 
 /* Recovers jobs left by a dead process, then starts the threads. NULL on failure with the reason in message. */

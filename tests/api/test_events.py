@@ -133,6 +133,8 @@ def test_streams_leave_connections(s):
     check(next(iter(streams[0]))[0] == "status")
     for stream in streams:
         stream.close()
+    time.sleep(0.5)
+    s.request("DELETE", f"/v1/jobs/{job['id']}")
 
 
 @options("--request-deadline-s", "1")

@@ -15,7 +15,8 @@ def test_job_lifecycle(s):
     reply = expect(s.post({**MATRICES, "tags": ["a", "b"]}), 202)
     job = reply.json
     check(reply.headers["location"] == f"/v1/jobs/{job['id']}", reply)
-    check(reply.headers["cache-control"] == "no-store", reply)
+    check(reply.headers["cache-control"] == "no-store" and "allow" not in reply.headers, reply)
+    check("allow" not in s.get("/v1/jobs").headers)
     check(job["tags"] == ["a", "b"] and job["status"] in ("accepted", "running", "successful"), job)
     ended = expect(s.get(reply.headers["location"], Prefer="wait=30"), 200).json
     check(ended["status"] == "successful" and ended["progress"] == 100, ended)
