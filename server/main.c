@@ -8,6 +8,7 @@
 #include "store/store.h"
 #include "store/uploads.h"
 #include "uzawa.h"
+#include "work/webhook.h"
 #include "work/work.h"
 
 #include <errno.h>
@@ -29,6 +30,7 @@ typedef struct {
     server_log *log;
     store *store;
     work *work;
+    webhooks *webhooks;
     http_server *http;
     sigset_t signals; /* taken by sigwait in main, blocked in every thread */
 } service;
@@ -107,7 +109,15 @@ static bool start(service *s, const server_options *options, char *url, size_t u
         close(fd);
         return false;
     }
-    http_parts parts = {.store = s->store, .work = s->work, .log = s->log};
+    const webhook_options hooks = {.allow = options->webhook_allow,
+                                   .n_allow = options->n_webhook_allow,
+                                   .secret_file = options->webhook_secret_file};
+    s->webhooks = webhooks_start(s->store, &hooks, s->log, message, size);
+    if (!s->webhooks) {
+        close(fd);
+        return false;
+    }
+    http_parts parts = {.webhooks = s->webhooks, .store = s->store, .work = s->work, .log = s->log};
     const http_options limits = {.max_body = options->max_body,
                                  .max_upload = options->max_upload,
                                  .cors = options->cors,
@@ -123,6 +133,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
 static void end(service *s)
 {
     http_stop(s->http);
+    webhooks_stop(s->webhooks);
     if (s->work) {
         work_stop(s->work, 0);
         work_free(s->work);

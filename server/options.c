@@ -25,6 +25,8 @@ enum {
     DEADLINE,
     MEMORY,
     CORS,
+    WEBHOOK_ALLOW,
+    WEBHOOK_SECRET,
     KEEP_DAYS,
     KEEP_JOBS,
     KEEP_BYTES,
@@ -55,6 +57,8 @@ static const struct option LONG_OPTIONS[] = {
     {"keep-jobs", required_argument, NULL, KEEP_JOBS},
     {"keep-bytes", required_argument, NULL, KEEP_BYTES},
     {"max-queue", required_argument, NULL, MAX_QUEUE},
+    {"webhook-allow", required_argument, NULL, WEBHOOK_ALLOW},
+    {"webhook-secret-file", required_argument, NULL, WEBHOOK_SECRET},
     {"cors", required_argument, NULL, CORS},
     {"version", no_argument, NULL, VERSION},
     {"help", no_argument, NULL, HELP},
@@ -83,6 +87,10 @@ void options_usage(FILE *to)
         "  --keep-days D, --keep-jobs N, --keep-bytes BYTES\n"
         "                          ended jobs that are older, more, or larger together than that are deleted, the\n"
         "                          oldest first (no limit)\n"
+        "  --webhook-allow HOST[:PORT]\n"
+        "                          jobs may ask to have their end told there; may be given several times (none)\n"
+        "  --webhook-secret-file FILE\n"
+        "                          what is told is signed with these bytes\n"
         "  --cors ORIGIN           pages of this origin (https://host[:port], or * for all) may use the service from "
         "a\n"
         "                          browser; may be given several times (none)\n"
@@ -167,6 +175,16 @@ static bool set_connections(unsigned *out, const char *text)
     return true;
 }
 
+static bool add_text(const char ***list, size_t *n, const char *text)
+{
+    const char **grown = realloc(*list, (*n + 1) * sizeof *grown);
+    if (!grown)
+        return false;
+    *list = grown;
+    grown[(*n)++] = text;
+    return true;
+}
+
 /* "https://host[:port]" as a browser sends it, or "*". */
 static bool add_origin(server_options *out, const char *text)
 {
@@ -174,19 +192,15 @@ static bool add_origin(server_options *out, const char *text)
     bool fits = host && (strncmp(text, "http://", 7) == 0 || strncmp(text, "https://", 8) == 0);
     if (strcmp(text, "*") != 0 && (!fits || !host[3] || strchr(host + 3, '/')))
         return false;
-    const char **grown = realloc(out->cors, (out->n_cors + 1) * sizeof *grown);
-    if (!grown)
-        return false;
-    out->cors = grown;
-    out->cors[out->n_cors++] = text;
-    return true;
+    return add_text(&out->cors, &out->n_cors, text);
 }
 
 void options_clear(server_options *options)
 {
     free(options->cors);
-    options->cors = NULL;
-    options->n_cors = 0;
+    free(options->webhook_allow);
+    options->cors = options->webhook_allow = NULL;
+    options->n_cors = options->n_webhook_allow = 0;
 }
 
 static bool set_option(server_options *out, int option, const char *text)
@@ -218,6 +232,11 @@ static bool set_option(server_options *out, int option, const char *text)
         return parse_bytes(text, &out->keep_bytes);
     case MAX_QUEUE:
         return parse_integer(text, 0, LONG_MAX, &out->max_queue);
+    case WEBHOOK_ALLOW:
+        return text[0] && !strchr(text, '/') && add_text(&out->webhook_allow, &out->n_webhook_allow, text);
+    case WEBHOOK_SECRET:
+        out->webhook_secret_file = text;
+        return text[0] != '\0';
     case CORS:
         return add_origin(out, text);
     case MAX_UPLOAD:

@@ -13,14 +13,17 @@ typedef struct {
     const char *listen, *db; /* point into argv or to constants */
     int workers, max_attempts;
     unsigned max_connections;
-    size_t max_body, cache;     /* bytes */
-    size_t memory;              /* of one solve, bytes */
-    size_t max_upload, uploads; /* bytes of one upload, and of all */
-    double upload_days;         /* one that no job uses is kept so long */
-    double keep_days;           /* ended jobs; 0: no limit */
-    long keep_jobs, max_queue;  /* 0: no limit */
-    size_t keep_bytes;          /* 0: no limit */
-    const char **cors;          /* n_cors origins; allocated, the texts are argv's */
+    size_t max_body, cache;          /* bytes */
+    size_t memory;                   /* of one solve, bytes */
+    size_t max_upload, uploads;      /* bytes of one upload, and of all */
+    double upload_days;              /* one that no job uses is kept so long */
+    double keep_days;                /* ended jobs; 0: no limit */
+    long keep_jobs, max_queue;       /* 0: no limit */
+    size_t keep_bytes;               /* 0: no limit */
+    const char *webhook_secret_file; /* NULL: none */
+    const char **webhook_allow;      /* n_webhook_allow, as cors */
+    size_t n_webhook_allow;
+    const char **cors; /* n_cors origins; allocated, the texts are argv's */
     size_t n_cors;
     double drain_s, request_deadline_s;
     log_level level;

@@ -46,6 +46,7 @@ typedef struct {
     size_t n_uploads;
     int priority;         /* -10..10 */
     double queue_limit_s; /* 0: none */
+    char *webhook;        /* address to tell of the end, or NULL */
 } codec_request;
 
 /* What a body may be: the one that a route takes, or any that the store may hold. */

@@ -115,6 +115,16 @@ static bool decode_tags(char **out, const json_t *tags, problem_details *problem
     return *out != NULL;
 }
 
+/* object NULL: nobody is told. */
+static bool decode_webhook(char **out, const json_t *object, problem_details *problem)
+{
+    const char *url = json_string_value(json_object_get(object, "url"));
+    if (!url)
+        return true;
+    *out = strdup(url);
+    return *out || decode_no_memory(problem);
+}
+
 static bool decode_problem(uz_problem *out, json_doc *doc, size_t body_len, problem_details *problem)
 {
     const json_t *object = json_object_get(doc->root, "problem");
@@ -197,7 +207,8 @@ static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_
     decode_settings(&out->settings, solver);
     out->priority = (int)json_real_value(json_object_get(doc->root, "priority")); /* 0 where there is none */
     out->queue_limit_s = json_real_value(json_object_get(doc->root, "queue_limit_s"));
-    return decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
+    return decode_webhook(&out->webhook, json_object_get(doc->root, "webhook"), problem) &&
+           decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
            decode_problem(&out->problem, doc, len, problem) &&
            decode_cases(&out->problem, doc, json_object_get(doc->root, "cases"), len, problem) &&
            decode_start(&out->start, doc, json_object_get(solver, "warm_start"), len, problem) &&
@@ -242,9 +253,11 @@ void codec_request_strip(codec_request *request)
                           .uploads = request->uploads,
                           .n_uploads = request->n_uploads,
                           .priority = request->priority,
-                          .queue_limit_s = request->queue_limit_s};
+                          .queue_limit_s = request->queue_limit_s,
+                          .webhook = request->webhook};
     request->tags = NULL;
     request->uploads = NULL;
+    request->webhook = NULL;
     codec_request_clear(request);
     *request = kept;
 }
@@ -259,5 +272,6 @@ void codec_request_clear(codec_request *request)
     free(request->answer.r);
     free(request->tags);
     free(request->uploads);
+    free(request->webhook);
     memset(request, 0, sizeof *request);
 }

@@ -133,6 +133,7 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.store = parts->store;
     server->context.work = parts->work;
     server->context.log = parts->log;
+    server->context.webhooks = parts->webhooks;
     server->context.max_wait_s = options->max_wait_s;
     server->context.cors = options->cors;
     server->context.n_cors = options->n_cors;

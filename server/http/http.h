@@ -8,6 +8,7 @@
 
 #include "log.h"
 #include "store/store.h"
+#include "work/webhook.h"
 #include "work/work.h"
 
 #include <stdbool.h>
@@ -18,6 +19,7 @@ typedef struct http_server http_server;
 typedef struct {
     store *store;
     work *work;
+    const webhooks *webhooks; /* NULL: there are none */
     server_log *log;
 } http_parts;
 

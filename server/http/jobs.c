@@ -130,12 +130,28 @@ store_request jobs_request(const codec_request *request, const char *body, size_
                            .uploads = (const char(*)[65])request->uploads,
                            .n_uploads = request->n_uploads,
                            .priority = request->priority,
-                           .queue_limit_s = request->queue_limit_s};
+                           .queue_limit_s = request->queue_limit_s,
+                           .webhook = request->webhook};
+}
+
+bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
+{
+    const char *why;
+    if (!url || webhooks_allow(context->webhooks, url, &why))
+        return true;
+    http_problem(problem, 422, "webhook_not_allowed", "The webhook cannot be called", "/webhook/url: %s", why);
+    strcpy(problem->pointer, "/webhook/url");
+    return false;
 }
 
 bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
 {
     bool repeated = false;
+    problem_details problem;
+    if (!jobs_check_webhook(context, request->webhook, &problem)) {
+        reply_problem(reply, &problem);
+        return false;
+    }
     store_status status = store_submit(context->store, request, out, &repeated);
     if (status == STORE_CONFLICT)
         reply_refuse(reply, 422, "idempotency_key_reused", "The Idempotency-Key was used for another request",
@@ -175,7 +191,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     bool validate_only;
     if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
         !codec_decode_with(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
-        !start_check(context, &request, rq, &problem)) {
+        !start_check(context, &request, rq, &problem) || !jobs_check_webhook(context, request.webhook, &problem)) {
         reply_problem(reply, &problem);
         goto done;
     }

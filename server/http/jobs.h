@@ -19,6 +19,9 @@ bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
 /* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
 store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key);
 
+/* url NULL: there is none. False: a 422. */
+bool jobs_check_webhook(api *context, const char *url, problem_details *problem);
+
 /* Stores a request and tells the workers. False with a failure in reply; the caller clears *out. */
 bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply);
 

@@ -56,8 +56,9 @@ static bool parse_time(const char *text, double *out)
     t.tm_mon -= 1;
     struct tm asked = t;
     time_t seconds = timegm(&t);
-    bool exists = gmtime_r(&seconds, &back) && back.tm_mon == asked.tm_mon && back.tm_mday == asked.tm_mday && back.tm_hour == asked.tm_hour &&
-                  back.tm_min == asked.tm_min && asked.tm_sec < 61; /* no 30th of February */
+    bool exists = gmtime_r(&seconds, &back) && back.tm_mon == asked.tm_mon && back.tm_mday == asked.tm_mday &&
+                  back.tm_hour == asked.tm_hour && back.tm_min == asked.tm_min &&
+                  asked.tm_sec < 61; /* no 30th of February */
     if (!exists || !read_zone(at, &zone))
         return false;
     *out = (double)seconds + fraction - zone;

@@ -8,6 +8,7 @@
 #include "log.h"
 #include "store/store.h"
 #include "store/uploads.h"
+#include "work/webhook.h"
 #include "work/work.h"
 
 #include <stdatomic.h>
@@ -17,6 +18,7 @@ typedef struct {
     store *store;
     work *work;
     server_log *log;
+    const webhooks *webhooks; /* NULL: there are none */
     double max_wait_s;
     int64_t max_upload;      /* bytes, decompressed */
     const char *const *cors; /* n_cors origins whose pages may use the service; "*": all */

@@ -28,6 +28,7 @@
  * upload   texts in files beside this one (uploads.h), by the digest of their bytes.
  * upload_use which jobs name which uploads in their requests.
  * webhook  whom to tell of the end of a job. state 0: it has not ended, 1: to be told at `next`, 2: told, 3: given up.
+ *          A trigger makes it due, whatever ends the job.
  * Deleting a job deletes its rows in every other table. */
 #define RESULT_TABLES                                                                                                  \
     "CREATE TABLE answer("                                                                                             \
@@ -67,7 +68,9 @@
     "  state INTEGER NOT NULL DEFAULT 0 CHECK(state BETWEEN 0 AND 3), attempts INTEGER NOT NULL DEFAULT 0,"            \
     "  next REAL NOT NULL DEFAULT 0"                                                                                   \
     ") STRICT, WITHOUT ROWID;"                                                                                         \
-    "CREATE INDEX webhook_due ON webhook(next) WHERE state = 1;"
+    "CREATE INDEX webhook_due ON webhook(next) WHERE state = 1;"                                                       \
+    "CREATE TRIGGER webhook_falls_due AFTER UPDATE OF status ON job WHEN new.status >= 2 AND old.status < 2 BEGIN"     \
+    "  UPDATE webhook SET state = 1, next = new.finished WHERE job = new.id; END;"
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"

@@ -127,6 +127,14 @@ static store_status use_uploads(connection *c, const store_request *r, const cha
     return status;
 }
 
+static store_status insert_webhook(connection *c, const char *id, const char *url)
+{
+    statement st = statement_begin(c, QUERY_INSERT_WEBHOOK);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, url);
+    return statement_run(&st);
+}
+
 static store_status read_by_id(connection *c, const char *id, job *out)
 {
     store_status status = STORE_NOT_FOUND;
@@ -176,6 +184,8 @@ static store_status submit(store *s, connection *c, void *args)
     status = insert_job(c, a->request, id);
     if (status == STORE_OK)
         status = use_uploads(c, a->request, id);
+    if (status == STORE_OK && a->request->webhook)
+        status = insert_webhook(c, id, a->request->webhook);
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 

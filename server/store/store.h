@@ -63,6 +63,7 @@ typedef struct {
     const char (*uploads)[65];   /* n_uploads ids of uploads that the body names */
     size_t n_uploads;
     int priority;         /* -10..10: larger ones run first, of the same the older one */
+    const char *webhook;  /* address to tell of its end (webhooks.h), or NULL */
     double queue_limit_s; /* it fails if it has not begun so long after it came; 0: no limit */
 } store_request;
 
