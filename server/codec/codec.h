@@ -108,6 +108,8 @@ typedef struct {
 } codec_run;
 char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run);
 char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes);
+/* The reply to a request that is only checked; NULL: nothing is predicted. */
+char *codec_encode_valid(const uz_prediction *predicted);
 /* The data of a progress event; row: the newest of the history, or NULL. */
 char *codec_encode_progress(int progress, const double *row);
 char *codec_encode_upload(const upload_info *info);

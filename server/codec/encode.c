@@ -181,6 +181,37 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
     return text_finish(&t, NULL);
 }
 
+char *codec_encode_valid(const uz_prediction *predicted)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "valid");
+    text_bool(&t, true);
+    text_key(&t, "predicted");
+    if (!predicted) {
+        text_raw(&t, NULL);
+    } else {
+        text_open(&t, '{');
+        text_key(&t, "d");
+        text_integer(&t, predicted->d);
+        text_key(&t, "m");
+        text_integer(&t, predicted->m);
+        text_key(&t, "operator");
+        text_string(&t, uz_operator_name(predicted->op));
+        text_key(&t, "factor_nnz");
+        text_integer(&t, predicted->factor_nnz);
+        text_key(&t, "bytes");
+        text_number(&t, predicted->bytes);
+        text_key(&t, "seconds");
+        text_number(&t, predicted->seconds);
+        text_key(&t, "fits");
+        text_bool(&t, predicted->fits);
+        text_close(&t, '}');
+    }
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
 char *codec_encode_progress(int progress, const double *row)
 {
     static const int SHOWN[] = {0, 2, 3, 9, 10}; /* columns of the history */

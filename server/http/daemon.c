@@ -133,6 +133,7 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.store = parts->store;
     server->context.work = parts->work;
     server->context.log = parts->log;
+    pthread_mutex_init(&server->context.predict_lock, NULL);
     server->context.webhooks = parts->webhooks;
     server->context.max_wait_s = options->max_wait_s;
     server->context.cors = options->cors;
@@ -182,5 +183,6 @@ void http_stop(http_server *server)
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
     deadlines_free(server->deadlines);
     pthread_key_delete(server->current);
+    pthread_mutex_destroy(&server->context.predict_lock);
     free(server);
 }

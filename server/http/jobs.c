@@ -183,6 +183,49 @@ static void submit(api *context, http_request *rq, const store_request *request,
     job_clear(&j);
 }
 
+/* ---- validate */
+
+typedef struct {
+    api *context;
+    const http_request *rq;
+} asker;
+
+static bool is_unwanted(void *ctx)
+{
+    const asker *a = ctx;
+    return atomic_load(&a->context->draining) || request_client_gone(a->rq);
+}
+
+/* Bytes that assembly takes for each dof, at least: a scene beyond the limit is not assembled only to say so. */
+#define ASSEMBLY_BYTES 500.0
+
+static bool worth_predicting(const codec_request *request, size_t limit)
+{
+    int64_t m, n_u;
+    problem_details ignored;
+    return !request->settings.semidefinite && codec_request_sizes(request, &m, &n_u, &ignored) &&
+           (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit);
+}
+
+/* One prediction at a time: it takes memory and a processor that are counted for the workers. */
+static void reply_valid(api *context, const http_request *rq, codec_request *request, http_reply *reply)
+{
+    uz_prediction predicted;
+    uz_error err = {.status = UZ_OK};
+    asker a = {context, rq};
+    uz_hooks hooks = {.ctx = &a, .cancelled = is_unwanted};
+    request->settings.memory_limit = work_solve_bytes(context->work);
+    bool known = false;
+    if (worth_predicting(request, request->settings.memory_limit)) {
+        pthread_mutex_lock(&context->predict_lock);
+        uz_thread_init();
+        known =
+            !is_unwanted(&a) && uz_predict(&predicted, &request->problem, &request->settings, &hooks, &err) == UZ_OK;
+        pthread_mutex_unlock(&context->predict_lock);
+    }
+    reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
+}
+
 void jobs_submit(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem = {0};
@@ -195,10 +238,10 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         reply_problem(reply, &problem);
         goto done;
     }
-    codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
-    if (validate_only)
-        reply_json(reply, 200, strdup("{\"valid\": true}\n"));
-    else {
+    if (validate_only) {
+        reply_valid(context, rq, &request, reply);
+    } else {
+        codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
         store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
         submit(context, rq, &stored, reply);
     }

@@ -11,6 +11,7 @@
 #include "work/webhook.h"
 #include "work/work.h"
 
+#include <pthread.h>
 #include <stdatomic.h>
 
 /* What handlers may use, the same for all requests. */
@@ -18,7 +19,8 @@ typedef struct {
     store *store;
     work *work;
     server_log *log;
-    const webhooks *webhooks; /* NULL: there are none */
+    pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
+    const webhooks *webhooks;     /* NULL: there are none */
     double max_wait_s;
     int64_t max_upload;      /* bytes, decompressed */
     const char *const *cors; /* n_cors origins whose pages may use the service; "*": all */

@@ -418,6 +418,11 @@ size_t work_cache_bytes(const work *w)
     return w->options.cache_bytes;
 }
 
+size_t work_solve_bytes(const work *w)
+{
+    return w->options.solve_bytes;
+}
+
 int work_workers(const work *w)
 {
     return w->options.workers;

@@ -68,6 +68,7 @@ bool work_live_history(work *w, const char *id, const char *case_name, int64_t a
 
 uz_cache *work_cache(work *w);
 size_t work_cache_bytes(const work *w);
+size_t work_solve_bytes(const work *w); /* of one solve; 0: no limit */
 int work_workers(const work *w);
 
 /* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to

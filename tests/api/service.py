@@ -66,12 +66,12 @@ class Reply:
 
 
 # What tells which schema a reply must meet: a member that only this kind of object has.
-KINDS = [("factors", "factors.json"), ("used_by", "upload.json"), ("rows", "history.json"), ("code", "problem-details.json"),
+KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("rows", "history.json"), ("code", "problem-details.json"),
          ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json")]
 
 
 def schema_of(reply):
-    if "schema+json" in reply.headers["content-type"] or "openapi" in reply.json or "valid" in reply.json:
+    if "schema+json" in reply.headers["content-type"] or "openapi" in reply.json:
         return None
     if isinstance(reply.json.get("jobs"), list):
         return "jobs.json"
