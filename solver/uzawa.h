@@ -680,6 +680,19 @@ void uz_results_free(uz_result **results, int64_t n);
 uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
                     const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 
+/* What a solve will take after the assembly, by the same model that chooses the operator (summary.cost): from the
+ * pattern of the matrices, nothing is factored. Takes as long as assembly and symbolic analysis do. Errors: those of
+ * uz_scene_to_qp; UZ_ERR_CANCELLED. A body that only the obstacle holds is UZ_ERR_FREE_BODY: no model counts its
+ * rounds. */
+typedef struct {
+    int64_t d, m, factor_nnz; /* factor_nnz 0: no factor is made, or not known */
+    double bytes, seconds;    /* matrices, factor and vectors together; all load cases */
+    uz_operator op;
+    bool fits; /* settings->memory_limit */
+} uz_prediction;
+uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                     uz_error *err);
+
 /* Process-wide settings that a library must not choose alone: BLAS threads. Call once from main before threads start;
  * `workers` is how many threads will call uz_solve at once. */
 void uz_process_init(int workers);

@@ -6,6 +6,7 @@
 
 #include "codec/codec.h"
 #include "codec/json_doc.h"
+#include "store/uploads.h"
 #include "uzawa.h"
 
 /* Takes big vectors out of the document and frees big texts as soon as they are read. body_len bounds what the
@@ -33,6 +34,18 @@ size_t decode_memory_bound(size_t body_len);
 /* A string's bytes, lifted or not; decode_text_done frees them early. */
 const char *decode_text(const json_doc *doc, const json_t *value, size_t *len);
 void decode_text_done(const json_doc *doc, const json_t *value);
+/* What {"upload": id} names, or NULL where the value is something else. */
+const char *decode_upload_id(const json_t *value);
+/* A text of the request: a string's bytes, or those of the upload that it names. `where` as above. */
+typedef struct {
+    const char *data; /* not NUL-terminated */
+    size_t len;
+    upload_text mapped; /* of an upload */
+} decode_source;
+bool decode_source_open(decode_source *out, json_doc *doc, const json_t *value, const char *where,
+                        problem_details *problem);
+/* Gives the text back, so that it is not in memory twice: it can't be opened again if it was a string. */
+void decode_source_close(decode_source *source, const json_doc *doc, const json_t *value);
 /* The document against a schema file, as schemas_check. */
 bool decode_check(const json_doc *doc, const char *schema, problem_details *problem);
 bool decode_no_memory(problem_details *problem); /* 503; returns false */
