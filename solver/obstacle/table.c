@@ -234,7 +234,11 @@ static void gap_on_border(uz_gap *out, const uz_table *t, int64_t item, const ce
 
 void uz_table_gap(uz_gap *out, const uz_table *table, const double x[3])
 {
-    const int64_t found = uz_box_tree_nearest(&table->tree, x, distance_to, table), item = found < 0 ? 0 : found;
+    const int64_t item = uz_box_tree_nearest(&table->tree, x, distance_to, table);
+    if (item < 0) {
+        out->gap = NAN;
+        return;
+    }
     const cell s = cell_of(table, item);
     closest(out->foot, &s, x);
     out->foot[2] = height(&s, out->foot[0], out->foot[1]);
