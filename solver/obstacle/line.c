@@ -56,8 +56,9 @@ static int64_t piece_number(const uz_line *line, int64_t item)
     return item + (line->closed ? 1 : 0);
 }
 
-static double distance_to(const void *ctx, int64_t item, const double *x)
+static double distance_to(const void *ctx, int64_t item, const double *x, double best)
 {
+    (void)best;
     const uz_line *line = ctx;
     const int64_t i = piece_number(line, item);
     double foot[2];
