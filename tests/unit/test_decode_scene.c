@@ -49,8 +49,9 @@ static void refuse(const char *body, const char *code, const char *pointer, cons
     "\",\"materials\":[{\"on\":\"all\",\"young\":2,\"poisson\":0.25}],"
 #define PLANE HEAD("plane_stress") "\"mesh\":{\"box\":{\"size\":[2,1],\"cells\":[2,1]}}"
 #define SOLID                                                                                                          \
-    HEAD("solid") "\"mesh\":{\"box\":{\"size\":[2,1,3],\"cells\":[2,1,4],\"element\":\"tet10\",\"grading\":[1,2,0.5]}" \
-                  "}"
+    HEAD("solid")                                                                                                      \
+    "\"mesh\":{\"box\":{\"size\":[2,1,3],\"cells\":[2,1,4],\"element\":\"tet10\",\"grading\":[1,2,0.5]}"               \
+    "}"
 
 TEST(boxes_models_and_materials)
 {
