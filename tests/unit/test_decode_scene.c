@@ -53,6 +53,10 @@ static void refuse(const char *body, const char *code, const char *pointer, cons
     "\"mesh\":{\"box\":{\"size\":[2,1,3],\"cells\":[2,1,4],\"element\":\"tet10\",\"grading\":[1,2,0.5]}"               \
     "}"
 
+#define NODES "\"nodes\":[[0,0],[1,0],[1,1],[0,1],[2,0]]"
+#define MESH  HEAD("plane_strain") "\"mesh\":{" NODES ",\"elements\":{\"quad4\":[[0,1,2,3]],\"tri3\":[[1,4,2]]}"
+#define LONG  "01234567890123456789012345678901234567890123456789012345678901\xc3\xa9"
+
 TEST(boxes_models_and_materials)
 {
     uz_scene s = take(SOLID ",\"candidates\":\"all\"}}");
@@ -94,6 +98,11 @@ TEST(supports_and_loads)
     uz_scene_clear(&s);
     s = take(PLANE ",\"loads\":[{\"node\":1e300,\"force\":[1,2]}]}}");
     CHECK(s.loads[0].node == INT64_MAX);
+    uz_scene_clear(&s);
+    /* 63 characters may be more bytes than a name has: what is left must not be another group's name */
+    s = take(MESH "},\"loads\":[{\"on\":\"a\\u0000b\",\"force\":[1,2]},{\"on\":\"" LONG "\",\"force\":[1,2]}]}}");
+    CHECK_STR(s.loads[0].on, "");
+    CHECK_STR(s.loads[1].on, "");
     uz_scene_clear(&s);
     refuse(PLANE ",\"supports\":[{\"on\":\"left\",\"normal\":[0,-0.0],\"u\":0}]}}", "out_of_range",
            "/problem/supports/0/normal", "is zero");
@@ -165,9 +174,6 @@ TEST(tables_fit_together)
 }
 
 /* ------------------------------------------------------------------ meshes */
-
-#define NODES "\"nodes\":[[0,0],[1,0],[1,1],[0,1],[2,0]]"
-#define MESH  HEAD("plane_strain") "\"mesh\":{" NODES ",\"elements\":{\"quad4\":[[0,1,2,3]],\"tri3\":[[1,4,2]]}"
 
 TEST(meshes_in_numbers)
 {
