@@ -163,6 +163,8 @@ bool uz_element_parse(uz_element_kind *out, const char *name);
 int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */
 int uz_element_node_count(uz_element_kind kind); /* 3 to 10 */
 
+/* A rectangle or a cuboid in cells along the axes. Its sides are the groups left and right (x), bottom and top (y),
+ * back and front (z, 3D only). */
 typedef struct {
     double origin[3], size[3];
     int64_t cells[3];
@@ -193,10 +195,12 @@ typedef struct {
 } uz_given_mesh;
 void uz_given_mesh_clear(uz_given_mesh *mesh);
 
-/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary; physical groups become groups. Nodes and elements are
- * numbered from 0 in the order of the file; only the elements of the highest dimension are elements, the others are
- * edges and faces of groups. A flat mesh (all z equal) is plane. max_bytes (0: none) bounds what the result may take.
- * Errors: UZ_ERR_FORMAT with the line, _UNSUPPORTED, _NOT_FINITE, _LIMIT, _MEMORY.
+/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary. Nodes and elements are numbered from 0 in the order of
+ * the file; only the elements of the highest dimension are elements. Physical groups of that dimension become groups of
+ * elements, of one less groups of edges or faces, of still less groups of nodes; one without a name is "physical_7", or
+ * "physical_7_dim1" if a nameless one of higher dimension has that number too. A flat mesh (all z equal) is plane;
+ * other surfaces are refused. max_bytes (0: none) bounds what the result may take. Errors: UZ_ERR_FORMAT, _UNSUPPORTED,
+ * _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
  * Source: Gmsh reference manual, section "Gmsh file formats". */
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 
