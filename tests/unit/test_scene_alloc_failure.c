@@ -208,8 +208,15 @@ TEST(every_allocation_for_a_second_part_may_fail)
                                {.name = "side", .n_nodes = 4, .node = side}};
     uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){1, 1, 0}, (int64_t[3]){1, 1, 0});
     s.source = UZ_MESH_GIVEN;
-    s.given = (uz_given_mesh){.dim = 2, .n_nodes = 8, .xyz = xyz, .n_elements = 2, .kind = kind, .first = first,
-                              .node = node, .groups = groups, .n_groups = 5};
+    s.given = (uz_given_mesh){.dim = 2,
+                              .n_nodes = 8,
+                              .xyz = xyz,
+                              .n_elements = 2,
+                              .kind = kind,
+                              .first = first,
+                              .node = node,
+                              .groups = groups,
+                              .n_groups = 5};
     body_hold(&s, "side", 0, NAN, NAN);
     body_hold(&s, "low", NAN, 0, NAN);
     body_load(&s, UZ_LOAD_PRESSURE, "high", 5, 0, 0);
