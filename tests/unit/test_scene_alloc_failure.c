@@ -95,9 +95,10 @@ static uz_status key(const uz_scene *scene, uz_error *err)
 static uz_status copy_info(const uz_scene *scene, uz_error *err)
 {
     static double xyz[8];
-    static int64_t node[1];
+    static int64_t node[2];
     uz_mesh_info copy, info = {.dim = 2, .n_nodes = 4, .xyz = xyz, .contact_node = node};
     info.contact_area = info.contact_normal = xyz;
+    info.contact_of = info.contact_face = node;
     (void)scene;
     const uz_status status = uz_mesh_info_copy(&copy, &info, 1, err);
     CHECK((copy.xyz != NULL) == (status == UZ_OK));
@@ -136,7 +137,7 @@ TEST(every_allocation_may_fail)
     CHECK(fail_each(to_qp, &scene) > 23);
     CHECK(fail_each(uz_scene_check, &scene) > 23);
     CHECK(fail_each(key, &scene) >= 2);
-    CHECK_INT(fail_each(copy_info, &scene), 4);
+    CHECK_INT(fail_each(copy_info, &scene), 6);
     uz_scene_clear(&scene);
 }
 
