@@ -183,6 +183,27 @@ static inline uz_element take_element(double *xe, double *ue, const small_mesh *
     return element;
 }
 
+/* Calls `load` with each side all of whose nodes are marked, its nodes' numbers, and ctx. */
+static inline void each_side(const small_mesh *mesh, const bool *marked, void *ctx,
+                             void (*load)(void *ctx, const uz_side *side, const int *node))
+{
+    for (int e = 0; e < mesh->n_elements; e++)
+        for (int s = 0; s < uz_element_side_count(mesh->element.kind); s++) {
+            double xs[3 * UZ_SIDE_NODES];
+            const int *local;
+            int node[UZ_SIDE_NODES], on = 0;
+            const uz_side side = {mesh->dim, uz_element_side(&local, mesh->element.kind, s), mesh->element.model,
+                                  mesh->element.thickness, xs};
+            for (int a = 0; a < side.nodes; a++) {
+                node[a] = mesh->node[e * mesh->per + local[a]];
+                on += marked[node[a]];
+                memcpy(xs + a * mesh->dim, mesh->xyz + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *xs);
+            }
+            if (on == side.nodes)
+                load(ctx, &side, node);
+        }
+}
+
 /* A symmetric matrix by rows of its lower triangle, row i from column first[i] on at value[start[i]]. */
 typedef struct {
     int n, *first;

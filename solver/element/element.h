@@ -98,7 +98,7 @@ typedef enum {
 /* For a message, after "element 3 ": "is inverted or not convex", ... Never NULL. */
 const char *uz_shape_fault_text(uz_shape_fault fault);
 
-/* Is the Jacobian positive at nodes, centre and Gauss points? It is measured against the product of its rows' lengths,
+/* Is the Jacobian positive at nodes and Gauss points? It is measured against the product of its rows' lengths,
  * so that neither units nor flat elements matter. Everything below needs a good shape. */
 uz_shape_fault uz_element_check(const uz_element *element);
 

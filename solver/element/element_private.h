@@ -16,10 +16,10 @@ double uz_invert_jacobian(double inverse[3][3], double J[3][3], int dim);
 #define UZ_AXIS 1e-12
 double uz_ring_radius(double *largest, const uz_element *element, const double *N);
 
-/* One Gauss point: shape functions, their derivatives by x, y, z, and the volume that the point stands for. */
+/* One Gauss point: derivatives of the shape functions by x, y, z, and the volume that the point stands for. */
 typedef struct {
-    double point[3], N[UZ_ELEMENT_NODES], grad[UZ_ELEMENT_NODES][3];
-    double det, volume, radius; /* radius: axisymmetric only */
+    double point[3], grad[UZ_ELEMENT_NODES][3], det, volume;
+    double N[UZ_ELEMENT_NODES], radius; /* axisymmetric only: shape functions, distance from the axis */
 } uz_gauss_state;
 void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g);
 

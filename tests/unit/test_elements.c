@@ -110,28 +110,39 @@ static void eigenvalues(double *value, double *A, int n)
         value[i] = A[i * n + i];
 }
 
+static void check_null_space(const uz_element *element)
+{
+    double ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], value[UZ_ELEMENT_DOFS], largest = 0;
+    const int n = uz_element_node_count(element->kind) * uz_element_dim(element->kind);
+    const int rigid = element->model == UZ_SOLID ? 6 : element->model == UZ_AXISYMMETRIC ? 1 : 3;
+    int none = 0, soft = 0;
+    CHECK(uz_element_stiffness(ke, element) == UZ_SHAPE_GOOD);
+    for (int r = 0; r < n; r++)
+        for (int c = 0; c < r; c++)
+            CHECK(ke[r * n + c] == ke[c * n + r]);
+    eigenvalues(value, ke, n);
+    for (int k = 0; k < n; k++)
+        largest = fmax(largest, value[k]);
+    for (int k = 0; k < n; k++) {
+        none += fabs(value[k]) < 1e-13 * largest;
+        soft += value[k] < 1e-5 * largest;
+    }
+    CHECK_MSG(none == rigid && soft == rigid, "%s: %d eigenvalues are zero, %d small, want %d", element_words(element),
+              none, soft, rigid);
+}
+
 TEST(only_rigid_motions_have_no_energy)
 {
     uz_element element;
+    uint64_t seed = 17;
     for (int i = 0; each_element(&element, i, 0.3); i++) {
-        double xe[UZ_ELEMENT_DOFS], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS], value[UZ_ELEMENT_DOFS], largest = 0;
+        double xe[UZ_ELEMENT_DOFS];
+        const int dim = uz_element_dim(element.kind), n = uz_element_node_count(element.kind) * dim;
         element = bent(xe, element, 1);
-        const int n = uz_element_node_count(element.kind) * uz_element_dim(element.kind);
-        const int rigid = element.model == UZ_SOLID ? 6 : element.model == UZ_AXISYMMETRIC ? 1 : 3;
-        int none = 0, soft = 0;
-        CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
-        for (int r = 0; r < n; r++)
-            for (int c = 0; c < r; c++)
-                CHECK(ke[r * n + c] == ke[c * n + r]);
-        eigenvalues(value, ke, n);
-        for (int k = 0; k < n; k++)
-            largest = fmax(largest, value[k]);
-        for (int k = 0; k < n; k++) {
-            none += fabs(value[k]) < 1e-13 * largest;
-            soft += value[k] < 1e-5 * largest;
-        }
-        CHECK_MSG(none == rigid && soft == rigid, "%s: %d eigenvalues are zero, %d small, want %d",
-                  element_words(&element), none, soft, rigid);
+        check_null_space(&element);
+        for (int k = corner_count(element.kind) * dim; k < n; k++) /* curved */
+            xe[k] += 0.05 * shake(&seed);
+        check_null_space(&element);
     }
 }
 
@@ -212,6 +223,32 @@ TEST(linear_fields_have_their_strain)
             for (int s = 0; s < uz_stress_count(element.model); s++)
                 CHECK_MSG(fabs(got[s] - want[s]) < 1e-13, "%s: strain %d at node %d is %.17g, want %.17g",
                           element_words(&element), s, a, got[s], want[s]);
+        }
+    }
+}
+
+/* And they need the forces of their stress, all six (four, three) components of it. */
+TEST(constant_stress_has_its_forces)
+{
+    double H[3][3] = {{0.3, -0.7, 0.2}, {0.4, 0.5, 0.9}, {-0.6, 0.1, -0.8}};
+    uz_element element;
+    for (int i = 0; each_element(&element, i, 0.3); i++) {
+        double xe[UZ_ELEMENT_DOFS], u[UZ_ELEMENT_DOFS], strain[6], ke[UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS];
+        double f[UZ_ELEMENT_DOFS] = {0}, largest = 0;
+        element = bent(xe, element, 1);
+        const int n = uz_element_node_count(element.kind) * uz_element_dim(element.kind);
+        H[0][1] = element.model == UZ_AXISYMMETRIC ? 0 : -0.7;
+        linear_field(u, strain, &element, H);
+        CHECK(uz_element_stiffness(ke, &element) == UZ_SHAPE_GOOD);
+        uz_element_add_thermal_load(f, &element, strain);
+        for (int r = 0; r < n; r++)
+            largest = fmax(largest, fabs(f[r]));
+        for (int r = 0; r < n; r++) {
+            double force = 0;
+            for (int c = 0; c < n; c++)
+                force += ke[r * n + c] * u[c];
+            CHECK_MSG(fabs(force - f[r]) < 1e-13 * largest, "%s: dof %d has %g, want %g", element_words(&element), r,
+                      force, f[r]);
         }
     }
 }
@@ -403,6 +440,42 @@ TEST(bad_solid_elements_are_refused)
     CHECK(uz_element_stiffness(ke, &small) == UZ_SHAPE_GOOD);
     cube[0] = cube[1] = cube[2] = 1 + 1e-3; /* a corner at the opposite one */
     CHECK(uz_element_stiffness(ke, &small) == UZ_SHAPE_INVERTED);
+}
+
+/* At every node these have a positive Jacobian, inside not. */
+TEST(elements_inverted_inside_are_refused)
+{
+    const double quad[16] = {-1, -0.3, 1.4, -2, 0, 1.8, -0.2, 2, -0.7, -0.5, 1.1, 0.8, -0.1, 0.6, -1.4, 0.6};
+    const double hex[24] = {0.1, 0.1,  -1.2, -0.1, -0.8, -0.1, 0.3, 0.1, -1.3, -1.1, 1.4, -1.7,
+                            0,   -1.9, 0.4,  1.6,  -1.4, 0.2,  0.2, 2,   0,    -1.7, 1.3, 1.9};
+    const double *xyz[2] = {quad, hex};
+    for (int k = 0; k < 2; k++) {
+        const uz_element_kind kind = k ? UZ_HEX8 : UZ_QUAD8;
+        const uz_element element = {kind, UZ_PLANE_STRESS, UZ_FORMULATION_STANDARD, {1, 1}, 1, xyz[k]};
+        double grad[UZ_ELEMENT_NODES][3];
+        for (int a = 0; a < uz_element_node_count(kind); a++)
+            CHECK(uz_element_gradients(grad, &element, uz_element_local_nodes(kind)[a]) > 1e-3);
+        CHECK(fault_of(kind, k ? UZ_SOLID : UZ_PLANE_STRESS, xyz[k]) == (k ? UZ_SHAPE_INVERTED : UZ_SHAPE_MIDDLES));
+    }
+}
+
+/* No node is beyond the axis, but a curved side is. */
+TEST(a_curved_side_must_not_cross_the_axis)
+{
+    const double thin[16] = {0, 0, 0.2, 0, 1.2, 1, 1, 1, 0.1, 0, 0.2, 0.5, 1.1, 1, 0, 0.5};
+    CHECK(fault_of(UZ_QUAD8, UZ_PLANE_STRESS, thin) == UZ_SHAPE_GOOD);
+    CHECK(fault_of(UZ_QUAD8, UZ_AXISYMMETRIC, thin) == UZ_SHAPE_NEGATIVE_RADIUS);
+}
+
+/* An area that is only the rounding of its coordinates is none; a sharp angle is one. */
+TEST(rounding_is_no_area)
+{
+    const double line[6] = {-0.45, -0.54, -0.45 + 0.1, -0.54 + 0.3, -0.45 + 0.2, -0.54 + 0.6};
+    const uz_element element = {UZ_TRI3, UZ_PLANE_STRESS, UZ_FORMULATION_STANDARD, {1, 1}, 1, line};
+    double grad[UZ_ELEMENT_NODES][3];
+    CHECK(uz_element_gradients(grad, &element, (const double[3]){0.3, 0.3}) > 0);
+    CHECK(fault_of(UZ_TRI3, UZ_PLANE_STRESS, line) == UZ_SHAPE_DEGENERATE);
+    CHECK(fault_of(UZ_TRI3, UZ_PLANE_STRESS, (const double[]){0, 0, 1, 0, 2, 1e-6}) == UZ_SHAPE_GOOD);
 }
 
 TEST(formulations_are_resolved)
