@@ -163,6 +163,26 @@ TEST(blocks_of_other_meshes)
     }
 }
 
+/* A support that moves the master, all of whose nodes are held, closes the gap: the block above it is strained by it. */
+TEST(a_moved_master_presses)
+{
+    uz_scene s = stack(UZ_PLANE_STRESS, "quad4", "quad4", 2, 3);
+    hold_sides(&s, 'b');
+    body_hold(&s, "a all", 0, 1e-3, NAN);
+    body_hold(&s, "b top", NAN, 0, NAN);
+    put_pair(&s, "b bottom", "a top");
+    uz_result *x = body_solve(&s, 1e-10);
+    CHECK_INT(x->summary.active, 4);
+    CHECK_REL(x->summary.force[1], 200e3 * 1e-3 * 3, 1e-8);
+    uz_result_free(x);
+    body_hold(&s, "b all", NAN, 0, NAN); /* now no node can give way */
+    uz_error err = {0};
+    CHECK_INT(uz_scene_check(&s, &err), UZ_ERR_SCENE);
+    CHECK_STR(err.where, "/contacts/0");
+    CHECK_MSG(strstr(err.message, "inside the obstacle and cannot give way"), "%s", err.message);
+    uz_scene_clear(&s);
+}
+
 TEST(a_body_that_nothing_holds_is_named)
 {
     uz_scene s = stack(UZ_PLANE_STRESS, "quad4", "quad4", 2, 2);

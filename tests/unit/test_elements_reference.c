@@ -1,5 +1,4 @@
-/* Stiffness against other programs' and earlier code: CalculiX's tetrahedra, the quadrilateral of box scenes. */
-#include "assembly/quad4.h"
+/* Stiffness against another program's: the tetrahedra of CalculiX. */
 #include "element_mesh.h"
 #include "harness.h"
 #include "uzawa.h"
@@ -90,24 +89,4 @@ TEST(tetrahedra_are_those_of_calculix)
     uz_csc_clear(&K);
     free(text);
     free(mesh_text);
-}
-
-TEST(quadrilaterals_are_those_of_box_scenes)
-{
-    uint64_t seed = 21;
-    for (int trial = 0; trial < 40; trial++) {
-        const uz_model model = trial % 2 ? UZ_PLANE_STRAIN : UZ_PLANE_STRESS;
-        const double corner[8] = {0, 0, 2, 0, 2, 1, 0, 1};
-        double xy[8], C[9], want[64], got[64], largest = 0;
-        for (int i = 0; i < 8; i++)
-            xy[i] = 10 + corner[i] + 0.3 * shake(&seed);
-        const uz_element element = {UZ_QUAD4, model, UZ_FORMULATION_STANDARD, uz_lame_of(model, 200e3, 0.3), 5, xy};
-        uz_elasticity(C, model, 200e3, 0.3);
-        CHECK(uz_quad4_stiffness(want, xy, C, 5));
-        CHECK(uz_element_stiffness(got, &element) == UZ_SHAPE_GOOD);
-        for (int i = 0; i < 64; i++)
-            largest = fmax(largest, fabs(want[i]));
-        for (int i = 0; i < 64; i++)
-            CHECK_MSG(fabs(got[i] - want[i]) < 1e-14 * largest, "entry %d: %.17g, was %.17g", i, got[i], want[i]);
-    }
 }
