@@ -72,3 +72,11 @@ TEST(bent_beam)
     theory_beam(&t, "tri6", UZ_FORMULATION_AUTO, 2);
     check_all(&t, 0.02);
 }
+
+TEST(nafems_roller)
+{
+    theory_table t = {.count = 0};
+    theory_roller(&t, "quad4", 12, 1.3);
+    CHECK_INT(t.count, 2);
+    check_all(&t, 0.05);
+}
