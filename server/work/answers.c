@@ -103,9 +103,8 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     codec_run run = {.started_from = request->answer.u ? NULL : origin_name(result->summary.origin)};
     parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
     add_vectors(parts, result, is_scene);
-    return parts->summary &&
-           add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
-                       has_earlier ? from->rows[i] : 0);
+    return parts->summary && add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
+                                         has_earlier ? from->rows[i] : 0);
 }
 
 static store_answer as_stored(const answer_parts *parts, const char *name)
