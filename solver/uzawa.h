@@ -296,8 +296,8 @@ typedef struct {
 void uz_mesh_info_clear(uz_mesh_info *info);
 
 /* Mesh, assembly, boundary conditions: the scene as matrices. Their dofs are the free ones, node by node, along x, y,
- * z; at a node whose first contact has an oblique normal along that normal and tangents (info->frame), so that its row
- * of N has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
+ * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one whose
+ * first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
  * pointer into the problem. Nothing is factored. */
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
 /* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. */

@@ -95,9 +95,10 @@ static uz_status key(const uz_scene *scene, uz_error *err)
 static uz_status copy_info(const uz_scene *scene, uz_error *err)
 {
     static double xyz[8];
-    static int64_t node[1];
+    static int64_t node[2];
     uz_mesh_info copy, info = {.dim = 2, .n_nodes = 4, .xyz = xyz, .contact_node = node};
     info.contact_area = info.contact_normal = xyz;
+    info.contact_of = info.contact_face = node;
     (void)scene;
     const uz_status status = uz_mesh_info_copy(&copy, &info, 1, err);
     CHECK((copy.xyz != NULL) == (status == UZ_OK));
@@ -136,7 +137,7 @@ TEST(every_allocation_may_fail)
     CHECK(fail_each(to_qp, &scene) > 23);
     CHECK(fail_each(uz_scene_check, &scene) > 23);
     CHECK(fail_each(key, &scene) >= 2);
-    CHECK_INT(fail_each(copy_info, &scene), 4);
+    CHECK_INT(fail_each(copy_info, &scene), 6);
     uz_scene_clear(&scene);
 }
 
@@ -208,8 +209,15 @@ TEST(every_allocation_for_a_second_part_may_fail)
                                {.name = "side", .n_nodes = 4, .node = side}};
     uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){1, 1, 0}, (int64_t[3]){1, 1, 0});
     s.source = UZ_MESH_GIVEN;
-    s.given = (uz_given_mesh){.dim = 2, .n_nodes = 8, .xyz = xyz, .n_elements = 2, .kind = kind, .first = first,
-                              .node = node, .groups = groups, .n_groups = 5};
+    s.given = (uz_given_mesh){.dim = 2,
+                              .n_nodes = 8,
+                              .xyz = xyz,
+                              .n_elements = 2,
+                              .kind = kind,
+                              .first = first,
+                              .node = node,
+                              .groups = groups,
+                              .n_groups = 5};
     body_hold(&s, "side", 0, NAN, NAN);
     body_hold(&s, "low", NAN, 0, NAN);
     body_load(&s, UZ_LOAD_PRESSURE, "high", 5, 0, 0);
