@@ -480,8 +480,8 @@ typedef struct {
     uz_resultant *contacts,
         *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
     uz_resultant loads; /* all of them; on is "" */
-    /* What the forces and moments (about the middle of the body, by its extent) leave over, relative to the sum of
-     * their sizes. */
+    /* What the forces and moments (about the first node, by the body's extent) leave over, relative to the sum of the
+     * forces' sizes. */
     double imbalance;
     int n_warnings;
     uz_warning warnings[4];
