@@ -25,7 +25,7 @@ INC  := -Isolver -Iserver -Iclient -I$(BUILD)/gen
 pkg = $(shell pkg-config $(1) 2>/dev/null)
 SERVER_CFLAGS = $(call pkg,--cflags libmicrohttpd jansson sqlite3 libcurl gnutls)
 SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp -lsuitesparseconfig $(call pkg,--libs gnutls) -lpng -lz -lm
-SERVER_LIBS   = $(call pkg,--libs libmicrohttpd jansson sqlite3) $(SOLVER_LIBS) -lpthread
+SERVER_LIBS   = $(call pkg,--libs libmicrohttpd jansson sqlite3 libcurl) $(SOLVER_LIBS) -lpthread
 CLIENT_LIBS   = $(call pkg,--libs libcurl jansson) -lm
 CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)
 LDFLAGS_ALL   = $(SAN) -pthread $(LDFLAGS)
@@ -37,8 +37,9 @@ UNIT_SRC   := $(sort $(wildcard tests/unit/test_*.c))
 FUZZ_SRC   := $(sort $(wildcard tests/fuzz/fuzz_*.c))
 BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
 EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
+THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
@@ -132,10 +133,13 @@ $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 
+$(BUILD)/theory: $(call obj,$(THEORY_SRC)) $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
+
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci bench bench-size extremes
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci bench bench-size extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -194,6 +198,10 @@ bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/benc
 extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
 	@$(BUILD)/extremes $(BUILD)/extremes.json $(FILTER)
+
+theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table
+	@$(MAKE) --no-print-directory -s $(BUILD)/theory
+	@$(BUILD)/theory
 
 ##@ Style
 .PHONY: format lint

@@ -264,6 +264,31 @@ static void print_factor(FILE *to, const json_t *summary)
     fprintf(to, ", rcond %s\n", number_in_words(rcond, factor, "rcond", 2));
 }
 
+/* Why this form of the operator: what each was expected to take, and what the one that was taken took. */
+static void print_cost(FILE *to, const json_t *summary)
+{
+    const json_t *cost = client_json_at(summary, "cost"), *considered = client_json_at(cost, "considered"), *form;
+    double predicted = client_json_number(cost, "predicted.seconds"),
+           actual = client_json_number(cost, "actual.seconds");
+    char text[32], more[32];
+    size_t i;
+    if (!isfinite(predicted) || !isfinite(actual))
+        return;
+    label(to, "cost");
+    fprintf(to, "%s predicted, %s in fact", client_format_seconds(text, sizeof text, predicted),
+            client_format_seconds(more, sizeof more, actual));
+    json_array_foreach(considered, i, form)
+    {
+        double seconds = client_json_number(form, "seconds");
+        fputs(i ? ", " : "; considered: ", to);
+        client_print_safe(to, client_json_text(form, "operator"));
+        fprintf(to, " %s", isfinite(seconds) ? client_format_seconds(text, sizeof text, seconds) : "unknown");
+        if (json_is_false(json_object_get(form, "fits")))
+            fputs(" (too much memory)", to);
+    }
+    fputc('\n', to);
+}
+
 /* The stages that took at least a hundredth of the whole, in the order in which they ran. */
 static void print_timings(FILE *to, const json_t *summary)
 {
@@ -304,6 +329,7 @@ void client_print_summary(FILE *to, const json_t *job)
     print_energy(to, summary);
     print_certificate(to, summary);
     print_factor(to, summary);
+    print_cost(to, summary);
     print_timings(to, summary);
 }
 

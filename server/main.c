@@ -6,7 +6,9 @@
 #include "log.h"
 #include "options.h"
 #include "store/store.h"
+#include "store/uploads.h"
 #include "uzawa.h"
+#include "work/webhook.h"
 #include "work/work.h"
 
 #include <errno.h>
@@ -28,6 +30,7 @@ typedef struct {
     server_log *log;
     store *store;
     work *work;
+    webhooks *webhooks;
     http_server *http;
     sigset_t signals; /* taken by sigwait in main, blocked in every thread */
 } service;
@@ -85,6 +88,10 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     s->store = store_open(options->db, message, size);
     if (!s->store)
         return false;
+    store_limit_uploads(s->store, &(upload_limits){.one = (int64_t)options->max_upload,
+                                                   .all = (int64_t)options->uploads,
+                                                   .keep_s = options->upload_days * 86400});
+    store_limit_queue(s->store, options->max_queue);
     /* The port is taken before any job runs, so that a second daemon fails without a trace. */
     fd = http_listen(options->listen, url, url_size, message, size);
     if (fd < 0)
@@ -93,14 +100,28 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
                                   .solve_bytes = options->memory,
-                                  .lease_s = LEASE_S};
+                                  .lease_s = LEASE_S,
+                                  .retention = {.keep_s = options->keep_days * 86400,
+                                                .keep_jobs = options->keep_jobs,
+                                                .keep_bytes = (int64_t)options->keep_bytes}};
     s->work = work_start(s->store, &workers, s->log, message, size);
     if (!s->work) {
         close(fd);
         return false;
     }
-    http_parts parts = {.store = s->store, .work = s->work, .log = s->log};
+    const webhook_options hooks = {.allow = options->webhook_allow,
+                                   .n_allow = options->n_webhook_allow,
+                                   .secret_file = options->webhook_secret_file};
+    s->webhooks = webhooks_start(s->store, &hooks, s->log, message, size);
+    if (!s->webhooks) {
+        close(fd);
+        return false;
+    }
+    http_parts parts = {.webhooks = s->webhooks, .store = s->store, .work = s->work, .log = s->log};
     const http_options limits = {.max_body = options->max_body,
+                                 .max_upload = options->max_upload,
+                                 .cors = options->cors,
+                                 .n_cors = options->n_cors,
                                  .max_connections = options->max_connections,
                                  .request_deadline_s = options->request_deadline_s,
                                  .max_wait_s = MAX_WAIT_S};
@@ -112,6 +133,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
 static void end(service *s)
 {
     http_stop(s->http);
+    webhooks_stop(s->webhooks);
     if (s->work) {
         work_stop(s->work, 0);
         work_free(s->work);
@@ -219,5 +241,6 @@ int main(int argc, char **argv)
     }
     int status = run(&s, &options);
     log_close(s.log);
+    options_clear(&options);
     return status;
 }

@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <getopt.h>
+#include <limits.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -23,6 +24,16 @@ enum {
     LEVEL,
     DEADLINE,
     MEMORY,
+    CORS,
+    WEBHOOK_ALLOW,
+    WEBHOOK_SECRET,
+    KEEP_DAYS,
+    KEEP_JOBS,
+    KEEP_BYTES,
+    MAX_QUEUE,
+    MAX_UPLOAD,
+    UPLOADS,
+    UPLOAD_DAYS,
     VERSION,
     HELP
 };
@@ -39,6 +50,16 @@ static const struct option LONG_OPTIONS[] = {
     {"max-connections", required_argument, NULL, CONNECTIONS},
     {"log-level", required_argument, NULL, LEVEL},
     {"request-deadline-s", required_argument, NULL, DEADLINE},
+    {"max-upload", required_argument, NULL, MAX_UPLOAD},
+    {"uploads", required_argument, NULL, UPLOADS},
+    {"upload-days", required_argument, NULL, UPLOAD_DAYS},
+    {"keep-days", required_argument, NULL, KEEP_DAYS},
+    {"keep-jobs", required_argument, NULL, KEEP_JOBS},
+    {"keep-bytes", required_argument, NULL, KEEP_BYTES},
+    {"max-queue", required_argument, NULL, MAX_QUEUE},
+    {"webhook-allow", required_argument, NULL, WEBHOOK_ALLOW},
+    {"webhook-secret-file", required_argument, NULL, WEBHOOK_SECRET},
+    {"cors", required_argument, NULL, CORS},
     {"version", no_argument, NULL, VERSION},
     {"help", no_argument, NULL, HELP},
     {NULL, 0, NULL, 0},
@@ -57,7 +78,22 @@ void options_usage(FILE *to)
         "  --memory BYTES          memory that one problem may take (80 % of what the machine or its control group\n"
         "                          has, less the cache, divided by the workers)\n"
         "  --max-body BYTES        largest request body (64M)\n"
+        "  --max-upload BYTES      largest upload, after decompression (1G)\n"
+        "  --uploads BYTES         all uploads together, in the folder FILE-uploads; those that no job uses make\n"
+        "                          room (10G)\n"
+        "  --upload-days D         an upload that no job uses is deleted so long after it was last used (30)\n"
         "  --max-connections N     connections open at once (256)\n"
+        "  --max-queue N           jobs that may wait; one more is answered 503 (no limit)\n"
+        "  --keep-days D, --keep-jobs N, --keep-bytes BYTES\n"
+        "                          ended jobs that are older, more, or larger together than that are deleted, the\n"
+        "                          oldest first (no limit)\n"
+        "  --webhook-allow HOST[:PORT]\n"
+        "                          jobs may ask to have their end told there; may be given several times (none)\n"
+        "  --webhook-secret-file FILE\n"
+        "                          what is told is signed with these bytes\n"
+        "  --cors ORIGIN           pages of this origin (https://host[:port], or * for all) may use the service from "
+        "a\n"
+        "                          browser; may be given several times (none)\n"
         "  --request-deadline-s S  time for a request to arrive, plus 1 s per 100 kB of its body (30)\n"
         "  --max-attempts N        runs of a job whose run ends with the process before it is failed (3)\n"
         "  --drain-s S             time for running jobs to end after SIGTERM (30)\n"
@@ -139,6 +175,34 @@ static bool set_connections(unsigned *out, const char *text)
     return true;
 }
 
+static bool add_text(const char ***list, size_t *n, const char *text)
+{
+    const char **grown = realloc(*list, (*n + 1) * sizeof *grown);
+    if (!grown)
+        return false;
+    *list = grown;
+    grown[(*n)++] = text;
+    return true;
+}
+
+/* "https://host[:port]" as a browser sends it, or "*". */
+static bool add_origin(server_options *out, const char *text)
+{
+    const char *host = strstr(text, "://");
+    bool fits = host && (strncmp(text, "http://", 7) == 0 || strncmp(text, "https://", 8) == 0);
+    if (strcmp(text, "*") != 0 && (!fits || !host[3] || strchr(host + 3, '/')))
+        return false;
+    return add_text(&out->cors, &out->n_cors, text);
+}
+
+void options_clear(server_options *options)
+{
+    free(options->cors);
+    free(options->webhook_allow);
+    options->cors = options->webhook_allow = NULL;
+    options->n_cors = options->n_webhook_allow = 0;
+}
+
 static bool set_option(server_options *out, int option, const char *text)
 {
     switch (option) {
@@ -160,6 +224,27 @@ static bool set_option(server_options *out, int option, const char *text)
         return set_integer(&out->max_attempts, 1, 1000, text);
     case DRAIN:
         return parse_seconds(text, 0, &out->drain_s);
+    case KEEP_DAYS:
+        return parse_seconds(text, 0, &out->keep_days);
+    case KEEP_JOBS:
+        return parse_integer(text, 0, LONG_MAX, &out->keep_jobs);
+    case KEEP_BYTES:
+        return parse_bytes(text, &out->keep_bytes);
+    case MAX_QUEUE:
+        return parse_integer(text, 0, LONG_MAX, &out->max_queue);
+    case WEBHOOK_ALLOW:
+        return text[0] && !strchr(text, '/') && add_text(&out->webhook_allow, &out->n_webhook_allow, text);
+    case WEBHOOK_SECRET:
+        out->webhook_secret_file = text;
+        return text[0] != '\0';
+    case CORS:
+        return add_origin(out, text);
+    case MAX_UPLOAD:
+        return parse_bytes(text, &out->max_upload);
+    case UPLOADS:
+        return parse_bytes(text, &out->uploads);
+    case UPLOAD_DAYS:
+        return parse_seconds(text, 0, &out->upload_days);
     case CONNECTIONS:
         return set_connections(&out->max_connections, text);
     case LEVEL:
@@ -183,6 +268,9 @@ static server_options defaults(void)
                             .max_connections = 256,
                             .max_body = (size_t)64 << 20,
                             .cache = (size_t)1 << 30,
+                            .max_upload = (size_t)1 << 30,
+                            .uploads = (size_t)10 << 30,
+                            .upload_days = 30,
                             .drain_s = 30,
                             .request_deadline_s = 30,
                             .level = LOG_INFO};

@@ -36,7 +36,7 @@ static uz_status make_certifier(uz_block *block, uz_body *body, const uz_problem
     uz_factor_workspace *ws = uz_factor_workspace_new();
     if (!ws)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a linear solve");
-    double bound = uz_body_inverse_bound(body, block->K, ws);
+    double bound = uz_body_inverse_bound(body, block->K, ws, NULL);
     uz_factor_workspace_free(ws);
     return uz_lane_certifier_create(&block->certifier, block->K, uz_body_N(body, problem),
                                     uz_factor_describe(body->factor).rcond, bound, err);

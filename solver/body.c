@@ -4,6 +4,8 @@
 #include "core/clock.h"
 #include "core/digest.h"
 #include "core/error.h"
+#include "core/lock.h"
+#include "linalg/linalg.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -144,13 +146,16 @@ uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_body
     return status;
 }
 
-double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws)
+double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_leave *leave)
 {
     uz_error ignored = {0};
-    pthread_mutex_lock(&body->mutex);
-    if (isnan(body->inverse_bound))
-        uz_factor_inverse_norm(&body->inverse_bound, body->factor, ws, K, &ignored);
-    double bound = body->inverse_bound;
+    double bound;
+    if (!uz_lock_while(&body->mutex, leave))
+        return INFINITY;
+    if (isnan(body->inverse_bound) &&
+        uz_factor_inverse_norm(&bound, body->factor, ws, K, leave, &ignored) != UZ_ERR_CANCELLED)
+        body->inverse_bound = bound;
+    bound = isnan(body->inverse_bound) ? INFINITY : body->inverse_bound;
     pthread_mutex_unlock(&body->mutex);
     return bound;
 }

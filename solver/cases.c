@@ -6,6 +6,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "linalg/linalg.h"
 #include "methods/method.h"
 #include "semicoercive/semicoercive.h"
 #include "solve.h"
@@ -41,15 +42,6 @@ static void name_case(uz_error *err, int64_t i)
     err->where[sizeof err->where - 1] = '\0';
 }
 
-static uz_status check_vector(const double *x, int64_t n, const char *name, uz_error *err)
-{
-    for (int64_t i = 0; x && i < n; i++)
-        if (!isfinite(x[i]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld) is not a finite number (counted from 1)", name,
-                           (long long)i + 1);
-    return UZ_OK;
-}
-
 static uz_status check_case(const uz_load_case *load_case, const uz_problem *problem, uz_error *err)
 {
     bool scene = problem->kind == UZ_PROBLEM_SCENE;
@@ -57,8 +49,8 @@ static uz_status check_case(const uz_load_case *load_case, const uz_problem *pro
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "%s",
                        scene ? "a load case of a scene has loads, not p or h"
                              : "a load case of a problem in matrices has p and h, not loads");
-    uz_status status = check_vector(load_case->p, problem->qp.K.cols, "p", err);
-    return status == UZ_OK ? check_vector(load_case->h, problem->qp.N.rows, "h", err) : status;
+    uz_status status = uz_check_finite(load_case->p, problem->qp.K.cols, "p", err);
+    return status == UZ_OK ? uz_check_finite(load_case->h, problem->qp.N.rows, "h", err) : status;
 }
 
 uz_status uz_check_problem(const uz_problem *problem, uz_error *err)

@@ -12,9 +12,11 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "core/hooks.h"
 #include "methods/method.h"
 #include "solve.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -129,6 +131,7 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *err)
 {
     const uz_csc *K = uz_body_K(run->body, run->problem);
+    const uz_leave leave = {run->hooks, run->deadline};
     uz_status status = need_workspace(run, err);
     if (status != UZ_OK)
         return status;
@@ -141,7 +144,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *e
         .ctx = run,
         .rcond = run->result->summary.rcond,
         .inverse_bound =
-            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws) : INFINITY,
+            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws, &leave) : INFINITY,
         .sharp = 0.5 * run->requested,
     };
     return UZ_OK;
@@ -238,10 +241,12 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
     return status == UZ_OK && run->end == UZ_END_RAY ? prove_infeasible(run, err) : status;
 }
 
-/* Where the method can't do better, but the request is missed. */
+/* Where the method can't do better, but the request is missed. A run that was told to stop has an answer with a bound:
+ * another certificate would cost as much again. */
 static uz_status improve(uz_run *run, uz_error *err)
 {
-    bool missed = run->answer.certificate.relative_error > run->requested;
+    bool told = run->end == UZ_END_CANCELLED || run->end == UZ_END_TIME,
+         missed = run->answer.certificate.relative_error > (told ? DBL_MAX : run->requested);
     double start = uz_seconds();
     uz_status status = UZ_OK;
     if (missed && run->end != UZ_END_TARGET && run->end != UZ_END_PAPER)
@@ -307,8 +312,10 @@ static uz_outcome conclude(const uz_run *run)
         return UZ_DISMISSED;
     case UZ_END_PAPER:
         return UZ_PAPER_RULE;
-    default:
-        return UZ_PRECISION_LIMIT;
+    default: /* the certificate or the refinement may have been cut short */
+        return uz_cancelled(run->hooks)        ? UZ_DISMISSED
+               : uz_seconds() >= run->deadline ? UZ_TIME_LIMIT
+                                               : UZ_PRECISION_LIMIT;
     }
 }
 

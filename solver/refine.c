@@ -123,7 +123,8 @@ static uz_status correct(refinement *x, uz_error *err)
     return status;
 }
 
-/* One pass: the refined answer takes the place of the latest, unless the rows contradict each other. */
+/* One pass: the refined answer takes the place of the latest, unless the rows contradict each other or the run was told
+ * to stop. */
 static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
 {
     uz_run *run = x->run;
@@ -131,7 +132,8 @@ static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
     uz_status status = measure(x, latest, err);
     if (status == UZ_OK)
         status = correct(x, err);
-    if (status != UZ_OK || x->contradictory)
+    uz_leave leave = {run->hooks, run->deadline};
+    if (status != UZ_OK || x->contradictory || uz_leave_is_over(&leave)) /* half a correction is none */
         return status;
     for (int64_t j = 0; j < run->d; j++)
         latest->u[j] += x->c[j];

@@ -5,6 +5,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "fields/evaluate.h"
+#include "linalg/linalg.h"
 
 #include <float.h>
 #include <math.h>
@@ -95,11 +96,6 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     summary->timings.condense = run->body->condense_s;
 }
 
-static double csc_bytes(const uz_csc *A)
-{
-    return A->ptr ? 8.0 * (double)(A->cols + 1) + 16.0 * (double)A->ptr[A->cols] : 0.0;
-}
-
 /* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
 #define RUN_VECTORS 10.0
 
@@ -121,9 +117,10 @@ static void report_cost(uz_run *run)
         cost->flops = form->flops;
     }
     cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
-    cost->actual_bytes = (double)run->body->bytes + (run->load ? (double)uz_case_bytes(run->load) : 0.0) +
-                         (run->body->is_scene ? 0.0 : csc_bytes(&run->problem->qp.K) + csc_bytes(&run->problem->qp.N)) +
-                         8.0 * RUN_VECTORS * (double)run->d;
+    cost->actual_bytes =
+        (double)run->body->bytes + (run->load ? (double)uz_case_bytes(run->load) : 0.0) +
+        (run->body->is_scene ? 0.0 : (double)(uz_csc_bytes(&run->problem->qp.K) + uz_csc_bytes(&run->problem->qp.N))) +
+        8.0 * RUN_VECTORS * (double)run->d;
 }
 
 uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err)

@@ -163,6 +163,8 @@ bool uz_element_parse(uz_element_kind *out, const char *name);
 int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */
 int uz_element_node_count(uz_element_kind kind); /* 3 to 10 */
 
+/* A rectangle or a cuboid in cells along the axes. Its sides are the groups left and right (x), bottom and top (y),
+ * back and front (z, 3D only). */
 typedef struct {
     double origin[3], size[3];
     int64_t cells[3];
@@ -194,10 +196,12 @@ typedef struct {
 } uz_given_mesh;
 void uz_given_mesh_clear(uz_given_mesh *mesh);
 
-/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary; physical groups become groups. Nodes and elements are
- * numbered from 0 in the order of the file; only the elements of the highest dimension are elements, the others are
- * edges and faces of groups. A flat mesh (all z equal) is plane. max_bytes (0: none) bounds what the result may take.
- * Errors: UZ_ERR_FORMAT with the line, _UNSUPPORTED, _NOT_FINITE, _LIMIT, _MEMORY.
+/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary. Nodes and elements are numbered from 0 in the order of
+ * the file; only the elements of the highest dimension are elements. Physical groups of that dimension become groups of
+ * elements, of one less groups of edges or faces, of still less groups of nodes; one without a name is "physical_7", or
+ * "physical_7_dim1" if a nameless one of higher dimension has that number too. A flat mesh (all z equal) is plane;
+ * other surfaces are refused. max_bytes (0: none) bounds what the result may take. Errors: UZ_ERR_FORMAT, _UNSUPPORTED,
+ * _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
  * Source: Gmsh reference manual, section "Gmsh file formats". */
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 
@@ -297,8 +301,8 @@ typedef struct {
 void uz_mesh_info_clear(uz_mesh_info *info);
 
 /* Mesh, assembly, boundary conditions: the scene as matrices. Their dofs are the free ones, node by node, along x, y,
- * z; at a node whose first contact has an oblique normal along that normal and tangents (info->frame), so that its row
- * of N has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
+ * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one whose
+ * first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
  * pointer into the problem. Nothing is factored. */
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
 /* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. A box whose cells are
@@ -479,8 +483,8 @@ typedef struct {
     uz_resultant *contacts,
         *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
     uz_resultant loads; /* all of them; on is "" */
-    /* What the forces and moments (about the middle of the body, by its extent) leave over, relative to the sum of
-     * their sizes. */
+    /* What the forces and moments (about the first node, by the body's extent) leave over, relative to the sum of the
+     * forces' sizes. */
     double imbalance;
     int n_warnings;
     uz_warning warnings[4];
@@ -621,12 +625,12 @@ typedef struct {
     int64_t n_u, m;
 } uz_field_source;
 
-/* The scene has the loads of the case that
- * was solved (temperature makes strain without stress). Nodal stress: that at the points of each element where it is
- * most accurate, continued to its nodes by least squares (Hinton and Campbell, Int. J. Numer. Meth. Engng 8 (1974)
- * 461-480), averaged over the elements around the node by their volume, of all materials alike; the jumps between
- * materials are in gauss_stress. Errors: those of uz_scene_check, _SIZE where the answer is not one of this scene,
- * _CANCELLED. */
+/* The scene has the loads of the case that was solved (temperature makes strain without stress). Nodal stress: that at
+ * the points of each element where it is most accurate, continued to its nodes (Hinton and Campbell, Int. J. Numer.
+ * Meth. Engng 8 (1974) 461-480) and averaged over the elements around the node by volume; of linear elements fitted to
+ * the middles of those around (Zienkiewicz and Zhu, ibid. 33 (1992) 1331-1364). Where materials meet their values are
+ * averaged by volume: the jump is in gauss_stress. Errors: those of uz_scene_check, _SIZE where the answer is not one
+ * of this scene, _CANCELLED. */
 uz_status uz_fields_compute(uz_fields *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                             const uz_hooks *hooks, uz_error *err);
 void uz_fields_clear(uz_fields *fields);
@@ -716,6 +720,19 @@ void uz_results_free(uz_result **results, int64_t n);
  * with load cases is UZ_ERR_ARGUMENT. */
 uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
                     const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+
+/* What a solve will take after the assembly, by the same model that chooses the operator (summary.cost): from the
+ * pattern of the matrices, nothing is factored. Takes as long as assembly and symbolic analysis do. Errors: those of
+ * uz_scene_to_qp; UZ_ERR_CANCELLED. A body that only the obstacle holds is UZ_ERR_FREE_BODY: no model counts its
+ * rounds. */
+typedef struct {
+    int64_t d, m, factor_nnz; /* factor_nnz 0: no factor is made, or not known */
+    double bytes, seconds;    /* matrices, factor and vectors together; all load cases */
+    uz_operator op;
+    bool fits; /* settings->memory_limit */
+} uz_prediction;
+uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                     uz_error *err);
 
 /* Process-wide settings that a library must not choose alone: BLAS threads. Call once from main before threads start;
  * `workers` is how many threads will call uz_solve at once. */

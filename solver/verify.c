@@ -3,21 +3,18 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "linalg/linalg.h"
 #include "solve.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static uz_status check_finite(const double *x, int64_t n, const char *name, uz_error *err)
+static uz_status check_given(const double *x, int64_t n, const char *name, uz_error *err)
 {
     if (n > 0 && !x)
         return uz_fail(err, UZ_ERR_ARGUMENT, name, "there is no %s to verify", name);
-    for (int64_t i = 0; i < n; i++)
-        if (!isfinite(x[i]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld) is not a finite number (counted from 1)", name,
-                           (long long)i + 1);
-    return UZ_OK;
+    return uz_check_finite(x, n, name, err);
 }
 
 /* The free dofs of a nodal u. Supported ones must be where the scene holds them: the error that is bounded is one among
@@ -43,9 +40,9 @@ static uz_status take_answer(uz_run *run, const double *u, const double *r, uz_e
 {
     const uz_mesh *mesh = &run->body->model.mesh;
     bool scene = run->body->is_scene;
-    uz_status status = check_finite(u, scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
+    uz_status status = check_given(u, scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
     if (status == UZ_OK)
-        status = check_finite(r, run->m, "r", err);
+        status = check_given(r, run->m, "r", err);
     if (status != UZ_OK)
         return status;
     if (run->m > 0)

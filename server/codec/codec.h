@@ -9,6 +9,7 @@
 
 #include "problem_details.h"
 #include "store/store.h"
+#include "store/uploads.h"
 #include "uzawa.h"
 
 #include <stdbool.h>
@@ -40,7 +41,12 @@ typedef struct {
     uz_settings settings;
     codec_start start;
     codec_answer answer;
-    char *tags; /* JSON array text */
+    char *tags;          /* JSON array text */
+    char (*uploads)[65]; /* n_uploads ids of the uploads that it names, each once */
+    size_t n_uploads;
+    int priority;         /* -10..10 */
+    double queue_limit_s; /* 0: none */
+    char *webhook;        /* address to tell of the end, or NULL */
 } codec_request;
 
 /* What a body may be: the one that a route takes, or any that the store may hold. */
@@ -49,9 +55,14 @@ typedef enum { CODEC_SOLVE, CODEC_VERIFY, CODEC_STORED } codec_kind;
 /* Decodes and checks a body. False: *problem is filled (400 json_syntax, 422 with pointer, ...). Everything that can be
  * known without factoring K and without the store is known here. On success the caller clears *out. */
 bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem);
+/* The same where the body may name uploads of this store. */
+bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
+                       problem_details *problem);
 /* The same of a POST /v1/jobs body. */
 bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem);
 void codec_request_clear(codec_request *request);
+/* Frees the problem and all numbers, and leaves what the store keeps beside the body. */
+void codec_request_strip(codec_request *request);
 
 /* How many reactions and displacements an answer has (a scene's: dim numbers for each node). False: *problem. */
 bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u, problem_details *problem);
@@ -97,6 +108,11 @@ typedef struct {
 } codec_run;
 char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run);
 char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes);
+/* The reply to a request that is only checked; NULL: nothing is predicted. */
+char *codec_encode_valid(const uz_prediction *predicted);
+/* The data of a progress event; row: the newest of the history, or NULL. */
+char *codec_encode_progress(int progress, const double *row);
+char *codec_encode_upload(const upload_info *info);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);
 
 /* A result as GET /v1/jobs/{id}/result answers it. Vectors that were not asked for are NULL. dim 0: plain numbers;
@@ -106,6 +122,8 @@ typedef struct {
     const char *job_id, *summary; /* summary: JSON text, embedded as it is */
     const char *case_name;        /* NULL: none */
     int dim;
+    bool part;               /* only a part of the vectors was asked for: */
+    int64_t from;            /* the entry that it begins with */
     int64_t m, n_u, n_nodes; /* lengths of reactions and gaps, displacements, nodes (in doubles) */
     const double *reactions, *gaps, *displacements, *nodes, *contact_nodes;
     const double *pressure;  /* scenes: m, of each reaction */

@@ -124,6 +124,16 @@ static bool decode_tags(char **out, const json_t *tags, problem_details *problem
     return *out != NULL;
 }
 
+/* object NULL: nobody is told. */
+static bool decode_webhook(char **out, const json_t *object, problem_details *problem)
+{
+    const char *url = json_string_value(json_object_get(object, "url"));
+    if (!url)
+        return true;
+    *out = strdup(url);
+    return *out || decode_no_memory(problem);
+}
+
 static bool decode_problem(uz_problem *out, json_doc *doc, size_t body_len, problem_details *problem)
 {
     const json_t *object = json_object_get(doc->root, "problem");
@@ -234,21 +244,29 @@ static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_
 {
     const json_t *solver = json_object_get(doc->root, "solver"), *answer = json_object_get(doc->root, "answer");
     decode_settings(&out->settings, solver);
-    return decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
+    out->priority = (int)json_real_value(json_object_get(doc->root, "priority")); /* 0 where there is none */
+    out->queue_limit_s = json_real_value(json_object_get(doc->root, "queue_limit_s"));
+    return decode_webhook(&out->webhook, json_object_get(doc->root, "webhook"), problem) &&
+           decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
            decode_problem(&out->problem, doc, len, problem) && decode_automatic(out, solver, answer != NULL, problem) &&
            decode_cases(&out->problem, doc, json_object_get(doc->root, "cases"), len, problem) &&
            decode_start(&out->start, doc, json_object_get(solver, "warm_start"), len, problem) &&
            (!answer || decode_answer(&out->answer, doc, answer, len, problem));
 }
 
-bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem)
+bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
+                       problem_details *problem)
 {
     json_doc doc;
     codec_request request = {.tags = NULL};
     *out = request;
     if (!json_scan(&doc, body, len, problem))
         return false;
+    doc.store = uploads;
     bool good = decode_check(&doc, schema_of(kind, &doc), problem) && decode_parts(&request, &doc, len, problem);
+    request.uploads = doc.uploads;
+    request.n_uploads = doc.n_uploads;
+    doc.uploads = NULL;
     json_doc_clear(&doc);
     good = good && check_sizes(&request, problem);
     if (good)
@@ -258,9 +276,29 @@ bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t 
     return good;
 }
 
+bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem)
+{
+    return codec_decode_with(out, kind, body, len, NULL, problem);
+}
+
 bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem)
 {
     return codec_decode(out, CODEC_SOLVE, body, len, problem);
+}
+
+void codec_request_strip(codec_request *request)
+{
+    codec_request kept = {.tags = request->tags,
+                          .uploads = request->uploads,
+                          .n_uploads = request->n_uploads,
+                          .priority = request->priority,
+                          .queue_limit_s = request->queue_limit_s,
+                          .webhook = request->webhook};
+    request->tags = NULL;
+    request->uploads = NULL;
+    request->webhook = NULL;
+    codec_request_clear(request);
+    *request = kept;
 }
 
 void codec_request_clear(codec_request *request)
@@ -272,5 +310,7 @@ void codec_request_clear(codec_request *request)
     free(request->answer.u);
     free(request->answer.r);
     free(request->tags);
+    free(request->uploads);
+    free(request->webhook);
     memset(request, 0, sizeof *request);
 }

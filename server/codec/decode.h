@@ -6,6 +6,7 @@
 
 #include "codec/codec.h"
 #include "codec/json_doc.h"
+#include "store/uploads.h"
 #include "uzawa.h"
 
 /* Takes big vectors out of the document and frees big texts as soon as they are read. body_len bounds what the
@@ -33,12 +34,24 @@ size_t decode_memory_bound(size_t body_len);
 /* A string's bytes, lifted or not; decode_text_done frees them early. */
 const char *decode_text(const json_doc *doc, const json_t *value, size_t *len);
 void decode_text_done(const json_doc *doc, const json_t *value);
+/* What {"upload": id} names, or NULL where the value is something else. */
+const char *decode_upload_id(const json_t *value);
+/* A text of the request: a string's bytes, or those of the upload that it names. `where` as above. */
+typedef struct {
+    const char *data; /* not NUL-terminated */
+    size_t len;
+    upload_text mapped; /* of an upload */
+} decode_source;
+bool decode_source_open(decode_source *out, json_doc *doc, const json_t *value, const char *where,
+                        problem_details *problem);
+/* Gives the text back, so that it is not in memory twice: it can't be opened again if it was a string. */
+void decode_source_close(decode_source *source, const json_doc *doc, const json_t *value);
 /* The document against a schema file, as schemas_check. */
 bool decode_check(const json_doc *doc, const char *schema, problem_details *problem);
 bool decode_no_memory(problem_details *problem); /* 503; returns false */
 /* Room for the items of a list that may be absent, zeroed; NULL: *problem. */
 void *decode_room(const json_t *list, size_t size, int64_t *count, problem_details *problem);
-/* A group's name; a longer one, which no mesh has, is cut. */
+/* A group's name; one that no mesh has (too long, or with a NUL in it) becomes "". */
 void decode_name(char *out, size_t size, const json_t *object, const char *key, const char *otherwise);
 /* The vector `key` of an object into out[0..dim), `otherwise` in what is absent and 0 beyond dim; false if it has not
  * dim numbers. */

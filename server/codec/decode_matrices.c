@@ -55,10 +55,11 @@ static bool read_matrix(const reading *r, uz_csc *out, uz_mm_info *info, const c
 {
     uz_error err = {.status = UZ_OK};
     const json_t *value = json_object_get(r->object, name);
-    size_t len;
-    const char *text = decode_text(r->doc, value, &len);
-    bool good = uz_mm_read(out, info, text, len, r->bound, &err) == UZ_OK;
-    decode_text_done(r->doc, value);
+    decode_source text;
+    if (!decode_source_open(&text, r->doc, value, name, r->problem))
+        return false;
+    bool good = uz_mm_read(out, info, text.data, text.len, r->bound + 32 * text.len, &err) == UZ_OK;
+    decode_source_close(&text, r->doc, value);
     return good || refuse_call(r, &err, name);
 }
 

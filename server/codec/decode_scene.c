@@ -13,8 +13,11 @@ static const double MAX_CELLS = 1e7; /* keeps a tiny request from asking for a m
 
 void decode_name(char *out, size_t size, const json_t *object, const char *key, const char *otherwise)
 {
-    const char *text = json_string_value(json_object_get(object, key));
-    snprintf(out, size, "%s", text ? text : otherwise);
+    const json_t *value = json_object_get(object, key);
+    const char *text = value ? json_string_value(value) : otherwise;
+    const size_t len = text ? strlen(text) : size;
+    const bool whole = len < size && (!value || json_string_length(value) == len);
+    memcpy(out, whole ? text : "", whole ? len + 1 : 1);
 }
 
 void *decode_room(const json_t *list, size_t size, int64_t *count, problem_details *problem)

@@ -55,7 +55,7 @@ bool decode_vector(double **out, int64_t *n, json_doc *doc, const json_t *value,
 {
     uz_error err = {.status = UZ_OK};
     json_lifted *lifted = json_doc_lifted(doc, value);
-    size_t len;
+    decode_source text;
     if (lifted && !lifted->is_text) {
         *out = lifted->numbers;
         *n = lifted->count;
@@ -64,9 +64,10 @@ bool decode_vector(double **out, int64_t *n, json_doc *doc, const json_t *value,
     }
     if (json_is_array(value))
         return copy_numbers(out, n, value, problem);
-    const char *text = decode_text(doc, value, &len);
-    bool good = uz_mm_read_vector(out, n, text, len, bound, &err) == UZ_OK;
-    decode_text_done(doc, value);
+    if (!decode_source_open(&text, doc, value, where, problem))
+        return false;
+    bool good = uz_mm_read_vector(out, n, text.data, text.len, bound + 32 * text.len, &err) == UZ_OK;
+    decode_source_close(&text, doc, value);
     if (good)
         return true;
     snprintf(err.where, sizeof err.where, "%s", where);

@@ -86,6 +86,8 @@ static void put_links(text *t, const job *j)
         put_link(t, "history", j->id, "/history");
         put_link(t, "history_csv", j->id, "/history.csv");
     }
+    if (j->status == JOB_ACCEPTED || j->status == JOB_RUNNING)
+        put_link(t, "events", j->id, "/events");
     if (j->refines[0])
         put_link(t, "refines", j->refines, "");
     text_close(t, ']');
@@ -105,6 +107,8 @@ static void put_job(text *t, const job *j)
     put_time(t, "finished", j->finished);
     text_key(t, "attempts");
     text_integer(t, j->attempts);
+    text_key(t, "priority");
+    text_integer(t, j->priority);
     text_key(t, "tags");
     text_raw(t, j->tags ? j->tags : "[]");
     text_key(t, "summary");
@@ -173,6 +177,77 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
     text_integer(&t, (int64_t)bytes);
     text_key(&t, "max_bytes");
     text_integer(&t, (int64_t)max_bytes);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_valid(const uz_prediction *predicted)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "valid");
+    text_bool(&t, true);
+    text_key(&t, "predicted");
+    if (!predicted) {
+        text_raw(&t, NULL);
+    } else {
+        text_open(&t, '{');
+        text_key(&t, "d");
+        text_integer(&t, predicted->d);
+        text_key(&t, "m");
+        text_integer(&t, predicted->m);
+        text_key(&t, "operator");
+        text_string(&t, uz_operator_name(predicted->op));
+        text_key(&t, "factor_nnz");
+        text_integer(&t, predicted->factor_nnz);
+        text_key(&t, "bytes");
+        text_number(&t, predicted->bytes);
+        text_key(&t, "seconds");
+        text_number(&t, predicted->seconds);
+        text_key(&t, "fits");
+        text_bool(&t, predicted->fits);
+        text_close(&t, '}');
+    }
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_progress(int progress, const double *row)
+{
+    static const int SHOWN[] = {0, 2, 3, 9, 10}; /* columns of the history */
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "progress");
+    text_integer(&t, progress);
+    for (size_t i = 0; row && i < sizeof SHOWN / sizeof SHOWN[0]; i++) {
+        text_key(&t, CODEC_HISTORY_NAMES[SHOWN[i]]);
+        text_number(&t, row[SHOWN[i]]);
+    }
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_upload(const upload_info *info)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "id");
+    text_string(&t, info->id);
+    text_key(&t, "bytes");
+    text_integer(&t, info->bytes);
+    put_time(&t, "created", info->created);
+    put_time(&t, "used", info->used);
+    text_key(&t, "used_by");
+    text_integer(&t, info->jobs);
+    text_key(&t, "links");
+    text_open(&t, '[');
+    text_open(&t, '{');
+    text_key(&t, "rel");
+    text_string(&t, "self");
+    text_key(&t, "href");
+    text_format(&t, "\"/v1/uploads/%s\"", info->id);
+    text_close(&t, '}');
+    text_close(&t, ']');
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }

@@ -83,6 +83,10 @@ static void put_fields(text *t, const codec_result *result)
 
 static void put_places(text *t, const codec_result *result)
 {
+    if (result->part) {
+        text_key(t, "from");
+        text_integer(t, result->from);
+    }
     put_vector(t, "nodes", result->nodes, result->n_nodes, result->dim);
     put_vector(t, "contact_nodes", result->contact_nodes, result->m, 0);
 }

@@ -13,6 +13,7 @@ void json_doc_clear(json_doc *doc)
         free(doc->lifted[i].text);
     }
     free(doc->lifted);
+    free(doc->uploads);
     json_decref(doc->root);
     *doc = (json_doc){0};
 }

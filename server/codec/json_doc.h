@@ -12,6 +12,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+struct store;
+
 #define JSON_MAX_DEPTH    64     /* nested arrays and objects */
 #define JSON_MAX_VALUES   200000 /* each lifted array or string counts as one; about 100 bytes each */
 #define JSON_LIFT_NUMBERS 64    /* an array of more numbers than this, and of nothing else, is lifted; and a table of */
@@ -33,6 +35,9 @@ typedef struct {
     json_t *root;
     json_lifted *lifted; /* n_lifted */
     size_t n_lifted, capacity;
+    struct store *store; /* where uploads are read that the document names; NULL: there are none */
+    char (*uploads)[65]; /* n_uploads ids that were read; who takes them out sets it to NULL */
+    size_t n_uploads;
 } json_doc;
 
 void json_doc_clear(json_doc *doc);

@@ -30,6 +30,8 @@ static const struct {
     {"bad_scene", "The scene cannot be modelled"},
     {"memory_limit", "The problem needs more memory than allowed"},
     {"out_of_memory", "Not enough memory now"},
+    {"unknown_upload", "An upload is not there"},
+    {"queue_time_limit", "The job waited too long"},
     {"cancelled", "The job was dismissed"},
     {"internal", "A fault of this service"},
 };

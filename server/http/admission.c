@@ -4,11 +4,26 @@
 
 #include <string.h>
 
-/* A page of another site must not submit or delete through its visitor's browser. Programs send no such header. */
+void cors_find(http_server *server, http_request *rq)
+{
+    const api *context = &server->context;
+    const header_field *origin = header_find(&rq->headers, "Origin", NULL);
+    rq->reply.cors = context->n_cors > 0;
+    for (size_t i = 0; origin && i < context->n_cors && !rq->reply.cors_origin; i++) {
+        const char *one = context->cors[i];
+        if (strcmp(one, "*") == 0 ||
+            (strlen(one) == origin->value_len && memcmp(one, origin->value, origin->value_len) == 0))
+            rq->reply.cors_origin = one;
+    }
+}
+
+/* A page of another site must not submit or delete through its visitor's browser, unless its origin is one that may
+ * use the service. Programs send no such header. */
 static bool check_site(const http_request *rq, problem_details *problem)
 {
     const header_field *site = header_find(&rq->headers, "Sec-Fetch-Site", NULL);
-    if (!site || !token_equal(site->value, site->value_len, "cross-site") || strcmp(rq->route->method, "GET") == 0)
+    if (!site || !token_equal(site->value, site->value_len, "cross-site") || strcmp(rq->route->method, "GET") == 0 ||
+        rq->reply.cors_origin)
         return true;
     return http_problem(problem, 403, "cross_site", "Requests from other sites are refused",
                         "a browser sent this for a page of another site");
@@ -20,11 +35,18 @@ static bool check_body(const http_server *server, const http_request *rq, proble
     if (!takes_body && (rq->framing.chunked || rq->framing.length > 0))
         return http_problem(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
                             rq->route->method, rq->route->pattern);
-    if (rq->framing.length > server->options.max_body)
+    size_t limit = rq->route->streamed ? server->options.max_upload : server->options.max_body;
+    if (rq->framing.length > limit)
         return http_problem(problem, 413, "body_too_large", "The request body is too large",
                             "the body has %llu bytes, the limit of this server is %zu",
-                            (unsigned long long)rq->framing.length, server->options.max_body);
+                            (unsigned long long)rq->framing.length, limit);
     return true;
+}
+
+static bool is_gzip(const header_field *coding)
+{
+    return token_equal(coding->value, coding->value_len, "gzip") ||
+           token_equal(coding->value, coding->value_len, "x-gzip");
 }
 
 static bool check_type(const http_request *rq, problem_details *problem)
@@ -32,9 +54,13 @@ static bool check_type(const http_request *rq, problem_details *problem)
     const header_field *coding = header_find(&rq->headers, "Content-Encoding", NULL);
     if (strcmp(rq->route->method, "POST") != 0)
         return true;
-    if (coding && !token_equal(coding->value, coding->value_len, "identity"))
+    if (coding && !token_equal(coding->value, coding->value_len, "identity") &&
+        !(rq->route->streamed && is_gzip(coding)))
         return http_problem(problem, 415, "content_encoding", "The content coding is not supported",
-                            "send the body without Content-Encoding");
+                            rq->route->streamed ? "send the body as it is, or with Content-Encoding: gzip"
+                                                : "send the body without Content-Encoding");
+    if (rq->route->streamed)
+        return true;
     if (!request_is_json(rq))
         return http_problem(problem, 415, "content_type", "The body must be JSON",
                             "send the header field Content-Type: application/json");

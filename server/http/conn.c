@@ -1,5 +1,7 @@
 #include "http/conn.h"
+#include "http/negotiate.h"
 #include "http/problem.h"
+#include "http/uploads.h"
 
 #include <math.h>
 #include <poll.h>
@@ -34,6 +36,7 @@ static void request_free(conn *c)
         return;
     atomic_fetch_sub(&c->server->body_bytes, rq->body_capacity);
     reply_clear(&rq->reply);
+    store_upload_abort(rq->upload);
     target_clear(&rq->target);
     free(rq->raw_target);
     free(rq->body);
@@ -93,15 +96,15 @@ static bool send_reply(conn *c, struct MHD_Connection *mhd)
 {
     http_reply *reply = &c->request->reply;
     note_reply(c->request, reply);
-    deadline_set(c->deadline,
-                 deadlines_now() + c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE, false);
+    double allowed = c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE;
+    deadline_set(c->deadline, reply->source.read ? INFINITY : deadlines_now() + allowed, false);
     return reply_send(mhd, reply);
 }
 
 /* Where libmicrohttpd takes no reply: writes it and closes the connection's sending side. */
 static void send_directly(conn *c, const problem_details *problem)
 {
-    http_reply reply = {.close = true};
+    http_reply reply = {.close = true, .cors = c->request->reply.cors, .cors_origin = c->request->reply.cors_origin};
     reply_problem(&reply, problem);
     note_reply(c->request, &reply);
     char *message = reply_message(&reply);
@@ -178,7 +181,8 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
     http_request *rq = c->request;
     rq->begun = true;
     bool framed = read_framing(c, mhd, method, version);
-    if (framed && admit(c->server, rq)) {
+    cors_find(c->server, rq);
+    if (framed && admit(c->server, rq) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
         deadline_set(c->deadline,
                      rq->started + c->server->options.request_deadline_s + (double)rq->framing.length / SLOWEST_RATE,
                      true);
@@ -217,23 +221,41 @@ static bool reserve(conn *c, size_t more)
     return true;
 }
 
+static bool keep(conn *c, const char *data, size_t size)
+{
+    http_request *rq = c->request;
+    if (!reserve(c, size))
+        return false;
+    memcpy(rq->body + rq->body_len, data, size);
+    rq->body_len += size;
+    rq->body[rq->body_len] = '\0';
+    return true;
+}
+
+static bool pass_on(conn *c, const char *data, size_t size)
+{
+    http_request *rq = c->request;
+    rq->body_len += size;
+    return uploads_take(&c->server->context, rq, data, size);
+}
+
 bool conn_body(conn *c, const char *data, size_t size)
 {
     http_request *rq = c->request;
-    size_t limit = c->server->options.max_body;
+    bool streamed = rq->route->streamed;
+    size_t limit = streamed ? c->server->options.max_upload : c->server->options.max_body;
     if (size > limit - rq->body_len)
         http_problem(&rq->refused, 413, "body_too_large", "The request body is too large",
                      "the body has more than %zu bytes, the limit of this server", limit);
-    else if (reserve(c, size)) {
-        memcpy(rq->body + rq->body_len, data, size);
-        rq->body_len += size;
-        rq->body[rq->body_len] = '\0';
+    else if (streamed ? pass_on(c, data, size) : keep(c, data, size)) {
         if (rq->framing.chunked) /* the length is not known before: the allowance grows with what has come */
             deadline_set(c->deadline,
                          rq->started + c->server->options.request_deadline_s + (double)rq->body_len / SLOWEST_RATE,
                          true);
         return true;
     }
+    store_upload_abort(rq->upload);
+    rq->upload = NULL;
     send_directly(c, &rq->refused);
     return false;
 }
@@ -248,6 +270,7 @@ bool conn_answer(conn *c, struct MHD_Connection *mhd)
         reply_problem(&rq->reply, &rq->refused);
     else
         rq->route->handler(&c->server->context, rq, &rq->reply);
+    negotiate(rq, &rq->reply);
     return send_reply(c, mhd);
 }
 

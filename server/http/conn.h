@@ -13,6 +13,8 @@
 #define CONNECTION_MEMORY (64 * 1024)
 /* All bodies in memory at once; a request beyond it is told to come back later. */
 #define BODY_BUDGET(max_body) ((max_body) < SIZE_MAX / 8 ? 8 * (max_body) : SIZE_MAX)
+/* Event streams hold their connections for long: the others are for everything else. */
+#define MOST_STREAMS(max_connections) ((max_connections) - (max_connections) / 4)
 /* Slowest transfer that is waited for, bytes per second: the allowance that a body's length adds to a deadline. */
 #define SLOWEST_RATE 100e3
 
@@ -52,5 +54,7 @@ void conn_end_request(conn *c, unsigned status, bool completed);
 /* admission.c: everything that can be refused before the body is read; false with rq->refused and the header fields of
  * rq->reply. */
 bool admit(http_server *server, http_request *rq);
+/* Sets what the reply says to pages of other origins. */
+void cors_find(http_server *server, http_request *rq);
 
 #endif

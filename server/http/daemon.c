@@ -134,7 +134,14 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.store = parts->store;
     server->context.work = parts->work;
     server->context.log = parts->log;
+    pthread_mutex_init(&server->context.predict_lock, NULL);
+    server->context.webhooks = parts->webhooks;
     server->context.max_wait_s = options->max_wait_s;
+    server->context.cors = options->cors;
+    server->context.n_cors = options->n_cors;
+    server->context.max_streams = MOST_STREAMS(options->max_connections);
+    atomic_init(&server->context.streams, 0);
+    server->context.max_upload = (int64_t)options->max_upload;
     atomic_init(&server->context.draining, false);
     server->options = *options;
     server->body_budget = BODY_BUDGET(options->max_body);
@@ -176,9 +183,11 @@ void http_stop(http_server *server)
 {
     if (!server)
         return;
+    http_drain(server);              /* event streams end */
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
     deadlines_free(server->deadlines);
     field_slots_free(server->context.fields);
     pthread_key_delete(server->current);
+    pthread_mutex_destroy(&server->context.predict_lock);
     free(server);
 }

@@ -241,6 +241,29 @@ bool fields_vtu(char **text, size_t *len, const field_reader *reader, int64_t nu
     return done;
 }
 
+typedef struct {
+    file_text file;
+    const uz_picture *how;
+} drawing;
+
+static uz_status run_picture(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                             const uz_hooks *hooks, uz_error *err)
+{
+    drawing *d = out;
+    (void)which;
+    return uz_picture_deformed(&d->file.text, &d->file.len, scene, answer, d->how, hooks, err);
+}
+
+bool fields_picture(char **text, size_t *len, const field_reader *reader, int64_t number, const uz_picture *how,
+                    http_reply *reply)
+{
+    drawing d = {.how = how};
+    const bool done = compute(&d, run_picture, reader, number, 0, reply);
+    *text = d.file.text;
+    *len = d.file.len;
+    return done;
+}
+
 /* -------------------------------------------------------------------- names */
 
 static void list_names(char *text, size_t size, unsigned allowed)

@@ -28,12 +28,16 @@ void fields_close(field_reader *reader);
 bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply);
 bool fields_vtu(char **text, size_t *len, const field_reader *reader, int64_t number, unsigned which,
                 http_reply *reply);
+bool fields_picture(char **text, size_t *len, const field_reader *reader, int64_t number, const uz_picture *how,
+                    http_reply *reply);
 
 /* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits). False with a 400
  * that has the list. */
 typedef struct {
     unsigned which;
     bool nodes;
+    bool part;           /* only entries from .. from + count - 1 of each field */
+    int64_t from, count; /* an entry is a contact row, or a node (of matrices: a dof) */
 } field_list;
 bool fields_parse(field_list *out, const char *text, unsigned allowed, problem_details *problem);
 

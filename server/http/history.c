@@ -100,6 +100,7 @@ static void reply_history(api *context, http_request *rq, bool csv, http_reply *
         reply_problem(reply, &problem);
         return;
     }
+    reply->tag_by_body = true;
     if (jobs_load(context, rq, &j, reply) &&
         fetch(context, &j, target_value(&rq->target, "case"), after, &found, reply))
         encode(&found, csv, reply);
@@ -109,6 +110,7 @@ static void reply_history(api *context, http_request *rq, bool csv, http_reply *
 
 void history_get(api *context, http_request *rq, http_reply *reply)
 {
+    reply->varies_by_type = true;
     reply_history(context, rq, request_accepts(rq, "text/csv"), reply);
 }
 

@@ -8,6 +8,7 @@
 
 #include "log.h"
 #include "store/store.h"
+#include "work/webhook.h"
 #include "work/work.h"
 
 #include <stdbool.h>
@@ -18,14 +19,18 @@ typedef struct http_server http_server;
 typedef struct {
     store *store;
     work *work;
+    const webhooks *webhooks; /* NULL: there are none */
     server_log *log;
 } http_parts;
 
 typedef struct {
     size_t max_body;           /* bytes of one request's body */
+    size_t max_upload;         /* bytes of one upload, as it is sent and after decompression */
     unsigned max_connections;  /* open at once */
     double request_deadline_s; /* for a whole request, without the allowance for its body's length */
-    double max_wait_s;         /* cap of Prefer: wait */
+    const char *const *cors;   /* n_cors origins ("https://host[:port]" or "*") whose pages may use the service */
+    size_t n_cors;
+    double max_wait_s; /* cap of Prefer: wait */
 } http_options;
 
 /* Opens a listening socket on "HOST:PORT" or "[IPv6]:PORT"; port 0 takes a free one. url becomes "http://HOST:PORT"

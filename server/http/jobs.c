@@ -19,6 +19,10 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
         reply->retry_after_s = 60;
         reply_refuse(reply, 507, "storage_full", "The disk is full",
                      "nothing was stored: delete ended jobs or free disk space, then try again");
+    } else if (status == STORE_BUSY) {
+        reply->retry_after_s = 10;
+        reply_refuse(reply, 503, "queue_full", "Too many jobs wait",
+                     "as many jobs wait as this server lets (its option --max-queue): try again later");
     } else if (status == STORE_CONFLICT) {
         reply_refuse(reply, 409, "conflict", "The job's state does not allow this",
                      "the job changed meanwhile: look at its status and try again");
@@ -72,8 +76,7 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
     return status == STORE_OK;
 }
 
-/* A running job's progress lives in the worker; the store has the one of the last lease. */
-static void freshen(api *context, job *j)
+void jobs_freshen(api *context, job *j)
 {
     int progress;
     if (j->status == JOB_RUNNING && work_live(context->work, j->id, -1, &progress, NULL, NULL))
@@ -82,7 +85,7 @@ static void freshen(api *context, job *j)
 
 static void reply_job(api *context, int status, job *j, http_reply *reply)
 {
-    freshen(context, j);
+    jobs_freshen(context, j);
     reply_json(reply, status, codec_encode_job(j));
 }
 
@@ -118,13 +121,44 @@ static bool read_validate(const http_request *rq, bool *only, problem_details *p
     return true;
 }
 
+store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key)
+{
+    return (store_request){.body = body,
+                           .body_len = len,
+                           .tags = request->tags,
+                           .idempotency_key = key,
+                           .uploads = (const char(*)[65])request->uploads,
+                           .n_uploads = request->n_uploads,
+                           .priority = request->priority,
+                           .queue_limit_s = request->queue_limit_s,
+                           .webhook = request->webhook};
+}
+
+bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
+{
+    const char *why;
+    if (!url || webhooks_allow(context->webhooks, url, &why))
+        return true;
+    http_problem(problem, 422, "webhook_not_allowed", "The webhook cannot be called", "/webhook/url: %s", why);
+    strcpy(problem->pointer, "/webhook/url");
+    return false;
+}
+
 bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
 {
     bool repeated = false;
+    problem_details problem;
+    if (!jobs_check_webhook(context, request->webhook, &problem)) {
+        reply_problem(reply, &problem);
+        return false;
+    }
     store_status status = store_submit(context->store, request, out, &repeated);
     if (status == STORE_CONFLICT)
         reply_refuse(reply, 422, "idempotency_key_reused", "The Idempotency-Key was used for another request",
                      "this key came before with a different body: use a new key for a new job");
+    else if (status == STORE_NOT_FOUND)
+        reply_refuse(reply, 422, "unknown_upload", "An upload is not there",
+                     "an upload that the request names was deleted meanwhile: send it again");
     else if (status != STORE_OK)
         reply_store_failure(context, status, reply);
     if (status != STORE_OK)
@@ -149,85 +183,79 @@ static void submit(api *context, http_request *rq, const store_request *request,
     job_clear(&j);
 }
 
+/* ---- validate */
+
+typedef struct {
+    api *context;
+    const http_request *rq;
+} asker;
+
+static bool is_unwanted(void *ctx)
+{
+    const asker *a = ctx;
+    return atomic_load(&a->context->draining) || request_client_gone(a->rq);
+}
+
+/* Bytes that assembly takes for each dof, at least: a scene beyond the limit is not assembled only to say so. */
+#define ASSEMBLY_BYTES 500.0
+
+static bool worth_predicting(const codec_request *request, size_t limit)
+{
+    int64_t m, n_u;
+    problem_details ignored;
+    return !request->settings.semidefinite && codec_request_sizes(request, &m, &n_u, &ignored) &&
+           (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit);
+}
+
+/* One prediction at a time: it takes memory and a processor that are counted for the workers. */
+static void reply_valid(api *context, const http_request *rq, codec_request *request, http_reply *reply)
+{
+    uz_prediction predicted;
+    uz_error err = {.status = UZ_OK};
+    asker a = {context, rq};
+    uz_hooks hooks = {.ctx = &a, .cancelled = is_unwanted};
+    request->settings.memory_limit = work_solve_bytes(context->work);
+    bool known = false;
+    if (worth_predicting(request, request->settings.memory_limit)) {
+        pthread_mutex_lock(&context->predict_lock);
+        uz_thread_init();
+        known =
+            !is_unwanted(&a) && uz_predict(&predicted, &request->problem, &request->settings, &hooks, &err) == UZ_OK;
+        pthread_mutex_unlock(&context->predict_lock);
+    }
+    reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
+}
+
 void jobs_submit(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem = {0};
     codec_request request = {0};
-    char *key = NULL, *tags = NULL;
+    char *key = NULL;
     bool validate_only;
     if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
-        !codec_decode_request(&request, rq->body ? rq->body : "", rq->body_len, &problem) ||
-        !start_check(context, &request, rq, &problem)) {
+        !codec_decode_with(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
+        !start_check(context, &request, rq, &problem) || !jobs_check_webhook(context, request.webhook, &problem)) {
         reply_problem(reply, &problem);
         goto done;
     }
-    tags = request.tags;
-    request.tags = NULL;
-    codec_request_clear(&request); /* the worker decodes again: nothing decoded waits here while the client does */
-    if (validate_only)
-        reply_json(reply, 200, strdup("{\"valid\": true}\n"));
-    else
-        submit(context, rq, &(store_request){rq->body, rq->body_len, tags, key, NULL}, reply);
+    if (validate_only) {
+        reply_valid(context, rq, &request, reply);
+    } else {
+        codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
+        store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
+        submit(context, rq, &stored, reply);
+    }
 done:
     codec_request_clear(&request);
-    free(tags);
     free(key);
 }
 
-/* -------------------------------------------------------------- list, read */
-
-static bool is_id(const char *text)
-{
-    return strlen(text) == 32 && strspn(text, "0123456789abcdef") == 32;
-}
-
-static bool read_query(const http_request *rq, store_query *query, problem_details *problem)
-{
-    int64_t limit = 50;
-    const char *status = target_value(&rq->target, "status");
-    memset(query, 0, sizeof *query);
-    query->tag = target_value(&rq->target, "tag");
-    query->before = target_value(&rq->target, "cursor");
-    query->by_status = status != NULL;
-    if (status && !job_status_parse(&query->status, status))
-        return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "status must be accepted, running, successful, failed or dismissed");
-    if (query->before && !is_id(query->before))
-        return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "cursor must be the \"next\" of an earlier page");
-    if (!request_integer(rq, "limit", 1, 1000, &limit, problem))
-        return false;
-    query->limit = (int)limit;
-    return true;
-}
-
-void jobs_list(api *context, http_request *rq, http_reply *reply)
-{
-    store_query query;
-    problem_details problem;
-    job *jobs = NULL;
-    size_t count = 0;
-    bool more = false;
-    if (!read_query(rq, &query, &problem)) {
-        reply_problem(reply, &problem);
-        return;
-    }
-    store_status status = store_list(context->store, &query, &jobs, &count, &more);
-    if (status != STORE_OK) {
-        reply_store_failure(context, status, reply);
-        return;
-    }
-    for (size_t i = 0; i < count; i++)
-        freshen(context, &jobs[i]);
-    reply_json(reply, 200, codec_encode_jobs(jobs, count, more));
-    for (size_t i = 0; i < count; i++)
-        job_clear(&jobs[i]);
-    free(jobs);
-}
+/* -------------------------------------------------------------------- read */
 
 void jobs_get(api *context, http_request *rq, http_reply *reply)
 {
     job j;
+    reply->tag_by_body = true;
     if (jobs_load(context, rq, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
         reply_job(context, 200, &j, reply);
     job_clear(&j);

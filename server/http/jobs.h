@@ -6,6 +6,8 @@
 #include "http/request.h"
 
 bool jobs_ended(const job *j);
+/* A running job's progress lives in the worker; the store has the one of the last lease. */
+void jobs_freshen(api *context, job *j);
 
 /* Waits as the request prefers, `otherwise` seconds where it does not say, and reads the job again; *j is replaced.
  * False with a failure in reply. */
@@ -13,6 +15,12 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
 
 /* NULL in *key: none was given; freed by the caller. False with a 400. */
 bool jobs_read_key(const http_request *rq, char **key, problem_details *problem);
+
+/* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
+store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key);
+
+/* url NULL: there is none. False: a 422. */
+bool jobs_check_webhook(api *context, const char *url, problem_details *problem);
 
 /* Stores a request and tells the workers. False with a failure in reply; the caller clears *out. */
 bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply);

@@ -39,17 +39,14 @@ static void point_outside(problem_details *problem)
         memmove(problem->detail, problem->detail + skip, strlen(problem->detail + skip) + 1);
 }
 
-/* The body of the new job and its tags, checked as any other; NULL in *body: refused. */
-static void make_request(const http_request *rq, const job *old, const char *old_body, size_t old_len, char **body,
-                         size_t *len, char **tags, http_reply *reply)
+/* The body of the new job and what the store keeps beside it, checked as any other; NULL in *body: refused. */
+static void make_request(api *context, const http_request *rq, const job *old, const char *old_body, size_t old_len,
+                         char **body, size_t *len, codec_request *request, http_reply *reply)
 {
-    codec_request request = {0};
     problem_details problem = {0};
     *body = codec_refine(old_body, old_len, old->id, rq->body ? rq->body : "", rq->body_len, len, &problem);
-    if (*body && codec_decode(&request, CODEC_SOLVE, *body, *len, &problem)) {
-        *tags = request.tags;
-        request.tags = NULL;
-        codec_request_clear(&request);
+    if (*body && codec_decode_with(request, CODEC_SOLVE, *body, *len, context->store, &problem)) {
+        codec_request_strip(request);
         return;
     }
     point_outside(&problem);
@@ -78,7 +75,8 @@ static bool chose_cells(api *context, const job *j)
 
 static void refine(api *context, http_request *rq, const job *old, const char *key, http_reply *reply)
 {
-    char *old_body = NULL, *body = NULL, *tags = NULL;
+    char *old_body = NULL, *body = NULL;
+    codec_request made = {0};
     size_t old_len = 0, len = 0;
     store_status status = store_get_body(context->store, old->id, &old_body, &old_len);
     if (status != STORE_OK) {
@@ -92,16 +90,17 @@ static void refine(api *context, http_request *rq, const job *old, const char *k
             "the cells of its box were chosen for its accuracy: send the problem again with another accuracy, or "
             "with the cells of this job's summary");
     } else {
-        make_request(rq, old, old_body, old_len, &body, &len, &tags, reply);
+        make_request(context, rq, old, old_body, old_len, &body, &len, &made, reply);
         free(old_body); /* as large as the new one: not kept while the client waits */
         old_body = NULL;
-        store_request request = {body, len, tags, key, old->id};
+        store_request request = jobs_request(&made, body, len, key);
+        request.refines = old->id;
         if (body)
             submit(context, rq, &request, reply);
     }
     free(old_body);
     free(body);
-    free(tags);
+    codec_request_clear(&made);
 }
 
 void jobs_refine(api *context, http_request *rq, http_reply *reply)

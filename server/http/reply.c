@@ -7,8 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
+#include <unistd.h>
 
-#define MAX_FIELDS 12
+#define MAX_FIELDS 24
 
 static const char JSON_TYPE[] = "application/json";
 static const char PROBLEM_TYPE[] = "application/problem+json";
@@ -21,9 +23,27 @@ static void clear_body(http_reply *reply)
 {
     if (!reply->body_is_static)
         free(reply->body);
+    if (reply->has_file)
+        close(reply->fd);
+    reply->has_file = false;
+    if (reply->source.read)
+        reply->source.free(reply->source.ctx);
+    reply->source.read = NULL;
     reply->body = NULL;
     reply->len = 0;
     reply->body_is_static = false;
+}
+
+void reply_drop_body(http_reply *reply)
+{
+    clear_body(reply);
+}
+
+void reply_replace_body(http_reply *reply, char *body, size_t len)
+{
+    clear_body(reply);
+    reply->body = body;
+    reply->len = len;
 }
 
 void reply_clear(http_reply *reply)
@@ -58,6 +78,25 @@ void reply_text(http_reply *reply, int status, const char *type, char *text, siz
     reply->len = len;
 }
 
+void reply_file(http_reply *reply, int status, const char *type, int fd, size_t len)
+{
+    clear_body(reply);
+    reply->status = status;
+    reply->type = type;
+    reply->has_file = true;
+    reply->fd = fd;
+    reply->offset = 0;
+    reply->len = len;
+}
+
+void reply_stream(http_reply *reply, int status, const char *type, reply_source source)
+{
+    clear_body(reply);
+    reply->status = status;
+    reply->type = type;
+    reply->source = source;
+}
+
 void reply_json(http_reply *reply, int status, char *text)
 {
     reply_text(reply, status, JSON_TYPE, text, text ? strlen(text) : 0);
@@ -81,15 +120,64 @@ void reply_refuse(http_reply *reply, int status, const char *code, const char *t
     reply_problem(reply, &problem);
 }
 
-/* The header fields of a reply; number needs 16 bytes that outlive the list. */
-static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *number)
+/* Texts of header fields; they outlive the list of these. */
+typedef struct {
+    char number[16], tag[REPLY_TAG + 2], vary[64];
+} field_texts;
+
+static void write_texts(field_texts *out, const http_reply *reply)
+{
+    const char *const vary[] = {reply->varies_by_coding ? "Accept-Encoding" : NULL,
+                                reply->varies_by_type ? "Accept" : NULL, reply->cors ? "Origin" : NULL};
+    snprintf(out->number, sizeof out->number, "%d", reply->retry_after_s);
+    snprintf(out->tag, sizeof out->tag, "\"%s\"", reply->tag);
+    out->vary[0] = '\0';
+    for (size_t i = 0, used = 0; i < sizeof vary / sizeof vary[0]; i++)
+        if (vary[i])
+            used += (size_t)snprintf(out->vary + used, sizeof out->vary - used, "%s%s", used ? ", " : "", vary[i]);
+}
+
+/* What a page of another origin may do and see (WHATWG Fetch, CORS protocol). */
+static size_t list_cors(field *out, const http_reply *reply)
 {
     size_t n = 0;
-    snprintf(number, 16, "%d", reply->retry_after_s);
+    if (!reply->cors_origin)
+        return 0;
+    out[n++] = (field){"Access-Control-Allow-Origin", reply->cors_origin};
+    if (!reply->preflight) {
+        out[n++] =
+            (field){"Access-Control-Expose-Headers", "Content-Range, ETag, Location, Preference-Applied, Retry-After"};
+        return n;
+    }
+    out[n++] = (field){"Access-Control-Allow-Methods", reply->allow};
+    out[n++] = (field){"Access-Control-Allow-Headers",
+                       "Authorization, Content-Encoding, Content-Type, Idempotency-Key, If-None-Match, If-Range, "
+                       "Last-Event-ID, Prefer, Range"};
+    out[n++] = (field){"Access-Control-Max-Age", "600"};
+    return n;
+}
+
+/* The header fields of a reply. */
+static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, field_texts *texts)
+{
+    size_t n = 0;
+    write_texts(texts, reply);
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
     out[n++] = (field){"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"};
-    out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache" : "no-store"};
-    if (reply->body)
+    out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache"
+                                        : reply->tag[0]  ? "private, no-cache"
+                                                         : "no-store"};
+    if (reply->tag[0])
+        out[n++] = (field){"ETag", texts->tag};
+    if (texts->vary[0])
+        out[n++] = (field){"Vary", texts->vary};
+    if (reply->takes_ranges)
+        out[n++] = (field){"Accept-Ranges", "bytes"};
+    if (reply->content_range[0])
+        out[n++] = (field){"Content-Range", reply->content_range};
+    if (reply->gzip)
+        out[n++] = (field){"Content-Encoding", "gzip"};
+    if (reply->body || reply->has_file || reply->source.read)
         out[n++] = (field){"Content-Type", reply->type};
     if (reply->location[0])
         out[n++] = (field){"Location", reply->location};
@@ -98,27 +186,78 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
     if (reply->allow[0])
         out[n++] = (field){"Allow", reply->allow};
     if (reply->retry_after_s > 0)
-        out[n++] = (field){"Retry-After", number};
+        out[n++] = (field){"Retry-After", texts->number};
+    n += list_cors(out + n, reply);
     if (reply->close)
         out[n++] = (field){"Connection", "close"};
     return n;
 }
 
+static ssize_t read_source(void *ctx, uint64_t position, char *out, size_t size)
+{
+    const reply_source *source = ctx;
+    ptrdiff_t n = source->read(source->ctx, out, size);
+    (void)position;
+    return n == REPLY_STREAM_ENDS     ? MHD_CONTENT_READER_END_OF_STREAM
+           : n == REPLY_STREAM_BREAKS ? MHD_CONTENT_READER_END_WITH_ERROR
+                                      : (ssize_t)n;
+}
+
+static void free_source(void *ctx)
+{
+    reply_source *source = ctx;
+    source->free(source->ctx);
+    free(source);
+}
+
+#define STREAM_PIECE 16384 /* bytes asked for at once */
+
+static struct MHD_Response *make_stream(http_reply *reply)
+{
+    reply_source *source = malloc(sizeof *source);
+    if (!source)
+        return NULL;
+    *source = reply->source;
+    struct MHD_Response *response =
+        MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, STREAM_PIECE, read_source, source, free_source);
+    if (response)
+        reply->source.read = NULL;
+    else
+        free(source);
+    return response;
+}
+
+/* Owns what the body was. */
+static struct MHD_Response *make_response(http_reply *reply)
+{
+    struct MHD_Response *response;
+    if (reply->has_file) {
+        response = MHD_create_response_from_fd_at_offset64(reply->len, reply->fd, reply->offset);
+        reply->has_file = !response;
+        return response;
+    }
+    if (reply->source.read)
+        return make_stream(reply);
+    bool copy_is_needed = reply->body_is_static || !reply->body;
+    response = MHD_create_response_from_buffer(reply->len, reply->body,
+                                               copy_is_needed ? MHD_RESPMEM_PERSISTENT : MHD_RESPMEM_MUST_FREE);
+    if (response)
+        reply->body = NULL;
+    return response;
+}
+
 bool reply_send(struct MHD_Connection *connection, http_reply *reply)
 {
     field fields[MAX_FIELDS];
-    char number[16];
+    field_texts texts;
     bool sent = false;
-    bool copy_is_needed = reply->body_is_static || !reply->body;
-    struct MHD_Response *response = MHD_create_response_from_buffer(
-        reply->len, reply->body, copy_is_needed ? MHD_RESPMEM_PERSISTENT : MHD_RESPMEM_MUST_FREE);
+    size_t n = list_fields(fields, reply, &texts);
+    struct MHD_Response *response = make_response(reply);
     if (!response)
         goto done;
-    size_t n = list_fields(fields, reply, number);
     bool complete = true;
     for (size_t i = 0; i < n; i++)
         complete = complete && MHD_add_response_header(response, fields[i].name, fields[i].value) == MHD_YES;
-    reply->body = NULL; /* the response owns it */
     sent = complete && MHD_queue_response(connection, (unsigned)reply->status, response) == MHD_YES;
     MHD_destroy_response(response);
 done:
@@ -126,16 +265,29 @@ done:
     return sent;
 }
 
+/* What libmicrohttpd adds to the replies that it sends (RFC 9110, section 6.6.1). */
+static void put_date(FILE *out)
+{
+    static const char DAYS[] = "SunMonTueWedThuFriSat", MONTHS[] = "JanFebMarAprMayJunJulAugSepOctNovDec";
+    struct tm t;
+    time_t now = time(NULL);
+    if (gmtime_r(&now, &t))
+        fprintf(out, "Date: %.3s, %02d %.3s %04d %02d:%02d:%02d GMT\r\n", DAYS + 3 * t.tm_wday, t.tm_mday,
+                MONTHS + 3 * t.tm_mon, t.tm_year + 1900, t.tm_hour, t.tm_min, t.tm_sec);
+}
+
 char *reply_message(const http_reply *reply)
 {
     field fields[MAX_FIELDS];
-    char number[16], *text = NULL;
+    field_texts texts;
+    char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (!out)
         return NULL;
-    size_t n = list_fields(fields, reply, number);
+    size_t n = list_fields(fields, reply, &texts);
     fprintf(out, "HTTP/1.1 %d %s\r\n", reply->status, MHD_get_reason_phrase_for((unsigned)reply->status));
+    put_date(out);
     for (size_t i = 0; i < n; i++)
         fprintf(out, "%s: %s\r\n", fields[i].name, fields[i].value);
     fprintf(out, "Content-Length: %zu\r\n\r\n%.*s", reply->len, (int)reply->len, reply->body ? reply->body : "");

@@ -7,22 +7,53 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+/* A body that comes piece by piece. read blocks until it has written 1 to `size` bytes, and returns how many, or that
+ * there are no more, or that there are no more although there should be. It is called in the connection's thread. */
+enum { REPLY_STREAM_ENDS = -1, REPLY_STREAM_BREAKS = -2 };
+typedef struct {
+    ptrdiff_t (*read)(void *ctx, char *out, size_t size);
+    void (*free)(void *ctx);
+    void *ctx;
+} reply_source;
+
+#define REPLY_TAG 48 /* room for an entity tag without its quotes, in any coding, and a NUL */
+
 typedef struct {
     int status;
     const char *type; /* media type of body */
     char *body;       /* malloc'ed unless body_is_static */
     size_t len;
     bool body_is_static;
-    bool cacheable;    /* the same for everybody until the daemon is replaced */
-    bool close;        /* the connection ends with this reply */
-    int retry_after_s; /* 0: none */
-    char location[64], preference_applied[32], allow[64];
+    bool cacheable;      /* the same for everybody until the daemon is replaced */
+    bool close;          /* the connection ends with this reply */
+    int retry_after_s;   /* 0: none */
+    char tag[REPLY_TAG]; /* names the representation, "": no name */
+    bool tag_by_body;    /* the name follows from the body: negotiate makes it */
+    bool takes_ranges;   /* a part of it may be asked for */
+    bool varies_by_coding, varies_by_type;
+    bool gzip; /* body is compressed */
+    char content_range[80];
+    const char *cors_origin; /* a page of this origin may read the reply; NULL: none; lives as long as the server */
+    bool cors, preflight;    /* replies depend on the origin; this one says what may be asked */
+    bool has_file;           /* the body is the file fd, len bytes of it from offset on; body is NULL */
+    int fd;
+    size_t offset;
+    reply_source source; /* read NULL: none; then body is NULL */
+    char location[96], preference_applied[32], allow[64];
 } http_reply;
+
+void reply_drop_body(http_reply *reply);
+/* Takes ownership of body. */
+void reply_replace_body(http_reply *reply, char *body, size_t len);
 
 /* Takes ownership of text; NULL becomes a 500. */
 void reply_json(http_reply *reply, int status, char *text);
 void reply_text(http_reply *reply, int status, const char *type, char *text, size_t len);
 /* Keeps what stands in the other members (allow, retry_after_s, ...). */
+/* Takes ownership of fd. */
+void reply_file(http_reply *reply, int status, const char *type, int fd, size_t len);
+/* Takes ownership of source.ctx, also where it fails. */
+void reply_stream(http_reply *reply, int status, const char *type, reply_source source);
 void reply_problem(http_reply *reply, const problem_details *problem);
 void reply_refuse(http_reply *reply, int status, const char *code, const char *title, const char *format, ...)
     __attribute__((format(printf, 5, 6)));

@@ -118,6 +118,35 @@ bool request_accepts(const http_request *rq, const char *type)
     return false;
 }
 
+/* -1: the field does not name the coding, else whether it takes it. */
+static int field_takes(const header_field *field, const char *coding)
+{
+    const char *at = field->value, *end = at + field->value_len;
+    while (at < end) {
+        const char *next = member_end(at, end, ',');
+        const char *name = skip_space(at, next);
+        const char *name_end = trim_end(name, member_end(name, next, ';'));
+        if (token_equal(name, (size_t)(name_end - name), coding))
+            return !quality_is_zero(name, next);
+        at = next + (next < end);
+    }
+    return -1;
+}
+
+bool request_takes_gzip(const http_request *rq)
+{
+    static const char *const NAMES[] = {"gzip", "x-gzip", "*"}; /* the star is for those that are not named */
+    for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; k++)
+        for (size_t i = 0; i < rq->headers.count; i++) {
+            const header_field *field = &rq->headers.fields[i];
+            bool named = token_equal(field->name, field->name_len, "Accept-Encoding");
+            int takes = named ? field_takes(field, NAMES[k]) : -1;
+            if (takes >= 0)
+                return takes;
+        }
+    return false;
+}
+
 bool request_is_json(const http_request *rq)
 {
     size_t count;

@@ -7,8 +7,11 @@
 #include "http/target.h"
 #include "log.h"
 #include "store/store.h"
+#include "store/uploads.h"
+#include "work/webhook.h"
 #include "work/work.h"
 
+#include <pthread.h>
 #include <stdatomic.h>
 
 /* What handlers may use, the same for all requests. */
@@ -16,8 +19,15 @@ typedef struct {
     store *store;
     work *work;
     server_log *log;
-    struct field_slots *fields; /* turns of replies that are computed: fields.h */
+    struct field_slots *fields;   /* turns of replies that are computed: fields.h */
+    pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
+    const webhooks *webhooks;     /* NULL: there are none */
     double max_wait_s;
+    int64_t max_upload;      /* bytes, decompressed */
+    const char *const *cors; /* n_cors origins whose pages may use the service; "*": all */
+    size_t n_cors;
+    unsigned max_streams; /* event streams open at once */
+    atomic_uint streams;
     atomic_bool draining;
 } api;
 
@@ -27,10 +37,11 @@ typedef struct http_request {
     header_list headers;
     framing framing;
     const struct route *route;
-    char name[65]; /* what stood for {id} or {name} in the path */
-    char *body;    /* NUL-terminated; NULL when empty */
-    size_t body_len, body_capacity;
-    int fd; /* to see whether the client is still there */
+    char name[65];                  /* what stood for {id} or {name} in the path */
+    char *body;                     /* NUL-terminated; NULL when empty */
+    size_t body_len, body_capacity; /* body_len: as received, also of a body that is streamed */
+    upload_writer *upload;          /* where the body of a streamed route goes */
+    int fd;                         /* to see whether the client is still there */
     /* For the access log and the connection's bookkeeping. */
     char method[16];
     double started; /* on deadlines_now's clock */
@@ -47,6 +58,8 @@ typedef struct http_request {
 double request_wait(const http_request *rq, double otherwise, double max_wait_s);
 /* True if an Accept header field names the media type with a quality above 0, or a longer list does. */
 bool request_accepts(const http_request *rq, const char *type);
+/* True if Accept-Encoding names gzip, or all that it does not name, with a quality above 0. */
+bool request_takes_gzip(const http_request *rq);
 /* True if the body may be JSON: Content-Type absent, application/json or ...+json. */
 bool request_is_json(const http_request *rq);
 /* The client closed its end: an answer would reach nobody. */
@@ -62,9 +75,11 @@ typedef struct route {
     const char *method, *pattern;
     const char *const *parameters; /* known query keys, NULL-terminated */
     route_handler handler;
+    bool streamed; /* the body is bytes of any type that go to disk as they come */
 } route;
 
 /* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. */
+/* With rq->reply.cors, OPTIONS is answered on every path that there is. */
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem);
 /* 400 for a query key that the route does not know. */
 bool route_check_parameters(const http_request *rq, problem_details *problem);
@@ -78,6 +93,11 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply);
 void verify_submit(api *context, http_request *rq, http_reply *reply);
 void results_get(api *context, http_request *rq, http_reply *reply);
 void results_get_vtu(api *context, http_request *rq, http_reply *reply);
+void results_get_picture(api *context, http_request *rq, http_reply *reply);
+void uploads_create(api *context, http_request *rq, http_reply *reply);
+void uploads_get(api *context, http_request *rq, http_reply *reply);
+void uploads_delete(api *context, http_request *rq, http_reply *reply);
+void events_get(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);

@@ -2,8 +2,11 @@
 #include "codec/codec.h"
 #include "http/fields.h"
 #include "http/jobs.h"
+#include "http/negotiate.h"
 #include "http/problem.h"
 #include "http/request.h"
+#include "http/results.h"
+#include "options.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,22 +14,27 @@
 
 /* ------------------------------------------------------------------ result */
 
-/* What the store has, and what is computed from it. */
-#define STORED ((unsigned)(UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_DISPLACEMENTS | UZ_FIELD_PRESSURE))
-#define COMPUTED                                                                                                       \
-    ((unsigned)(UZ_FIELD_CONTACT_STATUS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES |                  \
-                UZ_FIELD_STRAIN | UZ_FIELD_STRESS_GAUSS))
 static const unsigned BY_DEFAULT = UZ_FIELD_REACTIONS | UZ_FIELD_GAPS;
 static const unsigned BY_ROW = UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_PRESSURE | UZ_FIELD_CONTACT_STATUS;
 static const unsigned BY_NODE =
     UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES | UZ_FIELD_STRAIN;
 
-static bool read_fields(const http_request *rq, field_list *out, unsigned otherwise, unsigned allowed,
-                        problem_details *problem)
+bool results_fields(const http_request *rq, field_list *out, unsigned otherwise, unsigned allowed,
+                    problem_details *problem)
 {
     const char *text = target_value(&rq->target, "fields");
     *out = (field_list){.which = otherwise};
     return !text || fields_parse(out, text, allowed, problem);
+}
+
+/* A part of every field: from, and how many. */
+static bool read_part(const http_request *rq, field_list *out, problem_details *problem)
+{
+    out->from = 0;
+    out->count = INT64_MAX;
+    out->part = target_value(&rq->target, "from") || target_value(&rq->target, "count");
+    return request_integer(rq, "from", 0, INT64_MAX, &out->from, problem) &&
+           request_integer(rq, "count", 0, INT64_MAX, &out->count, problem);
 }
 
 bool results_exist(const job *j, http_reply *reply)
@@ -118,27 +126,75 @@ static store_status fetch_shared(api *context, const job *j, const field_list *f
     return status;
 }
 
-/* computed: may be NULL. */
-static codec_result as_encoded(const place *at, const vectors *own, const vectors *shared, const uz_fields *computed)
+/* Leaves entries from .. from + count - 1 of *x, each of `size` numbers; *n numbers before and after. */
+static void cut(const double **x, int64_t *n, int64_t size, const field_list *fields)
 {
-    return (codec_result){.job_id = at->j->id,
-                          .summary = at->summary,
-                          .case_name = at->name,
-                          .dim = shared->dim && shared->n_dim == 1 ? (int)shared->dim[0] : 0,
-                          .m = own->reactions  ? own->n_reactions
-                               : own->gaps     ? own->n_gaps
-                               : own->pressure ? own->n_pressure
-                                               : shared->n_contact_nodes,
-                          .n_u = own->n_u,
-                          .n_nodes = shared->n_nodes,
-                          .reactions = own->reactions,
-                          .gaps = own->gaps,
-                          .pressure = own->pressure,
-                          .ray = own->ray,
-                          .fields = computed,
-                          .displacements = own->displacements,
-                          .nodes = shared->nodes,
-                          .contact_nodes = shared->contact_nodes};
+    int64_t entries = *n / size, lo = fields->from < entries ? fields->from : entries;
+    int64_t left = fields->count < entries - lo ? fields->count : entries - lo;
+    if (*x)
+        *x += lo * size;
+    *n = left * size;
+}
+
+static void cut_all(codec_result *r, const field_list *fields)
+{
+    const double **rows[] = {&r->gaps, &r->pressure, &r->ray, &r->contact_nodes, &r->reactions};
+    int64_t size = r->dim > 0 ? r->dim : 1, m = r->m;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        r->m = m;
+        cut(rows[i], &r->m, 1, fields);
+    }
+    cut(&r->displacements, &r->n_u, size, fields);
+    cut(&r->nodes, &r->n_nodes, size, fields);
+    r->part = true;
+    r->from = fields->from;
+}
+
+/* The same of what was computed: a view that owns nothing. Gauss points are told whole. */
+static uz_fields cut_computed(const uz_fields *computed, const field_list *fields)
+{
+    uz_fields view = *computed;
+    const int64_t k = view.components, m = view.m, nodes = view.n_nodes;
+    const struct {
+        double **x;
+        int64_t entries, size;
+    } LIST[] = {{&view.pressure, m, 1},      {&view.contact_status, m, 1}, {&view.stress, nodes, k},
+                {&view.principal, nodes, 3}, {&view.von_mises, nodes, 1},  {&view.strain, nodes, k}};
+    for (size_t i = 0; fields->part && i < sizeof LIST / sizeof LIST[0]; i++) {
+        const double *x = *LIST[i].x;
+        int64_t n = LIST[i].entries * LIST[i].size;
+        cut(&x, &n, LIST[i].size, fields);
+        *LIST[i].x = (double *)x;
+        *(LIST[i].entries == m && i < 2 ? &view.m : &view.n_nodes) = n / LIST[i].size;
+    }
+    return view;
+}
+
+/* computed: may be NULL. */
+static codec_result as_encoded(const place *at, const vectors *own, const vectors *shared, const uz_fields *computed,
+                               const field_list *fields)
+{
+    codec_result r = {.job_id = at->j->id,
+                      .summary = at->summary,
+                      .case_name = at->name,
+                      .dim = shared->dim && shared->n_dim == 1 ? (int)shared->dim[0] : 0,
+                      .m = own->reactions  ? own->n_reactions
+                           : own->gaps     ? own->n_gaps
+                           : own->pressure ? own->n_pressure
+                                           : shared->n_contact_nodes,
+                      .n_u = own->n_u,
+                      .n_nodes = shared->n_nodes,
+                      .reactions = own->reactions,
+                      .gaps = own->gaps,
+                      .pressure = own->pressure,
+                      .ray = own->ray,
+                      .fields = computed,
+                      .displacements = own->displacements,
+                      .nodes = shared->nodes,
+                      .contact_nodes = shared->contact_nodes};
+    if (fields->part)
+        cut_all(&r, fields);
+    return r;
 }
 
 /* Fields that the store does not have, of one case. False with a reply. */
@@ -164,7 +220,8 @@ static void encode_one(api *context, const place *at, const field_list *fields, 
     if (status == STORE_OK)
         status = fetch_own(context, at, fields, &own);
     if (status == STORE_OK) {
-        codec_result result = as_encoded(at, &own, &shared, computed);
+        const uz_fields part = cut_computed(computed ? computed : &(uz_fields){.dim = 0}, fields);
+        codec_result result = as_encoded(at, &own, &shared, computed ? &part : NULL, fields);
         char *text = codec_encode_result(&result, &len);
         reply_text(reply, 200, "application/json", text, len);
     } else {
@@ -199,7 +256,8 @@ static bool refuse_large(int64_t total, http_reply *reply)
 
 /* False with a 413, or a failure of the store. Numbers that are computed are counted with the first case of which they
  * are: `more`. */
-static bool check_room(api *context, const job *j, const field_list *fields, int64_t more, http_reply *reply)
+static bool check_room(api *context, const job *j, size_t cases, const field_list *fields, int64_t more,
+                       http_reply *reply)
 {
     int64_t total = more;
     for (unsigned bit = 1; bit <= STORED; bit <<= 1) {
@@ -211,7 +269,9 @@ static bool check_room(api *context, const job *j, const field_list *fields, int
             reply_store_failure(context, status, reply);
             return false;
         }
-        total += count;
+        /* an entry has at most 3 numbers */
+        int64_t most = fields->part && fields->count < MOST_NUMBERS ? 3 * (int64_t)cases * fields->count : count;
+        total += most < count ? most : count;
     }
     return total <= MOST_NUMBERS || refuse_large(total, reply);
 }
@@ -245,13 +305,15 @@ static bool add_case(many *of, size_t i, http_reply *reply)
     uz_fields computed = {.dim = 0};
     bool done = !which || fields_of_case(&computed, &of->reader, at.number, which, reply);
     if (done && which && i == 0)
-        done = check_room(of->context, of->j, of->fields, (int64_t)of->count * count_numbers(&computed), reply);
+        done =
+            check_room(of->context, of->j, of->count, of->fields, (int64_t)of->count * count_numbers(&computed), reply);
     store_status status = done ? fetch_own(of->context, &at, of->fields, &own) : STORE_OK;
     if (status != STORE_OK) {
         reply_store_failure(of->context, status, reply);
         done = false;
     }
-    codec_result one = as_encoded(&at, &own, &of->shared, &computed);
+    const uz_fields part = cut_computed(&computed, of->fields);
+    codec_result one = as_encoded(&at, &own, &of->shared, &part, of->fields);
     if (done)
         codec_results_add(of->all, &one);
     vectors_free(&own);
@@ -277,7 +339,7 @@ static void encode_cases(many *of, http_reply *reply)
     } else if (!add_cases(of, reply)) {
         codec_results_drop(of->all);
     } else {
-        codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL);
+        codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL, of->fields);
         char *text = codec_results_end(of->all, &rest, &len);
         reply_text(reply, 200, "application/json", text, len);
     }
@@ -297,10 +359,8 @@ static void reply_cases(many *of, const http_request *rq, http_reply *reply)
 
 /* ------------------------------------------------------------ which of them */
 
-/* The cases of the job, or the one that the query names; *count 0: the job has none and none is named. The caller frees
- * them. False with a 404, or a failure of the store. */
-static bool load_cases(api *context, const http_request *rq, const job *j, store_case **cases, size_t *count,
-                       http_reply *reply)
+bool results_cases(api *context, const http_request *rq, const job *j, store_case **cases, size_t *count,
+                   http_reply *reply)
 {
     const char *name = target_value(&rq->target, "case");
     store_status status = store_get_cases(context->store, j->id, name, cases, count);
@@ -328,15 +388,26 @@ static void reply_result(api *context, const http_request *rq, const job *j, con
 {
     store_case *cases = NULL;
     size_t count = 0;
-    if (!load_cases(context, rq, j, &cases, &count, reply))
+    if (!results_cases(context, rq, j, &cases, &count, reply))
         return;
     if (count == 0)
         reply_one(context, rq, &(place){.j = j, .summary = j->summary}, fields, reply);
     else if (target_value(&rq->target, "case"))
         reply_one(context, rq, &(place){j, cases[0].number, cases[0].name, cases[0].summary}, fields, reply);
-    else if (check_room(context, j, fields, 0, reply))
+    else if (check_room(context, j, count, fields, 0, reply))
         reply_cases(&(many){.context = context, .j = j, .cases = cases, .count = count, .fields = fields}, rq, reply);
     store_cases_free(cases, count);
+}
+
+bool results_known(const http_request *rq, const job *j, http_reply *reply)
+{
+    char finished[32];
+    snprintf(finished, sizeof finished, "%.6f", j->finished);
+    const char *const parts[] = {UZAWAD_VERSION, j->id, finished, rq->raw_target};
+    const size_t lens[] = {strlen(parts[0]), strlen(parts[1]), strlen(parts[2]), strlen(parts[3])};
+    tag_make(reply->tag, parts, lens, 4);
+    reply->takes_ranges = true;
+    return reply_unchanged(rq, reply);
 }
 
 void results_get(api *context, http_request *rq, http_reply *reply)
@@ -344,11 +415,11 @@ void results_get(api *context, http_request *rq, http_reply *reply)
     field_list fields;
     problem_details problem;
     job j = {0};
-    if (!read_fields(rq, &fields, BY_DEFAULT, STORED | COMPUTED, &problem)) {
+    if (!results_fields(rq, &fields, BY_DEFAULT, STORED | COMPUTED, &problem) || !read_part(rq, &fields, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply))
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply))
         reply_result(context, rq, &j, &fields, reply);
     job_clear(&j);
 }
@@ -357,57 +428,4 @@ void results_reply(api *context, const job *j, http_reply *reply)
 {
     const field_list fields = {.which = BY_DEFAULT};
     encode_one(context, &(place){.j = j, .summary = j->summary}, &fields, NULL, reply);
-}
-
-/* --------------------------------------------------------------------- vtu */
-
-static const unsigned IN_VTU = (STORED | COMPUTED | UZ_FIELD_MATERIALS) & ~(unsigned)UZ_FIELD_STRESS_GAUSS;
-static const unsigned VTU_BY_DEFAULT = UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_VON_MISES |
-                                       UZ_FIELD_PRESSURE | UZ_FIELD_GAPS | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_MATERIALS;
-
-static void refuse_all_cases(const store_case *cases, size_t count, http_reply *reply)
-{
-    problem_details problem;
-    http_problem(&problem, 400, "case_needed", "Each load case has a file of its own",
-                 "say which one with ?case=NAME.");
-    cases_list(&problem, cases, count);
-    reply_problem(reply, &problem);
-}
-
-static void write_vtu(api *context, const http_request *rq, const job *j, int64_t number, unsigned which,
-                      http_reply *reply)
-{
-    field_reader reader;
-    char *text = NULL;
-    size_t len = 0;
-    if (fields_open(&reader, context, rq, j, reply) && fields_vtu(&text, &len, &reader, number, which, reply))
-        reply_text(reply, 200, "application/xml", text, len);
-    fields_close(&reader);
-}
-
-static void reply_vtu(api *context, const http_request *rq, const job *j, unsigned which, http_reply *reply)
-{
-    store_case *cases = NULL;
-    size_t count = 0;
-    if (!load_cases(context, rq, j, &cases, &count, reply))
-        return;
-    if (count > 0 && !target_value(&rq->target, "case"))
-        refuse_all_cases(cases, count, reply);
-    else
-        write_vtu(context, rq, j, count > 0 ? cases[0].number : 0, which, reply);
-    store_cases_free(cases, count);
-}
-
-void results_get_vtu(api *context, http_request *rq, http_reply *reply)
-{
-    field_list fields;
-    problem_details problem;
-    job j = {0};
-    if (!read_fields(rq, &fields, VTU_BY_DEFAULT, IN_VTU, &problem)) {
-        reply_problem(reply, &problem);
-        return;
-    }
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply))
-        reply_vtu(context, rq, &j, fields.which, reply);
-    job_clear(&j);
 }

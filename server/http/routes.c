@@ -7,34 +7,43 @@
 
 static const char *const NONE[] = {NULL};
 static const char *const SUBMIT[] = {"validate", NULL};
-static const char *const LIST[] = {"status", "limit", "cursor", "tag", NULL};
-static const char *const RESULT[] = {"fields", "case", NULL};
+static const char *const LIST[] = {"status", "limit", "cursor", "tag", "since", "until", "order", NULL};
+static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
+static const char *const FILE_OF[] = {"fields", "case", NULL};
+static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};
 
 static const route ROUTES[] = {
-    {"POST", "/v1/jobs", SUBMIT, jobs_submit},
-    {"GET", "/v1/jobs", LIST, jobs_list},
-    {"GET", "/v1/jobs/{id}", NONE, jobs_get},
-    {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete},
-    {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine},
-    {"GET", "/v1/jobs/{id}/result", RESULT, results_get},
-    {"GET", "/v1/jobs/{id}/result.vtu", RESULT, results_get_vtu},
-    {"GET", "/v1/jobs/{id}/history", HISTORY, history_get},
-    {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv},
-    {"POST", "/v1/verify", NONE, verify_submit},
-    {"GET", "/v1/factors", NONE, service_factors},
-    {"GET", "/healthz", NONE, service_health},
-    {"GET", "/readyz", NONE, service_ready},
-    {"GET", "/openapi.json", NONE, service_openapi},
-    {"GET", "/schemas/{name}", NONE, service_schema},
+    {"POST", "/v1/jobs", SUBMIT, jobs_submit, false},
+    {"GET", "/v1/jobs", LIST, jobs_list, false},
+    {"GET", "/v1/jobs/{id}", NONE, jobs_get, false},
+    {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete, false},
+    {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine, false},
+    {"GET", "/v1/jobs/{id}/result", RESULT, results_get, false},
+    {"GET", "/v1/jobs/{id}/result.vtu", FILE_OF, results_get_vtu, false},
+    {"GET", "/v1/jobs/{id}/deformed.svg", PICTURE, results_get_picture, false},
+    {"GET", "/v1/jobs/{id}/events", NONE, events_get, false},
+    {"GET", "/v1/jobs/{id}/history", HISTORY, history_get, false},
+    {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv, false},
+    {"POST", "/v1/verify", NONE, verify_submit, false},
+    {"POST", "/v1/uploads", NONE, uploads_create, true},
+    {"GET", "/v1/uploads/{digest}", NONE, uploads_get, false},
+    {"DELETE", "/v1/uploads/{digest}", NONE, uploads_delete, false},
+    {"GET", "/v1/factors", NONE, service_factors, false},
+    {"GET", "/healthz", NONE, service_health, false},
+    {"GET", "/readyz", NONE, service_ready, false},
+    {"GET", "/openapi.json", NONE, service_openapi, false},
+    {"GET", "/schemas/{name}", NONE, service_schema, false},
 };
 static const size_t N_ROUTES = sizeof ROUTES / sizeof ROUTES[0];
 
-/* {id}: 32 hexadecimal digits in lower case. {name}: a file name. */
+/* {id}: 32 hexadecimal digits in lower case. {digest}: 64 of them. {name}: a file name. */
 static bool placeholder_matches(const char *kind, const char *text, size_t len)
 {
     if (strncmp(kind, "{id}", 4) == 0)
         return len == 32 && strspn(text, "0123456789abcdef") >= 32;
+    if (strncmp(kind, "{digest}", 8) == 0)
+        return len == 64 && strspn(text, "0123456789abcdef") >= 64;
     return len > 0 && len < sizeof((http_request *)0)->name;
 }
 
@@ -62,6 +71,15 @@ static void allow_also(char *allow, size_t size, const char *method)
     snprintf(allow + len, size - len, "%s%s%s", len ? ", " : "", method, strcmp(method, "GET") == 0 ? ", HEAD" : "");
 }
 
+static void answer_options(api *context, http_request *rq, http_reply *reply)
+{
+    (void)context;
+    (void)rq;
+    reply->status = 204; /* the header fields say it all */
+    reply->preflight = true;
+}
+static const route OPTIONS = {"OPTIONS", "every path", NONE, answer_options, false};
+
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem)
 {
     const char *method = strcmp(rq->method, "HEAD") == 0 ? "GET" : rq->method;
@@ -71,9 +89,15 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
             continue;
         if (strcmp(ROUTES[i].method, method) == 0) {
             rq->route = &ROUTES[i];
+            allow[0] = '\0';
             return true;
         }
         allow_also(allow, size, ROUTES[i].method);
+    }
+    if (allow[0] && rq->reply.cors && strcmp(method, "OPTIONS") == 0) {
+        allow_also(allow, size, method);
+        rq->route = &OPTIONS;
+        return true;
     }
     if (allow[0])
         return http_problem(problem, 405, "method_not_allowed", "The method is not allowed here",

@@ -60,6 +60,7 @@ static bool reply_embedded(const char *name, const char *type, http_reply *reply
         reply->len = file.len;
         reply->body_is_static = true;
         reply->cacheable = true;
+        reply->tag_by_body = true;
         return true;
     }
     reply_refuse(reply, 404, "not_found", "Not found", "there is no schema of this name: /openapi.json refers to all");

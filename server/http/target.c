@@ -62,7 +62,7 @@ static bool add_parameter(target *out, char *pair, problem_details *problem)
     if (!percent_decode(pair, true) || !percent_decode(value, true))
         return http_problem(problem, 400, "bad_target", "The request target is malformed",
                             "the query has a '%%' that is not followed by two hexadecimal digits other than 00");
-    if (target_value(out, pair))
+    if (target_value(out, pair) && strcmp(pair, TARGET_REPEATABLE) != 0)
         return http_problem(problem, 400, "repeated_parameter", "A query parameter is given twice",
                             "\"%.100s\" occurs more than once in the query", pair);
     if (out->count == TARGET_MAX_PARAMETERS)

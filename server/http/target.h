@@ -9,6 +9,7 @@
 #include <stddef.h>
 
 #define TARGET_MAX_PARAMETERS 16
+#define TARGET_REPEATABLE     "tag" /* the only key that may come more than once */
 
 typedef struct {
     char *text;       /* owns what the others point into */

@@ -31,20 +31,18 @@ void verify_submit(api *context, http_request *rq, http_reply *reply)
     problem_details problem = {0};
     codec_request request = {0};
     job j = {0};
-    char *key = NULL, *tags = NULL;
+    char *key = NULL;
     if (!jobs_read_key(rq, &key, &problem) ||
-        !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, &problem)) {
+        !codec_decode_with(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem)) {
         reply_problem(reply, &problem);
         goto done;
     }
-    tags = request.tags;
-    request.tags = NULL;
-    codec_request_clear(&request);
-    store_request stored = {rq->body, rq->body_len, tags, key, NULL};
+    codec_request_strip(&request);
+    store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
     if (jobs_store(context, rq, &stored, &j, reply) && jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
         reply_end(context, &j, reply);
 done:
     job_clear(&j);
-    free(tags);
+    codec_request_clear(&request);
     free(key);
 }

@@ -6,7 +6,20 @@
 #include <string.h>
 
 #define BUSY_TIMEOUT_MS 5000
-#define JOB_COLUMNS     "id, status, progress, attempts, created, started, finished, tags, summary, error, refines"
+#define JOB_COLUMNS                                                                                                    \
+    "id, status, progress, attempts, created, started, finished, tags, summary, error, refines, priority"
+
+/* Filters of every listing: time, further tags, and a bound on ids that the time implies (they begin with it). */
+#define LIST_FILTER                                                                                                    \
+    " AND job.id >= ?10 AND created >= ?5 AND created < ?6"                                                            \
+    " AND (?7 IS NULL OR EXISTS (SELECT 1 FROM tag AS t WHERE t.tag = ?7 AND t.job = job.id))"                         \
+    " AND (?8 IS NULL OR EXISTS (SELECT 1 FROM tag AS t WHERE t.tag = ?8 AND t.job = job.id))"                         \
+    " AND (?9 IS NULL OR EXISTS (SELECT 1 FROM tag AS t WHERE t.tag = ?9 AND t.job = job.id)) "
+#define LIST(status, than, order)                                                                                      \
+    "SELECT " JOB_COLUMNS " FROM job WHERE id " than " ?1 " status LIST_FILTER "ORDER BY id " order " LIMIT ?2"
+#define LIST_TAG(status, than, order)                                                                                  \
+    "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job WHERE tag.tag = ?4 AND tag.job " than          \
+    " ?1 " status LIST_FILTER "ORDER BY tag.job " order " LIMIT ?2"
 
 static const char *const SQL[QUERY_COUNT] = {
     [QUERY_BEGIN] = "BEGIN IMMEDIATE",
@@ -15,13 +28,14 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_NEWEST_ID] = "SELECT max(id) FROM job",
     [QUERY_FIND_KEY] = "SELECT " JOB_COLUMNS ", length(body) = ?2 AND body = ?3"
                        " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",
-    [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key, refines)"
-                         " VALUES(?1, 0, ?2, ?3, ?4, ?5)",
+    [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key, refines, priority, queue_until,"
+                         " bytes) VALUES(?1, 0, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
     [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body) VALUES(?1, ?2)",
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
     [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, owner = ?2,"
-                    " lease = ?1 + ?3 WHERE id = (SELECT id FROM job WHERE status = 0 ORDER BY id LIMIT 1)"
+                    " lease = ?1 + ?3 WHERE id = (SELECT id FROM job WHERE status = 0"
+                    " AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
                     " RETURNING " JOB_COLUMNS,
     [QUERY_BODY] = "SELECT body FROM request WHERE job = ?1",
     [QUERY_RENEW] = "UPDATE job SET lease = ?3, progress = ?4 WHERE id = ?1 AND status = 1 AND owner = ?2",
@@ -34,20 +48,37 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, part, version, columns, last, data, answer)"
                              " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)",
     [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - 1, progress = 0, started = 0, owner = NULL,"
-                      " lease = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
+                      " lease = 0, queue_until = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_RECOVER_FAIL] = "UPDATE job SET status = 3, finished = ?2, error = ?3, owner = NULL, lease = 0"
                            " WHERE status = 1 AND attempts >= ?1",
-    [QUERY_RECOVER_REQUEUE] = "UPDATE job SET status = 0, progress = 0, started = 0, owner = NULL, lease = 0"
-                              " WHERE status = 1",
+    [QUERY_RECOVER_REQUEUE] = "UPDATE job SET status = 0, progress = 0, started = 0, owner = NULL, lease = 0,"
+                              " queue_until = 0 WHERE status = 1",
     [QUERY_DISMISS] = "UPDATE job SET status = 4, finished = ?2 WHERE id = ?1 AND status = 0",
     [QUERY_DELETE] = "DELETE FROM job WHERE id = ?1",
     [QUERY_JOB] = "SELECT " JOB_COLUMNS " FROM job WHERE id = ?1",
-    [QUERY_LIST] = "SELECT " JOB_COLUMNS " FROM job WHERE id < ?1 ORDER BY id DESC LIMIT ?2",
-    [QUERY_LIST_STATUS] = "SELECT " JOB_COLUMNS " FROM job WHERE id < ?1 AND status = ?3 ORDER BY id DESC LIMIT ?2",
-    [QUERY_LIST_TAG] = "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job"
-                       " WHERE tag.tag = ?4 AND tag.job < ?1 ORDER BY tag.job DESC LIMIT ?2",
-    [QUERY_LIST_TAG_STATUS] = "SELECT " JOB_COLUMNS " FROM tag CROSS JOIN job ON job.id = tag.job"
-                              " WHERE tag.tag = ?4 AND tag.job < ?1 AND status = ?3 ORDER BY tag.job DESC LIMIT ?2",
+    [QUERY_LIST] = LIST("", "<", "DESC"),
+    [QUERY_LIST_STATUS] = LIST("AND status = ?3", "<", "DESC"),
+    [QUERY_LIST_TAG] = LIST_TAG("", "<", "DESC"),
+    [QUERY_LIST_TAG_STATUS] = LIST_TAG("AND status = ?3", "<", "DESC"),
+    [QUERY_OLDEST] = LIST("", ">", "ASC"),
+    [QUERY_OLDEST_STATUS] = LIST("AND status = ?3", ">", "ASC"),
+    [QUERY_OLDEST_TAG] = LIST_TAG("", ">", "ASC"),
+    [QUERY_OLDEST_TAG_STATUS] = LIST_TAG("AND status = ?3", ">", "ASC"),
+    [QUERY_INSERT_WEBHOOK] = "INSERT INTO webhook(job, url) VALUES(?1, ?2)",
+    [QUERY_WEBHOOK_NEXT] =
+        "SELECT job, url, attempts FROM webhook WHERE state = 1 AND next <= ?1 ORDER BY next LIMIT 1",
+    [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?2, next = ?3, attempts = attempts + 1 WHERE job = ?1",
+    [QUERY_WAITING] = "SELECT count(*) FROM job WHERE status = 0",
+    [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job WHERE status = 0 AND queue_until > 0 AND queue_until < ?1 LIMIT 1",
+    [QUERY_EXPIRE] = "UPDATE job SET status = 3, finished = ?1, error = ?2"
+                     " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1",
+    [QUERY_ADD_BYTES] = "UPDATE job SET bytes = bytes"
+                        " + coalesce((SELECT sum(length(data)) FROM vector WHERE job = id), 0)"
+                        " + coalesce((SELECT sum(length(data)) FROM history WHERE job = id), 0) WHERE id = ?1",
+    [QUERY_ENDED] = "SELECT count(*), coalesce(sum(bytes), 0) FROM job INDEXED BY job_by_end WHERE status >= 2",
+    [QUERY_OLD_JOBS] = "SELECT id, finished, bytes FROM job INDEXED BY job_by_end WHERE status >= 2"
+                       " AND NOT EXISTS (SELECT 1 FROM webhook WHERE job = id AND state = 1)"
+                       " ORDER BY finished, id LIMIT ?1",
     [QUERY_VECTOR] = "SELECT version, count, data FROM vector WHERE job = ?1 AND answer = ?3 AND name = ?2"
                      " ORDER BY part",
     [QUERY_COUNT_VECTORS] = "SELECT coalesce(sum(count), 0) FROM vector WHERE job = ?1 AND name = ?2 AND part = 0",
@@ -57,6 +88,16 @@ static const char *const SQL[QUERY_COUNT] = {
                       " AND answer = ?3"
                       " ORDER BY part",
     [QUERY_COUNTS] = "SELECT status, count(*) FROM job GROUP BY status",
+    [QUERY_UPLOAD] = "SELECT bytes, created, used, (SELECT count(*) FROM upload_use WHERE upload = id) FROM upload"
+                     " WHERE id = ?1",
+    [QUERY_INSERT_UPLOAD] = "INSERT OR IGNORE INTO upload(id, bytes, created, used) VALUES(?1, ?2, ?3, ?3)",
+    [QUERY_TOUCH_UPLOAD] = "UPDATE upload SET used = ?2 WHERE id = ?1",
+    [QUERY_USE_UPLOAD] = "INSERT OR IGNORE INTO upload_use(upload, job) VALUES(?1, ?2)",
+    [QUERY_DELETE_UPLOAD] = "DELETE FROM upload WHERE id = ?1"
+                            " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = ?1)",
+    [QUERY_IDLE_UPLOAD] = "SELECT id, bytes FROM upload WHERE used < ?1"
+                          " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = id) ORDER BY used LIMIT 1",
+    [QUERY_UPLOAD_BYTES] = "SELECT coalesce(sum(bytes), 0) FROM upload",
 };
 
 /* Settings of every connection. secure_delete FAST: freed pages are not rewritten only to blank them. */

@@ -15,7 +15,9 @@
  *     the reader keeps every number it ever wrote.
  *
  * job      what a listing needs, in small rows. Times are Unix seconds, 0: not yet. lease is when the owner's claim
- * ends. refines is the job whose run this one continues, which may be gone.
+ * ends. refines is the job whose run this one continues, which may be gone. priority:
+ * larger ones run first. queue_until: it fails if it has not begun by then, 0: never. bytes: of its request and its
+ * results once it has ended.
  * request  the body as it was sent; in its own table, so that a listing never reads past it.
  * tag      one row for each tag of a job, so that a filter by tag is a range of an index.
  * answer   one row for each load case of an ended job, numbered from 1 in the order of the request.
@@ -23,6 +25,10 @@
  *          answer is the number of its load case; 0: of the job, or of all its cases.
  * history  rows of a convergence history, in parts, by answer like vector; last is the iteration of the part's last
  *          row, so that a reader who has seen some rows skips whole parts.
+ * upload   texts in files beside this one (uploads.h), by the digest of their bytes.
+ * upload_use which jobs name which uploads in their requests.
+ * webhook  whom to tell of the end of a job. state 0: it has not ended, 1: to be told at `next`, 2: told, 3: given up.
+ *          A trigger makes it due, whatever ends the job.
  * Deleting a job deletes its rows in every other table. */
 #define RESULT_TABLES                                                                                                  \
     "CREATE TABLE answer("                                                                                             \
@@ -42,6 +48,29 @@
     "  columns INTEGER NOT NULL, last REAL NOT NULL, data BLOB NOT NULL,"                                              \
     "  PRIMARY KEY(job, answer, part)"                                                                                 \
     ") STRICT;"
+/* Version 3. Jobs that wait are few among those that have ended, so their indexes hold no others. */
+#define JOB_INDEXES_3                                                                                                  \
+    "CREATE INDEX job_by_turn ON job(priority DESC, id) WHERE status = 0;"                                             \
+    "CREATE INDEX job_by_queue_until ON job(queue_until) WHERE status = 0 AND queue_until > 0;"                        \
+    "CREATE INDEX job_by_end ON job(finished, id, bytes) WHERE status >= 2;"
+#define TABLES_3                                                                                                       \
+    "CREATE TABLE upload("                                                                                             \
+    "  id TEXT PRIMARY KEY NOT NULL, bytes INTEGER NOT NULL, created REAL NOT NULL, used REAL NOT NULL"                \
+    ") STRICT, WITHOUT ROWID;"                                                                                         \
+    "CREATE INDEX upload_by_use ON upload(used);"                                                                      \
+    "CREATE TABLE upload_use("                                                                                         \
+    "  upload TEXT NOT NULL REFERENCES upload(id), job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"            \
+    "  PRIMARY KEY(upload, job)"                                                                                       \
+    ") STRICT, WITHOUT ROWID;"                                                                                         \
+    "CREATE INDEX upload_use_by_job ON upload_use(job);"                                                               \
+    "CREATE TABLE webhook("                                                                                            \
+    "  job TEXT PRIMARY KEY NOT NULL REFERENCES job(id) ON DELETE CASCADE, url TEXT NOT NULL,"                         \
+    "  state INTEGER NOT NULL DEFAULT 0 CHECK(state BETWEEN 0 AND 3), attempts INTEGER NOT NULL DEFAULT 0,"            \
+    "  next REAL NOT NULL DEFAULT 0"                                                                                   \
+    ") STRICT, WITHOUT ROWID;"                                                                                         \
+    "CREATE INDEX webhook_due ON webhook(next) WHERE state = 1;"                                                       \
+    "CREATE TRIGGER webhook_falls_due AFTER UPDATE OF status ON job WHEN new.status >= 2 AND old.status < 2 BEGIN"     \
+    "  UPDATE webhook SET state = 1, next = new.finished WHERE job = new.id; END;"
 static const char *const SCHEMA =
     "CREATE TABLE job("
     "  id TEXT PRIMARY KEY NOT NULL,"
@@ -52,7 +81,8 @@ static const char *const SCHEMA =
     "  owner TEXT, lease REAL NOT NULL DEFAULT 0,"
     "  tags TEXT NOT NULL, summary TEXT, error TEXT,"
     "  idempotency_key TEXT UNIQUE,"
-    "  refines TEXT"
+    "  refines TEXT,"
+    "  priority INTEGER NOT NULL DEFAULT 0, queue_until REAL NOT NULL DEFAULT 0, bytes INTEGER NOT NULL DEFAULT 0"
     ") STRICT;"
     "CREATE INDEX job_by_status ON job(status, id);"
     "CREATE TABLE request("
@@ -63,7 +93,7 @@ static const char *const SCHEMA =
     "  tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
-    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES;
+    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -76,7 +106,8 @@ const char *file_format_why_unreadable(sqlite3 *db)
 }
 
 /* STEPS[n] turns version n into n + 1. Version 2: load cases, and jobs that refine others. The primary keys of the
- * result tables grew by a column, which SQLite can only do by copying the rows. */
+ * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
+ * and the size of jobs. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -86,6 +117,12 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
           "INSERT INTO history(job, answer, part, version, columns, last, data)"
           " SELECT job, 0, part, version, columns, last, data FROM history_1;"
           "DROP TABLE vector_1; DROP TABLE history_1;",
+    [2] = "ALTER TABLE job ADD COLUMN priority INTEGER NOT NULL DEFAULT 0;"
+          "ALTER TABLE job ADD COLUMN queue_until REAL NOT NULL DEFAULT 0;"
+          "ALTER TABLE job ADD COLUMN bytes INTEGER NOT NULL DEFAULT 0;" TABLES_3 JOB_INDEXES_3
+          "UPDATE job SET bytes = coalesce((SELECT length(body) FROM request WHERE job = id), 0)"
+          " + coalesce((SELECT sum(length(data)) FROM vector WHERE job = id), 0)"
+          " + coalesce((SELECT sum(length(data)) FROM history WHERE job = id), 0) WHERE status >= 2;",
 };
 
 /* The single integer that `sql` yields; false on any error. */

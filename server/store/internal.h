@@ -4,17 +4,20 @@
 
 #include "store/connection.h"
 #include "store/store.h"
+#include "store/uploads.h"
 
 #include <pthread.h>
 
 #define STORE_READERS 4
 
-/* Lock order: none of these is taken while another is held, except message under writer_lock. */
+/* Lock order: none of these is taken while another is held, except message under writer_lock, and any under
+ * upload_lock. */
 struct store {
-    pthread_mutex_t writer_lock; /* writer, last_ms, sequence */
+    pthread_mutex_t writer_lock; /* writer, last_ms, sequence, max_queue */
     connection writer;           /* the only one that writes and checkpoints */
     uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
     unsigned sequence;
+    int64_t max_queue; /* 0: no limit */
 
     pthread_mutex_t readers_lock; /* readers_free */
     pthread_cond_t reader_free;
@@ -24,6 +27,12 @@ struct store {
 
     pthread_mutex_t message_lock; /* message */
     char message[256];
+    pthread_mutex_t upload_lock; /* everything down to uploads_pending, and the files of uploads with their rows */
+    upload_limits upload_limits;
+    int64_t uploads_bytes;   /* of all that have rows */
+    int64_t uploads_pending; /* of those that are being written */
+    char *uploads_folder;    /* absolute; made with the first upload */
+
     int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
 };
 
@@ -35,6 +44,9 @@ store_status store_write(store *s, store_change change, void *args);
 /* A reader for the calling thread alone, until it is given back with how the read ended, which is returned. */
 connection *store_take_reader(store *s);
 store_status store_give_reader(store *s, connection *c, store_status status);
+
+/* Counts the uploads and removes what a crash left of one. False: the rows can't be read (writer.message). */
+bool store_open_uploads(store *s);
 
 /* The next id, 32 hex digits: 12 of milliseconds, 4 of a counter within them, 16 random. Under writer_lock. */
 void store_next_id(store *s, char id[33]);

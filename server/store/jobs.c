@@ -72,7 +72,7 @@ static store_status find_key(connection *c, submit_args *a)
     bind_integer(&st, 2, (int64_t)a->request->body_len);
     bind_blob(&st, 3, a->request->body, a->request->body_len);
     if (statement_row(&st))
-        status = sqlite3_column_int(st.stmt, 11) ? store_read_job(&st, a->out) : STORE_CONFLICT;
+        status = sqlite3_column_int(st.stmt, 12) ? store_read_job(&st, a->out) : STORE_CONFLICT;
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
 }
@@ -80,12 +80,16 @@ static store_status find_key(connection *c, submit_args *a)
 static store_status insert_job(connection *c, const store_request *r, const char *id)
 {
     const char *tags = r->tags ? r->tags : "[]";
+    double now = store_now();
     statement st = statement_begin(c, QUERY_INSERT_JOB);
     bind_text(&st, 1, id);
-    bind_real(&st, 2, store_now());
+    bind_real(&st, 2, now);
     bind_text(&st, 3, tags);
     bind_text(&st, 4, r->idempotency_key);
     bind_text(&st, 5, r->refines);
+    bind_integer(&st, 6, r->priority);
+    bind_real(&st, 7, r->queue_limit_s > 0 ? now + r->queue_limit_s : 0);
+    bind_integer(&st, 8, (int64_t)r->body_len);
     store_status status = statement_run(&st);
     if (status != STORE_OK)
         return status;
@@ -101,6 +105,36 @@ static store_status insert_job(connection *c, const store_request *r, const char
     return statement_run(&st);
 }
 
+/* STORE_NOT_FOUND where one is not there. */
+static store_status use_uploads(connection *c, const store_request *r, const char *id)
+{
+    store_status status = STORE_OK;
+    for (size_t i = 0; i < r->n_uploads && status == STORE_OK; i++) {
+        statement st = statement_begin(c, QUERY_TOUCH_UPLOAD);
+        bind_text(&st, 1, r->uploads[i]);
+        bind_real(&st, 2, store_now());
+        status = statement_run(&st);
+        if (status == STORE_OK && connection_changes(c) == 0)
+            return STORE_NOT_FOUND;
+        st = statement_begin(c, QUERY_USE_UPLOAD);
+        bind_text(&st, 1, r->uploads[i]);
+        bind_text(&st, 2, id);
+        if (status == STORE_OK)
+            status = statement_run(&st);
+        else
+            statement_end(&st);
+    }
+    return status;
+}
+
+static store_status insert_webhook(connection *c, const char *id, const char *url)
+{
+    statement st = statement_begin(c, QUERY_INSERT_WEBHOOK);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, url);
+    return statement_run(&st);
+}
+
 static store_status read_by_id(connection *c, const char *id, job *out)
 {
     store_status status = STORE_NOT_FOUND;
@@ -110,6 +144,25 @@ static store_status read_by_id(connection *c, const char *id, job *out)
         status = store_read_job(&st, out);
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
+}
+
+static store_status check_queue(store *s, connection *c)
+{
+    int64_t waiting = 0;
+    if (s->max_queue <= 0)
+        return STORE_OK;
+    statement st = statement_begin(c, QUERY_WAITING);
+    if (statement_row(&st))
+        waiting = sqlite3_column_int64(st.stmt, 0);
+    store_status status = statement_end(&st);
+    return status == STORE_OK && waiting >= s->max_queue ? STORE_BUSY : status;
+}
+
+void store_limit_queue(store *s, int64_t jobs)
+{
+    pthread_mutex_lock(&s->writer_lock);
+    s->max_queue = jobs;
+    pthread_mutex_unlock(&s->writer_lock);
 }
 
 static store_status submit(store *s, connection *c, void *args)
@@ -124,8 +177,15 @@ static store_status submit(store *s, connection *c, void *args)
         if (status != STORE_NOT_FOUND)
             return status;
     }
+    store_status status = check_queue(s, c);
+    if (status != STORE_OK)
+        return status;
     store_next_id(s, id);
-    store_status status = insert_job(c, a->request, id);
+    status = insert_job(c, a->request, id);
+    if (status == STORE_OK)
+        status = use_uploads(c, a->request, id);
+    if (status == STORE_OK && a->request->webhook)
+        status = insert_webhook(c, id, a->request->webhook);
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 
@@ -272,7 +332,13 @@ static store_status finish(store *s, connection *c, void *args)
     bind_text(&st, 5, a->outcome->whole.summary);
     bind_text(&st, 6, a->outcome->error);
     store_status status = run_update(&st, a->id);
-    return status == STORE_OK ? store_insert_results(c, a->id, a->outcome) : status;
+    if (status == STORE_OK)
+        status = store_insert_results(c, a->id, a->outcome);
+    if (status != STORE_OK)
+        return status;
+    st = statement_begin(c, QUERY_ADD_BYTES);
+    bind_text(&st, 1, a->id);
+    return statement_run(&st);
 }
 
 store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome)

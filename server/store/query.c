@@ -1,6 +1,8 @@
 /* query.c: jobs read in rows. */
 #include "store/internal.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -31,6 +33,7 @@ store_status store_read_job(statement *st, job *out)
     out->tags = store_copy_text(st, 7, &ok);
     out->summary = store_copy_text(st, 8, &ok);
     out->error = store_copy_text(st, 9, &ok);
+    out->priority = sqlite3_column_int(row, 11);
     const char *refines = (const char *)sqlite3_column_text(row, 10);
     if (refines && strlen(refines) < sizeof out->refines)
         strcpy(out->refines, refines);
@@ -43,9 +46,31 @@ store_status store_read_job(statement *st, job *out)
 
 static query_id list_query(const store_query *q)
 {
+    if (q->ascending && q->tag)
+        return q->by_status ? QUERY_OLDEST_TAG_STATUS : QUERY_OLDEST_TAG;
+    if (q->ascending)
+        return q->by_status ? QUERY_OLDEST_STATUS : QUERY_OLDEST;
     if (q->tag)
         return q->by_status ? QUERY_LIST_TAG_STATUS : QUERY_LIST_TAG;
     return q->by_status ? QUERY_LIST_STATUS : QUERY_LIST;
+}
+
+/* Ids begin with the milliseconds of their creation, taken a moment before `created` and never going back. */
+static void least_id(char out[16], double since)
+{
+    double ms = (since - 1.0) * 1e3;
+    unsigned long long whole = ms > 0.0 ? (unsigned long long)fmin(ms, 281474976710655.0) : 0;
+    snprintf(out, 16, "%012llx", whole);
+}
+
+static void bind_filters(statement *st, const store_query *q, char least[16])
+{
+    bind_real(st, 5, q->since);
+    bind_real(st, 6, q->until > 0.0 ? q->until : 1e18);
+    for (int i = 0; i < STORE_MORE_TAGS; i++)
+        bind_text(st, 7 + i, q->more[i]);
+    least_id(least, q->since);
+    bind_text(st, 10, least);
 }
 
 /* Reads up to limit + 1 rows: one more says whether there are older ones. */
@@ -53,7 +78,9 @@ static store_status read_list(connection *c, const store_query *q, int limit, jo
 {
     store_status status = STORE_OK;
     statement st = statement_begin(c, list_query(q));
-    bind_text(&st, 1, q->before ? q->before : "~"); /* after every hex digit */
+    char least[16];
+    bind_text(&st, 1, q->before ? q->before : q->ascending ? "" : "~"); /* after every hex digit */
+    bind_filters(&st, q, least);
     bind_integer(&st, 2, limit + 1);
     if (q->by_status)
         bind_integer(&st, 3, q->status);

@@ -82,12 +82,25 @@ static bool read_newest_id(store *s, char *message, size_t size)
     return false;
 }
 
+static bool open_uploads(store *s, const char *path, char *message, size_t size)
+{
+    if (asprintf(&s->uploads_folder, "%s-uploads", path) < 0) {
+        s->uploads_folder = NULL;
+        snprintf(message, size, "no memory");
+        return false;
+    }
+    if (store_open_uploads(s))
+        return true;
+    snprintf(message, size, "cannot read the uploads: %s", s->writer.message);
+    return false;
+}
+
 /* An absolute path: SQLite would take "file:..." for a URI. */
 static bool open_connections(store *s, const char *path, char *message, size_t size)
 {
     char *absolute = realpath(path, NULL);
     bool ok = absolute && open_writer(s, absolute, message, size) && read_newest_id(s, message, size) &&
-              open_readers(s, absolute, message, size);
+              open_readers(s, absolute, message, size) && open_uploads(s, absolute, message, size);
     if (!absolute)
         snprintf(message, size, "cannot resolve the path: %s", strerror(errno));
     free(absolute);
@@ -105,6 +118,7 @@ store *store_open(const char *path, char *message, size_t size)
     pthread_mutex_init(&s->writer_lock, NULL);
     pthread_mutex_init(&s->readers_lock, NULL);
     pthread_mutex_init(&s->message_lock, NULL);
+    pthread_mutex_init(&s->upload_lock, NULL);
     pthread_cond_init(&s->reader_free, NULL);
     s->file = lock_file(path, why, sizeof why);
     if (s->file < 0 || !open_connections(s, path, why, sizeof why)) {
@@ -125,6 +139,8 @@ void store_close(store *s)
     if (s->file >= 0)
         close(s->file);
     pthread_cond_destroy(&s->reader_free);
+    free(s->uploads_folder);
+    pthread_mutex_destroy(&s->upload_lock);
     pthread_mutex_destroy(&s->message_lock);
     pthread_mutex_destroy(&s->readers_lock);
     pthread_mutex_destroy(&s->writer_lock);

@@ -17,6 +17,7 @@ typedef enum {
     STORE_OK,
     STORE_NOT_FOUND, /* no such job, or nothing to claim */
     STORE_CONFLICT,  /* the job is not in a state that allows this; or the idempotency key came with another body */
+    STORE_BUSY,      /* as many jobs wait as may */
     STORE_FULL,      /* the disk is full; nothing was changed */
     STORE_ERROR      /* anything else: store_message says what */
 } store_status;
@@ -31,9 +32,10 @@ typedef struct {
     int progress; /* 0..100 */
     int attempts; /* runs begun */
     double created, started, finished;
-    char *tags;       /* JSON array of strings, never NULL */
-    char *summary;    /* JSON object once it ended with an answer, else NULL */
-    char *error;      /* JSON object (problem details) when it failed, else NULL */
+    char *tags;    /* JSON array of strings, never NULL */
+    char *summary; /* JSON object once it ended with an answer, else NULL */
+    char *error;   /* JSON object (problem details) when it failed, else NULL */
+    int priority;
     char refines[33]; /* the job whose run this one continues; "": none. It may have been deleted */
 } job;
 void job_clear(job *j); /* frees the texts, zeroes *j; NULL is fine */
@@ -48,6 +50,9 @@ void store_message(store *s, char *buffer, size_t size);
  * STORE_FULL, as a full disk is. Not kept in the file. */
 store_status store_limit_bytes(store *s, int64_t bytes);
 
+/* So many jobs may wait; a submission beyond it is STORE_BUSY. 0: no limit. Not kept in the file. */
+void store_limit_queue(store *s, int64_t jobs);
+
 /* What is submitted. */
 typedef struct {
     const char *body;
@@ -55,14 +60,20 @@ typedef struct {
     const char *tags;            /* JSON array text; NULL: [] */
     const char *idempotency_key; /* may be NULL */
     const char *refines;         /* id, or NULL */
+    const char (*uploads)[65];   /* n_uploads ids of uploads that the body names */
+    size_t n_uploads;
+    int priority;         /* -10..10: larger ones run first, of the same the older one */
+    const char *webhook;  /* address to tell of its end (webhooks.h), or NULL */
+    double queue_limit_s; /* it fails if it has not begun so long after it came; 0: no limit */
 } store_request;
 
 /* ---- submit: the job is on disk (fsync) before STORE_OK is returned. When the key is known and came with the same
- * body, *out is the earlier job and *repeated is true; with another body STORE_CONFLICT. */
+ * body, *out is the earlier job and *repeated is true; with another body STORE_CONFLICT. STORE_NOT_FOUND: an upload is
+ * not there (any more). */
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
 
-/* ---- claim: the oldest accepted job becomes running, attempts + 1, owner and lease set; *body is the request as
- * submitted, freed by the caller. STORE_NOT_FOUND when nothing waits. */
+/* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, owner and lease
+ * set; *body is the request as submitted, freed by the caller. STORE_NOT_FOUND when nothing waits. */
 store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
 /* Extends the lease of a running job; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
 store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress);
@@ -104,6 +115,19 @@ store_status store_finish(store *s, const char *id, const char *owner, const sto
 store_status store_release(store *s, const char *id, const char *owner);
 store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 
+/* ---- expire: jobs that have waited longer than they may fail with the given error JSON; *count is how many. They are
+ * not claimed before that either. A job that had begun once and waits again has no limit any more. */
+store_status store_expire(store *s, const char *error_json, int64_t *count);
+
+/* ---- retain: ended jobs that are too old, too many or too large together go, the oldest first, a few in one
+ * transaction; *count is how many went, 0: all is well. Those that somebody is still to be told of stay. */
+typedef struct {
+    double keep_s;      /* since the end; 0: no limit */
+    int64_t keep_jobs;  /* 0: no limit */
+    int64_t keep_bytes; /* requests and results; 0: no limit */
+} store_retention;
+store_status store_retain(store *s, const store_retention *limits, int64_t *count);
+
 /* ---- dismiss: an accepted job becomes dismissed and *was is JOB_ACCEPTED; a running one is only reported (*was is
  * JOB_RUNNING: the caller tells the worker); an ended one is deleted with its result and *was is its status. */
 store_status store_dismiss(store *s, const char *id, job_status *was);
@@ -111,14 +135,18 @@ store_status store_dismiss(store *s, const char *id, job_status *was);
 /* ---- read */
 store_status store_get(store *s, const char *id, job *out);
 
+#define STORE_MORE_TAGS 3
 typedef struct {
     bool by_status;
     job_status status;
-    const char *tag;    /* NULL: any */
-    const char *before; /* only jobs older than this id (the cursor); NULL: from the newest */
+    const char *tag;                   /* NULL: any */
+    const char *more[STORE_MORE_TAGS]; /* tags that it must have too; NULL: none */
+    double since, until;               /* created in [since, until), Unix seconds; until 0: no end */
+    bool ascending;                    /* oldest first */
+    const char *before; /* only jobs older than this id (the cursor), ascending: newer; NULL: from the start */
     int limit;          /* 1..1000 */
 } store_query;
-/* Newest first; the caller frees with job_clear and free. *more: there are older ones. */
+/* Newest first unless ascending; the caller frees with job_clear and free. *more: there are older ones. */
 store_status store_list(store *s, const store_query *query, job **jobs, size_t *count, bool *more);
 
 /* The body as submitted; the caller frees it. */

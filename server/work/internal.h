@@ -54,8 +54,8 @@ struct work {
 
     atomic_bool interrupt; /* the time to drain is over */
     int n_started;         /* workers to join; set before any other thread may call */
-    bool keeper_started;
-    pthread_t keeper;
+    bool keeper_started, housekeeper_started;
+    pthread_t keeper, housekeeper;
     worker *workers; /* options.workers of them */
 };
 

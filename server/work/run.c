@@ -103,7 +103,7 @@ static bool decode_body(run *r, char *body, size_t body_len)
 {
     problem_details problem = {0};
     double start = work_clock();
-    bool ok = codec_decode(&r->request, CODEC_STORED, body, body_len, &problem);
+    bool ok = codec_decode_with(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
     free(body);
     r->parse_s = work_clock() - start;
     if (!ok) {

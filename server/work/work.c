@@ -1,4 +1,5 @@
 /* work.c: the threads: workers that claim, a keeper that renews their leases, and those who wait for a job. */
+#include "work/housekeeping.h"
 #include "work/internal.h"
 
 #include <errno.h>
@@ -198,6 +199,8 @@ static bool start_threads(work *w)
     block_signals(&before);
     bool ok = pthread_create(&w->keeper, NULL, keep_loop, w) == 0;
     w->keeper_started = ok;
+    ok = ok && pthread_create(&w->housekeeper, NULL, housekeeping_loop, w) == 0;
+    w->housekeeper_started = ok;
     pthread_mutex_lock(&w->lock);
     for (int i = 0; ok && i < w->options.workers; i++) {
         ok = pthread_create(&w->workers[i].thread, NULL, work_loop, &w->workers[i]) == 0;
@@ -277,6 +280,8 @@ static void join_threads(work *w)
     pthread_mutex_unlock(&w->lock);
     if (w->keeper_started)
         pthread_join(w->keeper, NULL);
+    if (w->housekeeper_started)
+        pthread_join(w->housekeeper, NULL);
 }
 
 void work_stop(work *w, double drain_s)
@@ -411,6 +416,11 @@ uz_cache *work_cache(work *w)
 size_t work_cache_bytes(const work *w)
 {
     return w->options.cache_bytes;
+}
+
+size_t work_solve_bytes(const work *w)
+{
+    return w->options.solve_bytes;
 }
 
 int work_workers(const work *w)

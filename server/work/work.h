@@ -34,6 +34,7 @@ typedef struct {
     size_t cache_bytes; /* factor cache */
     size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
     double lease_s;
+    store_retention retention; /* of ended jobs */
 } work_options;
 
 /* Recovers jobs left by a dead process, then starts the threads. NULL on failure with the reason in message. */
@@ -67,6 +68,7 @@ bool work_live_history(work *w, const char *id, const char *case_name, int64_t a
 
 uz_cache *work_cache(work *w);
 size_t work_cache_bytes(const work *w);
+size_t work_solve_bytes(const work *w); /* of one solve; 0: no limit */
 int work_workers(const work *w);
 
 /* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to

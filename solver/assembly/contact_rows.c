@@ -14,11 +14,10 @@
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3])
 {
     const int dim = model->mesh.dim;
-    const double least = uz_node_frame(model, node) ? UZ_DEPENDENT : 0;
     double share[3];
     uz_free_shares(share, model, node, normal);
     for (int c = 0; c < dim; c++)
-        if (fabs(share[c]) > least)
+        if (fabs(share[c]) > UZ_DEPENDENT)
             return true;
     return false;
 }
@@ -101,7 +100,8 @@ typedef struct {
     double *val, *area;
 } row_work;
 
-/* What a consistent constant pressure gives each node of a face. */
+/* What a consistent constant pressure gives each node of a face: nothing to the corners of a flat tri6 face, where it
+ * must not be what rounding leaves, as reactions are divided by it. */
 static void spread_area(double *area, const uz_body_model *model, const uz_group *group)
 {
     for (int64_t e = 0; e < group->n_faces; e++) {
@@ -110,8 +110,9 @@ static void spread_area(double *area, const uz_body_model *model, const uz_group
         double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
         uz_body_side(&side, xyz, node, model, group->face[e]);
         uz_side_weights(w, &side);
+        const double whole = uz_side_area(&side);
         for (int a = 0; a < side.nodes; a++)
-            area[node[a]] += w[a];
+            area[node[a]] += fabs(w[a]) > 1e-12 * whole ? w[a] : 0;
     }
 }
 

@@ -24,6 +24,14 @@ double uz_bound_norm(const double *x, int64_t n)
     return unit * sqrt(sum);
 }
 
+double uz_bound_largest(const double *x, int64_t n)
+{
+    double largest = 0.0;
+    for (int64_t i = 0; i < n; i++)
+        largest = fmax(largest, fabs(x[i]));
+    return largest;
+}
+
 /* Paper, section 4. */
 static void residuals(uz_residual *a, const uz_bound_terms *t, const double *r, const double *g, int64_t m)
 {
@@ -59,7 +67,8 @@ static double reach(const double *g, const double *h, int64_t m)
     return scale * sqrt(sum);
 }
 
-/* Force by ||p|| (by the reactions where there is no load), length by the size of h and N u, energy by |psi|. */
+/* Force by ||p|| (by the reactions where there is no load), length by the size of h and N u, or of what u
+ * could move a row by: where all rows touch and h = 0, N u is rounding. Energy by |psi|. */
 static void scale_residuals(uz_certificate *out, const uz_bound_terms *t, const double *r, const double *g,
                             const double *h, int64_t m)
 {
@@ -67,7 +76,7 @@ static void scale_residuals(uz_certificate *out, const uz_bound_terms *t, const 
     const uz_residual *a = &out->residual;
     uz_residual *b = &out->relative_residual;
     b->e1 = ratio(a->e1, force);
-    b->e2 = ratio(a->e2, fmax(uz_bound_norm(h, m), reach(g, h, m)));
+    b->e2 = ratio(a->e2, fmax(t->span, fmax(uz_bound_norm(h, m), reach(g, h, m))));
     b->e3 = ratio(a->e3, force);
     b->e4 = ratio(a->e4, fabs(out->energy_dual));
     b->total = hypot(hypot(b->e1, b->e2), hypot(b->e3, b->e4));

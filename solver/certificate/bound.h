@@ -10,6 +10,7 @@ typedef struct {
     double correction_energy; /* c'K c */
     double square;            /* bound on e'K^-1 e, with all that rounding may hide; INFINITY: none */
     double e1, force;         /* ||K u - p - N'r||, ||p|| */
+    double span;              /* the largest |N_ij| times the largest |u_j| */
     double complementarity;   /* -r'g(v) */
     double positive_part;     /* of the reactions that were given */
     bool anything;            /* some entry of u, c or K u - p - N'r is not zero */
@@ -35,5 +36,7 @@ double uz_bound_noise(double spread, double sum);
 
 /* 2-norm without overflow. */
 double uz_bound_norm(const double *x, int64_t n);
+/* The largest magnitude. */
+double uz_bound_largest(const double *x, int64_t n);
 
 #endif

@@ -138,6 +138,7 @@ static void add_up(const certifier *c, uz_bound_terms *t, const double *u)
     }
     t->e1 = uz_bound_norm(res->e_u, c->d);
     t->force = uz_bound_norm(p, c->d);
+    t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest(u, c->d);
 }
 
 static void add_dot(twofold *sum, double factor, const double *x, const double *y, int64_t n)

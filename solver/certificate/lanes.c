@@ -20,11 +20,13 @@ enum { WIDTH = UZ_CERTIFY_LANES, HALVES = WIDTH / 4 };
 /* Sums over the dofs, for each lane. */
 typedef struct {
     lanes stiffness, load, change, correction_energy, e_square, weighted, noise, force, sizes, residuals;
+    lanes largest; /* not a sum: of |u_j| */
 } sums;
 
 struct uz_lane_certifier {
     const uz_csc *K, *N;
     double rcond, inverse_bound;
+    double steepest;      /* the largest |N_ij| */
     double *weight;       /* d */
     int64_t n_b;          /* dofs that N touches */
     int64_t *dof;         /* n_b */
@@ -133,6 +135,7 @@ uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, con
     uz_status status = UZ_OK;
     if (ok) {
         uz_certify_weights(c->weight, K);
+        c->steepest = N->rows > 0 ? uz_bound_largest(N->val, N->ptr[N->cols]) : 0.0;
         status = compress(c, err);
     }
     if (ok && status == UZ_OK) {
@@ -198,6 +201,13 @@ static inline __attribute__((always_inline)) void add_magnitude(lanes *sum, cons
     *sum += (lanes)((lane_bits)*x & INT64_MAX);
 }
 
+/* largest = max(largest, |x|) */
+static inline __attribute__((always_inline)) void keep_largest(lanes *largest, const lanes *x)
+{
+    const lane_bits magnitude = (lane_bits)*x & INT64_MAX, more = (lanes)magnitude > *largest;
+    *largest = (lanes)((magnitude & more) | ((lane_bits)*largest & ~more));
+}
+
 /* Row j is complete: what it adds to the sums. hi + lo: (K u)_j, lost. */
 static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *c, int half, int64_t j, lanes *hi,
                                                              lanes *lo, const lanes *u, const lanes *p, int fused)
@@ -228,6 +238,7 @@ static inline __attribute__((always_inline)) void finish_row(uz_lane_certifier *
     s->weighted += weight * e * e;
     s->noise += stiff * *u * *u + weight * forces * forces;
     add_magnitude(&s->sizes, u);
+    keep_largest(&s->largest, u);
     add_magnitude(&s->sizes, &e_u);
     add_magnitude(&s->residuals, &e_u);
 }
@@ -341,6 +352,7 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     terms->correction_energy = s->correction_energy[l];
     terms->e1 = sqrt(s->e_square[l]);
     terms->force = sqrt(s->force[l]);
+    terms->span = c->steepest * s->largest[l];
     terms->anything = s->sizes[l] > 0.0;
     terms->square = uz_bound_enlarge(square, uz_bound_doubt(c->inverse_bound, c->rcond, c->K->cols),
                                      uz_bound_noise(c->inverse_bound, s->noise[l]));

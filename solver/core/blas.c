@@ -108,14 +108,74 @@ void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *
         cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k), 1.0, Z, narrow(ld), 0.0, C, narrow(n));
 }
 
-/* Columns of a panel whose update of an n x n block takes about PANEL_FLOPS. */
+/* Units of work between two questions take about PANEL_FLOPS, a few milliseconds: a panel of b columns against n b
+ * entries. Wider ones would wait longer, narrower ones would read the whole matrix for little work. */
 #define PANEL_FLOPS 5e7
-enum { LEAST_PANEL = 16, MOST_PANEL = 256 };
+enum { LEAST_PANEL = 16, MOST_PANEL = 128 };
 
 static int64_t panel_width(int64_t n)
 {
-    double width = PANEL_FLOPS / ((double)n * (double)n);
+    double width = sqrt(PANEL_FLOPS / fmax(1.0, (double)n));
     return width < LEAST_PANEL ? LEAST_PANEL : width > MOST_PANEL ? MOST_PANEL : (int64_t)width;
+}
+
+static int64_t least_of(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* Doubles cleared between two questions, a megabyte: pages of a new block are made when they are first written, which
+ * took 1 to 3 ms for each 2 MB on a virtual machine. */
+enum { CLEARED = 1 << 17 };
+
+bool uz_clear_while(int64_t n, double *x, const uz_leave *leave)
+{
+    for (int64_t k = 0; k < n; k += CLEARED) {
+        if (uz_leave_is_over(leave))
+            return false;
+        memset(x + k, 0, (size_t)least_of(n - k, CLEARED) * sizeof *x);
+    }
+    return true;
+}
+
+/* C (lower, n x n, ldc) = beta C + alpha A A' with A n x k, or alpha A'A with A k x n where transposed, by panels of
+ * columns of C. */
+static bool syrk_while(int64_t n, int64_t k, double alpha, const double *A, int64_t lda, bool transposed, double beta,
+                       double *C, int64_t ldc, const uz_leave *leave)
+{
+    CBLAS_TRANSPOSE left = transposed ? CblasTrans : CblasNoTrans, right = transposed ? CblasNoTrans : CblasTrans;
+    double most = PANEL_FLOPS / fmax(1.0, (double)n * (double)k);
+    int64_t width = most < LEAST_PANEL ? LEAST_PANEL
+                    : most < (double)n ? (int64_t)most
+                                       : n,
+            step = transposed ? lda : 1;
+    for (int64_t j = 0; j < n; j += width) {
+        int64_t b = least_of(n - j, width), below = n - j - b;
+        const double *A_j = A + j * step;
+        double *C_j = C + j + j * ldc;
+        if (uz_leave_is_over(leave))
+            return false;
+        cblas_dsyrk(CblasColMajor, CblasLower, left, narrow(b), narrow(k), alpha, A_j, narrow(lda), beta, C_j,
+                    narrow(ldc));
+        if (below > 0)
+            cblas_dgemm(CblasColMajor, left, right, narrow(below), narrow(b), narrow(k), alpha, A_j + b * step,
+                        narrow(lda), A_j, narrow(lda), beta, C_j + b, narrow(ldc));
+    }
+    return true;
+}
+
+/* X (n x columns, ldx) = L^-1 X with L n x n lower, ld, by panels of rows. */
+static bool forward_while(int64_t n, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx,
+                          const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    for (int64_t i = 0; i < n; i += width) {
+        int64_t b = least_of(n - i, width);
+        if (uz_leave_is_over(leave))
+            return false;
+        uz_block_eliminate(b, n - i - b, columns, L + i + i * ld, ld, X + i, ldx);
+    }
+    return true;
 }
 
 /* Rows and columns i < k change places in the lower triangle. */
@@ -161,21 +221,21 @@ enum { PIVOTED_PANEL = 64 };
 
 int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least, const uz_leave *leave)
 {
-    int64_t width = panel_width(n) < PIVOTED_PANEL ? panel_width(n) : PIVOTED_PANEL;
+    int64_t width = least_of(panel_width(n), PIVOTED_PANEL);
     double *squares = uz_alloc(n, sizeof *squares), largest = 0.0;
     for (int64_t i = 0; i < n; i++) {
         pivot[i] = i;
         largest = fmax(largest, A[i + i * n]);
     }
     int64_t rank = squares ? 0 : -1, end = squares ? n : 0;
-    for (int64_t k = 0; k < end && rank == k && !uz_leave_is_over(leave); k += width) {
-        int64_t next = k + width < n ? k + width : n;
+    for (int64_t k = 0; k < end && rank == k; k += width) {
+        int64_t next = least_of(k + width, n);
         memset(squares, 0, (size_t)n * sizeof *squares);
-        while (rank < next && pivot_column(n, A, pivot, squares, k, rank, least * largest))
+        while (rank < next && !uz_leave_is_over(leave) && pivot_column(n, A, pivot, squares, k, rank, least * largest))
             rank++;
-        if (rank == next && next < n)
-            cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, narrow(n - next), narrow(next - k), -1.0,
-                        A + next + k * n, narrow(n), 1.0, A + next + next * n, narrow(n));
+        if (rank == next &&
+            !syrk_while(n - next, next - k, -1.0, A + next + k * n, n, false, 1.0, A + next + next * n, n, leave))
+            break;
     }
     free(squares);
     return rank;
@@ -184,26 +244,20 @@ int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least,
 bool uz_trsm_lower_while(int64_t n, int64_t k, const double *L, double *X, const uz_leave *leave)
 {
     int64_t width = panel_width(n);
-    for (int64_t j = 0; j < k && n > 0; j += width) {
-        if (uz_leave_is_over(leave))
+    for (int64_t j = 0; j < k && n > 0; j += width)
+        if (!forward_while(n, least_of(k - j, width), L, n, X + j * n, n, leave))
             return false;
-        cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n),
-                    narrow(k - j < width ? k - j : width), 1.0, L, narrow(n), X + j * n, narrow(n));
-    }
     return true;
 }
 
 bool uz_syrk_lower_t_while(int64_t n, int64_t k, const double *Z, double *C, const uz_leave *leave)
 {
     int64_t width = panel_width(n);
-    if (n > 0 && k == 0)
-        memset(C, 0, (size_t)(n * n) * sizeof *C);
-    for (int64_t j = 0; j < k && n > 0; j += width) {
-        if (uz_leave_is_over(leave))
+    if (k == 0)
+        return uz_clear_while(n * n, C, leave);
+    for (int64_t j = 0; j < k && n > 0; j += width)
+        if (!syrk_while(n, least_of(k - j, width), 1.0, Z + j, k, true, j > 0 ? 1.0 : 0.0, C, n, leave))
             return false;
-        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k - j < width ? k - j : width), 1.0, Z + j,
-                    narrow(k), j > 0 ? 1.0 : 0.0, C, narrow(n));
-    }
     return true;
 }
 
@@ -213,7 +267,7 @@ bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave)
 {
     int64_t width = panel_width(n);
     for (int64_t k = 0; k < n; k += width) {
-        int64_t b = n - k < width ? n - k : width, rest = n - k - b;
+        int64_t b = least_of(n - k, width), rest = n - k - b;
         double *top = A + k + k * n, *below = top + b, *right = below + b * n;
         if (uz_leave_is_over(leave) || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(b), top, narrow(n)) != 0)
             return false;
@@ -221,8 +275,8 @@ bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave)
             break;
         cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, narrow(rest), narrow(b), 1.0, top,
                     narrow(n), below, narrow(n));
-        cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, narrow(rest), narrow(b), -1.0, below, narrow(n), 1.0,
-                    right, narrow(n));
+        if (!syrk_while(rest, b, -1.0, below, n, false, 1.0, right, n, leave))
+            return false;
     }
     return true;
 }
@@ -230,17 +284,16 @@ bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave)
 bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel, const uz_leave *leave)
 {
     int64_t width = panel_width(n);
-    memset(A, 0, (size_t)(n * n) * sizeof *A);
+    if (!uz_clear_while(n * n, A, leave))
+        return false;
     for (int64_t k = 0; k < n; k += width) {
-        int64_t b = n - k < width ? n - k : width, rows = n - k;
-        if (uz_leave_is_over(leave))
-            return false;
+        int64_t b = least_of(n - k, width), rows = n - k;
         for (int64_t j = 0; j < b; j++) {
             memset(panel + j * rows, 0, (size_t)j * sizeof *panel);
             memcpy(panel + j + j * rows, L + k + j + (k + j) * n, (size_t)(rows - j) * sizeof *panel);
         }
-        cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, narrow(rows), narrow(b), 1.0, panel, narrow(rows), 1.0,
-                    A + k + k * n, narrow(n));
+        if (!syrk_while(rows, b, 1.0, panel, rows, false, 1.0, A + k + k * n, n, leave))
+            return false;
     }
     return true;
 }
@@ -249,26 +302,22 @@ bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel,
 bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const uz_leave *leave)
 {
     int64_t width = panel_width(n);
-    memset(A, 0, (size_t)(n * n) * sizeof *A);
-    memset(X, 0, (size_t)(n * n) * sizeof *X);
+    if (!uz_clear_while(n * n, A, leave) || !uz_clear_while(n * n, X, leave))
+        return false;
     for (int64_t k = 0; k < n; k += width) {
-        int64_t b = n - k < width ? n - k : width, rows = n - k;
-        if (uz_leave_is_over(leave))
-            return false;
+        int64_t b = least_of(n - k, width);
         for (int64_t j = k; j < k + b; j++) {
             if (!(L[j + j * n] > 0.0))
                 return false;
             X[j + j * n] = 1.0;
         }
-        cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(rows), narrow(b), 1.0,
-                    L + k + k * n, narrow(n), X + k + k * n, narrow(n));
+        if (!forward_while(n - k, b, L + k + k * n, n, X + k + k * n, n, leave))
+            return false;
     }
     for (int64_t k = 0; k < n; k += width) {
-        int64_t b = n - k < width ? n - k : width;
-        if (uz_leave_is_over(leave))
+        int64_t b = least_of(n - k, width);
+        if (!syrk_while(k + b, b, 1.0, X + k, n, true, 1.0, A, n, leave))
             return false;
-        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(k + b), narrow(b), 1.0, X + k, narrow(n), 1.0, A,
-                    narrow(n));
     }
     return true;
 }

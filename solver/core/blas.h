@@ -17,6 +17,9 @@ void uz_trsv_lower(int64_t n, const double *L, double *x);                  /* x
 void uz_trsv_lower_t(int64_t n, const double *L, double *x);                /* x = L'^-1 x */
 void uz_trmv_lower_t(int64_t n, const double *L, double *x);                /* x = L'x */
 bool uz_potrf_lower(int64_t n, double *A); /* A = LL'; false: a pivot is not positive */
+/* x (n) = 0 by pieces of a megabyte, between which leave is asked; false: it was over. For rooms that nobody has
+ * written to before: the kernel makes their pages at the first touch. */
+bool uz_clear_while(int64_t n, double *x, const uz_leave *leave);
 /* The same by panels of some 5e7 flops (a few milliseconds), between which leave is asked: false also where it was
  * over. */
 bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave);

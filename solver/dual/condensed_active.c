@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/blas.h"
 #include "core/error.h"
+#include "core/lock.h"
 
 #include <float.h>
 #include <math.h>
@@ -43,6 +44,8 @@ static bool form_inverse(double *D_inverse, double *room, const uz_condensed *de
 {
     if (!uz_multiply_llt_while(dense->n_b, dense->L_bb, room, D_inverse, leave))
         return false;
+    if (!uz_clear_while(dense->n_b * dense->n_b, D_inverse, leave)) /* its pages, in order */
+        return false;
     return place_rows(D_inverse, dense, room, true, leave);
 }
 
@@ -56,7 +59,8 @@ static uz_status need(const double **out, double **slot, uz_case *load, former f
     uz_status status = UZ_OK;
     if (*out)
         return UZ_OK;
-    pthread_mutex_lock(&load->dual->lazy->mutex);
+    if (!uz_lock_while(&load->dual->lazy->making, &load->leave))
+        return UZ_OK;
     if (!*slot) {
         double *made = uz_alloc(size, sizeof *made), *room = uz_alloc(size, sizeof *room);
         if (!made || !room)
@@ -71,7 +75,7 @@ static uz_status need(const double **out, double **slot, uz_case *load, former f
             free(made);
     }
     *out = *slot;
-    pthread_mutex_unlock(&load->dual->lazy->mutex);
+    pthread_mutex_unlock(&load->dual->lazy->making);
     return status;
 }
 
@@ -91,8 +95,8 @@ int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
 
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
-/* r_A from D_AA r_A = g0_A. */
-static void solve_by_operator(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
+/* r_A from D_AA r_A = g0_A. false: no leave to go on. */
+static bool solve_by_operator(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
                               int64_t count)
 {
     int64_t m = load->dual->info.m;
@@ -103,12 +107,17 @@ static void solve_by_operator(uz_case *load, double *r, double *g, const double 
         for (int64_t k = 0; k < count; k++)
             x[k] = g[rows[k]];
         uz_potrs_lower(count, chol, x);
+        if (uz_leave_is_over(&load->leave))
+            return false;
         for (int64_t k = 0; k < count; k++)
             r[rows[k]] += x[k];
         uz_symv_lower(m, load->D, r, load->work2);
         for (int64_t i = 0; i < m; i++)
             g[i] = load->g0[i] - load->work2[i];
+        if (uz_leave_is_over(&load->leave))
+            return false;
     }
+    return true;
 }
 
 /* x at the rows = -(block)^-1 x there. */
@@ -123,8 +132,8 @@ static void solve_block(double *x, double *room, const double *chol, const int64
 
 /* With T = D^-1 and x = g0 - g: r = T x, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
  * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
- * through the factor: T is badly conditioned, its answer is not yet that of the body. */
-static void solve_by_inverse(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
+ * through the factor: T is badly conditioned, its answer is not yet that of the body. false: no leave to go on. */
+static bool solve_by_inverse(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
                              int64_t count)
 {
     int64_t m = load->dual->info.m;
@@ -138,16 +147,25 @@ static void solve_by_inverse(uz_case *load, double *r, double *g, const double *
         uz_symv_lower(m, load->D_inverse, x, change);
         for (int64_t k = 0; k < count; k++)
             x[rows[k]] = change[rows[k]];
+        if (uz_leave_is_over(&load->leave))
+            return false;
         solve_block(x, change, chol, rows, count);
+        if (uz_leave_is_over(&load->leave))
+            return false;
         uz_symv_lower(m, load->D_inverse, x, change);
         for (int64_t k = 0; k < count; k++)
             change[rows[k]] = 0.0;
         for (int64_t i = 0; i < m; i++)
             r[i] += change[i];
+        if (uz_leave_is_over(&load->leave))
+            return false;
         uz_condensed_apply(load, change, r);
         for (int64_t i = 0; i < m; i++)
             g[i] = load->g0[i] - change[i];
+        if (uz_leave_is_over(&load->leave))
+            return false;
     }
+    return true;
 }
 
 /* Signs below this, relative to the largest of their kind, are rounding: weakly active rows must not make the steps
@@ -200,13 +218,12 @@ uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *s
     if (status == UZ_OK && !block)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)count);
     if (status == UZ_OK && formed) {
-        uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m);
-        *solved = uz_potrf_lower_while(count, block, &load->leave) &&
-                  (scaled || are_independent(block, load->D, rows, count, m));
-        if (*solved) {
-            (scaled ? solve_by_inverse : solve_by_operator)(load, r, g, block, rows, count);
+        *solved = uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m, &load->leave) &&
+                  uz_potrf_lower_while(count, block, &load->leave) &&
+                  (scaled || are_independent(block, load->D, rows, count, m)) &&
+                  (scaled ? solve_by_inverse : solve_by_operator)(load, r, g, block, rows, count);
+        if (*solved)
             forgive_rounding(r, g, load, active);
-        }
     }
     free(block);
     free(rows);

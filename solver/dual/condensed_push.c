@@ -9,11 +9,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-void uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m)
+enum { GATHERED = 1 << 17 }; /* entries between questions whether to go on: a megabyte of a new block */
+
+bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m,
+                     const uz_leave *leave)
 {
-    for (int64_t l = 0; l < count; l++)
+    int64_t since = GATHERED;
+    for (int64_t l = 0; l < count; l++) {
+        if (since >= GATHERED && uz_leave_is_over(leave))
+            return false;
+        since = since >= GATHERED ? count : since + count; /* a column's upper part may be made with its page */
         for (int64_t k = l; k < count; k++)
             D_AA[k + l * count] = D[rows[k] + rows[l] * m];
+    }
+    return true;
 }
 
 enum { PUSH_ROUNDS = 6 };
@@ -24,7 +33,8 @@ enum { PUSH_ROUNDS = 6 };
 enum { REFINEMENTS = 2 };
 
 /* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
- * inverse of a stiffness and as badly conditioned. Dw (m) in passing. D_AA is room for count^2. */
+ * inverse of a stiffness and as badly conditioned. Dw (m) is D w, also where there was no leave to get w right. D_AA is
+ * room for count^2. */
 static bool solve_rows(double *w, double *Dw, double *D_AA, uz_case *load, const double *target, const int64_t *rows,
                        int64_t count)
 {
@@ -34,10 +44,10 @@ static bool solve_rows(double *w, double *Dw, double *D_AA, uz_case *load, const
     memset(w, 0, (size_t)m * sizeof *w);
     memset(Dw, 0, (size_t)m * sizeof *Dw);
     if (ok) {
-        uz_gather_lower(D_AA, load->D, rows, count, m);
-        int64_t rank = uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, &load->leave);
+        bool gathered = uz_gather_lower(D_AA, load->D, rows, count, m, &load->leave);
+        int64_t rank = gathered ? uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, &load->leave) : 0;
         ok = rank >= 0;
-        for (int pass = 0; ok && pass <= REFINEMENTS; pass++) {
+        for (int pass = 0; ok && pass <= REFINEMENTS && !uz_leave_is_over(&load->leave); pass++) {
             for (int64_t k = 0; k < rank; k++)
                 x[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
             uz_potrs_leading(rank, count, D_AA, x);

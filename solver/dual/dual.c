@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "core/lock.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -56,7 +57,8 @@ static uz_dual_lazy *lazy_new(void)
 {
     uz_dual_lazy *lazy = uz_alloc_zero(1, sizeof *lazy);
     if (lazy) {
-        pthread_mutex_init(&lazy->mutex, NULL);
+        pthread_mutex_init(&lazy->making, NULL);
+        pthread_mutex_init(&lazy->known, NULL);
         lazy->lambda_max = NAN;
     }
     return lazy;
@@ -66,7 +68,8 @@ static void lazy_free(uz_dual_lazy *lazy)
 {
     if (!lazy)
         return;
-    pthread_mutex_destroy(&lazy->mutex);
+    pthread_mutex_destroy(&lazy->making);
+    pthread_mutex_destroy(&lazy->known);
     free(lazy->D);
     free(lazy->D_inverse);
     free(lazy);
@@ -300,9 +303,9 @@ bool uz_case_crossed_bounds(const uz_case *load, double *y)
 
 double uz_dual_known_lambda_max(const uz_dual *dual)
 {
-    pthread_mutex_lock(&dual->lazy->mutex);
+    pthread_mutex_lock(&dual->lazy->known);
     double value = dual->lazy->lambda_max;
-    pthread_mutex_unlock(&dual->lazy->mutex);
+    pthread_mutex_unlock(&dual->lazy->known);
     return value;
 }
 
@@ -317,26 +320,40 @@ static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_err
 /* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
 #define LAMBDA_TOLERANCE 1e-4
 
+/* Kept for the body's other runs, unless applications may have been cut short: then 0. Under `making`. */
+static uz_status find_lambda_max(uz_case *load, double *lambda_max, uz_error *err)
+{
+    uz_dual_lazy *lazy = load->dual->lazy;
+    uz_inexact_probe(load, true, 0.1 * LAMBDA_TOLERANCE);
+    uz_status status = uz_lanczos_max(lambda_max, load->dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
+    uz_inexact_probe(load, false, 0.0);
+    if (status != UZ_OK || uz_leave_is_over(&load->leave)) {
+        *lambda_max = 0.0;
+        return status;
+    }
+    pthread_mutex_lock(&lazy->known);
+    lazy->lambda_max = *lambda_max;
+    pthread_mutex_unlock(&lazy->known);
+    return UZ_OK;
+}
+
 uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error *err)
 {
     uz_dual_lazy *lazy = load->dual->lazy;
     uz_status status = UZ_OK;
+    if (lambda_max)
+        *lambda_max = 0.0;
     if (load->dual->info.op == UZ_OPERATOR_CONDENSED)
         status = uz_condensed_need_operator(load, err);
     if (status != UZ_OK || !lambda_max)
         return status;
-    pthread_mutex_lock(&lazy->mutex);
-    if (load->inexact)
-        load->inexact->tight = 0.1 * LAMBDA_TOLERANCE;
+    if (!uz_lock_while(&lazy->making, &load->leave))
+        return UZ_OK;
     if (isnan(lazy->lambda_max))
-        status = uz_lanczos_max(lambda_max, load->dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
+        status = find_lambda_max(load, lambda_max, err);
     else
         *lambda_max = lazy->lambda_max;
-    if (status == UZ_OK)
-        lazy->lambda_max = *lambda_max;
-    if (load->inexact)
-        load->inexact->tight = UZ_CHANGE_KEPT;
-    pthread_mutex_unlock(&lazy->mutex);
+    pthread_mutex_unlock(&lazy->making);
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 

@@ -57,14 +57,16 @@ typedef struct {
     double base_slack; /* of base = K^-1 p */
     double slack;      /* of what the last apply or solve_active left */
     double tight;      /* relative accuracy of a change of the response */
+    bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
     double coarse;     /* accuracy at which the next guess of the active rows is judged */
     double *right;     /* d: a right-hand side */
 } uz_inexact;
 
-/* What is made at the first need, by whoever needs it; pointers are published to cases under the mutex and never
- * change. */
+/* What is made at the first need, by whoever needs it, under the mutex `making`; pointers are published to cases under
+ * it and never change. It may be held for seconds: see uz_lock_while. lambda_max is written under both and may be read
+ * under either. Order: making, known. */
 typedef struct {
-    pthread_mutex_t mutex;
+    pthread_mutex_t making, known;
     double *D;         /* CONDENSED: m x m */
     double *D_inverse; /* CONDENSED, scaled: m x m */
     double lambda_max; /* NaN until known */
@@ -109,8 +111,9 @@ void uz_condensed_clear(uz_condensed *dense);
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
 /* Lists in `rows` the rows with in == which, ascending; their number. */
 int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m);
-/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D. */
-void uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m);
+/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D; false: no leave to go on. */
+bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m,
+                     const uz_leave *leave);
 uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err);
 /* g0 from y = L^-1 P p, whose entry k stands at y[k stride]; x (d) is room. */
 uz_status uz_condensed_begin(uz_case *load, const double *y, int64_t stride, double *x, uz_error *err);
@@ -153,10 +156,13 @@ bool uz_bounded_recover(const uz_case *load, double *u, const double *r);
 /* Makes load->base and load->response what `factored` makes them, within the aim. */
 uz_status uz_inexact_create(uz_case *load, const double *p, uz_error *err);
 void uz_inexact_free(uz_inexact *inexact);
+/* Between begin true and false D is applied to vectors of about one size, which is not that of reactions, to this
+ * relative accuracy. Overwrites the response. */
+void uz_inexact_probe(uz_case *load, bool begin, double accuracy);
 uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
-/* Solves for the free dofs of box->u, those held standing at their bounds: r, g, active as uz_case_solve_active. A
- * guess that is seen to be wrong at a looser tolerance is not solved to the end. */
-uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *active, uz_error *err);
+/* Solves for the free dofs of box->u, those held standing at their bounds: r, g, solved, active as
+ * uz_case_solve_active. A guess that is seen to be wrong at a looser tolerance is not solved to the end. */
+uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.

@@ -43,6 +43,7 @@ uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err)
     }
     if (status != UZ_OK)
         return status;
+    load->psi0 = 0.0;
     for (int64_t j = 0; j < d; j++)
         load->psi0 -= 0.5 * p[j] * load->base[j];
     memcpy(load->g0, load->h, (size_t)m * sizeof *load->g0);

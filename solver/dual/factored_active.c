@@ -56,13 +56,14 @@ static uz_status solve_free(uz_case *load, bool *solved, uz_error *err)
 {
     uz_bounded *box = load->box;
     uz_principal *part = NULL;
-    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, load->ws, err);
-    *solved = part != NULL;
-    for (int pass = 0; part && status == UZ_OK && pass < PASSES; pass++) {
+    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, load->ws, &load->leave, err);
+    *solved = part && !uz_leave_is_over(&load->leave);
+    for (int pass = 0; status == UZ_OK && *solved && pass < PASSES; pass++) {
         uz_bounded_balance(box, load->K);
         status = uz_principal_solve(box->force, part, err);
         for (int64_t j = 0; status == UZ_OK && j < load->K->cols; j++)
             box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
+        *solved = !uz_leave_is_over(&load->leave);
     }
     uz_principal_free(part);
     return status;
@@ -112,8 +113,7 @@ uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *sol
     uz_bounded_hold(box, &dual->bounds, active, load->inexact != NULL, dual->info.d, dual->info.m);
     uz_status status = UZ_OK;
     if (load->inexact) {
-        status = uz_inexact_solve_active(load, r, g, active, err);
-        *solved = status == UZ_OK;
+        status = uz_inexact_solve_active(load, r, g, solved, active, err);
     } else {
         status = solve_free(load, solved, err);
     }

@@ -112,12 +112,23 @@ static double expected_norm(const uz_case *load, const double *r, double *Dr)
     return fmax(1e-3 * base, fmin(base, sqrt(norm2)));
 }
 
+void uz_inexact_probe(uz_case *load, bool begin, double accuracy)
+{
+    uz_inexact *x = load->inexact;
+    if (!x)
+        return;
+    x->probing = begin;
+    x->tight = begin ? accuracy : UZ_CHANGE_KEPT;
+    /* Of another size than what comes: no start for it. */
+    memset(load->response, 0, (size_t)load->dual->info.d * sizeof *load->response);
+}
+
 uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     uz_inexact *x = load->inexact;
     double root = root_of_lambda(load), norm = expected_norm(load, r, Dr);
-    uz_cg_stop stop = stop_at(x, x->tight, FLOOR * x->aim * norm * root);
+    uz_cg_stop stop = stop_at(x, x->tight, x->probing ? 0.0 : FLOOR * x->aim * norm * root);
     uz_cg_info info;
     memset(x->right, 0, (size_t)dual->info.d * sizeof *x->right);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, r);

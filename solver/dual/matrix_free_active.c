@@ -102,7 +102,7 @@ static uz_status solve_stepwise(uz_case *load, uz_cg *cg, double *r, double *g, 
     return status == UZ_OK ? measure_slack(load, err) : status;
 }
 
-uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *active, uz_error *err)
+uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
 {
     uz_inexact *x = load->inexact;
     const uz_bounded *box = load->box;
@@ -110,12 +110,15 @@ uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *act
     uz_cg cg = {0};
     if (x->coarse <= 0.0)
         x->coarse = FIRST_TOLERANCE;
-    uz_status status = uz_multigrid_create(&mg, load->K, uz_krylov_modes(load->dual->krylov), box->fixed, 0, NULL, err);
+    uz_leave leave = {x->hooks, x->deadline};
+    uz_status status =
+        uz_multigrid_create(&mg, load->K, uz_krylov_modes(load->dual->krylov), box->fixed, 0, &leave, err);
     if (status == UZ_OK)
         status = uz_cg_init(&cg, mg, box->fixed, load->dual->info.d, err);
     if (status == UZ_OK)
         status = solve_stepwise(load, &cg, r, g, active, err);
     uz_cg_clear(&cg);
     uz_multigrid_free(mg);
-    return status;
+    *solved = status == UZ_OK;
+    return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }

@@ -40,6 +40,10 @@ void uz_field_state_at(uz_field_state *out, const uz_field_element *element, con
 uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,
                            const uz_hooks *hooks, uz_error *err);
 
+/* The part of it for nodes around which all elements are linear: see patches.c. */
+uz_status uz_field_fit_patches(double *stress, double *strain, const uz_field_body *body, const double *u,
+                               const uz_hooks *hooks, uz_error *err);
+
 /* At the Gauss points of every element: which element, where (x dim), stress (x components). */
 int64_t uz_field_gauss_count(const uz_field_body *body);
 uz_status uz_field_gauss(double *element, double *point, double *stress, const uz_field_body *body, const double *u,

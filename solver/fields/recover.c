@@ -2,7 +2,8 @@
  *
  * Derivatives of a finite element solution are most accurate at certain points of each element (Barlow, Int. J. Numer.
  * Meth. Engng 10 (1976) 243-251): the Gauss points of one order less than the element's. From there they are continued
- * over the element by the polynomial that the points determine, and averaged at the nodes. */
+ * over the element by the polynomial that the points determine, and averaged at the nodes. Linear elements have one
+ * such point alone, and get their slope from their neighbours where these tell it (patches.c). */
 #include "fields/parts.h"
 
 #include "core/alloc.h"
@@ -158,7 +159,7 @@ uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *
     divide(stress, volume, mesh->n_nodes, body->components);
     divide(strain, volume, mesh->n_nodes, body->components);
     free(volume);
-    return status;
+    return status == UZ_OK ? uz_field_fit_patches(stress, strain, body, u, hooks, err) : status;
 }
 
 /* ---- Gauss points */

@@ -146,6 +146,17 @@ static double *block_of(block_row *row, int32_t aggregate)
 
 /* ------------------------------------------------------------------- smoothing */
 
+uz_status uz_no_leave(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the multigrid was made");
+}
+
+/* Asked for each row, and asks for every UZ_ROWS_AT_ONCE-th. */
+static bool must_leave(int64_t row, const uz_leave *leave)
+{
+    return row % UZ_ROWS_AT_ONCE == 0 && uz_leave_is_over(leave);
+}
+
 typedef struct {
     uz_level *level;
     int64_t count, room; /* blocks of the prolongation so far, and room for */
@@ -202,17 +213,17 @@ static void shrink(prolongation *p, int k)
 }
 
 uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *basis, const int32_t *of, double omega,
-                              int k, uz_error *err)
+                              int k, const uz_leave *leave, uz_error *err)
 {
     int64_t n = level->n;
     uz_row_walk walk;
     block_row row;
     prolongation p = {level, 0, 0};
-    bool ok = uz_row_walk_init(&walk, A);
+    bool ok = uz_row_walk_init(&walk, A), over = false;
     ok = block_row_init(&row, level->aggregates, k) && ok;
     level->ptr = uz_alloc_zero(n + 1, sizeof *level->ptr);
     ok = ok && level->ptr && reserve_blocks(&p, 2 * n, k);
-    for (int64_t i = 0; ok && i < n; i++) {
+    for (int64_t i = 0; ok && !(over = must_leave(i, leave)) && i < n; i++) {
         uz_row_walk_read(&walk, i);
         if (level->inverse[i] > 0.0)
             ok = smooth_row(&p, &row, &walk, basis, of, i, omega * level->inverse[i]);
@@ -223,6 +234,8 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *bas
         shrink(&p, k);
     uz_row_walk_clear(&walk);
     block_row_clear(&row);
+    if (over)
+        return uz_no_leave(err);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
 }
 
@@ -400,23 +413,25 @@ static uz_status convert(uz_csc *coarse, block_table *table, int64_t aggregates,
     return status;
 }
 
-uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, int k, uz_error *err)
+uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, int k, const uz_leave *leave,
+                      uz_error *err)
 {
     uz_row_walk walk;
     block_row row;
     block_table table = {.k = k};
-    bool ok = uz_row_walk_init(&walk, A);
+    bool ok = uz_row_walk_init(&walk, A), over = false;
     ok = block_row_init(&row, level->aggregates, k) && ok;
-    for (int64_t i = 0; ok && i < level->n; i++) {
+    for (int64_t i = 0; ok && !(over = must_leave(i, leave)) && i < level->n; i++) {
         uz_row_walk_read(&walk, i);
         if (level->ptr[i] == level->ptr[i + 1])
             continue;
         ok = multiply_row(&row, &walk, level) && add_outer(&table, &row, level, i);
         block_row_empty(&row);
     }
-    uz_status status = ok ? convert(coarse, &table, level->aggregates, err)
-                          : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a coarse matrix of %lld aggregates",
-                                    (long long)level->aggregates);
+    uz_status status = over ? uz_no_leave(err)
+                       : ok ? convert(coarse, &table, level->aggregates, err)
+                            : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a coarse matrix of %lld aggregates",
+                                      (long long)level->aggregates);
     uz_row_walk_clear(&walk);
     block_row_clear(&row);
     free(table.key);

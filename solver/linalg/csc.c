@@ -3,9 +3,15 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+size_t uz_csc_bytes(const uz_csc *A)
+{
+    return A->ptr ? 8 * (size_t)(A->cols + 1) + 16 * (size_t)A->ptr[A->cols] : 0;
+}
 
 uz_status uz_csc_init(uz_csc *A, int64_t rows, int64_t cols, int64_t nnz, uz_error *err)
 {

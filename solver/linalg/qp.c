@@ -2,6 +2,7 @@
 #include "uzawa.h"
 
 #include "core/error.h"
+#include "linalg/linalg.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -47,16 +48,20 @@ static uz_status check_matrix(const uz_csc *A, bool lower, const char *name, uz_
     return status;
 }
 
+uz_status uz_check_finite(const double *x, int64_t n, const char *name, uz_error *err)
+{
+    for (int64_t i = 0; x && i < n; i++)
+        if (!isfinite(x[i]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld) is not a finite number (counted from 1)", name,
+                           (long long)i + 1);
+    return UZ_OK;
+}
+
 static uz_status check_vector(const double *x, int64_t n, const char *name, uz_error *err)
 {
     if (n > 0 && !x)
         return uz_fail(err, UZ_ERR_SIZE, name, "%s is missing; it must have %lld numbers", name, (long long)n);
-    for (int64_t i = 0; i < n; i++) {
-        if (!isfinite(x[i]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld) is not a finite number (counted from 1)", name,
-                           (long long)i + 1);
-    }
-    return UZ_OK;
+    return uz_check_finite(x, n, name, err);
 }
 
 static uz_status check_shapes(const uz_qp *qp, uz_error *err)

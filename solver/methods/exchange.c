@@ -34,14 +34,22 @@ typedef struct {
     const uz_leave *leave;
 } exchange;
 
-static bool grow(exchange *x)
+/* Columns of L moved between two questions: the pages of the new room are made on the way. */
+enum { MOVED = 16 };
+
+/* Twice the room. Where there is no leave to go on the old one stays, and that is no error. */
+static uz_status grow(exchange *x, uz_error *err)
 {
     int64_t room = x->room ? 2 * x->room : FIRST_ROOM;
     int64_t *rows = uz_alloc(room, sizeof *rows);
     double **column = uz_alloc(room, sizeof *column), *L = uz_alloc(room * room, sizeof *L);
     double *l = uz_alloc(room, sizeof *l), *w = uz_alloc(room, sizeof *w);
-    bool ok = rows && column && L && l && w;
+    bool got = rows && column && L && l && w, ok = got;
     for (int64_t k = 0; ok && k < x->count; k++) {
+        if (k % MOVED == MOVED - 1 && uz_leave_is_over(x->leave)) {
+            ok = false;
+            break;
+        }
         rows[k] = x->rows[k];
         column[k] = x->column[k];
         l[k] = x->l[k];
@@ -60,10 +68,10 @@ static bool grow(exchange *x)
         x->w = w;
         x->room = room;
     }
-    return ok;
+    return got ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows in contact", (long long)x->count);
 }
 
-static bool allocate(exchange *x, int64_t m)
+static uz_status allocate(exchange *x, int64_t m, uz_error *err)
 {
     x->m = m;
     x->size = uz_alloc(m, sizeof *x->size);
@@ -71,7 +79,9 @@ static bool allocate(exchange *x, int64_t m)
     x->open = uz_alloc(m, sizeof *x->open);
     x->base = uz_alloc_zero(m, sizeof *x->base);
     x->barred = uz_alloc_zero(m, sizeof *x->barred);
-    return x->size && x->open && x->base && x->incoming && x->barred && grow(x);
+    if (x->size && x->open && x->base && x->incoming && x->barred)
+        return grow(x, err);
+    return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory to exchange %lld rows", (long long)m);
 }
 
 static void release(exchange *x)
@@ -112,14 +122,15 @@ static bool depends(const exchange *x, int64_t q)
     return !(x->compliance > UZ_DEPENDENT * x->incoming[q]);
 }
 
-/* q, pressed last and independent, joins the rows in contact. */
+/* q, pressed last and independent, joins the rows in contact, unless there was no leave to make room for it. */
 static uz_status join(exchange *x, int64_t q, uz_error *err)
 {
+    uz_status status = x->count == x->room ? grow(x, err) : UZ_OK;
+    if (status != UZ_OK || x->count == x->room)
+        return status;
     double *column = uz_alloc(x->m, sizeof *column);
-    if (!column || (x->count == x->room && !grow(x))) {
-        free(column);
+    if (!column)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows in contact", (long long)x->count);
-    }
     memcpy(column, x->incoming, (size_t)x->m * sizeof *column);
     for (int64_t k = 0; k < x->count; k++)
         x->L[x->count + k * x->room] = x->l[k];
@@ -208,7 +219,7 @@ static void settle(exchange *x)
     for (bool pulls = true; pulls && !uz_leave_is_over(x->leave);) {
         pulls = false;
         measure(x);
-        for (int pass = 0; pass < PASSES; pass++)
+        for (int pass = 0; pass < PASSES && !uz_leave_is_over(x->leave); pass++)
             close_gaps(x);
         for (int64_t k = x->count - 1; k >= 0 && !uz_leave_is_over(x->leave); k--)
             if (reaction(x, k) > 0.0) {
@@ -218,19 +229,21 @@ static void settle(exchange *x)
     }
 }
 
-/* From the rows asked for: an independent part of them. */
+/* From the rows asked for: an independent part of them. Where there is no leave to go on, what has come together. */
 static uz_status begin(exchange *x, const bool *active, uz_error *err)
 {
     uz_status status = UZ_OK;
     for (int64_t i = 0; status == UZ_OK && i < x->m; i++) {
-        bool wanted = active[i] && !uz_leave_is_over(x->leave);
-        if (!wanted && x->base[i] == 0.0)
+        if (!active[i] && x->base[i] == 0.0)
             continue;
+        if (uz_leave_is_over(x->leave))
+            break;
         status = press(x, i, err);
         if (status != UZ_OK)
             return status;
-        yield_to(x, i);
-        if (wanted && !depends(x, i))
+        if (active[i])
+            yield_to(x, i);
+        if (active[i] && !depends(x, i))
             status = join(x, i, err);
         else
             forget_base(x, i, x->incoming);
@@ -343,10 +356,8 @@ uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, doubl
 {
     int64_t m = uz_case_N(load)->rows;
     exchange x = {.load = load, .s = s, .g = g, .leave = leave, .most = *steps};
-    uz_status status = UZ_OK;
     *end = UZ_EXCHANGE_STOPPED;
-    if (!allocate(&x, m))
-        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory to exchange %lld rows", (long long)m);
+    uz_status status = allocate(&x, m, err);
     if (status == UZ_OK) {
         memcpy(x.open, uz_case_g0(load), (size_t)m * sizeof *x.open);
         if (base)

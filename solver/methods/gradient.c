@@ -174,12 +174,14 @@ static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *
     return status;
 }
 
-/* alpha = 1 / lambda_max(D) where the user gave none. */
-static uz_status prepare(uz_iterate *it, uz_case *load, uz_error *err)
+/* alpha = 1 / lambda_max(D) where the user gave none. A run that is told to stop before lambda_max is known has no
+ * alpha: who goes on with it chooses. */
+static uz_status prepare(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_error *err)
 {
+    const uz_leave leave = {options->hooks, options->deadline};
     double lambda = 0.0;
     uz_status status = uz_case_prepare_iterations(load, it->alpha > 0.0 ? NULL : &lambda, err);
-    if (it->alpha <= 0.0)
+    if (it->alpha <= 0.0 && (lambda > 0.0 || !uz_leave_is_over(&leave)))
         it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
     return status;
 }
@@ -206,7 +208,7 @@ static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *o
             return UZ_OK;
     }
     if (status == UZ_OK)
-        status = prepare(it, load, err);
+        status = prepare(it, load, options, err);
     if (status == UZ_OK && !it->begun)
         return uz_iterate_begin(it, load, options, history, err);
     if (status == UZ_OK && !it->fresh)

@@ -1,42 +1,67 @@
-#include "scene/scene.h"
+/* check.c: what a scene must satisfy as a whole, and its loads. */
+#include "scene/check.h"
 
 #include "core/error.h"
+#include "scene/scene.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-enum { POINTER = 96 };
+/* ---- pieces */
 
-static const char *const AXES = "xyz";
-
-/* "/materials/0/poisson"; key NULL: "/materials/0". */
-static const char *pointer_to(char where[POINTER], const char *list, int64_t i, const char *key)
+const char *uz_check_place(char where[UZ_CHECK_POINTER], const char *list, int64_t i, const char *key)
 {
-    snprintf(where, POINTER, "/%s/%lld%s%s", list, (long long)i, key ? "/" : "", key ? key : "");
+    snprintf(where, UZ_CHECK_POINTER, "/%s/%lld%s%s", list, (long long)i, key ? "/" : "", key ? key : "");
     return where;
 }
 
-bool uz_unit_normal(double out[3], const double normal[3], int dim)
+const uz_group *uz_check_group(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
+                               int64_t i, const char *key, uz_error *err)
 {
-    double largest = 0, norm = 0;
-    memset(out, 0, 3 * sizeof *out);
-    for (int c = 0; c < dim; c++) {
-        if (!isfinite(normal[c]))
-            return false;
-        largest = fmax(largest, fabs(normal[c]));
-    }
-    if (!(largest > 0))
-        return false;
-    for (int c = 0; c < dim; c++)
-        norm += (normal[c] / largest) * (normal[c] / largest);
-    for (int c = 0; c < dim; c++) {
-        double component = normal[c] / largest / sqrt(norm);
-        out[c] = fabs(component) > 4 * DBL_EPSILON ? component : 0;
-    }
-    return true;
+    const uz_group *group = uz_mesh_group(mesh, on, uz_check_place(where, list, i, key), err);
+    if (!group || uz_group_node_count(mesh, group) > 0)
+        return group;
+    uz_fail(err, UZ_ERR_SCENE, where, "the group \"%s\" has no node that belongs to an element", group->name);
+    return NULL;
 }
+
+uz_status uz_check_sides(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
+                         const char *remedy, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    const uz_group *group = uz_check_group(where, mesh, on, list, i, key, err);
+    if (!group)
+        return UZ_ERR_SCENE;
+    if (group->kind == UZ_GROUP_FACES)
+        return UZ_OK;
+    if (group->everything)
+        return uz_fail(err, UZ_ERR_SCENE, where, "\"%s\" is the whole body, not a part of its boundary; %s",
+                       group->name, remedy);
+    return uz_fail(err, UZ_ERR_SCENE, where, "the group \"%s\" is made of %s, which have no sides here; %s",
+                   group->name, group->kind == UZ_GROUP_NODES ? "nodes" : "elements", remedy);
+}
+
+uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    if (isfinite(value))
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_NOT_FINITE, uz_check_place(where, list, i, key), "not a finite number");
+}
+
+uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err)
+{
+    char place[32];
+    uz_status status = UZ_OK;
+    for (int c = 0; c < dim && status == UZ_OK; c++) {
+        snprintf(place, sizeof place, "%s/%d", key, c);
+        status = uz_check_number(v[c], list, i, place, err);
+    }
+    return status;
+}
+
+/* ---- the whole */
 
 /* Each item costs work on every node of its group. */
 static uz_status check_counts(const uz_scene *scene, uz_error *err)
@@ -45,12 +70,55 @@ static uz_status check_counts(const uz_scene *scene, uz_error *err)
     const struct {
         const char *where;
         int64_t count;
-    } lists[] = {{"/supports", scene->n_supports}, {"/loads", scene->n_loads}, {"/contacts", scene->n_contacts}};
+    } lists[] = {{"/supports", scene->n_supports},
+                 {"/loads", scene->n_loads},
+                 {"/contacts", scene->n_contacts},
+                 {"/materials", scene->n_materials}};
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)
         if (lists[i].count > MOST)
             return uz_fail(err, UZ_ERR_SCENE, lists[i].where, "%lld items; at most %d are allowed",
                            (long long)lists[i].count, MOST);
     return UZ_OK;
+}
+
+static uz_status check_thickness(const uz_scene *scene, uz_error *err)
+{
+    if (scene->model != UZ_PLANE_STRESS && scene->model != UZ_PLANE_STRAIN)
+        return UZ_OK;
+    if (!isfinite(scene->thickness))
+        return uz_fail(err, UZ_ERR_NOT_FINITE, "/thickness", "the thickness is not a finite number");
+    if (scene->thickness <= 0)
+        return uz_fail(err, UZ_ERR_SCENE, "/thickness", "the thickness must be positive");
+    return UZ_OK;
+}
+
+/* In a body of revolution x is the radius. */
+static uz_status check_radius(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
+{
+    for (int64_t i = 0; scene->model == UZ_AXISYMMETRIC && i < mesh->n_nodes; i++)
+        if (mesh->xyz[2 * i] < -1e-12 * mesh->extent)
+            return uz_fail(err, UZ_ERR_SCENE, "/mesh",
+                           "node %lld at (%g, %g) has a negative x, which is the radius in a body of revolution; "
+                           "mesh the half with x >= 0",
+                           (long long)i, mesh->xyz[2 * i], mesh->xyz[2 * i + 1]);
+    return UZ_OK;
+}
+
+static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
+{
+    const uz_formulation formulation = scene->formulation;
+    if (formulation >= UZ_FORMULATIONS)
+        return uz_fail(err, UZ_ERR_SCENE, "/formulation",
+                       "unknown formulation; use auto, standard, bbar or "
+                       "incompatible_modes");
+    if (formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD)
+        return UZ_OK;
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        if (mesh->kind[e] == UZ_QUAD4 || mesh->kind[e] == UZ_HEX8)
+            return UZ_OK;
+    return uz_fail(err, UZ_ERR_SCENE, "/formulation",
+                   "the formulations bbar and incompatible_modes are those of quad4 and hex8, and the mesh has none; "
+                   "use auto");
 }
 
 static uz_status check_model(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
@@ -61,150 +129,136 @@ static uz_status check_model(const uz_scene *scene, const uz_mesh *mesh, uz_erro
     if (uz_model_dim(scene->model) != mesh->dim)
         return uz_fail(err, UZ_ERR_SCENE, "/model", "a mesh in %d dimensions needs the model %s", mesh->dim,
                        mesh->dim == 3 ? "solid" : "plane_stress, plane_strain or axisymmetric");
-    if (!isfinite(scene->thickness))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, "/thickness", "the thickness is not a finite number");
-    if (scene->thickness <= 0)
-        return uz_fail(err, UZ_ERR_SCENE, "/thickness", "the thickness must be positive");
-    return UZ_OK;
-}
-
-/* Positive strain energy needs -1 < poisson < 1/2; in plane stress 1/2 itself (incompressible) is harmless. */
-static uz_status check_poisson(const uz_scene *scene, double poisson, const char *where, uz_error *err)
-{
-    if (!isfinite(poisson))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "Poisson's ratio is not a finite number");
-    if (poisson == 0.5 && scene->model == UZ_PLANE_STRAIN)
-        return uz_fail(err, UZ_ERR_SCENE, where,
-                       "Poisson's ratio 0.5 makes the body infinitely stiff in plane strain; use less, such as 0.49");
-    if (poisson <= -1 || poisson > 0.5)
-        return uz_fail(err, UZ_ERR_SCENE, where, "Poisson's ratio must lie between -1 and 0.5; it is %g", poisson);
-    return UZ_OK;
-}
-
-static uz_status check_young(double young, const char *where, uz_error *err)
-{
-    if (!isfinite(young))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "Young's modulus is not a finite number");
-    if (young <= 0)
-        return uz_fail(err, UZ_ERR_SCENE, where, "Young's modulus must be positive; it is %g", young);
-    return UZ_OK;
-}
-
-static uz_status check_material(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
-{
-    char where[POINTER];
-    const uz_material *material = &scene->materials[i];
-    const uz_group *group = uz_mesh_group(mesh, material->on, pointer_to(where, "materials", i, "on"), err);
-    if (!group)
-        return UZ_ERR_SCENE;
-    if (group->kind != UZ_GROUP_ELEMENTS)
-        return uz_fail(err, UZ_ERR_SCENE, where, "\"%s\" is a side; a material fills elements: use \"all\"",
-                       group->name);
-    if (i > 0)
-        return uz_fail(err, UZ_ERR_SCENE, where, "the elements of \"%s\" already have material 0", group->name);
-    uz_status status = check_young(material->young, pointer_to(where, "materials", i, "young"), err);
-    if (status != UZ_OK)
-        return status;
-    return check_poisson(scene, material->poisson, pointer_to(where, "materials", i, "poisson"), err);
-}
-
-static uz_status check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    if (scene->n_materials < 1)
-        return uz_fail(err, UZ_ERR_SCENE, "/materials", "no material; give young and poisson on \"all\"");
-    for (int64_t i = 0; i < scene->n_materials && status == UZ_OK; i++)
-        status = check_material(scene, mesh, i, err);
-    return status;
-}
-
-static uz_status check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
-{
-    char where[POINTER];
-    const uz_support *support = &scene->supports[i];
-    bool any = false;
-    if (!uz_mesh_group(mesh, support->on, pointer_to(where, "supports", i, "on"), err))
-        return UZ_ERR_SCENE;
-    for (int c = 0; c < mesh->dim; c++) {
-        const char key[3] = {'u', AXES[c], '\0'};
-        if (isinf(support->u[c]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, pointer_to(where, "supports", i, key),
-                           "the prescribed displacement is not a finite number");
-        any = any || !isnan(support->u[c]);
-    }
-    if (!any)
-        return uz_fail(err, UZ_ERR_SCENE, pointer_to(where, "supports", i, NULL),
-                       "this support holds no direction; give ux, uy or both");
-    return UZ_OK;
-}
-
-/* Each component must be finite; key is "traction", "point", ... */
-static uz_status check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err)
-{
-    char where[POINTER], place[32];
-    for (int c = 0; c < dim; c++) {
-        if (isfinite(v[c]))
-            continue;
-        snprintf(place, sizeof place, "%s/%d", key, c);
-        return uz_fail(err, UZ_ERR_NOT_FINITE, pointer_to(where, list, i, place), "not a finite number");
-    }
-    return UZ_OK;
-}
-
-/* The group must be made of edges: loads and contacts act on a boundary. */
-static uz_status check_boundary(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *remedy,
-                                uz_error *err)
-{
-    char where[POINTER];
-    const uz_group *group = uz_mesh_group(mesh, on, pointer_to(where, list, i, "on"), err);
-    if (!group)
-        return UZ_ERR_SCENE;
-    if (group->kind != UZ_GROUP_FACES)
-        return uz_fail(err, UZ_ERR_SCENE, where, "\"%s\" is the whole body, not a part of its boundary; %s",
-                       group->name, remedy);
-    return UZ_OK;
-}
-
-static uz_status check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
-{
-    double unit[3];
-    char where[POINTER];
-    const uz_contact *contact = &scene->contacts[i];
-    uz_status status = check_boundary(mesh, contact->on, "contacts", i,
-                                      "name the side that can touch: left, right, bottom or top", err);
+    uz_status status = check_thickness(scene, err);
     if (status == UZ_OK)
-        status = check_vector(contact->normal, mesh->dim, "contacts", i, "obstacle/plane/normal", err);
-    if (status == UZ_OK && !uz_unit_normal(unit, contact->normal, mesh->dim))
-        return uz_fail(err, UZ_ERR_SCENE, pointer_to(where, "contacts", i, "obstacle/plane/normal"),
-                       "the normal is zero; it must point out of the obstacle, towards the body");
-    return status;
+        status = check_radius(scene, mesh, err);
+    return status == UZ_OK ? check_formulation(scene, mesh, err) : status;
 }
 
 static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     uz_status status = check_counts(scene, err);
-    for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
-        status = check_support(scene, mesh, i, err);
-    for (int64_t i = 0; i < scene->n_contacts && status == UZ_OK; i++)
-        status = check_contact(scene, mesh, i, err);
-    return status;
+    if (status == UZ_OK)
+        status = uz_check_supports(scene, mesh, err);
+    return status == UZ_OK ? uz_check_contacts(scene, mesh, err) : status;
 }
 
 uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     uz_status status = check_model(scene, mesh, err);
     if (status == UZ_OK)
-        status = check_materials(scene, mesh, err);
+        status = uz_check_materials(scene, mesh, err);
     if (status == UZ_OK)
         status = check_supports_and_contacts(scene, mesh, err);
     return status;
 }
 
+/* ---- loads */
+
+static const char *const LOAD_KEY[UZ_LOAD_KINDS] = {
+    [UZ_LOAD_TRACTION] = "traction",      [UZ_LOAD_PRESSURE] = "pressure", [UZ_LOAD_FORCE] = "force",
+    [UZ_LOAD_BODY_FORCE] = "body_force",  [UZ_LOAD_GRAVITY] = "gravity",   [UZ_LOAD_NODE_FORCE] = "force",
+    [UZ_LOAD_TEMPERATURE] = "temperature"};
+
+static uz_status check_load_value(const uz_load *load, int dim, int64_t i, uz_error *err)
+{
+    if (load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_TEMPERATURE)
+        return uz_check_number(load->value, "loads", i, LOAD_KEY[load->kind], err);
+    return uz_check_vector(load->v, dim, "loads", i, LOAD_KEY[load->kind], err);
+}
+
+static uz_status check_on_sides(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    uz_status status = uz_check_sides(mesh, load->on, "loads", i, "on",
+                                      load->kind == UZ_LOAD_PRESSURE
+                                          ? "a pressure is a force per area of boundary: name the sides that it pushes"
+                                          : "a traction is a force per area of boundary: name the sides that it pulls",
+                                      err);
+    if (status != UZ_OK || load->kind != UZ_LOAD_PRESSURE)
+        return status;
+    const uz_group *group = uz_check_group(where, mesh, load->on, "loads", i, "on", err);
+    if (group->n_inner > 0)
+        return uz_fail(err, UZ_ERR_SCENE, where,
+                       "%lld faces of \"%s\" lie between two elements, where there is no outward normal; use a "
+                       "traction, or leave them out",
+                       (long long)group->n_inner, group->name);
+    return UZ_OK;
+}
+
+/* Density or expansion of any material: what the load is multiplied by. */
+static bool some_material_has(const uz_scene *scene, bool density)
+{
+    for (int64_t i = 0; i < scene->n_materials; i++)
+        if ((density ? scene->materials[i].density : scene->materials[i].expansion) != 0)
+            return true;
+    return false;
+}
+
+static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    const uz_load *load = &scene->loads[i];
+    const uz_group *group = uz_check_group(where, mesh, load->on, "loads", i, "on", err);
+    if (!group)
+        return UZ_ERR_SCENE;
+    if (group->kind != UZ_GROUP_ELEMENTS)
+        return uz_fail(err, UZ_ERR_SCENE, where,
+                       "the group \"%s\" is not made of elements, and %s acts on elements: use \"all\"", group->name,
+                       LOAD_KEY[load->kind]);
+    if (load->kind == UZ_LOAD_GRAVITY && !some_material_has(scene, true))
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "gravity"),
+                       "no material has a density; give one, or use body_force");
+    if (load->kind == UZ_LOAD_TEMPERATURE && !some_material_has(scene, false))
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
+                       "no material has an expansion, so that a temperature does nothing");
+    return UZ_OK;
+}
+
+static uz_status check_force(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
+{
+    char where[UZ_CHECK_POINTER];
+    if (load->kind == UZ_LOAD_NODE_FORCE) {
+        if (load->node >= 0 && load->node < mesh->n_nodes)
+            return UZ_OK;
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "node"),
+                       "there is no node %lld; this mesh has 0 to %lld", (long long)load->node,
+                       (long long)mesh->n_nodes - 1);
+    }
+    const uz_group *group = uz_check_group(where, mesh, load->on, "loads", i, "on", err);
+    if (!group)
+        return UZ_ERR_SCENE;
+    if (group->kind == UZ_GROUP_ELEMENTS)
+        return uz_fail(err, UZ_ERR_SCENE, where,
+                       "the group \"%s\" is made of elements; a force is spread over sides or nodes: use body_force "
+                       "(force per volume), or name sides",
+                       group->name);
+    return UZ_OK;
+}
+
 static uz_status check_load(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
-    uz_status status = check_boundary(mesh, scene->loads[i].on, "loads", i,
-                                      "a traction is a force per area of boundary: name the sides that it pulls", err);
-    return status == UZ_OK ? check_vector(scene->loads[i].v, mesh->dim, "loads", i, "traction", err) : status;
+    char where[UZ_CHECK_POINTER];
+    uz_status status;
+    const uz_load *load = &scene->loads[i];
+    switch (load->kind) {
+    case UZ_LOAD_TRACTION:
+    case UZ_LOAD_PRESSURE:
+        status = check_on_sides(load, mesh, i, err);
+        break;
+    case UZ_LOAD_FORCE:
+    case UZ_LOAD_NODE_FORCE:
+        status = check_force(load, mesh, i, err);
+        break;
+    case UZ_LOAD_BODY_FORCE:
+    case UZ_LOAD_GRAVITY:
+    case UZ_LOAD_TEMPERATURE:
+        status = check_on_elements(scene, mesh, i, err);
+        break;
+    default:
+        return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "loads", i, NULL), "an unknown kind of load");
+    }
+    return status == UZ_OK ? check_load_value(load, mesh->dim, i, err) : status;
 }
 
 uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
@@ -213,6 +267,7 @@ uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_err
     for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++)
         status = check_load(scene, mesh, i, err);
     for (int64_t i = 0; i < scene->n_contacts && status == UZ_OK; i++)
-        status = check_vector(scene->contacts[i].point, mesh->dim, "contacts", i, "obstacle/plane/point", err);
+        if (scene->contacts[i].kind == UZ_OBSTACLE_PLANE)
+            status = uz_check_vector(scene->contacts[i].point, mesh->dim, "contacts", i, "obstacle/plane/point", err);
     return status;
 }

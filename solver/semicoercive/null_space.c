@@ -3,6 +3,7 @@
 #include "core/alloc.h"
 #include "core/blas.h"
 #include "core/error.h"
+#include "core/hooks.h"
 
 #include <float.h>
 #include <math.h>
@@ -84,6 +85,7 @@ typedef struct {
     const uz_csc *K, *K_R, *N, *Nt;
     const double *weight;
     const uz_factor *factor;
+    const uz_hooks *hooks;
     uz_factor_workspace *ws;
     int64_t d, m, b;
     double *X, *Y;     /* d x b; Y: K_R X, or K X */
@@ -122,6 +124,8 @@ static void release(block *x)
 /* x (d) = K_R^-1 N'row. */
 static uz_status solve_rows(block *s, double *x, uz_error *err)
 {
+    if (uz_cancelled(s->hooks))
+        return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
     memset(x, 0, (size_t)s->d * sizeof *x);
     uz_csc_gaxpy(x, s->Nt, 1.0, s->row);
     uz_factor_permute(s->factor, s->dof, x);
@@ -293,9 +297,17 @@ static uz_status search(block *s, double **Z, int64_t *k, int64_t b, uz_error *e
 }
 
 uz_status uz_null_space(double **Z, int64_t *k, const uz_csc *K, const uz_csc *K_R, const uz_csc *N, const uz_csc *Nt,
-                        const double *weight, const uz_factor *factor, uz_error *err)
+                        const double *weight, const uz_factor *factor, const uz_hooks *hooks, uz_error *err)
 {
-    block s = {.K = K, .K_R = K_R, .N = N, .Nt = Nt, .weight = weight, .factor = factor, .d = K->cols, .m = N->rows};
+    block s = {.K = K,
+               .K_R = K_R,
+               .N = N,
+               .Nt = Nt,
+               .weight = weight,
+               .factor = factor,
+               .hooks = hooks,
+               .d = K->cols,
+               .m = N->rows};
     *Z = NULL;
     *k = 0;
     s.ws = uz_factor_workspace_new();

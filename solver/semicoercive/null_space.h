@@ -13,9 +13,10 @@ uz_status uz_check_semidefinite(const uz_csc *K, const uz_settings *settings, co
 /* *Z: d x *k, column by column, each of largest entry 1: a basis of the null space of K, where K_R = K + N'R N (weight:
  * R's diagonal, m) is positive definite and `factor` its factor. A null vector is an eigenvector of K_R^-1 N'R N for
  * the eigenvalue 1, the largest, so subspace iteration finds it (Golub and Van Loan 2013, section 8.2.4). At most
- * UZ_NULL_MOST; *k is more when there are more, *Z then NULL. The caller frees *Z. */
+ * UZ_NULL_MOST; *k is more when there are more, *Z then NULL. The caller frees *Z. hooks may
+ * be NULL; asked between linear solves: UZ_ERR_CANCELLED. */
 enum { UZ_NULL_MOST = 64 };
 uz_status uz_null_space(double **Z, int64_t *k, const uz_csc *K, const uz_csc *K_R, const uz_csc *N, const uz_csc *Nt,
-                        const double *weight, const uz_factor *factor, uz_error *err);
+                        const double *weight, const uz_factor *factor, const uz_hooks *hooks, uz_error *err);
 
 #endif

@@ -68,12 +68,15 @@ static uz_status refuse(const uz_semi *s, uz_pressing how, const double *y, uz_e
     if (how == UZ_PUSHED_AWAY)
         return uz_fail(err, UZ_ERR_FREE_BODY, "p",
                        "K is singular and the load pushes a part of the body away along a motion without stiffness "
-                       "that no row of N stands in the way of; it moves most: %s",
+                       "that no row of N stands in the way of; it moves most: %s. Support it there, add a row of N "
+                       "that stops this motion, or load it towards the rows that are there.",
                        dofs);
-    return uz_fail(err, UZ_ERR_FREE_BODY, "K",
-                   "K is singular and the load does not press the body on: a motion without stiffness that no row of N "
-                   "stands in the way of costs nothing; it moves most: %s",
-                   dofs);
+    return uz_fail(
+        err, UZ_ERR_FREE_BODY, "K",
+        "K is singular and the load does not press the body on: a motion without stiffness that no row of N "
+        "stands in the way of costs nothing; it moves most: %s. Support it there, or add a row of N or a load "
+        "that stops this motion.",
+        dofs);
 }
 
 uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err)

@@ -179,8 +179,8 @@ static uz_status find_null_space(uz_semi *s, uz_error *err)
     if (status == UZ_OK)
         status = uz_cache_acquire(&body, &reused, s->cache, &augmented, s->settings, s->hooks, err);
     if (status == UZ_OK)
-        status =
-            uz_null_space(&s->null_space, &s->k, s->of.K, &augmented.qp.K, s->of.N, &s->Nt, s->soft, body->factor, err);
+        status = uz_null_space(&s->null_space, &s->k, s->of.K, &augmented.qp.K, s->of.N, &s->Nt, s->soft, body->factor,
+                               s->hooks, err);
     s->Z = s->null_space;
     uz_cache_release(s->cache, body);
     uz_augmented_clear(&augmented);
@@ -269,7 +269,7 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
     if (body) {
         for (int64_t j = 0; j < s->d; j++)
             sum += noise[j] > 0.0 ? noise[j] / augmented.qp.K.val[augmented.qp.K.ptr[j]] * noise[j] : 0.0;
-        rows = sum > 0.0 ? uz_body_inverse_bound(body, &augmented.qp.K, ws) * sum : 0.0;
+        rows = sum > 0.0 ? uz_body_inverse_bound(body, &augmented.qp.K, ws, NULL) * sum : 0.0;
     }
     *bound = sqrt(rows);
     uz_cache_release(s->cache, body);
@@ -298,7 +298,7 @@ static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
         const uz_csc *K = &augmented.qp.K;
         for (int64_t j = 0; j < s->d; j++)
             most = fmax(most, 1.0 / (s->inverse[j] * K->val[K->ptr[j]]));
-        *bound = most * uz_body_inverse_bound(body, K, ws);
+        *bound = most * uz_body_inverse_bound(body, K, ws, NULL);
     }
     uz_cache_release(s->cache, body);
     uz_augmented_clear(&augmented);

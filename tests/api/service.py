@@ -5,6 +5,7 @@ BUILD_DIR [FILTER]. Each test gets a running Service that it may use up: stop() 
 needs other options is decorated with @options("--workers", "1"). Raise Skip("why") to skip.
 """
 import functools
+import gzip
 import http.client
 import json
 import os
@@ -48,15 +49,16 @@ class Skip(Exception):
 
 
 class Reply:
-    """status, headers (last of each name, in lower case), body (bytes), json (None if it is none)."""
+    """status, headers (last of each name, in lower case), body (bytes as they came), json (None if it is none)."""
 
     def __init__(self, status, headers, body):
         self.status = status
         self.headers = {name.lower(): value for name, value in headers}
         self.body = body
         self.json = None
-        if "json" in self.headers.get("content-type", "") and body:
-            self.json = json.loads(body)
+        if "json" in self.headers.get("content-type", "") and body and status != 206:
+            plain = gzip.decompress(body) if self.headers.get("content-encoding") == "gzip" else body
+            self.json = json.loads(plain)
             validate(self)
 
     def __repr__(self):
@@ -64,12 +66,12 @@ class Reply:
 
 
 # What tells which schema a reply must meet: a member that only this kind of object has.
-KINDS = [("factors", "factors.json"), ("rows", "history.json"), ("code", "problem-details.json"),
+KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("rows", "history.json"), ("code", "problem-details.json"),
          ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json")]
 
 
 def schema_of(reply):
-    if "schema+json" in reply.headers["content-type"] or "openapi" in reply.json or "valid" in reply.json:
+    if "schema+json" in reply.headers["content-type"] or "openapi" in reply.json:
         return None
     if isinstance(reply.json.get("jobs"), list):
         return "jobs.json"

@@ -282,6 +282,7 @@ def test_wrong_types(s):
         refused(s, {**MATRICES, "solver": wrong}, 422, "wrong_type", "/solver")
     for wrong in (None, True, {}, 1):
         refused(s, {**MATRICES, "tags": wrong}, 422, "wrong_type", "/tags")
+    for wrong in (None, True, 1):
         refused(s, {"problem": {**MATRICES["problem"], "p": wrong}}, 422, "wrong_type", "/problem/p")
     for wrong in (None, True, [1], 1, {"x": 1}):
         reply = s.post({**MATRICES, "problem": {**MATRICES["problem"], "K": wrong}})
@@ -472,7 +473,7 @@ def test_body_of_the_limit(s):
     """The limit itself is allowed; a megabyte of spaces more is not, whatever stands in it."""
     body = BODY.encode()
     reply = s.request("POST", "/v1/jobs?validate=true", body + b" " * (LIMIT - len(body)), AS_JSON, timeout=120)
-    check(expect(reply, 200).json == {"valid": True}, reply)
+    check(expect(reply, 200).json["valid"] is True, reply)
     expect(s.request("POST", "/v1/jobs?validate=true", body + b" " * (LIMIT + 1 - len(body)), AS_JSON), 413,
            "body_too_large")
     check(is_instrumented(s) or peak_memory(s) < 4 * LIMIT, "one body of the limit took", peak_memory(s))

@@ -15,7 +15,8 @@ def test_job_lifecycle(s):
     reply = expect(s.post({**MATRICES, "tags": ["a", "b"]}), 202)
     job = reply.json
     check(reply.headers["location"] == f"/v1/jobs/{job['id']}", reply)
-    check(reply.headers["cache-control"] == "no-store", reply)
+    check(reply.headers["cache-control"] == "no-store" and "allow" not in reply.headers, reply)
+    check("allow" not in s.get("/v1/jobs").headers)
     check(job["tags"] == ["a", "b"] and job["status"] in ("accepted", "running", "successful"), job)
     ended = expect(s.get(reply.headers["location"], Prefer="wait=30"), 200).json
     check(ended["status"] == "successful" and ended["progress"] == 100, ended)
@@ -190,7 +191,16 @@ def test_absolute_target(s):
 
 def test_validate(s):
     reply = expect(s.post(SCENE, query="?validate=true"), 200)
-    check(reply.json == {"valid": True}, reply)
+    predicted = reply.json["predicted"]
+    check(reply.json["valid"] is True and predicted["m"] == 30 and predicted["d"] == 660 and predicted["fits"], reply)
+    solved = s.solve(SCENE)["summary"]
+    s.request("DELETE", f"/v1/jobs/{s.get('/v1/jobs').json['jobs'][0]['id']}")
+    check(predicted["operator"] == solved["operator"] and predicted["factor_nnz"] == solved["factor"]["nnz"], solved)
+    check(predicted["bytes"] > 1e5 and 0 < predicted["seconds"] < 10, predicted)
+    free = json.loads(json.dumps(SCENE))
+    free["problem"]["supports"] = []
+    check(expect(s.post(free, query="?validate=true"), 200).json == {"valid": True, "predicted": None})
+    check(expect(s.post(MATRICES, query="?validate=true"), 200).json["predicted"]["d"] == 2)
     expect(s.post({"problem": {}}, query="?validate=true"), 422)
     expect(s.post(SCENE, query="?validate=maybe"), 400, "bad_parameter")
     expect(s.post(SCENE, query="?wait=1"), 400, "unknown_parameter")

@@ -269,6 +269,27 @@ static void bench_cases(report *out, int64_t nx)
     print_row(out, name, "x", ratio, "one CHOLMOD solve (target: 60)");
 }
 
+/* A filter that names a row, "stop_bounds", runs that row alone. */
+static void bench_stops(report *out)
+{
+    const char *row;
+    for (int k = 0; (row = bench_stop_name(k)) != NULL; k++) {
+        bench_value between, work, to_return;
+        char name[64];
+        if (out->filter && !strstr(row, out->filter))
+            continue;
+        if (!bench_stop(&between, &work, &to_return, k)) {
+            printf("%s gave no answer\n", row);
+            exit(1);
+        }
+        print_row(out, row, "ms", between, "longest between two questions (target: 50)");
+        snprintf(name, sizeof name, "%s_work", row);
+        print_row(out, name, "ms", work, "the same, of the processor's time");
+        snprintf(name, sizeof name, "%s_return", row);
+        print_row(out, name, "ms", to_return, "from \"stop\" to the return");
+    }
+}
+
 static bool wanted(const report *out, const char *name)
 {
     return !out->filter || strstr(name, out->filter);
@@ -317,6 +338,8 @@ int main(int argc, char **argv)
         bench_memories(&out);
     if (wanted(&out, "hex8"))
         bench_cubes(&out);
+    if (!out.filter || strncmp(out.filter, "stop", 4) == 0)
+        bench_stops(&out);
     for (int64_t nx = 300; wanted(&out, "load_cases") && nx <= 600; nx += 300)
         bench_cases(&out, nx);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {

@@ -51,6 +51,12 @@ bool bench_hex8(bench_value *ratio, int64_t n, bool leaning);
  * of one right-hand side, both with the factor at hand. false: no answer. */
 bool bench_load_cases(bench_value *ratio, int64_t nx);
 
+/* How soon solve `which` (0, 1, ...) stops, in milliseconds: the longest time between two questions whether to go on,
+ * by the clock and of this thread's processor alone, and from the answer "stop" to the return. name: NULL after the
+ * last. false: no answer. */
+const char *bench_stop_name(int which);
+bool bench_stop(bench_value *between, bench_value *work, bench_value *to_return, int which);
+
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);
 

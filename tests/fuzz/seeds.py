@@ -1,4 +1,5 @@
-"""Writes what the fuzz targets start from: OUT/json/* and OUT/mm/*, one seed a file, and OUT/json.dict, OUT/mm.dict.
+"""Writes what the fuzz targets start from: OUT/json/*, OUT/mm/* and OUT/gmsh/*, one seed a file, and OUT/json.dict,
+OUT/mm.dict and OUT/gmsh.dict.
 
 Seeds come from tests/data, and from the shared cases where they are there; the words of the JSON dictionary are the
 member names and values that the schemas know.
@@ -6,6 +7,7 @@ member names and values that the schemas know.
 import hashlib
 import json
 import pathlib
+import struct
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -15,6 +17,9 @@ LARGEST = 16384  # bytes; larger seeds slow every run down
 MM_WORDS = ["%%MatrixMarket", "matrix", "coordinate", "array", "real", "double", "integer", "complex", "pattern", "general",
             "symmetric", "skew-symmetric", "hermitian", "vector", "\n", "\r\n", "%", "1e308", "1e-320", "-0.0", "nan", "inf",
             "9223372036854775807", "2147483648"]
+GMSH_WORDS = ["$MeshFormat", "$EndMeshFormat", "2.2 0 8", "4.1 0 8", "2.2 1 8", "4.1 1 8", "$PhysicalNames", "$EndPhysicalNames",
+              "$Entities", "$EndEntities", "$PartitionedEntities", "$EndPartitionedEntities", "$Nodes", "$EndNodes",
+              "$Elements", "$EndElements", "$Periodic", "$EndPeriodic", "\n", "\r\n", '"a"', "1e308", "nan", "99999999999", "-1"]
 JSON_WORDS = ["null", "true", "false", "1e400", "-0.0", "1e-320", "9223372036854775808", "[[", "]]", "{}", "\\u0000", "\\ud800"]
 
 
@@ -31,6 +36,59 @@ def mm_seeds():
     for folder in (DATA, CASES / "mm_edge"):
         for path in folder.rglob("*.mtx"):
             yield path.read_bytes()
+
+
+def gmsh_seeds():
+    """Files, and small ones of every element in both versions, ASCII and binary."""
+    for folder in (DATA / "meshes", CASES / "meshes"):
+        for path in folder.rglob("*.msh"):
+            yield path.read_bytes()
+    points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0, 0, 0.5), (0, 0.5, 0.5), (0.5, 0, 0.5)]
+    for nodes, kind in ((3, 2), (6, 9), (4, 4), (10, 11)):
+        at = points[:3] + points[4:7] if nodes == 6 else points[:nodes]
+        yield small_gmsh_2(at, kind, False)
+        yield small_gmsh_2(at, kind, True)
+        yield small_gmsh_4(at, kind, False)
+        yield small_gmsh_4(at, kind, True)
+
+
+def gmsh_sections(version, binary, sections):
+    """Each section a list of (struct code, values): numbers as bytes or as words; text is text in both."""
+    out = f"$MeshFormat\n{version} {int(binary)} 8\n".encode() + (struct.pack("<i", 1) + b"\n" if binary else b"") + b"$EndMeshFormat\n"
+    for name, items in sections:
+        out += f"${name}\n".encode()
+        for code, values in items:
+            if code == "text":
+                out += values.encode()
+            elif binary:
+                out += struct.pack("<" + code, *values)
+            else:
+                out += (" ".join(str(v) for v in values) + "\n").encode()
+        out += f"\n$End{name}\n".encode()
+    return out
+
+
+def small_gmsh_2(points, kind, binary):
+    numbers = range(1, len(points) + 1)
+    nodes = [("text", f"{len(points)}\n")] + [("i3d", (i, *map(float, p))) for i, p in zip(numbers, points)]
+    tail = f"{len(points)}i"
+    elements = [("text", "2\n")]
+    if binary:
+        elements += [("3i", (1, 1, 2)), ("5i", (1, 3, 1, 1, 2)), ("3i", (kind, 1, 2)), ("3i" + tail, (2, 4, 1, *numbers))]
+    else:
+        elements += [("7i", (1, 1, 2, 3, 1, 1, 2)), ("5i" + tail, (2, kind, 2, 4, 1, *numbers))]
+    names = [("text", '1\n1 3 "edge"\n')]
+    return gmsh_sections("2.2", binary, [("PhysicalNames", names), ("Nodes", nodes), ("Elements", elements)])
+
+
+def small_gmsh_4(points, kind, binary):
+    numbers, n = range(1, len(points) + 1), len(points)
+    dim = 3 if kind in (4, 11) else 2
+    entity = ("i6dQiQ", (1, *6 * (0.0,), 1, 4, 0))
+    entities = [("4Q", (0, 0, int(dim == 2), int(dim == 3))), entity]
+    nodes = [("4Q", (1, n, 1, n)), ("3iQ", (dim, 1, 0, n)), (f"{n}Q", numbers)] + [("3d", tuple(map(float, p))) for p in points]
+    elements = [("4Q", (1, 1, 1, 1)), ("3iQ", (dim, 1, kind, 1)), (f"{n + 1}Q", (1, *numbers))]
+    return gmsh_sections("4.1", binary, [("Entities", entities), ("Nodes", nodes), ("Elements", elements)])
 
 
 def words(value):
@@ -65,8 +123,10 @@ def main():
     schema = json.loads((ROOT / "schemas" / "request.json").read_text())
     write_seeds(out / "json", json_seeds())
     write_seeds(out / "mm", mm_seeds())
+    write_seeds(out / "gmsh", gmsh_seeds())
     write_dictionary(out / "json.dict", [*(f'"{word}"' for word in words(schema)), *JSON_WORDS])
     write_dictionary(out / "mm.dict", MM_WORDS)
+    write_dictionary(out / "gmsh.dict", GMSH_WORDS)
 
 
 main()

@@ -161,6 +161,9 @@ static const char JOB[] =
     " \"certificate\": {\"relative_error\": 9.1e-10, \"absolute_error\": 8e-11, \"gap\": 3e-21,"
     " \"relative_residual\": {\"total\": 1e-9}},"
     " \"factor\": {\"cached\": true, \"ordering\": \"metis\", \"nnz\": 12345, \"bytes\": 200000, \"rcond\": 1e-5},"
+    " \"cost\": {\"predicted\": {\"seconds\": 0.004}, \"actual\": {\"seconds\": 0.005}, \"considered\": ["
+    "{\"operator\": \"condensed\", \"seconds\": 0.004, \"bytes\": 1e6, \"fits\": true},"
+    "{\"operator\": \"factored\", \"seconds\": 0.02, \"bytes\": 9e9, \"fits\": false}]},"
     " \"timings_s\": {\"queue\": 0, \"factor\": 0.002, \"iterate\": 0.003, \"certify\": 0.000001, \"total\": 0.005}}}";
 
 static char *summary_of(const json_t *job)
@@ -187,6 +190,7 @@ TEST(summary_says_everything_that_counts)
         "9 digits are certain (asked for 1e-08: met)",
         "off by about 0.022",
         "from the cache, metis ordering, 12345 entries, 0.2 MB",
+        "4 ms predicted, 5 ms in fact; considered: condensed 4 ms, factored 20 ms (too much memory)\n",
         "5 ms: factor 2 ms, iterate 3 ms\n",
         "demo x?[2J\n",
     };

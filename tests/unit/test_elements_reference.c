@@ -1,4 +1,4 @@
-/* Stiffness against another program's: CalculiX's tetrahedra. */
+/* Stiffness against another program's: the tetrahedra of CalculiX. */
 #include "element_mesh.h"
 #include "harness.h"
 #include "uzawa.h"

@@ -408,7 +408,7 @@ TEST(principal_part)
             b[i] = x[i] = random_signed(&rng);
         }
         CHECK(factor_of(&factor, &K, NULL, 0, orderings[seed % 3], 0, &err) == UZ_OK);
-        CHECK(uz_principal_create(&part, &K, fixed, factor, ws, &err) == UZ_OK && part);
+        CHECK(uz_principal_create(&part, &K, fixed, factor, ws, NULL, &err) == UZ_OK && part);
         CHECK(uz_principal_solve(x, part, &err) == UZ_OK);
         uz_csc held = hold(&K, fixed);
         for (int64_t i = 0; i < n; i++)
@@ -437,7 +437,7 @@ TEST(principal_part_that_is_singular)
     uz_error err;
     CHECK_INT(factor_of(&factor, &K, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
     other.val[0] = 1; /* [1 -1; -1 1] */
-    CHECK_INT(uz_principal_create(&part, &other, fixed, factor, ws, &err), UZ_OK);
+    CHECK_INT(uz_principal_create(&part, &other, fixed, factor, ws, NULL, &err), UZ_OK);
     CHECK(part == NULL);
     uz_principal_free(part);
     uz_factor_free(factor);
@@ -458,7 +458,7 @@ TEST(inverse_norm_is_an_upper_bound)
         uz_factor_workspace *ws = uz_factor_workspace_new();
         uz_error err;
         CHECK_INT(factor_of(&factor, &K, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
-        CHECK(uz_factor_inverse_norm(&bound, factor, ws, &K, &err) == UZ_OK);
+        CHECK(uz_factor_inverse_norm(&bound, factor, ws, &K, NULL, &err) == UZ_OK);
         double *x = vector(n), *L = dense_symmetric(&K);
         CHECK(dense_cholesky(L, n));
         for (int64_t i = 0; i < n; i++)

@@ -2,6 +2,7 @@
  * rule that chooses this form. */
 #include "cache/cache.h"
 #include "harness.h"
+#include "membrane.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
@@ -348,4 +349,60 @@ TEST(predicted_bytes_cover_what_is_used)
             uz_result_free(result);
             uz_problem_clear(&problem);
         }
+}
+
+/* The same membrane in other units: stiffer, or with larger displacements, and begun with reactions. Nothing but
+ * exponents may change. */
+TEST(units_do_not_decide)
+{
+    static const double stiffer[] = {1, 1e13, 1e100, 1e-100}, larger[] = {1, 1e5, 1e-30};
+    membrane kind = {8, 28, true, false, false};
+    for (int k = 0; k < 4; k++)
+        for (int l = 0; l < 3; l++) {
+            uz_settings settings = uz_settings_default();
+            uz_problem problem = {.kind = UZ_PROBLEM_MATRICES};
+            uz_error err = {0};
+            CHECK(membrane_qp(&problem.qp, &kind, &err) == UZ_OK);
+            for (int64_t e = 0; e < problem.qp.K.ptr[problem.qp.K.cols]; e++)
+                problem.qp.K.val[e] *= stiffer[k];
+            for (int64_t j = 0; j < problem.qp.K.cols; j++)
+                problem.qp.p[j] *= stiffer[k] * larger[l];
+            for (int64_t i = 0; i < problem.qp.N.rows; i++)
+                problem.qp.h[i] *= larger[l];
+            settings.op = UZ_OPERATOR_MATRIX_FREE;
+            settings.method = UZ_METHOD_ACCELERATED_RESTART;
+            settings.max_iterations = 3000;
+            uz_result *result = solve_problem(&problem, &settings);
+            CHECK_MSG(result && result->summary.outcome == UZ_CONVERGED, "K times %g, u times %g: %s", stiffer[k],
+                      larger[l], result ? uz_outcome_name(result->summary.outcome) : "refused");
+            if (result)
+                CHECK_REL(result->summary.lambda_max * stiffer[k], 6.4352550088, 1e-4);
+            uz_result_free(result);
+            uz_problem_clear(&problem);
+        }
+}
+
+/* psi(r) along the way is that of the problem, from the first row on. */
+TEST(the_dual_objective_of_the_history_is_that_of_the_other_forms)
+{
+    membrane kind = {8, 28, true, false, false};
+    uz_settings settings = uz_settings_default();
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES};
+    uz_result *results[2] = {NULL, NULL};
+    static const uz_operator forms[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_MATRIX_FREE};
+    uz_error err = {0};
+    CHECK(membrane_qp(&problem.qp, &kind, &err) == UZ_OK);
+    settings.method = UZ_METHOD_ACCELERATED_RESTART;
+    for (int k = 0; k < 2; k++) {
+        settings.op = forms[k];
+        results[k] = solve_problem(&problem, &settings);
+    }
+    if (results[0] && results[1]) {
+        const uz_history *dense = &results[0]->history, *history = &results[1]->history;
+        CHECK_REL(history->rows[0].dual_objective, dense->rows[0].dual_objective, 1e-9);
+        CHECK_REL(history->rows[history->count - 1].dual_objective, results[1]->summary.certificate.energy_dual, 1e-7);
+    }
+    uz_result_free(results[0]);
+    uz_result_free(results[1]);
+    uz_problem_clear(&problem);
 }

@@ -189,9 +189,9 @@ TEST(body_on_the_edge_of_its_contact_is_not_called_solved)
     static const double N[6] = {1, 0, 0, 0, 1, 0};
     uz_problem problem = dense_problem(K, N, 3, 2, 0, 0);
     problem.qp.p[1] = 1;
-    expect_refusal(&problem, UZ_ERR_FREE_BODY, "K", "costs nothing");
+    expect_refusal(&problem, UZ_ERR_FREE_BODY, "K", "Support it there");
     problem.qp.p[2] = 0.5; /* beyond the edge */
-    expect_refusal(&problem, UZ_ERR_FREE_BODY, "p", "away");
+    expect_refusal(&problem, UZ_ERR_FREE_BODY, "p", "Support it there");
     uz_problem_clear(&problem);
 }
 

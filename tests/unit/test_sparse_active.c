@@ -338,7 +338,7 @@ TEST(principal_submatrices)
             fixed[j] = every > 0 && j % every == 0;
             x[j] = b[j] = sin((double)j);
         }
-        CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, &err) == UZ_OK && part);
+        CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, NULL, &err) == UZ_OK && part);
         CHECK(part && uz_principal_solve(x, part, &err) == UZ_OK);
         for (int64_t j = 0; j < d; j++) {
             CHECK(!fixed[j] || x[j] == b[j]);
@@ -369,9 +369,9 @@ TEST(principal_submatrix_that_is_not_positive_definite)
     CHECK(factor_by(&factor, &qp.K, NULL, 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
     uz_factor_workspace *ws = uz_factor_workspace_new();
     qp.K.val[qp.K.ptr[7]] = -1;
-    CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, &err) == UZ_OK && !part);
+    CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, NULL, &err) == UZ_OK && !part);
     fixed[7] = true;
-    CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, &err) == UZ_OK && part);
+    CHECK(ws && uz_principal_create(&part, &qp.K, fixed, factor, ws, NULL, &err) == UZ_OK && part);
     uz_principal_free(part);
     uz_factor_workspace_free(ws);
     uz_factor_free(factor);

@@ -236,6 +236,9 @@ TEST(a_file_of_format_1_is_taken_over)
     if (!begin_old(&p, FORMAT_1_ROWS) || !place_open(&p))
         return;
     check_old_job(&p);
+    CHECK_INT(rows_in(p.path, "job WHERE bytes = 64 AND status = 2"), 1); /* 8 of the body, 4 + 3 numbers */
+    CHECK_INT(rows_in(p.path, "upload"), 0);
+    CHECK_INT(rows_in(p.path, "webhook"), 0);
     store_request again = {.body = "{\"b\": 2}", .body_len = 8, .idempotency_key = "key"};
     CHECK_INT(store_submit(p.s, &again, &j, &repeated), STORE_OK);
     CHECK(repeated);

@@ -293,3 +293,54 @@ TEST(load_cases_are_not_for_verification)
     check_refused(&problem, problem.qp.p, problem.qp.h, UZ_ERR_ARGUMENT, "/cases");
     uz_problem_clear(&problem);
 }
+
+/* The energy of the answer is beyond the largest double, that of its error is not: infinity over infinity is no bound.
+ */
+TEST(an_energy_beyond_double_bounds_nothing)
+{
+    uz_settings settings = uz_settings_default();
+    settings.relative_error = 1e-2;
+    for (int k = 0; k < 2; k++) {
+        double stiff = 1e200, u = k ? 1.9e54 : 2e54, r = 0; /* exact: 2e54 */
+        uz_qp qp = {.p = vector(1), .h = vector(1)};
+        uz_result *result = NULL;
+        uz_error err = {0};
+        double one = 1;
+        qp.K = csc_from_dense(&stiff, 1, 1, true);
+        qp.N = csc_from_dense(&one, 1, 1, false);
+        qp.p[0] = 2e254;
+        qp.h[0] = 3e54;
+        uz_problem problem = problem_of(qp);
+        CHECK_INT(uz_verify(&result, &problem, &u, &r, &settings, NULL, NULL, &err), UZ_OK);
+        if (result && k) {
+            CHECK_STR(uz_outcome_name(result->summary.outcome), "not_verified");
+            CHECK(result->summary.certificate.relative_error > 1e-2);
+        }
+        uz_result_free(result);
+        uz_problem_clear(&problem);
+    }
+}
+
+/* Everything touches, and h = 0: gaps and N u are nothing but rounding, which is small beside the displacements. */
+TEST(relative_residuals_of_a_body_that_touches_everywhere)
+{
+    double K[9] = {4, -1, -1.3, -1, 3, -0.7, -1.3, -0.7, 5}, N[6] = {0.6, 0.3, 0, 0, 0.7, 0.1};
+    uz_qp qp = {.p = vector(3), .h = vector(2)};
+    uz_settings settings = uz_settings_default();
+    qp.K = csc_from_dense(K, 3, 3, true);
+    qp.N = csc_from_dense(N, 2, 3, false);
+    qp.p[0] = 5;
+    qp.p[1] = 7;
+    qp.p[2] = 11;
+    settings.relative_error = 0;
+    uz_problem problem = problem_of(qp);
+    uz_result *result = solve_problem(&problem, &settings);
+    if (result) {
+        CHECK_STR(uz_outcome_name(result->summary.outcome), "converged");
+        CHECK_INT(result->summary.active, 2);
+        CHECK_MSG(result->summary.certificate.relative_residual.total < 1e-12, "relative residual %g",
+                  result->summary.certificate.relative_residual.total);
+    }
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}

@@ -1,0 +1,114 @@
+/* files.c: an answer as a file for other programs and for people: /v1/jobs/{id}/result.vtu and deformed.svg. */
+#include "codec/codec.h"
+#include "http/jobs.h"
+#include "http/problem.h"
+#include "http/results.h"
+
+#include <string.h>
+
+static const unsigned IN_VTU = (STORED | COMPUTED | UZ_FIELD_MATERIALS) & ~(unsigned)UZ_FIELD_STRESS_GAUSS;
+static const unsigned VTU_BY_DEFAULT = UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_VON_MISES |
+                                       UZ_FIELD_PRESSURE | UZ_FIELD_GAPS | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_MATERIALS;
+
+static void refuse_all_cases(const store_case *cases, size_t count, http_reply *reply)
+{
+    problem_details problem;
+    http_problem(&problem, 400, "case_needed", "Each load case has a file of its own",
+                 "say which one with ?case=NAME.");
+    cases_list(&problem, cases, count);
+    reply_problem(reply, &problem);
+}
+
+/* What is asked for. */
+typedef struct {
+    unsigned which; /* vtu: uz_field bits */
+    bool picture;   /* deformed.svg, drawn like `how` */
+    uz_picture how;
+} file_wanted;
+
+static void write_file(api *context, const http_request *rq, const job *j, int64_t number, const file_wanted *wanted,
+                       http_reply *reply)
+{
+    field_reader reader;
+    char *text = NULL;
+    size_t len = 0;
+    if (fields_open(&reader, context, rq, j, reply)) {
+        if (wanted->picture && fields_picture(&text, &len, &reader, number, &wanted->how, reply))
+            reply_text(reply, 200, "image/svg+xml", text, len);
+        else if (!wanted->picture && fields_vtu(&text, &len, &reader, number, wanted->which, reply))
+            reply_text(reply, 200, "application/xml", text, len);
+    }
+    fields_close(&reader);
+}
+
+static void reply_case(api *context, const http_request *rq, const job *j, file_wanted *wanted, http_reply *reply)
+{
+    store_case *cases = NULL;
+    size_t count = 0;
+    if (!results_cases(context, rq, j, &cases, &count, reply))
+        return;
+    if (count > 0 && !target_value(&rq->target, "case")) {
+        refuse_all_cases(cases, count, reply);
+    } else {
+        wanted->how.title = count > 0 ? cases[0].name : NULL;
+        write_file(context, rq, j, count > 0 ? cases[0].number : 0, wanted, reply);
+    }
+    store_cases_free(cases, count);
+}
+
+static void find_and_reply(api *context, http_request *rq, file_wanted *wanted, http_reply *reply)
+{
+    job j = {0};
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply))
+        reply_case(context, rq, &j, wanted, reply);
+    job_clear(&j);
+}
+
+void results_get_vtu(api *context, http_request *rq, http_reply *reply)
+{
+    field_list fields;
+    problem_details problem;
+    if (!results_fields(rq, &fields, VTU_BY_DEFAULT, IN_VTU, &problem))
+        reply_problem(reply, &problem);
+    else
+        find_and_reply(context, rq, &(file_wanted){.which = fields.which}, reply);
+}
+
+/* The colour: "displacements" or "von_mises". */
+static bool read_colour(const http_request *rq, uz_field *out, problem_details *problem)
+{
+    const char *text = target_value(&rq->target, "colour");
+    *out = UZ_FIELD_VON_MISES;
+    if (!text || strcmp(text, "von_mises") == 0)
+        return true;
+    *out = UZ_FIELD_DISPLACEMENTS;
+    return strcmp(text, "displacements") == 0 ||
+           http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                        "colour is displacements or von_mises, not \"%.60s\"", text);
+}
+
+static bool read_factor(const http_request *rq, double *out, problem_details *problem)
+{
+    const char *text = target_value(&rq->target, "factor");
+    *out = 0;
+    if (!text)
+        return true;
+    const size_t used = uz_parse_double(out, text, strlen(text));
+    return (used > 0 && text[used] == '\0' && *out >= 0 && *out <= 1e12) ||
+           http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                        "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", text);
+}
+
+void results_get_picture(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem;
+    int64_t width = 900;
+    file_wanted wanted = {.picture = true};
+    if (!read_colour(rq, &wanted.how.colour, &problem) || !read_factor(rq, &wanted.how.factor, &problem) ||
+        !request_integer(rq, "width", 200, 4000, &width, &problem)) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    wanted.how.width = (int)width;
+    find_and_reply(context, rq, &wanted, reply);
+}

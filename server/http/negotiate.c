@@ -1,0 +1,227 @@
+/* negotiate.c: what becomes of a whole reply by what the client has and takes: 304, a range of bytes, gzip. */
+#include "http/negotiate.h"
+#include "http/problem.h"
+
+#include <gnutls/crypto.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <zlib.h>
+
+/* Smaller bodies gain nothing: header fields and frames are of that size. */
+#define GZIP_LEAST 1024
+/* Level 1: numbers as decimal text shrink to near half at any level, and the time is the client's. */
+#define GZIP_LEVEL 1
+static const char GZIP_MARK[] = "-gz"; /* another representation has another strong tag (RFC 9110, section 8.8.3) */
+
+void tag_make(char tag[REPLY_TAG], const char *const *parts, const size_t *lens, size_t count)
+{
+    gnutls_hash_hd_t hash;
+    unsigned char digest[32];
+    tag[0] = '\0';
+    if (gnutls_hash_init(&hash, GNUTLS_DIG_SHA256) != 0)
+        return;
+    bool ok = true;
+    for (size_t i = 0; i < count; i++)
+        ok = gnutls_hash(hash, &lens[i], sizeof lens[i]) == 0 && gnutls_hash(hash, parts[i], lens[i]) == 0 && ok;
+    gnutls_hash_deinit(hash, digest);
+    for (int i = 0; ok && i < 16; i++)
+        snprintf(tag + 2 * i, 3, "%02x", digest[i]);
+}
+
+/* ---- If-None-Match */
+
+/* True if the member of an entity-tag list, `"x"` or `W/"x"`, is this tag in any coding. */
+static bool is_tag(const char *at, size_t len, const char *tag)
+{
+    size_t want = strlen(tag), mark = sizeof GZIP_MARK - 1;
+    if (len >= 2 && strncmp(at, "W/", 2) == 0) {
+        at += 2;
+        len -= 2;
+    }
+    if (len < 2 || at[0] != '"' || at[len - 1] != '"')
+        return false;
+    at++;
+    len -= 2;
+    if (len == want + mark && memcmp(at + want, GZIP_MARK, mark) == 0)
+        len = want;
+    return len == want && memcmp(at, tag, want) == 0;
+}
+
+static bool field_has_tag(const header_field *field, const char *tag)
+{
+    const char *at = field->value, *end = at + field->value_len;
+    while (at < end) {
+        const char *comma = memchr(at, ',', (size_t)(end - at)); /* our tags have none */
+        const char *from = at, *to = comma ? comma : end;
+        while (from < to && (*from == ' ' || *from == '\t'))
+            from++;
+        while (to > from && (to[-1] == ' ' || to[-1] == '\t'))
+            to--;
+        if ((to - from == 1 && *from == '*') || is_tag(from, (size_t)(to - from), tag))
+            return true;
+        at = comma ? comma + 1 : end;
+    }
+    return false;
+}
+
+static bool is_read(const http_request *rq)
+{
+    return strcmp(rq->method, "GET") == 0 || strcmp(rq->method, "HEAD") == 0;
+}
+
+bool reply_unchanged(const http_request *rq, http_reply *reply)
+{
+    if (!reply->tag[0] || !is_read(rq))
+        return false;
+    for (size_t i = 0; i < rq->headers.count; i++) {
+        const header_field *field = &rq->headers.fields[i];
+        if (token_equal(field->name, field->name_len, "If-None-Match") && field_has_tag(field, reply->tag)) {
+            reply_drop_body(reply);
+            reply->status = 304;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* ---- Range */
+
+typedef enum { RANGE_NONE, RANGE_GOOD, RANGE_BEYOND } range_kind;
+
+/* Digits of text[0..len), at most 18; -1: none. */
+static int64_t read_offset(const char *text, size_t len)
+{
+    int64_t value = 0;
+    if (len == 0 || len > 18 || strspn(text, "0123456789") < len)
+        return -1;
+    for (size_t i = 0; i < len; i++)
+        value = 10 * value + (text[i] - '0');
+    return value;
+}
+
+/* "bytes=A-B", "bytes=A-", "bytes=-N"; anything else, several ranges too, is as if it were not there. */
+static range_kind read_range(const header_field *field, int64_t size, int64_t *from, int64_t *to)
+{
+    static const char UNIT[] = "bytes=";
+    size_t skip = sizeof UNIT - 1;
+    if (field->value_len <= skip || strncasecmp(field->value, UNIT, skip) != 0)
+        return RANGE_NONE;
+    const char *at = field->value + skip, *end = field->value + field->value_len;
+    const char *dash = memchr(at, '-', (size_t)(end - at));
+    if (!dash)
+        return RANGE_NONE;
+    int64_t first = read_offset(at, (size_t)(dash - at)), last = read_offset(dash + 1, (size_t)(end - dash - 1));
+    bool open = dash + 1 == end, suffix = dash == at;
+    if ((first < 0 && !suffix) || (last < 0 && !open) || (open && suffix) || (!open && !suffix && last < first))
+        return RANGE_NONE;
+    *from = suffix ? (last < size ? size - last : 0) : first;
+    *to = suffix || open || last >= size ? size - 1 : last;
+    return *from >= size || (suffix && last == 0) ? RANGE_BEYOND : RANGE_GOOD;
+}
+
+/* A range is of the representation that the client has the first part of, if it says which (If-Range: strong). */
+static bool same_representation(const http_request *rq, const http_reply *reply)
+{
+    const header_field *field = header_find(&rq->headers, "If-Range", NULL);
+    size_t len = strlen(reply->tag);
+    return !field || (field->value_len == len + 2 && field->value[0] == '"' && field->value[len + 1] == '"' &&
+                      memcmp(field->value + 1, reply->tag, len) == 0);
+}
+
+static void take_range(http_reply *reply, int64_t from, int64_t to)
+{
+    snprintf(reply->content_range, sizeof reply->content_range, "bytes %lld-%lld/%zu", (long long)from, (long long)to,
+             reply->len);
+    reply->status = 206;
+    reply->len = (size_t)(to - from + 1);
+    if (reply->has_file)
+        reply->offset = (size_t)from;
+    else if (reply->body)
+        memmove(reply->body, reply->body + from, reply->len);
+}
+
+/* True if the reply is a part, or says that there is no such part. */
+static bool apply_range(const http_request *rq, http_reply *reply)
+{
+    size_t count;
+    int64_t from = 0, to = 0;
+    const header_field *field = header_find(&rq->headers, "Range", &count);
+    if (!field || count != 1 || strcmp(rq->method, "GET") != 0 || !same_representation(rq, reply))
+        return false;
+    size_t size = reply->len;
+    range_kind kind = read_range(field, (int64_t)size, &from, &to);
+    if (kind == RANGE_GOOD) {
+        take_range(reply, from, to);
+    } else if (kind == RANGE_BEYOND) {
+        reply_refuse(reply, 416, "range_not_satisfiable", "There is no such range", "the representation has %zu bytes",
+                     size);
+        snprintf(reply->content_range, sizeof reply->content_range, "bytes */%zu", size);
+        reply->tag[0] = '\0';
+    }
+    return kind != RANGE_NONE;
+}
+
+/* ---- gzip */
+
+static bool is_text(const http_reply *reply)
+{
+    return reply->body && reply->type && (strstr(reply->type, "json") || strncmp(reply->type, "text/", 5) == 0);
+}
+
+/* NULL: no memory. */
+static char *squeeze(const char *body, size_t len, size_t *out_len)
+{
+    z_stream z = {.next_in = (unsigned char *)(uintptr_t)body};
+    if (deflateInit2(&z, GZIP_LEVEL, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) /* 16: gzip, not zlib */
+        return NULL;
+    size_t room = deflateBound(&z, len);
+    char *out = malloc(room);
+    size_t left = len;
+    int rc = out ? Z_OK : Z_MEM_ERROR;
+    while (rc == Z_OK) { /* zlib counts what it is given in 32 bits */
+        unsigned piece = left < (1u << 30) ? (unsigned)left : 1u << 30;
+        size_t free_room = room - z.total_out;
+        z.avail_in += piece;
+        left -= piece;
+        z.next_out = (unsigned char *)out + z.total_out;
+        z.avail_out = free_room < UINT32_MAX ? (unsigned)free_room : UINT32_MAX;
+        rc = deflate(&z, left ? Z_NO_FLUSH : Z_FINISH);
+    }
+    *out_len = z.total_out;
+    deflateEnd(&z);
+    if (rc == Z_STREAM_END)
+        return out;
+    free(out);
+    return NULL;
+}
+
+static void apply_gzip(const http_request *rq, http_reply *reply)
+{
+    size_t len;
+    if (!is_text(reply) || reply->len < GZIP_LEAST)
+        return;
+    reply->varies_by_coding = true;
+    if (!request_takes_gzip(rq))
+        return;
+    char *small = squeeze(reply->body, reply->len, &len);
+    if (!small)
+        return; /* as it is, then */
+    reply_replace_body(reply, small, len);
+    reply->gzip = true;
+    if (reply->tag[0])
+        strcat(reply->tag, GZIP_MARK); /* REPLY_TAG has room */
+}
+
+void negotiate(const http_request *rq, http_reply *reply)
+{
+    if (reply->tag_by_body && reply->status == 200 && reply->body)
+        tag_make(reply->tag, (const char *const[]){reply->body}, &reply->len, 1);
+    if (reply->status != 200)
+        reply->tag[0] = reply->status == 304 ? reply->tag[0] : '\0';
+    if (reply->status == 200 && reply_unchanged(rq, reply))
+        return;
+    if (reply->status == 200 && reply->takes_ranges && apply_range(rq, reply))
+        return;
+    apply_gzip(rq, reply);
+}

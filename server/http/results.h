@@ -1,0 +1,27 @@
+/* results.h: what a job leaves behind: the parts that result, vtu and pictures share. */
+#ifndef SERVER_HTTP_RESULTS_H
+#define SERVER_HTTP_RESULTS_H
+
+#include "http/fields.h"
+#include "http/request.h"
+
+/* What the store has, and what is computed from it. */
+#define STORED ((unsigned)(UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_DISPLACEMENTS | UZ_FIELD_PRESSURE))
+#define COMPUTED                                                                                                       \
+    ((unsigned)(UZ_FIELD_CONTACT_STATUS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES |                  \
+                UZ_FIELD_STRAIN | UZ_FIELD_STRESS_GAUSS))
+
+/* The query's list of fields, or `otherwise`. False with a 400. */
+bool results_fields(const http_request *rq, field_list *out, unsigned otherwise, unsigned allowed,
+                    problem_details *problem);
+
+/* The answer of an ended job never changes: its tag follows from which one it is and what is asked of it. True: the
+ * client has it, and the reply says so. */
+bool results_known(const http_request *rq, const job *j, http_reply *reply);
+
+/* The cases of the job, or the one that the query names; *count 0: the job has none and none is named. The caller frees
+ * them. False with a 404, or a failure of the store. */
+bool results_cases(api *context, const http_request *rq, const job *j, store_case **cases, size_t *count,
+                   http_reply *reply);
+
+#endif

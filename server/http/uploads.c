@@ -1,0 +1,123 @@
+/* uploads.c: /v1/uploads: texts that are sent once and used in many requests. A body goes to disk as it comes. */
+#include "codec/codec.h"
+#include "http/problem.h"
+#include "http/request.h"
+#include "http/uploads.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool refuse(api *context, http_request *rq, upload_status status, problem_details *problem)
+{
+    char cause[256];
+    switch (status) {
+    case UPLOAD_OK:
+        return true;
+    case UPLOAD_TOO_LARGE:
+        return http_problem(problem, 413, "upload_too_large", "The upload is too large",
+                            "an upload has at most %lld bytes here, counted after decompression",
+                            (long long)context->max_upload);
+    case UPLOAD_NO_ROOM:
+        return http_problem(problem, 507, "uploads_full", "There is no room for more uploads",
+                            "uploads that no job uses make room after a while: delete some, or the jobs that use them");
+    case UPLOAD_DISK_FULL:
+        rq->reply.retry_after_s = 60;
+        return http_problem(problem, 507, "storage_full", "The disk is full",
+                            "nothing was stored: delete uploads or ended jobs or free disk space, then try again");
+    case UPLOAD_BAD_GZIP:
+        return http_problem(problem, 400, "bad_gzip", "The body is not what its Content-Encoding says",
+                            "it is no gzip stream (RFC 1952), or it ends too early");
+    case UPLOAD_FAILED:
+        break;
+    }
+    store_message(context->store, cause, sizeof cause);
+    log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
+    return http_problem(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+}
+
+bool uploads_begin(api *context, http_request *rq)
+{
+    upload_status status;
+    const header_field *coding = header_find(&rq->headers, "Content-Encoding", NULL);
+    bool gzip = coding && (token_equal(coding->value, coding->value_len, "gzip") ||
+                           token_equal(coding->value, coding->value_len, "x-gzip"));
+    rq->upload = store_upload_begin(context->store, gzip, &status);
+    return rq->upload || refuse(context, rq, status, &rq->refused);
+}
+
+bool uploads_take(api *context, http_request *rq, const char *data, size_t size)
+{
+    upload_status status = store_upload_write(rq->upload, data, size);
+    return refuse(context, rq, status, &rq->refused);
+}
+
+void uploads_create(api *context, http_request *rq, http_reply *reply)
+{
+    upload_info info;
+    problem_details problem;
+    bool known = false;
+    if (rq->body_len == 0) {
+        store_upload_abort(rq->upload);
+        rq->upload = NULL;
+        reply_refuse(reply, 400, "empty_upload", "The body is empty", "send the text as the body of the request");
+        return;
+    }
+    upload_status status = store_upload_end(rq->upload, &info, &known);
+    rq->upload = NULL;
+    if (!refuse(context, rq, status, &problem)) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    snprintf(reply->location, sizeof reply->location, "/v1/uploads/%s", info.id);
+    reply_json(reply, known ? 200 : 201, codec_encode_upload(&info));
+}
+
+static void reply_failure(api *context, store_status status, http_reply *reply)
+{
+    if (status == STORE_NOT_FOUND)
+        reply_refuse(reply, 404, "not_found", "Not found", "there is no upload with this id");
+    else if (status == STORE_CONFLICT)
+        reply_refuse(reply, 409, "upload_in_use", "A job uses the upload",
+                     "it stays as long as the jobs that name it: delete them first");
+    else
+        reply_store_failure(context, status, reply);
+}
+
+static void reply_bytes(api *context, http_request *rq, http_reply *reply)
+{
+    int fd;
+    int64_t bytes;
+    store_status status = store_upload_open(context->store, rq->name, &fd, &bytes);
+    if (status != STORE_OK)
+        reply_failure(context, status, reply);
+    else {
+        reply_file(reply, 200, "application/octet-stream", fd, (size_t)bytes);
+        snprintf(reply->tag, sizeof reply->tag, "%.32s", rq->name); /* half of a digest is name enough */
+        reply->takes_ranges = true;
+    }
+}
+
+void uploads_get(api *context, http_request *rq, http_reply *reply)
+{
+    upload_info info;
+    reply->varies_by_type = true;
+    if (request_accepts(rq, "application/octet-stream")) {
+        reply_bytes(context, rq, reply);
+        return;
+    }
+    store_status status = store_upload_get(context->store, rq->name, &info);
+    if (status != STORE_OK)
+        reply_failure(context, status, reply);
+    else
+        reply_json(reply, 200, codec_encode_upload(&info));
+}
+
+void uploads_delete(api *context, http_request *rq, http_reply *reply)
+{
+    store_status status = store_upload_delete(context->store, rq->name);
+    if (status != STORE_OK)
+        reply_failure(context, status, reply);
+    else
+        reply->status = 204;
+}

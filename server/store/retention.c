@@ -1,0 +1,122 @@
+/* retention.c: jobs that waited too long, and ended ones that were kept long enough. */
+#include "store/internal.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* Jobs, and bytes of theirs, that go in one transaction: others wait for its end. */
+#define MOST_AT_ONCE  20
+#define BYTES_AT_ONCE ((int64_t)64 << 20)
+
+typedef struct {
+    const char *error_json;
+    int64_t count;
+} expire_args;
+
+static store_status expire(store *s, connection *c, void *args)
+{
+    (void)s;
+    expire_args *a = args;
+    statement st = statement_begin(c, QUERY_EXPIRE);
+    bind_real(&st, 1, store_now());
+    bind_text(&st, 2, a->error_json);
+    store_status status = statement_run(&st);
+    a->count = status == STORE_OK ? connection_changes(c) : 0;
+    return status;
+}
+
+/* Looks before it writes: most of the time there is nothing. */
+static bool any_expired(store *s)
+{
+    connection *c = store_take_reader(s);
+    statement st = statement_begin(c, QUERY_ANY_EXPIRED);
+    bind_real(&st, 1, store_now());
+    bool any = statement_row(&st);
+    store_give_reader(s, c, statement_end(&st));
+    return any;
+}
+
+store_status store_expire(store *s, const char *error_json, int64_t *count)
+{
+    expire_args a = {error_json, 0};
+    store_status status = any_expired(s) ? store_write(s, expire, &a) : STORE_OK;
+    *count = status == STORE_OK ? a.count : 0;
+    return status;
+}
+
+/* ---- retention */
+
+typedef struct {
+    const store_retention *limits;
+    int64_t jobs, bytes; /* ended, as they stand */
+    char ids[MOST_AT_ONCE][33];
+    int n_ids;
+    int64_t count;
+} retain_args;
+
+static store_status count_ended(connection *c, retain_args *a)
+{
+    statement st = statement_begin(c, QUERY_ENDED);
+    if (statement_row(&st)) {
+        a->jobs = sqlite3_column_int64(st.stmt, 0);
+        a->bytes = sqlite3_column_int64(st.stmt, 1);
+    }
+    return statement_end(&st);
+}
+
+static bool too_much(const retain_args *a, double finished, double now)
+{
+    const store_retention *limits = a->limits;
+    return (limits->keep_s > 0 && finished < now - limits->keep_s) ||
+           (limits->keep_jobs > 0 && a->jobs > limits->keep_jobs) ||
+           (limits->keep_bytes > 0 && a->bytes > limits->keep_bytes);
+}
+
+/* The oldest jobs that must go. */
+static store_status choose(connection *c, retain_args *a)
+{
+    double now = store_now();
+    int64_t chosen_bytes = 0;
+    statement st = statement_begin(c, QUERY_OLD_JOBS);
+    bind_integer(&st, 1, MOST_AT_ONCE);
+    while (a->n_ids < MOST_AT_ONCE && chosen_bytes < BYTES_AT_ONCE && statement_row(&st) &&
+           too_much(a, sqlite3_column_double(st.stmt, 1), now)) {
+        snprintf(a->ids[a->n_ids++], sizeof a->ids[0], "%s", (const char *)sqlite3_column_text(st.stmt, 0));
+        a->jobs--;
+        a->bytes -= sqlite3_column_int64(st.stmt, 2);
+        chosen_bytes += sqlite3_column_int64(st.stmt, 2);
+    }
+    return statement_end(&st);
+}
+
+static store_status delete_chosen(store *s, connection *c, void *args)
+{
+    (void)s;
+    retain_args *a = args;
+    store_status status = STORE_OK;
+    a->count = 0;
+    for (int i = 0; i < a->n_ids && status == STORE_OK; i++) {
+        statement st = statement_begin(c, QUERY_DELETE);
+        bind_text(&st, 1, a->ids[i]);
+        status = statement_run(&st);
+        a->count += status == STORE_OK ? connection_changes(c) : 0;
+    }
+    return status;
+}
+
+store_status store_retain(store *s, const store_retention *limits, int64_t *count)
+{
+    retain_args a = {.limits = limits};
+    *count = 0;
+    if (limits->keep_s <= 0 && limits->keep_jobs <= 0 && limits->keep_bytes <= 0)
+        return STORE_OK;
+    connection *c = store_take_reader(s);
+    store_status status = count_ended(c, &a);
+    if (status == STORE_OK)
+        status = choose(c, &a);
+    store_give_reader(s, c, status);
+    if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */
+        status = store_write(s, delete_chosen, &a);
+    *count = status == STORE_OK ? a.count : 0;
+    return status;
+}

@@ -1,0 +1,73 @@
+/* uploads.h: texts that are sent once and named by their digest in many requests.
+ *
+ * An upload is a file in the folder "FILE-uploads" beside the database FILE, named by the SHA-256 of its bytes, and a
+ * row that says it is complete. It is written under another name, synced and renamed before the row is committed, so
+ * that a file without a row, or under another name, is what a crash left: it is removed when the store opens. A job
+ * that uses an upload keeps a reference until it is deleted; what no job uses goes by age, or to make room.
+ *
+ * Functions may be called from any thread, but a writer belongs to one. */
+#ifndef SERVER_STORE_UPLOADS_H
+#define SERVER_STORE_UPLOADS_H
+
+#include "store/store.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define UPLOAD_ID_LEN 64 /* hex digits */
+
+typedef struct {
+    char id[UPLOAD_ID_LEN + 1];
+    int64_t bytes, jobs;  /* jobs: that refer to it */
+    double created, used; /* used: last sent, or put into a job */
+} upload_info;
+
+typedef struct {
+    int64_t one;   /* bytes of one upload, after decompression */
+    int64_t all;   /* bytes of all together; what no job uses goes to make room */
+    double keep_s; /* one that no job uses goes so long after it was last used */
+} upload_limits;
+
+/* Before the first upload. */
+void store_limit_uploads(store *s, const upload_limits *limits);
+
+typedef enum {
+    UPLOAD_OK,
+    UPLOAD_TOO_LARGE, /* beyond the limit of one */
+    UPLOAD_NO_ROOM,   /* beyond the limit of all, and nothing can go */
+    UPLOAD_DISK_FULL, /* */
+    UPLOAD_BAD_GZIP,  /* the bytes are not a gzip stream, or not a whole one */
+    UPLOAD_FAILED     /* anything else: store_message says what */
+} upload_status;
+
+typedef struct upload_writer upload_writer;
+
+/* NULL on failure: *status. gzip: what is written is compressed (RFC 1952) and kept decompressed. */
+upload_writer *store_upload_begin(store *s, bool gzip, upload_status *status);
+upload_status store_upload_write(upload_writer *w, const void *data, size_t size);
+/* Ends it and frees w, whatever happens. UPLOAD_OK: it is on disk; *known says that it was there before. */
+upload_status store_upload_end(upload_writer *w, upload_info *out, bool *known);
+/* Leaves nothing behind. NULL is fine. */
+void store_upload_abort(upload_writer *w);
+
+/* STORE_NOT_FOUND where there is none, also for an id that is no id. */
+store_status store_upload_get(store *s, const char *id, upload_info *out);
+/* STORE_CONFLICT while a job refers to it. */
+store_status store_upload_delete(store *s, const char *id);
+/* A descriptor for reading that the caller closes; stays good if the upload is deleted. */
+store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes);
+
+/* The bytes of an upload, in memory for as long as they are looked at (mapped: pages that are read come from the file).
+ * data is not NUL-terminated. */
+typedef struct {
+    const char *data;
+    size_t len;
+} upload_text;
+store_status store_upload_text(store *s, const char *id, upload_text *out);
+void store_upload_text_done(upload_text *text); /* zeroes it; a zeroed one is fine */
+
+/* Deletes what no job uses and nobody used for limits.keep_s; *count (may be NULL) is how many. */
+store_status store_collect_uploads(store *s, int64_t *count);
+
+#endif

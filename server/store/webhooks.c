@@ -1,0 +1,45 @@
+#include "store/webhooks.h"
+#include "store/internal.h"
+
+#include <stdio.h>
+
+store_status store_webhook_next(store *s, webhook_due *out)
+{
+    bool ok = true;
+    store_status status = STORE_NOT_FOUND;
+    *out = (webhook_due){.url = NULL};
+    connection *c = store_take_reader(s);
+    statement st = statement_begin(c, QUERY_WEBHOOK_NEXT);
+    bind_real(&st, 1, store_now());
+    if (statement_row(&st)) {
+        snprintf(out->job, sizeof out->job, "%s", (const char *)sqlite3_column_text(st.stmt, 0));
+        out->url = store_copy_text(&st, 1, &ok);
+        out->attempts = sqlite3_column_int(st.stmt, 2);
+        status = ok ? STORE_OK : STORE_ERROR;
+    }
+    store_status ended = statement_end(&st);
+    return store_give_reader(s, c, ended == STORE_OK ? status : ended);
+}
+
+typedef struct {
+    const char *job;
+    webhook_end end;
+    double next;
+} attempted_args;
+
+static store_status attempted(store *s, connection *c, void *args)
+{
+    (void)s;
+    const attempted_args *a = args;
+    statement st = statement_begin(c, QUERY_WEBHOOK_ATTEMPTED);
+    bind_text(&st, 1, a->job);
+    bind_integer(&st, 2, a->end);
+    bind_real(&st, 3, a->next);
+    return statement_run(&st);
+}
+
+store_status store_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s)
+{
+    attempted_args a = {id, end, store_now() + delay_s};
+    return store_write(s, attempted, &a);
+}

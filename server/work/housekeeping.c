@@ -1,0 +1,71 @@
+/* housekeeping.c: what has to happen without anybody asking: what waits too long fails, what is old or too much goes.
+ * In a thread of its own, so that a long deletion never keeps a lease from being renewed. */
+#include "work/housekeeping.h"
+#include "codec/codec.h"
+#include "store/uploads.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#define ROUND_S 1.0
+
+static char *waited_too_long(void)
+{
+    problem_details problem = {.status = 503, .code = "queue_time_limit", .title = "The job waited too long"};
+    snprintf(problem.detail, sizeof problem.detail,
+             "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority.");
+    return codec_encode_problem(&problem);
+}
+
+static void expire(work *w)
+{
+    int64_t count = 0;
+    char *error = waited_too_long();
+    if (error && store_expire(w->store, error, &count) == STORE_OK && count > 0) {
+        log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", count), {0}});
+        work_notify(w, NULL);
+    }
+    free(error);
+}
+
+static bool goes_on(work *w)
+{
+    pthread_mutex_lock(&w->lock);
+    bool more = !w->stopping;
+    pthread_mutex_unlock(&w->lock);
+    return more;
+}
+
+static void retain(work *w)
+{
+    int64_t total = 0, count = 1;
+    while (count > 0 && goes_on(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
+        total += count;
+    if (total > 0)
+        log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
+}
+
+static void tidy(work *w)
+{
+    expire(w);
+    retain(w);
+    store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
+}
+
+void *housekeeping_loop(void *arg)
+{
+    work *w = arg;
+    struct timespec deadline;
+    pthread_mutex_lock(&w->lock);
+    while (!w->finished) {
+        work_deadline(&deadline, ROUND_S);
+        if (pthread_cond_timedwait(&w->tick, &w->lock, &deadline) != ETIMEDOUT)
+            continue;
+        pthread_mutex_unlock(&w->lock);
+        tidy(w);
+        pthread_mutex_lock(&w->lock);
+    }
+    pthread_mutex_unlock(&w->lock);
+    return NULL;
+}

@@ -1,0 +1,39 @@
+/* webhook.h: tells the outside that a job has ended: POSTs it to the address that its request names, if that is one of
+ * those that the service may call.
+ *
+ * The body is the job as GET /v1/jobs/{id} gives it. With a secret there is a header field
+ *   X-Uzawa-Signature: t=UNIX_SECONDS,v1=HEX
+ * where HEX is the HMAC-SHA256 (RFC 2104) of "UNIX_SECONDS.BODY" under the secret: the receiver computes it too,
+ * compares, and refuses a time that is long ago. X-Uzawa-Delivery is the job's id and the number of the attempt: a
+ * receiver may be told more than once. Any status 2xx ends it; 410 too; everything else is tried again, later each
+ * time. */
+#ifndef SERVER_WORK_WEBHOOK_H
+#define SERVER_WORK_WEBHOOK_H
+
+#include "log.h"
+#include "store/store.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+typedef struct webhooks webhooks;
+
+typedef struct {
+    const char *const *allow; /* n_allow of "HOST" (the scheme's own port) or "HOST:PORT"; 0: there are no webhooks */
+    size_t n_allow;
+    const char *secret_file; /* its bytes, without a line end at the end; NULL: nothing is signed */
+    double first_retry_s;    /* doubled after each attempt, up to an hour; 0: 5 s */
+} webhook_options;
+
+/* Starts the thread where there is something to allow. NULL: message. options must outlive it. */
+webhooks *webhooks_start(store *s, const webhook_options *options, server_log *log, char *message, size_t size);
+/* Cuts off what is on its way; it is told again after the next start. NULL is fine. */
+void webhooks_stop(webhooks *all);
+
+/* False, and why for a person, if the address may not be called. */
+bool webhooks_allow(const webhooks *all, const char *url, const char **why);
+
+/* "t=...,v1=..." for a body; false where it can't be made. Exposed for tests. */
+bool webhook_sign(char out[128], const char *secret, size_t secret_len, long long unix_s, const char *body, size_t len);
+
+#endif

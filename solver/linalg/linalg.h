@@ -1,0 +1,13 @@
+/* linalg.h: what several parts of the solver ask of vectors and matrices. */
+#ifndef UZ_LINALG_H
+#define UZ_LINALG_H
+
+#include "uzawa.h"
+
+/* x (n, or NULL: nothing to check) called `name`: UZ_ERR_NOT_FINITE names its first entry that is no finite number. */
+uz_status uz_check_finite(const double *x, int64_t n, const char *name, uz_error *err);
+
+/* What the arrays of A take; 0 for a zeroed struct. */
+size_t uz_csc_bytes(const uz_csc *A);
+
+#endif

@@ -1,0 +1,352 @@
+#include "obstacle/face_point.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+/* A foot closer to the border than this part of the face's size is on it. */
+#define SNAP 1e-9
+
+static double dot(const double *a, const double *b)
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/* ------------------------------------------------------------------ edges */
+
+/* x(s) = a + b s + c s^2, -1 <= s <= 1: two ends and perhaps a middle. */
+typedef struct {
+    double a[3], b[3], c[3];
+} curve;
+
+static curve curve_of(const double *p, const double *q, const double *middle, int dim)
+{
+    curve k = {{0}, {0}, {0}};
+    for (int i = 0; i < dim; i++) {
+        const double mean = 0.5 * (p[i] + q[i]);
+        k.a[i] = middle ? middle[i] : mean;
+        k.b[i] = 0.5 * (q[i] - p[i]);
+        k.c[i] = mean - k.a[i];
+    }
+    return k;
+}
+
+static void curve_at(double x[3], const curve *k, double s)
+{
+    for (int i = 0; i < 3; i++)
+        x[i] = k->a[i] + s * (k->b[i] + s * k->c[i]);
+}
+
+static double curve_distance(const curve *k, double s)
+{
+    double x[3];
+    curve_at(x, k, s);
+    return dot(x, x);
+}
+
+/* Half the derivative of the squared distance, and half the second one. */
+static double curve_slope(double *second, const curve *k, double s)
+{
+    double x[3], t[3];
+    curve_at(x, k, s);
+    for (int i = 0; i < 3; i++)
+        t[i] = k->b[i] + 2 * s * k->c[i];
+    *second = dot(t, t) + 2 * dot(x, k->c);
+    return dot(x, t);
+}
+
+/* Newton within a bracket, halved where a step leaves it. */
+static double curve_root(const curve *k, double low, double high)
+{
+    double s = 0.5 * (low + high);
+    for (int step = 0; step < 60 && high - low > DBL_EPSILON; step++) {
+        double second;
+        const double slope = curve_slope(&second, k, s);
+        if (slope < 0)
+            low = s;
+        else
+            high = s;
+        const double next = s - slope / second;
+        if (next == s || slope == 0)
+            return s;
+        s = next > low && next < high ? next : 0.5 * (low + high);
+    }
+    return s;
+}
+
+static double closest_on_curve(const curve *k)
+{
+    enum { SAMPLES = 8 };
+    double second, best = INFINITY, at = 0;
+    if (dot(k->c, k->c) <= DBL_EPSILON * DBL_EPSILON * dot(k->b, k->b))
+        return fmin(fmax(-dot(k->a, k->b) / dot(k->b, k->b), -1), 1);
+    for (int i = 0; i <= SAMPLES; i++) {
+        const double s = 2.0 * i / SAMPLES - 1, d = curve_distance(k, s);
+        if (d < best) {
+            best = d;
+            at = s;
+        }
+    }
+    const double low = fmax(at - 2.0 / SAMPLES, -1), high = fmin(at + 2.0 / SAMPLES, 1);
+    if (curve_slope(&second, k, low) >= 0)
+        return low;
+    return curve_slope(&second, k, high) <= 0 ? high : curve_root(k, low, high);
+}
+
+/* --------------------------------------------------------------- surfaces */
+
+typedef struct {
+    int count;
+    double x[UZ_FACE_NODES][3];
+} surface;
+
+static const double QUAD[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+
+static void quad_shape(double w[4], double da[4], double db[4], double a, double b)
+{
+    for (int i = 0; i < 4; i++) {
+        w[i] = 0.25 * (1 + QUAD[i][0] * a) * (1 + QUAD[i][1] * b);
+        da[i] = 0.25 * QUAD[i][0] * (1 + QUAD[i][1] * b);
+        db[i] = 0.25 * QUAD[i][1] * (1 + QUAD[i][0] * a);
+    }
+}
+
+/* In area coordinates L: corners L (2 L - 1), middles 4 L L'. */
+static void triangle_shape(double *w, double *da, double *db, int count, double a, double b)
+{
+    static const double DA[3] = {-1, 1, 0}, DB[3] = {-1, 0, 1};
+    const double l[3] = {1 - a - b, a, b};
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3;
+        const double slope = count == 3 ? 1 : 4 * l[i] - 1;
+        w[i] = count == 3 ? l[i] : l[i] * (2 * l[i] - 1);
+        da[i] = slope * DA[i];
+        db[i] = slope * DB[i];
+        if (count == 3)
+            continue;
+        w[3 + i] = 4 * l[i] * l[j];
+        da[3 + i] = 4 * (DA[i] * l[j] + l[i] * DA[j]);
+        db[3 + i] = 4 * (DB[i] * l[j] + l[i] * DB[j]);
+    }
+}
+
+static void shape(double *w, double *da, double *db, int count, const double at[2])
+{
+    if (count == 4)
+        quad_shape(w, da, db, at[0], at[1]);
+    else
+        triangle_shape(w, da, db, count, at[0], at[1]);
+}
+
+/* Second derivatives of the position: the same everywhere on a face. */
+static void second_derivatives(double aa[3], double ab[3], double bb[3], const surface *f)
+{
+    for (int c = 0; c < 3; c++) {
+        const double x[6] = {f->x[0][c], f->x[1][c], f->x[2][c], f->x[3][c], f->x[4][c], f->x[5][c]};
+        aa[c] = f->count == 6 ? 4 * (x[0] + x[1] - 2 * x[3]) : 0;
+        bb[c] = f->count == 6 ? 4 * (x[0] + x[2] - 2 * x[5]) : 0;
+        ab[c] = f->count == 6   ? 4 * (x[0] - x[3] + x[4] - x[5])
+                : f->count == 4 ? 0.25 * (x[0] - x[1] + x[2] - x[3])
+                                : 0;
+    }
+}
+
+static void combine(double out[3], const surface *f, const double *w)
+{
+    for (int c = 0; c < 3; c++) {
+        out[c] = 0;
+        for (int i = 0; i < f->count; i++)
+            out[c] += w[i] * f->x[i][c];
+    }
+}
+
+static double distance_at(const surface *f, const double at[2])
+{
+    double w[UZ_FACE_NODES], da[UZ_FACE_NODES], db[UZ_FACE_NODES], x[3];
+    shape(w, da, db, f->count, at);
+    combine(x, f, w);
+    return dot(x, x);
+}
+
+/* How far outside the face's own coordinates; < 0 within. */
+static double outside(int count, const double at[2])
+{
+    if (count == 4)
+        return fmax(fabs(at[0]), fabs(at[1])) - 1;
+    return fmax(fmax(-at[0], -at[1]), at[0] + at[1] - 1);
+}
+
+/* The Newton step of half the squared distance; Gauss-Newton's where the former would not go down. */
+static void newton_step(double step[2], const surface *f, const double at[2])
+{
+    double w[UZ_FACE_NODES], da[UZ_FACE_NODES], db[UZ_FACE_NODES], x[3], ta[3], tb[3], aa[3], ab[3], bb[3];
+    shape(w, da, db, f->count, at);
+    combine(x, f, w);
+    combine(ta, f, da);
+    combine(tb, f, db);
+    second_derivatives(aa, ab, bb, f);
+    const double ga = dot(x, ta), gb = dot(x, tb);
+    double haa = dot(ta, ta) + dot(x, aa), hab = dot(ta, tb) + dot(x, ab), hbb = dot(tb, tb) + dot(x, bb);
+    if (!(haa > 0 && haa * hbb - hab * hab > 1e-6 * haa * hbb)) {
+        haa = dot(ta, ta);
+        hab = dot(ta, tb);
+        hbb = dot(tb, tb);
+    }
+    const double determinant = haa * hbb - hab * hab;
+    step[0] = -(hbb * ga - hab * gb) / determinant;
+    step[1] = -(haa * gb - hab * ga) / determinant;
+}
+
+/* Down to a minimum of the distance. False: the way leads out of the face. */
+static bool descend(double at[2], const surface *f)
+{
+    enum { STEPS = 50, HALVINGS = 30 };
+    static const double SMALL = 1e-5; /* the distance is too flat there to tell whether such a step goes down */
+    double distance = distance_at(f, at);
+    for (int k = 0; k < STEPS; k++) {
+        double step[2], next[2], there = INFINITY, part = 1;
+        newton_step(step, f, at);
+        if (!isfinite(step[0]) || !isfinite(step[1]))
+            return false;
+        for (int halving = 0; halving < HALVINGS; halving++, part *= 0.5) {
+            next[0] = at[0] + part * step[0];
+            next[1] = at[1] + part * step[1];
+            there = distance_at(f, next);
+            if (there <= distance || fabs(step[0]) + fabs(step[1]) < SMALL)
+                break;
+        }
+        if (!isfinite(there))
+            return false;
+        memcpy(at, next, sizeof next);
+        distance = there;
+        if (outside(f->count, at) > 0.5)
+            return false;
+        if (part * (fabs(step[0]) + fabs(step[1])) <= 2 * DBL_EPSILON)
+            break;
+    }
+    return outside(f->count, at) < 0;
+}
+
+static void best_start(double at[2], const surface *f)
+{
+    static const double TRIANGLE[7][2] = {{1. / 3, 1. / 3}, {0.1, 0.1},   {0.8, 0.1}, {0.1, 0.8},
+                                          {0.45, 0.1},      {0.45, 0.45}, {0.1, 0.45}};
+    double best = INFINITY;
+    const int starts = f->count == 3 ? 1 : f->count == 6 ? 7 : 9;
+    for (int i = 0; i < starts; i++) {
+        const double grid[2] = {0.7 * (i % 3 - 1), 0.7 * (i / 3 - 1)};
+        const double *start = f->count == 4 ? grid : TRIANGLE[i];
+        const double d = distance_at(f, start);
+        if (d < best) {
+            best = d;
+            memcpy(at, start, sizeof grid);
+        }
+    }
+}
+
+/* ---------------------------------------------------------------- both */
+
+int uz_face_corners(int dim, int count)
+{
+    return dim == 2 ? 2 : count == 4 ? 4 : 3;
+}
+
+static void set_normal(uz_foot *out, const double normal[3])
+{
+    const double length = sqrt(dot(normal, normal));
+    for (int c = 0; c < 3; c++)
+        out->normal[c] = normal[c] / length;
+}
+
+static void closest_in_plane(uz_foot *out, int count, const double *xyz)
+{
+    const curve k = curve_of(xyz, xyz + 2, count == 3 ? xyz + 4 : NULL, 2);
+    double s = closest_on_curve(&k);
+    s = s >= 1 - SNAP ? 1 : s <= -1 + SNAP ? -1 : s;
+    out->local[0] = s;
+    out->place = fabs(s) == 1 ? UZ_FACE_CORNER : UZ_FACE_WITHIN;
+    out->which = s == 1;
+    const double bubble = count == 3 ? 1 - s * s : 0;
+    out->weight[0] = 0.5 * (1 - s) - 0.5 * bubble;
+    out->weight[1] = 0.5 * (1 + s) - 0.5 * bubble;
+    out->weight[2] = bubble;
+    curve_at(out->point, &k, s);
+    const double tangent[2] = {k.b[0] + 2 * s * k.c[0], k.b[1] + 2 * s * k.c[1]};
+    set_normal(out, (double[3]){tangent[1], -tangent[0], 0});
+}
+
+static const double TRI[3][2] = {{0, 0}, {1, 0}, {0, 1}};
+
+/* The face's own coordinates of a point of its edge. */
+static void edge_to_face(double at[2], int corners, int edge, double s)
+{
+    const double *from = corners == 4 ? QUAD[edge] : TRI[edge];
+    const double *to = corners == 4 ? QUAD[(edge + 1) % 4] : TRI[(edge + 1) % 3];
+    for (int c = 0; c < 2; c++)
+        at[c] = s == -1 ? from[c] : s == 1 ? to[c] : 0.5 * ((1 - s) * from[c] + (1 + s) * to[c]);
+}
+
+/* The closest point of the border; its squared distance is returned, its place in *out. */
+static double closest_on_border(uz_foot *out, const surface *f, double x[3])
+{
+    const int corners = uz_face_corners(3, f->count);
+    double best = INFINITY;
+    for (int edge = 0; edge < corners; edge++) {
+        const int next = (edge + 1) % corners;
+        const curve k = curve_of(f->x[edge], f->x[next], f->count == 6 ? f->x[3 + edge] : NULL, 3);
+        double s = closest_on_curve(&k);
+        s = s >= 1 - SNAP ? 1 : s <= -1 + SNAP ? -1 : s;
+        const double distance = curve_distance(&k, s);
+        if (!(distance < best))
+            continue;
+        best = distance;
+        curve_at(x, &k, s);
+        edge_to_face(out->local, corners, edge, s);
+        out->place = fabs(s) == 1 ? UZ_FACE_CORNER : UZ_FACE_EDGE;
+        out->which = s == 1 ? next : edge;
+    }
+    return best;
+}
+
+/* Is the point within the face nearer than that of the border, by more than rounding? */
+static bool truly_within(const surface *f, const double at[2], double border, const double on_border[3])
+{
+    double w[UZ_FACE_NODES], da[UZ_FACE_NODES], db[UZ_FACE_NODES], x[3], off[3], size = 0;
+    shape(w, da, db, f->count, at);
+    combine(x, f, w);
+    for (int c = 0; c < 3; c++) {
+        off[c] = x[c] - on_border[c];
+        size = fmax(size, fabs(f->x[1][c] - f->x[0][c]));
+    }
+    return dot(x, x) < border && dot(off, off) > SNAP * SNAP * size * size;
+}
+
+static void closest_in_space(uz_foot *out, int count, const double *xyz)
+{
+    surface f = {.count = count, .x = {{0}}};
+    double at[2], border[3], da[UZ_FACE_NODES], db[UZ_FACE_NODES], ta[3], tb[3];
+    memcpy(f.x, xyz, (size_t)count * sizeof f.x[0]);
+    const double distance = closest_on_border(out, &f, border);
+    best_start(at, &f);
+    if (descend(at, &f) && truly_within(&f, at, distance, border)) {
+        out->place = UZ_FACE_WITHIN;
+        out->which = 0;
+        memcpy(out->local, at, sizeof at);
+    }
+    shape(out->weight, da, db, count, out->local);
+    combine(out->point, &f, out->weight);
+    combine(ta, &f, da);
+    combine(tb, &f, db);
+    set_normal(
+        out, (double[3]){ta[1] * tb[2] - ta[2] * tb[1], ta[2] * tb[0] - ta[0] * tb[2], ta[0] * tb[1] - ta[1] * tb[0]});
+}
+
+void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz)
+{
+    memset(out, 0, sizeof *out);
+    if (dim == 2)
+        closest_in_plane(out, count, xyz);
+    else
+        closest_in_space(out, count, xyz);
+    out->distance2 = dot(out->point, out->point);
+}

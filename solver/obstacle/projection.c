@@ -1,0 +1,397 @@
+/* projection.c: the nodes of one body on the faces of the other. */
+#include "obstacle/projection.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "obstacle/box_tree.h"
+#include "obstacle/face_point.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Closer to an edge or a corner of the master than this part of the face's size, a node is on it: the direction between
+ * them would be rounding. */
+#define ON_BORDER 1e-6
+
+/* The faces of a group, where they are, and which of them meet at a node. Coordinates are the mesh's times a power of
+ * two near one over its extent. */
+typedef struct {
+    const uz_mesh *mesh;
+    const uz_group *group;
+    double scale;
+    uz_box_tree tree;
+    int64_t *first; /* n_nodes + 1: faces with node i for a corner are around[first[i]..first[i + 1]) */
+    int64_t *around;
+} master;
+
+static void master_clear(master *m)
+{
+    uz_box_tree_clear(&m->tree);
+    free(m->first);
+    free(m->around);
+}
+
+/* The face's nodes as seen from x, scaled; returns how many. */
+static int gather(double *xyz, int64_t node[UZ_FACE_NODES], const master *m, int64_t face, const double *x)
+{
+    const int dim = m->mesh->dim, count = uz_mesh_face(node, m->mesh, m->group->face[face]);
+    for (int i = 0; i < count; i++)
+        for (int c = 0; c < dim; c++)
+            xyz[i * dim + c] = m->mesh->xyz[node[i] * dim + c] * m->scale - x[c];
+    return count;
+}
+
+static int closest_on(uz_foot *foot, const master *m, int64_t face, const double *x)
+{
+    double xyz[3 * UZ_FACE_NODES];
+    int64_t node[UZ_FACE_NODES];
+    const int count = gather(xyz, node, m, face, x);
+    uz_face_closest(foot, m->mesh->dim, count, xyz);
+    return count;
+}
+
+/* A face lies within the box of its Bezier points: its corners, and for each middle twice it less the mean of its
+ * edge's ends (Farin, "Curves and Surfaces for CAGD", convex hull property). A bilinear face within that of its
+ * corners. */
+static void box_of(double *box, const double *xyz, int dim, int count)
+{
+    const int corners = uz_face_corners(dim, count);
+    for (int c = 0; c < dim; c++) {
+        box[c] = INFINITY;
+        box[dim + c] = -INFINITY;
+        for (int i = 0; i < count; i++) {
+            const double *x = xyz + c;
+            const int a = i - corners, b = (a + 1) % corners;
+            const double v = i < corners ? x[i * dim] : 2 * x[i * dim] - 0.5 * (x[a * dim] + x[b * dim]);
+            box[c] = fmin(box[c], v);
+            box[dim + c] = fmax(box[dim + c], v);
+        }
+    }
+}
+
+static double distance_to(const void *ctx, int64_t item, const double *x, double best)
+{
+    static const double ORIGIN[3] = {0};
+    const master *m = ctx;
+    const int dim = m->mesh->dim;
+    double xyz[3 * UZ_FACE_NODES], box[6];
+    int64_t node[UZ_FACE_NODES];
+    uz_foot foot;
+    const int count = gather(xyz, node, m, item, x);
+    box_of(box, xyz, dim, count);
+    if (uz_box_distance(box, dim, ORIGIN) > best)
+        return INFINITY;
+    uz_face_closest(&foot, dim, count, xyz);
+    return foot.distance2;
+}
+
+static uz_status out_of_memory(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two bodies");
+}
+
+static uz_status build_tree(master *m, uz_error *err)
+{
+    static const double ORIGIN[3] = {0};
+    const int64_t n = m->group->n_faces;
+    double xyz[3 * UZ_FACE_NODES];
+    int64_t node[UZ_FACE_NODES];
+    double *box = uz_alloc(n, 6 * sizeof *box);
+    if (!box)
+        return out_of_memory(err);
+    for (int64_t i = 0; i < n; i++)
+        box_of(box + 2 * m->mesh->dim * i, xyz, m->mesh->dim, gather(xyz, node, m, i, ORIGIN));
+    const uz_status status = uz_box_tree_init(&m->tree, n, m->mesh->dim, box, err);
+    free(box);
+    return status;
+}
+
+/* Counted, summed, placed: filling from the end leaves first[i] at the beginning of its list. */
+static uz_status list_around(master *m, uz_error *err)
+{
+    const int64_t n = m->mesh->n_nodes;
+    int64_t node[UZ_FACE_NODES];
+    m->first = uz_alloc_zero(n + 1, sizeof *m->first);
+    m->around = uz_alloc(m->group->n_faces, UZ_FACE_NODES * sizeof *m->around);
+    if (!m->first || !m->around)
+        return out_of_memory(err);
+    for (int64_t f = 0; f < m->group->n_faces; f++) {
+        const int corners = uz_face_corners(m->mesh->dim, uz_mesh_face(node, m->mesh, m->group->face[f]));
+        for (int i = 0; i < corners; i++)
+            m->first[node[i]]++;
+    }
+    for (int64_t i = 0; i < n; i++)
+        m->first[i + 1] += m->first[i];
+    for (int64_t f = m->group->n_faces - 1; f >= 0; f--) {
+        const int corners = uz_face_corners(m->mesh->dim, uz_mesh_face(node, m->mesh, m->group->face[f]));
+        for (int i = 0; i < corners; i++)
+            m->around[--m->first[node[i]]] = f;
+    }
+    return UZ_OK;
+}
+
+/* ---------------------------------------------------------------- the border */
+
+/* The place of a node among a face's corners; -1: not there. */
+static int corner_of(const master *m, int64_t face, int64_t node)
+{
+    int64_t of[UZ_FACE_NODES];
+    const int corners = uz_face_corners(m->mesh->dim, uz_mesh_face(of, m->mesh, m->group->face[face]));
+    for (int i = 0; i < corners; i++)
+        if (of[i] == node)
+            return i;
+    return -1;
+}
+
+static int64_t faces_with_edge(const master *m, int64_t a, int64_t b)
+{
+    int64_t count = 0;
+    for (int64_t q = m->first[a]; q < m->first[a + 1]; q++)
+        count += corner_of(m, m->around[q], b) >= 0;
+    return count;
+}
+
+/* Does the master end at this node? In 2D where one face has it, in 3D where one of its edges has one face. */
+static bool ends_at(const master *m, int64_t node)
+{
+    if (m->mesh->dim == 2)
+        return m->first[node + 1] - m->first[node] < 2;
+    for (int64_t q = m->first[node]; q < m->first[node + 1]; q++) {
+        int64_t of[UZ_FACE_NODES];
+        const int corners = uz_face_corners(3, uz_mesh_face(of, m->mesh, m->group->face[m->around[q]]));
+        const int at = corner_of(m, m->around[q], node);
+        if (faces_with_edge(m, node, of[(at + 1) % corners]) < 2)
+            return true;
+        if (faces_with_edge(m, node, of[(at + corners - 1) % corners]) < 2)
+            return true;
+    }
+    return false;
+}
+
+/* ---------------------------------------------------------------- normals */
+
+/* The angle of a face at one of its corners; edges in 2D count alike. */
+static double angle_at(const master *m, int64_t face, int64_t node)
+{
+    static const double ORIGIN[3] = {0};
+    double xyz[3 * UZ_FACE_NODES], a[3], b[3], aa = 0, bb = 0, ab = 0;
+    int64_t of[UZ_FACE_NODES];
+    if (m->mesh->dim == 2)
+        return 1;
+    const int corners = uz_face_corners(3, gather(xyz, of, m, face, ORIGIN)), at = corner_of(m, face, node);
+    for (int c = 0; c < 3; c++) {
+        a[c] = xyz[3 * ((at + 1) % corners) + c] - xyz[3 * at + c];
+        b[c] = xyz[3 * ((at + corners - 1) % corners) + c] - xyz[3 * at + c];
+        aa += a[c] * a[c];
+        bb += b[c] * b[c];
+        ab += a[c] * b[c];
+    }
+    return acos(fmin(fmax(ab / sqrt(aa * bb), -1), 1));
+}
+
+/* A place between faces of the master. */
+typedef struct {
+    double mean[3]; /* of their normals, unit */
+    bool smooth;    /* they are one to rounding */
+    bool border;    /* the master ends there */
+} meeting;
+
+/* The faces around corner a, or those that have the edge a, b (b >= 0); x: the place itself, scaled. */
+static void meet(meeting *out, const master *m, int64_t a, int64_t b, const double *x)
+{
+    double sum[3] = {0}, one[3] = {0}, apart = 0;
+    for (int64_t q = m->first[a]; q < m->first[a + 1]; q++) {
+        uz_foot foot;
+        const int64_t face = m->around[q];
+        if (b >= 0 && corner_of(m, face, b) < 0)
+            continue;
+        closest_on(&foot, m, face, x);
+        const double weight = b >= 0 ? 1 : angle_at(m, face, a);
+        if (one[0] == 0 && one[1] == 0 && one[2] == 0)
+            memcpy(one, foot.normal, sizeof one);
+        for (int c = 0; c < 3; c++) {
+            sum[c] += weight * foot.normal[c];
+            apart = fmax(apart, fabs(foot.normal[c] - one[c]));
+        }
+    }
+    out->border = b >= 0 ? faces_with_edge(m, a, b) < 2 : ends_at(m, a);
+    out->smooth = apart <= 1e-12;
+    uz_unit_normal(out->mean, sum, 3);
+}
+
+/* ------------------------------------------------------------------ rows */
+
+static double face_size(const double *xyz, int dim, int corners)
+{
+    double most = 0;
+    for (int i = 0; i < corners; i++) {
+        const int j = (i + 1) % corners;
+        double sum = 0;
+        for (int c = 0; c < dim; c++)
+            sum += (xyz[j * dim + c] - xyz[i * dim + c]) * (xyz[j * dim + c] - xyz[i * dim + c]);
+        most = fmax(most, sqrt(sum));
+    }
+    return most;
+}
+
+/* The normal where the foot is on an edge or a corner of its face. off: x_s - x_m. False: the node is beyond the border
+ * of the master. */
+static bool normal_between(double normal[3], const master *m, const uz_contact_pair *row, const uz_foot *foot,
+                           double size, const double *x, const double off[3])
+{
+    const int dim = m->mesh->dim, corners = uz_face_corners(dim, row->count);
+    const int64_t a = row->master[foot->which];
+    const int64_t b = foot->place == UZ_FACE_EDGE ? row->master[(foot->which + 1) % corners] : -1;
+    double place[3] = {0}, along = 0;
+    meeting at;
+    for (int c = 0; c < dim; c++)
+        place[c] = x[c] + foot->point[c];
+    meet(&at, m, a, b, place);
+    for (int c = 0; c < 3; c++)
+        along += off[c] * at.mean[c];
+    memcpy(normal, at.mean, sizeof at.mean);
+    if (at.border) {
+        const double beyond = sqrt(fmax(foot->distance2 - along * along, 0));
+        return beyond <= UZ_OVERHANG * size;
+    }
+    if (!at.smooth && foot->distance2 > ON_BORDER * ON_BORDER * size * size)
+        for (int c = 0; c < 3; c++)
+            normal[c] = along < 0 ? -off[c] : off[c];
+    return true;
+}
+
+static uz_status refuse_flat(const master *m, int64_t face, int64_t index, uz_error *err)
+{
+    char where[96];
+    int64_t of[UZ_FACE_NODES];
+    uz_mesh_face(of, m->mesh, m->group->face[face]);
+    snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
+    return uz_fail(err, UZ_ERR_SCENE, where, "the face at node %lld of \"%.63s\" has no area, and so no normal",
+                   (long long)of[0], m->group->name);
+}
+
+/* Fills the row of one node; *found false: it faces no part of the master. */
+static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, int64_t node, int64_t index,
+                          uz_error *err)
+{
+    const int dim = m->mesh->dim;
+    double x[3] = {0}, off[3], normal[3], xyz[3 * UZ_FACE_NODES], along = 0;
+    uz_foot foot;
+    *found = false;
+    memset(row, 0, sizeof *row);
+    for (int c = 0; c < dim; c++)
+        x[c] = m->mesh->xyz[node * dim + c] * m->scale;
+    const int64_t nearest = uz_box_tree_nearest(&m->tree, x, distance_to, m), face = nearest < 0 ? 0 : nearest;
+    row->count = gather(xyz, row->master, m, face, x);
+    uz_face_closest(&foot, dim, row->count, xyz);
+    if (!isfinite(foot.normal[0] + foot.normal[1] + foot.normal[2]))
+        return refuse_flat(m, face, index, err);
+    for (int c = 0; c < 3; c++)
+        off[c] = -foot.point[c];
+    memcpy(normal, foot.normal, sizeof normal);
+    const double size = face_size(xyz, dim, uz_face_corners(dim, row->count));
+    if (foot.place != UZ_FACE_WITHIN && !normal_between(normal, m, row, &foot, size, x, off))
+        return UZ_OK;
+    if (!uz_unit_normal(row->normal, normal, dim))
+        return refuse_flat(m, face, index, err);
+    for (int c = 0; c < dim; c++)
+        along += off[c] * row->normal[c];
+    row->node = node;
+    row->face = m->group->face[face];
+    row->gap = along / m->scale;
+    memcpy(row->local, foot.local, sizeof row->local);
+    memcpy(row->weight, foot.weight, sizeof row->weight);
+    *found = true;
+    return UZ_OK;
+}
+
+static uz_status check_groups(const uz_group *on, const uz_group *with, int64_t index, uz_error *err)
+{
+    char where[96];
+    snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
+    if (with->kind != UZ_GROUP_FACES || with->n_faces < 1)
+        return uz_fail(err, UZ_ERR_SCENE, where,
+                       "\"%.63s\" has no faces; the other body is given by the %s that can be touched", with->name,
+                       "edges or faces");
+    if (on == with)
+        return uz_fail(err, UZ_ERR_SCENE, where, "\"%.63s\" is both bodies; name the faces of the other one",
+                       with->name);
+    return UZ_OK;
+}
+
+/* No node of the master may be among the slaves: its gap to itself is zero for every motion. */
+static uz_status check_apart(const uz_mesh *mesh, const uz_group *on, const uz_group *with, int64_t index,
+                             uz_error *err)
+{
+    char where[96];
+    unsigned char *of_master = uz_alloc_zero(mesh->n_nodes, 1);
+    uz_status status = of_master ? UZ_OK : out_of_memory(err);
+    for (int64_t f = 0; f < with->n_faces && status == UZ_OK; f++) {
+        int64_t node[UZ_FACE_NODES];
+        const int count = uz_mesh_face(node, mesh, with->face[f]);
+        for (int i = 0; i < count; i++)
+            of_master[node[i]] = 1;
+    }
+    snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
+    for (int64_t i = 0; i < uz_group_node_count(mesh, on) && status == UZ_OK; i++)
+        if (of_master[uz_group_node_at(on, i)])
+            status = uz_fail(err, UZ_ERR_SCENE, where,
+                             "node %lld is in \"%.63s\" and on the faces of \"%.63s\"; the two bodies must have nodes "
+                             "of their own where they touch",
+                             (long long)uz_group_node_at(on, i), on->name, with->name);
+    free(of_master);
+    return status;
+}
+
+static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m, const uz_group *on, int64_t index,
+                           uz_error *err)
+{
+    char where[96];
+    *count = 0;
+    for (int64_t i = 0; i < uz_group_node_count(m->mesh, on); i++) {
+        bool found;
+        const uz_status status = make_row(&found, &row[*count], m, uz_group_node_at(on, i), index, err);
+        if (status != UZ_OK)
+            return status;
+        *count += found;
+    }
+    if (*count > 0)
+        return UZ_OK;
+    snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
+    return uz_fail(err, UZ_ERR_SCENE, where, "no node of \"%.63s\" faces \"%.63s\": all of them lie beyond its border",
+                   on->name, m->group->name);
+}
+
+uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
+                           const uz_group *with, int64_t index, uz_error *err)
+{
+    master m = {.mesh = mesh, .group = with};
+    uz_contact_pair *row = NULL;
+    int exponent;
+    *out = NULL;
+    *count = 0;
+    uz_status status = check_groups(on, with, index, err);
+    if (status == UZ_OK)
+        status = check_apart(mesh, on, with, index, err);
+    if (status != UZ_OK)
+        return status;
+    frexp(mesh->extent, &exponent);
+    m.scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
+    row = uz_alloc(uz_group_node_count(mesh, on), sizeof *row);
+    status = row ? build_tree(&m, err) : out_of_memory(err);
+    if (status == UZ_OK)
+        status = list_around(&m, err);
+    if (status == UZ_OK)
+        status = make_rows(row, count, &m, on, index, err);
+    if (status == UZ_OK)
+        *out = row;
+    else
+        *count = 0;
+    if (status != UZ_OK)
+        free(row);
+    master_clear(&m);
+    return status;
+}

@@ -1,0 +1,27 @@
+/* check.h: shared by the checks of a scene. */
+#ifndef UZ_SCENE_CHECK_H
+#define UZ_SCENE_CHECK_H
+
+#include "scene/mesh.h"
+
+enum { UZ_CHECK_POINTER = 96 };
+
+/* "/materials/0/poisson"; key NULL: "/materials/0". Returns `where`. */
+const char *uz_check_place(char where[UZ_CHECK_POINTER], const char *list, int64_t i, const char *key);
+
+/* The group `on` of an item, with at least one node; NULL: refused. `where` is then its pointer. */
+const uz_group *uz_check_group(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
+                               int64_t i, const char *key, uz_error *err);
+/* The same, and it must be made of faces. remedy: what to name instead. */
+uz_status uz_check_sides(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
+                         const char *remedy, uz_error *err);
+/* Each of dim components must be finite; key is "traction", "obstacle/plane/point", ... */
+uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err);
+uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err);
+
+/* Groups, directions and values of supports; groups and directions of contacts. */
+uz_status uz_check_supports(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
+uz_status uz_check_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
+uz_status uz_check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
+
+#endif

@@ -1,0 +1,205 @@
+"""Which jobs run first, which wait too long, which are listed, and which are kept."""
+import datetime
+import sqlite3
+import threading
+import time
+import urllib.parse
+
+import service
+from service import ENDLESS, MATRICES, check, expect, options
+
+
+def ids(reply):
+    return [job["id"] for job in expect(reply, 200).json["jobs"]]
+
+
+def listed(s, **query):
+    return ids(s.get("/v1/jobs?" + urllib.parse.urlencode(query, doseq=True)))
+
+
+def wait_until(condition, seconds=20):
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    check(condition(), "did not happen in", seconds, "s")
+
+
+# -------------------------------------------------------------------- list
+
+def test_list_by_time_and_order(s):
+    jobs = []
+    for i in range(5):
+        jobs.append(s.solve(MATRICES))
+        time.sleep(0.005)
+    all_ids, times = [job["id"] for job in jobs], [job["created"] for job in jobs]
+    check(len(set(times)) == 5, times)
+    check(listed(s, order="asc") == all_ids and listed(s, order="desc") == listed(s) == all_ids[::-1])
+    page = s.get("/v1/jobs?order=asc&limit=2").json
+    seen = [job["id"] for job in page["jobs"]]
+    while page["next"]:
+        page = s.get(f"/v1/jobs?order=asc&limit=2&cursor={page['next']}").json
+        seen += [job["id"] for job in page["jobs"]]
+    check(seen == all_ids, seen)
+    check(listed(s, until=times[3])[-1] == all_ids[0] and all_ids[4] not in listed(s, until=times[3]))
+    later = datetime.datetime.fromisoformat(times[2].replace("Z", "+00:00")) + datetime.timedelta(milliseconds=1)
+    zone = datetime.timezone(datetime.timedelta(hours=5, minutes=30))
+    for text in (later.isoformat().replace("+00:00", "Z"), later.astimezone(zone).isoformat(),
+                 later.isoformat().replace("+00:00", "z").replace("T", "t")):
+        check(listed(s, since=text) == all_ids[:2:-1], text, listed(s, since=text))
+        check(listed(s, since=text, status="successful", order="asc") == all_ids[3:], text)
+    check(ids(s.get(f"/v1/jobs?since={later.astimezone(zone).isoformat()}")) == all_ids[:2:-1])  # '+' not escaped
+    check(listed(s, since="2099-01-01T00:00:00Z") == [] and listed(s, until="1999-01-01T00:00:00-11:00") == [])
+    for key in ("since", "until"):
+        for wrong in ("", "yesterday", "2026-01-31", "2026-02-30T00:00:00Z", "2026-01-31T24:00:00Z", "1769860800",
+                      "2026-01-31T12:00:00", "2026-01-31T12:00:00.Z", "2026-01-31T12:00:00+1:00", "2026-13-01T00:00:00Z"):
+            expect(s.get(f"/v1/jobs?{urllib.parse.urlencode({key: wrong})}"), 400, "bad_parameter")
+    expect(s.get("/v1/jobs?order=up"), 400, "bad_parameter")
+
+
+def test_list_by_tags(s):
+    tags = [["a"], ["a", "b"], ["b", "c"], ["a", "b", "c", "d"], []]
+    jobs = [s.solve({**MATRICES, "tags": one})["id"] for one in tags]
+    for wanted in (["a"], ["a", "b"], ["b", "a"], ["c", "b"], ["a", "b", "c", "d"], ["a", "x"], ["d", "d"]):
+        have = [jobs[i] for i in range(5) if set(wanted) <= set(tags[i])]
+        check(listed(s, tag=wanted, order="asc") == have, wanted)
+        check(listed(s, tag=wanted, status="successful") == have[::-1], wanted)
+        check(listed(s, tag=wanted, status="failed") == [], wanted)
+    expect(s.get("/v1/jobs?tag=a&tag=b&tag=c&tag=d&tag=e"), 400, "bad_parameter")
+    expect(s.get("/v1/jobs?status=failed&status=failed"), 400, "repeated_parameter")
+
+
+# ------------------------------------------------------------------- queue
+
+@options("--workers", "1")
+def test_priorities(s):
+    first = s.post(ENDLESS).json
+    s.wait_status(first["id"], "running")
+    wanted = [(0, 2), (-10, 5), (10, 0), (0, 3), (5, 1), (-1, 4)]
+    jobs = [s.post({**MATRICES, "priority": priority}).json for priority, _ in wanted]
+    check([job["priority"] for job in jobs] == [priority for priority, _ in wanted], jobs)
+    s.request("DELETE", f"/v1/jobs/{first['id']}")
+    ended = [s.get(f"/v1/jobs/{job['id']}", Prefer="wait=30").json for job in jobs]
+    order = sorted(range(6), key=lambda i: ended[i]["started"])
+    check(all(job["status"] == "successful" for job in ended), ended)
+    check([wanted[i][1] for i in order] == list(range(6)), order)
+    check("priority" in s.get(f"/v1/jobs/{first['id']}").json)
+
+
+def test_bad_values(s):
+    for key, wrong, code in (("priority", 11, "out_of_range"), ("priority", -11, "out_of_range"),
+                             ("priority", 0.5, "wrong_type"), ("priority", "high", "wrong_type"),
+                             ("queue_limit_s", 0, "out_of_range"), ("queue_limit_s", -1, "out_of_range"),
+                             ("queue_limit_s", None, "wrong_type")):
+        check(expect(s.post({**MATRICES, key: wrong}), 422, code).json["pointer"] == "/" + key, key, wrong)
+
+
+@options("--workers", "1")
+def test_queue_limit(s):
+    first = s.post(ENDLESS).json
+    s.wait_status(first["id"], "running")
+    short = s.post({**MATRICES, "queue_limit_s": 0.2}).json
+    long = s.post({**MATRICES, "queue_limit_s": 60}).json
+    started = time.monotonic()
+    ended = s.get(f"/v1/jobs/{short['id']}", Prefer="wait=30").json  # whoever waits is told
+    check(ended["status"] == "failed" and ended["error"]["code"] == "queue_time_limit", ended)
+    check(time.monotonic() - started < 10 and ended["started"] is None and ended["finished"], ended)
+    expect(s.get(f"/v1/jobs/{short['id']}/result"), 409, "job_failed")
+    s.request("DELETE", f"/v1/jobs/{first['id']}")
+    check(s.get(f"/v1/jobs/{long['id']}", Prefer="wait=30").json["status"] == "successful")
+
+
+@options("--workers", "1")
+def test_a_limit_that_passed_while_the_service_was_down(s):
+    first = s.post(ENDLESS).json
+    s.wait_status(first["id"], "running")
+    job = s.post({**MATRICES, "queue_limit_s": 0.3}).json
+    s.terminate(number=9)
+    time.sleep(0.4)
+    s.start()
+    check(s.get(f"/v1/jobs/{job['id']}", Prefer="wait=30").json["error"]["code"] == "queue_time_limit")
+
+
+@options("--workers", "1", "--max-queue", "2")
+def test_full_queue(s):
+    first = s.post(ENDLESS).json
+    s.wait_status(first["id"], "running")
+    key = {"Idempotency-Key": "x"}
+    waiting = [expect(s.post(MATRICES, key), 202).json, expect(s.post(MATRICES), 202).json]
+    reply = expect(s.post(MATRICES), 503, "queue_full")
+    check(int(reply.headers["retry-after"]) > 0, reply)
+    check(expect(s.post(MATRICES, key), 202).json["id"] == waiting[0]["id"])  # a repeat is no new job
+    expect(s.request("DELETE", f"/v1/jobs/{waiting[1]['id']}"), 200)
+    expect(s.post(MATRICES), 202)
+    expect(s.post(MATRICES), 503, "queue_full")
+    s.request("DELETE", f"/v1/jobs/{first['id']}")
+
+
+@options("--workers", "1", "--max-queue", "5")
+def test_full_queue_race(s):
+    first = s.post(ENDLESS).json
+    s.wait_status(first["id"], "running")
+    statuses = []
+    threads = [threading.Thread(target=lambda: statuses.append(s.post(MATRICES).status)) for _ in range(16)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    check(sorted(statuses) == [202] * 5 + [503] * 11, statuses)
+    s.request("DELETE", f"/v1/jobs/{first['id']}")
+
+
+# --------------------------------------------------------------- retention
+
+@options("--keep-jobs", "3")
+def test_keep_jobs(s):
+    jobs = [s.solve(MATRICES)["id"] for _ in range(6)]
+    endless = s.post(ENDLESS).json["id"]
+    wait_until(lambda: listed(s, status="successful") == jobs[:2:-1])
+    check(s.get(f"/v1/jobs/{endless}").json["status"] in ("accepted", "running"))
+    expect(s.get(f"/v1/jobs/{jobs[0]}/result"), 404, "not_found")
+    expect(s.get(f"/v1/jobs/{jobs[5]}/result"), 200)
+    s.request("DELETE", f"/v1/jobs/{endless}")
+
+
+@options(None)
+def test_keep_days(s):
+    s.start()
+    jobs = [s.solve(MATRICES)["id"] for _ in range(2)]
+    s.terminate()
+    with sqlite3.connect(s.db) as db:
+        db.execute("UPDATE job SET finished = finished - 86400 WHERE id = ?", (jobs[0],))
+    db.close()
+    s.options = ("--keep-days", "0.5")
+    s.start()
+    wait_until(lambda: listed(s) == [jobs[1]])
+
+
+@options(None)
+def test_keep_bytes(s):
+    s.start()
+    jobs = [s.solve(MATRICES)["id"] for _ in range(4)]
+    s.terminate()
+    with sqlite3.connect(s.db) as db:
+        sizes = [db.execute("SELECT bytes FROM job WHERE id = ?", (one,)).fetchone()[0] for one in jobs]
+        body = db.execute("SELECT length(body) FROM request WHERE job = ?", (jobs[0],)).fetchone()[0]
+        data = db.execute("SELECT (SELECT sum(length(data)) FROM vector WHERE job = ?1)"
+                          " + (SELECT sum(length(data)) FROM history WHERE job = ?1)", (jobs[0],)).fetchone()[0]
+    db.close()
+    check(sizes[0] == body + data and body > 0 and data > 0, sizes, body, data)
+    s.options = ("--keep-bytes", str(sum(sizes[2:]) + 1))
+    s.start()
+    wait_until(lambda: listed(s) == [jobs[3], jobs[2]])
+
+
+@options("--keep-jobs", "1", "--upload-days", "0.000001")
+def test_an_upload_goes_after_its_job(s):
+    text = MATRICES["problem"]["K"].encode()
+    one = s.request("POST", "/v1/uploads", text).json["id"]
+    s.solve({"problem": {**MATRICES["problem"], "K": {"upload": one}}})
+    check(s.get(f"/v1/uploads/{one}").json["used_by"] == 1)
+    s.solve(MATRICES)
+    wait_until(lambda: s.get(f"/v1/uploads/{one}").status == 404)
+
+
+if __name__ == "__main__":
+    service.main(globals())

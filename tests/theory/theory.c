@@ -1,0 +1,76 @@
+/* theory.c: how stress and contact pressure come closer to theory as meshes get finer: `make theory`. */
+#include "theory.h"
+
+#include <stdarg.h>
+
+/* What the harness gives to tests. */
+static int failures;
+void test_fail(const char *file, int line, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fprintf(stderr, "%s:%d: ", file, line);
+    vfprintf(stderr, format, args);
+    fputc('\n', stderr);
+    va_end(args);
+    failures++;
+}
+
+static void print(const theory_table *t)
+{
+    for (int i = 0; i < t->count; i++)
+        printf("| %-66s | %-14s | %12.6g | %12.6g | %7.3f %% |\n", t->row[i].name, t->row[i].quantity,
+               t->row[i].computed, t->row[i].theory, 100 * theory_error(&t->row[i]));
+    fflush(stdout);
+}
+
+static void hertz_ladder(uz_model model, const char *element, int first, int last, double growth)
+{
+    for (int n = first; n <= last; n *= 2) {
+        theory_table t = {.count = 0};
+        theory_hertz(&t, model, element, n, growth);
+        print(&t);
+    }
+}
+
+static void hertz(void)
+{
+    hertz_ladder(UZ_PLANE_STRAIN, "quad4", 8, 64, 1.2);
+    hertz_ladder(UZ_PLANE_STRAIN, "tri3", 16, 64, 1.2);
+    hertz_ladder(UZ_PLANE_STRAIN, "quad8", 8, 32, 1.2);
+    hertz_ladder(UZ_PLANE_STRAIN, "tri6", 8, 32, 1.2);
+    hertz_ladder(UZ_AXISYMMETRIC, "quad4", 8, 64, 1.2);
+    hertz_ladder(UZ_AXISYMMETRIC, "quad8", 8, 32, 1.2);
+    hertz_ladder(UZ_SOLID, "hex8", 3, 6, 1.6);
+    hertz_ladder(UZ_SOLID, "tet10", 3, 3, 1.8);
+}
+
+static void others(void)
+{
+    theory_table t = {.count = 0};
+    for (int n = 8; n <= 32; n *= 2)
+        theory_punch(&t, "quad4", n);
+    for (int n = 6; n <= 24; n *= 2)
+        theory_tube(&t, UZ_PLANE_STRAIN, "quad4", n);
+    for (int n = 3; n <= 12; n *= 2)
+        theory_tube(&t, UZ_PLANE_STRAIN, "quad8", n);
+    for (int n = 6; n <= 24; n *= 2)
+        theory_tube(&t, UZ_AXISYMMETRIC, "quad4", n);
+    for (int n = 1; n <= 4; n *= 2)
+        theory_beam(&t, "quad4", UZ_FORMULATION_INCOMPATIBLE, n);
+    theory_beam(&t, "quad8", UZ_FORMULATION_AUTO, 1);
+    theory_beam(&t, "tri3", UZ_FORMULATION_AUTO, 16);
+    for (int n = 8; n <= 32; n *= 2)
+        theory_roller(&t, "quad4", n, 1.25);
+    theory_roller(&t, "quad8", 10, 1.3);
+    print(&t);
+}
+
+int main(void)
+{
+    printf("| %-66s | %-14s | %12s | %12s | %9s |\n|---|---|---|---|---|\n", "body", "quantity", "computed", "theory",
+           "error");
+    hertz();
+    others();
+    return failures > 0;
+}

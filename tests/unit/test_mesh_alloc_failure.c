@@ -1,0 +1,76 @@
+/* Each allocation on the way from a file, numbers or a box to a mesh fails once: the call must say so, publish nothing
+ * and keep nothing. Linked with malloc, calloc, realloc and free wrapped. */
+#include "failing_heap.h"
+#include "gmsh_text.h"
+#include "harness.h"
+#include "scene/mesh.h"
+
+/* Runs with the 1st, 2nd, ... allocation failing until it succeeds. Returns how many could fail. */
+static long fail_each(uz_status (*run)(uz_error *err))
+{
+    for (long n = 0; n < 1000; n++) {
+        uz_error err = {0};
+        heap.live = 0;
+        heap.failed = false;
+        heap.until_failure = n;
+        heap.watching = true;
+        const uz_status status = run(&err);
+        heap.watching = false;
+        CHECK_MSG(heap.live == 0, "%d blocks leaked where allocation %ld fails", heap.live, n);
+        CHECK_MSG(status == (heap.failed ? UZ_ERR_MEMORY : UZ_OK), "%s after %ld allocations (%s)",
+                  uz_status_name(status), n, err.message);
+        CHECK(!heap.failed || (err.status == UZ_ERR_MEMORY && err.message[0]));
+        if (!heap.failed)
+            return n;
+    }
+    return -1;
+}
+
+static gmsh_writer file;
+
+static uz_status read_and_mesh(uz_error *err)
+{
+    uz_given_mesh given;
+    uz_mesh mesh = {0};
+    uz_status status = uz_gmsh_read(&given, file.text, file.len, 0, err);
+    CHECK((given.xyz != NULL) == (status == UZ_OK));
+    if (status == UZ_OK)
+        status = uz_mesh_from_given(&mesh, &given, 3, err);
+    CHECK((mesh.xyz != NULL) == (status == UZ_OK));
+    uz_mesh_clear(&mesh);
+    uz_given_mesh_clear(&given);
+    return status;
+}
+
+TEST(gmsh_files)
+{
+    for (int k = 0; k < 4; k++) {
+        write_gmsh(&file, &TET_SOURCE, k < 2 ? 22 : 41, k % 2);
+        CHECK(fail_each(read_and_mesh) > 25);
+    }
+}
+
+/* Tags too far apart for a table. */
+TEST(gmsh_files_with_wild_numbers)
+{
+    static const char text[] = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n99999999 1 0 0\n7 0 1 0\n"
+                               "8 0 0 1\n$EndNodes\n$Elements\n1\n1 4 0 1 99999999 7 8\n$EndElements\n";
+    file.len = 0;
+    put_text(&file, text);
+    CHECK(fail_each(read_and_mesh) > 15);
+}
+
+static uz_status make_box(uz_error *err)
+{
+    uz_mesh mesh;
+    const uz_box box = {.size = {1, 1, 1}, .cells = {2, 1, 1}, .element = "tet10", .dim = 3};
+    const uz_status status = uz_mesh_from_box(&mesh, &box, err);
+    CHECK((mesh.xyz != NULL) == (status == UZ_OK));
+    uz_mesh_clear(&mesh);
+    return status;
+}
+
+TEST(boxes)
+{
+    CHECK(fail_each(make_box) > 10);
+}
