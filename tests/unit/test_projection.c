@@ -64,11 +64,11 @@ static bodies make_bodies(int dim, uz_element_kind kind, int64_t n, int64_t slav
     b.on.node = checked(uz_alloc_zero(slaves, sizeof *b.on.node));
     b.with.face = checked(uz_alloc_zero(cells, sizeof *b.with.face));
     for (int64_t i = 0; i < 2 * top; i++) {
-        const int64_t k = i % top;
+        const int64_t k = i % top, row = k / line;
         double *x = m->xyz + i * dim;
         x[0] = (double)(k % line) / (double)(line - 1);
         if (dim == 3)
-            x[1] = (double)(k / line) / (double)(line - 1);
+            x[1] = (double)row / (double)(line - 1);
         x[dim - 1] = height(x[0], dim == 3 ? x[1] : 0) - (i < top ? 0 : 1);
     }
     for (int64_t e = 0; e < cells; e++) {
@@ -428,7 +428,7 @@ TEST(bad_groups_are_refused)
     b.on.node[0] = 2;
     refused(&b, &b.on, &b.with, "/contacts/3/on", "node 2 is in \"shoe\"");
     b.on.node[0] = b.mesh.n_nodes - 2;
-    memcpy(b.mesh.xyz, b.mesh.xyz + 2, 16); /* the first face's ends are one place */
+    b.mesh.xyz[0] = b.mesh.xyz[2]; /* the first face's ends are one place: all of them have y = 0 */
     memcpy(slave(&b, 0), (double[]){0.25, 0.1}, 16);
     refused(&b, &b.on, &b.with, "/contacts/3/with", "has no area");
     clear(&b);
