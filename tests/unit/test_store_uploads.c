@@ -98,8 +98,11 @@ TEST(gzip_in_pieces_of_any_size)
     bool known;
     char *text = malloc(LEN);
     unsigned char *small = malloc(LEN);
-    if (!place_begin(&p))
+    if (!place_begin(&p)) {
+        free(text);
+        free(small);
         return;
+    }
     for (int i = 0; i < LEN; i++)
         text[i] = (char)('a' + i % 7 + (i / 1000) % 3);
     CHECK_INT(send(p.s, text, LEN, LEN, false, &plain, &known), UPLOAD_OK);
