@@ -43,6 +43,18 @@ bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply)
     return status == STORE_OK;
 }
 
+void jobs_check_still_there(api *context, const job *j, http_reply *reply)
+{
+    job now = {0};
+    store_status status = reply->status == 200 ? store_get(context->store, j->id, &now) : STORE_OK;
+    job_clear(&now);
+    if (status == STORE_OK)
+        return;
+    reply->tag[0] = '\0';
+    reply->tag_by_body = reply->takes_ranges = false;
+    reply_store_failure(context, status, reply);
+}
+
 bool jobs_ended(const job *j)
 {
     return j->status != JOB_ACCEPTED && j->status != JOB_RUNNING;

@@ -355,6 +355,7 @@ void results_get(api *context, http_request *rq, http_reply *reply)
     }
     if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !is_known(rq, &j, reply))
         reply_result(context, rq, &j, &fields, reply);
+    jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }
 
@@ -362,4 +363,5 @@ void results_reply(api *context, const job *j, http_reply *reply)
 {
     const wanted fields = {.reactions = true, .gaps = true};
     reply_one(context, &(place){.j = j, .summary = j->summary}, &fields, reply);
+    jobs_check_still_there(context, j, reply);
 }

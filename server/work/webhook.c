@@ -229,6 +229,8 @@ static void tell(webhooks *all, const webhook_due *due)
     if (status == 0 && atomic_load(&all->stop))
         return; /* cut off: it stays due */
     log_attempt(all, due, end, status, cause);
+    if (status == 0 && end == WEBHOOK_AGAIN) /* each attempt takes seconds that others wait for */
+        store_webhook_postpone(all->store, due->url, wait_after(all, 0));
     store_webhook_attempted(all->store, due->job, end, wait_after(all, due->attempts));
 }
 

@@ -203,5 +203,29 @@ def test_an_upload_goes_after_its_job(s):
     wait_until(lambda: s.get(f"/v1/uploads/{one}").status == 404)
 
 
+def test_a_result_is_whole_or_gone(s):
+    """A job may be deleted while its result is read: never is a part of it passed off as all."""
+    wrong, whole = [], []
+
+    def read(job_id, stop):
+        while not stop.is_set():
+            reply = s.get(f"/v1/jobs/{job_id}/result?fields=reactions,gaps,displacements")
+            if reply.status == 404:
+                return
+            complete = all(name in reply.json for name in ("reactions", "gaps", "displacements"))
+            (whole if complete else wrong).append(reply)
+    for _ in range(25):
+        job_id, stop = s.solve(MATRICES)["id"], threading.Event()
+        threads = [threading.Thread(target=read, args=(job_id, stop)) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        time.sleep(0.01)
+        expect(s.request("DELETE", f"/v1/jobs/{job_id}"), 204)
+        for thread in threads:
+            thread.join(10)
+        stop.set()
+    check(not wrong and whole, len(wrong), len(whole), wrong[:1])
+
+
 if __name__ == "__main__":
     service.main(globals())

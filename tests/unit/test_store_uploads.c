@@ -304,6 +304,12 @@ TEST(a_job_stays_until_somebody_was_told)
     change_file(p.path, "UPDATE webhook SET next = 0");
     CHECK_INT(store_webhook_next(p.s, &due), STORE_OK);
     CHECK_INT(due.attempts, 1);
+    CHECK_INT(store_webhook_postpone(p.s, "http://y/", 1000), STORE_OK);
+    webhook_due same;
+    CHECK_INT(store_webhook_next(p.s, &same), STORE_OK);
+    free(same.url);
+    CHECK_INT(store_webhook_postpone(p.s, due.url, 1000), STORE_OK);
+    CHECK_INT(store_webhook_next(p.s, &same), STORE_NOT_FOUND);
     free(due.url);
     CHECK_INT(store_webhook_attempted(p.s, due.job, WEBHOOK_TOLD, 0), STORE_OK);
     CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND);
