@@ -96,10 +96,10 @@ TEST(gzip_in_pieces_of_any_size)
     place p;
     upload_info info, plain;
     bool known;
-    char *text = malloc(LEN);
-    unsigned char *small = malloc(LEN);
     if (!place_begin(&p))
         return;
+    char *text = malloc(LEN);
+    unsigned char *small = malloc(LEN);
     for (int i = 0; i < LEN; i++)
         text[i] = (char)('a' + i % 7 + (i / 1000) % 3);
     CHECK_INT(send(p.s, text, LEN, LEN, false, &plain, &known), UPLOAD_OK);
