@@ -67,6 +67,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_INSERT_WEBHOOK] = "INSERT INTO webhook(job, url) VALUES(?1, ?2)",
     [QUERY_WEBHOOK_NEXT] =
         "SELECT job, url, attempts FROM webhook WHERE state = 1 AND next <= ?1 ORDER BY next LIMIT 1",
+    [QUERY_WEBHOOKS_OPEN] = "SELECT 1 FROM webhook WHERE state < 2 LIMIT 1",
     [QUERY_WEBHOOK_POSTPONE] = "UPDATE webhook SET next = max(next, ?2) WHERE state = 1 AND url = ?1",
     [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?2, next = ?3, attempts = attempts + 1 WHERE job = ?1",
     [QUERY_WAITING] = "SELECT count(*) FROM job WHERE status = 0",

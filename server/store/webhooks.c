@@ -21,6 +21,14 @@ store_status store_webhook_next(store *s, webhook_due *out)
     return store_give_reader(s, c, ended == STORE_OK ? status : ended);
 }
 
+store_status store_webhooks_open(store *s, bool *any)
+{
+    connection *c = store_take_reader(s);
+    statement st = statement_begin(c, QUERY_WEBHOOKS_OPEN);
+    *any = statement_row(&st);
+    return store_give_reader(s, c, statement_end(&st));
+}
+
 typedef struct {
     const char *job; /* or the address */
     webhook_end end;

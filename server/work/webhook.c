@@ -297,8 +297,11 @@ webhooks *webhooks_start(store *s, const webhook_options *options, server_log *l
     work_init_condition(&all->wake);
     if (options->secret_file && !read_secret(all, options->secret_file, message, size))
         goto fail;
-    if (options->n_allow == 0)
-        return all;
+    if (options->n_allow == 0) { /* what was to be told before is given up, so that its jobs need not stay for it */
+        bool any = false;
+        if (store_webhooks_open(s, &any) != STORE_OK || !any)
+            return all;
+    }
     snprintf(message, size, "cannot start the thread for webhooks");
     all->curl_ready = curl_global_init(CURL_GLOBAL_DEFAULT) == CURLE_OK;
     all->started = all->curl_ready && pthread_create(&all->thread, NULL, tell_loop, all) == 0;
