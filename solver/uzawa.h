@@ -301,9 +301,10 @@ typedef struct {
 void uz_mesh_info_clear(uz_mesh_info *info);
 
 /* Mesh, assembly, boundary conditions: the scene as matrices. Their dofs are the free ones, node by node, along x, y,
- * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one whose
- * first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
- * pointer into the problem. Nothing is factored. */
+ * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one
+ * whose first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE,
+ * _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON pointer into the problem. Nothing is factored.
+ */
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
 /* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. A box whose cells are
  * chosen here is checked on the first grid that would be tried; the other functions of a scene refuse it. */
@@ -382,7 +383,7 @@ typedef enum {
     UZ_PAPER_RULE,      /* the paper's stopping rule ended it before the certificate met the request */
     UZ_INFEASIBLE,
     UZ_DISMISSED,
-    UZ_VERIFIED,    /* uz_verify: the certificate of the given answer meets the request */
+    UZ_VERIFIED,     /* uz_verify: the certificate of the given answer meets the request */
     UZ_NOT_VERIFIED, /* uz_verify: it does not; the bound says how far it reaches */
     UZ_MESH_LIMIT    /* cells chosen here: the grid that would meet the request is larger than allowed */
 } uz_outcome;
@@ -523,9 +524,9 @@ typedef struct {
     double max_pressure;         /* scene: the largest of the result's pressure; NaN otherwise */
     double alpha, lambda_max;    /* NaN where no gradient step was taken */
     double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
-    double total_error; /* cells chosen here: sqrt(discretization_error^2 + the certificate's relative_error^2) */
-    double infeasible_radius;    /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
-    double requested_error;      /* the relative error that `converged` had to meet */
+    double total_error;       /* cells chosen here: sqrt(discretization_error^2 + the certificate's relative_error^2) */
+    double infeasible_radius; /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
+    double requested_error;   /* the relative error that `converged` had to meet */
     uz_certificate certificate;
     uz_semicoercive semicoercive;
     bool factor_cached; /* everything about the body was */

@@ -229,6 +229,8 @@ static void tell(webhooks *all, const webhook_due *due)
     if (status == 0 && atomic_load(&all->stop))
         return; /* cut off: it stays due */
     log_attempt(all, due, end, status, cause);
+    if (status == 0 && end == WEBHOOK_AGAIN) /* each attempt takes seconds that others wait for */
+        store_webhook_postpone(all->store, due->url, wait_after(all, 0));
     store_webhook_attempted(all->store, due->job, end, wait_after(all, due->attempts));
 }
 
@@ -295,8 +297,11 @@ webhooks *webhooks_start(store *s, const webhook_options *options, server_log *l
     work_init_condition(&all->wake);
     if (options->secret_file && !read_secret(all, options->secret_file, message, size))
         goto fail;
-    if (options->n_allow == 0)
-        return all;
+    if (options->n_allow == 0) { /* what was to be told before is given up, so that its jobs need not stay for it */
+        bool any = false;
+        if (store_webhooks_open(s, &any) != STORE_OK || !any)
+            return all;
+    }
     snprintf(message, size, "cannot start the thread for webhooks");
     all->curl_ready = curl_global_init(CURL_GLOBAL_DEFAULT) == CURLE_OK;
     all->started = all->curl_ready && pthread_create(&all->thread, NULL, tell_loop, all) == 0;

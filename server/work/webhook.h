@@ -25,7 +25,7 @@ typedef struct {
     double first_retry_s;    /* doubled after each attempt, up to an hour; 0: 5 s */
 } webhook_options;
 
-/* Starts the thread where there is something to allow. NULL: message. options must outlive it. */
+/* Starts the thread where there is something to allow, or to give up. NULL: message. options must outlive it. */
 webhooks *webhooks_start(store *s, const webhook_options *options, server_log *log, char *message, size_t size);
 /* Cuts off what is on its way; it is told again after the next start. NULL is fine. */
 void webhooks_stop(webhooks *all);

@@ -81,7 +81,7 @@ static void group_place(char where[UZ_POINTER], const uz_given_mesh *given, cons
     if (given->from_file)
         snprintf(where, UZ_POINTER, "/mesh/gmsh");
     else
-        snprintf(where, UZ_POINTER, "/mesh/groups/%.*s/%s%s", LONGEST, name, key, item);
+        snprintf(where, UZ_POINTER, "/mesh/groups/%.*s/%.10s%s", LONGEST, name, key, item);
 }
 
 static const char *face_key(const group_work *work)

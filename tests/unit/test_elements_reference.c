@@ -1,4 +1,4 @@
-/* Stiffness against another program's: the tetrahedra of CalculiX. */
+/* Stiffness against another program's: CalculiX's tetrahedra. */
 #include "element_mesh.h"
 #include "harness.h"
 #include "uzawa.h"

@@ -55,7 +55,7 @@ static void check_pressed(uz_model model, const char *element)
     CHECK(e->peak_node >= 0 && e->peak_at[1] == 0);
     CHECK(fabs(e->contacts[0].force[1] - 7 * area) <= 1e-7 * area);
     CHECK(fabs(e->loads.force[1] + 7 * area) <= 1e-11 * area);
-    CHECK(fabs(e->supports[0].force[0]) <= 1e-6);
+    CHECK(e->n_supports == 0 || fabs(e->supports[0].force[0]) <= 1e-6);
     CHECK_MSG(e->imbalance <= 1e-8, "%s %d: %g", element, model, e->imbalance);
     CHECK_INT(e->n_warnings, 0);
     /* 1/2 stress strain volume: in plane strain and in a slice held in z with 1 - nu^2 for the held direction */

@@ -441,6 +441,15 @@ TEST(what_is_no_obstacle_is_refused)
     c = (uz_contact){.kind = UZ_OBSTACLE_HEIGHT, .n_x = 2, .n_y = 2, .x = x, .y = x, .z = z};
     refused(&c, UZ_PLANE_STRESS, UZ_ERR_SCENE, "/contacts/4/obstacle/height/y", "leave y out");
     refused(&c, UZ_SOLID, UZ_ERR_NOT_FINITE, "/contacts/4/obstacle/height/z/1/1", "finite");
+    z[3] = 0;
+    z[1] = 2e6;
+    refused(&c, UZ_SOLID, UZ_ERR_SCENE, "/contacts/4/obstacle/height/z/0/1", "as good as a step");
+    z[1] = 0;
+    z[2] = z[3] = -2e6;
+    refused(&c, UZ_SOLID, UZ_ERR_SCENE, "/contacts/4/obstacle/height/z/1/0", "as good as a step");
+    z[0] = 2e6;
+    c.n_y = 0;
+    refused(&c, UZ_PLANE_STRAIN, UZ_ERR_SCENE, "/contacts/4/obstacle/height/z/1", "polyline");
     c = (uz_contact){.kind = UZ_OBSTACLE_BODY};
     refused(&c, UZ_SOLID, UZ_ERR_ARGUMENT, "", "body");
 }
