@@ -40,9 +40,10 @@ void uz_field_state_at(uz_field_state *out, const uz_field_element *element, con
 uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,
                            const uz_hooks *hooks, uz_error *err);
 
-/* The part of it for nodes around which all elements are linear: see patches.c. */
-uz_status uz_field_fit_patches(double *stress, double *strain, const uz_field_body *body, const double *u,
-                               const uz_hooks *hooks, uz_error *err);
+/* The part of it for nodes around which all elements are linear: see patches.c. done: n_nodes, zeroed; 1 where a node
+ * has its values, the others are left as they are. */
+uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *done, const uz_field_body *body,
+                               const double *u, const uz_hooks *hooks, uz_error *err);
 
 /* At the Gauss points of every element: which element, where (x dim), stress (x components). */
 int64_t uz_field_gauss_count(const uz_field_body *body);

@@ -46,7 +46,8 @@ static bool is_plain(const uz_field_body *body, int64_t e)
                UZ_FORMULATION_INCOMPATIBLE;
 }
 
-static void take_sample(sample *to, const uz_field_body *body, const double *u, int64_t e)
+/* volume: of the element where it is known, else 0. */
+static void take_sample(sample *to, const uz_field_body *body, const double *u, int64_t e, double volume)
 {
     const uz_mesh *mesh = &body->model->mesh;
     const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
@@ -59,7 +60,7 @@ static void take_sample(sample *to, const uz_field_body *body, const double *u, 
     uz_field_element_at(&at, body, u, e);
     uz_field_state_at(&state, &at, point);
     memset(to, 0, sizeof *to);
-    to->volume = uz_element_volume(&at.element);
+    to->volume = volume > 0 ? volume : uz_element_volume(&at.element);
     memcpy(to->value, state.stress, bytes);
     memcpy(to->value + body->components, state.strain, bytes);
     for (int a = 0; a < nodes; a++)
@@ -139,15 +140,15 @@ static double average(double value[MOST_VALUES], double *volume, const patches *
             value[v] += s->volume * s->value[v];
         for (int c = 0; c < p->dim; c++) {
             centre[c] += s->volume * (s->x[c] - x[c]);
-            distance = hypot(distance, s->x[c] - x[c]);
+            distance += (s->x[c] - x[c]) * (s->x[c] - x[c]);
         }
         radius = fmax(radius, distance);
     }
     for (int v = 0; v < p->values; v++)
         value[v] /= *volume;
     for (int c = 0; c < p->dim; c++)
-        offset = hypot(offset, centre[c] / *volume);
-    return offset / radius;
+        offset += centre[c] / *volume * (centre[c] / *volume);
+    return sqrt(offset / radius);
 }
 
 /* Solves G a = b for a[0] of each right-hand side. False: the samples do not determine a slope. */
@@ -234,8 +235,8 @@ static int list_materials(int32_t list[MOST_MATERIALS], const patches *p, int64_
     return count;
 }
 
-/* Replaces what is there, unless no slope can be told. False: no memory. */
-static bool recover_node(double *stress, double *strain, patches *p, int64_t node)
+/* *done false: no slope can be told, and nothing is written. False: no memory. */
+static bool recover_node(double *stress, double *strain, unsigned char *done, patches *p, int64_t node)
 {
     const int components = p->values / 2;
     double sum[MOST_VALUES] = {0}, total = 0, value[MOST_VALUES], volume;
@@ -255,6 +256,7 @@ static bool recover_node(double *stress, double *strain, patches *p, int64_t nod
         if (strain)
             strain[node * components + c] = sum[components + c] / total;
     }
+    *done = count > 0;
     return true;
 }
 
@@ -263,27 +265,28 @@ static uz_status no_memory(uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at nodes");
 }
 
-static uz_status recover_all(double *stress, double *strain, patches *p, const double *u, const uz_hooks *hooks,
-                             uz_error *err)
+static uz_status recover_all(double *stress, double *strain, unsigned char *done, patches *p, const double *u,
+                             const uz_hooks *hooks, uz_error *err)
 {
     const uz_mesh *mesh = &p->body->model->mesh;
+    const bool alike = mesh->uniform && p->body->model->kind != UZ_AXISYMMETRIC && is_plain(p->body, 0);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
         if (is_plain(p->body, e))
-            take_sample(&p->of[e], p->body, u, e);
+            take_sample(&p->of[e], p->body, u, e, alike && e > 0 ? p->of[0].volume : 0);
     }
     for (int64_t a = 0; a < mesh->n_nodes; a++) {
         if (a % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        if (!recover_node(stress, strain, p, a))
+        if (!recover_node(stress, strain, &done[a], p, a))
             return no_memory(err);
     }
     return UZ_OK;
 }
 
-uz_status uz_field_fit_patches(double *stress, double *strain, const uz_field_body *body, const double *u,
-                               const uz_hooks *hooks, uz_error *err)
+uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *done, const uz_field_body *body,
+                               const double *u, const uz_hooks *hooks, uz_error *err)
 {
     const uz_mesh *mesh = &body->model->mesh;
     patches p = {.body = body, .dim = mesh->dim, .values = 2 * body->components};
@@ -293,7 +296,7 @@ uz_status uz_field_fit_patches(double *stress, double *strain, const uz_field_bo
     if (!any)
         return UZ_OK;
     p.of = uz_alloc(mesh->n_elements, sizeof *p.of);
-    uz_status status = p.of && list_around(&p) ? recover_all(stress, strain, &p, u, hooks, err) : no_memory(err);
+    uz_status status = p.of && list_around(&p) ? recover_all(stress, strain, done, &p, u, hooks, err) : no_memory(err);
     free(p.of);
     free(p.first);
     free(p.around);

@@ -93,12 +93,19 @@ static void make_plan(recovery *plan, uz_element_kind kind)
         plan_box(plan, kind);
 }
 
+/* Sums at the nodes, but for those that are done. */
+typedef struct {
+    double *stress, *strain, *volume; /* stress, strain: NULL where they are not wanted */
+    unsigned char *done;
+} nodal_sums;
+
 /* sum[node] += volume x what the points give to that node. */
-static void add_to_nodes(double *sum, const recovery *plan, double value[POINTS][UZ_FIELD_COMPONENTS],
-                         const int64_t *node, int nodes, int components, double volume)
+static void add_to_nodes(double *sum, const unsigned char *done, const recovery *plan,
+                         double value[POINTS][UZ_FIELD_COMPONENTS], const int64_t *node, int nodes, int components,
+                         double volume)
 {
     for (int a = 0; sum && a < nodes; a++)
-        for (int c = 0; c < components; c++) {
+        for (int c = 0; !done[node[a]] && c < components; c++) {
             double at_node = 0;
             for (int k = 0; k < plan->points; k++)
                 at_node += plan->share[a][k] * value[k][c];
@@ -106,8 +113,17 @@ static void add_to_nodes(double *sum, const recovery *plan, double value[POINTS]
         }
 }
 
-static void add_element(double *stress, double *strain, double *volume, const recovery *plan, const uz_field_body *body,
-                        const double *u, int64_t element)
+static bool all_done(const unsigned char *done, const uz_mesh *mesh, int64_t element)
+{
+    int nodes, count = 0;
+    const int64_t *node = uz_mesh_element(mesh, element, &nodes);
+    while (count < nodes && done[node[count]])
+        count++;
+    return count == nodes;
+}
+
+static void add_element(const nodal_sums *to, const recovery *plan, const uz_field_body *body, const double *u,
+                        int64_t element)
 {
     uz_field_element at;
     uz_field_state state;
@@ -122,16 +138,34 @@ static void add_element(double *stress, double *strain, double *volume, const re
     }
     const double size = uz_element_volume(&at.element);
     for (int a = 0; a < nodes; a++)
-        volume[node[a]] += size;
-    add_to_nodes(stress, plan, sigma, node, nodes, body->components, size);
-    add_to_nodes(strain, plan, epsilon, node, nodes, body->components, size);
+        to->volume[node[a]] += size;
+    add_to_nodes(to->stress, to->done, plan, sigma, node, nodes, body->components, size);
+    add_to_nodes(to->strain, to->done, plan, epsilon, node, nodes, body->components, size);
 }
 
-static void divide(double *sum, const double *volume, int64_t n_nodes, int components)
+static void divide(double *sum, const nodal_sums *by, int64_t n_nodes, int components)
 {
     for (int64_t a = 0; sum && a < n_nodes; a++)
-        for (int c = 0; c < components; c++)
-            sum[a * components + c] = volume[a] > 0 ? sum[a * components + c] / volume[a] : NAN;
+        for (int c = 0; !by->done[a] && c < components; c++)
+            sum[a * components + c] = by->volume[a] > 0 ? sum[a * components + c] / by->volume[a] : NAN;
+}
+
+static uz_status average_the_others(const nodal_sums *to, const uz_field_body *body, const double *u,
+                                    const uz_hooks *hooks, uz_error *err)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    recovery plan[UZ_ELEMENT_KINDS];
+    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
+        make_plan(&plan[kind], (uz_element_kind)kind);
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
+        if (!all_done(to->done, mesh, e))
+            add_element(to, &plan[mesh->kind[e]], body, u, e);
+    }
+    divide(to->stress, to, mesh->n_nodes, body->components);
+    divide(to->strain, to, mesh->n_nodes, body->components);
+    return UZ_OK;
 }
 
 uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,
@@ -139,27 +173,23 @@ uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *
 {
     const uz_mesh *mesh = &body->model->mesh;
     const size_t bytes = (size_t)(mesh->n_nodes * body->components) * sizeof(double);
-    recovery plan[UZ_ELEMENT_KINDS];
-    uz_status status = UZ_OK;
-    double *volume = uz_alloc_zero(mesh->n_nodes, sizeof *volume);
-    if (!volume)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at %lld nodes", (long long)mesh->n_nodes);
-    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
-        make_plan(&plan[kind], (uz_element_kind)kind);
+    nodal_sums to = {.stress = stress, .strain = strain};
+    to.volume = uz_alloc_zero(mesh->n_nodes, sizeof *to.volume);
+    to.done = uz_alloc_zero(mesh->n_nodes, 1);
     if (stress)
         memset(stress, 0, bytes);
     if (strain)
         memset(strain, 0, bytes);
-    for (int64_t e = 0; status == UZ_OK && e < mesh->n_elements; e++) {
-        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
-            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        else
-            add_element(stress, strain, volume, &plan[mesh->kind[e]], body, u, e);
-    }
-    divide(stress, volume, mesh->n_nodes, body->components);
-    divide(strain, volume, mesh->n_nodes, body->components);
-    free(volume);
-    return status == UZ_OK ? uz_field_fit_patches(stress, strain, body, u, hooks, err) : status;
+    uz_status status = UZ_OK;
+    if (!to.volume || !to.done)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at %lld nodes", (long long)mesh->n_nodes);
+    if (status == UZ_OK)
+        status = uz_field_fit_patches(stress, strain, to.done, body, u, hooks, err);
+    if (status == UZ_OK)
+        status = average_the_others(&to, body, u, hooks, err);
+    free(to.volume);
+    free(to.done);
+    return status;
 }
 
 /* ---- Gauss points */

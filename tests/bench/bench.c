@@ -295,6 +295,28 @@ static bool wanted(const report *out, const char *name)
     return !out->filter || strstr(name, out->filter);
 }
 
+static void bench_assemblies(report *out)
+{
+    const char *row;
+    for (int k = 0; (row = bench_assembly_name(k)) != NULL; k++) {
+        bench_assembly cost;
+        char name[64];
+        if (!wanted(out, row))
+            continue;
+        if (!bench_assembly_of(&cost, k)) {
+            printf("%s gave no answer\n", row);
+            exit(1);
+        }
+        print_row(out, row, "x", cost.whole, "analysis and factorization (target: 0.5)");
+        const bench_value parts[] = {cost.assembly, cost.outputs, cost.factor};
+        static const char *const names[] = {"matrices", "outputs", "factor"};
+        for (int i = 0; i < 3; i++) {
+            snprintf(name, sizeof name, "%s_%s", row, names[i]);
+            print_row(out, name, "s", parts[i], "");
+        }
+    }
+}
+
 /* Memory that is given back and asked for again costs the kernel, or the host of a virtual machine, up to as much as
  * the factorization itself, now to us and now to the reference: both keep what they have touched once. */
 static void keep_memory(void)
@@ -340,6 +362,7 @@ int main(int argc, char **argv)
         bench_cubes(&out);
     if (!out.filter || strncmp(out.filter, "stop", 4) == 0)
         bench_stops(&out);
+    bench_assemblies(&out);
     for (int64_t nx = 300; wanted(&out, "load_cases") && nx <= 600; nx += 300)
         bench_cases(&out, nx);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {

@@ -57,6 +57,15 @@ bool bench_load_cases(bench_value *ratio, int64_t nx);
 const char *bench_stop_name(int which);
 bool bench_stop(bench_value *between, bench_value *work, bench_value *to_return, int which);
 
+/* Scenes of 200,000 dofs: seconds of the assembly, of all fields and the VTK file, of CHOLMOD's analysis and factor
+ * with METIS, and (whole) the sum of the first two over the third. name: NULL after the last scene. false: no answer.
+ */
+typedef struct {
+    bench_value whole, assembly, outputs, factor;
+} bench_assembly;
+const char *bench_assembly_name(int which);
+bool bench_assembly_of(bench_assembly *out, int which);
+
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);
 
