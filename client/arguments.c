@@ -1,6 +1,7 @@
 #include "arguments.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -12,7 +13,8 @@ typedef enum { FLAG, TEXT, SECONDS, COUNT, TAG } option_kind;
 #define ALL_COMMANDS (IN(CLIENT_COMMANDS) - 1u)
 #define ASKING       (ALL_COMMANDS & ~IN(CLIENT_VERSION) & ~IN(CLIENT_HELP)) /* commands that talk to the server */
 
-#define MAKING (IN(CLIENT_SUBMIT) | IN(CLIENT_REFINE) | IN(CLIENT_VERIFY)) /* commands that make a job */
+#define MAKING    (IN(CLIENT_SUBMIT) | IN(CLIENT_REFINE) | IN(CLIENT_VERIFY)) /* commands that make a job */
+#define OF_A_CASE (IN(CLIENT_RESULT) | IN(CLIENT_PICTURE) | IN(CLIENT_HISTORY))
 
 typedef struct {
     const char *name;
@@ -39,13 +41,16 @@ static const option_rule RULES[] = {
     {"--accuracy", 'a', TEXT, FIELD(accuracy), IN(CLIENT_REFINE), 0, 0},
     {"--max-iterations", 0, COUNT, FIELD(max_iterations), IN(CLIENT_REFINE), 0, 1000000000},
     {"--time-limit", 0, SECONDS, FIELD(time_limit_s), IN(CLIENT_REFINE), 0, 0},
-    {"--case", 'c', TEXT, FIELD(case_name), IN(CLIENT_RESULT) | IN(CLIENT_HISTORY), 0, 0},
+    {"--case", 'c', TEXT, FIELD(case_name), OF_A_CASE, 0, 0},
     {"--fields", 0, TEXT, FIELD(fields), IN(CLIENT_RESULT), 0, 0},
-    {"--output", 'o', TEXT, FIELD(output), IN(CLIENT_RESULT) | IN(CLIENT_HISTORY), 0, 0},
+    {"--format", 'f', TEXT, FIELD(format), IN(CLIENT_RESULT), 0, 0},
+    {"--output", 'o', TEXT, FIELD(output), OF_A_CASE, 0, 0},
+    {"--colour", 0, TEXT, FIELD(colour), IN(CLIENT_PICTURE), 0, 0},
+    {"--factor", 0, TEXT, FIELD(factor), IN(CLIENT_PICTURE), 0, 0},
     {"--csv", 0, FLAG, FIELD(csv), IN(CLIENT_HISTORY), 0, 0},
     {"--plot", 0, FLAG, FIELD(plot), IN(CLIENT_HISTORY), 0, 0},
     {"--ascii", 0, FLAG, FIELD(ascii), IN(CLIENT_HISTORY), 0, 0},
-    {"--width", 0, COUNT, FIELD(width), IN(CLIENT_HISTORY), 56, 400},
+    {"--width", 0, COUNT, FIELD(width), IN(CLIENT_HISTORY) | IN(CLIENT_PICTURE), 0, LONG_MAX}, /* check_width */
     {"--height", 0, COUNT, FIELD(height), IN(CLIENT_HISTORY), 8, 200},
     {"--status", 0, TEXT, FIELD(status), IN(CLIENT_LIST), 0, 0},
     {"--limit", 'n', COUNT, FIELD(limit), IN(CLIENT_LIST), 1, 1000000},
@@ -188,9 +193,9 @@ static bool take_words(parser *p)
 static bool check_operand(parser *p)
 {
     static const char *const WANTED[CLIENT_COMMANDS] = {
-        [CLIENT_SUBMIT] = "FILE", [CLIENT_STATUS] = "ID",   [CLIENT_WAIT] = "ID",
-        [CLIENT_REFINE] = "ID",   [CLIENT_VERIFY] = "FILE", [CLIENT_RESULT] = "ID",
-        [CLIENT_HISTORY] = "ID",  [CLIENT_CANCEL] = "ID",   [CLIENT_HELP] = "COMMAND",
+        [CLIENT_SUBMIT] = "FILE",  [CLIENT_STATUS] = "ID",   [CLIENT_WAIT] = "ID",    [CLIENT_REFINE] = "ID",
+        [CLIENT_VERIFY] = "FILE",  [CLIENT_RESULT] = "ID",   [CLIENT_HISTORY] = "ID", [CLIENT_CANCEL] = "ID",
+        [CLIENT_HELP] = "COMMAND", [CLIENT_UPLOAD] = "FILE", [CLIENT_PICTURE] = "ID",
     };
     const client_options *o = p->options;
     const char *name = client_command_name(o->command);
@@ -203,6 +208,17 @@ static bool check_operand(parser *p)
     return true;
 }
 
+/* Characters of a drawing, pixels of a picture. */
+static bool check_width(parser *p)
+{
+    const client_options *o = p->options;
+    const bool picture = o->command == CLIENT_PICTURE;
+    const long least = picture ? 200 : 56, most = picture ? 4000 : 400;
+    if (o->width < 0 || (o->width >= least && o->width <= most))
+        return true;
+    return fail(p, "--width wants a whole number from %ld to %ld, not \"%ld\"", least, most, o->width);
+}
+
 static bool check_combination(parser *p)
 {
     const client_options *o = p->options;
@@ -211,11 +227,13 @@ static bool check_combination(parser *p)
             return fail(p, "%s does not take %s", client_command_name(o->command), RULES[i].name);
     if (o->csv + o->plot + o->json > 1)
         return fail(p, "--csv, --plot and --json are alternatives: choose one");
+    if (o->format && strcmp(o->format, "json") != 0 && strcmp(o->format, "vtu") != 0)
+        return fail(p, "--format is json or vtu, not \"%s\"", o->format);
     if (o->command == CLIENT_REFINE && !o->accuracy)
         return fail(p, "refine wants --accuracy: a relative error such as 1e-8, or quick, balanced, precise, exact");
     if (o->command == CLIENT_LIST && o->n_tags > 1)
         return fail(p, "list filters by one --tag");
-    return true;
+    return check_width(p);
 }
 
 bool client_arguments_parse(client_options *out, int argc, char *const *argv, const char *env_server, char *message,
@@ -228,7 +246,7 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .time_limit_s = NAN,
                             .max_iterations = -1,
                             .limit = 20,
-                            .width = 72,
+                            .width = -1,
                             .height = 20};
     parser p = {.options = out, .argv = argv, .argc = argc, .next = 1, .message = message, .size = size};
     if (!take_words(&p))

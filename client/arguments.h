@@ -8,11 +8,13 @@
 
 typedef enum {
     CLIENT_SUBMIT,
+    CLIENT_UPLOAD,
     CLIENT_STATUS,
     CLIENT_WAIT,
     CLIENT_REFINE,
     CLIENT_VERIFY,
     CLIENT_RESULT,
+    CLIENT_PICTURE,
     CLIENT_HISTORY,
     CLIENT_LIST,
     CLIENT_CANCEL,
@@ -32,10 +34,10 @@ typedef struct {
     double retry_s;      /* how long to try to reach the server; < 0: chosen by the command */
     const char *tags[CLIENT_MAX_TAGS];
     int n_tags;
-    const char *key, *fields, *output, *status;
+    const char *key, *fields, *format, *output, *status, *colour, *factor;
     const char *case_name, *accuracy;          /* accuracy: a number or a level, as written */
     double time_limit_s;                       /* NAN: not given */
-    long limit, width, height, max_iterations; /* max_iterations -1: not given */
+    long limit, width, height, max_iterations; /* width and max_iterations -1: not given */
     bool wait, quiet, json, progress, csv, plot, ascii, help, version;
 } client_options;
 

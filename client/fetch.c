@@ -1,4 +1,4 @@
-/* status, list, cancel, result, history: one question, one answer. */
+/* status, list, cancel, result, picture, history: one question, one answer. */
 #include "plot.h"
 #include "report.h"
 #include "session.h"
@@ -9,7 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#define PAGE_JOBS 100L
+#define PAGE_JOBS  100L
+#define PLOT_WIDTH 72
 
 client_exit client_status(client_session *s)
 {
@@ -138,7 +139,7 @@ client_exit client_list(client_session *s)
     return code;
 }
 
-/* -------------------------------------------------------- result, history */
+/* ----------------------------------------------- result, picture, history */
 
 static client_exit deliver(client_session *s, const client_reply *reply)
 {
@@ -152,13 +153,19 @@ static client_exit deliver(client_session *s, const client_reply *reply)
     return CLIENT_OK;
 }
 
-/* "/v1/jobs/ID/result?a=1&b=2" without the members that are NULL; the caller frees. NULL: no memory, said. */
-static char *path_with_query(client_session *s, const char *suffix, const char *fields, const char *case_name)
+typedef struct {
+    const char *name, *value; /* value NULL: left out */
+} query_part;
+
+/* "/v1/jobs/ID/result?a=1&b=2"; a part without a name ends the list. The caller frees. NULL: no memory, said. */
+static char *path_with_query(client_session *s, const char *suffix, const query_part *part)
 {
     client_buffer query = {0};
     char *path = NULL;
-    if (client_buffer_append(&query, suffix, strlen(suffix)) && append_query(&query, "fields", fields) &&
-        append_query(&query, "case", case_name)) {
+    bool ok = client_buffer_append(&query, suffix, strlen(suffix));
+    for (; ok && part->name; part++)
+        ok = append_query(&query, part->name, part->value);
+    if (ok) {
         char *first = strchr(query.data, '&');
         if (first)
             *first = '?';
@@ -170,10 +177,10 @@ static char *path_with_query(client_session *s, const char *suffix, const char *
     return path;
 }
 
-client_exit client_result(client_session *s)
+/* What is at `path`, which it frees, as it comes. */
+static client_exit fetch_and_deliver(client_session *s, char *path)
 {
     client_reply reply;
-    char *path = path_with_query(s, "/result", s->options->fields, s->options->case_name);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);
@@ -183,6 +190,27 @@ client_exit client_result(client_session *s)
     client_reply_clear(&reply);
     free(path);
     return code;
+}
+
+client_exit client_result(client_session *s)
+{
+    const client_options *o = s->options;
+    const bool vtu = o->format && strcmp(o->format, "vtu") == 0;
+    const query_part query[] = {{"fields", o->fields}, {"case", o->case_name}, {NULL, NULL}};
+    return fetch_and_deliver(s, path_with_query(s, vtu ? "/result.vtu" : "/result", query));
+}
+
+client_exit client_picture(client_session *s)
+{
+    char width[24];
+    const client_options *o = s->options;
+    snprintf(width, sizeof width, "%ld", o->width);
+    const query_part query[] = {{"colour", o->colour},
+                                {"factor", o->factor},
+                                {"width", o->width < 0 ? NULL : width},
+                                {"case", o->case_name},
+                                {NULL, NULL}};
+    return fetch_and_deliver(s, path_with_query(s, "/deformed.svg", query));
 }
 
 static bool locale_is_utf8(void)
@@ -215,7 +243,7 @@ static client_exit draw(client_session *s, const char *csv)
     size_t len = 0;
     client_series series;
     const client_options *o = s->options;
-    client_plot_style style = {.width = (int)o->width, .height = (int)o->height};
+    client_plot_style style = {.width = o->width < 0 ? PLOT_WIDTH : (int)o->width, .height = (int)o->height};
     style.ascii = o->ascii || !locale_is_utf8();
     style.colour = !o->output && isatty(fileno(s->out)) == 1 && !getenv("NO_COLOR");
     if (!client_series_read(&series, csv, message, sizeof message))
@@ -239,7 +267,8 @@ client_exit client_history(client_session *s)
 {
     client_reply reply;
     const client_options *o = s->options;
-    char *path = path_with_query(s, "/history", NULL, o->case_name);
+    const query_part query[] = {{"case", o->case_name}, {NULL, NULL}};
+    char *path = path_with_query(s, "/history", query);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);

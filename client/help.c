@@ -25,6 +25,13 @@ static const page PAGES[CLIENT_COMMANDS] = {
                        "      --progress     show progress on stderr even where it is no terminal\n"
                        "\n"
                        "Exit status with --wait: " OUTCOME_EXITS},
+    [CLIENT_UPLOAD] =
+        {"upload", "upload FILE [--json]", "send a file that requests then name",
+         "FILE is a matrix or vector in Matrix Market form or a Gmsh mesh, \"-\" is standard input; what\n"
+         "ends in .gz is stored unpacked. Prints its id, which may stand in a request as\n"
+         "{\"upload\": \"ID\"} in place of the text. The same bytes always have the same id.\n"
+         "\n"
+         "  -j, --json         print what the service knows of it as JSON\n"},
     [CLIENT_STATUS] = {"status", "status ID [--json]", "show a job", "Exit status 0 whatever became of the job.\n"},
     [CLIENT_WAIT] = {"wait", "wait ID [options]", "wait until a job has ended, then print its summary",
                      "  -t, --timeout S    stop waiting after S seconds\n"
@@ -59,10 +66,18 @@ static const page PAGES[CLIENT_COMMANDS] = {
                        "\n"
                        "Exit status: 0 verified, 6 the job failed, 7 not verified,\n"
                        "9 dismissed, 10 --timeout passed (the job goes on).\n"},
-    [CLIENT_RESULT] = {"result", "result ID [options]", "fetch displacements, reactions, gaps as JSON",
-                       "      --fields A,B   of displacements, reactions, gaps (default: reactions,gaps)\n"
+    [CLIENT_RESULT] = {"result", "result ID [options]", "fetch the answer as JSON or as a file for ParaView",
+                       "  -f, --format F     json (default), or vtu: scenes only\n"
+                       "      --fields A,B   such as displacements, reactions, gaps, pressure, stress, von_mises\n"
+                       "                     (default: reactions,gaps; of vtu: everything useful)\n"
                        "  -c, --case NAME    of this load case alone\n"
                        "  -o, --output FILE  write to FILE, whole or not at all\n"},
+    [CLIENT_PICTURE] = {"picture", "picture ID [options]", "draw the deformed body of a scene as SVG",
+                        "      --colour C     von_mises (default) or displacements\n"
+                        "      --factor X     displacements are drawn X times as large (default: so that they show)\n"
+                        "      --width N      of the picture, in pixels (default 900)\n"
+                        "  -c, --case NAME    of this load case; needed where the job has some\n"
+                        "  -o, --output FILE  write to FILE, whole or not at all\n"},
     [CLIENT_HISTORY] = {"history", "history ID [options]", "fetch or draw the convergence history",
                         "  -c, --case NAME    of this load case; needed where the job has some\n"
                         "      --csv          as CSV instead of JSON\n"

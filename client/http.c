@@ -140,9 +140,10 @@ static struct curl_slist *header_list(const client_request *request)
 {
     struct curl_slist *list = curl_slist_append(NULL, "Expect:");
     bool ok = list != NULL;
-    const char *json = request->body ? "Content-Type: application/json" : NULL;
+    const char *of_body = request->body_type ? request->body_type : "Content-Type: application/json";
+    const char *type = request->body ? of_body : NULL;
     for (int i = -1; ok && i < CLIENT_HTTP_MAX_HEADERS; i++) {
-        const char *header = i < 0 ? json : request->headers[i];
+        const char *header = i < 0 ? type : request->headers[i];
         struct curl_slist *longer = header ? curl_slist_append(list, header) : list;
         ok = longer != NULL;
         list = ok ? longer : list;

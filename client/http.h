@@ -24,6 +24,7 @@ typedef struct {
     const char *method, *path;                    /* path begins with '/', its parts are escaped already */
     const char *headers[CLIENT_HTTP_MAX_HEADERS]; /* "Name: value"; unused ones NULL */
     const char *body;                             /* NULL: none */
+    const char *body_type;                        /* "Content-Type: ..." of the body; NULL: JSON */
     size_t body_len;
     bool repeatable;
     double patience_s; /* see above; 0: one attempt */

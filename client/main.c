@@ -9,6 +9,7 @@ static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_SUBMIT] = client_submit, [CLIENT_STATUS] = client_status,   [CLIENT_WAIT] = client_wait,
     [CLIENT_RESULT] = client_result, [CLIENT_HISTORY] = client_history, [CLIENT_LIST] = client_list,
     [CLIENT_CANCEL] = client_cancel, [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
+    [CLIENT_UPLOAD] = client_upload, [CLIENT_PICTURE] = client_picture,
 };
 
 static client_exit complain_usage(const char *message)

@@ -147,31 +147,92 @@ static void print_held(FILE *to, const json_t *summary)
             modes > 1 ? "s" : "", number_in_words(held, summary, "semicoercive.held", 9));
 }
 
-static void print_force(FILE *to, const json_t *summary)
+/* A point or a force in brackets behind the words; nothing where there is none. */
+static void print_vector(FILE *to, const char *before, const json_t *vector)
 {
-    const json_t *force = client_json_at(summary, "contact.force");
-    if (!json_is_array(force) || json_array_size(force) == 0)
+    size_t n = json_array_size(vector);
+    for (size_t i = 0; i < n; i++) {
+        const json_t *number = json_array_get(vector, i);
+        fputs(i ? ", " : before, to);
+        fputs(i ? "" : "(", to);
+        if (json_is_number(number))
+            fprintf(to, "%.6g", json_number_value(number));
+        else
+            fputs("unknown", to);
+    }
+    fputs(n ? ")" : "", to);
+}
+
+static void print_pressure(FILE *to, const json_t *summary)
+{
+    char text[32];
+    if (!json_is_number(client_json_at(summary, "contact.max_pressure")))
         return;
-    fputs(", force (", to);
-    for (size_t i = 0; i < json_array_size(force); i++)
-        fprintf(to, "%s%.6g", i ? ", " : "", json_number_value(json_array_get(force, i)));
-    fputs(")", to);
+    fprintf(to, ", largest pressure %s", number_in_words(text, summary, "contact.max_pressure", 6));
+    print_vector(to, " at ", client_json_at(summary, "contact.max_pressure_at.x"));
 }
 
 static void print_contact(FILE *to, const json_t *summary)
 {
     char text[32], more[32];
     label(to, "contact");
-    fprintf(to, "%s of %s candidates touch\n", number_in_words(text, summary, "contact.active", 9),
+    fprintf(to, "%s of %s candidates touch", number_in_words(text, summary, "contact.active", 9),
             number_in_words(more, summary, "contact.candidates", 9));
+    if (json_is_number(client_json_at(summary, "contact.area")))
+        fprintf(to, ", on an area of %s", number_in_words(text, summary, "contact.area", 6));
+    fputc('\n', to);
     label(to, "reactions");
     fprintf(to, "sum %s", number_in_words(text, summary, "contact.reaction_sum", 10));
-    print_force(to, summary);
-    if (json_is_number(client_json_at(summary, "contact.max_pressure")))
-        fprintf(to, ", largest pressure %s", number_in_words(text, summary, "contact.max_pressure", 6));
+    print_vector(to, ", force ", client_json_at(summary, "contact.force"));
+    print_pressure(to, summary);
     fputc('\n', to);
     label(to, "penetration");
     fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
+}
+
+/* One of the forces that act on the body: "contact bottom (0, 10.5)". */
+static void print_resultant(FILE *to, const char *kind, const json_t *one, bool first)
+{
+    label(to, first ? "forces" : "");
+    fputs(kind, to);
+    client_print_safe(to, client_json_text(one, "on"));
+    print_vector(to, " ", client_json_at(one, "force"));
+    fputc('\n', to);
+}
+
+/* What acts on the body; without moments. */
+static void print_resultants(FILE *to, const json_t *summary)
+{
+    const json_t *acts = client_json_at(summary, "resultants"), *one;
+    static const char *const LISTS[][2] = {{"contacts", "contact "}, {"supports", "support "}};
+    bool first = true;
+    char text[32];
+    size_t i;
+    if (!json_is_object(acts))
+        return;
+    for (int k = 0; k < 2; k++)
+        json_array_foreach(json_object_get(acts, LISTS[k][0]), i, one)
+        {
+            print_resultant(to, LISTS[k][1], one, first);
+            first = false;
+        }
+    print_resultant(to, "loads", json_object_get(acts, "loads"), first);
+    label(to, "");
+    fprintf(to, "imbalance %s of their sizes\n", number_in_words(text, acts, "imbalance", 2));
+}
+
+static void print_warnings(FILE *to, const json_t *summary)
+{
+    const json_t *one;
+    size_t i;
+    json_array_foreach(json_object_get(summary, "warnings"), i, one)
+    {
+        label(to, "warning");
+        client_print_safe(to, client_json_text(one, "code"));
+        fputs(": ", to);
+        client_print_safe(to, client_json_text(one, "message"));
+        fputc('\n', to);
+    }
 }
 
 static void print_energy(FILE *to, const json_t *summary)
@@ -326,6 +387,8 @@ void client_print_summary(FILE *to, const json_t *job)
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))
         print_contact(to, summary);
+    print_resultants(to, summary);
+    print_warnings(to, summary);
     print_energy(to, summary);
     print_certificate(to, summary);
     print_factor(to, summary);

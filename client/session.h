@@ -38,6 +38,7 @@ client_exit client_complain(client_session *s, client_exit code, const char *mes
 
 /* The commands. */
 client_exit client_submit(client_session *s);
+client_exit client_upload(client_session *s);
 client_exit client_refine(client_session *s);
 client_exit client_verify(client_session *s);
 client_exit client_wait(client_session *s);
@@ -45,6 +46,7 @@ client_exit client_status(client_session *s);
 client_exit client_list(client_session *s);
 client_exit client_cancel(client_session *s);
 client_exit client_result(client_session *s);
+client_exit client_picture(client_session *s);
 client_exit client_history(client_session *s);
 
 #endif

@@ -224,14 +224,15 @@ static bool read_groups(const mesh_reading *r, const json_t *groups)
 
 /* ---- Gmsh */
 
-/* The bytes of a Gmsh file. */
+/* The bytes of a Gmsh file, in the request or uploaded before. A binary one can only be uploaded: JSON has no bytes. */
 static bool read_gmsh(const mesh_reading *r, const json_t *gmsh)
 {
     uz_error err = {.status = UZ_OK};
-    size_t len;
-    const char *text = decode_text(r->doc, gmsh, &len);
-    const bool good = uz_gmsh_read(r->to, text, len, r->bound, &err) == UZ_OK;
-    decode_text_done(r->doc, gmsh);
+    decode_source file;
+    if (!decode_source_open(&file, r->doc, gmsh, "/problem/mesh/gmsh", r->problem))
+        return false;
+    const bool good = uz_gmsh_read(r->to, file.data, file.len, r->bound + 32 * file.len, &err) == UZ_OK;
+    decode_source_close(&file, r->doc, gmsh);
     if (good)
         return true;
     snprintf(err.where, sizeof err.where, "/mesh/gmsh");

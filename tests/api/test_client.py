@@ -1,4 +1,6 @@
 """Every command of the client against the real daemon. usage: test_client.py BUILD_DIR [FILTER]"""
+import gzip
+import hashlib
 import json
 import os
 import subprocess
@@ -93,6 +95,62 @@ def test_result_goes_to_a_file(server):
     result = json.load(open(target))
     check(done.stdout == "" and len(result["displacements"]) == 31 * 11, len(result["displacements"]))
     run(server, "result", job, "--fields", "nonsense", code=4)
+
+
+def test_forces_and_warnings_are_printed(server):
+    done = run(server, "submit", PAPER, "--wait", code=0)
+    for part in ("forces      contact bottom (0, 10.513", "support left (-50, 4.486", "loads (50, -15)", "area of 215",
+                 "largest pressure 0.053669", " at (36, 0)"):
+        check(part in done.stdout, part, "is missing in\n" + done.stdout)
+    check("warning" not in done.stdout, done.stdout)
+    far = json.loads(open(PAPER).read())
+    far["problem"]["loads"][0]["traction"] = [0, 1000]
+    done = run(server, "submit", "-", "--wait", stdin=json.dumps(far), code=0)
+    check("\nwarning     large_rotation: element" in done.stdout, done.stdout)
+    check("forces" not in run(server, "submit", SPRINGS, "--wait", code=0).stdout)
+
+
+def test_files_for_people_and_programs(server):
+    cases = json.loads(open(PAPER).read())
+    cases["cases"] = [{"name": "a b", "loads": cases["problem"].pop("loads")}, {"name": "none", "loads": []}]
+    job = submit(server, cases, "--wait", "--quiet")
+    target = os.path.join(server.folder, "result.vtu")
+    check(run(server, "result", job, "--format", "vtu", "--case", "a b", "--fields", "stress", "-o", target,
+              code=0).stdout == "")
+    vtu = open(target, encoding="utf-8").read()
+    check("UnstructuredGrid" in vtu and 'Name="stress"' in vtu and 'Name="gaps"' not in vtu, vtu[:2000])
+    run(server, "result", job, "--format", "vtu", code=4)  # which case?
+    json.loads(run(server, "result", job, "--format", "json", code=0).stdout)
+    target = os.path.join(server.folder, "deformed.svg")
+    run(server, "picture", job, "--case", "a b", "--width", "400", "--factor", "3", "--colour", "displacements", "-o",
+        target, code=0)
+    wide = run(server, "picture", job, "--case", "a b", code=0).stdout
+    picture = open(target, encoding="utf-8").read()
+    check('width="400"' in picture and 'width="900"' in wide and "</svg>" in picture, picture[:300])
+    for wrong in (["--factor", "much"], ["--colour", "mauve"], ["--case", "c"]):
+        done = run(server, "picture", job, "--case", "a b", *wrong, "-o", target, code=4)
+        check(wrong[0][2:] in done.stderr.lower(), wrong, done.stderr)
+    check(open(target, encoding="utf-8").read() == picture, "a refusal must leave the file")
+    springs = run(server, "submit", SPRINGS, "--wait", "--quiet", code=0).stdout.strip()
+    run(server, "picture", springs, code=4)
+
+
+def test_upload_prints_the_id(server):
+    request = json.loads(open(SPRINGS).read())
+    stiffness = request["problem"]["K"].encode()
+    plain, packed = (os.path.join(server.folder, name) for name in ("K.mtx", "K.mtx.gz"))
+    for name, data in ((plain, stiffness), (packed, gzip.compress(stiffness))):
+        with open(name, "wb") as file:
+            file.write(data)
+    ids = {run(server, "upload", plain, code=0).stdout, run(server, "upload", packed, code=0).stdout,
+           run(server, "upload", "-", stdin=stiffness.decode(), code=0).stdout}
+    check(ids == {hashlib.sha256(stiffness).hexdigest() + "\n"}, ids)
+    known = json.loads(run(server, "upload", plain, "--json", code=0).stdout)
+    check(known["bytes"] == len(stiffness), known)
+    request["problem"]["K"] = {"upload": known["id"]}
+    submit(server, request, "--wait")
+    run(server, "upload", "/dev/null", code=4)
+    run(server, "upload", os.path.join(server.folder, "none"), code=11)
 
 
 def test_history_in_three_forms(server):

@@ -8,8 +8,9 @@ import sqlite3
 import threading
 import time
 
+import gmsh_files
 import service
-from service import MATRICES, Skip, check, expect, options
+from service import MATRICES, ROOT, Skip, check, expect, options
 
 K, N = (MATRICES["problem"][name].encode() for name in "KN")
 VECTOR = b"%%MatrixMarket matrix array real general\n2 1\n2\n2\n"
@@ -127,6 +128,78 @@ def test_in_verify(s):
     answer["displacements"] = {"upload": "0" * 64}
     reply = expect(s.request("POST", "/v1/verify", {**MATRICES, "answer": answer}), 422, "unknown_upload")
     check(reply.json["pointer"] == "/answer/displacements/upload", reply)
+
+
+DISC = (ROOT / "tests/data/meshes/skfem_mixedtriquad.msh").read_bytes()
+
+
+def disc(gmsh):
+    """A disc on springs that is pulled down onto a plane close below it."""
+    return {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"gmsh": gmsh},
+                        "materials": [{"on": "domain", "young": 1000, "poisson": 0.3}],
+                        "supports": [{"on": "boundary", "spring": [10, 10]}],
+                        "loads": [{"on": "all", "body_force": [0, -2]}],
+                        "contacts": [{"on": "boundary", "obstacle": {"plane": {"point": [0, -0.251], "normal": [0, 1]}}}]},
+            "solver": {"accuracy": "precise"}}
+
+
+def answer(s, job, fields="reactions,gaps,displacements"):
+    return expect(s.get(f"/v1/jobs/{job['id']}/result?fields={fields}"), 200).json
+
+
+def test_a_mesh_in_every_form(s):
+    plain = s.solve(disc(DISC.decode()))
+    check(plain["summary"]["outcome"] == "converged" and plain["summary"]["contact"]["active"] > 0, plain)
+    wanted = answer(s, plain)
+    for file in (DISC, gmsh_files.binary_41(DISC.decode()), gmsh_files.binary_22(DISC.decode())):
+        upload = expect(send(s, gzip.compress(file), Content_Encoding="gzip"), 201).json["id"]
+        job = s.solve(disc({"upload": upload}))
+        check(job["summary"]["outcome"] == "converged", job)
+        got = answer(s, job)
+        worst = max(abs(a - b) for name in ("reactions", "gaps") for a, b in zip(got[name], wanted[name], strict=True))
+        check(worst < 1e-8, file[:30], worst)
+        check(s.get(f"/v1/uploads/{upload}").json["used_by"] == 1)
+        expect(s.request("DELETE", f"/v1/uploads/{upload}"), 409, "upload_in_use")
+
+
+def test_what_follows_an_uploaded_mesh(s):
+    """Everything that reads the stored request again finds the mesh, also after a restart."""
+    upload = expect(send(s, gmsh_files.binary_41(DISC.decode())), 201).json["id"]
+    loads = disc(upload)["problem"]["loads"]
+    job = s.solve({**disc({"upload": upload}), "cases": [{"name": "one", "loads": loads}, {"name": "none", "loads": []}]})
+    check(job.get("summary") and job["summary"]["outcome"] == "converged", job)
+    s.restart()
+    path = f"/v1/jobs/{job['id']}"
+    fields = answer(s, job, "stress,von_mises,nodes&case=one")
+    check(len(fields["von_mises"]) == len(fields["nodes"]) > 50, fields.keys())
+    vtu = expect(s.get(f"{path}/result.vtu?case=one"), 200)
+    check(b"UnstructuredGrid" in vtu.body, vtu)
+    picture = expect(s.get(f"{path}/deformed.svg?case=one"), 200)
+    check(picture.body.startswith(b"<") and b"</svg>" in picture.body, picture)
+    refined = s.request("POST", f"{path}/refine", {"accuracy": "exact"}, {"Prefer": "wait=30"})
+    check(expect(refined, 200).json["summary"]["outcome"] in ("converged", "precision_limit"), refined)
+    check(s.get(f"/v1/uploads/{upload}").json["used_by"] == 2)
+    one = s.solve(disc({"upload": upload}))
+    known = answer(s, one, "displacements,reactions")
+    body = {"problem": disc({"upload": upload})["problem"],
+            "answer": {name: known[name] for name in ("displacements", "reactions")}}
+    reply = expect(s.request("POST", "/v1/verify", body), 200)
+    check(reply.json["summary"]["outcome"] == "verified", reply)
+
+
+def test_an_uploaded_mesh_that_is_none(s):
+    for wrong in ("0" * 64, digest(DISC)):  # not sent yet
+        reply = expect(s.post(disc({"upload": wrong})), 422, "unknown_upload")
+        check(reply.json["pointer"] == "/problem/mesh/gmsh/upload", reply)
+    reply = expect(s.post(disc({"upload": "short"})), 422, "out_of_range")
+    check(reply.json["pointer"] == "/problem/mesh/gmsh/upload", reply)
+    whole = gmsh_files.binary_41(DISC.decode())
+    for file, code in ((K, "gmsh_syntax"), (whole[:-300], "gmsh_syntax"), (whole.replace(b"4.1 1", b"9.9 1"), "gmsh_unsupported")):
+        upload = expect(send(s, file), 201).json["id"]
+        reply = expect(s.post(disc({"upload": upload})), 422, code)
+        check(reply.json["pointer"] == "/problem/mesh/gmsh", reply)
+        expect(s.request("DELETE", f"/v1/uploads/{upload}"), 204)
+    check(s.get("/v1/jobs").json["jobs"] == [])
 
 
 def test_refusals(s):

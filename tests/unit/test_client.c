@@ -59,6 +59,21 @@ TEST(arguments_defaults)
     CHECK_STR(o.server, "http://line:7");
 }
 
+TEST(arguments_picture)
+{
+    client_options o;
+    char message[256] = "";
+    CHECK(parse(&o, "picture j -o p.svg --colour displacements --factor 5 --width 4000 --case a", NULL, message));
+    CHECK_INT(o.command, CLIENT_PICTURE);
+    CHECK_STR(o.colour, "displacements");
+    CHECK_STR(o.factor, "5");
+    CHECK_INT(o.width, 4000);
+    CHECK_STR(o.case_name, "a");
+    CHECK(parse(&o, "picture j", NULL, message) && o.width < 0 && !o.factor && !o.colour);
+    CHECK(parse(&o, "result j --format vtu", NULL, message));
+    CHECK_STR(o.format, "vtu");
+}
+
 TEST(arguments_end_of_options)
 {
     client_options o;
@@ -104,6 +119,15 @@ TEST(arguments_refused)
         {"list --tag a --tag b", "one --tag"},
         {"history x --csv --plot", "choose one"},
         {"history x --width 3", "56 to 400"},
+        {"--width 401 history x", "56 to 400"},
+        {"picture x --width 199", "200 to 4000"},
+        {"picture x --width 72.5", "--width"},
+        {"picture", "ID"},
+        {"picture x --fields a", "does not take --fields"},
+        {"upload", "FILE"},
+        {"upload x --tag a", "does not take --tag"},
+        {"result x --format xml", "json or vtu"},
+        {"history x --format vtu", "does not take --format"},
         {"submit a --tag=1 --tag=2 --tag=3 --tag=4 --tag=5 --tag=6 --tag=7 --tag=8 --tag=9 --tag=10 --tag=11 --tag=12 "
          "--tag=13 --tag=14 --tag=15 --tag=16 --tag=17",
          "at most 16"},
