@@ -22,13 +22,14 @@
 enum { EXIT_ENDED = 0, EXIT_FAILED = 1, EXIT_USAGE = 2 };
 
 static const double LEASE_S = 60;
-static const double MAX_WAIT_S = 60;
 
 typedef struct {
     server_log *log;
     store *store;
     work *work;
     http_server *http;
+    option_limit named[OPTIONS_MAX]; /* what limits points into */
+    codec_limit limits[OPTIONS_MAX];
     sigset_t signals; /* taken by sigwait in main, blocked in every thread */
 } service;
 
@@ -75,12 +76,25 @@ static void raise_descriptor_limit(void)
     setrlimit(RLIMIT_NOFILE, &limit);
 }
 
+/* For GET /v1/limits; returns how many. */
+static size_t list_limits(service *s, const server_options *options)
+{
+    size_t n = options_limits(options, s->named, OPTIONS_MAX);
+    for (size_t i = 0; i < n; i++)
+        s->limits[i] = (codec_limit){s->named[i].name, s->named[i].unit, s->named[i].meaning, s->named[i].value};
+    return n;
+}
+
 static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
 {
     int fd = -1;
     raise_descriptor_limit();
     if (!codec_init(message, size))
         return false;
+    codec_set_limits(&(codec_limits){.json_depth = options->max_json_depth,
+                                     .dofs = (int64_t)options->max_dofs,
+                                     .rows = (int64_t)options->max_rows,
+                                     .nonzeros = (int64_t)options->max_nonzeros});
     uz_process_init(options->workers);
     s->store = store_open(options->db, message, size);
     if (!s->store)
@@ -93,6 +107,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
                                   .solve_bytes = options->memory,
+                                  .max_solve_s = options->max_solve_s,
                                   .lease_s = LEASE_S};
     s->work = work_start(s->store, &workers, s->log, message, size);
     if (!s->work) {
@@ -101,9 +116,12 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     }
     http_parts parts = {.store = s->store, .work = s->work, .log = s->log};
     const http_options limits = {.max_body = options->max_body,
-                                 .max_connections = options->max_connections,
+                                 .max_connections = (unsigned)options->max_connections,
                                  .request_deadline_s = options->request_deadline_s,
-                                 .max_wait_s = MAX_WAIT_S};
+                                 .max_wait_s = options->max_wait_s,
+                                 .access_log = options->access_log,
+                                 .limits = s->limits,
+                                 .n_limits = list_limits(s, options)};
     s->http = http_start(fd, &parts, &limits, message, size);
     return s->http != NULL;
 }
@@ -195,7 +213,7 @@ static int run(service *s, const server_options *options)
 int main(int argc, char **argv)
 {
     server_options options;
-    char message[256];
+    char message[OPTION_PATH + 512];
     switch (options_parse(&options, argc, argv, message, sizeof message)) {
     case OPTIONS_HELP:
         options_usage(stdout);
@@ -203,10 +221,17 @@ int main(int argc, char **argv)
     case OPTIONS_VERSION:
         printf("uzawad %s\n", UZAWAD_VERSION);
         return EXIT_ENDED;
+    case OPTIONS_CHECK:
+        options_show(&options, stdout);
+        return EXIT_ENDED;
+    case OPTIONS_EXAMPLE:
+        options_example(stdout);
+        return EXIT_ENDED;
     case OPTIONS_WRONG:
-        fprintf(stderr, "uzawad: %s\n", message);
-        options_usage(stderr);
+        fprintf(stderr, "uzawad: %s\n%s", message, "usage: uzawad [OPTION]...; uzawad --help lists them\n");
         return EXIT_USAGE;
+    case OPTIONS_CHECK_DB:
+    case OPTIONS_BACKUP:
     case OPTIONS_RUN:
         break;
     }

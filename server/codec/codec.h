@@ -18,6 +18,15 @@
 bool codec_init(char *message, size_t size);
 void codec_end(void);
 
+/* What a request may ask for at most. */
+typedef struct {
+    int json_depth;               /* 1..JSON_MAX_DEPTH */
+    int64_t dofs, rows, nonzeros; /* d; m; entries of K and of N given as matrices */
+} codec_limits;
+/* After codec_init and before threads start; without it only the codec's own bounds hold. Jobs that are stored already
+ * are not held to them. */
+void codec_set_limits(const codec_limits *limits);
+
 /* ---- requests */
 
 /* Where a run begins: at another job's reactions (job), at given ones (reactions), or at zero (neither). */
@@ -98,6 +107,12 @@ typedef struct {
 char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run);
 char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);
+/* A bound that holds for this service. */
+typedef struct {
+    const char *name, *unit, *meaning;
+    double value; /* infinity: no bound */
+} codec_limit;
+char *codec_encode_limits(const codec_limit *limits, size_t count);
 
 /* A result as GET /v1/jobs/{id}/result answers it. Vectors that were not asked for are NULL. dim 0: plain numbers;
  * 2, 3: displacements and nodes are written as [[x, y], ...]. Doubles are written with the digits that read back

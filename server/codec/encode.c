@@ -177,6 +177,28 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
     return text_finish(&t, NULL);
 }
 
+char *codec_encode_limits(const codec_limit *limits, size_t count)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "limits");
+    text_open(&t, '{');
+    for (size_t i = 0; i < count; i++) {
+        text_key(&t, limits[i].name);
+        text_open(&t, '{');
+        text_key(&t, "value");
+        text_number(&t, limits[i].value);
+        text_key(&t, "unit");
+        text_string(&t, limits[i].unit);
+        text_key(&t, "description");
+        text_string(&t, limits[i].meaning);
+        text_close(&t, '}');
+    }
+    text_close(&t, '}');
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers)
 {
     text t = {0};

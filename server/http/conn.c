@@ -255,6 +255,8 @@ static void log_request(conn *c, bool completed)
 {
     const http_request *rq = c->request;
     char path[256];
+    if (!c->server->options.access_log && rq->status < 500)
+        return;
     snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
     for (char *at = path; *at; at++)
         if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)

@@ -134,6 +134,8 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.work = parts->work;
     server->context.log = parts->log;
     server->context.max_wait_s = options->max_wait_s;
+    server->context.limits = options->limits;
+    server->context.n_limits = options->n_limits;
     atomic_init(&server->context.draining, false);
     server->options = *options;
     server->body_budget = BODY_BUDGET(options->max_body);

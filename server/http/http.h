@@ -6,6 +6,7 @@
 #ifndef SERVER_HTTP_H
 #define SERVER_HTTP_H
 
+#include "codec/codec.h"
 #include "log.h"
 #include "store/store.h"
 #include "work/work.h"
@@ -26,6 +27,9 @@ typedef struct {
     unsigned max_connections;  /* open at once */
     double request_deadline_s; /* for a whole request, without the allowance for its body's length */
     double max_wait_s;         /* cap of Prefer: wait */
+    bool access_log;           /* a line for each request */
+    const codec_limit *limits; /* n_limits, for GET /v1/limits; they must outlive the server */
+    size_t n_limits;
 } http_options;
 
 /* Opens a listening socket on "HOST:PORT" or "[IPv6]:PORT"; port 0 takes a free one. url becomes "http://HOST:PORT"

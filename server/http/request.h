@@ -2,6 +2,7 @@
 #ifndef SERVER_HTTP_REQUEST_H
 #define SERVER_HTTP_REQUEST_H
 
+#include "codec/codec.h"
 #include "http/framing.h"
 #include "http/reply.h"
 #include "http/target.h"
@@ -17,6 +18,8 @@ typedef struct {
     work *work;
     server_log *log;
     double max_wait_s;
+    const codec_limit *limits; /* n_limits */
+    size_t n_limits;
     atomic_bool draining;
 } api;
 
@@ -78,6 +81,7 @@ void verify_submit(api *context, http_request *rq, http_reply *reply);
 void results_get(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
+void service_limits(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);
 void service_health(api *context, http_request *rq, http_reply *reply);
 void service_ready(api *context, http_request *rq, http_reply *reply);

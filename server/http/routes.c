@@ -22,6 +22,7 @@ static const route ROUTES[] = {
     {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv},
     {"POST", "/v1/verify", NONE, verify_submit},
     {"GET", "/v1/factors", NONE, service_factors},
+    {"GET", "/v1/limits", NONE, service_limits},
     {"GET", "/healthz", NONE, service_health},
     {"GET", "/readyz", NONE, service_ready},
     {"GET", "/openapi.json", NONE, service_openapi},

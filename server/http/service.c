@@ -18,6 +18,12 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     free(entries);
 }
 
+void service_limits(api *context, http_request *rq, http_reply *reply)
+{
+    (void)rq;
+    reply_json(reply, 200, codec_encode_limits(context->limits, context->n_limits));
+}
+
 static void reply_health(api *context, const char *status, const int64_t counts[5], http_reply *reply)
 {
     reply_json(reply, 200, codec_encode_health(status, counts, work_workers(context->work)));

@@ -203,6 +203,9 @@ static uz_status solve_or_verify(run *r, uz_error *err)
 static run_end solve(run *r)
 {
     uz_error err = {0};
+    double most = r->me->w->options.max_solve_s;
+    if (most > 0.0 && r->request.settings.time_limit_s > most)
+        r->request.settings.time_limit_s = most;
     r->request.settings.memory_limit = r->me->w->options.solve_bytes;
     uz_status status = solve_or_verify(r, &err);
     if (status == UZ_ERR_LIMIT)

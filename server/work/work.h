@@ -33,6 +33,7 @@ typedef struct {
     int max_attempts;   /* runs begun before a job that keeps killing the process is failed */
     size_t cache_bytes; /* factor cache */
     size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
+    double max_solve_s; /* of one job, whatever it asks for; 0: no limit */
     double lease_s;
 } work_options;
 
