@@ -4,6 +4,7 @@
 #include "codec/codec.h"
 #include "http/http.h"
 #include "log.h"
+#include "metrics.h"
 #include "options.h"
 #include "store/store.h"
 #include "uzawa.h"
@@ -25,6 +26,7 @@ static const double LEASE_S = 60;
 
 typedef struct {
     server_log *log;
+    metrics *metrics;
     store *store;
     work *work;
     http_server *http;
@@ -99,6 +101,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
     s->store = store_open(options->db, message, size);
     if (!s->store)
         return false;
+    store_observe(s->store, s->metrics);
     /* The port is taken before any job runs, so that a second daemon fails without a trace. */
     fd = http_listen(options->listen, url, url_size, message, size);
     if (fd < 0)
@@ -108,13 +111,14 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                   .cache_bytes = options->cache,
                                   .solve_bytes = options->memory,
                                   .max_solve_s = options->max_solve_s,
+                                  .metrics = s->metrics,
                                   .lease_s = LEASE_S};
     s->work = work_start(s->store, &workers, s->log, message, size);
     if (!s->work) {
         close(fd);
         return false;
     }
-    http_parts parts = {.store = s->store, .work = s->work, .log = s->log};
+    http_parts parts = {.store = s->store, .work = s->work, .log = s->log, .metrics = s->metrics};
     const http_options limits = {.max_body = options->max_body,
                                  .max_connections = (unsigned)options->max_connections,
                                  .request_deadline_s = options->request_deadline_s,
@@ -238,11 +242,13 @@ int main(int argc, char **argv)
     service s = {0};
     own_signals(argv, &s.signals);
     s.log = log_open(stderr, options.level);
-    if (!s.log) {
+    s.metrics = metrics_new();
+    if (!s.log || !s.metrics) {
         fprintf(stderr, "uzawad: no memory\n");
         return EXIT_FAILED;
     }
     int status = run(&s, &options);
+    metrics_free(s.metrics);
     log_close(s.log);
     return status;
 }

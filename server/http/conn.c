@@ -18,8 +18,10 @@ conn *conn_new(http_server *server, int fd)
         return NULL;
     c->server = server;
     c->fd = fd;
+    atomic_fetch_add(&server->context.connections, 1);
     c->deadline = deadlines_add(server->deadlines, fd, deadlines_now() + server->options.request_deadline_s);
     if (!c->deadline) {
+        atomic_fetch_sub(&server->context.connections, 1);
         free(c);
         return NULL;
     }
@@ -32,7 +34,7 @@ static void request_free(conn *c)
     c->request = NULL;
     if (!rq)
         return;
-    atomic_fetch_sub(&c->server->body_bytes, rq->body_capacity);
+    atomic_fetch_sub(&c->server->context.body_bytes, rq->body_capacity);
     reply_clear(&rq->reply);
     target_clear(&rq->target);
     free(rq->raw_target);
@@ -46,6 +48,7 @@ void conn_free(conn *c)
         return;
     deadline_remove(c->deadline);
     request_free(c);
+    atomic_fetch_sub(&c->server->context.connections, 1);
     free(c);
 }
 
@@ -83,10 +86,11 @@ static void linger(const conn *c)
     }
 }
 
-static void note_reply(http_request *rq, const http_reply *reply)
+static void note_reply(http_request *rq, http_reply *reply)
 {
     rq->status = reply->status;
     rq->reply_len = strcmp(rq->method, "HEAD") == 0 ? 0 : reply->len;
+    memcpy(reply->request_id, rq->id, sizeof reply->request_id);
 }
 
 static bool send_reply(conn *c, struct MHD_Connection *mhd)
@@ -154,12 +158,28 @@ static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *met
     return framing_tiles(&c->layout, &c->request->headers);
 }
 
+/* The client's X-Request-Id where it is a word that a log can hold, else one of our own. */
+static void name_request(http_server *server, http_request *rq)
+{
+    static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.:/+=@";
+    const header_field *field = header_find(&rq->headers, "X-Request-Id", NULL);
+    if (field && field->value_len > 0 && field->value_len < sizeof rq->id &&
+        strspn(field->value, ALLOWED) >= field->value_len) {
+        memcpy(rq->id, field->value, field->value_len);
+        rq->id[field->value_len] = '\0';
+        return;
+    }
+    unsigned long long number = (unsigned long long)atomic_fetch_add(&server->id, 1);
+    snprintf(rq->id, sizeof rq->id, "%s%08llx", server->id_prefix, number);
+}
+
 /* False with rq->refused: the bytes can't be trusted, so nothing after them on this connection can. */
 static bool read_framing(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
     http_request *rq = c->request;
     snprintf(rq->method, sizeof rq->method, "%s", method);
     MHD_get_connection_values_n(mhd, MHD_HEADER_KIND, collect_header, &rq->headers);
+    name_request(c->server, rq);
     if (!framing_read(&rq->framing, version, &rq->headers, &rq->refused))
         return false;
     if (!layout_is_sound(c, mhd, method, version))
@@ -203,13 +223,13 @@ static bool reserve(conn *c, size_t more)
         return true;
     size_t capacity = need < 4096 ? 4096 : need + need / 2;
     size_t added = capacity - rq->body_capacity;
-    if (atomic_fetch_add(&c->server->body_bytes, added) + added > c->server->body_budget) {
-        atomic_fetch_sub(&c->server->body_bytes, added);
+    if (atomic_fetch_add(&c->server->context.body_bytes, added) + added > c->server->body_budget) {
+        atomic_fetch_sub(&c->server->context.body_bytes, added);
         return http_problem(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
     }
     char *grown = realloc(rq->body, capacity);
     if (!grown) {
-        atomic_fetch_sub(&c->server->body_bytes, added);
+        atomic_fetch_sub(&c->server->context.body_bytes, added);
         return http_problem(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
     }
     rq->body = grown;
@@ -263,6 +283,7 @@ static void log_request(conn *c, bool completed)
             *at = '?';
     log_field fields[] = {LOG_S("method", rq->method),
                           LOG_S("path", path),
+                          LOG_S("request", rq->id),
                           LOG_I("status", rq->status),
                           LOG_I("bytes", rq->reply_len),
                           LOG_N("seconds", deadlines_now() - rq->started),
@@ -283,6 +304,9 @@ void conn_end_request(conn *c, unsigned status, bool completed)
     if (c->request->unread_body && completed)
         linger(c);
     log_request(c, completed);
+    const route *found = c->request->route;
+    metrics_request(c->server->context.metrics, found ? found->method : NULL, found ? found->pattern : NULL,
+                    c->request->status, deadlines_now() - c->request->started);
     request_free(c);
     deadline_set(c->deadline, deadlines_now() + c->server->options.request_deadline_s, false);
 }

@@ -24,7 +24,8 @@ struct http_server {
     pthread_key_t current; /* the conn that this thread serves, once it has a request */
     bool check_layout;
     size_t body_budget;
-    atomic_size_t body_bytes; /* reserved now */
+    char id_prefix[17];      /* of the request ids made here; random */
+    atomic_uint_fast64_t id; /* the last one's number */
 };
 
 typedef struct {

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <unistd.h>
 
 static conn *connection_of(struct MHD_Connection *mhd)
@@ -133,13 +134,21 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.store = parts->store;
     server->context.work = parts->work;
     server->context.log = parts->log;
+    server->context.metrics = parts->metrics;
     server->context.max_wait_s = options->max_wait_s;
     server->context.limits = options->limits;
     server->context.n_limits = options->n_limits;
     atomic_init(&server->context.draining, false);
     server->options = *options;
     server->body_budget = BODY_BUDGET(options->max_body);
-    atomic_init(&server->body_bytes, 0);
+    atomic_init(&server->context.body_bytes, 0);
+    atomic_init(&server->context.connections, 0);
+    pthread_mutex_init(&server->context.ready_lock, NULL);
+    atomic_init(&server->id, 0);
+    uint64_t random = 0;
+    if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
+        random = (uint64_t)(deadlines_now() * 1e9);
+    snprintf(server->id_prefix, sizeof server->id_prefix, "%016llx", (unsigned long long)random);
     /* The tiling of a header block is how 0.9.x parses; later versions refuse by themselves what it finds. */
     server->check_layout = strncmp(MHD_get_version(), "0.9.", 4) == 0;
     if (pthread_key_create(&server->current, NULL) != 0)
@@ -177,5 +186,6 @@ void http_stop(http_server *server)
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
     deadlines_free(server->deadlines);
     pthread_key_delete(server->current);
+    pthread_mutex_destroy(&server->context.ready_lock);
     free(server);
 }

@@ -8,6 +8,7 @@
 
 #include "codec/codec.h"
 #include "log.h"
+#include "metrics.h"
 #include "store/store.h"
 #include "work/work.h"
 
@@ -20,6 +21,7 @@ typedef struct {
     store *store;
     work *work;
     server_log *log;
+    metrics *metrics; /* may be NULL */
 } http_parts;
 
 typedef struct {

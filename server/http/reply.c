@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MAX_FIELDS 12
+#define MAX_FIELDS 16
 
 static const char JSON_TYPE[] = "application/json";
 static const char PROBLEM_TYPE[] = "application/problem+json";
@@ -91,6 +91,8 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
     out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache" : "no-store"};
     if (reply->body)
         out[n++] = (field){"Content-Type", reply->type};
+    if (reply->request_id[0])
+        out[n++] = (field){"X-Request-Id", reply->request_id};
     if (reply->location[0])
         out[n++] = (field){"Location", reply->location};
     if (reply->preference_applied[0])

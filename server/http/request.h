@@ -7,9 +7,11 @@
 #include "http/reply.h"
 #include "http/target.h"
 #include "log.h"
+#include "metrics.h"
 #include "store/store.h"
 #include "work/work.h"
 
+#include <pthread.h>
 #include <stdatomic.h>
 
 /* What handlers may use, the same for all requests. */
@@ -17,10 +19,16 @@ typedef struct {
     store *store;
     work *work;
     server_log *log;
+    metrics *metrics;
     double max_wait_s;
     const codec_limit *limits; /* n_limits */
     size_t n_limits;
     atomic_bool draining;
+    pthread_mutex_t ready_lock; /* the next two */
+    double ready_until;         /* on deadlines_now's clock: until then ready_why is what /readyz says */
+    char ready_why[64];         /* "": ready */
+    atomic_uint connections;    /* open now */
+    atomic_size_t body_bytes;   /* of all bodies in memory */
 } api;
 
 typedef struct http_request {
@@ -32,7 +40,8 @@ typedef struct http_request {
     char name[65]; /* what stood for {id} or {name} in the path */
     char *body;    /* NUL-terminated; NULL when empty */
     size_t body_len, body_capacity;
-    int fd; /* to see whether the client is still there */
+    char id[65]; /* X-Request-Id, the client's or our own */
+    int fd;      /* to see whether the client is still there */
     /* For the access log and the connection's bookkeeping. */
     char method[16];
     double started; /* on deadlines_now's clock */
@@ -83,6 +92,7 @@ void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_limits(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);
+void service_metrics(api *context, http_request *rq, http_reply *reply);
 void service_health(api *context, http_request *rq, http_reply *reply);
 void service_ready(api *context, http_request *rq, http_reply *reply);
 void service_openapi(api *context, http_request *rq, http_reply *reply);

@@ -23,6 +23,7 @@ static const route ROUTES[] = {
     {"POST", "/v1/verify", NONE, verify_submit},
     {"GET", "/v1/factors", NONE, service_factors},
     {"GET", "/v1/limits", NONE, service_limits},
+    {"GET", "/metrics", NONE, service_metrics},
     {"GET", "/healthz", NONE, service_health},
     {"GET", "/readyz", NONE, service_ready},
     {"GET", "/openapi.json", NONE, service_openapi},

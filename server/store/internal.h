@@ -24,6 +24,7 @@ struct store {
 
     pthread_mutex_t message_lock; /* message */
     char message[256];
+    metrics *metrics; /* may be NULL */
     int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
 };
 

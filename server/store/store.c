@@ -149,6 +149,18 @@ void store_message(store *s, char *buffer, size_t size)
 
 /* ---- transactions */
 
+void store_observe(store *s, metrics *m)
+{
+    s->metrics = m;
+}
+
+static double seconds_now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
 static store_status run_query(connection *c, query_id q)
 {
     statement st = statement_begin(c, q);
@@ -162,8 +174,12 @@ static store_status attempt(store *s, store_change change, void *args)
     if (status != STORE_OK)
         return status;
     status = change(s, c, args);
-    if (status == STORE_OK)
+    double begun = seconds_now();
+    if (status == STORE_OK) {
         status = run_query(c, QUERY_COMMIT);
+        metrics_seconds(s->metrics, METRIC_COMMIT, seconds_now() - begun);
+        metrics_add(s->metrics, METRIC_CHANGES, 1);
+    }
     if (!sqlite3_get_autocommit(c->db)) { /* a full disk may have rolled back already */
         char cause[sizeof c->message];
         memcpy(cause, c->message, sizeof cause);

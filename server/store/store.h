@@ -7,6 +7,8 @@
 #ifndef SERVER_STORE_H
 #define SERVER_STORE_H
 
+#include "metrics.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -47,6 +49,9 @@ void store_message(store *s, char *buffer, size_t size);
 /* The largest size of the database file (never less than it has), without its journal; 0: no limit. More is
  * STORE_FULL, as a full disk is. Not kept in the file. */
 store_status store_limit_bytes(store *s, int64_t bytes);
+
+/* Counts commits and changes there from now on; before other threads use the store. */
+void store_observe(store *s, metrics *m);
 
 /* What is submitted. */
 typedef struct {

@@ -21,6 +21,7 @@
 #define SERVER_WORK_H
 
 #include "log.h"
+#include "metrics.h"
 #include "store/store.h"
 #include "uzawa.h"
 
@@ -35,6 +36,7 @@ typedef struct {
     size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
     double max_solve_s; /* of one job, whatever it asks for; 0: no limit */
     double lease_s;
+    metrics *metrics; /* may be NULL */
 } work_options;
 
 /* Recovers jobs left by a dead process, then starts the threads. NULL on failure with the reason in message. */
@@ -69,6 +71,7 @@ bool work_live_history(work *w, const char *id, const char *case_name, int64_t a
 uz_cache *work_cache(work *w);
 size_t work_cache_bytes(const work *w);
 int work_workers(const work *w);
+int work_busy(work *w); /* workers that run a job */
 
 /* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to
  * accepted. Waiters wake at once. Returns when every worker has ended; a factorization cannot be interrupted and is
