@@ -6,6 +6,8 @@
 #include "log.h"
 #include "metrics.h"
 #include "options.h"
+#include "privileges.h"
+#include "store/maintenance.h"
 #include "store/store.h"
 #include "uzawa.h"
 #include "work/work.h"
@@ -30,6 +32,8 @@ typedef struct {
     store *store;
     work *work;
     http_server *http;
+    auth *auth; /* NULL: no token file */
+    http_tls tls;
     option_limit named[OPTIONS_MAX]; /* what limits points into */
     codec_limit limits[OPTIONS_MAX];
     sigset_t signals; /* taken by sigwait in main, blocked in every thread */
@@ -87,6 +91,24 @@ static size_t list_limits(service *s, const server_options *options)
     return n;
 }
 
+/* An address that others can reach needs tokens, or a word that says it is meant. */
+static bool check_exposure(const service *s, const server_options *options, int fd, char *message, size_t size)
+{
+    if (!http_is_public(fd))
+        return true;
+    if (!s->auth && !options->insecure_public) {
+        snprintf(
+            message, size,
+            "others can reach %s, and everybody could submit and delete jobs there: give --token-file FILE, listen "
+            "on 127.0.0.1 behind a proxy, or say --insecure-public",
+            options->listen);
+        return false;
+    }
+    if (!options->tls_cert[0])
+        log_write(s->log, LOG_WARN, "public_without_tls", (log_field[]){LOG_S("listen", options->listen), {0}});
+    return true;
+}
+
 static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
 {
     int fd = -1;
@@ -98,14 +120,23 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                      .rows = (int64_t)options->max_rows,
                                      .nonzeros = (int64_t)options->max_nonzeros});
     uz_process_init(options->workers);
-    s->store = store_open(options->db, message, size);
-    if (!s->store)
+    /* Secrets are read first, while the process may. */
+    if (options->token_file[0] && !(s->auth = auth_new(options->token_file, message, size)))
         return false;
-    store_observe(s->store, s->metrics);
-    /* The port is taken before any job runs, so that a second daemon fails without a trace. */
-    fd = http_listen(options->listen, url, url_size, message, size);
+    if (options->tls_cert[0] && !http_tls_read(&s->tls, options->tls_cert, options->tls_key, message, size))
+        return false;
+    /* The port is taken before any job runs, so that a second daemon fails without a trace; and before the privileges
+     * go that a low port needs. */
+    fd = http_listen(options->listen, s->tls.cert ? "https" : "http", url, url_size, message, size);
     if (fd < 0)
         return false;
+    if (!check_exposure(s, options, fd, message, size) ||
+        (options->user[0] && !privileges_drop(options->user, message, size)) ||
+        !(s->store = store_open(options->db, message, size))) {
+        close(fd);
+        return false;
+    }
+    store_observe(s->store, s->metrics);
     const work_options workers = {.workers = options->workers,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
@@ -118,11 +149,14 @@ static bool start(service *s, const server_options *options, char *url, size_t u
         close(fd);
         return false;
     }
-    http_parts parts = {.store = s->store, .work = s->work, .log = s->log, .metrics = s->metrics};
+    http_parts parts = {.store = s->store, .work = s->work, .log = s->log, .metrics = s->metrics, .auth = s->auth};
     const http_options limits = {.max_body = options->max_body,
                                  .max_connections = (unsigned)options->max_connections,
                                  .request_deadline_s = options->request_deadline_s,
                                  .max_wait_s = options->max_wait_s,
+                                 .max_client_connections = (unsigned)options->max_client_connections,
+                                 .max_client_rate = options->max_client_rate,
+                                 .tls = s->tls.cert ? &s->tls : NULL,
                                  .access_log = options->access_log,
                                  .limits = s->limits,
                                  .n_limits = list_limits(s, options)};
@@ -140,6 +174,8 @@ static void end(service *s)
     }
     if (s->store)
         store_close(s->store);
+    auth_free(s->auth);
+    http_tls_clear(&s->tls);
     codec_end();
 }
 
@@ -180,11 +216,24 @@ static void drain_until_stopped(service *s, double seconds)
     pthread_join(thread, NULL);
 }
 
+static void reload_tokens(const service *s)
+{
+    char message[OPTION_PATH + 256] = "";
+    if (auth_reload(s->auth, message, sizeof message))
+        log_write(s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
+    else
+        log_write(s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
+}
+
+/* SIGHUP reads the tokens again where there are any; else it ends the daemon, as for every program of a terminal. */
 static int wait_for_signal(const service *s)
 {
     int taken = 0;
-    while (sigwait(&s->signals, &taken) != 0)
-        ;
+    while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && s->auth)) {
+        if (taken == SIGHUP)
+            reload_tokens(s);
+        taken = 0;
+    }
     if (taken == SIGABRT) /* somebody wants a core file */
         abort();
     return taken;
@@ -192,7 +241,7 @@ static int wait_for_signal(const service *s)
 
 static int run(service *s, const server_options *options)
 {
-    char url[160], message[512] = "";
+    char url[160], message[OPTION_PATH + 512] = "";
     if (!start(s, options, url, sizeof url, message, sizeof message)) {
         fprintf(stderr, "uzawad: %s\n", message);
         end(s);
@@ -214,11 +263,46 @@ static int run(service *s, const server_options *options)
     return EXIT_ENDED;
 }
 
+/* --check-db */
+static int check_db(const char *path)
+{
+    char message[OPTION_PATH + 512] = "";
+    store_findings found;
+    if (!store_check_file(path, &found, message, sizeof message)) {
+        fprintf(stderr, "uzawad: %s\n", message);
+        return EXIT_FAILED;
+    }
+    bool whole = found.findings[0] == '\0';
+    if (whole)
+        printf("%s is whole: %lld jobs, checked in %.3g s\n", path, (long long)found.jobs, found.seconds);
+    else
+        fprintf(
+            stderr,
+            "uzawad: %s is damaged:\n%sKeep the file, and go on with a backup or a new file; sqlite3's .recover can "
+            "save what is readable.\n",
+            path, found.findings);
+    free(found.findings);
+    return whole ? EXIT_ENDED : EXIT_FAILED;
+}
+
+/* --backup */
+static int backup_db(const char *path, const char *to)
+{
+    char message[2 * OPTION_PATH + 512] = "";
+    int64_t bytes = 0;
+    if (!store_backup_file(path, to, &bytes, message, sizeof message)) {
+        fprintf(stderr, "uzawad: %s\n", message);
+        return EXIT_FAILED;
+    }
+    printf("%s: %lld bytes\n", to, (long long)bytes);
+    return EXIT_ENDED;
+}
+
 int main(int argc, char **argv)
 {
     server_options options;
-    char message[OPTION_PATH + 512];
-    switch (options_parse(&options, argc, argv, message, sizeof message)) {
+    char message[OPTION_PATH + 512], backup[OPTION_PATH];
+    switch (options_read(&options, argc, argv, backup, message, sizeof message)) {
     case OPTIONS_HELP:
         options_usage(stdout);
         return EXIT_ENDED;
@@ -235,7 +319,9 @@ int main(int argc, char **argv)
         fprintf(stderr, "uzawad: %s\n%s", message, "usage: uzawad [OPTION]...; uzawad --help lists them\n");
         return EXIT_USAGE;
     case OPTIONS_CHECK_DB:
+        return check_db(options.db);
     case OPTIONS_BACKUP:
+        return backup_db(options.db, backup);
     case OPTIONS_RUN:
         break;
     }

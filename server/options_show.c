@@ -78,7 +78,8 @@ void options_usage(FILE *to)
     }
     write_usage_line(to, "check-config", "", "print the values in effect and where they come from, and end");
     write_usage_line(to, "example-config", "", "print a configuration file with every option, and end");
-    write_usage_line(to, "check-db", "", "look whether the file of --db is whole, and end; no daemon may use it");
+    write_usage_line(to, "check-db", "",
+                     "look whether the file of --db is whole, also while a daemon uses it, and end");
     write_usage_line(to, "backup", " FILE", "copy the database to a new FILE, also while a daemon uses it, and end");
     fputs("  --version, --help\n", to);
     fputs(

@@ -106,6 +106,8 @@ typedef struct {
 } codec_run;
 char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run);
 char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes);
+/* What a check of the database found, one finding a line. */
+char *codec_encode_findings(const char *findings, int64_t jobs, double seconds);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);
 /* A bound that holds for this service. */
 typedef struct {

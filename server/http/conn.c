@@ -11,13 +11,14 @@
 /* Lingering after an early reply: long enough for the reply to cross the network. */
 static const double LINGER_S = 2.0;
 
-conn *conn_new(http_server *server, int fd)
+conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
 {
     conn *c = calloc(1, sizeof *c);
     if (!c)
         return NULL;
     c->server = server;
     c->fd = fd;
+    c->address_len = rate_address(address, c->address);
     atomic_fetch_add(&server->context.connections, 1);
     c->deadline = deadlines_add(server->deadlines, fd, deadlines_now() + server->options.request_deadline_s);
     if (!c->deadline) {
@@ -67,7 +68,7 @@ void conn_begin_request(conn *c, const char *raw_target)
     rq->started = deadlines_now();
     c->request = rq;
     c->layout = (framing_layout){.target = raw_target, .target_len = strlen(raw_target)};
-    deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, true);
+    deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, !c->server->tls);
 }
 
 /* ------------------------------------------------------------------ reply */
@@ -108,7 +109,7 @@ static void send_directly(conn *c, const problem_details *problem)
     http_reply reply = {.close = true};
     reply_problem(&reply, problem);
     note_reply(c->request, &reply);
-    char *message = reply_message(&reply);
+    char *message = c->server->tls ? NULL : reply_message(&reply); /* TLS: the close must say it */
     if (message && send(c->fd, message, strlen(message), MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
         linger(c);
     free(message);
@@ -198,10 +199,10 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
     http_request *rq = c->request;
     rq->begun = true;
     bool framed = read_framing(c, mhd, method, version);
-    if (framed && admit(c->server, rq)) {
+    if (framed && admit(c)) {
         deadline_set(c->deadline,
                      rq->started + c->server->options.request_deadline_s + (double)rq->framing.length / SLOWEST_RATE,
-                     true);
+                     !c->server->tls);
         return true;
     }
     if (framed && !has_body(rq))
@@ -251,7 +252,7 @@ bool conn_body(conn *c, const char *data, size_t size)
         if (rq->framing.chunked) /* the length is not known before: the allowance grows with what has come */
             deadline_set(c->deadline,
                          rq->started + c->server->options.request_deadline_s + (double)rq->body_len / SLOWEST_RATE,
-                         true);
+                         !c->server->tls);
         return true;
     }
     send_directly(c, &rq->refused);
@@ -288,6 +289,7 @@ static void log_request(conn *c, bool completed)
                           LOG_I("bytes", rq->reply_len),
                           LOG_N("seconds", deadlines_now() - rq->started),
                           LOG_S("job", rq->job_id),
+                          LOG_S("token", rq->token),
                           LOG_S("end", completed                       ? "complete"
                                        : deadline_expired(c->deadline) ? "deadline"
                                                                        : "aborted"),

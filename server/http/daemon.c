@@ -25,7 +25,8 @@ static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_c
     http_server *server = ctx;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD);
-        *socket_context = info ? conn_new(server, info->connect_fd) : NULL;
+        const union MHD_ConnectionInfo *from = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+        *socket_context = info ? conn_new(server, info->connect_fd, from ? from->client_addr : NULL) : NULL;
     } else {
         conn_free(*socket_context);
         *socket_context = NULL;
@@ -116,12 +117,24 @@ static struct MHD_Daemon *start_daemon(http_server *server, int listen_fd, const
         {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)on_completed, server},
         {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, server},
         {MHD_OPTION_URI_LOG_CALLBACK, (intptr_t)on_target, server},
+        {MHD_OPTION_PER_IP_CONNECTION_LIMIT, (intptr_t)options->max_client_connections, NULL}, /* 0: no limit */
+        {server->tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, server->tls ? options->tls->cert : NULL},
+        {MHD_OPTION_HTTPS_MEM_KEY, 0, server->tls ? options->tls->key : NULL},
         {MHD_OPTION_END, 0, NULL},
     };
+    unsigned tls = server->tls ? MHD_USE_TLS : 0;
     return MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL |
-                                MHD_USE_ITC | MHD_USE_ERROR_LOG,
+                                MHD_USE_ITC | MHD_USE_ERROR_LOG | tls,
                             0, NULL, NULL, on_request, server, MHD_OPTION_EXTERNAL_LOGGER, on_message, server,
                             MHD_OPTION_ARRAY, items, MHD_OPTION_END);
+}
+
+static void free_server(http_server *server)
+{
+    if (!server)
+        return;
+    rate_free(server->rate);
+    free(server);
 }
 
 http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message, size_t size)
@@ -140,6 +153,10 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.n_limits = options->n_limits;
     atomic_init(&server->context.draining, false);
     server->options = *options;
+    server->auth = parts->auth;
+    server->tls = options->tls != NULL;
+    if (options->max_client_rate > 0 && !(server->rate = rate_new(options->max_client_rate)))
+        goto fail;
     server->body_budget = BODY_BUDGET(options->max_body);
     atomic_init(&server->context.body_bytes, 0);
     atomic_init(&server->context.connections, 0);
@@ -168,7 +185,7 @@ fail:
         deadlines_free(server->deadlines);
     if (has_key)
         pthread_key_delete(server->current);
-    free(server);
+    free_server(server);
     free(words);
     close(listen_fd);
     return NULL;
@@ -187,5 +204,5 @@ void http_stop(http_server *server)
     deadlines_free(server->deadlines);
     pthread_key_delete(server->current);
     pthread_mutex_destroy(&server->context.ready_lock);
-    free(server);
+    free_server(server);
 }

@@ -97,6 +97,8 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, char *
         out[n++] = (field){"Location", reply->location};
     if (reply->preference_applied[0])
         out[n++] = (field){"Preference-Applied", reply->preference_applied};
+    if (reply->authenticate[0])
+        out[n++] = (field){"WWW-Authenticate", reply->authenticate};
     if (reply->allow[0])
         out[n++] = (field){"Allow", reply->allow};
     if (reply->retry_after_s > 0)

@@ -16,7 +16,7 @@ typedef struct {
     bool cacheable;    /* the same for everybody until the daemon is replaced */
     bool close;        /* the connection ends with this reply */
     int retry_after_s; /* 0: none */
-    char request_id[65], location[64], preference_applied[32], allow[64];
+    char request_id[65], authenticate[112], location[64], preference_applied[32], allow[64];
 } http_reply;
 
 /* Takes ownership of text; NULL becomes a 500. */

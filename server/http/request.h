@@ -3,6 +3,7 @@
 #define SERVER_HTTP_REQUEST_H
 
 #include "codec/codec.h"
+#include "http/auth.h"
 #include "http/framing.h"
 #include "http/reply.h"
 #include "http/target.h"
@@ -40,8 +41,9 @@ typedef struct http_request {
     char name[65]; /* what stood for {id} or {name} in the path */
     char *body;    /* NUL-terminated; NULL when empty */
     size_t body_len, body_capacity;
-    char id[65]; /* X-Request-Id, the client's or our own */
-    int fd;      /* to see whether the client is still there */
+    char id[65];    /* X-Request-Id, the client's or our own */
+    char token[64]; /* the name of the token that it came with; "": none */
+    int fd;         /* to see whether the client is still there */
     /* For the access log and the connection's bookkeeping. */
     char method[16];
     double started; /* on deadlines_now's clock */
@@ -75,6 +77,10 @@ typedef struct route {
     route_handler handler;
 } route;
 
+/* What a token must allow for this route. Whoever adds a route need not think of it: what changes something is for
+ * `submit`, what only reads for `read`, /v1/admin/ for `admin`. */
+auth_scope route_scope(const route *r);
+
 /* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. */
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem);
 /* 400 for a query key that the route does not know. */
@@ -92,6 +98,7 @@ void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_limits(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);
+void admin_check(api *context, http_request *rq, http_reply *reply);
 void service_metrics(api *context, http_request *rq, http_reply *reply);
 void service_health(api *context, http_request *rq, http_reply *reply);
 void service_ready(api *context, http_request *rq, http_reply *reply);

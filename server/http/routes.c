@@ -23,6 +23,7 @@ static const route ROUTES[] = {
     {"POST", "/v1/verify", NONE, verify_submit},
     {"GET", "/v1/factors", NONE, service_factors},
     {"GET", "/v1/limits", NONE, service_limits},
+    {"POST", "/v1/admin/check", NONE, admin_check},
     {"GET", "/metrics", NONE, service_metrics},
     {"GET", "/healthz", NONE, service_health},
     {"GET", "/readyz", NONE, service_ready},
@@ -30,6 +31,19 @@ static const route ROUTES[] = {
     {"GET", "/schemas/{name}", NONE, service_schema},
 };
 static const size_t N_ROUTES = sizeof ROUTES / sizeof ROUTES[0];
+
+/* What a person or a supervisor may see without a token: nothing about jobs. */
+static const char *const OPEN[] = {"/", "/healthz", "/readyz", "/openapi.json", "/schemas/{name}"};
+
+auth_scope route_scope(const route *r)
+{
+    for (size_t i = 0; i < sizeof OPEN / sizeof OPEN[0]; i++)
+        if (strcmp(r->pattern, OPEN[i]) == 0 && strcmp(r->method, "GET") == 0)
+            return SCOPE_NONE;
+    if (strncmp(r->pattern, "/v1/admin/", 10) == 0)
+        return SCOPE_ADMIN;
+    return strcmp(r->method, "GET") == 0 ? SCOPE_READ : SCOPE_SUBMIT;
+}
 
 /* {id}: 32 hexadecimal digits in lower case. {name}: a file name. */
 static bool placeholder_matches(const char *kind, const char *text, size_t len)

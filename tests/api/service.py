@@ -64,7 +64,7 @@ class Reply:
 
 
 # What tells which schema a reply must meet: a member that only this kind of object has.
-KINDS = [("factors", "factors.json"), ("limits", "limits.json"), ("rows", "history.json"), ("code", "problem-details.json"),
+KINDS = [("factors", "factors.json"), ("limits", "limits.json"), ("whole", "check.json"), ("rows", "history.json"), ("code", "problem-details.json"),
          ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json")]
 
 
