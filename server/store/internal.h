@@ -9,7 +9,7 @@
 
 #define STORE_READERS 4
 
-/* Lock order: none of these is taken while another is held, except message under writer_lock. */
+/* Lock order: none of these is taken while another is held, except message and sync under writer_lock. */
 struct store {
     pthread_mutex_t writer_lock; /* writer, last_ms, sequence */
     connection writer;           /* the only one that writes and checkpoints */
@@ -22,6 +22,16 @@ struct store {
     connection *readers_free[STORE_READERS];
     int n_readers_free;
 
+    /* Changes are numbered as they are committed; sync.c. */
+    pthread_mutex_t sync_lock; /* everything down to sync_stop */
+    pthread_cond_t sync_asked, sync_ended;
+    uint64_t committed; /* the last one's number */
+    uint64_t wanted;    /* somebody wants those up to here on disk */
+    uint64_t synced;    /* those up to here are, but for those up to */
+    uint64_t lost;      /* here where that could not be had */
+    bool sync_stop, sync_started;
+    pthread_t syncer;
+
     pthread_mutex_t message_lock; /* message */
     char message[256];
     metrics *metrics; /* may be NULL */
@@ -31,7 +41,28 @@ struct store {
 /* Runs `change` as one transaction on the writer: STORE_OK commits, anything else rolls back. On a full disk the
  * journal is moved into the database and `change` runs once more, so it must reset what it publishes. */
 typedef store_status (*store_change)(store *s, connection *c, void *args);
-store_status store_write(store *s, store_change change, void *args);
+/* When the caller is told. */
+typedef enum {
+    WRITE_DURABLE, /* when it is on disk */
+    WRITE_SOON, /* when it is committed: a power loss may undo it for a moment longer, but whoever reads what it wrote
+                   waits (store_settle) */
+    WRITE_LAZY  /* when it is committed; it reaches the disk with whatever comes next. Right for what the start
+                   after a crash undoes by itself: claims and leases */
+} write_durability;
+store_status store_write_as(store *s, write_durability durability, store_change change, void *args);
+store_status store_write(store *s, store_change change, void *args); /* WRITE_DURABLE */
+
+/* ---- sync.c */
+bool store_sync_begin(store *s); /* false: no thread */
+void store_sync_end(store *s);
+uint64_t store_note_commit(store *s); /* the number of the change just committed; under writer_lock */
+void store_want_sync(store *s, uint64_t number);
+store_status store_await_sync(store *s, uint64_t number);
+store_status store_settle(store *s); /* returns when all that is committed now is on disk */
+
+/* Keeps the connection's message as the store's last one. */
+void store_keep_message(store *s, const connection *c);
+double store_clock(void); /* seconds, CLOCK_MONOTONIC */
 
 /* A reader for the calling thread alone, until it is given back with how the read ended, which is returned. */
 connection *store_take_reader(store *s);

@@ -106,9 +106,17 @@ store *store_open(const char *path, char *message, size_t size)
     pthread_mutex_init(&s->readers_lock, NULL);
     pthread_mutex_init(&s->message_lock, NULL);
     pthread_cond_init(&s->reader_free, NULL);
+    pthread_mutex_init(&s->sync_lock, NULL);
+    pthread_cond_init(&s->sync_asked, NULL);
+    pthread_cond_init(&s->sync_ended, NULL);
     s->file = lock_file(path, why, sizeof why);
     if (s->file < 0 || !open_connections(s, path, why, sizeof why)) {
         snprintf(message, size, "%s: %s", path, why);
+        store_close(s);
+        return NULL;
+    }
+    if (!store_sync_begin(s)) {
+        snprintf(message, size, "%s: cannot start a thread", path);
         store_close(s);
         return NULL;
     }
@@ -119,11 +127,15 @@ void store_close(store *s)
 {
     if (!s)
         return;
+    store_sync_end(s);
     for (int i = 0; i < STORE_READERS; i++)
         connection_close(&s->readers[i]);
     connection_close(&s->writer); /* the last one: checkpoints and removes the journal */
     if (s->file >= 0)
         close(s->file);
+    pthread_cond_destroy(&s->sync_ended);
+    pthread_cond_destroy(&s->sync_asked);
+    pthread_mutex_destroy(&s->sync_lock);
     pthread_cond_destroy(&s->reader_free);
     pthread_mutex_destroy(&s->message_lock);
     pthread_mutex_destroy(&s->readers_lock);
@@ -133,7 +145,7 @@ void store_close(store *s)
 
 /* ---- the last failure's cause */
 
-static void keep_message(store *s, const connection *c)
+void store_keep_message(store *s, const connection *c)
 {
     pthread_mutex_lock(&s->message_lock);
     snprintf(s->message, sizeof s->message, "%s", c->message);
@@ -154,7 +166,7 @@ void store_observe(store *s, metrics *m)
     s->metrics = m;
 }
 
-static double seconds_now(void)
+double store_clock(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -174,10 +186,8 @@ static store_status attempt(store *s, store_change change, void *args)
     if (status != STORE_OK)
         return status;
     status = change(s, c, args);
-    double begun = seconds_now();
     if (status == STORE_OK) {
         status = run_query(c, QUERY_COMMIT);
-        metrics_seconds(s->metrics, METRIC_COMMIT, seconds_now() - begun);
         metrics_add(s->metrics, METRIC_CHANGES, 1);
     }
     if (!sqlite3_get_autocommit(c->db)) { /* a full disk may have rolled back already */
@@ -189,18 +199,31 @@ static store_status attempt(store *s, store_change change, void *args)
     return status;
 }
 
-store_status store_write(store *s, store_change change, void *args)
+store_status store_write_as(store *s, write_durability durability, store_change change, void *args)
 {
+    uint64_t number = 0;
     pthread_mutex_lock(&s->writer_lock);
     store_status status = attempt(s, change, args);
     if (status == STORE_FULL) {
         connection_checkpoint(&s->writer);
         status = attempt(s, change, args);
     }
+    if (status == STORE_OK)
+        number = store_note_commit(s);
     if (status == STORE_ERROR || status == STORE_FULL)
-        keep_message(s, &s->writer);
+        store_keep_message(s, &s->writer);
     pthread_mutex_unlock(&s->writer_lock);
-    return status;
+    if (status != STORE_OK || durability == WRITE_LAZY)
+        return status;
+    if (durability == WRITE_DURABLE)
+        return store_await_sync(s, number);
+    store_want_sync(s, number);
+    return STORE_OK;
+}
+
+store_status store_write(store *s, store_change change, void *args)
+{
+    return store_write_as(s, WRITE_DURABLE, change, args);
 }
 
 connection *store_take_reader(store *s)
@@ -216,7 +239,7 @@ connection *store_take_reader(store *s)
 store_status store_give_reader(store *s, connection *c, store_status status)
 {
     if (status == STORE_ERROR)
-        keep_message(s, c);
+        store_keep_message(s, c);
     pthread_mutex_lock(&s->readers_lock);
     s->readers_free[s->n_readers_free++] = c;
     pthread_cond_signal(&s->reader_free);
@@ -240,7 +263,7 @@ store_status store_limit_bytes(store *s, int64_t bytes)
     int rc = sqlite3_exec(c->db, sql, NULL, NULL, NULL);
     snprintf(c->message, sizeof c->message, "%s", sqlite3_errmsg(c->db));
     if (rc != SQLITE_OK)
-        keep_message(s, c);
+        store_keep_message(s, c);
     pthread_mutex_unlock(&s->writer_lock);
     return rc == SQLITE_OK ? STORE_OK : STORE_ERROR;
 }
