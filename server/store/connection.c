@@ -56,7 +56,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_HISTORY] = "SELECT version, columns, CASE WHEN last > ?2 THEN data END FROM history WHERE job = ?1"
                       " AND answer = ?3"
                       " ORDER BY part",
-    [QUERY_COUNTS] = "SELECT status, count(*) FROM job GROUP BY status",
+    [QUERY_COUNTS] = "SELECT status, jobs FROM tally",
 };
 
 /* Settings of every connection. secure_delete FAST: freed pages are not rewritten only to blank them. */

@@ -62,6 +62,10 @@ static bool check(sqlite3 *db, store_findings *out)
         rc = collect(db,
                      "SELECT id FROM job WHERE NOT EXISTS (SELECT 1 FROM request WHERE request.job = job.id) LIMIT 20",
                      "job %s has no request\n", text);
+    if (rc == SQLITE_OK)
+        rc = collect(
+            db, "SELECT status FROM tally WHERE jobs <> (SELECT count(*) FROM job WHERE job.status = tally.status)",
+            "the tally of jobs with status %s is wrong\n", text);
     if (rc != SQLITE_OK)
         fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
     out->jobs = count_jobs(db);
