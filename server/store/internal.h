@@ -30,6 +30,7 @@ struct store {
     uint64_t synced;    /* those up to here are, but for those up to */
     uint64_t lost;      /* here where that could not be had */
     bool sync_stop, sync_started;
+    sqlite3_file *log; /* the writer's write-ahead log, set before the thread starts */
     pthread_t syncer;
 
     pthread_mutex_t message_lock; /* message */
@@ -53,7 +54,7 @@ store_status store_write_as(store *s, write_durability durability, store_change 
 store_status store_write(store *s, store_change change, void *args); /* WRITE_DURABLE */
 
 /* ---- sync.c */
-bool store_sync_begin(store *s); /* false: no thread */
+bool store_sync_begin(store *s); /* once the writer has read the file; false: no thread, or no log */
 void store_sync_end(store *s);
 uint64_t store_note_commit(store *s); /* the number of the change just committed; under writer_lock */
 void store_want_sync(store *s, uint64_t number);

@@ -12,13 +12,15 @@
 #include <string.h>
 
 /* The writer's log. It is open as long as the writer; xSync touches nothing of it but its descriptor. */
-static int sync_log(store *s)
+static int sync_log(const store *s)
 {
-    sqlite3_file *log = NULL;
-    if (sqlite3_file_control(s->writer.db, "main", SQLITE_FCNTL_JOURNAL_POINTER, &log) != SQLITE_OK || !log ||
-        !log->pMethods)
-        return SQLITE_ERROR;
-    return log->pMethods->xSync(log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY);
+    return s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY);
+}
+
+static bool find_log(store *s)
+{
+    return sqlite3_file_control(s->writer.db, "main", SQLITE_FCNTL_JOURNAL_POINTER, &s->log) == SQLITE_OK && s->log &&
+           s->log->pMethods;
 }
 
 /* After a failed sync the kernel may take the log's pages for clean, and a second sync would succeed without them. A
@@ -62,7 +64,8 @@ static void *sync_loop(void *argument)
 
 bool store_sync_begin(store *s)
 {
-    return s->sync_started = pthread_create(&s->syncer, NULL, sync_loop, s) == 0;
+    s->sync_started = find_log(s) && pthread_create(&s->syncer, NULL, sync_loop, s) == 0;
+    return s->sync_started;
 }
 
 void store_sync_end(store *s)
