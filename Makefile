@@ -15,7 +15,7 @@ PYTHON ?= /usr/bin/python3
 
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
             libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev
-TEST_PACKAGES := python3 python3-jsonschema curl jq locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev
+TEST_PACKAGES := python3 python3-jsonschema curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev
 
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE

@@ -44,7 +44,7 @@ static const option_row ROWS[] = {
      "connections open at once"},
     {"max-client-connections", OPTION_INTEGER, AT(max_client_connections), 0, 100000, "0", NULL, "connections", true,
      "connections of one address open at once; 0: no limit of its own. Behind a proxy all clients are one"},
-    {"max-client-rate", OPTION_INTEGER, AT(max_client_rate), 0, 1000000, "2000", NULL, "requests per second", true,
+    {"max-client-rate", OPTION_INTEGER, AT(max_client_rate), 0, 1000000, "10000", NULL, "requests per second", true,
      "requests of one address or token per second, twice as many at once; more are answered 429; 0: no limit"},
     {"max-body", OPTION_BYTES, AT(max_body), 1, 0, "64M", NULL, "bytes", false, "largest request body"},
     {"max-json-depth", OPTION_INTEGER, AT(max_json_depth), 8, 64, "64", NULL, "levels", false,

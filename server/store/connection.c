@@ -12,6 +12,9 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_BEGIN] = "BEGIN IMMEDIATE",
     [QUERY_COMMIT] = "COMMIT",
     [QUERY_ROLLBACK] = "ROLLBACK",
+    [QUERY_SAVEPOINT] = "SAVEPOINT change",
+    [QUERY_RELEASE_SAVEPOINT] = "RELEASE change",
+    [QUERY_ROLLBACK_TO] = "ROLLBACK TO change",
     [QUERY_NEWEST_ID] = "SELECT max(id) FROM job",
     [QUERY_FIND_KEY] = "SELECT " JOB_COLUMNS ", length(body) = ?2 AND body = ?3"
                        " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",

@@ -85,6 +85,10 @@ const char *file_format_why_unreadable(sqlite3 *db)
 {
     if (db && sqlite3_errcode(db) == SQLITE_NOTADB)
         return "the file is not an SQLite database; give the path of a new file instead";
+    if (db && sqlite3_errcode(db) == SQLITE_CORRUPT)
+        return "the file is damaged; it is left as it is: put a backup in its place, or save what is readable into a "
+               "new "
+               "file with sqlite3's .recover";
     return db ? sqlite3_errmsg(db) : "no memory";
 }
 

@@ -10,11 +10,17 @@
 #define STORE_READERS 4
 
 /* Lock order: none of these is taken while another is held, except message and sync under writer_lock. */
+typedef struct pending pending;
+
 struct store {
     pthread_mutex_t writer_lock; /* writer, last_ms, sequence */
     connection writer;           /* the only one that writes and checkpoints */
     uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
     unsigned sequence;
+
+    pthread_mutex_t queue_lock; /* everything down to leading; write.c */
+    pending *queue, **queue_end;
+    bool leading; /* somebody carries out changes */
 
     pthread_mutex_t readers_lock; /* readers_free */
     pthread_cond_t reader_free;
@@ -39,8 +45,9 @@ struct store {
     int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
 };
 
-/* Runs `change` as one transaction on the writer: STORE_OK commits, anything else rolls back. On a full disk the
- * journal is moved into the database and `change` runs once more, so it must reset what it publishes. */
+/* Runs `change` on the writer, alone or with others in one transaction: STORE_OK commits, anything else takes back what
+ * it did. It may run more than once, so it must reset what it publishes; on a full disk it runs again once the journal
+ * is moved into the database. */
 typedef store_status (*store_change)(store *s, connection *c, void *args);
 /* When the caller is told. */
 typedef enum {

@@ -103,12 +103,14 @@ store *store_open(const char *path, char *message, size_t size)
         return NULL;
     }
     pthread_mutex_init(&s->writer_lock, NULL);
+    pthread_mutex_init(&s->queue_lock, NULL);
     pthread_mutex_init(&s->readers_lock, NULL);
     pthread_mutex_init(&s->message_lock, NULL);
     pthread_cond_init(&s->reader_free, NULL);
     pthread_mutex_init(&s->sync_lock, NULL);
     pthread_cond_init(&s->sync_asked, NULL);
     pthread_cond_init(&s->sync_ended, NULL);
+    s->queue_end = &s->queue;
     s->file = lock_file(path, why, sizeof why);
     if (s->file < 0 || !open_connections(s, path, why, sizeof why)) {
         snprintf(message, size, "%s: %s", path, why);
@@ -121,6 +123,11 @@ store *store_open(const char *path, char *message, size_t size)
         return NULL;
     }
     return s;
+}
+
+void store_observe(store *s, metrics *m)
+{
+    s->metrics = m;
 }
 
 void store_close(store *s)
@@ -139,6 +146,7 @@ void store_close(store *s)
     pthread_cond_destroy(&s->reader_free);
     pthread_mutex_destroy(&s->message_lock);
     pthread_mutex_destroy(&s->readers_lock);
+    pthread_mutex_destroy(&s->queue_lock);
     pthread_mutex_destroy(&s->writer_lock);
     free(s);
 }
@@ -157,73 +165,6 @@ void store_message(store *s, char *buffer, size_t size)
     pthread_mutex_lock(&s->message_lock);
     snprintf(buffer, size, "%s", s->message);
     pthread_mutex_unlock(&s->message_lock);
-}
-
-/* ---- transactions */
-
-void store_observe(store *s, metrics *m)
-{
-    s->metrics = m;
-}
-
-double store_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static store_status run_query(connection *c, query_id q)
-{
-    statement st = statement_begin(c, q);
-    return statement_run(&st);
-}
-
-static store_status attempt(store *s, store_change change, void *args)
-{
-    connection *c = &s->writer;
-    store_status status = run_query(c, QUERY_BEGIN);
-    if (status != STORE_OK)
-        return status;
-    status = change(s, c, args);
-    if (status == STORE_OK) {
-        status = run_query(c, QUERY_COMMIT);
-        metrics_add(s->metrics, METRIC_CHANGES, 1);
-    }
-    if (!sqlite3_get_autocommit(c->db)) { /* a full disk may have rolled back already */
-        char cause[sizeof c->message];
-        memcpy(cause, c->message, sizeof cause);
-        run_query(c, QUERY_ROLLBACK);
-        memcpy(c->message, cause, sizeof cause);
-    }
-    return status;
-}
-
-store_status store_write_as(store *s, write_durability durability, store_change change, void *args)
-{
-    uint64_t number = 0;
-    pthread_mutex_lock(&s->writer_lock);
-    store_status status = attempt(s, change, args);
-    if (status == STORE_FULL) {
-        connection_checkpoint(&s->writer);
-        status = attempt(s, change, args);
-    }
-    if (status == STORE_OK)
-        number = store_note_commit(s);
-    if (status == STORE_ERROR || status == STORE_FULL)
-        store_keep_message(s, &s->writer);
-    pthread_mutex_unlock(&s->writer_lock);
-    if (status != STORE_OK || durability == WRITE_LAZY)
-        return status;
-    if (durability == WRITE_DURABLE)
-        return store_await_sync(s, number);
-    store_want_sync(s, number);
-    return STORE_OK;
-}
-
-store_status store_write(store *s, store_change change, void *args)
-{
-    return store_write_as(s, WRITE_DURABLE, change, args);
 }
 
 connection *store_take_reader(store *s)
@@ -269,6 +210,13 @@ store_status store_limit_bytes(store *s, int64_t bytes)
 }
 
 /* ---- ids and time */
+
+double store_clock(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
 
 double store_now(void)
 {

@@ -50,13 +50,14 @@ static bool make_message(load *l, const char *path, const char *prefer)
 {
     FILE *file = fopen(path, "rb");
     char *body = malloc(1 << 20);
-    if (!file || !body)
+    size_t size = file && body ? fread(body, 1, 1 << 20, file) : 0;
+    if (file)
+        fclose(file);
+    FILE *out = size > 0 ? open_memstream(&l->message, &l->len) : NULL;
+    if (!out) {
+        free(body);
         return false;
-    size_t size = fread(body, 1, 1 << 20, file);
-    fclose(file);
-    FILE *out = open_memstream(&l->message, &l->len);
-    if (!out)
-        return false;
+    }
     fprintf(out, "POST /v1/jobs HTTP/1.1\r\nHost: load\r\nContent-Type: application/json\r\nContent-Length: %zu\r\n",
             size);
     if (prefer)
@@ -64,7 +65,7 @@ static bool make_message(load *l, const char *path, const char *prefer)
     fputs("\r\n", out);
     fwrite(body, 1, size, out);
     free(body);
-    return fclose(out) == 0 && size > 0;
+    return fclose(out) == 0;
 }
 
 static bool connect_client(client *c, int port)
