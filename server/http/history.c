@@ -104,6 +104,7 @@ static void reply_history(api *context, http_request *rq, bool csv, http_reply *
     if (jobs_load(context, rq, &j, reply) &&
         fetch(context, &j, target_value(&rq->target, "case"), after, &found, reply))
         encode(&found, csv, reply);
+    jobs_check_still_there(context, &j, reply);
     free(found.rows);
     job_clear(&j);
 }

@@ -43,6 +43,18 @@ bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply)
     return status == STORE_OK;
 }
 
+void jobs_check_still_there(api *context, const job *j, http_reply *reply)
+{
+    job now = {0};
+    store_status status = reply->status == 200 ? store_get(context->store, j->id, &now) : STORE_OK;
+    job_clear(&now);
+    if (status == STORE_OK)
+        return;
+    reply->tag[0] = '\0';
+    reply->tag_by_body = reply->takes_ranges = false;
+    reply_store_failure(context, status, reply);
+}
+
 bool jobs_ended(const job *j)
 {
     return j->status != JOB_ACCEPTED && j->status != JOB_RUNNING;
@@ -198,15 +210,17 @@ static bool is_unwanted(void *ctx)
     return atomic_load(&a->context->draining) || request_client_gone(a->rq);
 }
 
-/* Bytes that assembly takes for each dof, at least: a scene beyond the limit is not assembled only to say so. */
-#define ASSEMBLY_BYTES 500.0
+/* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
+#define ASSEMBLY_BYTES 1000.0
+/* Beyond it a prediction takes minutes. */
+#define PREDICTED_MOST 4e6
 
 static bool worth_predicting(const codec_request *request, size_t limit)
 {
     int64_t m, n_u;
     problem_details ignored;
     return !request->settings.semidefinite && codec_request_sizes(request, &m, &n_u, &ignored) &&
-           (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit);
+           (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit);
 }
 
 /* One prediction at a time: it takes memory and a processor that are counted for the workers. */

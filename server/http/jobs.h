@@ -9,6 +9,10 @@ bool jobs_ended(const job *j);
 /* A running job's progress lives in the worker; the store has the one of the last lease. */
 void jobs_freshen(api *context, job *j);
 
+/* For replies that were read from the store piece by piece: turns a 200 into a 404 if the job was deleted meanwhile, as
+ * pieces may then be missing. */
+void jobs_check_still_there(api *context, const job *j, http_reply *reply);
+
 /* Waits as the request prefers, `otherwise` seconds where it does not say, and reads the job again; *j is replaced.
  * False with a failure in reply. */
 bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply);

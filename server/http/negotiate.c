@@ -219,6 +219,7 @@ void negotiate(const http_request *rq, http_reply *reply)
         tag_make(reply->tag, (const char *const[]){reply->body}, &reply->len, 1);
     if (reply->status != 200)
         reply->tag[0] = reply->status == 304 ? reply->tag[0] : '\0';
+    reply->varies_by_coding = reply->tag[0] && !reply->has_file; /* also in a 304 (RFC 9110, section 15.4.5) */
     if (reply->status == 200 && reply_unchanged(rq, reply))
         return;
     if (reply->status == 200 && reply->takes_ranges && apply_range(rq, reply))

@@ -421,6 +421,7 @@ void results_get(api *context, http_request *rq, http_reply *reply)
     }
     if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply))
         reply_result(context, rq, &j, &fields, reply);
+    jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }
 
@@ -428,4 +429,5 @@ void results_reply(api *context, const job *j, http_reply *reply)
 {
     const field_list fields = {.which = BY_DEFAULT};
     encode_one(context, &(place){.j = j, .summary = j->summary}, &fields, NULL, reply);
+    jobs_check_still_there(context, j, reply);
 }

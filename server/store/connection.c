@@ -37,7 +37,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
     [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, owner = ?2,"
-                    " lease = ?1 + ?3 WHERE id = (SELECT id FROM job WHERE status = 0"
+                    " lease = ?1 + ?3 WHERE id = (SELECT id FROM job INDEXED BY job_by_turn WHERE status = 0"
                     " AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
                     " RETURNING " JOB_COLUMNS,
     [QUERY_BODY] = "SELECT body FROM request WHERE job = ?1",
@@ -70,9 +70,12 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_INSERT_WEBHOOK] = "INSERT INTO webhook(job, url) VALUES(?1, ?2)",
     [QUERY_WEBHOOK_NEXT] =
         "SELECT job, url, attempts FROM webhook WHERE state = 1 AND next <= ?1 ORDER BY next LIMIT 1",
+    [QUERY_WEBHOOKS_OPEN] = "SELECT 1 FROM webhook WHERE state < 2 LIMIT 1",
+    [QUERY_WEBHOOK_POSTPONE] = "UPDATE webhook SET next = max(next, ?2) WHERE state = 1 AND url = ?1",
     [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?2, next = ?3, attempts = attempts + 1 WHERE job = ?1",
     [QUERY_WAITING] = "SELECT jobs FROM tally WHERE status = 0",
-    [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job WHERE status = 0 AND queue_until > 0 AND queue_until < ?1 LIMIT 1",
+    [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job INDEXED BY job_by_queue_until WHERE status = 0 AND queue_until > 0 AND "
+                          "queue_until < ?1 LIMIT 1",
     [QUERY_EXPIRE] = "UPDATE job SET status = 3, finished = ?1, error = ?2"
                      " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1",
     [QUERY_ADD_BYTES] = "UPDATE job SET bytes = bytes"

@@ -52,7 +52,7 @@
 #define JOB_INDEXES_3                                                                                                  \
     "CREATE INDEX job_by_turn ON job(priority DESC, id) WHERE status = 0;"                                             \
     "CREATE INDEX job_by_queue_until ON job(queue_until) WHERE status = 0 AND queue_until > 0;"                        \
-    "CREATE INDEX job_by_end ON job(finished, id, bytes) WHERE status >= 2;"
+    "CREATE INDEX job_by_end ON job(finished, id, bytes, status) WHERE status >= 2;"
 #define TABLES_3                                                                                                       \
     "CREATE TABLE upload("                                                                                             \
     "  id TEXT PRIMARY KEY NOT NULL, bytes INTEGER NOT NULL, created REAL NOT NULL, used REAL NOT NULL"                \

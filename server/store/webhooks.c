@@ -21,8 +21,16 @@ store_status store_webhook_next(store *s, webhook_due *out)
     return store_give_reader(s, c, ended == STORE_OK ? status : ended);
 }
 
+store_status store_webhooks_open(store *s, bool *any)
+{
+    connection *c = store_take_reader(s);
+    statement st = statement_begin(c, QUERY_WEBHOOKS_OPEN);
+    *any = statement_row(&st);
+    return store_give_reader(s, c, statement_end(&st));
+}
+
 typedef struct {
-    const char *job;
+    const char *job; /* or the address */
     webhook_end end;
     double next;
 } attempted_args;
@@ -36,6 +44,22 @@ static store_status attempted(store *s, connection *c, void *args)
     bind_integer(&st, 2, a->end);
     bind_real(&st, 3, a->next);
     return statement_run(&st);
+}
+
+static store_status postpone(store *s, connection *c, void *args)
+{
+    (void)s;
+    const attempted_args *a = args;
+    statement st = statement_begin(c, QUERY_WEBHOOK_POSTPONE);
+    bind_text(&st, 1, a->job);
+    bind_real(&st, 2, a->next);
+    return statement_run(&st);
+}
+
+store_status store_webhook_postpone(store *s, const char *url, double delay_s)
+{
+    attempted_args a = {.job = url, .next = store_now() + delay_s};
+    return store_write(s, postpone, &a);
 }
 
 store_status store_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s)

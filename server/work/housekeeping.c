@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#define ROUND_S 1.0
+#define ROUND_S 0.5
 
 static char *waited_too_long(void)
 {

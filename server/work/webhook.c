@@ -228,6 +228,8 @@ static void tell(webhooks *all, const webhook_due *due)
         return; /* cut off: it stays due */
     log_attempt(all, due, end, status, cause);
     metrics_add(all->options.metrics, end == WEBHOOK_TOLD ? METRIC_WEBHOOK_TOLD : METRIC_WEBHOOK_FAILED, 1);
+    if (status == 0 && end == WEBHOOK_AGAIN) /* each attempt takes seconds that others wait for */
+        store_webhook_postpone(all->store, due->url, wait_after(all, 0));
     store_webhook_attempted(all->store, due->job, end, wait_after(all, due->attempts));
 }
 
@@ -303,8 +305,11 @@ webhooks *webhooks_start(store *s, const webhook_options *options, server_log *l
     atomic_init(&all->stop, false);
     pthread_mutex_init(&all->lock, NULL);
     work_init_condition(&all->wake);
-    if (options->n_allow == 0)
-        return all;
+    if (options->n_allow == 0) { /* what was to be told before is given up, so that its jobs need not stay for it */
+        bool any = false;
+        if (store_webhooks_open(s, &any) != STORE_OK || !any)
+            return all;
+    }
     snprintf(message, size, "cannot start the thread for webhooks");
     all->curl_ready = curl_global_init(CURL_GLOBAL_DEFAULT) == CURLE_OK;
     all->started = all->curl_ready && pthread_create(&all->thread, NULL, tell_loop, all) == 0;

@@ -1,6 +1,7 @@
 """Server-Sent Events of a job: /v1/jobs/{id}/events."""
 import http.client
 import json
+import signal
 import threading
 import time
 
@@ -137,24 +138,23 @@ def test_streams_leave_connections(s):
     s.request("DELETE", f"/v1/jobs/{job['id']}")
 
 
-@options("--request-deadline-s", "1")
+@options("--request-deadline-s", "0.3")
 def test_a_stream_outlives_the_deadline(s):
     job = s.post(ENDLESS).json
     started = time.monotonic()
     for event, _, data in Stream(s, job["id"]):
-        if time.monotonic() - started > 2.5:
+        if time.monotonic() - started > 1:
             s.request("DELETE", f"/v1/jobs/{job['id']}")
-    check(data["status"] == "dismissed" and time.monotonic() - started > 2.4, data)
+    check(data["status"] == "dismissed" and time.monotonic() - started > 0.9, data)
 
 
 def test_the_end_of_the_service_ends_streams(s):
     job = s.post(ENDLESS).json
     events = iter(Stream(s, job["id"]))
     next(events)
-    started = time.monotonic()
-    check(s.end() == 0, s.log())
-    list(events)  # ends
-    check(time.monotonic() - started < 20)
+    s.process.send_signal(signal.SIGTERM)
+    list(events)  # ends, although the job still runs
+    check(s.process.poll() is None and s.terminate() == 0, s.log())
 
 
 def test_deleted_meanwhile(s):

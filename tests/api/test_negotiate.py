@@ -19,6 +19,7 @@ def test_etags(s):
         for wanted in (tag, f"W/{tag}", f'"other", {tag}', "*", tag[:-1] + '-gz"'):
             reply = expect(s.get(path, If_None_Match=wanted), 304)
             check(reply.body == b"" and reply.headers["etag"] == tag, wanted, reply)
+            check(reply.headers["vary"] == first.headers["vary"] and "content-type" not in reply.headers, reply)
         for other in ('"other"', tag[1:-1], tag[:-2] + '"', ""):
             check(expect(s.get(path, If_None_Match=other), 200).body == first.body, other)
         check(expect(s.request("HEAD", path, headers={"If-None-Match": tag}), 304).headers["etag"] == tag)

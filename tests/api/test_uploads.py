@@ -120,6 +120,13 @@ def test_in_verify(s):
     answer = {"displacements": [0.5, 2], "reactions": [-1]}
     reply = s.request("POST", "/v1/verify", {**with_uploads(K=digest(K)), "answer": answer})
     check(expect(reply, 200).json["summary"]["outcome"] == "verified", reply)
+    u = b"%%MatrixMarket matrix array real general\n2 1\n0.5\n2\n"
+    answer["displacements"] = {"upload": expect(send(s, u), 201).json["id"]}
+    reply = s.request("POST", "/v1/verify", {**with_uploads(K=digest(K)), "answer": answer})
+    check(expect(reply, 200).json["summary"]["outcome"] == "verified", reply)
+    answer["displacements"] = {"upload": "0" * 64}
+    reply = expect(s.request("POST", "/v1/verify", {**MATRICES, "answer": answer}), 422, "unknown_upload")
+    check(reply.json["pointer"] == "/answer/displacements/upload", reply)
 
 
 def test_refusals(s):

@@ -153,6 +153,16 @@ def test_what_ends_the_telling(s):
     s.start()
     check(told_in_store(s, moved["id"], 2)[0] == 3)
     receiver.wait(2)  # it was not called any more
+    s.terminate()
+    with sqlite3.connect(s.db) as db:
+        db.execute("UPDATE webhook SET state = 1, next = 0, attempts = 1 WHERE job = ?", (gone["id"],))
+    db.close()
+    s.options = ("--keep-jobs", "1")
+    s.start()
+    end = time.monotonic() + 20
+    while s.get(f"/v1/jobs/{gone['id']}").status != 404:  # without webhooks too a job does not stay for ever for one
+        check(time.monotonic() < end, s.log())
+        time.sleep(0.05)
     receiver.close()
 
 

@@ -96,10 +96,10 @@ TEST(gzip_in_pieces_of_any_size)
     place p;
     upload_info info, plain;
     bool known;
-    char *text = malloc(LEN);
-    unsigned char *small = malloc(LEN);
     if (!place_begin(&p))
         return;
+    char *text = malloc(LEN);
+    unsigned char *small = malloc(LEN);
     for (int i = 0; i < LEN; i++)
         text[i] = (char)('a' + i % 7 + (i / 1000) % 3);
     CHECK_INT(send(p.s, text, LEN, LEN, false, &plain, &known), UPLOAD_OK);
@@ -304,6 +304,12 @@ TEST(a_job_stays_until_somebody_was_told)
     change_file(p.path, "UPDATE webhook SET next = 0");
     CHECK_INT(store_webhook_next(p.s, &due), STORE_OK);
     CHECK_INT(due.attempts, 1);
+    CHECK_INT(store_webhook_postpone(p.s, "http://y/", 1000), STORE_OK);
+    webhook_due same;
+    CHECK_INT(store_webhook_next(p.s, &same), STORE_OK);
+    free(same.url);
+    CHECK_INT(store_webhook_postpone(p.s, due.url, 1000), STORE_OK);
+    CHECK_INT(store_webhook_next(p.s, &same), STORE_NOT_FOUND);
     free(due.url);
     CHECK_INT(store_webhook_attempted(p.s, due.job, WEBHOOK_TOLD, 0), STORE_OK);
     CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND);
