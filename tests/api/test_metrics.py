@@ -1,5 +1,6 @@
 """What the daemon tells its operators: metrics, health, request ids."""
 import re
+import time
 
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect, options
@@ -28,6 +29,17 @@ def scrape(s):
     return values
 
 
+def scrape_after(s, jobs):
+    """The values once so many jobs were counted: a job is counted just after its end can be read."""
+    end = time.monotonic() + 20
+    while True:
+        values = scrape(s)
+        counted = sum(value for (name, _), value in values.items() if name == "uzawad_jobs_ended_total")
+        if values["uzawad_job_phase_seconds_count", 'phase="certify"'] + counted >= 2 * jobs or time.monotonic() > end:
+            return values
+        time.sleep(0.05)
+
+
 def test_counts_follow_what_happens(s):
     before = scrape(s)
     check(before["uzawad_jobs", 'status="successful"'] == 0 and before["uzawad_queue_depth", ""] == 0, before)
@@ -38,7 +50,7 @@ def test_counts_follow_what_happens(s):
                "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 2\n2 2 -1\n"}}
     check(s.solve(failing)["status"] == "failed")
     expect(s.get("/nothing"), 404)
-    now = scrape(s)
+    now = scrape_after(s, 2.5)
     check(now["uzawad_jobs", 'status="successful"'] == 2 and now["uzawad_jobs", 'status="failed"'] == 1, now)
     check(now["uzawad_jobs_ended_total", 'status="successful",outcome="converged"'] == 2, now)
     check(now["uzawad_jobs_ended_total", 'status="failed",outcome="none"'] == 1, now)
@@ -57,7 +69,7 @@ def test_counts_follow_what_happens(s):
 def test_histograms_are_cumulative(s):
     for _ in range(3):
         s.solve(MATRICES)
-    values = scrape(s)
+    values = scrape_after(s, 3)
     series = {}
     for (name, labels), value in values.items():
         if name.endswith("_bucket"):
@@ -80,7 +92,8 @@ def test_queue_and_workers(s):
     s.request("DELETE", f"/v1/jobs/{job['id']}")
     for one in waiting:
         s.wait_status(one, "successful")
-    now = scrape(s)
+    s.wait_status(job["id"], "dismissed")
+    now = scrape_after(s, 4)
     check(now["uzawad_queue_depth", ""] == 0 and now["uzawad_jobs_ended_total",
           'status="dismissed",outcome="dismissed"'] == 1, now)
 
