@@ -11,20 +11,22 @@ typedef struct {
     "8 infeasible, 9 dismissed, 10 --timeout passed (the job goes on).\n"
 
 static const page PAGES[CLIENT_COMMANDS] = {
-    [CLIENT_SUBMIT] = {"submit", "submit FILE [options]", "send a problem, and wait for its answer if told to",
-                       "FILE is a request in JSON, \"-\" is standard input. Prints the job's id, and with --wait its\n"
-                       "summary. A repeat after a lost connection never makes a second job.\n"
-                       "\n"
-                       "  -w, --wait         wait until the job has ended and print the summary\n"
-                       "  -t, --timeout S    with --wait: stop waiting after S seconds\n"
-                       "      --tag WORD     label the job; may be repeated\n"
-                       "  -k, --key KEY      idempotency key (default: random); the same key and file give the\n"
-                       "                     same job\n"
-                       "  -q, --quiet        print the id and nothing else\n"
-                       "  -j, --json         print the job as JSON\n"
-                       "      --progress     show progress on stderr even where it is no terminal\n"
-                       "\n"
-                       "Exit status with --wait: " OUTCOME_EXITS},
+    [CLIENT_SUBMIT] =
+        {"submit", "submit FILE [options]", "send a problem, and wait for its answer if told to",
+         "FILE is a request in JSON, \"-\" is standard input. Prints the job's id, and with --wait its\n"
+         "summary. A repeat after a lost connection never makes a second job.\n"
+         "\n"
+         "  -w, --wait         wait until the job has ended and print the summary\n"
+         "                     $UZAWA_TOKEN: the token to send; $UZAWA_CA: file with the certificates to trust\n"
+         "  -t, --timeout S    with --wait: stop waiting after S seconds\n"
+         "      --tag WORD     label the job; may be repeated\n"
+         "  -k, --key KEY      idempotency key (default: random); the same key and file give the\n"
+         "                     same job\n"
+         "  -q, --quiet        print the id and nothing else\n"
+         "  -j, --json         print the job as JSON\n"
+         "      --progress     show progress on stderr even where it is no terminal\n"
+         "\n"
+         "Exit status with --wait: " OUTCOME_EXITS},
     [CLIENT_STATUS] = {"status", "status ID [--json]", "show a job", "Exit status 0 whatever became of the job.\n"},
     [CLIENT_WAIT] = {"wait", "wait ID [options]", "wait until a job has ended, then print its summary",
                      "  -t, --timeout S    stop waiting after S seconds\n"

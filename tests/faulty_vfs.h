@@ -22,6 +22,7 @@ enum { FAULTY_FILES = 64, FAULTY_SECTOR = 512 };
 /* A write or a truncation that is not synced. */
 typedef struct {
     bool truncates;
+    bool forgotten;           /* a sync failed: the kernel takes it for written, and no later sync writes it */
     int64_t at, size;         /* of a write; at: the new size of a truncation */
     int64_t old_size;         /* of the file */
     unsigned char *old, *new; /* what was there (zeros past the end), what is there now */
@@ -81,6 +82,23 @@ static inline void faulty_drop_ops(faulty_record *r)
         free(r->ops[i].new);
     }
     r->n_ops = 0;
+}
+
+/* What a sync makes last: all but what an earlier, failed one forgot; a truncation takes that away too. */
+static inline void faulty_drop_synced(faulty_record *r)
+{
+    size_t kept = 0, cut = 0;
+    for (size_t i = 0; i < r->n_ops; i++)
+        cut = r->ops[i].truncates && r->ops[i].at == 0 && !r->ops[i].forgotten ? i : cut;
+    for (size_t i = 0; i < r->n_ops; i++) {
+        if (r->ops[i].forgotten && i >= cut) {
+            r->ops[kept++] = r->ops[i];
+            continue;
+        }
+        free(r->ops[i].old);
+        free(r->ops[i].new);
+    }
+    r->n_ops = kept;
 }
 
 static inline faulty_record *faulty_find(const char *path, bool add)
@@ -193,8 +211,10 @@ static inline int faulty_sync(sqlite3_file *file, int flags)
     pthread_mutex_lock(&faulty.lock);
     faulty_record *r = ((faulty_file *)(void *)file)->record;
     int rc = faulty_event() ? SQLITE_IOERR_FSYNC : SQLITE_OK;
+    for (size_t i = 0; r && rc != SQLITE_OK && i < r->n_ops; i++)
+        r->ops[i].forgotten = true;
     if (rc == SQLITE_OK && r) {
-        faulty_drop_ops(r);
+        faulty_drop_synced(r);
         if (strstr(r->path, "-wal") || strstr(r->path, "-journal")) /* its folder too, when it is new: os_unix.c */
             for (size_t i = 0; i < faulty.n_records; i++)
                 faulty.records[i].deleted = false;

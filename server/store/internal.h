@@ -36,8 +36,9 @@ struct store {
     pthread_cond_t sync_asked, sync_ended;
     uint64_t committed; /* the last one's number */
     uint64_t wanted;    /* somebody wants those up to here on disk */
-    uint64_t synced;    /* those up to here are, but for those up to */
-    uint64_t lost;      /* here where that could not be had */
+    uint64_t synced;    /* those up to here are */
+    uint64_t failures;  /* times that this could not be had, the last time */
+    uint64_t failed;    /* for those up to here */
     bool sync_stop, sync_started;
     sqlite3_file *log; /* the writer's write-ahead log, set before the thread starts */
     pthread_t syncer;

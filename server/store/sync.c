@@ -41,6 +41,7 @@ static bool save_by_checkpoint(store *s)
 static void *sync_loop(void *argument)
 {
     store *s = argument;
+    bool suspect = false;
     pthread_mutex_lock(&s->sync_lock);
     while (!s->sync_stop) {
         if (s->wanted <= s->synced) {
@@ -50,12 +51,18 @@ static void *sync_loop(void *argument)
         uint64_t upto = s->committed;
         pthread_mutex_unlock(&s->sync_lock);
         double begun = store_clock();
-        bool ok = sync_log(s) == SQLITE_OK || save_by_checkpoint(s);
+        suspect = suspect || sync_log(s) != SQLITE_OK;
+        bool ok = !suspect || save_by_checkpoint(s);
+        suspect = !ok; /* until a checkpoint succeeds a sync's word counts for nothing */
         metrics_seconds(s->metrics, METRIC_COMMIT, store_clock() - begun);
         pthread_mutex_lock(&s->sync_lock);
-        s->synced = upto;
-        if (!ok)
-            s->lost = upto;
+        if (ok) {
+            s->synced = upto;
+        } else { /* those who wait are told so; who asks later has it tried again */
+            s->failures++;
+            s->failed = upto;
+            s->wanted = s->synced;
+        }
         pthread_cond_broadcast(&s->sync_ended);
     }
     pthread_mutex_unlock(&s->sync_lock);
@@ -87,24 +94,31 @@ uint64_t store_note_commit(store *s)
     return number;
 }
 
+/* Under sync_lock. */
+static void want(store *s, uint64_t number)
+{
+    if (number <= s->wanted)
+        return;
+    s->wanted = number;
+    pthread_cond_signal(&s->sync_asked);
+}
+
 void store_want_sync(store *s, uint64_t number)
 {
     pthread_mutex_lock(&s->sync_lock);
-    if (number > s->wanted) {
-        s->wanted = number;
-        pthread_cond_signal(&s->sync_asked);
-    }
+    want(s, number);
     pthread_mutex_unlock(&s->sync_lock);
 }
 
 store_status store_await_sync(store *s, uint64_t number)
 {
-    store_want_sync(s, number);
     pthread_mutex_lock(&s->sync_lock);
-    while (s->synced < number && !s->sync_stop)
+    uint64_t failures = s->failures;
+    while (s->synced < number && !s->sync_stop && (s->failures == failures || s->failed < number)) {
+        want(s, number);
         pthread_cond_wait(&s->sync_ended, &s->sync_lock);
-    /* Whoever waited for a sync that failed is told so; who comes after it relies on the checkpoint's last word. */
-    bool ok = s->synced >= number && s->lost < number;
+    }
+    bool ok = s->synced >= number;
     pthread_mutex_unlock(&s->sync_lock);
     return ok ? STORE_OK : STORE_ERROR;
 }

@@ -67,6 +67,19 @@ def test_scopes(s):
                     check("allow" not in reply.headers, reply)
 
 
+def uzawa(s, *arguments, **environment):
+    return subprocess.run([str(s.build / "uzawa"), *arguments], capture_output=True, text=True, timeout=60, check=False,
+                          env={**os.environ, **environment})
+
+
+@options("--token-file", TOKENS)
+def test_client_sends_its_token(s):
+    got = uzawa(s, "--server", s.url, "list", UZAWA_TOKEN=READ)
+    check(got.returncode == 0, got)
+    got = uzawa(s, "--server", s.url, "list")
+    check(got.returncode == 4 and "401" in got.stderr, got)
+
+
 @options("--token-file", TOKENS)
 def test_wrong_tokens(s):
     for field in (f"Bearer {READ[:-1]}", f"Bearer {READ}x", "Bearer", "Bearer ", f"Basic {READ}", READ, "Bearer " + "x" * 5000,
@@ -243,6 +256,9 @@ def test_tls(s):
             check(status == 200 and json.loads(body)["summary"]["outcome"] == "converged", status, body)
             check(ask("GET", "/v1/jobs")[0] == 200 and ask("GET", "/nothing")[0] == 404)
             check(ask("POST", "/v1/jobs", "x" * 20000)[0] == 413)
+            got = uzawa(s, "--server", line.split()[-1], "list", UZAWA_CA=cert)
+            check(got.returncode == 0, got)
+            check(uzawa(s, "--server", line.split()[-1], "--retry", "0", "list").returncode == 3, "it trusts anybody")
             # A slow client is cut off, without plain text in the encrypted stream.
             with socket_to(port) as raw, context.wrap_socket(raw, server_hostname="127.0.0.1") as slow:
                 slow.sendall(b"GET /healthz HT")

@@ -1,5 +1,6 @@
 """What the daemon tells its operators: metrics, health, request ids."""
 import re
+import time
 
 import service
 from service import ENDLESS, MATRICES, SCENE, check, expect, options
@@ -28,6 +29,18 @@ def scrape(s):
     return values
 
 
+def scrape_after(s, solved, failed=0):
+    """The values once so many jobs were counted: a job is counted just after its end can be read, its phases last."""
+    end = time.monotonic() + 20
+    while True:
+        values = scrape(s)
+        if (values["uzawad_job_phase_seconds_count", 'phase="certify"'] == solved and
+                values["uzawad_job_phase_seconds_count", 'phase="total"'] == solved + failed):
+            return values
+        check(time.monotonic() < end, values)
+        time.sleep(0.05)
+
+
 def test_counts_follow_what_happens(s):
     before = scrape(s)
     check(before["uzawad_jobs", 'status="successful"'] == 0 and before["uzawad_queue_depth", ""] == 0, before)
@@ -38,7 +51,7 @@ def test_counts_follow_what_happens(s):
                "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 2\n2 2 -1\n"}}
     check(s.solve(failing)["status"] == "failed")
     expect(s.get("/nothing"), 404)
-    now = scrape(s)
+    now = scrape_after(s, 2, 1)
     check(now["uzawad_jobs", 'status="successful"'] == 2 and now["uzawad_jobs", 'status="failed"'] == 1, now)
     check(now["uzawad_jobs_ended_total", 'status="successful",outcome="converged"'] == 2, now)
     check(now["uzawad_jobs_ended_total", 'status="failed",outcome="none"'] == 1, now)
@@ -57,7 +70,7 @@ def test_counts_follow_what_happens(s):
 def test_histograms_are_cumulative(s):
     for _ in range(3):
         s.solve(MATRICES)
-    values = scrape(s)
+    values = scrape_after(s, 3)
     series = {}
     for (name, labels), value in values.items():
         if name.endswith("_bucket"):
@@ -80,9 +93,13 @@ def test_queue_and_workers(s):
     s.request("DELETE", f"/v1/jobs/{job['id']}")
     for one in waiting:
         s.wait_status(one, "successful")
-    now = scrape(s)
-    check(now["uzawad_queue_depth", ""] == 0 and now["uzawad_jobs_ended_total",
-          'status="dismissed",outcome="dismissed"'] == 1, now)
+    s.wait_status(job["id"], "dismissed")
+    end = time.monotonic() + 20
+    dismissed = {}
+    while not dismissed and time.monotonic() < end:  # stopped before its first iteration it has no outcome
+        now = scrape(s)
+        dismissed = {labels: value for (name, labels), value in now.items() if 'status="dismissed",' in labels}
+    check(list(dismissed.values()) == [1] and now["uzawad_queue_depth", ""] == 0, now)
 
 
 def test_ready_solves_a_problem(s):

@@ -187,6 +187,10 @@ static void lose_power(long run)
     if (!place_begin(&p)) /* the cut may come while the file is made too */
         return;
     faulty.cut_at = faulty.events + 1 + (long)(faulty_random(&seed) % 400);
+    if (run % 2) { /* a write or a sync fails before */
+        faulty.fail_at = faulty.events + 1 + (long)(faulty_random(&seed) % 100);
+        faulty.fail_code = SQLITE_IOERR_WRITE;
+    }
     for (int step = 0; step < 400 && !power.cut && p.s; step++) {
         unsigned what = faulty_random(&seed) % 16;
         if (what < 7)
@@ -195,7 +199,7 @@ static void lose_power(long run)
             step_run(p.s, &t);
         else if (what < 15)
             step_delete(p.s, &t);
-        else
+        else if (faulty.fired || !faulty.fail_at)
             place_reopen(&p); /* checkpoints and starts another log */
     }
     place_end(&p);
