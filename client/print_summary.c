@@ -15,6 +15,7 @@ static const char *outcome_in_words(const char *outcome)
         {"infeasible", "no displacement satisfies all contact conditions"},
         {"dismissed", "it was dismissed; this is the best answer so far"},
         {"verified", "the certificate of the given answer meets what was asked for"},
+        {"mesh_limit", "a grid that meets what was asked for is larger than allowed"},
         {"not_verified", "the certificate of the given answer does not meet what was asked for"},
     };
     for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
@@ -104,6 +105,36 @@ static void print_problem_size(FILE *to, const json_t *summary)
     fprintf(to, ", %.0f unknowns, %.0f contact conditions\n", d, m);
 }
 
+static void print_cells(FILE *to, const json_t *cells)
+{
+    for (size_t i = 0; i < json_array_size(cells); i++)
+        fprintf(to, "%s%.0f", i ? " x " : "", json_number_value(json_array_get(cells, i)));
+}
+
+/* A box whose cells were chosen: the grid of the answer, and all that were tried. */
+static void print_ladder(FILE *to, const json_t *summary)
+{
+    const json_t *ladder = client_json_at(summary, "mesh.ladder"), *rung;
+    char d[32], mesh[32], certified[32], iterations[32], seconds[32];
+    size_t i;
+    if (!json_is_array(ladder))
+        return;
+    label(to, "mesh");
+    print_cells(to, client_json_at(summary, "mesh.cells"));
+    fprintf(to, " cells, chosen after %zu grid%s:\n", json_array_size(ladder), json_array_size(ladder) > 1 ? "s" : "");
+    fprintf(to, "%12s%9s  %10s  %10s  %10s  %s\n", "", "unknowns", "mesh error", "certified", "iterations", "time");
+    json_array_foreach((json_t *)ladder, i, rung)
+    {
+        fprintf(to, "%12s%9s  %10s  %10s  %10s  %s  ", "", number_in_words(d, rung, "d", 9),
+                number_in_words(mesh, rung, "discretization_error", 3),
+                number_in_words(certified, rung, "certified_error", 2),
+                number_in_words(iterations, rung, "iterations", 9),
+                client_format_seconds(seconds, sizeof seconds, client_json_number(rung, "seconds")));
+        print_cells(to, json_object_get(rung, "cells"));
+        fputc('\n', to);
+    }
+}
+
 /* A body that its supports leave free to move. */
 static void print_held(FILE *to, const json_t *summary)
 {
@@ -155,11 +186,13 @@ static void print_energy(FILE *to, const json_t *summary)
 
 static void print_request_met(FILE *to, const json_t *summary)
 {
-    double asked = client_json_number(summary, "requested_error");
+    double asked = client_json_number(summary, "requested_error"), total = client_json_number(summary, "total_error");
     bool met = strcmp(client_json_text(summary, "outcome"), "converged") == 0 ||
                strcmp(client_json_text(summary, "outcome"), "verified") == 0;
     if (!isfinite(asked))
         fputs("\n", to);
+    else if (isfinite(total))
+        fprintf(to, "\n%12stotal error about %.2g (asked for %.3g: %s)\n", "", total, asked, met ? "met" : "not met");
     else if (asked > 0)
         fprintf(to, " (asked for %.3g: %s)\n", asked, met ? "met" : "not met");
     else
@@ -288,6 +321,7 @@ void client_print_summary(FILE *to, const json_t *job)
     print_outcome(to, summary);
     print_case_counts(to, summary);
     print_problem_size(to, summary);
+    print_ladder(to, summary);
     print_held(to, summary);
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))

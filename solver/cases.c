@@ -1,4 +1,5 @@
 /* cases.c: one body, one or many loads. */
+#include "adaptive/ladder.h"
 #include "block.h"
 #include "cache/cache.h"
 #include "core/alloc.h"
@@ -271,8 +272,8 @@ static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status ref
     return status;
 }
 
-uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
-                         const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
+                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     batch b = {.problem = problem, .settings = settings, .hooks = hooks, .starts = starts, .n = n};
@@ -288,6 +289,14 @@ uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_s
     else
         uz_results_free(b.results, n);
     return status;
+}
+
+uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
+                         const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    if (uz_cells_are_chosen(problem))
+        return uz_solve_ladder(out, problem, settings, starts, cache, hooks, err);
+    return uz_solve_on_mesh(out, problem, settings, starts, cache, hooks, err);
 }
 
 uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,

@@ -82,6 +82,10 @@ void uz_blank_answer(uz_result *result);
 /* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */
 void uz_explain_outcome(uz_result *result, uz_end end);
 
+/* uz_solve_cases on a mesh that is given, and on one whose cells are chosen (adaptive/ladder.c). */
+uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
+                           const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+
 /* uz_solve for a K that is positive definite; others are refused. */
 uz_status uz_solve_regular(uz_result **out, const uz_problem *problem, const uz_settings *settings, uz_cache *cache,
                            const uz_hooks *hooks, uz_error *err);

@@ -163,12 +163,15 @@ bool uz_element_parse(uz_element_kind *out, const char *name);
 int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */
 int uz_element_node_count(uz_element_kind kind); /* 3 to 10 */
 
+/* A rectangle or a cuboid in cells along the axes. Its sides are the groups left and right (x), bottom and top (y),
+ * back and front (z, 3D only). */
 typedef struct {
     double origin[3], size[3];
     int64_t cells[3];
     double grading[3]; /* last cell over first cell along each axis, > 0; 1 (or 0: not given): all equal */
     char element[16];  /* "quad4", "hex8", ... */
     int dim;           /* 2 or 3 */
+    bool automatic;    /* uz_solve and uz_solve_cases choose the cells; those above are not read */
 } uz_box;
 
 /* A named part of a mesh as somebody gave it: by nodes, by edges or faces, or by elements. */
@@ -193,10 +196,12 @@ typedef struct {
 } uz_given_mesh;
 void uz_given_mesh_clear(uz_given_mesh *mesh);
 
-/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary; physical groups become groups. Nodes and elements are
- * numbered from 0 in the order of the file; only the elements of the highest dimension are elements, the others are
- * edges and faces of groups. A flat mesh (all z equal) is plane. max_bytes (0: none) bounds what the result may take.
- * Errors: UZ_ERR_FORMAT with the line, _UNSUPPORTED, _NOT_FINITE, _LIMIT, _MEMORY.
+/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary. Nodes and elements are numbered from 0 in the order of
+ * the file; only the elements of the highest dimension are elements. Physical groups of that dimension become groups of
+ * elements, of one less groups of edges or faces, of still less groups of nodes; one without a name is "physical_7", or
+ * "physical_7_dim1" if a nameless one of higher dimension has that number too. A flat mesh (all z equal) is plane;
+ * other surfaces are refused. max_bytes (0: none) bounds what the result may take. Errors: UZ_ERR_FORMAT, _UNSUPPORTED,
+ * _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
  * Source: Gmsh reference manual, section "Gmsh file formats". */
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 
@@ -296,11 +301,13 @@ typedef struct {
 void uz_mesh_info_clear(uz_mesh_info *info);
 
 /* Mesh, assembly, boundary conditions: the scene as matrices. Their dofs are the free ones, node by node, along x, y,
- * z; at a node whose first contact has an oblique normal along that normal and tangents (info->frame), so that its row
- * of N has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
- * pointer into the problem. Nothing is factored. */
+ * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one
+ * whose first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE,
+ * _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON pointer into the problem. Nothing is factored.
+ */
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
-/* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. */
+/* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. A box whose cells are
+ * chosen here is checked on the first grid that would be tried; the other functions of a scene refuse it. */
 uz_status uz_scene_check(const uz_scene *scene, uz_error *err);
 /* What an answer's vectors measure, without the stiffness matrix: directions, nodes and contact rows m. */
 uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene *scene, uz_error *err);
@@ -376,8 +383,9 @@ typedef enum {
     UZ_PAPER_RULE,      /* the paper's stopping rule ended it before the certificate met the request */
     UZ_INFEASIBLE,
     UZ_DISMISSED,
-    UZ_VERIFIED,    /* uz_verify: the certificate of the given answer meets the request */
-    UZ_NOT_VERIFIED /* uz_verify: it does not; the bound says how far it reaches */
+    UZ_VERIFIED,     /* uz_verify: the certificate of the given answer meets the request */
+    UZ_NOT_VERIFIED, /* uz_verify: it does not; the bound says how far it reaches */
+    UZ_MESH_LIMIT    /* cells chosen here: the grid that would meet the request is larger than allowed */
 } uz_outcome;
 const char *uz_outcome_name(uz_outcome);
 
@@ -476,13 +484,30 @@ typedef struct {
     uz_resultant *contacts,
         *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
     uz_resultant loads; /* all of them; on is "" */
-    /* What the forces and moments (about the middle of the body, by its extent) leave over, relative to the sum of
-     * their sizes. */
+    /* What the forces and moments (about the first node, by the body's extent) leave over, relative to the sum of the
+     * forces' sizes. */
     double imbalance;
     int n_warnings;
     uz_warning warnings[4];
 } uz_evaluation;
 void uz_evaluation_free(uz_evaluation *evaluation);
+
+/* One grid that was tried for a box whose cells are chosen here. Of several load cases: the worst errors. */
+typedef struct {
+    int64_t cells[3], d, iterations;
+    double discretization_error; /* estimated */
+    double certified_error;      /* bound, of what the equations of this grid leave */
+    double seconds;
+} uz_rung;
+
+enum { UZ_LADDER_RUNGS = 16 };
+
+/* The grids in the order in which they were tried; the answer is on `cells`, which need not be the last of them. */
+typedef struct {
+    int dim, count;
+    uz_rung rung[UZ_LADDER_RUNGS];
+    int64_t cells[3];
+} uz_ladder;
 
 typedef struct {
     uz_outcome outcome;
@@ -499,8 +524,9 @@ typedef struct {
     double max_pressure;         /* scene: the largest of the result's pressure; NaN otherwise */
     double alpha, lambda_max;    /* NaN where no gradient step was taken */
     double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
-    double infeasible_radius;    /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
-    double requested_error;      /* the relative error that `converged` had to meet */
+    double total_error;       /* cells chosen here: sqrt(discretization_error^2 + the certificate's relative_error^2) */
+    double infeasible_radius; /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
+    double requested_error;   /* the relative error that `converged` had to meet */
     uz_certificate certificate;
     uz_semicoercive semicoercive;
     bool factor_cached; /* everything about the body was */
@@ -514,6 +540,7 @@ typedef struct {
     uz_timings timings;
     char message[256];               /* one sentence on the outcome where it is not `converged`; "" otherwise */
     const uz_evaluation *evaluation; /* scenes with an answer: the result's own; else NULL */
+    const uz_ladder *ladder;         /* cells chosen here: the result's own; else NULL */
 } uz_summary;
 
 /* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.
@@ -543,6 +570,7 @@ typedef struct {
     double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof; u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_evaluation *evaluation;
+    uz_ladder *ladder; /* box whose cells were chosen here */
     uz_history history;
     uz_state *state; /* where the iterations stood; NULL: nothing to continue */
 } uz_result;
@@ -554,6 +582,9 @@ typedef struct {
     bool (*cancelled)(void *ctx);                           /* may be NULL */
     void (*progress)(void *ctx, const uz_history_row *row); /* may be NULL; after each iteration */
     void (*begins)(void *ctx, int64_t load_case);           /* may be NULL; before the first iteration of a case */
+    /* may be NULL; cells chosen here: before each grid, the shares of the whole, 0 to 1, that it begins and ends with,
+     * by estimate */
+    void (*grid)(void *ctx, double from, double to);
 } uz_hooks;
 
 /* ------------------------------------------------------------------ fields */
@@ -647,6 +678,9 @@ uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **entries, size_t *count
 
 /* ------------------------------------------------------------------ solve */
 
+/* What `balanced` asks for where the cells are chosen too. */
+#define UZ_BALANCED_TOTAL_ERROR 5e-2
+
 /* Solves one problem: the pipeline from scene or matrices to a certified result. `cache` may be NULL.
  * The problem is only read; one with load cases is for uz_solve_cases. Called from many threads at once with one
  * cache. Prepare each calling thread once with uz_thread_init. */
@@ -666,7 +700,15 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
  * that the solution itself takes none. A start of another m is UZ_ERR_SIZE, one that is not finite UZ_ERR_NOT_FINITE,
  * one that no run can have left UZ_ERR_ARGUMENT. An error is that of the first case that fails as a call (its pointer
  * in err->where: "/cases/3/loads/0/on",
- * "/cases/3/p", "/cases/3/start"). The hook `begins` is called again for a case that goes on after others began. */
+ * "/cases/3/p", "/cases/3/start"). The hook `begins` is called again for a case that goes on after others began.
+ *
+ * A box whose cells are chosen here (uz_box.automatic) is solved on a ladder of grids with cells near square, each
+ * started from the contact pressure of the one before. relative_error then bounds the total error
+ * sqrt(discretization^2 + algebraic^2), whose first part is an estimate (uz_summary.discretization_error) and whose
+ * second is certified; `balanced` stands for UZ_BALANCED_TOTAL_ERROR. The answer is that of the coarsest grid found to
+ * meet it in every case: no other that was tried or that the observed rate predicts saves a quarter of its dofs. What
+ * could not be met ends in UZ_MESH_LIMIT or UZ_TIME_LIMIT, with the answer of the smallest total error. Starts and the
+ * paper's stopping rule are UZ_ERR_ARGUMENT there. */
 uz_status uz_solve_cases(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 void uz_results_free(uz_result **results, int64_t n);

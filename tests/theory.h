@@ -227,4 +227,102 @@ static inline void theory_beam(theory_table *t, const char *element, uz_formulat
     theory_clear(&s, result);
 }
 
+/* ---- a cylinder of steel, R = 50, pressed by 35 kN/mm on a block of aluminium: NAFEMS, "Benchmark tests for finite
+ * element modelling of contact", 2D roller (mm, N, MPa). Half of the lower half of the cylinder, up to its centre. */
+
+/* Adds the mesh of `from` to that of `to`; its groups come with `prefix` before their names, as do those of `to` with
+ * `own`. */
+static inline void theory_join(uz_scene *to, const char *own, uz_scene *from, const char *prefix)
+{
+    uz_given_mesh *a = &to->given, *b = &from->given;
+    const int64_t nodes = a->n_nodes, elements = a->n_elements, ends = a->first[elements],
+                  more = b->first[b->n_elements];
+    const int64_t n_groups = a->n_groups + b->n_groups;
+    a->xyz = realloc(a->xyz, (size_t)((nodes + b->n_nodes) * a->dim) * sizeof *a->xyz);
+    a->kind = realloc(a->kind, (size_t)(elements + b->n_elements));
+    a->first = realloc(a->first, (size_t)(elements + b->n_elements + 1) * sizeof *a->first);
+    a->node = realloc(a->node, (size_t)(ends + more) * sizeof *a->node);
+    a->groups = realloc(a->groups, (size_t)n_groups * sizeof *a->groups);
+    if (!a->xyz || !a->kind || !a->first || !a->node || !a->groups)
+        abort();
+    memcpy(a->xyz + nodes * a->dim, b->xyz, (size_t)(b->n_nodes * a->dim) * sizeof *a->xyz);
+    memcpy(a->kind + elements, b->kind, (size_t)b->n_elements);
+    for (int64_t e = 0; e <= b->n_elements; e++)
+        a->first[elements + e] = ends + b->first[e];
+    for (int64_t i = 0; i < more; i++)
+        a->node[ends + i] = nodes + b->node[i];
+    for (int64_t i = 0; i < n_groups; i++) {
+        const bool mine = i < a->n_groups;
+        char name[64];
+        uz_given_group *group = &a->groups[i];
+        if (!mine)
+            *group = b->groups[i - a->n_groups];
+        snprintf(name, sizeof name, "%s_%.40s", mine ? own : prefix, group->name);
+        memcpy(group->name, name, sizeof name);
+        for (int64_t k = 0; !mine && k < group->n_elements; k++)
+            group->element[k] += elements;
+        for (int64_t k = 0; !mine && group->n_faces > 0 && k < group->face_first[group->n_faces]; k++)
+            group->face_node[k] += nodes;
+    }
+    a->n_groups = n_groups;
+    a->n_nodes += b->n_nodes;
+    a->n_elements += b->n_elements;
+    free(b->xyz);
+    free(b->kind);
+    free(b->first);
+    free(b->node);
+    free(b->groups);
+    *b = (uz_given_mesh){.dim = a->dim};
+    uz_scene_clear(from);
+}
+
+/* The lower quarter: from the arc, that far along it, to the level of the centre. */
+static inline uz_scene theory_cylinder(const char *element, int per_radius, double a, double growth)
+{
+    const double R = 50, reach = 80 * M_PI / 180;
+    const theory_lines along = theory_graded(per_radius + per_radius / 2, a / per_radius, growth, R * reach);
+    const theory_lines up = theory_graded(per_radius + per_radius / 2, a / per_radius, growth, R);
+    uz_scene s = theory_scene(UZ_PLANE_STRAIN, element, along.cells, up.cells, 0);
+    body_give_mesh(&s, NULL);
+    for (int64_t i = 0; i < s.given.n_nodes; i++) {
+        double *x = s.given.xyz + 2 * i;
+        const double angle = theory_line(&along, x[0]) / R, t = theory_line(&up, x[1]) / R;
+        x[0] = (1 - t) * R * sin(angle) + t * R * angle / reach;
+        x[1] = (1 - t) * R * (1 - cos(angle)) + t * R;
+    }
+    return s;
+}
+
+static inline void theory_roller(theory_table *t, const char *element, int per_radius, double growth)
+{
+    const double a = 6.215, force = 35e3;
+    const theory_lines x = theory_graded(per_radius + per_radius / 2, a / per_radius, growth, 100);
+    const theory_lines y = theory_graded(per_radius + per_radius / 2, a / per_radius, growth, 200);
+    uz_scene s = theory_scene(UZ_PLANE_STRAIN, element, x.cells, y.cells, 0);
+    uz_scene roller = theory_cylinder(element, per_radius, a, growth);
+    body_give_mesh(&s, NULL);
+    for (int64_t i = 0; i < s.given.n_nodes; i++) {
+        s.given.xyz[2 * i] = theory_line(&x, s.given.xyz[2 * i]);
+        s.given.xyz[2 * i + 1] = -theory_line(&y, y.cells - s.given.xyz[2 * i + 1]);
+    }
+    theory_join(&s, "block", &roller, "roller");
+    s.materials[0] = (uz_material){.on = "block_all", .young = 70e3, .poisson = 0.3};
+    s.materials[s.n_materials++] = (uz_material){.on = "roller_all", .young = 210e3, .poisson = 0.3};
+    body_hold(&s, "block_left", 0, NAN, NAN);
+    body_hold(&s, "block_bottom", NAN, 0, NAN);
+    body_hold(&s, "roller_left", 0, NAN, NAN);
+    body_load(&s, UZ_LOAD_FORCE, "roller_top", 0, -0.5 * force, 0);
+    uz_contact *contact = body_plane(&s, "roller_bottom", (double[3]){0}, (double[3]){0, 1, 0});
+    contact->kind = UZ_OBSTACLE_BODY;
+    snprintf(contact->with, sizeof contact->with, "block_top");
+    uz_result *result = body_solve(&s, 1e-5);
+    char name[80];
+    snprintf(name, sizeof name, "NAFEMS roller, %s, %d cells in the half width", element, per_radius);
+    theory_add(t, name, "p0", result->summary.max_pressure, 3585);
+    theory_add(t, name, "a", result->evaluation->contact_area, a);
+    CHECK(fabs(result->evaluation->contacts[0].force[1] / (0.5 * force) - 1) < 1e-4);
+    CHECK(result->evaluation->imbalance < 1e-5);
+    theory_clear(&s, result);
+}
+
 #endif

@@ -105,7 +105,7 @@ char *codec_encode_jobs(const job *jobs, size_t count,
 char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind);
 
 /* How many cases of a job ended in each way. */
-#define CODEC_OUTCOMES (UZ_NOT_VERIFIED + 1)
+#define CODEC_OUTCOMES (UZ_MESH_LIMIT + 1)
 typedef struct {
     int64_t count, outcomes[CODEC_OUTCOMES];
     const char *worst; /* name */

@@ -256,6 +256,34 @@ static const char *schema_of(codec_kind kind, const json_doc *doc)
     return verify ? "verify.json" : "request.json";
 }
 
+/* A box whose cells are to be chosen has no mesh yet that a vector could belong to, and no other rule than the error
+ * that they could be chosen by. */
+static bool decode_automatic(codec_request *out, const json_t *solver, bool verify, problem_details *problem)
+{
+    json_path top = {NULL, "problem", 7, 0}, mesh = {&top, "mesh", 4, 0}, box = {&mesh, "box", 3, 0};
+    json_path cells = {&box, "cells", 5, 0}, root = {NULL, "solver", 6, 0};
+    json_path stopping = {&root, "stopping", 8, 0}, start = {&root, "warm_start", 10, 0};
+    const uz_problem *p = &out->problem;
+    if (p->kind != UZ_PROBLEM_SCENE || !p->scene.box.automatic)
+        return true;
+    if (!json_object_get(solver, "accuracy"))
+        out->settings.balanced = true;
+    if (verify)
+        problem_set(problem, 422, "not_allowed", &cells,
+                    "An answer belongs to a mesh: give the numbers of its cells in place of \"auto\".");
+    else if (out->settings.stopping == UZ_STOP_PAPER)
+        problem_set(problem, 422, "not_allowed", &stopping,
+                    "The paper's rule bounds no error that the cells of the box could be chosen by.");
+    else if (json_object_get(solver, "warm_start"))
+        problem_set(
+            problem, 422, "not_allowed", &start,
+            "Reactions belong to a mesh, and the cells of the box are still to be chosen: each grid starts from "
+            "the one before it.");
+    else
+        return true;
+    return false;
+}
+
 /* The parts of a checked document, each where the next may need it. */
 static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_details *problem)
 {
@@ -265,7 +293,7 @@ static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_
     out->queue_limit_s = json_real_value(json_object_get(doc->root, "queue_limit_s"));
     return decode_webhook(&out->webhook, json_object_get(doc->root, "webhook"), problem) &&
            decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
-           decode_problem(&out->problem, doc, len, problem) &&
+           decode_problem(&out->problem, doc, len, problem) && decode_automatic(out, solver, answer != NULL, problem) &&
            decode_cases(&out->problem, doc, json_object_get(doc->root, "cases"), len, problem) &&
            decode_start(&out->start, doc, json_object_get(solver, "warm_start"), len, problem) &&
            (!answer || decode_answer(&out->answer, doc, answer, len, problem));

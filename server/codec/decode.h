@@ -51,7 +51,7 @@ bool decode_check(const json_doc *doc, const char *schema, problem_details *prob
 bool decode_no_memory(problem_details *problem); /* 503; returns false */
 /* Room for the items of a list that may be absent, zeroed; NULL: *problem. */
 void *decode_room(const json_t *list, size_t size, int64_t *count, problem_details *problem);
-/* A group's name; a longer one, which no mesh has, is cut. */
+/* A group's name; one that no mesh has (too long, or with a NUL in it) becomes "". */
 void decode_name(char *out, size_t size, const json_t *object, const char *key, const char *otherwise);
 /* The vector `key` of an object into out[0..dim), `otherwise` in what is absent and 0 beyond dim; false if it has not
  * dim numbers. */

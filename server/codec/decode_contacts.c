@@ -159,7 +159,7 @@ static const struct {
 } SHAPES[] = {{"plane", read_plane},       {"circle", read_round},      {"sphere", read_round},
               {"cylinder", read_cylinder}, {"polyline", read_polyline}, {"height", read_height}};
 
-static bool decode_contact(obstacle_reading *r, const json_t *item, const json_path *item_at)
+static bool decode_contact(const obstacle_reading *r, const json_t *item, const json_path *item_at)
 {
     const json_t *obstacle = json_object_get(item, "obstacle");
     json_path at = {item_at, "obstacle", 8, 0};
@@ -169,9 +169,10 @@ static bool decode_contact(obstacle_reading *r, const json_t *item, const json_p
     for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {
         const json_t *shape = json_object_get(obstacle, SHAPES[k].key);
         json_path shape_at = {&at, SHAPES[k].key, strlen(SHAPES[k].key), 0};
-        r->at = &shape_at;
+        obstacle_reading here = *r;
+        here.at = &shape_at;
         if (shape)
-            return SHAPES[k].read(r, shape);
+            return SHAPES[k].read(&here, shape);
     }
     return true;
 }

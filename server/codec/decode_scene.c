@@ -13,8 +13,11 @@ static const double MAX_CELLS = 1e7; /* keeps a tiny request from asking for a m
 
 void decode_name(char *out, size_t size, const json_t *object, const char *key, const char *otherwise)
 {
-    const char *text = json_string_value(json_object_get(object, key));
-    snprintf(out, size, "%s", text ? text : otherwise);
+    const json_t *value = json_object_get(object, key);
+    const char *text = value ? json_string_value(value) : otherwise;
+    const size_t len = text ? strlen(text) : size;
+    const bool whole = len < size && (!value || json_string_length(value) == len);
+    memcpy(out, whole ? text : "", whole ? len + 1 : 1);
 }
 
 void *decode_room(const json_t *list, size_t size, int64_t *count, problem_details *problem)
@@ -74,15 +77,17 @@ static bool decode_box(uz_scene *out, const json_t *box, problem_details *proble
     json_path top = {NULL, "problem", 7, 0}, mesh = {&top, "mesh", 4, 0}, here = {&mesh, "box", 3, 0};
     json_path path = {&here, "cells", 5, 0};
     const int dim = uz_scene_dim(out);
-    double cells[3], count = 1;
+    const bool automatic = json_is_string(json_object_get(box, "cells"));
+    double cells[3] = {0}, count = 1;
     if (!decode_components(out->box.origin, box, "origin", 0, dim, &here, problem) ||
         !decode_components(out->box.size, box, "size", 0, dim, &here, problem) ||
-        !decode_components(cells, box, "cells", 0, dim, &here, problem) ||
+        (!automatic && !decode_components(cells, box, "cells", 0, dim, &here, problem)) ||
         !decode_components(out->box.grading, box, "grading", 1, dim, &here, problem))
         return false;
     decode_name(out->box.element, sizeof out->box.element, box, "element", dim == 3 ? "hex8" : "quad4");
     out->source = UZ_MESH_BOX;
     out->box.dim = dim;
+    out->box.automatic = automatic;
     for (int i = 0; i < 3; i++) {
         out->box.cells[i] = (int64_t)cells[i];
         count *= i < dim ? cells[i] : 1;

@@ -225,6 +225,41 @@ static void put_problem(text *t, const uz_summary *s, bool scene)
     text_close(t, '}');
 }
 
+/* cells: as many as the box has directions. */
+static void put_cells(text *t, const int64_t *cells, int dim)
+{
+    text_key(t, "cells");
+    text_open(t, '[');
+    for (int axis = 0; axis < dim; axis++)
+        text_integer(t, cells[axis]);
+    text_close(t, ']');
+}
+
+/* A box whose cells were chosen: the grids that were tried for it. */
+static void put_ladder(text *t, const uz_ladder *ladder)
+{
+    text_key(t, "mesh");
+    text_open(t, '{');
+    put_cells(t, ladder->cells, ladder->dim);
+    text_key(t, "ladder");
+    text_open(t, '[');
+    for (int i = 0; i < ladder->count; i++) {
+        const uz_rung *rung = &ladder->rung[i];
+        text_open(t, '{');
+        put_cells(t, rung->cells, ladder->dim);
+        put_count(t, "d", rung->d);
+        put_count(t, "iterations", rung->iterations);
+        put_named(t,
+                  (named[]){{"discretization_error", rung->discretization_error},
+                            {"certified_error", rung->certified_error},
+                            {"seconds", rung->seconds}},
+                  3);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+    text_close(t, '}');
+}
+
 static void put_cases(text *t, const codec_cases *cases)
 {
     text_key(t, "cases");
@@ -270,6 +305,10 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
                         {"alpha", summary->alpha},
                         {"lambda_max", summary->lambda_max}},
               4);
+    if (summary->ladder) {
+        put_named(&t, (named[]){{"total_error", summary->total_error}}, 1);
+        put_ladder(&t, summary->ladder);
+    }
     if (summary->outcome == UZ_INFEASIBLE)
         put_named(&t, (named[]){{"infeasible_radius", summary->infeasible_radius}}, 1);
     if (summary->semicoercive.free_modes > 0)

@@ -111,6 +111,21 @@ void fields_close(field_reader *reader)
 
 /* ---------------------------------------------------------------- computing */
 
+/* The cells that were chosen for a box go into it. */
+static store_status take_cells(uz_box *box, const field_reader *reader)
+{
+    double *cells = NULL;
+    int64_t count = 0;
+    if (!box->automatic)
+        return STORE_OK;
+    store_status status = store_get_vector(reader->context->store, reader->j->id, 0, "cells", &cells, &count);
+    for (int i = 0; status == STORE_OK && i < 3 && i < count; i++)
+        box->cells[i] = (int64_t)cells[i];
+    box->automatic = status != STORE_OK;
+    free(cells);
+    return status;
+}
+
 /* The scene with the loads of the case; borrowed. */
 static uz_scene scene_of_case(const field_reader *reader, int64_t number)
 {
@@ -174,11 +189,13 @@ static bool compute(void *out, computation run, const field_reader *reader, int6
                     http_reply *reply)
 {
     const uz_hooks hooks = {.ctx = (void *)reader, .cancelled = is_over};
-    const uz_scene scene = scene_of_case(reader, number);
+    uz_scene scene = scene_of_case(reader, number);
     stored_answer answer;
     uz_error err = {0};
     bool done = false;
     store_status found = read_answer(&answer, reader, number);
+    if (found == STORE_OK)
+        found = take_cells(&scene.box, reader);
     if (found == STORE_OK) {
         uz_status status = run(out, &scene, &answer.source, which, &hooks, &err);
         done = status == UZ_OK;

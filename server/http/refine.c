@@ -63,6 +63,16 @@ static void submit(api *context, http_request *rq, const store_request *request,
     job_clear(&j);
 }
 
+/* A run on a grid that nobody gave can't go on: another accuracy asks for another grid. */
+static bool chose_cells(api *context, const job *j)
+{
+    double *cells = NULL;
+    int64_t count = 0;
+    const store_status status = store_get_vector(context->store, j->id, 0, "cells", &cells, &count);
+    free(cells);
+    return status == STORE_OK;
+}
+
 static void refine(api *context, http_request *rq, const job *old, const char *key, http_reply *reply)
 {
     char *old_body = NULL, *body = NULL;
@@ -74,6 +84,11 @@ static void refine(api *context, http_request *rq, const job *old, const char *k
     } else if (codec_is_verify(old_body, old_len)) {
         reply_refuse(reply, 409, "not_solved_here", "The job solved nothing",
                      "it certified an answer that was given to it, and there is no run to continue");
+    } else if (chose_cells(context, old)) {
+        reply_refuse(
+            reply, 409, "mesh_is_chosen", "The job chose its mesh",
+            "the cells of its box were chosen for its accuracy: send the problem again with another accuracy, or "
+            "with the cells of this job's summary");
     } else {
         make_request(context, rq, old, old_body, old_len, &body, &len, &made, reply);
         free(old_body); /* as large as the new one: not kept while the client waits */

@@ -157,15 +157,19 @@ static uz_fields cut_computed(const uz_fields *computed, const field_list *field
     const int64_t k = view.components, m = view.m, nodes = view.n_nodes;
     const struct {
         double **x;
-        int64_t entries, size;
-    } LIST[] = {{&view.pressure, m, 1},      {&view.contact_status, m, 1}, {&view.stress, nodes, k},
-                {&view.principal, nodes, 3}, {&view.von_mises, nodes, 1},  {&view.strain, nodes, k}};
+        int64_t *left, entries, size;
+    } LIST[] = {{&view.pressure, &view.m, m, 1},
+                {&view.contact_status, &view.m, m, 1},
+                {&view.stress, &view.n_nodes, nodes, k},
+                {&view.principal, &view.n_nodes, nodes, 3},
+                {&view.von_mises, &view.n_nodes, nodes, 1},
+                {&view.strain, &view.n_nodes, nodes, k}};
     for (size_t i = 0; fields->part && i < sizeof LIST / sizeof LIST[0]; i++) {
         const double *x = *LIST[i].x;
         int64_t n = LIST[i].entries * LIST[i].size;
         cut(&x, &n, LIST[i].size, fields);
         *LIST[i].x = (double *)x;
-        *(LIST[i].entries == m && i < 2 ? &view.m : &view.n_nodes) = n / LIST[i].size;
+        *LIST[i].left = n / LIST[i].size;
     }
     return view;
 }

@@ -18,7 +18,8 @@ static void add_vector(answer_parts *to, const char *name, const double *data, i
     v->count = count;
 }
 
-/* The mesh is the same for all cases: dim, nodes, contact_nodes. */
+/* The mesh is the same for all cases: dim, nodes, contact_nodes; cells where they were chosen, which the request does
+ * not say. */
 static bool add_places(answers *a, answer_parts *to, const uz_result *result, bool is_scene)
 {
     a->dim = is_scene ? result->mesh.dim : 0;
@@ -26,6 +27,9 @@ static bool add_places(answers *a, answer_parts *to, const uz_result *result, bo
     if (!is_scene)
         return true;
     add_vector(to, "nodes", result->mesh.xyz, result->mesh.n_nodes * result->mesh.dim);
+    for (int i = 0; result->ladder && i < 3; i++)
+        a->cells[i] = (double)result->ladder->cells[i];
+    add_vector(to, "cells", result->ladder ? a->cells : NULL, 3);
     if (!result->mesh.contact_node)
         return true;
     a->contact_nodes = calloc((size_t)result->m + 1, sizeof *a->contact_nodes);

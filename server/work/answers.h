@@ -7,7 +7,7 @@
 #include "uzawa.h"
 #include "work/starts.h"
 
-#define ANSWER_VECTORS 8
+#define ANSWER_VECTORS 12
 
 /* What one case, or the job, leaves; owns everything but the vectors that are the result's own. */
 typedef struct {
@@ -23,7 +23,7 @@ typedef struct {
     answer_parts *parts; /* n */
     answer_parts shared; /* with cases: the job's own summary, and what all cases have in common */
     store_answer *cases; /* n_cases */
-    double dim, *contact_nodes;
+    double dim, cells[3], *contact_nodes;
 } answers;
 
 /* Fills outcome->whole and outcome->cases from the results, which must outlive them. False: no memory. The caller

@@ -45,6 +45,13 @@ void live_case(live *l, int64_t i)
     l->current = i;
 }
 
+void live_part(live *l, double from, double to)
+{
+    live_case(l, 0);
+    l->from = from;
+    l->to = to;
+}
+
 void live_forget_problem(live *l)
 {
     l->problem = NULL;
@@ -95,9 +102,12 @@ static double share_done(const live *l)
 
 int live_progress(live *l)
 {
-    if (l->any || l->current > 0) {
+    const bool whole = !(l->to > 0.0);
+    if (l->any || l->current > 0 || !whole) {
         double n = l->problem && l->problem->n_cases > 0 ? (double)l->problem->n_cases : 1.0;
         double share = fmin(1.0, ((double)l->current + (l->any ? share_done(l) : 0.0)) / n);
+        if (!whole)
+            share = l->from + (l->to - l->from) * share;
         int now = PROGRESS_FIRST_ROW + (int)((PROGRESS_LAST_ROW - PROGRESS_FIRST_ROW) * share);
         l->progress = now > l->progress ? now : l->progress;
     }

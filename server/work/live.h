@@ -23,6 +23,7 @@ typedef struct {
     int64_t max_iterations;
     const uz_problem *problem; /* whose case runs; NULL: none runs */
     int64_t current;           /* the case that runs */
+    double from, to;           /* shares of the whole that what runs begins and ends with; 0, 0: it is the whole */
     int progress;              /* the largest reported yet */
 } live;
 
@@ -32,6 +33,8 @@ void live_clear(live *l);
 void live_begin(live *l, const uz_settings *settings, const uz_problem *problem);
 /* The next load case begins: rows are its own from here on. */
 void live_case(live *l, int64_t i);
+/* What comes next is this part of the whole, all its load cases over again. */
+void live_part(live *l, double from, double to);
 void live_forget_problem(live *l);
 void live_add(live *l, const uz_history_row *row);
 

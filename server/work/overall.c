@@ -14,20 +14,22 @@ static int badness(uz_outcome outcome)
         return 0;
     case UZ_PRECISION_LIMIT:
         return 1;
-    case UZ_PAPER_RULE:
+    case UZ_MESH_LIMIT:
         return 2;
-    case UZ_ITERATION_LIMIT:
+    case UZ_PAPER_RULE:
         return 3;
-    case UZ_NOT_VERIFIED:
+    case UZ_ITERATION_LIMIT:
         return 4;
-    case UZ_TIME_LIMIT:
+    case UZ_NOT_VERIFIED:
         return 5;
-    case UZ_DISMISSED:
+    case UZ_TIME_LIMIT:
         return 6;
+    case UZ_DISMISSED:
+        return 7;
     case UZ_INFEASIBLE:
         break;
     }
-    return 7;
+    return 8;
 }
 
 /* A bound that is not known counts as the largest. */
@@ -37,10 +39,16 @@ static double bound_of(const uz_result *result)
     return isnan(bound) ? (double)INFINITY : bound;
 }
 
+/* Where the cells were chosen it is the total error that was asked for. */
+static double error_of(const uz_result *result)
+{
+    return result->summary.ladder ? result->summary.total_error : bound_of(result);
+}
+
 static bool is_worse(const uz_result *a, const uz_result *b)
 {
     int x = badness(a->summary.outcome), y = badness(b->summary.outcome);
-    return x != y ? x > y : bound_of(a) > bound_of(b);
+    return x != y ? x > y : error_of(a) > error_of(b);
 }
 
 static void add_timings(uz_timings *sum, const uz_timings *t)

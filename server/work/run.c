@@ -57,6 +57,14 @@ static void note_case(void *ctx, int64_t load_case)
     pthread_mutex_unlock(&me->lock);
 }
 
+static void note_grid(void *ctx, double from, double to)
+{
+    worker *me = ctx;
+    pthread_mutex_lock(&me->lock);
+    live_part(&me->live, from, to);
+    pthread_mutex_unlock(&me->lock);
+}
+
 /* ---- failures */
 
 static const char *const NO_MEMORY_JSON = "{\"type\": \"about:blank\", \"title\": \"Out of memory\", \"status\": 500,"
@@ -188,7 +196,8 @@ static uz_status verify(run *r, const uz_hooks *hooks, uz_error *err)
 static uz_status solve_or_verify(run *r, uz_error *err)
 {
     const uz_problem *problem = &r->request.problem;
-    uz_hooks hooks = {.ctx = r->me, .cancelled = is_cancelled, .progress = note_progress, .begins = note_case};
+    uz_hooks hooks = {
+        .ctx = r->me, .cancelled = is_cancelled, .progress = note_progress, .begins = note_case, .grid = note_grid};
     if (r->request.answer.u)
         return verify(r, &hooks, err);
     load_starts(r);

@@ -1,6 +1,7 @@
 /* body_model.c: the chain from a scene to matrices. */
 #include "assembly/parts.h"
 
+#include "adaptive/grids.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "scene/scene.h"
@@ -230,10 +231,16 @@ uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, u
 
 uz_status uz_scene_check(const uz_scene *scene, uz_error *err)
 {
+    uz_scene first = *scene; /* borrows all it has */
     uz_body_model model;
     double *p = NULL, *h = NULL;
     uz_error_reset(err);
     memset(&model, 0, sizeof model);
+    if (scene->source == UZ_MESH_BOX && scene->box.automatic) {
+        const uz_grids grids = uz_grids_of_box(&scene->box, 0.0);
+        first.box = uz_grid(&grids, grids.first);
+    }
+    scene = &first;
     uz_status status = prepare(&model, scene, true, err);
     if (status == UZ_OK)
         status = uz_check_elements(&model, err);

@@ -14,11 +14,10 @@
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3])
 {
     const int dim = model->mesh.dim;
-    const double least = uz_node_frame(model, node) ? UZ_DEPENDENT : 0;
     double share[3];
     uz_free_shares(share, model, node, normal);
     for (int c = 0; c < dim; c++)
-        if (fabs(share[c]) > least)
+        if (fabs(share[c]) > UZ_DEPENDENT)
             return true;
     return false;
 }

@@ -64,7 +64,8 @@ uz_status uz_find_pairs(uz_contact_sites *sites, const uz_body_model *model, con
 bool uz_contact_normal(double normal[3], const uz_body_model *model, const uz_scene *scene, int64_t k, int64_t i);
 /* mesh, dof, frames, sites -> N, m, n_pair_rows, info.contact_*. */
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* Does `node` get a row from an obstacle with this unit normal? Only where the normal moves some free dof of it. */
+/* Does `node` get a row from an obstacle with this unit normal? Only where some free dof of it has a share in the
+ * normal that is more than rounding. */
 bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double normal[3]);
 /* h; a supported node inside an obstacle: UZ_ERR_SCENE. */
 uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_model *model, const uz_scene *scene,

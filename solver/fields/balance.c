@@ -26,8 +26,8 @@ typedef struct {
     bool *held;                     /* n_nodes */
     int64_t *first, *support;       /* supports of each node: support[first[a]..first[a + 1]) */
     double centre[DIM];
-    double force[DIM], moment[DIM]; /* of everything, the moment about the centre */
-    double size, extent;
+    double force[DIM], moment[DIM]; /* of everything, the moment about the centre: the first node */
+    double size;
 } balance;
 
 static void add_moment(double moment[DIM], const double x[DIM], const double f[DIM])
@@ -101,8 +101,11 @@ static void add_contacts(balance *b)
 static uz_status add_loads(balance *b, uz_error *err)
 {
     uz_status status = uz_nodal_loads(b->load, b->model, b->scene, err);
-    for (int64_t a = 0; a < b->model->mesh.n_nodes && status == UZ_OK; a++)
-        add_force(b, &b->out->loads, a, b->load + a * b->dim);
+    for (int64_t a = 0; a < b->model->mesh.n_nodes && status == UZ_OK; a++) {
+        const double *f = b->load + a * b->dim;
+        if (f[0] != 0 || f[1] != 0 || (b->dim == 3 && f[2] != 0))
+            add_force(b, &b->out->loads, a, f);
+    }
     return status;
 }
 
@@ -293,29 +296,13 @@ static uz_status add_supports(balance *b, uz_error *err)
 
 /* ---- all together */
 
-static void find_middle(balance *b)
-{
-    const uz_mesh *mesh = &b->model->mesh;
-    double low[DIM] = {0}, high[DIM] = {0};
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        for (int c = 0; c < b->dim; c++) {
-            const double x = mesh->xyz[a * b->dim + c];
-            low[c] = a == 0 ? x : fmin(low[c], x);
-            high[c] = a == 0 ? x : fmax(high[c], x);
-        }
-    for (int c = 0; c < b->dim; c++) {
-        b->centre[c] = 0.5 * (low[c] + high[c]);
-        b->extent = hypot(b->extent, high[c] - low[c]);
-    }
-}
-
 /* A ring pushes its parts apart and is whole: only the axial sum must vanish. */
 static double imbalance(const balance *b)
 {
     const bool ring = b->model->kind == UZ_AXISYMMETRIC;
     double largest = 0;
     for (int c = ring ? 1 : 0; c < (ring ? 2 : DIM); c++)
-        largest = fmax(largest, fmax(fabs(b->force[c]), fabs(b->moment[c]) / b->extent));
+        largest = fmax(largest, fmax(fabs(b->force[c]), fabs(b->moment[c]) / b->model->mesh.extent));
     return b->size > 0 ? largest / b->size : 0;
 }
 
@@ -379,7 +366,7 @@ static uz_status make_room(balance *b, uz_error *err)
 static uz_status add_everything(balance *b, uz_error *err)
 {
     double thermal = 0;
-    find_middle(b);
+    memcpy(b->centre, b->model->mesh.xyz, (size_t)b->dim * sizeof *b->centre);
     add_contacts(b);
     uz_status status = add_loads(b, err);
     if (status == UZ_OK)

@@ -11,7 +11,7 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
                             const double *r, uz_error *err);
 
 /* Adds to out->warnings what makes the answer doubtful. */
-void uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                    const double *r);
+uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
+                         const double *r, uz_error *err);
 
 #endif

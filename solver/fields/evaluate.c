@@ -74,6 +74,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (status != UZ_OK)
         return status;
     evaluate_contact(result, result->evaluation);
-    uz_find_doubts(result->evaluation, model, scene, result->u, result->r);
+    status = uz_find_doubts(result->evaluation, model, scene, result->u, result->r, err);
+    if (status != UZ_OK)
+        return status;
     return uz_balance_forces(result->evaluation, model, scene, result->u, result->r, err);
 }

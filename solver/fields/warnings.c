@@ -3,6 +3,7 @@
 #include "fields/balance.h"
 
 #include "fields/parts.h"
+#include "obstacle/obstacle.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -11,7 +12,7 @@
 
 /* A rotation by w makes strains of w^2 / 2 that are not there: at 0.1 half a per cent. */
 static const double MOST_ROTATION = 0.1, MOST_STRAIN = 0.05;
-/* Sliding by s on a curvature k turns the normal by s k. */
+/* Of the obstacle's normal, from where the node was to where it is: the row kept the first. */
 static const double MOST_TURN = 0.1;
 /* Of a face of the other body, in parts of its size. */
 static const double MOST_FACE = 0.5;
@@ -40,30 +41,28 @@ __attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const
 
 /* ---- strain and rotation */
 
-static double squared_distance(const double *x, const double *y, int dim)
+static inline double squared_distance(const double *x, const double *y, int dim)
 {
-    double sum = 0;
-    for (int c = 0; c < dim; c++)
-        sum += (x[c] - y[c]) * (x[c] - y[c]);
-    return sum;
+    const double a = x[0] - y[0], b = x[1] - y[1], c = dim == 3 ? x[2] - y[2] : 0;
+    return a * a + b * b + c * c;
 }
 
-/* The largest change of u over a distance between neighbours: a cheap look that sees every strain and rotation. */
+/* The largest change of u over a distance between an element's first node and the others: every strain and rotation
+ * shows in it, if not in full. */
 static double largest_slope(const doubts *d)
 {
     const uz_mesh *mesh = &d->model->mesh;
     const int dim = mesh->dim;
+    const double *x = mesh->xyz, *u = d->u;
     double largest = 0;
     for (int64_t e = 0; e < mesh->n_elements; e++) {
-        int nodes;
-        const int64_t *node = uz_mesh_element(mesh, e, &nodes);
-        for (int a = 1; a < nodes; a++)
-            for (int other = 0; other<a; other += a> 1 ? a - 1 : 1) { /* the first node and the one before */
-                const int64_t i = node[a] * dim, j = node[other] * dim;
-                const double du = squared_distance(d->u + i, d->u + j, dim);
-                if (du > largest * squared_distance(mesh->xyz + i, mesh->xyz + j, dim))
-                    largest = du / squared_distance(mesh->xyz + i, mesh->xyz + j, dim);
-            }
+        const int64_t first = mesh->node[mesh->first[e]] * dim;
+        for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
+            const int64_t i = mesh->node[k] * dim;
+            const double du = squared_distance(u + i, u + first, dim), dx = squared_distance(x + i, x + first, dim);
+            if (du > largest * dx)
+                largest = du / dx;
+        }
     }
     return sqrt(largest);
 }
@@ -119,7 +118,7 @@ static void look_at_elements(const doubts *d)
 
 /* ---- sliding */
 
-/* Where a row's other side is: nothing moves but the node, or the nodes of a face do too. */
+/* Across the normal, of a node against the point of the face that it meets. */
 static void relative_motion(double v[3], const doubts *d, int64_t row, const uz_contact_sites *sites, int64_t place)
 {
     const int dim = d->model->mesh.dim;
@@ -128,8 +127,7 @@ static void relative_motion(double v[3], const doubts *d, int64_t row, const uz_
     memset(v, 0, 3 * sizeof *v);
     for (int c = 0; c < dim; c++) {
         v[c] = d->u[d->model->info.contact_node[row] * dim + c];
-        for (int64_t j = sites && sites->first ? sites->first[place] : 0;
-             sites && sites->first && j < sites->first[place + 1]; j++)
+        for (int64_t j = sites->first[place]; j < sites->first[place + 1]; j++)
             v[c] -= sites->weight[j] * d->u[sites->node[j] * dim + c];
         along += v[c] * n[c];
     }
@@ -142,18 +140,20 @@ static double length(const double v[3])
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* By how much sliding v turns the normal of the obstacle. */
-static double turn_of(const uz_contact *contact, const double v[3])
+/* By how much the obstacle's normal where the node has come to differs from the one that was kept. */
+static double turn_of(const doubts *d, const uz_obstacle *obstacle, int64_t row)
 {
-    double along = 0, axis = 0;
-    if (contact->kind != UZ_OBSTACLE_ROUND && contact->kind != UZ_OBSTACLE_CYLINDER)
+    const int dim = d->model->mesh.dim;
+    const int64_t first = d->model->info.contact_node[row] * dim;
+    double x[3] = {0}, chord = 0;
+    uz_gap there;
+    for (int c = 0; c < dim; c++)
+        x[c] = d->model->mesh.xyz[first + c] + d->u[first + c];
+    if (uz_obstacle_gap(&there, obstacle, x, NULL) != UZ_OK)
         return 0;
-    for (int c = 0; c < 3 && contact->kind == UZ_OBSTACLE_CYLINDER; c++) {
-        along += v[c] * contact->normal[c];
-        axis += contact->normal[c] * contact->normal[c];
-    }
-    const double across = length(v) * length(v) - (axis > 0 ? along * along / axis : 0);
-    return sqrt(fmax(0, across)) / contact->radius;
+    for (int c = 0; c < dim; c++)
+        chord = hypot(chord, there.normal[c] - d->model->info.contact_normal[row * dim + c]);
+    return 2 * asin(fmin(1, 0.5 * chord));
 }
 
 /* Of the face that a node meets: its longest distance between corners. */
@@ -169,43 +169,57 @@ static double size_of_face(const uz_mesh *mesh, uz_face face)
     return sqrt(largest);
 }
 
-static void look_at_row(const doubts *d, double *turn, double *part, int64_t row, int64_t k, int64_t place)
-{
-    const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
-    double v[3];
-    if (!(d->r[row] < 0))
-        return;
-    relative_motion(v, d, row, sites, place);
-    *turn = fmax(*turn, turn_of(&d->scene->contacts[k], v));
-    if (sites && sites->first)
-        *part = fmax(*part, length(v) / size_of_face(&d->model->mesh, sites->face[place]));
-}
-
-static void look_at_contact(const doubts *d)
+/* The rows of contact k from *row on. */
+static void look_at_rows(const doubts *d, const uz_obstacle *obstacle, double *turn, double *part, int64_t k,
+                         int64_t *row)
 {
     const uz_mesh_info *info = &d->model->info;
+    const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
+    const uz_group *group = uz_mesh_group(&d->model->mesh, d->scene->contacts[k].on, "", NULL);
+    const int64_t count = group ? uz_group_node_count(&d->model->mesh, group) : 0;
+    for (int64_t i = 0; i < count && *row < d->model->m && info->contact_of[*row] == k; i++) {
+        double v[3];
+        if (info->contact_node[*row] != uz_group_node_at(group, i))
+            continue;
+        if (d->r[*row] < 0 && obstacle)
+            *turn = fmax(*turn, turn_of(d, obstacle, *row));
+        if (d->r[*row] < 0 && sites && sites->first) {
+            relative_motion(v, d, *row, sites, i);
+            *part = fmax(*part, length(v) / size_of_face(&d->model->mesh, sites->face[i]));
+        }
+        ++*row;
+    }
+}
+
+static uz_status look_at_contact(const doubts *d, uz_error *err)
+{
     double turn = 0, part = 0;
     int64_t row = 0;
-    for (int64_t k = 0; k < d->scene->n_contacts; k++) {
-        const uz_group *group = uz_mesh_group(&d->model->mesh, d->scene->contacts[k].on, "", NULL);
-        const int64_t count = group ? uz_group_node_count(&d->model->mesh, group) : 0;
-        for (int64_t i = 0; i < count && row < d->model->m && info->contact_of[row] == k; i++)
-            if (info->contact_node[row] == uz_group_node_at(group, i))
-                look_at_row(d, &turn, &part, row++, k, i);
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < d->scene->n_contacts && status == UZ_OK; k++) {
+        const uz_contact *contact = &d->scene->contacts[k];
+        uz_obstacle *obstacle = NULL;
+        if (contact->kind != UZ_OBSTACLE_PLANE && contact->kind != UZ_OBSTACLE_BODY)
+            status = uz_obstacle_new(&obstacle, contact, k, d->scene->model, err);
+        look_at_rows(d, obstacle, &turn, &part, k, &row);
+        uz_obstacle_free(obstacle);
     }
     if (turn > MOST_TURN)
         warn(d->out, "large_sliding", turn,
-             "a node slides so far on a round obstacle that the normal, which was kept, turns by %.2g rad", turn);
+             "a node slides so far on an obstacle that the normal there is turned by %.2g rad from the one that was "
+             "kept",
+             turn);
     if (part > MOST_FACE)
         warn(d->out, "sliding_off_face", part,
              "a node slides by %.2g of the face of the other body that it was set against", part);
+    return status;
 }
 
-void uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                    const double *r)
+uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
+                         const double *r, uz_error *err)
 {
     const doubts d = {model, scene, u, r, out};
     if (largest_slope(&d) > 0.25 * fmin(MOST_STRAIN, MOST_ROTATION))
         look_at_elements(&d);
-    look_at_contact(&d);
+    return look_at_contact(&d, err);
 }

@@ -15,7 +15,8 @@ typedef struct {
     uz_vtu vtu;
     const uz_field_body *body;
     const uz_fields *fields;
-    double *room; /* 6 x n_nodes: for one array at a time */
+    double *room;  /* 6 x n_nodes: for one array at a time */
+    bool *has_row; /* n_nodes */
 } writing;
 
 static void put_nodal(writing *w, uz_field field, const double *data, int components, const char *const *labels)
@@ -50,7 +51,7 @@ static void put_tensor(writing *w, uz_field field, const double *data)
 static void put_rows(writing *w, uz_field field, const double *data, double elsewhere, bool largest)
 {
     const uz_body_model *model = w->body->model;
-    bool *has_row = (bool *)(w->room + w->fields->n_nodes);
+    bool *has_row = w->has_row;
     if (!data)
         return;
     memset(has_row, 0, (size_t)w->fields->n_nodes);
@@ -110,8 +111,11 @@ static uz_status write_body(char **text, size_t *len, const uz_field_body *body,
     uz_status status = uz_fields_of_body(&fields, body, answer, which & ~(unsigned)UZ_FIELD_STRESS_GAUSS, hooks, err);
     if (status != UZ_OK)
         return status;
-    writing w = {.body = body, .fields = &fields, .room = uz_alloc(6 * fields.n_nodes, sizeof *w.room)};
-    if (!w.room)
+    writing w = {.body = body,
+                 .fields = &fields,
+                 .room = uz_alloc(6 * fields.n_nodes, sizeof *w.room),
+                 .has_row = uz_alloc(fields.n_nodes, sizeof *w.has_row)};
+    if (!w.room || !w.has_row)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vtu file");
     else if (uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the file was written");
@@ -120,6 +124,7 @@ static uz_status write_body(char **text, size_t *len, const uz_field_body *body,
         status = uz_vtu_finish(text, len, &w.vtu, err);
     }
     free(w.room);
+    free(w.has_row);
     uz_fields_clear(&fields);
     return status;
 }

@@ -143,15 +143,19 @@ void uz_box_tree_clear(uz_box_tree *tree)
     memset(tree, 0, sizeof *tree);
 }
 
-static double box_distance(const uz_box_tree *tree, int64_t node, const double *x)
+double uz_box_distance(const double *box, int dim, const double *x)
 {
-    const double *low = tree->box + 2 * tree->dim * node, *high = low + tree->dim;
     double sum = 0;
-    for (int c = 0; c < tree->dim; c++) {
-        const double off = fmax(fmax(low[c] - x[c], x[c] - high[c]), 0);
+    for (int c = 0; c < dim; c++) {
+        const double off = fmax(fmax(box[c] - x[c], x[c] - box[dim + c]), 0);
         sum += off * off;
     }
     return sum;
+}
+
+static double node_distance(const uz_box_tree *tree, int64_t node, const double *x)
+{
+    return uz_box_distance(tree->box + 2 * tree->dim * node, tree->dim, x);
 }
 
 int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_distance *distance, const void *ctx)
@@ -171,7 +175,7 @@ int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_di
             continue;
         if (of.end - of.first > LEAF) {
             const part halves[2] = {half_of(of, 0), half_of(of, 1)};
-            const double far[2] = {box_distance(tree, halves[0].node, x), box_distance(tree, halves[1].node, x)};
+            const double far[2] = {node_distance(tree, halves[0].node, x), node_distance(tree, halves[1].node, x)};
             const int later = far[1] < far[0] ? 0 : 1;
             stack[depth].of = halves[later];
             stack[depth++].distance = far[later];
@@ -180,7 +184,7 @@ int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_di
             continue;
         }
         for (int64_t i = of.first; i < of.end; i++) {
-            const double d = distance(ctx, tree->item[i], x);
+            const double d = distance(ctx, tree->item[i], x, best);
             if (d < best || (d == best && tree->item[i] < found)) {
                 best = d;
                 found = tree->item[i];

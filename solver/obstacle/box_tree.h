@@ -16,10 +16,13 @@ typedef struct {
 uz_status uz_box_tree_init(uz_box_tree *out, int64_t n, int dim, const double *box, uz_error *err);
 void uz_box_tree_clear(uz_box_tree *tree);
 
-/* The squared distance of a thing from the point in question. */
-typedef double uz_item_distance(const void *ctx, int64_t item, const double *x);
+/* The squared distance of a thing from the point in question; anything beyond `best` where it is more than that. */
+typedef double uz_item_distance(const void *ctx, int64_t item, const double *x, double best);
 /* The nearest thing, of several the one of least number; -1 where no distance is a number. Allocates nothing. */
 int64_t uz_box_tree_nearest(const uz_box_tree *tree, const double *x, uz_item_distance *distance, const void *ctx);
+
+/* The squared distance of x from a box (2 dim). */
+double uz_box_distance(const double *box, int dim, const double *x);
 
 /* Called with each thing of the leaves that meet the box (2 dim) until it returns true. Returns whether it did. */
 typedef bool uz_item_visit(void *ctx, int64_t item);

@@ -9,6 +9,9 @@
 
 enum { POINTER = 96 };
 
+/* A table steeper than this is a step: its normal would be rounding. */
+#define STEEPEST 1e6
+
 /* Coordinates that differ by less than this part of their size have no direction between them. */
 #define TOLD_APART (64 * DBL_EPSILON)
 
@@ -151,6 +154,35 @@ static uz_status check_ascending(const subject *s, const char *key, const double
     return status;
 }
 
+/* n heights, `stride` apart, over the places v; `first` is the number of the first in the table. */
+static uz_status check_slopes(const subject *s, const double *v, int64_t n, int64_t first, int64_t stride)
+{
+    char where[POINTER], row[32];
+    const uz_contact *c = s->contact;
+    for (int64_t i = 1; i < n; i++) {
+        const int64_t at = first + i * stride, line = at / c->n_x;
+        if (fabs(c->z[at] - c->z[at - stride]) <= STEEPEST * (v[i] - v[i - 1]))
+            continue;
+        snprintf(row, sizeof row, s->dim == 3 ? "z/%lld" : "z", (long long)line);
+        return uz_fail(s->err, UZ_ERR_SCENE, pointer_to(where, s, row, at % c->n_x),
+                       "the table rises from %g to %g within %g, as good as a step; the steepest slope is %g%s",
+                       c->z[at - stride], c->z[at], v[i] - v[i - 1], STEEPEST,
+                       s->dim == 2 ? "; a polyline may be vertical" : "");
+    }
+    return UZ_OK;
+}
+
+static uz_status check_steepness(const subject *s)
+{
+    const uz_contact *c = s->contact;
+    uz_status status = UZ_OK;
+    for (int64_t j = 0; j < (s->dim == 3 ? c->n_y : 1) && status == UZ_OK; j++)
+        status = check_slopes(s, c->x, c->n_x, j * c->n_x, 1);
+    for (int64_t i = 0; i < c->n_x && s->dim == 3 && status == UZ_OK; i++)
+        status = check_slopes(s, c->y, c->n_y, i, c->n_x);
+    return status;
+}
+
 static uz_status check_height(const subject *s)
 {
     char where[POINTER], row[32];
@@ -170,7 +202,7 @@ static uz_status check_height(const subject *s)
         snprintf(row, sizeof row, s->dim == 3 ? "z/%lld" : "z", (long long)j);
         status = check_finite(s, row, c->z + j * c->n_x, c->n_x);
     }
-    return status;
+    return status == UZ_OK ? check_steepness(s) : status;
 }
 
 static uz_status check_dimension(const subject *s)

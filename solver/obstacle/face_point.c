@@ -234,7 +234,8 @@ static void best_start(double at[2], const surface *f)
     double best = INFINITY;
     const int starts = f->count == 3 ? 1 : f->count == 6 ? 7 : 9;
     for (int i = 0; i < starts; i++) {
-        const double grid[2] = {0.7 * (i % 3 - 1), 0.7 * (i / 3 - 1)};
+        const int column = i % 3, line = i / 3;
+        const double grid[2] = {0.7 * (column - 1), 0.7 * (line - 1)};
         const double *start = f->count == 4 ? grid : TRIANGLE[i];
         const double d = distance_at(f, start);
         if (d < best) {

@@ -56,8 +56,9 @@ static int64_t piece_number(const uz_line *line, int64_t item)
     return item + (line->closed ? 1 : 0);
 }
 
-static double distance_to(const void *ctx, int64_t item, const double *x)
+static double distance_to(const void *ctx, int64_t item, const double *x, double best)
 {
+    (void)best;
     const uz_line *line = ctx;
     const int64_t i = piece_number(line, item);
     double foot[2];
@@ -110,7 +111,12 @@ static void gap_to_corner(uz_gap *out, const uz_line *line, int64_t corner, cons
 void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2])
 {
     const int64_t item = uz_box_tree_nearest(&line->tree, x, distance_to, line);
-    const int64_t i = piece_number(line, item < 0 ? 0 : item), corner = closest(out->foot, line, i, x);
+    const int64_t i = piece_number(line, item);
+    if (item < 0) {
+        out->gap = NAN;
+        return;
+    }
+    const int64_t corner = closest(out->foot, line, i, x);
     out->foot[2] = out->normal[2] = 0;
     if (corner < 0)
         gap_to_piece(out, line, i, x);

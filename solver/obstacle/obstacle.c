@@ -190,21 +190,26 @@ static uz_status round_gap(uz_gap *out, const uz_obstacle *o, const double x[3],
     return UZ_OK;
 }
 
+static uz_status refuse_overflow(const uz_obstacle *o, uz_error *err)
+{
+    char where[96];
+    snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)o->index);
+    return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the gap to this obstacle overflows");
+}
+
 /* Back to the caller's units. */
 static uz_status unscale(uz_gap *out, const uz_obstacle *o, const uz_gap *scaled, uz_error *err)
 {
-    char where[96];
-    *out = *scaled;
-    out->gap /= o->scale;
-    out->curvature *= o->scale;
+    uz_gap gap = *scaled;
+    gap.gap /= o->scale;
+    gap.curvature *= o->scale;
     for (int c = 0; c < 3; c++)
-        out->foot[c] /= o->scale;
-    const double sum = out->gap + out->normal[0] + out->normal[1] + out->normal[2];
-    if (isfinite(sum) && !isnan(out->curvature))
-        return UZ_OK;
-    memset(out, 0, sizeof *out);
-    snprintf(where, sizeof where, "/contacts/%lld/obstacle", (long long)o->index);
-    return uz_fail(err, UZ_ERR_NOT_FINITE, where, "the gap to this obstacle overflows");
+        gap.foot[c] /= o->scale;
+    const double sum = gap.gap + gap.normal[0] + gap.normal[1] + gap.normal[2];
+    if (!isfinite(sum) || isnan(gap.curvature))
+        return refuse_overflow(o, err);
+    *out = gap;
+    return UZ_OK;
 }
 
 uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, uz_error *err)
@@ -214,8 +219,11 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
     uz_gap scaled = {0};
     uz_status status = UZ_OK;
     memset(out, 0, sizeof *out);
-    for (int c = 0; c < o->dim; c++)
+    for (int c = 0; c < o->dim; c++) {
         at[c] = x[c] * o->scale;
+        if (!isfinite(at[c]))
+            return refuse_overflow(o, err);
+    }
     if (o->is_line)
         uz_line_gap(&scaled, &o->line, at);
     else if (o->kind == UZ_OBSTACLE_HEIGHT)

@@ -52,9 +52,10 @@ uz_status uz_obstacle_check(const uz_contact *contact, int64_t index, uz_model m
 uz_status uz_obstacle_new(uz_obstacle **out, const uz_contact *contact, int64_t index, uz_model model, uz_error *err);
 void uz_obstacle_free(uz_obstacle *obstacle);
 
-/* x: dim coordinates. Allocates nothing; O(log n). UZ_ERR_SCENE where there is no normal: x is at the centre of a
- * circle or sphere or on the axis of a cylinder; err->where names the obstacle. UZ_ERR_NOT_FINITE: x, or the gap
- * overflows. */
+/* x: dim coordinates. Allocates nothing. O(log n) for points within a few pieces of the surface; further away as many
+ * pieces are looked at as are nearly as close, of the order of the root of their number. UZ_ERR_SCENE where there is no
+ * normal: x is at the centre of a circle or sphere or on the axis of a cylinder; err->where names the obstacle.
+ * UZ_ERR_NOT_FINITE: x, or the gap overflows. */
 uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, uz_error *err);
 
 #endif

@@ -53,23 +53,12 @@ static int closest_on(uz_foot *foot, const master *m, int64_t face, const double
     return count;
 }
 
-static double distance_to(const void *ctx, int64_t item, const double *x)
-{
-    uz_foot foot;
-    closest_on(&foot, ctx, item, x);
-    return foot.distance2;
-}
-
 /* A face lies within the box of its Bezier points: its corners, and for each middle twice it less the mean of its
  * edge's ends (Farin, "Curves and Surfaces for CAGD", convex hull property). A bilinear face within that of its
  * corners. */
-static void box_of(double *box, const master *m, int64_t face)
+static void box_of(double *box, const double *xyz, int dim, int count)
 {
-    static const double ORIGIN[3] = {0};
-    const int dim = m->mesh->dim;
-    double xyz[3 * UZ_FACE_NODES];
-    int64_t node[UZ_FACE_NODES];
-    const int count = gather(xyz, node, m, face, ORIGIN), corners = uz_face_corners(dim, count);
+    const int corners = uz_face_corners(dim, count);
     for (int c = 0; c < dim; c++) {
         box[c] = INFINITY;
         box[dim + c] = -INFINITY;
@@ -83,6 +72,22 @@ static void box_of(double *box, const master *m, int64_t face)
     }
 }
 
+static double distance_to(const void *ctx, int64_t item, const double *x, double best)
+{
+    static const double ORIGIN[3] = {0};
+    const master *m = ctx;
+    const int dim = m->mesh->dim;
+    double xyz[3 * UZ_FACE_NODES], box[6];
+    int64_t node[UZ_FACE_NODES];
+    uz_foot foot;
+    const int count = gather(xyz, node, m, item, x);
+    box_of(box, xyz, dim, count);
+    if (uz_box_distance(box, dim, ORIGIN) > best)
+        return INFINITY;
+    uz_face_closest(&foot, dim, count, xyz);
+    return foot.distance2;
+}
+
 static uz_status out_of_memory(uz_error *err)
 {
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two bodies");
@@ -90,12 +95,15 @@ static uz_status out_of_memory(uz_error *err)
 
 static uz_status build_tree(master *m, uz_error *err)
 {
+    static const double ORIGIN[3] = {0};
     const int64_t n = m->group->n_faces;
+    double xyz[3 * UZ_FACE_NODES];
+    int64_t node[UZ_FACE_NODES];
     double *box = uz_alloc(n, 6 * sizeof *box);
     if (!box)
         return out_of_memory(err);
     for (int64_t i = 0; i < n; i++)
-        box_of(box + 2 * m->mesh->dim * i, m, i);
+        box_of(box + 2 * m->mesh->dim * i, xyz, m->mesh->dim, gather(xyz, node, m, i, ORIGIN));
     const uz_status status = uz_box_tree_init(&m->tree, n, m->mesh->dim, box, err);
     free(box);
     return status;

@@ -24,6 +24,7 @@ typedef struct {
 uz_status uz_line_init(uz_line *out, int64_t n, const double *x, const double *y, const double *ends, double scale,
                        uz_error *err);
 void uz_line_clear(uz_line *line);
+/* The gap is NaN where squares of distances overflow. */
 void uz_line_gap(uz_gap *out, const uz_line *line, const double x[2]);
 /* A pair of pieces that cross, touch, or fold back on one another; false: there is none. Looks at no more pairs than
  * UZ_LINE_PAIRS per point: long segments side by side may all be near one another. */

@@ -125,11 +125,28 @@ static double closest(double at[2], const cell *s, const double q[3])
     return best;
 }
 
-static double distance_to(const void *ctx, int64_t item, const double *x)
+static void box_of(double box[6], const cell *s)
+{
+    box[2] = INFINITY;
+    box[5] = -INFINITY;
+    for (int c = 0; c < 2; c++) {
+        box[c] = s->low[c];
+        box[3 + c] = s->high[c];
+    }
+    for (int k = 0; k < 4; k++) { /* a bilinear surface lies between the heights of its corners */
+        const double x = k % 2 ? s->high[0] : s->low[0], y = k / 2 ? s->high[1] : s->low[1];
+        const double z = height(s, isfinite(x) ? x : s->x0, isfinite(y) ? y : s->y0);
+        box[2] = fmin(box[2], z);
+        box[5] = fmax(box[5], z);
+    }
+}
+
+static double distance_to(const void *ctx, int64_t item, const double *x, double best)
 {
     const cell s = cell_of(ctx, item);
-    double at[2];
-    return closest(at, &s, x);
+    double at[2], box[6];
+    box_of(box, &s);
+    return uz_box_distance(box, 3, x) > best ? INFINITY : closest(at, &s, x);
 }
 
 static void normal_at(double normal[3], const cell *s, double x, double y)
@@ -234,7 +251,11 @@ static void gap_on_border(uz_gap *out, const uz_table *t, int64_t item, const ce
 
 void uz_table_gap(uz_gap *out, const uz_table *table, const double x[3])
 {
-    const int64_t found = uz_box_tree_nearest(&table->tree, x, distance_to, table), item = found < 0 ? 0 : found;
+    const int64_t item = uz_box_tree_nearest(&table->tree, x, distance_to, table);
+    if (item < 0) {
+        out->gap = NAN;
+        return;
+    }
     const cell s = cell_of(table, item);
     closest(out->foot, &s, x);
     out->foot[2] = height(&s, out->foot[0], out->foot[1]);
@@ -244,31 +265,16 @@ void uz_table_gap(uz_gap *out, const uz_table *table, const double x[3])
         gap_on_border(out, table, item, &s, x);
 }
 
-static void box_of(double box[6], const uz_table *t, int64_t item)
-{
-    const cell s = cell_of(t, item);
-    box[2] = INFINITY;
-    box[5] = -INFINITY;
-    for (int c = 0; c < 2; c++) {
-        box[c] = s.low[c];
-        box[3 + c] = s.high[c];
-    }
-    for (int k = 0; k < 4; k++) { /* a bilinear surface lies between the heights of its corners */
-        const double x = k % 2 ? s.high[0] : s.low[0], y = k / 2 ? s.high[1] : s.low[1];
-        const double z = height(&s, isfinite(x) ? x : s.x0, isfinite(y) ? y : s.y0);
-        box[2] = fmin(box[2], z);
-        box[5] = fmax(box[5], z);
-    }
-}
-
 static uz_status build_tree(uz_table *table, uz_error *err)
 {
     const int64_t cells = (table->n_x + 1) * (table->n_y + 1);
     double *box = uz_alloc(cells, 6 * sizeof *box);
     if (!box)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a table of %lld heights", (long long)cells);
-    for (int64_t i = 0; i < cells; i++)
-        box_of(box + 6 * i, table, i);
+    for (int64_t i = 0; i < cells; i++) {
+        const cell s = cell_of(table, i);
+        box_of(box + 6 * i, &s);
+    }
     const uz_status status = uz_box_tree_init(&table->tree, cells, 3, box, err);
     free(box);
     return status;

@@ -168,7 +168,7 @@ void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
 
 void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title)
 {
-    enum { BAR = 220, STOPS = 8 };
+    enum { BAR = 300, STOPS = 8 };
     const int y = scenery->height + 12, x = scenery->width - BAR - 20;
     uz_buffer_print(svg, "<defs><linearGradient id=\"scale\">");
     for (int i = 0; i <= STOPS; i++) {
@@ -181,7 +181,7 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
                     "</linearGradient></defs>\n<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"12\" "
                     "fill=\"url(#scale)\"/>\n",
                     x, y, BAR);
-    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\">%.4g</text><text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.4g</text>",
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\">%.3g</text><text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.3g</text>",
                     x, y + 26, scenery->low, x + BAR, y + 26, scenery->high);
     uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", x + BAR / 2, y + 26,
                     scenery->what);

@@ -149,8 +149,8 @@ static double lattice_line(const uz_box *box, int axis, int order, int64_t i)
     return 0.5 * (grid_line(box, axis, i / 2) + grid_line(box, axis, i / 2 + 1));
 }
 
-/* The lattice along each axis, once: logarithms for every node would take longer than all the rest. */
-static double *lattice_lines(const uz_box *box, int axis, int order)
+/* Once for all nodes: logarithms for each of them would take longer than all the rest. */
+double *uz_box_lines(const uz_box *box, int axis, int order)
 {
     const int64_t count = axis < box->dim ? order * box->cells[axis] + 1 : 1;
     double *line = uz_alloc(count, sizeof *line);
@@ -180,7 +180,7 @@ static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_element_kind ki
 {
     double *line[3];
     for (int axis = 0; axis < 3; axis++)
-        line[axis] = lattice_lines(box, axis, uz_box_order(kind));
+        line[axis] = uz_box_lines(box, axis, uz_box_order(kind));
     const bool room = line[0] && line[1] && line[2];
     if (room)
         place_nodes(mesh, box, kind, line);
@@ -228,6 +228,8 @@ uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err)
 {
     uz_status status;
     memset(out, 0, sizeof *out);
+    if (box->automatic)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells", "the cells are still to be chosen: give their numbers");
     if ((status = check_kind(box, err)) != UZ_OK || (status = check_lengths(box, err)) != UZ_OK ||
         (status = check_cells(box, err)) != UZ_OK || (status = check_spacing(box, err)) != UZ_OK)
         return status;

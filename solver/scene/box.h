@@ -13,6 +13,9 @@ int uz_box_parts(uz_element_kind kind);
 /* The number of a lattice point that is a node; at[2] = 0 in 2D. */
 int64_t uz_box_node(const uz_box *box, uz_element_kind kind, const int64_t at[3]);
 
+/* The lattice along an axis: order x cells + 1 coordinates, ascending; the caller frees them. NULL: no memory. */
+double *uz_box_lines(const uz_box *box, int axis, int order);
+
 void uz_box_fill_elements(uz_mesh *mesh, const uz_box *box, uz_element_kind kind);
 uz_status uz_box_fill_groups(uz_mesh *mesh, const uz_box *box, uz_element_kind kind, uz_error *err);
 

@@ -72,6 +72,23 @@ static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, 
     }
 }
 
+/* Buckets are small but in meshes made to be hard: a node of a regular mesh is the lowest of a few sides. */
+static void sort_entries(sort_entry *entry, int64_t count)
+{
+    enum { FEW = 16 };
+    if (count > FEW) {
+        qsort(entry, (size_t)count, sizeof *entry, compare_entries);
+        return;
+    }
+    for (int64_t i = 1; i < count; i++) {
+        const sort_entry moved = entry[i];
+        int64_t j = i;
+        for (; j > 0 && compare_entries(&entry[j - 1], &moved) > 0; j--)
+            entry[j] = entry[j - 1];
+        entry[j] = moved;
+    }
+}
+
 static void sort_bucket(uz_corner_table *table, const uz_mesh *mesh, int64_t from, int64_t end, sort_entry *entry)
 {
     int64_t corner[UZ_MOST_CORNERS];
@@ -80,7 +97,7 @@ static void sort_bucket(uz_corner_table *table, const uz_mesh *mesh, int64_t fro
         memcpy(entry[i - from].corner, corner + 1, sizeof entry->corner);
         entry[i - from].item = table->item[i];
     }
-    qsort(entry, (size_t)(end - from), sizeof *entry, compare_entries);
+    sort_entries(entry, end - from);
     for (int64_t i = from; i < end; i++) {
         table->item[i] = entry[i - from].item;
         table->same[i] = i > from && compare_corners(entry[i - from].corner, entry[i - from - 1].corner) == 0;

@@ -64,10 +64,11 @@ static uz_status check_nodes(const uz_given_mesh *given, int64_t e, uz_error *er
     const int count = (int)(given->first[e + 1] - given->first[e]);
     char what[96];
     for (int i = 0; i < count; i++) {
-        snprintf(what, sizeof what, "asks for node %lld, but there are only 0 to %lld", (long long)node[i],
-                 (long long)given->n_nodes - 1);
-        if (node[i] < 0 || node[i] >= given->n_nodes)
+        if (node[i] < 0 || node[i] >= given->n_nodes) {
+            snprintf(what, sizeof what, "asks for node %lld, but there are only 0 to %lld", (long long)node[i],
+                     (long long)given->n_nodes - 1);
             return refuse_element(given, e, what, "nodes are numbered from 0", err);
+        }
         for (int j = 0; j < i; j++)
             if (node[i] == node[j])
                 return refuse_element(given, e, "has one node twice",
@@ -80,9 +81,8 @@ static uz_status check_kind(const uz_given_mesh *given, int64_t e, uz_error *err
 {
     char where[UZ_POINTER];
     const uz_element_kind kind = (uz_element_kind)given->kind[e];
-    snprintf(where, sizeof where, "/mesh/elements");
     if (kind >= UZ_ELEMENT_KINDS || given->first[e + 1] - given->first[e] != uz_element_node_count(kind))
-        return uz_fail(err, UZ_ERR_ARGUMENT, where, "element %lld has no kind, or not the nodes of its kind",
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/mesh/elements", "element %lld has no kind, or not the nodes of its kind",
                        (long long)e);
     if (uz_element_dim(kind) == given->dim)
         return UZ_OK;

@@ -81,7 +81,7 @@ static void group_place(char where[UZ_POINTER], const uz_given_mesh *given, cons
     if (given->from_file)
         snprintf(where, UZ_POINTER, "/mesh/gmsh");
     else
-        snprintf(where, UZ_POINTER, "/mesh/groups/%s/%s%s", name, key, item);
+        snprintf(where, UZ_POINTER, "/mesh/groups/%.*s/%.10s%s", LONGEST, name, key, item);
 }
 
 static const char *face_key(const group_work *work)
@@ -195,11 +195,12 @@ static uz_status collect_nodes(named_parts *parts, const group_work *work, const
     char where[UZ_POINTER];
     for (int64_t i = 0; i < group->n_nodes; i++) {
         const int64_t given = group->node[i];
-        group_place(where, work->given, group, "nodes", i);
-        if (given < 0 || given >= work->given->n_nodes)
+        if (given < 0 || given >= work->given->n_nodes) {
+            group_place(where, work->given, group, "nodes", i);
             return uz_fail(work->err, UZ_ERR_SCENE, where,
                            "the group \"%s\" asks for node %lld, but there are only 0 to %lld", group->name,
                            (long long)given, (long long)work->given->n_nodes - 1);
+        }
         if (work->new_node[given] >= 0 && !append(&parts->nodes, work->new_node[given]))
             return no_memory(work);
     }
@@ -232,11 +233,12 @@ static uz_status collect_elements(named_parts *parts, const group_work *work, co
     for (int64_t i = 0; i < group->n_elements; i++) {
         const int64_t e = group->element[i];
         int count;
-        group_place(where, work->given, group, "elements", i);
-        if (e < 0 || e >= work->mesh->n_elements)
+        if (e < 0 || e >= work->mesh->n_elements) {
+            group_place(where, work->given, group, "elements", i);
             return uz_fail(work->err, UZ_ERR_SCENE, where,
                            "the group \"%s\" asks for element %lld, but there are only 0 to %lld", group->name,
                            (long long)e, (long long)work->mesh->n_elements - 1);
+        }
         const int64_t *node = uz_mesh_element(work->mesh, e, &count);
         bool room = append(&parts->elements, e);
         for (int k = 0; k < count && room; k++)

@@ -43,6 +43,53 @@ def pulled(cells=(4, 3)):
     return scene
 
 
+# ---------------------------------------------------------------- summary
+
+def add(*vectors):
+    return [sum(numbers) for numbers in zip(*vectors)]
+
+
+def test_what_acts_on_the_body(s):
+    job = solved(s, SCENE)
+    summary = result(s, job)["summary"]
+    acts = summary["resultants"]
+    check([one["on"] for one in acts["contacts"]] == ["bottom"] and [one["on"] for one in acts["supports"]] == ["left"],
+          acts)
+    check(all(close(a, b, 1e-9) for a, b in zip(acts["loads"]["force"], [50, -15])), acts["loads"])
+    check(acts["contacts"][0]["force"] == summary["contact"]["force"], acts["contacts"])
+    everything = [acts["loads"], acts["contacts"][0], acts["supports"][0]]
+    check(max(map(abs, add(*(one["force"] for one in everything)))) < 1e-4, acts)  # certified to 1e-6
+    check(abs(add(*(one["moment"] for one in everything))[0]) < 1e-2 and len(acts["loads"]["moment"]) == 1, acts)
+    check(0 <= acts["imbalance"] < 1e-6 and summary["warnings"] == [], summary["warnings"])
+    at = summary["contact"]["max_pressure_at"]
+    answer = result(s, job, "?fields=pressure,nodes")
+    check(answer["pressure"][answer["contact_nodes"].index(at["node"])] == summary["contact"]["max_pressure"], at)
+    check(answer["nodes"][at["node"]] == at["x"], at)
+    check(0 < summary["contact"]["area"] < 300 and close(summary["energy"]["strain"], -summary["energy"]["dual"], 1e-6),
+          summary["energy"])
+
+
+def test_each_case_has_its_own_resultants(s):
+    request = copy.deepcopy(SCENE)
+    request["cases"] = [{"name": "pressed", "loads": [{"on": "top", "traction": [0, -1]}]}, {"name": "free", "loads": []}]
+    cases = result(s, solved(s, request))["cases"]
+    check([round(case["summary"]["resultants"]["loads"]["force"][1], 9) for case in cases] == [-300, 0], cases)
+    check(cases[1]["summary"]["contact"]["max_pressure_at"] is None, cases[1]["summary"]["contact"])
+
+
+def test_matrices_have_no_resultants(s):
+    summary = result(s, solved(s, MATRICES))["summary"]
+    check(not {"resultants", "warnings"} & set(summary) and "strain" not in summary["energy"], summary)
+
+
+def test_large_deformation_is_doubted(s):
+    scene = copy.deepcopy(SCENE)
+    scene["problem"]["loads"] = [{"on": "top", "traction": [0, 1000]}]
+    warnings = result(s, solved(s, scene))["summary"]["warnings"]
+    check(["large_rotation"] == [w["code"] for w in warnings if w["value"] > 0.1][:1], warnings)
+    check(all(w["message"] for w in warnings), warnings)
+
+
 # ------------------------------------------------------------------- JSON
 
 def test_uniform_stress(s):
@@ -191,6 +238,35 @@ def check_vtu(s, request, cells):
 
 def test_vtu_of_a_plane(s):
     check(check_vtu(s, SCENE, {"quad": 300}) == 2)
+
+
+SOLID = {"problem": {"kind": "scene", "model": "solid",
+                     "mesh": {"box": {"size": [2, 1, 1], "cells": [3, 2, 2], "element": "tet10"}},
+                     "materials": [{"on": "all", "young": 200e3, "poisson": 0.3}],
+                     "supports": [{"on": "left", "ux": 0, "uz": 0}],
+                     "loads": [{"on": "top", "pressure": 5}],
+                     "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, 0, 0], "normal": [0, 1, 0]}}}]}}
+# Two materials in two kinds of elements, side by side.
+MIXED = {"problem": {"kind": "scene", "model": "plane_strain", "thickness": 1,
+                     "mesh": {"nodes": [[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]],
+                              "elements": {"tri3": [[0, 1, 4], [0, 4, 3]], "quad4": [[1, 2, 5, 4]]},
+                              "groups": {"soft": {"elements": [0, 1]}, "hard": {"elements": [2]},
+                                         "below": {"edges": [[0, 1], [1, 2]]}, "above": {"edges": [[4, 3], [5, 4]]},
+                                         "side": {"nodes": [0, 3]}}},
+                     "materials": [{"on": "soft", "young": 10, "poisson": 0.3}, {"on": "hard", "young": 1000, "poisson": 0.2}],
+                     "supports": [{"on": "side", "ux": 0}],
+                     "loads": [{"on": "above", "pressure": 0.1}],
+                     "contacts": [{"on": "below", "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}]}}
+
+
+def test_vtu_of_a_solid(s):
+    check(check_vtu(s, SOLID, {"tetra10": 72}) == 3)
+
+
+def test_vtu_of_mixed_elements_and_materials(s):
+    check(check_vtu(s, MIXED, {"triangle": 2, "quad": 1}) == 2)
+    mesh = read_vtu(s, solved(s, MIXED))
+    check([m.tolist() for m in mesh.cell_data["materials"]] == [[0, 0], [1]], mesh.cell_data)
 
 
 def test_vtu_of_several_blocks(s):

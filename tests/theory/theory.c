@@ -60,6 +60,9 @@ static void others(void)
         theory_beam(&t, "quad4", UZ_FORMULATION_INCOMPATIBLE, n);
     theory_beam(&t, "quad8", UZ_FORMULATION_AUTO, 1);
     theory_beam(&t, "tri3", UZ_FORMULATION_AUTO, 16);
+    for (int n = 8; n <= 32; n *= 2)
+        theory_roller(&t, "quad4", n, 1.25);
+    theory_roller(&t, "quad8", 10, 1.3);
     print(&t);
 }
 

@@ -39,14 +39,17 @@ static uz_scene block_on_floor(const body_kind *kind)
 /* ------------------------------------------------------------------- contact */
 
 /* A uniform pressure on top: uniform stress, and on the floor each node's share of it. */
-static void check_uniform_pressure(const body_kind *kind, bool given)
+static void check_uniform_pressure(const body_kind *kind, body_map map, uz_formulation formulation)
 {
     const double q = 12;
     uz_scene s = block_on_floor(kind);
+    s.formulation = formulation;
     double along, across;
     body_load(&s, UZ_LOAD_TRACTION, "top", 0, -q, 0);
-    if (given)
-        body_give_mesh(&s, NULL);
+    if (map) {
+        body_give_mesh(&s, map);
+        body_straighten(&s);
+    }
     uniaxial(&along, &across, kind->model);
     uz_result *x = body_solve(&s, 1e-9);
     const int dim = x->summary.dim;
@@ -74,13 +77,27 @@ static void check_uniform_pressure(const body_kind *kind, bool given)
 TEST(uniform_pressure_on_an_obstacle)
 {
     for (int k = 0; k < N_KINDS; k++)
-        check_uniform_pressure(&KINDS[k], false);
+        check_uniform_pressure(&KINDS[k], NULL, UZ_FORMULATION_AUTO);
 }
 
-TEST(uniform_pressure_on_meshes_in_numbers)
+/* Moves inner nodes; the sides stay flat. */
+static void distort(double x[3])
 {
-    for (int k = 0; k < N_KINDS; k++)
-        check_uniform_pressure(&KINDS[k], true);
+    const double pi = acos(-1), bump = sin(pi * x[0] / SIZE[0]) * sin(pi * x[1] / SIZE[1]);
+    x[0] += 0.15 * bump;
+    x[1] -= 0.1 * bump * (1 + x[2]);
+    x[2] += 0.1 * bump * sin(pi * x[2] / SIZE[2]);
+}
+
+/* The patch test, with contact: edges are straight, as the Gauss rules of solids and rings ask for. */
+TEST(uniform_pressure_on_distorted_meshes)
+{
+    for (int f = 0; f < UZ_FORMULATIONS; f++)
+        for (int k = 0; k < N_KINDS; k++) {
+            const bool has_others = strcmp(KINDS[k].element, "quad4") == 0 || strcmp(KINDS[k].element, "hex8") == 0;
+            if (f <= UZ_FORMULATION_STANDARD || has_others)
+                check_uniform_pressure(&KINDS[k], distort, (uz_formulation)f);
+        }
 }
 
 /* ------------------------------------------------------------------ models */
@@ -173,6 +190,28 @@ TEST(motions_in_space_are_named)
     s.n_contacts = 0;
     s.n_supports = 0;
     expect_free(&s, "/supports", "translation along x, translation along y, translation along z, rotation");
+    uz_scene_clear(&s);
+}
+
+/* A brick that only its floor holds upright: a translation and two rotations. Soft springs keep it from sliding. */
+TEST(a_brick_stands_on_its_floor)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){2, 1, 1.5}, (int64_t[3]){2, 1, 2});
+    s.materials[0].poisson = 0;
+    body_spring(&s, "bottom", 1, 0, 1);
+    body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+    body_load(&s, UZ_LOAD_FORCE, "top", 0, -6, 0);
+    uz_result *x = body_solve(&s, 1e-9);
+    CHECK_INT(x->summary.semicoercive.free_modes, 3);
+    CHECK_REL(x->summary.force[1], 6.0, 1e-7);
+    for (int64_t a = 0; a < x->n_nodes; a++)
+        CHECK(fabs(x->u[3 * a + 1] + 2 * x->mesh.xyz[3 * a + 1] / 200e3) < 1e-6 * 2 / 200e3);
+    uz_result_free(x);
+    /* Pulled up on top and down at its side: the sum of both acts beyond the edge of the floor. */
+    s.loads[0].v[1] = 0.4;
+    body_load(&s, UZ_LOAD_FORCE, "right", 0, -1, 0);
+    expect_free(&s, "/loads", "push the body away: rotation about the axis through (");
+    expect_free(&s, "/loads", "along -z");
     uz_scene_clear(&s);
 }
 

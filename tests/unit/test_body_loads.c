@@ -126,6 +126,54 @@ TEST(several_supports_at_one_node)
     uz_scene_clear(&s);
 }
 
+static int64_t row_entries(const uz_csc *N, int64_t row)
+{
+    int64_t count = 0;
+    for (int64_t q = 0; q < N->ptr[N->cols]; q++)
+        count += N->idx[q] == row;
+    return count;
+}
+
+/* On what an inclined plane of symmetry leaves of a node, the normal of an obstacle is a dof again. */
+TEST(an_obstacle_at_inclined_supports_costs_one_dof)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){2, 1, 1}, (int64_t[3]){2, 2, 2});
+    body_hold_normal(&s, "left", (double[3]){2, 1, 1}, 0);
+    body_hold_normal(&s, "right", (double[3]){0, 3, 1}, 0);
+    body_plane(&s, "bottom", (double[3]){0, -1, 0}, (double[3]){0.3, 1, -0.2});
+    uz_body_model model = body_model(&s);
+    CHECK_INT(model.m, 9);
+    for (int64_t i = 0; i < model.m; i++) {
+        const int64_t a = model.info.contact_node[i];
+        CHECK_INT(row_entries(&model.N, i), 1);
+        for (int64_t t = 0; t < model.info.n_turned; t++)
+            for (int k = 0; k < 9 && model.info.turned_node[t] == a; k++) { /* its frame is orthogonal */
+                const double *Q = model.info.frame + 9 * t;
+                double dot = 0;
+                for (int c = 0; c < 3; c++)
+                    dot += Q[k / 3 * 3 + c] * Q[k % 3 * 3 + c];
+                CHECK(fabs(dot - (k / 3 == k % 3)) < 1e-15);
+            }
+    }
+    uz_body_model_clear(&model);
+    uz_scene_clear(&s);
+}
+
+/* What the obstacle bounds is held already, but for rounding in the frame: no row. */
+TEST(an_obstacle_along_the_held_direction_has_no_rows)
+{
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){2, 1, 1}, (int64_t[3]){2, 2, 2});
+    body_hold(&s, "bottom", 0, 0, 0);
+    body_hold_normal(&s, "left", (double[3]){2, 1, 1}, 0);
+    body_plane(&s, "left", (double[3]){-9, 0, 0}, (double[3]){4, 2, 2});
+    body_plane(&s, "right", (double[3]){9, 0, 0}, (double[3]){-4, 2, 2});
+    uz_body_model model = body_model(&s);
+    CHECK_INT(model.m, 6);
+    CHECK_INT(model.info.contact_of[0], 1);
+    uz_body_model_clear(&model);
+    uz_scene_clear(&s);
+}
+
 /* -------------------------------------------------------------------- springs */
 
 /* A block on elastic ground: it sinks by force over stiffness, whatever else it does, and nothing is left free. */
@@ -297,6 +345,32 @@ TEST(heated_bar_meets_an_obstacle)
     CHECK_INT(x->summary.active, 3);
     CHECK_REL(x->summary.force[0], 200e3 * (4e-4 - 1e-3), 1e-8);
     uz_result_free(x);
+    uz_scene_clear(&s);
+}
+
+/* The loads of a case replace all of the scene's, temperature among them. */
+TEST(cases_replace_temperatures)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){10, 1, 0}, (int64_t[3]){10, 2, 0});
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE};
+    uz_settings settings = uz_settings_default();
+    uz_result **x = NULL;
+    uz_error err = {0};
+    s.materials[0].expansion = 1e-5;
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "bottom", NAN, 0, NAN);
+    body_load(&s, UZ_LOAD_TEMPERATURE, "all", 100, 0, 0);
+    uz_load pull = {.kind = UZ_LOAD_TRACTION, .on = "right", .v = {20, 0, 0}};
+    uz_load_case cases[2] = {{.name = "hot"}, {.name = "pulled", .loads = &pull, .n_loads = 1}};
+    problem.scene = s;
+    problem.cases = cases;
+    problem.n_cases = 2;
+    CHECK_MSG(uz_solve_cases(&x, &problem, &settings, NULL, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+    if (x) {
+        CHECK_REL(x[0]->u[2 * 10], 10 * 1e-3, 1e-7);
+        CHECK_REL(x[1]->u[2 * 10], 10 * 1e-4, 1e-7);
+    }
+    uz_results_free(x, 2);
     uz_scene_clear(&s);
 }
 

@@ -168,7 +168,8 @@ static bool same_key(const uz_scene *a, const uz_scene *b)
 {
     unsigned char *x, *y;
     size_t n, m;
-    CHECK(uz_scene_body_key(&x, &n, a, NULL) == UZ_OK && uz_scene_body_key(&y, &m, b, NULL) == UZ_OK);
+    CHECK(uz_scene_body_key(&x, &n, a, NULL) == UZ_OK);
+    CHECK(uz_scene_body_key(&y, &m, b, NULL) == UZ_OK);
     const bool same = n == m && memcmp(x, y, n) == 0;
     free(x);
     free(y);

@@ -125,6 +125,29 @@ TEST(two_blocks_pressed_are_one)
     check_pressed(UZ_PLANE_STRESS, "quad8");
 }
 
+/* Nothing but the floor holds the lower block down, nothing but the lower block the upper one. */
+TEST(a_stack_on_a_floor)
+{
+    const double q = 12, along = 1 / 200e3;
+    uz_scene s = stack(UZ_PLANE_STRESS, "quad4", "quad4", 2, 2);
+    hold_sides(&s, 'a');
+    hold_sides(&s, 'b');
+    body_load(&s, UZ_LOAD_PRESSURE, "b top", q, 0, 0);
+    body_plane(&s, "a bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+    put_pair(&s, "b bottom", "a top");
+    uz_result *x = body_solve(&s, 1e-9);
+    CHECK_INT(x->summary.semicoercive.free_modes, 2);
+    for (int64_t a = 0; a < x->n_nodes; a++)
+        CHECK(fabs(x->u[2 * a + 1] + q * along * x->mesh.xyz[2 * a + 1]) < 1e-6 * 2 * q * along);
+    CHECK_REL(x->summary.force[1], 2 * 36.0, 1e-6); /* of both contacts */
+    uz_result_free(x);
+    uz_error err = {0};
+    s.n_contacts = 1; /* the upper block is held by nothing */
+    CHECK_INT(uz_scene_check(&s, &err), UZ_ERR_FREE_BODY);
+    CHECK_MSG(strstr(err.message, "leave translation along y of the part with node 9 free"), "%s", err.message);
+    uz_scene_clear(&s);
+}
+
 /* Meshes that do not match: the forces on both bodies balance, and no node is inside of the other body. */
 TEST(blocks_of_other_meshes)
 {
@@ -161,6 +184,27 @@ TEST(blocks_of_other_meshes)
         uz_result_free(x);
         uz_scene_clear(&s);
     }
+}
+
+/* A support that moves the master, all of whose nodes are held, closes the gap: the block above it is strained by it.
+ */
+TEST(a_moved_master_presses)
+{
+    uz_scene s = stack(UZ_PLANE_STRESS, "quad4", "quad4", 2, 3);
+    hold_sides(&s, 'b');
+    body_hold(&s, "a all", 0, 1e-3, NAN);
+    body_hold(&s, "b top", NAN, 0, NAN);
+    put_pair(&s, "b bottom", "a top");
+    uz_result *x = body_solve(&s, 1e-10);
+    CHECK_INT(x->summary.active, 4);
+    CHECK_REL(x->summary.force[1], 200e3 * 1e-3 * 3, 1e-8);
+    uz_result_free(x);
+    body_hold(&s, "b all", NAN, 0, NAN); /* now no node can give way */
+    uz_error err = {0};
+    CHECK_INT(uz_scene_check(&s, &err), UZ_ERR_SCENE);
+    CHECK_STR(err.where, "/contacts/0");
+    CHECK_MSG(strstr(err.message, "inside the obstacle and cannot give way"), "%s", err.message);
+    uz_scene_clear(&s);
 }
 
 TEST(a_body_that_nothing_holds_is_named)

@@ -1,6 +1,7 @@
 /* Every allocation of the codec, and of jansson under it, fails once. What comes out then is a whole answer or a clear
  * refusal, and not one block is left behind. Linked with malloc, calloc, realloc and free wrapped. */
 #include "codec/codec.h"
+#include "codec/decode.h"
 #include "harness.h"
 
 #include <jansson.h>
@@ -106,6 +107,30 @@ static bool try_decode(const char *path)
     return good;
 }
 
+/* A scene's JSON up to the solver's structs, whether or not it can be solved. */
+static bool try_scene(const char *path)
+{
+    uz_scene scene = {0};
+    problem_details problem = {0};
+    json_doc doc = {0};
+    size_t len;
+    int64_t planned = countdown;
+    countdown = -1;
+    char *body = test_read_file(path, &len);
+    countdown = planned;
+    const bool good = json_scan(&doc, body, len, &problem) && decode_check(&doc, "request.json", &problem) &&
+                      decode_scene(&scene, &doc, json_object_get(doc.root, "problem"), len, &problem);
+    planned = countdown;
+    countdown = -1;
+    CHECK_MSG(good || (problem.status == 503 && strcmp(problem.code, "out_of_memory") == 0), "%s: %d %s %s", path,
+              problem.status, problem.code, problem.detail);
+    json_doc_clear(&doc);
+    uz_scene_clear(&scene);
+    free(body);
+    countdown = planned;
+    return good;
+}
+
 static bool try_encode(const char *argument)
 {
     static const double rows[40 * CODEC_HISTORY_COLUMNS];
@@ -158,6 +183,8 @@ TEST(decoding)
     exhaust(try_decode, "tests/data/long_vectors.json");
     exhaust(try_decode, "tests/data/cases.json");
     exhaust(try_decode, "tests/data/verify.json");
+    exhaust(try_scene, "tests/data/mesh_scene.json");
+    exhaust(try_scene, "tests/data/gmsh_scene.json");
     exhaust(try_refine, "{\"problem\": 1, \"solver\": {\"method\": \"uzawa\"}}");
     exhaust(try_refine, "{\"problem\": 1}");
     codec_end();

@@ -79,7 +79,7 @@ static void two_squares(small_mesh *m)
     m->mesh.dim = 2;
     bind(m);
     for (int i = 0; i < 6; i++)
-        add_node(m, i % 3, i / 3, 0);
+        add_node(m, i % 3, i < 3 ? 0 : 1, 0);
     add_element(m, UZ_TRI3, (int64_t[]){1, 2, 5});
     add_element(m, UZ_TRI3, (int64_t[]){1, 5, 4});
     add_element(m, UZ_QUAD4, (int64_t[]){0, 1, 4, 3});
@@ -215,7 +215,7 @@ TEST(middles_out_of_place_are_refused)
         m.mesh.dim = 2;
         bind(&m);
         for (int i = 0; i < 4; i++)
-            add_node(&m, i == 1 || i == 2 ? 4 : 0, i / 2 * 4, 0);
+            add_node(&m, i == 1 || i == 2 ? 4 : 0, i < 2 ? 0 : 4, 0);
         add_node(&m, k ? 1 : 1.5, 0, 0);
         add_node(&m, 4.25, 2, 0);
         add_node(&m, 2, 4, 0);

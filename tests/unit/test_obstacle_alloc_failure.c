@@ -2,6 +2,7 @@
  * keep nothing. Linked with the heap wrapped. */
 #include "failing_heap.h"
 #include "harness.h"
+#include "obstacle/candidates.h"
 #include "obstacle/obstacle.h"
 #include "obstacle/projection.h"
 
@@ -67,9 +68,29 @@ static void make_pairs(void)
     free(row);
 }
 
+static void choose(void)
+{
+    static const double h[] = {0, 1, 5};
+    static int64_t ptr[] = {0, 1, 3}, idx[] = {0, 1, 2};
+    static double val[] = {1, 2, 3};
+    const uz_csc N = {.rows = 3, .cols = 2, .ptr = ptr, .idx = idx, .val = val};
+    uz_candidates c;
+    uz_csc part = {0};
+    uz_error err = {0};
+    uz_status status = uz_candidates_first(&c, h, 3, 1, &err);
+    if (status == UZ_OK)
+        status = uz_candidates_reduce(&part, &N, &c, &err);
+    CHECK_INT(status, heap.failed ? UZ_ERR_MEMORY : UZ_OK);
+    CHECK((part.ptr != NULL) == (status == UZ_OK));
+    CHECK(status != UZ_OK || (part.rows == 2 && part.ptr[2] == 2 && part.idx[1] == 1 && part.val[1] == 2));
+    uz_csc_clear(&part);
+    uz_candidates_clear(&c);
+}
+
 TEST(every_allocation_may_fail)
 {
     CHECK_INT(fail_each(make_line), 6);
     CHECK_INT(fail_each(make_table), 7);
     CHECK_INT(fail_each(make_pairs), 7);
+    CHECK_INT(fail_each(choose), 5);
 }

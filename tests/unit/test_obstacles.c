@@ -441,6 +441,15 @@ TEST(what_is_no_obstacle_is_refused)
     c = (uz_contact){.kind = UZ_OBSTACLE_HEIGHT, .n_x = 2, .n_y = 2, .x = x, .y = x, .z = z};
     refused(&c, UZ_PLANE_STRESS, UZ_ERR_SCENE, "/contacts/4/obstacle/height/y", "leave y out");
     refused(&c, UZ_SOLID, UZ_ERR_NOT_FINITE, "/contacts/4/obstacle/height/z/1/1", "finite");
+    z[3] = 0;
+    z[1] = 2e6;
+    refused(&c, UZ_SOLID, UZ_ERR_SCENE, "/contacts/4/obstacle/height/z/0/1", "as good as a step");
+    z[1] = 0;
+    z[2] = z[3] = -2e6;
+    refused(&c, UZ_SOLID, UZ_ERR_SCENE, "/contacts/4/obstacle/height/z/1/0", "as good as a step");
+    z[0] = 2e6;
+    c.n_y = 0;
+    refused(&c, UZ_PLANE_STRAIN, UZ_ERR_SCENE, "/contacts/4/obstacle/height/z/1", "polyline");
     c = (uz_contact){.kind = UZ_OBSTACLE_BODY};
     refused(&c, UZ_SOLID, UZ_ERR_ARGUMENT, "", "body");
 }
@@ -465,12 +474,20 @@ TEST(gaps_that_are_no_numbers_are_refused)
     const uz_contact all[] = {{.kind = UZ_OBSTACLE_PLANE, .normal = {0, 0, 1}},
                               {.kind = UZ_OBSTACLE_ROUND, .radius = 1},
                               {.kind = UZ_OBSTACLE_HEIGHT, .n_x = 2, .n_y = 2, .x = x, .y = y, .z = z}};
-    const double at[3] = {(double)NAN, (double)NAN, (double)NAN};
+    const double at[3] = {(double)NAN, (double)NAN, (double)NAN}, far[3] = {-1e200, 3e200, 1e200};
     for (size_t k = 0; k < sizeof all / sizeof all[0]; k++) {
         uz_obstacle *o = made(&all[k], UZ_SOLID);
         uz_gap gap;
-        uz_error err = {0};
+        uz_error err = {0}, again = {0};
         CHECK_INT(uz_obstacle_gap(&gap, o, at, &err), UZ_ERR_NOT_FINITE);
+        const uz_status status = uz_obstacle_gap(&gap, o, far, &again);
+        CHECK(status == UZ_ERR_NOT_FINITE || (k < 2 && status == UZ_OK && gap.gap >= 1e200));
         uz_obstacle_free(o);
     }
+    const uz_contact line = polyline(x, y, 2);
+    uz_obstacle *o = made(&line, UZ_PLANE_STRAIN);
+    uz_gap gap;
+    uz_error err = {0};
+    CHECK_INT(uz_obstacle_gap(&gap, o, (double[]){1e300, -1e300}, &err), UZ_ERR_NOT_FINITE);
+    uz_obstacle_free(o);
 }

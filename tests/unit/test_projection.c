@@ -64,11 +64,11 @@ static bodies make_bodies(int dim, uz_element_kind kind, int64_t n, int64_t slav
     b.on.node = checked(uz_alloc_zero(slaves, sizeof *b.on.node));
     b.with.face = checked(uz_alloc_zero(cells, sizeof *b.with.face));
     for (int64_t i = 0; i < 2 * top; i++) {
-        const int64_t k = i % top;
+        const int64_t k = i % top, row = k / line;
         double *x = m->xyz + i * dim;
         x[0] = (double)(k % line) / (double)(line - 1);
         if (dim == 3)
-            x[1] = (double)(k / line) / (double)(line - 1);
+            x[1] = (double)row / (double)(line - 1);
         x[dim - 1] = height(x[0], dim == 3 ? x[1] : 0) - (i < top ? 0 : 1);
     }
     for (int64_t e = 0; e < cells; e++) {
@@ -406,6 +406,59 @@ TEST(nodes_beyond_the_border_have_no_row)
     clear(&b);
 }
 
+/* Each side of one tetrahedron under a node that stands off its middle. */
+static void check_tetrahedron(uz_element_kind kind)
+{
+    static const int EDGE[6][2] = {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}};
+    double xyz[33] = {0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3};
+    unsigned char kinds[1] = {(unsigned char)kind};
+    const int nodes = uz_element_node_count(kind), corners = 4;
+    int64_t first[2] = {0, nodes}, node[10], shoe[1] = {nodes};
+    for (int i = 0; i < nodes; i++)
+        node[i] = i;
+    for (int k = 0; k < 18 && nodes > corners; k++)
+        xyz[12 + k] = 0.5 * (xyz[3 * EDGE[k / 3][0] + k % 3] + xyz[3 * EDGE[k / 3][1] + k % 3]);
+    const uz_mesh mesh = {.dim = 3,
+                          .n_nodes = nodes + 1,
+                          .n_elements = 1,
+                          .xyz = xyz,
+                          .kind = kinds,
+                          .first = first,
+                          .node = node,
+                          .extent = 4};
+    for (int side = 0; side < 4; side++) {
+        uz_face face = {0, side};
+        const uz_group on = {.name = "shoe", .kind = UZ_GROUP_NODES, .n_nodes = 1, .node = shoe};
+        const uz_group with = {.name = "side", .kind = UZ_GROUP_FACES, .n_faces = 1, .face = &face};
+        int64_t of[UZ_FACE_NODES], count;
+        uz_contact_pair *row;
+        uz_error err = {0};
+        double inner[3], *x = xyz + 3 * (size_t)nodes;
+        const int per = uz_mesh_face(of, &mesh, face);
+        for (int c = 0; c < 3; c++) { /* away from the tetrahedron's middle, through that of the side */
+            const double middle = (xyz[3 * of[0] + c] + xyz[3 * of[1] + c] + xyz[3 * of[2] + c]) / 3;
+            inner[c] = (xyz[c] + xyz[3 + c] + xyz[6 + c] + xyz[9 + c]) / 4;
+            x[c] = middle + 0.1 * (middle - inner[c]);
+        }
+        CHECK_INT(uz_contact_pairs(&row, &count, &mesh, &on, &with, 0, &err), UZ_OK);
+        CHECK_INT(count, 1);
+        CHECK_INT(row->count, per);
+        CHECK(row->gap > 0);
+        for (int j = 0; j < per; j++) /* the foot's coordinates, from those of the nodes */
+            for (int c = 0; c < 3; c++)
+                x[c] -= row->weight[j] * xyz[3 * row->master[j] + c];
+        for (int c = 0; c < 3; c++)
+            near(x[c], row->gap * row->normal[c], 1e-14, "off the foot");
+        free(row);
+    }
+}
+
+TEST(sides_of_tetrahedra)
+{
+    check_tetrahedron(UZ_TET4);
+    check_tetrahedron(UZ_TET10);
+}
+
 static void refused(const bodies *b, const uz_group *on, const uz_group *with, const char *where, const char *fragment)
 {
     uz_contact_pair *row;
@@ -428,7 +481,7 @@ TEST(bad_groups_are_refused)
     b.on.node[0] = 2;
     refused(&b, &b.on, &b.with, "/contacts/3/on", "node 2 is in \"shoe\"");
     b.on.node[0] = b.mesh.n_nodes - 2;
-    memcpy(b.mesh.xyz, b.mesh.xyz + 2, 16); /* the first face's ends are one place */
+    b.mesh.xyz[0] = b.mesh.xyz[2]; /* the first face's ends are one place: all of them have y = 0 */
     memcpy(slave(&b, 0), (double[]){0.25, 0.1}, 16);
     refused(&b, &b.on, &b.with, "/contacts/3/with", "has no area");
     clear(&b);

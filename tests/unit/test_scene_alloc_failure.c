@@ -95,9 +95,10 @@ static uz_status key(const uz_scene *scene, uz_error *err)
 static uz_status copy_info(const uz_scene *scene, uz_error *err)
 {
     static double xyz[8];
-    static int64_t node[1];
+    static int64_t node[2];
     uz_mesh_info copy, info = {.dim = 2, .n_nodes = 4, .xyz = xyz, .contact_node = node};
     info.contact_area = info.contact_normal = xyz;
+    info.contact_of = info.contact_face = node;
     (void)scene;
     const uz_status status = uz_mesh_info_copy(&copy, &info, 1, err);
     CHECK((copy.xyz != NULL) == (status == UZ_OK));
@@ -136,7 +137,7 @@ TEST(every_allocation_may_fail)
     CHECK(fail_each(to_qp, &scene) > 23);
     CHECK(fail_each(uz_scene_check, &scene) > 23);
     CHECK(fail_each(key, &scene) >= 2);
-    CHECK_INT(fail_each(copy_info, &scene), 4);
+    CHECK_INT(fail_each(copy_info, &scene), 6);
     uz_scene_clear(&scene);
 }
 
@@ -174,6 +175,59 @@ TEST(every_allocation_for_supports_and_materials_may_fail)
     CHECK(fail_each(uz_scene_check, &s) > 30);
     CHECK(fail_each(key, &s) >= 3);
     CHECK(fail_each(estimate, &s) >= 6);
+    uz_scene_clear(&s);
+}
+
+/* A round obstacle, and a second part of the mesh on the first: elements of the same nodes twice over. */
+TEST(every_allocation_for_obstacles_may_fail)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){1, 1, 0}, (int64_t[3]){1, 1, 0});
+    double y[2] = {0, 0}, x[2] = {-5, 5};
+    body_hold(&s, "left", 0, NAN, NAN);
+    body_hold(&s, "top", NAN, 0, NAN);
+    uz_contact *contact = body_plane(&s, "bottom", (double[3]){0, -9, 0}, (double[3]){0, 1, 0});
+    contact->kind = UZ_OBSTACLE_POLYLINE;
+    contact->n_x = 2;
+    contact->x = x;
+    contact->y = y;
+    CHECK(fail_each(to_qp, &s) > 25);
+    CHECK(fail_each(uz_scene_check, &s) > 25);
+    contact->x = contact->y = NULL;
+    uz_scene_clear(&s);
+}
+
+TEST(every_allocation_for_a_second_part_may_fail)
+{
+    static double xyz[16] = {0, 0, 1, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 2, 0, 2};
+    static int64_t first[3] = {0, 4, 8}, node[8] = {0, 1, 2, 3, 4, 5, 6, 7}, ends[2] = {0, 2};
+    static int64_t low[2] = {0, 1}, high[2] = {6, 7}, lower[2] = {2, 3}, upper[2] = {4, 5}, side[4] = {0, 3, 4, 7};
+    static unsigned char kind[2] = {UZ_QUAD4, UZ_QUAD4};
+    uz_given_group groups[] = {{.name = "low", .n_faces = 1, .face_first = ends, .face_node = low},
+                               {.name = "high", .n_faces = 1, .face_first = ends, .face_node = high},
+                               {.name = "lower", .n_faces = 1, .face_first = ends, .face_node = lower},
+                               {.name = "upper", .n_faces = 1, .face_first = ends, .face_node = upper},
+                               {.name = "side", .n_nodes = 4, .node = side}};
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){1, 1, 0}, (int64_t[3]){1, 1, 0});
+    s.source = UZ_MESH_GIVEN;
+    s.given = (uz_given_mesh){.dim = 2,
+                              .n_nodes = 8,
+                              .xyz = xyz,
+                              .n_elements = 2,
+                              .kind = kind,
+                              .first = first,
+                              .node = node,
+                              .groups = groups,
+                              .n_groups = 5};
+    body_hold(&s, "side", 0, NAN, NAN);
+    body_hold(&s, "low", NAN, 0, NAN);
+    body_load(&s, UZ_LOAD_PRESSURE, "high", 5, 0, 0);
+    uz_contact *contact = body_plane(&s, "upper", (double[3]){0}, (double[3]){0});
+    contact->kind = UZ_OBSTACLE_BODY;
+    snprintf(contact->with, sizeof contact->with, "lower");
+    CHECK(fail_each(uz_scene_check, &s) > 40);
+    body_hold(&s, "high", NAN, 0, NAN);
+    CHECK(fail_each(to_qp, &s) > 40);
+    s.given = (uz_given_mesh){0};
     uz_scene_clear(&s);
 }
 

@@ -215,11 +215,11 @@ TEST(a_job_that_ran_once_has_no_queue_limit)
     int64_t count;
     if (!place_begin(&p))
         return;
-    submit_with(p.s, (store_request){.queue_limit_s = 0.05}, id);
+    submit_with(p.s, (store_request){.queue_limit_s = 1000}, id);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
     CHECK_INT(store_release(p.s, claimed, "me"), STORE_OK);
-    submit_with(p.s, (store_request){.queue_limit_s = 0.05}, other);
-    usleep(80000);
+    submit_with(p.s, (store_request){.queue_limit_s = 1000}, other);
+    change_file(p.path, "UPDATE job SET queue_until = 1 WHERE queue_until > 0"); /* long after */
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
     CHECK_STR(claimed, id);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_NOT_FOUND); /* too late, though nobody has said so yet */

@@ -49,23 +49,17 @@ class Mesh:
 
 
 def cylinder():
-    """The lower half of a cylinder, R = 50 mm, pressed on a plane; half of it by symmetry. Hertz: a line contact."""
+    """Half of the lower part of a cylinder, R = 50 mm, pressed on a plane. Hertz: a line contact."""
     radius, n, m = 50.0, 48, 28
     mesh = Mesh()
-    angles = [math.pi / 2 * s for s in graded(n, 60)]
+    angles = [math.radians(75) * s for s in graded(n, 60)]
     depths = graded(m, 60)
 
     def place(i, j):
-        # From the arc (j = 0) towards the top of the half disc (j = m), which is flat.
+        # From the arc (j = 0) to the flat top (j = m).
         t, a = depths[j], angles[i]
         x, y = radius * math.sin(a), -radius * math.cos(a)
-        top = (radius * math.sin(a) * 0.999, 0.0) if i else (0.0, 0.0)
-        # The last column meets the top at its corner: keep it apart by a slanted side.
-        if i == n:
-            top = (0.6 * radius, 0.0)
-        elif i:
-            top = (0.6 * radius * i / n, 0.0)
-        return (1 - t) * x + t * top[0], (1 - t) * y + t * top[1]
+        return (1 - t) * x + t * 0.6 * radius * i / n, (1 - t) * y
 
     first = mesh.grid(place, n, m)
     mesh.edges("arc", [first + i for i in range(n + 1)])
@@ -89,13 +83,9 @@ def press_fit():
             return r * math.sin(a), r * math.cos(a)
         return mesh.grid(place, steps, m)
 
-    # Angles run clockwise from +y, so the radius is given first along j and quads are counter-clockwise.
     shaft = ring(10, 20.05, n)
     count = len(mesh.elements["quad4"])
     hub = ring(20, 35, 3 * n // 2)
-    for quads in (mesh.elements["quad4"],):
-        for k, (a, b, c, d) in enumerate(quads):
-            quads[k] = [a, d, c, b]
     total = len(mesh.elements["quad4"])
     width = n + 1
     mesh.groups["shaft"] = {"elements": list(range(count))}
@@ -126,7 +116,7 @@ def gear():
                         "mesh": {"box": {"origin": [0, 3.05], "size": [60, 20], "cells": [150, 50],
                                          "element": "quad4"}},
                         "materials": [{"on": "all", "young": 5, "poisson": 0.45}],
-                        "supports": [{"on": "top", "ux": 0, "uy": -1.5}],
+                        "supports": [{"on": "top", "ux": 0, "uy": -0.4}],
                         "contacts": [{"on": "bottom", "obstacle": {"polyline": {"points": points}}}]},
             "tags": ["gallery", "gear"]}
 

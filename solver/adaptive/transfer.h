@@ -1,0 +1,13 @@
+/* transfer.h: the contact of one grid of a box as the start of the next. */
+#ifndef UZ_ADAPTIVE_TRANSFER_H
+#define UZ_ADAPTIVE_TRANSFER_H
+
+#include "uzawa.h"
+
+/* Reactions for the contact rows of `fine`: the pressure of the result on box `coarse`, interpolated from its nodes,
+ * times the area of each row. Contacts are those of one scene. *out NULL and UZ_OK: the result has no pressure. The
+ * caller frees with uz_state_free. */
+uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_mesh_info *fine,
+                            int64_t m, uz_error *err);
+
+#endif
