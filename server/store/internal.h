@@ -34,7 +34,8 @@ struct store {
     /* Changes are numbered as they are committed; sync.c. */
     pthread_mutex_t sync_lock; /* everything down to sync_stop */
     pthread_cond_t sync_asked, sync_ended;
-    uint64_t committed; /* the last one's number */
+    uint64_t begun;     /* the number of the last COMMIT, which may be under way: readers may see it already */
+    uint64_t committed; /* of the last one that ended */
     uint64_t wanted;    /* somebody wants those up to here on disk */
     uint64_t synced;    /* those up to here are */
     uint64_t failures;  /* times that this could not be had, the last time */
@@ -73,10 +74,15 @@ store_status store_write(store *s, store_change change, void *args); /* WRITE_DU
 /* ---- sync.c */
 bool store_sync_begin(store *s); /* once the writer has read the file; false: no thread, or no log */
 void store_sync_end(store *s);
-uint64_t store_note_commit(store *s); /* the number of the change just committed; under writer_lock */
+/* Around a COMMIT, however it ends; under writer_lock. The second returns its number. */
+void store_begin_commit(store *s);
+uint64_t store_note_commit(store *s);
 void store_want_sync(store *s, uint64_t number);
 store_status store_await_sync(store *s, uint64_t number);
-store_status store_settle(store *s); /* returns when all that is committed now is on disk */
+store_status store_settle(store *s); /* returns when all that anybody may have read is on disk */
+
+/* Before jobs are told that were read: returns when the end of each is on disk. */
+store_status store_settle_jobs(store *s, const job *jobs, size_t count);
 
 /* Keeps the connection's message as the store's last one. */
 void store_keep_message(store *s, const connection *c);

@@ -441,13 +441,21 @@ store_status store_dismiss(store *s, const char *id, job_status *was)
 /* What has just ended is told once it is on disk. After this long it is, even if nobody asked for it. */
 static const double UNSETTLED_S = 60.0;
 
+store_status store_settle_jobs(store *s, const job *jobs, size_t count)
+{
+    bool fresh = false;
+    for (size_t i = 0; i < count; i++)
+        fresh = fresh || (has_ended(jobs[i].status) && fabs(store_now() - jobs[i].finished) < UNSETTLED_S);
+    return fresh ? store_settle(s) : STORE_OK;
+}
+
 store_status store_get(store *s, const char *id, job *out)
 {
     memset(out, 0, sizeof *out);
     connection *c = store_take_reader(s);
     store_status status = store_give_reader(s, c, read_by_id(c, id, out));
-    if (status == STORE_OK && has_ended(out->status) && fabs(store_now() - out->finished) < UNSETTLED_S)
-        status = store_settle(s);
+    if (status == STORE_OK)
+        status = store_settle_jobs(s, out, 1);
     if (status != STORE_OK)
         job_clear(out);
     return status;

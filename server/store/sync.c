@@ -44,7 +44,7 @@ static void *sync_loop(void *argument)
     bool suspect = false;
     pthread_mutex_lock(&s->sync_lock);
     while (!s->sync_stop) {
-        if (s->wanted <= s->synced) {
+        if (s->wanted <= s->synced || s->committed <= s->synced) {
             pthread_cond_wait(&s->sync_asked, &s->sync_lock);
             continue;
         }
@@ -86,10 +86,19 @@ void store_sync_end(store *s)
     pthread_join(s->syncer, NULL);
 }
 
+void store_begin_commit(store *s)
+{
+    pthread_mutex_lock(&s->sync_lock);
+    s->begun++;
+    pthread_mutex_unlock(&s->sync_lock);
+}
+
 uint64_t store_note_commit(store *s)
 {
     pthread_mutex_lock(&s->sync_lock);
-    uint64_t number = ++s->committed;
+    uint64_t number = s->committed = s->begun;
+    if (s->wanted > s->synced)
+        pthread_cond_signal(&s->sync_asked);
     pthread_mutex_unlock(&s->sync_lock);
     return number;
 }
@@ -126,7 +135,7 @@ store_status store_await_sync(store *s, uint64_t number)
 store_status store_settle(store *s)
 {
     pthread_mutex_lock(&s->sync_lock);
-    uint64_t number = s->committed;
+    uint64_t number = s->begun; /* readers see a commit a moment before its COMMIT returns */
     bool settled = s->synced >= number;
     pthread_mutex_unlock(&s->sync_lock);
     return settled ? STORE_OK : store_await_sync(s, number);

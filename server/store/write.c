@@ -37,7 +37,15 @@ static void roll_back(connection *c)
     memcpy(c->message, cause, sizeof cause);
 }
 
-static store_status attempt(store *s, store_change change, void *args)
+static store_status commit(store *s, uint64_t *number)
+{
+    store_begin_commit(s);
+    store_status status = run_query(&s->writer, QUERY_COMMIT);
+    *number = store_note_commit(s);
+    return status;
+}
+
+static store_status attempt(store *s, store_change change, void *args, uint64_t *number)
 {
     connection *c = &s->writer;
     store_status status = run_query(c, QUERY_BEGIN);
@@ -45,20 +53,18 @@ static store_status attempt(store *s, store_change change, void *args)
         return status;
     status = change(s, c, args);
     if (status == STORE_OK)
-        status = run_query(c, QUERY_COMMIT);
+        status = commit(s, number);
     roll_back(c);
     return status;
 }
 
 static void run_alone(store *s, pending *p)
 {
-    p->status = attempt(s, p->change, p->args);
+    p->status = attempt(s, p->change, p->args, &p->number);
     if (p->status == STORE_FULL) {
         connection_checkpoint(&s->writer);
-        p->status = attempt(s, p->change, p->args);
+        p->status = attempt(s, p->change, p->args, &p->number);
     }
-    if (p->status == STORE_OK)
-        p->number = store_note_commit(s);
     if (p->status == STORE_ERROR || p->status == STORE_FULL)
         store_keep_message(s, &s->writer);
 }
@@ -84,9 +90,9 @@ static bool run_together(store *s, pending *list)
     bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
     for (pending *p = list; p && good; p = p->next)
         good = run_in_savepoint(s, p);
-    good = good && run_query(c, QUERY_COMMIT) == STORE_OK;
+    uint64_t number = 0;
+    good = good && commit(s, &number) == STORE_OK;
     roll_back(c);
-    uint64_t number = good ? store_note_commit(s) : 0;
     for (pending *p = list; p && good; p = p->next)
         p->number = number;
     return good;
