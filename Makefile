@@ -180,7 +180,7 @@ tsan: deps-test ## the server's tests under ThreadSanitizer
 
 soak: deps-test ## a long life in an hour: kills, power losses, slow clients, a million jobs; a table; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load
-	@$(PYTHON) -B tests/soak/soak.py $(BUILD) $(FILTER)
+	@$(PYTHON) -B tests/soak/soak.py $(BUILD) "$(FILTER)"
 
 fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
 	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang fuzz-bins
