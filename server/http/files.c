@@ -61,6 +61,7 @@ static void find_and_reply(api *context, http_request *rq, file_wanted *wanted, 
     job j = {0};
     if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply))
         reply_case(context, rq, &j, wanted, reply);
+    jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }
 
