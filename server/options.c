@@ -310,7 +310,8 @@ static options_verdict read_flags(flags *f, int argc, char **argv, char *message
         if (option >= ASK_CHECK)
             take_request(f, option);
         else if (!take_value(f, (size_t)(option - FIRST), optarg ? optarg : "yes")) {
-            snprintf(message, size, "%.200s is too long, or given too often", argv[optind - 1]);
+            snprintf(message, size, "--%s takes words of %d bytes together", known[option - FIRST].name,
+                     OPTION_PATH - 1);
             return OPTIONS_WRONG;
         }
     }

@@ -109,6 +109,28 @@ def test_ready_solves_a_problem(s):
     check(scrape(s)["uzawad_jobs", 'status="successful"'] == 0 and scrape(s)["uzawad_store_changes_total", ""] == commits)
 
 
+@options("--workers", "1")
+def test_uploads_streams_and_what_ends_without_a_run(s):
+    for _ in range(2):
+        s.request("POST", "/v1/uploads", "some text")
+    running = s.post(ENDLESS).json["id"]
+    s.wait_status(running, "running")
+    waiting = [s.post(ENDLESS).json["id"] for _ in range(2)]
+    expect(s.request("DELETE", f"/v1/jobs/{waiting[-1]}"), 200)
+    late = s.post({**ENDLESS, "queue_limit_s": 0.01}).json["id"]
+    s.wait_status(late, "failed")
+    with s.connect() as stream:
+        stream.sendall(f"GET /v1/jobs/{running}/events HTTP/1.1\r\nHost: x\r\n\r\n".encode())
+        check(b"200 OK" in stream.recv(4096))
+        now = scrape(s)
+        check(now["uzawad_http_event_streams", ""] == 1, now)
+    check(now["uzawad_uploads_total", ""] == 2, now)
+    check(now["uzawad_jobs_ended_total", 'status="dismissed",outcome="none"'] == 1, now)
+    check(now["uzawad_jobs_ended_total", 'status="failed",outcome="none"'] == 1, now)
+    for one in [running] + waiting[:-1]:
+        s.request("DELETE", f"/v1/jobs/{one}")
+
+
 def test_request_ids(s):
     own = s.get("/healthz", X_Request_Id="trace-42/a").headers["x-request-id"]
     check(own == "trace-42/a", own)
