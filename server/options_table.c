@@ -44,7 +44,8 @@ static const option_row ROWS[] = {
     {"max-upload", OPTION_BYTES, AT(max_upload), 1, 0, "1G", NULL, "bytes", false,
      "largest upload, after decompression"},
     {"uploads", OPTION_BYTES, AT(uploads), 1, 0, "10G", NULL, "bytes", false,
-     "all uploads together, in a folder beside the db with its name and \"-uploads\"; those that no job uses make room"},
+     "all uploads together, in a folder beside the db with its name and \"-uploads\"; those that no job uses make "
+     "room"},
     {"upload-days", OPTION_SECONDS, AT(upload_days), 0, 1e6, "30", NULL, "days", true,
      "an upload that no job uses is deleted so long after it was last used; 0: it is kept"},
     {"webhook-allow", OPTION_HOSTS, AT(webhook_allow), 0, 0, "", NULL, NO_LIMIT, false,

@@ -1,4 +1,5 @@
 #include "store/maintenance.h"
+#include "store/backup_uploads.h"
 #include "store/file_format.h"
 #include "store/internal.h"
 
@@ -136,14 +137,20 @@ static bool copy_pages(sqlite3 *from, sqlite3 *to, char *message, size_t size)
     return false;
 }
 
-static bool copy_to(const char *part, sqlite3 *from, char *message, size_t size)
+/* path: of the database that is copied; to: what the copy at `part` will be called. The files of uploads are taken
+ * before the pages, so that those are there that are deleted meanwhile, and after them, for those that came meanwhile.
+ * What no row of the copy names goes when the copy is opened. */
+static bool copy_to(const char *part, const char *to, sqlite3 *from, const char *path, char *message, size_t size)
 {
-    sqlite3 *to = NULL;
-    bool ok = sqlite3_open_v2(part, &to, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL) == SQLITE_OK;
+    sqlite3 *copy = NULL;
+    char *absolute = realpath(path, NULL);
+    bool ok = absolute && sqlite3_open_v2(part, &copy, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL) == SQLITE_OK;
     if (!ok)
-        snprintf(message, size, "cannot write %s: %s", part, to ? sqlite3_errmsg(to) : "no memory");
-    ok = ok && copy_pages(from, to, message, size);
-    if (sqlite3_close(to) != SQLITE_OK && ok) {
+        snprintf(message, size, "cannot write %s: %s", part, copy ? sqlite3_errmsg(copy) : "no memory");
+    ok = ok && backup_uploads(from, absolute, to, message, size) && copy_pages(from, copy, message, size) &&
+         backup_uploads(copy, absolute, to, message, size);
+    free(absolute);
+    if (sqlite3_close(copy) != SQLITE_OK && ok) {
         snprintf(message, size, "cannot finish %s", part);
         ok = false;
     }
@@ -175,12 +182,21 @@ static bool publish(const char *part, const char *to, char *message, size_t size
     return false;
 }
 
+static bool is_taken(const char *to)
+{
+    char folder[4096];
+    struct stat st;
+    return (size_t)snprintf(folder, sizeof folder, "%s-uploads", to) >= sizeof folder || stat(to, &st) == 0 ||
+           lstat(folder, &st) == 0;
+}
+
 bool store_backup_file(const char *path, const char *to, int64_t *bytes, char *message, size_t size)
 {
     char part[4096];
     struct stat st;
-    if ((size_t)snprintf(part, sizeof part, "%s.part", to) >= sizeof part || stat(to, &st) == 0) {
-        snprintf(message, size, "%s is there already, or its name is too long: give the name of a new file", to);
+    if ((size_t)snprintf(part, sizeof part, "%s.part", to) >= sizeof part || is_taken(to)) {
+        snprintf(message, size,
+                 "%s or its uploads are there already, or its name is too long: give the name of a new file", to);
         return false;
     }
     sqlite3 *from = open_file(path, message, size);
@@ -192,9 +208,11 @@ bool store_backup_file(const char *path, const char *to, int64_t *bytes, char *m
         snprintf(message, size, "cannot make %s: %s", part, strerror(errno));
     else
         close(fd);
-    ok = ok && copy_to(part, from, message, size) && publish(part, to, message, size);
-    if (!ok && fd >= 0)
+    ok = ok && copy_to(part, to, from, path, message, size) && publish(part, to, message, size);
+    if (!ok && fd >= 0) {
         unlink(part);
+        backup_uploads_undo(to);
+    }
     sqlite3_close(from);
     if (ok && bytes)
         *bytes = stat(to, &st) == 0 ? (int64_t)st.st_size : 0;

@@ -17,7 +17,8 @@ store_status store_check(store *s, store_findings *out);
 /* The same of a file; false where it can't be read at all, with the reason and a remedy in message. */
 bool store_check_file(const char *path, store_findings *out, char *message, size_t size);
 
-/* Copies the file as it is at one moment to a new file. The copy appears under its name only when it is complete and on
+/* Copies the file as it is at one moment to a new file. The files of uploads go
+ * to the folder TO-uploads. The copy appears under its name only when it is complete and on
  * disk. *bytes (may be NULL) is its size. False with the reason in message. */
 bool store_backup_file(const char *path, const char *to, int64_t *bytes, char *message, size_t size);
 
