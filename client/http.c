@@ -12,6 +12,7 @@
 struct client_http {
     CURL *curl;
     char *base; /* server URL without a trailing '/' */
+    const char *token, *ca_file;
     char curl_says[CURL_ERROR_SIZE];
 };
 
@@ -155,6 +156,12 @@ static struct curl_slist *header_list(const client_request *request)
     return list;
 }
 
+void client_http_trust(client_http *http, const char *token, const char *ca_file)
+{
+    http->token = token && *token ? token : NULL;
+    http->ca_file = ca_file && *ca_file ? ca_file : NULL;
+}
+
 static void set_limits(CURL *curl, const client_request *request)
 {
     double left_ms = (request->deadline - client_clock()) * 1000;
@@ -176,6 +183,12 @@ static void set_request(client_http *http, client_reply *reply, const client_req
     }
     curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, request->method);
     curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
+    if (http->token) {
+        curl_easy_setopt(curl, CURLOPT_HTTPAUTH, (long)CURLAUTH_BEARER);
+        curl_easy_setopt(curl, CURLOPT_XOAUTH2_BEARER, http->token);
+    }
+    if (http->ca_file)
+        curl_easy_setopt(curl, CURLOPT_CAINFO, http->ca_file);
     curl_easy_setopt(curl, CURLOPT_PATH_AS_IS, 1L); /* a job called ".." is the server's to refuse */
     curl_easy_setopt(curl, CURLOPT_USERAGENT, "uzawa");
     curl_easy_setopt(curl, CURLOPT_ACCEPT_ENCODING, "");

@@ -43,6 +43,9 @@ void client_reply_clear(client_reply *reply);
 /* NULL: message says what is wrong with the URL. The caller frees. */
 client_http *client_http_open(const char *server, char *message, size_t size);
 void client_http_close(client_http *http);
+/* From now on: the bearer token to send (RFC 6750), and the file with the certificates (PEM) to trust for https instead
+ * of the system's. NULL or "": none. Both must outlive http. */
+void client_http_trust(client_http *http, const char *token, const char *ca_file);
 
 /* Sends the request, again if need be. The caller clears *reply in every case. */
 client_http_end client_http_send(client_http *http, client_reply *reply, const client_request *request);

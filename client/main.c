@@ -44,6 +44,7 @@ static client_exit run_command(const client_options *options)
     session.http = client_http_open(options->server, message, sizeof message);
     if (!session.http)
         return complain_usage(message);
+    client_http_trust(session.http, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"));
     client_exit code = RUN[options->command](&session);
     client_http_close(session.http);
     return code;

@@ -4,7 +4,10 @@
 #include "codec/codec.h"
 #include "http/http.h"
 #include "log.h"
+#include "metrics.h"
 #include "options.h"
+#include "privileges.h"
+#include "store/maintenance.h"
 #include "store/store.h"
 #include "store/uploads.h"
 #include "uzawa.h"
@@ -24,14 +27,20 @@
 enum { EXIT_ENDED = 0, EXIT_FAILED = 1, EXIT_USAGE = 2 };
 
 static const double LEASE_S = 60;
-static const double MAX_WAIT_S = 60;
 
 typedef struct {
     server_log *log;
+    metrics *metrics;
     store *store;
     work *work;
     webhooks *webhooks;
     http_server *http;
+    auth *auth; /* NULL: no token file */
+    http_tls tls;
+    option_words origins, callable; /* --cors, --webhook-allow */
+    webhook_options hooks;
+    option_limit named[OPTIONS_MAX]; /* what limits points into */
+    codec_limit limits[OPTIONS_MAX];
     sigset_t signals; /* taken by sigwait in main, blocked in every thread */
 } service;
 
@@ -78,55 +87,130 @@ static void raise_descriptor_limit(void)
     setrlimit(RLIMIT_NOFILE, &limit);
 }
 
-static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
+/* For GET /v1/limits; returns how many. */
+static size_t list_limits(service *s, const server_options *options)
 {
-    int fd = -1;
-    raise_descriptor_limit();
-    if (!codec_init(message, size))
+    size_t n = options_limits(options, s->named, OPTIONS_MAX);
+    for (size_t i = 0; i < n; i++)
+        s->limits[i] = (codec_limit){s->named[i].name, s->named[i].unit, s->named[i].meaning, s->named[i].value};
+    return n;
+}
+
+/* An address that others can reach needs tokens, or a word that says it is meant. */
+static bool check_exposure(const service *s, const server_options *options, int fd, char *message, size_t size)
+{
+    if (!http_is_public(fd))
+        return true;
+    if (!s->auth && !options->insecure_public) {
+        snprintf(
+            message, size,
+            "others can reach %s, and everybody could submit and delete jobs there: give --token-file FILE, listen "
+            "on 127.0.0.1 behind a proxy, or say --insecure-public",
+            options->listen);
         return false;
-    uz_process_init(options->workers);
+    }
+    if (!options->tls_cert[0])
+        log_write(s->log, LOG_WARN, "public_without_tls", (log_field[]){LOG_S("listen", options->listen), {0}});
+    return true;
+}
+
+/* While the process may: later it may be another user. */
+static bool read_secrets(service *s, const server_options *options, char *message, size_t size)
+{
+    if (options->token_file[0] && !(s->auth = auth_new(options->token_file, message, size)))
+        return false;
+    if (options->webhook_secret_file[0] && !webhook_read_secret(&s->hooks, options->webhook_secret_file, message, size))
+        return false;
+    return !options->tls_cert[0] || http_tls_read(&s->tls, options->tls_cert, options->tls_key, message, size);
+}
+
+static bool open_store(service *s, const server_options *options, char *message, size_t size)
+{
     s->store = store_open(options->db, message, size);
     if (!s->store)
         return false;
+    store_observe(s->store, s->metrics);
     store_limit_uploads(s->store, &(upload_limits){.one = (int64_t)options->max_upload,
                                                    .all = (int64_t)options->uploads,
                                                    .keep_s = options->upload_days * 86400});
     store_limit_queue(s->store, options->max_queue);
-    /* The port is taken before any job runs, so that a second daemon fails without a trace. */
-    fd = http_listen(options->listen, url, url_size, message, size);
-    if (fd < 0)
-        return false;
+    return true;
+}
+
+static bool start_work(service *s, const server_options *options, char *message, size_t size)
+{
     const work_options workers = {.workers = options->workers,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
                                   .solve_bytes = options->memory,
+                                  .max_solve_s = options->max_solve_s,
+                                  .metrics = s->metrics,
                                   .lease_s = LEASE_S,
                                   .retention = {.keep_s = options->keep_days * 86400,
                                                 .keep_jobs = options->keep_jobs,
                                                 .keep_bytes = (int64_t)options->keep_bytes}};
     s->work = work_start(s->store, &workers, s->log, message, size);
-    if (!s->work) {
-        close(fd);
+    if (!s->work)
         return false;
-    }
-    const webhook_options hooks = {.allow = options->webhook_allow,
-                                   .n_allow = options->n_webhook_allow,
-                                   .secret_file = options->webhook_secret_file};
-    s->webhooks = webhooks_start(s->store, &hooks, s->log, message, size);
-    if (!s->webhooks) {
-        close(fd);
-        return false;
-    }
-    http_parts parts = {.webhooks = s->webhooks, .store = s->store, .work = s->work, .log = s->log};
+    options_split(&s->callable, options->webhook_allow);
+    s->hooks.allow = s->callable.words;
+    s->hooks.n_allow = s->callable.n;
+    s->hooks.metrics = s->metrics;
+    s->webhooks = webhooks_start(s->store, &s->hooks, s->log, message, size);
+    return s->webhooks != NULL;
+}
+
+/* Owns fd, also on failure. */
+static bool start_http(service *s, const server_options *options, int fd, char *message, size_t size)
+{
+    const http_parts parts = {.store = s->store,
+                              .work = s->work,
+                              .webhooks = s->webhooks,
+                              .log = s->log,
+                              .metrics = s->metrics,
+                              .auth = s->auth};
+    options_split(&s->origins, options->cors);
     const http_options limits = {.max_body = options->max_body,
                                  .max_upload = options->max_upload,
-                                 .cors = options->cors,
-                                 .n_cors = options->n_cors,
-                                 .max_connections = options->max_connections,
+                                 .cors = s->origins.words,
+                                 .n_cors = s->origins.n,
+                                 .max_connections = (unsigned)options->max_connections,
                                  .request_deadline_s = options->request_deadline_s,
-                                 .max_wait_s = MAX_WAIT_S};
+                                 .max_wait_s = options->max_wait_s,
+                                 .max_client_connections = (unsigned)options->max_client_connections,
+                                 .max_client_rate = options->max_client_rate,
+                                 .tls = s->tls.cert ? &s->tls : NULL,
+                                 .access_log = options->access_log,
+                                 .limits = s->limits,
+                                 .n_limits = list_limits(s, options)};
     s->http = http_start(fd, &parts, &limits, message, size);
     return s->http != NULL;
+}
+
+static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
+{
+    raise_descriptor_limit();
+    if (!codec_init(message, size))
+        return false;
+    codec_set_limits(&(codec_limits){.json_depth = options->max_json_depth,
+                                     .dofs = (int64_t)options->max_dofs,
+                                     .rows = (int64_t)options->max_rows,
+                                     .nonzeros = (int64_t)options->max_nonzeros});
+    uz_process_init(options->workers);
+    if (!read_secrets(s, options, message, size))
+        return false;
+    /* The port is taken before any job runs, so that a second daemon fails without a trace; and before the privileges
+     * go that a low port needs. */
+    int fd = http_listen(options->listen, s->tls.cert ? "https" : "http", url, url_size, message, size);
+    if (fd < 0)
+        return false;
+    if (!check_exposure(s, options, fd, message, size) ||
+        (options->user[0] && !privileges_drop(options->user, message, size)) ||
+        !open_store(s, options, message, size) || !start_work(s, options, message, size)) {
+        close(fd);
+        return false;
+    }
+    return start_http(s, options, fd, message, size);
 }
 
 /* Legal at every stage of a start that failed. */
@@ -140,6 +224,9 @@ static void end(service *s)
     }
     if (s->store)
         store_close(s->store);
+    auth_free(s->auth);
+    http_tls_clear(&s->tls);
+    webhook_forget_secret(&s->hooks);
     codec_end();
 }
 
@@ -180,11 +267,24 @@ static void drain_until_stopped(service *s, double seconds)
     pthread_join(thread, NULL);
 }
 
+static void reload_tokens(const service *s)
+{
+    char message[OPTION_PATH + 256] = "";
+    if (auth_reload(s->auth, message, sizeof message))
+        log_write(s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
+    else
+        log_write(s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
+}
+
+/* SIGHUP reads the tokens again where there are any; else it ends the daemon, as for every program of a terminal. */
 static int wait_for_signal(const service *s)
 {
     int taken = 0;
-    while (sigwait(&s->signals, &taken) != 0)
-        ;
+    while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && s->auth)) {
+        if (taken == SIGHUP)
+            reload_tokens(s);
+        taken = 0;
+    }
     if (taken == SIGABRT) /* somebody wants a core file */
         abort();
     return taken;
@@ -192,7 +292,7 @@ static int wait_for_signal(const service *s)
 
 static int run(service *s, const server_options *options)
 {
-    char url[160], message[512] = "";
+    char url[160], message[OPTION_PATH + 512] = "";
     if (!start(s, options, url, sizeof url, message, sizeof message)) {
         fprintf(stderr, "uzawad: %s\n", message);
         end(s);
@@ -214,33 +314,78 @@ static int run(service *s, const server_options *options)
     return EXIT_ENDED;
 }
 
+/* --check-db */
+static int check_db(const char *path)
+{
+    char message[OPTION_PATH + 512] = "";
+    store_findings found;
+    if (!store_check_file(path, &found, message, sizeof message)) {
+        fprintf(stderr, "uzawad: %s\n", message);
+        return EXIT_FAILED;
+    }
+    bool whole = found.findings[0] == '\0';
+    if (whole)
+        printf("%s is whole: %lld jobs, checked in %.3g s\n", path, (long long)found.jobs, found.seconds);
+    else
+        fprintf(
+            stderr,
+            "uzawad: %s is damaged:\n%sKeep the file, and go on with a backup or a new file; sqlite3's .recover can "
+            "save what is readable.\n",
+            path, found.findings);
+    free(found.findings);
+    return whole ? EXIT_ENDED : EXIT_FAILED;
+}
+
+/* --backup */
+static int backup_db(const char *path, const char *to)
+{
+    char message[2 * OPTION_PATH + 512] = "";
+    int64_t bytes = 0;
+    if (!store_backup_file(path, to, &bytes, message, sizeof message)) {
+        fprintf(stderr, "uzawad: %s\n", message);
+        return EXIT_FAILED;
+    }
+    printf("%s: %lld bytes\n", to, (long long)bytes);
+    return EXIT_ENDED;
+}
+
 int main(int argc, char **argv)
 {
     server_options options;
-    char message[256];
-    switch (options_parse(&options, argc, argv, message, sizeof message)) {
+    char message[OPTION_PATH + 512], backup[OPTION_PATH];
+    switch (options_read(&options, argc, argv, backup, message, sizeof message)) {
     case OPTIONS_HELP:
         options_usage(stdout);
         return EXIT_ENDED;
     case OPTIONS_VERSION:
         printf("uzawad %s\n", UZAWAD_VERSION);
         return EXIT_ENDED;
+    case OPTIONS_CHECK:
+        options_show(&options, stdout);
+        return EXIT_ENDED;
+    case OPTIONS_EXAMPLE:
+        options_example(stdout);
+        return EXIT_ENDED;
     case OPTIONS_WRONG:
-        fprintf(stderr, "uzawad: %s\n", message);
-        options_usage(stderr);
+        fprintf(stderr, "uzawad: %s\n%s", message, "usage: uzawad [OPTION]...; uzawad --help lists them\n");
         return EXIT_USAGE;
+    case OPTIONS_CHECK_DB:
+        return check_db(options.db);
+    case OPTIONS_BACKUP:
+        return backup_db(options.db, backup);
     case OPTIONS_RUN:
         break;
     }
     service s = {0};
     own_signals(argv, &s.signals);
     s.log = log_open(stderr, options.level);
-    if (!s.log) {
+    s.metrics = metrics_new();
+    if (!s.log || !s.metrics) {
         fprintf(stderr, "uzawad: no memory\n");
         return EXIT_FAILED;
     }
     int status = run(&s, &options);
+    metrics_free(s.metrics);
     log_close(s.log);
-    options_clear(&options);
     return status;
 }

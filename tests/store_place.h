@@ -88,7 +88,7 @@ static const store_outcome PLAIN_SUCCESS
 
 static inline int64_t rows_in(const char *path, const char *table)
 {
-    char sql[64];
+    char sql[256];
     sqlite3 *db = NULL;
     sqlite3_stmt *stmt = NULL;
     int64_t count = -1;

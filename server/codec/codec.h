@@ -19,6 +19,15 @@
 bool codec_init(char *message, size_t size);
 void codec_end(void);
 
+/* What a request may ask for at most. */
+typedef struct {
+    int json_depth;               /* 1..JSON_MAX_DEPTH */
+    int64_t dofs, rows, nonzeros; /* d; m; entries of K and of N given as matrices */
+} codec_limits;
+/* After codec_init and before threads start; without it only the codec's own bounds hold. Jobs that are stored already
+ * are not held to them. */
+void codec_set_limits(const codec_limits *limits);
+
 /* ---- requests */
 
 /* Where a run begins: at another job's reactions (job), at given ones (reactions), or at zero (neither). */
@@ -113,7 +122,15 @@ char *codec_encode_valid(const uz_prediction *predicted);
 /* The data of a progress event; row: the newest of the history, or NULL. */
 char *codec_encode_progress(int progress, const double *row);
 char *codec_encode_upload(const upload_info *info);
+/* What a check of the database found, one finding a line. */
+char *codec_encode_findings(const char *findings, int64_t jobs, double seconds);
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers);
+/* A bound that holds for this service. */
+typedef struct {
+    const char *name, *unit, *meaning;
+    double value; /* infinity: no bound */
+} codec_limit;
+char *codec_encode_limits(const codec_limit *limits, size_t count);
 
 /* A result as GET /v1/jobs/{id}/result answers it. Vectors that were not asked for are NULL. dim 0: plain numbers;
  * 2, 3: displacements and nodes are written as [[x, y], ...]. Doubles are written with the digits that read back

@@ -10,11 +10,16 @@
 
 /* Set by codec_init before threads start, only read until codec_end. */
 static schemas *loaded;
+/* The same for what a request may ask for at most. */
+static codec_limits limits;
+
+static const codec_limits NO_LIMITS = {JSON_MAX_DEPTH, INT64_MAX, INT64_MAX, INT64_MAX};
 
 bool codec_init(char *message, size_t size)
 {
     codec_end();
     json_object_seed(0);
+    limits = NO_LIMITS;
     loaded = schemas_load(message, size);
     return loaded != NULL;
 }
@@ -23,6 +28,16 @@ void codec_end(void)
 {
     schemas_free(loaded);
     loaded = NULL;
+}
+
+void codec_set_limits(const codec_limits *given)
+{
+    limits = *given;
+}
+
+int json_depth_limit(void)
+{
+    return limits.json_depth > 0 ? limits.json_depth : JSON_MAX_DEPTH;
 }
 
 bool decode_check(const json_doc *doc, const char *schema, problem_details *problem)
@@ -189,6 +204,36 @@ static bool check_columns(const codec_request *request, problem_details *problem
     return false;
 }
 
+static bool check_limit(int64_t have, int64_t most, const char *what, const char *option, problem_details *problem)
+{
+    if (have <= most)
+        return true;
+    problem_set(problem, 413, "problem_too_large", NULL,
+                "The problem has %lld %s; this service takes at most %lld (the daemon's option --%s).", (long long)have,
+                what, (long long)most, option);
+    return false;
+}
+
+/* Without making the mesh, which is what a limit shall spare. */
+static int64_t scene_dofs(const uz_scene *scene)
+{
+    double dofs = scene->box.dim;
+    for (int i = 0; i < scene->box.dim; i++)
+        dofs *= (double)scene->box.cells[i] + 1.0;
+    return dofs < 9e18 ? (int64_t)dofs : INT64_MAX;
+}
+
+static bool check_limits(const codec_request *request, problem_details *problem)
+{
+    const uz_qp *qp = &request->problem.qp;
+    if (request->problem.kind == UZ_PROBLEM_SCENE)
+        return check_limit(scene_dofs(&request->problem.scene), limits.dofs, "degrees of freedom", "max-dofs", problem);
+    return check_limit(qp->K.rows, limits.dofs, "degrees of freedom", "max-dofs", problem) &&
+           check_limit(qp->N.rows, limits.rows, "contact rows", "max-rows", problem) &&
+           check_limit(qp->K.ptr[qp->K.cols], limits.nonzeros, "entries of K", "max-nonzeros", problem) &&
+           check_limit(qp->N.ptr[qp->N.cols], limits.nonzeros, "entries of N", "max-nonzeros", problem);
+}
+
 static bool check_sizes(const codec_request *request, problem_details *problem)
 {
     const codec_answer *answer = &request->answer;
@@ -268,7 +313,7 @@ bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, si
     request.n_uploads = doc.n_uploads;
     doc.uploads = NULL;
     json_doc_clear(&doc);
-    good = good && check_sizes(&request, problem);
+    good = good && (kind == CODEC_STORED || check_limits(&request, problem)) && check_sizes(&request, problem);
     if (good)
         *out = request;
     else

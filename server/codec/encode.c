@@ -252,6 +252,52 @@ char *codec_encode_upload(const upload_info *info)
     return text_finish(&t, NULL);
 }
 
+char *codec_encode_findings(const char *findings, int64_t jobs, double seconds)
+{
+    text t = {0};
+    char line[512];
+    text_open(&t, '{');
+    text_key(&t, "whole");
+    text_bool(&t, findings[0] == '\0');
+    text_key(&t, "findings");
+    text_open(&t, '[');
+    for (const char *at = findings; *at;) {
+        size_t len = strcspn(at, "\n");
+        snprintf(line, sizeof line, "%.*s", (int)len, at);
+        text_string(&t, line);
+        at += len + (at[len] == '\n');
+    }
+    text_close(&t, ']');
+    text_key(&t, "jobs");
+    text_integer(&t, jobs);
+    text_key(&t, "seconds");
+    text_number(&t, seconds);
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
+char *codec_encode_limits(const codec_limit *limits, size_t count)
+{
+    text t = {0};
+    text_open(&t, '{');
+    text_key(&t, "limits");
+    text_open(&t, '{');
+    for (size_t i = 0; i < count; i++) {
+        text_key(&t, limits[i].name);
+        text_open(&t, '{');
+        text_key(&t, "value");
+        text_number(&t, limits[i].value);
+        text_key(&t, "unit");
+        text_string(&t, limits[i].unit);
+        text_key(&t, "description");
+        text_string(&t, limits[i].meaning);
+        text_close(&t, '}');
+    }
+    text_close(&t, '}');
+    text_close(&t, '}');
+    return text_finish(&t, NULL);
+}
+
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers)
 {
     text t = {0};

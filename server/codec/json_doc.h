@@ -14,7 +14,9 @@
 
 struct store;
 
-#define JSON_MAX_DEPTH    64     /* nested arrays and objects */
+#define JSON_MAX_DEPTH 64 /* nested arrays and objects */
+/* The depth allowed to requests, at most JSON_MAX_DEPTH (codec_set_limits). */
+int json_depth_limit(void);
 #define JSON_MAX_VALUES   200000 /* each lifted array or string counts as one; about 100 bytes each */
 #define JSON_LIFT_NUMBERS 64    /* an array of more numbers than this, and of nothing else, is lifted; and a table of */
                                 /* more rows than this, of the same number of numbers each, at most this many */

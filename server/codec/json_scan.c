@@ -409,8 +409,8 @@ static json_t *scan_object(scanner *s, const json_path *path)
 
 static json_t *scan_container(scanner *s, const json_path *path, bool object)
 {
-    if (s->depth == JSON_MAX_DEPTH)
-        return stop_limit(s, 400, "json_depth", path, "levels of arrays and objects", JSON_MAX_DEPTH);
+    if (s->depth == json_depth_limit())
+        return stop_limit(s, 400, "json_depth", path, "levels of arrays and objects", json_depth_limit());
     s->depth++;
     json_t *value = object ? scan_object(s, path) : scan_array(s, path);
     s->depth--;

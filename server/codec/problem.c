@@ -12,6 +12,7 @@ static const struct {
     {"json_depth", "The JSON is nested too deep"},
     {"duplicate_key", "A key stands twice in one object"},
     {"number_out_of_range", "A number is beyond double precision"},
+    {"problem_too_large", "The problem is larger than allowed here"},
     {"too_many_values", "The JSON has too many single values"},
     {"unknown_key", "A key is not known"},
     {"missing_key", "A key is missing"},

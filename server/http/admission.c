@@ -2,6 +2,7 @@
 #include "http/conn.h"
 #include "http/problem.h"
 
+#include <stdio.h>
 #include <string.h>
 
 void cors_find(http_server *server, http_request *rq)
@@ -76,11 +77,87 @@ static bool check_draining(http_server *server, http_request *rq, problem_detail
                         "no new work is taken: try again when the server is back");
 }
 
-bool admit(http_server *server, http_request *rq)
+/* ---- who asks, and how often */
+
+/* The token of `Authorization: Bearer TOKEN`; NULL: no such field. */
+static const char *bearer(const http_request *rq, size_t *len)
 {
+    static const char SCHEME[] = "Bearer";
+    const header_field *field = header_find(&rq->headers, "Authorization", NULL);
+    *len = 0;
+    if (!field || field->value_len <= sizeof SCHEME || field->value[sizeof SCHEME - 1] != ' ' ||
+        !token_equal(field->value, sizeof SCHEME - 1, SCHEME))
+        return NULL;
+    const char *at = field->value + sizeof SCHEME, *end = field->value + field->value_len;
+    while (at < end && *at == ' ')
+        at++;
+    *len = (size_t)(end - at);
+    return at;
+}
+
+/* A known token counts by its name, everybody else by address: guesses too. */
+static bool check_rate(conn *c, problem_details *problem)
+{
+    http_request *rq = c->request;
+    double now = deadlines_now(), wait = 0.0;
+    if (!c->server->rate || (rq->route && strcmp(rq->route->pattern, "/healthz") == 0))
+        return true;
+    if (rq->token[0])
+        wait = rate_take(c->server->rate, rq->token, strlen(rq->token), now);
+    else if (c->address_len > 0)
+        wait = rate_take(c->server->rate, c->address, c->address_len, now);
+    if (wait == 0.0)
+        return true;
+    metrics_add(c->server->context.metrics, METRIC_RATE_LIMITED, 1);
+    rq->reply.retry_after_s = 1 + (int)wait;
+    return http_problem(problem, 429, "too_many_requests", "Too many requests",
+                        "one client may send %d requests per second (the daemon's option --max-client-rate)",
+                        c->server->options.max_client_rate);
+}
+
+static bool refuse_token(conn *c, auth_scope have, auth_scope need, bool given, problem_details *problem)
+{
+    http_reply *reply = &c->request->reply;
+    char *field = reply->authenticate;
+    size_t size = sizeof reply->authenticate;
+    metrics_add(c->server->context.metrics, METRIC_UNAUTHORIZED, 1);
+    if (have != SCOPE_NONE) {
+        snprintf(field, size, "Bearer realm=\"uzawad\", error=\"insufficient_scope\", scope=\"%s\"",
+                 auth_scope_name(need));
+        return http_problem(problem, 403, "insufficient_scope", "This token does not allow that",
+                            "the token \"%s\" has the scope %s, and this needs %s", c->request->token,
+                            auth_scope_name(have), auth_scope_name(need));
+    }
+    snprintf(field, size, "Bearer realm=\"uzawad\"%s", given ? ", error=\"invalid_token\"" : "");
+    return http_problem(problem, 401, "unauthorized", "A token is needed", "%s",
+                        given ? "the token is not one of this server's"
+                              : "send the header field Authorization: Bearer TOKEN");
+}
+
+/* Before anything about the request is told, even whether its path exists. */
+static bool check_client(conn *c, bool has_route, problem_details *problem)
+{
+    http_request *rq = c->request;
+    auth_scope need = has_route ? route_scope(rq->route) : SCOPE_READ, have = SCOPE_NONE;
+    size_t len = 0;
+    const char *secret = c->server->auth ? bearer(rq, &len) : NULL;
+    if (secret)
+        have = auth_check(c->server->auth, secret, len, rq->token);
+    if (!check_rate(c, problem))
+        return false;
+    if (!c->server->auth || have >= need)
+        return true;
+    rq->reply.allow[0] = '\0';
+    return refuse_token(c, have, need, secret != NULL, problem);
+}
+
+bool admit(conn *c)
+{
+    http_server *server = c->server;
+    http_request *rq = c->request;
     problem_details *problem = &rq->refused;
-    return target_parse(&rq->target, rq->raw_target, problem) &&
-           route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem) && check_site(rq, problem) &&
-           check_body(server, rq, problem) && route_check_parameters(rq, problem) && check_type(rq, problem) &&
-           check_draining(server, rq, problem);
+    bool found = target_parse(&rq->target, rq->raw_target, problem) &&
+                 route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem);
+    return check_client(c, found, problem) && found && check_site(rq, problem) && check_body(server, rq, problem) &&
+           route_check_parameters(rq, problem) && check_type(rq, problem) && check_draining(server, rq, problem);
 }

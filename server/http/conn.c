@@ -13,15 +13,18 @@
 /* Lingering after an early reply: long enough for the reply to cross the network. */
 static const double LINGER_S = 2.0;
 
-conn *conn_new(http_server *server, int fd)
+conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
 {
     conn *c = calloc(1, sizeof *c);
     if (!c)
         return NULL;
     c->server = server;
     c->fd = fd;
+    c->address_len = rate_address(address, c->address);
+    atomic_fetch_add(&server->context.connections, 1);
     c->deadline = deadlines_add(server->deadlines, fd, deadlines_now() + server->options.request_deadline_s);
     if (!c->deadline) {
+        atomic_fetch_sub(&server->context.connections, 1);
         free(c);
         return NULL;
     }
@@ -34,7 +37,7 @@ static void request_free(conn *c)
     c->request = NULL;
     if (!rq)
         return;
-    atomic_fetch_sub(&c->server->body_bytes, rq->body_capacity);
+    atomic_fetch_sub(&c->server->context.body_bytes, rq->body_capacity);
     reply_clear(&rq->reply);
     store_upload_abort(rq->upload);
     target_clear(&rq->target);
@@ -49,6 +52,7 @@ void conn_free(conn *c)
         return;
     deadline_remove(c->deadline);
     request_free(c);
+    atomic_fetch_sub(&c->server->context.connections, 1);
     free(c);
 }
 
@@ -67,7 +71,7 @@ void conn_begin_request(conn *c, const char *raw_target)
     rq->started = deadlines_now();
     c->request = rq;
     c->layout = (framing_layout){.target = raw_target, .target_len = strlen(raw_target)};
-    deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, true);
+    deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, !c->server->tls);
 }
 
 /* ------------------------------------------------------------------ reply */
@@ -86,10 +90,11 @@ static void linger(const conn *c)
     }
 }
 
-static void note_reply(http_request *rq, const http_reply *reply)
+static void note_reply(http_request *rq, http_reply *reply)
 {
     rq->status = reply->status;
     rq->reply_len = strcmp(rq->method, "HEAD") == 0 ? 0 : reply->len;
+    memcpy(reply->request_id, rq->id, sizeof reply->request_id);
 }
 
 static bool send_reply(conn *c, struct MHD_Connection *mhd)
@@ -107,7 +112,7 @@ static void send_directly(conn *c, const problem_details *problem)
     http_reply reply = {.close = true, .cors = c->request->reply.cors, .cors_origin = c->request->reply.cors_origin};
     reply_problem(&reply, problem);
     note_reply(c->request, &reply);
-    char *message = reply_message(&reply);
+    char *message = c->server->tls ? NULL : reply_message(&reply); /* TLS: the close must say it */
     if (message && send(c->fd, message, strlen(message), MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
         linger(c);
     free(message);
@@ -157,12 +162,28 @@ static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *met
     return framing_tiles(&c->layout, &c->request->headers);
 }
 
+/* The client's X-Request-Id where it is a word that a log can hold, else one of our own. */
+static void name_request(http_server *server, http_request *rq)
+{
+    static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.:/+=@";
+    const header_field *field = header_find(&rq->headers, "X-Request-Id", NULL);
+    if (field && field->value_len > 0 && field->value_len < sizeof rq->id &&
+        strspn(field->value, ALLOWED) >= field->value_len) {
+        memcpy(rq->id, field->value, field->value_len);
+        rq->id[field->value_len] = '\0';
+        return;
+    }
+    unsigned long long number = (unsigned long long)atomic_fetch_add(&server->id, 1);
+    snprintf(rq->id, sizeof rq->id, "%s%08llx", server->id_prefix, number);
+}
+
 /* False with rq->refused: the bytes can't be trusted, so nothing after them on this connection can. */
 static bool read_framing(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
     http_request *rq = c->request;
     snprintf(rq->method, sizeof rq->method, "%s", method);
     MHD_get_connection_values_n(mhd, MHD_HEADER_KIND, collect_header, &rq->headers);
+    name_request(c->server, rq);
     if (!framing_read(&rq->framing, version, &rq->headers, &rq->refused))
         return false;
     if (!layout_is_sound(c, mhd, method, version))
@@ -182,10 +203,10 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
     rq->begun = true;
     bool framed = read_framing(c, mhd, method, version);
     cors_find(c->server, rq);
-    if (framed && admit(c->server, rq) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
+    if (framed && admit(c) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
         deadline_set(c->deadline,
                      rq->started + c->server->options.request_deadline_s + (double)rq->framing.length / SLOWEST_RATE,
-                     true);
+                     !c->server->tls);
         return true;
     }
     if (framed && !has_body(rq))
@@ -207,13 +228,13 @@ static bool reserve(conn *c, size_t more)
         return true;
     size_t capacity = need < 4096 ? 4096 : need + need / 2;
     size_t added = capacity - rq->body_capacity;
-    if (atomic_fetch_add(&c->server->body_bytes, added) + added > c->server->body_budget) {
-        atomic_fetch_sub(&c->server->body_bytes, added);
+    if (atomic_fetch_add(&c->server->context.body_bytes, added) + added > c->server->body_budget) {
+        atomic_fetch_sub(&c->server->context.body_bytes, added);
         return http_problem(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
     }
     char *grown = realloc(rq->body, capacity);
     if (!grown) {
-        atomic_fetch_sub(&c->server->body_bytes, added);
+        atomic_fetch_sub(&c->server->context.body_bytes, added);
         return http_problem(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
     }
     rq->body = grown;
@@ -251,7 +272,7 @@ bool conn_body(conn *c, const char *data, size_t size)
         if (rq->framing.chunked) /* the length is not known before: the allowance grows with what has come */
             deadline_set(c->deadline,
                          rq->started + c->server->options.request_deadline_s + (double)rq->body_len / SLOWEST_RATE,
-                         true);
+                         !c->server->tls);
         return true;
     }
     store_upload_abort(rq->upload);
@@ -278,16 +299,20 @@ static void log_request(conn *c, bool completed)
 {
     const http_request *rq = c->request;
     char path[256];
+    if (!c->server->options.access_log && rq->status < 500)
+        return;
     snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
     for (char *at = path; *at; at++)
         if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
             *at = '?';
     log_field fields[] = {LOG_S("method", rq->method),
                           LOG_S("path", path),
+                          LOG_S("request", rq->id),
                           LOG_I("status", rq->status),
                           LOG_I("bytes", rq->reply_len),
                           LOG_N("seconds", deadlines_now() - rq->started),
                           LOG_S("job", rq->job_id),
+                          LOG_S("token", rq->token),
                           LOG_S("end", completed                       ? "complete"
                                        : deadline_expired(c->deadline) ? "deadline"
                                                                        : "aborted"),
@@ -304,6 +329,9 @@ void conn_end_request(conn *c, unsigned status, bool completed)
     if (c->request->unread_body && completed)
         linger(c);
     log_request(c, completed);
+    const route *found = c->request->route;
+    metrics_request(c->server->context.metrics, found ? found->method : NULL, found ? found->pattern : NULL,
+                    c->request->status, deadlines_now() - c->request->started);
     request_free(c);
     deadline_set(c->deadline, deadlines_now() + c->server->options.request_deadline_s, false);
 }

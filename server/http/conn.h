@@ -4,6 +4,7 @@
 
 #include "http/deadlines.h"
 #include "http/http.h"
+#include "http/rate.h"
 #include "http/request.h"
 
 #include <microhttpd.h>
@@ -23,10 +24,14 @@ struct http_server {
     http_options options;
     struct MHD_Daemon *daemon;
     deadlines *deadlines;
+    auth *auth;
+    rate *rate;            /* NULL: no limit */
+    bool tls;              /* nothing can be written past libmicrohttpd */
     pthread_key_t current; /* the conn that this thread serves, once it has a request */
     bool check_layout;
     size_t body_budget;
-    atomic_size_t body_bytes; /* reserved now */
+    char id_prefix[17];      /* of the request ids made here; random */
+    atomic_uint_fast64_t id; /* the last one's number */
 };
 
 typedef struct {
@@ -34,11 +39,13 @@ typedef struct {
     deadline *deadline;
     http_request *request; /* NULL between requests */
     int fd;
+    unsigned char address[16]; /* that counts for the rate */
+    size_t address_len;
     framing_layout layout;
 } conn;
 
 /* NULL: no memory; the connection's requests are then refused. */
-conn *conn_new(http_server *server, int fd);
+conn *conn_new(http_server *server, int fd, const struct sockaddr *address);
 void conn_free(conn *c);
 
 void conn_begin_request(conn *c, const char *raw_target);
@@ -53,7 +60,7 @@ void conn_end_request(conn *c, unsigned status, bool completed);
 
 /* admission.c: everything that can be refused before the body is read; false with rq->refused and the header fields of
  * rq->reply. */
-bool admit(http_server *server, http_request *rq);
+bool admit(conn *c);
 /* Sets what the reply says to pages of other origins. */
 void cors_find(http_server *server, http_request *rq);
 

@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <unistd.h>
 
 static conn *connection_of(struct MHD_Connection *mhd)
@@ -25,7 +26,8 @@ static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_c
     http_server *server = ctx;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD);
-        *socket_context = info ? conn_new(server, info->connect_fd) : NULL;
+        const union MHD_ConnectionInfo *from = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+        *socket_context = info ? conn_new(server, info->connect_fd, from ? from->client_addr : NULL) : NULL;
     } else {
         conn_free(*socket_context);
         *socket_context = NULL;
@@ -116,12 +118,24 @@ static struct MHD_Daemon *start_daemon(http_server *server, int listen_fd, const
         {MHD_OPTION_NOTIFY_COMPLETED, (intptr_t)on_completed, server},
         {MHD_OPTION_NOTIFY_CONNECTION, (intptr_t)on_connection, server},
         {MHD_OPTION_URI_LOG_CALLBACK, (intptr_t)on_target, server},
+        {MHD_OPTION_PER_IP_CONNECTION_LIMIT, (intptr_t)options->max_client_connections, NULL}, /* 0: no limit */
+        {server->tls ? MHD_OPTION_HTTPS_MEM_CERT : MHD_OPTION_END, 0, server->tls ? options->tls->cert : NULL},
+        {MHD_OPTION_HTTPS_MEM_KEY, 0, server->tls ? options->tls->key : NULL},
         {MHD_OPTION_END, 0, NULL},
     };
+    unsigned tls = server->tls ? MHD_USE_TLS : 0;
     return MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL |
-                                MHD_USE_ITC | MHD_USE_ERROR_LOG,
+                                MHD_USE_ITC | MHD_USE_ERROR_LOG | tls,
                             0, NULL, NULL, on_request, server, MHD_OPTION_EXTERNAL_LOGGER, on_message, server,
                             MHD_OPTION_ARRAY, items, MHD_OPTION_END);
+}
+
+static void free_server(http_server *server)
+{
+    if (!server)
+        return;
+    rate_free(server->rate);
+    free(server);
 }
 
 http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message, size_t size)
@@ -136,16 +150,30 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.log = parts->log;
     pthread_mutex_init(&server->context.predict_lock, NULL);
     server->context.webhooks = parts->webhooks;
+    server->context.metrics = parts->metrics;
     server->context.max_wait_s = options->max_wait_s;
     server->context.cors = options->cors;
     server->context.n_cors = options->n_cors;
     server->context.max_streams = MOST_STREAMS(options->max_connections);
     atomic_init(&server->context.streams, 0);
     server->context.max_upload = (int64_t)options->max_upload;
+    server->context.limits = options->limits;
+    server->context.n_limits = options->n_limits;
     atomic_init(&server->context.draining, false);
     server->options = *options;
+    server->auth = parts->auth;
+    server->tls = options->tls != NULL;
+    if (options->max_client_rate > 0 && !(server->rate = rate_new(options->max_client_rate)))
+        goto fail;
     server->body_budget = BODY_BUDGET(options->max_body);
-    atomic_init(&server->body_bytes, 0);
+    atomic_init(&server->context.body_bytes, 0);
+    atomic_init(&server->context.connections, 0);
+    pthread_mutex_init(&server->context.ready_lock, NULL);
+    atomic_init(&server->id, 0);
+    uint64_t random = 0;
+    if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
+        random = (uint64_t)(deadlines_now() * 1e9);
+    snprintf(server->id_prefix, sizeof server->id_prefix, "%016llx", (unsigned long long)random);
     /* The tiling of a header block is how 0.9.x parses; later versions refuse by themselves what it finds. */
     server->check_layout = strncmp(MHD_get_version(), "0.9.", 4) == 0;
     if (pthread_key_create(&server->current, NULL) != 0)
@@ -168,7 +196,7 @@ fail:
     }
     if (has_key)
         pthread_key_delete(server->current);
-    free(server);
+    free_server(server);
     free(words);
     close(listen_fd);
     return NULL;
@@ -189,5 +217,6 @@ void http_stop(http_server *server)
     field_slots_free(server->context.fields);
     pthread_key_delete(server->current);
     pthread_mutex_destroy(&server->context.predict_lock);
-    free(server);
+    pthread_mutex_destroy(&server->context.ready_lock);
+    free_server(server);
 }

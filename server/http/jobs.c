@@ -176,8 +176,10 @@ bool jobs_store(api *context, http_request *rq, const store_request *request, jo
     if (status != STORE_OK)
         return false;
     memcpy(rq->job_id, out->id, sizeof rq->job_id);
-    if (!repeated)
+    if (!repeated) {
+        metrics_add(context->metrics, METRIC_SUBMITTED, 1);
         work_wake(context->work);
+    }
     return true;
 }
 
@@ -294,6 +296,8 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
         reply->status = 204;
         return;
     }
+    if (was == JOB_ACCEPTED) /* the worker counts those that run */
+        metrics_job(context->metrics, job_status_name(JOB_DISMISSED), NULL, 1);
     if (was == JOB_RUNNING && work_cancel(context->work, rq->job_id))
         work_wait(context->work, rq->job_id, DISMISS_WAIT_S);
     if (jobs_load(context, rq, &j, reply))

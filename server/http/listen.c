@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <netdb.h>
+#include <netinet/in.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -47,7 +48,7 @@ static int listen_on(const struct addrinfo *at)
     return -1;
 }
 
-static bool describe(int fd, char *url, size_t size)
+static bool describe(int fd, const char *scheme, char *url, size_t size)
 {
     struct sockaddr_storage name;
     socklen_t len = sizeof name;
@@ -56,11 +57,11 @@ static bool describe(int fd, char *url, size_t size)
         getnameinfo((struct sockaddr *)&name, len, host, sizeof host, port, sizeof port,
                     NI_NUMERICHOST | NI_NUMERICSERV) != 0)
         return false;
-    int n = snprintf(url, size, name.ss_family == AF_INET6 ? "http://[%s]:%s" : "http://%s:%s", host, port);
+    int n = snprintf(url, size, name.ss_family == AF_INET6 ? "%s://[%s]:%s" : "%s://%s:%s", scheme, host, port);
     return n > 0 && (size_t)n < size;
 }
 
-int http_listen(const char *host_port, char *url, size_t url_size, char *message, size_t size)
+int http_listen(const char *host_port, const char *scheme, char *url, size_t url_size, char *message, size_t size)
 {
     char host[256], port[6];
     if (!split_host_port(host_port, host, port)) {
@@ -77,10 +78,25 @@ int http_listen(const char *host_port, char *url, size_t url_size, char *message
     if (fd < 0)
         snprintf(message, size, "cannot listen on %s: %s", host_port, strerror(errno));
     freeaddrinfo(found);
-    if (fd >= 0 && !describe(fd, url, url_size)) {
+    if (fd >= 0 && !describe(fd, scheme, url, url_size)) {
         snprintf(message, size, "cannot tell the address of the socket on %s", host_port);
         close(fd);
         fd = -1;
     }
     return fd;
+}
+
+bool http_is_public(int listen_fd)
+{
+    struct sockaddr_storage name;
+    socklen_t len = sizeof name;
+    if (getsockname(listen_fd, (struct sockaddr *)&name, &len) != 0)
+        return true;
+    if (name.ss_family == AF_INET)
+        return ntohl(((struct sockaddr_in *)(void *)&name)->sin_addr.s_addr) >> 24 != IN_LOOPBACKNET;
+    if (name.ss_family != AF_INET6)
+        return true;
+    const struct in6_addr *six = &((struct sockaddr_in6 *)(void *)&name)->sin6_addr;
+    bool mapped = IN6_IS_ADDR_V4MAPPED(six) && six->s6_addr[12] == IN_LOOPBACKNET;
+    return !IN6_IS_ADDR_LOOPBACK(six) && !mapped;
 }

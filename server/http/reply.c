@@ -146,13 +146,14 @@ static size_t list_cors(field *out, const http_reply *reply)
     out[n++] = (field){"Access-Control-Allow-Origin", reply->cors_origin};
     if (!reply->preflight) {
         out[n++] =
-            (field){"Access-Control-Expose-Headers", "Content-Range, ETag, Location, Preference-Applied, Retry-After"};
+            (field){"Access-Control-Expose-Headers", "Content-Range, ETag, Location, Preference-Applied, Retry-After, "
+                                                     "WWW-Authenticate, X-Request-Id"};
         return n;
     }
     out[n++] = (field){"Access-Control-Allow-Methods", reply->allow};
     out[n++] = (field){"Access-Control-Allow-Headers",
                        "Authorization, Content-Encoding, Content-Type, Idempotency-Key, If-None-Match, If-Range, "
-                       "Last-Event-ID, Prefer, Range"};
+                       "Last-Event-ID, Prefer, Range, X-Request-Id"};
     out[n++] = (field){"Access-Control-Max-Age", "600"};
     return n;
 }
@@ -179,10 +180,14 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, field_
         out[n++] = (field){"Content-Encoding", "gzip"};
     if (reply->body || reply->has_file || reply->source.read)
         out[n++] = (field){"Content-Type", reply->type};
+    if (reply->request_id[0])
+        out[n++] = (field){"X-Request-Id", reply->request_id};
     if (reply->location[0])
         out[n++] = (field){"Location", reply->location};
     if (reply->preference_applied[0])
         out[n++] = (field){"Preference-Applied", reply->preference_applied};
+    if (reply->authenticate[0])
+        out[n++] = (field){"WWW-Authenticate", reply->authenticate};
     if (reply->allow[0])
         out[n++] = (field){"Allow", reply->allow};
     if (reply->retry_after_s > 0)

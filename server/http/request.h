@@ -2,10 +2,13 @@
 #ifndef SERVER_HTTP_REQUEST_H
 #define SERVER_HTTP_REQUEST_H
 
+#include "codec/codec.h"
+#include "http/auth.h"
 #include "http/framing.h"
 #include "http/reply.h"
 #include "http/target.h"
 #include "log.h"
+#include "metrics.h"
 #include "store/store.h"
 #include "store/uploads.h"
 #include "work/webhook.h"
@@ -22,13 +25,21 @@ typedef struct {
     struct field_slots *fields;   /* turns of replies that are computed: fields.h */
     pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
     const webhooks *webhooks;     /* NULL: there are none */
+    metrics *metrics;
     double max_wait_s;
     int64_t max_upload;      /* bytes, decompressed */
     const char *const *cors; /* n_cors origins whose pages may use the service; "*": all */
     size_t n_cors;
     unsigned max_streams; /* event streams open at once */
     atomic_uint streams;
+    const codec_limit *limits; /* n_limits */
+    size_t n_limits;
     atomic_bool draining;
+    pthread_mutex_t ready_lock; /* the next two */
+    double ready_until;         /* on deadlines_now's clock: until then ready_why is what /readyz says */
+    char ready_why[64];         /* "": ready */
+    atomic_uint connections;    /* open now */
+    atomic_size_t body_bytes;   /* of all bodies in memory */
 } api;
 
 typedef struct http_request {
@@ -41,6 +52,8 @@ typedef struct http_request {
     char *body;                     /* NUL-terminated; NULL when empty */
     size_t body_len, body_capacity; /* body_len: as received, also of a body that is streamed */
     upload_writer *upload;          /* where the body of a streamed route goes */
+    char id[65];                    /* X-Request-Id, the client's or our own */
+    char token[64];                 /* the name of the token that it came with; "": none */
     int fd;                         /* to see whether the client is still there */
     /* For the access log and the connection's bookkeeping. */
     char method[16];
@@ -78,6 +91,10 @@ typedef struct route {
     bool streamed; /* the body is bytes of any type that go to disk as they come */
 } route;
 
+/* What a token must allow for this route. Whoever adds a route need not think of it: what changes something is for
+ * `submit`, what only reads for `read`, /v1/admin/ for `admin`. */
+auth_scope route_scope(const route *r);
+
 /* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. */
 /* With rq->reply.cors, OPTIONS is answered on every path that there is. */
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem);
@@ -100,7 +117,10 @@ void uploads_delete(api *context, http_request *rq, http_reply *reply);
 void events_get(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
+void service_limits(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);
+void admin_check(api *context, http_request *rq, http_reply *reply);
+void service_metrics(api *context, http_request *rq, http_reply *reply);
 void service_health(api *context, http_request *rq, http_reply *reply);
 void service_ready(api *context, http_request *rq, http_reply *reply);
 void service_openapi(api *context, http_request *rq, http_reply *reply);

@@ -30,6 +30,9 @@ static const route ROUTES[] = {
     {"GET", "/v1/uploads/{digest}", NONE, uploads_get, false},
     {"DELETE", "/v1/uploads/{digest}", NONE, uploads_delete, false},
     {"GET", "/v1/factors", NONE, service_factors, false},
+    {"GET", "/v1/limits", NONE, service_limits, false},
+    {"POST", "/v1/admin/check", NONE, admin_check, false},
+    {"GET", "/metrics", NONE, service_metrics, false},
     {"GET", "/healthz", NONE, service_health, false},
     {"GET", "/readyz", NONE, service_ready, false},
     {"GET", "/openapi.json", NONE, service_openapi, false},
@@ -79,6 +82,21 @@ static void answer_options(api *context, http_request *rq, http_reply *reply)
     reply->preflight = true;
 }
 static const route OPTIONS = {"OPTIONS", "every path", NONE, answer_options, false};
+
+/* What a person or a supervisor may see without a token: nothing about jobs. */
+static const char *const OPEN[] = {"/", "/healthz", "/readyz", "/openapi.json", "/schemas/{name}"};
+
+auth_scope route_scope(const route *r)
+{
+    if (r == &OPTIONS) /* a browser asks it before it may send a token (WHATWG Fetch, CORS preflight) */
+        return SCOPE_NONE;
+    for (size_t i = 0; i < sizeof OPEN / sizeof OPEN[0]; i++)
+        if (strcmp(r->pattern, OPEN[i]) == 0 && strcmp(r->method, "GET") == 0)
+            return SCOPE_NONE;
+    if (strncmp(r->pattern, "/v1/admin/", 10) == 0)
+        return SCOPE_ADMIN;
+    return strcmp(r->method, "GET") == 0 ? SCOPE_READ : SCOPE_SUBMIT;
+}
 
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem)
 {

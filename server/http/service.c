@@ -1,8 +1,12 @@
 /* service.c: routes about the service itself: what is cached, whether it lives, what is valid. */
 #include "codec/codec.h"
 #include "codec/embedded.h"
+#include "http/deadlines.h"
 #include "http/request.h"
+#include "options.h"
 
+#include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,9 +22,50 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     free(entries);
 }
 
+void service_limits(api *context, http_request *rq, http_reply *reply)
+{
+    (void)rq;
+    reply_json(reply, 200, codec_encode_limits(context->limits, context->n_limits));
+}
+
 static void reply_health(api *context, const char *status, const int64_t counts[5], http_reply *reply)
 {
     reply_json(reply, 200, codec_encode_health(status, counts, work_workers(context->work)));
+}
+
+static void count_cache(api *context, metrics_now *now)
+{
+    uz_cache_entry *entries = NULL;
+    size_t count = 0;
+    if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) == UZ_OK)
+        for (size_t i = 0; i < count; i++)
+            now->cache_bytes += entries[i].bytes;
+    now->cache_entries = count;
+    now->cache_max_bytes = work_cache_bytes(context->work);
+    free(entries);
+}
+
+void service_metrics(api *context, http_request *rq, http_reply *reply)
+{
+    metrics_now now = {.workers = work_workers(context->work),
+                       .workers_busy = work_busy(context->work),
+                       .connections = atomic_load(&context->connections),
+                       .streams = atomic_load(&context->streams),
+                       .body_bytes = atomic_load(&context->body_bytes),
+                       .version = UZAWAD_VERSION};
+    size_t len = 0;
+    (void)rq;
+    if (!context->metrics) {
+        reply_refuse(reply, 404, "not_found", "Not found", "this server keeps no metrics");
+        return;
+    }
+    if (store_counts(context->store, now.jobs) != STORE_OK)
+        now.jobs[0] = -1;
+    for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
+        now.job_names[i] = job_status_name((job_status)i);
+    count_cache(context, &now);
+    char *text = metrics_text(context->metrics, &now, &len);
+    reply_text(reply, 200, "text/plain; version=0.0.4; charset=utf-8", text, len);
 }
 
 /* Alive: the process answers. A supervisor restarts it on anything else, which would not help a failing store, so a
@@ -33,15 +78,73 @@ void service_health(api *context, http_request *rq, http_reply *reply)
     reply_health(context, answered ? "ok" : "store_unavailable", counts, reply);
 }
 
+/* ---- ready: what a job needs, tried */
+
+/* Two springs of stiffness 2 and 1 pulled by 2; the first is stopped at 0.5 and pushes back with 2 - 2 * 0.5 = 1. */
+static const char PROBE[] =
+    "{\"problem\": {\"kind\": \"matrices\", \"K\": \"%%MatrixMarket matrix coordinate real symmetric\\n"
+    "2 2 2\\n1 1 2\\n2 2 1\\n\", \"N\": \"%%MatrixMarket matrix coordinate real general\\n1 2 1\\n1 1 1\\n\","
+    " \"h\": [0.5], \"p\": [2, 2]}}";
+
+static bool solve_probe(void)
+{
+    codec_request request;
+    problem_details problem;
+    uz_result *result = NULL;
+    uz_error err = {0};
+    uz_thread_init();
+    if (!codec_decode_request(&request, PROBE, sizeof PROBE - 1, &problem))
+        return false;
+    bool good = uz_solve(&result, &request.problem, &request.settings, NULL, NULL, &err) == UZ_OK &&
+                result->summary.outcome == UZ_CONVERGED && fabs(result->summary.reaction_sum + 1.0) < 1e-6;
+    uz_result_free(result);
+    codec_request_clear(&request);
+    return good;
+}
+
+/* A change of a job that does not exist goes all the way to the store's writer. */
+static bool store_takes_changes(store *s)
+{
+    return store_renew(s, "00000000000000000000000000000000", "nobody", 0, 0) == STORE_NOT_FOUND;
+}
+
+static const char *why_not_ready(api *context)
+{
+    if (!store_takes_changes(context->store))
+        return "store_unavailable";
+    return solve_probe() ? "" : "solver_unavailable";
+}
+
+static const double READY_FOR_S = 1.0; /* so often at most it is tried, however many ask */
+
+static void try_ready(api *context, char why[64])
+{
+    pthread_mutex_lock(&context->ready_lock);
+    if (deadlines_now() >= context->ready_until) {
+        snprintf(context->ready_why, sizeof context->ready_why, "%s", why_not_ready(context));
+        context->ready_until = deadlines_now() + READY_FOR_S;
+    }
+    memcpy(why, context->ready_why, sizeof context->ready_why);
+    pthread_mutex_unlock(&context->ready_lock);
+}
+
 void service_ready(api *context, http_request *rq, http_reply *reply)
 {
     int64_t counts[5] = {0};
+    char why[64] = "";
     (void)rq;
     reply->retry_after_s = 5;
     if (atomic_load(&context->draining)) {
         reply_refuse(reply, 503, "draining", "The server is shutting down", "no new work is taken");
-    } else if (store_counts(context->store, counts) != STORE_OK) {
-        reply_refuse(reply, 503, "store_unavailable", "The store does not answer", "the server's log has the cause");
+        return;
+    }
+    try_ready(context, why);
+    if (!why[0] && store_counts(context->store, counts) != STORE_OK)
+        snprintf(why, sizeof why, "store_unavailable");
+    if (strcmp(why, "solver_unavailable") == 0) {
+        reply_refuse(reply, 503, why, "The solver does not answer", "a problem with a known answer was not solved");
+    } else if (why[0]) {
+        reply_refuse(reply, 503, why, "The store does not answer", "the server's log has the cause");
     } else {
         reply->retry_after_s = 0;
         reply_health(context, "ready", counts, reply);

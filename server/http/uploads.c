@@ -69,6 +69,7 @@ void uploads_create(api *context, http_request *rq, http_reply *reply)
         reply_problem(reply, &problem);
         return;
     }
+    metrics_add(context->metrics, METRIC_UPLOADS, 1);
     snprintf(reply->location, sizeof reply->location, "/v1/uploads/%s", info.id);
     reply_json(reply, known ? 200 : 201, codec_encode_upload(&info));
 }

@@ -25,6 +25,9 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_BEGIN] = "BEGIN IMMEDIATE",
     [QUERY_COMMIT] = "COMMIT",
     [QUERY_ROLLBACK] = "ROLLBACK",
+    [QUERY_SAVEPOINT] = "SAVEPOINT change",
+    [QUERY_RELEASE_SAVEPOINT] = "RELEASE change",
+    [QUERY_ROLLBACK_TO] = "ROLLBACK TO change",
     [QUERY_NEWEST_ID] = "SELECT max(id) FROM job",
     [QUERY_FIND_KEY] = "SELECT " JOB_COLUMNS ", length(body) = ?2 AND body = ?3"
                        " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",
@@ -70,7 +73,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_WEBHOOKS_OPEN] = "SELECT 1 FROM webhook WHERE state < 2 LIMIT 1",
     [QUERY_WEBHOOK_POSTPONE] = "UPDATE webhook SET next = max(next, ?2) WHERE state = 1 AND url = ?1",
     [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?2, next = ?3, attempts = attempts + 1 WHERE job = ?1",
-    [QUERY_WAITING] = "SELECT count(*) FROM job WHERE status = 0",
+    [QUERY_WAITING] = "SELECT jobs FROM tally WHERE status = 0",
     [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job INDEXED BY job_by_queue_until WHERE status = 0 AND queue_until > 0 AND "
                           "queue_until < ?1 LIMIT 1",
     [QUERY_EXPIRE] = "UPDATE job SET status = 3, finished = ?1, error = ?2"
@@ -90,7 +93,6 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_HISTORY] = "SELECT version, columns, CASE WHEN last > ?2 THEN data END FROM history WHERE job = ?1"
                       " AND answer = ?3"
                       " ORDER BY part",
-    [QUERY_COUNTS] = "SELECT status, count(*) FROM job GROUP BY status",
     [QUERY_UPLOAD] = "SELECT bytes, created, used, (SELECT count(*) FROM upload_use WHERE upload = id) FROM upload"
                      " WHERE id = ?1",
     [QUERY_INSERT_UPLOAD] = "INSERT OR IGNORE INTO upload(id, bytes, created, used) VALUES(?1, ?2, ?3, ?3)",
@@ -101,14 +103,17 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_IDLE_UPLOAD] = "SELECT id, bytes FROM upload WHERE used < ?1"
                           " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = id) ORDER BY used LIMIT 1",
     [QUERY_UPLOAD_BYTES] = "SELECT coalesce(sum(bytes), 0) FROM upload",
+    [QUERY_COUNTS] = "SELECT status, jobs FROM tally",
 };
 
 /* Settings of every connection. secure_delete FAST: freed pages are not rewritten only to blank them. */
 static const char *const COMMON_PRAGMAS = "PRAGMA foreign_keys = ON; PRAGMA mmap_size = 0; PRAGMA temp_store = MEMORY;"
                                           "PRAGMA trusted_schema = OFF;";
-/* FULL, because in WAL mode NORMAL may lose the last commits at power loss, and a 202 promises the job is on disk. */
-static const char *const WRITER_PRAGMAS = "PRAGMA synchronous = FULL; PRAGMA journal_size_limit = 16777216;"
-                                          "PRAGMA secure_delete = FAST;";
+/* NORMAL: a commit alone may be lost at power loss, so sync.c syncs the log before anything is acknowledged. The log is
+ * moved into the file every 4000 pages: what the many small jobs change is then written there once for many. */
+static const char *const WRITER_PRAGMAS =
+    "PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 4000; PRAGMA journal_size_limit = 16777216;"
+    "PRAGMA secure_delete = FAST;";
 
 bool connection_open(connection *c, const char *path, bool writer, char *message, size_t size)
 {

@@ -10,8 +10,10 @@
 
 #define STORE_READERS 4
 
-/* Lock order: none of these is taken while another is held, except message under writer_lock, and any under
+/* Lock order: none of these is taken while another is held, except message and sync under writer_lock, and any under
  * upload_lock. */
+typedef struct pending pending;
+
 struct store {
     pthread_mutex_t writer_lock; /* writer, last_ms, sequence, max_queue */
     connection writer;           /* the only one that writes and checkpoints */
@@ -19,11 +21,28 @@ struct store {
     unsigned sequence;
     int64_t max_queue; /* 0: no limit */
 
+    pthread_mutex_t queue_lock; /* everything down to leading; write.c */
+    pending *queue, **queue_end;
+    bool leading; /* somebody carries out changes */
+
     pthread_mutex_t readers_lock; /* readers_free */
     pthread_cond_t reader_free;
     connection readers[STORE_READERS];
     connection *readers_free[STORE_READERS];
     int n_readers_free;
+
+    /* Changes are numbered as they are committed; sync.c. */
+    pthread_mutex_t sync_lock; /* everything down to sync_stop */
+    pthread_cond_t sync_asked, sync_ended;
+    uint64_t begun;     /* the number of the last COMMIT, which may be under way: readers may see it already */
+    uint64_t committed; /* of the last one that ended */
+    uint64_t wanted;    /* somebody wants those up to here on disk */
+    uint64_t synced;    /* those up to here are */
+    uint64_t failures;  /* times that this could not be had, the last time */
+    uint64_t failed;    /* for those up to here */
+    bool sync_stop, sync_started;
+    sqlite3_file *log; /* the writer's write-ahead log, set before the thread starts */
+    pthread_t syncer;
 
     pthread_mutex_t message_lock; /* message */
     char message[256];
@@ -33,13 +52,41 @@ struct store {
     int64_t uploads_pending; /* of those that are being written */
     char *uploads_folder;    /* absolute; made with the first upload */
 
+    metrics *metrics; /* may be NULL */
     int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
 };
 
-/* Runs `change` as one transaction on the writer: STORE_OK commits, anything else rolls back. On a full disk the
- * journal is moved into the database and `change` runs once more, so it must reset what it publishes. */
+/* Runs `change` on the writer, alone or with others in one transaction: STORE_OK commits, anything else takes back what
+ * it did. It may run more than once, so it must reset what it publishes; on a full disk it runs again once the journal
+ * is moved into the database. */
 typedef store_status (*store_change)(store *s, connection *c, void *args);
-store_status store_write(store *s, store_change change, void *args);
+/* When the caller is told. */
+typedef enum {
+    WRITE_DURABLE, /* when it is on disk */
+    WRITE_SOON, /* when it is committed: a power loss may undo it for a moment longer, but whoever reads what it wrote
+                   waits (store_settle) */
+    WRITE_LAZY  /* when it is committed; it reaches the disk with whatever comes next. Right for what the start
+                   after a crash undoes by itself: claims and leases */
+} write_durability;
+store_status store_write_as(store *s, write_durability durability, store_change change, void *args);
+store_status store_write(store *s, store_change change, void *args); /* WRITE_DURABLE */
+
+/* ---- sync.c */
+bool store_sync_begin(store *s); /* once the writer has read the file; false: no thread, or no log */
+void store_sync_end(store *s);
+/* Around a COMMIT, however it ends; under writer_lock. The second returns its number. */
+void store_begin_commit(store *s);
+uint64_t store_note_commit(store *s);
+void store_want_sync(store *s, uint64_t number);
+store_status store_await_sync(store *s, uint64_t number);
+store_status store_settle(store *s); /* returns when all that anybody may have read is on disk */
+
+/* Before jobs are told that were read: returns when the end of each is on disk. */
+store_status store_settle_jobs(store *s, const job *jobs, size_t count);
+
+/* Keeps the connection's message as the store's last one. */
+void store_keep_message(store *s, const connection *c);
+double store_clock(void); /* seconds, CLOCK_MONOTONIC */
 
 /* A reader for the calling thread alone, until it is given back with how the read ended, which is returned. */
 connection *store_take_reader(store *s);

@@ -1,6 +1,7 @@
 /* jobs.c: the life of a job, each step one transaction. */
 #include "store/internal.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -278,7 +279,7 @@ store_status store_claim(store *s, const char *owner, double lease_s, job *out, 
     *body = NULL;
     *body_len = 0;
     claim_args a = {owner, lease_s, out, NULL, 0};
-    store_status status = store_write(s, claim, &a);
+    store_status status = store_write_as(s, WRITE_LAZY, claim, &a);
     if (status != STORE_OK) {
         job_clear(out);
         free(a.body);
@@ -313,7 +314,7 @@ static store_status renew(store *s, connection *c, void *args)
 store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress)
 {
     owner_args a = {id, owner, lease_s, progress, NULL};
-    return store_write(s, renew, &a);
+    return store_write_as(s, WRITE_LAZY, renew, &a);
 }
 
 static store_status finish(store *s, connection *c, void *args)
@@ -344,7 +345,7 @@ static store_status finish(store *s, connection *c, void *args)
 store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome)
 {
     owner_args a = {id, owner, 0.0, 0, outcome};
-    return store_write(s, finish, &a);
+    return store_write_as(s, WRITE_SOON, finish, &a);
 }
 
 static store_status release(store *s, connection *c, void *args)
@@ -360,7 +361,7 @@ static store_status release(store *s, connection *c, void *args)
 store_status store_release(store *s, const char *id, const char *owner)
 {
     owner_args a = {id, owner, 0.0, 0, NULL};
-    return store_write(s, release, &a);
+    return store_write_as(s, WRITE_SOON, release, &a);
 }
 
 /* ---- recover */
@@ -437,12 +438,25 @@ store_status store_dismiss(store *s, const char *id, job_status *was)
 
 /* ---- one job */
 
+/* What has just ended is told once it is on disk. After this long it is, even if nobody asked for it. */
+static const double UNSETTLED_S = 60.0;
+
+store_status store_settle_jobs(store *s, const job *jobs, size_t count)
+{
+    bool fresh = false;
+    for (size_t i = 0; i < count; i++)
+        fresh = fresh || (has_ended(jobs[i].status) && fabs(store_now() - jobs[i].finished) < UNSETTLED_S);
+    return fresh ? store_settle(s) : STORE_OK;
+}
+
 store_status store_get(store *s, const char *id, job *out)
 {
     memset(out, 0, sizeof *out);
     connection *c = store_take_reader(s);
-    store_status status = read_by_id(c, id, out);
+    store_status status = store_give_reader(s, c, read_by_id(c, id, out));
+    if (status == STORE_OK)
+        status = store_settle_jobs(s, out, 1);
     if (status != STORE_OK)
         job_clear(out);
-    return store_give_reader(s, c, status);
+    return status;
 }

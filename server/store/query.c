@@ -109,6 +109,8 @@ store_status store_list(store *s, const store_query *query, job **jobs, size_t *
     else
         strcpy(c->message, "no memory for a list of jobs");
     store_give_reader(s, c, status);
+    if (status == STORE_OK)
+        status = store_settle_jobs(s, found, n);
     if (status != STORE_OK) {
         while (n > 0)
             job_clear(&found[--n]);

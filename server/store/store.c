@@ -116,40 +116,60 @@ store *store_open(const char *path, char *message, size_t size)
         return NULL;
     }
     pthread_mutex_init(&s->writer_lock, NULL);
+    pthread_mutex_init(&s->queue_lock, NULL);
     pthread_mutex_init(&s->readers_lock, NULL);
     pthread_mutex_init(&s->message_lock, NULL);
     pthread_mutex_init(&s->upload_lock, NULL);
     pthread_cond_init(&s->reader_free, NULL);
+    pthread_mutex_init(&s->sync_lock, NULL);
+    pthread_cond_init(&s->sync_asked, NULL);
+    pthread_cond_init(&s->sync_ended, NULL);
+    s->queue_end = &s->queue;
     s->file = lock_file(path, why, sizeof why);
     if (s->file < 0 || !open_connections(s, path, why, sizeof why)) {
         snprintf(message, size, "%s: %s", path, why);
         store_close(s);
         return NULL;
     }
+    if (!store_sync_begin(s)) {
+        snprintf(message, size, "%s: cannot start a thread", path);
+        store_close(s);
+        return NULL;
+    }
     return s;
+}
+
+void store_observe(store *s, metrics *m)
+{
+    s->metrics = m;
 }
 
 void store_close(store *s)
 {
     if (!s)
         return;
+    store_sync_end(s);
     for (int i = 0; i < STORE_READERS; i++)
         connection_close(&s->readers[i]);
     connection_close(&s->writer); /* the last one: checkpoints and removes the journal */
     if (s->file >= 0)
         close(s->file);
+    pthread_cond_destroy(&s->sync_ended);
+    pthread_cond_destroy(&s->sync_asked);
+    pthread_mutex_destroy(&s->sync_lock);
     pthread_cond_destroy(&s->reader_free);
     free(s->uploads_folder);
     pthread_mutex_destroy(&s->upload_lock);
     pthread_mutex_destroy(&s->message_lock);
     pthread_mutex_destroy(&s->readers_lock);
+    pthread_mutex_destroy(&s->queue_lock);
     pthread_mutex_destroy(&s->writer_lock);
     free(s);
 }
 
 /* ---- the last failure's cause */
 
-static void keep_message(store *s, const connection *c)
+void store_keep_message(store *s, const connection *c)
 {
     pthread_mutex_lock(&s->message_lock);
     snprintf(s->message, sizeof s->message, "%s", c->message);
@@ -161,46 +181,6 @@ void store_message(store *s, char *buffer, size_t size)
     pthread_mutex_lock(&s->message_lock);
     snprintf(buffer, size, "%s", s->message);
     pthread_mutex_unlock(&s->message_lock);
-}
-
-/* ---- transactions */
-
-static store_status run_query(connection *c, query_id q)
-{
-    statement st = statement_begin(c, q);
-    return statement_run(&st);
-}
-
-static store_status attempt(store *s, store_change change, void *args)
-{
-    connection *c = &s->writer;
-    store_status status = run_query(c, QUERY_BEGIN);
-    if (status != STORE_OK)
-        return status;
-    status = change(s, c, args);
-    if (status == STORE_OK)
-        status = run_query(c, QUERY_COMMIT);
-    if (!sqlite3_get_autocommit(c->db)) { /* a full disk may have rolled back already */
-        char cause[sizeof c->message];
-        memcpy(cause, c->message, sizeof cause);
-        run_query(c, QUERY_ROLLBACK);
-        memcpy(c->message, cause, sizeof cause);
-    }
-    return status;
-}
-
-store_status store_write(store *s, store_change change, void *args)
-{
-    pthread_mutex_lock(&s->writer_lock);
-    store_status status = attempt(s, change, args);
-    if (status == STORE_FULL) {
-        connection_checkpoint(&s->writer);
-        status = attempt(s, change, args);
-    }
-    if (status == STORE_ERROR || status == STORE_FULL)
-        keep_message(s, &s->writer);
-    pthread_mutex_unlock(&s->writer_lock);
-    return status;
 }
 
 connection *store_take_reader(store *s)
@@ -216,7 +196,7 @@ connection *store_take_reader(store *s)
 store_status store_give_reader(store *s, connection *c, store_status status)
 {
     if (status == STORE_ERROR)
-        keep_message(s, c);
+        store_keep_message(s, c);
     pthread_mutex_lock(&s->readers_lock);
     s->readers_free[s->n_readers_free++] = c;
     pthread_cond_signal(&s->reader_free);
@@ -240,12 +220,19 @@ store_status store_limit_bytes(store *s, int64_t bytes)
     int rc = sqlite3_exec(c->db, sql, NULL, NULL, NULL);
     snprintf(c->message, sizeof c->message, "%s", sqlite3_errmsg(c->db));
     if (rc != SQLITE_OK)
-        keep_message(s, c);
+        store_keep_message(s, c);
     pthread_mutex_unlock(&s->writer_lock);
     return rc == SQLITE_OK ? STORE_OK : STORE_ERROR;
 }
 
 /* ---- ids and time */
+
+double store_clock(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
 
 double store_now(void)
 {

@@ -7,6 +7,8 @@
 #ifndef SERVER_STORE_H
 #define SERVER_STORE_H
 
+#include "metrics.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -52,6 +54,9 @@ store_status store_limit_bytes(store *s, int64_t bytes);
 
 /* So many jobs may wait; a submission beyond it is STORE_BUSY. 0: no limit. Not kept in the file. */
 void store_limit_queue(store *s, int64_t jobs);
+
+/* Counts commits and changes there from now on; before other threads use the store. */
+void store_observe(store *s, metrics *m);
 
 /* What is submitted. */
 typedef struct {

@@ -24,6 +24,7 @@ static void expire(work *w)
     char *error = waited_too_long();
     if (error && store_expire(w->store, error, &count) == STORE_OK && count > 0) {
         log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", count), {0}});
+        metrics_job(w->options.metrics, job_status_name(JOB_FAILED), NULL, count);
         work_notify(w, NULL);
     }
     free(error);
@@ -42,6 +43,7 @@ static void retain(work *w)
     int64_t total = 0, count = 1;
     while (count > 0 && goes_on(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
         total += count;
+    metrics_add(w->options.metrics, METRIC_DELETED, total);
     if (total > 0)
         log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
 }

@@ -212,6 +212,9 @@ static uz_status solve_or_verify(run *r, uz_error *err)
 static run_end solve(run *r)
 {
     uz_error err = {0};
+    double most = r->me->w->options.max_solve_s;
+    if (most > 0.0 && r->request.settings.time_limit_s > most)
+        r->request.settings.time_limit_s = most;
     r->request.settings.memory_limit = r->me->w->options.solve_bytes;
     uz_status status = solve_or_verify(r, &err);
     if (status == UZ_ERR_LIMIT)
@@ -267,6 +270,38 @@ static int64_t count_iterations(const run *r)
     return sum;
 }
 
+/* Phases and cache: of the first case, which paid for the body; iterating and certifying of all. */
+static void count_results(const run *r)
+{
+    metrics *m = r->me->w->options.metrics;
+    double iterate = 0.0, certify = 0.0;
+    if (!r->results || !r->results[0])
+        return;
+    const uz_summary *first = &r->results[0]->summary;
+    for (int64_t i = 0; i < r->n && r->results[i]; i++) {
+        iterate += r->results[i]->summary.timings.iterate;
+        certify += r->results[i]->summary.timings.certify;
+    }
+    metrics_add(m, first->reused.factor ? METRIC_CACHE_HITS : METRIC_CACHE_MISSES, 1);
+    metrics_add(m, METRIC_ITERATIONS, count_iterations(r));
+    metrics_seconds(m, METRIC_ASSEMBLE, first->timings.assemble);
+    metrics_seconds(m, METRIC_ORDER, first->timings.order);
+    metrics_seconds(m, METRIC_FACTOR, first->timings.factor);
+    metrics_seconds(m, METRIC_CONDENSE, first->timings.condense);
+    metrics_seconds(m, METRIC_ITERATE, iterate);
+    metrics_seconds(m, METRIC_CERTIFY, certify);
+}
+
+static void count_job(const run *r, const char *outcome)
+{
+    metrics *m = r->me->w->options.metrics;
+    metrics_job(m, job_status_name(r->outcome.status), outcome, 1);
+    metrics_seconds(m, METRIC_QUEUE, r->queue_s);
+    metrics_seconds(m, METRIC_PARSE, r->parse_s);
+    metrics_seconds(m, METRIC_TOTAL, work_clock() - r->began + r->queue_s);
+    count_results(r);
+}
+
 static void store_end(run *r, run_end end)
 {
     work *w = r->me->w;
@@ -274,12 +309,14 @@ static void store_end(run *r, run_end end)
     if (end == END_RELEASE && store_release(w->store, r->job->id, r->me->owner) != STORE_OK)
         log_store_failure(r, LOG_ERROR, "release_failed");
     if (end != END_FINISH) {
+        metrics_add(w->options.metrics, METRIC_REQUEUED, end == END_RELEASE);
         const char *event = end == END_RELEASE ? "job_released" : "job_taken_over";
         log_write(w->log, LOG_INFO, event, (log_field[]){LOG_S("job", r->job->id), {0}});
         return;
     }
     if (!store_outcome_of(r))
         return;
+    count_job(r, first ? uz_outcome_name(first->outcome) : NULL);
     log_write(w->log, LOG_INFO, "job_ended",
               (log_field[]){LOG_S("job", r->job->id),
                             LOG_S("status", job_status_name(r->outcome.status)),

@@ -25,8 +25,6 @@ struct webhooks {
     store *store;
     server_log *log;
     webhook_options options;
-    char *secret;
-    size_t secret_len;
     pthread_t thread;
     bool started, curl_ready;
     atomic_bool stop;
@@ -127,9 +125,9 @@ static struct curl_slist *make_headers(const webhooks *all, const webhook_due *d
 {
     char delivery[96], signature[160] = "X-Uzawa-Signature: ";
     snprintf(delivery, sizeof delivery, "X-Uzawa-Delivery: %s.%d", due->job, due->attempts + 1);
-    bool sign = all->secret_len > 0;
-    if (sign &&
-        !webhook_sign(signature + strlen(signature), all->secret, all->secret_len, (long long)time(NULL), body, len))
+    bool sign = all->options.secret_len > 0;
+    if (sign && !webhook_sign(signature + strlen(signature), all->options.secret, all->options.secret_len,
+                              (long long)time(NULL), body, len))
         return NULL;
     const char *const lines[] = {"Content-Type: application/json", "Expect:", "X-Uzawa-Event: job.ended", delivery,
                                  sign ? signature : "X-Uzawa-Signature:"}; /* without a value: none is sent */
@@ -229,6 +227,7 @@ static void tell(webhooks *all, const webhook_due *due)
     if (status == 0 && atomic_load(&all->stop))
         return; /* cut off: it stays due */
     log_attempt(all, due, end, status, cause);
+    metrics_add(all->options.metrics, end == WEBHOOK_TOLD ? METRIC_WEBHOOK_TOLD : METRIC_WEBHOOK_FAILED, 1);
     if (status == 0 && end == WEBHOOK_AGAIN) /* each attempt takes seconds that others wait for */
         store_webhook_postpone(all->store, due->url, wait_after(all, 0));
     store_webhook_attempted(all->store, due->job, end, wait_after(all, due->attempts));
@@ -256,10 +255,10 @@ static void *tell_loop(void *arg)
 
 /* ---- start and stop */
 
-static bool read_secret(webhooks *all, const char *path, char *message, size_t size)
+bool webhook_read_secret(webhook_options *out, const char *path, char *message, size_t size)
 {
-    char text[SECRET_MAX + 1];
-    FILE *file = fopen(path, "rb");
+    char text[SECRET_MAX + 2];
+    FILE *file = fopen(path, "rbe");
     size_t len = file ? fread(text, 1, sizeof text, file) : 0;
     int cause = errno;
     bool ok = file && !ferror(file);
@@ -271,15 +270,26 @@ static bool read_secret(webhooks *all, const char *path, char *message, size_t s
         snprintf(message, size, "cannot read the webhook secret %s: %s", path, strerror(cause));
     else if (len == 0 || len > SECRET_MAX)
         snprintf(message, size, "the webhook secret %s must have 1 to %d bytes", path, SECRET_MAX);
-    if (!ok || len == 0 || len > SECRET_MAX)
-        return false;
-    all->secret = malloc(len);
-    all->secret_len = all->secret ? len : 0;
-    if (all->secret)
-        memcpy(all->secret, text, len);
-    else
+    ok = ok && len > 0 && len <= SECRET_MAX;
+    if (ok && !(out->secret = malloc(len))) {
         snprintf(message, size, "no memory for the webhook secret");
-    return all->secret != NULL;
+        ok = false;
+    }
+    if (ok) {
+        memcpy(out->secret, text, len);
+        out->secret_len = len;
+    }
+    explicit_bzero(text, sizeof text);
+    return ok;
+}
+
+void webhook_forget_secret(webhook_options *options)
+{
+    if (options->secret)
+        explicit_bzero(options->secret, options->secret_len);
+    free(options->secret);
+    options->secret = NULL;
+    options->secret_len = 0;
 }
 
 webhooks *webhooks_start(store *s, const webhook_options *options, server_log *log, char *message, size_t size)
@@ -295,8 +305,6 @@ webhooks *webhooks_start(store *s, const webhook_options *options, server_log *l
     atomic_init(&all->stop, false);
     pthread_mutex_init(&all->lock, NULL);
     work_init_condition(&all->wake);
-    if (options->secret_file && !read_secret(all, options->secret_file, message, size))
-        goto fail;
     if (options->n_allow == 0) { /* what was to be told before is given up, so that its jobs need not stay for it */
         bool any = false;
         if (store_webhooks_open(s, &any) != STORE_OK || !any)
@@ -307,7 +315,6 @@ webhooks *webhooks_start(store *s, const webhook_options *options, server_log *l
     all->started = all->curl_ready && pthread_create(&all->thread, NULL, tell_loop, all) == 0;
     if (all->started)
         return all;
-fail:
     webhooks_stop(all);
     return NULL;
 }
@@ -326,8 +333,5 @@ void webhooks_stop(webhooks *all)
         curl_global_cleanup();
     pthread_cond_destroy(&all->wake);
     pthread_mutex_destroy(&all->lock);
-    if (all->secret)
-        explicit_bzero(all->secret, all->secret_len);
-    free(all->secret);
     free(all);
 }

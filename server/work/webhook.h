@@ -11,6 +11,7 @@
 #define SERVER_WORK_WEBHOOK_H
 
 #include "log.h"
+#include "metrics.h"
 #include "store/store.h"
 
 #include <stdbool.h>
@@ -21,11 +22,18 @@ typedef struct webhooks webhooks;
 typedef struct {
     const char *const *allow; /* n_allow of "HOST" (the scheme's own port) or "HOST:PORT"; 0: there are no webhooks */
     size_t n_allow;
-    const char *secret_file; /* its bytes, without a line end at the end; NULL: nothing is signed */
-    double first_retry_s;    /* doubled after each attempt, up to an hour; 0: 5 s */
+    char *secret; /* secret_len bytes; NULL: nothing is signed */
+    size_t secret_len;
+    metrics *metrics;     /* may be NULL */
+    double first_retry_s; /* doubled after each attempt, up to an hour; 0: 5 s */
 } webhook_options;
 
-/* Starts the thread where there is something to allow, or to give up. NULL: message. options must outlive it. */
+/* The secret of a file: its bytes, without a line end at the end. False: message. */
+bool webhook_read_secret(webhook_options *out, const char *path, char *message, size_t size);
+void webhook_forget_secret(webhook_options *options); /* {.secret = NULL} is fine */
+
+/* Starts the thread where there is something to allow, or to give up. NULL: message. What options point to must outlive
+ * it. */
 webhooks *webhooks_start(store *s, const webhook_options *options, server_log *log, char *message, size_t size);
 /* Cuts off what is on its way; it is told again after the next start. NULL is fine. */
 void webhooks_stop(webhooks *all);

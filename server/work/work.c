@@ -165,6 +165,7 @@ static bool recover(work *w, char *message, size_t size)
         snprintf(message, size, "cannot take up the jobs that were left running: %s", cause);
         return false;
     }
+    metrics_add(w->options.metrics, METRIC_REQUEUED, requeued);
     if (requeued + failed > 0)
         log_write(w->log, LOG_WARN, "recovered",
                   (log_field[]){LOG_I("requeued", requeued), LOG_I("failed", failed), {0}});
@@ -426,4 +427,15 @@ size_t work_solve_bytes(const work *w)
 int work_workers(const work *w)
 {
     return w->options.workers;
+}
+
+int work_busy(work *w)
+{
+    int busy = 0;
+    for (int i = 0; i < w->options.workers; i++) {
+        pthread_mutex_lock(&w->workers[i].lock);
+        busy += w->workers[i].id[0] != '\0';
+        pthread_mutex_unlock(&w->workers[i].lock);
+    }
+    return busy;
 }

@@ -21,6 +21,7 @@
 #define SERVER_WORK_H
 
 #include "log.h"
+#include "metrics.h"
 #include "store/store.h"
 #include "uzawa.h"
 
@@ -33,8 +34,10 @@ typedef struct {
     int max_attempts;   /* runs begun before a job that keeps killing the process is failed */
     size_t cache_bytes; /* factor cache */
     size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
+    double max_solve_s; /* of one job, whatever it asks for; 0: no limit */
     double lease_s;
     store_retention retention; /* of ended jobs */
+    metrics *metrics;          /* may be NULL */
 } work_options;
 
 /* Recovers jobs left by a dead process, then starts the threads. NULL on failure with the reason in message. */
@@ -70,6 +73,7 @@ uz_cache *work_cache(work *w);
 size_t work_cache_bytes(const work *w);
 size_t work_solve_bytes(const work *w); /* of one solve; 0: no limit */
 int work_workers(const work *w);
+int work_busy(work *w); /* workers that run a job */
 
 /* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to
  * accepted. Waiters wake at once. Returns when every worker has ended; a factorization cannot be interrupted and is

@@ -66,7 +66,8 @@ class Reply:
 
 
 # What tells which schema a reply must meet: a member that only this kind of object has.
-KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("rows", "history.json"), ("code", "problem-details.json"),
+KINDS = [("valid", "valid.json"), ("factors", "factors.json"), ("used_by", "upload.json"), ("limits", "limits.json"),
+         ("whole", "check.json"), ("rows", "history.json"), ("code", "problem-details.json"),
          ("workers", "health.json"), ("progress", "job.json"), ("summary", "result.json")]
 
 

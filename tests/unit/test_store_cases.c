@@ -237,6 +237,7 @@ TEST(a_file_of_format_1_is_taken_over)
         return;
     check_old_job(&p);
     CHECK_INT(rows_in(p.path, "job WHERE bytes = 64 AND status = 2"), 1); /* 8 of the body, 4 + 3 numbers */
+    CHECK_INT(rows_in(p.path, "tally WHERE (status = 0 OR status = 2) AND jobs = 1"), 2);
     CHECK_INT(rows_in(p.path, "upload"), 0);
     CHECK_INT(rows_in(p.path, "webhook"), 0);
     store_request again = {.body = "{\"b\": 2}", .body_len = 8, .idempotency_key = "key"};

@@ -1,4 +1,5 @@
 /* Uploads, expiry, retention and webhooks in the store: what the API tests can't reach or would wait for. */
+#include "store/maintenance.h"
 #include "store_place.h"
 #include "store/uploads.h"
 #include "store/webhooks.h"
@@ -77,6 +78,47 @@ TEST(an_upload_is_named_by_its_digest)
     CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_NOT_FOUND);
     CHECK_INT(store_upload_delete(p.s, ABC), STORE_NOT_FOUND);
     CHECK_INT(files_in(&p), 0);
+    end_place(&p);
+}
+
+TEST(a_backup_has_the_uploads)
+{
+    place p, copy;
+    upload_info info;
+    upload_text text;
+    bool known;
+    char message[300] = "", folder[256];
+    struct stat st;
+    if (!place_begin(&p))
+        return;
+    copy = p;
+    snprintf(copy.path, sizeof copy.path, "%s/copy.db", p.folder);
+    snprintf(folder, sizeof folder, "%s-uploads", copy.path);
+    CHECK_MSG(store_backup_file(p.path, copy.path, NULL, message, sizeof message), "%s", message);
+    CHECK(lstat(folder, &st) != 0 && unlink(copy.path) == 0); /* none: no folder */
+    CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
+    CHECK_MSG(store_backup_file(p.path, copy.path, NULL, message, sizeof message), "%s", message);
+    CHECK(!store_backup_file(p.path, copy.path, NULL, message, sizeof message) && strstr(message, "there already"));
+    CHECK_INT(store_upload_delete(p.s, ABC), STORE_OK);
+    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_NOT_FOUND);
+    copy.s = NULL;
+    if (place_open(&copy)) {
+        CHECK_INT(files_in(&copy), 1);
+        CHECK_INT(store_upload_text(copy.s, ABC, &text), STORE_OK);
+        CHECK(text.len == 3 && memcmp(text.data, "abc", 3) == 0);
+        store_upload_text_done(&text);
+        CHECK_INT(store_upload_delete(copy.s, ABC), STORE_OK);
+        store_close(copy.s);
+    }
+    unlink(copy.path);
+    /* A file that is gone: no backup, and nothing is left of one. */
+    CHECK(rmdir(folder) == 0);
+    CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
+    snprintf(folder, sizeof folder, "%s-uploads/" ABC, p.path);
+    CHECK_INT(unlink(folder), 0);
+    CHECK(!store_backup_file(p.path, copy.path, NULL, message, sizeof message) && strstr(message, ABC));
+    snprintf(folder, sizeof folder, "%s-uploads", copy.path);
+    CHECK(lstat(folder, &st) != 0 && lstat(copy.path, &st) != 0);
     end_place(&p);
 }
 
@@ -215,11 +257,11 @@ TEST(a_job_that_ran_once_has_no_queue_limit)
     int64_t count;
     if (!place_begin(&p))
         return;
-    submit_with(p.s, (store_request){.queue_limit_s = 0.05}, id);
+    submit_with(p.s, (store_request){.queue_limit_s = 1000}, id);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
     CHECK_INT(store_release(p.s, claimed, "me"), STORE_OK);
-    submit_with(p.s, (store_request){.queue_limit_s = 0.05}, other);
-    usleep(80000);
+    submit_with(p.s, (store_request){.queue_limit_s = 1000}, other);
+    change_file(p.path, "UPDATE job SET queue_until = 1 WHERE queue_until > 0"); /* long after */
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
     CHECK_STR(claimed, id);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_NOT_FOUND); /* too late, though nobody has said so yet */

@@ -1,0 +1,103 @@
+#include "http/rate.h"
+
+#include <math.h>
+#include <netinet/in.h>
+#include <pthread.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+enum { SETS = 1024, WAYS = 4 };
+
+typedef struct {
+    uint64_t key; /* 0: free */
+    double left, at;
+} bucket;
+
+struct rate {
+    pthread_mutex_t lock;
+    double per_s, burst;
+    uint64_t seed; /* so that nobody can choose who shares a set */
+    bucket buckets[SETS][WAYS];
+};
+
+rate *rate_new(int per_s)
+{
+    rate *r = calloc(1, sizeof *r);
+    if (!r)
+        return NULL;
+    pthread_mutex_init(&r->lock, NULL);
+    r->per_s = per_s;
+    r->burst = 2.0 * per_s;
+    if (getrandom(&r->seed, sizeof r->seed, 0) != (ssize_t)sizeof r->seed)
+        r->seed = (uint64_t)(uintptr_t)r;
+    return r;
+}
+
+void rate_free(rate *r)
+{
+    if (!r)
+        return;
+    pthread_mutex_destroy(&r->lock);
+    free(r);
+}
+
+/* FNV-1a with a seed, and the finishing steps of MurmurHash3 (both public domain algorithms). */
+static uint64_t hash(uint64_t seed, const unsigned char *key, size_t len)
+{
+    uint64_t h = seed ^ 0xcbf29ce484222325u;
+    for (size_t i = 0; i < len; i++)
+        h = (h ^ key[i]) * 0x100000001b3u;
+    h = (h ^ (h >> 33)) * 0xff51afd7ed558ccdu;
+    h = (h ^ (h >> 33)) * 0xc4ceb9fe1a85ec53u;
+    h ^= h >> 33;
+    return h ? h : 1;
+}
+
+/* The client's bucket, or the one of its set that was not used for longest, filled. */
+static bucket *find(rate *r, uint64_t key, double now)
+{
+    bucket *set = r->buckets[key % SETS], *oldest = set;
+    for (size_t i = 0; i < WAYS; i++) {
+        if (set[i].key == key)
+            return &set[i];
+        if (set[i].key == 0 || (oldest->key != 0 && set[i].at < oldest->at))
+            oldest = &set[i];
+    }
+    *oldest = (bucket){.key = key, .left = r->burst, .at = now};
+    return oldest;
+}
+
+double rate_take(rate *r, const void *key, size_t len, double now)
+{
+    uint64_t hashed = hash(r->seed, key, len);
+    pthread_mutex_lock(&r->lock);
+    bucket *b = find(r, hashed, now);
+    b->left = fmin(r->burst, b->left + fmax(0.0, now - b->at) * r->per_s);
+    b->at = now;
+    double wait = b->left >= 1.0 ? 0.0 : (1.0 - b->left) / r->per_s;
+    if (wait == 0.0)
+        b->left -= 1.0;
+    pthread_mutex_unlock(&r->lock);
+    return wait;
+}
+
+size_t rate_address(const struct sockaddr *address, unsigned char out[16])
+{
+    if (!address)
+        return 0;
+    if (address->sa_family == AF_INET) {
+        memcpy(out, &((const struct sockaddr_in *)(const void *)address)->sin_addr, 4);
+        return 4;
+    }
+    if (address->sa_family != AF_INET6)
+        return 0;
+    const struct in6_addr *six = &((const struct sockaddr_in6 *)(const void *)address)->sin6_addr;
+    if (IN6_IS_ADDR_V4MAPPED(six)) {
+        memcpy(out, &six->s6_addr[12], 4);
+        return 4;
+    }
+    memcpy(out, six->s6_addr, 8);
+    return 8;
+}

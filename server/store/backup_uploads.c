@@ -1,0 +1,147 @@
+#include "store/backup_uploads.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+/* Folders as descriptors. */
+typedef struct {
+    int from, to;
+} folders;
+
+static int open_folder(const char *db, bool make)
+{
+    char path[4096];
+    if ((size_t)snprintf(path, sizeof path, "%s-uploads", db) >= sizeof path) {
+        errno = ENAMETOOLONG;
+        return -1;
+    }
+    if (make && mkdir(path, 0700) != 0 && errno != EEXIST)
+        return -1;
+    return open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+}
+
+static bool write_all(int fd, const char *data, size_t size)
+{
+    while (size > 0) {
+        ssize_t n = write(fd, data, size);
+        if (n < 0 && errno != EINTR)
+            return false;
+        data += n > 0 ? n : 0;
+        size -= n > 0 ? (size_t)n : 0;
+    }
+    return true;
+}
+
+static bool copy_bytes(int in, int out)
+{
+    char piece[65536];
+    ssize_t n;
+    while ((n = read(in, piece, sizeof piece)) != 0)
+        if ((n < 0 && errno != EINTR) || (n > 0 && !write_all(out, piece, (size_t)n)))
+            return false;
+    return fsync(out) == 0;
+}
+
+static bool copy_file(const folders *f, const char *id)
+{
+    int in = openat(f->from, id, O_RDONLY | O_CLOEXEC);
+    int out = in < 0 ? -1 : openat(f->to, id, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    bool ok = out >= 0 && copy_bytes(in, out);
+    int cause = errno;
+    if (in >= 0)
+        close(in);
+    if (out >= 0)
+        close(out);
+    errno = cause;
+    return ok;
+}
+
+static bool put_file(const folders *f, const char *id)
+{
+    if (linkat(f->from, id, f->to, id, 0) == 0 || errno == EEXIST)
+        return true;
+    return errno != ENOENT && copy_file(f, id);
+}
+
+static bool put_files(sqlite3 *db, const folders *f, char *message, size_t size)
+{
+    sqlite3_stmt *stmt = NULL;
+    int rc = sqlite3_prepare_v2(db, "SELECT id FROM upload", -1, &stmt, NULL);
+    bool ok = rc == SQLITE_OK;
+    while (ok && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+        const char *id = (const char *)sqlite3_column_text(stmt, 0);
+        ok = id && !strchr(id, '/') && put_file(f, id);
+        if (!ok)
+            snprintf(message, size, "cannot copy upload %s: %s", id ? id : "", strerror(errno));
+    }
+    sqlite3_finalize(stmt);
+    if (ok && rc != SQLITE_DONE) {
+        snprintf(message, size, "cannot read the uploads: %s", sqlite3_errmsg(db));
+        ok = false;
+    }
+    if (ok && fsync(f->to) != 0) {
+        snprintf(message, size, "cannot sync the folder of uploads: %s", strerror(errno));
+        ok = false;
+    }
+    return ok;
+}
+
+/* 1, 0; -1: can't be read. Files of formats before 3 have no such table. */
+static int has_uploads(sqlite3 *db)
+{
+    sqlite3_stmt *stmt = NULL;
+    int any = -1;
+    if (sqlite3_prepare_v2(db, "SELECT count(*) FROM sqlite_schema WHERE name = 'upload'", -1, &stmt, NULL) ==
+            SQLITE_OK &&
+        sqlite3_step(stmt) == SQLITE_ROW)
+        any = sqlite3_column_int(stmt, 0);
+    sqlite3_finalize(stmt);
+    if (any <= 0)
+        return any;
+    any = -1;
+    if (sqlite3_prepare_v2(db, "SELECT EXISTS (SELECT 1 FROM upload)", -1, &stmt, NULL) == SQLITE_OK &&
+        sqlite3_step(stmt) == SQLITE_ROW)
+        any = sqlite3_column_int(stmt, 0);
+    sqlite3_finalize(stmt);
+    return any;
+}
+
+bool backup_uploads(sqlite3 *db, const char *from, const char *to, char *message, size_t size)
+{
+    folders f = {-1, -1};
+    int any = has_uploads(db);
+    bool ok = any == 0;
+    if (any < 0)
+        snprintf(message, size, "cannot read the uploads: %s", sqlite3_errmsg(db));
+    else if (any > 0 && ((f.from = open_folder(from, false)) < 0 || (f.to = open_folder(to, true)) < 0))
+        snprintf(message, size, "cannot open the folder of uploads beside %s: %s", f.from < 0 ? from : to,
+                 strerror(errno));
+    else if (any > 0)
+        ok = put_files(db, &f, message, size);
+    if (f.from >= 0)
+        close(f.from);
+    if (f.to >= 0)
+        close(f.to);
+    return ok;
+}
+
+void backup_uploads_undo(const char *to)
+{
+    char path[4096];
+    int fd = open_folder(to, false);
+    DIR *folder = fd >= 0 ? fdopendir(fd) : NULL;
+    struct dirent *entry;
+    while (folder && (entry = readdir(folder)))
+        unlinkat(fd, entry->d_name, 0); /* "." and ".." are refused */
+    if (folder)
+        closedir(folder);
+    else if (fd >= 0)
+        close(fd);
+    snprintf(path, sizeof path, "%s-uploads", to);
+    rmdir(path);
+}

@@ -1,0 +1,17 @@
+/* backup_uploads.h: the files of uploads that belong to a copy of the database. */
+#ifndef SERVER_STORE_BACKUP_UPLOADS_H
+#define SERVER_STORE_BACKUP_UPLOADS_H
+
+#include <sqlite3.h>
+#include <stdbool.h>
+#include <stddef.h>
+
+/* Puts the files of all uploads that have a row in db from beside the database `from` to beside
+ * the one that will be named `to` (their folders are FILE-uploads): as hard links, which cost nothing, since no upload
+ * is ever changed; as copies where the file system has no links. What is there already stays. On disk before this
+ * returns. False: message. */
+bool backup_uploads(sqlite3 *db, const char *from, const char *to, char *message, size_t size);
+/* Takes the folder beside `to` away again. */
+void backup_uploads_undo(const char *to);
+
+#endif

@@ -1,0 +1,220 @@
+#include "store/maintenance.h"
+#include "store/backup_uploads.h"
+#include "store/file_format.h"
+#include "store/internal.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+/* ------------------------------------------------------------------- check */
+
+/* Appends what each row of `sql` says; returns SQLite's result. */
+static int collect(sqlite3 *db, const char *sql, const char *format, FILE *out)
+{
+    sqlite3_stmt *stmt = NULL;
+    int rc = sqlite3_prepare_v2(db, sql, -1, &stmt, NULL);
+    while (rc == SQLITE_OK && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+        const char *text = (const char *)sqlite3_column_text(stmt, 0);
+        if (text && strcmp(text, "ok") != 0)
+            fprintf(out, format, text);
+        rc = SQLITE_OK;
+    }
+    sqlite3_finalize(stmt);
+    return rc == SQLITE_DONE ? SQLITE_OK : rc;
+}
+
+static double seconds_now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int64_t count_jobs(sqlite3 *db)
+{
+    sqlite3_stmt *stmt = NULL;
+    int64_t count = 0;
+    if (sqlite3_prepare_v2(db, "SELECT count(*) FROM job", -1, &stmt, NULL) == SQLITE_OK &&
+        sqlite3_step(stmt) == SQLITE_ROW)
+        count = sqlite3_column_int64(stmt, 0);
+    sqlite3_finalize(stmt);
+    return count;
+}
+
+/* A damaged page may end a check early: that is a finding, not a failure of the check. */
+static bool check(sqlite3 *db, store_findings *out)
+{
+    size_t len = 0;
+    *out = (store_findings){0};
+    double begun = seconds_now();
+    FILE *text = open_memstream(&out->findings, &len);
+    if (!text)
+        return false;
+    int rc = collect(db, "PRAGMA integrity_check(20)", "%s\n", text);
+    if (rc == SQLITE_OK)
+        rc = collect(db, "PRAGMA foreign_key_check", "a row of %s refers to what is not there\n", text);
+    if (rc == SQLITE_OK)
+        rc = collect(db,
+                     "SELECT id FROM job WHERE NOT EXISTS (SELECT 1 FROM request WHERE request.job = job.id) LIMIT 20",
+                     "job %s has no request\n", text);
+    if (rc == SQLITE_OK)
+        rc = collect(
+            db, "SELECT status FROM tally WHERE jobs <> (SELECT count(*) FROM job WHERE job.status = tally.status)",
+            "the tally of jobs with status %s is wrong\n", text);
+    if (rc != SQLITE_OK)
+        fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
+    out->jobs = count_jobs(db);
+    out->seconds = seconds_now() - begun;
+    if (fclose(text) == 0)
+        return true;
+    free(out->findings);
+    out->findings = NULL;
+    return false;
+}
+
+store_status store_check(store *s, store_findings *out)
+{
+    connection *c = store_take_reader(s);
+    bool ok = check(c->db, out);
+    if (!ok)
+        snprintf(c->message, sizeof c->message, "no memory for the findings");
+    return store_give_reader(s, c, ok ? STORE_OK : STORE_ERROR);
+}
+
+/* A connection that only reads, on a file of ours. NULL with the reason. */
+static sqlite3 *open_file(const char *path, char *message, size_t size)
+{
+    sqlite3 *db = NULL;
+    int version = 0;
+    char why[300] = "";
+    char *absolute = realpath(path, NULL); /* SQLite would take "file:..." for a URI */
+    if (!absolute)
+        snprintf(why, sizeof why, "cannot open the file: %s", strerror(errno));
+    else if (sqlite3_open_v2(absolute, &db, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, NULL) != SQLITE_OK)
+        snprintf(why, sizeof why, "cannot open the file: %s", file_format_why_unreadable(db));
+    else if (sqlite3_busy_timeout(db, 5000) == SQLITE_OK && file_format_check(db, &version, why, sizeof why) &&
+             version == 0)
+        snprintf(why, sizeof why, "the file is empty: there is no job in it");
+    free(absolute);
+    if (!why[0])
+        return db;
+    sqlite3_close(db);
+    snprintf(message, size, "%s: %s", path, why);
+    return NULL;
+}
+
+bool store_check_file(const char *path, store_findings *out, char *message, size_t size)
+{
+    *out = (store_findings){0};
+    sqlite3 *db = open_file(path, message, size);
+    if (!db)
+        return false;
+    bool ok = check(db, out);
+    if (!ok)
+        snprintf(message, size, "no memory for the findings");
+    sqlite3_close(db);
+    return ok;
+}
+
+/* ------------------------------------------------------------------ backup */
+
+/* One step copies all pages within one read transaction: the copy is of one moment, and a writer goes on beside it. */
+static bool copy_pages(sqlite3 *from, sqlite3 *to, char *message, size_t size)
+{
+    sqlite3_backup *backup = sqlite3_backup_init(to, "main", from, "main");
+    int rc = backup ? sqlite3_backup_step(backup, -1) : SQLITE_ERROR;
+    if (backup)
+        sqlite3_backup_finish(backup);
+    if (rc == SQLITE_DONE)
+        return true;
+    snprintf(message, size, "cannot copy the database: %s", backup ? sqlite3_errstr(rc) : sqlite3_errmsg(to));
+    return false;
+}
+
+/* path: of the database that is copied; to: what the copy at `part` will be called. The files of uploads are taken
+ * before the pages, so that those are there that are deleted meanwhile, and after them, for those that came meanwhile.
+ * What no row of the copy names goes when the copy is opened. */
+static bool copy_to(const char *part, const char *to, sqlite3 *from, const char *path, char *message, size_t size)
+{
+    sqlite3 *copy = NULL;
+    char *absolute = realpath(path, NULL);
+    bool ok = absolute && sqlite3_open_v2(part, &copy, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL) == SQLITE_OK;
+    if (!ok)
+        snprintf(message, size, "cannot write %s: %s", part, copy ? sqlite3_errmsg(copy) : "no memory");
+    ok = ok && backup_uploads(from, absolute, to, message, size) && copy_pages(from, copy, message, size) &&
+         backup_uploads(copy, absolute, to, message, size);
+    free(absolute);
+    if (sqlite3_close(copy) != SQLITE_OK && ok) {
+        snprintf(message, size, "cannot finish %s", part);
+        ok = false;
+    }
+    return ok;
+}
+
+static bool sync_path(const char *path, int flags)
+{
+    int fd = open(path, flags | O_CLOEXEC);
+    bool ok = fd >= 0 && fsync(fd) == 0;
+    if (fd >= 0)
+        close(fd);
+    return ok;
+}
+
+/* Gives the copy its name, for good: never over a file that is there, and on disk before this returns. */
+static bool publish(const char *part, const char *to, char *message, size_t size)
+{
+    char folder[4096];
+    snprintf(folder, sizeof folder, "%s", to);
+    char *slash = strrchr(folder, '/');
+    if (slash)
+        slash[slash == folder] = '\0';
+    else
+        strcpy(folder, ".");
+    if (sync_path(part, O_RDONLY) && link(part, to) == 0 && unlink(part) == 0 && sync_path(folder, O_RDONLY))
+        return true;
+    snprintf(message, size, "cannot put the copy at %s: %s", to, strerror(errno));
+    return false;
+}
+
+static bool is_taken(const char *to)
+{
+    char folder[4096];
+    struct stat st;
+    return (size_t)snprintf(folder, sizeof folder, "%s-uploads", to) >= sizeof folder || stat(to, &st) == 0 ||
+           lstat(folder, &st) == 0;
+}
+
+bool store_backup_file(const char *path, const char *to, int64_t *bytes, char *message, size_t size)
+{
+    char part[4096];
+    struct stat st;
+    if ((size_t)snprintf(part, sizeof part, "%s.part", to) >= sizeof part || is_taken(to)) {
+        snprintf(message, size,
+                 "%s or its uploads are there already, or its name is too long: give the name of a new file", to);
+        return false;
+    }
+    sqlite3 *from = open_file(path, message, size);
+    if (!from)
+        return false;
+    int fd = open(part, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    bool ok = fd >= 0;
+    if (!ok)
+        snprintf(message, size, "cannot make %s: %s", part, strerror(errno));
+    else
+        close(fd);
+    ok = ok && copy_to(part, to, from, path, message, size) && publish(part, to, message, size);
+    if (!ok && fd >= 0) {
+        unlink(part);
+        backup_uploads_undo(to);
+    }
+    sqlite3_close(from);
+    if (ok && bytes)
+        *bytes = stat(to, &st) == 0 ? (int64_t)st.st_size : 0;
+    return ok;
+}

@@ -1,0 +1,142 @@
+/* sync.c: when a change is on disk.
+ *
+ * SQLite's COMMIT with synchronous = FULL writes the change into the log and waits for the disk while it holds the
+ * writer: one change per turn of the disk. Here COMMIT only writes (synchronous = NORMAL: the log is synced before a
+ * checkpoint, and by its checksums it is valid up to its last whole transaction, in order), and one thread syncs the
+ * log, again and again while somebody wants it. All changes that were committed before a sync began are on disk when it
+ * ends, so that any number of them share one turn, and the next ones are committed meanwhile.
+ * Sources: SQLite documentation, "Write-Ahead Logging" and PRAGMA synchronous; Helland et al., "Group Commit Timers and
+ * High Volume Transaction Systems", 1987. */
+#include "store/internal.h"
+
+#include <string.h>
+
+/* The writer's log. It is open as long as the writer; xSync touches nothing of it but its descriptor. */
+static int sync_log(const store *s)
+{
+    return s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY);
+}
+
+static bool find_log(store *s)
+{
+    return sqlite3_file_control(s->writer.db, "main", SQLITE_FCNTL_JOURNAL_POINTER, &s->log) == SQLITE_OK && s->log &&
+           s->log->pMethods;
+}
+
+/* After a failed sync the kernel may take the log's pages for clean, and a second sync would succeed without them. A
+ * checkpoint writes them once more, elsewhere, and syncs that. */
+static bool save_by_checkpoint(store *s)
+{
+    pthread_mutex_lock(&s->writer_lock);
+    int rc = sqlite3_wal_checkpoint_v2(s->writer.db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+    if (rc != SQLITE_OK)
+        snprintf(s->writer.message, sizeof s->writer.message, "the log could not be synced, nor moved: %s",
+                 sqlite3_errmsg(s->writer.db));
+    if (rc != SQLITE_OK)
+        store_keep_message(s, &s->writer);
+    pthread_mutex_unlock(&s->writer_lock);
+    return rc == SQLITE_OK;
+}
+
+static void *sync_loop(void *argument)
+{
+    store *s = argument;
+    bool suspect = false;
+    pthread_mutex_lock(&s->sync_lock);
+    while (!s->sync_stop) {
+        if (s->wanted <= s->synced || s->committed <= s->synced) {
+            pthread_cond_wait(&s->sync_asked, &s->sync_lock);
+            continue;
+        }
+        uint64_t upto = s->committed;
+        pthread_mutex_unlock(&s->sync_lock);
+        double begun = store_clock();
+        suspect = suspect || sync_log(s) != SQLITE_OK;
+        bool ok = !suspect || save_by_checkpoint(s);
+        suspect = !ok; /* until a checkpoint succeeds a sync's word counts for nothing */
+        metrics_seconds(s->metrics, METRIC_COMMIT, store_clock() - begun);
+        pthread_mutex_lock(&s->sync_lock);
+        if (ok) {
+            s->synced = upto;
+        } else { /* those who wait are told so; who asks later has it tried again */
+            s->failures++;
+            s->failed = upto;
+            s->wanted = s->synced;
+        }
+        pthread_cond_broadcast(&s->sync_ended);
+    }
+    pthread_mutex_unlock(&s->sync_lock);
+    return NULL;
+}
+
+bool store_sync_begin(store *s)
+{
+    s->sync_started = find_log(s) && pthread_create(&s->syncer, NULL, sync_loop, s) == 0;
+    return s->sync_started;
+}
+
+void store_sync_end(store *s)
+{
+    if (!s->sync_started)
+        return;
+    pthread_mutex_lock(&s->sync_lock);
+    s->sync_stop = true;
+    pthread_cond_signal(&s->sync_asked);
+    pthread_mutex_unlock(&s->sync_lock);
+    pthread_join(s->syncer, NULL);
+}
+
+void store_begin_commit(store *s)
+{
+    pthread_mutex_lock(&s->sync_lock);
+    s->begun++;
+    pthread_mutex_unlock(&s->sync_lock);
+}
+
+uint64_t store_note_commit(store *s)
+{
+    pthread_mutex_lock(&s->sync_lock);
+    uint64_t number = s->committed = s->begun;
+    if (s->wanted > s->synced)
+        pthread_cond_signal(&s->sync_asked);
+    pthread_mutex_unlock(&s->sync_lock);
+    return number;
+}
+
+/* Under sync_lock. */
+static void want(store *s, uint64_t number)
+{
+    if (number <= s->wanted)
+        return;
+    s->wanted = number;
+    pthread_cond_signal(&s->sync_asked);
+}
+
+void store_want_sync(store *s, uint64_t number)
+{
+    pthread_mutex_lock(&s->sync_lock);
+    want(s, number);
+    pthread_mutex_unlock(&s->sync_lock);
+}
+
+store_status store_await_sync(store *s, uint64_t number)
+{
+    pthread_mutex_lock(&s->sync_lock);
+    uint64_t failures = s->failures;
+    while (s->synced < number && !s->sync_stop && (s->failures == failures || s->failed < number)) {
+        want(s, number);
+        pthread_cond_wait(&s->sync_ended, &s->sync_lock);
+    }
+    bool ok = s->synced >= number;
+    pthread_mutex_unlock(&s->sync_lock);
+    return ok ? STORE_OK : STORE_ERROR;
+}
+
+store_status store_settle(store *s)
+{
+    pthread_mutex_lock(&s->sync_lock);
+    uint64_t number = s->begun; /* readers see a commit a moment before its COMMIT returns */
+    bool settled = s->synced >= number;
+    pthread_mutex_unlock(&s->sync_lock);
+    return settled ? STORE_OK : store_await_sync(s, number);
+}

@@ -1,0 +1,178 @@
+/* write.c: changes as transactions.
+ *
+ * While one change is under way others come, and wait. Whoever is first among them then carries out all of them in one
+ * transaction, each in a savepoint of its own, so that one that fails takes nothing with it. What many changes touch
+ * alike (the ends of tables and indexes) is so written once for all. What they wait for next is the disk: sync.c. */
+#include "store/internal.h"
+
+#include <string.h>
+
+#define BATCH_MOST 32 /* so that the first of them does not wait for ever */
+
+/* A change that waits for its turn; on its caller's stack. */
+struct pending {
+    store_change change;
+    void *args;
+    store_status status;
+    uint64_t number; /* of its commit */
+    bool done;
+    pthread_cond_t turn; /* done, or first in the queue with nobody at work */
+    struct pending *next;
+};
+
+static store_status run_query(connection *c, query_id q)
+{
+    statement st = statement_begin(c, q);
+    return statement_run(&st);
+}
+
+/* Ends what is left of a transaction; the message stays the cause. */
+static void roll_back(connection *c)
+{
+    char cause[sizeof c->message];
+    if (sqlite3_get_autocommit(c->db)) /* a full disk may have rolled back already */
+        return;
+    memcpy(cause, c->message, sizeof cause);
+    run_query(c, QUERY_ROLLBACK);
+    memcpy(c->message, cause, sizeof cause);
+}
+
+static store_status commit(store *s, uint64_t *number)
+{
+    store_begin_commit(s);
+    store_status status = run_query(&s->writer, QUERY_COMMIT);
+    *number = store_note_commit(s);
+    return status;
+}
+
+static store_status attempt(store *s, store_change change, void *args, uint64_t *number)
+{
+    connection *c = &s->writer;
+    store_status status = run_query(c, QUERY_BEGIN);
+    if (status != STORE_OK)
+        return status;
+    status = change(s, c, args);
+    if (status == STORE_OK)
+        status = commit(s, number);
+    roll_back(c);
+    return status;
+}
+
+static void run_alone(store *s, pending *p)
+{
+    p->status = attempt(s, p->change, p->args, &p->number);
+    if (p->status == STORE_FULL) {
+        connection_checkpoint(&s->writer);
+        p->status = attempt(s, p->change, p->args, &p->number);
+    }
+    if (p->status == STORE_ERROR || p->status == STORE_FULL)
+        store_keep_message(s, &s->writer);
+}
+
+/* One of several; false where the whole transaction can't go on. */
+static bool run_in_savepoint(store *s, pending *p)
+{
+    connection *c = &s->writer;
+    if (run_query(c, QUERY_SAVEPOINT) != STORE_OK)
+        return false;
+    p->status = p->change(s, c, p->args);
+    if (p->status == STORE_FULL || p->status == STORE_ERROR || sqlite3_get_autocommit(c->db))
+        return false;
+    if (p->status != STORE_OK && run_query(c, QUERY_ROLLBACK_TO) != STORE_OK)
+        return false;
+    return run_query(c, QUERY_RELEASE_SAVEPOINT) == STORE_OK;
+}
+
+/* False with nothing changed: each must then be tried alone, so that the failure is told to whom it belongs. */
+static bool run_together(store *s, pending *list)
+{
+    connection *c = &s->writer;
+    bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
+    for (pending *p = list; p && good; p = p->next)
+        good = run_in_savepoint(s, p);
+    uint64_t number = 0;
+    good = good && commit(s, &number) == STORE_OK;
+    roll_back(c);
+    for (pending *p = list; p && good; p = p->next)
+        p->number = number;
+    return good;
+}
+
+static void run_batch(store *s, pending *list)
+{
+    int count = 0;
+    pthread_mutex_lock(&s->writer_lock);
+    if (!list->next || !run_together(s, list))
+        for (pending *p = list; p; p = p->next)
+            run_alone(s, p);
+    pthread_mutex_unlock(&s->writer_lock);
+    for (pending *p = list; p; p = p->next)
+        count += p->status == STORE_OK;
+    metrics_add(s->metrics, METRIC_CHANGES, count);
+}
+
+/* ------------------------------------------------------------------- queue */
+
+/* The first ones of the queue, which begins with the caller's own. Under queue_lock. */
+static pending *take_batch(store *s)
+{
+    pending *first = s->queue, *last = first;
+    for (int n = 1; n < BATCH_MOST && last->next; n++)
+        last = last->next;
+    s->queue = last->next;
+    if (!s->queue)
+        s->queue_end = &s->queue;
+    last->next = NULL;
+    return first;
+}
+
+/* Under queue_lock, which it gives up meanwhile. */
+static void lead(store *s)
+{
+    pending *list = take_batch(s), *next;
+    s->leading = true;
+    pthread_mutex_unlock(&s->queue_lock);
+    run_batch(s, list);
+    pthread_mutex_lock(&s->queue_lock);
+    s->leading = false;
+    for (; list; list = next) {
+        next = list->next; /* its owner may go as soon as it is done */
+        list->done = true;
+        pthread_cond_signal(&list->turn);
+    }
+    if (s->queue)
+        pthread_cond_signal(&s->queue->turn);
+}
+
+static void wait_turn(store *s, pending *me)
+{
+    pthread_mutex_lock(&s->queue_lock);
+    *s->queue_end = me;
+    s->queue_end = &me->next;
+    while (!me->done) {
+        if (!s->leading && s->queue == me)
+            lead(s);
+        else
+            pthread_cond_wait(&me->turn, &s->queue_lock);
+    }
+    pthread_mutex_unlock(&s->queue_lock);
+}
+
+store_status store_write_as(store *s, write_durability durability, store_change change, void *args)
+{
+    pending me = {.change = change, .args = args};
+    pthread_cond_init(&me.turn, NULL);
+    wait_turn(s, &me);
+    pthread_cond_destroy(&me.turn);
+    if (me.status != STORE_OK || durability == WRITE_LAZY)
+        return me.status;
+    if (durability == WRITE_DURABLE)
+        return store_await_sync(s, me.number);
+    store_want_sync(s, me.number);
+    return STORE_OK;
+}
+
+store_status store_write(store *s, store_change change, void *args)
+{
+    return store_write_as(s, WRITE_DURABLE, change, args);
+}

@@ -1,0 +1,49 @@
+"""Short forms of `make soak`: a daemon that is ended under load, slow clients, cancels, many jobs. Nothing is timed:
+usage: test_soak.py BUILD_DIR [FILTER]"""
+import pathlib
+import signal
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "soak"))
+
+import scenarios  # noqa: E402  the path is set above
+import service  # noqa: E402
+from service import check, options  # noqa: E402
+
+
+def clean(figures):
+    wrong = {key: figures[key] for key in scenarios.ZERO if figures.get(key)}
+    check(not wrong, wrong, figures)
+    return figures
+
+
+@options(None)
+def test_killed_under_load(s):
+    figures = clean(scenarios.endings(s.build, 20, signal.SIGKILL))
+    check(figures["acknowledged"] > 50, figures)
+
+
+@options(None)
+def test_terminated_under_load(s):
+    figures = clean(scenarios.endings(s.build, 5, signal.SIGTERM))
+    check(figures["acknowledged"] > 10, figures)
+
+
+@options(None)
+def test_slow_clients(s):
+    figures = clean(scenarios.slow_clients(s.build, 200, 2))
+    check(figures["asked"] > 10, figures)
+
+
+@options(None)
+def test_cancels(s):
+    clean(scenarios.cancels(s.build, 5))
+
+
+@options(None)
+def test_many_jobs_in_the_database(s):
+    clean(scenarios.full_database(s.build, 5000, 10))
+
+
+if __name__ == "__main__":
+    service.main(globals())

@@ -1,0 +1,54 @@
+"""The long forms of what tests/api/test_soak.py does shortly: usage: soak.py BUILD_DIR [FILTER].
+
+Prints a table; exit status 1 if a figure that must be 0 is not.
+"""
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import scenarios
+from scenarios import PAPER, ZERO
+
+
+def unit(build, program, times):
+    """A C test at `times` its usual length: how many of its tests failed, and what it says of itself."""
+    done = subprocess.run([os.path.join(build, "tests", program)], capture_output=True, text=True, check=False,
+                          env={**os.environ, "SOAK": str(times)})
+    said = [line[2:] for line in done.stdout.splitlines() if line.startswith("# ")]
+    return {"errors": done.stdout.count("not ok ") + (done.returncode != 0), "": "; ".join(said[-3:])}
+
+
+RUNS = [
+    ("500 x kill -9, 16 posting clients", lambda b: scenarios.endings(b, 500, signal.SIGKILL)),
+    ("200 x SIGTERM under load", lambda b: scenarios.endings(b, 200, signal.SIGTERM)),
+    ("1,000 power losses, faults at every write, 1,000 damaged files", lambda b: unit(b, "test_store_faults", 10)),
+    ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
+    ("cancel", lambda b: scenarios.cancels(b, 100)),
+    ("30 x 10 body, default solver", lambda b: scenarios.throughput(b, 20)),
+    ("30 x 10 body, accelerated_restart", lambda b: scenarios.throughput(b, 20, PAPER)),
+    ("30 x 10 body, acknowledged only", lambda b: scenarios.throughput(b, 10, None, 64, "wait=0")),
+    ("one million jobs in the database", lambda b: scenarios.full_database(b, 1000000)),
+    ("100,000 jobs", lambda b: scenarios.leaks(b, 100000)),
+]
+
+
+def main():
+    build, wanted = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else ""
+    failed = False
+    print("| what | figures | s |\n|---|---|---|")
+    for name, run in RUNS:
+        if wanted not in name:
+            continue
+        begun = time.monotonic()
+        figures = run(build)
+        wrong = [key for key in ZERO if figures.get(key)]
+        failed = failed or bool(wrong)
+        text = ", ".join(f"{key} {value}".strip() for key, value in figures.items())
+        print(f"| {name} | {'**WRONG** ' if wrong else ''}{text} | {time.monotonic() - begun:.0f} |", flush=True)
+    sys.exit(failed)
+
+
+if __name__ == "__main__":
+    main()
