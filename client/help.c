@@ -101,6 +101,7 @@ static const page PAGES[CLIENT_COMMANDS] = {
 static const char GENERAL[] =
     "General options:\n"
     "  -s, --server URL   the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080)\n"
+    "                     $UZAWA_TOKEN is sent as the token; $UZAWA_CA is a file of certificates to trust\n"
     "  -t, --timeout S    give up after S seconds; for wait and submit --wait: stop waiting\n"
     "      --retry S      keep trying to reach the server for S seconds (default 3; 30 while waiting)\n"
     "  -h, --help         explain the command\n"

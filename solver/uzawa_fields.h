@@ -1,0 +1,79 @@
+/* uzawa_fields.h: the part of uzawa.h on what an answer to a scene means: fields, files, pictures. Included by uzawa.h,
+ * after the types that it uses. */
+#ifndef UZAWA_FIELDS_H
+#define UZAWA_FIELDS_H
+
+/* ------------------------------------------------------------------ fields */
+
+/* What an answer to a scene means, computed when somebody asks for it. A set of bits. */
+typedef enum {
+    UZ_FIELD_PRESSURE = 1 << 0,       /* m: force per area of contact, >= 0 for reactions <= 0 */
+    UZ_FIELD_CONTACT_STATUS = 1 << 1, /* m: 1 in contact (r < 0), 0 apart */
+    UZ_FIELD_STRESS = 1 << 2,         /* n_nodes x components */
+    UZ_FIELD_PRINCIPAL = 1 << 3,      /* n_nodes x 3: principal stresses, the largest first */
+    UZ_FIELD_VON_MISES = 1 << 4,      /* n_nodes */
+    UZ_FIELD_STRAIN = 1 << 5,         /* n_nodes x components: the tensor (xy is half the shear angle), with its thermal
+                                         part */
+    UZ_FIELD_STRESS_GAUSS = 1 << 6,   /* the stress where the elements are integrated, unsmoothed */
+    UZ_FIELD_DISPLACEMENTS = 1 << 7,  /* uz_vtu_write only, as are those below: what the caller gave */
+    UZ_FIELD_REACTIONS = 1 << 8,
+    UZ_FIELD_GAPS = 1 << 9,
+    UZ_FIELD_MATERIALS = 1 << 10 /* of each element, as in the scene */
+} uz_field;
+/* "von_mises"; "unknown" where `field` is not one bit of the above. */
+const char *uz_field_name(uz_field field);
+bool uz_field_parse(uz_field *out, const char *name, size_t len);
+
+/* Components: xx, yy, zz, xy in the plane (zz across it: 0 in plane stress, the hoop in axisymmetric models, where x is
+ * the radius and y the axis); xx, yy, zz, xy, yz, zx in space. A field that was not asked for is NULL. */
+typedef struct {
+    int dim, components;
+    int64_t n_nodes, n_elements, m, n_points;
+    double *pressure, *contact_status;
+    double *stress, *principal, *von_mises, *strain;
+    double *gauss_element, *gauss_point, *gauss_stress; /* n_points, x dim, x components */
+} uz_fields;
+const char *const *uz_field_components(int dim); /* the names of the 4 or 6 components */
+
+/* What fields are made from; what they do not need may be NULL. */
+typedef struct {
+    const double *u;     /* n_u: n_nodes x dim */
+    const double *r, *g; /* m */
+    int64_t n_u, m;
+} uz_field_source;
+
+/* The scene has the loads of the case that was solved (temperature makes strain without stress). Nodal stress: that at
+ * the points of each element where it is most accurate, continued to its nodes (Hinton and Campbell, Int. J. Numer.
+ * Meth. Engng 8 (1974) 461-480) and averaged over the elements around the node by volume; of linear elements fitted to
+ * the middles of those around (Zienkiewicz and Zhu, ibid. 33 (1992) 1331-1364). Where materials meet their values are
+ * averaged by volume: the jump is in gauss_stress. Errors: those of uz_scene_check, _SIZE where the answer is not one
+ * of this scene, _CANCELLED. */
+uz_status uz_fields_compute(uz_fields *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                            const uz_hooks *hooks, uz_error *err);
+void uz_fields_clear(uz_fields *fields);
+
+/* The same as a VTK XML file (.vtu) with the arrays that `which` names, zlib compressed. What belongs to rows of the
+ * contact stands at their nodes: nodes without a row have pressure and reaction 0, a gap of NaN and status -1; of
+ * several rows at one node the largest pressure and status, the smallest reaction and gap. stress_gauss is left out.
+ * *text is NUL-terminated, the caller frees it. */
+uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                       const uz_hooks *hooks, uz_error *err);
+
+/* ---------------------------------------------------------------- pictures */
+
+/* How a deformed body is drawn. */
+typedef struct {
+    int width;         /* of the picture in pixels, 200 to 4000; 0: 900 */
+    double factor;     /* displacements are drawn this many times as large; 0: chosen so that they show */
+    uz_field colour;   /* UZ_FIELD_DISPLACEMENTS (their length) or UZ_FIELD_VON_MISES */
+    const char *title; /* may be NULL */
+} uz_picture;
+
+/* The deformed body in colour over its undeformed outline, the obstacles (plane models), an arrow for the contact force
+ * at each node that touches (at most some 80 of them), a colour bar: as SVG, with the body's colours as a PNG image in
+ * it, so that the size does not grow with the mesh. Solids are seen from the front, the right and above.
+ * *svg is NUL-terminated, the caller frees it. Errors: those of uz_fields_compute, _ARGUMENT. */
+uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
+                              const uz_picture *how, const uz_hooks *hooks, uz_error *err);
+
+#endif
