@@ -53,12 +53,16 @@ UNIT_BIN   := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(UNIT_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all demo run install clean help deps deps-test
+.PHONY: all demo gallery run install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
 
 demo: deps ## install what is missing, build, start the daemon, solve the paper's body, show the answer
 	@$(MAKE) --no-print-directory -s all
 	@tests/demo.sh $(BUILD)
+
+gallery: deps ## solve the five scenes of the gallery: pictures and summaries in build/gallery; KEEP=1: pictures into client/examples too
+	@$(MAKE) --no-print-directory -s all
+	@tests/gallery.sh $(BUILD) $(BUILD)/gallery $(if $(KEEP),--keep)
 
 run: deps ## keep the daemon in the foreground on 127.0.0.1:8080 with ./contact.db
 	@$(MAKE) --no-print-directory -s all
@@ -163,7 +167,7 @@ test-hygiene: ## formatting, static analysis, both compilers
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
 TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
-TSAN_API  = $(filter-out test_bad_input test_cases test_client_faults test_readme test_reference test_schemas, \
+TSAN_API  = $(filter-out test_bad_input test_cases test_client_faults test_gallery test_readme test_reference test_schemas, \
             $(notdir $(basename $(wildcard tests/api/test_*.py))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer

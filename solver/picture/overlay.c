@@ -168,8 +168,10 @@ void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
 
 void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title)
 {
-    enum { BAR = 300, STOPS = 8 };
-    const int y = scenery->height + 12, x = scenery->width - BAR - 20;
+    /* The text on the left takes up to 160 pixels; below the bar three texts need 210. */
+    enum { LEFT = 180, LEAST = 210, MOST = 300, STOPS = 8 };
+    const int room = scenery->width - 20 - LEFT, bar = room < LEAST ? LEAST : room < MOST ? room : MOST;
+    const int y = scenery->height + 12, x = scenery->width - bar - 20;
     uz_buffer_print(svg, "<defs><linearGradient id=\"scale\">");
     for (int i = 0; i <= STOPS; i++) {
         unsigned char rgb[3];
@@ -180,13 +182,12 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
     uz_buffer_print(svg,
                     "</linearGradient></defs>\n<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"12\" "
                     "fill=\"url(#scale)\"/>\n",
-                    x, y, BAR);
+                    x, y, bar);
     uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\">%.3g</text><text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.3g</text>",
-                    x, y + 26, scenery->low, x + BAR, y + 26, scenery->high);
-    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", x + BAR / 2, y + 26,
+                    x, y + 26, scenery->low, x + bar, y + 26, scenery->high);
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", x + bar / 2, y + 26,
                     scenery->what);
     uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", y + 10);
     uz_buffer_put_escaped(svg, title ? title : "");
-    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements drawn %.6g times as large</text>\n", y + 26,
-                    scenery->factor);
+    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g</text>\n", y + 26, scenery->factor);
 }

@@ -1,0 +1,119 @@
+"""The scenes of the gallery against theory, and `make gallery`. usage: test_gallery.py BUILD_DIR [FILTER]"""
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import xml.etree.ElementTree
+
+import service
+from service import ROOT, check, expect, options
+
+FOLDER = ROOT / "client/examples/gallery"
+FILES = {**{name: FOLDER / f"{name}.json" for name in ("cylinder", "press_fit", "gear", "bracket")},
+         "paper_body": ROOT / "tests/data/paper_body.json"}
+SMALL = 150000  # bytes of a picture that is kept in the repository
+
+
+def solved(s, name):
+    """The scene's summary, which meets what was asked for."""
+    job = s.solve(json.loads(FILES[name].read_text()))
+    summary = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=summary"), 200).json["summary"]
+    check(summary["outcome"] == "converged", name, summary)
+    check(summary["certificate"]["relative_error"] <= summary["requested_error"], name, summary["certificate"])
+    check(summary["resultants"]["imbalance"] < 1e-6, name, summary["resultants"])
+    return summary
+
+
+def near(got, wanted, tolerance):
+    check(abs(got - wanted) <= tolerance * abs(wanted), got, "is not", wanted, "within", tolerance)
+
+
+def test_cylinder_is_a_line_contact_of_hertz(s):
+    """K. L. Johnson, Contact Mechanics, 1985, section 4.2(c), for the force that the cylinder got; half of it is there."""
+    contact = solved(s, "cylinder")["contact"]
+    load, radius, modulus = 2 * contact["force"][1], 50, 210e3 / (1 - 0.3 ** 2)
+    half_width = math.sqrt(4 * load * radius / (math.pi * modulus))
+    near(contact["max_pressure"], 2 * load / (math.pi * half_width), 0.03)
+    near(contact["area"], half_width, 0.03)
+    check(contact["max_pressure_at"]["x"] == [0, -radius], contact)
+
+
+def test_press_fit_has_the_pressure_of_lame(s):
+    """S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd ed. 1970, section 28: two rings, in plane strain.
+    The nodes of the rings do not meet, and chords of different lengths are on top of each other, so that single
+    pressures scatter about the mean."""
+    contact = solved(s, "press_fit")["contact"]
+    inner, seat, outer, interference = 10, 20, 35, 0.05
+
+    def plane_strain(young, poisson):
+        return young / (1 - poisson ** 2), poisson / (1 - poisson)
+
+    shaft, shaft_poisson = plane_strain(70e3, 0.33)
+    hub, hub_poisson = plane_strain(210e3, 0.3)
+    give = seat / hub * ((outer ** 2 + seat ** 2) / (outer ** 2 - seat ** 2) + hub_poisson)
+    give += seat / shaft * ((seat ** 2 + inner ** 2) / (seat ** 2 - inner ** 2) - shaft_poisson)
+    near(-contact["reaction_sum"] / contact["area"], interference / give, 0.03)
+    check(contact["active"] == contact["candidates"], contact)
+    near(contact["force"][0], contact["force"][1], 1e-6)  # the same along both axes of a quarter
+
+
+def test_bracket_is_held_by_bolt_and_wall(s):
+    """Contact alone holds it: the bolt carries the load, bolt and wall the couple that it makes."""
+    acts = solved(s, "bracket")["resultants"]
+    bolt, wall = acts["contacts"]
+    check((bolt["on"], wall["on"]) == ("hole", "back") and acts["supports"] == [], acts)
+    near(bolt["force"][1], -acts["loads"]["force"][1], 1e-6)
+    near(bolt["force"][0], -wall["force"][0], 1e-6)
+    near(bolt["moment"][0] + wall["moment"][0], -acts["loads"]["moment"][0], 1e-6)
+    check(wall["force"][0] > 0, wall)
+
+
+def test_gear_presses_each_tooth(s):
+    """Symmetric about the middle of the block, so that the moment is the force by half its width. The corners of the
+    teeth strain the rubber by more than small deformation allows, which has to be said."""
+    summary = solved(s, "gear")
+    contact = summary["resultants"]["contacts"][0]
+    near(contact["moment"][0], 30 * contact["force"][1], 1e-6)
+    check(contact["force"][1] > 0 and summary["contact"]["active"] >= 6, summary["contact"])
+    check("large_strain" in [one["code"] for one in summary["warnings"]], summary["warnings"])
+
+
+def test_paper_body(s):
+    contact = solved(s, "paper_body")["contact"]
+    check(contact["active"] == 22, contact)
+    near(contact["reaction_sum"], -10.513717, 1e-7)
+
+
+@options(None)
+def test_meshes_are_those_of_the_program(_):
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-B", FOLDER / "meshes.py", folder], check=True, timeout=60)
+        made = sorted(pathlib.Path(folder).iterdir())
+        check([path.name for path in made] == ["cylinder.json", "gear.json", "press_fit.json"], made)
+        for path in made:
+            check(path.read_bytes() == (FOLDER / path.name).read_bytes(), path.name, "differs from the one that is kept")
+
+
+def check_picture(path):
+    root = xml.etree.ElementTree.parse(path).getroot()
+    check(root.tag.endswith("svg") and path.stat().st_size < SMALL, path, path.stat().st_size)
+    return root.get("viewBox")
+
+
+@options(None)
+def test_make_gallery(s):
+    """The command behind `make gallery`, and that what it draws is what is kept."""
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(["tests/gallery.sh", s.build, folder], cwd=ROOT, capture_output=True, text=True, timeout=300)
+        check(done.returncode == 0, done.stdout, done.stderr)
+        for name in FILES:
+            text = (pathlib.Path(folder) / f"{name}.txt").read_text()
+            check("outcome     converged" in text and "\nforces " in text, text)
+            drawn = check_picture(pathlib.Path(folder) / f"{name}.svg")
+            check(drawn == check_picture(FOLDER / f"{name}.svg"), name, drawn)
+
+
+if __name__ == "__main__":
+    service.main(globals())
