@@ -39,8 +39,9 @@ BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
 EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
 THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
+PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(SOAK_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(SOAK_SRC) $(PRELOAD_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
@@ -50,6 +51,7 @@ CLIENT_OBJ := $(call obj,$(CLIENT_SRC))
 # What unit tests may link: everything but the two mains.
 PARTS_OBJ  := $(filter-out $(BUILD)/obj/server/main.o,$(SERVER_OBJ)) $(filter-out $(BUILD)/obj/client/main.o,$(CLIENT_OBJ))
 UNIT_BIN   := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(UNIT_SRC))
+PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
@@ -144,6 +146,11 @@ $(BUILD)/theory: $(call obj,$(THEORY_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/load: $(call obj,$(SOAK_SRC))
 	$(CC) $(LDFLAGS_ALL) -o $@ $^
 
+# Stands before the heap of a whole daemon: never with a sanitizer, which has its own.
+$(BUILD)/%.so: tests/preload/%.c
+	@mkdir -p $(@D)
+	$(CC) $(STD) $(OPT) $(WARN) -fPIC -shared -o $@ $< -ldl
+
 .SECONDARY:
 
 ##@ Test
@@ -152,12 +159,12 @@ test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
 
-unit-bins: $(UNIT_BIN)
+unit-bins: $(UNIT_BIN) $(PRELOADS)
 
 test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 	@tests/run.sh $(BUILD) unit $(FILTER)
 
-test-api: all ## the tests that drive the real daemon and client; FILTER=name runs some
+test-api: all $(PRELOADS) ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
 test-hygiene: ## formatting, static analysis, both compilers
@@ -183,7 +190,7 @@ tsan: deps-test ## the server's tests under ThreadSanitizer
 	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT) $(TSAN_API)"
 
 soak: deps-test ## a long life in an hour: kills, power losses, slow clients, a million jobs; a table; FILTER=name runs some
-	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(PRELOADS)
 	@$(PYTHON) -B tests/soak/soak.py $(BUILD) "$(FILTER)"
 
 fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each

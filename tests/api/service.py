@@ -109,6 +109,7 @@ class Service:
         self.folder = tempfile.mkdtemp(prefix="uzawad-")
         self.db = db or os.path.join(self.folder, "contact.db")
         self.options = options
+        self.environment = {}
         self.process = None
 
     def command(self, *options):
@@ -119,7 +120,7 @@ class Service:
         suppressions = f"suppressions={ROOT / 'tests' / 'tsan.supp'} {os.environ.get('TSAN_OPTIONS', '')}"
         self.process = subprocess.Popen(self.command("--listen", "127.0.0.1:0", "--db", self.db, *self.options),
                                         stdout=subprocess.PIPE, stderr=self.log_file,
-                                        env={**os.environ, "TSAN_OPTIONS": suppressions})
+                                        env={**os.environ, "TSAN_OPTIONS": suppressions, **self.environment})
         line = self.process.stdout.readline().decode()
         if not line.startswith("listening on http://"):
             self.process.wait(timeout=30)

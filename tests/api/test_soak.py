@@ -6,9 +6,11 @@ import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "soak"))
 
-import scenarios  # noqa: E402  the path is set above
+import malformed  # noqa: E402  the path is set above
+import no_memory  # noqa: E402
+import scenarios  # noqa: E402
 import service  # noqa: E402
-from service import check, options  # noqa: E402
+from service import Skip, check, options  # noqa: E402
 
 
 def clean(figures):
@@ -33,6 +35,24 @@ def test_terminated_under_load(s):
 def test_slow_clients(s):
     figures = clean(scenarios.slow_clients(s.build, 200, 2))
     check(figures["asked"] > 10, figures)
+
+
+@options(None)
+def test_malformed_requests(s):
+    wrong = []
+    figures = malformed.malformed(s.build, 1500, report=wrong)
+    check(not wrong, wrong[:3])
+    clean(figures)
+    check(figures["4xx"] > 500 and figures["2xx"] > 60, figures)
+
+
+@options(None)
+def test_no_memory(s):
+    why = no_memory.possible(s.build)
+    if why:
+        raise Skip(why)
+    figures = clean(no_memory.failing(s.build, 97, 1))
+    check(figures["failed"] > 10, figures)
 
 
 @options(None)

@@ -21,7 +21,7 @@ sys.path.insert(0, str(ROOT / "tests/api"))
 
 import service  # noqa: E402  the path is set above
 
-ZERO = ("lost", "twice", "stuck", "damaged", "wrong_exit", "refused", "broken", "errors", "put_back_missing")
+ZERO = ("lost", "twice", "stuck", "damaged", "wrong_exit", "refused", "broken", "errors", "put_back_missing", "leaked")
 BODY = json.dumps(service.MATRICES).encode()
 PAPER = ROOT / "tests/data/paper_body.json"
 

@@ -8,6 +8,8 @@ import subprocess
 import sys
 import time
 
+import malformed
+import no_memory
 import scenarios
 from scenarios import PAPER, ZERO
 
@@ -25,6 +27,8 @@ RUNS = [
     ("200 x SIGTERM under load", lambda b: scenarios.endings(b, 200, signal.SIGTERM)),
     ("1,000 power losses, faults at every write, 1,000 damaged files", lambda b: unit(b, "test_store_faults", 10)),
     ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
+    ("200,000 malformed requests", lambda b: malformed.malformed(b, 200000)),
+    ("every allocation of a job fails", no_memory.failing),
     ("cancel", lambda b: scenarios.cancels(b, 100)),
     ("30 x 10 body, default solver", lambda b: scenarios.throughput(b, 20)),
     ("30 x 10 body, accelerated_restart", lambda b: scenarios.throughput(b, 20, PAPER)),
