@@ -231,7 +231,7 @@ typedef enum {
     UZ_LOAD_FORCE,       /* v: the sum, spread over edges or faces by area; over nodes equally */
     UZ_LOAD_BODY_FORCE,  /* v: force per volume of elements */
     UZ_LOAD_GRAVITY,     /* v: acceleration; times the density of each material */
-    UZ_LOAD_NODE_FORCE,  /* v: at `node` */
+    UZ_LOAD_NODE_FORCE,  /* v: at `node`; refused where nodes of a file are left out, as the others are numbered anew */
     UZ_LOAD_TEMPERATURE, /* value: rise of temperature of elements */
     UZ_LOAD_KINDS
 } uz_load_kind;
@@ -467,7 +467,7 @@ typedef struct {
     double force[3], moment[3];
 } uz_resultant;
 
-/* Something that makes small deformation on a fixed contact geometry doubtful. */
+/* Something that makes the answer doubtful: as one of small deformation on a fixed contact geometry, or by its mesh. */
 typedef struct {
     char code[24];     /* "large_rotation", ... */
     double value;      /* what was found, without unit */
@@ -488,7 +488,7 @@ typedef struct {
      * forces' sizes. */
     double imbalance;
     int n_warnings;
-    uz_warning warnings[4];
+    uz_warning warnings[8];
 } uz_evaluation;
 void uz_evaluation_free(uz_evaluation *evaluation);
 

@@ -410,7 +410,7 @@ static void play(tally *t, uint64_t seed)
 TEST(no_scene_has_a_false_answer)
 {
     const char *from = getenv("FIRST_SEED"), *count = getenv("SEEDS");
-    const uint64_t first = from ? strtoull(from, NULL, 10) : 0, seeds = count ? strtoull(count, NULL, 10) : 60;
+    const uint64_t first = from ? strtoull(from, NULL, 10) : 0, seeds = count ? strtoull(count, NULL, 10) : 300;
     tally t = {0};
     for (uint64_t seed = first; seed < first + seeds; seed++)
         play(&t, seed);
