@@ -356,13 +356,10 @@ static inline bool has_formulations(const uz_given_mesh *g)
     return false;
 }
 
-static inline random_scene make_random_scene(uint64_t seed)
+/* Room for SCENE_MOST_ITEMS of everything. */
+static inline void scene_make_room(uz_scene *scene, uz_model model)
 {
-    random_scene s = {.rng = {seed * 0x9E3779B97F4A7C15u + 77}, .bodies = 1};
-    qp_random *rng = &s.rng;
-    uz_scene *scene = &s.scene;
-    random_unit(rng);
-    scene->model = (uz_model)random_int(rng, 0, 4);
+    scene->model = model;
     scene->thickness = scene->model == UZ_PLANE_STRESS || scene->model == UZ_PLANE_STRAIN ? 0.5 : 1;
     scene->source = UZ_MESH_GIVEN;
     scene->materials = scene_room(SCENE_MOST_ITEMS, sizeof *scene->materials);
@@ -371,6 +368,15 @@ static inline random_scene make_random_scene(uint64_t seed)
     scene->contacts = scene_room(SCENE_MOST_ITEMS, sizeof *scene->contacts);
     scene->given.first = scene_room(1, sizeof *scene->given.first);
     scene->given.groups = scene_room(SCENE_MOST_GROUPS + 4, sizeof *scene->given.groups);
+}
+
+static inline random_scene make_random_scene(uint64_t seed)
+{
+    random_scene s = {.rng = {seed * 0x9E3779B97F4A7C15u + 77}, .bodies = 1};
+    qp_random *rng = &s.rng;
+    uz_scene *scene = &s.scene;
+    random_unit(rng);
+    scene_make_room(scene, (uz_model)random_int(rng, 0, 4));
     scene->all_candidates = random_chance(rng, 0.5);
     s.turnable = scene->model != UZ_AXISYMMETRIC;
     s.stiffer = pow(10, 6 * random_signed(rng));
