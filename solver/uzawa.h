@@ -300,7 +300,7 @@ typedef struct {
     double force[3], moment[3];
 } uz_resultant;
 
-/* Something that makes small deformation on a fixed contact geometry doubtful. */
+/* Something that makes the answer doubtful: as one of small deformation on a fixed contact geometry, or by its mesh. */
 typedef struct {
     char code[24];     /* "large_rotation", ... */
     double value;      /* what was found, without unit */
@@ -321,7 +321,7 @@ typedef struct {
      * forces' sizes. */
     double imbalance;
     int n_warnings;
-    uz_warning warnings[4];
+    uz_warning warnings[8];
 } uz_evaluation;
 void uz_evaluation_free(uz_evaluation *evaluation);
 

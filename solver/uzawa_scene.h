@@ -91,7 +91,7 @@ typedef enum {
     UZ_LOAD_FORCE,       /* v: the sum, spread over edges or faces by area; over nodes equally */
     UZ_LOAD_BODY_FORCE,  /* v: force per volume of elements */
     UZ_LOAD_GRAVITY,     /* v: acceleration; times the density of each material */
-    UZ_LOAD_NODE_FORCE,  /* v: at `node` */
+    UZ_LOAD_NODE_FORCE,  /* v: at `node`; refused where nodes of a file are left out, as the others are numbered anew */
     UZ_LOAD_TEMPERATURE, /* value: rise of temperature of elements */
     UZ_LOAD_KINDS
 } uz_load_kind;

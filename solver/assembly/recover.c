@@ -54,12 +54,17 @@ const char *uz_dof_name(const uz_body_model *model, int64_t node, int c)
     return is_axis(uz_node_frame(model, node), c, model->mesh.dim) ? axes[c] : "the normal of its support";
 }
 
-double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v)
+double uz_turning_error(const uz_body_model *model, int64_t node, const double *v)
 {
     double size = 0;
     for (int c = 0; c < model->mesh.dim; c++)
         size += fabs(v[c]);
-    return uz_node_frame(model, node) ? 8 * DBL_EPSILON * size : 0;
+    return uz_node_frame(model, node) ? 4 * DBL_EPSILON * size : 0;
+}
+
+double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v)
+{
+    return 2 * uz_turning_error(model, node, v);
 }
 
 static void *duplicate(const void *from, int64_t count, size_t size)

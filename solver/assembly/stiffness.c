@@ -277,3 +277,46 @@ uz_status uz_internal_forces(double *f, const uz_body_model *model, const double
     source_clear(&source);
     return status;
 }
+
+/* ------------------------------------------------------------ energy of rounding */
+
+/* |x|'|ke||x| of one element. */
+static double element_energy_bound(const double *ke, const double *x, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            sum += fabs(ke[i * n + j]) * fabs(x[i]) * fabs(x[j]);
+    return sum;
+}
+
+uz_status uz_turning_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err)
+{
+    const uz_mesh *mesh = &model->mesh;
+    const int dim = mesh->dim;
+    stiffness_source source;
+    const double *ke;
+    *energy = 0;
+    uz_status status = source_init(&source, model, err);
+    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
+        double delta[DOFS];
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        if (!uz_is_turned_element(model, e))
+            continue;
+        status = source_get(&ke, &source, e, err);
+        for (int a = 0; a < count; a++)
+            for (int c = 0; c < dim; c++)
+                delta[a * dim + c] = uz_turning_error(model, node[a], nodal + node[a] * dim);
+        if (status == UZ_OK)
+            *energy += element_energy_bound(ke, delta, count * dim);
+    }
+    for (int64_t t = 0; t < model->info.n_turned && model->spring; t++) {
+        const int64_t a = model->info.turned_node[t];
+        const double delta = uz_turning_error(model, a, nodal + a * dim);
+        for (int c = 0; c < dim; c++)
+            *energy += model->spring[a * dim + c] * delta * delta;
+    }
+    source_clear(&source);
+    return status;
+}

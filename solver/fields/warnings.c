@@ -17,6 +17,10 @@ static const double MOST_TURN = 0.1;
 /* Of a face of the other body, in parts of its size. */
 static const double MOST_FACE = 0.5;
 
+/* Poisson's ratio from which on plain linear elements are much too stiff: on Cook's membrane in plane strain quad4 has
+ * 17 % too little energy there (element/stiffness.c). */
+static const double LOCKS = 0.45;
+
 typedef struct {
     const uz_body_model *model;
     const uz_scene *scene;
@@ -169,9 +173,16 @@ static double size_of_face(const uz_mesh *mesh, uz_face face)
     return sqrt(largest);
 }
 
+/* The most of each that was seen. */
+typedef struct {
+    double turn;  /* of the normal */
+    double part;  /* slid, of a face */
+    double depth; /* at which a node begins in the other body, in lengths of the face */
+    int64_t deepest;
+} findings;
+
 /* The rows of contact k from *row on. */
-static void look_at_rows(const doubts *d, const uz_obstacle *obstacle, double *turn, double *part, int64_t k,
-                         int64_t *row)
+static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obstacle, int64_t k, int64_t *row)
 {
     const uz_mesh_info *info = &d->model->info;
     const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
@@ -181,11 +192,16 @@ static void look_at_rows(const doubts *d, const uz_obstacle *obstacle, double *t
         double v[3];
         if (info->contact_node[*row] != uz_group_node_at(group, i))
             continue;
+        const double face = sites && sites->first ? size_of_face(&d->model->mesh, sites->face[i]) : 0;
         if (d->r[*row] < 0 && obstacle)
-            *turn = fmax(*turn, turn_of(d, obstacle, *row));
-        if (d->r[*row] < 0 && sites && sites->first) {
+            most->turn = fmax(most->turn, turn_of(d, obstacle, *row));
+        if (d->r[*row] < 0 && face > 0) {
             relative_motion(v, d, *row, sites, i);
-            *part = fmax(*part, length(v) / size_of_face(&d->model->mesh, sites->face[i]));
+            most->part = fmax(most->part, length(v) / face);
+        }
+        if (face > 0 && -sites->gap[i] > most->depth * face) {
+            most->depth = -sites->gap[i] / face;
+            most->deepest = info->contact_node[*row];
         }
         ++*row;
     }
@@ -193,7 +209,7 @@ static void look_at_rows(const doubts *d, const uz_obstacle *obstacle, double *t
 
 static uz_status look_at_contact(const doubts *d, uz_error *err)
 {
-    double turn = 0, part = 0;
+    findings most = {0};
     int64_t row = 0;
     uz_status status = UZ_OK;
     for (int64_t k = 0; k < d->scene->n_contacts && status == UZ_OK; k++) {
@@ -201,18 +217,61 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
         uz_obstacle *obstacle = NULL;
         if (contact->kind != UZ_OBSTACLE_PLANE && contact->kind != UZ_OBSTACLE_BODY)
             status = uz_obstacle_new(&obstacle, contact, k, d->scene->model, err);
-        look_at_rows(d, obstacle, &turn, &part, k, &row);
+        look_at_rows(&most, d, obstacle, k, &row);
         uz_obstacle_free(obstacle);
     }
-    if (turn > MOST_TURN)
-        warn(d->out, "large_sliding", turn,
+    if (most.turn > MOST_TURN)
+        warn(d->out, "large_sliding", most.turn,
              "a node slides so far on an obstacle that the normal there is turned by %.2g rad from the one that was "
              "kept",
-             turn);
-    if (part > MOST_FACE)
-        warn(d->out, "sliding_off_face", part,
-             "a node slides by %.2g of the face of the other body that it was set against", part);
+             most.turn);
+    if (most.part > MOST_FACE)
+        warn(d->out, "sliding_off_face", most.part,
+             "a node slides by %.2g of the face of the other body that it was set against", most.part);
+    if (most.depth > 1)
+        warn(d->out, "deep_overlap", most.depth,
+             "node %lld begins %.2g lengths of the face that it meets deep in the other body: another face may be the "
+             "one "
+             "that it should meet",
+             (long long)most.deepest, most.depth);
     return status;
+}
+
+/* ---- mesh */
+
+/* Is it linear, of its own strain, and kept from changing its volume in all directions? */
+static bool may_lock(const uz_body_model *model, int64_t e)
+{
+    const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
+    const double poisson = uz_element_material(model, e)->poisson;
+    if (model->kind == UZ_PLANE_STRESS || poisson < LOCKS)
+        return false;
+    if (kind == UZ_TRI3 || kind == UZ_TET4)
+        return true;
+    return (kind == UZ_QUAD4 || kind == UZ_HEX8) &&
+           uz_resolve_formulation(model->formulation, kind, model->kind, poisson) == UZ_FORMULATION_STANDARD;
+}
+
+static void look_at_mesh(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    double poisson = 0;
+    int64_t stiff = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        if (may_lock(d->model, e) && uz_element_material(d->model, e)->poisson > poisson) {
+            poisson = uz_element_material(d->model, e)->poisson;
+            stiff = e;
+        }
+    if (poisson > 0)
+        warn(d->out, "locking", poisson,
+             "element %lld (%s) has Poisson's ratio %.5g: plain linear elements are too stiff there; use %s",
+             (long long)stiff, uz_element_name((uz_element_kind)mesh->kind[stiff]), poisson,
+             mesh->dim == 2 ? "quad4 with bbar, tri6 or quad8" : "hex8 with bbar, or tet10");
+    if (mesh->n_unused > 0)
+        warn(
+            d->out, "unused_nodes", (double)mesh->n_unused,
+            "%lld nodes of the file belong to no element and are left out; the others are numbered anew in their order",
+            (long long)mesh->n_unused);
 }
 
 uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
@@ -221,5 +280,6 @@ uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const u
     const doubts d = {model, scene, u, r, out};
     if (largest_slope(&d) > 0.25 * fmin(MOST_STRAIN, MOST_ROTATION))
         look_at_elements(&d);
+    look_at_mesh(&d);
     return look_at_contact(&d, err);
 }

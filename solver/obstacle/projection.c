@@ -16,6 +16,9 @@
  * them would be rounding. */
 #define ON_BORDER 1e-6
 
+/* Cosine between the normals of two faces that surely do not face each other, which has them opposite. */
+#define SAME_WAY 0.1
+
 /* The faces of a group, where they are, and which of them meet at a node. Coordinates are the mesh's times a power of
  * two near one over its extent. */
 typedef struct {
@@ -109,8 +112,9 @@ static uz_status build_tree(master *m, uz_error *err)
     return status;
 }
 
-/* Counted, summed, placed: filling from the end leaves first[i] at the beginning of its list. */
-static uz_status list_around(master *m, uz_error *err)
+/* middles: also the faces that a node is a middle of. Counted, summed, placed: filling from the end leaves first[i] at
+ * the beginning of its list. */
+static uz_status list_around(master *m, bool middles, uz_error *err)
 {
     const int64_t n = m->mesh->n_nodes;
     int64_t node[UZ_FACE_NODES];
@@ -119,15 +123,17 @@ static uz_status list_around(master *m, uz_error *err)
     if (!m->first || !m->around)
         return out_of_memory(err);
     for (int64_t f = 0; f < m->group->n_faces; f++) {
-        const int corners = uz_face_corners(m->mesh->dim, uz_mesh_face(node, m->mesh, m->group->face[f]));
-        for (int i = 0; i < corners; i++)
+        const int all = uz_mesh_face(node, m->mesh, m->group->face[f]);
+        const int count = middles ? all : uz_face_corners(m->mesh->dim, all);
+        for (int i = 0; i < count; i++)
             m->first[node[i]]++;
     }
     for (int64_t i = 0; i < n; i++)
         m->first[i + 1] += m->first[i];
     for (int64_t f = m->group->n_faces - 1; f >= 0; f--) {
-        const int corners = uz_face_corners(m->mesh->dim, uz_mesh_face(node, m->mesh, m->group->face[f]));
-        for (int i = 0; i < corners; i++)
+        const int all = uz_mesh_face(node, m->mesh, m->group->face[f]);
+        const int count = middles ? all : uz_face_corners(m->mesh->dim, all);
+        for (int i = 0; i < count; i++)
             m->around[--m->first[node[i]]] = f;
     }
     return UZ_OK;
@@ -273,9 +279,25 @@ static uz_status refuse_flat(const master *m, int64_t face, int64_t index, uz_er
                    (long long)of[0], m->group->name);
 }
 
+/* Do all faces of the slave around its node (at x, scaled) look the way the master does? Then what is behind the master
+ * there is the far side of the slave, as of a clamp around a plate, and did not come through it. */
+static bool looks_away(const master *slave, int64_t node, const double *x, const double normal[3])
+{
+    for (int64_t q = slave->first[node]; q < slave->first[node + 1]; q++) {
+        uz_foot foot;
+        double cosine = 0;
+        closest_on(&foot, slave, slave->around[q], x);
+        for (int c = 0; c < 3; c++)
+            cosine += foot.normal[c] * normal[c];
+        if (!(cosine > SAME_WAY))
+            return false;
+    }
+    return slave->first[node + 1] > slave->first[node];
+}
+
 /* Fills the row of one node; *found false: it faces no part of the master. */
-static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, int64_t node, int64_t index,
-                          uz_error *err)
+static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, const master *slave, int64_t node,
+                          int64_t index, uz_error *err)
 {
     const int dim = m->mesh->dim;
     double x[3] = {0}, off[3], normal[3], xyz[3 * UZ_FACE_NODES], along = 0;
@@ -299,6 +321,8 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, in
         return refuse_flat(m, face, index, err);
     for (int c = 0; c < dim; c++)
         along += off[c] * row->normal[c];
+    if (along < -ON_BORDER * size && looks_away(slave, node, x, row->normal))
+        return UZ_OK;
     row->node = node;
     row->face = m->group->face[face];
     row->gap = along / m->scale;
@@ -346,14 +370,15 @@ static uz_status check_apart(const uz_mesh *mesh, const uz_group *on, const uz_g
     return status;
 }
 
-static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m, const uz_group *on, int64_t index,
+static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m, const master *slave, int64_t index,
                            uz_error *err)
 {
+    const uz_group *on = slave->group;
     char where[96];
     *count = 0;
     for (int64_t i = 0; i < uz_group_node_count(m->mesh, on); i++) {
         bool found;
-        const uz_status status = make_row(&found, &row[*count], m, uz_group_node_at(on, i), index, err);
+        const uz_status status = make_row(&found, &row[*count], m, slave, uz_group_node_at(on, i), index, err);
         if (status != UZ_OK)
             return status;
         *count += found;
@@ -368,7 +393,7 @@ static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
                            const uz_group *with, int64_t index, uz_error *err)
 {
-    master m = {.mesh = mesh, .group = with};
+    master m = {.mesh = mesh, .group = with}, slave = {.mesh = mesh, .group = on};
     uz_contact_pair *row = NULL;
     int exponent;
     *out = NULL;
@@ -380,12 +405,15 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
         return status;
     frexp(mesh->extent, &exponent);
     m.scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
+    slave.scale = m.scale;
     row = uz_alloc(uz_group_node_count(mesh, on), sizeof *row);
     status = row ? build_tree(&m, err) : out_of_memory(err);
     if (status == UZ_OK)
-        status = list_around(&m, err);
+        status = list_around(&m, false, err);
     if (status == UZ_OK)
-        status = make_rows(row, count, &m, on, index, err);
+        status = list_around(&slave, true, err);
+    if (status == UZ_OK)
+        status = make_rows(row, count, &m, &slave, index, err);
     if (status == UZ_OK)
         *out = row;
     else
@@ -393,5 +421,6 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
     if (status != UZ_OK)
         free(row);
     master_clear(&m);
+    master_clear(&slave);
     return status;
 }

@@ -32,7 +32,7 @@ typedef struct {
     double gap;       /* (x_s - x_m) . normal; < 0: the bodies overlap */
 } uz_contact_pair;
 
-/* The rows of all nodes of `on` that face `with`, in the order of the nodes (ascending). O((n + f) log f) for n nodes
+/* The rows of all nodes of `on` that face `with` (behind it, only those that look at it), in the order of the nodes (ascending). O((n + f) log f) for n nodes
  * within a few faces' size of f faces. `index` is the contact's place in the scene, for pointers. The caller frees *out
  * with free(). Errors: UZ_ERR_SCENE ("/contacts/i/with": not faces; "/contacts/i/on": a node of the master itself, or
  * no node that faces it), UZ_ERR_MEMORY. */

@@ -218,6 +218,11 @@ static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, i
 static uz_status check_force(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
+    if (load->kind == UZ_LOAD_NODE_FORCE && mesh->n_unused > 0)
+        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "node"),
+                       "%lld nodes of the file belong to no element and are left out, so that numbers are not those of "
+                       "the file; name a physical point by \"on\"",
+                       (long long)mesh->n_unused);
     if (load->kind == UZ_LOAD_NODE_FORCE) {
         if (load->node >= 0 && load->node < mesh->n_nodes)
             return UZ_OK;

@@ -60,6 +60,7 @@ bool wants_family(const suite *all, const char *name);
 /* The families. */
 void run_scenes(suite *all);
 void run_scene_mixtures(suite *all);
+void run_bodies(suite *all);
 void run_stiffnesses(suite *all);
 void run_rows(suite *all);
 void run_ranges(suite *all);

@@ -226,6 +226,40 @@ TEST(a_body_that_nothing_holds_is_named)
     uz_scene_clear(&s);
 }
 
+static void sink(double x[3])
+{
+    x[1] -= 1.25;
+}
+
+/* A clamp around a plate: its lower jaw is behind the plate's top, and did not come through it. */
+TEST(the_far_side_of_a_clamp_has_no_rows)
+{
+    static const char *const elements[] = {"quad4", "quad8", "hex8", "tet10"};
+    for (int k = 0; k < 4; k++) {
+        uz_scene s = stack(k < 2 ? UZ_PLANE_STRESS : UZ_SOLID, elements[k], elements[k], 2, 3);
+        uz_mesh_info info;
+        uz_qp qp;
+        uz_error err = {0};
+        add_box(&s, &s.box, 'c', sink);
+        for (int64_t g = 0; g < s.given.n_groups; g++)
+            if (strcmp(s.given.groups[g].name, "c top") == 0) /* groups of one name are one */
+                snprintf(s.given.groups[g].name, sizeof s.given.groups[g].name, "b bottom");
+        body_hold(&s, "a bottom", 0, 0, s.model == UZ_SOLID ? 0 : NAN);
+        body_hold(&s, "b top", 0, 0, s.model == UZ_SOLID ? 0 : NAN);
+        body_hold(&s, "c bottom", 0, 0, s.model == UZ_SOLID ? 0 : NAN);
+        put_pair(&s, "b bottom", "a top");
+        CHECK_MSG(uz_scene_to_qp(&qp, &info, &s, &err) == UZ_OK, "%s: %s", err.where, err.message);
+        CHECK(qp.N.rows > 0);
+        for (int64_t i = 0; i < qp.N.rows; i++) {
+            const double y = info.xyz[info.contact_node[i] * info.dim + 1];
+            CHECK_MSG(y == 1 && qp.h[i] == 0, "%s: row %lld at y = %g", elements[k], (long long)i, y);
+        }
+        uz_qp_clear(&qp);
+        uz_mesh_info_clear(&info);
+        uz_scene_clear(&s);
+    }
+}
+
 /* ------------------------------------------------------------------- roller */
 
 enum { RADIUS = 50 };

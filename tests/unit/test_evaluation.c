@@ -311,6 +311,79 @@ TEST(sliding_off_a_face_is_doubted)
     }
 }
 
+TEST(a_deep_overlap_is_doubted)
+{
+    for (int i = 0; i < 2; i++) {
+        uz_scene s = stacked(0);
+        for (int64_t a = 3 * 5; a < s.given.n_nodes; a++) /* of the upper block; faces are 0.5 long */
+            s.given.xyz[2 * a + 1] -= i == 0 ? 0.4 : 0.6;
+        uz_result *result = body_solve(&s, 1e-8);
+        const uz_warning *w = warning(result, "deep_overlap");
+        CHECK_INT(w != NULL, i);
+        if (w)
+            CHECK_REL(w->value, 1.2, 1e-9);
+        clear(&s, result);
+    }
+}
+
+TEST(linear_elements_that_lock_are_doubted)
+{
+    static const struct {
+        const char *element;
+        uz_model model;
+        uz_formulation formulation;
+        double poisson;
+        bool locks;
+    } rows[] = {{"tri3", UZ_PLANE_STRAIN, UZ_FORMULATION_AUTO, 0.45, true},
+                {"tri3", UZ_AXISYMMETRIC, UZ_FORMULATION_AUTO, 0.4999, true},
+                {"tet4", UZ_SOLID, UZ_FORMULATION_AUTO, 0.49, true},
+                {"quad4", UZ_PLANE_STRAIN, UZ_FORMULATION_STANDARD, 0.49, true},
+                {"quad4", UZ_PLANE_STRAIN, UZ_FORMULATION_AUTO, 0.49, false},
+                {"quad4", UZ_PLANE_STRAIN, UZ_FORMULATION_INCOMPATIBLE, 0.49, false},
+                {"tri3", UZ_PLANE_STRESS, UZ_FORMULATION_AUTO, 0.49, false},
+                {"tri3", UZ_PLANE_STRAIN, UZ_FORMULATION_AUTO, 0.44, false},
+                {"tri6", UZ_PLANE_STRAIN, UZ_FORMULATION_AUTO, 0.49, false},
+                {"hex8", UZ_SOLID, UZ_FORMULATION_AUTO, 0.49, false}};
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        uz_scene s = pressed(rows[k].model, rows[k].element, 7);
+        s.formulation = rows[k].formulation;
+        s.materials[0].poisson = rows[k].poisson;
+        uz_result *result = body_solve(&s, 1e-8);
+        const uz_warning *w = warning(result, "locking");
+        CHECK_MSG((w != NULL) == rows[k].locks, "%s, row %d", rows[k].element, (int)k);
+        if (w) {
+            CHECK(w->value == rows[k].poisson && strstr(w->message, rows[k].element) != NULL);
+            CHECK(strlen(w->message) < sizeof w->message - 1);
+        }
+        clear(&s, result);
+    }
+}
+
+/* Numbers are then not those of the file, so that a force at a number would be at another node than was meant. */
+TEST(nodes_of_a_file_that_are_left_out_are_told)
+{
+    for (int i = 0; i < 2; i++) {
+        uz_scene s = stacked(0);
+        uz_error err = {0};
+        s.given.from_file = true;
+        if (i == 1) {
+            double *more = body_room((s.given.n_nodes + 2) * 2, sizeof *more);
+            memcpy(more, s.given.xyz, (size_t)s.given.n_nodes * 2 * sizeof *more);
+            free(s.given.xyz);
+            s.given.xyz = more;
+            s.given.n_nodes += 2;
+        }
+        uz_result *result = body_solve(&s, 1e-8);
+        const uz_warning *w = warning(result, "unused_nodes");
+        CHECK_INT(w != NULL, i);
+        CHECK(!w || w->value == 2);
+        body_load(&s, UZ_LOAD_NODE_FORCE, "", 0, -1, 0)->node = 20;
+        CHECK_INT(uz_scene_check(&s, &err), i == 0 ? UZ_OK : UZ_ERR_SCENE);
+        CHECK_STR(err.where, i == 0 ? "" : "/loads/2/node");
+        clear(&s, result);
+    }
+}
+
 TEST(units_leave_the_digits)
 {
     uint64_t random = 11, again = 11;
