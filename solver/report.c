@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "fields/evaluate.h"
 #include "linalg/linalg.h"
+#include "rows.h"
 
 #include <float.h>
 #include <math.h>
@@ -78,7 +79,11 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     uz_factor_info factor = describe_factor(run->body);
     uz_dual_info dual = uz_dual_describe(run->body->dual);
     run->d = summary->d = run->result->d = dual.d;
-    run->m = summary->m = run->result->m = dual.m;
+    run->m = run->all = summary->kept = dual.m;
+    if (run->body->rows.in)
+        run->all = run->body->rows.m;
+    summary->m = run->result->m = run->all;
+    summary->rounds = 1;
     summary->op = dual.op;
     summary->ordering = factor.ordering;
     run->hit = run->serves_many = summary->factor_cached = reused.op;
@@ -320,6 +325,20 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
     return status;
 }
 
+/* Where the iterations stood, in all rows. */
+static uz_status report_state(uz_run *run, uz_error *err)
+{
+    uz_state *part = NULL;
+    uz_status status = uz_iterate_state(&part, &run->it, run->load, run->settings->method, err);
+    if (status != UZ_OK || !run->body->rows.in) {
+        run->result->state = part;
+        return status;
+    }
+    status = uz_state_scatter(&run->result->state, part, &run->body->rows, err);
+    uz_state_free(part);
+    return status;
+}
+
 uz_status uz_run_report(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
@@ -331,7 +350,7 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
     summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
     uz_status status = UZ_OK;
     if (!run->result->ray)
-        status = uz_iterate_state(&run->result->state, &run->it, run->load, run->settings->method, err);
+        status = report_state(run, err);
     return status == UZ_OK ? uz_run_publish(run, err) : status;
 }
 
@@ -342,6 +361,7 @@ void uz_run_end(uz_run *run)
     uz_factor_workspace_free(run->ws);
     free(run->owned);
     uz_answer_clear(&run->answer);
+    uz_candidates_clear(&run->wants);
     free(run->work);
     uz_result_free(run->result);
 }

@@ -277,7 +277,7 @@ typedef struct {
     int64_t n_loads;
     uz_contact *contacts;
     int64_t n_contacts;
-    bool all_candidates; /* contact rows also for nodes that surely cannot touch */
+    bool all_candidates; /* solve with every contact row, also those far from any obstacle */
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);
 /* Dimensions of the bodies that its model is for: 2 or 3. */
@@ -300,9 +300,10 @@ typedef struct {
 void uz_mesh_info_clear(uz_mesh_info *info);
 
 /* Mesh, assembly, boundary conditions: the scene as matrices. Their dofs are the free ones, node by node, along x, y,
- * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one whose
- * first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE, _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON
- * pointer into the problem. Nothing is factored. */
+ * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one
+ * whose first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE,
+ * _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON pointer into the problem. Nothing is factored.
+ */
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
 /* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. */
 uz_status uz_scene_check(const uz_scene *scene, uz_error *err);
@@ -497,6 +498,9 @@ typedef struct {
     int64_t d, m, iterations, restarts;
     int64_t refinements; /* corrections by the residual of the original data that made the certificate better */
     int64_t active;      /* rows with r < 0 */
+    int64_t kept;        /* rows that the last round solved with, of m; the others are proved not to matter */
+    int64_t added;       /* those of them that the first round had left out */
+    int64_t rounds;      /* bodies that were solved: 1 unless a row that was left out turned out to matter */
     double reaction_sum, max_penetration;
     int dim;                     /* scene: 2 or 3, else 0 */
     double force[3];             /* scene: force of the body on the obstacle's normal side, sum of -r n */

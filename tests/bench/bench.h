@@ -57,6 +57,15 @@ bool bench_load_cases(bench_value *ratio, int64_t nx);
 const char *bench_stop_name(int which);
 bool bench_stop(bench_value *between, bench_value *work, bench_value *to_return, int which);
 
+/* Cold solves of bodies whose whole surface may touch, with all candidates and with those kept: a cube of n x n x n
+ * bricks on a sphere (solid), or the paper's body with n x n/3 cells between four walls. false: no answer. */
+typedef struct {
+    int64_t given, kept, rounds;
+    bench_value seconds, all_seconds;
+    double bytes, all_bytes;
+} bench_candidates;
+bool bench_candidates_left_out(bench_candidates *out, int64_t n, bool solid);
+
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);
 
