@@ -1,6 +1,6 @@
 /* Scenes that are solved with a part of their contact rows: what they say holds for all of them. */
 #include "body_fixture.h"
-#include "judge.h"
+#include "quad_exact.h"
 #include "rows.h"
 
 #include <string.h>
@@ -50,46 +50,82 @@ static uz_result *solve(const uz_problem *problem)
     return solve_cached(problem, NULL, NULL);
 }
 
-/* A scene with all of its rows, and its solution in quadruple precision. */
+/* A scene with all of its rows, and its solution in quadruple precision: that of the rows which touch, if no other one
+ * is penetrated by it. */
 typedef struct {
-    uz_qp qp;
+    uz_qp all, few;
     uz_body_model model;
-    truth truth;
+    uz_candidates touching;
+    quad_exact best;
 } exact;
 
-/* answer: whose rows in contact are a good guess. */
+/* No row pulls, and none of all is penetrated. */
+static void check_optimal(const exact *x)
+{
+    const uz_csc *N = &x->all.N;
+    quad *gap = quad_zeros(N->rows);
+    for (int64_t i = 0; i < N->rows; i++)
+        gap[i] = x->all.h[i];
+    for (int64_t j = 0; j < N->cols; j++)
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+            gap[N->idx[k]] -= (quad)N->val[k] * x->best.u[j];
+    for (int64_t i = 0; i < N->rows; i++)
+        CHECK_MSG(gap[i] > -1e-22, "the reference penetrates row %d: %g", (int)i, (double)gap[i]);
+    for (int64_t k = 0; k < x->best.m; k++)
+        CHECK(x->best.r[k] <= 0);
+    free(gap);
+}
+
 static exact solve_exactly(const uz_problem *problem, const uz_result *answer)
 {
-    exact x = {.qp = {.p = NULL}};
+    exact x = {.all = {.p = NULL}};
     uz_error err = {0};
-    bool *touch = body_room(answer->m, sizeof *touch);
-    CHECK_INT(uz_scene_to_qp(&x.qp, NULL, &problem->scene, &err), UZ_OK);
+    CHECK_INT(uz_scene_to_qp(&x.all, NULL, &problem->scene, &err), UZ_OK);
     CHECK_INT(uz_body_model_build(&x.model, &problem->scene, &err), UZ_OK);
-    CHECK_INT(answer->m, x.qp.N.rows);
-    for (int64_t i = 0; i < answer->m; i++)
-        touch[i] = answer->r[i] < 0;
-    x.truth = find_truth(&x.qp, touch);
-    free(touch);
+    CHECK_INT(answer->m, x.all.N.rows);
+    x.touching = (uz_candidates){.m = answer->m, .in = body_room(answer->m, 1)};
+    for (int64_t i = 0; i < answer->m; i++) {
+        x.touching.in[i] = answer->r[i] < 0;
+        x.touching.count += answer->r[i] < 0;
+    }
+    CHECK_INT(uz_csc_copy(&x.few.K, &x.all.K, &err), UZ_OK);
+    CHECK_INT(uz_candidates_reduce(&x.few.N, &x.all.N, &x.touching, &err), UZ_OK);
+    x.few.p = body_room(x.model.d, sizeof(double));
+    x.few.h = body_room(x.touching.count, sizeof(double));
+    memcpy(x.few.p, x.all.p, (size_t)x.model.d * sizeof(double));
+    uz_candidates_gather(x.few.h, x.all.h, &x.touching);
+    bool *all = body_room(x.touching.count, sizeof *all);
+    memset(all, 1, (size_t)x.touching.count * sizeof *all);
+    CHECK(quad_exact_solve(&x.best, &x.few, all));
+    free(all);
+    check_optimal(&x);
     return x;
 }
 
 static void exact_clear(exact *x)
 {
-    truth_clear(&x->truth);
+    quad_exact_free(&x->best);
+    uz_candidates_clear(&x->touching);
     uz_body_model_clear(&x->model);
-    uz_qp_clear(&x->qp);
+    uz_qp_clear(&x->all);
+    uz_qp_clear(&x->few);
 }
 
 static void judge_result(const exact *x, const uz_result *got, const char *what)
 {
-    double *u = body_room(x->model.d, sizeof *u);
+    const uz_certificate *c = &got->summary.certificate;
+    double *u = body_room(x->model.d, sizeof *u), *r = body_room(got->m, sizeof *r);
     uz_restrict_nodal(u, &x->model, got->u);
-    judgement j = judge(&x->truth, &x->qp, got, u);
-    CHECK_MSG(j.verdict == JUDGED_OK, "%s: %s", what, j.why);
-    for (int64_t i = 0; i < got->m && got->summary.outcome == UZ_CONVERGED; i++)
-        CHECK_MSG(fabs(got->r[i] - (double)x->truth.best.r[i]) <= 1e-4 * fabs(got->summary.reaction_sum) + 1e-12,
-                  "%s: row %d: %g instead of %g", what, (int)i, got->r[i], (double)x->truth.best.r[i]);
+    const double error = quad_error(&x->best, u), norm = (double)quad_sqrt(x->best.norm2);
+    CHECK_MSG(error <= c->absolute_error, "%s: error %g above the bound %g", what, error, c->absolute_error);
+    CHECK_MSG(error <= c->relative_error * norm, "%s: %g of %g, certified %g", what, error, norm, c->relative_error);
+    CHECK(got->summary.outcome != UZ_CONVERGED || error <= got->summary.requested_error * norm);
+    uz_candidates_gather(r, got->r, &x->touching);
+    for (int64_t k = 0; k < x->touching.count && got->summary.outcome == UZ_CONVERGED; k++)
+        CHECK_MSG(fabs(r[k] - (double)x->best.r[k]) <= 1e-4 * fabs(got->summary.reaction_sum),
+                  "%s: row %d: %g instead of %g", what, (int)k, r[k], (double)x->best.r[k]);
     free(u);
+    free(r);
 }
 
 static void judge_all_rows(const uz_problem *problem, const uz_result *got, const char *what)
