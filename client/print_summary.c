@@ -127,12 +127,24 @@ static void print_force(FILE *to, const json_t *summary)
     fputs(")", to);
 }
 
+/* Candidates that were left out, and those that had to be taken back. */
+static void print_kept(FILE *to, const json_t *summary)
+{
+    double kept = client_json_number(summary, "contact.kept"), added = client_json_number(summary, "contact.added");
+    if (kept < client_json_number(summary, "contact.candidates"))
+        fprintf(to, "; solved with %.0f, the others are proved not to matter", kept);
+    if (added > 0)
+        fprintf(to, "; %.0f added in %.0f rounds", added, client_json_number(summary, "contact.rounds"));
+    fputc('\n', to);
+}
+
 static void print_contact(FILE *to, const json_t *summary)
 {
     char text[32], more[32];
     label(to, "contact");
-    fprintf(to, "%s of %s candidates touch\n", number_in_words(text, summary, "contact.active", 9),
+    fprintf(to, "%s of %s candidates touch", number_in_words(text, summary, "contact.active", 9),
             number_in_words(more, summary, "contact.candidates", 9));
+    print_kept(to, summary);
     label(to, "reactions");
     fprintf(to, "sum %s", number_in_words(text, summary, "contact.reaction_sum", 10));
     print_force(to, summary);

@@ -33,7 +33,7 @@ uz_status uz_check_settings(const uz_settings *s, uz_error *err)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
     if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
-    if (s->method == UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
+    if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
         !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "method, operator, ordering or stopping is not one of the known ones");
     return UZ_OK;
@@ -343,6 +343,8 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
     summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
+    if (run->all == 0)
+        summary->method = UZ_METHOD_LINEAR;
     summary->origin = run->it.origin;
     summary->iterations = run->it.iteration;
     summary->restarts = run->it.restarts;

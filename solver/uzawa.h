@@ -337,7 +337,8 @@ typedef enum {
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
     UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
-    UZ_METHOD_GIVEN                /* results of uz_verify only: the answer is the caller's */
+    UZ_METHOD_GIVEN,               /* results of uz_verify only: the answer is the caller's */
+    UZ_METHOD_LINEAR /* results only: without contact rows u is one linear solve, whatever was asked for */
 } uz_method;
 typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE } uz_operator;
 typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;

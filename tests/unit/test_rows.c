@@ -458,6 +458,31 @@ TEST(few_rows_are_all_kept)
     uz_problem_clear(&problem);
 }
 
+/* Whatever was asked for: there is nothing to iterate on. */
+TEST(a_body_without_contact_is_a_linear_solve)
+{
+    uz_problem problem = scene_problem(column(10, 3));
+    push(&problem.scene, 1);
+    problem.scene.n_contacts = 0;
+    for (int method = 0; method < UZ_METHOD_GIVEN; method++) {
+        uz_settings settings = uz_settings_default();
+        uz_result *x = NULL;
+        settings.method = (uz_method)method;
+        CHECK_INT(uz_solve(&x, &problem, &settings, NULL, NULL, NULL), UZ_OK);
+        CHECK_INT(x->summary.outcome, UZ_CONVERGED);
+        CHECK_STR(uz_method_name(x->summary.method), "linear");
+        CHECK(x->summary.iterations == 0 && x->summary.kept == 0 && x->summary.m == 0);
+        uz_result_free(x);
+    }
+    uz_settings settings = uz_settings_default();
+    uz_result *x = NULL;
+    uz_method parsed;
+    settings.method = UZ_METHOD_LINEAR;
+    CHECK_INT(uz_solve(&x, &problem, &settings, NULL, NULL, NULL), UZ_ERR_ARGUMENT);
+    CHECK(!x && !uz_method_parse(&parsed, "linear"));
+    uz_problem_clear(&problem);
+}
+
 TEST(sets_of_rows)
 {
     double r[] = {0, -1, 0, 0}, rho[] = {0, 0, -2, 0}, none[] = {0, 0, 0, 0};
