@@ -172,6 +172,17 @@ static void print_pressure(FILE *to, const json_t *summary)
     print_vector(to, " at ", client_json_at(summary, "contact.max_pressure_at.x"));
 }
 
+/* Candidates that were left out, and those that had to be taken back. */
+static void print_kept(FILE *to, const json_t *summary)
+{
+    double kept = client_json_number(summary, "contact.kept"), added = client_json_number(summary, "contact.added");
+    if (kept < client_json_number(summary, "contact.candidates"))
+        fprintf(to, "; solved with %.0f, the others are proved not to matter", kept);
+    if (added > 0)
+        fprintf(to, "; %.0f added in %.0f rounds", added, client_json_number(summary, "contact.rounds"));
+    fputc('\n', to);
+}
+
 static void print_contact(FILE *to, const json_t *summary)
 {
     char text[32], more[32];
@@ -180,7 +191,7 @@ static void print_contact(FILE *to, const json_t *summary)
             number_in_words(more, summary, "contact.candidates", 9));
     if (json_is_number(client_json_at(summary, "contact.area")))
         fprintf(to, ", on an area of %s", number_in_words(text, summary, "contact.area", 6));
-    fputc('\n', to);
+    print_kept(to, summary);
     label(to, "reactions");
     fprintf(to, "sum %s", number_in_words(text, summary, "contact.reaction_sum", 10));
     print_vector(to, ", force ", client_json_at(summary, "contact.force"));

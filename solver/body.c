@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "core/lock.h"
 #include "linalg/linalg.h"
+#include "rows.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -34,7 +35,25 @@ static uz_status add_scene(uz_digest *digest, const uz_scene *scene, uz_error *e
     return status;
 }
 
-uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_settings *settings, uz_error *err)
+/* Where the choice of rows begins: initial gaps follow from the places of planes and the values of supports, which the
+ * key of the model leaves out. */
+static void add_rows(uz_digest *digest, const uz_problem *problem, const uz_candidates *wanted)
+{
+    const uz_scene *scene = &problem->scene;
+    if (!uz_may_omit_rows(problem))
+        return;
+    for (int64_t k = 0; k < scene->n_contacts; k++)
+        uz_digest_add(digest, scene->contacts[k].point, sizeof scene->contacts[k].point);
+    for (int64_t i = 0; i < scene->n_supports; i++) {
+        uz_digest_add(digest, scene->supports[i].u, sizeof scene->supports[i].u);
+        uz_digest_add(digest, &scene->supports[i].value, sizeof scene->supports[i].value);
+    }
+    if (wanted && wanted->in)
+        uz_digest_add(digest, wanted->in, (size_t)wanted->m);
+}
+
+uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_candidates *wanted,
+                         const uz_settings *settings, uz_error *err)
 {
     memset(key, 0, sizeof *key);
     uz_digest *state = uz_digest_new();
@@ -46,6 +65,7 @@ uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_s
     uz_digest_add(state, &settings->memory_limit, sizeof settings->memory_limit);
     if (problem->kind == UZ_PROBLEM_SCENE) {
         status = add_scene(state, &problem->scene, err);
+        add_rows(state, problem, wanted);
     } else {
         status = uz_matrix_digest(&key->K, &problem->qp.K, err);
         uz_digest_add(state, key->K.values, sizeof key->K.values);
@@ -62,6 +82,11 @@ const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem)
 }
 
 const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
+{
+    return body->rows.in ? &body->N_in : uz_body_all_rows(body, problem);
+}
+
+const uz_csc *uz_body_all_rows(const uz_body *body, const uz_problem *problem)
 {
     if (body->no_rows.ptr)
         return &body->no_rows;
@@ -112,18 +137,53 @@ static uz_status take_matrices(uz_body *body, const uz_problem *problem, const u
     return status;
 }
 
+/* The initial gaps of a scene's rows follow from its supports; of its loads there may be several lists. */
+static uz_status choose_by_gaps(uz_body *body, const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
+{
+    const uz_body_model *model = &body->model;
+    uz_scene unloaded = *scene;
+    unloaded.loads = NULL;
+    unloaded.n_loads = 0;
+    double *p = uz_alloc(model->d, sizeof *p), *h = uz_alloc(model->m, sizeof *h);
+    uz_error refusal = {0};
+    uz_status status = UZ_ERR_MEMORY;
+    if (p && h)
+        status = uz_body_model_load(p, h, NULL, model, &unloaded, &refusal);
+    if (status == UZ_OK)
+        status = uz_choose_rows(&body->rows, h, model->m, &model->info, scene, wanted, err);
+    else if (status == UZ_ERR_MEMORY)
+        status = uz_fail(err, status, "", "no memory for the gaps of %lld contacts", (long long)model->m);
+    else
+        status = UZ_OK; /* the load will tell what is wrong with it */
+    free(p);
+    free(h);
+    return status;
+}
+
+static uz_status choose_rows(uz_body *body, const uz_problem *problem, const uz_candidates *wanted, uz_error *err)
+{
+    if (!body->is_scene || !uz_may_omit_rows(problem))
+        return UZ_OK;
+    uz_status status = choose_by_gaps(body, &problem->scene, wanted, err);
+    if (status == UZ_OK && body->rows.in)
+        status = uz_candidates_reduce(&body->N_in, &body->model.N, &body->rows, err);
+    return status;
+}
+
 static void describe(uz_body *body)
 {
     size_t form = body->krylov ? uz_krylov_describe(body->krylov).bytes : uz_factor_describe(body->factor).bytes;
     body->bytes = sizeof *body + (body->shared.item ? 0 : form) + uz_dual_describe(body->dual).bytes;
     if (body->is_scene)
         body->bytes += uz_body_model_bytes(&body->model);
+    if (body->rows.in)
+        body->bytes += (size_t)body->rows.m + uz_csc_bytes(&body->N_in);
     body->reused.ordering = body->shared.analysis_reused;
     body->reused.factor = body->shared.factor_reused;
 }
 
-uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_body_key *key, const uz_settings *settings,
-                         uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_candidates *wanted, const uz_body_key *key,
+                         const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     uz_matrix_key K_key;
     *out = NULL;
@@ -133,6 +193,8 @@ uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_body
     pthread_mutex_init(&body->mutex, NULL);
     body->inverse_bound = NAN;
     uz_status status = take_matrices(body, problem, settings, err);
+    if (status == UZ_OK)
+        status = choose_rows(body, problem, wanted, err);
     if (status == UZ_OK)
         status = find_key(&K_key, key, body, err);
     if (status == UZ_OK)
@@ -171,5 +233,7 @@ void uz_body_free(uz_body *body)
     if (body->is_scene)
         uz_body_model_clear(&body->model);
     uz_csc_clear(&body->no_rows);
+    uz_csc_clear(&body->N_in);
+    uz_candidates_clear(&body->rows);
     free(body);
 }

@@ -8,6 +8,7 @@
 #include "core/hooks.h"
 #include "linalg/linalg.h"
 #include "methods/method.h"
+#include "rows.h"
 #include "semicoercive/semicoercive.h"
 #include "solve.h"
 
@@ -25,8 +26,14 @@ typedef struct {
     int64_t n;
     uz_body *body; /* borrowed from the cache */
     uz_reuse reused;
-    double started;
+    double started, round_started;
     uz_result **results; /* n */
+    int64_t *todo;       /* n_todo: the cases of this round; NULL: all n of them */
+    int64_t n_todo;
+    int64_t *again; /* n: the cases of the next round, n_again of them */
+    int64_t n_again, round;
+    int64_t kept;         /* rows of the first round */
+    uz_candidates wanted; /* rows of the next round, or in NULL */
 } batch;
 
 /* Says which case an error is about: /loads/0/on becomes /cases/3/loads/0/on. Pointers too long are cut. */
@@ -66,29 +73,61 @@ uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
     return status;
 }
 
-/* The first case carries the cost of the body; for the others it is there. */
-static uz_status open_case(uz_run *run, const batch *b, int64_t i, uz_error *err)
+/* The first case of a round carries the cost of the body; for the others it is there. place: in the round. */
+static uz_status open_case(uz_run *run, const batch *b, int64_t place, uz_error *err)
 {
     static const uz_reuse everything = {true, true, true, true};
+    const int64_t i = b->todo ? b->todo[place] : place;
     uz_status status = uz_run_begin(run, b->problem, b->settings, b->hooks, err);
     run->index = i;
     run->load_case = b->problem->n_cases > 0 ? &b->problem->cases[i] : NULL;
     run->start = b->starts ? b->starts[i] : NULL;
     run->body = b->body;
     run->deadline = b->started + b->settings->time_limit_s;
-    if (i == 0)
-        run->started = b->started;
+    if (place == 0)
+        run->started = b->round_started;
     if (status != UZ_OK)
         return status;
-    uz_run_take_body(run, i > 0 ? everything : b->reused);
+    uz_run_take_body(run, place > 0 ? everything : b->reused);
     run->serves_many = run->hit || b->n > 1;
     return UZ_OK;
 }
 
-/* The result goes to its place, or the error is named. */
-static uz_status close_case(uz_run *run, const batch *b, uz_status status, uz_error *err)
+/* What the rounds before took of the case's time counts. */
+static void count_rounds(const batch *b, const uz_result *before, uz_summary *summary)
 {
+    uz_timings *t = &summary->timings;
+    summary->rounds = b->round;
+    summary->added = summary->kept - b->kept;
+    if (!before)
+        return;
+    const uz_timings *earlier = &before->summary.timings;
+    t->assemble += earlier->assemble;
+    t->order += earlier->order;
+    t->factor += earlier->factor;
+    t->condense += earlier->condense;
+    t->iterate += earlier->iterate;
+    t->certify += earlier->certify;
+    t->total += earlier->total;
+}
+
+/* The case's rows go to those of the next round. */
+static uz_status take_wants(batch *b, const uz_run *run, uz_error *err)
+{
+    if (!run->wants.in)
+        return UZ_OK;
+    b->again[b->n_again++] = run->index;
+    return uz_candidates_add(&b->wanted, &run->wants, err);
+}
+
+/* The result goes to its place, or the error is named. */
+static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err)
+{
+    if (status == UZ_OK)
+        status = take_wants(b, run, err);
     if (status == UZ_OK) {
+        count_rounds(b, b->results[run->index], &run->result->summary);
+        uz_result_free(b->results[run->index]);
         b->results[run->index] = run->result;
         run->result = NULL;
     } else if (b->problem->n_cases > 0) {
@@ -97,7 +136,7 @@ static uz_status close_case(uz_run *run, const batch *b, uz_status status, uz_er
     return status;
 }
 
-static uz_status solve_one(const batch *b, int64_t i, uz_error *err)
+static uz_status solve_one(batch *b, int64_t i, uz_error *err)
 {
     uz_run run;
     uz_status status = open_case(&run, b, i, err);
@@ -115,7 +154,7 @@ static int64_t blocks_for(const batch *b)
     return b->n > UZ_LANES ? 2 : 1;
 }
 
-static uz_status solve_block(const batch *b, uz_block *block, int64_t first, int64_t count, uz_error *err)
+static uz_status solve_block(batch *b, uz_block *block, int64_t first, int64_t count, uz_error *err)
 {
     uz_run *runs = uz_block_runs(block);
     int64_t open = 0, failed = first;
@@ -126,7 +165,7 @@ static uz_status solve_block(const batch *b, uz_block *block, int64_t first, int
         status = uz_block_solve(block, count, &failed, err);
     for (int64_t k = 0; k < open; k++) {
         if (status == UZ_OK)
-            close_case(&runs[k], b, status, err);
+            status = close_case(&runs[k], b, status, err);
         else if (runs[k].index == failed && b->problem->n_cases > 0)
             name_case(err, failed);
         uz_run_end(&runs[k]);
@@ -134,13 +173,13 @@ static uz_status solve_block(const batch *b, uz_block *block, int64_t first, int
     return status;
 }
 
-static uz_status solve_in_blocks(const batch *b, uz_error *err)
+static uz_status solve_in_blocks(batch *b, int64_t n, uz_error *err)
 {
     uz_block *block = NULL;
     int64_t width = blocks_for(b) * UZ_LANES;
     uz_status status = uz_block_create(&block, b->body, b->problem, blocks_for(b), err);
-    for (int64_t i = 0; status == UZ_OK && i < b->n; i += width)
-        status = solve_block(b, block, i, b->n - i < width ? b->n - i : width, err);
+    for (int64_t i = 0; status == UZ_OK && i < n; i += width)
+        status = solve_block(b, block, i, n - i < width ? n - i : width, err);
     uz_block_free(block);
     return status;
 }
@@ -173,20 +212,117 @@ static uz_status check(const batch *b, uz_error *err)
     return status;
 }
 
+/* The rows whose reactions the starts know have to be in, so that an answer is a start that takes no iterations. */
+static uz_status add_starts(batch *b, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    const int64_t m = b->body->rows.m;
+    for (int64_t i = 0; b->starts && i < b->n && status == UZ_OK; i++)
+        if (b->starts[i] && uz_state_check(b->starts[i], m, NULL) == UZ_OK)
+            status = uz_candidates_add_start(&b->wanted, b->starts[i], err);
+    return status;
+}
+
+static uz_status acquire(batch *b, uz_cache *cache, uz_error *err)
+{
+    uz_status status =
+        uz_cache_acquire_rows(&b->body, &b->reused, cache, b->problem, &b->wanted, b->settings, b->hooks, err);
+    if (status != UZ_OK || !b->body->rows.in || b->round > 1)
+        return status;
+    status = add_starts(b, err);
+    if (status != UZ_OK || uz_candidates_has(&b->body->rows, &b->wanted))
+        return status;
+    uz_cache_release(cache, b->body);
+    b->body = NULL;
+    return uz_cache_acquire_rows(&b->body, &b->reused, cache, b->problem, &b->wanted, b->settings, b->hooks, err);
+}
+
+/* The cases of this round, on its rows. */
+static uz_status solve_round(batch *b, uz_cache *cache, uz_error *err)
+{
+    const int64_t n = b->todo ? b->n_todo : b->n;
+    b->round_started = b->round == 1 ? b->started : uz_seconds();
+    uz_status status = acquire(b, cache, err);
+    if (status == UZ_OK)
+        status = check_memory(b, err);
+    if (status == UZ_OK && b->round == 1)
+        b->kept = uz_dual_describe(b->body->dual).m;
+    bool in_blocks = status == UZ_OK && n > 1 && uz_dual_describe(b->body->dual).op == UZ_OPERATOR_CONDENSED;
+    if (in_blocks)
+        status = solve_in_blocks(b, n, err);
+    for (int64_t i = 0; status == UZ_OK && !in_blocks && i < n; i++)
+        status = solve_one(b, i, err);
+    uz_cache_release(cache, b->body);
+    b->body = NULL;
+    return status;
+}
+
+/* There are answers with bounds: whoever ends the solve now gets these. */
+static bool is_over(const batch *b)
+{
+    uz_leave leave = {b->hooks, b->started + b->settings->time_limit_s};
+    return uz_leave_is_over(&leave);
+}
+
+static void end_before_round(batch *b)
+{
+    for (int64_t k = 0; k < b->n_todo; k++) {
+        uz_result *result = b->results[b->todo[k]];
+        if (result->summary.rounds == b->round)
+            continue; /* it had its turn */
+        result->summary.outcome = uz_cancelled(b->hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+        uz_explain_outcome(result, UZ_END_TARGET);
+    }
+}
+
+enum { MAX_ROUNDS = 8 };
+
+/* Rows are only ever added, and after some rounds all of them: the last round leaves none out. */
+static void prepare_round(batch *b)
+{
+    int64_t *done = b->todo;
+    b->todo = b->again;
+    b->n_todo = b->n_again;
+    b->again = done;
+    b->n_again = 0;
+    b->round++;
+    if (b->round < MAX_ROUNDS)
+        return;
+    memset(b->wanted.in, 1, (size_t)b->wanted.m);
+    b->wanted.count = b->wanted.m;
+}
+
+static uz_status solve_rounds(batch *b, uz_cache *cache, uz_error *err)
+{
+    uz_error cut = {0};
+    uz_status status = solve_round(b, cache, err);
+    while (status == UZ_OK && b->n_again > 0) {
+        if (!b->todo && !(b->todo = uz_alloc(b->n, sizeof *b->todo)))
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld cases", (long long)b->n);
+        prepare_round(b);
+        status = is_over(b) ? UZ_ERR_CANCELLED : solve_round(b, cache, &cut);
+        if (status == UZ_ERR_CANCELLED) {
+            end_before_round(b);
+            return UZ_OK;
+        }
+        if (status != UZ_OK && err)
+            *err = cut;
+    }
+    return status;
+}
+
 static uz_status solve_all(batch *b, uz_cache *cache, uz_error *err)
 {
     b->started = uz_seconds();
+    b->round = 1;
     uz_status status = check(b, err);
+    if (status == UZ_OK && !(b->again = uz_alloc(b->n, sizeof *b->again)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld cases", (long long)b->n);
     if (status == UZ_OK)
-        status = uz_cache_acquire(&b->body, &b->reused, cache, b->problem, b->settings, b->hooks, err);
-    if (status == UZ_OK)
-        status = check_memory(b, err);
-    bool in_blocks = status == UZ_OK && b->n > 1 && uz_dual_describe(b->body->dual).op == UZ_OPERATOR_CONDENSED;
-    if (in_blocks)
-        status = solve_in_blocks(b, err);
-    for (int64_t i = 0; status == UZ_OK && !in_blocks && i < b->n; i++)
-        status = solve_one(b, i, err);
-    uz_cache_release(cache, b->body);
+        status = solve_rounds(b, cache, err);
+    free(b->todo);
+    free(b->again);
+    uz_candidates_clear(&b->wanted);
     return status;
 }
 
@@ -200,7 +336,10 @@ uz_status uz_solve_regular(uz_result **out, const uz_problem *problem, const uz_
     if (problem->n_cases > 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "a problem with load cases is for uz_solve_cases");
     uz_status status = solve_all(&b, cache, err);
-    *out = result;
+    if (status == UZ_OK)
+        *out = result;
+    else
+        uz_result_free(result);
     return status;
 }
 

@@ -14,6 +14,7 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "methods/method.h"
+#include "rows.h"
 #include "solve.h"
 
 #include <float.h>
@@ -40,16 +41,24 @@ static uz_status make_load(uz_run *run, uz_error *err)
     if (!body->is_scene) {
         run->p = load_case && load_case->p ? load_case->p : run->problem->qp.p;
         run->h = load_case && load_case->h ? load_case->h : run->problem->qp.h;
+        run->h_all = run->h;
         return UZ_OK;
     }
     uz_scene scene = scene_of_case(run);
-    run->owned = uz_alloc_zero(run->d + run->m + body->model.n_fixed, sizeof(double));
+    int64_t kept = body->rows.in ? run->m : 0, n_fixed = body->model.n_fixed;
+    run->owned = uz_alloc_zero(run->d + run->all + n_fixed + kept, sizeof(double));
     if (!run->owned)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
+    double *h = run->owned + run->d;
     run->p = run->owned;
-    run->h = run->owned + run->d;
-    run->prescribed = run->owned + run->d + run->m;
-    return uz_body_model_load(run->owned, run->owned + run->d, run->prescribed, &body->model, &scene, err);
+    run->h = run->h_all = h;
+    run->prescribed = h + run->all;
+    uz_status status = uz_body_model_load(run->owned, h, run->prescribed, &body->model, &scene, err);
+    if (status == UZ_OK && body->rows.in) {
+        uz_candidates_gather(run->prescribed + n_fixed, h, &body->rows);
+        run->h = run->prescribed + n_fixed;
+    }
+    return status;
 }
 
 uz_status uz_run_make_load(uz_run *run, uz_error *err)
@@ -137,9 +146,9 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *e
         return status;
     *input = (uz_certify_input){
         .K = K,
-        .N = uz_body_N(run->body, run->problem),
+        .N = run->wide ? uz_body_all_rows(run->body, run->problem) : uz_body_N(run->body, run->problem),
         .p = run->p,
-        .h = run->h,
+        .h = run->wide ? run->h_all : run->h,
         .inverse_norm = inverse_norm,
         .ctx = run,
         .rcond = run->result->summary.rcond,
@@ -319,13 +328,28 @@ static uz_outcome conclude(const uz_run *run)
     }
 }
 
+/* What the rows that the body is solved with have of the start. */
+static uz_status take_start(uz_run *run, uz_error *err)
+{
+    uz_state *part = NULL;
+    if (!run->body->rows.in)
+        return uz_iterate_start(&run->it, run->load, run->start, err);
+    uz_status status = uz_state_check(run->start, run->all, err);
+    if (status == UZ_OK)
+        status = uz_state_gather(&part, run->start, &run->body->rows, err);
+    if (status == UZ_OK)
+        status = uz_iterate_start(&run->it, run->load, part, err);
+    uz_state_free(part);
+    return status;
+}
+
 uz_status uz_run_start(uz_run *run, uz_error *err)
 {
     uz_status status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
         status = uz_iterate_init(&run->it, run->m, run->settings->alpha, err);
     if (status == UZ_OK && run->start)
-        status = uz_iterate_start(&run->it, run->load, run->start, err);
+        status = take_start(run, err);
     if (status == UZ_OK)
         tell_begin(run);
     return status;
@@ -334,6 +358,8 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
 uz_status uz_run_finish(uz_run *run, uz_error *err)
 {
     uz_status status = iterate_until_certified(run, err);
+    if (status == UZ_OK)
+        status = uz_run_widen(run, err);
     if (status != UZ_OK)
         return status;
     run->result->summary.outcome = conclude(run);

@@ -3,6 +3,7 @@
 #include "cost.h"
 #include "dual/dual.h"
 #include "factor/factor.h"
+#include "rows.h"
 #include "solve.h"
 #include "uzawa.h"
 
@@ -62,6 +63,26 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, u
     return status;
 }
 
+/* The matrices of a scene with the rows that its solve begins with. */
+static uz_status make_scene(uz_qp *qp, int64_t *m, const uz_scene *scene, uz_error *err)
+{
+    uz_mesh_info info = {0};
+    uz_candidates rows = {0};
+    uz_csc N = {0};
+    uz_status status = uz_scene_to_qp(qp, &info, scene, err);
+    *m = qp->N.rows;
+    if (status == UZ_OK)
+        status = uz_choose_rows(&rows, qp->h, *m, &info, scene, NULL, err);
+    if (status == UZ_OK && rows.in) {
+        status = uz_candidates_reduce(&N, &qp->N, &rows, err);
+        uz_csc_clear(&qp->N);
+        qp->N = N;
+    }
+    uz_candidates_clear(&rows);
+    uz_mesh_info_clear(&info);
+    return status;
+}
+
 uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                      uz_error *err)
 {
@@ -70,10 +91,9 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
     bool scene = problem->kind == UZ_PROBLEM_SCENE;
     *out = (uz_prediction){.d = 0};
     uz_status status = uz_check_settings(settings, err);
+    int64_t m = problem->qp.N.rows;
     if (status == UZ_OK && scene) {
-        uz_mesh_info info = {0};
-        status = uz_scene_to_qp(&made, &info, &problem->scene, err);
-        uz_mesh_info_clear(&info);
+        status = make_scene(&made, &m, &problem->scene, err);
         qp = &made;
     }
     if (status == UZ_OK) {
@@ -85,7 +105,7 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
                              .bounds = uz_dual_bounds_dofs(&qp->N),
                              .cases = problem->n_cases};
         out->d = size.d;
-        out->m = size.m;
+        out->m = m;
         status = predict(out, &qp->K, &qp->N, &size, settings, hooks, err);
     }
     uz_qp_clear(&made);

@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "fields/evaluate.h"
 #include "linalg/linalg.h"
+#include "rows.h"
 
 #include <float.h>
 #include <math.h>
@@ -32,7 +33,7 @@ uz_status uz_check_settings(const uz_settings *s, uz_error *err)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
     if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
-    if (s->method == UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
+    if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
         !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "method, operator, ordering or stopping is not one of the known ones");
     return UZ_OK;
@@ -78,7 +79,11 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     uz_factor_info factor = describe_factor(run->body);
     uz_dual_info dual = uz_dual_describe(run->body->dual);
     run->d = summary->d = run->result->d = dual.d;
-    run->m = summary->m = run->result->m = dual.m;
+    run->m = run->all = summary->kept = dual.m;
+    if (run->body->rows.in)
+        run->all = run->body->rows.m;
+    summary->m = run->result->m = run->all;
+    summary->rounds = 1;
     summary->op = dual.op;
     summary->ordering = factor.ordering;
     run->hit = run->serves_many = summary->factor_cached = reused.op;
@@ -310,10 +315,26 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
     return status;
 }
 
+/* Where the iterations stood, in all rows. */
+static uz_status report_state(uz_run *run, uz_error *err)
+{
+    uz_state *part = NULL;
+    uz_status status = uz_iterate_state(&part, &run->it, run->load, run->settings->method, err);
+    if (status != UZ_OK || !run->body->rows.in) {
+        run->result->state = part;
+        return status;
+    }
+    status = uz_state_scatter(&run->result->state, part, &run->body->rows, err);
+    uz_state_free(part);
+    return status;
+}
+
 uz_status uz_run_report(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
     summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
+    if (run->all == 0)
+        summary->method = UZ_METHOD_LINEAR;
     summary->origin = run->it.origin;
     summary->iterations = run->it.iteration;
     summary->restarts = run->it.restarts;
@@ -321,7 +342,7 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
     summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
     uz_status status = UZ_OK;
     if (!run->result->ray)
-        status = uz_iterate_state(&run->result->state, &run->it, run->load, run->settings->method, err);
+        status = report_state(run, err);
     return status == UZ_OK ? uz_run_publish(run, err) : status;
 }
 
@@ -332,6 +353,7 @@ void uz_run_end(uz_run *run)
     uz_factor_workspace_free(run->ws);
     free(run->owned);
     uz_answer_clear(&run->answer);
+    uz_candidates_clear(&run->wants);
     free(run->work);
     uz_result_free(run->result);
 }

@@ -11,6 +11,7 @@ static const char *const METHODS[] = {
     [UZ_METHOD_ACCELERATED_RESTART] = "accelerated_restart",
     [UZ_METHOD_ACTIVE_SET] = "active_set",
     [UZ_METHOD_GIVEN] = "given",
+    [UZ_METHOD_LINEAR] = "linear",
 };
 static const char *const OPERATORS[] = {
     [UZ_OPERATOR_AUTO] = "auto",
@@ -79,7 +80,7 @@ const char *uz_outcome_name(uz_outcome value)
 
 bool uz_method_parse(uz_method *out, const char *name)
 {
-    int found = find_name(METHODS, UZ_METHOD_GIVEN, name); /* nobody can ask for an answer that is given */
+    int found = find_name(METHODS, UZ_METHOD_GIVEN, name); /* what follows are results, nobody can ask for them */
     if (found >= 0)
         *out = (uz_method)found;
     return found >= 0;

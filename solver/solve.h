@@ -26,9 +26,12 @@ typedef struct {
     bool hit;                      /* the body came from the cache */
     bool serves_many;              /* it serves more than this case: what makes certificates cheaper pays */
     uz_body *body;                 /* borrowed */
-    int64_t d, m;
-    const double *p, *h; /* d, m */
-    double *owned;       /* scenes: room of p, h and prescribed */
+    int64_t d, m;        /* m: rows that the body is solved with; once the run is `wide` all of the problem's */
+    int64_t all;         /* rows of the problem */
+    bool wide;           /* answer and certificate are about all rows */
+    const double *p, *h; /* d, rows that the body is solved with */
+    const double *h_all; /* all */
+    double *owned;       /* scenes: room of p, h_all, prescribed and h */
     double *prescribed;  /* scenes: n_fixed */
     uz_case *load;
     uz_iterate it;
@@ -41,6 +44,7 @@ typedef struct {
     bool in_block;            /* other cases began before this one ended */
     bool again;               /* the method's target was met, the certificate was not */
     uz_end end;
+    uz_candidates wants; /* rows that the case has to be solved with, as others were left out wrongly; in NULL: none */
     uz_result *result;
 } uz_run;
 
@@ -62,6 +66,10 @@ uz_status uz_run_start(uz_run *run, uz_error *err);   /* vectors, the given star
 uz_status uz_run_iterate(uz_run *run, uz_error *err); /* until the method's own estimate is met, or it ends */
 uz_status uz_run_certify(uz_run *run, uz_error *err); /* the best answer */
 uz_status uz_run_finish(uz_run *run, uz_error *err);  /* further rounds where the certificate asks for them */
+/* The answer and its certificate become those of all rows, where the body left some out (widen.c); run->wants. */
+uz_status uz_run_widen(uz_run *run, uz_error *err);
+/* From here on certificates are about all rows, of which the answer has room. */
+void uz_run_take_all_rows(uz_run *run);
 /* Fills answer->certificate and answer->g from answer->u and answer->r (caller's rows), from the original data. */
 uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err);
 /* Iterative refinement of run->answer while its certificate misses the request and gets better. */

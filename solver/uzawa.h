@@ -172,7 +172,8 @@ typedef enum {
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
     UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
-    UZ_METHOD_GIVEN                /* results of uz_verify only: the answer is the caller's */
+    UZ_METHOD_GIVEN,               /* results of uz_verify only: the answer is the caller's */
+    UZ_METHOD_LINEAR /* results only: without contact rows u is one linear solve, whatever was asked for */
 } uz_method;
 typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE } uz_operator;
 typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;
@@ -351,6 +352,9 @@ typedef struct {
     int64_t d, m, iterations, restarts;
     int64_t refinements; /* corrections by the residual of the original data that made the certificate better */
     int64_t active;      /* rows with r < 0 */
+    int64_t kept;        /* rows that the last round solved with, of m; the others are proved not to matter */
+    int64_t added;       /* those of them that the first round had left out */
+    int64_t rounds;      /* bodies that were solved: 1 unless a row that was left out turned out to matter */
     double reaction_sum, max_penetration;
     int dim;                     /* scene: 2 or 3, else 0 */
     double force[3];             /* scene: force of the body on the obstacle's normal side, sum of -r n */

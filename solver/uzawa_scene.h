@@ -138,7 +138,7 @@ typedef struct {
     int64_t n_loads;
     uz_contact *contacts;
     int64_t n_contacts;
-    bool all_candidates; /* contact rows also for nodes that surely cannot touch */
+    bool all_candidates; /* solve with every contact row, also those far from any obstacle */
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);
 /* Dimensions of the bodies that its model is for: 2 or 3. */

@@ -74,6 +74,7 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
 {
     uz_summary *summary = &run->result->summary;
     uz_status status = uz_run_make_load(run, err);
+    uz_run_take_all_rows(run);
     if (status == UZ_OK)
         status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)

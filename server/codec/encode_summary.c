@@ -106,6 +106,9 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
     text_key(t, "contact");
     text_open(t, '{');
     put_count(t, "candidates", s->m);
+    put_count(t, "kept", s->kept);
+    put_count(t, "added", s->added);
+    put_count(t, "rounds", s->rounds);
     put_count(t, "active", s->active);
     put_named(t, (named[]){{"reaction_sum", s->reaction_sum}, {"max_penetration", s->max_penetration}}, 2);
     if (scene) {

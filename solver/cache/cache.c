@@ -14,11 +14,11 @@ static void destroy_body(void *object)
 }
 
 /* Makes the body of a reserved item. */
-static uz_status fill(uz_cache *cache, uz_item *item, const uz_problem *problem, const uz_body_key *key,
-                      const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+static uz_status fill(uz_cache *cache, uz_item *item, const uz_problem *problem, const uz_candidates *wanted,
+                      const uz_body_key *key, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
     uz_body *body = NULL;
-    uz_status status = uz_body_create(&body, problem, key, settings, cache, hooks, err);
+    uz_status status = uz_body_create(&body, problem, wanted, key, settings, cache, hooks, err);
     if (status == UZ_OK) {
         body->item = item;
         uz_table_publish(cache, item, body, body->bytes, destroy_body);
@@ -31,6 +31,13 @@ static uz_status fill(uz_cache *cache, uz_item *item, const uz_problem *problem,
 uz_status uz_cache_acquire(uz_body **body, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
                            const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
+    return uz_cache_acquire_rows(body, reused, cache, problem, NULL, settings, hooks, err);
+}
+
+uz_status uz_cache_acquire_rows(uz_body **body, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
+                                const uz_candidates *wanted, const uz_settings *settings, const uz_hooks *hooks,
+                                uz_error *err)
+{
     static const uz_reuse everything = {true, true, true, true}, nothing;
     uz_body_key key;
     uz_item *item = NULL;
@@ -38,12 +45,12 @@ uz_status uz_cache_acquire(uz_body **body, uz_reuse *reused, uz_cache *cache, co
     *body = NULL;
     *reused = nothing;
     if (!cache)
-        return uz_body_create(body, problem, NULL, settings, NULL, hooks, err);
-    uz_status status = uz_body_digest(&key, problem, settings, err);
+        return uz_body_create(body, problem, wanted, NULL, settings, NULL, hooks, err);
+    uz_status status = uz_body_digest(&key, problem, wanted, settings, err);
     if (status == UZ_OK)
         status = uz_table_acquire(&item, &create, cache, UZ_ITEM_BODY, key.digest, hooks, err);
     if (status == UZ_OK && create)
-        status = fill(cache, item, problem, &key, settings, hooks, err);
+        status = fill(cache, item, problem, wanted, &key, settings, hooks, err);
     if (status != UZ_OK)
         return status;
     *body = uz_item_object(item);

@@ -257,6 +257,30 @@ static void bench_oblique_planes(report *out)
     }
 }
 
+static void bench_surfaces(report *out)
+{
+    static const struct {
+        const char *name;
+        int64_t n;
+        bool solid;
+    } rows[] = {
+        {"candidates_box_nx600", 600, false}, {"candidates_cube_n16", 16, true}, {"candidates_cube_n24", 24, true}};
+    for (size_t k = 0; k < sizeof rows / sizeof rows[0]; k++) {
+        bench_candidates x;
+        char text[128];
+        if (!bench_candidates_left_out(&x, rows[k].n, rows[k].solid)) {
+            printf("%s did not converge\n", rows[k].name);
+            exit(1);
+        }
+        snprintf(text, sizeof text, "with all, %.3f s: %lld of %lld rows, %lld rounds, %.0f of %.0f MB",
+                 x.all_seconds.median, (long long)x.kept, (long long)x.given, (long long)x.rounds, 1e-6 * x.bytes,
+                 1e-6 * x.all_bytes);
+        const bench_value ratio = {x.seconds.median / x.all_seconds.median, x.seconds.min / x.all_seconds.max,
+                                   x.seconds.max / x.all_seconds.min, x.seconds.runs};
+        print_row(out, rows[k].name, "x", ratio, text);
+    }
+}
+
 static void bench_cases(report *out, int64_t nx)
 {
     bench_value ratio;
@@ -358,6 +382,8 @@ int main(int argc, char **argv)
         bench_oblique_planes(&out);
     if (wanted(&out, "memory"))
         bench_memories(&out);
+    if (wanted(&out, "candidates"))
+        bench_surfaces(&out);
     if (wanted(&out, "hex8"))
         bench_cubes(&out);
     if (!out.filter || strncmp(out.filter, "stop", 4) == 0)

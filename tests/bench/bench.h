@@ -66,6 +66,15 @@ typedef struct {
 const char *bench_assembly_name(int which);
 bool bench_assembly_of(bench_assembly *out, int which);
 
+/* Cold solves of bodies whose whole surface may touch, with all candidates and with those kept: a cube of n x n x n
+ * bricks on a sphere (solid), or the paper's body with n x n/3 cells between four walls. false: no answer. */
+typedef struct {
+    int64_t given, kept, rounds;
+    bench_value seconds, all_seconds;
+    double bytes, all_bytes;
+} bench_candidates;
+bool bench_candidates_left_out(bench_candidates *out, int64_t n, bool solid);
+
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);
 

@@ -302,7 +302,7 @@ static void digest_of(char digest[65], const uz_problem *problem, const uz_setti
 {
     uz_body_key key;
     uz_error err = {0};
-    CHECK(uz_body_digest(&key, problem, settings, &err) == UZ_OK);
+    CHECK(uz_body_digest(&key, problem, NULL, settings, &err) == UZ_OK);
     memcpy(digest, key.digest, 65);
     CHECK_INT(strlen(digest), 64);
 }

@@ -23,6 +23,7 @@ typedef struct {
     uz_problem problem;
     uz_settings settings;
     bool cached; /* through a cache, twice */
+    long step;   /* between the allocations that fail, 0: 1 */
 } scenario;
 
 /* Solves once or twice; whether every call ended as it may: with an answer or with UZ_ERR_MEMORY. */
@@ -50,7 +51,7 @@ static void attempt(const scenario *s, long n)
 /* The 1st, 2nd, ... allocation fails until none is left that could. Returns how many there were. */
 static long fail_each(const scenario *s)
 {
-    for (long n = 0; n < MOST_ALLOCATIONS; n++) {
+    for (long n = 0; n<MOST_ALLOCATIONS; n += s->step> 0 ? s->step : 1) {
         heap.live = 0;
         heap.until_failure = n;
         heap.failed = false;
@@ -141,6 +142,24 @@ TEST(scenes)
     check_scenario("chosen cells", chosen, UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
     check_scenario("factored scene", scene_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_FACTORED,
                    UZ_ORDERING_METIS, false);
+}
+
+/* A slender cantilever between two walls, whose end reaches the one that its rows were left out of. */
+TEST(rows_left_out)
+{
+    uz_problem slender = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(60, 2, 260, 1)};
+    add_support(&slender.scene, "left", 0, 0);
+    add_load(&slender.scene, "right", 0, 4);
+    add_plane(&slender.scene, "bottom", 0, -0.5, 0, 1);
+    add_plane(&slender.scene, "top", 0, 4, 0, -1);
+    uz_result *x = NULL;
+    const uz_settings settings = uz_settings_default();
+    CHECK_INT(uz_solve(&x, &slender, &settings, NULL, NULL, NULL), UZ_OK);
+    CHECK(x->summary.rounds > 1 && x->summary.added > 0);
+    uz_result_free(x);
+    scenario s = {"rows left out", slender, settings, false, 7}; /* as its rows are many, each attempt is slow */
+    CHECK(fail_each(&s) > 50);
+    uz_problem_clear(&slender);
 }
 
 TEST(matrices)
