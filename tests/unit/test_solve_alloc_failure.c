@@ -51,7 +51,8 @@ static void attempt(const scenario *s, long n)
 /* The 1st, 2nd, ... allocation fails until none is left that could. Returns how many there were. */
 static long fail_each(const scenario *s)
 {
-    for (long n = 0; n<MOST_ALLOCATIONS; n += s->step> 0 ? s->step : 1) {
+    const long step = s->step > 0 ? s->step : 1;
+    for (long n = 0; n < MOST_ALLOCATIONS; n += step) {
         heap.live = 0;
         heap.until_failure = n;
         heap.failed = false;
@@ -68,7 +69,7 @@ static long fail_each(const scenario *s)
 static void check_scenario(const char *name, uz_problem problem, uz_method method, uz_operator op, uz_ordering ordering,
                            bool cached)
 {
-    scenario s = {name, problem, uz_settings_default(), cached};
+    scenario s = {name, problem, uz_settings_default(), cached, 1};
     s.settings.semidefinite = true; /* heard only where K is singular */
     s.settings.method = method;
     s.settings.op = op;
