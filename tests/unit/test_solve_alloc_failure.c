@@ -23,7 +23,7 @@ typedef struct {
     uz_problem problem;
     uz_settings settings;
     bool cached; /* through a cache, twice */
-    long step;   /* between the allocations that fail, 0: 1 */
+    long step;   /* between the allocations that fail */
 } scenario;
 
 /* Solves once or twice; whether every call ended as it may: with an answer or with UZ_ERR_MEMORY. */
@@ -68,7 +68,7 @@ static long fail_each(const scenario *s)
 static void check_scenario(const char *name, uz_problem problem, uz_method method, uz_operator op, uz_ordering ordering,
                            bool cached)
 {
-    scenario s = {name, problem, uz_settings_default(), cached};
+    scenario s = {name, problem, uz_settings_default(), cached, 1};
     s.settings.semidefinite = true; /* heard only where K is singular */
     s.settings.method = method;
     s.settings.op = op;
