@@ -23,7 +23,7 @@ typedef struct {
     uz_problem problem;
     uz_settings settings;
     bool cached; /* through a cache, twice */
-    long step;   /* between the allocations that fail, 0: 1 */
+    long step;   /* between the allocations that fail */
 } scenario;
 
 /* Solves once or twice; whether every call ended as it may: with an answer or with UZ_ERR_MEMORY. */
