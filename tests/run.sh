@@ -19,17 +19,19 @@ locale=()
 if localedef -i de_DE -f UTF-8 "$work/de_DE.UTF-8" >/dev/null 2>&1; then locale=(env "LOCPATH=$work"); fi
 
 run_one() { # NAME COMMAND...
-    local name=$1 out=$work/out status
+    local name=$1 out=$work/out status TIMEFORMAT='%U %S' user system
     shift
     SECONDS=0
-    "$@" >"$out" 2>&1
+    { time "$@" >"$out" 2>&1; } 2>"$work/time"
     status=$?
+    read -r user system < <(tail -1 "$work/time")
     if [ $status -ne 0 ] && ! grep -q '^not ok ' "$out"; then
         echo "not ok $name: exit status $status" >>"$out"
     fi
     # Show failures with what led to them; successes stay one line per program.
     if grep -q '^not ok ' "$out"; then cat "$out"; else
-        printf '%-34s %4s passed %4s s\n' "$name" "$(grep -c '^ok ' "$out")" "$SECONDS"
+        printf '%-34s %4s passed %4s s %4.0f s of processor\n' "$name" "$(grep -c '^ok ' "$out")" "$SECONDS" \
+            "$(echo "$user + $system" | awk '{print $1 + $3}')"
         grep '^skip ' "$out"
     fi
     cat "$out" >>"$log"

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Runs every fuzz target for SECONDS and prints one "ok" or "not ok" line for each; the last line counts them.
+# Runs every fuzz target for SECONDS, one per core at a time, and prints one "ok" or "not ok" line for each; the last
+# line counts them.
 # usage: tests/fuzz/run.sh BUILD_DIR SECONDS [TARGET...]
 # An input that breaks a target stays in BUILD_DIR/fuzz/found; `BUILD_DIR/fuzz/TARGET FILE` runs it again.
 set -uo pipefail
@@ -34,9 +35,17 @@ fuzz() { # TARGET
     fi
 }
 
-passed=0 failed=0
+# One per core at a time.
+passed=0 failed=0 running=0
+collect() {
+    if wait -n; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
+    running=$((running - 1))
+}
 for target in "${targets[@]}"; do
-    if fuzz "$target"; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
+    [ "$running" -lt "$(nproc)" ] || collect
+    fuzz "$target" &
+    running=$((running + 1))
 done
+while [ "$running" -gt 0 ]; do collect; done
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]

@@ -3,6 +3,7 @@
 #include "codec/codec.h"
 #include "codec/decode.h"
 #include "harness.h"
+#include "sanitized.h"
 
 #include <jansson.h>
 #include <stdint.h>
@@ -58,18 +59,16 @@ void __wrap_free(void *block)
 static void exhaust(bool (*attempt)(const char *), const char *argument)
 {
     enum { MOST = 20000 };
-    int64_t n = 0;
+    long n = 0;
     bool done = false;
     json_set_alloc_funcs(malloc, free);
-    for (; n < MOST && !done; n++) {
+    for (; n < MOST && !done; n = next_allocation(n)) {
         int64_t before = blocks;
         countdown = n;
         done = attempt(argument);
-        CHECK_MSG(!done || countdown >= 0, "%s: allocation %lld failed without a word", argument ? argument : "",
-                  (long long)n);
+        CHECK_MSG(!done || countdown >= 0, "%s: allocation %ld failed without a word", argument ? argument : "", n);
         countdown = -1;
-        CHECK_MSG(blocks == before, "allocation %lld failed: %lld blocks left", (long long)n,
-                  (long long)(blocks - before));
+        CHECK_MSG(blocks == before, "allocation %ld failed: %lld blocks left", n, (long long)(blocks - before));
     }
     CHECK(done && n > 1);
 }

@@ -1,5 +1,6 @@
 #include "codec/json_doc.h"
 #include "harness.h"
+#include "sanitized.h"
 
 #include <dirent.h>
 #include <sys/resource.h>
@@ -345,15 +346,6 @@ static char *big_body(size_t size, size_t *len)
     *len = at + (size_t)sprintf(body + at, "]}");
     return body;
 }
-
-#ifndef __has_feature
-#define __has_feature(name) 0 /* clang's way of saying what gcc says with a macro */
-#endif
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || __has_feature(address_sanitizer)
-enum { SANITIZED = 1 };
-#else
-enum { SANITIZED = 0 };
-#endif
 
 TEST(memory_stays_below_twice_the_body)
 {

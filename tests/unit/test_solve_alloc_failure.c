@@ -3,6 +3,7 @@
 #include "failing_heap.h"
 #include "harness.h"
 #include "qp_fixture.h"
+#include "sanitized.h"
 #include "scene_fixture.h"
 
 #include <suitesparse/SuiteSparse_config.h>
@@ -52,7 +53,7 @@ static void attempt(const scenario *s, long n)
 static long fail_each(const scenario *s)
 {
     const long step = s->step > 0 ? s->step : 1;
-    for (long n = 0; n < MOST_ALLOCATIONS; n += step) {
+    for (long n = 0; n < MOST_ALLOCATIONS; n = step > 1 ? n + step : next_allocation(n)) {
         heap.live = 0;
         heap.until_failure = n;
         heap.failed = false;
@@ -262,7 +263,7 @@ static void check_cases(uz_operator op, uz_method method, int64_t count)
     problem.n_cases = count;
     for (int64_t i = 1; i < count; i += 2)
         starts[i] = earlier->state;
-    for (bool more = true; more && n < MOST_ALLOCATIONS; n++) {
+    for (bool more = true; more && n < MOST_ALLOCATIONS; n = next_allocation(n)) {
         begin_watching(n);
         attempt_cases(&problem, &settings, starts, n);
         more = end_watching("cases", n);
@@ -287,7 +288,7 @@ TEST(verification)
     long n = 0;
     CHECK_INT(uz_solve(&answer, &problem, &settings, NULL, NULL, NULL), UZ_OK);
     settings.relative_error = 1e-6;
-    for (bool more = true; more && n < MOST_ALLOCATIONS; n++) {
+    for (bool more = true; more && n < MOST_ALLOCATIONS; n = next_allocation(n)) {
         begin_watching(n);
         attempt_verification(&problem, &settings, answer, n);
         more = end_watching("verification", n);
