@@ -139,8 +139,11 @@ $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/theory: $(call obj,$(THEORY_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
-$(BUILD)/load: $(call obj,$(SOAK_SRC))
+$(BUILD)/load: $(call obj,tests/soak/load.c)
 	$(CC) $(LDFLAGS_ALL) -o $@ $^
+
+$(BUILD)/library: $(call obj,tests/soak/library.c) $(PARTS_OBJ) $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
 
 # Stands before the heap of a whole daemon: never with a sanitizer, which has its own.
 $(BUILD)/%.so: tests/preload/%.c
@@ -155,12 +158,12 @@ test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
 
-unit-bins: $(UNIT_BIN) $(PRELOADS)
+unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library
 
 test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 	@tests/run.sh $(BUILD) unit $(FILTER)
 
-test-api: all $(PRELOADS) ## the tests that drive the real daemon and client; FILTER=name runs some
+test-api: all $(PRELOADS) $(BUILD)/library ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
 test-hygiene: ## formatting, static analysis, both compilers
@@ -186,7 +189,7 @@ tsan: deps-test ## the server's tests under ThreadSanitizer
 	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT) $(TSAN_API)"
 
 soak: deps-test ## a long life in an hour: kills, power losses, slow clients, a million jobs; a table; FILTER=name runs some
-	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(PRELOADS)
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(BUILD)/library $(PRELOADS)
 	@$(PYTHON) -B tests/soak/soak.py $(BUILD) "$(FILTER)"
 
 fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
