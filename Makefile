@@ -153,7 +153,7 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak bench bench-size extremes theory
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -191,6 +191,11 @@ tsan: deps-test ## the server's tests under ThreadSanitizer
 soak: deps-test ## a long life in an hour: kills, power losses, slow clients, a million jobs; a table; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(BUILD)/library $(PRELOADS)
 	@$(PYTHON) -B tests/soak/soak.py $(BUILD) "$(FILTER)"
+
+valgrind: deps-test ## the C tests under valgrind, VALGRIND_SECONDS (default 60) each; FILTER=name runs some
+	@tests/deps.sh valgrind
+	@$(MAKE) --no-print-directory -s -j$$(nproc) unit-bins
+	@tests/valgrind.sh $(BUILD) $(FILTER)
 
 fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
 	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang fuzz-bins
