@@ -148,8 +148,11 @@ $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/theory: $(call obj,$(THEORY_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
-$(BUILD)/load: $(call obj,$(SOAK_SRC))
+$(BUILD)/load: $(call obj,tests/soak/load.c)
 	$(CC) $(LDFLAGS_ALL) -o $@ $^
+
+$(BUILD)/library: $(call obj,tests/soak/library.c) $(PARTS_OBJ) $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
 
 # Stands before the heap of a whole daemon: never with a sanitizer, which has its own.
 $(BUILD)/%.so: tests/preload/%.c
@@ -159,17 +162,17 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak bench bench-size extremes theory
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
 
-unit-bins: $(UNIT_BIN) $(PRELOADS)
+unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library
 
 test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 	@tests/run.sh $(BUILD) unit $(FILTER)
 
-test-api: all $(PRELOADS) ## the tests that drive the real daemon and client; FILTER=name runs some
+test-api: all $(PRELOADS) $(BUILD)/library ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
 test-hygiene: ## formatting, static analysis, both compilers
@@ -195,8 +198,13 @@ tsan: deps-test ## the server's tests under ThreadSanitizer
 	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT) $(TSAN_API)"
 
 soak: deps-test ## a long life in an hour: kills, power losses, slow clients, a million jobs; a table; FILTER=name runs some
-	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(PRELOADS)
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(BUILD)/library $(PRELOADS)
 	@$(PYTHON) -B tests/soak/soak.py $(BUILD) "$(FILTER)"
+
+valgrind: deps-test ## the C tests under valgrind, VALGRIND_SECONDS (default 60) each; FILTER=name runs some
+	@tests/deps.sh valgrind
+	@$(MAKE) --no-print-directory -s -j$$(nproc) unit-bins
+	@tests/valgrind.sh $(BUILD) $(FILTER)
 
 fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
 	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang fuzz-bins

@@ -261,8 +261,19 @@ void uz_explain_outcome(uz_result *result, uz_end end)
     default:
         return;
     }
-    snprintf(s->message, sizeof s->message, "%s. Certified: relative error at most %.3g, asked for %.3g.", why,
-             s->certificate.relative_error, s->requested_error);
+    const uz_certificate *c = &s->certificate;
+    if (isfinite(c->relative_error))
+        snprintf(s->message, sizeof s->message, "%s. Certified: relative error at most %.3g, asked for %.3g.", why,
+                 c->relative_error, s->requested_error);
+    else if (isfinite(c->absolute_error))
+        snprintf(
+            s->message, sizeof s->message,
+            "%s. Certified: error at most %.3g in the energy norm, which is too much to bound a relative error; asked "
+            "for %.3g.",
+            why, c->absolute_error, s->requested_error);
+    else
+        snprintf(s->message, sizeof s->message, "%s. Nothing could be certified; asked for a relative error of %.3g.",
+                 why, s->requested_error);
 }
 
 /* In a block the others' time is not this case's. */

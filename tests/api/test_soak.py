@@ -8,6 +8,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "soak"))
 
 import malformed  # noqa: E402  the path is set above
 import no_memory  # noqa: E402
+import overhead  # noqa: E402
 import scenarios  # noqa: E402
 import service  # noqa: E402
 from service import Skip, check, options  # noqa: E402
@@ -56,8 +57,16 @@ def test_no_memory(s):
 
 
 @options(None)
+def test_overhead(s):
+    if not pathlib.Path(s.build, "library").exists():
+        raise Skip("library was not built")
+    clean(overhead.overhead(s.build, (60, 20), 1))
+
+
+@options(None)
 def test_cancels(s):
     clean(scenarios.cancels(s.build, 5))
+    clean(scenarios.cancels(s.build, 2, scenarios.LARGE))
 
 
 @options(None)

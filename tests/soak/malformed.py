@@ -105,8 +105,9 @@ def _send(s, mutator, lock, chance, deal, seen, wrong):
 
 
 def resident(s):
+    """Megabytes of its own that the daemon holds."""
     with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
-        return next(int(line.split()[1]) for line in file if line.startswith("VmRSS")) / 1024
+        return next(int(line.split()[1]) for line in file if line.startswith("RssAnon")) / 1024
 
 
 def _drain(s, seconds=120):
@@ -134,11 +135,12 @@ def malformed(build, count, seed=1, clients=4, report=None):
     """Sends so many mutants; errors: replies that are 5xx but 503 and 507, or none; jobs that ended as "internal"."""
     s = service.Service(build, *LIMITS)
     seen, wrong, figures = collections.Counter(), [], {"mutants": 0}
+    memory = []
     try:
         s.start()
         mutator = Mutator(s.solve(service.MATRICES)["id"])
         lock, chance = threading.Lock(), random.Random(seed)
-        for part in (count // 3, count - count // 3):
+        for part in (count // 4,) * 3 + (count - 3 * (count // 4),):
             deal = {"left": part, "sent": 0}
             threads = [threading.Thread(target=_send, args=(s, mutator, lock, chance, deal, seen, wrong)) for _ in range(clients)]
             for one in threads:
@@ -146,14 +148,13 @@ def malformed(build, count, seed=1, clients=4, report=None):
             for one in threads:
                 one.join()
             figures["stuck"] = int(not _drain(s))
-            figures["memory_grown_mb"] = round(resident(s) - figures.get("memory_mb", resident(s)), 1)
-            figures["memory_mb"] = round(resident(s), 1)
+            memory.append(round(resident(s), 1))
             figures["mutants"] += deal["sent"]
         inner = _inner_failures(s)
         wrong += [("job", b"", json.dumps(one).encode()) for one in inner]
         right = s.solve(service.MATRICES)  # it still solves
         figures["errors"] = len(wrong) + (right["summary"]["outcome"] != "converged") + (figures["mutants"] != count)
-        figures |= dict(sorted(seen.items()))
+        figures |= {"memory_mb": "/".join(map(str, memory)), **dict(sorted(seen.items()))}
         figures["wrong_exit"] = s.end()
         for one in wrong if report is None else ():
             print("#", *one, sep="\n#   ")

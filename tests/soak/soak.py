@@ -10,6 +10,7 @@ import time
 
 import malformed
 import no_memory
+import overhead
 import scenarios
 from scenarios import PAPER, ZERO
 
@@ -29,7 +30,9 @@ RUNS = [
     ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
     ("200,000 malformed requests", lambda b: malformed.malformed(b, 200000)),
     ("every allocation of a job fails", no_memory.failing),
-    ("cancel", lambda b: scenarios.cancels(b, 100)),
+    ("600 x 200 cells: HTTP against the library", overhead.overhead),
+    ("cancel", lambda b: scenarios.cancels(b, 200)),
+    ("cancel while ordering and factoring", lambda b: scenarios.cancels(b, 50, scenarios.LARGE)),
     ("30 x 10 body, default solver", lambda b: scenarios.throughput(b, 20)),
     ("30 x 10 body, accelerated_restart", lambda b: scenarios.throughput(b, 20, PAPER)),
     ("30 x 10 body, acknowledged only", lambda b: scenarios.throughput(b, 10, None, 64, "wait=0")),

@@ -1,0 +1,67 @@
+"""What becomes of a job that needs more time or memory than it may have, before its first iteration.
+usage: test_job_limits.py BUILD_DIR [FILTER]"""
+import copy
+import math
+import re
+
+import service
+from service import MATRICES, SCENE, check, expect, options
+
+FIELDS = "?fields=displacements,reactions,gaps"
+
+
+def plate(**solver):
+    body = copy.deepcopy(SCENE)
+    body["problem"]["mesh"]["box"]["cells"] = [120, 40]
+    body["solver"] = {"accuracy": {"relative_error": 1e-6}, **solver}
+    return body
+
+
+def check_out_of_time(s, body):
+    """Factored, then out of time: the answer says so, bounds its own error, and can be gone on with."""
+    job = s.solve(body)
+    check(job["status"] == "successful", job)
+    summary = job["summary"]
+    check(summary["outcome"] == "time_limit" and summary["iterations"] == 0 and "time_limit_s" in summary["message"], summary)
+    certificate = summary["certificate"]
+    check(certificate["absolute_error"] is None or 0 < certificate["absolute_error"] < math.inf, certificate)
+    check("inf" not in summary["message"].replace("infeasible", "") and "nan" not in summary["message"], summary["message"])
+    result = expect(s.get(f"/v1/jobs/{job['id']}/result{FIELDS}"), 200).json
+    check(max(result["reactions"]) <= 0 and all(math.isfinite(r) for r in result["reactions"]), result["reactions"])
+    return job, certificate, result
+
+
+def test_time_while_factoring(s):
+    job, certificate, _ = check_out_of_time(s, plate(time_limit_s=1e-6))
+    exact = s.solve(plate())["summary"]["energy"]
+    below = exact["primal"] - job["summary"]["energy"]["dual"]  # psi(r) is a lower bound of the optimum
+    check(-1e-9 <= below <= 0.5 * certificate["absolute_error"] ** 2 * (1 + 1e-9), below, certificate, exact)
+    on = s.request("POST", f"/v1/jobs/{job['id']}/refine", {"accuracy": {"relative_error": 1e-6}, "time_limit_s": 60},
+                   {"Prefer": "wait=60"})
+    check(expect(on, 200).json["summary"]["outcome"] == "converged", on)
+
+
+def test_time_without_a_factor(s):
+    check_out_of_time(s, plate(time_limit_s=1e-6, operator="matrix_free"))
+
+
+@options("--max-solve-s", "0.000001")
+def test_time_of_the_daemon(s):
+    """The daemon's own limit holds where the request asks for more, or for nothing."""
+    check_out_of_time(s, plate())
+    check_out_of_time(s, plate(time_limit_s=1000))
+
+
+@options("--memory", "4M")
+def test_memory(s):
+    """Refused before it is taken, with the bytes; what fits is solved beside it."""
+    refused, small = s.post(plate()).json, s.solve(MATRICES)
+    job = s.get(f"/v1/jobs/{refused['id']}", Prefer="wait=60").json
+    check(small["status"] == "successful" and job["status"] == "failed", small, job)
+    check(job["error"]["code"] == "memory_limit", job)
+    bytes_ = [float(number) for number in re.findall(r"([\d.e+]+) bytes", job["error"]["detail"])]
+    check(bytes_ and max(bytes_) > 4 << 20, job["error"]["detail"])
+
+
+if __name__ == "__main__":
+    service.main(globals())
