@@ -116,6 +116,9 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
  * where they are. Less the loads and the springs' -k u it is what supports and obstacles do. */
 uz_status uz_internal_forces(double *f, const uz_body_model *model, const double *nodal, uz_error *err);
 
+/* 1/2 u'K u over all dofs, springs included. */
+uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err);
+
 /* What turning a vector at a node from its dofs to the axes may round in each component: 0 where they are the same. */
 double uz_turning_error(const uz_body_model *model, int64_t node, const double *v);
 /* A bound on delta' K delta, over all dofs, for the errors delta that turning leaves in nodal (n_nodes x dim): the sum

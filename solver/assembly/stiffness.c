@@ -278,6 +278,44 @@ uz_status uz_internal_forces(double *f, const uz_body_model *model, const double
     return status;
 }
 
+/* ------------------------------------------------------------ strain energy */
+
+/* An element's displacements against those of its first node: a translation strains nothing, and what it would leave by
+ * rounding grows with it. Not along the radius. */
+static void take_relative(double *d, const uz_body_model *model, const double *nodal, const int64_t *node, int count)
+{
+    const int dim = model->mesh.dim;
+    for (int i = 0; i < count * dim; i++) {
+        const bool radial = model->kind == UZ_AXISYMMETRIC && i % dim == 0;
+        d[i] = nodal[node[i / dim] * dim + i % dim] - (radial ? 0 : nodal[node[0] * dim + i % dim]);
+    }
+}
+
+uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err)
+{
+    const uz_mesh *mesh = &model->mesh;
+    stiffness_source source;
+    const double *ke;
+    double twice = 0;
+    uz_status status = source_init(&source, model, err);
+    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
+        double d[DOFS];
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        const int n = count * mesh->dim;
+        take_relative(d, model, nodal, node, count);
+        status = source_get(&ke, &source, e, err);
+        for (int i = 0; i < n && status == UZ_OK; i++)
+            for (int j = 0; j < n; j++)
+                twice += d[i] * ke[i * n + j] * d[j];
+    }
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && model->spring; i++)
+        twice += model->spring[i] * nodal[i] * nodal[i];
+    source_clear(&source);
+    *energy = 0.5 * twice;
+    return status;
+}
+
 /* ------------------------------------------------------------ energy of rounding */
 
 /* |x|'|ke||x| of one element. */

@@ -306,21 +306,6 @@ static double imbalance(const balance *b)
     return b->size > 0 ? largest / b->size : 0;
 }
 
-/* 1/2 u'K u from the forces that hold u: K u is what loads, contacts and supports do. What warmth alone stores or takes
- * is not in it. */
-static double energy_of_displacement(const balance *b)
-{
-    const uz_body_model *model = b->model;
-    double twice = 0;
-    for (int64_t a = 0; a < model->mesh.n_nodes; a++)
-        for (int c = 0; c < b->dim; c++) {
-            const int64_t i = a * b->dim + c;
-            const double spring = model->spring ? model->spring[i] * b->u[i] : 0;
-            twice += b->u[i] * (b->held[a] ? b->inner[i] + spring : b->load[i] + b->contact[i]);
-        }
-    return 0.5 * twice;
-}
-
 /* With thermal strain e: 1/2 (strain - e)' C (strain - e) = 1/2 u'K u - u'f + 1/2 e' C e, f the thermal forces. */
 static uz_status thermal_energy(double *energy, const balance *b, uz_error *err)
 {
@@ -365,7 +350,7 @@ static uz_status make_room(balance *b, uz_error *err)
 
 static uz_status add_everything(balance *b, uz_error *err)
 {
-    double thermal = 0;
+    double thermal = 0, energy = 0;
     memcpy(b->centre, b->model->mesh.xyz, (size_t)b->dim * sizeof *b->centre);
     add_contacts(b);
     uz_status status = add_loads(b, err);
@@ -373,7 +358,9 @@ static uz_status add_everything(balance *b, uz_error *err)
         status = add_supports(b, err);
     if (status == UZ_OK)
         status = thermal_energy(&thermal, b, err);
-    b->out->strain_energy = energy_of_displacement(b) + thermal;
+    if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the whole body */
+        status = uz_strain_energy(&energy, b->model, b->u, err);
+    b->out->strain_energy = energy + thermal;
     b->out->imbalance = imbalance(b);
     return status;
 }

@@ -237,6 +237,11 @@ static void check_equilibrium(examined *e)
     free(free_left);
 }
 
+static bool is_held_by_obstacles(const examined *e)
+{
+    return e->x->summary.semicoercive.free_modes > 0;
+}
+
 /* Clapeyron: the work of all forces, those of supports too, is twice the strain energy. */
 static void check_work(examined *e)
 {
@@ -245,8 +250,8 @@ static void check_work(examined *e)
     const uz_certificate *c = &e->x->summary.certificate;
     if (e->s->hot)
         return;
-    HOLDS(e, fabs(twice - told) <= 1e-9 * fabs(twice) + 1e-12 * c->energy_norm * c->energy_norm,
-          "strain energy %g, by its forces %g", told / 2, twice / 2);
+    const double allowed = 1e-7 * fabs(twice) + 1e-12 * c->energy_norm * c->energy_norm;
+    HOLDS(e, fabs(twice - told) <= allowed, "strain energy %g, by its forces %g", told / 2, twice / 2);
     double work = 0, size = 0;
     for (int64_t i = 0; i < total; i++) {
         const double f = e->load[i] + e->contact[i];
@@ -260,7 +265,13 @@ static void check_work(examined *e)
     double *u = scene_room(e->model.d, sizeof *u);
     uz_restrict_nodal(u, &e->model, e->x->u);
     const double supports = dot_of(left, e->x->u, total) - dot_of(free_left, u, e->model.d);
-    HOLDS(e, fabs(twice - work - supports) <= 4 * c->absolute_error * c->energy_norm + 1e-9 * (size + fabs(twice)),
+    /* what a body that only obstacles hold leaves over works along with the whole of it; it is told as imbalance */
+    double far = 0;
+    for (int64_t i = 0; i < total && is_held_by_obstacles(e); i++)
+        far = fmax(far, fabs(e->x->u[i]));
+    const double over = 10.0 * (double)e->model.info.dim * e->x->evaluation->imbalance * e->size * far;
+    HOLDS(e,
+          fabs(twice - work - supports) <= 4 * c->absolute_error * c->energy_norm + over + 1e-9 * (size + fabs(twice)),
           "work %g and %g of supports, twice the strain energy %g", work, supports, twice);
     free(left);
     free(free_left);
@@ -269,12 +280,46 @@ static void check_work(examined *e)
 
 /* ------------------------------------------------------------------ one scene */
 
-static bool solve(uz_result **out, const random_scene *s, uz_error *err)
+static uz_settings settings_of(uint64_t seed)
 {
-    const uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s->scene};
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_AUTO, UZ_METHOD_ACTIVE_SET,
+                                        UZ_METHOD_ACCELERATED_RESTART};
+    static const uz_operator ops[] = {UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED,
+                                      UZ_OPERATOR_MATRIX_FREE};
+    static const double errors[] = {1e-8, 1e-2, 1e-4, 0};
     uz_settings settings = uz_settings_default();
+    qp_random rng = {seed * 0x9E3779B97F4A7C15u + 5};
     settings.max_iterations = 3000;
-    return uz_solve(out, &problem, &settings, NULL, NULL, err) == UZ_OK;
+    if (seed % 3 > 0)
+        return settings;
+    random_unit(&rng);
+    settings.method = methods[random_int(&rng, 0, 4)];
+    settings.op = ops[random_int(&rng, 0, 4)];
+    settings.relative_error = errors[random_int(&rng, 0, 4)];
+    return settings;
+}
+
+/* With other loads before it, every fifth: the answer is that of the last of several cases. */
+static bool solve(uz_result **out, const random_scene *s, uint64_t seed, uz_error *err)
+{
+    uz_load_case cases[3] = {{.name = "none", .loads = s->scene.loads},
+                             {.name = "first", .loads = s->scene.loads, .n_loads = 1},
+                             {.name = "all"}};
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s->scene};
+    const uz_settings settings = settings_of(seed);
+    uz_result **results = NULL;
+    if (seed % 5 > 0)
+        return uz_solve(out, &problem, &settings, NULL, NULL, err) == UZ_OK;
+    problem.cases = cases;
+    problem.n_cases = 3;
+    if (uz_solve_cases(&results, &problem, &settings, NULL, NULL, NULL, err) != UZ_OK) {
+        problem.n_cases = 0; /* a body that only its load presses on has no answer without */
+        return uz_solve(out, &problem, &settings, NULL, NULL, err) == UZ_OK;
+    }
+    *out = results[2];
+    results[2] = NULL;
+    uz_results_free(results, 3);
+    return true;
 }
 
 static void examine(random_scene *s, const uz_result *x, tally *t, uint64_t seed)
@@ -325,11 +370,15 @@ static void compare(random_scene *s, const uz_result *x, const uz_result *y, con
         square += e.model.spring[i] * d[i] * d[i];
         whole += e.model.spring[i] * x->u[i] * x->u[i];
     }
-    const double least = x->summary.certificate.energy_norm, error = sqrt(fmax(square, 0) / fmax(whole, least * least));
-    HOLDS(&e, whole <= 0 || error <= 1e-7, "differs by %g (d = %lld, certified %g and %g)", error, (long long)e.model.d,
-          x->summary.certificate.relative_error, y->summary.certificate.relative_error);
-    double sum[2] = {x->summary.reaction_sum, y->summary.reaction_sum / how->force};
-    HOLDS(&e, fabs(sum[0] - sum[1]) <= 1e-4 * (fabs(sum[0]) + 1e-3), "reactions sum to %g, but %g", sum[0], sum[1]);
+    const uz_certificate *cx = &x->summary.certificate, *cy = &y->summary.certificate;
+    const double norm = fmax(sqrt(fmax(whole, 0)), cx->energy_norm), other = sqrt(how->force * how->length);
+    const double error = sqrt(fmax(square, 0)),
+                 allowed = cx->absolute_error + cy->absolute_error / other + 1e-8 * norm + 1e-12;
+    HOLDS(&e, error <= allowed, "differs by %g of %g, allowed %g (d = %lld, certified %g and %g)", error, norm, allowed,
+          (long long)e.model.d, cx->relative_error, cy->relative_error);
+    const double sum[2] = {x->summary.reaction_sum, y->summary.reaction_sum / how->force};
+    if (fmax(cx->relative_error, cy->relative_error) <= 1e-8)
+        HOLDS(&e, fabs(sum[0] - sum[1]) <= 1e-4 * (fabs(sum[0]) + 1e-3), "reactions sum to %g, but %g", sum[0], sum[1]);
     free(d);
     free(f);
     free(ku);
@@ -367,7 +416,7 @@ static void move_and_compare(random_scene *s, const uz_result *x, tally *t, uint
     scene_move how = choose_move(s, k);
     move_scene(&moved, &how);
     examined e = {.s = s, .x = x, .seed = seed, .what = how.reorder ? names[3] : names[k]};
-    const bool answered = solve(&y, &moved, &err);
+    const bool answered = solve(&y, &moved, seed, &err);
     HOLDS(&e, answered, "refused at %s: %s", err.where, err.message);
     if (answered && y->summary.outcome == UZ_CONVERGED) {
         compare(s, x, y, &how, seed, e.what);
@@ -387,7 +436,7 @@ static void play(tally *t, uint64_t seed)
     uz_result *x = NULL;
     uz_error err = {0};
     t->scenes++;
-    if (!solve(&x, &s, &err)) {
+    if (!solve(&x, &s, seed, &err)) {
         t->refused++;
         if (getenv("SEEDS"))
             printf("# seed %llu refused at %s: %s\n", (unsigned long long)seed, err.where, err.message);
