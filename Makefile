@@ -181,7 +181,7 @@ ubsan: deps-test ## the C tests under UndefinedBehaviorSanitizer alone
 
 tsan: deps-test ## the server's tests under ThreadSanitizer
 	$(call sanitized,tsan,-fsanitize=thread) all $(TSAN_UNIT:%=$(BUILD)/tsan/tests/%)
-	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT) $(TSAN_API)"
+	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT:%=unit/%) $(TSAN_API:%=api/%)"
 
 fuzz: deps-test ## run every fuzz target for FUZZ_SECONDS (default 30) each
 	$(call sanitized,fuzzing,-fsanitize=address$(comma)undefined$(comma)fuzzer-no-link -fno-sanitize-recover=undefined) CC=clang fuzz-bins

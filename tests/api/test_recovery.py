@@ -9,12 +9,11 @@ import os
 import random
 import signal
 import sqlite3
-import sys
 import threading
 import time
 
 import service
-from service import ENDLESS, MATRICES, SCENE, check, expect, options
+from service import ENDLESS, INSTRUMENTED, MATRICES, SCENE, check, expect, options
 
 ALL_FIELDS = "?fields=summary,reactions,gaps,displacements"
 
@@ -27,7 +26,6 @@ def scene(cells, **solver):
 
 # Requests and their minimum energies; the third takes some tenths of a second, the fifth has a larger factor. An
 # instrumented daemon is slow enough without the plain method, and with smaller bodies.
-INSTRUMENTED = "tsan" in "".join(sys.argv[1:2])
 MIX = [(MATRICES, -2.75), (scene((30, 10)), -3.9608186040e-3)]
 MIX += [(scene((30, 10), method="accelerated_restart", operator="factored"), -3.9608186040e-3),
         (scene((30, 10), operator="factored"), -3.9608186040e-3),
