@@ -195,7 +195,7 @@ ubsan: deps-test ## the C tests under UndefinedBehaviorSanitizer alone
 
 tsan: deps-test ## the server's tests under ThreadSanitizer
 	$(call sanitized,tsan,-fsanitize=thread) all $(TSAN_UNIT:%=$(BUILD)/tsan/tests/%)
-	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT) $(TSAN_API)"
+	@tests/run.sh $(BUILD)/tsan "unit api" "$(FILTER)" "$(TSAN_UNIT:%=unit/%) $(TSAN_API:%=api/%)"
 
 soak: deps-test ## a long life in an hour: kills, power losses, slow clients, a million jobs; a table; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all $(BUILD)/tests/test_store_faults $(BUILD)/load $(BUILD)/library $(PRELOADS)

@@ -2,7 +2,7 @@
 # Runs the test programs and counts their "ok", "not ok" and "skip" lines; the last line is "N passed, N failed".
 # usage: tests/run.sh BUILD_DIR ["unit api hygiene"] [FILTER] [PROGRAMS]
 # FILTER goes to each program, which runs the tests whose name contains it. PROGRAMS is a list of programs ("test_store
-# test_http"); without it all run. A program that dies without a "not ok" line of its own counts as one failure.
+# api/test_http", of both kinds unless one is named); without it all run. A program that dies without a "not ok" line of its own counts as one failure.
 set -uo pipefail
 build=$1 kinds=${2:-unit api hygiene} filter=${3:-} programs=${4:-}
 work=$(mktemp -d)
@@ -36,8 +36,8 @@ run_one() { # NAME COMMAND...
     fi
     cat "$out" >>"$log"
 }
-wanted() { # NAME
-    [ -z "$programs" ] || [[ " $programs " == *" $1 "* ]]
+wanted() { # NAME: of this kind
+    [ -z "$programs" ] || [[ " $programs " == *" $1 "* || " $programs " == *" $kind/$1 "* ]]
 }
 
 for kind in $kinds; do

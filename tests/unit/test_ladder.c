@@ -107,14 +107,15 @@ TEST(first_grids_are_small_and_near_square)
             CHECK(first.cells[axis] >= 2);
         CHECK(uz_grid_dofs(&grids, grids.first + 1) > uz_grid_dofs(&grids, grids.first));
     }
-    const uz_scene s = paper(1);
+    uz_scene s = paper(1);
     const uz_box box = grid_of(&s, 7);
     CHECK(box.cells[X] == 21 && box.cells[Y] == 7);
+    uz_scene_clear(&s);
 }
 
 TEST(next_grids_follow_the_observed_rate)
 {
-    const uz_scene s = paper(1);
+    uz_scene s = paper(1);
     const uz_grids grids = uz_grids_of_box(&s.box, 4e6);
     uz_tried tried[3] = {{4, 0.16}, {8, 0.08}, {16, 0.04}};
     CHECK_REL(uz_observed_rate(&tried[0], &tried[1], 1), 1.0, 1e-12);
@@ -129,6 +130,7 @@ TEST(next_grids_follow_the_observed_rate)
     const uz_tried failed = {8, 0.08}, passed = {24, 0.08 / 3}, near = {15, 0.08 * 8 / 15};
     CHECK_INT(uz_grid_between(&grids, &failed, &passed, 0.05), 14);
     CHECK_INT(uz_grid_between(&grids, &failed, &near, 0.05), 0); /* saves too little */
+    uz_scene_clear(&s);
 }
 
 /* ---- answers */
