@@ -14,7 +14,7 @@ for source in tests/unit/test_*.c; do
     name=$(basename "$source" .c)
     [[ $name == *"$filter"* ]] || continue
     SECONDS=0
-    timeout --signal=INT "$seconds" valgrind -q --error-exitcode=99 --leak-check=full --show-leak-kinds=definite \
+    timeout --signal=INT "$seconds" stdbuf -oL valgrind -q --error-exitcode=99 --leak-check=full --show-leak-kinds=definite \
         --errors-for-leak-kinds=definite --suppressions=tests/valgrind.supp "$build/tests/$name" >"$log" 2>&1
     status=$?
     if [ $status -eq 99 ] || grep -q '^==[0-9]*== ' "$log"; then
