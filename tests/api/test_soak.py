@@ -52,8 +52,8 @@ def test_no_memory(s):
     why = no_memory.possible(s.build)
     if why:
         raise Skip(why)
-    figures = clean(no_memory.failing(s.build, 97, 1))
-    check(figures["failed"] > 10, figures)
+    figures = clean(no_memory.failing(s.build, 151, 1))
+    check(figures["failed"] > 5, figures)
 
 
 @options(None)

@@ -48,6 +48,11 @@ def possible(build):
     return None if pathlib.Path(build, "failing_malloc.so").exists() else "failing_malloc.so was not built"
 
 
+def environment(build, s):
+    """Of a service whose heap is counted in the file "heap" of its folder."""
+    return {"FAILING_MALLOC": os.path.join(s.folder, "heap"), "LD_PRELOAD": str(pathlib.Path(build, "failing_malloc.so").resolve())}
+
+
 def _ask(s, method, path, body=None, headers=None):
     """(status, JSON or None); (0, None) where the connection broke: a daemon without memory may drop it."""
     connection = http.client.HTTPConnection(s.host, s.port, timeout=5)
@@ -90,8 +95,7 @@ def failing(build, every=1, rounds=2):
                         "--access-log", "no")
     heap = Heap(os.path.join(s.folder, "heap"))
     # One thread for each job: which allocation is the n-th is then nearly the same every time.
-    s.environment = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "FAILING_MALLOC": os.path.join(s.folder, "heap"),
-                     "LD_PRELOAD": str(pathlib.Path(build, "failing_malloc.so").resolve())}
+    s.environment = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **environment(build, s)}
     figures = {"allocations": 0, "failed": 0, "stuck": 0, "errors": 0, "ended_failed": 0}
     try:
         s.start()
