@@ -32,10 +32,10 @@ typedef struct {
     double gap;       /* (x_s - x_m) . normal; < 0: the bodies overlap */
 } uz_contact_pair;
 
-/* The rows of all nodes of `on` that face `with` (behind it, only those that look at it), in the order of the nodes (ascending). O((n + f) log f) for n nodes
- * within a few faces' size of f faces. `index` is the contact's place in the scene, for pointers. The caller frees *out
- * with free(). Errors: UZ_ERR_SCENE ("/contacts/i/with": not faces; "/contacts/i/on": a node of the master itself, or
- * no node that faces it), UZ_ERR_MEMORY. */
+/* The rows of all nodes of `on` that face `with` (behind it, only those that look at it), in the order of the nodes
+ * (ascending). O((n + f) log f) for n nodes within a few faces' size of f faces. `index` is the contact's place in the
+ * scene, for pointers. The caller frees *out with free(). Errors: UZ_ERR_SCENE ("/contacts/i/with": not faces;
+ * "/contacts/i/on": a node of the master itself, or no node that faces it), UZ_ERR_MEMORY. */
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
                            const uz_group *with, int64_t index, uz_error *err);
 
