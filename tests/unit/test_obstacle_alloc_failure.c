@@ -91,6 +91,6 @@ TEST(every_allocation_may_fail)
 {
     CHECK_INT(fail_each(make_line), 6);
     CHECK_INT(fail_each(make_table), 7);
-    CHECK_INT(fail_each(make_pairs), 7);
+    CHECK_INT(fail_each(make_pairs), 9);
     CHECK_INT(fail_each(choose), 5);
 }

@@ -53,7 +53,7 @@ static void attempt(const scenario *s, long n)
 static long fail_each(const scenario *s)
 {
     const long step = s->step > 0 ? s->step : 1;
-    for (long n = 0; n < MOST_ALLOCATIONS; n = step > 1 ? n + step : next_allocation(n)) {
+    for (long n = 0; n<MOST_ALLOCATIONS; n = step> 1 ? n + step : next_allocation(n)) {
         heap.live = 0;
         heap.until_failure = n;
         heap.failed = false;
