@@ -155,7 +155,8 @@ static const char JOB[] =
     " \"method\": \"accelerated_restart\", \"operator\": \"condensed\", \"iterations\": 283, \"restarts\": 1,"
     " \"problem\": {\"kind\": \"scene\", \"d\": 660, \"m\": 30}, \"requested_error\": 1e-8,"
     " \"discretization_error\": 0.022, \"message\": \"\","
-    " \"contact\": {\"candidates\": 30, \"active\": 22, \"reaction_sum\": -10.513717, \"max_penetration\": 1e-12,"
+    " \"contact\": {\"candidates\": 30, \"kept\": 25, \"added\": 3, \"rounds\": 2, \"active\": 22, \"reaction_sum\": "
+    "-10.513717, \"max_penetration\": 1e-12,"
     " \"force\": [0, -10.513717], \"max_pressure\": 0.37},"
     " \"energy\": {\"primal\": -3.960818604e-3, \"dual\": -3.960818605e-3},"
     " \"certificate\": {\"relative_error\": 9.1e-10, \"absolute_error\": 8e-11, \"gap\": 3e-21,"
@@ -183,7 +184,7 @@ TEST(summary_says_everything_that_counts)
         "converged: the certificate meets",
         "accelerated_restart, condensed operator, 283 iterations, 1 restart\n",
         "660 unknowns, 30 contact conditions",
-        "22 of 30 candidates touch",
+        "22 of 30 candidates touch; solved with 25, the others are proved not to matter; 3 added in 2 rounds\n",
         "sum -10.513717, force (0, -10.5137), largest pressure 0.37",
         "-0.003960818604 primal",
         "within 9.1e-10 of this one",
