@@ -257,7 +257,9 @@ def test_live_readers(s):
     """A running job's history read by many: rows ascend, none comes twice, and the tail is what the whole has."""
     job_id = s.post(ENDLESS).json["id"]
     s.wait_status(job_id, "running")
-    time.sleep(0.2)
+    until = time.monotonic() + 60
+    while not s.get(f"/v1/jobs/{job_id}/history").json["rows"] and time.monotonic() < until:
+        time.sleep(0.05)
 
     def work(_):
         after, seen = -1, []
