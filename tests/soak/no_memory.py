@@ -89,7 +89,7 @@ def _ended(s, job, seconds=20):
 
 def failing(build, every=1, rounds=2):
     """Lets each `every`-th allocation fail, once and from then on; stuck: jobs acknowledged that did not end; errors:
-    jobs after it that were not solved; leaked: 1 if the last of two rounds left a block for each hundred failures."""
+    jobs after it that were not solved; leaked: 1 if the last of two rounds left a block for every ten failures, and 200."""
     text = json.dumps(service.SCENE).encode()
     s = service.Service(build, "--log-level", "error", "--max-client-rate", "0", "--workers", "1", "--keep-jobs", "4", "--cache", "1",
                         "--access-log", "no")
@@ -114,7 +114,7 @@ def failing(build, every=1, rounds=2):
             time.sleep(0.1)
             held.append(heap[HELD])
         figures["blocks_grown"] = held[-1] - held[0]
-        figures["leaked"] = int(100 * figures["blocks_grown"] > figures["failed"] + 5000)
+        figures["leaked"] = int(figures["blocks_grown"] > 200 + figures["failed"] // 10)
         figures["wrong_exit"] = s.end()
         return figures
     finally:

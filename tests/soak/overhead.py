@@ -11,6 +11,7 @@ import time
 import service
 
 PARTS = ("K", "N", "h", "p")
+ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # of both: how many there are is not the question
 
 
 class Library:
@@ -19,7 +20,8 @@ class Library:
     def __init__(self, build, folder, body):
         path = os.path.join(folder, "scene.json")
         pathlib.Path(path).write_text(json.dumps(body))
-        self.process = subprocess.Popen([os.path.join(build, "library"), path, folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        self.process = subprocess.Popen([os.path.join(build, "library"), path, folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                        env={**os.environ, **ONE_THREAD})
 
     def seconds(self, what):
         self.process.stdin.write(what.encode() + b"\n")
@@ -79,6 +81,7 @@ def overhead(build, cells=(600, 200), turns=7):
     body["problem"]["mesh"]["box"]["cells"] = list(cells)
     body["solver"] = {"accuracy": {"relative_error": 1e-6}}
     s = service.Service(build, "--log-level", "warn", "--cache", "1", "--workers", "1")
+    s.environment = ONE_THREAD
     times = {name: [] for name in ("scene_library", "scene", "matrices_library", "matrices", "sent", "read", "solve")}
     figures = {}
     library = Library(build, s.folder, body)
