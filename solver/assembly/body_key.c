@@ -4,6 +4,7 @@
 
 #include "assembly/parts.h"
 #include "core/alloc.h"
+#include "core/buffer.h"
 #include "core/digest.h"
 #include "core/error.h"
 #include "scene/scene.h"
@@ -12,57 +13,33 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct {
-    unsigned char *bytes;
-    size_t len, capacity;
-    bool failed;
-} key_buffer;
-
-static void put(key_buffer *key, const void *bytes, size_t len)
+static void put_int(uz_buffer *key, int64_t value)
 {
-    if (key->failed)
-        return;
-    if (len > key->capacity - key->len) {
-        size_t wanted = 2 * key->capacity + len + 256;
-        unsigned char *grown = uz_realloc(key->bytes, (int64_t)wanted, 1);
-        if (!grown) {
-            key->failed = true;
-            return;
-        }
-        key->bytes = grown;
-        key->capacity = wanted;
-    }
-    memcpy(key->bytes + key->len, bytes, len);
-    key->len += len;
+    uz_buffer_put(key, &value, sizeof value);
 }
 
-static void put_int(key_buffer *key, int64_t value)
-{
-    put(key, &value, sizeof value);
-}
-
-static void put_double(key_buffer *key, double value)
+static void put_double(uz_buffer *key, double value)
 {
     value += 0.0; /* -0 and 0 are the same */
-    put(key, &value, sizeof value);
+    uz_buffer_put(key, &value, sizeof value);
 }
 
 /* Length first, so that names cannot run into what follows. */
-static void put_name(key_buffer *key, const char *name, size_t size)
+static void put_name(uz_buffer *key, const char *name, size_t size)
 {
     const size_t len = strnlen(name, size);
     put_int(key, (int64_t)len);
-    put(key, name, len);
+    uz_buffer_put(key, name, len);
 }
 
-static void put_doubles(key_buffer *key, const double *x, int64_t n)
+static void put_doubles(uz_buffer *key, const double *x, int64_t n)
 {
     put_int(key, x ? n : -1);
     for (int64_t i = 0; x && i < n; i++)
         put_double(key, x[i]);
 }
 
-static void put_box(key_buffer *key, const uz_box *box)
+static void put_box(uz_buffer *key, const uz_box *box)
 {
     put_int(key, box->dim);
     put_name(key, box->element, sizeof box->element);
@@ -94,7 +71,7 @@ static void add_given_group(uz_digest *digest, const uz_given_group *group)
 }
 
 /* A mesh in numbers is as large as a request may be: its digest stands for it. */
-static void put_given(key_buffer *key, const uz_given_mesh *mesh)
+static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
 {
     char hex[65] = "";
     uz_digest *digest = uz_digest_new();
@@ -113,10 +90,10 @@ static void put_given(key_buffer *key, const uz_given_mesh *mesh)
     put_int(key, mesh->dim);
     put_int(key, mesh->n_groups);
     put_int(key, mesh->from_file);
-    put(key, hex, sizeof hex);
+    uz_buffer_put(key, hex, sizeof hex);
 }
 
-static void put_materials(key_buffer *key, const uz_scene *scene)
+static void put_materials(uz_buffer *key, const uz_scene *scene)
 {
     put_int(key, scene->n_materials);
     for (int64_t i = 0; i < scene->n_materials; i++) {
@@ -146,7 +123,7 @@ static int by_group(const void *a, const void *b)
 }
 
 /* What stands in no axis's way: springs, and inclined normals, which turn nodes in their order. */
-static void put_inclined_and_springs(key_buffer *key, const uz_scene *scene, int dim)
+static void put_inclined_and_springs(uz_buffer *key, const uz_scene *scene, int dim)
 {
     double n[3] = {0};
     for (int64_t i = 0; i < scene->n_supports; i++) {
@@ -162,7 +139,7 @@ static void put_inclined_and_springs(key_buffer *key, const uz_scene *scene, int
 }
 
 /* Which directions each group is held in: neither the values nor the order of the supports matter. */
-static void put_supports(key_buffer *key, const uz_scene *scene, int dim)
+static void put_supports(uz_buffer *key, const uz_scene *scene, int dim)
 {
     const uz_support **sorted = uz_alloc(scene->n_supports, sizeof *sorted);
     if (!sorted) {
@@ -195,7 +172,7 @@ static void point_counts(int64_t n[3], const uz_contact *contact)
 }
 
 /* Of a plane only the normal: where it is, is the load's matter. Of others the normals of the rows depend on all. */
-static void put_contacts(key_buffer *key, const uz_scene *scene, int dim)
+static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
 {
     put_int(key, scene->n_contacts);
     put_int(key, scene->all_candidates);
@@ -223,11 +200,12 @@ static void put_contacts(key_buffer *key, const uz_scene *scene, int dim)
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
     static const char format[] = "uzawa body 2";
-    key_buffer key = {NULL, 0, 0, false};
+    uz_buffer key = {0};
+    char *text = NULL;
     const int dim = uz_model_dim(scene->model);
     *out = NULL;
     *len = 0;
-    put(&key, format, sizeof format);
+    uz_buffer_put(&key, format, sizeof format);
     put_int(&key, (int64_t)scene->model);
     put_double(&key, scene->thickness);
     put_int(&key, scene->formulation);
@@ -239,11 +217,8 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
     put_materials(&key, scene);
     put_supports(&key, scene, dim);
     put_contacts(&key, scene, dim);
-    if (key.failed) {
-        free(key.bytes);
+    if (uz_buffer_finish(&text, len, &key, NULL) != UZ_OK)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the key of a body");
-    }
-    *out = key.bytes;
-    *len = key.len;
+    *out = (unsigned char *)text;
     return UZ_OK;
 }

@@ -1,10 +1,7 @@
 #include "fields/vtu.h"
 
 #include "core/alloc.h"
-#include "core/error.h"
 
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <zlib.h>
@@ -13,59 +10,6 @@
 enum { BLOCK = 1 << 20 };
 /* Level 1 of zlib: noisy digits hardly get smaller by more. */
 enum { LEVEL = 1 };
-
-static bool reserve(uz_vtu *vtu, size_t more)
-{
-    if (vtu->failed || more > SIZE_MAX / 4 - vtu->len) {
-        vtu->failed = true;
-        return false;
-    }
-    if (vtu->len + more <= vtu->capacity)
-        return true;
-    size_t capacity = vtu->capacity + vtu->capacity / 2 + more + 4096;
-    char *data = uz_realloc(vtu->data, (int64_t)capacity, 1);
-    if (!data) {
-        vtu->failed = true;
-        return false;
-    }
-    vtu->data = data;
-    vtu->capacity = capacity;
-    return true;
-}
-
-__attribute__((format(printf, 2, 3))) static void put(uz_vtu *vtu, const char *format, ...)
-{
-    enum { MOST = 1024 };
-    va_list args;
-    if (!reserve(vtu, MOST))
-        return;
-    va_start(args, format);
-    const int n = vsnprintf(vtu->data + vtu->len, MOST, format, args);
-    va_end(args);
-    if (n < 0 || n >= MOST)
-        vtu->failed = true;
-    else
-        vtu->len += (size_t)n;
-}
-
-/* RFC 4648, section 4. */
-static void put_base64(uz_vtu *vtu, const unsigned char *bytes, size_t n)
-{
-    static const char DIGITS[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    if (!reserve(vtu, n / 3 * 4 + 4))
-        return;
-    char *out = vtu->data + vtu->len;
-    for (size_t i = 0; i < n; i += 3) {
-        const size_t left = n - i;
-        const unsigned v = (unsigned)bytes[i] << 16 | (left > 1 ? (unsigned)bytes[i + 1] << 8 : 0U) |
-                           (left > 2 ? (unsigned)bytes[i + 2] : 0U);
-        *out++ = DIGITS[v >> 18];
-        *out++ = DIGITS[v >> 12 & 63];
-        *out++ = left > 1 ? DIGITS[v >> 6 & 63] : '=';
-        *out++ = left > 2 ? DIGITS[v & 63] : '=';
-    }
-    vtu->len = (size_t)(out - vtu->data);
-}
 
 /* compress2 with a strategy. */
 static bool deflate_block(unsigned char *out, size_t *room, const unsigned char *bytes, size_t n, int strategy)
@@ -104,15 +48,15 @@ static bool compress_blocks(uint64_t *head, unsigned char *out, size_t *out_len,
     return true;
 }
 
-static void put_compressed(uz_vtu *vtu, const unsigned char *bytes, size_t n, int strategy)
+static void put_compressed(uz_buffer *vtu, const unsigned char *bytes, size_t n, int strategy)
 {
     const size_t blocks = (n + BLOCK - 1) / BLOCK;
     size_t packed = 0;
     uint64_t *head = uz_alloc((int64_t)blocks + 3, sizeof *head);
     unsigned char *out = uz_alloc((int64_t)(blocks * compressBound(BLOCK)), 1);
     if (head && out && compress_blocks(head, out, &packed, bytes, n, strategy)) {
-        put_base64(vtu, (const unsigned char *)head, (3 + blocks) * sizeof *head);
-        put_base64(vtu, out, packed);
+        uz_buffer_put_base64(vtu, head, (3 + blocks) * sizeof *head);
+        uz_buffer_put_base64(vtu, out, packed);
     } else {
         vtu->failed = true;
     }
@@ -120,37 +64,37 @@ static void put_compressed(uz_vtu *vtu, const unsigned char *bytes, size_t n, in
     free(out);
 }
 
-void uz_vtu_array(uz_vtu *vtu, const char *name, uz_vtu_type type, const void *data, int64_t count, int components,
+void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void *data, int64_t count, int components,
                   const char *const *labels)
 {
     static const struct {
         const char *name;
         size_t size;
     } TYPES[] = {{"Float64", sizeof(double)}, {"Int64", sizeof(int64_t)}, {"UInt8", 1}};
-    put(vtu, "        <DataArray type=\"%s\" Name=\"%s\"", TYPES[type].name, name);
+    uz_buffer_print(vtu, "        <DataArray type=\"%s\" Name=\"%s\"", TYPES[type].name, name);
     if (components > 1)
-        put(vtu, " NumberOfComponents=\"%d\"", components);
+        uz_buffer_print(vtu, " NumberOfComponents=\"%d\"", components);
     for (int c = 0; labels && c < components; c++)
-        put(vtu, " ComponentName%d=\"%s\"", c, labels[c]);
-    put(vtu, " format=\"binary\">");
+        uz_buffer_print(vtu, " ComponentName%d=\"%s\"", c, labels[c]);
+    uz_buffer_print(vtu, " format=\"binary\">");
     /* of computed numbers only zeros repeat: looking for more takes more than twice the time for a twentieth in size */
     const int strategy = type == UZ_VTU_DOUBLE && strcmp(name, "Points") != 0 ? Z_RLE : Z_DEFAULT_STRATEGY;
     put_compressed(vtu, data, (size_t)count * (size_t)components * TYPES[type].size, strategy);
-    put(vtu, "</DataArray>\n");
+    uz_buffer_print(vtu, "</DataArray>\n");
 }
 
-void uz_vtu_open(uz_vtu *vtu, const char *section)
+void uz_vtu_open(uz_buffer *vtu, const char *section)
 {
-    put(vtu, "      <%s>\n", section);
+    uz_buffer_print(vtu, "      <%s>\n", section);
 }
 
-void uz_vtu_close(uz_vtu *vtu, const char *section)
+void uz_vtu_close(uz_buffer *vtu, const char *section)
 {
-    put(vtu, "      </%s>\n", section);
+    uz_buffer_print(vtu, "      </%s>\n", section);
 }
 
 /* A point has three coordinates there, whatever the model. */
-static void put_points(uz_vtu *vtu, const uz_mesh *mesh)
+static void put_points(uz_buffer *vtu, const uz_mesh *mesh)
 {
     double *xyz = uz_alloc_zero(mesh->n_nodes * 3, sizeof *xyz);
     if (!xyz) {
@@ -166,7 +110,7 @@ static void put_points(uz_vtu *vtu, const uz_mesh *mesh)
 }
 
 /* Node order of all kinds is VTK's own. */
-static void put_cells(uz_vtu *vtu, const uz_mesh *mesh)
+static void put_cells(uz_buffer *vtu, const uz_mesh *mesh)
 {
     static const unsigned char TYPE[UZ_ELEMENT_KINDS] = {
         [UZ_TRI3] = 5, [UZ_QUAD4] = 9, [UZ_TRI6] = 22, [UZ_QUAD8] = 23, [UZ_TET4] = 10, [UZ_HEX8] = 12, [UZ_TET10] = 24,
@@ -186,38 +130,23 @@ static void put_cells(uz_vtu *vtu, const uz_mesh *mesh)
     free(type);
 }
 
-void uz_vtu_begin(uz_vtu *vtu, const uz_mesh *mesh)
+void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh)
 {
     const bool little = __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__;
     memset(vtu, 0, sizeof *vtu);
-    put(vtu,
-        "<?xml version=\"1.0\"?>\n"
-        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"%s\" header_type=\"UInt64\" "
-        "compressor=\"vtkZLibDataCompressor\">\n"
-        "  <UnstructuredGrid>\n"
-        "    <Piece NumberOfPoints=\"%lld\" NumberOfCells=\"%lld\">\n",
-        little ? "LittleEndian" : "BigEndian", (long long)mesh->n_nodes, (long long)mesh->n_elements);
+    uz_buffer_print(vtu,
+                    "<?xml version=\"1.0\"?>\n"
+                    "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"%s\" header_type=\"UInt64\" "
+                    "compressor=\"vtkZLibDataCompressor\">\n"
+                    "  <UnstructuredGrid>\n"
+                    "    <Piece NumberOfPoints=\"%lld\" NumberOfCells=\"%lld\">\n",
+                    little ? "LittleEndian" : "BigEndian", (long long)mesh->n_nodes, (long long)mesh->n_elements);
     put_points(vtu, mesh);
     put_cells(vtu, mesh);
 }
 
-uz_status uz_vtu_finish(char **text, size_t *len, uz_vtu *vtu, uz_error *err)
+uz_status uz_vtu_finish(char **text, size_t *len, uz_buffer *vtu, uz_error *err)
 {
-    put(vtu, "    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
-    *text = NULL;
-    *len = 0;
-    if (vtu->failed) {
-        uz_vtu_drop(vtu);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vtu file");
-    }
-    *text = vtu->data;
-    *len = vtu->len;
-    memset(vtu, 0, sizeof *vtu);
-    return UZ_OK;
-}
-
-void uz_vtu_drop(uz_vtu *vtu)
-{
-    free(vtu->data);
-    memset(vtu, 0, sizeof *vtu);
+    uz_buffer_print(vtu, "    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
+    return uz_buffer_finish(text, len, vtu, err);
 }

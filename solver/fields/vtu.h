@@ -5,28 +5,21 @@
 #ifndef UZ_FIELDS_VTU_H
 #define UZ_FIELDS_VTU_H
 
+#include "core/buffer.h"
 #include "scene/mesh.h"
 #include "uzawa.h"
-
-/* A growing text; a failed allocation is remembered and told by uz_vtu_finish. */
-typedef struct {
-    char *data;
-    size_t len, capacity;
-    bool failed;
-} uz_vtu;
 
 typedef enum { UZ_VTU_DOUBLE, UZ_VTU_INT64, UZ_VTU_BYTE } uz_vtu_type;
 
 /* The file's head, points and cells. */
-void uz_vtu_begin(uz_vtu *vtu, const uz_mesh *mesh);
+void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh);
 /* Arrays follow between these, section "PointData" or "CellData". */
-void uz_vtu_open(uz_vtu *vtu, const char *section);
-void uz_vtu_close(uz_vtu *vtu, const char *section);
+void uz_vtu_open(uz_buffer *vtu, const char *section);
+void uz_vtu_close(uz_buffer *vtu, const char *section);
 /* `count` items of `components` numbers each. labels (may be NULL): names of the components. */
-void uz_vtu_array(uz_vtu *vtu, const char *name, uz_vtu_type type, const void *data, int64_t count, int components,
+void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void *data, int64_t count, int components,
                   const char *const *labels);
-/* Ends the file: *text is NUL-terminated and the caller's. UZ_ERR_MEMORY; the vtu is empty afterwards. */
-uz_status uz_vtu_finish(char **text, size_t *len, uz_vtu *vtu, uz_error *err);
-void uz_vtu_drop(uz_vtu *vtu);
+/* Ends the file: uz_buffer_finish. */
+uz_status uz_vtu_finish(char **text, size_t *len, uz_buffer *vtu, uz_error *err);
 
 #endif

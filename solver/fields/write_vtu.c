@@ -12,7 +12,7 @@
 
 /* What is written, and from what. */
 typedef struct {
-    uz_vtu vtu;
+    uz_buffer vtu;
     const uz_field_body *body;
     const uz_fields *fields;
     double *room;  /* 6 x n_nodes: for one array at a time */
