@@ -41,7 +41,7 @@ static void hertz(void)
     hertz_ladder(UZ_PLANE_STRAIN, "tri6", 8, 32, 1.2);
     hertz_ladder(UZ_AXISYMMETRIC, "quad4", 8, 64, 1.2);
     hertz_ladder(UZ_AXISYMMETRIC, "quad8", 8, 32, 1.2);
-    hertz_ladder(UZ_SOLID, "hex8", 3, 6, 1.6);
+    hertz_ladder(UZ_SOLID, "hex8", 3, 12, 1.6);
     hertz_ladder(UZ_SOLID, "tet10", 3, 3, 1.8);
 }
 
