@@ -167,6 +167,8 @@ static uz_fields cut_computed(const uz_fields *computed, const field_list *field
     for (size_t i = 0; fields->part && i < sizeof LIST / sizeof LIST[0]; i++) {
         const double *x = *LIST[i].x;
         int64_t n = LIST[i].entries * LIST[i].size;
+        if (!x) /* not asked for; without any of them a stress has no components either */
+            continue;
         cut(&x, &n, LIST[i].size, fields);
         *LIST[i].x = (double *)x;
         *LIST[i].left = n / LIST[i].size;
