@@ -9,6 +9,11 @@
 
 #include <stdint.h>
 
+__attribute__((constructor)) static void settle_threads(void)
+{
+    uz_thread_init();
+}
+
 enum { MOST_EXACT = 110 };
 
 typedef struct {
