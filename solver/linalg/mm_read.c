@@ -152,8 +152,9 @@ uz_status uz_mm_read_vector(double **out, int64_t *n, const char *text, size_t l
                             "a vector was expected, this matrix is %lld x %lld; send n x 1 or 1 x n",
                             (long long)head.rows, (long long)head.cols);
     int64_t size = head.cols == 1 ? head.rows : head.cols, room = entry_room(&t, &head);
-    int64_t numbers = head.format == UZ_MM_COORDINATE ? size : 0;
-    if (!within_limit(head.cols + 1 + numbers, room, len, max_bytes))
+    int64_t numbers = head.format == UZ_MM_COORDINATE ? size : 0, wanted;
+    if (__builtin_add_overflow(head.cols, 1, &wanted) || __builtin_add_overflow(wanted, numbers, &wanted) ||
+        !within_limit(wanted, room, len, max_bytes))
         return fail_limit(&head, t.size_line, err);
     status = read_body(&A, &t, &head, room);
     double *x = status == UZ_OK ? take_numbers(&A, &head, size) : NULL;

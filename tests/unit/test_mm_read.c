@@ -368,6 +368,19 @@ TEST(vectors_stand_or_lie_full_or_sparse)
     check_vector(GENERAL "0 1 0\n", 0, x);
 }
 
+/* One more than the largest length would not fit into the count of what is needed. */
+TEST(vector_of_the_largest_length_is_refused)
+{
+    const char *text[2] = {GENERAL "9223372036854775806 1 1\n1 1 1\n", GENERAL "1 9223372036854775806 1\n1 1 1\n"};
+    for (int i = 0; i < 2; i++) {
+        double *x;
+        int64_t n;
+        uz_error err = {0};
+        CHECK_INT(uz_mm_read_vector(&x, &n, text[i], strlen(text[i]), 0, &err), UZ_ERR_LIMIT);
+        CHECK(!x && err.line == 2);
+    }
+}
+
 TEST(what_is_no_vector_is_refused)
 {
     const char *text = ARRAY "% c\n2 2\n1\n2\n3\n4\n", *huge = GENERAL "1000000000 1 1\n5 1 1\n";
