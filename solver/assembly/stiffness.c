@@ -285,10 +285,26 @@ uz_status uz_internal_forces(double *f, const uz_body_model *model, const double
 static void take_relative(double *d, const uz_body_model *model, const double *nodal, const int64_t *node, int count)
 {
     const int dim = model->mesh.dim;
-    for (int i = 0; i < count * dim; i++) {
-        const bool radial = model->kind == UZ_AXISYMMETRIC && i % dim == 0;
-        d[i] = nodal[node[i / dim] * dim + i % dim] - (radial ? 0 : nodal[node[0] * dim + i % dim]);
+    double first[3] = {0};
+    memcpy(first, nodal + node[0] * dim, (size_t)dim * sizeof *first);
+    if (model->kind == UZ_AXISYMMETRIC)
+        first[0] = 0;
+    for (int a = 0; a < count; a++)
+        for (int c = 0; c < dim; c++)
+            *d++ = nodal[node[a] * dim + c] - first[c];
+}
+
+/* d'ke d by one triangle of the symmetric ke; the rows do not wait for each other. */
+static double element_energy(const double *ke, const double *d, int n)
+{
+    double sum = 0;
+    for (int i = 0; i < n; i++) {
+        double row = 0;
+        for (int j = 0; j < i; j++)
+            row += ke[i * n + j] * d[j];
+        sum += d[i] * (2 * row + ke[i * n + i] * d[i]);
     }
+    return sum;
 }
 
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err)
@@ -302,12 +318,10 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
         double d[DOFS];
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
-        const int n = count * mesh->dim;
         take_relative(d, model, nodal, node, count);
         status = source_get(&ke, &source, e, err);
-        for (int i = 0; i < n && status == UZ_OK; i++)
-            for (int j = 0; j < n; j++)
-                twice += d[i] * ke[i * n + j] * d[j];
+        if (status == UZ_OK)
+            twice += element_energy(ke, d, count * mesh->dim);
     }
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && model->spring; i++)
         twice += model->spring[i] * nodal[i] * nodal[i];
