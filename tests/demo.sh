@@ -3,33 +3,13 @@
 # usage: tests/demo.sh BUILD_DIR
 set -euo pipefail
 build=$1
-folder=$(mktemp -d)
-daemon=
-
-finish() {
-    if [ -n "$daemon" ] && kill -TERM "$daemon" 2>/dev/null; then wait "$daemon" || true; fi
-    rm -rf "$folder"
-}
-trap finish EXIT
-trap 'exit 130' INT TERM
+# shellcheck source=tests/daemon.sh
+. "$(dirname "$0")/daemon.sh"
 
 step() { printf '\n\033[1m%s\033[0m\n' "$*"; }
 if [ ! -t 1 ] || [ -n "${NO_COLOR:-}" ]; then step() { printf '\n%s\n' "$*"; }; fi
 
-"$build/uzawad" --listen 127.0.0.1:0 --db "$folder/contact.db" >"$folder/out" 2>"$folder/log" &
-daemon=$!
-for _ in $(seq 200); do
-    grep -q '^listening on ' "$folder/out" && break
-    kill -0 "$daemon" 2>/dev/null || break
-    sleep 0.05
-done
-if ! grep -q '^listening on ' "$folder/out"; then
-    echo "the daemon did not start; its log says:" >&2
-    cat "$folder/log" >&2
-    exit 1
-fi
-UZAWA_SERVER=$(sed -n 's/^listening on //p' "$folder/out")
-export UZAWA_SERVER
+start_daemon
 body=tests/data/paper_body_120.json
 
 step "A steel plate, 60 x 20 x 5 mm in 120 x 40 elements, pressed on a rigid plane: $body"
@@ -44,9 +24,6 @@ again=$("$build/uzawa" submit "$body" --wait --quiet)
 "$build/uzawa" status "$again" | grep -E '^(factor|time) '
 
 step "Stopping the daemon"
-kill -TERM "$daemon"
-status=0
-wait "$daemon" || status=$?
-daemon=
+stop_daemon
 echo "it ended with status $status"
 exit "$status"

@@ -4,30 +4,10 @@
 # FOLDER gets NAME.txt (what the client prints) and NAME.svg; --keep copies the pictures into client/examples/gallery.
 set -euo pipefail
 build=$1 out=$2 keep=${3:-}
-folder=$(mktemp -d)
-daemon=
+# shellcheck source=tests/daemon.sh
+. "$(dirname "$0")/daemon.sh"
 
-finish() {
-    if [ -n "$daemon" ] && kill -TERM "$daemon" 2>/dev/null; then wait "$daemon" || true; fi
-    rm -rf "$folder"
-}
-trap finish EXIT
-trap 'exit 130' INT TERM
-
-"$build/uzawad" --listen 127.0.0.1:0 --db "$folder/contact.db" >"$folder/out" 2>"$folder/log" &
-daemon=$!
-for _ in $(seq 200); do
-    grep -q '^listening on ' "$folder/out" && break
-    kill -0 "$daemon" 2>/dev/null || break
-    sleep 0.05
-done
-if ! grep -q '^listening on ' "$folder/out"; then
-    echo "the daemon did not start; its log says:" >&2
-    cat "$folder/log" >&2
-    exit 1
-fi
-UZAWA_SERVER=$(sed -n 's/^listening on //p' "$folder/out")
-export UZAWA_SERVER
+start_daemon
 mkdir -p "$out"
 
 # How each is drawn: a press fit to scale, the cylinder so that its contact shows; wide enough to read, below 150 kB.
@@ -46,9 +26,6 @@ scene client/examples/gallery/gear.json --width 600
 scene client/examples/gallery/bracket.json --width 600
 scene tests/data/paper_body.json --width 600
 
-status=0
-kill -TERM "$daemon"
-wait "$daemon" || status=$?
-daemon=
+stop_daemon
 echo "pictures and summaries are in $out"
 exit "$status"
