@@ -40,13 +40,19 @@ void uz_field_body_clear(uz_field_body *body)
     memset(body, 0, sizeof *body);
 }
 
-void uz_field_element_at(uz_field_element *out, const uz_field_body *body, const double *u, int64_t element)
+/* Displacements of one element's nodes; returns how many numbers. */
+static int gather(double *out, const uz_mesh *mesh, const double *u, int64_t element)
 {
-    const uz_mesh *mesh = &body->model->mesh;
     int nodes;
     const int64_t *node = uz_mesh_element(mesh, element, &nodes);
     for (int a = 0; a < nodes; a++)
-        memcpy(out->u + a * mesh->dim, u + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *u);
+        memcpy(out + a * mesh->dim, u + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *u);
+    return nodes * mesh->dim;
+}
+
+void uz_field_element_at(uz_field_element *out, const uz_field_body *body, const double *u, int64_t element)
+{
+    gather(out->u, &body->model->mesh, u, element);
     uz_body_element(&out->element, out->xyz, body->model, element);
     out->material = uz_element_material(body->model, element);
     out->free_strain = body->rise ? out->material->expansion * body->rise[element] : 0;
@@ -62,13 +68,13 @@ static double strain_zz(const uz_field_element *element, const double *stress)
     return element->free_strain - poisson / young * (stress[0] + stress[1]);
 }
 
-/* Shear strains become tensor components. Axisymmetric: rr, zz, hoop, rz are xx, yy, zz, xy here. */
-void uz_field_state_at(uz_field_state *out, const uz_field_element *element, const double point[3])
+/* Stress and strain from the strains of the model; shear strains become tensor components. Axisymmetric: rr, zz, hoop,
+ * rz are xx, yy, zz, xy here. */
+static void state_of_strain(uz_field_state *out, const uz_field_element *element, double strain[UZ_ELEMENT_STRESSES])
 {
     const uz_model model = element->element.model;
-    double strain[UZ_ELEMENT_STRESSES], thermal[UZ_ELEMENT_STRESSES], stress[UZ_ELEMENT_STRESSES];
+    double thermal[UZ_ELEMENT_STRESSES], stress[UZ_ELEMENT_STRESSES];
     const int n = uz_stress_count(model), direct = n == 3 ? 2 : 3;
-    uz_element_strain(strain, &element->motion, point);
     memcpy(stress, strain, sizeof stress);
     if (element->free_strain != 0) {
         uz_thermal_strain(thermal, model, element->material->lame, element->free_strain);
@@ -86,4 +92,57 @@ void uz_field_state_at(uz_field_state *out, const uz_field_element *element, con
     const double zz = uz_stress_zz(model, element->material->lame, stress, element->free_strain);
     memcpy(out->stress, (double[4]){stress[0], stress[1], zz, stress[2]}, 4 * sizeof *stress);
     memcpy(out->strain, (double[4]){strain[0], strain[1], strain_zz(element, stress), strain[2]}, 4 * sizeof *strain);
+}
+
+void uz_field_state_at(uz_field_state *out, const uz_field_element *element, const double point[3])
+{
+    double strain[UZ_ELEMENT_STRESSES] = {0};
+    uz_element_strain(strain, &element->motion, point);
+    state_of_strain(out, element, strain);
+}
+
+/* ---- the same points of element after element */
+
+void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const double *u, int64_t element)
+{
+    const uz_body_model *model = body->model;
+    out->body = body;
+    out->u = u;
+    out->kind = (uz_element_kind)model->mesh.kind[element];
+    out->alike = model->mesh.uniform && model->kind != UZ_AXISYMMETRIC && !model->material_of;
+    if (!out->alike)
+        return;
+    uz_field_element_at(&out->at, body, u, element);
+    for (int k = 0; k < out->count; k++)
+        uz_element_strain_operator(out->strain_of[k], &out->at.element, out->point[k]);
+}
+
+/* By the operator of all elements: no gradient is made again. */
+static void states_of_alike(uz_field_state *state, uz_field_points *points, int64_t element)
+{
+    const uz_field_body *body = points->body;
+    double *u = points->at.u;
+    const int n = uz_stress_count(points->at.element.model);
+    const int dofs = gather(u, &body->model->mesh, points->u, element);
+    points->at.free_strain = body->rise ? points->at.material->expansion * body->rise[element] : 0;
+    for (int k = 0; k < points->count; k++) {
+        double strain[UZ_ELEMENT_STRESSES] = {0};
+        for (int i = 0; i < n; i++) {
+            const double *row = points->strain_of[k] + i * dofs;
+            for (int j = 0; j < dofs; j++)
+                strain[i] += row[j] * u[j];
+        }
+        state_of_strain(&state[k], &points->at, strain);
+    }
+}
+
+void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element)
+{
+    if (points->alike) {
+        states_of_alike(state, points, element);
+        return;
+    }
+    uz_field_element_at(&points->at, points->body, points->u, element);
+    for (int k = 0; k < points->count; k++)
+        uz_field_state_at(&state[k], &points->at, points->point[k]);
 }

@@ -36,6 +36,22 @@ typedef struct {
 } uz_field_state;
 void uz_field_state_at(uz_field_state *out, const uz_field_element *element, const double point[3]);
 
+/* The same local points of elements of one kind, one element after another: where all are one shape of one material, by
+ * one matrix for each point. count and point are the caller's; it refers to itself: not to be copied. */
+typedef struct {
+    int count;
+    double point[UZ_ELEMENT_GAUSS][3];
+    const uz_field_body *body;
+    const double *u;
+    uz_element_kind kind;
+    bool alike;
+    uz_field_element at; /* the last element; where all are alike, any of them */
+    double strain_of[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES * UZ_ELEMENT_DOFS];
+} uz_field_points;
+/* For elements of the kind that `element` is of. */
+void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const double *u, int64_t element);
+void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element);
+
 /* Nodal averages, n_nodes x components each; either may be NULL. UZ_ERR_CANCELLED, _MEMORY. */
 uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,
                            const uz_hooks *hooks, uz_error *err);

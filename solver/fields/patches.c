@@ -27,6 +27,7 @@ typedef struct {
     const uz_field_body *body;
     int dim, values;
     sample *of;              /* n_elements */
+    unsigned char *plain;    /* n_elements: is_plain */
     int64_t *first, *around; /* elements around each node */
     int64_t *seen;           /* n_elements: 1 + the last patch that it was in */
     int64_t patches;
@@ -46,26 +47,30 @@ static bool is_plain(const uz_field_body *body, int64_t e)
                UZ_FORMULATION_INCOMPATIBLE;
 }
 
-/* volume: of the element where it is known, else 0. */
-static void take_sample(sample *to, const uz_field_body *body, const double *u, int64_t e, double volume)
+static const double *middle_of(uz_element_kind kind)
 {
+    static const double TRI[3] = {1.0 / 3, 1.0 / 3}, TET[3] = {0.25, 0.25, 0.25}, BOX[3] = {0};
+    return kind == UZ_TRI3 ? TRI : kind == UZ_TET4 ? TET : BOX;
+}
+
+static void take_sample(sample *to, uz_field_points *middle, int64_t e, double volume)
+{
+    const uz_field_body *body = middle->body;
     const uz_mesh *mesh = &body->model->mesh;
-    const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
-    const double middle = kind == UZ_TRI3 ? 1.0 / 3 : kind == UZ_TET4 ? 0.25 : 0, point[3] = {middle, middle, middle};
     const size_t bytes = (size_t)body->components * sizeof(double);
-    uz_field_element at;
     uz_field_state state;
     int nodes;
     const int64_t *node = uz_mesh_element(mesh, e, &nodes);
-    uz_field_element_at(&at, body, u, e);
-    uz_field_state_at(&state, &at, point);
-    memset(to, 0, sizeof *to);
-    to->volume = volume > 0 ? volume : uz_element_volume(&at.element);
+    uz_field_points_states(&state, middle, e);
+    memset(to->x, 0, sizeof to->x);
+    to->volume = volume > 0 ? volume : uz_element_volume(&middle->at.element);
     memcpy(to->value, state.stress, bytes);
     memcpy(to->value + body->components, state.strain, bytes);
     for (int a = 0; a < nodes; a++)
         for (int c = 0; c < mesh->dim; c++)
-            to->x[c] += mesh->xyz[node[a] * mesh->dim + c] / nodes;
+            to->x[c] += mesh->xyz[node[a] * mesh->dim + c];
+    for (int c = 0; c < mesh->dim; c++)
+        to->x[c] /= nodes;
 }
 
 static bool list_around(patches *p)
@@ -97,7 +102,7 @@ static bool add_ring(patches *p, int64_t node, int32_t material)
 {
     for (int64_t i = p->first[node]; i < p->first[node + 1]; i++) {
         const int64_t e = p->around[i];
-        if (p->seen[e] == p->patches || material_of(p, e) != material || !is_plain(p->body, e))
+        if (p->seen[e] == p->patches || material_of(p, e) != material || !p->plain[e])
             continue;
         if (p->count == p->capacity) {
             int64_t *more = uz_realloc(p->patch, 2 * p->capacity + 64, sizeof *more);
@@ -227,7 +232,7 @@ static int list_materials(int32_t list[MOST_MATERIALS], const patches *p, int64_
         int k = 0;
         while (k < count && list[k] != material)
             k++;
-        if (!is_plain(p->body, p->around[i]) || k == MOST_MATERIALS)
+        if (!p->plain[p->around[i]] || k == MOST_MATERIALS)
             return 0;
         list[k] = material;
         count += k == count;
@@ -265,17 +270,32 @@ static uz_status no_memory(uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at nodes");
 }
 
-static uz_status recover_all(double *stress, double *strain, unsigned char *done, patches *p, const double *u,
-                             const uz_hooks *hooks, uz_error *err)
+static uz_status take_samples(patches *p, uz_field_points *middle, const double *u, const uz_hooks *hooks,
+                              uz_error *err)
 {
     const uz_mesh *mesh = &p->body->model->mesh;
-    const bool alike = mesh->uniform && p->body->model->kind != UZ_AXISYMMETRIC && is_plain(p->body, 0);
+    bool known[UZ_ELEMENT_KINDS] = {false};
     for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
         if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        if (is_plain(p->body, e))
-            take_sample(&p->of[e], p->body, u, e, alike && e > 0 ? p->of[0].volume : 0);
+        if (!p->plain[e])
+            continue;
+        if (!known[kind]) {
+            middle[kind].count = 1;
+            memcpy(middle[kind].point[0], middle_of(kind), sizeof middle[kind].point[0]);
+            uz_field_points_init(&middle[kind], p->body, u, e);
+            known[kind] = true;
+        }
+        take_sample(&p->of[e], &middle[kind], e, middle[kind].alike && e > 0 ? p->of[0].volume : 0);
     }
+    return UZ_OK;
+}
+
+static uz_status recover_all(double *stress, double *strain, unsigned char *done, patches *p, const uz_hooks *hooks,
+                             uz_error *err)
+{
+    const uz_mesh *mesh = &p->body->model->mesh;
     for (int64_t a = 0; a < mesh->n_nodes; a++) {
         if (a % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
@@ -285,19 +305,36 @@ static uz_status recover_all(double *stress, double *strain, unsigned char *done
     return UZ_OK;
 }
 
+/* False: no memory. */
+static bool find_plain(bool *any, patches *p)
+{
+    const int64_t n = p->body->model->mesh.n_elements;
+    *any = false;
+    p->plain = uz_alloc(n, 1);
+    for (int64_t e = 0; p->plain && e < n; e++) {
+        p->plain[e] = is_plain(p->body, e);
+        *any = *any || p->plain[e];
+    }
+    return p->plain != NULL;
+}
+
 uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *done, const uz_field_body *body,
                                const double *u, const uz_hooks *hooks, uz_error *err)
 {
-    const uz_mesh *mesh = &body->model->mesh;
-    patches p = {.body = body, .dim = mesh->dim, .values = 2 * body->components};
-    bool any = false;
-    for (int64_t e = 0; e < mesh->n_elements && !any; e++)
-        any = is_plain(body, e);
-    if (!any)
-        return UZ_OK;
-    p.of = uz_alloc(mesh->n_elements, sizeof *p.of);
-    uz_status status = p.of && list_around(&p) ? recover_all(stress, strain, done, &p, u, hooks, err) : no_memory(err);
+    patches p = {.body = body, .dim = body->model->mesh.dim, .values = 2 * body->components};
+    uz_field_points *middle = NULL;
+    bool any;
+    uz_status status = find_plain(&any, &p) ? UZ_OK : no_memory(err);
+    if (status == UZ_OK && any) {
+        p.of = uz_alloc(body->model->mesh.n_elements, sizeof *p.of);
+        middle = uz_alloc(UZ_ELEMENT_KINDS, sizeof *middle);
+        status = p.of && middle && list_around(&p) ? take_samples(&p, middle, u, hooks, err) : no_memory(err);
+        if (status == UZ_OK)
+            status = recover_all(stress, strain, done, &p, hooks, err);
+    }
+    free(middle);
     free(p.of);
+    free(p.plain);
     free(p.first);
     free(p.around);
     free(p.seen);

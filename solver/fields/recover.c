@@ -203,12 +203,29 @@ int64_t uz_field_gauss_count(const uz_field_body *body)
     return count;
 }
 
-static void place_of(double *x, const uz_mesh *mesh, int64_t element, const double point[3])
+/* The Gauss points of elements of one kind, and the shape functions there. */
+typedef struct {
+    uz_field_points points;
+    double N[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES];
+    bool known;
+} gauss_plan;
+
+static void plan_gauss(gauss_plan *plan, const uz_field_body *body, const double *u, int64_t element)
 {
-    double N[UZ_ELEMENT_NODES];
+    const uz_element_kind kind = (uz_element_kind)body->model->mesh.kind[element];
+    plan->points.count = uz_element_gauss_count(kind, body->scene->model);
+    for (int g = 0; g < plan->points.count; g++) {
+        uz_element_gauss(plan->points.point[g], kind, body->scene->model, g);
+        uz_element_shape(plan->N[g], kind, plan->points.point[g]);
+    }
+    uz_field_points_init(&plan->points, body, u, element);
+    plan->known = true;
+}
+
+static void place_of(double *x, const uz_mesh *mesh, int64_t element, const double *N)
+{
     int nodes;
     const int64_t *node = uz_mesh_element(mesh, element, &nodes);
-    uz_element_shape(N, (uz_element_kind)mesh->kind[element], point);
     for (int c = 0; c < mesh->dim; c++) {
         x[c] = 0;
         for (int a = 0; a < nodes; a++)
@@ -216,28 +233,36 @@ static void place_of(double *x, const uz_mesh *mesh, int64_t element, const doub
     }
 }
 
-uz_status uz_field_gauss(double *element, double *point, double *stress, const uz_field_body *body, const double *u,
-                         const uz_hooks *hooks, uz_error *err)
+static uz_status fill_gauss(double *element, double *point, double *stress, gauss_plan plan[UZ_ELEMENT_KINDS],
+                            const uz_field_body *body, const double *u, const uz_hooks *hooks, uz_error *err)
 {
     const uz_mesh *mesh = &body->model->mesh;
-    const int components = body->components;
-    uz_field_element at;
-    uz_field_state state;
-    double local[3];
+    uz_field_state state[UZ_ELEMENT_GAUSS];
     for (int64_t e = 0; e < mesh->n_elements; e++) {
+        gauss_plan *own = &plan[mesh->kind[e]];
         if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        uz_field_element_at(&at, body, u, e);
-        const int count = uz_element_gauss_count(at.element.kind, at.element.model);
-        for (int g = 0; g < count; g++) {
-            uz_element_gauss(local, at.element.kind, at.element.model, g);
-            uz_field_state_at(&state, &at, local);
+        if (!own->known)
+            plan_gauss(own, body, u, e);
+        uz_field_points_states(state, &own->points, e);
+        for (int g = 0; g < own->points.count; g++) {
             *element++ = (double)e;
-            place_of(point, mesh, e, local);
+            place_of(point, mesh, e, own->N[g]);
             point += mesh->dim;
-            memcpy(stress, state.stress, (size_t)components * sizeof *stress);
-            stress += components;
+            memcpy(stress, state[g].stress, (size_t)body->components * sizeof *stress);
+            stress += body->components;
         }
     }
     return UZ_OK;
+}
+
+uz_status uz_field_gauss(double *element, double *point, double *stress, const uz_field_body *body, const double *u,
+                         const uz_hooks *hooks, uz_error *err)
+{
+    gauss_plan *plan = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *plan);
+    if (!plan)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at Gauss points");
+    const uz_status status = fill_gauss(element, point, stress, plan, body, u, hooks, err);
+    free(plan);
+    return status;
 }

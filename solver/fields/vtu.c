@@ -2,59 +2,44 @@
 
 #include "core/alloc.h"
 
+#include <libdeflate.h>
 #include <stdlib.h>
 #include <string.h>
-#include <zlib.h>
 
 /* Of numbers before compression; a reader needs one block at a time. */
 enum { BLOCK = 1 << 20 };
-/* Level 1 of zlib: noisy digits hardly get smaller by more. */
+/* Of libdeflate, whose fastest level takes two thirds of zlib's time on noisy digits, for three quarters of the size.
+ */
 enum { LEVEL = 1 };
 
-/* compress2 with a strategy. */
-static bool deflate_block(unsigned char *out, size_t *room, const unsigned char *bytes, size_t n, int strategy)
-{
-    z_stream z;
-    memset(&z, 0, sizeof z);
-    if (deflateInit2(&z, LEVEL, Z_DEFLATED, MAX_WBITS, MAX_MEM_LEVEL, strategy) != Z_OK)
-        return false;
-    z.next_in = (z_const Bytef *)bytes;
-    z.avail_in = (uInt)n;
-    z.next_out = out;
-    z.avail_out = (uInt)*room;
-    const bool whole = deflate(&z, Z_FINISH) == Z_STREAM_END;
-    *room = z.total_out;
-    deflateEnd(&z);
-    return whole;
-}
-
-/* Fills head (3 + blocks numbers) and the compressed bytes; false: no memory in zlib. */
-static bool compress_blocks(uint64_t *head, unsigned char *out, size_t *out_len, const unsigned char *bytes, size_t n,
-                            int strategy)
+/* Fills head (3 + blocks numbers) and the compressed bytes. */
+static bool compress_blocks(uint64_t *head, unsigned char *out, size_t *out_len, const unsigned char *bytes, size_t n)
 {
     const size_t blocks = (n + BLOCK - 1) / BLOCK;
+    struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
+    bool ok = compressor != NULL;
     head[0] = blocks;
     head[1] = BLOCK;
     head[2] = n % BLOCK; /* 0: the last one is whole */
     *out_len = 0;
-    for (size_t b = 0; b < blocks; b++) {
+    for (size_t b = 0; ok && b < blocks; b++) {
         const size_t size = b + 1 < blocks || n % BLOCK == 0 ? (size_t)BLOCK : n % BLOCK;
-        size_t room = compressBound((uLong)size);
-        if (!deflate_block(out + *out_len, &room, bytes + b * BLOCK, size, strategy))
-            return false;
-        head[3 + b] = room;
-        *out_len += room;
+        const size_t room = libdeflate_zlib_compress_bound(compressor, size);
+        head[3 + b] = libdeflate_zlib_compress(compressor, bytes + b * BLOCK, size, out + *out_len, room);
+        *out_len += head[3 + b];
+        ok = head[3 + b] > 0;
     }
-    return true;
+    libdeflate_free_compressor(compressor);
+    return ok;
 }
 
-static void put_compressed(uz_buffer *vtu, const unsigned char *bytes, size_t n, int strategy)
+static void put_compressed(uz_buffer *vtu, const unsigned char *bytes, size_t n)
 {
     const size_t blocks = (n + BLOCK - 1) / BLOCK;
     size_t packed = 0;
     uint64_t *head = uz_alloc((int64_t)blocks + 3, sizeof *head);
-    unsigned char *out = uz_alloc((int64_t)(blocks * compressBound(BLOCK)), 1);
-    if (head && out && compress_blocks(head, out, &packed, bytes, n, strategy)) {
+    unsigned char *out = uz_alloc((int64_t)(blocks * libdeflate_zlib_compress_bound(NULL, BLOCK)), 1);
+    if (head && out && compress_blocks(head, out, &packed, bytes, n)) {
         uz_buffer_put_base64(vtu, head, (3 + blocks) * sizeof *head);
         uz_buffer_put_base64(vtu, out, packed);
     } else {
@@ -77,9 +62,7 @@ void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void
     for (int c = 0; labels && c < components; c++)
         uz_buffer_print(vtu, " ComponentName%d=\"%s\"", c, labels[c]);
     uz_buffer_print(vtu, " format=\"binary\">");
-    /* of computed numbers only zeros repeat: looking for more takes more than twice the time for a twentieth in size */
-    const int strategy = type == UZ_VTU_DOUBLE && strcmp(name, "Points") != 0 ? Z_RLE : Z_DEFAULT_STRATEGY;
-    put_compressed(vtu, data, (size_t)count * (size_t)components * TYPES[type].size, strategy);
+    put_compressed(vtu, data, (size_t)count * (size_t)components * TYPES[type].size);
     uz_buffer_print(vtu, "</DataArray>\n");
 }
 

@@ -272,3 +272,51 @@ TEST(gauss_points_carry_the_elements_own_stress)
         loose_clear(&b);
     }
 }
+
+/* Nodal and Gauss stress of a warm box, as one array of n numbers. */
+static double *stress_of_box(int64_t *n, uz_scene *scene, const double *u, bool alike)
+{
+    uz_body_model model;
+    uz_field_body body;
+    CHECK(uz_body_model_outline(&model, scene, NULL) == UZ_OK && model.mesh.uniform);
+    model.mesh.uniform = alike;
+    CHECK(uz_field_body_init(&body, scene, &model, NULL) == UZ_OK);
+    const int64_t nodal = model.mesh.n_nodes * body.components, points = uz_field_gauss_count(&body);
+    *n = nodal + points * body.components;
+    double *stress = zeros(*n), *element = zeros(points), *point = zeros(points * model.mesh.dim);
+    CHECK(uz_field_recover(stress, NULL, &body, u, NULL, NULL) == UZ_OK);
+    CHECK(uz_field_gauss(element, point, stress + nodal, &body, u, NULL, NULL) == UZ_OK);
+    free(element);
+    free(point);
+    uz_field_body_clear(&body);
+    uz_body_model_clear(&model);
+    return stress;
+}
+
+/* Elements of one shape and material share their strain operators: that changes nothing but roundings. */
+TEST(equal_elements_have_the_stress_of_single_ones)
+{
+    static const uz_formulation ALL[] = {UZ_FORMULATION_STANDARD, UZ_FORMULATION_BBAR, UZ_FORMULATION_INCOMPATIBLE};
+    uint64_t seed = 5;
+    for (int k = 0; k < 6; k++) {
+        uz_scene scene = box_scene(60, 20, 5, 4);
+        scene.model = k < 3 ? UZ_PLANE_STRAIN : UZ_PLANE_STRESS;
+        scene.formulation = ALL[k % 3];
+        add_support(&scene, "left", 0, 0);
+        scene.materials[0].expansion = 1e-5;
+        scene.loads[scene.n_loads++] = (uz_load){.on = "all", .kind = UZ_LOAD_TEMPERATURE, .value = 30};
+        double *u = zeros(6 * 5 * 2);
+        for (int i = 0; i < 6 * 5 * 2; i++)
+            u[i] = 0.01 * (uz_uniform(&seed) - 0.5);
+        int64_t n, n_single;
+        double *one = stress_of_box(&n, &scene, u, true), *single = stress_of_box(&n_single, &scene, u, false);
+        CHECK_INT(n, n_single);
+        const double size = largest(single, n);
+        for (int64_t i = 0; i < n; i++)
+            CHECK(fabs(one[i] - single[i]) <= 1e-12 * size);
+        free(one);
+        free(single);
+        free(u);
+        uz_scene_clear(&scene);
+    }
+}
