@@ -19,12 +19,12 @@ locale=()
 if localedef -i de_DE -f UTF-8 "$work/de_DE.UTF-8" >/dev/null 2>&1; then locale=(env "LOCPATH=$work"); fi
 
 run_one() { # NAME COMMAND...
-    local name=$1 out=$work/out status TIMEFORMAT='%U %S' user system
+    local name=$1 out=$work/$kind.out status TIMEFORMAT='%U %S' user system
     shift
     SECONDS=0
-    { time "$@" >"$out" 2>&1; } 2>"$work/time"
+    { time "$@" >"$out" 2>&1; } 2>"$work/$kind.time"
     status=$?
-    read -r user system < <(tail -1 "$work/time")
+    read -r user system < <(tail -1 "$work/$kind.time")
     if [ $status -ne 0 ] && ! grep -q '^not ok ' "$out"; then
         echo "not ok $name: exit status $status" >>"$out"
     fi
@@ -40,7 +40,8 @@ wanted() { # NAME: of this kind
     [ -z "$programs" ] || [[ " $programs " == *" $1 "* || " $programs " == *" $kind/$1 "* ]]
 }
 
-for kind in $kinds; do
+run_kind() {
+    local kind=$1 source script name
     case $kind in
     unit) for source in tests/unit/test_*.c; do
               name=$(basename "$source" .c)
@@ -52,7 +53,11 @@ for kind in $kinds; do
          done ;;
     hygiene) run_one lint tests/lint.sh ;;
     esac
-done
+}
+
+# The kinds run side by side: most programs keep one core busy.
+for kind in $kinds; do run_kind "$kind" & done
+wait
 passed=$(grep -c '^ok ' "$log") failed=$(grep -c '^not ok ' "$log") skipped=$(grep -c '^skip ' "$log")
 [ "$skipped" -eq 0 ] || echo "$skipped skipped"
 echo "$passed passed, $failed failed"
