@@ -110,7 +110,7 @@ static const char GENERAL[] =
 static const char EXITS[] = "Exit status:\n"
                             "   0  done; wait, verify and --wait: ended and certified as asked\n"
                             "   2  the command line is wrong\n"
-                            "   3  the server cannot be reached, or does not answer in time\n"
+                            "   3  the answer fails an assertion or a comparison that was asked for\n"
                             "   4  the server refused the request; why is on stderr\n"
                             "   5  the server failed\n"
                             "   6  the job failed\n"
@@ -119,7 +119,8 @@ static const char EXITS[] = "Exit status:\n"
                             "   8  the problem is infeasible\n"
                             "   9  the job was dismissed\n"
                             "  10  the job goes on, but --timeout has passed\n"
-                            "  11  a local file could not be read or written\n";
+                            "  11  a local file could not be read or written\n"
+                            "  12  the server cannot be reached, or does not answer in time\n";
 
 const char *client_command_name(client_command command)
 {
