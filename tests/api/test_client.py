@@ -270,7 +270,7 @@ def test_wait_survives_a_restart(server):
 def test_server_from_the_environment(server):
     server.start()
     run(None, "list", code=0, UZAWA_SERVER=server.url)
-    run(None, "list", code=3, UZAWA_SERVER="http://127.0.0.1:1", seconds=30)
+    run(None, "list", code=12, UZAWA_SERVER="http://127.0.0.1:1", seconds=30)
     run(server, "list", code=0, UZAWA_SERVER="http://127.0.0.1:1")
 
 

@@ -7,10 +7,11 @@ import sys
 import tempfile
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
-from fake_server import Fake
+from fake_server import Cutter, Fake
 
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 BODY = "tests/data/small_matrices.json"
@@ -77,14 +78,14 @@ def test_nobody_listens(_):
         placeholder.bind(("127.0.0.1", 0))
         url = "http://127.0.0.1:%d" % placeholder.getsockname()[1]
         start = time.monotonic()
-        expect(run(url, "list", "--retry", "0"), 3)
+        expect(run(url, "list", "--retry", "0"), 12)
         assert time.monotonic() - start < 1
-        expect(run(url, "list", "--retry", "1"), 3)
+        expect(run(url, "list", "--retry", "1"), 12)
         assert time.monotonic() - start > 0.5
-        expect(run(url, "cancel", ID, "--retry", "0"), 3)
-        expect(run(url, "wait", ID, "--retry", "0"), 3)
+        expect(run(url, "cancel", ID, "--retry", "0"), 12)
+        expect(run(url, "wait", ID, "--retry", "0"), 12)
         start = time.monotonic()
-        expect(run(url, "list", "--timeout", "0.5", "--retry", "20"), 3)
+        expect(run(url, "list", "--timeout", "0.5", "--retry", "20"), 12)
         assert time.monotonic() - start < 3
 
 
@@ -120,7 +121,7 @@ def test_retry_after_is_obeyed(_):
 def test_gives_up_when_patience_ends(_):
     with Fake("drop") as fake:
         start = time.monotonic()
-        expect(run(fake.url, "list", "--retry", "1"), 3)
+        expect(run(fake.url, "list", "--retry", "1"), 12)
         assert time.monotonic() - start < 5
         assert 2 <= len(fake.requests) <= 8, len(fake.requests)
 
@@ -128,14 +129,14 @@ def test_gives_up_when_patience_ends(_):
 def test_cancel_is_never_sent_twice(_):
     for fault in ("drop", (503, ""), "cut"):
         with Fake(fault, (204, "")) as fake:
-            assert run(fake.url, "cancel", ID).returncode in (3, 5)
+            assert run(fake.url, "cancel", ID).returncode in (12, 5)
             assert len(fake.requests) == 1
 
 
 def test_silent_server(_):
     with Fake(20) as fake:
         start = time.monotonic()
-        done = expect(run(fake.url, "list", "--timeout", "0.6"), 3)
+        done = expect(run(fake.url, "list", "--timeout", "0.6"), 12)
         assert time.monotonic() - start < 4 and "no answer" in done.stderr
 
 
@@ -216,7 +217,7 @@ def test_result_file_is_whole_or_not_there(_):
     with tempfile.TemporaryDirectory() as folder:
         target = os.path.join(folder, "r.json")
         with Fake("cut") as fake:
-            expect(run(fake.url, "result", ID, "-o", target, "--retry", "0"), 3)
+            expect(run(fake.url, "result", ID, "-o", target, "--retry", "0"), 12)
         assert os.listdir(folder) == []
         with Fake((200, {"reactions": [1]})) as fake:
             expect(run(fake.url, "result", ID, "-o", target, "--fields", "reactions,gaps"), 0)
@@ -233,7 +234,8 @@ def test_local_faults(_):
         if os.path.exists("/dev/full"):
             with open("/dev/full", "w") as full:
                 expect(run(fake.url, "result", ID, stdout=full), 11)
-                expect(run(fake.url, "help", stdout=full), 11)
+                help_page = subprocess.run([CLIENT, "help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=30)
+                expect(help_page, 11)
 
 
 def test_history_that_is_none(_):
@@ -264,7 +266,27 @@ def test_many_clients_at_once(_):
     assert codes == [0] * 8, codes
 
 
+def test_a_reply_cut_at_any_byte_makes_no_second_job(server):
+    server.start()
+    whole = server.raw(b"POST /v1/jobs HTTP/1.1\r\nHost: h\r\nContent-Type: application/json\r\nConnection: close\r\n"
+                       b"Accept-Encoding: gzip\r\nContent-Length: %d\r\n\r\n%s"
+                       % (os.path.getsize(BODY), open(BODY, "rb").read()))[0]
+    cuts = range(0, len(whole) - 1)
+
+    def submit(count):
+        with Cutter((server.host, server.port), count) as cutter:
+            done = run(cutter.url, "submit", BODY, "--retry", "20")
+            return done.returncode, done.stdout.strip(), cutter.connections
+
+    with ThreadPoolExecutor(8) as pool:
+        ends = list(pool.map(submit, cuts))
+    assert all(code == 0 for code, _, _ in ends), ends
+    assert sum(connections == 2 for _, _, connections in ends) > 0.9 * len(ends), ends
+    jobs = json.loads(run(server.url, "list", "--json", "--limit", "100000").stdout)
+    assert sorted(job["id"] for job in jobs)[1:] == sorted(found for _, found, _ in ends), (len(jobs), len(ends))
+
+
 if __name__ == "__main__":
     for test in [value for name, value in globals().items() if name.startswith("test_")]:
-        service.options(None)(test)  # no daemon is needed here
+        service.options(None)(test)  # no daemon is needed here, or the test starts it
     service.main(globals())
