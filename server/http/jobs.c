@@ -1,11 +1,9 @@
 /* jobs.c: /v1/jobs and /v1/jobs/{id}. */
 #include "codec/codec.h"
-#include "http/deadlines.h"
 #include "http/jobs.h"
 #include "http/problem.h"
 #include "http/request.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,23 +58,12 @@ bool jobs_ended(const job *j)
     return j->status != JOB_ACCEPTED && j->status != JOB_RUNNING;
 }
 
-/* Waits in slices, so that a thread does not outlive its client for long. */
-static void wait_for_end(api *context, const http_request *rq, const char *id, double seconds)
-{
-    const double slice_s = 1.0;
-    double end = deadlines_now() + seconds;
-    for (double left = seconds; left > 0; left = end - deadlines_now())
-        if (work_wait(context->work, id, fmin(left, slice_s)) || atomic_load(&context->draining) ||
-            request_client_gone(rq))
-            return;
-}
-
 bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply)
 {
     double seconds = request_wait(rq, otherwise, context->max_wait_s);
     if (seconds <= 0 || jobs_ended(j))
         return true;
-    wait_for_end(context, rq, j->id, seconds);
+    work_wait_for(context->work, j->id, seconds, rq->fd, &context->draining);
     if (request_wait(rq, -1, context->max_wait_s) >= 0)
         snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
     char id[sizeof j->id];

@@ -77,7 +77,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job INDEXED BY job_by_queue_until WHERE status = 0 AND queue_until > 0 AND "
                           "queue_until < ?1 LIMIT 1",
     [QUERY_EXPIRE] = "UPDATE job SET status = 3, finished = ?1, error = ?2"
-                     " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1",
+                     " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1 RETURNING id",
     [QUERY_ADD_BYTES] = "UPDATE job SET bytes = bytes"
                         " + coalesce((SELECT sum(length(data)) FROM vector WHERE job = id), 0)"
                         " + coalesce((SELECT sum(length(data)) FROM history WHERE job = id), 0) WHERE id = ?1",

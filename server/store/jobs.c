@@ -198,6 +198,8 @@ store_status store_submit(store *s, const store_request *request, job *out, bool
     if (status != STORE_OK)
         job_clear(out);
     *repeated = status == STORE_OK && a.repeated;
+    if (status == STORE_OK && !a.repeated)
+        store_tell(s, out->id);
     return status;
 }
 
@@ -433,6 +435,8 @@ store_status store_dismiss(store *s, const char *id, job_status *was)
     dismiss_args a = {id, JOB_ACCEPTED};
     store_status status = store_write(s, dismiss, &a);
     *was = a.was;
+    if (status == STORE_OK && a.was != JOB_RUNNING)
+        store_tell(s, id);
     return status;
 }
 

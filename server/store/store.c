@@ -144,6 +144,18 @@ void store_observe(store *s, metrics *m)
     s->metrics = m;
 }
 
+void store_listen(store *s, void (*changed)(void *ctx, const char *id), void *ctx)
+{
+    s->changed = changed;
+    s->changed_ctx = ctx;
+}
+
+void store_tell(const store *s, const char *id)
+{
+    if (s->changed)
+        s->changed(s->changed_ctx, id);
+}
+
 void store_close(store *s)
 {
     if (!s)

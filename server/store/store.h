@@ -58,6 +58,12 @@ void store_limit_queue(store *s, int64_t jobs);
 /* Counts commits and changes there from now on; before other threads use the store. */
 void store_observe(store *s, metrics *m);
 
+/* From now on changed(ctx, id) is called after every change of a job that anybody but its owner makes (submitted,
+ * dismissed, expired, deleted) was committed, by the thread that made it, without a lock; what owners do (claim,
+ * finish, release) they tell themselves. NULL: nobody is told. Before other threads use the store, and after they did.
+ */
+void store_listen(store *s, void (*changed)(void *ctx, const char *id), void *ctx);
+
 /* What is submitted. */
 typedef struct {
     const char *body;
