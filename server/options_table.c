@@ -56,7 +56,7 @@ static const option_row ROWS[] = {
     {"cors", OPTION_ORIGINS, AT(cors), 0, 0, "", NULL, NO_LIMIT, false,
      "pages of this origin (https://host[:port], or * for all) may use the service from a browser; several: give it "
      "again, or spaces between them"},
-    {"max-connections", OPTION_INTEGER, AT(max_connections), 1, 100000, "256", NULL, "connections", false,
+    {"max-connections", OPTION_INTEGER, AT(max_connections), 1, 100000, "1024", NULL, "connections", false,
      "connections open at once"},
     {"max-streams", OPTION_INTEGER, AT(max_streams), 1, 100000, NULL, "three quarters of max-connections", "streams",
      false, "event streams open at once; they are connections too"},

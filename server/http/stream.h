@@ -6,8 +6,11 @@
  * libmicrohttpd can suspend connections only where many of them share a thread. This daemon does not run it so: a
  * handler may block there for all others (a commit waits for the disk, a prediction orders a matrix, a picture is
  * drawn), and the message by which it announces a refusal of its own, which daemon.c answers instead, does not say
- * there which connection it is about. What a sleeping thread costs instead is its stack and its connection's buffer, as
- * far as they were touched, and no processor time. */
+ * there which connection it is about. What a sleeping thread costs instead, measured with 2,000 streams and 1,000 long
+ * polls at once on 2 processors (tests/soak/streams.py): 150 kB of memory each, of which 92 kB are the thread-local
+ * data of OpenBLAS (61 kB) and METIS (29 kB) that every thread of a program with them has; no processor time while
+ * nothing happens; 0.03 s from a job's end to the first that is told and 0.35 s to the last; as many submissions per
+ * second beside them as without. */
 #ifndef SERVER_HTTP_STREAM_H
 #define SERVER_HTTP_STREAM_H
 

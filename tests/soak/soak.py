@@ -12,6 +12,7 @@ import malformed
 import no_memory
 import overhead
 import scenarios
+import streams
 from scenarios import PAPER, ZERO
 
 
@@ -28,6 +29,7 @@ RUNS = [
     ("200 x SIGTERM under load", lambda b: scenarios.endings(b, 200, signal.SIGTERM)),
     ("1,000 power losses, faults at every write, 1,000 damaged files", lambda b: unit(b, "test_store_faults", 10)),
     ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
+    ("2,000 event streams, 1,000 long polls", streams.crowds),
     ("200,000 malformed requests", lambda b: malformed.malformed(b, 200000)),
     ("every allocation of a job fails", no_memory.failing),
     ("600 x 200 cells: HTTP against the library", overhead.overhead),
