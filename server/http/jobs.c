@@ -11,6 +11,7 @@
 void reply_store_failure(api *context, store_status status, http_reply *reply)
 {
     char cause[512] = "";
+    problem_details problem;
     if (status == STORE_NOT_FOUND) {
         reply_refuse(reply, 404, "not_found", "Not found", "there is no job with this id");
     } else if (status == STORE_FULL) {
@@ -24,6 +25,12 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
     } else if (status == STORE_CONFLICT) {
         reply_refuse(reply, 409, "conflict", "The job's state does not allow this",
                      "the job changed meanwhile: look at its status and try again");
+    } else if (status == STORE_DAMAGED) {
+        store_message(context->store, cause, sizeof cause);
+        log_write(context->log, LOG_ERROR, "stored_data_damaged",
+                  (log_field[]){LOG_S("job", reply->job), LOG_S("cause", cause), {0}});
+        codec_problem_damaged(&problem, reply->job ? reply->job : "");
+        reply_problem(reply, &problem);
     } else {
         store_message(context->store, cause, sizeof cause);
         log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
@@ -36,6 +43,10 @@ bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply)
     memset(out, 0, sizeof *out);
     snprintf(rq->job_id, sizeof rq->job_id, "%.32s", rq->name);
     store_status status = store_get(context->store, rq->job_id, out);
+    if (status == STORE_OK && out->damaged) {
+        job_clear(out);
+        status = STORE_DAMAGED;
+    }
     if (status != STORE_OK)
         reply_store_failure(context, status, reply);
     return status == STORE_OK;

@@ -207,7 +207,7 @@ connection *store_take_reader(store *s)
 
 store_status store_give_reader(store *s, connection *c, store_status status)
 {
-    if (status == STORE_ERROR)
+    if (status == STORE_ERROR || status == STORE_DAMAGED)
         store_keep_message(s, c);
     pthread_mutex_lock(&s->readers_lock);
     s->readers_free[s->n_readers_free++] = c;

@@ -135,7 +135,9 @@ static bool decode_body(run *r, char *body, size_t body_len)
 {
     problem_details problem = {0};
     double start = work_clock();
-    bool ok = codec_decode_with(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
+    bool ok = body && codec_decode_with(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
+    if (!body)
+        codec_problem_damaged(&problem, r->job->id);
     free(body);
     r->parse_s = work_clock() - start;
     if (!ok) {
