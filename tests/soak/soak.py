@@ -3,17 +3,20 @@
 Prints a table; exit status 1 if a figure that must be 0 is not.
 """
 import os
+import pathlib
 import signal
 import subprocess
 import sys
 import time
 
-import malformed
-import no_memory
-import overhead
-import scenarios
-import streams
-from scenarios import PAPER, ZERO
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "api"))
+
+import malformed  # noqa: E402  the path is set above
+import no_memory  # noqa: E402
+import overhead  # noqa: E402
+import scenarios  # noqa: E402
+import streams  # noqa: E402
+from scenarios import PAPER, ZERO  # noqa: E402
 
 
 def unit(build, program, times):
