@@ -175,6 +175,7 @@ static bool start_http(service *s, const server_options *options, int fd, char *
                                  .cors = s->origins.words,
                                  .n_cors = s->origins.n,
                                  .max_connections = (unsigned)options->max_connections,
+                                 .max_streams = (unsigned)options->max_streams,
                                  .request_deadline_s = options->request_deadline_s,
                                  .max_wait_s = options->max_wait_s,
                                  .max_client_connections = (unsigned)options->max_client_connections,

@@ -398,6 +398,8 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     if (!set_from_file(out, &f, message, size) || !set_from_environment(out, message, size) ||
         !set_from_flags(out, &f, message, size) || !check_together(out, message, size))
         return OPTIONS_WRONG;
+    if (out->max_streams == 0) /* they hold their connections for long: the others are for everything else */
+        out->max_streams = out->max_connections - out->max_connections / 4;
     if (out->memory == 0)
         out->memory = memory_share(memory_available(), out->cache, out->workers);
     if (backup)

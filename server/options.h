@@ -40,6 +40,7 @@ typedef struct {
     double upload_days;         /* one that no job uses is kept so long */
     /* requests */
     int max_connections, max_client_connections, max_client_rate; /* the last two: 0 is no limit */
+    int max_streams;                                              /* of the connections */
     int max_json_depth;
     size_t max_body, max_dofs, max_rows, max_nonzeros;
     double request_deadline_s, max_wait_s;

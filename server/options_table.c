@@ -56,8 +56,10 @@ static const option_row ROWS[] = {
     {"cors", OPTION_ORIGINS, AT(cors), 0, 0, "", NULL, NO_LIMIT, false,
      "pages of this origin (https://host[:port], or * for all) may use the service from a browser; several: give it "
      "again, or spaces between them"},
-    {"max-connections", OPTION_INTEGER, AT(max_connections), 1, 100000, "256", NULL, "connections", false,
+    {"max-connections", OPTION_INTEGER, AT(max_connections), 1, 100000, "1024", NULL, "connections", false,
      "connections open at once"},
+    {"max-streams", OPTION_INTEGER, AT(max_streams), 1, 100000, NULL, "three quarters of max-connections", "streams",
+     false, "event streams open at once; they are connections too"},
     {"max-client-connections", OPTION_INTEGER, AT(max_client_connections), 0, 100000, "0", NULL, "connections", true,
      "connections of one address open at once; 0: no limit of its own. Behind a proxy all clients are one"},
     {"max-client-rate", OPTION_INTEGER, AT(max_client_rate), 0, 1000000, "10000", NULL, "requests per second", true,

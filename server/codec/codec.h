@@ -94,6 +94,9 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
 /* The candidate that was probably meant, -1: none is close. */
 int codec_closest(const char *text, const char *const *candidates, size_t count);
 
+/* What is stored of this job is not what was written. */
+void codec_problem_damaged(problem_details *out, const char *id);
+
 /* Reads back what codec_encode_problem wrote (a job's error); members that are missing stay empty. */
 bool codec_decode_problem(problem_details *out, const char *json);
 

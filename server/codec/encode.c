@@ -40,6 +40,15 @@ char *codec_encode_problem(const problem_details *problem)
     return text_finish(&t, NULL);
 }
 
+void codec_problem_damaged(problem_details *out, const char *id)
+{
+    *out = (problem_details){.status = 500, .code = "stored_data_damaged", .title = "Stored data are damaged"};
+    snprintf(out->detail, sizeof out->detail,
+             "What is stored of job %.32s is not what was written, by its checksum: it is not shown. Delete the job "
+             "and submit it again; uzawad --check-db finds what else is damaged.",
+             id);
+}
+
 /* ----------------------------------------------------------------- jobs */
 
 /* RFC 3339, UTC, milliseconds; null for 0. */
@@ -79,7 +88,7 @@ static void put_links(text *t, const job *j)
     text_key(t, "links");
     text_open(t, '[');
     put_link(t, "self", j->id, "");
-    bool has_answer = j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary);
+    bool has_answer = !j->damaged && (j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary));
     if (has_answer)
         put_link(t, "result", j->id, "/result");
     if (has_answer && !has_cases(j)) {
@@ -91,6 +100,13 @@ static void put_links(text *t, const job *j)
     if (j->refines[0])
         put_link(t, "refines", j->refines, "");
     text_close(t, ']');
+}
+
+static void put_damaged(text *t, const job *j)
+{
+    problem_details problem;
+    codec_problem_damaged(&problem, j->id);
+    put_problem(t, &problem);
 }
 
 static void put_job(text *t, const job *j)
@@ -114,7 +130,10 @@ static void put_job(text *t, const job *j)
     text_key(t, "summary");
     text_raw(t, j->summary);
     text_key(t, "error");
-    text_raw(t, j->error);
+    if (j->damaged)
+        put_damaged(t, j);
+    else
+        text_raw(t, j->error);
     put_links(t, j);
     text_close(t, '}');
 }

@@ -287,6 +287,7 @@ bool conn_answer(conn *c, struct MHD_Connection *mhd)
 {
     http_request *rq = c->request;
     deadline_set(c->deadline, INFINITY, false); /* the client has done its part */
+    rq->reply.job = rq->job_id;
     if (rq->refused.status)
         reply_problem(&rq->reply, &rq->refused);
     else

@@ -14,8 +14,6 @@
 #define CONNECTION_MEMORY (64 * 1024)
 /* All bodies in memory at once; a request beyond it is told to come back later. */
 #define BODY_BUDGET(max_body) ((max_body) < SIZE_MAX / 8 ? 8 * (max_body) : SIZE_MAX)
-/* Event streams hold their connections for long: the others are for everything else. */
-#define MOST_STREAMS(max_connections) ((max_connections) - (max_connections) / 4)
 /* Slowest transfer that is waited for, bytes per second: the allowance that a body's length adds to a deadline. */
 #define SLOWEST_RATE 100e3
 

@@ -3,6 +3,7 @@
  * A connection has at most one request at a time. The request is made when its first line has come (on_target), looked
  * at when its header block has come (begin), fed with its body (take_body), answered (answer) and ended
  * (on_completed). All of this happens in the connection's own thread. */
+#include "http/all_events.h"
 #include "http/conn.h"
 #include "http/fields.h"
 
@@ -154,7 +155,7 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.max_wait_s = options->max_wait_s;
     server->context.cors = options->cors;
     server->context.n_cors = options->n_cors;
-    server->context.max_streams = MOST_STREAMS(options->max_connections);
+    server->context.max_streams = options->max_streams;
     atomic_init(&server->context.streams, 0);
     server->context.max_upload = (int64_t)options->max_upload;
     server->context.limits = options->limits;
@@ -174,14 +175,16 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
         random = (uint64_t)(deadlines_now() * 1e9);
     snprintf(server->id_prefix, sizeof server->id_prefix, "%016llx", (unsigned long long)random);
+    memcpy(server->context.run, server->id_prefix, sizeof server->context.run);
     /* The tiling of a header block is how 0.9.x parses; later versions refuse by themselves what it finds. */
     server->check_layout = strncmp(MHD_get_version(), "0.9.", 4) == 0;
     if (pthread_key_create(&server->current, NULL) != 0)
         goto fail;
     has_key = true;
     server->context.fields = field_slots_new(work_workers(parts->work));
+    server->context.told = told_changes_new();
     server->deadlines = deadlines_new(words);
-    if (!server->deadlines || !server->context.fields)
+    if (!server->deadlines || !server->context.fields || !server->context.told)
         goto fail;
     server->daemon = start_daemon(server, listen_fd, options);
     if (!server->daemon)
@@ -193,6 +196,7 @@ fail:
     if (server) {
         deadlines_free(server->deadlines);
         field_slots_free(server->context.fields);
+        told_changes_free(server->context.told);
     }
     if (has_key)
         pthread_key_delete(server->current);
@@ -205,6 +209,7 @@ fail:
 void http_drain(http_server *server)
 {
     atomic_store(&server->context.draining, true);
+    feed_wake_all(work_feed(server->context.work)); /* those who wait there see it */
 }
 
 void http_stop(http_server *server)
@@ -215,6 +220,7 @@ void http_stop(http_server *server)
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
     deadlines_free(server->deadlines);
     field_slots_free(server->context.fields);
+    told_changes_free(server->context.told);
     pthread_key_delete(server->current);
     pthread_mutex_destroy(&server->context.predict_lock);
     pthread_mutex_destroy(&server->context.ready_lock);

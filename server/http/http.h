@@ -41,6 +41,7 @@ typedef struct {
     size_t max_body;           /* bytes of one request's body */
     size_t max_upload;         /* bytes of one upload, as it is sent and after decompression */
     unsigned max_connections;  /* open at once */
+    unsigned max_streams;      /* of them, event streams */
     double request_deadline_s; /* for a whole request, without the allowance for its body's length */
     const char *const *cors;   /* n_cors origins ("https://host[:port]" or "*") whose pages may use the service */
     size_t n_cors;

@@ -1,11 +1,9 @@
 /* jobs.c: /v1/jobs and /v1/jobs/{id}. */
 #include "codec/codec.h"
-#include "http/deadlines.h"
 #include "http/jobs.h"
 #include "http/problem.h"
 #include "http/request.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,6 +11,7 @@
 void reply_store_failure(api *context, store_status status, http_reply *reply)
 {
     char cause[512] = "";
+    problem_details problem;
     if (status == STORE_NOT_FOUND) {
         reply_refuse(reply, 404, "not_found", "Not found", "there is no job with this id");
     } else if (status == STORE_FULL) {
@@ -26,6 +25,12 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
     } else if (status == STORE_CONFLICT) {
         reply_refuse(reply, 409, "conflict", "The job's state does not allow this",
                      "the job changed meanwhile: look at its status and try again");
+    } else if (status == STORE_DAMAGED) {
+        store_message(context->store, cause, sizeof cause);
+        log_write(context->log, LOG_ERROR, "stored_data_damaged",
+                  (log_field[]){LOG_S("job", reply->job), LOG_S("cause", cause), {0}});
+        codec_problem_damaged(&problem, reply->job ? reply->job : "");
+        reply_problem(reply, &problem);
     } else {
         store_message(context->store, cause, sizeof cause);
         log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
@@ -38,6 +43,10 @@ bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply)
     memset(out, 0, sizeof *out);
     snprintf(rq->job_id, sizeof rq->job_id, "%.32s", rq->name);
     store_status status = store_get(context->store, rq->job_id, out);
+    if (status == STORE_OK && out->damaged) {
+        job_clear(out);
+        status = STORE_DAMAGED;
+    }
     if (status != STORE_OK)
         reply_store_failure(context, status, reply);
     return status == STORE_OK;
@@ -60,23 +69,12 @@ bool jobs_ended(const job *j)
     return j->status != JOB_ACCEPTED && j->status != JOB_RUNNING;
 }
 
-/* Waits in slices, so that a thread does not outlive its client for long. */
-static void wait_for_end(api *context, const http_request *rq, const char *id, double seconds)
-{
-    const double slice_s = 1.0;
-    double end = deadlines_now() + seconds;
-    for (double left = seconds; left > 0; left = end - deadlines_now())
-        if (work_wait(context->work, id, fmin(left, slice_s)) || atomic_load(&context->draining) ||
-            request_client_gone(rq))
-            return;
-}
-
 bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply)
 {
     double seconds = request_wait(rq, otherwise, context->max_wait_s);
     if (seconds <= 0 || jobs_ended(j))
         return true;
-    wait_for_end(context, rq, j->id, seconds);
+    work_wait_for(context->work, j->id, seconds, rq->fd, &context->draining);
     if (request_wait(rq, -1, context->max_wait_s) >= 0)
         snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
     char id[sizeof j->id];

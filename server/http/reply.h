@@ -39,6 +39,7 @@ typedef struct {
     int fd;
     size_t offset;
     reply_source source; /* read NULL: none; then body is NULL */
+    const char *job;     /* the id of the job that the request is about, "": none; lives as long as the request */
     char request_id[65], authenticate[112];
     char location[96], preference_applied[32], allow[64];
 } http_reply;

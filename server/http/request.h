@@ -23,6 +23,8 @@ typedef struct {
     work *work;
     server_log *log;
     struct field_slots *fields;   /* turns of replies that are computed: fields.h */
+    struct told_changes *told;    /* texts of the latest changes of jobs: all_events.h */
+    char run[17];                 /* a random name of this run of the daemon */
     pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
     const webhooks *webhooks;     /* NULL: there are none */
     metrics *metrics;
@@ -115,6 +117,7 @@ void uploads_create(api *context, http_request *rq, http_reply *reply);
 void uploads_get(api *context, http_request *rq, http_reply *reply);
 void uploads_delete(api *context, http_request *rq, http_reply *reply);
 void events_get(api *context, http_request *rq, http_reply *reply);
+void events_get_all(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_limits(api *context, http_request *rq, http_reply *reply);

@@ -23,6 +23,7 @@ static const route ROUTES[] = {
     {"GET", "/v1/jobs/{id}/result.vtu", FILE_OF, results_get_vtu, false},
     {"GET", "/v1/jobs/{id}/deformed.svg", PICTURE, results_get_picture, false},
     {"GET", "/v1/jobs/{id}/events", NONE, events_get, false},
+    {"GET", "/v1/events", NONE, events_get_all, false},
     {"GET", "/v1/jobs/{id}/history", HISTORY, history_get, false},
     {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv, false},
     {"POST", "/v1/verify", NONE, verify_submit, false},

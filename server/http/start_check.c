@@ -16,9 +16,13 @@ static bool refuse(problem_details *problem, const char *member, const char *cod
     return false;
 }
 
-static bool refuse_store(api *context, problem_details *problem)
+static bool refuse_store(api *context, const codec_start *start, store_status status, problem_details *problem)
 {
     char cause[256];
+    if (status == STORE_DAMAGED) {
+        codec_problem_damaged(problem, start->job);
+        return false;
+    }
     store_message(context->store, cause, sizeof cause);
     log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
     return http_problem(problem, 500, "store_error", "The store failed", "the server's log has the cause");
@@ -30,13 +34,14 @@ static bool check_job(api *context, const codec_start *start, problem_details *p
     job other = {0};
     store_status status = store_get(context->store, start->job, &other);
     bool ended = status == STORE_OK && jobs_ended(&other), good = ended && other.summary;
+    status = status == STORE_OK && other.damaged ? STORE_DAMAGED : status;
     job_clear(&other);
     if (good)
         return true;
     if (status == STORE_NOT_FOUND)
         return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: there is no job with this id");
     if (status != STORE_OK)
-        return refuse_store(context, problem);
+        return refuse_store(context, start, status, problem);
     return refuse(problem, "job", "not_allowed",
                   ended ? "/solver/warm_start/job: this job ended without an answer"
                         : "/solver/warm_start/job: this job has not ended");
@@ -48,8 +53,9 @@ static bool find_case(api *context, const codec_start *start, int64_t *number, p
     store_case *cases = NULL;
     size_t count = 0, i = 0;
     *number = 0;
-    if (store_get_cases(context->store, start->job, NULL, &cases, &count) != STORE_OK)
-        return refuse_store(context, problem);
+    store_status status = store_get_cases(context->store, start->job, NULL, &cases, &count);
+    if (status != STORE_OK)
+        return refuse_store(context, start, status, problem);
     while (i < count && strcmp(cases[i].name, start->case_name) != 0)
         i++;
     bool good = i < count || (count == 0 && !start->case_name[0]);
@@ -79,7 +85,7 @@ static bool check_reactions(api *context, const codec_request *request, int64_t 
         finite = isfinite(r[i]);
     free(r);
     if (status != STORE_OK && status != STORE_NOT_FOUND)
-        return refuse_store(context, problem);
+        return refuse_store(context, &request->start, status, problem);
     if (!finite)
         return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: this job ended without reactions");
     if (!codec_request_sizes(request, &m, &n_u, problem))
@@ -106,7 +112,7 @@ static bool check_same(api *context, const codec_start *start, const http_reques
     if (same)
         return true;
     if (status != STORE_OK && status != STORE_NOT_FOUND)
-        return refuse_store(context, problem);
+        return refuse_store(context, start, status, problem);
     return refuse(problem, "continue", "not_allowed",
                   "/solver/warm_start/continue: problem and cases are not, byte by byte, those of that job; leave this "
                   "out to start from its reactions");

@@ -1,4 +1,5 @@
 #include "store/connection.h"
+#include "store/checksum.h"
 #include "store/file_format.h"
 
 #include <errno.h>
@@ -7,7 +8,8 @@
 
 #define BUSY_TIMEOUT_MS 5000
 #define JOB_COLUMNS                                                                                                    \
-    "id, status, progress, attempts, created, started, finished, tags, summary, error, refines, priority"
+    "id, status, progress, attempts, created, started, finished, tags, summary, error, refines, priority, "            \
+    "summary IS NULL OR " SUM_IS("summary_sum", SUM_JOB)
 
 /* Filters of every listing: time, further tags, and a bound on ids that the time implies (they begin with it). */
 #define LIST_FILTER                                                                                                    \
@@ -33,23 +35,26 @@ static const char *const SQL[QUERY_COUNT] = {
                        " FROM job JOIN request ON request.job = job.id WHERE idempotency_key = ?1",
     [QUERY_INSERT_JOB] = "INSERT INTO job(id, status, created, tags, idempotency_key, refines, priority, queue_until,"
                          " bytes) VALUES(?1, 0, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-    [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body) VALUES(?1, ?2)",
+    [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body, sum) VALUES(?1, ?2, " SUM_OF("?1, ?2") ")",
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
     [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, owner = ?2,"
                     " lease = ?1 + ?3 WHERE id = (SELECT id FROM job INDEXED BY job_by_turn WHERE status = 0"
                     " AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
                     " RETURNING " JOB_COLUMNS,
-    [QUERY_BODY] = "SELECT body FROM request WHERE job = ?1",
+    [QUERY_BODY] = "SELECT body, " SUM_IS("sum", SUM_REQUEST) " FROM request WHERE job = ?1",
     [QUERY_RENEW] = "UPDATE job SET lease = ?3, progress = ?4 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_FINISH] = "UPDATE job SET status = ?3, finished = ?4, summary = ?5, error = ?6, owner = NULL, lease = 0,"
-                     " progress = CASE WHEN ?3 = 2 THEN 100 ELSE progress END"
-                     " WHERE id = ?1 AND status = 1 AND owner = ?2",
-    [QUERY_INSERT_ANSWER] = "INSERT INTO answer(job, number, name, summary) VALUES(?1, ?2, ?3, ?4)",
-    [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data, answer)"
-                            " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)",
-    [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, part, version, columns, last, data, answer)"
-                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                     " summary_sum = CASE WHEN ?5 IS NOT NULL THEN " SUM_OF(
+                         "?1, ?3, ?5") " END,"
+                                       " progress = CASE WHEN ?3 = 2 THEN 100 ELSE progress END"
+                                       " WHERE id = ?1 AND status = 1 AND owner = ?2",
+    [QUERY_INSERT_ANSWER] = "INSERT INTO answer(job, number, name, summary, sum) VALUES(?1, ?2, ?3, ?4,"
+                            " " SUM_OF("?1, ?2, ?3, ?4") ")",
+    [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data, answer, sum)"
+                            " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?2, ?3, ?4, ?5, ?6") ")",
+    [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, part, version, columns, last, data, answer, sum)"
+                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?2, ?3, ?4, ?5, ?6") ")",
     [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - 1, progress = 0, started = 0, owner = NULL,"
                       " lease = 0, queue_until = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_RECOVER_FAIL] = "UPDATE job SET status = 3, finished = ?2, error = ?3, owner = NULL, lease = 0"
@@ -77,7 +82,7 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job INDEXED BY job_by_queue_until WHERE status = 0 AND queue_until > 0 AND "
                           "queue_until < ?1 LIMIT 1",
     [QUERY_EXPIRE] = "UPDATE job SET status = 3, finished = ?1, error = ?2"
-                     " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1",
+                     " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1 RETURNING id",
     [QUERY_ADD_BYTES] = "UPDATE job SET bytes = bytes"
                         " + coalesce((SELECT sum(length(data)) FROM vector WHERE job = id), 0)"
                         " + coalesce((SELECT sum(length(data)) FROM history WHERE job = id), 0) WHERE id = ?1",
@@ -85,14 +90,18 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_OLD_JOBS] = "SELECT id, finished, bytes FROM job INDEXED BY job_by_end WHERE status >= 2"
                        " AND NOT EXISTS (SELECT 1 FROM webhook WHERE job = id AND state = 1)"
                        " ORDER BY finished, id LIMIT ?1",
-    [QUERY_VECTOR] = "SELECT version, count, data FROM vector WHERE job = ?1 AND answer = ?3 AND name = ?2"
-                     " ORDER BY part",
+    [QUERY_VECTOR] =
+        "SELECT version, count, data, " SUM_IS("sum", SUM_VECTOR) " FROM vector"
+                                                                  " WHERE job = ?1 AND answer = ?3 AND name = ?2"
+                                                                  " ORDER BY part",
     [QUERY_COUNT_VECTORS] = "SELECT coalesce(sum(count), 0) FROM vector WHERE job = ?1 AND name = ?2 AND part = 0",
-    [QUERY_ANSWERS] = "SELECT number, name, summary FROM answer WHERE job = ?1 AND (?2 IS NULL OR name = ?2)"
-                      " ORDER BY number",
-    [QUERY_HISTORY] = "SELECT version, columns, CASE WHEN last > ?2 THEN data END FROM history WHERE job = ?1"
-                      " AND answer = ?3"
-                      " ORDER BY part",
+    [QUERY_ANSWERS] = "SELECT number, name, summary, " SUM_IS(
+        "sum", SUM_ANSWER) " FROM answer WHERE job = ?1 AND (?2 IS NULL OR name = ?2)"
+                           " ORDER BY number",
+    [QUERY_HISTORY] = "SELECT version, columns, CASE WHEN last > ?2 THEN data END,"
+                      " " SUM_IS("sum", SUM_HISTORY) " FROM history WHERE job = ?1"
+                                                     " AND answer = ?3"
+                                                     " ORDER BY part",
     [QUERY_UPLOAD] = "SELECT bytes, created, used, (SELECT count(*) FROM upload_use WHERE upload = id) FROM upload"
                      " WHERE id = ?1",
     [QUERY_INSERT_UPLOAD] = "INSERT OR IGNORE INTO upload(id, bytes, created, used) VALUES(?1, ?2, ?3, ?3)",
@@ -121,7 +130,7 @@ bool connection_open(connection *c, const char *path, bool writer, char *message
     int flags = SQLITE_OPEN_NOMUTEX | (writer ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY);
     if (sqlite3_open_v2(path, &c->db, flags, NULL) == SQLITE_OK &&
         sqlite3_busy_timeout(c->db, BUSY_TIMEOUT_MS) == SQLITE_OK &&
-        sqlite3_exec(c->db, COMMON_PRAGMAS, NULL, NULL, NULL) == SQLITE_OK &&
+        sqlite3_exec(c->db, COMMON_PRAGMAS, NULL, NULL, NULL) == SQLITE_OK && checksum_register(c->db) &&
         (!writer || sqlite3_exec(c->db, WRITER_PRAGMAS, NULL, NULL, NULL) == SQLITE_OK))
         return true;
     snprintf(message, size, "cannot use the file: %s", file_format_why_unreadable(c->db));

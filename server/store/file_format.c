@@ -29,6 +29,7 @@
  * upload_use which jobs name which uploads in their requests.
  * webhook  whom to tell of the end of a job. state 0: it has not ended, 1: to be told at `next`, 2: told, 3: given up.
  *          A trigger makes it due, whatever ends the job.
+ * sum, summary_sum: checksums of what answers are made of (checksum.h); NULL in rows that an older format wrote.
  * Deleting a job deletes its rows in every other table. */
 #define RESULT_TABLES                                                                                                  \
     "CREATE TABLE answer("                                                                                             \
@@ -84,6 +85,11 @@
     "CREATE TRIGGER tally_update AFTER UPDATE OF status ON job WHEN OLD.status <> NEW.status BEGIN"                    \
     " UPDATE tally SET jobs = jobs - 1 WHERE status = OLD.status;"                                                     \
     " UPDATE tally SET jobs = jobs + 1 WHERE status = NEW.status; END;"
+/* Version 5. Rows that are there already stay without: to sum them up would write a large file once more. */
+#define COLUMNS_5                                                                                                      \
+    "ALTER TABLE job ADD COLUMN summary_sum INTEGER; ALTER TABLE request ADD COLUMN sum INTEGER;"                      \
+    "ALTER TABLE answer ADD COLUMN sum INTEGER; ALTER TABLE vector ADD COLUMN sum INTEGER;"                            \
+    "ALTER TABLE history ADD COLUMN sum INTEGER;"
 
 static const char *const SCHEMA =
     "CREATE TABLE job("
@@ -107,7 +113,7 @@ static const char *const SCHEMA =
     "  tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
     "  PRIMARY KEY(tag, job)"
     ") STRICT, WITHOUT ROWID;"
-    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4;
+    "CREATE INDEX tag_by_job ON tag(job);" RESULT_TABLES TABLES_3 JOB_INDEXES_3 TABLES_4 COLUMNS_5;
 
 _Static_assert(JOB_ACCEPTED == 0 && JOB_RUNNING == 1 && JOB_SUCCESSFUL == 2 && JOB_FAILED == 3 && JOB_DISMISSED == 4,
                "these numbers stand in stored rows");
@@ -125,7 +131,7 @@ const char *file_format_why_unreadable(sqlite3 *db)
 
 /* STEPS[n] turns version n into n + 1. Version 2: load cases, and jobs that refine others. The primary keys of the
  * result tables grew by a column, which SQLite can only do by copying the rows. Version 3: uploads, webhooks, the turn
- * and the size of jobs. Version 4: the tally. */
+ * and the size of jobs. Version 4: the tally. Version 5: checksums. */
 static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [0] = NULL,
     [1] = "ALTER TABLE job ADD COLUMN refines TEXT;"
@@ -142,6 +148,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
           " + coalesce((SELECT sum(length(data)) FROM vector WHERE job = id), 0)"
           " + coalesce((SELECT sum(length(data)) FROM history WHERE job = id), 0) WHERE status >= 2;",
     [3] = TABLES_4,
+    [4] = COLUMNS_5,
 };
 
 /* The single integer that `sql` yields; false on any error. */

@@ -52,6 +52,8 @@ struct store {
     int64_t uploads_pending; /* of those that are being written */
     char *uploads_folder;    /* absolute; made with the first upload */
 
+    void (*changed)(void *ctx, const char *id); /* store_listen; may be NULL */
+    void *changed_ctx;
     metrics *metrics; /* may be NULL */
     int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
 };
@@ -83,6 +85,9 @@ store_status store_settle(store *s); /* returns when all that anybody may have r
 
 /* Before jobs are told that were read: returns when the end of each is on disk. */
 store_status store_settle_jobs(store *s, const job *jobs, size_t count);
+
+/* Calls who listens (store_listen). */
+void store_tell(const store *s, const char *id);
 
 /* Keeps the connection's message as the store's last one. */
 void store_keep_message(store *s, const connection *c);

@@ -2,6 +2,7 @@
 #include "store/internal.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -73,7 +74,7 @@ static store_status find_key(connection *c, submit_args *a)
     bind_integer(&st, 2, (int64_t)a->request->body_len);
     bind_blob(&st, 3, a->request->body, a->request->body_len);
     if (statement_row(&st))
-        status = sqlite3_column_int(st.stmt, 12) ? store_read_job(&st, a->out) : STORE_CONFLICT;
+        status = sqlite3_column_int(st.stmt, 13) ? store_read_job(&st, a->out) : STORE_CONFLICT;
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
 }
@@ -198,6 +199,8 @@ store_status store_submit(store *s, const store_request *request, job *out, bool
     if (status != STORE_OK)
         job_clear(out);
     *repeated = status == STORE_OK && a.repeated;
+    if (status == STORE_OK && !a.repeated)
+        store_tell(s, out->id);
     return status;
 }
 
@@ -222,12 +225,16 @@ static store_status read_body(connection *c, const char *id, char **body, size_t
 {
     statement st = statement_begin(c, QUERY_BODY);
     bind_text(&st, 1, id);
-    bool found = statement_row(&st);
-    if (found)
+    bool found = statement_row(&st), good = found && sqlite3_column_int(st.stmt, 1);
+    if (good)
         *body = store_copy_blob(&st, 0, len);
     store_status ended = statement_end(&st);
     if (ended != STORE_OK || *body)
         return ended;
+    if (found && !good) {
+        snprintf(c->message, sizeof c->message, "the request of job %.32s is not what was written", id);
+        return STORE_DAMAGED;
+    }
     strcpy(c->message, "the request of a job is missing, or there is no memory for it");
     return found ? STORE_ERROR : STORE_NOT_FOUND;
 }
@@ -270,6 +277,8 @@ static store_status claim(store *s, connection *c, void *args)
     if (status != STORE_OK)
         return status;
     status = read_body(c, a->out->id, &a->body, &a->body_len);
+    if (status == STORE_DAMAGED) /* it is to end, not to stand before all others for ever */
+        return STORE_OK;
     return status == STORE_NOT_FOUND ? STORE_ERROR : status; /* a job without its request is a damaged file */
 }
 
@@ -433,6 +442,8 @@ store_status store_dismiss(store *s, const char *id, job_status *was)
     dismiss_args a = {id, JOB_ACCEPTED};
     store_status status = store_write(s, dismiss, &a);
     *was = a.was;
+    if (status == STORE_OK && a.was != JOB_RUNNING)
+        store_tell(s, id);
     return status;
 }
 

@@ -1,5 +1,6 @@
 #include "store/maintenance.h"
 #include "store/backup_uploads.h"
+#include "store/checksum.h"
 #include "store/file_format.h"
 #include "store/internal.h"
 
@@ -36,15 +37,31 @@ static double seconds_now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static int64_t count_jobs(sqlite3 *db)
+static int64_t read_integer(sqlite3 *db, const char *sql)
 {
     sqlite3_stmt *stmt = NULL;
-    int64_t count = 0;
-    if (sqlite3_prepare_v2(db, "SELECT count(*) FROM job", -1, &stmt, NULL) == SQLITE_OK &&
-        sqlite3_step(stmt) == SQLITE_ROW)
-        count = sqlite3_column_int64(stmt, 0);
+    int64_t value = 0;
+    if (sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW)
+        value = sqlite3_column_int64(stmt, 0);
     sqlite3_finalize(stmt);
-    return count;
+    return value;
+}
+
+/* What is not what was written. Each row is read whole. */
+static int check_sums(sqlite3 *db, FILE *text)
+{
+    static const char *const SQL[] = {
+        "SELECT 'summary of job ' || id FROM job WHERE summary IS NOT NULL AND NOT " SUM_IS("summary_sum", SUM_JOB),
+        "SELECT 'request of job ' || job FROM request WHERE NOT " SUM_IS("sum", SUM_REQUEST),
+        "SELECT 'summary of case ' || number || ' of job ' || job FROM answer WHERE NOT " SUM_IS("sum", SUM_ANSWER),
+        "SELECT name || ' of job ' || job FROM vector WHERE NOT " SUM_IS("sum", SUM_VECTOR),
+        "SELECT 'history of job ' || job FROM history WHERE NOT " SUM_IS("sum", SUM_HISTORY)};
+    int rc = SQLITE_OK;
+    if (read_integer(db, "PRAGMA user_version") < 5)
+        return SQLITE_OK;
+    for (size_t i = 0; i < sizeof SQL / sizeof SQL[0] && rc == SQLITE_OK; i++)
+        rc = collect(db, SQL[i], "the %s is not what was written\n", text);
+    return rc;
 }
 
 /* A damaged page may end a check early: that is a finding, not a failure of the check. */
@@ -63,13 +80,15 @@ static bool check(sqlite3 *db, store_findings *out)
         rc = collect(db,
                      "SELECT id FROM job WHERE NOT EXISTS (SELECT 1 FROM request WHERE request.job = job.id) LIMIT 20",
                      "job %s has no request\n", text);
-    if (rc == SQLITE_OK)
+    if (rc == SQLITE_OK && read_integer(db, "PRAGMA user_version") >= 4)
         rc = collect(
             db, "SELECT status FROM tally WHERE jobs <> (SELECT count(*) FROM job WHERE job.status = tally.status)",
             "the tally of jobs with status %s is wrong\n", text);
+    if (rc == SQLITE_OK)
+        rc = check_sums(db, text);
     if (rc != SQLITE_OK)
         fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
-    out->jobs = count_jobs(db);
+    out->jobs = read_integer(db, "SELECT count(*) FROM job");
     out->seconds = seconds_now() - begun;
     if (fclose(text) == 0)
         return true;
@@ -98,8 +117,8 @@ static sqlite3 *open_file(const char *path, char *message, size_t size)
         snprintf(why, sizeof why, "cannot open the file: %s", strerror(errno));
     else if (sqlite3_open_v2(absolute, &db, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, NULL) != SQLITE_OK)
         snprintf(why, sizeof why, "cannot open the file: %s", file_format_why_unreadable(db));
-    else if (sqlite3_busy_timeout(db, 5000) == SQLITE_OK && file_format_check(db, &version, why, sizeof why) &&
-             version == 0)
+    else if (sqlite3_busy_timeout(db, 5000) == SQLITE_OK && checksum_register(db) &&
+             file_format_check(db, &version, why, sizeof why) && version == 0)
         snprintf(why, sizeof why, "the file is empty: there is no job in it");
     free(absolute);
     if (!why[0])

@@ -37,6 +37,11 @@ store_status store_read_job(statement *st, job *out)
     const char *refines = (const char *)sqlite3_column_text(row, 10);
     if (refines && strlen(refines) < sizeof out->refines)
         strcpy(out->refines, refines);
+    out->damaged = ok && !sqlite3_column_int(row, 12);
+    if (out->damaged) {
+        free(out->summary);
+        out->summary = NULL;
+    }
     if (ok)
         return STORE_OK;
     job_clear(out);
@@ -139,6 +144,10 @@ void store_cases_free(store_case *cases, size_t count)
 static store_status read_case(statement *st, store_case *out)
 {
     bool ok = true;
+    if (!sqlite3_column_int(st->stmt, 3)) {
+        *out = (store_case){.name = NULL};
+        return STORE_DAMAGED;
+    }
     *out = (store_case){.number = sqlite3_column_int64(st->stmt, 0)};
     out->name = store_copy_text(st, 1, &ok);
     out->summary = store_copy_text(st, 2, &ok);
@@ -179,6 +188,8 @@ store_status store_get_cases(store *s, const char *id, const char *name, store_c
     store_status ended = statement_end(&st);
     if (ended != STORE_OK)
         status = ended;
+    if (status == STORE_DAMAGED)
+        snprintf(c->message, sizeof c->message, "a summary of job %.32s is not what was written", id);
     if (status != STORE_OK) {
         store_cases_free(*cases, *count);
         *cases = NULL;

@@ -3,6 +3,7 @@
 #include "store/file_format.h"
 
 #include <endian.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -36,10 +37,10 @@ static store_status no_memory(connection *c)
     return STORE_ERROR;
 }
 
-static store_status damaged(connection *c)
+static store_status damaged(connection *c, const char *id)
 {
-    strcpy(c->message, "a stored result is damaged or was written by another version");
-    return STORE_ERROR;
+    snprintf(c->message, sizeof c->message, "the result of job %.32s is damaged or was written by another version", id);
+    return STORE_DAMAGED;
 }
 
 /* ---- writing */
@@ -153,22 +154,23 @@ static bool append_blob(statement *st, int at, double *x, int64_t *have, int64_t
     return true;
 }
 
-static store_status read_vector(statement *st, double **out, int64_t *total)
+static store_status read_vector(statement *st, const char *id, double **out, int64_t *total)
 {
     int64_t have = 0;
     if (!statement_row(st))
         return STORE_NOT_FOUND;
     *total = sqlite3_column_int64(st->stmt, 1);
     if (*total < 0 || *total > INT64_MAX / 8)
-        return damaged(st->c);
+        return damaged(st->c, id);
     *out = malloc(*total > 0 ? (size_t)*total * 8 : 1);
     if (!*out)
         return no_memory(st->c);
     do {
-        if (sqlite3_column_int64(st->stmt, 0) != FILE_FORMAT_VECTOR_VERSION || !append_blob(st, 2, *out, &have, *total))
-            return damaged(st->c);
+        if (!sqlite3_column_int(st->stmt, 3) || sqlite3_column_int64(st->stmt, 0) != FILE_FORMAT_VECTOR_VERSION ||
+            !append_blob(st, 2, *out, &have, *total))
+            return damaged(st->c, id);
     } while (statement_row(st));
-    return have == *total ? STORE_OK : damaged(st->c);
+    return have == *total ? STORE_OK : damaged(st->c, id);
 }
 
 store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data, int64_t *count)
@@ -182,7 +184,7 @@ store_status store_get_vector(store *s, const char *id, int64_t number, const ch
     bind_text(&st, 1, id);
     bind_text(&st, 2, name);
     bind_integer(&st, 3, number);
-    store_status status = read_vector(&st, &x, &total);
+    store_status status = read_vector(&st, id, &x, &total);
     store_status ended = statement_end(&st);
     if (ended != STORE_OK)
         status = ended;
@@ -213,25 +215,26 @@ typedef struct {
     int64_t columns;
 } rows_buffer;
 
-static store_status read_part(statement *st, rows_buffer *rows)
+static store_status read_part(statement *st, const char *id, rows_buffer *rows)
 {
     rows->columns = sqlite3_column_int64(st->stmt, 1);
-    if (sqlite3_column_int64(st->stmt, 0) != FILE_FORMAT_VECTOR_VERSION || rows->columns <= 0)
-        return damaged(st->c);
+    if (!sqlite3_column_int(st->stmt, 3) || sqlite3_column_int64(st->stmt, 0) != FILE_FORMAT_VECTOR_VERSION ||
+        rows->columns <= 0)
+        return damaged(st->c, id);
     int64_t total = rows->count + sqlite3_column_bytes(st->stmt, 2) / 8;
     double *grown = realloc(rows->x, total > 0 ? (size_t)total * 8 : 1);
     if (!grown)
         return no_memory(st->c);
     rows->x = grown;
     return append_blob(st, 2, rows->x, &rows->count, total) && rows->count % rows->columns == 0 ? STORE_OK
-                                                                                                : damaged(st->c);
+                                                                                                : damaged(st->c, id);
 }
 
-static store_status read_history(statement *st, rows_buffer *rows)
+static store_status read_history(statement *st, const char *id, rows_buffer *rows)
 {
     store_status status = STORE_NOT_FOUND;
     while ((status == STORE_OK || status == STORE_NOT_FOUND) && statement_row(st))
-        status = read_part(st, rows);
+        status = read_part(st, id, rows);
     return status;
 }
 
@@ -256,7 +259,7 @@ store_status store_get_history(store *s, const char *id, int64_t number, int64_t
     bind_text(&st, 1, id);
     bind_real(&st, 2, (double)after);
     bind_integer(&st, 3, number);
-    store_status status = read_history(&st, &found);
+    store_status status = read_history(&st, id, &found);
     store_status ended = statement_end(&st);
     if (ended != STORE_OK)
         status = ended;

@@ -2,6 +2,7 @@
 #include "store/internal.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Jobs, and bytes of theirs, that go in one transaction: others wait for its end. */
@@ -11,7 +12,23 @@
 typedef struct {
     const char *error_json;
     int64_t count;
+    char (*ids)[33]; /* n_ids of them, which expired; where there is no memory fewer */
+    size_t n_ids, capacity;
 } expire_args;
+
+/* Without memory for it nobody is told of this one; who looks sees it all the same. */
+static void keep_id(expire_args *a, const char *id)
+{
+    if (a->n_ids == a->capacity) {
+        size_t capacity = a->capacity ? 2 * a->capacity : 64;
+        char(*grown)[33] = realloc(a->ids, capacity * sizeof *grown);
+        if (!grown)
+            return;
+        a->ids = grown;
+        a->capacity = capacity;
+    }
+    snprintf(a->ids[a->n_ids++], sizeof *a->ids, "%s", id);
+}
 
 static store_status expire(store *s, connection *c, void *args)
 {
@@ -20,9 +37,13 @@ static store_status expire(store *s, connection *c, void *args)
     statement st = statement_begin(c, QUERY_EXPIRE);
     bind_real(&st, 1, store_now());
     bind_text(&st, 2, a->error_json);
-    store_status status = statement_run(&st);
-    a->count = status == STORE_OK ? connection_changes(c) : 0;
-    return status;
+    a->count = 0;
+    a->n_ids = 0;
+    while (statement_row(&st)) {
+        keep_id(a, (const char *)sqlite3_column_text(st.stmt, 0));
+        a->count++;
+    }
+    return statement_end(&st);
 }
 
 /* Looks before it writes: most of the time there is nothing. */
@@ -38,9 +59,12 @@ static bool any_expired(store *s)
 
 store_status store_expire(store *s, const char *error_json, int64_t *count)
 {
-    expire_args a = {error_json, 0};
+    expire_args a = {.error_json = error_json};
     store_status status = any_expired(s) ? store_write(s, expire, &a) : STORE_OK;
     *count = status == STORE_OK ? a.count : 0;
+    for (size_t i = 0; status == STORE_OK && i < a.n_ids; i++)
+        store_tell(s, a.ids[i]);
+    free(a.ids);
     return status;
 }
 
@@ -118,5 +142,7 @@ store_status store_retain(store *s, const store_retention *limits, int64_t *coun
     if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */
         status = store_write(s, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;
+    for (int i = 0; status == STORE_OK && i < a.n_ids; i++)
+        store_tell(s, a.ids[i]);
     return status;
 }

@@ -144,6 +144,18 @@ void store_observe(store *s, metrics *m)
     s->metrics = m;
 }
 
+void store_listen(store *s, void (*changed)(void *ctx, const char *id), void *ctx)
+{
+    s->changed = changed;
+    s->changed_ctx = ctx;
+}
+
+void store_tell(const store *s, const char *id)
+{
+    if (s->changed)
+        s->changed(s->changed_ctx, id);
+}
+
 void store_close(store *s)
 {
     if (!s)
@@ -195,7 +207,7 @@ connection *store_take_reader(store *s)
 
 store_status store_give_reader(store *s, connection *c, store_status status)
 {
-    if (status == STORE_ERROR)
+    if (status == STORE_ERROR || status == STORE_DAMAGED)
         store_keep_message(s, c);
     pthread_mutex_lock(&s->readers_lock);
     s->readers_free[s->n_readers_free++] = c;

@@ -21,6 +21,7 @@ typedef enum {
     STORE_CONFLICT,  /* the job is not in a state that allows this; or the idempotency key came with another body */
     STORE_BUSY,      /* as many jobs wait as may */
     STORE_FULL,      /* the disk is full; nothing was changed */
+    STORE_DAMAGED,   /* what is stored of this job is not what was written: store_message names the job */
     STORE_ERROR      /* anything else: store_message says what */
 } store_status;
 
@@ -39,6 +40,7 @@ typedef struct {
     char *error;   /* JSON object (problem details) when it failed, else NULL */
     int priority;
     char refines[33]; /* the job whose run this one continues; "": none. It may have been deleted */
+    bool damaged;     /* its summary was there and is not what was written: it is not shown */
 } job;
 void job_clear(job *j); /* frees the texts, zeroes *j; NULL is fine */
 
@@ -57,6 +59,12 @@ void store_limit_queue(store *s, int64_t jobs);
 
 /* Counts commits and changes there from now on; before other threads use the store. */
 void store_observe(store *s, metrics *m);
+
+/* From now on changed(ctx, id) is called after every change of a job that anybody but its owner makes (submitted,
+ * dismissed, expired, deleted) was committed, by the thread that made it, without a lock; what owners do (claim,
+ * finish, release) they tell themselves. NULL: nobody is told. Before other threads use the store, and after they did.
+ */
+void store_listen(store *s, void (*changed)(void *ctx, const char *id), void *ctx);
 
 /* What is submitted. */
 typedef struct {
@@ -78,7 +86,8 @@ typedef struct {
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
 
 /* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, owner and lease
- * set; *body is the request as submitted, freed by the caller. STORE_NOT_FOUND when nothing waits. */
+ * set; *body is the request as submitted, freed by the caller, or NULL where it is not what was written any more:
+ * the job can only be failed. STORE_NOT_FOUND when nothing waits. */
 store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
 /* Extends the lease of a running job; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
 store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress);

@@ -25,7 +25,6 @@ static void expire(work *w)
     if (error && store_expire(w->store, error, &count) == STORE_OK && count > 0) {
         log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", count), {0}});
         metrics_job(w->options.metrics, job_status_name(JOB_FAILED), NULL, count);
-        work_notify(w, NULL);
     }
     free(error);
 }

@@ -2,6 +2,7 @@
 #ifndef SERVER_WORK_INTERNAL_H
 #define SERVER_WORK_INTERNAL_H
 
+#include "work/feed.h"
 #include "work/live.h"
 #include "work/work.h"
 
@@ -20,17 +21,13 @@ typedef struct {
 
     atomic_bool cancel; /* somebody wants this job to end with its best answer */
     atomic_bool lost;   /* the store says the job is not ours any more */
+
+    double told_at; /* CLOCK_MONOTONIC: when its progress was told last; of this thread alone, as the next */
+    int told;       /* what was told */
 } worker;
 
-/* Somebody in work_wait. */
-typedef struct waiter {
-    const char *id;
-    bool look; /* the job may have ended: ask the store again */
-    pthread_cond_t changed;
-    struct waiter *next;
-} waiter;
-
-/* Lock order: claim_lock, then a worker's lock. claim_lock, then the store's. No other two are held together. */
+/* Lock order: claim_lock, then a worker's lock. claim_lock, then the store's. No other two are held together, but that
+ * the feed's own is taken last. */
 struct work {
     store *store;
     server_log *log;
@@ -40,7 +37,9 @@ struct work {
     /* A claim and the publishing of its id are one step, so that whoever saw the job running finds its worker. */
     pthread_mutex_t claim_lock;
 
-    pthread_mutex_t lock; /* everything down to waiters */
+    feed *feed; /* told of every change of a job after it was committed */
+
+    pthread_mutex_t lock; /* everything down to drain_until */
     pthread_cond_t wake;  /* submitted or stopping */
     pthread_cond_t idle;  /* alive became 0, the drain was shortened, or stopped */
     pthread_cond_t tick;  /* finished */
@@ -50,7 +49,6 @@ struct work {
     bool finished;        /* the keeper shall stop */
     bool stopped;         /* every thread was joined */
     double drain_until;   /* work_clock() */
-    waiter *waiters;
 
     atomic_bool interrupt; /* the time to drain is over */
     int n_started;         /* workers to join; set before any other thread may call */
@@ -66,8 +64,5 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len);
 void work_deadline(struct timespec *deadline, double seconds);
 double work_clock(void); /* seconds, CLOCK_MONOTONIC */
 void work_init_condition(pthread_cond_t *condition);
-
-/* Makes those who wait for this job look again; NULL: all. */
-void work_notify(work *w, const char *id);
 
 #endif

@@ -41,12 +41,42 @@ static bool is_cancelled(void *ctx)
            atomic_load_explicit(&me->w->interrupt, memory_order_relaxed);
 }
 
+/* Progress is told so often; what ends a job is told at once. */
+#define TELL_S 0.25
+
+/* By a clock that costs nothing: there may be a million iterations a second. */
+static bool is_time_to_tell(worker *me)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC_COARSE, &t);
+    double now = (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+    bool is_time = now - me->told_at >= TELL_S;
+    me->told_at = is_time ? now : me->told_at;
+    return is_time;
+}
+
+/* To all who follow this job; to those who follow all jobs only where the percentage is another one. */
+static void tell_progress(worker *me)
+{
+    if (!is_time_to_tell(me))
+        return;
+    pthread_mutex_lock(&me->lock);
+    int progress = live_progress(&me->live);
+    pthread_mutex_unlock(&me->lock);
+    if (progress != me->told)
+        feed_changed(me->w->feed, me->id); /* only this thread changes its id */
+    else
+        feed_moved(me->w->feed, me->id);
+    me->told = progress;
+}
+
 static void note_progress(void *ctx, const uz_history_row *row)
 {
     worker *me = ctx;
     pthread_mutex_lock(&me->lock);
     live_add(&me->live, row);
     pthread_mutex_unlock(&me->lock);
+    tell_progress(me);
 }
 
 static void note_case(void *ctx, int64_t load_case)
@@ -55,6 +85,7 @@ static void note_case(void *ctx, int64_t load_case)
     pthread_mutex_lock(&me->lock);
     live_case(&me->live, load_case);
     pthread_mutex_unlock(&me->lock);
+    tell_progress(me);
 }
 
 static void note_grid(void *ctx, double from, double to)
@@ -63,6 +94,7 @@ static void note_grid(void *ctx, double from, double to)
     pthread_mutex_lock(&me->lock);
     live_part(&me->live, from, to);
     pthread_mutex_unlock(&me->lock);
+    tell_progress(me);
 }
 
 /* ---- failures */
@@ -103,7 +135,9 @@ static bool decode_body(run *r, char *body, size_t body_len)
 {
     problem_details problem = {0};
     double start = work_clock();
-    bool ok = codec_decode_with(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
+    bool ok = body && codec_decode_with(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
+    if (!body)
+        codec_problem_damaged(&problem, r->job->id);
     free(body);
     r->parse_s = work_clock() - start;
     if (!ok) {

@@ -1,11 +1,11 @@
 /* wait.c: those who wait for a job to end, and the clock that they wait by. */
 #include "work/internal.h"
 
-#include <errno.h>
-#include <string.h>
+#include <poll.h>
 #include <time.h>
 
-#define LOOK_AGAIN_S 2.0 /* work_wait asks the store at least this often */
+/* Every change of a job is told; should a store have failed when one looked, it is asked again after this. */
+#define LOOK_AGAIN_S 15.0
 
 /* ---- time */
 
@@ -38,17 +38,6 @@ void work_init_condition(pthread_cond_t *condition)
 
 /* ---- waiters */
 
-void work_notify(work *w, const char *id)
-{
-    pthread_mutex_lock(&w->lock);
-    for (waiter *it = w->waiters; it; it = it->next)
-        if (!id || strcmp(it->id, id) == 0) {
-            it->look = true;
-            pthread_cond_signal(&it->changed);
-        }
-    pthread_mutex_unlock(&w->lock);
-}
-
 static bool has_ended(work *w, const char *id)
 {
     job j;
@@ -59,49 +48,35 @@ static bool has_ended(work *w, const char *id)
     return ended;
 }
 
-/* Waits until there is a reason to look at the job again; false: the time is over or the service stops. */
-static bool wait_for_change(work *w, waiter *me, double until)
+static bool is_stopping(work *w)
 {
-    struct timespec deadline;
-    double left = until - work_clock();
-    work_deadline(&deadline, left < LOOK_AGAIN_S ? left : LOOK_AGAIN_S);
     pthread_mutex_lock(&w->lock);
-    while (!me->look && !w->stopping && pthread_cond_timedwait(&me->changed, &w->lock, &deadline) != ETIMEDOUT)
-        continue;
-    bool look = me->look || (!w->stopping && work_clock() < until);
-    me->look = false;
+    bool stopping = w->stopping;
     pthread_mutex_unlock(&w->lock);
-    return look;
+    return stopping;
 }
 
-static void add_waiter(work *w, waiter *me)
+static bool has_left(int fd)
 {
-    pthread_mutex_lock(&w->lock);
-    me->next = w->waiters;
-    w->waiters = me;
-    pthread_mutex_unlock(&w->lock);
+    struct pollfd p = {.fd = fd, .events = POLLRDHUP};
+    return poll(&p, 1, 0) > 0;
 }
 
-static void remove_waiter(work *w, waiter *me)
+bool work_wait_for(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more)
 {
-    pthread_mutex_lock(&w->lock);
-    waiter **at = &w->waiters;
-    while (*at != me)
-        at = &(*at)->next;
-    *at = me->next;
-    pthread_mutex_unlock(&w->lock);
+    double until = work_clock() + seconds, left = seconds;
+    listener *l = feed_listen(w->feed, id); /* before the first look, so that no end is missed */
+    bool ended = has_ended(w, id);
+    while (l && !ended && left > 0.0 && !is_stopping(w) && !has_left(fd) && !(no_more && atomic_load(no_more))) {
+        feed_wait(l, fd, left < LOOK_AGAIN_S ? left : LOOK_AGAIN_S);
+        ended = has_ended(w, id);
+        left = until - work_clock();
+    }
+    feed_unlisten(l);
+    return ended;
 }
 
 bool work_wait(work *w, const char *id, double seconds)
 {
-    waiter me = {.id = id};
-    double until = work_clock() + seconds;
-    work_init_condition(&me.changed);
-    add_waiter(w, &me); /* before the first look, so that no end is missed */
-    bool ended = has_ended(w, id);
-    while (!ended && wait_for_change(w, &me, until))
-        ended = has_ended(w, id);
-    remove_waiter(w, &me);
-    pthread_cond_destroy(&me.changed);
-    return ended;
+    return work_wait_for(w, id, seconds, -1, NULL);
 }

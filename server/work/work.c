@@ -34,6 +34,8 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
         publish(me, claimed->id);
     }
     pthread_mutex_unlock(&w->claim_lock);
+    if (status == STORE_OK)
+        feed_changed(w->feed, claimed->id);
     return status;
 }
 
@@ -88,7 +90,7 @@ static void *work_loop(void *arg)
             strcpy(id, claimed.id);
             work_run(me, &claimed, body, body_len);
             publish(me, "");
-            work_notify(w, id);
+            feed_changed(w->feed, id); /* ended, or put back */
             continue;
         }
         if (status != STORE_NOT_FOUND)
@@ -230,6 +232,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     work_init_condition(&w->idle);
     work_init_condition(&w->tick);
     w->cache = uz_cache_new(options->cache_bytes);
+    w->feed = feed_new();
     w->workers = calloc((size_t)w->options.workers, sizeof *w->workers);
     for (int i = 0; w->workers && i < w->options.workers; i++) {
         w->workers[i].w = w;
@@ -238,10 +241,15 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     return w;
 }
 
+static void tell_change(void *ctx, const char *id)
+{
+    feed_changed(ctx, id);
+}
+
 work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size)
 {
     work *w = make_work(s, options, log);
-    if (!w || !w->cache || !w->workers) {
+    if (!w || !w->cache || !w->workers || !w->feed) {
         snprintf(message, size, "no memory for the workers");
         work_free(w);
         return NULL;
@@ -251,6 +259,7 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         work_free(w);
         return NULL;
     }
+    store_listen(s, tell_change, w->feed);
     if (!start_threads(w)) {
         snprintf(message, size, "cannot start %d worker threads", w->options.workers);
         work_free(w);
@@ -295,7 +304,7 @@ void work_stop(work *w, double drain_s)
     pthread_cond_broadcast(&w->wake);
     pthread_cond_broadcast(&w->idle);
     pthread_mutex_unlock(&w->lock);
-    work_notify(w, NULL);
+    feed_wake_all(w->feed);
     pthread_mutex_lock(&w->lock);
     if (first)
         drain(w);
@@ -316,13 +325,16 @@ void work_free(work *w)
 {
     if (!w)
         return;
-    work_stop(w, 0.0);
+    if (w->feed)
+        work_stop(w, 0.0);
+    store_listen(w->store, NULL, NULL);
     for (int i = 0; w->workers && i < w->options.workers; i++) {
         live_clear(&w->workers[i].live);
         pthread_mutex_destroy(&w->workers[i].lock);
     }
     free(w->workers);
     uz_cache_free(w->cache);
+    feed_free(w->feed);
     pthread_cond_destroy(&w->tick);
     pthread_cond_destroy(&w->idle);
     pthread_cond_destroy(&w->wake);
@@ -362,8 +374,6 @@ bool work_cancel(work *w, const char *id)
         pthread_mutex_unlock(&found->lock);
     }
     pthread_mutex_unlock(&w->claim_lock);
-    if (!found)
-        work_notify(w, id);
     return found != NULL;
 }
 
@@ -407,6 +417,11 @@ bool work_live_history(work *w, const char *id, const char *case_name, int64_t a
         ok = live_rows(l, after, &out->rows, &out->count);
     pthread_mutex_unlock(&found->lock);
     return ok;
+}
+
+feed *work_feed(work *w)
+{
+    return w->feed;
 }
 
 uz_cache *work_cache(work *w)

@@ -24,7 +24,9 @@
 #include "metrics.h"
 #include "store/store.h"
 #include "uzawa.h"
+#include "work/feed.h"
 
+#include <stdatomic.h>
 #include <stdbool.h>
 
 typedef struct work work;
@@ -47,12 +49,16 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
 void work_wake(work *w);
 
 /* Asks a running job to stop; false if no worker here runs it. The job ends as dismissed with its best answer so far,
- * unless it ends of itself first. Call it after every store_dismiss: for a job that does not run it makes those who
- * wait for it look at the store again. */
+ * unless it ends of itself first. */
 bool work_cancel(work *w, const char *id);
 
 /* Blocks until the job has ended, `seconds` have passed or the service stops; true if it ended (or does not exist). */
 bool work_wait(work *w, const char *id, double seconds);
+/* The same for the client at the socket fd (-1: none): returns too when it has closed its end, or when *no_more (may be
+ * NULL) is true, which whoever sets it tells by feed_wake_all. */
+bool work_wait_for(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more);
+/* What changes jobs is told there: by the store what others than a job's owner do, by the workers the rest. */
+feed *work_feed(work *w);
 
 /* Progress and history of a job that runs now: *rows (freed by the caller) has *count rows of 12 doubles (codec's
  * columns) with iteration > after. Of a long run rows are left out, evenly; the newest is always there. False if it

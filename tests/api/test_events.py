@@ -1,4 +1,4 @@
-"""Server-Sent Events of a job: /v1/jobs/{id}/events."""
+"""Server-Sent Events of a job, /v1/jobs/{id}/events, and of all jobs, /v1/events."""
 import http.client
 import json
 import signal
@@ -15,7 +15,8 @@ class Stream:
     def __init__(self, s, job_id, last=None):
         self.comments = 0
         self.connection = http.client.HTTPConnection(s.host, s.port, timeout=30)
-        self.connection.request("GET", f"/v1/jobs/{job_id}/events", headers={"Last-Event-ID": last} if last else {})
+        path = f"/v1/jobs/{job_id}/events" if job_id else "/v1/events"
+        self.connection.request("GET", path, headers={"Last-Event-ID": last} if last else {})
         self.reply = self.connection.getresponse()
         if self.reply.status != 200:
             self.close()
@@ -162,6 +163,152 @@ def test_deleted_meanwhile(s):
     expect(s.request("DELETE", f"/v1/jobs/{job['id']}"), 204)
     expect(s.get(f"/v1/jobs/{job['id']}/events"), 404, "not_found")
     expect(s.get(f"/v1/jobs/{job['id']}/events?x=1"), 400, "unknown_parameter")
+
+
+# ---- all jobs
+
+def until(events, wanted):
+    """The events up to the first one that `wanted` holds for, with it."""
+    seen = []
+    for one in events:
+        seen.append(one)
+        if wanted(*one):
+            return seen
+    raise AssertionError(seen)
+
+
+def ended(job_id, status="successful"):
+    return lambda event, _, data: event == "job" and data["id"] == job_id and data["status"] == status
+
+
+def test_all_jobs(s):
+    stream = Stream(s, None)
+    events = iter(stream)
+    event, _, data = next(events)  # what was before is for the list
+    check(event == "reset" and data == {}, event)
+    first, second = s.post(MATRICES).json["id"], s.post(SCENE).json["id"]
+    seen = until(events, ended(second))
+    if not any(ended(first)(*one) for one in seen):
+        seen += until(events, ended(first))
+    for _, _, data in seen:
+        check_job(data)
+    ids = [event_id for _, event_id, _ in seen]
+    check(len(set(ids)) == len(ids), ids)
+    listed = {job["id"]: job for job in s.get("/v1/jobs").json["jobs"]}
+    check({data["id"]: data for _, _, data in seen} == listed, (seen, listed))
+    expect(s.request("DELETE", f"/v1/jobs/{first}"), 204)
+    event, last, data = next(events)
+    check(event == "deleted" and data == {"id": first}, (event, data))
+    stream.close()
+    third = s.solve(MATRICES)["id"]
+    stream = Stream(s, None, last)  # goes on after what was seen
+    seen = until(iter(stream), ended(third))
+    check({data["id"] for _, _, data in seen} == {third}, seen)
+    stream.close()
+
+
+def test_all_jobs_progress(s):
+    stream = Stream(s, None)
+    events = iter(stream)
+    next(events)
+    job = s.post({**ENDLESS, "solver": {"method": "uzawa", "alpha": 1e-9, "max_iterations": 3000000}}).json["id"]
+    started, percents, times = time.monotonic(), [], []
+    for event, _, data in events:
+        check(event == "job" and data["id"] == job, data)
+        if data["status"] == "running":
+            percents.append(data["progress"])
+            times.append(time.monotonic())
+        if len(set(percents)) >= 4:
+            s.request("DELETE", f"/v1/jobs/{job}")
+        if data["status"] not in ("accepted", "running"):
+            break
+    check(percents == sorted(percents) and len(set(percents)) >= 4, percents)
+    check(len(times) <= 3 + 10 * (times[-1] - started), times)  # no more than one in a tenth of a second
+    stream.close()
+
+
+def test_all_jobs_expired_and_dismissed(s):
+    """What others than a job's owner do to it is told as well."""
+    stream = Stream(s, None)
+    events = iter(stream)
+    next(events)
+    running = [s.post(ENDLESS).json["id"] for _ in range(s.get("/healthz").json["workers"])]
+    for job in running:
+        s.wait_status(job, "running")
+    late, waiting = s.post({**MATRICES, "queue_limit_s": 0.1}).json["id"], s.post(MATRICES).json["id"]
+    until(events, ended(late, "failed"))
+    s.request("DELETE", f"/v1/jobs/{waiting}")
+    until(events, ended(waiting, "dismissed"))
+    for job in running:
+        s.request("DELETE", f"/v1/jobs/{job}")
+    stream.close()
+
+
+@options("--keep-jobs", "1")
+def test_all_jobs_retention(s):
+    stream = Stream(s, None)
+    first = s.solve(MATRICES)["id"]
+    s.solve(MATRICES)
+    until(stream, lambda event, _, data: event == "deleted" and data["id"] == first)
+    stream.close()
+
+
+def test_all_jobs_begin_again(s):
+    """Another run of the daemon, a number that is not there (yet), nonsense: load the list."""
+    stream = Stream(s, None)
+    _, last, _ = next(iter(stream))
+    stream.close()
+    run = last.partition(".")[0]
+    for unknown in ("0" * 16 + ".0", run + ".999", run + ".", run + ".1x", run, "x" * 100, ".", run + "." + "9" * 20):
+        stream = Stream(s, None, unknown)
+        event, event_id, _ = next(iter(stream))
+        check(event == "reset" and event_id == last, (unknown, event, event_id))
+        stream.close()
+    stream = Stream(s, None, last)
+    job = s.solve(MATRICES)["id"]
+    check(next(iter(stream))[2]["id"] == job)
+    stream.close()
+    expect(s.request("HEAD", "/v1/events"), 200)
+    expect(s.request("POST", "/v1/events", MATRICES), 405)
+    expect(s.get("/v1/events?x=1"), 400, "unknown_parameter")
+
+
+def test_all_jobs_more_than_are_kept(s):
+    """Who was away for longer than the changes are kept loads the list."""
+    stream = Stream(s, None)
+    _, last, _ = next(iter(stream))
+    stream.close()
+
+    def post():
+        for _ in range(500):
+            s.post(MATRICES)
+    threads = [threading.Thread(target=post) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    while s.get("/healthz").json["jobs"]["successful"] < 2000:
+        time.sleep(0.05)
+    stream = Stream(s, None, last)
+    check(next(iter(stream))[0] == "reset")
+    stream.close()
+
+
+@options("--max-streams", "2")
+def test_the_limit_of_streams_has_a_name(s):
+    limits = s.get("/v1/limits").json["limits"]
+    check(limits["max_streams"]["value"] == 2, limits)
+    streams = [Stream(s, None), Stream(s, None)]
+    expect(s.get("/v1/events"), 503, "too_many_streams")
+    for stream in streams:
+        stream.close()
+
+
+def test_the_end_of_the_service_ends_streams_of_all(s):
+    stream = Stream(s, None)
+    s.process.send_signal(signal.SIGTERM)
+    check([event for event, _, _ in stream] in (["reset"], []))
+    check(s.terminate() == 0, s.log())
 
 
 if __name__ == "__main__":

@@ -81,7 +81,7 @@ def test_request_objects_are_strict():
 def test_openapi_has_every_route():
     wanted = {"/v1/jobs": {"get", "post"}, "/v1/jobs/{id}": {"get", "delete"}, "/v1/jobs/{id}/result": {"get"},
               "/v1/jobs/{id}/history": {"get"}, "/v1/jobs/{id}/history.csv": {"get"}, "/v1/factors": {"get"},
-              "/v1/limits": {"get"}, "/metrics": {"get"}, "/v1/admin/check": {"post"},
+              "/v1/limits": {"get"}, "/v1/events": {"get"}, "/metrics": {"get"}, "/v1/admin/check": {"post"},
               "/healthz": {"get"}, "/readyz": {"get"}, "/openapi.json": {"get"}, "/schemas/{name}": {"get"}}
     assert OPENAPI["openapi"].startswith("3.1")
     got = {path: set(item) - {"parameters"} for path, item in OPENAPI["paths"].items()}

@@ -11,6 +11,7 @@ import no_memory  # noqa: E402
 import overhead  # noqa: E402
 import scenarios  # noqa: E402
 import service  # noqa: E402
+import streams  # noqa: E402
 from service import Skip, check, options  # noqa: E402
 
 
@@ -36,6 +37,12 @@ def test_terminated_under_load(s):
 def test_slow_clients(s):
     figures = clean(scenarios.slow_clients(s.build, 200, 2))
     check(figures["asked"] > 10, figures)
+
+
+@options(None)
+def test_streams_and_long_polls(s):
+    figures = clean(streams.crowds(s.build, 120, 60, 0.5, 0))
+    check(figures["idle_bytes"] == 0, figures)
 
 
 @options(None)

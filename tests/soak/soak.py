@@ -3,16 +3,20 @@
 Prints a table; exit status 1 if a figure that must be 0 is not.
 """
 import os
+import pathlib
 import signal
 import subprocess
 import sys
 import time
 
-import malformed
-import no_memory
-import overhead
-import scenarios
-from scenarios import PAPER, ZERO
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "api"))
+
+import malformed  # noqa: E402  the path is set above
+import no_memory  # noqa: E402
+import overhead  # noqa: E402
+import scenarios  # noqa: E402
+import streams  # noqa: E402
+from scenarios import PAPER, ZERO  # noqa: E402
 
 
 def unit(build, program, times):
@@ -28,6 +32,7 @@ RUNS = [
     ("200 x SIGTERM under load", lambda b: scenarios.endings(b, 200, signal.SIGTERM)),
     ("1,000 power losses, faults at every write, 1,000 damaged files", lambda b: unit(b, "test_store_faults", 10)),
     ("1,000 slow clients, /healthz", lambda b: scenarios.slow_clients(b, 1000, 20)),
+    ("2,000 event streams, 1,000 long polls", streams.crowds),
     ("200,000 malformed requests", lambda b: malformed.malformed(b, 200000)),
     ("every allocation of a job fails", no_memory.failing),
     ("600 x 200 cells: HTTP against the library", overhead.overhead),

@@ -298,10 +298,10 @@ TEST(a_damaged_vector_is_an_error)
         sqlite3_close(db);
         if (!place_open(&p))
             return;
-        CHECK_INT(store_get_vector(p.s, id, 0, "gaps", &data, &count), STORE_ERROR);
+        CHECK_INT(store_get_vector(p.s, id, 0, "gaps", &data, &count), STORE_DAMAGED);
         CHECK(!data && count == 0);
         store_message(p.s, message, sizeof message);
-        CHECK(strstr(message, "damaged"));
+        CHECK(strstr(message, "damaged") && strstr(message, id));
     }
     place_end(&p);
 }

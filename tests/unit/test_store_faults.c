@@ -398,11 +398,12 @@ static void use(store *s)
             size_t len;
             int64_t n, columns;
             CHECK(strlen(jobs[i].id) <= 32 && jobs[i].tags && jobs[i].status <= JOB_DISMISSED);
+            CHECK(!jobs[i].summary || strcmp(jobs[i].summary, "{\"outcome\": \"converged\"}") == 0);
             if (store_get_body(s, jobs[i].id, &body, &len) == STORE_OK)
                 CHECK(body && strlen(body) <= len);
             free(body);
             if (store_get_vector(s, jobs[i].id, 0, "gaps", &x, &n) == STORE_OK)
-                CHECK(n >= 0 && x);
+                CHECK(n == 3 && x && x[0] == 0.5 && x[1] == 1.5 && x[2] == 2.5); /* by its checksum */
             free(x);
             x = NULL;
             store_get_history(s, jobs[i].id, 0, -1, &x, &n, &columns);

@@ -1,0 +1,146 @@
+/* all_events.c: GET /v1/events: what happens to any job, for a list that is to stay as it is in the store.
+ *
+ * "job": a job as a list shows it, whenever it was created or its status or progress changed. "deleted": the id of one
+ * that is gone. "reset": load the list (again): it comes first on a stream that does not go on from another one, and
+ * where changes were missed. As in events.c these are states, not steps: of several changes of one job in quick
+ * succession only the last is told. An event's id is the number of its change in this run of the daemon; a stream that
+ * comes again with it (Last-Event-ID) goes on from there. */
+#include "http/all_events.h"
+#include "http/jobs.h"
+#include "http/stream.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EVERY_S 0.1 /* a stream tells at most so often */
+#define AT_ONCE 64  /* changes that are told together */
+#define TEXTS   512 /* that are kept for other streams */
+
+typedef struct {
+    uint64_t number; /* of the change; 0: none */
+    const char *event;
+    char *data;
+} told_text;
+
+struct told_changes {
+    pthread_mutex_t lock;   /* taken before the store's and the workers' own */
+    told_text texts[TEXTS]; /* of change n at n % TEXTS */
+};
+
+typedef struct {
+    event_stream base;
+    uint64_t seen; /* the number up to which all is told */
+    bool reset;    /* that it must be told first */
+} all_stream;
+
+told_changes *told_changes_new(void)
+{
+    told_changes *t = calloc(1, sizeof *t);
+    if (t)
+        pthread_mutex_init(&t->lock, NULL);
+    return t;
+}
+
+void told_changes_free(told_changes *t)
+{
+    if (!t)
+        return;
+    for (size_t i = 0; i < TEXTS; i++)
+        free(t->texts[i].data);
+    pthread_mutex_destroy(&t->lock);
+    free(t);
+}
+
+/* ---- texts */
+
+/* What has become of the job; NULL: no memory, or the store failed. */
+static char *describe(api *context, const char *id, const char **event)
+{
+    job j;
+    char *data = NULL;
+    store_status status = store_get(context->store, id, &j);
+    *event = status == STORE_NOT_FOUND ? "deleted" : "job";
+    if (status == STORE_NOT_FOUND && asprintf(&data, "{\"id\": \"%s\"}", id) < 0)
+        data = NULL;
+    if (status == STORE_OK) {
+        jobs_freshen(context, &j);
+        data = codec_encode_job(&j);
+        job_clear(&j);
+    }
+    return data;
+}
+
+/* Under the lock. It may describe a later state than the change made: then there is a later change, told after it. */
+static const told_text *text_of(api *context, const feed_change *change)
+{
+    told_text *kept = &context->told->texts[change->number % TEXTS];
+    if (kept->number == change->number)
+        return kept;
+    free(kept->data);
+    kept->data = describe(context, change->id, &kept->event);
+    kept->number = kept->data ? change->number : 0;
+    return kept->data ? kept : NULL;
+}
+
+/* ---- a stream */
+
+static bool say(all_stream *s, const char *event, uint64_t number, const char *data)
+{
+    char id[64];
+    snprintf(id, sizeof id, "%s.%" PRIu64, s->base.context->run, number);
+    return stream_say(&s->base, event, id, data);
+}
+
+static bool say_reset(all_stream *s)
+{
+    s->seen = feed_last(work_feed(s->base.context->work));
+    s->reset = false;
+    return say(s, "reset", s->seen, "{}");
+}
+
+static bool look(event_stream *base)
+{
+    all_stream *s = (all_stream *)base;
+    api *context = base->context;
+    feed_change changes[AT_ONCE];
+    size_t count;
+    uint64_t seen;
+    if (s->reset || !feed_since(work_feed(context->work), s->seen, changes, AT_ONCE, &count, &seen))
+        return say_reset(s);
+    bool ok = true;
+    pthread_mutex_lock(&context->told->lock);
+    for (size_t i = 0; ok && i < count; i++) {
+        const told_text *text = text_of(context, &changes[i]);
+        ok = text && say(s, text->event, changes[i].number, text->data);
+    }
+    pthread_mutex_unlock(&context->told->lock);
+    s->seen = seen;
+    return ok;
+}
+
+/* True with the number that the client has seen, if it is one of this run. */
+static bool read_seen(const api *context, const http_request *rq, uint64_t *seen)
+{
+    char last[64];
+    size_t run = strlen(context->run);
+    stream_last_seen(rq, last, sizeof last);
+    const char *number = last + run + 1;
+    if (strncmp(last, context->run, run) != 0 || last[run] != '.' || strlen(number) < 1 || strlen(number) > 18 ||
+        number[strspn(number, "0123456789")])
+        return false;
+    *seen = strtoull(number, NULL, 10);
+    return true;
+}
+
+void events_get_all(api *context, http_request *rq, http_reply *reply)
+{
+    all_stream *s = calloc(1, sizeof *s);
+    if (s) {
+        s->base.look = look;
+        s->base.every_s = EVERY_S;
+        s->reset = !read_seen(context, rq, &s->seen);
+    }
+    stream_reply(context, rq, s ? &s->base : NULL, NULL, reply);
+}

@@ -1,0 +1,135 @@
+#include "http/stream.h"
+#include "http/deadlines.h"
+#include "http/problem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define HEARTBEAT_S 15.0 /* a comment, so that proxies see life and a client that left is noticed */
+
+static void stream_free(void *ctx)
+{
+    event_stream *s = ctx;
+    feed_unlisten(s->listener);
+    atomic_fetch_sub(&s->context->streams, 1);
+    free(s->text);
+    free(s);
+}
+
+void stream_last_seen(const http_request *rq, char *out, size_t size)
+{
+    const header_field *field = header_find(&rq->headers, "Last-Event-ID", NULL);
+    out[0] = '\0';
+    if (field && field->value_len < size) {
+        memcpy(out, field->value, field->value_len);
+        out[field->value_len] = '\0';
+    }
+}
+
+bool stream_say(event_stream *s, const char *event, const char *id, const char *data)
+{
+    static const char FORM[] = "event: %s\nid: %s\ndata: %s\n\n";
+    if (!data)
+        return false;
+    size_t more = sizeof FORM + strlen(event) + strlen(id) + strlen(data);
+    char *grown = realloc(s->text, s->len + more);
+    if (!grown)
+        return false;
+    s->text = grown;
+    s->len += (size_t)snprintf(s->text + s->len, more, FORM, event, id, data);
+    s->told = s->spoke = deadlines_now();
+    return true;
+}
+
+/* ---- the reply's reader */
+
+static ptrdiff_t take(event_stream *s, char *out, size_t size)
+{
+    size_t n = s->len - s->at < size ? s->len - s->at : size;
+    memcpy(out, s->text + s->at, n);
+    s->at += n;
+    if (s->at == s->len) {
+        free(s->text);
+        s->text = NULL;
+        s->len = s->at = 0;
+    }
+    return (ptrdiff_t)n;
+}
+
+static ptrdiff_t heartbeat(event_stream *s, char *out, size_t size)
+{
+    static const char COMMENT[] = ":\n\n";
+    if (size < sizeof COMMENT)
+        return REPLY_STREAM_ENDS;
+    s->spoke = deadlines_now();
+    memcpy(out, COMMENT, sizeof COMMENT - 1);
+    return sizeof COMMENT - 1;
+}
+
+/* Until there may be something to tell; what comes in quick succession is told together. */
+static void sleep_until_told(event_stream *s)
+{
+    double due = s->spoke + HEARTBEAT_S - deadlines_now(), pause = s->told + s->every_s - deadlines_now();
+    if (feed_wait(s->listener, s->rq->fd, fmax(due, 0.001)))
+        for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->context->draining);
+             pause = s->told + s->every_s - deadlines_now())
+            feed_wait(s->listener, s->rq->fd, pause);
+}
+
+/* Blocks until there is something to send. */
+static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
+{
+    event_stream *s = ctx;
+    for (;;) {
+        if (s->text)
+            return take(s, out, size);
+        if (s->ended || atomic_load(&s->context->draining))
+            return REPLY_STREAM_ENDS;
+        if (request_client_gone(s->rq) || !s->look(s))
+            return REPLY_STREAM_BREAKS;
+        if (s->text)
+            continue;
+        if (deadlines_now() - s->spoke > HEARTBEAT_S)
+            return heartbeat(s, out, size);
+        sleep_until_told(s);
+    }
+}
+
+/* ---- the reply */
+
+static bool take_place(api *context, http_reply *reply)
+{
+    if (atomic_fetch_add(&context->streams, 1) < context->max_streams)
+        return true;
+    atomic_fetch_sub(&context->streams, 1);
+    reply->retry_after_s = 5;
+    reply_refuse(reply, 503, "too_many_streams", "Too many event streams at once",
+                 "at most %u may be open (the daemon's option --max-streams): close some, or ask for the job with "
+                 "\"Prefer: wait=N\"",
+                 context->max_streams);
+    return false;
+}
+
+void stream_reply(api *context, http_request *rq, event_stream *s, const char *id, http_reply *reply)
+{
+    if (!s) {
+        reply_no_memory(reply);
+        return;
+    }
+    if (!take_place(context, reply)) {
+        free(s);
+        return;
+    }
+    s->context = context;
+    s->rq = rq;
+    s->spoke = deadlines_now();
+    s->listener = feed_listen(work_feed(context->work), id);
+    if (s->listener) {
+        reply_stream(reply, 200, "text/event-stream", (reply_source){stream_read, stream_free, s});
+    } else {
+        stream_free(s);
+        reply_no_memory(reply);
+    }
+}

@@ -1,0 +1,196 @@
+#include "work/feed.h"
+
+#include <errno.h>
+#include <math.h>
+#include <poll.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#define BUCKETS 4096 /* a power of 2 */
+/* Without a descriptor to be woken by a listener looks by itself, so often. */
+#define LOOK_S 0.25
+
+/* A listener waits for a descriptor, not for a condition, so that it sees its client leave in the same wait. */
+struct listener {
+    feed *feed;
+    char id[33];   /* "": all jobs */
+    int wake;      /* eventfd; -1: there was none to be had */
+    bool signaled; /* wake was written since the last wait returned */
+    listener **at, *next;
+};
+
+typedef struct {
+    feed_change change;
+    bool is_past; /* a later change of the same job is kept */
+} kept_change;
+
+struct feed {
+    pthread_mutex_t lock;
+    uint64_t last;
+    kept_change kept[FEED_KEPT];  /* number n at n % FEED_KEPT */
+    uint64_t newest[BUCKETS];     /* a change of one of the jobs with this hash: the newest */
+    listener *listeners[BUCKETS]; /* to one job */
+    listener *all;
+};
+
+/* FNV-1a. */
+static size_t bucket(const char *id)
+{
+    uint32_t hash = 2166136261u;
+    for (; *id; id++)
+        hash = (hash ^ (unsigned char)*id) * 16777619u;
+    return hash % BUCKETS;
+}
+
+feed *feed_new(void)
+{
+    feed *f = calloc(1, sizeof *f);
+    if (f)
+        pthread_mutex_init(&f->lock, NULL);
+    return f;
+}
+
+void feed_free(feed *f)
+{
+    if (!f)
+        return;
+    pthread_mutex_destroy(&f->lock);
+    free(f);
+}
+
+/* ---- telling; under the lock */
+
+static void wake(listener *l)
+{
+    if (!l->signaled && l->wake >= 0)
+        eventfd_write(l->wake, 1);
+    l->signaled = true;
+}
+
+static void wake_those_of(listener *first, const char *id)
+{
+    for (listener *l = first; l; l = l->next)
+        if (strcmp(l->id, id) == 0)
+            wake(l);
+}
+
+static void keep(feed *f, const char *id)
+{
+    uint64_t *newest = &f->newest[bucket(id)];
+    kept_change *before = &f->kept[*newest % FEED_KEPT], *now = &f->kept[++f->last % FEED_KEPT];
+    if (*newest > 0 && before->change.number == *newest && strcmp(before->change.id, id) == 0)
+        before->is_past = true;
+    *newest = now->change.number = f->last;
+    now->is_past = false;
+    snprintf(now->change.id, sizeof now->change.id, "%s", id);
+}
+
+void feed_changed(feed *f, const char *id)
+{
+    pthread_mutex_lock(&f->lock);
+    keep(f, id);
+    wake_those_of(f->listeners[bucket(id)], id);
+    wake_those_of(f->all, "");
+    pthread_mutex_unlock(&f->lock);
+}
+
+void feed_moved(feed *f, const char *id)
+{
+    pthread_mutex_lock(&f->lock);
+    wake_those_of(f->listeners[bucket(id)], id);
+    pthread_mutex_unlock(&f->lock);
+}
+
+void feed_wake_all(feed *f)
+{
+    pthread_mutex_lock(&f->lock);
+    for (size_t i = 0; i < BUCKETS; i++)
+        for (listener *l = f->listeners[i]; l; l = l->next)
+            wake(l);
+    wake_those_of(f->all, "");
+    pthread_mutex_unlock(&f->lock);
+}
+
+/* ---- listening */
+
+listener *feed_listen(feed *f, const char *id)
+{
+    listener *l = calloc(1, sizeof *l);
+    if (!l)
+        return NULL;
+    l->feed = f;
+    l->wake = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    snprintf(l->id, sizeof l->id, "%s", id ? id : "");
+    pthread_mutex_lock(&f->lock);
+    l->at = id ? &f->listeners[bucket(id)] : &f->all;
+    l->next = *l->at;
+    if (l->next)
+        l->next->at = &l->next;
+    *l->at = l;
+    pthread_mutex_unlock(&f->lock);
+    return l;
+}
+
+void feed_unlisten(listener *l)
+{
+    if (!l)
+        return;
+    pthread_mutex_lock(&l->feed->lock);
+    *l->at = l->next;
+    if (l->next)
+        l->next->at = l->at;
+    pthread_mutex_unlock(&l->feed->lock);
+    if (l->wake >= 0)
+        close(l->wake);
+    free(l);
+}
+
+static bool take_signal(listener *l)
+{
+    eventfd_t unused;
+    pthread_mutex_lock(&l->feed->lock);
+    bool was = l->signaled;
+    l->signaled = false;
+    if (was && l->wake >= 0)
+        eventfd_read(l->wake, &unused);
+    pthread_mutex_unlock(&l->feed->lock);
+    return was;
+}
+
+bool feed_wait(listener *l, int fd, double seconds)
+{
+    struct pollfd p[2] = {{.fd = l->wake, .events = POLLIN}, {.fd = fd, .events = POLLRDHUP}};
+    double most = l->wake < 0 && seconds > LOOK_S ? LOOK_S : seconds;
+    int ms = most > 0.0 ? (int)fmin(ceil(most * 1e3), 1e9) : 0; /* NaN: at once */
+    poll(p, 2, ms); /* a signal handler's EINTR is as good as any other return */
+    return take_signal(l);
+}
+
+/* ---- reading */
+
+uint64_t feed_last(feed *f)
+{
+    pthread_mutex_lock(&f->lock);
+    uint64_t last = f->last;
+    pthread_mutex_unlock(&f->lock);
+    return last;
+}
+
+bool feed_since(feed *f, uint64_t after, feed_change *out, size_t most, size_t *count, uint64_t *seen)
+{
+    *count = 0;
+    *seen = after;
+    pthread_mutex_lock(&f->lock);
+    bool known = after <= f->last && f->last - after <= FEED_KEPT;
+    while (known && *seen < f->last && *count < most) {
+        const kept_change *one = &f->kept[++*seen % FEED_KEPT];
+        if (!one->is_past)
+            out[(*count)++] = one->change;
+    }
+    pthread_mutex_unlock(&f->lock);
+    return known;
+}

@@ -1,0 +1,47 @@
+/* feed.h: which job changed when, and those who wait to hear of it.
+ *
+ * Changes are numbered from 1 in the order in which they were told; the last FEED_KEPT are kept. A change says only
+ * that a job was created, has another status or progress, or was deleted: what it is now stands in the store, so that
+ * who hears of it late reads the present state and nothing is told from two sources. Changes are told after they were
+ * committed. Any thread may call; the one lock inside is taken last. */
+#ifndef SERVER_WORK_FEED_H
+#define SERVER_WORK_FEED_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define FEED_KEPT 4096 /* a power of 2 */
+
+typedef struct feed feed;
+typedef struct listener listener;
+
+typedef struct {
+    uint64_t number;
+    char id[33];
+} feed_change;
+
+feed *feed_new(void);    /* NULL: no memory */
+void feed_free(feed *f); /* nobody listens any more; NULL is fine */
+
+void feed_changed(feed *f, const char *id);
+/* Something that only those who follow this job want to know: no number, and nothing that is kept. */
+void feed_moved(feed *f, const char *id);
+/* Everybody looks again. */
+void feed_wake_all(feed *f);
+
+/* Listens to one job, or with id NULL to all, from now on. NULL: no memory. Freed by feed_unlisten (NULL is fine). */
+listener *feed_listen(feed *f, const char *id);
+void feed_unlisten(listener *l);
+/* Returns when there was something since the last return, when the peer of the socket fd has closed it (-1: no socket)
+ * or after so many seconds. True: there was something. One thread waits for one listener. */
+bool feed_wait(listener *l, int fd, double seconds);
+
+/* The number of the last change; 0: there was none. */
+uint64_t feed_last(feed *f);
+/* The changes with numbers above `after`, the oldest first, at most `most`; of several of one job only the last (a few
+ * earlier ones may be among them). *seen: the number up to which they go, from which the next call goes on. False: some
+ * of them are not kept any more, or `after` is no number of this feed. */
+bool feed_since(feed *f, uint64_t after, feed_change *out, size_t most, size_t *count, uint64_t *seen);
+
+#endif

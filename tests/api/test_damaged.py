@@ -1,0 +1,161 @@
+"""A bit that changes in the database file is found by its row's checksum: what is not what was written is never told as an
+answer, and everything else goes on. usage: test_damaged.py BUILD_DIR [FILTER]
+"""
+import contextlib
+import pathlib
+import sqlite3
+import struct
+import subprocess
+
+import service
+from service import ENDLESS, MATRICES, SCENE, check, expect, options
+
+
+def change(s, old, new):
+    """Changes the one place in the file of a stopped daemon that holds these bytes."""
+    check(len(old) == len(new) and old != new, old, new)
+    data = pathlib.Path(s.db).read_bytes()
+    check(data.count(old) == 1, old, data.count(old))
+    pathlib.Path(s.db).write_bytes(data.replace(old, new))
+
+
+def stop(s):
+    check(s.terminate() == 0, s.log())
+    s.process.stdout.close()
+    s.log_file.close()
+
+
+def flipped(data, at, bit=0):
+    return data[:at] + bytes([data[at] ^ 1 << bit]) + data[at + 1:]
+
+
+def doubles(values):
+    return struct.pack(f"<{len(values)}d", *values)
+
+
+def findings(s):
+    done = subprocess.run(s.command("--check-db", "--db", s.db), capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+def check_named(reply, job):
+    expect(reply, 500, "stored_data_damaged")
+    check(job in reply.json["detail"], reply)
+
+
+def test_a_vector(s):
+    job, other = s.solve(SCENE)["id"], s.solve(MATRICES)["id"]
+    path = f"/v1/jobs/{job}/result"
+    gaps = doubles(s.get(path + "?fields=gaps").json["gaps"])
+    stop(s)
+    check(findings(s)[0] == 0, findings(s))
+    change(s, gaps, flipped(gaps, 8 * 20 + 3, 5))
+    code, text = findings(s)
+    check(code != 0 and job in text and "gaps" in text and other not in text, code, text)
+    s.start()
+    check_named(s.get(path), job)
+    check_named(s.get(path + "?fields=gaps"), job)
+    check(len(s.get(path + "?fields=reactions").json["reactions"]) == 30)  # this one is as it was
+    expect(s.get(f"/v1/jobs/{job}"), 200)
+    expect(s.get(f"/v1/jobs/{other}/result"), 200)
+    check(any(event["job"] == job for event in s.events("stored_data_damaged")), s.log())
+    check_found = expect(s.request("POST", "/v1/admin/check"), 200).json
+    check(not check_found["whole"] and any(job in one for one in check_found["findings"]), check_found)
+    expect(s.request("DELETE", f"/v1/jobs/{job}"), 204)  # the way out
+    stop(s)
+    check(findings(s)[0] == 0, findings(s))
+    s.start()
+
+
+def test_a_start(s):
+    """A run does not begin where a damaged one ended."""
+    job = s.solve(SCENE)["id"]
+    reactions = doubles(s.get(f"/v1/jobs/{job}/result").json["reactions"])
+    stop(s)
+    data = pathlib.Path(s.db).read_bytes()
+    at = data.index(reactions)  # the state holds them too
+    pathlib.Path(s.db).write_bytes(flipped(data, at + 8 * 3 + 1))
+    s.start()
+    named = s.get(f"/v1/jobs/{job}/result?fields=reactions").status == 500
+    warm = s.post({**SCENE, "solver": {**SCENE["solver"], "warm_start": {"job": job}}})
+    if named:
+        check_named(warm, job)
+    else:  # it was the state: the run begins at zero, and ends where it did
+        check(s.wait_status(warm.json["id"], "successful")["summary"]["outcome"] == "converged", warm)
+
+
+def test_a_history(s):
+    job = s.solve(SCENE)["id"]
+    rows = s.get(f"/v1/jobs/{job}/history").json["rows"]
+    some = b"".join(struct.pack("<d", x) for x in rows[5] if x is not None)[:40]
+    stop(s)
+    change(s, some, flipped(some, 26, 3))
+    check("history" in findings(s)[1], findings(s))
+    s.start()
+    check_named(s.get(f"/v1/jobs/{job}/history"), job)
+    check_named(s.get(f"/v1/jobs/{job}/history.csv"), job)
+    expect(s.get(f"/v1/jobs/{job}/result"), 200)
+
+
+def test_a_summary(s):
+    """A digit of a certificate."""
+    job, other = s.solve(SCENE), s.solve(MATRICES)
+    stop(s)
+    data = pathlib.Path(s.db).read_bytes()
+    old = b'"iterations":' + str(job["summary"]["iterations"]).encode()
+    check(data.count(old) == 1, old)
+    change(s, old, flipped(old, len(old) - 1))
+    s.start()
+    path = f"/v1/jobs/{job['id']}"
+    for of_it in ("", "/result", "/history", "/events", "/result.vtu", "/deformed.svg"):
+        check_named(s.get(path + of_it), job["id"])
+    check_named(s.request("POST", path + "/refine", {"accuracy": {"relative_error": 1e-9}}), job["id"])
+    listed = {one["id"]: one for one in s.get("/v1/jobs").json["jobs"]}
+    check(listed[job["id"]]["summary"] is None and listed[job["id"]]["error"]["code"] == "stored_data_damaged", listed)
+    check(listed[other["id"]] == other, listed)
+
+
+def test_the_summary_of_a_case(s):
+    cases = [{"name": "one", "loads": SCENE["problem"]["loads"]}, {"name": "two", "loads": SCENE["problem"]["loads"][:1]}]
+    job = s.solve({**SCENE, "cases": cases})["id"]
+    two = s.get(f"/v1/jobs/{job}/result?case=two").json["summary"]
+    stop(s)
+    old = b'"iterations":%d,' % two["iterations"]
+    data = pathlib.Path(s.db).read_bytes()
+    at = data.rindex(old) if data.count(old) else -1
+    check(at >= 0)
+    pathlib.Path(s.db).write_bytes(flipped(data, at + len(old) - 2))
+    s.start()
+    replies = [s.get(f"/v1/jobs/{job}" + one) for one in ("/result?case=one", "/result?case=two", "/result", "")]
+    bad = [one for one in replies if one.status == 500]
+    check(bad, replies)
+    for one in bad:
+        check_named(one, job)
+
+
+@options("--workers", "1")
+def test_a_request(s):
+    """A problem that is not the one that was sent is not solved; those behind it are."""
+    first = s.post(ENDLESS).json["id"]
+    s.wait_status(first, "running")
+    damaged = s.post({**MATRICES, "tags": ["damaged-one"]}).json["id"]
+    behind = s.post(MATRICES).json["id"]
+    s.process.kill()
+    s.process.wait()
+    s.process.stdout.close()
+    s.log_file.close()
+    with contextlib.closing(sqlite3.connect(s.db)) as connection:  # past the daemon: also what stands in the journal
+        body = connection.execute("SELECT body FROM request WHERE job = ?", (damaged,)).fetchone()[0]
+        connection.execute("UPDATE request SET body = ? WHERE job = ?",
+                           (body.replace(b"[2, 2]", b"[2, 3]"), damaged))
+        connection.execute("UPDATE job SET status = 4 WHERE id = ?", (first,))
+        connection.commit()
+        check(b"[2, 2]" in body)
+    s.start()
+    failed = s.wait_status(damaged, "failed")
+    check(failed["error"]["code"] == "stored_data_damaged" and failed["summary"] is None, failed)
+    check(s.wait_status(behind, "successful")["summary"]["outcome"] == "converged")
+
+
+if __name__ == "__main__":
+    service.main(globals())

@@ -1,0 +1,122 @@
+/* The feed of changes: what is told, to whom, and what is kept. */
+#include "harness.h"
+#include "work/feed.h"
+
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+TEST(changes_are_numbered_and_kept)
+{
+    feed *f = feed_new();
+    feed_change got[8];
+    size_t count;
+    uint64_t seen;
+    CHECK(feed_last(f) == 0);
+    CHECK(feed_since(f, 0, got, 8, &count, &seen) && count == 0 && seen == 0);
+    CHECK(!feed_since(f, 1, got, 8, &count, &seen)); /* not told yet */
+    feed_changed(f, "a");
+    feed_changed(f, "b");
+    feed_changed(f, "a");
+    CHECK(feed_last(f) == 3);
+    CHECK(feed_since(f, 0, got, 8, &count, &seen) && count == 2 && seen == 3); /* the first of "a" is past */
+    CHECK(got[0].number == 2 && strcmp(got[0].id, "b") == 0 && got[1].number == 3 && strcmp(got[1].id, "a") == 0);
+    CHECK(feed_since(f, 0, got, 1, &count, &seen) && count == 1 && seen == 2);
+    CHECK(feed_since(f, 2, got, 1, &count, &seen) && count == 1 && got[0].number == 3);
+    feed_moved(f, "a");
+    CHECK(feed_last(f) == 3);
+    feed_free(f);
+}
+
+TEST(old_changes_are_missed_not_forgotten)
+{
+    feed *f = feed_new();
+    feed_change got[1];
+    size_t count;
+    uint64_t seen;
+    char id[33];
+    for (int i = 0; i < FEED_KEPT; i++) {
+        snprintf(id, sizeof id, "%032x", (unsigned)i);
+        feed_changed(f, id);
+    }
+    CHECK(feed_since(f, 0, got, 1, &count, &seen) && count == 1 && got[0].number == 1);
+    feed_changed(f, "one more");
+    CHECK(!feed_since(f, 0, got, 1, &count, &seen) && count == 0);
+    CHECK(feed_since(f, 1, got, 1, &count, &seen) && got[0].number == 2);
+    CHECK(!feed_since(f, UINT64_MAX, got, 1, &count, &seen));
+    feed_free(f);
+}
+
+TEST(who_listens_is_woken)
+{
+    feed *f = feed_new();
+    listener *a = feed_listen(f, "a"), *b = feed_listen(f, "b"), *all = feed_listen(f, NULL);
+    CHECK(!feed_wait(a, -1, 0) && !feed_wait(all, -1, 0));
+    feed_changed(f, "a");
+    CHECK(feed_wait(a, -1, 60) && !feed_wait(b, -1, 0) && feed_wait(all, -1, 60));
+    CHECK(!feed_wait(a, -1, 0)); /* once */
+    feed_moved(f, "b");
+    CHECK(feed_wait(b, -1, 60) && !feed_wait(a, -1, 0) && !feed_wait(all, -1, 0));
+    feed_wake_all(f);
+    CHECK(feed_wait(a, -1, 60) && feed_wait(b, -1, 60) && feed_wait(all, -1, 60));
+    feed_unlisten(a);
+    feed_changed(f, "a"); /* nobody */
+    feed_unlisten(all);
+    feed_unlisten(b);
+    feed_unlisten(NULL);
+    feed_free(f);
+    feed_free(NULL);
+}
+
+/* The wait ends when the client leaves, long before its time. */
+TEST(a_client_that_leaves_ends_the_wait)
+{
+    feed *f = feed_new();
+    listener *l = feed_listen(f, "a");
+    int ends[2];
+    CHECK(socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0);
+    close(ends[1]);
+    CHECK(!feed_wait(l, ends[0], 1e6));
+    close(ends[0]);
+    feed_unlisten(l);
+    feed_free(f);
+}
+
+enum { TELLERS = 4, TOLD = 5000 };
+
+static void *tell(void *ctx)
+{
+    for (int i = 0; i < TOLD; i++)
+        feed_changed(ctx, i % 2 ? "odd" : "even");
+    return NULL;
+}
+
+/* Whatever the interleaving, who waits and reads ends with the last number. */
+TEST(nothing_is_missed_by_threads)
+{
+    feed *f = feed_new();
+    listener *l = feed_listen(f, NULL);
+    pthread_t tellers[TELLERS];
+    feed_change got[16];
+    size_t count;
+    uint64_t seen = 0;
+    int gaps = 0;
+    for (int i = 0; i < TELLERS; i++)
+        CHECK(pthread_create(&tellers[i], NULL, tell, f) == 0);
+    while (seen < TELLERS * TOLD) {
+        if (!feed_since(f, seen, got, 16, &count, &seen)) {
+            seen = feed_last(f);
+            gaps++;
+        } else if (count == 0 && seen == feed_last(f) && seen < TELLERS * TOLD) {
+            CHECK(feed_wait(l, -1, 60));
+        }
+    }
+    for (int i = 0; i < TELLERS; i++)
+        pthread_join(tellers[i], NULL);
+    CHECK(feed_last(f) == TELLERS * TOLD && gaps <= TELLERS * TOLD / FEED_KEPT + 1);
+    feed_unlisten(l);
+    feed_free(f);
+}
