@@ -14,6 +14,7 @@ typedef enum { FLAG, TEXT, SECONDS, COUNT, TAG } option_kind;
 #define ASKING       (ALL_COMMANDS & ~IN(CLIENT_VERSION) & ~IN(CLIENT_HELP)) /* commands that talk to the server */
 
 #define MAKING    (IN(CLIENT_SUBMIT) | IN(CLIENT_REFINE) | IN(CLIENT_VERIFY)) /* commands that make a job */
+#define STAYING   (MAKING | IN(CLIENT_WAIT))
 #define OF_A_CASE (IN(CLIENT_RESULT) | IN(CLIENT_PICTURE) | IN(CLIENT_HISTORY))
 
 typedef struct {
@@ -38,6 +39,9 @@ static const option_rule RULES[] = {
     {"--key", 'k', TEXT, FIELD(key), MAKING, 0, 0},
     {"--quiet", 'q', FLAG, FIELD(quiet), MAKING | IN(CLIENT_WAIT) | IN(CLIENT_CANCEL), 0, 0},
     {"--progress", 0, FLAG, FIELD(progress), MAKING | IN(CLIENT_WAIT), 0, 0},
+    {"--junit", 0, TEXT, FIELD(junit), STAYING, 0, 0},
+    {"--baseline", 0, TEXT, FIELD(baseline), STAYING, 0, 0},
+    {"--tolerance", 0, SECONDS, FIELD(tolerance), STAYING, 0, 0},
     {"--accuracy", 'a', TEXT, FIELD(accuracy), IN(CLIENT_REFINE), 0, 0},
     {"--max-iterations", 0, COUNT, FIELD(max_iterations), IN(CLIENT_REFINE), 0, 1000000000},
     {"--time-limit", 0, SECONDS, FIELD(time_limit_s), IN(CLIENT_REFINE), 0, 0},
@@ -225,6 +229,10 @@ static bool check_combination(parser *p)
     for (size_t i = 0; i < RULE_COUNT; i++)
         if ((p->used >> i & 1u) && !(RULES[i].commands & IN(o->command)))
             return fail(p, "%s does not take %s", client_command_name(o->command), RULES[i].name);
+    if ((o->junit || o->baseline) && !o->wait && (o->command == CLIENT_SUBMIT || o->command == CLIENT_REFINE))
+        return fail(p, "%s wants --wait", o->junit ? "--junit" : "--baseline");
+    if (o->tolerance >= 0 && !o->baseline)
+        return fail(p, "--tolerance wants --baseline");
     if (o->csv + o->plot + o->json > 1)
         return fail(p, "--csv, --plot and --json are alternatives: choose one");
     if (o->format && strcmp(o->format, "json") != 0 && strcmp(o->format, "vtu") != 0)
@@ -243,6 +251,7 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .server = env_server && *env_server ? env_server : "http://127.0.0.1:8080",
                             .timeout_s = INFINITY,
                             .retry_s = -1,
+                            .tolerance = -1,
                             .time_limit_s = NAN,
                             .max_iterations = -1,
                             .limit = 20,

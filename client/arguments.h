@@ -37,6 +37,8 @@ typedef struct {
     const char *key, *fields, *format, *output, *status, *colour, *factor;
     const char *case_name, *accuracy;          /* accuracy: a number or a level, as written */
     double time_limit_s;                       /* NAN: not given */
+    const char *junit, *baseline;              /* a file; a job */
+    double tolerance;                          /* < 0: not given */
     long limit, width, height, max_iterations; /* width and max_iterations -1: not given */
     bool wait, quiet, json, progress, csv, plot, ascii, help, version;
 } client_options;

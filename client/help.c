@@ -7,7 +7,7 @@ typedef struct {
 } page;
 
 #define OUTCOME_EXITS                                                                                                  \
-    "0 converged, 6 the job failed, 7 ended without converging,\n"                                                     \
+    "0 converged, 3 an assertion or the baseline is missed, 6 the job failed, 7 ended without converging,\n"           \
     "8 infeasible, 9 dismissed, 10 --timeout passed (the job goes on).\n"
 
 static const page PAGES[CLIENT_COMMANDS] = {
@@ -22,6 +22,9 @@ static const page PAGES[CLIENT_COMMANDS] = {
                        "                     same job\n"
                        "  -q, --quiet        print the id and nothing else\n"
                        "  -j, --json         print the job as JSON\n"
+                       "      --junit FILE   write what became of it as a JUnit report, for a CI system\n"
+                       "      --baseline ID  compare with another job, within --tolerance (default 1e-3, relative)\n"
+                       "      --tolerance T  of energy, reactions, pressure, displacements and what touches\n"
                        "      --progress     show progress on stderr even where it is no terminal\n"
                        "\n"
                        "Exit status with --wait: " OUTCOME_EXITS},
@@ -37,6 +40,9 @@ static const page PAGES[CLIENT_COMMANDS] = {
                      "  -t, --timeout S    stop waiting after S seconds\n"
                      "  -q, --quiet        print nothing; the exit status tells\n"
                      "  -j, --json         print the job as JSON\n"
+                     "      --junit FILE   write what became of it as a JUnit report, for a CI system\n"
+                     "      --baseline ID  compare with another job, within --tolerance (default 1e-3, relative)\n"
+                     "      --tolerance T  of energy, reactions, pressure, displacements and what touches\n"
                      "      --progress     show progress on stderr even where it is no terminal\n"
                      "\nExit status: " OUTCOME_EXITS},
     [CLIENT_REFINE] = {"refine", "refine ID --accuracy A [options]",
@@ -51,6 +57,9 @@ static const page PAGES[CLIENT_COMMANDS] = {
                        "  -k, --key KEY      idempotency key (default: random)\n"
                        "  -q, --quiet        print the id and nothing else\n"
                        "  -j, --json         print the job as JSON\n"
+                       "      --junit FILE   write what became of it as a JUnit report, for a CI system\n"
+                       "      --baseline ID  compare with another job, within --tolerance (default 1e-3, relative)\n"
+                       "      --tolerance T  of energy, reactions, pressure, displacements and what touches\n"
                        "      --progress     show progress on stderr even where it is no terminal\n"
                        "\n"
                        "Exit status with --wait: " OUTCOME_EXITS},
@@ -62,6 +71,9 @@ static const page PAGES[CLIENT_COMMANDS] = {
                        "  -k, --key KEY      idempotency key (default: random)\n"
                        "  -q, --quiet        print nothing; the exit status tells\n"
                        "  -j, --json         print the job as JSON\n"
+                       "      --junit FILE   write what became of it as a JUnit report, for a CI system\n"
+                       "      --baseline ID  compare with another job, within --tolerance (default 1e-3, relative)\n"
+                       "      --tolerance T  of energy, reactions, pressure, displacements and what touches\n"
                        "      --progress     show progress on stderr even where it is no terminal\n"
                        "\n"
                        "Exit status: 0 verified, 6 the job failed, 7 not verified,\n"

@@ -113,7 +113,9 @@ static client_exit wait_and_report(client_session *s, const char *id, json_t **j
     client_progress_end(progress);
     if (code == CLIENT_WAIT_TIMEOUT)
         print_wait_timeout(s, id);
-    return code == CLIENT_OK ? report_end(s, *job) : code;
+    if (code == CLIENT_OK)
+        code = report_end(s, *job);
+    return *job ? client_contract(s, *job, code) : code;
 }
 
 client_exit client_wait(client_session *s)

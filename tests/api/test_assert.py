@@ -1,7 +1,12 @@
 """Assertions in jobs, and what the client makes of them: summary, exit status, JUnit, baselines.
 usage: test_assert.py BUILD_DIR [FILTER]"""
 import json
+import os
+import re
+import subprocess
 import sys
+import tempfile
+import xml.etree.ElementTree
 
 import service
 from service import MATRICES, SCENE, check, expect
@@ -140,6 +145,162 @@ def test_a_given_answer_is_judged_too(s):
                                                      {"quantity": "contact.reaction_sum", "max": -2}]}
     summary = expect(s.request("POST", "/v1/verify", body), 200).json["summary"]
     check(summary["outcome"] == "verified" and [x["result"] for x in summary["assertions"]] == ["pass", "fail"], summary)
+
+
+# ---- the client
+
+def run(s, *words, body=None, code=0):
+    """The client, with a dict as its standard input."""
+    done = subprocess.run([os.path.join(sys.argv[1], "uzawa"), "--server", s.url, *words], capture_output=True,
+                          input=json.dumps(body) if body else "", text=True, timeout=90)
+    check(done.returncode == code, words, "exit", done.returncode, "wanted", code, done.stdout, done.stderr)
+    return done
+
+
+def read_report(path):
+    """The root of a JUnit report that has the common shape: testsuites > testsuite > properties? testcase*, counts that
+    agree with what is there, a failure or error with a message, names and times everywhere."""
+    root = xml.etree.ElementTree.parse(path).getroot()
+    check(root.tag == "testsuites" and len(root) >= 1, root.tag)
+    for suite in root:
+        check(suite.tag == "testsuite" and suite.get("name"), suite.attrib)
+        check(re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", suite.get("timestamp")), suite.attrib)
+        cases = suite.findall("testcase")
+        check([child.tag for child in suite] == ["properties"] + ["testcase"] * len(cases), [x.tag for x in suite])
+        check(all(one.get("name") and one.get("value") is not None for one in suite.find("properties")), suite)
+        for case in cases:
+            check(set(case.attrib) == {"classname", "name", "time"} and float(case.get("time")) >= 0, case.attrib)
+            check([child.tag for child in case] in (["failure"], ["error"], ["system-out"]), case)
+            check(case[0].tag == "system-out" or (case[0].get("message") and case[0].get("type")), case[0].attrib)
+        for count, tag in (("tests", "testcase"), ("failures", "testcase/failure"), ("errors", "testcase/error"),
+                           ("skipped", "testcase/skipped")):
+            check(int(suite.get(count)) == len(suite.findall(tag)), count, suite.attrib)
+    for count in ("tests", "failures", "errors", "skipped"):
+        check(int(root.get(count)) == sum(int(suite.get(count)) for suite in root), root.attrib)
+    return root
+
+
+def report_of(s, body, *words, code):
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "report.xml")
+        done = run(s, "submit", "-", "--wait", "--junit", path, *words, body=body, code=code)
+        return read_report(path), done
+
+
+def names_of(report, tag=""):
+    """Names of the test cases with such a child."""
+    return [case.get("name") for case in report.iter("testcase") if not tag or case.find(tag) is not None]
+
+
+def test_client_passes(s):
+    report, done = report_of(s, {**SCENE, "assert": PASSING}, code=0)
+    check("assertions  6 of 6 pass" in done.stdout and "no yielding" in done.stdout, done.stdout)
+    check(names_of(report)[:3] == ["converged", "contact.active at least 22 at most 22", "no yielding"], names_of(report))
+    check(len(names_of(report)) == 7 and report[0].find("properties/property[@name='job']").get("value"), report)
+
+
+def test_client_fails_with_3(s):
+    report, done = report_of(s, {**SCENE, "assert": [*PASSING, FAILING]}, code=3)
+    check("assertions  6 of 7 pass" in done.stdout and "FAIL       contact.max_pressure at most 0.05" in done.stdout, done)
+    check(names_of(report, "failure") == ["contact.max_pressure at most 0.05"], names_of(report, "failure"))
+    job = run(s, "submit", "-", "--wait", "--quiet", body={**SCENE, "assert": [FAILING]}, code=3).stdout.strip()
+    run(s, "wait", job, "--quiet", code=3)
+    shown = run(s, "status", job).stdout
+    check("assertions  0 of 1 pass" in shown, shown)
+    run(s, "refine", job, "--accuracy", "1e-9", "--wait", code=3)
+
+
+def test_client_tells_other_ends_first(s):
+    stopped = {**SCENE, "solver": {"method": "uzawa", "max_iterations": 3}, "assert": [PASSING[0]]}
+    report, done = report_of(s, stopped, code=7)
+    check("uncertain" in done.stdout, done.stdout)
+    check(len(names_of(report, "failure")) == 2, names_of(report, "failure"))
+    broken = {"problem": {**SCENE["problem"], "contacts": []}}
+    broken["problem"]["supports"] = [{"on": "left", "ux": 0}]
+    report, _ = report_of(s, broken, code=6)
+    check(names_of(report, "error") == ["converged"], names_of(report))
+
+
+def test_report_of_cases(s):
+    asserted = [{"quantity": "contact.max_pressure", "max": 0.1, "name": "a < b & \"c\""},
+                {"quantity": "cases.converged", "min": 2}]
+    report, done = report_of(s, {**SCENE, "cases": CASES, "assert": asserted}, code=3)
+    check("(case heavy)" in done.stdout, done.stdout)
+    found = [(case.get("classname").partition(".")[2], case.get("name"), case[0].tag) for case in report.iter("testcase")]
+    name = 'a < b & "c"'
+    check(found == [("", "converged", "system-out"), ("", "cases.converged at least 2", "system-out"),
+                    ("light", "converged", "system-out"), ("light", name, "system-out"),
+                    ("heavy", "converged", "system-out"), ("heavy", name, "failure")], found)
+
+
+def test_report_of_a_job_that_goes_on(s):
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "report.xml")
+        job = run(s, "submit", "-", body=service.ENDLESS).stdout.strip()
+        run(s, "wait", job, "--timeout", "1", "--junit", path, code=10)
+        check(names_of(read_report(path), "error") == ["converged"], names_of(read_report(path)))
+        run(s, "cancel", job)
+
+
+def test_options_that_do_nothing_are_refused(s):
+    for words in (["--junit", "x.xml"], ["--baseline", "x"], ["--wait", "--tolerance", "1e-3"],
+                  ["--wait", "--baseline", "x", "--tolerance", "-1"]):
+        run(s, "submit", "-", *words, body=SCENE, code=2)
+    run(s, "submit", "-", "--wait", "--junit", "no/such/folder/x.xml", body=MATRICES, code=11)
+
+
+# ---- baselines
+
+def submitted(s, body):
+    return run(s, "submit", "-", "--wait", "--quiet", body=body).stdout.strip()
+
+
+def with_load(traction, cells=(30, 10)):
+    problem = {**SCENE["problem"], "mesh": {"box": {"size": [60, 20], "cells": list(cells)}},
+               "loads": [{"on": "top", "traction": [0, traction]}, {"on": "right", "traction": [0.5, 0]}]}
+    return {"problem": problem}
+
+
+def test_no_drift_from_itself(s):
+    baseline = submitted(s, with_load(-0.05))
+    report, done = report_of(s, SCENE, "--baseline", baseline, code=0)
+    check("baseline    5 of 5 pass" in done.stdout, done.stdout)
+    check("baseline: displacements" in names_of(report), names_of(report))
+    done = run(s, "submit", "-", "--wait", "--json", "--baseline", baseline, body=SCENE)
+    check(json.loads(done.stdout)["status"] == "successful" and "5 of 5 pass" in done.stderr, done)
+
+
+def test_drift_is_told(s):
+    """One more node touches, and the pressure has risen; within a tenth that is nothing."""
+    baseline = submitted(s, with_load(-0.05))
+    report, done = report_of(s, with_load(-0.051), "--baseline", baseline, "--tolerance", "1e-3", code=3)
+    check("closed at node 8" in done.stdout and "more than 0.001" in done.stdout, done.stdout)
+    check("baseline: contact.active set" in names_of(report, "failure"), names_of(report, "failure"))
+    report_of(s, with_load(-0.051), "--baseline", baseline, "--tolerance", "0.1", code=0)
+
+
+def test_another_mesh_is_told(s):
+    baseline = submitted(s, with_load(-0.05))
+    report, done = report_of(s, with_load(-0.05, (60, 20)), "--baseline", baseline, "--tolerance", "0.1", code=3)
+    check("the meshes differ in their number of nodes" in done.stdout, done.stdout)
+    check(names_of(report, "failure") == ["baseline: mesh"], names_of(report, "failure"))
+
+
+def test_cases_against_a_baseline(s):
+    body = {**SCENE, "cases": CASES}
+    baseline = submitted(s, body)
+    run(s, "submit", "-", "--wait", "--baseline", baseline, body=body)
+    more = {**SCENE, "cases": [*CASES, {"name": "new", "loads": []}]}
+    done = run(s, "submit", "-", "--wait", "--baseline", baseline, body=more, code=3)
+    check("new: baseline: it has no load case of this name" in done.stdout, done.stdout)
+    done = run(s, "submit", "-", "--wait", "--baseline", baseline, body=SCENE, code=3)
+    check("it has some load cases" in done.stdout, done.stdout)
+    matrices = submitted(s, MATRICES)
+    run(s, "submit", "-", "--wait", "--baseline", matrices, body=MATRICES)
+
+
+def test_a_baseline_that_is_not_there(s):
+    run(s, "submit", "-", "--wait", "--baseline", "0" * 32, body=MATRICES, code=4)
 
 
 if __name__ == "__main__":
