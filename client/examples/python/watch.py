@@ -23,7 +23,8 @@ def main(path, enough):
                 stopped = True
                 service.open("DELETE", f"/v1/jobs/{job['id']}").close()
     if job["summary"]:
-        print(f"{job['summary']['outcome']}: error at most {job['summary']['certificate']['absolute_error']:.3g}")
+        bound = job["summary"]["certificate"]["absolute_error"]  # None: nothing could be certified
+        print(f"{job['summary']['outcome']}: error {'unknown' if bound is None else f'at most {bound:.3g}'}")
     return 0 if job["summary"] else 1
 
 
