@@ -26,7 +26,7 @@ pkg = $(shell pkg-config $(1) 2>/dev/null)
 SERVER_CFLAGS = $(call pkg,--cflags libmicrohttpd jansson sqlite3 libcurl gnutls)
 SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp -lsuitesparseconfig $(call pkg,--libs gnutls) -lpng -lz -lm
 SERVER_LIBS   = $(call pkg,--libs libmicrohttpd jansson sqlite3 libcurl) $(SOLVER_LIBS) -lpthread
-CLIENT_LIBS   = $(call pkg,--libs libcurl jansson) -lm
+CLIENT_LIBS   = $(call pkg,--libs libcurl jansson gnutls) -lm
 CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)
 LDFLAGS_ALL   = $(SAN) -pthread $(LDFLAGS)
 

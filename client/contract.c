@@ -45,17 +45,25 @@ static client_exit add_cases(client_session *s, client_checks *to, const json_t 
     return code;
 }
 
-static client_exit write_report(client_session *s, const json_t *job, client_checks *checks)
+/* "scene.json young=2e5": what was sent, and which of several jobs. NULL: no memory. */
+static char *suite_name(const client_session *s, const json_t *job, const char *label)
 {
-    char message[512] = "no memory for the report";
+    char *name = NULL;
     const client_options *o = s->options;
     const bool of_file = o->command == CLIENT_SUBMIT || o->command == CLIENT_VERIFY;
     const char *file = of_file && o->operand && strcmp(o->operand, "-") != 0 ? o->operand : NULL;
     const char *slash = file ? strrchr(file, '/') : NULL;
-    if (client_suites_add(&s->suites, slash ? slash + 1 : file, job, checks) &&
-        client_junit_write(&s->suites, o->junit, message, sizeof message))
-        return CLIENT_OK;
-    return client_complain(s, CLIENT_LOCAL, message);
+    const char *base = slash ? slash + 1 : file ? file : client_json_text(job, "id");
+    return asprintf(&name, "%s%s%s", base, label ? " " : "", label ? label : "") < 0 ? NULL : name;
+}
+
+static client_exit write_report(client_session *s, const json_t *job, const char *label, client_checks *checks)
+{
+    char message[512] = "no memory for the report", *name = suite_name(s, job, label);
+    const bool ok = name && client_suites_add(&s->suites, name, job, checks) &&
+                    client_junit_write(&s->suites, s->options->junit, message, sizeof message);
+    free(name);
+    return ok ? CLIENT_OK : client_complain(s, CLIENT_LOCAL, message);
 }
 
 static client_exit compare(client_session *s, client_checks *checks, const json_t *job)
@@ -74,7 +82,7 @@ static client_exit compare(client_session *s, client_checks *checks, const json_
 }
 
 /* The first thing that is wrong is told: how the job ended, what differs, what could not be written. */
-client_exit client_contract(client_session *s, const json_t *job, client_exit code)
+client_exit client_contract(client_session *s, const json_t *job, const char *label, client_exit code)
 {
     const client_options *o = s->options;
     const bool answered = *client_json_text(job, "summary.outcome") && client_job_ended(job);
@@ -93,7 +101,7 @@ client_exit client_contract(client_session *s, const json_t *job, client_exit co
     if (more == CLIENT_OK && o->baseline && answered)
         more = compare(s, &checks, job);
     if (o->junit)
-        written = write_report(s, job, &checks);
+        written = write_report(s, job, label, &checks);
     client_checks_clear(&checks);
     return code != CLIENT_OK ? code : more != CLIENT_OK ? more : written;
 }

@@ -14,7 +14,8 @@ typedef enum {
     CLIENT_DISMISSED = 9,        /* the job was dismissed */
     CLIENT_WAIT_TIMEOUT = 10,    /* the job goes on, but --timeout has passed */
     CLIENT_LOCAL = 11,           /* a file could not be read or written, or there is no memory */
-    CLIENT_UNREACHABLE = 12      /* no connection, or no answer in time */
+    CLIENT_UNREACHABLE = 12,     /* no connection, or no answer in time */
+    CLIENT_INTERRUPTED = 130     /* by SIGINT, as shells say it; a job that was waited for goes on */
 } client_exit;
 
 #endif

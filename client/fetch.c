@@ -1,16 +1,9 @@
-/* status, list, cancel, result, picture, history: one question, one answer. */
-#include "plot.h"
+/* status, cancel, delete, result, picture, history: one question, one answer. */
+#include "fetch.h"
 #include "report.h"
-#include "session.h"
 
-#include <langinfo.h>
-#include <locale.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
-
-#define PAGE_JOBS  100L
-#define PLOT_WIDTH 72
 
 client_exit client_status(client_session *s)
 {
@@ -33,6 +26,40 @@ client_exit client_status(client_session *s)
     return code;
 }
 
+client_exit client_show_cases(client_session *s, const json_t *job)
+{
+    json_t *result = NULL;
+    if (!json_is_object(client_json_at(job, "summary.cases")))
+        return CLIENT_OK;
+    char *path = client_job_path(s, client_json_text(job, "id"), "/result?fields=summary");
+    if (!path)
+        return CLIENT_LOCAL;
+    client_request request = client_request_new(s, "GET", path);
+    client_exit code = client_ask_json(s, &result, &request);
+    if (result)
+        client_print_cases(s->out, result);
+    json_decref(result);
+    free(path);
+    return code;
+}
+
+/* What became of the job, in words or as JSON. */
+static client_exit say_gone(client_session *s, const char *what, const client_reply *reply)
+{
+    if (s->options->quiet)
+        return CLIENT_OK;
+    if (!s->options->json) {
+        fprintf(s->out, "%s\n", what);
+        return CLIENT_OK;
+    }
+    json_t *job = reply->body.len ? json_loadb(reply->body.data, reply->body.len, 0, NULL) : NULL;
+    if (!job)
+        job = json_pack("{s:s, s:s}", "id", s->options->operand, "status", what);
+    client_exit code = job ? client_print_json(s, job) : client_complain(s, CLIENT_LOCAL, "no memory");
+    json_decref(job);
+    return code;
+}
+
 /* A DELETE that arrived must not be sent again: the first dismisses a job, the second would delete it. */
 client_exit client_cancel(client_session *s)
 {
@@ -43,128 +70,78 @@ client_exit client_cancel(client_session *s)
     client_request request = client_request_new(s, "DELETE", path);
     request.repeatable = false;
     client_exit code = client_ask(s, &reply, &request);
-    if (code == CLIENT_OK && s->options->json && reply.body.len)
-        fprintf(s->out, "%s\n", reply.body.data);
-    else if (code == CLIENT_OK && !s->options->quiet && !s->options->json)
-        fprintf(s->out, "%s\n", reply.status == 204 ? "deleted" : "dismissed");
+    if (code == CLIENT_OK)
+        code = say_gone(s, reply.status == 204 ? "deleted" : "dismissed", &reply);
     client_reply_clear(&reply);
     free(path);
     return code;
 }
 
-/* ------------------------------------------------------------------- list */
-
-static bool append_query(client_buffer *path, const char *name, const char *value)
+/* Of a job that has ended, which it stays, so that it may be sent again: one that is not there then is gone by it. */
+static client_exit delete_ended(client_session *s, const char *path)
 {
-    return !value || (client_buffer_append(path, "&", 1) && client_buffer_append(path, name, strlen(name)) &&
-                      client_buffer_append(path, "=", 1) && client_http_append_escaped(path, value));
-}
-
-static client_exit list_page(client_session *s, json_t **page, long limit, const char *cursor)
-{
-    char start[64];
-    client_buffer path = {0};
-    const client_options *o = s->options;
-    client_exit code = CLIENT_LOCAL;
-    snprintf(start, sizeof start, "/v1/jobs?limit=%ld", limit);
-    *page = NULL;
-    if (client_buffer_append(&path, start, strlen(start)) && append_query(&path, "status", o->status) &&
-        append_query(&path, "tag", o->n_tags ? o->tags[0] : NULL) && append_query(&path, "cursor", cursor)) {
-        client_request request = client_request_new(s, "GET", path.data);
-        code = client_ask_json(s, page, &request);
-    } else
-        client_complain(s, code, "no memory");
-    free(path.data);
+    client_reply reply;
+    client_request request = client_request_new(s, "DELETE", path);
+    client_http_end end = client_http_send(s->http, &reply, &request);
+    bool gone = end == CLIENT_HTTP_ANSWERED && (reply.status == 204 || (reply.status == 404 && reply.attempts > 1));
+    client_reply nothing = {0};
+    client_exit code = gone ? say_gone(s, "deleted", &nothing) : client_explain(s, end, &reply);
+    client_reply_clear(&reply);
     return code;
 }
 
-/* Up to `limit` jobs in as many pages as that takes. *jobs: array, released by the caller. */
-static client_exit list_all(client_session *s, json_t *jobs, long limit)
+client_exit client_delete(client_session *s)
 {
-    char cursor[256] = "";
-    client_exit code = CLIENT_OK;
-    while (code == CLIENT_OK && (long)json_array_size(jobs) < limit) {
-        json_t *page;
-        long left = limit - (long)json_array_size(jobs);
-        code = list_page(s, &page, left < PAGE_JOBS ? left : PAGE_JOBS, *cursor ? cursor : NULL);
-        json_t *more = json_object_get(page, "jobs");
-        if (code == CLIENT_OK && (!json_is_array(more) || json_array_extend(jobs, more) != 0))
-            code = client_complain(s, CLIENT_SERVER_ERROR, "the reply is no list of jobs");
-        snprintf(cursor, sizeof cursor, "%s", client_json_text(page, "next"));
-        bool last = !*cursor || json_array_size(more) == 0;
-        json_decref(page);
-        if (last)
-            break;
-    }
-    return code;
-}
-
-static void print_cell(FILE *to, const char *text, int width)
-{
-    client_print_safe(to, text);
-    for (int i = (int)strlen(text); i < width; i++)
-        fputc(' ', to);
-    fputs("  ", to);
-}
-
-static void print_row(FILE *to, const json_t *job)
-{
-    const json_t *tags = json_object_get(job, "tags");
-    print_cell(to, client_json_text(job, "id"), 32);
-    print_cell(to, client_json_text(job, "status"), 10);
-    print_cell(to, client_json_text(job, "summary.outcome"), 15);
-    print_cell(to, client_json_text(job, "created"), 24);
-    for (size_t i = 0; i < json_array_size(tags); i++) {
-        const json_t *tag = json_array_get(tags, i);
-        fputs(i ? "," : "", to);
-        client_print_safe(to, json_is_string(tag) ? json_string_value(tag) : "?");
-    }
-    fputc('\n', to);
-}
-
-client_exit client_list(client_session *s)
-{
-    json_t *jobs = json_array();
-    if (!jobs)
-        return client_complain(s, CLIENT_LOCAL, "no memory");
-    client_exit code = list_all(s, jobs, s->options->limit);
-    if (code == CLIENT_OK && s->options->json)
-        code = client_print_json(s, jobs);
-    else if (code == CLIENT_OK) {
-        fprintf(s->out, "%-32s  %-10s  %-15s  %-24s  %s\n", "id", "status", "outcome", "created", "tags");
-        for (size_t i = 0; i < json_array_size(jobs); i++)
-            print_row(s->out, json_array_get(jobs, i));
-    }
-    json_decref(jobs);
+    json_t *job = NULL;
+    char message[200];
+    char *path = client_job_path(s, s->options->operand, "");
+    if (!path)
+        return CLIENT_LOCAL;
+    client_request request = client_request_new(s, "GET", path);
+    client_exit code = client_ask_json(s, &job, &request);
+    snprintf(message, sizeof message, "the job is %.20s: delete is for ended ones; to stop it: uzawa cancel %.40s",
+             client_json_text(job, "status"), client_json_text(job, "id"));
+    if (code == CLIENT_OK && !client_job_ended(job))
+        code = client_complain(s, CLIENT_REFUSED, message);
+    else if (code == CLIENT_OK)
+        code = delete_ended(s, path);
+    json_decref(job);
+    free(path);
     return code;
 }
 
 /* ----------------------------------------------- result, picture, history */
 
-static client_exit deliver(client_session *s, const client_reply *reply)
+bool client_append_query(client_buffer *path, const char *name, const char *value)
+{
+    return !value || (client_buffer_append(path, "&", 1) && client_buffer_append(path, name, strlen(name)) &&
+                      client_buffer_append(path, "=", 1) && client_http_append_escaped(path, value));
+}
+
+client_exit client_deliver(client_session *s, const char *text, size_t len)
 {
     char message[512];
     const char *path = s->options->output ? s->options->output : "-";
-    const char *text = reply->body.data ? reply->body.data : "";
-    if (!client_file_write(path, text, reply->body.len, message, sizeof message))
+    if (!client_file_write(path, text ? text : "", len, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
-    if (strcmp(path, "-") == 0 && reply->body.len && text[reply->body.len - 1] != '\n')
+    if (strcmp(path, "-") == 0 && len && text[len - 1] != '\n')
         fputc('\n', s->out);
-    return CLIENT_OK;
+    if (strcmp(path, "-") == 0 || !s->options->json)
+        return CLIENT_OK;
+    json_t *written = json_pack("{s:s, s:I}", "file", path, "bytes", (json_int_t)len);
+    client_exit code = written ? client_print_json(s, written) : CLIENT_LOCAL;
+    json_decref(written);
+    return code;
 }
 
-typedef struct {
-    const char *name, *value; /* value NULL: left out */
-} query_part;
-
 /* "/v1/jobs/ID/result?a=1&b=2"; a part without a name ends the list. The caller frees. NULL: no memory, said. */
-static char *path_with_query(client_session *s, const char *suffix, const query_part *part)
+char *client_path_with_query(client_session *s, const char *suffix, const client_query *part)
 {
     client_buffer query = {0};
     char *path = NULL;
     bool ok = client_buffer_append(&query, suffix, strlen(suffix));
     for (; ok && part->name; part++)
-        ok = append_query(&query, part->name, part->value);
+        ok = client_append_query(&query, part->name, part->value);
     if (ok) {
         char *first = strchr(query.data, '&');
         if (first)
@@ -186,18 +163,43 @@ static client_exit fetch_and_deliver(client_session *s, char *path)
     client_request request = client_request_new(s, "GET", path);
     client_exit code = client_ask(s, &reply, &request);
     if (code == CLIENT_OK)
-        code = deliver(s, &reply);
+        code = client_deliver(s, reply.body.data, reply.body.len);
     client_reply_clear(&reply);
     free(path);
     return code;
 }
 
+/* "a,b" of the words, "" of none. The caller frees; NULL: no memory, said. */
+static char *joined(client_session *s, const client_words *words)
+{
+    client_buffer text = {0};
+    bool ok = client_buffer_append(&text, "", 0);
+    for (int i = 0; ok && i < words->count; i++)
+        ok = client_buffer_append(&text, ",", i > 0) &&
+             client_buffer_append(&text, words->item[i], strlen(words->item[i]));
+    if (!ok) {
+        free(text.data);
+        client_complain(s, CLIENT_LOCAL, "no memory");
+    }
+    return ok ? text.data : NULL;
+}
+
 client_exit client_result(client_session *s)
 {
     const client_options *o = s->options;
-    const bool vtu = o->format && strcmp(o->format, "vtu") == 0;
-    const query_part query[] = {{"fields", o->fields}, {"case", o->case_name}, {NULL, NULL}};
-    return fetch_and_deliver(s, path_with_query(s, vtu ? "/result.vtu" : "/result", query));
+    const char *format = o->format ? o->format : "json";
+    char *fields = joined(s, &o->fields);
+    if (!fields)
+        return CLIENT_LOCAL;
+    const client_query query[] = {{"fields", *fields ? fields : NULL}, {"case", o->case_name}, {NULL, NULL}};
+    client_exit code;
+    if (strcmp(format, "csv") == 0)
+        code = client_table(s, *fields ? fields : "reactions,gaps");
+    else
+        code = fetch_and_deliver(
+            s, client_path_with_query(s, strcmp(format, "vtu") == 0 ? "/result.vtu" : "/result", query));
+    free(fields);
+    return code;
 }
 
 client_exit client_picture(client_session *s)
@@ -205,79 +207,29 @@ client_exit client_picture(client_session *s)
     char width[24];
     const client_options *o = s->options;
     snprintf(width, sizeof width, "%ld", o->width);
-    const query_part query[] = {{"colour", o->colour},
-                                {"factor", o->factor},
-                                {"width", o->width < 0 ? NULL : width},
-                                {"case", o->case_name},
-                                {NULL, NULL}};
-    return fetch_and_deliver(s, path_with_query(s, "/deformed.svg", query));
-}
-
-static bool locale_is_utf8(void)
-{
-    setlocale(LC_CTYPE, "");
-    return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
-}
-
-client_exit client_show_cases(client_session *s, const json_t *job)
-{
-    json_t *result = NULL;
-    if (!json_is_object(client_json_at(job, "summary.cases")))
-        return CLIENT_OK;
-    char *path = client_job_path(s, client_json_text(job, "id"), "/result?fields=summary");
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask_json(s, &result, &request);
-    if (result)
-        client_print_cases(s->out, result);
-    json_decref(result);
-    free(path);
-    return code;
-}
-
-/* The drawing goes where the data would: to the file or to standard output. */
-static client_exit draw(client_session *s, const char *csv)
-{
-    char message[512], *text = NULL;
-    size_t len = 0;
-    client_series series;
-    const client_options *o = s->options;
-    client_plot_style style = {.width = o->width < 0 ? PLOT_WIDTH : (int)o->width, .height = (int)o->height};
-    style.ascii = o->ascii || !locale_is_utf8();
-    style.colour = !o->output && isatty(fileno(s->out)) == 1 && !getenv("NO_COLOR");
-    if (!client_series_read(&series, csv, message, sizeof message))
-        return client_complain(s, CLIENT_SERVER_ERROR, message);
-    FILE *drawing = open_memstream(&text, &len);
-    bool drawn = drawing && client_plot_print(drawing, &series, &style);
-    bool ok = drawing && fclose(drawing) == 0;
-    client_exit code = CLIENT_OK;
-    if (!ok)
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
-    else if (!drawn)
-        client_complain(s, CLIENT_OK, "the history has no iteration to draw");
-    else if (!client_file_write(o->output ? o->output : "-", text, len, message, sizeof message))
-        code = client_complain(s, CLIENT_LOCAL, message);
-    free(text);
-    client_series_clear(&series);
-    return code;
+    const client_query query[] = {{"colour", o->colour},
+                                  {"factor", o->factor},
+                                  {"width", o->width < 0 ? NULL : width},
+                                  {"case", o->case_name},
+                                  {NULL, NULL}};
+    return fetch_and_deliver(s, client_path_with_query(s, "/deformed.svg", query));
 }
 
 client_exit client_history(client_session *s)
 {
     client_reply reply;
     const client_options *o = s->options;
-    const query_part query[] = {{"case", o->case_name}, {NULL, NULL}};
-    char *path = path_with_query(s, "/history", query);
+    const client_query query[] = {{"case", o->case_name}, {NULL, NULL}};
+    char *path = client_path_with_query(s, "/history", query);
     if (!path)
         return CLIENT_LOCAL;
     client_request request = client_request_new(s, "GET", path);
     request.headers[0] = o->csv || o->plot ? "Accept: text/csv" : "Accept: application/json";
     client_exit code = client_ask(s, &reply, &request);
     if (code == CLIENT_OK && o->plot)
-        code = draw(s, reply.body.data ? reply.body.data : "");
+        code = client_draw_history(s, reply.body.data ? reply.body.data : "");
     else if (code == CLIENT_OK)
-        code = deliver(s, &reply);
+        code = client_deliver(s, reply.body.data, reply.body.len);
     client_reply_clear(&reply);
     free(path);
     return code;

@@ -2,15 +2,19 @@
 
 #include <curl/curl.h>
 #include <math.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include <time.h>
 
 #define CONNECT_LIMIT_MS 10000L
+#define TICK_MS          250
 
 struct client_http {
     CURL *curl;
+    CURLM *multi; /* so that a request can be left when something else happens */
+    const client_http_watch *watch;
     char *base; /* server URL without a trailing '/' */
     const char *token, *ca_file;
     char curl_says[CURL_ERROR_SIZE];
@@ -21,15 +25,6 @@ double client_clock(void)
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-void client_sleep(double seconds)
-{
-    if (!(seconds > 0))
-        return;
-    struct timespec pause = {.tv_sec = (time_t)seconds};
-    pause.tv_nsec = (long)((seconds - floor(seconds)) * 1e9);
-    nanosleep(&pause, NULL);
 }
 
 bool client_http_append_escaped(client_buffer *to, const char *text)
@@ -90,8 +85,9 @@ client_http *client_http_open(const char *server, char *message, size_t size)
         return NULL;
     }
     http->curl = curl_easy_init();
+    http->multi = curl_multi_init();
     http->base = strdup(server);
-    if (!http->curl || !http->base) {
+    if (!http->curl || !http->multi || !http->base) {
         client_http_close(http);
         snprintf(message, size, "no memory");
         return NULL;
@@ -109,31 +105,63 @@ void client_http_close(client_http *http)
     if (!http)
         return;
     curl_easy_cleanup(http->curl);
+    curl_multi_cleanup(http->multi);
     free(http->base);
     free(http);
     curl_global_cleanup();
 }
 
+/* Where a reply's body goes. */
+typedef struct {
+    client_http *http;
+    client_reply *reply;
+    const client_request *request;
+    bool enough;
+} body_sink;
+
 static size_t take_body(char *bytes, size_t size, size_t count, void *ctx)
 {
-    client_reply *reply = ctx;
-    return client_buffer_append(&reply->body, bytes, size * count) ? size * count : 0;
+    body_sink *sink = ctx;
+    long status = 0;
+    curl_easy_getinfo(sink->http->curl, CURLINFO_RESPONSE_CODE, &status);
+    if (!sink->request->take || status < 200 || status >= 300)
+        return client_buffer_append(&sink->reply->body, bytes, size * count) ? size * count : 0;
+    sink->enough = !sink->request->take(sink->request->take_ctx, bytes, size * count);
+    return sink->enough ? 0 : size * count;
 }
 
-/* Wants Retry-After in seconds; the form with a date is taken as absent. */
+/* The value of a header line of that name, cut to `size`, in value; false: it is another header. */
+static bool header_value(char *value, size_t size, const char *line, size_t len, const char *name)
+{
+    size_t name_len = strlen(name);
+    if (len <= name_len || strncasecmp(line, name, name_len) != 0)
+        return false;
+    snprintf(value, size, "%.*s", (int)(len - name_len), line + name_len);
+    value[strcspn(value, "\r\n")] = '\0';
+    return true;
+}
+
+/* Seconds from now, for both forms of Retry-After (RFC 9110, 10.2.3): a number or a date. */
+static double retry_after(const char *value)
+{
+    char *end;
+    double seconds = strtod(value, &end);
+    if (end == value) {
+        time_t then = curl_getdate(value, NULL);
+        seconds = then < 0 ? 0 : difftime(then, time(NULL));
+    }
+    return seconds > 0 && isfinite(seconds) ? seconds : 0;
+}
+
 static size_t take_header(char *bytes, size_t size, size_t count, void *ctx)
 {
-    static const char NAME[] = "Retry-After:";
     client_reply *reply = ctx;
-    size_t len = size * count;
-    char value[24] = "";
-    if (len > sizeof NAME - 1 && strncasecmp(bytes, NAME, sizeof NAME - 1) == 0) {
-        size_t rest = len - (sizeof NAME - 1);
-        memcpy(value, bytes + sizeof NAME - 1, rest < sizeof value ? rest : sizeof value - 1);
-        double seconds = strtod(value, NULL);
-        reply->retry_after_s = seconds > 0 && isfinite(seconds) ? seconds : 0;
-    }
-    return len;
+    char value[64];
+    if (header_value(value, sizeof value, bytes, size * count, "Retry-After:"))
+        reply->retry_after_s = retry_after(value);
+    else if (header_value(value, sizeof value, bytes, size * count, "Date:"))
+        reply->date = curl_getdate(value, NULL);
+    return size * count;
 }
 
 /* NULL: no memory. "Expect:" keeps curl from holding back a large body for a second. */
@@ -172,7 +200,12 @@ static void set_limits(CURL *curl, const client_request *request)
     curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, (long)ceil(request->silence_s));
 }
 
-static void set_request(client_http *http, client_reply *reply, const client_request *request)
+void client_http_set_watch(client_http *http, const client_http_watch *watch)
+{
+    http->watch = watch;
+}
+
+static void set_request(client_http *http, body_sink *sink, const client_request *request)
 {
     CURL *curl = http->curl;
     curl_easy_setopt(curl, CURLOPT_HTTPGET, 1L);
@@ -194,25 +227,85 @@ static void set_request(client_http *http, client_reply *reply, const client_req
     curl_easy_setopt(curl, CURLOPT_ACCEPT_ENCODING, "");
     curl_easy_setopt(curl, CURLOPT_ERRORBUFFER, http->curl_says);
     curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, take_body);
-    curl_easy_setopt(curl, CURLOPT_WRITEDATA, reply);
+    curl_easy_setopt(curl, CURLOPT_WRITEDATA, sink);
     curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, take_header);
-    curl_easy_setopt(curl, CURLOPT_HEADERDATA, reply);
+    curl_easy_setopt(curl, CURLOPT_HEADERDATA, sink->reply);
+    curl_easy_setopt(curl, CURLOPT_CERTINFO, request->certificate ? 1L : 0L);
     set_limits(curl, request);
+}
+
+/* False: the watch wants to give up. *seconds of pause, or until something of the request happens if busy. */
+static bool look_around(client_http *http, int ms)
+{
+    const client_http_watch *watch = http->watch;
+    struct curl_waitfd extra = {.fd = watch ? watch->fd : -1, .events = CURL_WAIT_POLLIN};
+    bool has_fd = watch && watch->fd >= 0;
+    curl_multi_poll(http->multi, has_fd ? &extra : NULL, has_fd ? 1 : 0, ms, NULL);
+    struct pollfd ready = {.fd = extra.fd, .events = POLLIN};
+    if (has_fd && poll(&ready, 1, 0) > 0 && watch->woken(watch->ctx))
+        return false;
+    if (watch && watch->tick)
+        watch->tick(watch->ctx);
+    return true;
+}
+
+/* What curl_easy_perform does, but for the watch: CURLE_ABORTED_BY_CALLBACK. */
+static CURLcode perform(client_http *http)
+{
+    int running = 1, left = 0;
+    CURLcode code = CURLE_ABORTED_BY_CALLBACK;
+    if (curl_multi_add_handle(http->multi, http->curl) != CURLM_OK)
+        return CURLE_OUT_OF_MEMORY;
+    bool ok = curl_multi_perform(http->multi, &running) == CURLM_OK;
+    while (ok && running && look_around(http, TICK_MS))
+        ok = curl_multi_perform(http->multi, &running) == CURLM_OK;
+    CURLMsg *message = curl_multi_info_read(http->multi, &left);
+    if (!ok)
+        code = CURLE_OUT_OF_MEMORY;
+    else if (!running && message && message->msg == CURLMSG_DONE)
+        code = message->data.result;
+    curl_multi_remove_handle(http->multi, http->curl);
+    return code;
+}
+
+/* The server's own certificate is the first of the chain. */
+static void note_certificate(client_http *http, client_reply *reply)
+{
+    struct curl_certinfo *chain = NULL;
+    char value[128];
+    if (curl_easy_getinfo(http->curl, CURLINFO_CERTINFO, &chain) != CURLE_OK || !chain || chain->num_of_certs < 1)
+        return;
+    for (struct curl_slist *line = chain->certinfo[0]; line; line = line->next) {
+        size_t len = strlen(line->data);
+        if (header_value(value, sizeof value, line->data, len, "Expire date:"))
+            reply->cert_until = curl_getdate(value, NULL);
+        else if (header_value(value, sizeof value, line->data, len, "Subject:"))
+            snprintf(reply->cert_subject, sizeof reply->cert_subject, "%s", value);
+    }
 }
 
 static CURLcode send_once(client_http *http, client_reply *reply, const client_request *request)
 {
-    char *url = NULL;
+    char *url = NULL, *address = NULL;
     CURLcode code = CURLE_OUT_OF_MEMORY;
     struct curl_slist *headers = header_list(request);
+    body_sink sink = {.http = http, .reply = reply, .request = request};
+    int attempts = reply->attempts + 1;
     client_reply_clear(reply);
+    reply->attempts = attempts;
+    reply->date = -1;
     http->curl_says[0] = '\0';
     if (headers && asprintf(&url, "%s%s", http->base, request->path) >= 0) {
-        set_request(http, reply, request);
+        set_request(http, &sink, request);
         curl_easy_setopt(http->curl, CURLOPT_URL, url);
         curl_easy_setopt(http->curl, CURLOPT_HTTPHEADER, headers);
-        code = curl_easy_perform(http->curl);
+        code = perform(http);
+        code = sink.enough ? CURLE_OK : code;
         curl_easy_getinfo(http->curl, CURLINFO_RESPONSE_CODE, &reply->status);
+        if (curl_easy_getinfo(http->curl, CURLINFO_PRIMARY_IP, &address) == CURLE_OK && address)
+            snprintf(reply->address, sizeof reply->address, "%s", address);
+        if (request->certificate)
+            note_certificate(http, reply);
         free(url);
     }
     curl_slist_free_all(headers);
@@ -228,8 +321,9 @@ static bool never_arrived(CURLcode code)
 /* A local cause, or one that another attempt will meet again. */
 static bool hopeless(CURLcode code)
 {
-    return code == CURLE_OUT_OF_MEMORY || code == CURLE_WRITE_ERROR || code == CURLE_UNSUPPORTED_PROTOCOL ||
-           code == CURLE_URL_MALFORMAT || code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CONNECT_ERROR;
+    return code == CURLE_ABORTED_BY_CALLBACK || code == CURLE_OUT_OF_MEMORY || code == CURLE_WRITE_ERROR ||
+           code == CURLE_UNSUPPORTED_PROTOCOL || code == CURLE_URL_MALFORMAT ||
+           code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CONNECT_ERROR;
 }
 
 static bool is_passing(long status)
@@ -254,15 +348,47 @@ static double pause_before(int attempt, const client_reply *reply)
     return fmax(pause, reply->retry_after_s);
 }
 
+static client_http_cause cause_of(CURLcode code)
+{
+    switch (code) {
+    case CURLE_COULDNT_RESOLVE_HOST:
+    case CURLE_COULDNT_RESOLVE_PROXY:
+        return CLIENT_CAUSE_NAME;
+    case CURLE_COULDNT_CONNECT:
+        return CLIENT_CAUSE_CONNECTION;
+    case CURLE_PEER_FAILED_VERIFICATION:
+    case CURLE_SSL_CACERT_BADFILE:
+        return CLIENT_CAUSE_CERTIFICATE;
+    case CURLE_SSL_CONNECT_ERROR:
+        return CLIENT_CAUSE_TLS;
+    case CURLE_OPERATION_TIMEDOUT:
+        return CLIENT_CAUSE_SILENCE;
+    default:
+        return CLIENT_CAUSE_OTHER;
+    }
+}
+
 static client_http_end end_of(client_http *http, client_reply *reply, CURLcode code, const client_request *request)
 {
     if (code == CURLE_OK)
         return CLIENT_HTTP_ANSWERED;
     const char *why = http->curl_says[0] ? http->curl_says : curl_easy_strerror(code);
     snprintf(reply->message, sizeof reply->message, "no answer from %.60s: %.220s", http->base, why);
+    reply->cause = cause_of(code);
+    if (code == CURLE_ABORTED_BY_CALLBACK)
+        return CLIENT_HTTP_INTERRUPTED;
     if (code == CURLE_OUT_OF_MEMORY || code == CURLE_WRITE_ERROR)
         return CLIENT_HTTP_MEMORY;
     return client_clock() >= request->deadline ? CLIENT_HTTP_DEADLINE : CLIENT_HTTP_UNREACHABLE;
+}
+
+bool client_http_pause(client_http *http, double seconds)
+{
+    double end = client_clock() + seconds, left;
+    while ((left = end - client_clock()) > 0)
+        if (!look_around(http, (int)fmin(ceil(left * 1000), TICK_MS)))
+            return false;
+    return true;
 }
 
 client_http_end client_http_send(client_http *http, client_reply *reply, const client_request *request)
@@ -276,6 +402,7 @@ client_http_end client_http_send(client_http *http, client_reply *reply, const c
             worth_another(code, reply, request) && then <= start + request->patience_s && then < request->deadline;
         if (!again)
             return end_of(http, reply, code, request);
-        client_sleep(pause);
+        if (!client_http_pause(http, pause))
+            return end_of(http, reply, CURLE_ABORTED_BY_CALLBACK, request);
     }
 }

@@ -20,7 +20,7 @@ static void clear_suite(client_suite *suite)
 bool client_suites_add(client_suites *to, const char *name, const json_t *job, client_checks *checks)
 {
     const char *outcome = client_json_text(job, "summary.outcome"), *id = client_json_text(job, "id");
-    client_suite suite = {.name = strdup(name ? name : id),
+    client_suite suite = {.name = strdup(name),
                           .id = strdup(id),
                           .created = strdup(client_json_text(job, "created")),
                           .outcome = strdup(*outcome ? outcome : client_json_text(job, "status")),

@@ -19,8 +19,7 @@ typedef struct {
     size_t count;
 } client_suites;
 
-/* Adds a suite for the job, called `name`, or by its id where that is NULL, and takes over *checks, which is then
- * empty. False: no memory. */
+/* Adds a suite for the job and takes over *checks, which is then empty. False: no memory. */
 bool client_suites_add(client_suites *to, const char *name, const json_t *job, client_checks *checks);
 void client_suites_clear(client_suites *suites);
 

@@ -2,6 +2,7 @@
 #include "session.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 typedef client_exit (*command_run)(client_session *);
 
@@ -9,7 +10,8 @@ static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_SUBMIT] = client_submit, [CLIENT_STATUS] = client_status,   [CLIENT_WAIT] = client_wait,
     [CLIENT_RESULT] = client_result, [CLIENT_HISTORY] = client_history, [CLIENT_LIST] = client_list,
     [CLIENT_CANCEL] = client_cancel, [CLIENT_REFINE] = client_refine,   [CLIENT_VERIFY] = client_verify,
-    [CLIENT_UPLOAD] = client_upload, [CLIENT_PICTURE] = client_picture,
+    [CLIENT_UPLOAD] = client_upload, [CLIENT_PICTURE] = client_picture, [CLIENT_PLOT] = client_plot,
+    [CLIENT_DELETE] = client_delete, [CLIENT_FACTORS] = client_factors, [CLIENT_DOCTOR] = client_doctor,
 };
 
 static client_exit complain_usage(const char *message)
@@ -21,6 +23,13 @@ static client_exit complain_usage(const char *message)
 static client_exit explain(const client_options *options)
 {
     client_command topic = options->command;
+    const char *format = options->json ? "json" : options->format ? options->format : "text";
+    if (strcmp(format, "json") == 0)
+        return client_help_print_json(stdout) ? CLIENT_OK : CLIENT_LOCAL;
+    if (strcmp(format, "man") == 0 || strcmp(format, "bash") == 0) {
+        (*format == 'm' ? client_manual_print : client_completion_print)(stdout);
+        return CLIENT_OK;
+    }
     if (topic == CLIENT_HELP && options->operand) {
         if (!client_command_find(&topic, options->operand))
             return complain_usage("there is no such command");
@@ -34,7 +43,7 @@ static client_exit run_command(const client_options *options)
 {
     char message[256];
     if (options->version || options->command == CLIENT_VERSION) {
-        puts("uzawa " CLIENT_VERSION_TEXT);
+        puts(options->json ? "{\"version\": \"" CLIENT_VERSION_TEXT "\"}" : "uzawa " CLIENT_VERSION_TEXT);
         return CLIENT_OK;
     }
     if (options->help || options->command == CLIENT_HELP)

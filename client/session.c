@@ -7,8 +7,22 @@
 #define PATIENCE_S 3.0
 #define SILENCE_S  60.0
 
+/* One line of JSON on s->err. */
+static void complain_json(client_session *s, client_exit code, json_t *what)
+{
+    json_object_set_new(what, "exit", json_integer(code));
+    json_dumpf(what, s->err, JSON_COMPACT);
+    fputc('\n', s->err);
+    json_decref(what);
+}
+
 client_exit client_complain(client_session *s, client_exit code, const char *message)
 {
+    json_t *what = s->options->json ? json_pack("{s:s}", "detail", message) : NULL;
+    if (what) {
+        complain_json(s, code, what);
+        return code;
+    }
     fputs("uzawa: ", s->err);
     client_print_safe(s->err, message);
     fputc('\n', s->err);
@@ -28,20 +42,32 @@ client_request client_request_new(const client_session *s, const char *method, c
 
 static client_exit exit_of_end(client_http_end end)
 {
+    if (end == CLIENT_HTTP_INTERRUPTED)
+        return CLIENT_INTERRUPTED;
     return end == CLIENT_HTTP_MEMORY ? CLIENT_LOCAL : CLIENT_UNREACHABLE;
+}
+
+client_exit client_explain(client_session *s, client_http_end end, const client_reply *reply)
+{
+    if (end == CLIENT_HTTP_INTERRUPTED)
+        return CLIENT_INTERRUPTED; /* whoever was waiting knows what to say */
+    if (end != CLIENT_HTTP_ANSWERED)
+        return client_complain(s, exit_of_end(end), reply->message);
+    client_exit code = reply->status >= 400 && reply->status < 500 ? CLIENT_REFUSED : CLIENT_SERVER_ERROR;
+    json_t *problem = reply->body.data ? json_loadb(reply->body.data, reply->body.len, 0, NULL) : NULL;
+    if (s->options->json && json_is_object(problem))
+        complain_json(s, code, json_incref(problem));
+    else
+        client_print_problem(s->err, reply->status, problem);
+    json_decref(problem);
+    return code;
 }
 
 client_exit client_ask(client_session *s, client_reply *reply, const client_request *request)
 {
     client_http_end end = client_http_send(s->http, reply, request);
-    if (end != CLIENT_HTTP_ANSWERED)
-        return client_complain(s, exit_of_end(end), reply->message);
-    if (reply->status >= 200 && reply->status < 300)
-        return CLIENT_OK;
-    json_t *problem = reply->body.data ? json_loadb(reply->body.data, reply->body.len, 0, NULL) : NULL;
-    client_print_problem(s->err, reply->status, problem);
-    json_decref(problem);
-    return reply->status >= 400 && reply->status < 500 ? CLIENT_REFUSED : CLIENT_SERVER_ERROR;
+    bool good = end == CLIENT_HTTP_ANSWERED && reply->status >= 200 && reply->status < 300;
+    return good ? CLIENT_OK : client_explain(s, end, reply);
 }
 
 client_exit client_ask_json(client_session *s, json_t **out, const client_request *request)

@@ -1,22 +1,18 @@
-/* submit, refine, verify and wait: the commands that may stay until a job has ended. */
-#include "progress.h"
+/* submit, refine and verify: the commands that make jobs. */
+#include "build.h"
+#include "follow.h"
 #include "report.h"
-#include "session.h"
-#include "tags.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 
-#define PATIENCE_WAITING_S 30.0 /* a server that restarts is back by then */
-#define GRACE_S            5.0  /* for the reply to the last poll before the deadline */
-#define LONG_POLL_S        30.0
-#define SHORT_POLL_S       1.0 /* while progress is shown */
-#define KEY_BYTES          16
+#define KEY_BYTES 16
+#define KEY_ROOM  (2 * KEY_BYTES + 1)
 
 /* Random, so that a repeated request is recognised as the same one and no other. */
-static bool make_key(char key[2 * KEY_BYTES + 1])
+static bool make_key(char key[KEY_ROOM])
 {
     unsigned char bytes[KEY_BYTES];
     if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
@@ -26,205 +22,204 @@ static bool make_key(char key[2 * KEY_BYTES + 1])
     return true;
 }
 
-static double poll_seconds(const client_session *s, const client_progress *progress)
-{
-    double left = fmax(s->deadline - client_clock(), 0);
-    return floor(fmin(progress->shown ? SHORT_POLL_S : LONG_POLL_S, left));
-}
-
-static void set_wait(client_request *request, char *header, size_t size, double seconds)
-{
-    request->silence_s += seconds;
-    if (seconds < 1)
-        return;
-    snprintf(header, size, "Prefer: wait=%.0f", seconds);
-    request->headers[1] = header;
-}
-
-/* One look at the job, which may take a while. *job is replaced only by a newer one. */
-static client_exit poll_job(client_session *s, const char *path, const client_progress *progress, json_t **job)
-{
-    char prefer[40];
-    json_t *newer;
-    client_request request = client_request_new(s, "GET", path);
-    set_wait(&request, prefer, sizeof prefer, poll_seconds(s, progress));
-    request.deadline += GRACE_S;
-    if (s->options->retry_s < 0)
-        request.patience_s = PATIENCE_WAITING_S;
-    client_exit code = client_ask_json(s, &newer, &request);
-    if (newer) {
-        json_decref(*job);
-        *job = newer;
-    }
-    return code;
-}
-
-/* Until *job, which may be NULL at first, has ended. CLIENT_OK says that it has, however. */
-static client_exit wait_for_end(client_session *s, const char *id, json_t **job, client_progress *progress)
-{
-    client_exit code = CLIENT_OK;
-    char *path = client_job_path(s, id, "");
-    if (!path)
-        return CLIENT_LOCAL;
-    while (code == CLIENT_OK && !client_job_ended(*job)) {
-        double asked = client_clock();
-        if (*job && asked >= s->deadline) {
-            code = CLIENT_WAIT_TIMEOUT;
-            break;
-        }
-        code = poll_job(s, path, progress, job);
-        if (code == CLIENT_OK)
-            client_progress_show(progress, *job);
-        /* A server that does not hold the request must not be asked without a pause. */
-        if (code == CLIENT_OK && !client_job_ended(*job) && client_clock() - asked < 0.2)
-            client_sleep(fmin(0.2, s->deadline - client_clock()));
-    }
-    free(path);
-    return code;
-}
-
-static void print_wait_timeout(client_session *s, const char *id)
-{
-    fprintf(s->err, "uzawa: the job has not ended after %g s and goes on; see it with: uzawa wait ",
-            s->options->timeout_s);
-    client_print_safe(s->err, id);
-    fputc('\n', s->err);
-}
-
-/* What the user sees of an ended job; the exit code says how it ended. */
-static client_exit report_end(client_session *s, const json_t *job)
-{
-    const json_t *error = json_object_get(job, "error");
-    client_exit code = client_job_exit(job);
-    if (code == CLIENT_JOB_FAILED || json_is_object(error))
-        client_print_problem(s->err, 0, error);
-    if (s->options->json)
-        return client_print_json(s, job) == CLIENT_OK ? code : CLIENT_LOCAL;
-    if (s->options->quiet)
-        return code;
-    client_print_summary(s->out, job);
-    client_exit shown = client_show_cases(s, job);
-    return shown == CLIENT_OK ? code : shown;
-}
-
-static client_exit wait_and_report(client_session *s, const char *id, json_t **job, client_progress *progress)
-{
-    client_exit code = wait_for_end(s, id, job, progress);
-    client_progress_end(progress);
-    if (code == CLIENT_WAIT_TIMEOUT)
-        print_wait_timeout(s, id);
-    if (code == CLIENT_OK)
-        code = report_end(s, *job);
-    return *job ? client_contract(s, *job, code) : code;
-}
-
-client_exit client_wait(client_session *s)
-{
-    json_t *job = NULL;
-    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
-    client_exit code = wait_and_report(s, s->options->operand, &job, &progress);
-    json_decref(job);
-    return code;
-}
-
-/* The request as it will be sent: the file, with the tags of the command line in it. */
-static client_exit load_body(client_session *s, client_buffer *out)
-{
-    char message[512];
-    client_buffer file;
-    *out = (client_buffer){0};
-    if (!client_file_read(&file, s->options->operand, message, sizeof message))
-        return client_complain(s, CLIENT_LOCAL, message);
-    bool ok = client_tags_add(out, &file, s->options->tags, s->options->n_tags);
-    free(file.data);
-    return ok ? CLIENT_OK : client_complain(s, CLIENT_LOCAL, "cannot add the tags: one is not UTF-8, or no memory");
-}
-
 /* A certificate is wanted at once. */
 static bool stays(const client_session *s)
 {
     return s->options->wait || s->options->command == CLIENT_VERIFY;
 }
 
-static client_exit post_body(client_session *s, const char *path, const client_buffer *body,
-                             const client_progress *progress, json_t **job)
+static void tell_of_the_key(client_session *s, const char *key)
 {
-    char key[2 * KEY_BYTES + 1], prefer[40], *header = NULL;
+    char message[300];
+    snprintf(message, sizeof message,
+             "interrupted before the service answered; the same command with --key %.200s finds the job", key);
+    client_complain(s, CLIENT_INTERRUPTED, message);
+}
+
+/* One of several jobs, from 0; -1: the only one, which may be waited for at once. */
+static client_exit post_body(client_session *s, const char *path, const client_buffer *body, client_watch *watch,
+                             int number, json_t **job)
+{
+    char made[KEY_ROOM], prefer[40], *header = NULL, *key = NULL;
     client_request request = client_request_new(s, "POST", path);
-    if (!s->options->key && !make_key(key))
+    *job = NULL;
+    if (!s->options->key && !make_key(made))
         return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
-    if (asprintf(&header, "Idempotency-Key: %s", s->options->key ? s->options->key : key) < 0)
+    const char *given = s->options->key ? s->options->key : made;
+    bool ok = (number < 0 ? asprintf(&key, "%s", given) : asprintf(&key, "%s-%d", given, number)) >= 0;
+    if (!ok || asprintf(&header, "Idempotency-Key: %s", key) < 0) {
+        if (ok)
+            free(key);
         return client_complain(s, CLIENT_LOCAL, "no memory");
-    request.headers[0] = header;
-    request.body = body->data;
-    request.body_len = body->len;
-    if (stays(s)) {
-        set_wait(&request, prefer, sizeof prefer, poll_seconds(s, progress));
-        request.deadline += GRACE_S;
     }
+    request.headers[0] = header;
+    request.body = body->data ? body->data : "";
+    request.body_len = body->len;
+    if (stays(s) && number < 0)
+        client_hold(&request, prefer, sizeof prefer, client_hold_seconds(s, watch->progress));
     client_exit code = client_ask_json(s, job, &request);
+    if (code == CLIENT_INTERRUPTED)
+        tell_of_the_key(s, key);
     free(header);
+    free(key);
     return code;
 }
 
-static client_exit report_accepted(client_session *s, const json_t *job)
+static void print_id(client_session *s, const char *id)
 {
-    if (s->options->json)
-        return client_print_json(s, job);
-    client_print_safe(s->out, client_json_text(job, "id"));
+    client_print_safe(s->out, id);
     fputc('\n', s->out);
-    return CLIENT_OK;
+    fflush(s->out); /* whoever reads it may want to use it while we wait */
 }
 
-static client_exit follow(client_session *s, json_t **job, client_progress *progress)
+/* Of a job, or of the result that verify answers with. "" where the reply has none, which is told. */
+static client_exit job_id(client_session *s, char id[128], const json_t *job)
+{
+    const char *of_result = client_json_text(job, "job");
+    snprintf(id, 128, "%s", *of_result ? of_result : client_json_text(job, "id"));
+    return *id ? CLIENT_OK
+               : client_complain(s, CLIENT_SERVER_ERROR, "the reply names no job; is this the right server?");
+}
+
+/* --------------------------------------------------------------- one job */
+
+static client_exit stay(client_session *s, json_t **job, client_watch *watch)
 {
     char id[128];
-    const char *of_result = client_json_text(*job, "job"); /* verify answers with a result */
-    snprintf(id, sizeof id, "%s", *of_result ? of_result : client_json_text(*job, "id"));
-    if (!*id)
-        return client_complain(s, CLIENT_SERVER_ERROR, "the reply names no job; is this the right server?");
-    if (*of_result) {
-        json_decref(*job);
-        *job = NULL;
-        return wait_and_report(s, id, job, progress);
-    }
-    bool quiet = s->options->quiet && !s->options->json && s->options->command != CLIENT_VERIFY;
-    if (!stays(s) || quiet)
-        report_accepted(s, *job);
+    client_exit code = job_id(s, id, *job);
+    if (code != CLIENT_OK)
+        return code;
+    if (!stays(s) && s->options->json)
+        return client_print_json(s, *job);
+    if (!stays(s) || (s->options->quiet && s->options->command != CLIENT_VERIFY))
+        print_id(s, id);
     if (!stays(s))
         return CLIENT_OK;
-    client_progress_show(progress, *job);
-    return wait_and_report(s, id, job, progress);
+    if (*client_json_text(*job, "job")) { /* verify answered with a result, which is no job */
+        json_decref(*job);
+        *job = NULL;
+    } else {
+        client_progress_show(watch->progress, *job);
+    }
+    return client_follow(s, id, job, watch);
 }
 
-/* Sends the body, which it frees, and stays if it was told to. */
-static client_exit post_and_follow(client_session *s, const char *path, client_buffer *body)
+static client_exit post_and_stay(client_session *s, const char *path, const client_buffer *body)
 {
     json_t *job = NULL;
+    client_watch watch;
     client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
-    client_exit code = post_body(s, path, body, &progress, &job);
-    free(body->data);
+    progress.shown = progress.shown && stays(s);
+    client_watch_begin(&watch, s->http, &progress);
+    client_exit code = post_body(s, path, body, &watch, -1, &job);
     if (code == CLIENT_OK)
-        code = follow(s, &job, &progress);
+        code = stay(s, &job, &watch);
+    client_watch_end(&watch, s->http);
+    if (stays(s))
+        code = client_report_end(s, job, code);
     json_decref(job);
     return code;
 }
 
-static client_exit send_file(client_session *s, const char *path)
+/* -------------------------------------------------------------- several */
+
+static client_exit post_all(client_session *s, const client_bodies *bodies, client_watch *watch, json_t *jobs)
 {
-    client_buffer body;
-    client_exit code = load_body(s, &body);
-    return code == CLIENT_OK ? post_and_follow(s, path, &body) : code;
+    client_exit code = CLIENT_OK;
+    for (size_t i = 0; code == CLIENT_OK && i < bodies->count; i++) {
+        char id[128];
+        json_t *job;
+        code = post_body(s, "/v1/jobs", &bodies->item[i].body, watch, (int)i, &job);
+        if (code == CLIENT_OK)
+            code = job_id(s, id, job);
+        if (code == CLIENT_OK && !s->options->json && (!stays(s) || s->options->quiet))
+            print_id(s, id);
+        if (code == CLIENT_OK && json_array_append(jobs, job) != 0)
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        json_decref(job);
+    }
+    return code;
 }
+
+static void print_job_line(client_session *s, const json_t *job, const char *label)
+{
+    double error = client_json_number(job, "summary.certificate.relative_error");
+    client_print_safe(s->out, client_json_text(job, "id"));
+    fputs("  ", s->out);
+    const char *outcome = client_json_text(job, "summary.outcome");
+    fprintf(s->out, "%-15s  ", *outcome ? outcome : client_json_text(job, "status"));
+    if (isfinite(error))
+        fprintf(s->out, "%-9.2g  ", error);
+    else
+        fprintf(s->out, "%-9s  ", "unknown");
+    client_print_safe(s->out, label);
+    fputc('\n', s->out);
+}
+
+/* Each job to its end. The first exit code that is not 0 counts, but an interrupt or a timeout ends it all. */
+static client_exit follow_all(client_session *s, const client_bodies *bodies, client_watch *watch, json_t *jobs)
+{
+    client_exit worst = CLIENT_OK;
+    if (!s->options->json && !s->options->quiet)
+        fprintf(s->out, "%-32s  %-15s  %-9s  %s\n", "id", "outcome", "error", "values");
+    for (size_t i = 0; i < json_array_size(jobs); i++) {
+        json_t *job = json_incref(json_array_get(jobs, i));
+        client_exit code = client_follow(s, client_json_text(job, "id"), &job, watch);
+        json_array_set(jobs, i, job);
+        bool ended = code == CLIENT_OK;
+        if (ended)
+            code = client_job_exit(job);
+        if (ended && !s->options->json && !s->options->quiet)
+            print_job_line(s, job, bodies->item[i].label);
+        code = client_contract(s, job, bodies->item[i].label, code);
+        json_decref(job);
+        worst = worst == CLIENT_OK ? code : worst;
+        if (!ended)
+            return code;
+    }
+    return worst;
+}
+
+static client_exit post_several(client_session *s, const client_bodies *bodies)
+{
+    client_watch watch;
+    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
+    json_t *jobs = json_array();
+    progress.shown = progress.shown && stays(s);
+    client_watch_begin(&watch, s->http, &progress);
+    client_exit code = post_all(s, bodies, &watch, jobs);
+    if (code == CLIENT_OK && stays(s))
+        code = follow_all(s, bodies, &watch, jobs);
+    client_watch_end(&watch, s->http);
+    if (s->options->json && json_array_size(jobs) && client_print_json(s, jobs) != CLIENT_OK)
+        code = CLIENT_LOCAL;
+    json_decref(jobs);
+    return code;
+}
+
+/* ------------------------------------------------------------ the commands */
 
 client_exit client_submit(client_session *s)
 {
-    return send_file(s, "/v1/jobs");
+    client_bodies bodies;
+    client_exit code = client_build(s, &bodies);
+    if (code == CLIENT_OK && bodies.count == 1)
+        code = post_and_stay(s, "/v1/jobs", &bodies.item[0].body);
+    else if (code == CLIENT_OK)
+        code = post_several(s, &bodies);
+    client_bodies_clear(&bodies);
+    return code;
 }
 
 client_exit client_verify(client_session *s)
 {
-    return send_file(s, "/v1/verify");
+    char message[512];
+    client_buffer file;
+    if (!client_file_read(&file, s->options->operand, message, sizeof message))
+        return client_complain(s, CLIENT_LOCAL, message);
+    client_exit code = post_and_stay(s, "/v1/verify", &file);
+    free(file.data);
+    return code;
 }
 
 /* {"accuracy": {"relative_error": 1e-8}} or {"accuracy": "exact"}, and the limits that were given. NULL: no memory. */
@@ -251,8 +246,7 @@ client_exit client_refine(client_session *s)
     client_exit code = CLIENT_LOCAL;
     if (path && text) {
         client_buffer body = {.data = text, .len = strlen(text)};
-        code = post_and_follow(s, path, &body);
-        text = NULL;
+        code = post_and_stay(s, path, &body);
     } else if (path) {
         client_complain(s, code, "no memory, or the accuracy is not UTF-8");
     }

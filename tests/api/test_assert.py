@@ -233,6 +233,15 @@ def test_report_of_cases(s):
                     ("heavy", "converged", "system-out"), ("heavy", name, "failure")], found)
 
 
+def test_report_of_several_jobs(s):
+    """A suite for each value."""
+    body = {**SCENE, "assert": [{"quantity": "energy.strain", "max": 0.004}]}
+    report, done = report_of(s, body, "--vary", "materials.0.young=1e5,2e5", code=3)
+    suites = [(suite.get("name").split()[-1], suite.get("tests"), suite.get("failures")) for suite in report]
+    check(len(suites) == 2 and [one[1:] for one in suites] == [("2", "1"), ("2", "0")], suites)
+    check(suites[0][0] != suites[1][0] and "young" in suites[0][0], suites)
+
+
 def test_report_of_a_job_that_goes_on(s):
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "report.xml")

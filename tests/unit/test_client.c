@@ -35,9 +35,9 @@ TEST(arguments_submit)
     CHECK_STR(o.server, "http://h:1");
     CHECK_STR(o.operand, "f.json");
     CHECK_STR(o.key, "key");
-    CHECK_INT(o.n_tags, 2);
-    CHECK_STR(o.tags[0], "a");
-    CHECK_STR(o.tags[1], "b");
+    CHECK_INT(o.tags.count, 2);
+    CHECK_STR(o.tags.item[0], "a");
+    CHECK_STR(o.tags.item[1], "b");
     CHECK(o.wait && !o.json && !o.quiet);
     CHECK(o.timeout_s == 2.5);
 }
@@ -118,15 +118,15 @@ TEST(arguments_refused)
         {"list --limit 3x", "--limit"},
         {"list --tag a --tag b", "one --tag"},
         {"history x --csv --plot", "choose one"},
-        {"history x --width 3", "56 to 400"},
-        {"--width 401 history x", "56 to 400"},
+        {"history x --plot --width 3", "24 to 400"},
+        {"--width 401 history --plot x", "24 to 400"},
         {"picture x --width 199", "200 to 4000"},
         {"picture x --width 72.5", "--width"},
         {"picture", "ID"},
         {"picture x --fields a", "does not take --fields"},
         {"upload", "FILE"},
         {"upload x --tag a", "does not take --tag"},
-        {"result x --format xml", "json or vtu"},
+        {"result x --format xml", "json csv vtu"},
         {"history x --format vtu", "does not take --format"},
         {"submit a --tag=1 --tag=2 --tag=3 --tag=4 --tag=5 --tag=6 --tag=7 --tag=8 --tag=9 --tag=10 --tag=11 --tag=12 "
          "--tag=13 --tag=14 --tag=15 --tag=16 --tag=17",
