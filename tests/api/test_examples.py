@@ -310,5 +310,79 @@ def test_gitlab_ci(_):
         check(done.returncode != 0 and repository.reports() == {"plate.xml": 1, "springs.xml": 0}, done)
 
 
+# ---- the scene guide
+
+GUIDE = EXAMPLES / "scene_guide.md"
+BLOCK = re.compile(r"(?:^<!-- put: (\S+) -->\n)?^```json\n(.*?)^```$", re.M | re.S)
+
+
+def make_guide(*words):
+    return subprocess.run([*PYTHON, EXAMPLES / "make_guide.py", *words], capture_output=True, text=True, timeout=60)
+
+
+@options(None)
+def test_the_guide_is_what_the_schema_says(_):
+    made = make_guide()
+    check(made.returncode == 0, made.stderr)
+    check(made.stdout == GUIDE.read_text(), "scene_guide.md is not what make_guide.py makes: run it again")
+
+
+@options(None)
+def test_the_guide_leaves_out_no_key(_):
+    """A key that gets into the schema without a word about it, or without a table, is told."""
+    schema = json.loads((service.SCHEMAS / "request.json").read_text())
+    schema["$defs"]["material"]["properties"]["yield"] = {"type": "number"}
+    text = (EXAMPLES / "scene_guide.in.md").read_text()
+    with tempfile.TemporaryDirectory() as folder:
+        changed, template = pathlib.Path(folder) / "request.json", pathlib.Path(folder) / "guide.md"
+        changed.write_text(json.dumps(schema))
+        made = make_guide(EXAMPLES / "scene_guide.in.md", changed)
+        check(made.returncode == 1 and "/$defs/material/properties/yield has no description" in made.stderr, made)
+        schema["$defs"]["material"]["properties"]["yield"]["description"] = "Where it begins to flow."
+        changed.write_text(json.dumps(schema))
+        made = make_guide(EXAMPLES / "scene_guide.in.md", changed)
+        check(made.returncode == 0 and "| `yield` | number | Where it begins to flow. |" in made.stdout, made)
+        template.write_text(text.replace("<!-- keys: /$defs/scene_case -->", ""))
+        made = make_guide(template)
+        check(made.returncode == 1 and "no table has the keys of /$defs/scene_case" in made.stderr, made)
+
+
+def put(request, pointer, value):
+    """The request with a value in place of what is there."""
+    request = json.loads(json.dumps(request))
+    *way, last = pointer.split("/")[1:]
+    at = request
+    for step in way:
+        at = at[step]
+    at[last] = value
+    return request
+
+
+def test_the_guide_s_examples_are_valid(s):
+    """A fragment stands in the first example, at the place that is said before it."""
+    blocks = [(pointer, json.loads(text)) for pointer, text in BLOCK.findall(GUIDE.read_text())]
+    check(len(blocks) > 12 and not blocks[0][0], len(blocks))
+    whole = blocks[0][1]
+    for pointer, value in blocks:
+        request = put(whole, pointer, value) if pointer else value
+        reply = s.post(request, query="?validate=true")
+        check(reply.status == 200, pointer, value, reply)
+        job = s.solve(request)
+        check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", pointer, value, job)
+
+
+def test_the_guide_s_commands_are_those_of_the_client(s):
+    """`uzawa ...` in the text, with the first example as its scene."""
+    commands = re.findall(r"`uzawa ((?:submit|refine)[^`]*)`", GUIDE.read_text())
+    check(len(commands) >= 4, commands)
+    with tempfile.TemporaryDirectory() as folder:
+        (pathlib.Path(folder) / "scene.json").write_text(BLOCK.search(GUIDE.read_text()).group(2))
+        uzawa = str((pathlib.Path(sys.argv[1]) / "uzawa").resolve())
+        job = run(s, uzawa, "submit", "scene.json", "--wait", "--quiet", cwd=folder).strip()
+        for command in commands:
+            if "part.msh" not in command:  # the gallery's bracket is one, tested there
+                run(s, uzawa, *command.replace("ID", job).split(), cwd=folder)
+
+
 if __name__ == "__main__":
     service.main(globals())
