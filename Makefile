@@ -55,7 +55,7 @@ PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all demo gallery run install clean help deps deps-test
+.PHONY: all demo gallery run man install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
 
 demo: deps ## install what is missing, build, start the daemon, solve the paper's body, show the answer
@@ -76,9 +76,15 @@ deps: ## install the Debian packages that are missing
 deps-test: ## the same with what only the tests use
 	@tests/deps.sh $(PACKAGES) $(TEST_PACKAGES)
 
-install: all ## install both programs under PREFIX
+man: $(BUILD)/uzawa ## renew client/uzawa.1 and client/uzawa.bash, which follow from the client's table of commands
+	@$(BUILD)/uzawa help --format man >client/uzawa.1
+	@$(BUILD)/uzawa help --format bash >client/uzawa.bash
+
+install: all ## install both programs, the manual page and the completion for bash under PREFIX
 	install -D -m 755 $(BUILD)/uzawad $(DESTDIR)$(PREFIX)/bin/uzawad
 	install -D -m 755 $(BUILD)/uzawa $(DESTDIR)$(PREFIX)/bin/uzawa
+	install -D -m 644 client/uzawa.1 $(DESTDIR)$(PREFIX)/share/man/man1/uzawa.1
+	install -D -m 644 client/uzawa.bash $(DESTDIR)$(PREFIX)/share/bash-completion/completions/uzawa
 
 clean: ## remove everything built
 	rm -rf build

@@ -215,6 +215,8 @@ static void set_request(client_http *http, body_sink *sink, const client_request
         curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)request->body_len);
     }
     curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, request->method);
+    /* On a connection that was used before, curl itself sends a request again when the reply is lost. */
+    curl_easy_setopt(curl, CURLOPT_FRESH_CONNECT, strcmp(request->method, "DELETE") == 0 ? 1L : 0L);
     curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
     if (http->token) {
         curl_easy_setopt(curl, CURLOPT_HTTPAUTH, (long)CURLAUTH_BEARER);
@@ -268,6 +270,13 @@ static CURLcode perform(client_http *http)
     return code;
 }
 
+/* "2026-11-26 16:58:04 GMT" of GnuTLS, or what curl_getdate knows; -1: neither. */
+static time_t certificate_date(const char *text)
+{
+    struct tm parts = {0};
+    return strptime(text, "%Y-%m-%d %H:%M:%S", &parts) ? timegm(&parts) : curl_getdate(text, NULL);
+}
+
 /* The server's own certificate is the first of the chain. */
 static void note_certificate(client_http *http, client_reply *reply)
 {
@@ -278,7 +287,7 @@ static void note_certificate(client_http *http, client_reply *reply)
     for (struct curl_slist *line = chain->certinfo[0]; line; line = line->next) {
         size_t len = strlen(line->data);
         if (header_value(value, sizeof value, line->data, len, "Expire date:"))
-            reply->cert_until = curl_getdate(value, NULL);
+            reply->cert_until = certificate_date(value);
         else if (header_value(value, sizeof value, line->data, len, "Subject:"))
             snprintf(reply->cert_subject, sizeof reply->cert_subject, "%s", value);
     }

@@ -231,13 +231,18 @@ static void print_iterations(FILE *to, const canvas *c)
     fputc('\n', to);
 }
 
+#define LEGEND_WIDTH 56
+
 static void print_legend(FILE *to, const client_plot_style *style)
 {
-    fprintf(to, "%*s", MARGIN, "");
+    const bool narrow = style->width < LEGEND_WIDTH;
+    fprintf(to, "%*s", narrow ? 0 : MARGIN, "");
     print_marked(to, style, SOLID, style->ascii ? "**" : "⠒⠒");
-    fputs(" error bound   ", to);
+    fputs(narrow ? " bound " : " error bound   ", to);
     print_marked(to, style, DOTTED, style->ascii ? ".." : "⠑⠡");
-    fprintf(to, " KKT residual   %s restart\n", style->ascii ? "^" : "▲");
+    fputs(narrow ? " residual\n" : " KKT residual   ", to);
+    if (!narrow)
+        fprintf(to, "%s restart\n", style->ascii ? "^" : "▲");
 }
 
 bool client_plot_print(FILE *to, const client_series *series, const client_plot_style *style)

@@ -8,7 +8,7 @@
 #include <stdio.h>
 
 typedef struct {
-    int width, height; /* of the whole drawing in characters and lines; at least 56 x 8 */
+    int width, height; /* of the whole drawing in characters and lines; at least 24 x 8 */
     bool ascii;        /* plain ASCII, one point per character; else UTF-8 with Braille cells, 2 x 4 points each */
     bool colour;       /* ANSI colours */
 } client_plot_style;

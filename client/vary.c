@@ -160,7 +160,7 @@ static void append_name(char *name, size_t size, const json_t *value)
         snprintf(number, sizeof number, "%.15g", json_real_value(value));
         text = number;
     } else if (!text)
-        text = dumped = json_dumps(value, JSON_COMPACT | JSON_ENCODE_ANY);
+        text = dumped = json_dumps(value, JSON_COMPACT | JSON_ENCODE_ANY | JSON_REAL_PRECISION(15));
     snprintf(name + len, size - len, "%s%s", len ? "," : "", text ? text : "?");
     free(dumped);
 }

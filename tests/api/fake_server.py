@@ -15,7 +15,7 @@ class Fake:
     """Answers the n-th request with the n-th step of the script, and all later ones with the last step.
 
     A step is (status, body[, headers]) with a str or JSON value as body, "drop" (close without a word), "cut" (promise
-    more than is sent) or a number of seconds of silence."""
+    more than is sent), a number of seconds of silence, or bytes: all that is sent before the connection is closed."""
 
     def __init__(self, *script):
         self.script, self.requests, self.lock = script, [], threading.Lock()
@@ -48,6 +48,10 @@ class Fake:
         if step == "drop" or step == "cut":
             if step == "cut":
                 handler.wfile.write(b"HTTP/1.1 200 OK\r\nContent-Length: 1000\r\n\r\n{\"id\"")
+            handler.close_connection = True
+            return
+        if isinstance(step, bytes):
+            handler.wfile.write(step)
             handler.close_connection = True
             return
         if isinstance(step, (int, float)):

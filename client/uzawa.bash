@@ -1,0 +1,149 @@
+# Completion of uzawa for bash. Made from client/commands.c by make man.
+
+# The newest jobs, if the service answers at once.
+_uzawa_ids() {
+    "${COMP_WORDS[0]}" list --quiet --limit 20 --retry 0 --timeout 1 2>/dev/null
+}
+
+_uzawa() {
+    local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
+    local command='' options='' words='' files='' i commands='submit upload status wait refine verify result picture history plot list cancel delete factors doctor version help'
+    COMPREPLY=()
+    for ((i = 1; i < COMP_CWORD; i++)); do
+        case ${COMP_WORDS[i]} in
+        -s|--server|-t|--timeout|--retry) ((i++)) ;;
+        -*) ;;
+        *) command=${COMP_WORDS[i]}; break ;;
+        esac
+    done
+    case $command in
+    '') options='--server --timeout --retry --help --version'; words=$commands ;;
+    submit) options='--K --N --h --p --mesh --set --vary --wait --timeout --tag --key --progress --quiet --json --server --retry --help --version ' ;;
+    upload) options='--json --server --timeout --retry --help --version ' ;;
+    status) options='--json --server --timeout --retry --help --version ' ;;
+    wait) options='--timeout --progress --quiet --json --server --retry --help --version ' ;;
+    refine) options='--accuracy --max-iterations --time-limit --wait --timeout --key --progress --quiet --json --server --retry --help --version ' ;;
+    verify) options='--timeout --key --progress --quiet --json --server --retry --help --version ' ;;
+    result) options='--format --fields --field --case --output --json --server --timeout --retry --help --version ' ;;
+    picture) options='--colour --factor --width --case --output --json --server --timeout --retry --help --version ' ;;
+    history) options='--csv --plot --width --height --ascii --case --output --json --server --timeout --retry --help --version ' ;;
+    plot) options='--deformed --trade --x --with --colour --factor --width --ascii --case --output --json --server --timeout --retry --help --version ' ;;
+    list) options='--status --tag --limit --quiet --json --server --timeout --retry --help --version ' ;;
+    cancel) options='--quiet --json --server --timeout --retry --help --version ' ;;
+    delete) options='--quiet --json --server --timeout --retry --help --version ' ;;
+    factors) options='--json --server --timeout --retry --help --version ' ;;
+    doctor) options='--quiet --json --server --timeout --retry --help --version ' ;;
+    version) options='--json --help --version ' ;;
+    help) options='--format --json --help --version ' ;;
+    esac
+    case $command$previous in
+    -s|--server|-t|--timeout|--retry) words='' ;;
+    submit--K) files=1 ;;
+    submit--N) files=1 ;;
+    submit--h) files=1 ;;
+    submit--p) files=1 ;;
+    submit--mesh) files=1 ;;
+    submit--set) words='' ;;
+    submit--vary) words='' ;;
+    submit--timeout|submit-t) words='' ;;
+    submit--tag) words='' ;;
+    submit--key|submit-k) words='' ;;
+    submit--server|submit-s) words='' ;;
+    submit--retry) words='' ;;
+    upload--server|upload-s) words='' ;;
+    upload--timeout|upload-t) words='' ;;
+    upload--retry) words='' ;;
+    status--server|status-s) words='' ;;
+    status--timeout|status-t) words='' ;;
+    status--retry) words='' ;;
+    wait--timeout|wait-t) words='' ;;
+    wait--server|wait-s) words='' ;;
+    wait--retry) words='' ;;
+    refine--accuracy|refine-a) words='quick balanced precise exact' ;;
+    refine--max-iterations) words='' ;;
+    refine--time-limit) words='' ;;
+    refine--timeout|refine-t) words='' ;;
+    refine--key|refine-k) words='' ;;
+    refine--server|refine-s) words='' ;;
+    refine--retry) words='' ;;
+    verify--timeout|verify-t) words='' ;;
+    verify--key|verify-k) words='' ;;
+    verify--server|verify-s) words='' ;;
+    verify--retry) words='' ;;
+    result--format|result-f) words='json csv vtu' ;;
+    result--fields) words='summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss' ;;
+    result--field) words='summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain stress_gauss' ;;
+    result--case|result-c) words='' ;;
+    result--output|result-o) files=1 ;;
+    result--server|result-s) words='' ;;
+    result--timeout|result-t) words='' ;;
+    result--retry) words='' ;;
+    picture--colour) words='von_mises displacements' ;;
+    picture--factor) words='' ;;
+    picture--width) words='' ;;
+    picture--case|picture-c) words='' ;;
+    picture--output|picture-o) files=1 ;;
+    picture--server|picture-s) words='' ;;
+    picture--timeout|picture-t) words='' ;;
+    picture--retry) words='' ;;
+    history--width) words='' ;;
+    history--height) words='' ;;
+    history--case|history-c) words='' ;;
+    history--output|history-o) files=1 ;;
+    history--server|history-s) words='' ;;
+    history--timeout|history-t) words='' ;;
+    history--retry) words='' ;;
+    plot--x) words='iterations seconds' ;;
+    plot--with) words=$(_uzawa_ids) ;;
+    plot--colour) words='von_mises displacements' ;;
+    plot--factor) words='' ;;
+    plot--width) words='' ;;
+    plot--case|plot-c) words='' ;;
+    plot--output|plot-o) files=1 ;;
+    plot--server|plot-s) words='' ;;
+    plot--timeout|plot-t) words='' ;;
+    plot--retry) words='' ;;
+    list--status) words='accepted running successful failed dismissed' ;;
+    list--tag) words='' ;;
+    list--limit|list-n) words='' ;;
+    list--server|list-s) words='' ;;
+    list--timeout|list-t) words='' ;;
+    list--retry) words='' ;;
+    cancel--server|cancel-s) words='' ;;
+    cancel--timeout|cancel-t) words='' ;;
+    cancel--retry) words='' ;;
+    delete--server|delete-s) words='' ;;
+    delete--timeout|delete-t) words='' ;;
+    delete--retry) words='' ;;
+    factors--server|factors-s) words='' ;;
+    factors--timeout|factors-t) words='' ;;
+    factors--retry) words='' ;;
+    doctor--server|doctor-s) words='' ;;
+    doctor--timeout|doctor-t) words='' ;;
+    doctor--retry) words='' ;;
+    help--format|help-f) words='text man bash json' ;;
+    *)  if [[ $current == -* ]]; then words=$options; else case $command in
+    submit) files=1 ;;
+    upload) files=1 ;;
+    status) words=$(_uzawa_ids) ;;
+    wait) words=$(_uzawa_ids) ;;
+    refine) words=$(_uzawa_ids) ;;
+    verify) files=1 ;;
+    result) words=$(_uzawa_ids) ;;
+    picture) words=$(_uzawa_ids) ;;
+    history) words=$(_uzawa_ids) ;;
+    plot) words=$(_uzawa_ids) ;;
+    cancel) words=$(_uzawa_ids) ;;
+    delete) words=$(_uzawa_ids) ;;
+    help) words=$commands ;;
+        esac; fi ;;
+    esac
+    if [[ $files ]]; then
+        mapfile -t COMPREPLY < <(compgen -f -- "$current")
+        compopt -o filenames 2>/dev/null
+    else
+        mapfile -t COMPREPLY < <(compgen -W "$words" -- "$current")
+    fi
+    return 0
+}
+complete -F _uzawa uzawa

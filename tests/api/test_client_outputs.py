@@ -1,0 +1,355 @@
+"""What the client fetches and prints: tables, pictures, the price of digits, factors, the doctor, JSON everywhere.
+usage: test_client_outputs.py BUILD_DIR [FILTER]"""
+import csv
+import datetime
+import email.utils
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import service
+from fake_server import Fake
+from service import Skip, check, options
+
+CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
+PAPER, SPRINGS = "tests/data/paper_body.json", "tests/data/small_matrices.json"
+ID = "0" * 31 + "1"
+
+
+def run(server, *words, code=0, stdin=None, **environment):
+    url = server if isinstance(server, str) else server.url
+    done = subprocess.run([CLIENT, "--server", url, *words], input=stdin, capture_output=True, text=True, timeout=90,
+                          env={**os.environ, **environment})
+    check(code in (None, done.returncode), f"{words}: exit {done.returncode}, want {code}\n{done.stdout}{done.stderr}")
+    return done
+
+
+def solved(server, body=PAPER, *words):
+    return run(server, "submit", body, "--wait", "--quiet", *words).stdout.strip()
+
+
+def table(server, job, *words):
+    return list(csv.DictReader(io.StringIO(run(server, "result", job, "--format", "csv", *words).stdout)))
+
+
+# ----------------------------------------------------------------- tables
+
+
+def test_table_of_nodes(server):
+    job = solved(server)
+    rows = table(server, job, "--field", "displacements", "--field", "stress", "--field", "von_mises")
+    result = json.loads(run(server, "result", job, "--fields", "nodes,displacements,stress,von_mises").stdout)
+    check(list(rows[0]) == ["node", "x", "y", "ux", "uy", "stress_xx", "stress_yy", "stress_zz", "stress_xy", "von_mises"],
+          rows[0])
+    check(len(rows) == 31 * 11, len(rows))
+    for i, row in enumerate(rows):
+        numbers = [float(value) for value in row.values()]
+        check(numbers == [i, *result["nodes"][i], *result["displacements"][i], *result["stress"][i], result["von_mises"][i]],
+              "every digit:", row)
+
+
+def test_table_of_contacts(server):
+    job = solved(server)
+    rows = table(server, job)
+    result = json.loads(run(server, "result", job, "--fields", "nodes,reactions,gaps").stdout)
+    check(list(rows[0]) == ["contact", "node", "x", "y", "reactions", "gaps"] and len(rows) == 30, rows[0])
+    for i, row in enumerate(rows):
+        node = result["contact_nodes"][i]
+        check([float(value) for value in row.values()] ==
+              [i, node, *result["nodes"][node], result["reactions"][i], result["gaps"][i]], row)
+    status = table(server, job, "--fields", "contact_status,pressure")
+    check(sum(int(row["contact_status"]) for row in status) == 22, status)
+
+
+def test_tables_of_other_kinds(server):
+    job = solved(server)
+    points = table(server, job, "--field", "stress_gauss")
+    check(len(points) == 4 * 300 and list(points[0])[:3] == ["element", "x", "y"], points[0])
+    check(list(table(server, job, "--field", "nodes")[0]) == ["node", "x", "y"])
+    springs = solved(server, SPRINGS)
+    rows = table(server, springs, "--field", "displacements")
+    check(list(rows[0]) == ["dof", "u"] and len(rows) == 3, rows)
+    check(list(table(server, springs)[0]) == ["contact", "reactions", "gaps"])
+    cases = solved(server, PAPER, "--vary", "loads.1.traction.0=0.1,0.2")
+    rows = table(server, cases)
+    check([row["case"] for row in rows] == ["0.1"] * 30 + ["0.2"] * 30, rows[::30])
+    one = table(server, cases, "--case", "0.2")
+    check("case" not in one[0] and [row["gaps"] for row in one] == [row["gaps"] for row in rows[30:]])
+    target = os.path.join(server.folder, "t.csv")
+    run(server, "result", job, "--format", "csv", "-o", target)
+    check(open(target, encoding="utf-8").read() == run(server, "result", job, "--format", "csv").stdout)
+
+
+def test_tables_that_cannot_be(server):
+    job = solved(server)
+    for fields, says in (("reactions,displacements", "is not of the same"), ("nonsense", "no field"), ("summary", "no field")):
+        done = run(server, "result", job, "--format", "csv", "--fields", fields, code=2)
+        check(says in done.stderr and done.stdout == "", done)
+    run(server, "result", solved(server, SPRINGS), "--format", "csv", "--field", "stress", code=4)
+
+
+@options(None)
+def test_names_in_a_table_are_quoted(_):
+    answer = {"job": ID, "summary": {}, "cases": [{"name": 'a,"b"', "reactions": [1, None]}], "nodes": []}
+    with Fake((200, answer)) as fake:
+        done = run(fake.url, "result", ID, "--format", "csv", "--field", "reactions")
+    check(done.stdout == 'case,contact,reactions\n"a,""b""",0,1\n"a,""b""",1,\n', done.stdout)
+
+
+# ---------------------------------------------------------------- pictures
+
+
+def test_pictures_go_to_files(server):
+    job = solved(server)
+    target = os.path.join(server.folder, "body.svg")
+    said = json.loads(run(server, "plot", job, "--deformed", "--width", "300", "-o", target, "--json").stdout)
+    svg = open(target, encoding="utf-8").read()
+    check(said == {"file": target, "bytes": len(svg.encode())} and 'width="300"' in svg, said)
+    check(run(server, "plot", job, "--deformed", "--factor", "2").stdout.rstrip().endswith("</svg>"))
+    run(server, "plot", job, "--deformed", "--colour", "mauve", code=4)
+
+
+def test_png_by_the_converter(server):
+    if not shutil.which("rsvg-convert"):
+        raise Skip("rsvg-convert is not installed")
+    target = os.path.join(server.folder, "body.png")
+    run(server, "plot", solved(server), "--deformed", "-o", target)
+    check(open(target, "rb").read(8) == b"\x89PNG\r\n\x1a\n")
+    with Fake((200, "<svg" + " " * 300_000)) as fake:  # more than the pipes hold, and no picture
+        done = run(fake.url, "plot", ID, "-o", os.path.join(server.folder, "none.png"), code=11)
+        check("rsvg-convert could not" in done.stderr and not os.path.exists(os.path.join(server.folder, "none.png")), done)
+
+
+def test_png_without_the_converter(server):
+    job = solved(server)
+    target = os.path.join(server.folder, "body.png")
+    done = run(server, "plot", job, "--deformed", "-o", target, code=11, PATH="/nonexistent")
+    check("librsvg2-bin" in done.stderr and not os.path.exists(target), done.stderr)
+
+
+@options(None)
+def test_convergence_is_asked_for(_):
+    with Fake((200, "<svg></svg>")) as fake:
+        done = run(fake.url, "plot", ID, "--x", "seconds", "--with", "a", "--with", "b", "--case", "c d")
+        check(done.stdout == "<svg></svg>\n", done)
+        check(fake.requests[0].path == f"/v1/jobs/{ID}/convergence.svg?case=c%20d&x=seconds&with=a%2Cb", fake.requests[0].path)
+
+
+@options(None)
+def test_price_of_digits(_):
+    decades = [{"relative_error": 10.0**-k, "seconds": 0.001 * 2**k if k < 9 else None, "iterations": 10 * k if k < 9 else None,
+                "by": "iteration"} for k in range(1, 11)]
+    trade = {"job": ID, "decades": decades, "mesh_error": 0.022,
+             "suggestion": {"level": "balanced", "text": "balanced would have taken 1/8 of the time\u001b[2J"}}
+    with Fake((200, trade)) as fake:
+        done = run(fake.url, "plot", ID, "--trade", LC_ALL="C")
+        check(fake.requests[0].path == f"/v1/jobs/{ID}/work-precision", fake.requests[0].path)
+        narrow = run(fake.url, "plot", ID, "--trade", LC_ALL="C.UTF-8", COLUMNS="40").stdout
+        check(json.loads(run(fake.url, "plot", ID, "--trade", "--json").stdout) == trade)
+    lines = done.stdout.splitlines()
+    bars = [line.count("#") for line in lines[1:9]]
+    check(bars == sorted(bars) and 0 < bars[0] < bars[-1], lines)
+    steps = [after - before for before, after in zip(bars, bars[1:])]
+    check(max(steps) - min(steps) <= 1, "a factor of two is the same length anywhere:", bars)
+    check("2 ms" in lines[1] and "never" in lines[9] and "never" in lines[10], lines)
+    check("0.022" in lines[11] and "1/8 of the time?[2J" in lines[12], lines)
+    check(all(len(line) <= 40 for line in narrow.splitlines()[:11]) and "\u2588" in narrow, narrow)
+    with Fake((200, {"a": 1})) as fake:
+        run(fake.url, "plot", ID, "--trade", code=5)
+
+
+# ------------------------------------------------------- delete and factors
+
+
+@options("--workers", "1")
+def test_delete_is_for_ended_jobs(server):
+    running = run(server, "submit", "-", stdin=json.dumps(service.ENDLESS)).stdout.strip()
+    server.wait_status(running, "running")
+    done = run(server, "delete", running, code=4)
+    check("uzawa cancel " + running in done.stderr and server.get(f"/v1/jobs/{running}").json["status"] == "running", done)
+    run(server, "cancel", running)
+    server.wait_status(running, "dismissed")
+    check(run(server, "delete", running).stdout == "deleted\n")
+    run(server, "delete", running, code=4)
+    check(json.loads(run(server, "delete", solved(server), "--json").stdout)["status"] == "deleted")
+    check(run(server, "delete", solved(server), "--quiet").stdout == "")
+
+
+@options(None)
+def test_delete_survives_a_lost_reply(_):
+    ended = (200, {"id": ID, "status": "successful"})
+    gone = (404, {"detail": "there is no job with this id"})
+    for fault in ("drop", "cut", (503, "")):
+        with Fake(ended, fault, gone) as fake:
+            check(run(fake.url, "delete", ID).stdout == "deleted\n")
+            check([request.method for request in fake.requests] == ["GET", "DELETE", "DELETE"])
+    with Fake(ended, gone) as fake:
+        run(fake.url, "delete", ID, code=4)
+
+
+def test_factors(server):
+    check(json.loads(run(server, "factors", "--json").stdout)["factors"] == [])
+    solved(server), solved(server)
+    lines = run(server, "factors").stdout.splitlines()
+    check(len(lines) == 3 and lines[1].split()[1:3] == ["660", "30"] and lines[1].split()[4] == "1", lines)
+
+
+# ------------------------------------------------------------------ doctor
+
+
+def doctor(url, code, **environment):
+    lines = json.loads(run(url, "doctor", "--json", code=code, **environment).stdout)
+    return {line["check"]: line for line in lines}
+
+
+def test_doctor_of_a_healthy_service(server):
+    found = doctor(server.url, 0)
+    check(all(line["state"] == "ok" and line["remedy"] == "" for line in found.values()), found)
+    check({"connection", "clock", "alive", "ready", "reading", "submitting", "version", "queue", "limits"} <= set(found), found)
+    lines = run(server, "doctor").stdout.splitlines()
+    check(all(line.startswith("ok ") for line in lines) and len(lines) == len(found), lines)
+    check(run(server, "doctor", "--quiet").stdout == "")
+    check(json.loads(run(server, "list", "--json").stdout) == [], "it must leave no job")
+
+
+@options("--workers", "1", "--max-queue", "1")
+def test_doctor_sees_a_full_queue(server):
+    for _ in range(2):
+        job = run(server, "submit", "-", stdin=json.dumps(service.ENDLESS)).stdout.strip()
+        if _ == 0:
+            server.wait_status(job, "running")
+    queue = doctor(server.url, 5)["queue"]
+    check(queue["state"] == "wrong" and "full: 1 of 1" in queue["about"] and "--max-queue" in queue["remedy"], queue)
+
+
+@options(None)
+def test_doctor_without_a_service(_):
+    for url, says, remedy in (("http://127.0.0.1:1", "Failed to connect", "is uzawad running"),
+                              ("http://no-such-host.invalid:80", "resolve", "name")):
+        found = doctor(url, 12)["connection"]
+        check(says.lower() in found["about"].lower() and remedy in found["remedy"], found)
+    with Fake((200, "<html>")) as fake:
+        check(doctor(fake.url, 5)["service"]["state"] == "wrong")
+        found = doctor(fake.url.replace("http:", "https:"), 12)["connection"]
+        check("http://" in found["remedy"], found)
+    with Fake("drop") as fake:
+        check(doctor(fake.url, 12)["connection"]["state"] == "wrong")
+
+
+def healthy(**headers):
+    return 200, {"status": "ok", "workers": 2, "jobs": {"accepted": 0}}, headers
+
+
+@options(None)
+def test_doctor_of_an_ailing_service(_):
+    allowed, listed = (200, {"valid": True}), (200, {"jobs": [], "next": None})
+    metrics = (200, 'uzawad_build_info{version="9.9",compiler="x"} 1\nuzawad_queue_depth 95\nuzawad_store_free_bytes 5e8\n')
+    limits = (200, {"limits": {"max_queue": {"value": 100}}})
+    with Fake(healthy(), healthy(), listed, allowed, metrics, limits) as fake:
+        found = doctor(fake.url, 0)
+    for name, part in (("version", "9.9"), ("queue", "95 of 100"), ("disk", "0.5 GB")):
+        check(found[name]["state"] == "warning" and part in found[name]["about"] and found[name]["remedy"], name, found)
+    with Fake(healthy(), (503, {"title": "The store does not answer", "detail": "d", "code": "store_unavailable"}),
+              (500, {"detail": "broken"})) as fake:
+        found = doctor(fake.url, 5)
+    check("disk" in found["ready"]["remedy"] and found["reading"]["about"] == "broken", found)
+
+
+def clock_of(when):
+    """A fake service whose clock says `when`."""
+    date = email.utils.format_datetime(when, usegmt=True)
+    reply = ("HTTP/1.1 200 OK\r\nDate: %s\r\nContent-Type: application/json\r\nContent-Length: %d\r\nConnection: close\r\n\r\n%s")
+    body = json.dumps({"status": "ok", "workers": 1, "jobs": {}})
+    return (reply % (date, len(body), body)).encode()
+
+
+@options(None)
+def test_doctor_compares_clocks(_):
+    behind = datetime.datetime.now(datetime.timezone.utc) - datetime.timedelta(hours=1)
+    with Fake(clock_of(behind)) as fake:
+        found = doctor(fake.url, None)
+    check(found["clock"]["state"] == "warning" and "ahead of" in found["clock"]["about"], found)
+
+
+def token_file(server, lines):
+    path = os.path.join(server.folder, "tokens")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(lines)
+    os.chmod(path, 0o600)
+    return path
+
+
+@options(None)
+def test_doctor_checks_the_token(server):
+    server.options = ("--token-file", token_file(server, f"reader read {'r' * 40}\nwriter submit {'w' * 40}\n"))
+    server.start()
+    found = doctor(server.url, 4, UZAWA_TOKEN="")
+    check("none is set" in found["reading"]["about"] and "submitting" not in found, found)
+    found = doctor(server.url, 4, UZAWA_TOKEN="x" * 40)
+    check("does not know the token" in found["reading"]["about"], found)
+    found = doctor(server.url, 4, UZAWA_TOKEN="r" * 40)
+    check(found["reading"]["state"] == "ok" and found["submitting"]["state"] == "wrong", found)
+    found = doctor(server.url, 0, UZAWA_TOKEN="w" * 40)
+    check(found["submitting"]["state"] == "ok", found)
+
+
+def certificate(folder, days):
+    key, cert = os.path.join(folder, "key.pem"), os.path.join(folder, "cert.pem")
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days",
+                    str(days), "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout",
+                    key, "-out", cert], check=True, capture_output=True)
+    os.chmod(key, 0o600)
+    return key, cert
+
+
+@options(None)
+def test_doctor_checks_the_certificate(server):
+    if not shutil.which("openssl"):
+        raise Skip("openssl is not installed")
+    key, cert = certificate(server.folder, 5)
+    server.options = ("--tls-key", key, "--tls-cert", cert)
+    process = subprocess.Popen(server.command("--listen", "127.0.0.1:0", "--db", server.db, *server.options),
+                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        url = process.stdout.readline().split()[-1]
+        found = doctor(url, 12)["connection"]
+        check("UZAWA_CA" in found["remedy"], found)
+        found = doctor(url, 0, UZAWA_CA=cert)["certificate"]
+        check(found["state"] == "warning" and "localhost" in found["about"] and "days left" in found["about"], found)
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+# ---------------------------------------------------------- JSON everywhere
+
+
+def test_json_of_every_command(server):
+    job = solved(server)
+    target = os.path.join(server.folder, "x.svg")
+    answer = {"problem": json.load(open(SPRINGS))["problem"], "answer": {"displacements": [0, 0, 0], "reactions": [0, 0]}}
+    lines = [["submit", SPRINGS], ["submit", SPRINGS, "--wait"], ["submit", SPRINGS, "--vary", "solver.max_iterations=100,200"],
+             ["upload", "tests/data/springs_K.mtx"], ["status", job], ["wait", job], ["refine", job, "-a", "1e-9", "--wait"],
+             ["result", job], ["picture", job, "-o", target], ["history", job], ["plot", job, "--deformed", "-o", target],
+             ["list"], ["factors"], ["doctor"]]
+    for words in lines:
+        done = run(server, *words, "--json")
+        check(isinstance(json.loads(done.stdout), (dict, list)) and done.stderr == "", words, done)
+    check(json.loads(run(server, "verify", "-", "--json", code=7, stdin=json.dumps(answer)).stdout)["status"] == "successful")
+    check(json.loads(run(server, "cancel", job, "--json").stdout)["status"] == "deleted")
+    for words in (["version"], ["help"], ["help", "--format", "json"]):
+        done = subprocess.run([CLIENT, *words, *([] if "--format" in words else ["--json"])], capture_output=True, text=True)
+        check(json.loads(done.stdout)["version"], done)
+    for words, code in ((["status", job], 4), (["wait", "0" * 32], 4), (["submit", "tests/none"], 11),
+                        (["submit", SPRINGS, "--set", "x.y=1"], 2)):
+        wrong = json.loads(run(server, *words, "--json", code=code).stderr)
+        check(wrong["exit"] == code and wrong["detail"], wrong)
+
+
+if __name__ == "__main__":
+    service.main(globals())

@@ -1,0 +1,280 @@
+"""Requests that the client makes itself: from matrices and meshes, with values put in and varied.
+usage: test_client_requests.py BUILD_DIR [FILTER]"""
+import gzip
+import hashlib
+import json
+import os
+import subprocess
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import service
+from fake_server import Fake
+from service import check, options
+
+CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
+PAPER = "tests/data/paper_body.json"
+MATRICES = {name: f"tests/data/springs_{name}.mtx" for name in "KNhp"}
+ID = "0" * 31 + "1"
+
+
+def run(url, *words, stdin=None, code=0, text=True):
+    done = subprocess.run([CLIENT, "--server", url, *words], input=stdin, capture_output=True, text=text, timeout=90)
+    check(done.returncode == code, f"{words}: exit {done.returncode}, want {code}\n{done.stdout}{done.stderr}")
+    return done
+
+
+def job(url, *words, stdin=None, code=0):
+    return json.loads(run(url, "submit", *words, "--wait", "--json", stdin=stdin, code=code).stdout)
+
+
+def sent(*words, stdin=None, answers=1):
+    """What the client posts, as a server sees it that accepts everything."""
+    with Fake(*[(202, {"id": ID, "status": "accepted", "progress": 0, "tags": []})] * answers) as fake:
+        run(fake.url, "submit", *words, stdin=stdin)
+        return [json.loads(request.body) for request in fake.requests if request.path == "/v1/jobs"]
+
+
+def refused(*words, says, code=2, stdin=None):
+    """Nothing may be sent, and stderr must have every part of `says`."""
+    with Fake((202, {"id": ID, "status": "accepted"})) as fake:
+        done = run(fake.url, "submit", *words, code=code, stdin=stdin)
+        check(not fake.requests and done.stdout == "", fake.requests, done)
+    for part in [says] if isinstance(says, str) else says:
+        check(part in done.stderr, part, "is not in", done.stderr)
+
+
+def matrices(without=""):
+    return [word for name, path in MATRICES.items() if name not in without for word in ("--" + name, path)]
+
+
+def scene(**more):
+    return {**json.load(open(PAPER)), **more}
+
+
+# ------------------------------------------------------------------ files
+
+
+def test_matrices_from_files(server):
+    answer = job(server.url, *matrices())
+    check(answer["summary"]["outcome"] == "converged" and answer["summary"]["problem"]["d"] == 3, answer)
+    linear = job(server.url, *matrices("Nh"), "--tag", "free")
+    check(linear["summary"]["method"] == "linear" and linear["tags"] == ["free"], linear)
+    with open(MATRICES["p"], encoding="utf-8") as file:
+        again = job(server.url, *matrices("p"), "--p", "-", stdin=file.read())
+    check(again["summary"]["energy"] == answer["summary"]["energy"], again["summary"])
+
+
+@options(None)
+def test_matrices_into_a_request(_):
+    body = {"problem": {"kind": "matrices", "K": "old", "p": [1, 2, 3], "N": "n", "h": [0]}, "solver": {"accuracy": "quick"}}
+    request, = sent("-", "--K", MATRICES["K"], stdin=json.dumps(body))
+    check(request["problem"] == {**body["problem"], "K": open(MATRICES["K"]).read()}, request)
+    check(request["solver"] == body["solver"], request)
+    request, = sent("-", *matrices(), stdin='{"solver": {"method": "active_set"}}')
+    check(request["problem"]["kind"] == "matrices" and request["solver"]["method"] == "active_set", request)
+
+
+@options(None)
+def test_files_that_do_not_go_together(_):
+    refused("--K", MATRICES["K"], says="--K and --p")
+    refused(*matrices("h"), says="both or neither")
+    refused("--mesh", "part.msh", says="wants a FILE")
+    refused(PAPER, "--mesh", "part.msh", "--K", MATRICES["K"], says="choose one")
+    refused("-", "--mesh", "-", says="only one file")
+    refused(PAPER, *matrices(), says="the problem of FILE is none")
+    refused("tests/data/small_matrices.json", "--mesh", "-", says="the problem of FILE is none", stdin="x")
+    refused("--K", "tests/none.mtx", "--p", MATRICES["p"], says="tests/none.mtx", code=11)
+    refused("-", "--set", "solver.accuracy=quick", stdin='{\n"problem": }', says="line 2", code=11)
+    refused("-", "--set", "solver.accuracy=quick", stdin="[1]", says="no object", code=11)
+
+
+def test_large_files_are_uploaded_once(server):
+    size = 9000
+    lines = [f"%%MatrixMarket matrix coordinate real symmetric\n{size} {size} {size}"]
+    big = "\n".join(lines + [f"{i + 1} {i + 1} 2" for i in range(size)]) + "\n"
+    load = f"%%MatrixMarket matrix array real general\n{size} 1\n" + "1\n" * size
+    names = {name: os.path.join(server.folder, name) for name in ("K.mtx", "K.mtx.gz", "p.mtx")}
+    for name, data in (("K.mtx", big.encode()), ("K.mtx.gz", gzip.compress(big.encode())), ("p.mtx", load.encode())):
+        with open(names[name], "wb") as file:
+            file.write(data)
+    for stiffness in ("K.mtx", "K.mtx", "K.mtx.gz"):
+        done = job(server.url, "--K", names[stiffness], "--p", names["p.mtx"])
+        check(done["summary"]["outcome"] == "converged", done)
+    digest = hashlib.sha256(big.encode()).hexdigest()
+    check(server.get(f"/v1/uploads/{digest}").json["used_by"] == 3)
+    posted = [line for line in server.get("/metrics").body.decode().splitlines()
+              if line.startswith("uzawad_http_request_seconds_count") and 'route="/v1/uploads"' in line]
+    check(posted and posted[0].endswith(" 2"), "sent once, and once packed:", posted)
+
+
+def test_mesh_from_a_file(server):
+    path = os.path.join(server.folder, "part.msh")
+    body = scene()
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(GMSH)
+    body["problem"]["supports"] = [{"on": "left", "ux": 0, "uy": 0}]
+    body["problem"]["loads"] = [{"on": "right", "traction": [0.5, 0]}]
+    body["problem"]["contacts"] = []
+    del body["problem"]["mesh"]
+    done = job(server.url, "-", "--mesh", path, stdin=json.dumps(body))
+    check(done["summary"]["outcome"] == "converged" and done["summary"]["problem"]["d"] > 0, done)
+    done = run(server.url, "submit", "-", "--mesh", "tests/data/springs_K.mtx", stdin=json.dumps(body), code=4)
+    check("/problem/mesh/gmsh" in done.stderr, done.stderr)
+
+
+# Two quad4 in a row, with the groups that the scene names.
+GMSH = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+3
+1 1 "left"
+1 2 "right"
+2 3 "body"
+$EndPhysicalNames
+$Nodes
+6
+1 0 0 0
+2 30 0 0
+3 60 0 0
+4 0 20 0
+5 30 20 0
+6 60 20 0
+$EndNodes
+$Elements
+4
+1 1 2 1 1 1 4
+2 1 2 2 2 3 6
+3 3 2 3 3 1 2 5 4
+4 3 2 3 3 2 3 6 5
+$EndElements
+"""
+
+
+# -------------------------------------------------------------------- --set
+
+
+@options(None)
+def test_values_are_put_in(_):
+    request, = sent(PAPER, "--set", "loads.1.traction.0=0.25", "--set", "problem.materials.0.young=70e3", "--set",
+                    "solver.accuracy.relative_error=1e-3", "--set", "thickness=2", "--set", "tags=[\"a\"]", "--tag", "b",
+                    "--set", "loads.2={\"on\": \"top\", \"pressure\": 1}", "--set", "webhook.url=http://h/x=1")
+    problem = request["problem"]
+    check(problem["loads"][1]["traction"][0] == 0.25 and problem["materials"][0]["young"] == 70e3, problem)
+    check(request["solver"]["accuracy"] == {"relative_error": 1e-3} and problem["thickness"] == 2, request)
+    check(request["tags"] == ["a", "b"] and problem["loads"][2]["pressure"] == 1, request)
+    check(request["webhook"] == {"url": "http://h/x=1"}, request)
+    untouched = scene()["problem"]
+    check(problem["mesh"] == untouched["mesh"] and problem["contacts"] == untouched["contacts"], problem)
+    request, = sent(PAPER, "--set", "solver.accuracy=quick", "--set", "problem.model=plane_strain", "--set", "priority=3")
+    check(request["solver"]["accuracy"] == "quick" and request["problem"]["model"] == "plane_strain", request)
+    check(request["priority"] == 3, request)
+
+
+@options(None)
+def test_numbers_stay_what_they_are(_):
+    body = {"problem": {"kind": "matrices", "K": "k", "p": [0.1, 1e-300, 123456789012345678, -0.0, 1.7976931348623157e308]}}
+    request, = sent("-", "--set", "solver.accuracy=quick", stdin=json.dumps(body))
+    check(repr(request["problem"]) == repr(body["problem"]), request)
+
+
+@options(None)
+def test_without_changes_the_file_goes_as_it_is(_):
+    with Fake((202, {"id": ID, "status": "accepted"})) as fake:
+        run(fake.url, "submit", PAPER)
+        check(fake.requests[0].body == open(PAPER, "rb").read())
+
+
+@options(None)
+def test_wrong_paths_say_what_is_there(_):
+    cases = [("laods.1.traction.0=1", ["problem has no \"laods\"", "it has: kind, model"]),
+             ("loads.7.traction.0=1", ["problem.loads is a list of 2", "0 to 1"]),
+             ("loads.x=1", ["is none of its indices"]),
+             ("loads.1.tracton.0=1", ["problem.loads.1 has no \"tracton\"", "it has: on, traction"]),
+             ("loads.1.traction.0.x=1", ["is a single value"]),
+             ("problem.mesh.bax.cells=1", ["problem.mesh has no \"bax\"", "it has: box"]),
+             ("loads..0=1", ["is no path"]), ("=1", ["empty"]), ("loads", ["PATH=VALUE"]),
+             (".".join("a" * 40) + "=1", ["is no path"]), ("a" * 300 + "=1", ["255"])]
+    for word, says in cases:
+        refused(PAPER, "--set", word, says=says)
+    refused("-", "--set", "loads.0=1", says="the request has no \"problem\"", stdin='{"solver": {}}')
+
+
+def test_a_new_key_is_the_servers_to_judge(server):
+    done = run(server.url, "submit", PAPER, "--set", "materials.0.yong=3", code=4)
+    check("/problem/materials/0" in done.stderr and "yong" in done.stderr, done.stderr)
+
+
+# ------------------------------------------------------------------- --vary
+
+
+def test_loads_become_cases(server):
+    done = job(server.url, PAPER, "--vary", "loads.1.traction.0=0.1:1.0:10")
+    check(done["summary"]["cases"]["count"] == 10, done["summary"]["cases"])
+    whole = json.loads(run(server.url, "result", done["id"], "--field", "reactions").stdout)
+    check([case["name"] for case in whole["cases"]] == ["0.1", "0.2", "0.3", "0.4", "0.5", "0.6", "0.7", "0.8", "0.9", "1"],
+          [case["name"] for case in whole["cases"]])
+    single = job(server.url, PAPER, "--set", "loads.1.traction.0=0.3")
+    answer = json.loads(run(server.url, "result", single["id"], "--field", "reactions").stdout)["reactions"]
+    worst = max(abs(a - b) for a, b in zip(answer, whole["cases"][2]["reactions"]))
+    check(worst < 1e-6 * max(map(abs, answer)), worst)
+
+
+@options(None)
+def test_several_make_every_combination(_):
+    request, = sent(PAPER, "--vary", "loads.0.traction.1=-0.05,-0.1", "--vary", "loads.1.traction=[0.1,0],[0.2,0],[0.3,0]")
+    cases = request["cases"]
+    check([case["name"] for case in cases][:2] == ["-0.05,[0.1,0]", "-0.05,[0.2,0]"] and len(cases) == 6, cases)
+    check([case["loads"][0]["traction"][1] for case in cases] == [-0.05] * 3 + [-0.1] * 3, cases)
+    check([case["loads"][1]["traction"][0] for case in cases] == [0.1, 0.2, 0.3] * 2, cases)
+    check(request["problem"] == scene()["problem"], "the problem keeps its own load")
+    body = {"problem": {"kind": "matrices", "K": "k", "p": [1, 2], "N": "n", "h": [0]}}
+    request, = sent("-", "--vary", "p.1=3,4", "--vary", "h.0=0,1", stdin=json.dumps(body))
+    check(request["cases"] == [{"name": "3,0", "p": [1, 3], "h": [0]}, {"name": "3,1", "p": [1, 3], "h": [1]},
+                               {"name": "4,0", "p": [1, 4], "h": [0]}, {"name": "4,1", "p": [1, 4], "h": [1]}], request)
+
+
+def test_other_values_become_jobs(server):
+    done = run(server.url, "submit", PAPER, "--vary", "materials.0.young=70e3,210e3", "--vary", "loads.1.traction.0=0.1,0.2",
+               "--vary", "materials.0.poisson=0.2:0.3:2", "--wait", "--json")
+    jobs = json.loads(done.stdout)
+    check(len(jobs) == 4 and all(one["summary"]["cases"]["count"] == 2 for one in jobs), jobs)
+    common = set.intersection(*[set(one["tags"]) for one in jobs]) - {"paper"}
+    check(len(common) == 1 and next(iter(common)).startswith("vary-"), common)
+    check([one["tags"][-1] for one in jobs] == ["70000,0.2", "70000,0.3", "210000,0.2", "210000,0.3"],
+          [one["tags"] for one in jobs])
+    shown = run(server.url, "submit", PAPER, "--vary", "materials.0.young=70e3,210e3", "--tag", "metals", "--wait")
+    check(len(shown.stdout.splitlines()) == 3 and shown.stdout.count("converged") == 2 and shown.stderr == "", shown)
+    ids = run(server.url, "submit", PAPER, "--vary", "materials.0.young=1e3,2e3", "--tag", "metals").stdout.split()
+    listed = run(server.url, "list", "--tag", "metals", "--quiet").stdout.split()
+    check(len(ids) == 2 and len(listed) == 4 and set(ids) <= set(listed), ids, listed)
+    again = [run(server.url, "submit", PAPER, "--vary", "thickness=1,2", "--key", "k", "--tag", "t").stdout for _ in range(2)]
+    check(again[0] == again[1] and len(set(again[0].split())) == 2, again)
+
+
+def test_the_worst_of_several_is_the_exit_status(server):
+    limited = scene(solver={"method": "accelerated_restart"})
+    run(server.url, "submit", "-", "--vary", "solver.max_iterations=3,100000", "--tag", "t", "--wait", "--quiet",
+        stdin=json.dumps(limited), code=7)
+    run(server.url, "submit", "-", "--vary", "solver.max_iterations=3,x", "--tag", "t", "--wait", "--quiet",
+        stdin=json.dumps(limited), code=4)
+
+
+@options(None)
+def test_wrong_variations(_):
+    cases = [("loads.1.traction.0=1:2", "FIRST:LAST:COUNT"), ("loads.1.traction.0=1:2:1", "FIRST:LAST:COUNT"),
+             ("loads.1.traction.0=1:2:99999", "FIRST:LAST:COUNT"), ("loads.1.traction.0=1:inf:3", "FIRST:LAST:COUNT"),
+             ("loads.1.traction.0=", "no list"), ("loads.1.traction.0=1,,2", "no list"), ("loads.1.traction.0", "PATH=VALUES"),
+             ("loads.1.traction.7=1,2", "0 to 1"), ("materials.0.yong=1,2", "has no \"yong\""),
+             ("loads.1.traction.0=1,1.0", "twice")]
+    for word, says in cases:
+        refused(PAPER, "--vary", word, says=says)
+    with_cases = scene(cases=[{"name": "a", "loads": []}])
+    refused("-", "--vary", "loads.1.traction.0=1,2", says="cases of its own", stdin=json.dumps(with_cases))
+    refused(PAPER, "--vary", "loads.1.traction.0=0:1:200", "--vary", "loads.0.traction.1=0:1:200", says="10000 cases")
+    refused(PAPER, "--vary", "thickness=1:2:2000", says="1000 jobs")
+
+
+if __name__ == "__main__":
+    service.main(globals())
