@@ -58,7 +58,7 @@ PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
 ##@ Use
-.PHONY: all demo gallery run man install clean help deps deps-test
+.PHONY: all demo gallery run man guide install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
 
 demo: deps ## install what is missing, build, start the daemon, solve the paper's body, show the answer
@@ -78,6 +78,10 @@ deps: ## install the Debian packages that are missing
 
 deps-test: ## the same with what only the tests use
 	@tests/deps.sh $(PACKAGES) $(TEST_PACKAGES)
+
+guide: ## renew client/examples/scene_guide.md, whose tables follow from schemas/request.json
+	@$(PYTHON) -B client/examples/make_guide.py >$(BUILD)/scene_guide.md
+	@mv $(BUILD)/scene_guide.md client/examples/scene_guide.md
 
 man: $(BUILD)/uzawa ## renew client/uzawa.1 and client/uzawa.bash, which follow from the client's table of commands
 	@$(BUILD)/uzawa help --format man >client/uzawa.1

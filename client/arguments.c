@@ -50,7 +50,8 @@ static bool set_seconds(parser *p, const client_option *rule, const char *value)
     char *end;
     double seconds = strtod(value, &end);
     if (end == value || *end || !isfinite(seconds) || seconds < 0)
-        return fail(p, "%s wants a number of seconds, 0 or more, not \"%s\"", rule->name, value);
+        return fail(p, "%s wants a number%s, 0 or more, not \"%s\"", rule->name,
+                    *rule->value == 'S' ? " of seconds" : "", value);
     *(double *)(void *)((char *)p->options + rule->offset) = seconds;
     return true;
 }
@@ -221,6 +222,10 @@ static bool check_idle(parser *p)
     const bool stays = o->wait || o->command == CLIENT_WAIT || o->command == CLIENT_VERIFY;
     if (o->progress && !stays)
         return fail(p, "--progress wants --wait");
+    if ((o->junit || o->baseline) && !stays)
+        return fail(p, "%s wants --wait", o->junit ? "--junit" : "--baseline");
+    if (o->tolerance >= 0 && !o->baseline)
+        return fail(p, "--tolerance wants --baseline");
     if (o->progress && o->quiet)
         return fail(p, "--progress and --quiet contradict each other");
     if (o->quiet && o->json)
@@ -280,6 +285,7 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .timeout_s = INFINITY,
                             .retry_s = -1,
                             .time_limit_s = NAN,
+                            .tolerance = -1,
                             .max_iterations = -1,
                             .limit = 20,
                             .width = -1,

@@ -28,6 +28,8 @@ typedef struct {
     const char *key, *format, *output, *status, *colour, *factor, *axis;
     const char *case_name, *accuracy;          /* accuracy: a number or a level, as written */
     double time_limit_s;                       /* NAN: not given */
+    const char *junit, *baseline;              /* a file; a job */
+    double tolerance;                          /* of the baseline; -1: not given */
     long limit, width, height, max_iterations; /* -1: not given */
     bool wait, quiet, json, progress, csv, plot, ascii, deformed, trade, help, version;
 } client_options;

@@ -5,7 +5,8 @@
 #include <string.h>
 
 #define OUTCOME_EXITS                                                                                                  \
-    "0 converged, 3 an assertion failed, 6 the job failed, 7 ended without converging, 8 infeasible, "                 \
+    "0 converged, 3 an assertion or the baseline is missed, 6 the job failed, 7 ended without converging, "            \
+    "8 infeasible, "                                                                                                   \
     "9 dismissed, 10 --timeout passed (the job goes on), 130 interrupted (the job goes on)."
 
 static const client_page PAGES[CLIENT_COMMANDS] = {
@@ -121,6 +122,12 @@ static const client_option OPTIONS[] = {
      "summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain "
      "stress_gauss",
      "one of them; may be repeated"},
+    {"--junit", 0, CLIENT_TEXT, FIELD(junit), STAYING, 0, 0, "FILE", NULL,
+     "write a JUnit report: whether the job converged, each assertion, each comparison"},
+    {"--baseline", 0, CLIENT_TEXT, FIELD(baseline), STAYING, 0, 0, "ID", NULL,
+     "compare with another job: energy, reactions, pressure, displacements and what touches"},
+    {"--tolerance", 0, CLIENT_SECONDS, FIELD(tolerance), STAYING, 0, 0, "T", NULL,
+     "what the comparison lets pass, relative (default 1e-3)"},
     {"--deformed", 0, CLIENT_FLAG, FIELD(deformed), IN(PLOT), 0, 0, NULL, NULL, "draw the deformed body of a scene"},
     {"--trade", 0, CLIENT_FLAG, FIELD(trade), IN(PLOT), 0, 0, NULL, NULL,
      "print what each certified digit took, as a table and a drawing"},

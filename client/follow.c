@@ -186,7 +186,7 @@ client_exit client_follow(client_session *s, const char *id, json_t **job, clien
     return code;
 }
 
-client_exit client_report_end(client_session *s, const json_t *job, client_exit waited)
+static client_exit tell_end(client_session *s, const json_t *job, client_exit waited)
 {
     const json_t *error = json_object_get(job, "error");
     client_exit code = waited == CLIENT_OK ? client_job_exit(job) : waited;
@@ -201,6 +201,12 @@ client_exit client_report_end(client_session *s, const json_t *job, client_exit 
     client_print_summary(s->out, job);
     client_exit shown = client_show_cases(s, job);
     return shown == CLIENT_OK ? code : shown;
+}
+
+client_exit client_report_end(client_session *s, const json_t *job, client_exit waited)
+{
+    const client_exit code = tell_end(s, job, waited);
+    return job ? client_contract(s, job, NULL, code) : code;
 }
 
 client_exit client_wait(client_session *s)

@@ -55,6 +55,7 @@ static client_exit run_command(const client_options *options)
         return complain_usage(message);
     client_http_trust(session.http, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"));
     client_exit code = RUN[options->command](&session);
+    client_suites_clear(&session.suites);
     client_http_close(session.http);
     return code;
 }

@@ -39,6 +39,11 @@ static const struct {
                                                                         "uzawa refine $job --accuracy 1e-10 --wait\n"
                                                                         "uzawa verify answer.json\n"
                                                                         "uzawa submit - --wait <body.json"},
+    {"In a pipeline: a JUnit report, exit status 3 where an assertion of the scene is missed or where something has "
+     "changed since another job:",
+     "uzawa submit body.json --wait --junit report.xml\n"
+     "baseline=$(uzawa submit body.json --wait --quiet)\n"
+     "uzawa submit body.json --set materials.0.poisson=0.30001 --wait --baseline $baseline --tolerance 1e-3"},
     {"In scripts:", "uzawa submit body.json --wait --json | jq .summary.contact.active\n"
                     "uzawa list --quiet --limit 5\n"
                     "uzawa factors --json | jq .bytes"},

@@ -1,5 +1,6 @@
-#include "report.h"
+#include "checks.h"
 #include "files.h"
+#include "report.h"
 
 #include <math.h>
 #include <string.h>
@@ -384,6 +385,16 @@ static void print_timings(FILE *to, const json_t *summary)
     fputc('\n', to);
 }
 
+static void print_assertions(FILE *to, const json_t *summary)
+{
+    client_checks checks = {.item = NULL};
+    client_checks_assertions(&checks, summary, "");
+    client_checks_print(to, &checks, 0, "assertions");
+    if (checks.failed)
+        fputs("assertions  no memory to show all of them\n", to);
+    client_checks_clear(&checks);
+}
+
 void client_print_summary(FILE *to, const json_t *job)
 {
     const json_t *summary = json_object_get(job, "summary");
@@ -405,6 +416,7 @@ void client_print_summary(FILE *to, const json_t *job)
     print_factor(to, summary);
     print_cost(to, summary);
     print_timings(to, summary);
+    print_assertions(to, summary);
 }
 
 /* ---- load cases */

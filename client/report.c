@@ -39,6 +39,19 @@ bool client_job_ended(const json_t *job)
     return strcmp(status, "successful") == 0 || strcmp(status, "failed") == 0 || strcmp(status, "dismissed") == 0;
 }
 
+/* Surely, whatever a finer answer would be. */
+static bool fails_assertion(const json_t *summary)
+{
+    const json_t *line;
+    size_t i;
+    json_array_foreach(json_object_get(summary, "assertions"), i, line)
+    {
+        if (strcmp(client_json_text(line, "result"), "fail") == 0)
+            return true;
+    }
+    return false;
+}
+
 client_exit client_job_exit(const json_t *job)
 {
     const char *status = client_json_text(job, "status"), *outcome = client_json_text(job, "summary.outcome");
@@ -48,8 +61,11 @@ client_exit client_job_exit(const json_t *job)
         return CLIENT_DISMISSED;
     if (strcmp(status, "failed") == 0)
         return CLIENT_JOB_FAILED;
-    bool met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0;
-    return met ? CLIENT_OK : CLIENT_NOT_CONVERGED;
+    if (fails_assertion(json_object_get(job, "summary")))
+        return CLIENT_ASSERTION_FAILED;
+    if (strcmp(outcome, "converged") != 0 && strcmp(outcome, "verified") != 0)
+        return CLIENT_NOT_CONVERGED;
+    return json_is_false(client_json_at(job, "summary.assertions_passed")) ? CLIENT_ASSERTION_FAILED : CLIENT_OK;
 }
 
 const char *client_format_seconds(char *buffer, size_t size, double seconds)

@@ -5,6 +5,7 @@
 #include "arguments.h"
 #include "exit_codes.h"
 #include "http.h"
+#include "junit.h"
 
 #include <jansson.h>
 
@@ -14,7 +15,8 @@ typedef struct {
     const client_options *options;
     client_http *http;
     FILE *out, *err;
-    double deadline; /* client_clock time after which the command gives up; INFINITY: never */
+    double deadline;      /* client_clock time after which the command gives up; INFINITY: never */
+    client_suites suites; /* of the jobs so far, for --junit */
 } client_session;
 
 /* A request without body or headers that is patient as the command line says. */
@@ -33,6 +35,11 @@ char *client_job_path(client_session *s, const char *id, const char *suffix);
 
 /* The cases of an ended job whose summary says that it has some, as a table on s->out; else nothing. */
 client_exit client_show_cases(client_session *s, const json_t *job);
+
+/* What --baseline and --junit ask for about a job that was waited for: prints the comparison, writes the report with
+ * the checks of all jobs so far. label: which of several jobs of one command, NULL: the only one. code: how the job
+ * ended; returns that, or what is to be told besides. */
+client_exit client_contract(client_session *s, const json_t *job, const char *label, client_exit code);
 
 /* Prints JSON on one or many lines for a person or a program. */
 client_exit client_print_json(client_session *s, const json_t *value);

@@ -171,6 +171,7 @@ static client_exit follow_all(client_session *s, const client_bodies *bodies, cl
             code = client_job_exit(job);
         if (ended && !s->options->json && !s->options->quiet)
             print_job_line(s, job, bodies->item[i].label);
+        code = client_contract(s, job, bodies->item[i].label, code);
         json_decref(job);
         worst = worst == CLIENT_OK ? code : worst;
         if (!ended)

@@ -18,12 +18,12 @@ _uzawa() {
     done
     case $command in
     '') options='--server --timeout --retry --help --version'; words=$commands ;;
-    submit) options='--K --N --h --p --mesh --set --vary --wait --timeout --tag --key --progress --quiet --json --server --retry --help --version ' ;;
+    submit) options='--K --N --h --p --mesh --set --vary --wait --timeout --tag --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
     upload) options='--json --server --timeout --retry --help --version ' ;;
     status) options='--json --server --timeout --retry --help --version ' ;;
-    wait) options='--timeout --progress --quiet --json --server --retry --help --version ' ;;
-    refine) options='--accuracy --max-iterations --time-limit --wait --timeout --key --progress --quiet --json --server --retry --help --version ' ;;
-    verify) options='--timeout --key --progress --quiet --json --server --retry --help --version ' ;;
+    wait) options='--timeout --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
+    refine) options='--accuracy --max-iterations --time-limit --wait --timeout --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
+    verify) options='--timeout --key --junit --baseline --tolerance --progress --quiet --json --server --retry --help --version ' ;;
     result) options='--format --fields --field --case --output --json --server --timeout --retry --help --version ' ;;
     picture) options='--colour --factor --width --case --output --json --server --timeout --retry --help --version ' ;;
     history) options='--csv --plot --width --height --ascii --case --output --json --server --timeout --retry --help --version ' ;;
@@ -48,6 +48,9 @@ _uzawa() {
     submit--timeout|submit-t) words='' ;;
     submit--tag) words='' ;;
     submit--key|submit-k) words='' ;;
+    submit--junit) files=1 ;;
+    submit--baseline) words=$(_uzawa_ids) ;;
+    submit--tolerance) words='' ;;
     submit--server|submit-s) words='' ;;
     submit--retry) words='' ;;
     upload--server|upload-s) words='' ;;
@@ -57,6 +60,9 @@ _uzawa() {
     status--timeout|status-t) words='' ;;
     status--retry) words='' ;;
     wait--timeout|wait-t) words='' ;;
+    wait--junit) files=1 ;;
+    wait--baseline) words=$(_uzawa_ids) ;;
+    wait--tolerance) words='' ;;
     wait--server|wait-s) words='' ;;
     wait--retry) words='' ;;
     refine--accuracy|refine-a) words='quick balanced precise exact' ;;
@@ -64,10 +70,16 @@ _uzawa() {
     refine--time-limit) words='' ;;
     refine--timeout|refine-t) words='' ;;
     refine--key|refine-k) words='' ;;
+    refine--junit) files=1 ;;
+    refine--baseline) words=$(_uzawa_ids) ;;
+    refine--tolerance) words='' ;;
     refine--server|refine-s) words='' ;;
     refine--retry) words='' ;;
     verify--timeout|verify-t) words='' ;;
     verify--key|verify-k) words='' ;;
+    verify--junit) files=1 ;;
+    verify--baseline) words=$(_uzawa_ids) ;;
+    verify--tolerance) words='' ;;
     verify--server|verify-s) words='' ;;
     verify--retry) words='' ;;
     result--format|result-f) words='json csv vtu' ;;

@@ -45,11 +45,20 @@ typedef struct {
     int columns; /* u came as points of so many numbers; 0: as numbers */
 } codec_answer;
 
+/* What a number of the summary must be: at least, at most, or near a value. NaN: not given. */
+typedef struct {
+    char quantity[128], name[64], case_name[64]; /* name "": none; case_name "": every case, or the job has none */
+    double least, most;
+    double near, absolute, relative; /* near: within the larger of absolute and relative * |near| */
+} codec_assertion;
+
 typedef struct {
     uz_problem problem;
     uz_settings settings;
     codec_start start;
     codec_answer answer;
+    codec_assertion *assertions; /* n_assertions, in the request's order */
+    int64_t n_assertions;
     char *tags;          /* JSON array text */
     char (*uploads)[65]; /* n_uploads ids of the uploads that it names, each once */
     size_t n_uploads;
@@ -119,6 +128,24 @@ typedef struct {
     const codec_cases *cases; /* a job with cases: `summary` is what they come to together; else NULL */
 } codec_run;
 char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run);
+
+/* What became of an assertion: the exact value meets it, does not, or may or may not. In the order of their badness. */
+typedef enum { CODEC_PASS, CODEC_UNCERTAIN, CODEC_FAIL, CODEC_VERDICTS } codec_verdict;
+/* One assertion, of all summaries that were judged by it: how many ended in which way, and the worst of them. */
+typedef struct {
+    int64_t counts[CODEC_VERDICTS];
+    codec_verdict verdict;
+    double value, error, margin; /* NaN: not known; margin: of the value to the nearer limit, negative beyond it */
+    char reason[160], case_name[64];
+} codec_finding;
+/* Adds to a summary of this service (malloc'ed, replaced) what became of the request's assertions, as `assertions` and
+ * `assertions_passed`; without assertions it stays as it is. name: of the case that the summary is of, NULL: the job
+ * has none. all: n_assertions findings that begin zeroed, which gather those of every case; NULL where there are none.
+ * False: no memory. */
+bool codec_judge(char **summary, const codec_request *request, const char *name, codec_finding *all);
+/* The same for the summary of a job with cases, once all of them were judged. */
+bool codec_judge_whole(char **summary, const codec_request *request, codec_finding *all);
+
 char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes);
 /* The reply to a request that is only checked; NULL: nothing is predicted. */
 char *codec_encode_valid(const uz_prediction *predicted);

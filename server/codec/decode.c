@@ -40,6 +40,11 @@ int json_depth_limit(void)
     return limits.json_depth > 0 ? limits.json_depth : JSON_MAX_DEPTH;
 }
 
+const schemas *decode_schemas(void)
+{
+    return loaded;
+}
+
 bool decode_check(const json_doc *doc, const char *schema, problem_details *problem)
 {
     return schemas_check(loaded, schema, doc, problem);
@@ -296,6 +301,7 @@ static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_
            decode_problem(&out->problem, doc, len, problem) && decode_automatic(out, solver, answer != NULL, problem) &&
            decode_cases(&out->problem, doc, json_object_get(doc->root, "cases"), len, problem) &&
            decode_start(&out->start, doc, json_object_get(solver, "warm_start"), len, problem) &&
+           decode_assertions(out, json_object_get(doc->root, "assert"), problem) &&
            (!answer || decode_answer(&out->answer, doc, answer, len, problem));
 }
 
@@ -354,6 +360,7 @@ void codec_request_clear(codec_request *request)
     free(request->start.reactions);
     free(request->answer.u);
     free(request->answer.r);
+    free(request->assertions);
     free(request->tags);
     free(request->uploads);
     free(request->webhook);

@@ -6,6 +6,7 @@
 
 #include "codec/codec.h"
 #include "codec/json_doc.h"
+#include "codec/schema.h"
 #include "store/uploads.h"
 #include "uzawa.h"
 
@@ -21,6 +22,11 @@ bool decode_mesh(uz_scene *out, json_doc *doc, const json_t *mesh, size_t body_l
 bool decode_contacts(uz_scene *out, json_doc *doc, const json_t *list, size_t body_len, problem_details *problem);
 /* The load cases of a decoded problem; list NULL: none. */
 bool decode_cases(uz_problem *problem, json_doc *doc, const json_t *list, size_t body_len, problem_details *details);
+/* A short text of the user's: 1 to 63 bytes without control characters, since it is compared as a C string by the store
+ * and shown in terminals. what: "A name of a case". */
+bool decode_label(char out[64], const json_t *value, const json_path *path, const char *what, problem_details *problem);
+/* Assertions about the summary, after the cases; list NULL: none. */
+bool decode_assertions(codec_request *out, const json_t *list, problem_details *problem);
 /* object NULL: from zero. */
 bool decode_start(codec_start *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem);
 bool decode_answer(codec_answer *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem);
@@ -46,6 +52,8 @@ bool decode_source_open(decode_source *out, json_doc *doc, const json_t *value, 
                         problem_details *problem);
 /* Gives the text back, so that it is not in memory twice: it can't be opened again if it was a string. */
 void decode_source_close(decode_source *source, const json_doc *doc, const json_t *value);
+/* The schema files; set while the codec is. */
+const schemas *decode_schemas(void);
 /* The document against a schema file, as schemas_check. */
 bool decode_check(const json_doc *doc, const char *schema, problem_details *problem);
 bool decode_no_memory(problem_details *problem); /* 503; returns false */

@@ -10,23 +10,28 @@
 
 /* ---- names */
 
-/* A name is compared as a C string by the store, and shown in terminals. */
-static bool take_name(char out[64], const json_t *value, const json_path *parent, problem_details *problem)
+bool decode_label(char out[64], const json_t *value, const json_path *path, const char *what, problem_details *problem)
 {
-    const char *name = json_string_value(value);
+    const char *label = json_string_value(value);
     size_t len = json_string_length(value);
-    json_path path = {parent, "name", 4, 0};
-    bool fits = len < 64;
+    bool fits = label && len < 64;
     for (size_t i = 0; fits && i < len; i++)
-        fits = (unsigned char)name[i] >= 0x20 && name[i] != 0x7f;
+        fits = (unsigned char)label[i] >= 0x20 && label[i] != 0x7f;
     if (fits) {
-        memcpy(out, name, len + 1);
+        memcpy(out, label, len + 1);
         return true;
     }
-    problem_set(problem, 422, "out_of_range", &path,
-                "A name of a case has 1 to 63 bytes and no control characters; this one %s.",
-                len < 64 ? "has one" : "is longer");
+    problem_set(problem, 422, "out_of_range", path, "%s has 1 to 63 bytes and no control characters; this one %s.",
+                what, label && len < 64 ? "has one" : "is longer");
     return false;
+}
+
+/* `key` of the object at `parent`. */
+static bool take_name(char out[64], const json_t *object, const char *key, const json_path *parent,
+                      problem_details *problem)
+{
+    const json_path path = {parent, key, strlen(key), 0};
+    return decode_label(out, json_object_get(object, key), &path, "A name of a case", problem);
 }
 
 static int compare_names(const void *a, const void *b)
@@ -99,7 +104,7 @@ static bool take_case(uz_problem *p, int64_t i, json_doc *doc, const json_t *ite
 {
     json_path list = {NULL, "cases", 5, 0}, path = {&list, NULL, 0, (size_t)i};
     uz_load_case *out = &p->cases[i];
-    if (!take_name(out->name, json_object_get(item, "name"), &path, problem))
+    if (!take_name(out->name, item, "name", &path, problem))
         return false;
     json_path loads = {&path, "loads", 5, 0};
     if (p->kind == UZ_PROBLEM_SCENE)
@@ -129,11 +134,11 @@ bool decode_cases(uz_problem *problem, json_doc *doc, const json_t *list, size_t
 bool decode_start(codec_start *out, json_doc *doc, const json_t *object, size_t body_len, problem_details *problem)
 {
     const char *id = json_string_value(json_object_get(object, "job"));
-    const json_t *name = json_object_get(object, "case"), *reactions = json_object_get(object, "reactions");
+    const json_t *reactions = json_object_get(object, "reactions");
     json_path solver = {NULL, "solver", 6, 0}, path = {&solver, "warm_start", 10, 0};
     snprintf(out->job, sizeof out->job, "%s", id ? id : "");
     out->continued = json_is_true(json_object_get(object, "continue"));
-    if (name && !take_name(out->case_name, name, &path, problem))
+    if (json_object_get(object, "case") && !take_name(out->case_name, object, "case", &path, problem))
         return false;
     return !reactions || decode_vector(&out->reactions, &out->n_reactions, doc, reactions,
                                        decode_memory_bound(body_len), "/solver/warm_start/reactions", problem);

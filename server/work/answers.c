@@ -107,8 +107,10 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     codec_run run = {.started_from = request->answer.u ? NULL : origin_name(result->summary.origin)};
     parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
     add_vectors(parts, result, is_scene);
-    return parts->summary && add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
-                                         has_earlier ? from->rows[i] : 0);
+    const char *name = request->problem.n_cases > 0 ? request->problem.cases[i].name : NULL;
+    return parts->summary && codec_judge(&parts->summary, request, name, a->findings) &&
+           add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
+                       has_earlier ? from->rows[i] : 0);
 }
 
 static store_answer as_stored(const answer_parts *parts, const char *name)
@@ -147,7 +149,8 @@ static bool build_whole(answers *a, uz_result *const *results, const codec_reque
     add_waiting(&overall.timings, queue_s, parse_s);
     codec_run run = {.started_from = started_from(results, a->n), .cases = &counts};
     a->shared.summary = codec_encode_run(&overall, request->problem.kind, &run);
-    return a->shared.summary && add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE);
+    return a->shared.summary && codec_judge_whole(&a->shared.summary, request, a->findings) &&
+           add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE);
 }
 
 static bool build_cases(answers *a, store_outcome *outcome, const codec_request *request)
@@ -169,7 +172,8 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
     bool has_cases = request->problem.n_cases > 0, ok = true;
     *out = (answers){.n = has_cases ? request->problem.n_cases : 1};
     out->parts = calloc((size_t)out->n, sizeof *out->parts);
-    if (!out->parts)
+    out->findings = calloc((size_t)request->n_assertions + 1, sizeof *out->findings);
+    if (!out->parts || !out->findings)
         return false;
     if (!has_cases)
         add_waiting(&results[0]->summary.timings, queue_s, parse_s);
@@ -196,6 +200,7 @@ void answers_clear(answers *a)
     clear_parts(&a->shared);
     free(a->parts);
     free(a->cases);
+    free(a->findings);
     free(a->contact_nodes);
     *a = (answers){.n = 0};
 }

@@ -19,10 +19,11 @@ typedef struct {
 } answer_parts;
 
 typedef struct {
-    int64_t n;           /* results: max(1, cases) */
-    answer_parts *parts; /* n */
-    answer_parts shared; /* with cases: the job's own summary, and what all cases have in common */
-    store_answer *cases; /* n_cases */
+    int64_t n;               /* results: max(1, cases) */
+    answer_parts *parts;     /* n */
+    answer_parts shared;     /* with cases: the job's own summary, and what all cases have in common */
+    store_answer *cases;     /* n_cases */
+    codec_finding *findings; /* of the request's assertions, over all cases */
     double dim, cells[3], *contact_nodes;
 } answers;
 

@@ -6,6 +6,7 @@
 #include "sanitized.h"
 
 #include <jansson.h>
+#include <math.h>
 #include <stdint.h>
 
 void *__real_malloc(size_t size);
@@ -152,6 +153,23 @@ static bool try_refine(const char *old)
     return made != NULL;
 }
 
+/* A summary stays as it was where there is no memory for what was found. */
+static bool try_judge(const char *summary)
+{
+    codec_assertion list[] = {{"contact.active", "", "", 1, 3, NAN, NAN, NAN}};
+    const codec_request request = {.assertions = list, .n_assertions = 1};
+    codec_finding found = {.reason = ""};
+    int64_t planned = countdown;
+    countdown = -1;
+    char *text = malloc(strlen(summary) + 1); /* as counted, unlike strdup's */
+    memcpy(text, summary, strlen(summary) + 1);
+    countdown = planned;
+    const bool good = codec_judge(&text, &request, "a", &found) && codec_judge_whole(&text, &request, &found);
+    CHECK(good ? strstr(text, "\"pass\"") != NULL : strncmp(text, summary, strlen(summary) - 1) == 0);
+    free(text);
+    return good;
+}
+
 static bool try_results(const char *argument)
 {
     static const double r[100];
@@ -182,6 +200,7 @@ TEST(decoding)
     exhaust(try_decode, "tests/data/long_vectors.json");
     exhaust(try_decode, "tests/data/cases.json");
     exhaust(try_decode, "tests/data/verify.json");
+    exhaust(try_decode, "tests/data/assertions.json");
     exhaust(try_scene, "tests/data/mesh_scene.json");
     exhaust(try_scene, "tests/data/gmsh_scene.json");
     exhaust(try_refine, "{\"problem\": 1, \"solver\": {\"method\": \"uzawa\"}}");
@@ -193,4 +212,5 @@ TEST(encoding)
 {
     exhaust(try_results, NULL);
     exhaust(try_encode, NULL);
+    exhaust(try_judge, "{\"outcome\":\"converged\",\"contact\":{\"active\":2}}");
 }

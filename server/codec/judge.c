@@ -1,0 +1,305 @@
+/* judge.c: what became of a request's assertions, from the summary as it is told and stored.
+ *
+ * What is asserted is meant of the exact answer, and a summary is of one that is certified to be near it. Where the
+ * certificate bounds how far a number is from that of the exact answer, the whole range must meet the limits to pass,
+ * and miss them to fail. The other numbers are taken as they are, and `error` says that no bound is known. An answer
+ * that is not what was asked for passes nothing. */
+#include "codec/codec.h"
+#include "codec/quantity.h"
+#include "codec/text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- limits */
+
+typedef struct {
+    double lo, hi;
+} range;
+
+/* Where the exact number is, and how far from the value at most; all NaN: no bound is known. */
+typedef struct {
+    range in;
+    double error;
+} bound;
+
+static const bound UNKNOWN = {{NAN, NAN}, NAN};
+
+static double tolerance_of(const codec_assertion *a)
+{
+    return fmax(a->absolute, a->relative * fabs(a->near)); /* fmax leaves out what is not given, a NaN */
+}
+
+static range limits_of(const codec_assertion *a)
+{
+    if (!isnan(a->near))
+        return (range){a->near - tolerance_of(a), a->near + tolerance_of(a)};
+    return (range){isnan(a->least) ? -INFINITY : a->least, isnan(a->most) ? INFINITY : a->most};
+}
+
+static double margin_of(range limits, double value)
+{
+    return isnan(value) ? -INFINITY : fmin(value - limits.lo, limits.hi - value);
+}
+
+/* ---- how far a number may be from that of the exact answer */
+
+static double number_at(const json_t *summary, const char *name)
+{
+    double value = NAN;
+    return quantity_read(&value, summary, name) ? value : (double)NAN;
+}
+
+/* Numbers of the answer, which a finer one would have otherwise; the others are what they are. */
+static bool is_estimate(const char *quantity)
+{
+    static const char *const FACTS[] = {"contact.candidates", "contact.kept", "contact.added", "contact.rounds"};
+    static const char *const ESTIMATES[] = {"contact.", "energy.", "resultants.", "warnings"};
+    for (size_t i = 0; i < sizeof FACTS / sizeof FACTS[0]; i++)
+        if (strcmp(quantity, FACTS[i]) == 0)
+            return false;
+    for (size_t i = 0; i < sizeof ESTIMATES / sizeof ESTIMATES[0]; i++)
+        if (strncmp(quantity, ESTIMATES[i], strlen(ESTIMATES[i])) == 0)
+            return true;
+    return false;
+}
+
+/* The minimum of the energy is between the dual and the primal value. The strain energy W is half the square of a
+ * seminorm of the strain without its thermal part, and by the triangle inequality sqrt(2 W) differs from the exact one
+ * by at most the energy norm of the displacement's error. */
+static bound exact_bound(const json_t *summary, const char *quantity, double value)
+{
+    const double gap = number_at(summary, "certificate.gap"), e = number_at(summary, "certificate.absolute_error");
+    if (!is_estimate(quantity))
+        return (bound){{value, value}, 0.0};
+    if (strcmp(quantity, "energy.primal") == 0 && !isnan(gap))
+        return (bound){{value - gap, value}, gap};
+    if (strcmp(quantity, "energy.dual") == 0 && !isnan(gap))
+        return (bound){{value, value + gap}, gap};
+    if (strcmp(quantity, "energy.strain") == 0 && value >= 0.0 && !isnan(e)) {
+        const double norm = sqrt(2.0 * value), least = fmax(norm - e, 0.0);
+        return (bound){{0.5 * least * least, 0.5 * (norm + e) * (norm + e)}, e * (norm + 0.5 * e)};
+    }
+    return UNKNOWN;
+}
+
+/* ---- the verdict */
+
+/* The digits that read back, whatever the locale. */
+static const char *shown(char out[TEXT_DOUBLE], double x)
+{
+    if (isfinite(x))
+        text_shortest(out, x);
+    else
+        snprintf(out, TEXT_DOUBLE, "unbounded");
+    return out;
+}
+
+static void say_missed(codec_finding *out, const codec_assertion *a, range limits)
+{
+    char value[TEXT_DOUBLE], limit[TEXT_DOUBLE], near[TEXT_DOUBLE];
+    shown(value, out->value);
+    if (!isnan(a->near))
+        snprintf(out->reason, sizeof out->reason, "%s is not within %s of %s", value, shown(limit, tolerance_of(a)),
+                 shown(near, a->near));
+    else if (out->value < limits.lo)
+        snprintf(out->reason, sizeof out->reason, "%s is below %s", value, shown(limit, limits.lo));
+    else
+        snprintf(out->reason, sizeof out->reason, "%s is above %s", value, shown(limit, limits.hi));
+}
+
+static void say_between(codec_finding *out, range exact)
+{
+    char lo[TEXT_DOUBLE], hi[TEXT_DOUBLE];
+    snprintf(out->reason, sizeof out->reason,
+             "the exact value is between %s and %s, so that it may or may not meet the limit", shown(lo, exact.lo),
+             shown(hi, exact.hi));
+}
+
+/* A finding without a reason passes. */
+static void judge_value(codec_finding *out, const codec_assertion *a, const json_t *summary)
+{
+    const char *outcome = json_string_value(json_object_get(summary, "outcome"));
+    const bool met = outcome && (strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0);
+    const range limits = limits_of(a);
+    const bound known = exact_bound(summary, a->quantity, out->value);
+    const bool bounded = !isnan(known.error) && !isnan(out->value);
+    const range exact = bounded ? known.in : (range){out->value, out->value};
+    out->error = bounded ? known.error : (double)NAN;
+    out->margin = margin_of(limits, out->value);
+    const bool misses = exact.hi < limits.lo || exact.lo > limits.hi;
+    if (misses && (met || bounded)) {
+        out->verdict = CODEC_FAIL;
+        say_missed(out, a, limits);
+    } else if (!met || isnan(out->value)) {
+        out->verdict = CODEC_UNCERTAIN;
+        snprintf(out->reason, sizeof out->reason, "%s%.40s", met ? "the value is not known" : "the job ended with ",
+                 met ? "" : outcome);
+    } else if (exact.lo < limits.lo || exact.hi > limits.hi) {
+        out->verdict = CODEC_UNCERTAIN;
+        say_between(out, exact);
+    } else {
+        out->verdict = CODEC_PASS;
+    }
+}
+
+static codec_finding judge_one(const codec_assertion *a, const json_t *summary)
+{
+    codec_finding out = {.verdict = CODEC_FAIL, .value = NAN, .error = NAN, .margin = -INFINITY};
+    if (quantity_read(&out.value, summary, a->quantity))
+        judge_value(&out, a, summary);
+    else
+        snprintf(out.reason, sizeof out.reason, "the summary of this job has no such number");
+    return out;
+}
+
+/* ---- what is told */
+
+static void put_given(text *t, const char *key, double value)
+{
+    if (isnan(value))
+        return;
+    text_key(t, key);
+    text_number(t, value);
+}
+
+static void put_member(text *t, const char *key, const char *value)
+{
+    if (!value[0])
+        return;
+    text_key(t, key);
+    text_string(t, value);
+}
+
+static const char *const WORDS[CODEC_VERDICTS] = {"pass", "uncertain", "fail"};
+
+static void put_finding(text *t, const codec_assertion *a, const codec_finding *f, bool of_cases)
+{
+    text_open(t, '{');
+    put_member(t, "name", a->name);
+    put_member(t, "quantity", a->quantity);
+    put_member(t, "case", f->case_name);
+    put_given(t, "min", a->least);
+    put_given(t, "max", a->most);
+    put_given(t, "near", a->near);
+    put_given(t, "absolute", a->absolute);
+    put_given(t, "relative", a->relative);
+    text_key(t, "value");
+    text_number(t, f->value);
+    text_key(t, "error");
+    text_number(t, f->error);
+    put_member(t, "result", WORDS[f->verdict]);
+    put_member(t, "reason", f->reason);
+    if (of_cases) {
+        text_key(t, "cases");
+        text_open(t, '{');
+        for (int i = 0; i < CODEC_VERDICTS; i++) {
+            text_key(t, WORDS[i]);
+            text_integer(t, f->counts[i]);
+        }
+        text_close(t, '}');
+    }
+    text_close(t, '}');
+}
+
+/* The worst of several cases; of equally good ones that which is nearest to its limit. */
+static void gather(codec_finding *sum, const codec_finding *one, const char *name)
+{
+    const bool first = sum->counts[0] + sum->counts[1] + sum->counts[2] == 0;
+    sum->counts[one->verdict]++;
+    if (!first && (one->verdict < sum->verdict || (one->verdict == sum->verdict && !(one->margin < sum->margin))))
+        return;
+    sum->verdict = one->verdict;
+    sum->value = one->value;
+    sum->error = one->error;
+    sum->margin = one->margin;
+    memcpy(sum->reason, one->reason, sizeof sum->reason);
+    snprintf(sum->case_name, sizeof sum->case_name, "%s", name);
+}
+
+/* How many cases ended how, and how long all took, is known of the whole job alone. */
+static bool is_of_the_whole(const codec_assertion *a)
+{
+    return !a->case_name[0] && (strncmp(a->quantity, "cases.", 6) == 0 || strncmp(a->quantity, "timings_s.", 10) == 0);
+}
+
+static bool concerns(const codec_assertion *a, const char *name)
+{
+    return !name || (a->case_name[0] ? strcmp(a->case_name, name) == 0 : !is_of_the_whole(a));
+}
+
+/* Opens the summary's text again. */
+static void begin_list(text *t, const char *summary)
+{
+    text_bytes(t, summary, strlen(summary) - 1);
+    text_key(t, "assertions");
+    text_open(t, '[');
+}
+
+static bool end_list(text *t, bool passed, char **summary)
+{
+    text_close(t, ']');
+    text_key(t, "assertions_passed");
+    text_bool(t, passed);
+    text_close(t, '}');
+    char *longer = text_finish(t, NULL);
+    if (longer) {
+        free(*summary);
+        *summary = longer;
+    }
+    return longer != NULL;
+}
+
+/* The summary as values; false: no memory. */
+static bool read_summary(json_doc *doc, const char *summary)
+{
+    problem_details problem;
+    return json_scan(doc, summary, strlen(summary), &problem);
+}
+
+bool codec_judge(char **summary, const codec_request *request, const char *name, codec_finding *all)
+{
+    json_doc doc;
+    text t = {0};
+    bool passed = true;
+    if (request->n_assertions == 0)
+        return true;
+    if (!read_summary(&doc, *summary))
+        return false;
+    begin_list(&t, *summary);
+    for (int64_t i = 0; i < request->n_assertions; i++) {
+        const codec_assertion *a = &request->assertions[i];
+        if (!concerns(a, name))
+            continue;
+        const codec_finding found = judge_one(a, doc.root);
+        passed = passed && found.verdict == CODEC_PASS;
+        put_finding(&t, a, &found, false);
+        if (name)
+            gather(&all[i], &found, name);
+    }
+    json_doc_clear(&doc);
+    return end_list(&t, passed, summary);
+}
+
+bool codec_judge_whole(char **summary, const codec_request *request, codec_finding *all)
+{
+    json_doc doc;
+    text t = {0};
+    bool passed = true;
+    if (request->n_assertions == 0)
+        return true;
+    if (!read_summary(&doc, *summary))
+        return false;
+    begin_list(&t, *summary);
+    for (int64_t i = 0; i < request->n_assertions; i++) {
+        const codec_assertion *a = &request->assertions[i];
+        if (is_of_the_whole(a))
+            all[i] = judge_one(a, doc.root);
+        passed = passed && all[i].verdict == CODEC_PASS;
+        put_finding(&t, a, &all[i], !is_of_the_whole(a));
+    }
+    json_doc_clear(&doc);
+    return end_list(&t, passed, summary);
+}

@@ -1,0 +1,232 @@
+#include "codec/quantity.h"
+#include "codec/problem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- steps of a name */
+
+typedef struct {
+    const char *at, *end; /* of the step; end points at '.' or behind the name */
+} step;
+
+static step first_step(const char *name, const char *end)
+{
+    const char *dot = memchr(name, '.', (size_t)(end - name));
+    return (step){name, dot ? dot : end};
+}
+
+static size_t step_length(step s)
+{
+    return (size_t)(s.end - s.at);
+}
+
+static bool step_is(step s, const char *word)
+{
+    return strlen(word) == step_length(s) && memcmp(s.at, word, step_length(s)) == 0;
+}
+
+/* A decimal index without leading zeros, of at most 9 digits; -1: the step is none. */
+static long step_index(step s)
+{
+    size_t len = step_length(s);
+    long index = 0;
+    if (len == 0 || len > 9 || (len > 1 && *s.at == '0'))
+        return -1;
+    for (const char *c = s.at; c < s.end; c++) {
+        if (*c < '0' || *c > '9')
+            return -1;
+        index = 10 * index + (*c - '0');
+    }
+    return index;
+}
+
+/* ---- names against the schema */
+
+/* What a summary says of its own assertions is nothing to assert. */
+static bool is_verdict(const char *key)
+{
+    return strncmp(key, "assertions", 10) == 0;
+}
+
+static bool has_code(schema_at items, step s)
+{
+    const json_t *code = json_object_get(json_object_get(items.node, "properties"), "code"), *word;
+    size_t i;
+    json_array_foreach(json_object_get(code, "enum"), i, word)
+    {
+        if (step_is(s, json_string_value(word)))
+            return true;
+    }
+    return false;
+}
+
+/* The schema one step further; node NULL: there is none. A code leads to the warning's value. */
+static schema_at schema_step(schema_at at, step s)
+{
+    if (!(schema_types(at) & SCHEMA_ARRAY))
+        return schema_resolve(
+            schema_child(at, json_object_getn(json_object_get(at.node, "properties"), s.at, step_length(s))));
+    schema_at items = schema_resolve(schema_child(at, json_object_get(at.node, "items")));
+    if (step_index(s) < 0)
+        items.node = has_code(items, s) ? json_object_get(json_object_get(items.node, "properties"), "value") : NULL;
+    return schema_resolve(items);
+}
+
+static bool is_number(schema_at at)
+{
+    unsigned types = schema_types(at);
+    return types != SCHEMA_ANY && (types & (SCHEMA_FRACTION | SCHEMA_INTEGER));
+}
+
+static schema_at summary_schema(const schemas *all)
+{
+    return (schema_at){all->files, "summary.json", json_object_get(all->files, "summary.json")};
+}
+
+/* ---- what may have been meant */
+
+enum { MOST_NAMES = 400 };
+
+typedef struct {
+    char name[MOST_NAMES][64];
+    const char *whole[MOST_NAMES], *last[MOST_NAMES]; /* the names, and what follows their last dot */
+    size_t count;
+} name_list;
+
+static void collect(name_list *out, schema_at at, const char *name);
+
+static void collect_below(name_list *out, schema_at at, const char *name, const char *key)
+{
+    char longer[64];
+    int len = snprintf(longer, sizeof longer, "%s%s%s", name, name[0] ? "." : "", key);
+    if (at.node && len < (int)sizeof longer && !is_verdict(longer))
+        collect(out, at, longer);
+}
+
+/* Arrays by their first item. */
+static void collect(name_list *out, schema_at at, const char *name)
+{
+    const char *key;
+    json_t *child;
+    bool array = schema_types(at) != SCHEMA_ANY && (schema_types(at) & SCHEMA_ARRAY);
+    if ((is_number(at) || array) && out->count < MOST_NAMES) {
+        memcpy(out->name[out->count], name, strlen(name) + 1);
+        out->whole[out->count] = out->name[out->count];
+        const char *dot = strrchr(out->whole[out->count], '.');
+        out->last[out->count] = dot ? dot + 1 : out->whole[out->count];
+        out->count++;
+    }
+    if (array)
+        collect_below(out, schema_resolve(schema_child(at, json_object_get(at.node, "items"))), name, "0");
+    json_object_foreach((json_t *)json_object_get(at.node, "properties"), key, child)
+    {
+        collect_below(out, schema_resolve(schema_child(at, child)), name, key);
+    }
+}
+
+/* The whole name with the fewest edits, else the one that ends as this one does. */
+static const char *closest(const name_list *names, const char *name, size_t len)
+{
+    const char *dot = memrchr(name, '.', len), *last = dot ? dot + 1 : name;
+    int found = problem_closest(name, len, names->whole, names->count);
+    if (found < 0)
+        found = problem_closest(last, len - (size_t)(last - name), names->last, names->count);
+    return found < 0 ? NULL : names->whole[found];
+}
+
+/* Without memory for the names the refusal has no suggestion. */
+static void suggest(const schemas *all, const char *name, size_t len, problem_details *problem)
+{
+    name_list *names = calloc(1, sizeof *names);
+    if (!names)
+        return;
+    collect(names, summary_schema(all), "");
+    const char *meant = closest(names, name, len);
+    if (meant)
+        problem_add(problem, " Did you mean \"%s\"?", meant);
+    free(names);
+}
+
+/* The first few numbers of an object. */
+static void list_members(schema_at at, const char *name, size_t len, problem_details *problem)
+{
+    const char *key, *before = ": ";
+    json_t *child;
+    json_object_foreach((json_t *)json_object_get(at.node, "properties"), key, child)
+    {
+        if (!is_number(schema_resolve(schema_child(at, child))))
+            continue;
+        problem_add(problem, "%s%.*s.%s", before, (int)len, name, key);
+        before = ", ";
+    }
+    problem_add(problem, ".");
+}
+
+bool quantity_check(const schemas *all, const char *name, size_t len, const json_path *path, problem_details *problem)
+{
+    char shown[80];
+    const char *end = name + len;
+    schema_at at = summary_schema(all);
+    bool own = len >= 10 && is_verdict(name);
+    for (step s = first_step(name, end); at.node && !own; s = first_step(s.end + 1, end)) {
+        at = schema_step(at, s);
+        if (s.end == end)
+            break;
+    }
+    if (at.node && !own && (is_number(at) || (schema_types(at) != SCHEMA_ANY && (schema_types(at) & SCHEMA_ARRAY))))
+        return true;
+    problem_quote(shown, sizeof shown, name, len);
+    problem_set(problem, 422, "not_allowed", path, "%s is no number of a job's summary (/schemas/summary.json)", shown);
+    if (at.node && !own && (schema_types(at) & SCHEMA_OBJECT) && schema_types(at) != SCHEMA_ANY) {
+        problem_add(problem, ", but holds some");
+        list_members(at, name, len, problem);
+    } else {
+        problem_add(problem, ".");
+        suggest(all, name, len, problem);
+    }
+    return false;
+}
+
+/* ---- numbers of a summary */
+
+/* The value that the warning of this code has; 0 where there is none. */
+static double warning_value(const json_t *warnings, step s)
+{
+    const json_t *item;
+    size_t i;
+    json_array_foreach(warnings, i, item)
+    {
+        const char *code = json_string_value(json_object_get(item, "code"));
+        if (code && step_is(s, code))
+            return json_number_value(json_object_get(item, "value"));
+    }
+    return 0.0;
+}
+
+static bool read_end(double *value, const json_t *node)
+{
+    *value = json_is_array(node) ? (double)json_array_size(node) : json_is_number(node) ? json_number_value(node) : NAN;
+    return json_is_array(node) || json_is_number(node) || json_is_null(node);
+}
+
+bool quantity_read(double *value, const json_t *summary, const char *name)
+{
+    const char *end = name + strlen(name);
+    const json_t *node = summary;
+    *value = NAN;
+    for (step s = first_step(name, end);; s = first_step(s.end + 1, end)) {
+        if (json_is_null(node)) /* max_pressure_at.node where nothing presses */
+            return true;
+        if (json_is_array(node) && step_index(s) < 0) {
+            *value = warning_value(node, s);
+            return true;
+        }
+        node = json_is_array(node) ? json_array_get(node, (size_t)step_index(s))
+                                   : json_object_getn(node, s.at, step_length(s));
+        if (!node || s.end == end)
+            return node && read_end(value, node);
+    }
+}
