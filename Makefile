@@ -14,8 +14,10 @@ PREFIX ?= /usr/local
 PYTHON ?= /usr/bin/python3
 
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
-            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libpng-dev
-TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev
+            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libpng-dev \
+            esbuild libjs-three node-d3-scale node-d3-shape
+TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev \
+                 chromium chromium-driver python3-selenium python3-pil
 
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
@@ -41,12 +43,13 @@ THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
+PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(SOAK_SRC) $(PRELOAD_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 SOLVER_OBJ := $(call obj,$(SOLVER_SRC))
-SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(BUILD)/obj/gen/embedded.o
+SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(BUILD)/obj/gen/embedded.o $(BUILD)/obj/gen/page.o
 CLIENT_OBJ := $(call obj,$(CLIENT_SRC))
 # What unit tests may link: everything but the two mains.
 PARTS_OBJ  := $(filter-out $(BUILD)/obj/server/main.o,$(SERVER_OBJ)) $(filter-out $(BUILD)/obj/client/main.o,$(CLIENT_OBJ))
@@ -119,6 +122,14 @@ $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS)
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) -c -o $@ $<
 
+# The web page, bundled and put into the daemon.
+$(BUILD)/obj/gen/page.o: $(BUILD)/gen/page.c
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS_ALL) -c -o $@ $<
+$(BUILD)/gen/page.c: $(PAGE_SRC)
+	@mkdir -p $(@D)
+	@client/page/bundle.sh $(BUILD)
+
 # Every schema file becomes bytes in the daemon, found by name (server/codec/embedded.h).
 $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 	@mkdir -p $(@D)
@@ -162,7 +173,7 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
+.PHONY: test test-unit test-api test-browser test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -174,6 +185,10 @@ test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 
 test-api: all $(PRELOADS) $(BUILD)/library ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
+
+test-browser: deps-test ## the web page in headless Chromium; FILTER=name runs some
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all
+	@tests/run.sh $(BUILD) browser $(FILTER)
 
 test-hygiene: ## formatting, static analysis, both compilers
 	@tests/run.sh $(BUILD) hygiene

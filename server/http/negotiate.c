@@ -199,6 +199,13 @@ static char *squeeze(const char *body, size_t len, size_t *out_len)
     return NULL;
 }
 
+static void name_gzip(http_reply *reply)
+{
+    reply->gzip = true;
+    if (reply->tag[0])
+        strcat(reply->tag, GZIP_MARK); /* REPLY_TAG has room */
+}
+
 static void apply_gzip(const http_request *rq, http_reply *reply)
 {
     size_t len;
@@ -207,13 +214,17 @@ static void apply_gzip(const http_request *rq, http_reply *reply)
     reply->varies_by_coding = true;
     if (!request_takes_gzip(rq))
         return;
+    if (reply->packed) {
+        reply_replace_body(reply, (char *)(uintptr_t)reply->packed, reply->packed_len);
+        reply->body_is_static = true;
+        name_gzip(reply);
+        return;
+    }
     char *small = squeeze(reply->body, reply->len, &len);
     if (!small)
         return; /* as it is, then */
     reply_replace_body(reply, small, len);
-    reply->gzip = true;
-    if (reply->tag[0])
-        strcat(reply->tag, GZIP_MARK); /* REPLY_TAG has room */
+    name_gzip(reply);
 }
 
 void negotiate(const http_request *rq, http_reply *reply)

@@ -164,10 +164,13 @@ static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, field_
     size_t n = 0;
     write_texts(texts, reply);
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
-    out[n++] = (field){"Content-Security-Policy", "default-src 'none'; frame-ancestors 'none'"};
-    out[n++] = (field){"Cache-Control", reply->cacheable ? "no-cache"
-                                        : reply->tag[0]  ? "private, no-cache"
-                                                         : "no-store"};
+    out[n++] = (field){"Content-Security-Policy",
+                       reply->policy ? reply->policy : "default-src 'none'; frame-ancestors 'none'"};
+    out[n++] = (field){"Referrer-Policy", "no-referrer"};
+    out[n++] = (field){"Cache-Control", reply->immutable   ? "public, max-age=31536000, immutable"
+                                        : reply->cacheable ? "no-cache"
+                                        : reply->tag[0]    ? "private, no-cache"
+                                                           : "no-store"};
     if (reply->tag[0])
         out[n++] = (field){"ETag", texts->tag};
     if (texts->vary[0])

@@ -31,7 +31,11 @@ typedef struct {
     bool tag_by_body;    /* the name follows from the body: negotiate makes it */
     bool takes_ranges;   /* a part of it may be asked for */
     bool varies_by_coding, varies_by_type;
-    bool gzip; /* body is compressed */
+    bool gzip;          /* body is compressed */
+    const char *packed; /* the gzip of a body that is static, packed_len bytes, static too; NULL: none was made */
+    size_t packed_len;
+    const char *policy; /* what a page may load and do (Content-Security-Policy); NULL: nothing */
+    bool immutable;     /* what has this address never changes */
     char content_range[80];
     const char *cors_origin; /* a page of this origin may read the reply; NULL: none; lives as long as the server */
     bool cors, preflight;    /* replies depend on the origin; this one says what may be asked */

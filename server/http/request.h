@@ -126,6 +126,8 @@ void service_health(api *context, http_request *rq, http_reply *reply);
 void service_ready(api *context, http_request *rq, http_reply *reply);
 void service_openapi(api *context, http_request *rq, http_reply *reply);
 void service_schema(api *context, http_request *rq, http_reply *reply);
+void page_index(api *context, http_request *rq, http_reply *reply);
+void page_part(api *context, http_request *rq, http_reply *reply);
 
 /* Reads the job named in the path; false with a 404 or 500 in reply. */
 bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply);

@@ -36,6 +36,8 @@ static const route ROUTES[] = {
     {"GET", "/metrics", NONE, service_metrics, false},
     {"GET", "/healthz", NONE, service_health, false},
     {"GET", "/readyz", NONE, service_ready, false},
+    {"GET", "/", NONE, page_index, false},
+    {"GET", "/page/{name}", NONE, page_part, false},
     {"GET", "/openapi.json", NONE, service_openapi, false},
     {"GET", "/schemas/{name}", NONE, service_schema, false},
 };
@@ -85,7 +87,7 @@ static void answer_options(api *context, http_request *rq, http_reply *reply)
 static const route OPTIONS = {"OPTIONS", "every path", NONE, answer_options, false};
 
 /* What a person or a supervisor may see without a token: nothing about jobs. */
-static const char *const OPEN[] = {"/", "/healthz", "/readyz", "/openapi.json", "/schemas/{name}"};
+static const char *const OPEN[] = {"/", "/page/{name}", "/healthz", "/readyz", "/openapi.json", "/schemas/{name}"};
 
 auth_scope route_scope(const route *r)
 {

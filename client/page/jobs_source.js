@@ -1,0 +1,161 @@
+// jobs_source.js: the jobs of the list: pages by cursor as far as they are looked at, and what changes meanwhile, from
+// GET /v1/events or, where the service has no such stream, by asking again.
+
+import { pause } from "./dom.js";
+import { has_ended, result_words } from "./words.js";
+
+const PAGE = 200, POLL_MS = 2000;
+
+/** What the list keeps of a job: a summary is some kilobytes, and there may be many thousand jobs. */
+function slim(job) {
+  const summary = job.summary || {};
+  return {
+    id: job.id, status: job.status, progress: job.progress, created: job.created, tags: job.tags, ended: has_ended(job),
+    result: result_words(job), total: summary.timings_s?.total ?? null, outcome: summary.outcome || null,
+    d: summary.problem?.d ?? null, m: summary.problem?.m ?? null, kind: summary.problem?.kind ?? null,
+  };
+}
+
+/**
+ * filter: {status, tags: []}. on_change({inserted}) after jobs came, changed or went; inserted: how many at the top.
+ * on_state("stream" | "poll" | "offline").
+ */
+export class JobsSource {
+  constructor(api, filter, { on_change, on_state }) {
+    Object.assign(this, { api, filter, on_change, on_state });
+    this.rows = []; // newest first
+    this.by_id = new Map();
+    this.streams = false;
+    this.next = undefined; // cursor of the next page; null: none follow
+    this.loading = null;
+    this.ends = new AbortController();
+  }
+
+  query(more) {
+    const query = new URLSearchParams({ limit: String(PAGE), ...more });
+    if (this.filter.status) query.set("status", this.filter.status);
+    for (const tag of this.filter.tags) query.append("tag", tag);
+    return `/v1/jobs?${query}`;
+  }
+
+  matches(job) {
+    return (!this.filter.status || job.status === this.filter.status) && this.filter.tags.every((tag) => job.tags.includes(tag));
+  }
+
+  /** Takes a job as it is now; returns whether it is a new one at the top. */
+  put(job) {
+    const known = this.by_id.get(job.id);
+    if (!this.matches(job)) {
+      this.drop(job.id);
+      return false;
+    }
+    const row = slim(job);
+    this.by_id.set(job.id, row);
+    if (known) {
+      this.rows[this.index_of(job.id)] = row;
+      return false;
+    }
+    const at = this.index_of(job.id);
+    this.rows.splice(at, 0, row);
+    return at === 0;
+  }
+
+  drop(id) {
+    if (!this.by_id.delete(id)) return;
+    this.rows.splice(this.index_of(id), 1);
+  }
+
+  /** Where the id stands, or would. */
+  index_of(id) {
+    let low = 0, high = this.rows.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.rows[middle].id > id) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  /** Loads the next page, if there is one and none is on its way. */
+  more() {
+    if (this.next === null || this.loading) return this.loading;
+    this.loading = this.load().finally(() => (this.loading = null));
+    return this.loading;
+  }
+
+  async load() {
+    const page = await this.api.get(this.query(this.next ? { cursor: this.next } : {}), { signal: this.ends.signal });
+    for (const job of page.jobs) this.put(job);
+    this.next = page.next;
+    this.on_change({ inserted: 0 });
+  }
+
+  take(jobs) {
+    let inserted = 0;
+    for (const job of jobs) {
+      // Older than all that was loaded: its page is still to come.
+      if (this.next && this.rows.length && job.id < this.rows[this.rows.length - 1].id) continue;
+      if (this.put(job)) inserted++;
+    }
+    this.on_change({ inserted });
+  }
+
+  async refresh() {
+    const { signal } = this.ends;
+    const page = await this.api.get(this.query({}), { signal });
+    const seen = new Set(page.jobs.map((job) => job.id));
+    const oldest = page.next ? page.jobs[page.jobs.length - 1].id : "";
+    for (const row of this.rows.filter((one) => one.id >= oldest && !seen.has(one.id))) this.drop(row.id);
+    const running = page.next ? (await this.api.get("/v1/jobs?status=running&limit=200", { signal })).jobs : [];
+    this.take([...page.jobs, ...running]);
+    if (this.next === undefined) this.next = page.next;
+  }
+
+  async follow_stream() {
+    let last = "";
+    await this.api.stream("/v1/events", {
+      signal: this.ends.signal, last,
+      on_open: () => this.on_state("stream"),
+      on_event: (event) => this.on_event(event),
+    });
+  }
+
+  on_event(event) {
+    if (event.event === "reset") {
+      this.refresh().catch(() => {});
+      return;
+    }
+    if (event.event === "deleted") {
+      this.drop(JSON.parse(event.data).id);
+      this.on_change({ inserted: 0 });
+    } else if (event.event === "job") {
+      this.take([JSON.parse(event.data)]);
+    }
+  }
+
+  /** Runs until stop(): first page, then whatever changes. Errors other than lost connections go to on_error. */
+  async run(on_error) {
+    const { signal } = this.ends;
+    let streams = this.streams;
+    while (!signal.aborted) {
+      try {
+        await (this.next === undefined ? this.more() : this.refresh());
+        if (streams) await this.follow_stream();
+        else this.on_state("poll");
+        await pause(POLL_MS, signal);
+      } catch (error) {
+        if (signal.aborted) return;
+        if (error.status === 404 || error.status === 503) streams = false;
+        else if (error.status) {
+          on_error(error);
+          if (error.status === 401 || error.status === 400) return;
+        } else this.on_state("offline");
+        await pause(POLL_MS, signal).catch(() => {});
+      }
+    }
+  }
+
+  stop() {
+    this.ends.abort();
+  }
+}

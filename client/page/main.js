@@ -1,0 +1,80 @@
+// main.js: the frame of the page: header, addresses, keys. Each view is a function (element, context, argument) that
+// fills the element and returns what ends it; views that are not the first are loaded when they are first shown.
+
+import { make_api } from "./api.js";
+import { h, show } from "./dom.js";
+import { show_list } from "./list.js";
+import { show_keys, listen_keys } from "./keys.js";
+import { theme, turn_theme } from "./theme.js";
+import { ask_token, forget_token, on_token, token } from "./token.js";
+
+const api = make_api({ token, ask: ask_token });
+const main = document.getElementById("main");
+const bar = document.getElementById("bar");
+
+const VIEWS = [
+  { pattern: /^$/, title: "Jobs", load: async () => show_list },
+  { pattern: /^jobs\/([0-9a-f]{32})$/, title: "Job", load: async () => (await import("./job.js")).show_job },
+];
+
+let end_view = null, turn = 0;
+
+/** What stands after "#/" in the address. */
+function place() {
+  return decodeURIComponent(location.hash.replace(/^#\/?/, ""));
+}
+
+async function go() {
+  const at = place(), mine = ++turn;
+  const view = VIEWS.find((one) => one.pattern.test(at));
+  end_view?.();
+  end_view = null;
+  for (const link of bar.querySelectorAll("nav a"))
+    link.toggleAttribute("aria-current", false), link.getAttribute("href") === `#/${at}` && link.setAttribute("aria-current", "page");
+  document.title = `${view ? view.title : "Nothing here"} · Contact solver`;
+  if (!view) {
+    show(main, h("h1", null, "Nothing here"), h("p", null, "This address leads nowhere: ", h("a", { href: "#/" }, "all jobs"), "."));
+    return;
+  }
+  const run = await view.load();
+  if (mine !== turn) return;
+  main.replaceChildren();
+  end_view = run(main, { api, token }, view.pattern.exec(at)[1]);
+}
+
+function theme_button() {
+  const words = { auto: "Theme: as the system", light: "Theme: light", dark: "Theme: dark" };
+  const signs = { auto: "◐", light: "☀", dark: "☾" };
+  const button = h("button", { type: "button", id: "theme", class: "plain" });
+  const say = () => {
+    button.setAttribute("aria-label", words[theme()]);
+    button.title = words[theme()];
+    show(button, h("span", { "aria-hidden": "true" }, signs[theme()]));
+  };
+  button.addEventListener("click", () => (turn_theme(), say()));
+  say();
+  return button;
+}
+
+function token_button() {
+  const button = h("button", { type: "button", id: "token", class: "plain", onclick: () => (forget_token(), go()) }, "Forget token");
+  const say = () => (button.hidden = !token());
+  on_token(say);
+  say();
+  return button;
+}
+
+show(bar,
+  h("a", { href: "#/", class: "brand" }, "Contact solver"),
+  h("nav", { "aria-label": "Views" },
+    h("a", { href: "#/" }, "Jobs"), h("a", { href: "#/new" }, "New job"), h("a", { href: "#/compare" }, "Compare")),
+  h("div", { class: "tools" }, token_button(),
+    h("button", { type: "button", id: "keys", class: "plain", "aria-label": "Keyboard shortcuts", title: "Keyboard shortcuts", onclick: show_keys }, "?"),
+    theme_button()));
+document.querySelector(".skip").addEventListener("click", (event) => {
+  event.preventDefault(); // the address is the view's
+  main.focus();
+});
+listen_keys({ theme: () => document.getElementById("theme").click() });
+addEventListener("hashchange", () => go().then(() => main.focus({ preventScroll: false })));
+go();

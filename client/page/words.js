@@ -1,0 +1,83 @@
+// words.js: what a job's status, outcome and certificate mean, in sentences.
+
+import { count, number, percent_up, seconds } from "./format.js";
+
+export const STATUSES = ["accepted", "running", "successful", "failed", "dismissed"];
+export const STATUS_WORDS = {
+  accepted: "waiting", running: "running", successful: "successful", failed: "failed", dismissed: "dismissed",
+};
+
+export function has_ended(job) {
+  return job.status !== "accepted" && job.status !== "running";
+}
+
+const OUTCOMES = {
+  converged: ["good", "Converged", "The certificate meets what was asked for."],
+  verified: ["good", "Verified", "The answer that was given meets what was asked for."],
+  not_verified: ["bad", "Not verified", "The answer that was given is not proved to be as good as was asked for."],
+  iteration_limit: ["warn", "Iteration limit", "It stopped after the iterations that were allowed. This is the best answer so far, with its own certificate."],
+  time_limit: ["warn", "Time limit", "It stopped after the time that was allowed. This is the best answer so far, with its own certificate."],
+  precision_limit: ["warn", "Precision limit", "More was asked for than double precision holds. The answer is as good as it can be, with its own certificate."],
+  paper_rule: ["warn", "Stopped by the paper's rule", "The change of the reactions became small before the certificate met what was asked for."],
+  infeasible: ["bad", "Infeasible", "No displacement satisfies all contact conditions: supports and obstacles contradict each other."],
+  dismissed: ["warn", "Dismissed", "It was stopped. This is the best answer so far, with its own certificate."],
+  mesh_limit: ["warn", "Mesh limit", "A grid fine enough would be larger than allowed. The answer is on the finest one that is."],
+};
+
+/** {tone: "good" | "warn" | "bad", title, text} of a summary's outcome. */
+export function outcome_words(summary) {
+  const [tone, title, text] = OUTCOMES[summary.outcome] || ["warn", summary.outcome, "This outcome is not known to the page."];
+  return { tone, title, text };
+}
+
+function bound_of(summary) {
+  const value = summary.certificate?.relative_error;
+  return Number.isFinite(value) ? value : null;
+}
+
+/** The certificate in a sentence. */
+export function certificate_words(summary) {
+  const bound = bound_of(summary);
+  if (summary.outcome === "infeasible") {
+    const radius = summary.infeasible_radius;
+    return radius === null || radius === undefined
+      ? "It is proved that no displacement at all satisfies the contact conditions."
+      : `It is proved that no displacement whose components are all smaller than ${number(radius)} satisfies the contact conditions.`;
+  }
+  if (bound === null) return "No bound on the error could be proved: this answer must not be relied on.";
+  return `The exact answer of this discrete problem differs by at most ${percent_up(bound)}, in the energy norm.`;
+}
+
+/** What the mesh adds, where it was estimated; null otherwise. */
+export function mesh_words(summary) {
+  const mesh = summary.discretization_error, bound = bound_of(summary);
+  if (!Number.isFinite(mesh)) return null;
+  const text = `The mesh itself is estimated to be off by about ${percent_up(mesh)}`;
+  if (bound === null || bound <= 0) return `${text}.`;
+  return mesh > bound ? `${text}: ${number(mesh / bound, 2)} times the bound on the solver's error.` : `${text}, less than the solver's bound.`;
+}
+
+/** One line about what was solved. */
+export function problem_words(summary) {
+  const p = summary.problem;
+  return p ? `${p.kind}, ${count(p.d)} unknowns, ${count(p.m)} contact rows` : "";
+}
+
+/** How it was solved. */
+export function method_words(summary) {
+  const t = summary.timings_s || {};
+  const cached = summary.factor?.cached ? ", on a body that was in the cache" : "";
+  return `${summary.method}, ${summary.operator} operator, ${count(summary.iterations)} iterations` +
+    `${summary.restarts ? `, ${count(summary.restarts)} restarts` : ""}, ${seconds(t.total)}${cached}`;
+}
+
+/** The shortest that tells how good an ended job is, for a line of a list. */
+export function result_words(job) {
+  if (job.status === "failed") return job.error?.title || "failed";
+  const summary = job.summary;
+  if (!summary) return "";
+  const bound = bound_of(summary);
+  if (summary.outcome === "infeasible") return "infeasible";
+  const error = bound === null ? "no bound" : `≤ ${percent_up(bound)}`;
+  return summary.outcome === "converged" || summary.outcome === "verified" ? error : `${OUTCOMES[summary.outcome]?.[1].toLowerCase() || summary.outcome}, ${error}`;
+}

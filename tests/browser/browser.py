@@ -1,0 +1,185 @@
+"""The page in Debian's Chromium, headless, driven through its own WebDriver: what tests/browser/test_*.py share.
+
+A test is a function test_*(s, b): s is a running Service (tests/api/service.py), b the browser, a selenium WebDriver with
+a few methods more. `browser.main(globals())` runs them like service.main. WebGL is drawn by SwiftShader, without a
+graphics card. After each test its console must be empty: whatever a test provokes on purpose it takes by b.console().
+"""
+import base64
+import json
+import os
+import pathlib
+import shutil
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tests" / "api"))
+
+import service  # noqa: E402
+from service import Skip, check, options  # noqa: E402,F401
+
+try:
+    from selenium import webdriver
+    from selenium.common.exceptions import WebDriverException
+    from selenium.webdriver.chrome.service import Service as Driver
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys  # noqa: F401
+except ImportError:
+    webdriver = None
+    WebDriverException = Exception
+
+
+def start(width=1200, height=900, dark=False, downloads=None):
+    """A browser with an empty profile; the caller calls quit()."""
+    wanted = webdriver.ChromeOptions()
+    for one in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
+                "--enable-unsafe-swiftshader", "--hide-scrollbars", "--force-device-scale-factor=1", "--no-first-run",
+                "--disable-background-networking", "--disable-component-update", f"--window-size={width},{height}"):
+        wanted.add_argument(one)
+    wanted.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    if downloads:
+        wanted.add_experimental_option("prefs", {"download.default_directory": downloads})
+    wanted.binary_location = shutil.which("chromium")
+    driver = webdriver.Chrome(service=Driver(shutil.which("chromedriver")), options=wanted)
+    driver.set_script_timeout(60)
+    return Browser(driver, width, height, dark)
+
+
+class Browser:
+    """A WebDriver, and what tests do with a page."""
+
+    def __init__(self, driver, width, height, dark):
+        self.driver = driver
+        self.size(width, height)
+        self.media("prefers-color-scheme", "dark" if dark else "light")
+
+    def size(self, width, height, phone=False):
+        """Of the page itself, without a frame."""
+        self.command("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=phone)
+
+    def media(self, feature, value):
+        """Emulates one media feature: ("prefers-reduced-motion", "reduce")."""
+        self.command("Emulation.setEmulatedMedia", features=[{"name": feature, "value": value}])
+
+    def command(self, name, **arguments):
+        """One command of Chromium's own protocol."""
+        return self.driver.execute_cdp_cmd(name, arguments)
+
+    def open(self, s, place=""):
+        """Loads the page of a service anew, at a view: "", "new", "jobs/ID", "compare"."""
+        self.driver.get("about:blank")
+        self.driver.get(f"{s.url}/#/{place}")
+        self.wait("the view", "return document.querySelector('main').childElementCount > 0")
+
+    def run(self, script, *arguments):
+        """The value of a script that says `return`."""
+        return self.driver.execute_script(script, *arguments)
+
+    def wait(self, what, script, *arguments, seconds=30):
+        """Waits until the script returns something true, and returns that."""
+        end = time.monotonic() + seconds
+        while True:
+            value = self.run(script, *arguments)
+            if value:
+                return value
+            check(time.monotonic() < end, "not there after", seconds, "s:", what, "\nthe page says:", self.text("body")[:1500],
+                  "\nthe console:", self.console())
+            time.sleep(0.03)
+
+    def all(self, selector):
+        return self.driver.find_elements(By.CSS_SELECTOR, selector)
+
+    def one(self, selector, seconds=30):
+        """The element that a CSS selector finds, waited for until it is seen."""
+        self.wait(selector, "const e = document.querySelector(arguments[0]); return e && e.checkVisibility()", selector,
+                  seconds=seconds)
+        return self.all(selector)[0]
+
+    def click(self, selector):
+        self.one(selector).click()
+
+    def text(self, selector):
+        """What an element shows; "" if there is none."""
+        return self.run("return document.querySelector(arguments[0])?.innerText || ''", selector)
+
+    def says(self, selector, text, seconds=30):
+        """Waits until an element shows a text."""
+        return self.wait(f"{selector} saying {text!r}",
+                         "return (document.querySelector(arguments[0])?.innerText || '').includes(arguments[1])",
+                         selector, text, seconds=seconds)
+
+    def write(self, selector, text):
+        """Sets the value of a field as if it had been pasted."""
+        self.one(selector)
+        self.run("""const field = document.querySelector(arguments[0]);
+                    field.focus(); field.value = arguments[1];
+                    field.dispatchEvent(new Event('input', {bubbles: true}));""", selector, text)
+
+    def console(self):
+        """What came to the console since the last call: [level, message]."""
+        return [(line["level"], line["message"]) for line in self.driver.get_log("browser") if line["level"] != "DEBUG"]
+
+    def picture(self, selector=None):
+        """The PNG bytes of the page as it is in sight, or of an element."""
+        if selector is None:
+            return base64.b64decode(self.command("Page.captureScreenshot", format="png")["data"])
+        self.run("document.querySelector(arguments[0]).scrollIntoView({block: 'center'})", selector)
+        return self.one(selector).screenshot_as_png
+
+    def pixels(self, selector=None):
+        """{colour: how many} of the page in sight, or of an element; colours are (r, g, b)."""
+        from PIL import Image
+        import io
+        image = Image.open(io.BytesIO(self.picture(selector))).convert("RGB")
+        return {colour: n for n, colour in image.getcolors(image.width * image.height)}
+
+    def near(self, selector, colour, distance=40):
+        """How many pixels of an element are of nearly this colour, "#rrggbb" or the name of a variable "--series-1"."""
+        text = self.run("return getComputedStyle(document.documentElement).getPropertyValue(arguments[0]).trim()",
+                        colour) if colour.startswith("--") else colour
+        wanted = tuple(int(text[i:i + 2], 16) for i in (1, 3, 5))
+        return sum(n for got, n in self.pixels(selector).items()
+                   if sum((a - b) ** 2 for a, b in zip(got, wanted)) <= distance ** 2)
+
+    def quit(self):
+        self.driver.quit()
+
+
+def with_browser(test):
+    """A test of service.main from one of a browser."""
+    def run(s):
+        missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
+        if webdriver is None or missing:
+            raise Skip(f"needs python3-selenium and {' and '.join(missing) or 'nothing else'}: make deps-test installs them")
+        downloads = tempfile.mkdtemp(prefix="downloads-")
+        b = start(downloads=downloads)
+        b.downloads = downloads
+        try:
+            if None not in getattr(test, "options", ()):
+                b.driver.get("about:blank")
+            test(s, b)
+            said = b.console()
+            check(not said, "the console says", said)
+        except Exception:
+            keep = os.environ.get("BROWSER_PICTURES")  # a folder: what the page looked like when a test failed
+            if keep:
+                pathlib.Path(keep, f"{test.__name__}.png").write_bytes(b.picture())
+            raise
+        finally:
+            b.quit()
+            shutil.rmtree(downloads, ignore_errors=True)
+    run.__name__ = test.__name__
+    if hasattr(test, "options"):
+        run.options = test.options
+    return run
+
+
+def main(names):
+    """As service.main, for tests that take a browser too."""
+    service.main({name: with_browser(one) if name.startswith("test_") and callable(one) else one
+                  for name, one in names.items()})
+
+
+def dump(value):
+    return json.dumps(value, indent=1)
