@@ -28,7 +28,7 @@ async function problem_of(response) {
  * once for all requests that wait.
  */
 export function make_api({ token, ask }) {
-  let asking = null;
+  let asking = null, description = null;
 
   async function new_token(sent) {
     if (token() !== sent) return true; // another request asked meanwhile
@@ -69,8 +69,20 @@ export function make_api({ token, ask }) {
     }
   }
 
+  /** Whether the service has such a path: it describes itself, so that nothing need be tried in vain. */
+  async function offers(path) {
+    description = description || send("/openapi.json").then((response) => response.json());
+    try {
+      return path in (await description).paths;
+    } catch (error) {
+      description = null;
+      throw error;
+    }
+  }
+
   return {
     fetch: send,
+    offers,
     stream,
     get: async (path, init) => (await send(path, init)).json(),
     text: async (path, init) => (await send(path, init)).text(),

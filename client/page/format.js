@@ -1,11 +1,23 @@
 // format.js: numbers, times and sizes for people.
 
-/** A number with so many significant digits: 0.00032, 1.2e-9, 12,300. */
+const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+
+/** "⁻¹²" */
+export function superscript(exponent) {
+  return String(exponent).replace("-", "⁻").replace(/\d/g, (digit) => SUPERSCRIPTS[digit]);
+}
+
+function scientific(value, digits) {
+  const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
+  return `${mantissa.includes(".") ? mantissa.replace(/\.?0+$/, "") : mantissa}×10${superscript(Number(exponent))}`;
+}
+
+/** A number with so many significant digits: 0.0032, 1.2×10⁻⁹, 12,300. */
 export function number(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size >= 1e6 || size < 1e-3) return value.toExponential(digits - 1).replace("e+", "e").replace(/\.?0+e/, "e");
+  if (size >= 1e6 || size < 1e-3) return scientific(value, digits);
   return Number(value.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: Math.max(digits, Math.ceil(Math.log10(size))) });
 }
 
@@ -13,7 +25,7 @@ export function count(value) {
   return value === null || value === undefined ? "–" : value.toLocaleString("en");
 }
 
-/** A relative number as per cent, plain as long as that is readable: "0.0003 %", "1.2e-9 %". */
+/** A relative number as per cent, plain as long as that is readable: "0.0003 %", "1.2×10⁻⁹ %". */
 export function percent(value) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const p = 100 * value;

@@ -1,21 +1,231 @@
-// job.js: one job.
+// job.js: one job, live while it waits and runs: progress, convergence, then the answer in words and pictures.
 
-import { h, show } from "./dom.js";
+import { Convergence } from "./convergence.js";
+import { announce, h, pause, show } from "./dom.js";
+import { download_buttons, files_of } from "./download.js";
+import { elapsed, moment, number, seconds, short_id } from "./format.js";
+import { status_chip, sure_button } from "./list.js";
+import { show_precision } from "./precision.js";
+import { refine_form } from "./refine.js";
+import { timings_bar } from "./timings.js";
+import { failure_card, verdict_card } from "./verdict.js";
+import { has_ended } from "./words.js";
 
-/** The body of a job that has one: drawn when it is asked for, by code that is loaded then. */
-function body_section(api, id, ends) {
-  const place = h("div", { class: "body", id: "body" });
-  const open = h("button", { type: "button", id: "open-body", onclick: async () => {
-    const { mountBody } = await import("./body.js");
-    const body = await mountBody(place, api, id, {});
-    ends.push(() => body.destroy());
-  } }, "Show the body");
-  show(place, open);
-  return h("section", { "aria-label": "Body" }, h("h2", null, "Body"), place);
+const HISTORY_MS = 700, MOST_CASES = 10000;
+
+class JobView {
+  constructor(main, api, id) {
+    Object.assign(this, { main, api, id, job: null, case_name: "", cases: [], parts: [] });
+    this.ends = new AbortController();
+    this.head = h("div", { class: "title" });
+    this.trouble = h("p", { class: "bad", role: "alert", hidden: true });
+    this.progress = h("section", { class: "progress", "aria-label": "Progress", hidden: true });
+    this.case_field = h("div", { class: "cases", hidden: true });
+    this.verdict = h("div");
+    this.timings = h("section", { "aria-label": "Timings", hidden: true });
+    this.convergence_place = h("section", { "aria-label": "Convergence", id: "convergence", hidden: true });
+    this.precision = h("section", { "aria-label": "Time against certified error", id: "precision", hidden: true });
+    this.body = h("section", { "aria-label": "Body", hidden: true });
+    this.downloads = h("section", { "aria-label": "Downloads", hidden: true });
+    show(main, this.head, this.trouble, this.case_field, h("div", { class: "job-page" }, this.progress, this.verdict, this.convergence_place,
+      this.body, this.precision, this.timings, this.downloads));
+  }
+
+  complain(error) {
+    if (error.name === "AbortError" || this.ends.signal.aborted) return;
+    this.trouble.hidden = false;
+    show(this.trouble, error.status === 404 ? "There is no such job, or it has been deleted." : error.message);
+  }
+
+  // ---- what changes while it runs
+
+  show_head() {
+    const { job } = this, ended = has_ended(job);
+    const refines = job.links.find((link) => link.rel === "refines");
+    const stop = sure_button(ended ? "Delete" : "Cancel", async () => {
+      try {
+        const left = await this.api.remove(`/v1/jobs/${this.id}`);
+        if (left) this.take(left);
+        else location.hash = "#/";
+      } catch (error) {
+        this.complain(error);
+      }
+    });
+    stop.id = "stop";
+    const actions = h("div", { class: "actions" }, job.status === "successful" ? refine_form(this.api, job) : null, stop);
+    show(this.head, h("h1", { title: this.id }, "Job ", h("code", null, short_id(this.id))), status_chip(job.status, job.summary?.outcome),
+      h("span", { class: "muted" }, moment(job.created)), job.tags.map((tag) => h("span", { class: "tag" }, tag)),
+      refines ? h("a", { href: `#/jobs/${refines.href.split("/").pop()}` }, `refines ${short_id(refines.href.split("/").pop())}`) : null, actions);
+  }
+
+  show_progress(row) {
+    const { job } = this;
+    this.progress.hidden = has_ended(job);
+    if (this.progress.hidden) return;
+    const words = [job.status === "running" ? `running for ${seconds(elapsed(job.started))}` : "waiting for its turn"];
+    if (row?.iteration !== undefined && row.iteration !== null) words.push(`iteration ${number(row.iteration, 9)}`);
+    if (Number.isFinite(row?.error_bound)) words.push(`certified bound ${number(row.error_bound)}`);
+    if (Number.isFinite(row?.residual_total)) words.push(`residual ${number(row.residual_total)}`);
+    show(this.progress, h("progress", { value: job.progress, max: 100, "aria-label": "Progress" }), h("span", { id: "progress-text" }, words.join(", ")));
+  }
+
+  /** A status came. */
+  take(job) {
+    const first = !this.job, changed = first || this.job.status !== job.status;
+    this.job = job;
+    if (changed) {
+      this.show_head();
+      if (!first) announce(`Job ${job.status}`);
+    }
+    this.show_progress(null);
+    if (has_ended(job) && changed) this.finish();
+    else if (job.status === "running" && changed) this.start_convergence();
+  }
+
+  // ---- convergence
+
+  start_convergence() {
+    if (this.convergence) return;
+    this.convergence_place.hidden = false;
+    const place = h("div");
+    show(this.convergence_place, h("h2", null, "Convergence"), place);
+    this.convergence = new Convergence(place, this.api, this.id, this.case_name, async () =>
+      (await this.api.get("/v1/jobs?status=successful&limit=20")).jobs.filter((job) => job.id !== this.id && !job.summary?.cases));
+  }
+
+  async refresh_convergence() {
+    try {
+      await this.convergence?.refresh();
+    } catch (error) {
+      if (error.status !== 404 && error.problem?.code !== "case_needed") this.complain(error);
+    }
+  }
+
+  // ---- when it has ended
+
+  async finish() {
+    const { job } = this;
+    this.parts.splice(0).forEach((end) => end());
+    this.progress.hidden = true;
+    if (job.summary?.cases && !this.cases.length) await this.load_cases().catch((error) => this.complain(error));
+    show(this.verdict, job.status === "failed" ? failure_card(job) : this.summary() ? verdict_card(this.summary())
+      : h("p", { class: "muted" }, "It was stopped before there was an answer."));
+    if (this.summary()?.timings_s) {
+      this.timings.hidden = false;
+      show(this.timings, h("h2", null, `Where ${seconds(this.summary().timings_s.total)} went`), timings_bar(this.summary().timings_s));
+    }
+    if (job.status === "successful" && job.summary?.outcome !== "verified" && job.summary?.outcome !== "not_verified") {
+      this.start_convergence();
+      this.refresh_convergence();
+      this.show_precision();
+    }
+    if (job.status === "successful" && job.summary?.problem?.kind === "scene") this.show_body();
+    this.downloads.hidden = false;
+    show(this.downloads, h("h2", null, "Downloads"), download_buttons(this.api, await files_of(this.api, job, this.case_name), (error) => this.complain(error)));
+  }
+
+  summary() {
+    return this.cases.find((one) => one.name === this.case_name)?.summary || this.job.summary;
+  }
+
+  async load_cases() {
+    const got = await this.api.get(`/v1/jobs/${this.id}/result?fields=summary`, { signal: this.ends.signal });
+    this.cases = (got.cases || []).slice(0, MOST_CASES);
+    if (!this.cases.length) return;
+    this.case_name = this.job.summary.cases.worst;
+    const select = h("select", { id: "case", onchange: () => this.choose_case(select.value) },
+      this.cases.map((one) => h("option", { value: one.name }, one.name)));
+    select.value = this.case_name;
+    this.case_field.hidden = false;
+    show(this.case_field, h("label", { for: "case" }, `Load case, of ${this.cases.length}`), select,
+      h("span", { class: "muted" }, `The worst is ${this.case_name}.`));
+    this.convergence?.destroy();
+    this.convergence = null;
+  }
+
+  choose_case(name) {
+    this.case_name = name;
+    this.convergence?.destroy();
+    this.convergence = null;
+    this.finish();
+  }
+
+  async show_precision() {
+    try {
+      if (!(await this.api.offers("/v1/jobs/{id}/work-precision"))) return;
+      const end = await show_precision(this.precision, this.api, this.id, this.case_name, this.ends.signal);
+      this.precision.hidden = !end;
+      if (end) this.parts.push(end);
+    } catch (error) {
+      if (error.status !== 404) this.complain(error);
+    }
+  }
+
+  /** Drawn when it is asked for, by code that is loaded then. */
+  show_body() {
+    const place = h("div", { class: "body", id: "body" });
+    const open = h("button", { type: "button", id: "open-body", class: "primary", onclick: async () => {
+      open.disabled = true;
+      try {
+        const { mountBody } = await import("./body.js");
+        const body = await mountBody(place, this.api, this.id, { cases: this.cases.map((one) => one.name), case: this.case_name });
+        this.parts.push(() => body.destroy());
+      } catch (error) {
+        open.disabled = false;
+        this.complain(error);
+      }
+    } }, "Show the deformed body");
+    this.body.hidden = false;
+    show(place, open);
+    show(this.body, h("h2", null, "Body"), place);
+  }
+
+  // ---- the loop
+
+  async follow_stream() {
+    let fetched = 0;
+    await this.api.stream(`/v1/jobs/${this.id}/events`, { signal: this.ends.signal, on_event: ({ event, data }) => {
+      const value = JSON.parse(data);
+      if (event === "status") this.take(value);
+      if (event !== "progress") return;
+      this.job.progress = value.progress;
+      this.show_progress(value);
+      if (performance.now() - fetched > HISTORY_MS) {
+        fetched = performance.now();
+        this.refresh_convergence();
+      }
+    } });
+  }
+
+  async run() {
+    const { signal } = this.ends;
+    let streams = true, pauses = 1;
+    while (!signal.aborted) {
+      try {
+        this.take(await this.api.get(`/v1/jobs/${this.id}`, { signal }));
+        if (has_ended(this.job)) return;
+        if (streams) await this.follow_stream();
+        else this.refresh_convergence();
+        this.trouble.hidden = true;
+      } catch (error) {
+        if (error.status === 503) streams = false;
+        else this.complain(error);
+        if (error.status && error.status < 500) return;
+      }
+      if (this.job && has_ended(this.job)) return;
+      await pause(Math.min(5000, 500 * pauses++), signal).catch(() => {});
+    }
+  }
+
+  destroy() {
+    this.ends.abort();
+    this.convergence?.destroy();
+    this.parts.forEach((end) => end());
+  }
 }
 
 export function show_job(main, { api }, id) {
-  const ends = [];
-  show(main, h("h1", null, "Job ", h("code", null, id)), body_section(api, id, ends));
-  return () => ends.forEach((end) => end());
+  const view = new JobView(main, api, id);
+  view.run();
+  return () => view.destroy();
 }

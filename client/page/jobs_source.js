@@ -25,7 +25,6 @@ export class JobsSource {
     Object.assign(this, { api, filter, on_change, on_state });
     this.rows = []; // newest first
     this.by_id = new Map();
-    this.streams = false;
     this.next = undefined; // cursor of the next page; null: none follow
     this.loading = null;
     this.ends = new AbortController();
@@ -100,58 +99,76 @@ export class JobsSource {
     this.on_change({ inserted });
   }
 
+  /** Loads the first page again, and whatever of the others may have changed: also the first time. */
   async refresh() {
     const { signal } = this.ends;
     const page = await this.api.get(this.query({}), { signal });
-    const seen = new Set(page.jobs.map((job) => job.id));
+    const seen = new Set(page.jobs.map((job) => job.id)), first = this.next === undefined;
     const oldest = page.next ? page.jobs[page.jobs.length - 1].id : "";
     for (const row of this.rows.filter((one) => one.id >= oldest && !seen.has(one.id))) this.drop(row.id);
-    const running = page.next ? (await this.api.get("/v1/jobs?status=running&limit=200", { signal })).jobs : [];
-    this.take([...page.jobs, ...running]);
-    if (this.next === undefined) this.next = page.next;
+    if (first) this.next = page.next;
+    this.take([...page.jobs, ...(await this.unsettled(oldest))]);
   }
 
-  async follow_stream() {
-    let last = "";
-    await this.api.stream("/v1/events", {
-      signal: this.ends.signal, last,
+  /** Jobs below the first page as they are now, of which the list says that they have not ended. */
+  async unsettled(oldest) {
+    const { signal } = this.ends, jobs = [];
+    for (const row of this.rows.filter((one) => one.id < oldest && !one.ended).slice(0, 50)) {
+      try {
+        jobs.push(await this.api.get(`/v1/jobs/${row.id}`, { signal }));
+      } catch (error) {
+        if (error.status !== 404) throw error;
+        this.drop(row.id);
+      }
+    }
+    return jobs;
+  }
+
+  /** Until the stream ends. It begins with a "reset", unless it goes on from an earlier one. */
+  follow_stream() {
+    return this.api.stream("/v1/events", {
+      signal: this.ends.signal, last: this.last_event,
       on_open: () => this.on_state("stream"),
       on_event: (event) => this.on_event(event),
     });
   }
 
-  on_event(event) {
-    if (event.event === "reset") {
-      this.refresh().catch(() => {});
-      return;
-    }
-    if (event.event === "deleted") {
-      this.drop(JSON.parse(event.data).id);
+  on_event({ event, data, id }) {
+    this.last_event = id || this.last_event;
+    if (event === "job") {
+      this.take([JSON.parse(data)]);
+    } else if (event === "deleted") {
+      this.drop(JSON.parse(data).id);
       this.on_change({ inserted: 0 });
-    } else if (event.event === "job") {
-      this.take([JSON.parse(event.data)]);
+    } else if (event === "reset") {
+      this.refresh().catch((error) => this.ends.signal.aborted || this.on_error(error));
     }
   }
 
-  /** Runs until stop(): first page, then whatever changes. Errors other than lost connections go to on_error. */
+  async follow() {
+    if (this.streams === undefined) this.streams = await this.api.offers("/v1/events");
+    if (this.streams) return this.follow_stream();
+    await this.refresh();
+    this.on_state("poll");
+    return null;
+  }
+
+  /** Runs until stop(): first page, then whatever changes. on_error: what the service refuses. */
   async run(on_error) {
     const { signal } = this.ends;
-    let streams = this.streams;
+    this.on_error = on_error;
     while (!signal.aborted) {
       try {
-        await (this.next === undefined ? this.more() : this.refresh());
-        if (streams) await this.follow_stream();
-        else this.on_state("poll");
-        await pause(POLL_MS, signal);
+        await this.follow();
       } catch (error) {
         if (signal.aborted) return;
-        if (error.status === 404 || error.status === 503) streams = false;
+        if (error.status === 503) this.streams = false; // too many streams
         else if (error.status) {
           on_error(error);
-          if (error.status === 401 || error.status === 400) return;
+          if (error.status < 500) return;
         } else this.on_state("offline");
-        await pause(POLL_MS, signal).catch(() => {});
       }
+      await pause(POLL_MS, signal).catch(() => {});
     }
   }
 

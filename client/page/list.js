@@ -126,7 +126,7 @@ function filters(on_filter) {
   status.value = filter.status;
   const tag = h("input", { id: "filter-tag", type: "search", placeholder: "demo, paper", value: filter.tags.join(", "),
     autocomplete: "off", spellcheck: "false" });
-  const changed = () => on_filter({ status: status.value, tags: tag.value.split(/[\s,]+/).filter(Boolean).slice(0, 4) });
+  const changed = () => on_filter({ status: status.value, tags: tag.value.split(",").map((one) => one.trim()).filter(Boolean).slice(0, 4) });
   status.addEventListener("change", changed);
   tag.addEventListener("input", debounce(changed, 300));
   return h("form", { class: "filters", role: "search", onsubmit: (event) => event.preventDefault() },

@@ -13,15 +13,26 @@ const main = document.getElementById("main");
 const bar = document.getElementById("bar");
 
 const VIEWS = [
-  { pattern: /^$/, title: "Jobs", load: async () => show_list },
-  { pattern: /^jobs\/([0-9a-f]{32})$/, title: "Job", load: async () => (await import("./job.js")).show_job },
+  { pattern: /^$/, home: "", title: "Jobs", load: async () => show_list },
+  { pattern: /^new(?:\/(\w+))?$/, home: "new", title: "New job", load: async () => (await import("./editor.js")).show_editor },
+  { pattern: /^compare(?:\/([\w.-]+))?$/, home: "compare", title: "Compare accuracies", load: async () => (await import("./compare.js")).show_compare },
+  { pattern: /^jobs\/([0-9a-f]{32})$/, home: "", title: "Job", load: async () => (await import("./job.js")).show_job },
 ];
 
 let end_view = null, turn = 0;
 
 /** What stands after "#/" in the address. */
 function place() {
-  return decodeURIComponent(location.hash.replace(/^#\/?/, ""));
+  return location.hash.replace(/^#\/?/, "");
+}
+
+/** Says in the header which view this is, or belongs to. */
+function mark_home(view, at) {
+  for (const link of bar.querySelectorAll("nav a")) {
+    const here = view && link.getAttribute("href") === `#/${view.home}`;
+    if (here) link.setAttribute("aria-current", view.home === at ? "page" : "true");
+    else link.removeAttribute("aria-current");
+  }
 }
 
 async function go() {
@@ -29,8 +40,7 @@ async function go() {
   const view = VIEWS.find((one) => one.pattern.test(at));
   end_view?.();
   end_view = null;
-  for (const link of bar.querySelectorAll("nav a"))
-    link.toggleAttribute("aria-current", false), link.getAttribute("href") === `#/${at}` && link.setAttribute("aria-current", "page");
+  mark_home(view, at);
   document.title = `${view ? view.title : "Nothing here"} · Contact solver`;
   if (!view) {
     show(main, h("h1", null, "Nothing here"), h("p", null, "This address leads nowhere: ", h("a", { href: "#/" }, "all jobs"), "."));

@@ -1,0 +1,25 @@
+// precision.js: when each decade of accuracy was first certified, GET /v1/jobs/{id}/work-precision.
+
+import { h, show } from "./dom.js";
+import { number, seconds } from "./format.js";
+import { Chart } from "./plot.js";
+
+/** Draws it in an element; returns what ends it, null where there is none. */
+export async function show_precision(element, api, id, case_name, signal) {
+  const query = case_name ? `?case=${encodeURIComponent(case_name)}` : "";
+  const got = await api.get(`/v1/jobs/${id}/work-precision${query}`, { signal });
+  const decades = (got.decades || []).filter((one) => Number.isFinite(one.seconds) && one.seconds > 0);
+  if (!decades.length) return null;
+  const place = h("div");
+  show(element, h("h2", null, "Time against certified error"), place,
+    h("p", { class: "muted" }, `Certified to ${decades.map((one) => `${number(one.relative_error)} after ${seconds(one.seconds)}`).slice(-1)}.`));
+  const chart = new Chart(place, 240);
+  const points = decades.map((one) => [one.seconds, one.relative_error]).sort((a, b) => a[0] - b[0]);
+  const series = [{ name: "first certified", colour: 1, dots: true, points }];
+  if (Number.isFinite(got.mesh_error) && got.mesh_error > 0)
+    series.push({ name: "error of the mesh, estimated", colour: 2, dash: "6 3",
+      points: [[points[0][0], got.mesh_error], [points[points.length - 1][0], got.mesh_error]] });
+  chart.update({ x: { label: "time", log: true, format: seconds }, y: { label: "relative error", log: true }, series,
+    label: `When each decade of the relative error was first certified, from ${seconds(points[0][0])} to ${seconds(points[points.length - 1][0])}` });
+  return () => chart.destroy();
+}

@@ -1,0 +1,80 @@
+// verdict.js: how good the answer of a job is, in words, and its main numbers.
+
+import { h } from "./dom.js";
+import { count, number, percent_up, seconds } from "./format.js";
+import { certificate_words, mesh_words, method_words, outcome_words, problem_words } from "./words.js";
+
+function vector(values) {
+  return values ? `(${values.map((value) => number(value)).join(", ")})` : null;
+}
+
+/** [name, value] pairs that are known. */
+function facts_of(summary) {
+  const { contact, energy, certificate } = summary;
+  const at = contact?.max_pressure_at?.x;
+  return [
+    ["Problem", problem_words(summary)],
+    ["Method", method_words(summary)],
+    ["Asked for", summary.requested_error === 0 ? "rounding level" : `≤ ${percent_up(summary.requested_error)}`],
+    ["Residual, relative", certificate ? number(certificate.relative_residual.total) : null],
+    ["In contact", contact ? `${count(contact.active)} of ${count(contact.candidates)} candidates` : null],
+    ["Contact force", contact ? vector(contact.force) || number(contact.reaction_sum, 6) : null],
+    ["Largest pressure", Number.isFinite(contact?.max_pressure) ? `${number(contact.max_pressure, 4)}${at ? ` at ${vector(at)}` : ""}` : null],
+    ["Contact area", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
+    ["Largest penetration", contact ? number(contact.max_penetration) : null],
+    ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number(energy.dual, 6)})` : null],
+    ["Imbalance of all forces", summary.resultants ? number(summary.resultants.imbalance) : null],
+    ["Expected", summary.cost?.predicted ? `${seconds(summary.cost.predicted.seconds)} after the assembly; it took ${seconds(summary.cost.actual?.seconds)}` : null],
+  ].filter(([, value]) => value);
+}
+
+function warnings_of(summary) {
+  if (!summary.warnings?.length) return null;
+  return h("ul", { class: "warnings", "aria-label": "Warnings" }, summary.warnings.map((one) =>
+    h("li", null, h("strong", { class: "warn" }, one.code.replace(/_/g, " ")), ` ${one.message}`)));
+}
+
+function limits_of(one) {
+  const words = [];
+  if (one.min !== undefined) words.push(`at least ${number(one.min, 6)}`);
+  if (one.max !== undefined) words.push(`at most ${number(one.max, 6)}`);
+  if (one.near !== undefined) words.push(`near ${number(one.near, 6)}`);
+  return words.join(", ");
+}
+
+const TONES = { pass: "good", fail: "bad" };
+
+function assertions_of(summary) {
+  if (!summary.assertions?.length) return null;
+  return h("table", { class: "assertions" }, h("caption", null, "Assertions"),
+    h("thead", null, h("tr", null, ["Result", "Quantity", "Value", "Wanted"].map((name) => h("th", { scope: "col" }, name)))),
+    h("tbody", null, summary.assertions.map((one) => h("tr", null,
+      h("td", { class: TONES[one.result] || "warn" }, one.result), h("td", null, one.name || one.quantity, one.case ? h("span", { class: "muted" }, ` in ${one.case}`) : null),
+      h("td", null, number(one.value, 6), one.error > 0 ? ` ± ${number(one.error, 2)}` : ""),
+      h("td", null, limits_of(one), one.reason ? h("div", { class: "muted" }, one.reason) : null)))));
+}
+
+function suggestion_of(summary) {
+  const text = summary.suggestion?.text;
+  return text ? h("p", { class: "suggestion" }, h("strong", null, "Cheaper: "), text) : null;
+}
+
+/** The card of a summary. */
+export function verdict_card(summary) {
+  const outcome = outcome_words(summary), mesh = mesh_words(summary);
+  return h("div", { class: `verdict tone-${outcome.tone}` },
+    h("h2", null, h("span", { class: outcome.tone }, outcome.title)),
+    h("p", { class: "certificate", id: "certificate" }, certificate_words(summary)),
+    mesh ? h("p", null, mesh) : null,
+    h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
+    suggestion_of(summary), warnings_of(summary), assertions_of(summary),
+    h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));
+}
+
+/** The card of a job that has no answer. */
+export function failure_card(job) {
+  const error = job.error || {};
+  return h("div", { class: "verdict tone-bad" }, h("h2", { class: "bad" }, error.title || "Failed"),
+    h("p", null, error.detail || ""), error.pointer ? h("p", { class: "muted" }, "At ", h("code", null, error.pointer), error.line ? `, line ${error.line}` : "") : null,
+    h("p", { class: "muted" }, "Code ", h("code", null, error.code || "unknown")));
+}
