@@ -58,7 +58,7 @@ export function listen(canvas, view, { changed, home, over }, signal) {
   });
 }
 
-function drag(view(), from, to, moves) {
+function drag(view, from, to, moves) {
   const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
   if (view.dim === 3 && !moves) view.rotate(DRAG_TURN * dx, DRAG_TURN * dy);
   else view.pan(dx, dy);
