@@ -76,4 +76,49 @@ typedef struct {
 uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
                               const uz_picture *how, const uz_hooks *hooks, uz_error *err);
 
+/* ----------------------------------------------------------------- surface */
+
+/* Numbers in single precision: value = unit * x. The unit is a power of two that brings the largest to [0.5, 1], so
+ * that whatever the user's units are, nothing overflows; 1 where all are zero. */
+typedef struct {
+    float *x; /* NULL: not asked for */
+    double unit;
+    double low, high; /* of the values; 0 where there are none */
+} uz_drawn;
+
+/* What a viewer draws of an answer: the elements of a plane, the outer faces of a solid, as triangles between mesh
+ * nodes (elements with middle nodes are divided at them); vertices are nodes in ascending order. Places are origin +
+ * unit * position, displacements unit * displacement. */
+typedef struct {
+    int dim;
+    int64_t n_nodes, n_elements; /* of the mesh */
+    int64_t n_vertices, n_triangles, n_lines, n_outline, n_rows;
+    double origin[3], unit;
+    float low[3], high[3];   /* of position */
+    float least[3], most[3]; /* of displacement */
+    float *position;         /* n_vertices x 3; z = 0 in the plane */
+    float *displacement;     /* n_vertices x 3 */
+    double largest;          /* length of the largest displacement of a node that is drawn */
+    double factor;           /* of displacements: one that lets them show */
+    float *node;             /* n_vertices: number of the node, exact below 2^24. NULL: that of the vertex */
+    uz_drawn von_mises;      /* n_vertices */
+    unsigned *triangle;      /* n_triangles x 3, counter-clockwise from outside */
+    unsigned *line;          /* n_lines x 2: edges of elements, each once */
+    unsigned *outline;       /* n_outline x 2: the border of a plane, the sharp edges of a solid */
+    unsigned *row_vertex;    /* n_rows: contact rows whose nodes are drawn */
+    unsigned *row_contact;   /* n_rows: which contact of the scene */
+    float *row_normal;       /* n_rows x 3: of the obstacle, towards the body */
+    uz_drawn reaction, gap;  /* n_rows */
+    uz_drawn pressure;       /* n_rows; -1 * unit where the contact has no area */
+    uz_drawn arc;            /* n_rows; plane models: place along the sides of the contact's group, undeformed */
+    unsigned *row_part;      /* n_rows; plane models: which connected piece of those sides */
+} uz_surface;
+
+/* which: UZ_FIELD_VON_MISES and _PRESSURE, or 0; all else is always there. most_bytes (0: no limit) bounds what the
+ * arrays take. Errors: those of uz_fields_compute; _LIMIT, which says how much they would take; _NOT_FINITE. The caller
+ * clears *out. */
+uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                             size_t most_bytes, const uz_hooks *hooks, uz_error *err);
+void uz_surface_clear(uz_surface *surface);
+
 #endif

@@ -187,6 +187,14 @@ void codec_results_add(codec_results *all, const codec_result *one);         /* 
 char *codec_results_end(codec_results *all, const codec_result *shared, size_t *len);
 void codec_results_drop(codec_results *all); /* frees without a text; NULL is fine */
 
+/* The surface of a deformed body as a binary glTF file. NULL: no memory. */
+typedef struct {
+    const uz_surface *surface;
+    const uz_scene *scene;
+    const char *job_id, *case_name; /* case_name NULL: none */
+} codec_surface;
+char *codec_encode_surface(const codec_surface *surface, size_t *len);
+
 /* The history's columns in order, and rows of doubles in that order. */
 #define CODEC_HISTORY_COLUMNS 12
 extern const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS];

@@ -175,6 +175,8 @@ static void reply_failure(const field_reader *reader, uz_status status, const uz
     } else if (status == UZ_ERR_CANCELLED) {
         reply->retry_after_s = 5;
         reply_refuse(reply, 503, "draining", "The server is shutting down", "the reply was not computed to its end");
+    } else if (status == UZ_ERR_LIMIT && !err->where[0]) {
+        reply_refuse(reply, 413, "result_too_large", "The result is too large for one reply", "%s", err->message);
     } else {
         codec_problem_from_error(&problem, err, reader->request.problem.kind);
         reply_problem(reply, &problem);
@@ -261,6 +263,36 @@ bool fields_picture(char **text, size_t *len, const field_reader *reader, int64_
     const bool done = compute(&d, run_picture, reader, number, 0, reply);
     *text = d.file.text;
     *len = d.file.len;
+    return done;
+}
+
+typedef struct {
+    file_text file;
+    const char *job_id, *case_name;
+} surface_file;
+
+static uz_status run_surface(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                             const uz_hooks *hooks, uz_error *err)
+{
+    surface_file *s = out;
+    uz_surface surface;
+    uz_status status = uz_surface_compute(&surface, scene, answer, which, FIELDS_MOST_SURFACE, hooks, err);
+    if (status == UZ_OK) {
+        const codec_surface what = {&surface, scene, s->job_id, s->case_name};
+        s->file.text = codec_encode_surface(&what, &s->file.len);
+        status = s->file.text ? UZ_OK : UZ_ERR_MEMORY;
+    }
+    uz_surface_clear(&surface);
+    return status;
+}
+
+bool fields_surface(char **file, size_t *len, const field_reader *reader, int64_t number, unsigned which,
+                    const char *case_name, http_reply *reply)
+{
+    surface_file s = {.job_id = reader->j->id, .case_name = case_name};
+    const bool done = compute(&s, run_surface, reader, number, which, reply);
+    *file = s.file.text;
+    *len = s.file.len;
     return done;
 }
 

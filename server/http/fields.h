@@ -31,6 +31,11 @@ bool fields_vtu(char **text, size_t *len, const field_reader *reader, int64_t nu
 bool fields_picture(char **text, size_t *len, const field_reader *reader, int64_t number, const uz_picture *how,
                     http_reply *reply);
 
+/* A glTF file of what a viewer draws; case_name NULL: none. 413 where it is larger than FIELDS_MOST_SURFACE. */
+#define FIELDS_MOST_SURFACE ((size_t)256 << 20) /* openapi.json says so */
+bool fields_surface(char **file, size_t *len, const field_reader *reader, int64_t number, unsigned which,
+                    const char *case_name, http_reply *reply);
+
 /* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits). False with a 400
  * that has the list. */
 typedef struct {

@@ -1,4 +1,4 @@
-/* files.c: an answer as a file for other programs and for people: /v1/jobs/{id}/result.vtu and deformed.svg. */
+/* files.c: an answer as a file for other programs and for people: /v1/jobs/{id}/result.vtu, deformed.svg, surface. */
 #include "codec/codec.h"
 #include "http/jobs.h"
 #include "http/problem.h"
@@ -21,9 +21,9 @@ static void refuse_all_cases(const store_case *cases, size_t count, http_reply *
 
 /* What is asked for. */
 typedef struct {
-    unsigned which; /* vtu: uz_field bits */
-    bool picture;   /* deformed.svg, drawn like `how` */
-    uz_picture how;
+    enum { FILE_VTU, FILE_PICTURE, FILE_SURFACE } kind;
+    unsigned which; /* vtu, surface: uz_field bits */
+    uz_picture how; /* picture; its title is the name of the case for all */
 } file_wanted;
 
 static void write_file(api *context, const http_request *rq, const job *j, int64_t number, const file_wanted *wanted,
@@ -33,10 +33,13 @@ static void write_file(api *context, const http_request *rq, const job *j, int64
     char *text = NULL;
     size_t len = 0;
     if (fields_open(&reader, context, rq, j, reply)) {
-        if (wanted->picture && fields_picture(&text, &len, &reader, number, &wanted->how, reply))
+        if (wanted->kind == FILE_PICTURE && fields_picture(&text, &len, &reader, number, &wanted->how, reply))
             reply_text(reply, 200, "image/svg+xml", text, len);
-        else if (!wanted->picture && fields_vtu(&text, &len, &reader, number, wanted->which, reply))
+        else if (wanted->kind == FILE_VTU && fields_vtu(&text, &len, &reader, number, wanted->which, reply))
             reply_text(reply, 200, "application/xml", text, len);
+        else if (wanted->kind == FILE_SURFACE &&
+                 fields_surface(&text, &len, &reader, number, wanted->which, wanted->how.title, reply))
+            reply_text(reply, 200, "model/gltf-binary", text, len);
     }
     fields_close(&reader);
 }
@@ -75,6 +78,18 @@ void results_get_vtu(api *context, http_request *rq, http_reply *reply)
         find_and_reply(context, rq, &(file_wanted){.which = fields.which}, reply);
 }
 
+static const unsigned IN_SURFACE = UZ_FIELD_DISPLACEMENTS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE;
+
+void results_get_surface(api *context, http_request *rq, http_reply *reply)
+{
+    field_list fields;
+    problem_details problem;
+    if (!results_fields(rq, &fields, IN_SURFACE, IN_SURFACE, &problem))
+        reply_problem(reply, &problem);
+    else
+        find_and_reply(context, rq, &(file_wanted){.kind = FILE_SURFACE, .which = fields.which}, reply);
+}
+
 /* The colour: "displacements" or "von_mises". */
 static bool read_colour(const http_request *rq, uz_field *out, problem_details *problem)
 {
@@ -104,7 +119,7 @@ void results_get_picture(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem;
     int64_t width = 900;
-    file_wanted wanted = {.picture = true};
+    file_wanted wanted = {.kind = FILE_PICTURE};
     if (!read_colour(rq, &wanted.how.colour, &problem) || !read_factor(rq, &wanted.how.factor, &problem) ||
         !request_integer(rq, "width", 200, 4000, &width, &problem)) {
         reply_problem(reply, &problem);

@@ -164,9 +164,12 @@ static bool apply_range(const http_request *rq, http_reply *reply)
 
 /* ---- gzip */
 
-static bool is_text(const http_reply *reply)
+/* Text, and the arrays of a surface, whose numbers repeat their leading bytes. */
+static bool shrinks(const http_reply *reply)
 {
-    return reply->body && reply->type && (strstr(reply->type, "json") || strncmp(reply->type, "text/", 5) == 0);
+    return reply->body && reply->type &&
+           (strstr(reply->type, "json") || strncmp(reply->type, "text/", 5) == 0 ||
+            strncmp(reply->type, "model/", 6) == 0);
 }
 
 /* NULL: no memory. */
@@ -206,7 +209,7 @@ static void name_gzip(http_reply *reply)
 static void apply_gzip(const http_request *rq, http_reply *reply)
 {
     size_t len;
-    if (!is_text(reply) || reply->len < GZIP_LEAST)
+    if (!shrinks(reply) || reply->len < GZIP_LEAST)
         return;
     reply->varies_by_coding = true;
     if (!request_takes_gzip(rq))

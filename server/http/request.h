@@ -112,6 +112,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply);
 void verify_submit(api *context, http_request *rq, http_reply *reply);
 void results_get(api *context, http_request *rq, http_reply *reply);
 void results_get_vtu(api *context, http_request *rq, http_reply *reply);
+void results_get_surface(api *context, http_request *rq, http_reply *reply);
 void results_get_picture(api *context, http_request *rq, http_reply *reply);
 void uploads_create(api *context, http_request *rq, http_reply *reply);
 void uploads_get(api *context, http_request *rq, http_reply *reply);

@@ -21,6 +21,7 @@ static const route ROUTES[] = {
     {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine, false},
     {"GET", "/v1/jobs/{id}/result", RESULT, results_get, false},
     {"GET", "/v1/jobs/{id}/result.vtu", FILE_OF, results_get_vtu, false},
+    {"GET", "/v1/jobs/{id}/surface", FILE_OF, results_get_surface, false},
     {"GET", "/v1/jobs/{id}/deformed.svg", PICTURE, results_get_picture, false},
     {"GET", "/v1/jobs/{id}/events", NONE, events_get, false},
     {"GET", "/v1/events", NONE, events_get_all, false},

@@ -24,6 +24,9 @@ typedef struct {
 /* axes, scale, offset, height and extent from the mesh, displacements and width. UZ_ERR_NOT_FINITE. */
 uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err);
 
+/* How many times as large displacements (n_nodes x dim) are drawn to be seen: at least 1; it reads well. */
+double uz_show_factor(const uz_mesh *mesh, const double *u);
+
 /* Where a point (dim coordinates) is. */
 uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x);
 /* Where a node is; its place is that before the deformation plus `factor` times the displacement. */

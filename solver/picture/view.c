@@ -61,12 +61,11 @@ static double round_factor(double x)
     return power * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
 }
 
-static double choose_factor(const uz_scenery *scenery)
+double uz_show_factor(const uz_mesh *mesh, const double *u)
 {
-    const uz_mesh *mesh = &scenery->model->mesh;
     double largest = 0;
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
-        largest = fmax(largest, fabs(scenery->answer->u[i]));
+        largest = fmax(largest, fabs(u[i]));
     const double ideal = 0.06 * mesh->extent / largest;
     return largest > 0 && isfinite(ideal) ? fmax(round_factor(ideal), 1) : 1;
 }
@@ -77,7 +76,7 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
     choose_axes(scenery);
     scenery->extent = scenery->model->mesh.extent;
     if (!(scenery->factor > 0))
-        scenery->factor = choose_factor(scenery);
+        scenery->factor = uz_show_factor(&scenery->model->mesh, scenery->answer->u);
     scenery->scale = 1;
     scenery->offset[0] = scenery->offset[1] = 0;
     extend_box(low, high, scenery, 0);

@@ -1,0 +1,424 @@
+/* encode_surface.c: the surface of a deformed body as a binary glTF 2.0 file (Khronos Group, "glTF 2.0 Specification",
+ * sections 3 and 4: the GLB container; ISO/IEC 12113:2022).
+ *
+ * The body is a mesh with three primitives on one set of vertices: triangles, the edges of the elements, and the nodes
+ * of contact rows. The displacement is a morph target, so that any viewer shows the body deformed `weight` times. A
+ * second mesh is the undeformed outline. What glTF has no words for stands in `extras` of the file, with numbers of
+ * accessors: openapi.json says what each of them is. */
+#include "codec/codec.h"
+#include "codec/room.h"
+#include "codec/text.h"
+
+#include <string.h>
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "glTF is little-endian");
+_Static_assert(sizeof(unsigned) == 4 && sizeof(float) == 4, "numbers are written as they are in memory");
+
+enum { FLOAT = 5126, UNSIGNED = 5125, ARRAYS = 20, NONE = -1 };
+enum { POINTS = 0, LINES = 1, TRIANGLES = 4 };    /* modes of a primitive */
+enum { VERTEX_DATA = 34962, INDEX_DATA = 34963 }; /* targets of a buffer view */
+enum { HEAD = 12, CHUNK_HEAD = 8, JSON_CHUNK = 0x4E4F534A, BINARY_CHUNK = 0x004E4942, MAGIC = 0x46546C67 };
+
+/* One array of the binary chunk: accessor and buffer view have its place in the list as number. */
+typedef struct {
+    const void *data;
+    size_t count, components, offset; /* 4 bytes a component */
+    int type, target;                 /* target 0: neither vertices nor indices */
+    const float *low, *high;          /* of each component; NULL: not told */
+} array;
+
+typedef struct {
+    const codec_surface *in;
+    text json;
+    array arrays[ARRAYS];
+    int n_arrays;
+    size_t bytes; /* of all arrays */
+} surface_writer;
+
+/* Returns the number of its accessor, NONE where there is nothing in it: glTF has no empty ones. */
+static int add_array(surface_writer *w, int type, int target, const void *data, int64_t count, size_t components)
+{
+    if (!data || count < 1)
+        return NONE;
+    w->arrays[w->n_arrays] = (array){.data = data,
+                                     .count = (size_t)count,
+                                     .components = components,
+                                     .offset = w->bytes,
+                                     .type = type,
+                                     .target = target};
+    w->bytes += 4 * components * (size_t)count;
+    return w->n_arrays++;
+}
+
+static int add_floats(surface_writer *w, const float *data, int64_t count)
+{
+    return add_array(w, FLOAT, 0, data, count, 1);
+}
+
+static int add_indices(surface_writer *w, const unsigned *data, int64_t count)
+{
+    return add_array(w, UNSIGNED, INDEX_DATA, data, count, 1);
+}
+
+/* -------------------------------------------------------------------- JSON */
+
+static void put_integer(text *t, const char *key, int64_t value)
+{
+    text_key(t, key);
+    text_integer(t, value);
+}
+
+static void put_number(text *t, const char *key, double value)
+{
+    text_key(t, key);
+    text_number(t, value);
+}
+
+static void put_string(text *t, const char *key, const char *value)
+{
+    text_key(t, key);
+    text_string(t, value);
+}
+
+static void put_vector(text *t, const char *key, const double *x, int64_t n)
+{
+    text_key(t, key);
+    text_numbers(t, x, n);
+}
+
+static void put_floats(text *t, const char *key, const float *x, size_t n)
+{
+    double wide[3];
+    for (size_t i = 0; i < n && i < 3; i++)
+        wide[i] = (double)x[i];
+    put_vector(t, key, wide, (int64_t)n);
+}
+
+static void put_accessors(surface_writer *w)
+{
+    text *t = &w->json;
+    text_key(t, "accessors");
+    text_open(t, '[');
+    for (int i = 0; i < w->n_arrays; i++) {
+        const array *a = &w->arrays[i];
+        text_open(t, '{');
+        put_integer(t, "bufferView", i);
+        put_integer(t, "componentType", a->type);
+        put_integer(t, "count", (int64_t)a->count);
+        put_string(t, "type", a->components == 3 ? "VEC3" : "SCALAR");
+        if (a->low) {
+            put_floats(t, "min", a->low, a->components);
+            put_floats(t, "max", a->high, a->components);
+        }
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
+static void put_views(surface_writer *w)
+{
+    text *t = &w->json;
+    text_key(t, "bufferViews");
+    text_open(t, '[');
+    for (int i = 0; i < w->n_arrays; i++) {
+        const array *a = &w->arrays[i];
+        text_open(t, '{');
+        put_integer(t, "buffer", 0);
+        put_integer(t, "byteOffset", (int64_t)a->offset);
+        put_integer(t, "byteLength", (int64_t)(4 * a->count * a->components));
+        if (a->target)
+            put_integer(t, "target", a->target);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+    text_key(t, "buffers");
+    text_open(t, '[');
+    text_open(t, '{');
+    put_integer(t, "byteLength", (int64_t)w->bytes);
+    text_close(t, '}');
+    text_close(t, ']');
+}
+
+static void put_accessor(text *t, const char *key, int accessor)
+{
+    if (accessor != NONE)
+        put_integer(t, key, accessor);
+}
+
+/* What the primitives share. */
+typedef struct {
+    int position, displacement, node, von_mises;
+} vertices;
+
+static void put_primitive(text *t, int mode, int indices, const vertices *v, bool coloured, bool moves)
+{
+    if (indices == NONE)
+        return;
+    text_open(t, '{');
+    text_key(t, "attributes");
+    text_open(t, '{');
+    put_integer(t, "POSITION", v->position);
+    put_accessor(t, "_NODE", coloured ? v->node : NONE);
+    put_accessor(t, "_VON_MISES", coloured ? v->von_mises : NONE);
+    text_close(t, '}');
+    put_integer(t, "indices", indices);
+    put_integer(t, "mode", mode);
+    if (moves) {
+        text_key(t, "targets");
+        text_open(t, '[');
+        text_open(t, '{');
+        put_integer(t, "POSITION", v->displacement);
+        text_close(t, '}');
+        text_close(t, ']');
+    }
+    text_close(t, '}');
+}
+
+static void put_node(text *t, const char *name, int mesh, const uz_surface *s)
+{
+    text_open(t, '{');
+    put_string(t, "name", name);
+    put_integer(t, "mesh", mesh);
+    put_vector(t, "translation", s->origin, 3);
+    put_vector(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
+    text_close(t, '}');
+}
+
+static void put_nodes(text *t, const uz_surface *s, bool outline)
+{
+    text_key(t, "scene");
+    text_integer(t, 0);
+    text_key(t, "scenes");
+    text_put(t, outline ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
+    text_key(t, "nodes");
+    text_open(t, '[');
+    put_node(t, "body", 0, s);
+    if (outline)
+        put_node(t, "undeformed outline", 1, s);
+    text_close(t, ']');
+}
+
+static void put_meshes(surface_writer *w, const vertices *v, int row_vertex)
+{
+    const uz_surface *s = w->in->surface;
+    text *t = &w->json;
+    const int triangles = add_indices(w, s->triangle, 3 * s->n_triangles);
+    const int lines = add_indices(w, s->line, 2 * s->n_lines);
+    const int outline = add_indices(w, s->outline, 2 * s->n_outline);
+    put_nodes(t, s, outline != NONE);
+    text_key(t, "meshes");
+    text_open(t, '[');
+    text_open(t, '{');
+    text_key(t, "primitives");
+    text_open(t, '[');
+    put_primitive(t, TRIANGLES, triangles, v, true, true);
+    put_primitive(t, LINES, lines, v, false, true);
+    put_primitive(t, POINTS, row_vertex, v, false, true);
+    text_close(t, ']');
+    put_vector(t, "weights", &s->factor, 1);
+    text_close(t, '}');
+    if (outline != NONE) {
+        text_open(t, '{');
+        text_key(t, "primitives");
+        text_open(t, '[');
+        put_primitive(t, LINES, outline, v, false, false);
+        text_close(t, ']');
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
+/* ------------------------------------------------------------------ extras */
+
+static void put_drawn(text *t, const char *key, const uz_drawn *drawn, int accessor)
+{
+    if (!drawn->x)
+        return;
+    text_key(t, key);
+    text_open(t, '{');
+    put_accessor(t, "accessor", accessor);
+    put_number(t, "unit", drawn->unit);
+    put_number(t, "low", drawn->low);
+    put_number(t, "high", drawn->high);
+    text_close(t, '}');
+}
+
+static void put_contact(surface_writer *w, int row_vertex)
+{
+    const uz_surface *s = w->in->surface;
+    const int64_t n = s->n_rows;
+    text *t = &w->json;
+    text_key(t, "contact");
+    text_open(t, '{');
+    put_integer(t, "rows", n);
+    put_accessor(t, "vertex", row_vertex);
+    put_accessor(t, "contact", add_array(w, UNSIGNED, 0, s->row_contact, n, 1));
+    put_accessor(t, "normal", add_array(w, FLOAT, 0, s->row_normal, n, 3));
+    put_drawn(t, "reaction", &s->reaction, add_floats(w, s->reaction.x, n));
+    put_drawn(t, "gap", &s->gap, add_floats(w, s->gap.x, n));
+    put_drawn(t, "pressure", &s->pressure, add_floats(w, s->pressure.x, n));
+    put_drawn(t, "arc", &s->arc, add_floats(w, s->arc.x, n));
+    put_accessor(t, "part", add_array(w, UNSIGNED, 0, s->row_part, n, 1));
+    text_close(t, '}');
+}
+
+static void put_round(text *t, const uz_contact *c, int dim)
+{
+    text_key(t, c->kind == UZ_OBSTACLE_CYLINDER ? "cylinder" : dim == 2 ? "circle" : "sphere");
+    text_open(t, '{');
+    put_vector(t, c->kind == UZ_OBSTACLE_CYLINDER ? "point" : "center", c->point, dim);
+    if (c->kind == UZ_OBSTACLE_CYLINDER)
+        put_vector(t, "axis", c->normal, dim);
+    put_number(t, "radius", c->radius);
+    text_key(t, "inside");
+    text_bool(t, c->inside);
+    text_close(t, '}');
+}
+
+static void put_polyline(text *t, const uz_contact *c)
+{
+    text_key(t, "polyline");
+    text_open(t, '{');
+    text_key(t, "points");
+    text_open(t, '[');
+    for (int64_t i = 0; i < c->n_x; i++)
+        text_numbers(t, (const double[]){c->x[i], c->y[i]}, 2);
+    text_close(t, ']');
+    text_close(t, '}');
+}
+
+static void put_height(text *t, const uz_contact *c)
+{
+    text_key(t, "height");
+    text_open(t, '{');
+    put_vector(t, "x", c->x, c->n_x);
+    if (c->n_y > 0) {
+        put_vector(t, "y", c->y, c->n_y);
+        text_key(t, "z");
+        text_open(t, '[');
+        for (int64_t j = 0; j < c->n_y; j++)
+            text_numbers(t, c->z + j * c->n_x, c->n_x);
+        text_close(t, ']');
+    } else {
+        put_vector(t, "z", c->z, c->n_x);
+    }
+    text_close(t, '}');
+}
+
+/* An obstacle in the words of a request. */
+static void put_obstacle(text *t, const uz_contact *c, int dim)
+{
+    text_open(t, '{');
+    put_string(t, "on", c->on);
+    if (c->kind == UZ_OBSTACLE_BODY) {
+        put_string(t, "with", c->with);
+        text_close(t, '}');
+        return;
+    }
+    text_key(t, "obstacle");
+    text_open(t, '{');
+    if (c->kind == UZ_OBSTACLE_PLANE) {
+        text_key(t, "plane");
+        text_open(t, '{');
+        put_vector(t, "point", c->point, dim);
+        put_vector(t, "normal", c->normal, dim);
+        text_close(t, '}');
+    } else if (c->kind == UZ_OBSTACLE_POLYLINE) {
+        put_polyline(t, c);
+    } else if (c->kind == UZ_OBSTACLE_HEIGHT) {
+        put_height(t, c);
+    } else {
+        put_round(t, c, dim);
+    }
+    text_close(t, '}');
+    text_close(t, '}');
+}
+
+static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
+{
+    const uz_surface *s = w->in->surface;
+    const uz_scene *scene = w->in->scene;
+    text *t = &w->json;
+    text_key(t, "extras");
+    text_open(t, '{');
+    put_string(t, "job", w->in->job_id);
+    put_string(t, "case", w->in->case_name);
+    put_integer(t, "dim", s->dim);
+    text_key(t, "axisymmetric");
+    text_bool(t, scene->model == UZ_AXISYMMETRIC);
+    put_integer(t, "nodes", s->n_nodes);
+    put_integer(t, "elements", s->n_elements);
+    put_vector(t, "origin", s->origin, 3);
+    put_number(t, "unit", s->unit);
+    put_number(t, "factor", s->factor);
+    put_number(t, "largest_displacement", s->largest);
+    put_integer(t, "position", v->position);
+    put_integer(t, "displacement", v->displacement);
+    put_drawn(t, "von_mises", &s->von_mises, v->von_mises);
+    put_contact(w, row_vertex);
+    text_key(t, "contacts");
+    text_open(t, '[');
+    for (int64_t k = 0; k < scene->n_contacts; k++)
+        put_obstacle(t, &scene->contacts[k], s->dim);
+    text_close(t, ']');
+    text_close(t, '}');
+}
+
+static void put_json(surface_writer *w)
+{
+    const uz_surface *s = w->in->surface;
+    text *t = &w->json;
+    vertices v;
+    v.position = add_array(w, FLOAT, VERTEX_DATA, s->position, s->n_vertices, 3);
+    v.displacement = add_array(w, FLOAT, VERTEX_DATA, s->displacement, s->n_vertices, 3);
+    v.node = add_array(w, FLOAT, VERTEX_DATA, s->node, s->n_vertices, 1);
+    v.von_mises = add_array(w, FLOAT, VERTEX_DATA, s->von_mises.x, s->n_vertices, 1);
+    w->arrays[v.position].low = s->low;
+    w->arrays[v.position].high = s->high;
+    w->arrays[v.displacement].low = s->least;
+    w->arrays[v.displacement].high = s->most;
+    const int row_vertex = add_indices(w, s->row_vertex, s->n_rows);
+    text_open(t, '{');
+    text_key(t, "asset");
+    text_put(t, "{\"version\":\"2.0\",\"generator\":\"uzawad\"}");
+    put_meshes(w, &v, row_vertex);
+    put_extras(w, &v, row_vertex);
+    put_accessors(w);
+    put_views(w);
+    text_close(t, '}');
+    while (w->json.len % 4 != 0 && !w->json.failed)
+        text_put(t, " ");
+}
+
+/* --------------------------------------------------------------- container */
+
+static char *put_words(char *at, const unsigned *word, size_t count)
+{
+    memcpy(at, word, 4 * count);
+    return at + 4 * count;
+}
+
+static char *assemble(const surface_writer *w, size_t *len)
+{
+    const size_t total = HEAD + CHUNK_HEAD + w->json.len + CHUNK_HEAD + w->bytes;
+    char *file = total <= UINT32_MAX ? room_for(total, 1) : NULL, *at = file;
+    if (!file)
+        return NULL;
+    at = put_words(at, (const unsigned[]){MAGIC, 2, (unsigned)total, (unsigned)w->json.len, JSON_CHUNK}, 5);
+    memcpy(at, w->json.data, w->json.len);
+    at = put_words(at + w->json.len, (const unsigned[]){(unsigned)w->bytes, BINARY_CHUNK}, 2);
+    for (int i = 0; i < w->n_arrays; i++)
+        memcpy(at + w->arrays[i].offset, w->arrays[i].data, 4 * w->arrays[i].count * w->arrays[i].components);
+    *len = total;
+    return file;
+}
+
+char *codec_encode_surface(const codec_surface *surface, size_t *len)
+{
+    surface_writer w = {.in = surface};
+    *len = 0;
+    put_json(&w);
+    char *file = w.json.failed ? NULL : assemble(&w, len);
+    free(w.json.data);
+    return file;
+}

@@ -1,0 +1,356 @@
+/* arrays.c: the surface of a deformed body as arrays for a viewer: uz_surface_compute. */
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "picture/arc.h"
+#include "picture/scenery.h"
+#include "picture/skin.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Displacements of so many times the body's size are none of an elastic body, and no float's. */
+static const double FAR = 1e30;
+
+/* What the arrays are made from. */
+typedef struct {
+    const uz_scene *scene;
+    const uz_body_model *model;
+    const uz_field_source *answer;
+    uz_fields fields;
+    uz_skin skin;
+    uz_skin_edges edges;
+    int64_t *vertex_of; /* n_nodes: -1 where a node is not drawn */
+    int64_t *drawn;     /* n_rows: rows whose nodes are */
+    double *arc;        /* m; plane models */
+    unsigned *part;     /* m; plane models */
+} surface_work;
+
+static uz_status fail_memory(uz_error *err, const uz_surface *s)
+{
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the surface of %lld elements", (long long)s->n_elements);
+}
+
+/* The least power of two that is not below a number >= 0; 1 for zero. */
+static double unit_of(double largest)
+{
+    int exponent = 0;
+    if (!(largest > 0))
+        return 1;
+    return frexp(largest, &exponent) == 0.5 ? largest : ldexp(1, exponent < 1024 ? exponent : 1023);
+}
+
+/* --------------------------------------------------------------- triangles */
+
+static void count_triangles(uz_surface *s, const uz_skin *skin)
+{
+    const int(*triangle)[3];
+    for (int64_t i = 0; i < skin->n_cells; i++)
+        s->n_triangles += uz_cell_triangles(&triangle, (int)(skin->first[i + 1] - skin->first[i]));
+}
+
+/* Numbers the nodes that are drawn. */
+static uz_status number_vertices(uz_surface *s, surface_work *w, uz_error *err)
+{
+    w->vertex_of = uz_alloc_zero(s->n_nodes, sizeof *w->vertex_of);
+    if (!w->vertex_of)
+        return fail_memory(err, s);
+    for (int64_t i = 0; i < w->skin.first[w->skin.n_cells]; i++)
+        w->vertex_of[w->skin.point[i]] = 1;
+    for (int64_t a = 0; a < s->n_nodes; a++)
+        w->vertex_of[a] = w->vertex_of[a] ? s->n_vertices++ : -1;
+    return UZ_OK;
+}
+
+static uz_status fill_triangles(uz_surface *s, const surface_work *w, uz_error *err)
+{
+    s->triangle = uz_alloc(3 * s->n_triangles, sizeof *s->triangle);
+    if (!s->triangle)
+        return fail_memory(err, s);
+    for (int64_t i = 0, n = 0; i < w->skin.n_cells; i++) {
+        const int(*triangle)[3];
+        const int64_t *point = w->skin.point + w->skin.first[i];
+        const int count = uz_cell_triangles(&triangle, (int)(w->skin.first[i + 1] - w->skin.first[i]));
+        for (int k = 0; k < 3 * count; k++)
+            s->triangle[n++] = (unsigned)w->vertex_of[point[triangle[k / 3][k % 3]]];
+    }
+    return UZ_OK;
+}
+
+static unsigned *as_vertices(const surface_work *w, const int64_t *node, int64_t count)
+{
+    unsigned *out = uz_alloc(count, sizeof *out);
+    for (int64_t i = 0; out && i < count; i++)
+        out[i] = (unsigned)w->vertex_of[node[i]];
+    return out;
+}
+
+static uz_status fill_edges(uz_surface *s, const surface_work *w, uz_error *err)
+{
+    s->n_lines = w->edges.n_lines;
+    s->n_outline = w->edges.n_outline;
+    s->line = as_vertices(w, w->edges.line, 2 * s->n_lines);
+    s->outline = as_vertices(w, w->edges.outline, 2 * s->n_outline);
+    return s->line && s->outline ? UZ_OK : fail_memory(err, s);
+}
+
+/* ---------------------------------------------------------------- vertices */
+
+/* The middle of the body and the size of what is drawn. */
+static void choose_unit(uz_surface *s, const uz_mesh *mesh)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
+        low[i % mesh->dim] = fmin(low[i % mesh->dim], mesh->xyz[i]);
+        high[i % mesh->dim] = fmax(high[i % mesh->dim], mesh->xyz[i]);
+    }
+    for (int c = 0; c < mesh->dim; c++)
+        s->origin[c] = 0.5 * low[c] + 0.5 * high[c];
+    s->unit = unit_of(mesh->extent);
+}
+
+static void extend(float *low, float *high, float x)
+{
+    *low = fminf(*low, x);
+    *high = fmaxf(*high, x);
+}
+
+/* The middle of the body is at 0, so that low <= 0 <= high from the beginning. */
+static void put_vertex(uz_surface *s, int64_t vertex, const double *x, const double *u)
+{
+    double length = 0;
+    for (int c = 0; c < s->dim; c++) {
+        const float at = (float)((x[c] - s->origin[c]) / s->unit), by = (float)(u[c] / s->unit);
+        s->position[3 * vertex + c] = at;
+        s->displacement[3 * vertex + c] = by;
+        extend(&s->low[c], &s->high[c], at);
+        extend(&s->least[c], &s->most[c], by);
+        length = hypot(length, u[c]);
+    }
+    s->largest = fmax(s->largest, length);
+}
+
+static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *err)
+{
+    const uz_mesh *mesh = &w->model->mesh;
+    const bool renumbered = s->n_vertices < s->n_nodes;
+    s->position = uz_alloc_zero(3 * s->n_vertices, sizeof *s->position);
+    s->displacement = uz_alloc_zero(3 * s->n_vertices, sizeof *s->displacement);
+    s->node = renumbered ? uz_alloc(s->n_vertices, sizeof *s->node) : NULL;
+    if (!s->position || !s->displacement || (renumbered && !s->node))
+        return fail_memory(err, s);
+    choose_unit(s, mesh);
+    for (int c = 0; c < 3; c++) {
+        s->least[c] = c < s->dim ? INFINITY : 0;
+        s->most[c] = c < s->dim ? -INFINITY : 0;
+    }
+    for (int64_t a = 0; a < s->n_nodes; a++) {
+        const int64_t vertex = w->vertex_of[a];
+        if (vertex < 0)
+            continue;
+        put_vertex(s, vertex, mesh->xyz + a * s->dim, w->answer->u + a * s->dim);
+        if (renumbered)
+            s->node[vertex] = (float)a;
+    }
+    if (!(s->largest / s->unit < FAR))
+        return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacements are %g times the body's size: cannot be drawn",
+                       s->largest / s->unit);
+    s->factor = uz_show_factor(mesh, w->answer->u);
+    return UZ_OK;
+}
+
+/* value[place[i]], or value[i]; NaN becomes -unit. */
+static uz_status draw_values(uz_drawn *out, const uz_surface *s, const double *value, const int64_t *place,
+                             int64_t count, uz_error *err)
+{
+    out->x = uz_alloc(count, sizeof *out->x);
+    if (!out->x)
+        return fail_memory(err, s);
+    double low = INFINITY, high = -INFINITY;
+    for (int64_t i = 0; i < count; i++) {
+        low = fmin(low, value[place ? place[i] : i]); /* of two numbers of which one is NaN: the other */
+        high = fmax(high, value[place ? place[i] : i]);
+    }
+    out->low = isfinite(low) ? low : 0;
+    out->high = isfinite(high) ? high : 0;
+    out->unit = unit_of(fmax(fabs(out->low), fabs(out->high)));
+    for (int64_t i = 0; i < count; i++) {
+        const double x = value[place ? place[i] : i] / out->unit;
+        out->x[i] = isnan(x) ? -1 : (float)x;
+    }
+    return UZ_OK;
+}
+
+static uz_status fill_stress(uz_surface *s, const surface_work *w, uz_error *err)
+{
+    double *stress = w->fields.von_mises;
+    if (!stress)
+        return UZ_OK;
+    for (int64_t a = 0; a < s->n_nodes; a++) /* moves only to the front: vertices are numbered like nodes */
+        if (w->vertex_of[a] >= 0)
+            stress[w->vertex_of[a]] = stress[a];
+    return draw_values(&s->von_mises, s, stress, NULL, s->n_vertices, err);
+}
+
+/* ----------------------------------------------------------------- contact */
+
+/* A group between two elements has nodes within the body: their rows are left out. */
+static uz_status choose_rows(uz_surface *s, surface_work *w, uz_error *err)
+{
+    const uz_mesh_info *info = &w->model->info;
+    w->drawn = uz_alloc(w->model->m, sizeof *w->drawn);
+    if (!w->drawn)
+        return fail_memory(err, s);
+    for (int64_t i = 0; i < w->model->m; i++)
+        if (w->vertex_of[info->contact_node[i]] >= 0)
+            w->drawn[s->n_rows++] = i;
+    return UZ_OK;
+}
+
+static uz_status fill_places(uz_surface *s, const surface_work *w, uz_error *err)
+{
+    const uz_mesh_info *info = &w->model->info;
+    s->row_vertex = uz_alloc(s->n_rows, sizeof *s->row_vertex);
+    s->row_contact = uz_alloc(s->n_rows, sizeof *s->row_contact);
+    s->row_normal = uz_alloc_zero(3 * s->n_rows, sizeof *s->row_normal);
+    if (!s->row_vertex || !s->row_contact || !s->row_normal)
+        return fail_memory(err, s);
+    for (int64_t i = 0; i < s->n_rows; i++) {
+        const int64_t row = w->drawn[i];
+        s->row_vertex[i] = (unsigned)w->vertex_of[info->contact_node[row]];
+        s->row_contact[i] = (unsigned)info->contact_of[row];
+        for (int c = 0; c < s->dim; c++)
+            s->row_normal[3 * i + c] = (float)info->contact_normal[row * s->dim + c];
+    }
+    return UZ_OK;
+}
+
+static uz_status fill_arc(uz_surface *s, surface_work *w, uz_error *err)
+{
+    if (s->dim != 2)
+        return UZ_OK;
+    w->arc = uz_alloc(w->model->m, sizeof *w->arc);
+    w->part = uz_alloc(w->model->m, sizeof *w->part);
+    s->row_part = uz_alloc(s->n_rows, sizeof *s->row_part);
+    if (!w->arc || !w->part || !s->row_part)
+        return fail_memory(err, s);
+    uz_status status = uz_contact_arc(w->arc, w->part, w->model, w->scene, err);
+    for (int64_t i = 0; status == UZ_OK && i < s->n_rows; i++)
+        s->row_part[i] = w->part[w->drawn[i]];
+    return status == UZ_OK ? draw_values(&s->arc, s, w->arc, w->drawn, s->n_rows, err) : status;
+}
+
+static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
+{
+    uz_status status = choose_rows(s, w, err);
+    if (status == UZ_OK)
+        status = fill_places(s, w, err);
+    if (status == UZ_OK)
+        status = draw_values(&s->reaction, s, w->answer->r, w->drawn, s->n_rows, err);
+    if (status == UZ_OK && w->answer->g)
+        status = draw_values(&s->gap, s, w->answer->g, w->drawn, s->n_rows, err);
+    if (status == UZ_OK && w->fields.pressure)
+        status = draw_values(&s->pressure, s, w->fields.pressure, w->drawn, s->n_rows, err);
+    return status == UZ_OK ? fill_arc(s, w, err) : status;
+}
+
+/* ------------------------------------------------------------------- whole */
+
+static uz_status check_size(const uz_surface *s, const surface_work *w, size_t most_bytes, uz_error *err)
+{
+    const double vertices = (double)s->n_vertices, triangles = (double)s->n_triangles;
+    const double bytes = 4 * (8 * vertices + 3 * triangles + 2 * (double)(w->edges.n_lines + w->edges.n_outline) +
+                              10 * (double)w->model->m);
+    if (s->n_vertices >= INT32_MAX || s->n_triangles >= INT32_MAX || (most_bytes > 0 && bytes > (double)most_bytes))
+        return uz_fail(err, UZ_ERR_LIMIT, "", "the surface has %.0f triangles and would take %.0f MB; %.0f MB may be",
+                       triangles, bytes / 1e6, (double)most_bytes / 1e6);
+    return UZ_OK;
+}
+
+static uz_status check_answer(const uz_field_source *answer, const uz_body_model *model, uz_error *err)
+{
+    const int64_t n_u = model->mesh.n_nodes * model->mesh.dim;
+    if (!answer->u || answer->n_u != n_u || answer->m != model->m || (model->m > 0 && !answer->r))
+        return uz_fail(err, UZ_ERR_SIZE, "u", "a surface needs %lld displacements and %lld reactions", (long long)n_u,
+                       (long long)model->m);
+    for (int64_t i = 0; i < n_u; i++)
+        if (!isfinite(answer->u[i]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacement %lld is not finite: there is no answer",
+                           (long long)i);
+    return UZ_OK;
+}
+
+static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body, unsigned which, size_t most_bytes,
+                       const uz_hooks *hooks, uz_error *err)
+{
+    const uz_mesh *mesh = &w->model->mesh;
+    *s = (uz_surface){.dim = mesh->dim, .n_nodes = mesh->n_nodes, .n_elements = mesh->n_elements};
+    uz_status status = uz_skin_build(&w->skin, mesh, hooks, err);
+    if (status == UZ_OK)
+        status = number_vertices(s, w, err);
+    if (status == UZ_OK)
+        status = uz_skin_edges_build(&w->edges, &w->skin, mesh, err);
+    if (status == UZ_OK) {
+        count_triangles(s, &w->skin);
+        status = check_size(s, w, most_bytes, err);
+    }
+    if (status == UZ_OK)
+        status = uz_fields_of_body(&w->fields, body, w->answer, which & (UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE), hooks,
+                                   err);
+    if (status == UZ_OK)
+        status = fill_triangles(s, w, err);
+    if (status == UZ_OK)
+        status = fill_edges(s, w, err);
+    if (status == UZ_OK)
+        status = fill_vertices(s, w, err);
+    if (status == UZ_OK)
+        status = fill_stress(s, w, err);
+    return status == UZ_OK ? fill_rows(s, w, err) : status;
+}
+
+static void clear_work(surface_work *w)
+{
+    uz_fields_clear(&w->fields);
+    uz_skin_clear(&w->skin);
+    uz_skin_edges_clear(&w->edges);
+    free(w->vertex_of);
+    free(w->drawn);
+    free(w->arc);
+    free(w->part);
+}
+
+uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                             size_t most_bytes, const uz_hooks *hooks, uz_error *err)
+{
+    uz_body_model model;
+    uz_field_body body = {.scene = scene};
+    surface_work w = {.scene = scene, .model = &model, .answer = answer};
+    uz_error_reset(err);
+    memset(out, 0, sizeof *out);
+    uz_status status = uz_body_model_outline(&model, scene, err);
+    if (status == UZ_OK)
+        status = check_answer(answer, &model, err);
+    if (status == UZ_OK)
+        status = uz_field_body_init(&body, scene, &model, err);
+    if (status == UZ_OK)
+        status = build(out, &w, &body, which, most_bytes, hooks, err);
+    clear_work(&w);
+    uz_field_body_clear(&body);
+    uz_body_model_clear(&model);
+    if (status != UZ_OK)
+        uz_surface_clear(out);
+    return status;
+}
+
+void uz_surface_clear(uz_surface *s)
+{
+    if (!s)
+        return;
+    void *const blocks[] = {s->position,   s->displacement, s->node,       s->von_mises.x, s->triangle,
+                            s->line,       s->outline,      s->row_vertex, s->row_contact, s->row_normal,
+                            s->reaction.x, s->gap.x,        s->pressure.x, s->arc.x,       s->row_part};
+    for (size_t i = 0; i < sizeof blocks / sizeof blocks[0]; i++)
+        free(blocks[i]);
+    memset(s, 0, sizeof *s);
+}
