@@ -30,6 +30,7 @@ bool fields_vtu(char **text, size_t *len, const field_reader *reader, int64_t nu
                 http_reply *reply);
 bool fields_picture(char **text, size_t *len, const field_reader *reader, int64_t number, const uz_picture *how,
                     http_reply *reply);
+bool fields_mesh_error(double *error, const field_reader *reader, int64_t number, http_reply *reply);
 
 /* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits). False with a 400
  * that has the list. */
