@@ -87,7 +87,7 @@ static void put_x_ticks(uz_buffer *svg, const uz_panel *panel, bool numbers)
         const double x = across(panel, (double)k * step);
         uz_buffer_print(svg, "<path class=\"grid\" d=\"M%.2f %.2fV%.2f\"/>", x, panel->top, foot);
         if (numbers)
-            uz_buffer_print(svg, "<text class=\"x\" x=\"%.2f\" y=\"%.1f\" text-anchor=\"middle\">%.6g</text>", x,
+            uz_buffer_print(svg, "<text class=\"x\" x=\"%.2f\" y=\"%.1f\" text-anchor=\"middle\">%.10g</text>", x,
                             foot + 15, (double)k * step);
     }
 }
