@@ -94,8 +94,9 @@ static uz_status open_case(uz_run *run, const batch *b, int64_t place, uz_error 
 }
 
 /* What the rounds before took of the case's time counts. */
-static void count_rounds(const batch *b, const uz_result *before, uz_summary *summary)
+static void count_rounds(const batch *b, const uz_result *before, uz_result *result)
 {
+    uz_summary *summary = &result->summary;
     uz_timings *t = &summary->timings;
     summary->rounds = b->round;
     summary->added = summary->kept - b->kept;
@@ -109,6 +110,7 @@ static void count_rounds(const batch *b, const uz_result *before, uz_summary *su
     t->iterate += earlier->iterate;
     t->certify += earlier->certify;
     t->total += earlier->total;
+    uz_trade_shift(&result->trade, earlier->total);
 }
 
 /* The case's rows go to those of the next round. */
@@ -126,7 +128,7 @@ static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *e
     if (status == UZ_OK)
         status = take_wants(b, run, err);
     if (status == UZ_OK) {
-        count_rounds(b, b->results[run->index], &run->result->summary);
+        count_rounds(b, b->results[run->index], run->result);
         uz_result_free(b->results[run->index]);
         b->results[run->index] = run->result;
         run->result = NULL;

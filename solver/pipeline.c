@@ -22,17 +22,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The scene with the loads of the case; it borrows all it has. */
-static uz_scene scene_of_case(const uz_run *run)
-{
-    uz_scene scene = run->problem->scene;
-    if (run->load_case && run->load_case->loads) {
-        scene.loads = run->load_case->loads;
-        scene.n_loads = run->load_case->n_loads;
-    }
-    return scene;
-}
-
 /* p and h: the case's or the problem's own, or assembled from the loads of the scene. */
 static uz_status make_load(uz_run *run, uz_error *err)
 {
@@ -44,7 +33,7 @@ static uz_status make_load(uz_run *run, uz_error *err)
         run->h_all = run->h;
         return UZ_OK;
     }
-    uz_scene scene = scene_of_case(run);
+    uz_scene scene = uz_run_scene(run);
     int64_t kept = body->rows.in ? run->m : 0, n_fixed = body->model.n_fixed;
     run->owned = uz_alloc_zero(run->d + run->all + n_fixed + kept, sizeof(double));
     if (!run->owned)
@@ -213,7 +202,7 @@ void uz_run_balance_request(uz_run *run)
     if (!nodal)
         return; /* the request stays at what it was, which is stricter */
     uz_recover_nodal(nodal, &run->body->model, run->answer.u, run->prescribed);
-    const uz_scene scene = scene_of_case(run);
+    const uz_scene scene = uz_run_scene(run);
     summary->discretization_error = uz_estimate_mesh_error(&run->body->model, &scene, nodal);
     free(nodal);
     if (summary->discretization_error > 0.0)
@@ -244,9 +233,19 @@ static uz_status prove_infeasible(uz_run *run, uz_error *err)
     return UZ_OK;
 }
 
+/* What the certificate says of the bounds so far. */
+static void note_certificate(uz_run *run)
+{
+    uz_decades_resume(&run->decades, uz_run_time(run));
+    uz_decades_certify(&run->decades, run->answer.certificate.relative_error, run->it.iteration,
+                       uz_case_applications(run->load));
+}
+
 uz_status uz_run_iterate(uz_run *run, uz_error *err)
 {
+    uz_decades_resume(&run->decades, uz_run_time(run));
     uz_status status = iterate(run, err);
+    uz_decades_pause(&run->decades);
     return status == UZ_OK && run->end == UZ_END_RAY ? prove_infeasible(run, err) : status;
 }
 
@@ -290,15 +289,19 @@ enum { MAX_ROUNDS = 8 };
 static uz_status iterate_until_certified(uz_run *run, uz_error *err)
 {
     bool done = false;
+    note_certificate(run);
     uz_status status = judge(&done, run, err);
+    note_certificate(run);
     for (int round = 1; status == UZ_OK && !done && round < MAX_ROUNDS; round++) {
         if (run->in_block)
             tell_begin(run);
         status = uz_run_iterate(run, err);
         if (status == UZ_OK)
             status = uz_run_certify(run, err);
+        note_certificate(run);
         if (status == UZ_OK)
             status = judge(&done, run, err);
+        note_certificate(run);
     }
     if (!done)
         run->end = UZ_END_STALLED;
@@ -348,6 +351,8 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     uz_status status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
         status = uz_iterate_init(&run->it, run->m, run->settings->alpha, err);
+    run->it.decades = &run->decades;
+    uz_decades_resume(&run->decades, uz_run_time(run));
     if (status == UZ_OK && run->start)
         status = take_start(run, err);
     if (status == UZ_OK)

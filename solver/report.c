@@ -60,6 +60,7 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
     run->result->summary.discretization_error = NAN;
     run->result->summary.max_pressure = NAN;
+    uz_decades_init(&run->decades, false);
     return UZ_OK;
 }
 
@@ -86,6 +87,7 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     summary->rounds = 1;
     summary->op = dual.op;
     summary->ordering = factor.ordering;
+    uz_decades_init(&run->decades, run->body->rows.in != NULL);
     run->hit = run->serves_many = summary->factor_cached = reused.op;
     summary->reused = reused;
     summary->contact_last = factor.contact_last;
@@ -157,8 +159,7 @@ static void report_contact(uz_run *run)
     }
 }
 
-/* The scene with the loads of the case. */
-static uz_scene scene_of_case(const uz_run *run)
+uz_scene uz_run_scene(const uz_run *run)
 {
     uz_scene scene = run->problem->scene;
     if (run->load_case && run->load_case->loads) {
@@ -184,7 +185,7 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)result->n_nodes);
     uz_recover_nodal(result->u, model, run->answer.u, run->prescribed);
-    const uz_scene scene = scene_of_case(run);
+    const uz_scene scene = uz_run_scene(run);
     return status == UZ_OK ? uz_evaluate(result, model, &scene, err) : status;
 }
 
@@ -276,8 +277,7 @@ void uz_explain_outcome(uz_result *result, uz_end end)
                  why, s->requested_error);
 }
 
-/* In a block the others' time is not this case's. */
-static double total_time(const uz_run *run)
+double uz_run_time(const uz_run *run)
 {
     const uz_timings *t = &run->result->summary.timings;
     if (run->in_block)
@@ -307,6 +307,14 @@ static uz_status widen_by_turning(uz_run *run, uz_error *err)
     return UZ_OK;
 }
 
+/* Displacements that were turned have a larger bound, and a problem without an answer has none. */
+static void report_trade(uz_run *run)
+{
+    uz_decades_drop(&run->decades, run->result->summary.certificate.relative_error);
+    run->result->trade = run->decades.trade;
+    run->result->trade.total_s = uz_run_time(run);
+}
+
 uz_status uz_run_publish(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
@@ -322,7 +330,10 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
         uz_blank_answer(run->result);
     uz_explain_outcome(run->result, run->end);
     report_cost(run);
-    summary->timings.total = total_time(run);
+    report_trade(run);
+    if (status == UZ_OK)
+        uz_run_suggest(run);
+    summary->timings.total = uz_run_time(run);
     return status;
 }
 

@@ -5,6 +5,7 @@
 
 #include "body.h"
 #include "certificate/certificate.h"
+#include "methods/decades.h"
 #include "methods/method.h"
 #include "uzawa.h"
 
@@ -35,6 +36,7 @@ typedef struct {
     double *prescribed;  /* scenes: n_fixed */
     uz_case *load;
     uz_iterate it;
+    uz_decades decades;
     uz_factor_workspace *ws;
     uz_answer answer;
     double *work;             /* d */
@@ -78,6 +80,12 @@ uz_status uz_run_refine(uz_run *run, uz_error *err);
 uz_status uz_run_report(uz_run *run, uz_error *err);
 /* The part of it that is about the answer, whoever made it: u, r and g go to the result. The outcome stands. */
 uz_status uz_run_publish(uz_run *run, uz_error *err);
+/* Scenes: that with the loads of the case; it borrows all it has. */
+uz_scene uz_run_scene(const uz_run *run);
+/* Seconds of the run until now. In a block the others' time is not this case's. */
+double uz_run_time(const uz_run *run);
+/* Whether `balanced` would have served (suggest.c), in the summary; the trade of the result is complete. */
+void uz_run_suggest(uz_run *run);
 void uz_run_end(uz_run *run);
 
 /* The problem's matrices and load cases, as far as they can be checked before anything is computed. */

@@ -59,6 +59,11 @@ void uz_fields_clear(uz_fields *fields);
 uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                        const uz_hooks *hooks, uz_error *err);
 
+/* *error: the estimated relative energy-norm error of the mesh (Zienkiewicz and Zhu 1987), as in a summary; NaN where
+ * nothing is strained. Errors as above. */
+uz_status uz_mesh_error(double *error, const uz_scene *scene, const uz_field_source *answer, const uz_hooks *hooks,
+                        uz_error *err);
+
 /* ---------------------------------------------------------------- pictures */
 
 /* How a deformed body is drawn. */
@@ -120,5 +125,32 @@ typedef struct {
 uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                              size_t most_bytes, const uz_hooks *hooks, uz_error *err);
 void uz_surface_clear(uz_surface *surface);
+
+/* A history as a curve: `count` rows, `stride` doubles from a row to the next, so that a table of rows or columns alone
+ * will do. */
+enum { UZ_CURVES = 8 };
+typedef struct {
+    const char *name; /* in the legend; may be NULL */
+    const double *iteration, *seconds, *dual_objective, *residual, *error_bound, *contacts, *restart;
+    int64_t count, stride;
+    double dual; /* a lower bound on the energy that is known beside them, as a certificate's; NaN: none */
+} uz_curve;
+
+typedef enum { UZ_PLOT_ITERATIONS, UZ_PLOT_SECONDS } uz_plot_x;
+typedef enum { UZ_THEME_AUTO, UZ_THEME_LIGHT, UZ_THEME_DARK } uz_theme; /* AUTO: as whoever looks prefers */
+typedef struct {
+    int width; /* in pixels, 300 to 4000; 0: 900 */
+    uz_plot_x x;
+    uz_theme theme;
+    const char *title; /* may be NULL */
+} uz_plot;
+
+/* How runs converged, as SVG: the dual objective's distance from its best known value, the total residual and the
+ * certified bound on logarithmic axes, in the units of the problem, and the number of contacts, one below the other;
+ * restarts are marked. n: 1 to UZ_CURVES. What is not finite, or not positive, is left out. The text stays below 8
+ * points for each column of pixels, panel and curve, however long the histories are. *svg is NUL-terminated, the caller
+ * frees it. Errors: UZ_ERR_ARGUMENT, _MEMORY. */
+uz_status uz_picture_convergence(char **svg, size_t *len, const uz_curve *curves, int n, const uz_plot *how,
+                                 uz_error *err);
 
 #endif

@@ -87,6 +87,9 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     summary->timings.certify = uz_seconds() - start;
     if (status != UZ_OK)
         return status;
+    uz_decades_resume(&run->decades, uz_run_time(run));
+    uz_decades_pause(&run->decades);
+    uz_decades_certify(&run->decades, summary->certificate.relative_error, 0, 0);
     summary->outcome = summary->certificate.relative_error <= run->requested ? UZ_VERIFIED : UZ_NOT_VERIFIED;
     summary->method = UZ_METHOD_GIVEN;
     summary->alpha = NAN;

@@ -202,4 +202,17 @@ void codec_history_row(double out[CODEC_HISTORY_COLUMNS], const uz_history_row *
 char *codec_encode_history(const char *case_name, const double *rows, int64_t count, size_t *len); /* NULL: no case */
 char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len);
 
+/* What accuracy took a run, and what its summary says of its errors; NaN: not known. */
+typedef struct {
+    const char *job_id, *case_name; /* case_name NULL: none */
+    uz_trade trade;
+    double mesh_error, solver_error, requested_error, certify_s;
+    bool is_scene, has_answer, may_save;
+} codec_trade;
+/* Fills the members after trade from the JSON text of a summary; false: no memory. */
+bool codec_read_trade(codec_trade *out, const char *summary);
+char *codec_encode_trade(const codec_trade *of, size_t *len);
+/* The method and the operator that a summary names; "" where it does not, or there is no memory. */
+void codec_read_method(char *method, char *op, size_t size, const char *summary);
+
 #endif

@@ -1,4 +1,5 @@
 #include "codec/codec.h"
+#include "codec/encode_trade.h"
 #include "codec/text.h"
 
 #include <math.h>
@@ -308,6 +309,10 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
                         {"alpha", summary->alpha},
                         {"lambda_max", summary->lambda_max}},
               4);
+    if (summary->suggestion.any) {
+        text_key(&t, "suggestion");
+        put_suggestion(&t, &summary->suggestion);
+    }
     if (summary->ladder) {
         put_named(&t, (named[]){{"total_error", summary->total_error}}, 1);
         put_ladder(&t, summary->ladder);

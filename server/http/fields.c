@@ -296,6 +296,18 @@ bool fields_surface(char **file, size_t *len, const field_reader *reader, int64_
     return done;
 }
 
+static uz_status run_mesh_error(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                                const uz_hooks *hooks, uz_error *err)
+{
+    (void)which;
+    return uz_mesh_error(out, scene, answer, hooks, err);
+}
+
+bool fields_mesh_error(double *error, const field_reader *reader, int64_t number, http_reply *reply)
+{
+    return compute(error, run_mesh_error, reader, number, 0, reply);
+}
+
 /* -------------------------------------------------------------------- names */
 
 static void list_names(char *text, size_t size, unsigned allowed)

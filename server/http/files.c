@@ -10,15 +10,6 @@ static const unsigned IN_VTU = (STORED | COMPUTED | UZ_FIELD_MATERIALS) & ~(unsi
 static const unsigned VTU_BY_DEFAULT = UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_VON_MISES |
                                        UZ_FIELD_PRESSURE | UZ_FIELD_GAPS | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_MATERIALS;
 
-static void refuse_all_cases(const store_case *cases, size_t count, http_reply *reply)
-{
-    problem_details problem;
-    http_problem(&problem, 400, "case_needed", "Each load case has a file of its own",
-                 "say which one with ?case=NAME.");
-    cases_list(&problem, cases, count);
-    reply_problem(reply, &problem);
-}
-
 /* What is asked for. */
 typedef struct {
     enum { FILE_VTU, FILE_PICTURE, FILE_SURFACE } kind;
@@ -46,17 +37,12 @@ static void write_file(api *context, const http_request *rq, const job *j, int64
 
 static void reply_case(api *context, const http_request *rq, const job *j, file_wanted *wanted, http_reply *reply)
 {
-    store_case *cases = NULL;
-    size_t count = 0;
-    if (!results_cases(context, rq, j, &cases, &count, reply))
-        return;
-    if (count > 0 && !target_value(&rq->target, "case")) {
-        refuse_all_cases(cases, count, reply);
-    } else {
-        wanted->how.title = count > 0 ? cases[0].name : NULL;
-        write_file(context, rq, j, count > 0 ? cases[0].number : 0, wanted, reply);
+    results_place at;
+    if (results_one(&at, context, rq, j, "a file", reply)) {
+        wanted->how.title = at.name;
+        write_file(context, rq, j, at.number, wanted, reply);
     }
-    store_cases_free(cases, count);
+    results_place_clear(&at);
 }
 
 static void find_and_reply(api *context, http_request *rq, file_wanted *wanted, http_reply *reply)

@@ -1,17 +1,11 @@
 /* history.c: how a run went: /v1/jobs/{id}/history and /history.csv, also while it goes on. */
+#include "http/history.h"
 #include "http/jobs.h"
 #include "http/problem.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* The rows of one case, or of a job without cases. */
-typedef struct {
-    char case_name[64]; /* "": none */
-    double *rows;
-    int64_t count;
-} found_rows;
 
 static bool refuse_case(http_reply *reply, int status, const char *name, const store_case *cases, size_t count)
 {
@@ -68,7 +62,7 @@ static bool fetch_stored(api *context, const job *j, const char *name, int64_t a
 /* The rows of a running job are with its worker, those of an ended one in the store; a job may end in between, and one
  * that waits has none. While a job with cases runs, the rows are those of the case that runs; another of its cases has
  * none to show. False with a reply. */
-static bool fetch(api *context, const job *j, const char *name, int64_t after, found_rows *out, http_reply *reply)
+bool history_rows(api *context, const job *j, const char *name, int64_t after, found_rows *out, http_reply *reply)
 {
     work_history live;
     if (j->status == JOB_ACCEPTED)
@@ -102,7 +96,7 @@ static void reply_history(api *context, http_request *rq, bool csv, http_reply *
     }
     reply->tag_by_body = true;
     if (jobs_load(context, rq, &j, reply) &&
-        fetch(context, &j, target_value(&rq->target, "case"), after, &found, reply))
+        history_rows(context, &j, target_value(&rq->target, "case"), after, &found, reply))
         encode(&found, csv, reply);
     jobs_check_still_there(context, &j, reply);
     free(found.rows);

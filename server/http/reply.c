@@ -158,14 +158,23 @@ static size_t list_cors(field *out, const http_reply *reply)
     return n;
 }
 
+/* Replies load and run nothing; a picture that is looked at by itself has a style and an image within it. */
+static const char *policy_of(const http_reply *reply)
+{
+    if (reply->policy)
+        return reply->policy;
+    return reply->type && strcmp(reply->type, "image/svg+xml") == 0
+               ? "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+               : "default-src 'none'; frame-ancestors 'none'";
+}
+
 /* The header fields of a reply. */
 static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, field_texts *texts)
 {
     size_t n = 0;
     write_texts(texts, reply);
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
-    out[n++] = (field){"Content-Security-Policy",
-                       reply->policy ? reply->policy : "default-src 'none'; frame-ancestors 'none'"};
+    out[n++] = (field){"Content-Security-Policy", policy_of(reply)};
     out[n++] = (field){"Referrer-Policy", "no-referrer"};
     out[n++] = (field){"Cache-Control", reply->immutable   ? "public, max-age=31536000, immutable"
                                         : reply->cacheable ? "no-cache"

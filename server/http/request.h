@@ -120,6 +120,8 @@ void uploads_delete(api *context, http_request *rq, http_reply *reply);
 void events_get(api *context, http_request *rq, http_reply *reply);
 void events_get_all(api *context, http_request *rq, http_reply *reply);
 void history_get(api *context, http_request *rq, http_reply *reply);
+void trade_get(api *context, http_request *rq, http_reply *reply);
+void convergence_get(api *context, http_request *rq, http_reply *reply);
 void history_get_csv(api *context, http_request *rq, http_reply *reply);
 void service_limits(api *context, http_request *rq, http_reply *reply);
 void service_factors(api *context, http_request *rq, http_reply *reply);

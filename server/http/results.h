@@ -24,4 +24,18 @@ bool results_known(const http_request *rq, const job *j, http_reply *reply);
 bool results_cases(api *context, const http_request *rq, const job *j, store_case **cases, size_t *count,
                    http_reply *reply);
 
+/* A job, or the one of its cases that the query names. */
+typedef struct {
+    int64_t number;      /* 0: the job has no cases */
+    const char *name;    /* NULL with it */
+    const char *summary; /* JSON text */
+    store_case *cases;   /* what the texts live in */
+    size_t count;
+} results_place;
+/* False with a reply, also where the job has cases and none is named; `what` each of them has of its own. The caller
+ * clears *out in every case. */
+bool results_one(results_place *out, api *context, const http_request *rq, const job *j, const char *what,
+                 http_reply *reply);
+void results_place_clear(results_place *place);
+
 #endif

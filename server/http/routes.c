@@ -12,6 +12,8 @@ static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
 static const char *const FILE_OF[] = {"fields", "case", NULL};
 static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL};
 static const char *const HISTORY[] = {"after", "case", NULL};
+static const char *const OF_CASE[] = {"case", NULL};
+static const char *const CURVES[] = {"case", "x", "with", "theme", "width", NULL};
 
 static const route ROUTES[] = {
     {"POST", "/v1/jobs", SUBMIT, jobs_submit, false},
@@ -27,6 +29,8 @@ static const route ROUTES[] = {
     {"GET", "/v1/events", NONE, events_get_all, false},
     {"GET", "/v1/jobs/{id}/history", HISTORY, history_get, false},
     {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv, false},
+    {"GET", "/v1/jobs/{id}/work-precision", OF_CASE, trade_get, false},
+    {"GET", "/v1/jobs/{id}/convergence.svg", CURVES, convergence_get, false},
     {"POST", "/v1/verify", NONE, verify_submit, false},
     {"POST", "/v1/uploads", NONE, uploads_create, true},
     {"GET", "/v1/uploads/{digest}", NONE, uploads_get, false},

@@ -60,6 +60,15 @@ static void add_vectors(answer_parts *to, const uz_result *result, bool is_scene
     add_state(to, result);
 }
 
+/* earlier: of the run that was continued, NULL: none was. */
+static void add_trade(answer_parts *to, const uz_result *result, const uz_trade *earlier)
+{
+    uz_trade trade = result->trade;
+    if (earlier)
+        trade_join(&trade, earlier);
+    add_vector(to, TRADE_VECTOR, to->trade, trade_pack(to->trade, &trade));
+}
+
 /* ---- history */
 
 /* Rows of the run that was continued up to where the new ones begin. */
@@ -108,6 +117,7 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
     add_vectors(parts, result, is_scene);
     const char *name = request->problem.n_cases > 0 ? request->problem.cases[i].name : NULL;
+    add_trade(parts, result, has_earlier ? &from->trades[i] : NULL);
     return parts->summary && codec_judge(&parts->summary, request, name, a->findings) &&
            add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
                        has_earlier ? from->rows[i] : 0);

@@ -6,6 +6,7 @@
 #include "store/store.h"
 #include "uzawa.h"
 #include "work/starts.h"
+#include "work/trade.h"
 
 #define ANSWER_VECTORS 12
 
@@ -13,6 +14,7 @@
 typedef struct {
     char *summary;
     double *history, *state;
+    double trade[TRADE_NUMBERS];
     store_vector vectors[ANSWER_VECTORS];
     size_t n_vectors;
     int64_t history_rows;

@@ -1,5 +1,6 @@
 #include "work/starts.h"
 #include "work/state.h"
+#include "work/trade.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -45,6 +46,17 @@ static store_status load_history(double **rows, int64_t *count, store *s, const 
     return status == STORE_NOT_FOUND ? STORE_OK : status;
 }
 
+/* What accuracy took that run; nothing where it was not recorded. */
+static store_status load_trade(uz_trade *out, store *s, const char *id, int64_t number)
+{
+    double *x = NULL;
+    int64_t count = 0;
+    store_status status = store_get_vector(s, id, number, TRADE_VECTOR, &x, &count);
+    trade_unpack(out, x, status == STORE_OK ? count : 0);
+    free(x);
+    return status == STORE_NOT_FOUND ? STORE_OK : status;
+}
+
 /* The number of the case that the request names; 0: the job has no cases. */
 static store_status find_number(store *s, const codec_start *start, int64_t *number)
 {
@@ -68,7 +80,10 @@ static bool make_room(starts *out, int64_t n)
     out->states = calloc((size_t)n, sizeof *out->states);
     out->histories = calloc((size_t)n, sizeof *out->histories);
     out->rows = calloc((size_t)n, sizeof *out->rows);
-    return out->states && out->histories && out->rows;
+    out->trades = calloc((size_t)n, sizeof *out->trades);
+    for (int64_t i = 0; out->trades && i < n; i++)
+        uz_trade_clear(&out->trades[i]);
+    return out->states && out->histories && out->rows && out->trades;
 }
 
 static store_status load_continued(starts *out, store *s, const codec_request *request)
@@ -79,6 +94,8 @@ static store_status load_continued(starts *out, store *s, const codec_request *r
         status = load_state(&out->states[i], s, request->start.job, number, true);
         if (status == STORE_OK && out->states[i] && out->states[i]->rho)
             status = load_history(&out->histories[i], &out->rows[i], s, request->start.job, number);
+        if (status == STORE_OK && out->states[i] && out->states[i]->rho)
+            status = load_trade(&out->trades[i], s, request->start.job, number);
     }
     return status;
 }
@@ -122,5 +139,6 @@ void starts_clear(starts *s)
     free(s->states);
     free(s->histories);
     free(s->rows);
+    free(s->trades);
     *s = (starts){.n = 0};
 }

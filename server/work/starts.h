@@ -12,6 +12,7 @@ typedef struct {
     uz_state **states;  /* n; NULL: all from zero */
     double **histories; /* n, the rows of the runs that are continued; NULL: none */
     int64_t *rows;      /* n */
+    uz_trade *trades;   /* n: of the same runs; NULL: none */
 } starts;
 
 /* What the store gives of what the request asks for; STORE_OK unless it fails. The caller clears *out. */

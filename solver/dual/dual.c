@@ -386,10 +386,16 @@ void uz_case_energies(const uz_case *load, double *psi, double *norm2, const dou
 
 uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
 {
+    load->applications++;
     if (load->dual->info.op != UZ_OPERATOR_CONDENSED)
         return uz_factored_apply(load, Dr, r, err);
     uz_condensed_apply(load, Dr, r);
     return UZ_OK;
+}
+
+int64_t uz_case_applications(const uz_case *load)
+{
+    return load->applications;
 }
 
 uz_status uz_case_column(uz_case *load, double *column, int64_t i, uz_error *err)

@@ -96,6 +96,7 @@ double uz_dual_known_lambda_max(const uz_dual *dual);
 
 /* Dr = D r (m). */
 uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
+int64_t uz_case_applications(const uz_case *load); /* how often that was done, lambda_max included */
 
 /* Column i of D (m): row i's own reaction as every row feels it. CONDENSED reads D, FACTORED costs a sparse solve.
  * Overwrites what the last apply left. */

@@ -101,8 +101,9 @@ struct uz_case {
     uz_bounded *box;             /* FACTORED with bounds, else NULL */
     double *push, *kept; /* correction: CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
     bool has_kept;
-    uz_inexact *inexact; /* MATRIX_FREE, else NULL */
-    uz_leave leave;      /* of the run: asked inside dense work of n^3 */
+    int64_t applications; /* of D by uz_case_apply */
+    uz_inexact *inexact;  /* MATRIX_FREE, else NULL */
+    uz_leave leave;       /* of the run: asked inside dense work of n^3 */
 };
 
 uz_status uz_condensed_create(uz_dual *dual, const uz_leave *leave, uz_error *err);

@@ -5,6 +5,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
+#include "methods/decades.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -67,6 +68,7 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_case *load, uz_method by, uz_error
     it->made_by = by;
     memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
     uz_case_keep_push(load);
+    uz_decades_note(it->decades, it->best_relative, it->iteration, uz_case_applications(load));
     return UZ_OK;
 }
 

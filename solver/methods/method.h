@@ -52,7 +52,8 @@ typedef struct {
     bool fresh;        /* D r and rho are those of r as they stand: nothing is to be made again before the next step */
     int32_t phase;     /* of auto */
     int64_t phase_end;
-    uz_best before; /* what was best before the last answer of a run that ended was bounded out of turn */
+    struct uz_decades *decades; /* where bounds are noted; NULL: nowhere */
+    uz_best before;             /* what was best before the last answer of a run that ended was bounded out of turn */
 } uz_iterate;
 
 /* alpha 0: chosen when the first gradient step needs it. */

@@ -172,6 +172,19 @@ static uz_outcome outcome_of(const uz_semi *s)
     return summary->outcome == UZ_CONVERGED ? UZ_PRECISION_LIMIT : summary->outcome;
 }
 
+/* Bounds of iterations were about regularized problems; that of the certificate alone is about this one. */
+static void report_trade(uz_result *result)
+{
+    uz_decades decades;
+    uz_decades_init(&decades, false);
+    uz_decades_resume(&decades, result->summary.timings.total);
+    uz_decades_pause(&decades);
+    uz_decades_certify(&decades, result->summary.certificate.relative_error, result->summary.iterations, 0);
+    result->trade = decades.trade;
+    result->trade.total_s = decades.trade.iterated_s;
+    result->summary.suggestion.any = false;
+}
+
 uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
 {
     uz_result *result = s->last;
@@ -195,5 +208,6 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
                  "its contact");
     summary->timings.assemble += s->assemble_s;
     summary->timings.total = uz_seconds() - s->started;
+    report_trade(s->last);
     return status;
 }

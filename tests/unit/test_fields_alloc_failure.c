@@ -29,6 +29,22 @@ static uz_status vtu(const uz_scene *scene, const uz_field_source *answer, uz_er
     return status;
 }
 
+/* A history of five rows, all of whose columns are one. */
+static uz_status convergence(const uz_scene *scene, const uz_field_source *answer, uz_error *err)
+{
+    static const double rows[5] = {1, 2, 4, 0, 8};
+    const uz_curve curve = {"a", rows, rows, rows, rows, rows, rows, rows, 5, 1, NAN};
+    const uz_plot how = {.title = "title"};
+    char *svg;
+    size_t len;
+    (void)scene;
+    (void)answer;
+    uz_status status = uz_picture_convergence(&svg, &len, &curve, 1, &how, err);
+    CHECK((svg != NULL) == (status == UZ_OK) && (len > 0) == (status == UZ_OK));
+    free(svg);
+    return status;
+}
+
 static bool fail_at(attempt run, const uz_scene *scene, const uz_field_source *answer, long n)
 {
     uz_error err = {0};
@@ -90,6 +106,7 @@ static void check_element(const char *element)
     uz_body_model model = body_model(&s);
     CHECK(fail_each(fields, &s, &answer) > 30);
     CHECK(fail_each(vtu, &s, &answer) > 40);
+    CHECK(fail_each(convergence, &s, &answer) > 3);
     long n = 0;
     while (n < 1000 && evaluate_at(&s, &model, result, n))
         n++;

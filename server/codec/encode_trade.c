@@ -1,0 +1,181 @@
+/* encode_trade.c: what accuracy took: /v1/jobs/{id}/work-precision, and the suggestion in a summary. */
+#include "codec/encode_trade.h"
+
+#include "codec/codec.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { DECADES = 10 };
+
+static void put_count(text *t, const char *key, const int64_t *value)
+{
+    text_key(t, key);
+    if (value)
+        text_integer(t, *value);
+    else
+        text_raw(t, NULL);
+}
+
+static void put_real(text *t, const char *key, double value)
+{
+    text_key(t, key);
+    text_number(t, value);
+}
+
+/* "1/8" where it is at most that, else "70 %". */
+static void put_share(text *t, double share)
+{
+    if (share <= 0.5)
+        text_format(t, "1/%.0f", floor(1.0 / share * (1.0 + 1e-12)));
+    else
+        text_format(t, "%.0f %%", ceil(100.0 * share));
+}
+
+void put_suggestion(text *t, const uz_suggestion *s)
+{
+    if (!s->any) {
+        text_raw(t, NULL);
+        return;
+    }
+    text_open(t, '{');
+    text_key(t, "level");
+    text_string(t, "balanced");
+    text_key(t, "text");
+    text_format(t, "\"mesh error %.2g %%, solver error %.2g %%: balanced would have taken ", 100.0 * s->mesh_error,
+                100.0 * s->solver_error);
+    put_share(t, s->share);
+    text_put(t, " of the time\"");
+    put_real(t, "relative_error", s->relative_error);
+    put_real(t, "mesh_error", s->mesh_error);
+    put_real(t, "solver_error", s->solver_error);
+    put_real(t, "seconds", s->seconds);
+    put_real(t, "total_s", s->total_s);
+    put_real(t, "share", s->share);
+    put_count(t, "iterations", &s->iterations);
+    text_close(t, '}');
+}
+
+/* seconds: when the bound was established, or what the whole solve would have taken. step NULL: it never was. */
+static void put_step(text *t, double seconds, const uz_trade_step *step)
+{
+    put_real(t, "seconds", seconds);
+    put_count(t, "iterations", step ? &step->iterations : NULL);
+    put_count(t, "applications", step ? &step->applications : NULL);
+    text_key(t, "by");
+    text_string(t, !step ? NULL : step->by_certificate ? "certificate" : "iteration");
+}
+
+static void put_decades(text *t, const uz_trade *trade)
+{
+    static const double DECADE[DECADES] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
+    text_key(t, "decades");
+    text_open(t, '[');
+    for (int k = 0; k < DECADES; k++) {
+        const uz_trade_step *step = uz_trade_reach(trade, DECADE[k]);
+        text_open(t, '{');
+        put_real(t, "relative_error", DECADE[k]);
+        put_step(t, step ? step->seconds : NAN, step);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
+static void put_level(text *t, const char *name, double relative_error, const uz_trade *trade)
+{
+    const uz_trade_step *step = isfinite(relative_error) ? uz_trade_reach(trade, relative_error) : NULL;
+    text_open(t, '{');
+    text_key(t, "level");
+    text_string(t, name);
+    put_real(t, "relative_error", relative_error);
+    put_step(t, step ? uz_trade_cost(trade, step) : NAN, step);
+    text_close(t, '}');
+}
+
+/* `balanced` is known where the mesh's error is. */
+static void put_levels(text *t, const uz_trade *trade, double mesh_error)
+{
+    text_key(t, "levels");
+    text_open(t, '[');
+    put_level(t, "quick", 1e-2, trade);
+    put_level(t, "balanced", mesh_error > 0.0 ? fmin(1.0, 0.1 * mesh_error) : NAN, trade);
+    put_level(t, "precise", 1e-8, trade);
+    put_level(t, "exact", 1e-12, trade);
+    text_close(t, ']');
+}
+
+/* A number of the summary, NaN where there is none. */
+static double number_at(const json_t *object, const char *key)
+{
+    const json_t *value = json_object_get(object, key);
+    return json_is_number(value) ? json_number_value(value) : NAN;
+}
+
+static bool word_is(const json_t *object, const char *key, const char *word)
+{
+    const char *value = json_string_value(json_object_get(object, key));
+    return value && strcmp(value, word) == 0;
+}
+
+bool codec_read_trade(codec_trade *out, const char *summary)
+{
+    json_t *root = json_loads(summary, 0, NULL);
+    const json_t *suggestion = json_object_get(root, "suggestion"), *certificate = json_object_get(root, "certificate");
+    if (!root)
+        return false;
+    out->mesh_error = number_at(json_is_object(suggestion) ? suggestion : root,
+                                json_is_object(suggestion) ? "mesh_error" : "discretization_error");
+    out->solver_error = number_at(certificate, "relative_error");
+    out->requested_error = number_at(root, "requested_error");
+    out->certify_s = number_at(json_object_get(root, "timings_s"), "certify");
+    out->is_scene = word_is(json_object_get(root, "problem"), "kind", "scene");
+    out->has_answer = !word_is(root, "outcome", "infeasible");
+    /* what may be told that it could have asked for less: a run from the beginning that asked for an error of its own
+     */
+    out->may_save = out->is_scene && word_is(root, "outcome", "converged") && word_is(root, "started_from", "zero") &&
+                    !word_is(root, "method", "linear") && !json_object_get(root, "mesh");
+    json_decref(root);
+    return true;
+}
+
+static void copy_word(char *out, size_t size, const json_t *object, const char *key)
+{
+    const char *value = json_string_value(json_object_get(object, key));
+    snprintf(out, size, "%s", value ? value : "");
+}
+
+void codec_read_method(char *method, char *op, size_t size, const char *summary)
+{
+    json_t *root = json_loads(summary, 0, NULL);
+    copy_word(method, size, root, "method");
+    copy_word(op, size, root, "operator");
+    json_decref(root);
+}
+
+char *codec_encode_trade(const codec_trade *of, size_t *len)
+{
+    text t = {0};
+    const uz_trade *trade = &of->trade;
+    uz_suggestion suggestion = {0};
+    if (of->may_save && of->requested_error < (1.0 - 1e-9) * 0.1 * of->mesh_error)
+        suggestion = uz_trade_suggest(trade, of->mesh_error, of->solver_error, of->certify_s);
+    text_open(&t, '{');
+    text_key(&t, "job");
+    text_string(&t, of->job_id);
+    if (of->case_name) {
+        text_key(&t, "case");
+        text_string(&t, of->case_name);
+    }
+    put_decades(&t, trade);
+    put_levels(&t, trade, of->mesh_error);
+    put_real(&t, "iterated_s", trade->iterated_s);
+    put_real(&t, "total_s", trade->total_s);
+    put_real(&t, "solver_error", of->solver_error);
+    put_real(&t, "mesh_error", of->mesh_error);
+    text_key(&t, "suggestion");
+    put_suggestion(&t, &suggestion);
+    text_close(&t, '}');
+    return text_finish(&t, len);
+}

@@ -1,0 +1,182 @@
+/* convergence.c: how jobs converged, as a picture: /v1/jobs/{id}/convergence.svg. */
+#include "http/history.h"
+#include "http/jobs.h"
+#include "http/problem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    COLUMN_ITERATION,
+    COLUMN_SECONDS,
+    COLUMN_DUAL,
+    COLUMN_RESIDUAL,
+    COLUMN_BOUND = 9,
+    COLUMN_CONTACTS,
+    COLUMN_RESTART
+};
+
+/* The curves of one picture, the first of which is the job's own. */
+typedef struct {
+    char text[160];
+} curve_name;
+typedef struct {
+    uz_curve curves[UZ_CURVES];
+    found_rows rows[UZ_CURVES];
+    curve_name names[UZ_CURVES];
+    int n;
+} curve_list;
+
+static void clear(curve_list *list)
+{
+    for (int k = 0; k < list->n; k++)
+        free(list->rows[k].rows);
+    list->n = 0;
+}
+
+/* The end of an id tells jobs of one minute apart; the beginning is the time. */
+static curve_name name_curve(const job *j, const char *case_name)
+{
+    curve_name out;
+    char method[40] = "", op[40] = "";
+    if (j->summary)
+        codec_read_method(method, op, sizeof method, j->summary);
+    snprintf(out.text, sizeof out.text, "%s%s%s%s%s, job \u2026%s", case_name, case_name[0] ? ": " : "",
+             method[0] ? method : job_status_name(j->status), op[0] ? ", " : "", op, j->id + 24);
+    return out;
+}
+
+static bool add_job(curve_list *list, api *context, const job *j, const char *case_name, http_reply *reply)
+{
+    found_rows *found = &list->rows[list->n];
+    *found = (found_rows){.rows = NULL};
+    list->n++;
+    if (!history_rows(context, j, case_name, -1, found, reply))
+        return false;
+    list->names[list->n - 1] = name_curve(j, found->case_name);
+    static const double NOTHING[CODEC_HISTORY_COLUMNS];
+    const double *rows = found->rows ? found->rows : NOTHING;
+    list->curves[list->n - 1] = (uz_curve){.name = list->names[list->n - 1].text,
+                                           .iteration = rows + COLUMN_ITERATION,
+                                           .seconds = rows + COLUMN_SECONDS,
+                                           .dual_objective = rows + COLUMN_DUAL,
+                                           .residual = rows + COLUMN_RESIDUAL,
+                                           .error_bound = rows + COLUMN_BOUND,
+                                           .contacts = rows + COLUMN_CONTACTS,
+                                           .restart = rows + COLUMN_RESTART,
+                                           .count = found->count,
+                                           .stride = CODEC_HISTORY_COLUMNS,
+                                           .dual = NAN};
+    return true;
+}
+
+static bool refuse_with(http_reply *reply, int status, const char *code, const char *detail, const char *id, size_t len)
+{
+    problem_details problem;
+    http_problem(&problem, status, code, "The list of other jobs can't be used", detail, (int)(len < 60 ? len : 60), id,
+                 (int)UZ_CURVES - 1);
+    reply_problem(reply, &problem);
+    return false;
+}
+
+/* ID, or ID:CASE. */
+static bool add_other(curve_list *list, api *context, const char *text, size_t len, http_reply *reply)
+{
+    char id[33], case_name[64] = "";
+    job other = {0};
+    if (list->n == UZ_CURVES)
+        return refuse_with(reply, 400, "bad_parameter", "\"%.*s\" is one too many: with names up to %d", text, len);
+    if (len < 32 || strspn(text, "0123456789abcdef") < 32 || (len > 32 && text[32] != ':') ||
+        len >= 33 + sizeof case_name)
+        return refuse_with(reply, 400, "bad_parameter", "\"%.*s\" is not ID or ID:CASE; with names up to %d of them",
+                           text, len);
+    snprintf(id, sizeof id, "%.32s", text);
+    if (len > 33)
+        snprintf(case_name, sizeof case_name, "%.*s", (int)(len - 33), text + 33);
+    store_status status = store_get(context->store, id, &other);
+    bool done = status == STORE_OK && add_job(list, context, &other, case_name[0] ? case_name : NULL, reply);
+    job_clear(&other);
+    if (status == STORE_NOT_FOUND)
+        return refuse_with(reply, 404, "job_not_found", "there is no job %.*s; with names up to %d of them", text, len);
+    if (status != STORE_OK)
+        reply_store_failure(context, status, reply);
+    return done;
+}
+
+/* with=ID,ID:CASE: other jobs over this one. False with a reply. */
+static bool add_others(curve_list *list, api *context, const char *ids, http_reply *reply)
+{
+    while (ids) {
+        const size_t len = strcspn(ids, ",");
+        if (!add_other(list, context, ids, len, reply))
+            return false;
+        ids = ids[len] ? ids + len + 1 : NULL;
+    }
+    return true;
+}
+
+/* One of two or three words; *out is its number. */
+static bool read_choice(const http_request *rq, const char *key, const char *const *words, int count, int *out,
+                        problem_details *problem)
+{
+    const char *text = target_value(&rq->target, key);
+    char list[80] = "";
+    *out = 0;
+    for (int i = 0; text && i < count; i++) {
+        if (strcmp(text, words[i]) == 0) {
+            *out = i;
+            return true;
+        }
+        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i ? ", " : "", words[i]);
+    }
+    return !text || http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                                 "%s is one of %s, not \"%.60s\"", key, list, text);
+}
+
+static bool read_plot(const http_request *rq, uz_plot *out, problem_details *problem)
+{
+    static const char *const X[] = {"iterations", "seconds"}, *const THEMES[] = {"auto", "light", "dark"};
+    int64_t width = 900;
+    int x, theme;
+    if (!read_choice(rq, "x", X, 2, &x, problem) || !read_choice(rq, "theme", THEMES, 3, &theme, problem) ||
+        !request_integer(rq, "width", 300, 4000, &width, problem))
+        return false;
+    *out = (uz_plot){.width = (int)width, .x = (uz_plot_x)x, .theme = (uz_theme)theme};
+    return true;
+}
+
+static void draw(const curve_list *list, const uz_plot *how, http_reply *reply)
+{
+    char *svg = NULL;
+    size_t len = 0;
+    uz_error err = {0};
+    if (uz_picture_convergence(&svg, &len, list->curves, list->n, how, &err) == UZ_OK)
+        reply_text(reply, 200, "image/svg+xml", svg, len);
+    else
+        reply_no_memory(reply); /* arguments were checked */
+}
+
+void convergence_get(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem;
+    uz_plot how;
+    curve_list list = {.n = 0};
+    job j = {0};
+    char title[96];
+    if (!read_plot(rq, &how, &problem)) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    reply->tag_by_body = true;
+    if (jobs_load(context, rq, &j, reply) && add_job(&list, context, &j, target_value(&rq->target, "case"), reply) &&
+        add_others(&list, context, target_value(&rq->target, "with"), reply)) {
+        snprintf(title, sizeof title, "Convergence of job %s", j.id);
+        how.title = title;
+        draw(&list, &how, reply);
+    }
+    clear(&list);
+    jobs_check_still_there(context, &j, reply);
+    job_clear(&j);
+}

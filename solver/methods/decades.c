@@ -1,0 +1,113 @@
+#include "methods/decades.h"
+
+#include "core/clock.h"
+
+#include <math.h>
+
+/* Of a partial run (decades.h): with b <= KEPT t and c <= ALL t the error relative to the norm of the solution on all
+ * rows, which is that on the rows kept within 2c, is at most (b + 2c) / (1 - 2c) <= t for every t <= 1. */
+#define KEPT 0.85
+#define ALL  0.05
+
+double uz_trade_error(int step)
+{
+    return pow(10.0, -(step + 1) / (double)UZ_TRADE_PER_DECADE);
+}
+
+void uz_trade_clear(uz_trade *trade)
+{
+    for (int k = 0; k < UZ_TRADE_STEPS; k++)
+        trade->step[k] = (uz_trade_step){.seconds = NAN};
+    trade->iterated_s = trade->total_s = 0.0;
+}
+
+void uz_decades_init(uz_decades *d, bool partial)
+{
+    *d = (uz_decades){.partial = partial, .since = uz_seconds()};
+    uz_trade_clear(&d->trade);
+}
+
+void uz_decades_resume(uz_decades *d, double spent_s)
+{
+    d->base = spent_s;
+    d->since = uz_seconds();
+}
+
+static double seconds_now(const uz_decades *d)
+{
+    return d->base + (uz_seconds() - d->since);
+}
+
+void uz_decades_pause(uz_decades *d)
+{
+    d->trade.iterated_s = seconds_now(d);
+}
+
+/* Asked at every bound: the clock is read only where something is reached for the first time. */
+static void note(uz_decades *d, double bound, const uz_trade_step *reached)
+{
+    if (d->reached >= UZ_TRADE_STEPS || !(bound <= uz_trade_error(d->reached)))
+        return;
+    uz_trade_step step = *reached;
+    step.seconds = seconds_now(d);
+    while (d->reached < UZ_TRADE_STEPS && bound <= uz_trade_error(d->reached))
+        d->trade.step[d->reached++] = step;
+}
+
+void uz_decades_note(uz_decades *d, double bound, int64_t iterations, int64_t applications)
+{
+    if (d)
+        note(d, d->partial ? bound / KEPT : bound,
+             &(uz_trade_step){.iterations = iterations, .applications = applications});
+}
+
+void uz_decades_drop(uz_decades *d, double bound)
+{
+    while (d->reached > 0 && !(bound <= uz_trade_error(d->reached - 1)))
+        d->trade.step[--d->reached] = (uz_trade_step){.seconds = NAN};
+}
+
+static uz_trade_step by_certificate(int64_t iterations, int64_t applications)
+{
+    return (uz_trade_step){.iterations = iterations, .applications = applications, .by_certificate = true};
+}
+
+void uz_decades_certify(uz_decades *d, double bound, int64_t iterations, int64_t applications)
+{
+    uz_trade_step step = by_certificate(iterations, applications);
+    uz_decades_drop(d, bound);
+    if (d->partial) /* about the rows kept, as the bounds of the iterations are */
+        uz_decades_note(d, bound, iterations, applications);
+    else
+        note(d, bound, &step);
+}
+
+void uz_decades_widen(uz_decades *d, double bound, int64_t iterations, int64_t applications)
+{
+    uz_trade_step step = by_certificate(iterations, applications);
+    uz_decades_drop(d, bound / ALL);
+    d->partial = false;
+    note(d, bound, &step);
+}
+
+void uz_trade_shift(uz_trade *trade, double seconds)
+{
+    for (int k = 0; k < UZ_TRADE_STEPS; k++)
+        trade->step[k].seconds += seconds;
+    trade->iterated_s += seconds;
+    trade->total_s += seconds;
+}
+
+const uz_trade_step *uz_trade_reach(const uz_trade *trade, double relative_error)
+{
+    int k = 0;
+    while (k < UZ_TRADE_STEPS && !(uz_trade_error(k) <= relative_error))
+        k++;
+    return k < UZ_TRADE_STEPS && !isnan(trade->step[k].seconds) ? &trade->step[k] : NULL;
+}
+
+double uz_trade_cost(const uz_trade *trade, const uz_trade_step *step)
+{
+    return step->by_certificate ? trade->total_s
+                                : fmin(trade->total_s, step->seconds + (trade->total_s - trade->iterated_s));
+}

@@ -1,0 +1,239 @@
+#include "picture/plot.h"
+
+#include <math.h>
+
+uz_range uz_range_none(void)
+{
+    return (uz_range){INFINITY, -INFINITY};
+}
+
+static bool has_place(double x, bool log)
+{
+    return isfinite(x) && (!log || x > 0.0);
+}
+
+void uz_range_take(uz_range *range, double x, bool log)
+{
+    if (!has_place(x, log))
+        return;
+    range->low = fmin(range->low, x);
+    range->high = fmax(range->high, x);
+}
+
+/* The smallest of 1, 2, 5 times a power of ten that is at least x > 0. */
+static double round_step(double x)
+{
+    const double power = pow(10.0, floor(log10(x)));
+    for (int k = 0; k < 3; k++)
+        if (x <= (k == 0 ? 1.0 : k == 1 ? 2.0 : 5.0) * power * (1.0 + 1e-9))
+            return (k == 0 ? 1.0 : k == 1 ? 2.0 : 5.0) * power;
+    return 10.0 * power;
+}
+
+/* Room for a number on either axis. */
+enum { ROOM_X = 90, ROOM_Y = 26 };
+
+static double step_of(uz_range range, double length, double room, bool log)
+{
+    const double step = round_step((range.high - range.low) / fmax(1.0, floor(length / room)));
+    return log ? fmax(1.0, ceil(step)) : step;
+}
+
+uz_panel uz_panel_make(double left, double top, double width, double height, uz_range x, uz_range y, bool log)
+{
+    if (!(x.low <= x.high))
+        x = (uz_range){0.0, 1.0};
+    if (!(x.high > x.low))
+        x.high = x.low + 1.0;
+    if (!(y.low <= y.high))
+        y = (uz_range){log ? 0.1 : 0.0, 1.0};
+    if (log) { /* exponents from here on */
+        y = (uz_range){floor(log10(y.low)), ceil(log10(y.high))};
+        if (!(y.high > y.low))
+            y.high = y.low + 1.0;
+    } else {
+        y = (uz_range){0.0, fmax(1.0, y.high)};
+        const double step = fmax(1.0, step_of(y, height, ROOM_Y, false));
+        y.high = step * ceil(y.high / step);
+    }
+    return (uz_panel){left, top, width, height, x, y, log};
+}
+
+static double across(const uz_panel *panel, double x)
+{
+    return panel->left + panel->width * ((x - panel->x.low) / (panel->x.high - panel->x.low));
+}
+
+/* y: an exponent on a logarithmic axis. */
+static double up(const uz_panel *panel, double y)
+{
+    return panel->top + panel->height * ((panel->y.high - y) / (panel->y.high - panel->y.low));
+}
+
+bool uz_panel_place(double *px, double *py, const uz_panel *panel, double x, double y)
+{
+    if (!isfinite(x) || !has_place(y, panel->log))
+        return false;
+    *px = across(panel, x);
+    *py = up(panel, panel->log ? log10(y) : y);
+    return true;
+}
+
+static void put_x_ticks(uz_buffer *svg, const uz_panel *panel, bool numbers)
+{
+    const double step = step_of(panel->x, panel->width, ROOM_X, false), foot = panel->top + panel->height;
+    const int64_t first = (int64_t)ceil(panel->x.low / step - 1e-9), last = (int64_t)floor(panel->x.high / step + 1e-9);
+    for (int64_t k = first; k <= last; k++) {
+        const double x = across(panel, (double)k * step);
+        uz_buffer_print(svg, "<path class=\"grid\" d=\"M%.2f %.2fV%.2f\"/>", x, panel->top, foot);
+        if (numbers)
+            uz_buffer_print(svg, "<text class=\"x\" x=\"%.2f\" y=\"%.1f\" text-anchor=\"middle\">%.10g</text>", x,
+                            foot + 15, (double)k * step);
+    }
+}
+
+static void put_y_ticks(uz_buffer *svg, const uz_panel *panel)
+{
+    const double step = step_of(panel->y, panel->height, ROOM_Y, panel->log);
+    const double first = ceil(panel->y.low / step - 1e-9), last = floor(panel->y.high / step + 1e-9);
+    for (double k = first; k <= last; k++) {
+        const double y = up(panel, k * step);
+        uz_buffer_print(svg,
+                        "<path class=\"grid\" d=\"M%.2f %.2fH%.2f\"/><text class=\"y\" x=\"%.1f\" y=\"%.2f\" "
+                        "text-anchor=\"end\">%s%.6g</text>",
+                        panel->left, y, panel->left + panel->width, panel->left - 6, y + 4, panel->log ? "1e" : "",
+                        k * step + 0.0);
+    }
+}
+
+void uz_panel_put_axes(uz_buffer *svg, const uz_panel *panel, const char *name, bool x_numbers)
+{
+    uz_buffer_print(svg, "<text class=\"title\" x=\"%.1f\" y=\"%.1f\">", panel->left, panel->top - 6);
+    uz_buffer_put_escaped(svg, name);
+    uz_buffer_print(svg, "</text>\n");
+    put_x_ticks(svg, panel, x_numbers);
+    put_y_ticks(svg, panel);
+    uz_buffer_print(svg, "\n<rect class=\"frame\" x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\"/>\n",
+                    panel->left, panel->top, panel->width, panel->height);
+}
+
+double uz_curve_value(const uz_curve_of *curve, int64_t i)
+{
+    const double y = uz_column_at(curve->y, i);
+    return isnan(curve->minuend) ? y : curve->minuend - y;
+}
+
+typedef struct {
+    double x, y;
+} point;
+
+/* The points of one column of pixels: first, lowest, highest, last, in the order in which they came. */
+typedef struct {
+    uz_buffer *svg;
+    int colour;
+    bool drawing;  /* a polyline is open */
+    int64_t drawn; /* points in it */
+    double column; /* NaN: none */
+    int64_t count, lowest_at, highest_at;
+    point first, lowest, highest, last;
+} pen;
+
+static void put_point(pen *p, point at)
+{
+    if (!p->drawing)
+        uz_buffer_print(p->svg, "<polyline class=\"curve c%d\" points=\"", p->colour);
+    uz_buffer_print(p->svg, "%s%.2f,%.2f", p->drawing ? " " : "", at.x, at.y);
+    p->drawing = true;
+    p->drawn++;
+    p->last = at;
+}
+
+static void put_column(pen *p)
+{
+    if (p->count == 0)
+        return;
+    const bool low_first = p->lowest_at <= p->highest_at;
+    const int64_t early = low_first ? p->lowest_at : p->highest_at, late = low_first ? p->highest_at : p->lowest_at;
+    const point last = p->last;
+    put_point(p, p->first);
+    if (early > 0 && early < p->count - 1)
+        put_point(p, low_first ? p->lowest : p->highest);
+    if (late > early && late < p->count - 1)
+        put_point(p, low_first ? p->highest : p->lowest);
+    if (p->count > 1)
+        put_point(p, last);
+    p->count = 0;
+}
+
+/* A line of one point is drawn as a dot: its two ends are round. */
+static void lift(pen *p)
+{
+    put_column(p);
+    if (p->drawing && p->drawn == 1)
+        put_point(p, p->last);
+    if (p->drawing)
+        uz_buffer_print(p->svg, "\"/>\n");
+    p->drawing = false;
+    p->drawn = 0;
+    p->column = NAN;
+}
+
+static void go_to(pen *p, point at)
+{
+    if (p->count == 0) {
+        p->first = p->lowest = p->highest = at;
+        p->lowest_at = p->highest_at = 0;
+    }
+    if (at.y > p->lowest.y) { /* down the paper */
+        p->lowest = at;
+        p->lowest_at = p->count;
+    }
+    if (at.y < p->highest.y) {
+        p->highest = at;
+        p->highest_at = p->count;
+    }
+    p->last = at;
+    p->count++;
+}
+
+void uz_panel_put_curve(uz_buffer *svg, const uz_panel *panel, const uz_curve_of *curve, int colour)
+{
+    pen p = {.svg = svg, .colour = colour, .column = NAN};
+    bool gap = false;
+    for (int64_t i = 0; i < curve->x.count && !svg->failed; i++) {
+        point at;
+        if (!uz_panel_place(&at.x, &at.y, panel, uz_column_at(curve->x, i), uz_curve_value(curve, i))) {
+            gap = true; /* one within a column of pixels is too small to see */
+            continue;
+        }
+        const bool same = floor(at.x) >= p.column && floor(at.x) <= p.column;
+        if (!same && gap)
+            lift(&p);
+        else if (!same)
+            put_column(&p);
+        p.column = floor(at.x);
+        gap = false;
+        go_to(&p, at);
+    }
+    lift(&p);
+}
+
+void uz_panel_put_marks(uz_buffer *svg, const uz_panel *panel, const uz_curve_of *curve, uz_column flag, int colour)
+{
+    double column = NAN;
+    bool any = false;
+    for (int64_t i = 0; i < curve->x.count && !svg->failed; i++) {
+        point at;
+        if (!(uz_column_at(flag, i) > 0.0) ||
+            !uz_panel_place(&at.x, &at.y, panel, uz_column_at(curve->x, i), uz_curve_value(curve, i)) ||
+            (floor(at.x) >= column && floor(at.x) <= column))
+            continue;
+        column = floor(at.x);
+        if (!any)
+            uz_buffer_print(svg, "<path class=\"restart c%d\" d=\"", colour);
+        any = true;
+        uz_buffer_print(svg, "M%.2f %.2fl-3.5 -7h7z", at.x, at.y - 2);
+    }
+    if (any)
+        uz_buffer_print(svg, "\"/>\n");
+}
