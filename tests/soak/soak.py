@@ -2,7 +2,9 @@
 
 Prints a table; exit status 1 if a figure that must be 0 is not.
 """
+import json
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -43,7 +45,7 @@ RUNS = [
 
 def main():
     build, wanted = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else ""
-    failed = False
+    failed, rows = False, []
     print("| what | figures | s |\n|---|---|---|")
     for name, run in RUNS:
         if wanted not in name:
@@ -53,7 +55,10 @@ def main():
         wrong = [key for key in ZERO if figures.get(key)]
         failed = failed or bool(wrong)
         text = ", ".join(f"{key} {value}".strip() for key, value in figures.items())
-        print(f"| {name} | {'**WRONG** ' if wrong else ''}{text} | {time.monotonic() - begun:.0f} |", flush=True)
+        text = f"{'**WRONG** ' if wrong else ''}{text}"
+        rows.append({"name": name, "figures": text, "seconds": round(time.monotonic() - begun)})
+        print(f"| {name} | {text} | {rows[-1]['seconds']} |", flush=True)
+        (pathlib.Path(build) / "soak.json").write_text(json.dumps({"rows": rows}))
     sys.exit(failed)
 
 
