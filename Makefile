@@ -40,11 +40,12 @@ FUZZ_SRC   := $(sort $(wildcard tests/fuzz/fuzz_*.c))
 BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
 EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
 THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
+FIGURES_SRC := $(sort $(wildcard tests/figures/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(SOAK_SRC) $(PRELOAD_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(PRELOAD_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
@@ -169,6 +170,11 @@ $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/theory: $(call obj,$(THEORY_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
+# Counts back-substitutions by standing between the solver's parts (tests/figures/count.c).
+FIGURES_WRAP := uz_factor_forward uz_factor_backward uz_principal_solve uz_multigrid_apply
+$(BUILD)/figures: $(call obj,$(FIGURES_SRC)) $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) $(patsubst %,-Wl$(comma)--wrap=%,$(FIGURES_WRAP)) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
+
 $(BUILD)/load: $(call obj,tests/soak/load.c)
 	$(CC) $(LDFLAGS_ALL) -o $@ $^
 
@@ -183,7 +189,7 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-browser test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
+.PHONY: test test-unit test-api test-browser test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory figures numbers
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -257,9 +263,18 @@ extremes: deps ## claims at the extremes against exact solutions: a table and bu
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
 	@$(BUILD)/extremes $(BUILD)/extremes.json $(FILTER)
 
-theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table
+theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table and build/theory.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory
-	@$(BUILD)/theory
+	@$(BUILD)/theory $(BUILD)/theory.json
+
+figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes
+	@$(MAKE) --no-print-directory -s $(BUILD)/figures
+	@$(BUILD)/figures $(BUILD)/figures.json
+	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
+
+numbers: ## measure everything that docs/numbers.md and the README show (hours: soak is one of it), then write them; SPARED="soak" leaves some out
+	@for part in $(filter-out $(SPARED),theory extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
+	    $(MAKE) --no-print-directory $$part || exit 1; done
 
 ##@ Style
 .PHONY: format lint

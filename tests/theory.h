@@ -121,8 +121,9 @@ static inline double theory_width(const uz_result *result, bool line)
     return sqrt((line ? 4 : 2.5) * moment / sum);
 }
 
-/* `per_radius` cells in the contact radius; 0 < growth of those beyond. */
-static inline void theory_hertz(theory_table *t, uz_model model, const char *element, int per_radius, double growth)
+/* `per_radius` cells in the contact radius; 0 < growth of those beyond. *peak (may be NULL): Hertz's pressure. */
+static inline uz_scene theory_hertz_scene(uz_model model, const char *element, int per_radius, double growth,
+                                          double *peak)
 {
     const bool solid = model == UZ_SOLID, line = model == UZ_PLANE_STRAIN;
     const double length = solid ? 10 : THEORY_BLOCK;
@@ -141,7 +142,8 @@ static inline void theory_hertz(theory_table *t, uz_model model, const char *ele
     /* of the half or quarter that is there */
     const double force = line ? M_PI / 8 * THEORY_CURVATURE : (solid ? 1.0 / 3 : 4.0 / 3) * THEORY_CURVATURE;
     const double area = line ? length : solid ? length * length : M_PI * length * length;
-    const double peak = line ? 0.5 * THEORY_CURVATURE : 2 / M_PI * THEORY_CURVATURE;
+    if (peak)
+        *peak = line ? 0.5 * THEORY_CURVATURE : 2 / M_PI * THEORY_CURVATURE;
     if (model != UZ_AXISYMMETRIC)
         body_hold(&s, "left", 0, NAN, NAN);
     body_hold(&s, "right", 0, NAN, NAN);
@@ -151,6 +153,14 @@ static inline void theory_hertz(theory_table *t, uz_model model, const char *ele
     }
     body_load(&s, UZ_LOAD_PRESSURE, "top", force / area, 0, 0);
     body_plane(&s, "bottom", (double[3]){0}, (double[3]){0, 1, 0});
+    return s;
+}
+
+static inline void theory_hertz(theory_table *t, uz_model model, const char *element, int per_radius, double growth)
+{
+    const bool solid = model == UZ_SOLID, line = model == UZ_PLANE_STRAIN;
+    double peak;
+    uz_scene s = theory_hertz_scene(model, element, per_radius, growth, &peak);
     uz_result *result = body_solve(&s, 1e-7);
     char name[80];
     snprintf(name, sizeof name, "Hertz, %s, %s, %d cells in the radius",

@@ -2,6 +2,7 @@
 
 Prints a table; exit status 1 if a figure that must be 0 is not.
 """
+import json
 import os
 import pathlib
 import signal
@@ -48,7 +49,7 @@ RUNS = [
 
 def main():
     build, wanted = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else ""
-    failed = False
+    failed, rows = False, []
     print("| what | figures | s |\n|---|---|---|")
     for name, run in RUNS:
         if wanted not in name:
@@ -58,7 +59,10 @@ def main():
         wrong = [key for key in ZERO if figures.get(key)]
         failed = failed or bool(wrong)
         text = ", ".join(f"{key} {value}".strip() for key, value in figures.items())
-        print(f"| {name} | {'**WRONG** ' if wrong else ''}{text} | {time.monotonic() - begun:.0f} |", flush=True)
+        text = f"{'**WRONG** ' if wrong else ''}{text}"
+        rows.append({"name": name, "figures": text, "seconds": round(time.monotonic() - begun)})
+        print(f"| {name} | {text} | {rows[-1]['seconds']} |", flush=True)
+        (pathlib.Path(build) / "soak.json").write_text(json.dumps({"rows": rows}))
     sys.exit(failed)
 
 

@@ -1,4 +1,5 @@
-/* theory.c: how stress and contact pressure come closer to theory as meshes get finer: `make theory`. */
+/* theory.c: how stress and contact pressure come closer to theory as meshes get finer: `make theory`. Prints a table
+ * and writes it as JSON. usage: theory OUTPUT.json */
 #include "theory.h"
 
 #include <stdarg.h>
@@ -16,11 +17,17 @@ void test_fail(const char *file, int line, const char *format, ...)
     failures++;
 }
 
+static FILE *json;
+static int rows;
+
 static void print(const theory_table *t)
 {
-    for (int i = 0; i < t->count; i++)
+    for (int i = 0; i < t->count; i++) {
+        fprintf(json, "%s  {\"name\": \"%s\", \"quantity\": \"%s\", \"computed\": %.9g, \"theory\": %.9g}",
+                rows++ ? ",\n" : "", t->row[i].name, t->row[i].quantity, t->row[i].computed, t->row[i].theory);
         printf("| %-66s | %-14s | %12.6g | %12.6g | %7.3f %% |\n", t->row[i].name, t->row[i].quantity,
                t->row[i].computed, t->row[i].theory, 100 * theory_error(&t->row[i]));
+    }
     fflush(stdout);
 }
 
@@ -66,11 +73,17 @@ static void others(void)
     print(&t);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
+    if (argc != 2 || !(json = fopen(argv[1], "w"))) {
+        fprintf(stderr, "usage: theory OUTPUT.json\n");
+        return 2;
+    }
+    fprintf(json, "{\"rows\": [\n");
     printf("| %-66s | %-14s | %12s | %12s | %9s |\n|---|---|---|---|---|\n", "body", "quantity", "computed", "theory",
            "error");
     hertz();
     others();
-    return failures > 0;
+    fprintf(json, "\n]}\n");
+    return fclose(json) != 0 || failures > 0;
 }

@@ -1,0 +1,140 @@
+"""Every measured number of docs/numbers.md and of the README's blocks is that of its data file, and the tables say what the data does.
+usage: test_numbers.py BUILD_DIR [FILTER]"""
+import json
+import pathlib
+import re
+import shutil
+import sys
+import tempfile
+import xml.etree.ElementTree
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "figures"))
+
+import collect  # noqa: E402  the path is set above
+import numbers_page as numbers  # noqa: E402
+import service  # noqa: E402
+import svg  # noqa: E402
+import tables  # noqa: E402
+from service import ROOT, Skip, check, options  # noqa: E402
+
+
+def copy(folder):
+    """What the generator reads and writes, somewhere else."""
+    root = pathlib.Path(folder)
+    shutil.copytree(ROOT / "docs", root / "docs")
+    shutil.copy(ROOT / "README.md", root / "README.md")
+    return root
+
+
+def measured():
+    data = numbers.load(ROOT / "docs" / "figures")
+    if "figures" not in data:
+        raise Skip("no data in docs/figures")
+    return data
+
+
+@options(None)
+def test_nothing_is_stale(s):
+    wrong, missing = numbers.stale(ROOT)
+    check(not wrong, "not what the data gives (make figures):", wrong)
+    for name in missing:
+        print(f"# README block {name} has no data yet")
+
+
+@options(None)
+def test_a_changed_number_is_found(s):
+    measured()
+    with tempfile.TemporaryDirectory() as folder:
+        root = copy(folder)
+        check(numbers.stale(root)[0] == [], "a copy is as good")
+        for name in ("docs/numbers.md", "docs/figures/sizes.csv", "docs/figures/history.svg", "README.md"):
+            path = root / name
+            text = path.read_text()
+            place = re.search(r"numbers:iterations.*?(\d)\d*,\d{3} \|", text, re.S) if name == "README.md" else re.search(r"[^\d](\d)\d*\.\d+", text)
+            at = place.start(1)
+            path.write_text(text[:at] + str((int(text[at]) + 1) % 10) + text[at + 1:])
+            check(numbers.stale(root)[0] == [name], name, numbers.stale(root)[0])
+            numbers.write(root)
+            check(path.read_text() == text, name, "is not what it was")
+        (root / "docs" / "figures" / "old.svg").write_text("<svg/>")
+        check(numbers.stale(root)[0] == ["docs/figures/old.svg"])
+
+
+@options(None)
+def test_blocks_without_data_stay(s):
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        (root / "docs" / "figures").mkdir(parents=True)
+        text = "a\n<!-- numbers:growth -->\n| by hand |\n<!-- /numbers -->\nb\n"
+        (root / "README.md").write_text(text)
+        check(numbers.stale(root) == ([], ["growth"]))
+        rows = [{"d": 1000, "m": 10, "iterations": 4, "factor_bytes": 2500000, "linear_s": 0.5, "cold_s": 0.25, "cached_s": 0.01}]
+        (root / "docs" / "figures" / "bench_size.json").write_text(
+            json.dumps({"sizes": rows, "exponents": {"linear": 1.234, "cold": 1.3, "cached": 1.0}}))
+        check(numbers.stale(root) == (["README.md"], []))
+        numbers.write(root)
+        new = (root / "README.md").read_text()
+        check("| 1,000 | 0.5 | 0.25 | 0.01 | 0.50 | 4 | 2.5 |" in new and "linear solve 1.23" in new, new)
+        check(new.startswith("a\n<!-- numbers:growth -->\n") and new.endswith("<!-- /numbers -->\nb\n"), new)
+
+
+@options(None)
+def test_no_run_claims_too_much(s):
+    """The bound that an answer carries is never below its error."""
+    data = measured()
+    checked = 0
+    for problem in data["figures"]["precision"]:
+        check(tables.false_claims(problem) == [], problem["name"], tables.false_claims(problem))
+        check(problem["reference_change"] < 1e-20, problem["name"], problem["reference_change"])
+        for run in problem["runs"]:
+            if run["outcome"] == "converged":
+                check(run["certified"] <= run["requested"] or run["level"] == "exact", run)
+                checked += 1
+    check(checked > 100, checked)
+    claim = {"runs": [{"certified": 1e-6, "energy_error": 2e-6}, {"certified": 1e-6, "energy_error": 1e-7}]}
+    check(tables.false_claims(claim) == claim["runs"][:1])
+
+
+@options(None)
+def test_figures_are_svg(s):
+    for path in sorted((ROOT / "docs" / "figures").glob("*.svg")):
+        root = xml.etree.ElementTree.fromstring(path.read_text())
+        width, height = float(root.get("width")), float(root.get("height"))
+        found = list(root.iter("{http://www.w3.org/2000/svg}text"))
+        check(len(found) > 20, path)
+        for text in found:
+            x, y = float(text.get("x")), float(text.get("y"))
+            check(0 <= x <= width and 0 <= y <= height, path, text.text, x, y)
+
+
+@options(None)
+def test_numbers_as_text(s):
+    got = [tables.sig(v) for v in (None, 0, 0.0123, 1.26, 12.6, 126, 12600, 1.2e-9, 9.96e-5)]
+    check(got == ["–", "0", "0.012", "1.3", "13", "126", "12,600", "1.2e-9", "0.0001"], got)
+    got = [tables.duration(v) for v in (2.5, 1.0, 0.0123, 0.99999, 4.2e-5, None)]
+    check(got == ["2.5 s", "1 s", "12 ms", "1 s", "42 µs", "–"], got)
+    check(tables.percent(0.0213) == "2.1 %")
+
+
+@options(None)
+def test_axes(s):
+    axis = svg.Log(2e-4, 0.5)
+    check([v for v, _ in axis.ticks()] == [1e-4, 1e-3, 1e-2, 1e-1, 1.0] and abs(axis.at(1e-2) - 0.5) < 1e-12 and axis.at(0) == 0)
+    check([label for _, label in svg.Linear(-0.3, 1.1).ticks()][:2] == ["−0.4", "−0.2"] or svg.Linear(-0.3, 1.1).low <= -0.3)
+    check(svg.Count(30).at(0) == 0 and svg.Count(30).at(30) == 1)
+
+
+@options(None)
+def test_collected(s):
+    rows = [[k, 0, 0] for k in range(5000)]
+    thinned = collect.thin(rows)
+    check(thinned[0] == rows[0] and thinned[-1] == rows[-1] and 200 < len(thinned) <= collect.KEPT_ROWS + 1, len(thinned))
+    check(all(a[0] < b[0] for a, b in zip(thinned, thinned[1:])) and collect.thin(rows[:7]) == rows[:7])
+    merged = collect.renewed_rows("ratios")({"ratios": [{"name": "b", "median": 3}]}, {"ratios": [{"name": "a", "median": 1}, {"name": "b", "median": 2}]})
+    check([(r["name"], r["median"]) for r in merged["ratios"]] == [("a", 1), ("b", 3)], merged)
+    value = {"machine": {"a": 1}, "list": [{"x": 1, "runs": [{"y": 2}]}, {"x": 2}], "none": []}
+    check(json.loads(collect.dump(value)) == value)
+
+
+if __name__ == "__main__":
+    service.main(globals())

@@ -1,0 +1,80 @@
+/* main.c: measures what docs/numbers.md shows, as JSON; progress goes to stderr. tests/figures/numbers_page.py makes
+ * figures and tables of it. usage: figures OUTPUT.json [history|sizes|precision [problem]] */
+#include "figures/figures.h"
+#include "harness.h"
+
+#include <limits.h>
+#include <malloc.h>
+#include <stdarg.h>
+#include <string.h>
+#include <unistd.h>
+
+static int failures;
+
+/* What the harness gives to tests, for the fixtures that are shared with them. */
+void test_fail(const char *file, int line, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    fprintf(stderr, "%s:%d: ", file, line);
+    vfprintf(stderr, format, args);
+    fputc('\n', stderr);
+    va_end(args);
+    failures++;
+}
+
+const char *test_cases_dir(void)
+{
+    return access("../shared/cases", R_OK) == 0 ? "../shared/cases" : NULL;
+}
+
+char *test_read_file(const char *path, size_t *len)
+{
+    FILE *file = fopen(path, "rb");
+    long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
+    char *text = size >= 0 ? malloc((size_t)size + 1) : NULL;
+    bool ok = text && fseek(file, 0, SEEK_SET) == 0 && fread(text, 1, (size_t)size, file) == (size_t)size;
+    if (file)
+        fclose(file);
+    if (!ok) {
+        free(text);
+        return NULL;
+    }
+    text[size] = '\0';
+    *len = (size_t)size;
+    return text;
+}
+
+/* As in the benchmark: memory that is given back and asked for again costs the kernel as much as a factorization. */
+static void keep_memory(void)
+{
+    mallopt(M_MMAP_MAX, 0);
+    mallopt(M_TRIM_THRESHOLD, INT_MAX);
+}
+
+static bool wanted(const char *part, const char *asked)
+{
+    return !asked || strcmp(part, asked) == 0;
+}
+
+int main(int argc, char **argv)
+{
+    const char *part = argc > 2 ? argv[2] : NULL;
+    json out = {.first = true};
+    if (argc < 2 || !(out.file = fopen(argv[1], "w"))) {
+        fprintf(stderr, "usage: figures OUTPUT.json [history|sizes|precision [problem]]\n");
+        return 2;
+    }
+    keep_memory();
+    uz_process_init(2);
+    uz_thread_init();
+    fputc('{', out.file);
+    if (wanted("history", part))
+        figure_history(&out);
+    if (wanted("sizes", part))
+        figure_sizes(&out);
+    if (wanted("precision", part))
+        figure_precision(&out, argc > 3 ? argv[3] : NULL);
+    fputs("\n}\n", out.file);
+    return fclose(out.file) != 0 || failures > 0;
+}

@@ -1,0 +1,208 @@
+"""Makes docs/numbers.md, the figures and CSV files beside it, and the README's measured blocks, from the data in docs/figures.
+
+usage: numbers_page.py collect BUILD   renew the data from what BUILD/*.json holds, then write everything
+       numbers_page.py write           write everything from the data that is there
+       numbers_page.py check           exit status 1, naming the files, where what is there is not what would be written
+NUMBERS_ROOT names another checkout than this file's own.
+"""
+import csv
+import io
+import json
+import os
+import pathlib
+import re
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import collect  # noqa: E402  the path is set above
+import draw  # noqa: E402
+import tables  # noqa: E402
+
+ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
+BLOCK = re.compile(r"<!-- numbers:([a-z_]+) -->\n(.*?)<!-- /numbers -->", re.S)
+COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes",
+            "theory": "make theory", "soak": "make soak", "peers": "make peers"}
+
+
+def load(folder):
+    return {path.stem: json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))}
+
+
+def csv_text(rows, columns):
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([["" if row.get(c) is None else row[c] for c in columns] for row in rows])
+    return out.getvalue()
+
+
+TIMES = ["runs", "cpu_s", "cpu_min_s", "cpu_max_s", "wall_s", "wall_min_s", "wall_max_s"]
+
+
+def csv_files(data):
+    """The numbers behind each figure."""
+    measured = data["figures"]
+    history = [dict(zip(("iteration", "dual_objective", "residual"), row), nx=run["nx"], method=run["method"], minimum=run["minimum"])
+               for run in measured["history"] for row in run["rows"]]
+    sizes = [{**run, "nx": s["nx"], "d": s["d"], "m": s["m"], "lambda_1": s["lambda_1"]} for s in measured["sizes"] for run in s["ways"]]
+    precision = [{**run, "problem": p["name"], "d": p["d"], "m": p["m"]} for p in measured["precision"] for run in p["runs"]]
+    return {"history.csv": csv_text(history, ["nx", "method", "iteration", "dual_objective", "minimum", "residual"]),
+            "sizes.csv": csv_text(sizes, ["nx", "d", "m", "name", "rule", "outcome", "lambda_1", "alpha", "iterations", "restarts", "residual",
+                                          "certified"] + TIMES),
+            "precision.csv": csv_text(precision, ["problem", "d", "m", "method", "operator", "operator_used", "level", "start", "outcome",
+                                                  "requested", "certified", "energy_error", "reaction_error", "mismatches", "iterations",
+                                                  "back_substitutions", "cycles"] + TIMES)}
+
+
+def figure_files(data):
+    measured, peers = data["figures"], (data.get("peers") or {}).get("rows", [])
+    files = {"history.svg": draw.history(measured["history"]), "sizes.svg": draw.sizes(measured["sizes"], peers),
+             "iterations.svg": draw.iterations(measured["sizes"])}
+    for problem in measured["precision"]:
+        if len({(run["method"], run["operator"]) for run in problem["runs"]}) > 1:
+            files[f"precision_{problem['name']}.svg"] = draw.precision(problem)
+    return files
+
+
+def machine_lines(data):
+    rows = []
+    for name, command in COMMANDS.items():
+        if name in data:
+            m = data[name]["machine"]
+            rows.append([f"`{command}`", m["measured"], f"`{m['commit']}`", m["load"],
+                         f"{m['processor']}, {m['cores']} cores, {m['memory_bytes'] / 2**30:.0f} GiB; {m['system']}",
+                         ", ".join([f"gcc {m['compiler']}"] + [f"{k} {v}" for k, v in m["packages"].items() if k != "gcc"])])
+    return tables.table(["measured by", "when", "commit", "load", "machine", "versions"], rows)
+
+
+def problem_lines(problem, files):
+    name = f"precision_{problem['name']}.svg"
+    mesh = (f"The error of the mesh is {tables.percent(problem['mesh_error'])}, {problem['mesh_how']}: below that line more digits describe "
+            f"the mesh, not the body." if problem["mesh_error"] else "It has no mesh, so there is no line.")
+    lines = [f"### {problem['title'][0].upper()}{problem['title'][1:]}", "",
+             f"d = {problem['d']:,}, m = {problem['m']:,}, {problem['active']:,} rows touch, the least pressed of them with "
+             f"{tables.sig(problem['reference_margin'], 1)} of the largest reaction. {mesh} The last correction of the reference was "
+             f"{tables.sig(problem['reference_change'], 1)} of its norm. Runs: {tables.ends(problem)} (limit {tables.sig(problem['limit_s'])} s). "
+             f"Errors above their certified bound: {len(tables.false_claims(problem)) or 'none'}.", ""]
+    if name in files:
+        lines += [f"![work against precision](figures/{name})", ""]
+    lines += ["`auto`:", ""] + tables.level_rows(problem) + [""]
+    if name in files:
+        lines += tables.cheapest(problem) + [""]
+    return lines
+
+
+def section(title, lines, *before):
+    return [f"## {title}", "", *before, *lines, ""] if lines else []
+
+
+INTRODUCTION = """# Numbers
+
+Everything here is written by `make figures` from the data in `docs/figures`; nothing is typed by hand, and a test fails where a number is not that of its
+data file. `make numbers` measures all of it again.
+
+Times are medians of several runs in one thread after a warm-up, of the processor's clock for that thread: on a quiet machine they are those of the wall, which stand beside them in
+the CSV files with minima and maxima. The column "load" tells how many others were running."""
+
+PRECISION = """Each line is a method (colour) on a form of the operator (line and mark); its points are the accuracies asked for, loosest first: `quick`, `balanced` (scenes), 1e-4, 1e-6, `precise`, 1e-10,
+`exact`. What is drawn is the *achieved* error against a reference of some 30 digits: the touching rows are taken as equations, the rest is solved by iterative refinement with the residual in `__float128`, and the
+optimality conditions are checked in `__float128` (`tests/figures/reference.h`). Three measures: the energy norm; the largest error of a reaction over the largest reaction; rows wrongly in or out of
+contact. Work is seconds, cold and with the factor cached, from the scene (or the matrices, where there is no scene) to the certified answer with everything that the summary says; and passes over the
+factor, one forward and one backward being one back-substitution (those along the paths of a few dofs and those with the factor of the free dofs count as whole ones), for `matrix_free` cycles of multigrid.
+A cross is a run that was stopped by the limit on its time, at the error that it had reached; tighter levels of such a line are not run. `balanced` stands hollow beside its line, as it pays for the estimate
+of the mesh's error too."""
+
+RESIDUAL = """The paper's body and stopping rule, with the step 1/λ_max(N K⁻¹ N'). The residual is the paper's: of r with the displacement of that iteration, which in the accelerated methods belongs to the extrapolated
+ρ: e1 = N'(ρ − r) is most of it, and vanishes for an iteration where a restart sets ρ = r."""
+
+
+def page(data, files):
+    measured = data["figures"]
+    lines = INTRODUCTION.splitlines() + [""] + machine_lines(data) + [""]
+    lines += section("Convergence: the paper's Figure 2", ["![convergence](figures/history.svg)", "", "[CSV](figures/history.csv)"],
+                     RESIDUAL, "")
+    peers = " Other solvers are drawn at the tolerance 1e-6, with what they were certified for." if "peers" in data else ""
+    lines += section("Time and residual against size: the paper's Figure 3",
+                     ["![sizes](figures/sizes.svg)", "", *tables.size_rows(data), "", "[CSV](figures/sizes.csv)"],
+                     f"From the assembled matrices; time, and total residual of the answer. A cross or `>` is a run that was stopped after "
+                     f"{tables.sig(measured['sizes'][0]['limit_s'])} s of the processor.{peers}", "")
+    lines += section("Iterations", ["![iterations](figures/iterations.svg)", "", *tables.iterations(data), "", *tables.targets(data)],
+                     "Uzawa and the accelerated methods take the step 1/λ_max(N K⁻¹ N') unless it says λ₁(K), the step of the paper.", "")
+    lines += section("Accuracy levels", tables.levels(data))
+    lines += section("Work against precision", sum((problem_lines(p, files) for p in measured["precision"]), []), PRECISION, "",
+                     "[CSV of all runs](figures/precision.csv)", "")
+    lines += section("Against one linear solve", tables.ratios(data))
+    lines += section("What digits cost", tables.digits(data))
+    lines += section("Other ratios", tables.others(data))
+    lines += section("Cost against size", tables.growth(data))
+    lines += section("Other solvers", tables.peers(data))
+    lines += section("Claims at the extremes", tables.extremes(data))
+    lines += section("Against theory", tables.theory(data))
+    lines += section("The service", tables.soak(data))
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def readme(text, data):
+    """The README with its measured blocks renewed. Returns it and the names of blocks whose data is not there: those stay."""
+    missing = []
+
+    def fill(found):
+        lines = tables.BLOCKS[found[1]](data)
+        if lines is None:
+            missing.append(found[1])
+            return found[0]
+        return f"<!-- numbers:{found[1]} -->\n" + "\n".join(lines) + "\n<!-- /numbers -->"
+    return BLOCK.sub(fill, text), missing
+
+
+def outputs(root):
+    """{path: text} of all that is made, and the README's blocks without data."""
+    folder = root / "docs" / "figures"
+    data = load(folder)
+    made = {}
+    if "figures" in data:
+        files = {**figure_files(data), **csv_files(data)}
+        made = {folder / name: text for name, text in files.items()}
+        made[root / "docs" / "numbers.md"] = page(data, files)
+    text, missing = readme((root / "README.md").read_text(), data)
+    made[root / "README.md"] = text
+    return made, missing
+
+
+def stale(root):
+    """Files that differ from what the data gives, and files that nothing makes."""
+    made, missing = outputs(root)
+    wrong = [str(path.relative_to(root)) for path, text in made.items() if not path.exists() or path.read_text() != text]
+    extra = [path for kind in ("*.svg", "*.csv") for path in (root / "docs" / "figures").glob(kind) if path not in made]
+    return wrong + [str(path.relative_to(root)) for path in extra], missing
+
+
+def write(root):
+    made, missing = outputs(root)
+    for path, text in made.items():
+        path.write_text(text)
+    for name in missing:
+        print(f"README block {name}: no data yet, left as it is")
+    for path in stale(root)[0]:
+        print(f"{path}: nothing makes it")
+
+
+def main():
+    command = sys.argv[1] if len(sys.argv) > 1 else ""
+    if command == "collect" and len(sys.argv) == 3:
+        renewed = collect.collect(sys.argv[2], ROOT / "docs" / "figures", ROOT)
+        print("data renewed:", ", ".join(renewed) or "none")
+        write(ROOT)
+    elif command == "write":
+        write(ROOT)
+    elif command == "check":
+        wrong, _ = stale(ROOT)
+        for path in wrong:
+            print(f"{path}: not what its data gives; run make figures")
+        sys.exit(bool(wrong))
+    else:
+        sys.exit(__doc__)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,300 @@
+"""The tables of docs/numbers.md and of the README's measured blocks, from the data in docs/figures. Each function returns
+Markdown lines, or None where the data it needs was not measured."""
+
+LEVELS = ["quick", "balanced", "precise", "exact"]
+NONE = "–"
+
+
+def sig(value, digits=2):
+    """A number with so many digits, without an exponent where that reads better."""
+    if value is None:
+        return NONE
+    if value == 0:
+        return "0"
+    text = f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, exponent = text.split("e")
+        if -5 <= int(exponent) <= 6:
+            return f"{float(text):,.{max(0, digits - 1 - int(exponent))}f}"
+        return f"{mantissa}e{int(exponent)}"
+    return f"{float(text):,.0f}" if abs(value) >= 10 ** digits else text
+
+
+def duration(seconds):
+    if seconds is None:
+        return NONE
+    for unit, scale in (("s", 1), ("ms", 1e3), ("µs", 1e6)):
+        if seconds * scale >= 0.9995 or unit == "µs":
+            return f"{sig(seconds * scale)} {unit}"
+
+
+def table(head, rows):
+    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)] + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows]
+
+
+def percent(value):
+    return NONE if value is None else f"{sig(100 * value)} %"
+
+
+# ---- work and precision
+
+def find(problem, level, start, method="auto", operator="auto"):
+    for run in problem["runs"]:
+        if (run["method"], run["operator"], run["level"], run["start"]) == (method, operator, level, start):
+            return run if "cpu_s" in run else None
+    return None
+
+
+def level_cell(problem, level):
+    cold, cached = find(problem, level, "cold"), find(problem, level, "cached")
+    if not cold or not cached:
+        return NONE
+    return f"{duration(cold['cpu_s'])} / {duration(cached['cpu_s'])}; {sig(cached['energy_error'], 1)}"
+
+
+def levels(data):
+    """What each accuracy level costs."""
+    if not data.get("figures"):
+        return None
+    rows = [[p["title"], f"{p['d']:,}", percent(p["mesh_error"])] + [level_cell(p, level) for level in LEVELS]
+            for p in data["figures"]["precision"]]
+    return table(["cold / cached time of `auto`; error of the answer", "d", "error of the mesh"] + [f"`{name}`" for name in LEVELS], rows)
+
+
+def level_rows(problem):
+    """All levels of one problem, asked, certified and achieved."""
+    rows = []
+    for level in ["quick", "balanced", "1e-4", "1e-6", "precise", "1e-10", "exact"]:
+        cold, cached = find(problem, level, "cold"), find(problem, level, "cached")
+        if cold and cached:
+            rows.append([f"`{level}`", "rounding" if level == "exact" else sig(cached["requested"]), duration(cold["cpu_s"]),
+                         duration(cached["cpu_s"]), sig(cached["back_substitutions"]), sig(cached["certified"]),
+                         sig(cached["energy_error"]), sig(cached["reaction_error"]), cached["mismatches"]])
+    return table(["level", "asked", "cold", "cached", "back-substitutions", "certified", "achieved", "largest reaction", "mismatches"], rows)
+
+
+def cheapest(problem):
+    """For each level the series that is cheapest with the factor cached, and the gradient methods' best."""
+    rows = []
+    for level in ["quick", "balanced", "1e-4", "1e-6", "precise", "1e-10", "exact"]:
+        row = [f"`{level}`"]
+        for method in ("auto", "active_set", "accelerated_restart", "accelerated", "uzawa"):
+            met = [run for run in problem["runs"] if run["method"] == method and run["level"] == level and
+                   run["start"] == "cached" and run["outcome"] == "converged"]
+            best = min(met, key=lambda run: run["cpu_s"], default=None)
+            row.append(f"{duration(best['cpu_s'])} ({best['operator_used']})" if best else NONE)
+        if any(cell != NONE for cell in row[1:]):
+            rows.append(row)
+    return table(["cached, cheapest form", "auto", "active_set", "accelerated_restart", "accelerated", "uzawa"], rows)
+
+
+def ends(problem):
+    """How many runs ended how: nothing is dropped."""
+    count = {}
+    for run in problem["runs"]:
+        count[run["outcome"]] = count.get(run["outcome"], 0) + 1
+    return ", ".join(f"{n} {name}" for name, n in sorted(count.items()))
+
+
+def false_claims(problem):
+    """Runs whose error is larger than the bound they carry: must be none. A rounding of the reference's own is forgiven."""
+    return [run for run in problem["runs"] if run.get("certified") is not None and
+            run["energy_error"] > run["certified"] * (1 + 1e-9) + 1e-16]
+
+
+# ---- iterations
+
+def way(size, name, rule):
+    for run in size["ways"]:
+        if run["name"] == name and run["rule"] == rule and "iterations" in run:
+            return run
+    return None
+
+
+def count_cell(run):
+    if not run:
+        return NONE
+    return ("> " if run["outcome"] == "time_limit" else "") + f"{run['iterations']:,}"
+
+
+def over(run, base):
+    """Iterations over those of the accelerated method with restart."""
+    if not run or not base or base["outcome"] == "time_limit":
+        return NONE
+    return ("> " if run["outcome"] == "time_limit" else "") + sig(run["iterations"] / base["iterations"], 3)
+
+
+def iterations(data):
+    if not data.get("figures"):
+        return None
+    rows = []
+    for rule, name in (("paper", "paper's rule"), ("certified", "certified 1e-6")):
+        for size in data["figures"]["sizes"]:
+            runs = {n: way(size, n, rule) for n in ("restart", "restart_paper_step", "accelerated", "uzawa")}
+            rows.append([name, f"{size['nx']} x {size['nx'] // 3}"] + [count_cell(runs[n]) for n in runs] +
+                        [over(runs["restart_paper_step"], runs["restart"]), over(runs["uzawa"], runs["restart"])])
+    return table(["until", "cells", "with restart", "with restart, step λ₁(K)", "without restart", "Uzawa", "λ₁(K) / restart", "Uzawa / restart"], rows)
+
+
+def targets(data):
+    """The least ratios over the sizes: what was promised is 2 and 10."""
+    if not data.get("figures"):
+        return None
+    lines = []
+    for rule, name in (("paper", "By the paper's rule"), ("certified", "To a certified error of 1e-6")):
+        least = {}
+        for other in ("restart_paper_step", "uzawa"):
+            ratios = []
+            for size in data["figures"]["sizes"]:
+                run, base = way(size, other, rule), way(size, "restart", rule)
+                if run and base:
+                    ratios.append((run["iterations"] / base["iterations"], size["nx"]))
+            least[other] = min(ratios)
+        lines.append(f"{name} the accelerated method with restart takes 1/{sig(least['restart_paper_step'][0], 3)} of the iterations "
+                     f"of the paper's step size λ₁(K) or less (least at NX = {least['restart_paper_step'][1]}), and "
+                     f"1/{sig(least['uzawa'][0], 3)} of plain Uzawa's or less (least at NX = {least['uzawa'][1]}).")
+    return lines
+
+
+def size_rows(data):
+    """Figure 3 as a table."""
+    rows = []
+    names = [("uzawa", "paper"), ("accelerated", "paper"), ("restart", "paper"), ("restart_factored", "paper"), ("auto", "certified"), ("auto_cached", "certified")]
+    for size in data["figures"]["sizes"]:
+        row = [f"{size['nx']} x {size['nx'] // 3}", f"{size['d']:,}"]
+        for name, rule in names:
+            run = way(size, name, rule)
+            text = NONE if not run else f"{duration(run['cpu_s'])}, {sig(run['residual'])}"
+            row.append("> " + text if run and run["outcome"] == "time_limit" else text)
+        rows.append(row)
+    return table(["cells", "d", "Uzawa", "accelerated", "with restart", "with restart, a sparse solve per iteration", "auto, certified 1e-6", "the same, cached"], rows)
+
+
+# ---- what other commands measure
+
+def ratio(data, name, digits=2):
+    for row in (data.get("bench") or {}).get("ratios", []):
+        if row["name"] == name:
+            return f"{row['median']:.{digits}f}"
+    return NONE
+
+
+def ratios(data):
+    if not data.get("bench"):
+        return None
+    sizes = [150, 300, 600, 900]
+    rows = [["d"] + [f"{2 * nx * (nx // 3 + 1):,}" for nx in sizes],
+            ["cold, from assembled K to certified 1e-8, over the whole linear solve"] + [ratio(data, f"cold_nx{nx}_1e-08") for nx in sizes],
+            ["cached factor, to 1e-8, with energy, resultants and warnings, over one `cholmod_solve`"] + [ratio(data, f"cached_nx{nx}_1e-08") for nx in sizes],
+            ["100 load cases on one factor, each to 1e-8, over one `cholmod_solve`"] + [ratio(data, f"100_load_cases_nx{nx}", 0) for nx in sizes],
+            ["peak memory of a cold solve over the linear solve's"] + [ratio(data, f"memory_nx{nx}") for nx in sizes]]
+    return table(["paper's body, cells"] + [f"{nx} x {nx // 3}" for nx in sizes], rows)
+
+
+def others(data):
+    """The bench's rows that no other table has, as they are."""
+    if not data.get("bench"):
+        return None
+    shown = ("cold_nx", "cached_nx", "100_load", "memory_nx", "accuracy_")
+    rows = [[f"`{r['name']}`", sig(r["median"], 3), f"{sig(r['min'], 3)} .. {sig(r['max'], 3)}", r["runs"], r["unit"]]
+            for r in data["bench"]["ratios"] if not r["name"].startswith(shown)]
+    return table(["`make bench`", "median", "min .. max", "runs", "unit"], rows) if rows else None
+
+
+SENTENCES = """A scene of 200,000 dofs (546 x 182 `quad4`) is assembled in {assembly_quad4_matrices} s; all fields and the `.vtu` with most of them again take {assembly_quad4_outputs} s: together {assembly_quad4} times CHOLMOD's analysis and factorization (`make bench FILTER=assembly`).
+In three dimensions (a cube of 32^3 `hex8` bricks, d = 101,277) cold takes {cold_hex8_d101277} times the linear solve, and {memory_hex8_32} times its memory.
+An oblique plane costs {oblique_nx600} times one along an axis.
+Matrix Market: {matrix_market_read} MB/s read, {matrix_market_write} MB/s written. The obstacle problem OBSTCLAE (d = 9,604, m = 19,208) to certified 1e-8: {obstclae} ms, {ipopt_over_uzawa_obstclae} times faster than Ipopt to its default tolerance."""
+
+
+def sentences(data):
+    """None unless the bench has run whole, Ipopt included."""
+    if not data.get("bench"):
+        return None
+    values = {row["name"]: sig(row["median"], 3 if 0.9 < row["median"] < 2 else 2) for row in data["bench"]["ratios"]}
+    try:
+        return SENTENCES.format(**values).splitlines()
+    except KeyError:
+        return None
+
+
+def digits(data):
+    if not data.get("bench") or ratio(data, "accuracy_auto_1e-02") == NONE:
+        return None
+    rows = []
+    for error in ("1e-02", "1e-04", "1e-06", "1e-08", "1e-10"):
+        row = [f"1e-{int(error[-2:])}"]
+        for method in ("auto", "accelerated_restart"):
+            row += [ratio(data, f"accuracy_{method}_{error}", 1), ratio(data, f"accuracy_{method}_{error}_iterations", 0)]
+        rows.append(row)
+    return table(["relative error", "`auto`", "steps", "`accelerated_restart`", "iterations"], rows)
+
+
+def growth(data):
+    sizes = data.get("bench_size")
+    if not sizes:
+        return None
+    rows = [[f"{r['d']:,}", sig(r["linear_s"]), sig(r["cold_s"]), sig(r["cached_s"]), f"{r['cold_s'] / r['linear_s']:.2f}", r["iterations"],
+             f"{1e-6 * r['factor_bytes']:.1f}"] for r in sizes["sizes"]]
+    exponents = sizes["exponents"]
+    return table(["d", "linear solve, s", "cold to 1e-8, s", "cached, s", "cold / linear", "steps", "factor, MB"], rows) + ["", (
+        f"Fitted exponents over the upper half: linear solve {exponents['linear']:.2f}, cold {exponents['cold']:.2f}, "
+        f"cached {exponents['cached']:.2f}.")]
+
+
+FAMILIES = {"young": "Young's modulus 1e-6..1e15", "poisson": "Poisson's ratio -0.99..0.499999", "thickness": "thickness 1e-9..1e3",
+            "aspect": "aspect ratio to 1e4", "length": "length 1e-9..1e6", "load": "load 0, 1e-12..1e12", "gap": "gap 0, negative, to 1e9",
+            "fraction": "contact fraction 0, one node, 1", "motion": "prescribed motion", "cells": "numbers of cells",
+            "scene elements": "elements: all kinds, nearly incompressible, thin, slivers",
+            "scene obstacles": "obstacles: far, tiny, polylines of tiny segments, mm and m",
+            "scene bodies": "two bodies: stiffness ratios to 1e8, gaps to 1e9", "mixture": "a mixture of all",
+            "stiffness": "K near singular, to rcond 1e-17", "rows": "dependent, parallel, repeated, contradicting rows",
+            "range": "numbers at the ends of the range", "exhaustive": "small problems, all active sets searched",
+            "invariance": "units, row scaling, renumbering"}
+
+
+def extremes(data):
+    """Claims at the extremes by family; generated problems have a line of their own."""
+    if not data.get("extremes"):
+        return None
+    rows = [[FAMILIES.get(f["family"], f["family"])] + [f[k] for k in ("rows", "converged", "other", "short", "refused", "failed")] +
+            [sig(f["least_ratio"], 6)] for f in data["extremes"]["families"] if f["family"] != "generated"]
+    total, made = data["extremes"], data["extremes"]["generated"]
+    return table(["family", "rows", "converged", "other", "short", "refused", "false", "bound / true error, least"], rows) + ["", (
+        f"{total['passed'] + total['failed']:,} claims, {total['failed'] or 'none'} false. {made['problems']:,} generated problems (condition 1 "
+        f"to 1e14, dependent rows), {made['solves']:,} solves: {made['wrong'] or 'none'} false; bound over true error has the median "
+        f"{sig(made['ratio_median'], 3)}, the least is {sig(made['ratio_least'], 6)}.")]
+
+
+def theory(data):
+    """Errors in percent; a body's meshes side by side."""
+    if not data.get("theory"):
+        return None
+    bodies = {}
+    for row in data["theory"]["rows"]:
+        name, _, cells = row["name"].rpartition(", ")
+        quantities = bodies.setdefault(name, {})
+        quantities.setdefault(row["quantity"], []).append((cells.split(" ")[0], 100 * abs(row["computed"] / row["theory"] - 1)))
+    rows = [[name if k == 0 else "", quantity, " / ".join(c for c, _ in errors), " / ".join(sig(max(e, 1e-3), 2) for _, e in errors)]
+            for name, quantities in bodies.items() for k, (quantity, errors) in enumerate(quantities.items())]
+    return table(["body", "quantity", "cells", "error, %"], rows)
+
+
+def soak(data):
+    if not data.get("soak"):
+        return None
+    return table(["`make soak`", "figures", "s"], [[r["name"], r["figures"], f"{r['seconds']:.0f}"] for r in data["soak"]["rows"]])
+
+
+def peers(data):
+    """Every run against other solvers, those that failed too."""
+    if not data.get("peers"):
+        return None
+    rows = [[r["problem"], r["solver"], sig(r["tolerance"], 1), duration(r.get("seconds")), sig(r.get("certified"), 2), r["status"]]
+            for r in data["peers"]["rows"]]
+    return table(["problem", "solver", "tolerance", "time", "certified", "how it ended"], rows)
+
+
+# The README's blocks: name, and what fills it.
+BLOCKS = {"levels": levels, "iterations": iterations, "ratios": ratios, "sentences": sentences, "digits": digits, "growth": growth,
+          "extremes": extremes, "theory": theory, "soak": soak}
