@@ -149,6 +149,7 @@ def test_price_of_digits(_):
         done = run(fake.url, "plot", ID, "--trade", LC_ALL="C")
         check(fake.requests[0].path == f"/v1/jobs/{ID}/work-precision", fake.requests[0].path)
         narrow = run(fake.url, "plot", ID, "--trade", LC_ALL="C.UTF-8", COLUMNS="40").stdout
+        least = run(fake.url, "plot", ID, "--trade", LC_ALL="C.UTF-8", COLUMNS="26").stdout
         check(json.loads(run(fake.url, "plot", ID, "--trade", "--json").stdout) == trade)
     lines = done.stdout.splitlines()
     bars = [line.count("#") for line in lines[1:9]]
@@ -158,6 +159,7 @@ def test_price_of_digits(_):
     check("2 ms" in lines[1] and "never" in lines[9] and "never" in lines[10], lines)
     check("0.022" in lines[11] and "1/8 of the time?[2J" in lines[12], lines)
     check(all(len(line) <= 40 for line in narrow.splitlines()[:11]) and "\u2588" in narrow, narrow)
+    check(all(len(line) <= 26 for line in least.splitlines()[:11]), least)
     with Fake((200, {"a": 1})) as fake:
         run(fake.url, "plot", ID, "--trade", code=5)
 
