@@ -1,4 +1,5 @@
 """The client against a server that fails in every way it can. usage: test_client_faults.py BUILD_DIR [FILTER]"""
+import email.utils
 import json
 import os
 import socket
@@ -113,6 +114,11 @@ def test_retry_after_is_obeyed(_):
         expect(run(fake.url, "submit", BODY), 0)
         pause = fake.requests[1].time - fake.requests[0].time
     assert 0.95 < pause < 2.5, pause
+    date = email.utils.formatdate(time.time() + 3, usegmt=True)
+    with Fake((503, {"detail": "draining"}, {"Retry-After": date}), (202, job())) as fake:
+        expect(run(fake.url, "submit", BODY, "--retry", "10"), 0)
+        pause = fake.requests[1].time - fake.requests[0].time
+    assert 1.5 < pause < 6, pause
     with Fake((503, {"detail": "draining"}, {"Retry-After": "3600"})) as fake:
         done = expect(run(fake.url, "submit", BODY), 5)
         assert "draining" in done.stderr and len(fake.requests) == 1

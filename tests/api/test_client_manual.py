@@ -140,6 +140,10 @@ def test_completion_of_values(_):
     check(complete("uzawa result x -f v") == ["vtu"])
     check(complete("uzawa list --status r") == ["running"])
     check(complete("uzawa refine x --accuracy e") == ["exact"])
+    # As bash takes the words apart: at "=" and ":" as well.
+    check(complete("uzawa result x --format = v") == ["vtu"] and complete("uzawa result x --format =") == ["json", "csv", "vtu"])
+    check(complete("uzawa --server http : //h : 1 li") == ["list"])
+    check(complete("uzawa --server = http : //h : 1 list --status = r") == ["running"])
     check(complete("uzawa submit --vary ") == [] and complete("uzawa list --limit ") == [])
 
 
