@@ -15,6 +15,7 @@
 #include "work/work.h"
 
 #include <errno.h>
+#include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -76,6 +77,18 @@ static void own_signals(char **argv, sigset_t *signals)
         path[len] = '\0';
         execv(path, argv); /* returns only on failure: then it runs as it is */
     }
+}
+
+/* Bytes from which glibc maps a block by itself, and that may stay free at the end of an arena. */
+#define HEAP_KEPT (2 << 20)
+
+/* Unless both are set, glibc raises them, up to 32 and 64 MiB, to twice the largest block that was ever freed; and
+ * there are eight arenas for each processor, each of which then keeps as much of what the requests of a day took at
+ * most. */
+static void keep_little_free_memory(void)
+{
+    mallopt(M_MMAP_THRESHOLD, HEAP_KEPT);
+    mallopt(M_TRIM_THRESHOLD, HEAP_KEPT);
 }
 
 static void raise_descriptor_limit(void)
@@ -190,6 +203,7 @@ static bool start_http(service *s, const server_options *options, int fd, char *
 
 static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
 {
+    keep_little_free_memory();
     raise_descriptor_limit();
     if (!codec_init(message, size))
         return false;

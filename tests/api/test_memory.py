@@ -2,9 +2,11 @@
 refused, and the daemon lives through both. usage: test_memory.py BUILD_DIR [FILTER]
 """
 import copy
+import http.client
+import threading
 
 import service
-from service import SCENE, check, expect, options
+from service import INSTRUMENTED, MATRICES, SCENE, Skip, check, expect, options
 
 
 def plate(cells, **solver):
@@ -63,6 +65,42 @@ def test_by_name(s):
     again = s.solve(plate([60, 20]))["summary"]["cost"]
     check(again["predicted"]["bytes"] == cost["predicted"]["bytes"], again)
     check(again["predicted"]["seconds"] < cost["predicted"]["seconds"], cost, again)
+
+
+def free_memory_held(s):
+    with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
+        return next(int(line.split()[1]) for line in file if line.startswith("RssAnon")) / 1024
+
+
+@options("--workers", "1")
+def test_large_requests_leave_nothing_behind(s):
+    """What a request took is given back, whichever thread and so whichever arena of the heap it was in."""
+    if INSTRUMENTED:
+        raise Skip("the sanitizer has a heap of its own")
+    body = {**MATRICES, "problem": {**MATRICES["problem"], "h": [0.5] * 400000}}  # refused once it is read
+    s.solve(MATRICES)
+    before = free_memory_held(s)
+    connections = [http.client.HTTPConnection(s.host, s.port, timeout=60) for _ in range(40)]
+    replies = []
+
+    def post(connection):
+        text = service.json.dumps(body)
+        connection.request("POST", "/v1/jobs", text, {"Content-Type": "application/json"})
+        reply = connection.getresponse()
+        replies.append((reply.status, reply.read()))
+    for one in connections:  # so that each has a thread, and its arena
+        one.connect()
+    for _ in range(2):
+        threads = [threading.Thread(target=post, args=(one,)) for one in connections]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    check({status for status, _ in replies} <= {422, 503}, replies[0])
+    grown = free_memory_held(s) - before
+    for one in connections:
+        one.close()
+    check(grown < 64, grown)
 
 
 if __name__ == "__main__":

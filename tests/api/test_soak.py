@@ -59,7 +59,7 @@ def test_no_memory(s):
     why = no_memory.possible(s.build)
     if why:
         raise Skip(why)
-    figures = clean(no_memory.failing(s.build, 151, 1))
+    figures = clean(no_memory.failing(s.build, 151, rounds=0))
     check(figures["failed"] > 5, figures)
 
 

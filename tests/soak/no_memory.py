@@ -87,9 +87,10 @@ def _ended(s, job, seconds=20):
     return None
 
 
-def failing(build, every=1, rounds=2):
-    """Lets each `every`-th allocation fail, once and from then on; stuck: jobs acknowledged that did not end; errors:
-    jobs after it that were not solved; leaked: 1 if the last of two rounds left a block for every ten failures, and 200."""
+def failing(build, every=1, again=8, rounds=2):
+    """Lets each `every`-th allocation fail, once and from then on; then each `again`-th of these, `rounds` times. stuck: jobs
+    acknowledged that did not end; errors: jobs after it that were not solved; leaked: 1 if the last of the rounds left a block
+    for every ten failures, and 200."""
     text = json.dumps(service.SCENE).encode()
     s = service.Service(build, "--log-level", "error", "--max-client-rate", "0", "--workers", "1", "--keep-jobs", "4", "--cache", "1",
                         "--access-log", "no")
@@ -105,16 +106,17 @@ def failing(build, every=1, rounds=2):
         _way(s, text)
         figures["allocations"] = heap.unwatch()[0]
         held = []
-        for _ in range(rounds):
+        for step in (every,) + (every * again,) * rounds:
+            before = figures["failed"]
             for lasting in (0, 1):
-                for n in range(0, figures["allocations"], every):
+                for n in range(0, figures["allocations"], step):
                     _fail_at(s, heap, n, lasting, text, figures)
             for _ in range(8):  # what may be kept is as it was
                 _way(s, text)
             time.sleep(0.1)
             held.append(heap[HELD])
-        figures["blocks_grown"] = held[-1] - held[0]
-        figures["leaked"] = int(figures["blocks_grown"] > 200 + figures["failed"] // 10)
+        figures["blocks_grown"] = held[-1] - held[-2] if rounds else 0
+        figures["leaked"] = int(figures["blocks_grown"] > 200 + (figures["failed"] - before) // 10)
         figures["wrong_exit"] = s.end()
         return figures
     finally:
