@@ -173,7 +173,7 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-browser test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
+.PHONY: test test-unit test-api test-browser screenshots test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -189,6 +189,10 @@ test-api: all $(PRELOADS) $(BUILD)/library ## the tests that drive the real daem
 test-browser: deps-test ## the web page in headless Chromium; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all
 	@tests/run.sh $(BUILD) browser $(FILTER)
+
+screenshots: deps-test ## the pictures of the README, from the running page, into client/page/screenshots
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all
+	@$(PYTHON) -B tests/browser/screenshots.py $(BUILD) client/page/screenshots
 
 test-hygiene: ## formatting, static analysis, both compilers
 	@tests/run.sh $(BUILD) hygiene

@@ -4,7 +4,7 @@
 import { idempotency_key } from "./api.js";
 import { announce, debounce, h, show } from "./dom.js";
 import { draft, EXAMPLES, example_text } from "./examples.js";
-import { bytes, count, seconds } from "./format.js";
+import { bytes, counted, seconds } from "./format.js";
 import { locate } from "./json_locate.js";
 import { TextField } from "./text_field.js";
 
@@ -12,7 +12,7 @@ const CHECK_MS = 350;
 
 function predicted_words(predicted) {
   if (!predicted) return "What it will take is not known beforehand.";
-  return `${count(predicted.d)} unknowns, ${count(predicted.m)} contact rows, ${predicted.operator.replace("_", "-")} operator: about ` +
+  return `${counted(predicted.d, "unknown")}, ${counted(predicted.m, "contact row")}, ${predicted.operator.replace("_", "-")} operator: about ` +
     `${seconds(predicted.seconds)} after the assembly and ${bytes(predicted.bytes)}${predicted.fits ? "" : ", more than this service may take"}.`;
 }
 
