@@ -30,7 +30,8 @@ client_exit client_build_values(client_session *s, json_t *request);
  * new. *labels: array of strings beside it, new. */
 client_exit client_build_variants(client_session *s, json_t **requests, json_t **labels, const json_t *request);
 
-/* The values of --vary as an array, new; NULL: message says what is wrong. */
+/* The values of --vary as an array, new; NULL: message says what is wrong, "" where there is no
+ * memory. */
 json_t *client_vary_values(const char *text, char *message, size_t size);
 
 /* The id of a file's bytes on the service, which is sent them unless it has them. `name` tells whether it is packed. */

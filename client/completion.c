@@ -64,15 +64,17 @@ static void print_operand(FILE *to, client_command command)
         fputs("words=$commands ;;\n", to);
 }
 
-/* The command is the first word that is none of a general option's. */
+/* The command is the first word that is one: bash takes a URL apart at its colons. Words are also taken apart at "=".
+ */
 static void print_find_command(FILE *to)
 {
-    fputs("    for ((i = 1; i < COMP_CWORD; i++)); do\n"
-          "        case ${COMP_WORDS[i]} in\n"
-          "        -s|--server|-t|--timeout|--retry) ((i++)) ;;\n"
-          "        -*) ;;\n"
-          "        *) command=${COMP_WORDS[i]}; break ;;\n"
-          "        esac\n"
+    fputs("    if [[ $current == '=' ]]; then current=''; previous='='; fi\n"
+          "    if [[ $previous == '=' ]]; then\n"
+          "        previous=${COMP_WORDS[COMP_CWORD-1]}\n"
+          "        [[ $previous != '=' ]] || previous=${COMP_WORDS[COMP_CWORD-2]}\n"
+          "    fi\n"
+          "    for ((i = 1; i < COMP_CWORD; i++)); do\n"
+          "        if [[ \" $commands \" == *\" ${COMP_WORDS[i]} \"* ]]; then command=${COMP_WORDS[i]}; break; fi\n"
           "    done\n",
           to);
 }

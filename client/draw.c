@@ -90,9 +90,11 @@ static void print_decade(FILE *to, const json_t *decade, double low, double high
         client_format_seconds(time, sizeof time, seconds);
     if (isfinite(iterations))
         snprintf(steps, sizeof steps, "%.0f", iterations);
-    fprintf(to, "%7.0e  %9s  %10s  ", client_json_number(decade, "relative_error"), time, steps);
-    if (seconds > 0)
+    fprintf(to, "%5.0e  %9s  %7s", client_json_number(decade, "relative_error"), time, steps);
+    if (seconds > 0 && cells > 0) {
+        fputs("  ", to);
         print_bar(to, seconds, low, high, cells, ascii);
+    }
     fputc('\n', to);
 }
 
@@ -102,7 +104,7 @@ void client_draw_trade(client_session *s, const json_t *trade)
     const char *advice = client_json_text(trade, "suggestion.text");
     const bool ascii = s->options->ascii || !locale_is_utf8();
     double low, high;
-    int cells = drawing_width(s) - 33;
+    int cells = drawing_width(s) - 27;
     bool any = time_range(decades, &low, &high);
     fprintf(s->out, "%7s  %9s  %10s  %s\n", "error", "certified", "iterations",
             any && cells >= 24 ? "time, logarithmic"

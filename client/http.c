@@ -111,12 +111,13 @@ void client_http_close(client_http *http)
     curl_global_cleanup();
 }
 
-/* Where a reply's body goes. */
+/* Where a reply goes. header_whole: the empty line after its header has come. Without it a connection that breaks off
+ * before Content-Length looks to curl like a reply that ends with the connection. */
 typedef struct {
     client_http *http;
     client_reply *reply;
     const client_request *request;
-    bool enough;
+    bool enough, header_whole;
 } body_sink;
 
 static size_t take_body(char *bytes, size_t size, size_t count, void *ctx)
@@ -155,9 +156,14 @@ static double retry_after(const char *value)
 
 static size_t take_header(char *bytes, size_t size, size_t count, void *ctx)
 {
-    client_reply *reply = ctx;
+    body_sink *sink = ctx;
+    client_reply *reply = sink->reply;
     char value[64];
-    if (header_value(value, sizeof value, bytes, size * count, "Retry-After:"))
+    if (size * count > 0 && (bytes[0] == '\r' || bytes[0] == '\n'))
+        sink->header_whole = true;
+    else if (header_value(value, sizeof value, bytes, size * count, "HTTP/")) /* after a 1xx another one begins */
+        sink->header_whole = false;
+    else if (header_value(value, sizeof value, bytes, size * count, "Retry-After:"))
         reply->retry_after_s = retry_after(value);
     else if (header_value(value, sizeof value, bytes, size * count, "Date:"))
         reply->date = curl_getdate(value, NULL);
@@ -231,7 +237,7 @@ static void set_request(client_http *http, body_sink *sink, const client_request
     curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, take_body);
     curl_easy_setopt(curl, CURLOPT_WRITEDATA, sink);
     curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, take_header);
-    curl_easy_setopt(curl, CURLOPT_HEADERDATA, sink->reply);
+    curl_easy_setopt(curl, CURLOPT_HEADERDATA, sink);
     curl_easy_setopt(curl, CURLOPT_CERTINFO, request->certificate ? 1L : 0L);
     set_limits(curl, request);
 }
@@ -309,6 +315,8 @@ static CURLcode send_once(client_http *http, client_reply *reply, const client_r
         curl_easy_setopt(http->curl, CURLOPT_URL, url);
         curl_easy_setopt(http->curl, CURLOPT_HTTPHEADER, headers);
         code = perform(http);
+        if (code == CURLE_OK && !sink.header_whole)
+            code = CURLE_PARTIAL_FILE;
         code = sink.enough ? CURLE_OK : code;
         curl_easy_getinfo(http->curl, CURLINFO_RESPONSE_CODE, &reply->status);
         if (curl_easy_getinfo(http->curl, CURLINFO_PRIMARY_IP, &address) == CURLE_OK && address)

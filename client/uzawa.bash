@@ -9,12 +9,13 @@ _uzawa() {
     local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}
     local command='' options='' words='' files='' i commands='submit upload status wait refine verify result picture history plot list cancel delete factors doctor version help'
     COMPREPLY=()
+    if [[ $current == '=' ]]; then current=''; previous='='; fi
+    if [[ $previous == '=' ]]; then
+        previous=${COMP_WORDS[COMP_CWORD-1]}
+        [[ $previous != '=' ]] || previous=${COMP_WORDS[COMP_CWORD-2]}
+    fi
     for ((i = 1; i < COMP_CWORD; i++)); do
-        case ${COMP_WORDS[i]} in
-        -s|--server|-t|--timeout|--retry) ((i++)) ;;
-        -*) ;;
-        *) command=${COMP_WORDS[i]}; break ;;
-        esac
+        if [[ " $commands " == *" ${COMP_WORDS[i]} "* ]]; then command=${COMP_WORDS[i]}; break; fi
     done
     case $command in
     '') options='--server --timeout --retry --help --version'; words=$commands ;;

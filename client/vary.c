@@ -47,7 +47,10 @@ static json_t *read_range(const char *text)
         return NULL;
     json_t *values = json_array();
     for (long i = 0; values && i < count; i++)
-        json_array_append_new(values, tidy_number(first + (last - first) * (double)i / (double)(count - 1)));
+        if (json_array_append_new(values, tidy_number(first + (last - first) * (double)i / (double)(count - 1))) != 0) {
+            json_decref(values);
+            return NULL;
+        }
     return values;
 }
 
@@ -67,16 +70,17 @@ static json_t *read_words(const char *text)
     return values;
 }
 
-/* A,B,C as JSON, or else as words. NULL: one is empty. */
-static json_t *read_list(const char *text)
+/* A,B,C as JSON, or else as words. NULL: one is empty, or *memory, which becomes false. */
+static json_t *read_list(const char *text, bool *memory)
 {
     client_buffer array = {0};
     json_t *values = NULL;
-    if (client_buffer_append(&array, "[", 1) && client_buffer_append(&array, text, strlen(text)) &&
-        client_buffer_append(&array, "]", 1))
+    *memory = client_buffer_append(&array, "[", 1) && client_buffer_append(&array, text, strlen(text)) &&
+              client_buffer_append(&array, "]", 1);
+    if (*memory)
         values = json_loadb(array.data, array.len, JSON_REJECT_DUPLICATES, NULL);
     free(array.data);
-    if (values && json_array_size(values))
+    if (json_array_size(values) || !*memory)
         return values;
     json_decref(values);
     return read_words(text);
@@ -86,9 +90,10 @@ json_t *client_vary_values(const char *text, char *message, size_t size)
 {
     char *end;
     strtod(text, &end);
-    bool range = end != text && *end == ':';
-    json_t *values = range ? read_range(text) : read_list(text);
-    if (values)
+    bool range = end != text && *end == ':', memory = true;
+    json_t *values = range ? read_range(text) : read_list(text, &memory);
+    message[0] = '\0';
+    if (values || !memory)
         return values;
     snprintf(message, size,
              range ? "\"%.100s\" is no FIRST:LAST:COUNT: two numbers and a count from 2 to 10000, such as 0.1:1.0:10"
@@ -135,6 +140,8 @@ static client_exit read_varied(client_session *s, varied *out, const json_t *req
     }
     if (ok)
         return CLIENT_OK;
+    if (!why[0])
+        return client_complain(s, CLIENT_LOCAL, "no memory");
     snprintf(message, sizeof message, "--vary %.*s: %s", (int)(len < 200 ? len : 200), word, why);
     return client_complain(s, CLIENT_USAGE, message);
 }

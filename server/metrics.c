@@ -236,6 +236,9 @@ static void write_now(const metrics *m, const metrics_now *now, FILE *out)
     write_gauge(out, "cache_bytes", "Bytes that cached factors take.", (double)now->cache_bytes);
     write_gauge(out, "cache_max_bytes", "Bytes that cached factors may take.", (double)now->cache_max_bytes);
     write_gauge(out, "cache_entries", "Cached factors.", (double)now->cache_entries);
+    if (now->store_free_bytes >= 0)
+        write_gauge(out, "store_free_bytes", "Bytes that are free on the disk of the database.",
+                    (double)now->store_free_bytes);
     write_gauge(out, "http_connections", "Open connections.", now->connections);
     write_gauge(out, "http_event_streams", "Open connections that are event streams.", now->streams);
     write_gauge(out, "http_body_bytes", "Bytes of request bodies in memory.", (double)now->body_bytes);

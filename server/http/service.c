@@ -52,6 +52,7 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
                        .connections = atomic_load(&context->connections),
                        .streams = atomic_load(&context->streams),
                        .body_bytes = atomic_load(&context->body_bytes),
+                       .store_free_bytes = store_free_bytes(context->store),
                        .version = UZAWAD_VERSION};
     size_t len = 0;
     (void)rq;

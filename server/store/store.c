@@ -11,6 +11,7 @@
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
+#include <sys/statvfs.h>
 
 /* ---- opening */
 
@@ -223,6 +224,16 @@ store_status store_limit_bytes(store *s, int64_t bytes)
         store_keep_message(s, c);
     pthread_mutex_unlock(&s->writer_lock);
     return rc == SQLITE_OK ? STORE_OK : STORE_ERROR;
+}
+
+int64_t store_free_bytes(store *s)
+{
+    struct statvfs disk;
+    /* The name is the connection's for as long as it lives: no lock. */
+    const char *path = sqlite3_db_filename(s->writer.db, "main");
+    if (!path || !*path || statvfs(path, &disk) != 0)
+        return -1;
+    return (int64_t)disk.f_bavail * (int64_t)disk.f_frsize;
 }
 
 /* ---- ids and time */

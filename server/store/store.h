@@ -52,6 +52,9 @@ void store_message(store *s, char *buffer, size_t size);
  * STORE_FULL, as a full disk is. Not kept in the file. */
 store_status store_limit_bytes(store *s, int64_t bytes);
 
+/* What a program without privileges may still write to the disk of the database file; -1: not known. */
+int64_t store_free_bytes(store *s);
+
 /* So many jobs may wait; a submission beyond it is STORE_BUSY. 0: no limit. Not kept in the file. */
 void store_limit_queue(store *s, int64_t jobs);
 

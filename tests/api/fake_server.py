@@ -1,6 +1,7 @@
 """A server whose every answer is scripted: for faults that a healthy daemon does not have."""
 import http.server
 import json
+import socket
 import threading
 import time
 
@@ -75,4 +76,58 @@ class Fake:
         self.stopping.set()
         self.server.shutdown()
         self.server.server_close()
+        self.thread.join()
+
+
+class Cutter:
+    """Stands between a client and a server. The first connection breaks off after `count` bytes of the reply, the later ones
+    are left alone."""
+
+    def __init__(self, address, count):
+        self.address, self.count, self.connections = address, count, 0
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.url = "http://127.0.0.1:%d" % self.listener.getsockname()[1]
+        self.thread = threading.Thread(target=self.serve)
+        self.thread.start()
+
+    def serve(self):
+        while True:
+            try:
+                client, _ = self.listener.accept()
+            except OSError:
+                return
+            self.connections += 1
+            with client, socket.create_connection(self.address) as server:
+                self.carry(client, server, self.count if self.connections == 1 else None)
+
+    @staticmethod
+    def carry(client, server, count):
+        def request():
+            try:
+                while data := client.recv(65536):
+                    server.sendall(data)
+                server.shutdown(socket.SHUT_WR)
+            except OSError:
+                pass
+
+        forward = threading.Thread(target=request)
+        forward.start()
+        left = count
+        try:
+            while left != 0 and (data := server.recv(65536)):
+                client.sendall(data if left is None else data[:left])
+                left = None if left is None else max(0, left - len(data))
+            if left == 0 and count == 0:
+                server.recv(1)  # the server has answered: the job is there
+            client.shutdown(socket.SHUT_RDWR)
+        except OSError:
+            pass
+        forward.join()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.listener.shutdown(socket.SHUT_RDWR)
+        self.listener.close()
         self.thread.join()

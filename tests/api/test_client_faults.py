@@ -1,4 +1,5 @@
 """The client against a server that fails in every way it can. usage: test_client_faults.py BUILD_DIR [FILTER]"""
+import email.utils
 import json
 import os
 import socket
@@ -7,10 +8,11 @@ import sys
 import tempfile
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
-from fake_server import Fake
+from fake_server import Cutter, Fake
 
 CLIENT = os.path.join(sys.argv[1] if len(sys.argv) > 1 else "build", "uzawa")
 BODY = "tests/data/small_matrices.json"
@@ -112,6 +114,11 @@ def test_retry_after_is_obeyed(_):
         expect(run(fake.url, "submit", BODY), 0)
         pause = fake.requests[1].time - fake.requests[0].time
     assert 0.95 < pause < 2.5, pause
+    date = email.utils.formatdate(time.time() + 3, usegmt=True)
+    with Fake((503, {"detail": "draining"}, {"Retry-After": date}), (202, job())) as fake:
+        expect(run(fake.url, "submit", BODY, "--retry", "10"), 0)
+        pause = fake.requests[1].time - fake.requests[0].time
+    assert 1.5 < pause < 6, pause
     with Fake((503, {"detail": "draining"}, {"Retry-After": "3600"})) as fake:
         done = expect(run(fake.url, "submit", BODY), 5)
         assert "draining" in done.stderr and len(fake.requests) == 1
@@ -265,7 +272,27 @@ def test_many_clients_at_once(_):
     assert codes == [0] * 8, codes
 
 
+def test_a_reply_cut_at_any_byte_makes_no_second_job(server):
+    server.start()
+    whole = server.raw(b"POST /v1/jobs HTTP/1.1\r\nHost: h\r\nContent-Type: application/json\r\nConnection: close\r\n"
+                       b"Accept-Encoding: gzip\r\nContent-Length: %d\r\n\r\n%s"
+                       % (os.path.getsize(BODY), open(BODY, "rb").read()))[0]
+    cuts = range(0, len(whole) - 1)
+
+    def submit(count):
+        with Cutter((server.host, server.port), count) as cutter:
+            done = run(cutter.url, "submit", BODY, "--retry", "20")
+            return done.returncode, done.stdout.strip(), cutter.connections
+
+    with ThreadPoolExecutor(8) as pool:
+        ends = list(pool.map(submit, cuts))
+    assert all(code == 0 for code, _, _ in ends), ends
+    assert sum(connections == 2 for _, _, connections in ends) > 0.9 * len(ends), ends
+    jobs = json.loads(run(server.url, "list", "--json", "--limit", "100000").stdout)
+    assert sorted(job["id"] for job in jobs)[1:] == sorted(found for _, found, _ in ends), (len(jobs), len(ends))
+
+
 if __name__ == "__main__":
     for test in [value for name, value in globals().items() if name.startswith("test_")]:
-        service.options(None)(test)  # no daemon is needed here
+        service.options(None)(test)  # no daemon is needed here, or the test starts it
     service.main(globals())

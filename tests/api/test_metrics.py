@@ -63,6 +63,7 @@ def test_counts_follow_what_happens(s):
     check(now["uzawad_store_commit_seconds_count", ""] > before["uzawad_store_commit_seconds_count", ""], now)
     check(now["uzawad_job_phase_seconds_count", 'phase="total"'] == 3, now)
     check(now["uzawad_job_phase_seconds_count", 'phase="factor"'] == 2, now)
+    check(now["uzawad_store_free_bytes", ""] > 1e6, now)
     check(any(name == "uzawad_build_info" and value == 1 for (name, _), value in now.items()), now)
     check(now["process_resident_memory_bytes", ""] > 1e6 and now["uzawad_http_connections", ""] >= 1, now)
 

@@ -11,7 +11,7 @@
 
 /* ------------------------------------------------------------ command line */
 
-#define MOST_WORDS 40
+#define MOST_WORDS 60
 
 /* Parses "submit a.json --wait" split at blanks. The words live until the next call. */
 static bool parse(client_options *out, const char *line, const char *env, char *message)
@@ -127,6 +127,36 @@ TEST(arguments_refused)
         {"upload", "FILE"},
         {"upload x --tag a", "does not take --tag"},
         {"result x --format xml", "json csv vtu"},
+        {"submit a --progress", "--progress wants --wait"},
+        {"submit a --wait --quiet --json", "contradict"},
+        {"wait a --quiet --progress", "contradict"},
+        {"history x --width 60", "want --plot"},
+        {"history x --height 10", "want --plot"},
+        {"history x --ascii", "want --plot"},
+        {"history x --json --csv", "choose one"},
+        {"result x --json --format csv", "contradict"},
+        {"picture x --json", "--output FILE"},
+        {"plot x --json -o -", "--output FILE"},
+        {"plot x --deformed --trade", "choose one"},
+        {"plot x --colour displacements", "want --deformed"},
+        {"plot x --trade --factor 3", "want --deformed"},
+        {"plot x --width 300", "wants --deformed or --trade"},
+        {"plot x --deformed --width 100", "200 to 4000"},
+        {"plot x --trade --width 1000", "40 to 400"},
+        {"plot x --trade --x seconds", "of the convergence"},
+        {"plot x --deformed --with y", "of the convergence"},
+        {"plot x --ascii", "wants --trade"},
+        {"plot x --trade -o f", "no --output"},
+        {"plot x --x frogs", "iterations seconds"},
+        {"help submit --format man", "all commands together"},
+        {"submit --K a", "--K and --p"},
+        {"submit --K a --p b --N c", "both or neither"},
+        {"submit --mesh a", "FILE with the scene"},
+        {"submit a --mesh b --p c", "choose one"},
+        {"submit - --mesh -", "only one file"},
+        {"version --server http://h", "does not take --server"},
+        {"refine x", "wants --accuracy"},
+        {"status", "an ID"},
         {"history x --format vtu", "does not take --format"},
         {"submit a --tag=1 --tag=2 --tag=3 --tag=4 --tag=5 --tag=6 --tag=7 --tag=8 --tag=9 --tag=10 --tag=11 --tag=12 "
          "--tag=13 --tag=14 --tag=15 --tag=16 --tag=17",
@@ -138,6 +168,47 @@ TEST(arguments_refused)
         CHECK_MSG(!parse(&o, CASES[i][0], NULL, message), "accepted: %s", CASES[i][0]);
         CHECK_MSG(strstr(message, CASES[i][1]), "\"%s\" said: %s", CASES[i][0], message);
     }
+}
+
+/* An operand where one is needed, a value where one is wanted: what is left to be refused is the option itself. */
+static bool takes(client_command command, const client_option *option)
+{
+    client_options o;
+    char message[256] = "", line[200];
+    const client_page *page = client_page_of(command);
+    const char *value = option->kind == CLIENT_FLAG ? "" : option->kind == CLIENT_CHOICE ? " json" : " 60";
+    snprintf(line, sizeof line, "%s %s %s%s", page->name, page->operands & CLIENT_OPERAND_NEEDED ? "x" : "",
+             option->name, value);
+    return parse(&o, line, NULL, message) || !strstr(message, "does not take");
+}
+
+TEST(arguments_are_refused_by_commands_that_do_not_have_them)
+{
+    const client_option *option, *other;
+    for (size_t i = 0; (option = client_option_at(i)); i++)
+        for (int c = 0; c < CLIENT_COMMANDS; c++) {
+            bool has = false;
+            for (size_t k = 0; (other = client_option_at(k)); k++)
+                has = has || (strcmp(other->name, option->name) == 0 && other->commands & CLIENT_IN(c));
+            CHECK_MSG(takes((client_command)c, option) == has, "%s %s", client_command_name((client_command)c),
+                      option->name);
+        }
+}
+
+TEST(arguments_of_submit_and_plot)
+{
+    client_options o;
+    char message[256] = "";
+    CHECK_MSG(parse(&o, "submit --K k --p p --N n --h h --set a=1 --set b=2 --vary c=1,2 -w", NULL, message), "%s",
+              message);
+    CHECK_STR(o.h, "h");
+    CHECK_INT(o.set.count, 2);
+    CHECK_STR(o.vary.item[0], "c=1,2");
+    CHECK(parse(&o, "result x --field a --fields b,c --format csv", NULL, message) && o.fields.count == 2);
+    CHECK(parse(&o, "plot x --with a --with b --x seconds -o f.png", NULL, message) && o.with.count == 2);
+    CHECK(parse(&o, "plot x --trade --width 60 --json", NULL, message) && o.trade);
+    CHECK(parse(&o, "--tag a list", NULL, message) && o.tags.count == 1);
+    CHECK(parse(&o, "help --format bash", NULL, message));
 }
 
 TEST(help_has_a_page_for_each_command)
