@@ -26,7 +26,8 @@ bool client_suites_add(client_suites *to, const char *name, const json_t *job, c
                           .outcome = strdup(*outcome ? outcome : client_json_text(job, "status")),
                           .seconds = client_json_number(job, "summary.timings_s.total")};
     client_suite *grown = realloc(to->item, (to->count + 1) * sizeof *grown);
-    to->item = grown ? grown : to->item;
+    if (grown)
+        to->item = grown;
     if (!grown || !suite.name || !suite.id || !suite.created || !suite.outcome || checks->failed) {
         clear_suite(&suite);
         return false;

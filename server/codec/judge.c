@@ -259,7 +259,8 @@ static bool read_summary(json_doc *doc, const char *summary)
     return json_scan(doc, summary, strlen(summary), &problem);
 }
 
-bool codec_judge(char **summary, const codec_request *request, const char *name, codec_finding *all)
+/* whole: the summary is of all cases together. */
+static bool judge_list(char **summary, const codec_request *request, const char *name, bool whole, codec_finding *all)
 {
     json_doc doc;
     text t = {0};
@@ -271,11 +272,12 @@ bool codec_judge(char **summary, const codec_request *request, const char *name,
     begin_list(&t, *summary);
     for (int64_t i = 0; i < request->n_assertions; i++) {
         const codec_assertion *a = &request->assertions[i];
-        if (!concerns(a, name))
+        const bool gathered = whole && !is_of_the_whole(a);
+        if (!whole && !concerns(a, name))
             continue;
-        const codec_finding found = judge_one(a, doc.root);
+        const codec_finding found = gathered ? all[i] : judge_one(a, doc.root);
         passed = passed && found.verdict == CODEC_PASS;
-        put_finding(&t, a, &found, false);
+        put_finding(&t, a, &found, gathered);
         if (name)
             gather(&all[i], &found, name);
     }
@@ -283,23 +285,12 @@ bool codec_judge(char **summary, const codec_request *request, const char *name,
     return end_list(&t, passed, summary);
 }
 
+bool codec_judge(char **summary, const codec_request *request, const char *name, codec_finding *all)
+{
+    return judge_list(summary, request, name, false, all);
+}
+
 bool codec_judge_whole(char **summary, const codec_request *request, codec_finding *all)
 {
-    json_doc doc;
-    text t = {0};
-    bool passed = true;
-    if (request->n_assertions == 0)
-        return true;
-    if (!read_summary(&doc, *summary))
-        return false;
-    begin_list(&t, *summary);
-    for (int64_t i = 0; i < request->n_assertions; i++) {
-        const codec_assertion *a = &request->assertions[i];
-        if (is_of_the_whole(a))
-            all[i] = judge_one(a, doc.root);
-        passed = passed && all[i].verdict == CODEC_PASS;
-        put_finding(&t, a, &all[i], !is_of_the_whole(a));
-    }
-    json_doc_clear(&doc);
-    return end_list(&t, passed, summary);
+    return judge_list(summary, request, NULL, true, all);
 }
