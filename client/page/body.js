@@ -250,7 +250,7 @@ class BodyView {
   }
 
   resize() {
-    const { width, height } = this.frame_box.getBoundingClientRect(), ratio = Math.min(window.devicePixelRatio || 1, 3);
+    const { clientWidth: width, clientHeight: height } = this.frame_box, ratio = Math.min(window.devicePixelRatio || 1, 3);
     if (!(width > 0 && height > 0)) return;
     this.view.resize(width, height);
     this.gl.resize(width, height, ratio);
