@@ -93,7 +93,7 @@ class Comparison {
       const got = await this.api.get(`/v1/jobs/${job.id}/work-precision`, { signal: this.ends.signal });
       this.curve = (got.decades || []).filter((one) => one.seconds > 0).map((one) => [one.seconds, one.relative_error]).sort((a, b) => a[0] - b[0]);
     } catch (error) {
-      if (error.status !== 404) throw error;
+      if (error.status !== 404 && error.status !== 409) throw error; // 409: none was recorded
     }
   }
 

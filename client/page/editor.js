@@ -61,6 +61,8 @@ class Editor {
     draft.set(text);
     this.key = idempotency_key();
     this.checking?.abort();
+    this.field.unmark();
+    this.say("muted", "Checking …");
     this.check_soon();
   }
 

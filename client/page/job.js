@@ -157,7 +157,7 @@ class JobView {
       this.precision.hidden = !end;
       if (end) this.parts.push(end);
     } catch (error) {
-      if (error.status !== 404) this.complain(error);
+      if (error.status !== 404 && error.status !== 409) this.complain(error); // 409: none was recorded
     }
   }
 

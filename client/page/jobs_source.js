@@ -4,7 +4,7 @@
 import { pause } from "./dom.js";
 import { has_ended, result_words } from "./words.js";
 
-const PAGE = 200, POLL_MS = 2000;
+const FIRST = 100, PAGE = 500, POLL_MS = 2000;
 
 /** What the list keeps of a job: a summary is some kilobytes, and there may be many thousand jobs. */
 function slim(job) {
@@ -31,7 +31,7 @@ export class JobsSource {
   }
 
   query(more) {
-    const query = new URLSearchParams({ limit: String(PAGE), ...more });
+    const query = new URLSearchParams({ limit: String(more.cursor ? PAGE : FIRST), ...more });
     if (this.filter.status) query.set("status", this.filter.status);
     for (const tag of this.filter.tags) query.append("tag", tag);
     return `/v1/jobs?${query}`;

@@ -188,7 +188,7 @@ export function show_list(main, { api }) {
   }
 
   rows.on_drawn = (last) => {
-    if (source && source.next && last + 100 > source.rows.length) source.more()?.catch(() => {});
+    if (source && source.next && last + 200 > source.rows.length) source.more()?.catch(() => {});
   };
   show(main,
     h("div", { class: "title" }, h("h1", null, "Jobs"), state, total, h("a", { class: "button primary", href: "#/new" }, "New job")),

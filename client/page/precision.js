@@ -12,10 +12,15 @@ export async function show_precision(element, api, id, case_name, signal) {
   if (!decades.length) return null;
   const place = h("div");
   show(element, h("h2", null, "Time against certified error"), place,
-    h("p", { class: "muted" }, `Certified to ${decades.map((one) => `${number(one.relative_error)} after ${seconds(one.seconds)}`).slice(-1)}.`));
+    h("p", { class: "muted" }, `Certified to ${number(decades[decades.length - 1].relative_error)} after ${seconds(decades[decades.length - 1].seconds)}.`),
+    got.suggestion ? h("p", { class: "suggestion" }, h("strong", null, "Cheaper: "), got.suggestion.text) : null);
   const chart = new Chart(place, 240);
   const points = decades.map((one) => [one.seconds, one.relative_error]).sort((a, b) => a[0] - b[0]);
   const series = [{ name: "first certified", colour: 1, dots: true, points }];
+  const levels = (got.levels || []).filter((one) => one.seconds > 0 && one.relative_error > 0);
+  if (levels.length)
+    series.push({ name: "a whole solve at this level", colour: 3, line: false, texts: true, size: 5,
+      points: levels.map((one) => [one.seconds, one.relative_error, one.level]) });
   if (Number.isFinite(got.mesh_error) && got.mesh_error > 0)
     series.push({ name: "error of the mesh, estimated", colour: 2, dash: "6 3",
       points: [[points[0][0], got.mesh_error], [points[points.length - 1][0], got.mesh_error]] });

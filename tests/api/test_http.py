@@ -148,7 +148,7 @@ def test_service_routes(s):
 
 
 def test_not_found(s):
-    for path in ("/", "/v1", "/v1/jobs/", "/v1/jobs/xyz", f"/v1/jobs/{UNKNOWN.upper()}x", "/v1/jobsx", "/healthz/",
+    for path in ("/page", "/page/none.js", "/v1", "/v1/jobs/", "/v1/jobs/xyz", f"/v1/jobs/{UNKNOWN.upper()}x", "/v1/jobsx", "/healthz/",
                  f"/v1/jobs/{UNKNOWN}/nothing", "//v1/jobs", "/v1/../v1/jobs"):
         expect(s.get(path), 404, "not_found")
     expect(s.get(f"/v1/jobs/{UNKNOWN}"), 404, "not_found")

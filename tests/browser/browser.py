@@ -5,7 +5,6 @@ a few methods more. `browser.main(globals())` runs them like service.main. WebGL
 graphics card. After each test its console must be empty: whatever a test provokes on purpose it takes by b.console().
 """
 import base64
-import json
 import os
 import pathlib
 import shutil
@@ -30,7 +29,7 @@ except ImportError:
     WebDriverException = Exception
 
 
-def start(width=1200, height=900, dark=False, downloads=None):
+def start(width=1200, height=900, dark=False):
     """A browser with an empty profile; the caller calls quit()."""
     wanted = webdriver.ChromeOptions()
     for one in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--use-gl=angle", "--use-angle=swiftshader",
@@ -38,12 +37,14 @@ def start(width=1200, height=900, dark=False, downloads=None):
                 "--disable-background-networking", "--disable-component-update", f"--window-size={width},{height}"):
         wanted.add_argument(one)
     wanted.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    if downloads:
-        wanted.add_experimental_option("prefs", {"download.default_directory": downloads})
     wanted.binary_location = shutil.which("chromium")
     driver = webdriver.Chrome(service=Driver(shutil.which("chromedriver")), options=wanted)
     driver.set_script_timeout(60)
     return Browser(driver, width, height, dark)
+
+
+# What an element shows; of one that is hidden innerText would be all that is in it.
+SHOWN = "const e = document.querySelector(arguments[0]); const text = e?.checkVisibility() ? e.innerText : ''; "
 
 
 class Browser:
@@ -101,13 +102,12 @@ class Browser:
 
     def text(self, selector):
         """What an element shows; "" if there is none."""
-        return self.run("return document.querySelector(arguments[0])?.innerText || ''", selector)
+        return self.run(SHOWN + "return text", selector)
 
     def says(self, selector, text, seconds=30):
         """Waits until an element shows a text."""
-        return self.wait(f"{selector} saying {text!r}",
-                         "return (document.querySelector(arguments[0])?.innerText || '').includes(arguments[1])",
-                         selector, text, seconds=seconds)
+        return self.wait(f"{selector} saying {text!r}", SHOWN + "return text.includes(arguments[1])", selector, text,
+                         seconds=seconds)
 
     def write(self, selector, text):
         """Sets the value of a field as if it had been pasted."""
@@ -146,28 +146,58 @@ class Browser:
         self.driver.quit()
 
 
+# The browser that the tests of a program share, one after another: each service is an origin of its own, so that nothing
+# of one test is there in the next. A test that fails ends it.
+SHARED = {}
+
+
+def take_browser(downloads):
+    missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
+    if webdriver is None or missing:
+        raise Skip(f"needs {' and '.join(missing) or 'python3-selenium'}: make deps-test installs it")
+    if "browser" not in SHARED:
+        SHARED["browser"] = start()
+    b = SHARED["browser"]
+    b.downloads = downloads
+    b.command("Browser.setDownloadBehavior", behavior="allow", downloadPath=downloads)
+    b.size(1200, 900)
+    b.media("prefers-color-scheme", "light")
+    b.driver.get("about:blank")
+    b.console()
+    return b
+
+
+def end_browser():
+    if "browser" in SHARED:
+        SHARED.pop("browser").quit()
+
+
+def keep_picture(b, name):
+    """BROWSER_PICTURES=FOLDER: what the page looked like when a test failed."""
+    folder = os.environ.get("BROWSER_PICTURES")
+    if folder:
+        pathlib.Path(folder, f"{name}.png").write_bytes(b.picture())
+
+
 def with_browser(test):
     """A test of service.main from one of a browser."""
     def run(s):
-        missing = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
-        if webdriver is None or missing:
-            raise Skip(f"needs python3-selenium and {' and '.join(missing) or 'nothing else'}: make deps-test installs them")
         downloads = tempfile.mkdtemp(prefix="downloads-")
-        b = start(downloads=downloads)
-        b.downloads = downloads
+        b = None
         try:
-            if None not in getattr(test, "options", ()):
-                b.driver.get("about:blank")
+            b = take_browser(downloads)
             test(s, b)
             said = b.console()
             check(not said, "the console says", said)
+            b.driver.get("about:blank")  # a stream that is open would keep the daemon from ending
+        except Skip:
+            raise
         except Exception:
-            keep = os.environ.get("BROWSER_PICTURES")  # a folder: what the page looked like when a test failed
-            if keep:
-                pathlib.Path(keep, f"{test.__name__}.png").write_bytes(b.picture())
+            if b:
+                keep_picture(b, test.__name__)
+            end_browser()
             raise
         finally:
-            b.quit()
             shutil.rmtree(downloads, ignore_errors=True)
     run.__name__ = test.__name__
     if hasattr(test, "options"):
@@ -177,9 +207,7 @@ def with_browser(test):
 
 def main(names):
     """As service.main, for tests that take a browser too."""
-    service.main({name: with_browser(one) if name.startswith("test_") and callable(one) else one
-                  for name, one in names.items()})
-
-
-def dump(value):
-    return json.dumps(value, indent=1)
+    try:
+        service.main({name: with_browser(one) if name.startswith("test_") else one for name, one in names.items()})
+    finally:
+        end_browser()

@@ -1,0 +1,179 @@
+"""A job's page: live, plots, words, files. usage: test_job.py BUILD_DIR [FILTER]"""
+import json
+import pathlib
+import time
+import xml.etree.ElementTree
+
+import browser
+from browser import check, options
+from service import ENDLESS, MATRICES, SCENE
+
+CURVES = """return [...document.querySelectorAll('#convergence path.line')].map((path) =>
+    [path.dataset.series, path.getAttribute('d').split(/[ML]/).length - 1])"""
+
+
+def file_saved(b, name, seconds=20):
+    """The bytes of a file that the page saved."""
+    path = pathlib.Path(b.downloads, name)
+    end = time.monotonic() + seconds
+    while not path.exists():
+        check(time.monotonic() < end, name, "is not among", list(pathlib.Path(b.downloads).iterdir()))
+        time.sleep(0.05)
+    return path.read_bytes()
+
+
+@options("--workers", "1")
+def test_is_watched_live_from_the_editor_on(s, b):
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    b.write("#job-text", json.dumps({**ENDLESS, "tags": ["watched"]}))
+    b.says("#verdict", "Valid")
+    b.click("#submit")
+    b.says(".title", "running")
+    b.says("#progress-text", "certified bound")
+    first = b.wait("a curve", CURVES)
+    rows = "return document.querySelector('#convergence p[role=status]').innerText"
+    said = b.run(rows)
+    b.wait("more iterations", rows.replace("return ", "return arguments[0] !== "), said)
+    check(len(first) == 3, first)
+    b.click("#stop")
+    b.says("#stop", "Cancel?")
+    b.click("#stop")
+    b.says(".verdict h2", "Dismissed")
+    b.says("#certificate", "differs by at most")
+    check(s.get("/v1/jobs?tag=watched").json["jobs"][0]["summary"]["outcome"] == "dismissed", "the daemon says otherwise")
+    check(not b.run("return document.querySelector('section.progress').checkVisibility()"), "there is progress no longer")
+
+
+def test_convergence_is_drawn(s, b):
+    job = s.solve(SCENE)
+    b.open(s, f"jobs/{job['id']}")
+    b.wait("three curves", "return document.querySelectorAll('#convergence path.line').length === 3")
+    for number in (1, 2, 3):
+        check(b.near("#convergence .chart", f"--series-{number}") > 150, "curve", number, "has too few pixels")
+    b.click("#convergence input[value=residual_total]")
+    b.wait("two curves", "return document.querySelectorAll('#convergence path.line').length === 2")
+    check(b.near("#convergence .chart", "--series-2") < 30, "a curve that was switched off is still seen")
+    b.click("#convergence input[value=seconds]")
+    b.wait("seconds", "return document.querySelector('#convergence .chart').getAttribute('aria-label').includes('time')")
+    # The curve ends where the history does: decoded back from the picture.
+    rows = s.get(f"/v1/jobs/{job['id']}/history").json["rows"]
+    b.click("#convergence input[value=iteration]")
+    b.click("#convergence input[name=axis]")  # linear in iterations
+    b.wait("a linear axis", """return [...document.querySelectorAll('#convergence .tick')].some((t) => t.textContent === '0')""")
+    x, y, ticks = b.run("""
+        const path = [...document.querySelectorAll('#convergence path.line')].find((p) => p.dataset.series === 'certified bound');
+        const end = path.getPointAtLength(path.getTotalLength());
+        return [end.x, end.y, [...document.querySelectorAll('#convergence .tick')].map((t) =>
+            [t.textContent, +t.getAttribute('x'), +t.getAttribute('y') - 4, t.getAttribute('text-anchor')])]""")
+    across = [(float(text.replace(",", "")), at) for text, at, _, anchor in ticks if anchor == "middle"]
+    (x0, at0), (x1, at1) = across[0], across[-1]
+    check(abs(x0 + (x - at0) / (at1 - at0) * (x1 - x0) - rows[-1][0]) < 1, "ends at", x, across, rows[-1][0])
+    check(y < 320, y)
+
+
+def test_other_jobs_are_laid_over(s, b):
+    job = s.solve(SCENE)
+    other = s.solve({**SCENE, "solver": {"method": "accelerated", "accuracy": "quick"}})
+    b.open(s, f"jobs/{job['id']}")
+    b.wait("curves", "return document.querySelectorAll('#convergence path.line').length === 3")
+    b.write("#overlay", "nonsense")
+    b.click("#overlay-add")
+    b.says("#convergence [role=alert]", "32 digits")
+    b.write("#overlay", other["id"])
+    b.click("#overlay-add")
+    b.wait("six curves", "return document.querySelectorAll('#convergence path.line').length === 6")
+    check(b.near("#convergence .chart", "--series-2") > 100, "the other job's colour is not there")
+    check(other["id"][-8:] in b.text("#convergence .legend") and "accelerated" in b.text("#convergence .legend"), b.text("#convergence .legend"))
+    b.click(".overlays button")
+    b.wait("three curves again", "return document.querySelectorAll('#convergence path.line').length === 3")
+
+
+def test_says_in_words_how_good_the_answer_is(s, b):
+    job = s.solve({**SCENE, "solver": {"accuracy": "precise"}})
+    b.open(s, f"jobs/{job['id']}")
+    b.says("#certificate", "The exact answer of this discrete problem differs by at most")
+    said = b.text("#certificate").split("at most ")[1].split(" %")[0]
+    plain = said.replace("×10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))
+    error = job["summary"]["certificate"]["relative_error"]
+    check(error <= float(plain) / 100 <= 1.11 * error + 1e-30, said, "of", error)  # never less than the bound
+    facts = b.text(".facts")
+    for text in ("660 unknowns, 30 contact rows", f"{job['summary']['contact']['active']} of 30 candidates", "condensed operator"):
+        check(text in facts, text, facts)
+    pieces = b.run("return [...document.querySelectorAll('.timings .piece')].map((p) => p.getBoundingClientRect().width)")
+    check(len(pieces) >= 4 and sum(pieces) > 500, pieces)
+    check("iterations" in b.text(".timing-keys") and "factorization" in b.text(".timing-keys"), b.text(".timing-keys"))
+
+
+def test_other_endings_are_said_plainly(s, b):
+    limit = s.solve({**SCENE, "solver": {"method": "uzawa", "max_iterations": 3}})
+    b.open(s, f"jobs/{limit['id']}")
+    b.says(".verdict h2", "Iteration limit")
+    check("best answer so far" in b.text(".verdict"), b.text(".verdict"))
+    matrices = MATRICES["problem"]
+    infeasible = s.solve({"problem": {**matrices, "N": "%%MatrixMarket matrix coordinate real general\n2 2 2\n1 1 1\n2 1 -1\n", "h": [-1, -1]}})
+    check(infeasible["summary"]["outcome"] == "infeasible", infeasible["summary"])
+    b.open(s, f"jobs/{infeasible['id']}")
+    b.says(".verdict h2", "Infeasible")
+    b.says("#certificate", "It is proved that no displacement")
+    failed = s.solve({"problem": {**matrices, "K": matrices["K"].replace("2 2 1\n", "2 2 -1\n")}})
+    b.open(s, f"jobs/{failed['id']}")
+    b.says(".verdict h2", "not positive definite")
+    check("not_positive_definite" in b.text(".verdict"), b.text(".verdict"))
+
+
+def test_files_are_saved(s, b):
+    job = s.solve(SCENE)
+    stem = job["id"][-8:]
+    b.open(s, f"jobs/{job['id']}")
+    b.one(".downloads button")
+    for name in b.run("return [...document.querySelectorAll('.downloads button')].map((one) => one.dataset.file)"):
+        b.click(f'[data-file="{name}"]')
+        content = file_saved(b, name)
+        if name.endswith(".json"):
+            check(json.loads(content).get("id", json.loads(content).get("job")) == job["id"], name)
+        elif name.endswith(".csv"):
+            check(content == s.get(f"/v1/jobs/{job['id']}/history.csv").body, name)
+        else:
+            check(xml.etree.ElementTree.fromstring(content).tag.endswith("svg" if name.endswith(".svg") else "VTKFile"), name)
+    saved = {path.name for path in pathlib.Path(b.downloads).iterdir()}
+    check({f"{stem}-job.json", f"{stem}-result.json", f"{stem}-history.csv", f"{stem}.vtu", f"{stem}-deformed.svg"} <= saved, saved)
+
+
+def test_refines(s, b):
+    job = s.solve({**SCENE, "solver": {"method": "accelerated_restart", "accuracy": "quick"}})
+    b.open(s, f"jobs/{job['id']}")
+    b.says("#certificate", "at most")
+    b.click("#refine")
+    b.click(".refine button")
+    b.says(".title", f"refines {job['id'][-8:]}")
+    b.says(".verdict h2", "Converged")
+    newest = s.get("/v1/jobs?limit=1").json["jobs"][0]
+    check(newest["summary"]["requested_error"] <= 1e-12 and newest["summary"]["started_from"] == "continued", newest["summary"])
+
+
+def test_each_load_case_has_its_own(s, b):
+    cases = [{"name": name, "loads": [{"on": "top", "traction": [0, -pull]}, {"on": "right", "traction": [0.1, 0]}]}
+             for name, pull in (("light", 0.01), ("heavy & <b>", 0.5))]
+    job = s.solve({**SCENE, "cases": cases})
+    b.open(s, f"jobs/{job['id']}")
+    b.one("#case")
+    for name in ("light", "heavy & <b>"):
+        b.run("const f = document.querySelector('#case'); f.value = arguments[0]; f.dispatchEvent(new Event('change'))", name)
+        answer = s.get("/v1/jobs/" + job["id"] + "/result?fields=summary&case=" + name.replace("&", "%26").replace(" ", "%20")).json
+        answer = answer.get("summary") if "cases" not in answer else answer["cases"][0]["summary"]
+        b.says(".facts", f"{answer['contact']['active']} of 30 candidates")
+        b.wait("curves", "return document.querySelectorAll('#convergence path.line').length === 3")
+
+
+def test_the_body_is_loaded_when_it_is_asked_for(s, b):
+    job = s.solve(SCENE)
+    b.open(s, f"jobs/{job['id']}")
+    b.one("#open-body")
+    before = b.run("return performance.getEntriesByType('resource').length")
+    b.click("#open-body")
+    b.wait("more was loaded", "return performance.getEntriesByType('resource').length > arguments[0]", before)
+    b.wait("a picture", "return document.querySelector('#body img, #body canvas, #body svg')")
+
+
+browser.main(globals())
