@@ -166,7 +166,8 @@ static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const patc
             uz_raster_point at[4];
             for (int k = 0; k < 4; k++) {
                 double x[3];
-                patch_point(x, p, 2.0 * (i + k % 2) / CELLS - 1, 2.0 * (j + k / 2) / CELLS - 1);
+                const int to_the_right = k % 2, above = k / 2;
+                patch_point(x, p, 2.0 * (i + to_the_right) / CELLS - 1, 2.0 * (j + above) / CELLS - 1);
                 at[k] = uz_scenery_point(scenery, x);
                 at[k].value = NAN;
             }
