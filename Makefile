@@ -14,10 +14,12 @@ PREFIX ?= /usr/local
 PYTHON ?= /usr/bin/python3
 
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
-            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libpng-dev \
-            esbuild libjs-three node-d3-scale node-d3-shape
-TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev \
-                 chromium chromium-driver python3-selenium python3-pil
+            libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libpng-dev
+TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev
+
+# The web page's bundler and libraries; the browser that tests it.
+PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
+TEST_PACKAGES += chromium chromium-driver python3-selenium python3-pil
 
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
@@ -43,9 +45,10 @@ THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(SOAK_SRC) $(PRELOAD_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
+
+PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 SOLVER_OBJ := $(call obj,$(SOLVER_SRC))
@@ -173,7 +176,7 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-browser test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
@@ -186,9 +189,14 @@ test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 test-api: all $(PRELOADS) $(BUILD)/library ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
+.PHONY: test-browser screenshots
 test-browser: deps-test ## the web page in headless Chromium; FILTER=name runs some
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all
 	@tests/run.sh $(BUILD) browser $(FILTER)
+
+screenshots: deps-test ## the pictures of the README, from the running page, into client/page/screenshots
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all
+	@$(PYTHON) -B tests/browser/screenshots.py $(BUILD) client/page/screenshots
 
 test-hygiene: ## formatting, static analysis, both compilers
 	@tests/run.sh $(BUILD) hygiene

@@ -1,7 +1,7 @@
 // convergence.js: the convergence history of a job, while it runs and after, with other jobs laid over it.
 
 import { debounce, h, show } from "./dom.js";
-import { count, seconds, short_id } from "./format.js";
+import { counted, seconds, short_id } from "./format.js";
 import { Chart } from "./plot.js";
 
 const QUANTITIES = [
@@ -10,6 +10,7 @@ const QUANTITIES = [
   { key: "dual_objective", name: "dual objective, distance to the last", dash: "2 3" },
 ];
 const MOST_OVERLAYS = 5;
+const MANY = 30; // iterations: then their axis is logarithmic unless one chooses
 
 /** The history of one job, as far as it has been fetched. */
 class History {
@@ -57,7 +58,10 @@ export class Convergence {
     this.trouble = h("p", { class: "bad", role: "alert", hidden: true });
     this.form = h("form", { class: "choose", onsubmit: (event) => event.preventDefault() },
       choices("across", [["iteration", "iterations", true], ["seconds", "seconds"]], () => this.draw()),
-      choices("axis", [["log", "logarithmic", true, "checkbox"]], () => this.draw()),
+      choices("axis", [["log", "logarithmic", false, "checkbox"]], () => {
+        this.axis_chosen = true;
+        this.draw();
+      }),
       choices("show", QUANTITIES.map((q) => [q.key, q.name.split(",")[0], true, "checkbox"]), () => this.draw()),
       this.overlay_field());
     show(element, this.place, this.said, this.form, this.trouble);
@@ -116,6 +120,8 @@ export class Convergence {
   }
 
   draw() {
+    const last = this.histories[0].rows[this.histories[0].rows.length - 1]?.[0] ?? 0;
+    if (!this.axis_chosen) this.form.elements.axis.checked = last >= MANY;
     const data = new FormData(this.form), x = data.get("across"), log = data.has("axis");
     const shown = QUANTITIES.filter((q) => data.getAll("show").includes(q.key)), several = this.histories.length > 1;
     const series = [];
@@ -130,7 +136,7 @@ export class Convergence {
     const label = x === "seconds" ? "time" : "iteration";
     this.chart.update({ x: { label, log, from_zero: true, format: x === "seconds" ? seconds : null }, y: { label: "in the units of the problem", log: true }, series,
       label: `Convergence over ${label === "time" ? label : "iterations"}: ${shown.map((q) => q.name).join(", ")}` });
-    show(this.said, rows.length ? `${count(rows[rows.length - 1][0])} iterations, ${count(rows[rows.length - 1][this.histories[0].at.contacts])} contacts active in the last.`
+    show(this.said, rows.length ? `${counted(last, "iteration")}, ${counted(rows[rows.length - 1][this.histories[0].at.contacts], "contact")} active in the last.`
       : "There is no history: no iteration was needed, or none was made yet.");
     show(this.overlays, this.histories.slice(1).map((history) =>
       h("button", { type: "button", class: "small", "aria-label": `Remove ${history.name}`, onclick: () => this.remove(history) }, `${history.name} ✕`)));

@@ -4,15 +4,17 @@
 import { idempotency_key } from "./api.js";
 import { announce, debounce, h, show } from "./dom.js";
 import { draft, EXAMPLES, example_text } from "./examples.js";
-import { bytes, count, seconds } from "./format.js";
-import { locate } from "./json_locate.js";
+import { bytes, counted, seconds } from "./format.js";
+import { locate, tokens_at } from "./json_locate.js";
+import { help_of, path_words } from "./schema_help.js";
 import { TextField } from "./text_field.js";
 
-const CHECK_MS = 350;
+const CHECK_MS = 350, HELP_MS = 150;
+const LONG = 500000; // characters: a text in which the place of the caret is not looked up all the time
 
 function predicted_words(predicted) {
   if (!predicted) return "What it will take is not known beforehand.";
-  return `${count(predicted.d)} unknowns, ${count(predicted.m)} contact rows, ${predicted.operator.replace("_", "-")} operator: about ` +
+  return `${counted(predicted.d, "unknown")}, ${counted(predicted.m, "contact row")}, ${predicted.operator.replace("_", "-")} operator: about ` +
     `${seconds(predicted.seconds)} after the assembly and ${bytes(predicted.bytes)}${predicted.fits ? "" : ", more than this service may take"}.`;
 }
 
@@ -25,13 +27,16 @@ class Editor {
     this.examples = h("select", { id: "example", onchange: () => (location.hash = `#/new/${this.examples.value}`) },
       h("option", { value: "", disabled: true }, "choose"), EXAMPLES.map((one) => h("option", { value: one.name }, one.text)));
     this.check_soon = debounce(() => this.check(), CHECK_MS);
+    this.help = h("p", { id: "key-help", class: "muted" });
+    const help_soon = debounce(() => this.show_help(), HELP_MS);
+    for (const event of ["keyup", "click", "input", "focus"]) this.field.area.addEventListener(event, help_soon);
     const file = h("input", { type: "file", id: "file", class: "unseen", accept: ".json,application/json",
       onchange: async () => file.files[0] && this.set(await file.files[0].text()) });
     const form = h("form", { onsubmit: (event) => (event.preventDefault(), this.send()) },
       h("div", { class: "title" }, h("h1", null, "New job")),
       h("div", { class: "editor-tools" }, h("label", { for: "example" }, "Start from"), this.examples,
         file, h("label", { for: "file", class: "button" }, "Open a file"), this.submit),
-      this.verdict, this.field.element,
+      this.verdict, this.field.element, this.help,
       h("p", { class: "muted" }, "Ctrl + Enter submits. Every key is explained in the ", h("a", { href: "/schemas/request.json" }, "schema"), "."));
     form.addEventListener("keydown", (event) => {
       if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) form.requestSubmit();
@@ -50,6 +55,20 @@ class Editor {
     } catch (error) {
       this.say("bad", error.message);
     }
+  }
+
+  /** What the schema says about the key that the caret is in. */
+  async show_help() {
+    const { text } = this.field;
+    if (text.length > LONG) return;
+    try {
+      this.schema = this.schema || (await this.api.get("/schemas/request.json", { signal: this.ends.signal }));
+    } catch {
+      return; // it is only a help
+    }
+    const tokens = tokens_at(text, this.field.area.selectionStart), help = help_of(this.schema, tokens);
+    show(this.help, tokens.length ? [h("code", null, path_words(tokens)), help ? `: ${help.text}` : ": not known to the schema", " "] : null,
+      help?.keys.length ? ["Keys: ", help.keys.map((key, i) => [i ? ", " : "", h("code", null, key)])] : null);
   }
 
   set(text) {

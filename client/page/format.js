@@ -25,6 +25,11 @@ export function count(value) {
   return value === null || value === undefined ? "–" : value.toLocaleString("en");
 }
 
+/** "1 iteration", "599 iterations" */
+export function counted(value, noun) {
+  return `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
+}
+
 /** A relative number as per cent, plain as long as that is readable: "0.0003 %", "1.2×10⁻⁹ %". */
 export function percent(value) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";

@@ -13,8 +13,21 @@ class Mistake {
 }
 
 class Reader {
-  constructor(text, wanted) {
-    Object.assign(this, { text, wanted, at: 0, found: null });
+  /** wanted: the tokens of a pointer that is looked for; caret: an offset whose pointer is. */
+  constructor(text, wanted, caret = -1) {
+    Object.assign(this, { text, wanted, caret, at: 0, found: null, path: [], here: null });
+  }
+
+  /** Reads one member; the innermost whose text has the caret in it is where that is. */
+  member(token, from, read) {
+    this.path.push(token);
+    if (from <= this.caret) {
+      const before = this.here;
+      this.here = [...this.path];
+      read();
+      if (this.at < this.caret) this.here = before;
+    } else read();
+    this.path.pop();
   }
 
   match(pattern) {
@@ -88,8 +101,10 @@ class Reader {
       if (names.has(name)) throw new Mistake(from, `the key "${name}" stands here twice`);
       names.add(name);
       const key = [from, this.at];
-      this.expect(":", 'a ":"');
-      this.value(this.step(depth, name), level + 1, key);
+      this.member(name, from, () => {
+        this.expect(":", 'a ":"');
+        this.value(this.step(depth, name), level + 1, key);
+      });
       this.space();
       if (this.text[this.at] === "}") break;
       this.expect(",", 'a "," or "}"');
@@ -105,7 +120,8 @@ class Reader {
       return;
     }
     for (let i = 0; ; i++) {
-      this.value(this.step(depth, String(i)), level + 1, null);
+      this.space();
+      this.member(String(i), this.at, () => this.value(this.step(depth, String(i)), level + 1, null));
       this.space();
       if (this.text[this.at] === "]") break;
       this.expect(",", 'a "," or "]"');
@@ -131,6 +147,17 @@ export function locate(text, pointer = "") {
   }
   const { key, value } = reader.found;
   return { range: key || (value[1] - value[0] > 200 ? [value[0], value[0] + 1] : value) };
+}
+
+/** The tokens of the pointer to what an offset is in, as far as the text can be read: ["problem", "loads", "0"]. */
+export function tokens_at(text, caret) {
+  const reader = new Reader(text, [], caret);
+  try {
+    reader.value(-1, 0, null);
+  } catch (mistake) {
+    if (!(mistake instanceof Mistake)) throw mistake;
+  }
+  return reader.here || [];
 }
 
 /** {line, column}, both from 0, of an offset. */

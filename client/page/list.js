@@ -55,6 +55,18 @@ function row_of(row, index, act) {
     h("span", { role: "cell", class: "action" }, sure_button(row.ended ? "Delete" : "Cancel", () => act(row))));
 }
 
+/** A row becomes what it is now, cell by cell: what has the focus, or was pressed once, stays where it can. */
+function renew(old, now, button_too) {
+  const cells = [...now.children];
+  [...old.children].forEach((cell, i) => {
+    const kept = cell.classList.contains("job") || (cell.classList.contains("action") && !button_too);
+    if (kept || cell.isEqualNode(cells[i])) return;
+    const focused = cell.contains(document.activeElement);
+    cell.replaceWith(cells[i]);
+    if (focused) cells[i].querySelector("button")?.focus({ preventScroll: true });
+  });
+}
+
 /** The scrolled part: draws source.rows into an element of its own. */
 class Rows {
   constructor(act) {
@@ -87,24 +99,16 @@ class Rows {
     this.sizer.style.height = `${this.rows.length * height}px`;
     for (let i = first; i < last; i++) {
       const row = this.rows[i], old = this.drawn.get(row.id);
-      const same = old && old.row === row;
-      const element = same ? old.element : row_of(row, i, this.act);
-      if (old && !same) this.exchange(old.element, element);
-      else if (!old) this.sizer.append(element);
-      if (!same || old.index !== i) element.setAttribute("aria-rowindex", i + 2);
+      const element = old ? old.element : row_of(row, i, this.act);
+      if (!old) this.sizer.append(element);
+      else if (old.row !== row) renew(element, row_of(row, i, this.act), old.row.ended !== row.ended);
+      if (old && old.index !== i) element.setAttribute("aria-rowindex", i + 2);
       element.style.transform = `translateY(${i * height}px)`;
       kept.set(row.id, { row, element, index: i });
     }
     for (const [id, one] of this.drawn) if (!kept.has(id)) one.element.remove();
     this.drawn = kept;
     this.on_drawn?.(last);
-  }
-
-  /** A row that changed keeps the focus that is within it. */
-  exchange(old, element) {
-    const focus = old.contains(document.activeElement) ? document.activeElement.tagName : null;
-    old.replaceWith(element);
-    if (focus) element.querySelector(focus.toLowerCase())?.focus({ preventScroll: true });
   }
 
   move(by) {

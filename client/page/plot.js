@@ -67,8 +67,8 @@ function fine_ticks(low, high) {
       for (const digit of digits) if (digit * 10 ** k >= low && digit * 10 ** k <= high) found.push(digit * 10 ** k);
     return found;
   };
-  const coarse = of([1, 2, 5]);
-  return coarse.length >= 2 ? coarse : of([1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9]);
+  const found = [of([1, 2, 5]), of([1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9])].find((ticks) => ticks.length >= 2);
+  return found || scaleLinear().domain([low, high]).ticks(4);
 }
 
 /** [{value, text}]: powers of ten where there are some, at most so many. format: of a value, where not a plain number. */

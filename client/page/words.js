@@ -1,6 +1,6 @@
 // words.js: what a job's status, outcome and certificate mean, in sentences.
 
-import { count, number, percent_up, seconds } from "./format.js";
+import { count, counted, number, percent_up, seconds } from "./format.js";
 
 export const STATUSES = ["accepted", "running", "successful", "failed", "dismissed"];
 export const STATUS_WORDS = {
@@ -60,15 +60,15 @@ export function mesh_words(summary) {
 /** One line about what was solved. */
 export function problem_words(summary) {
   const p = summary.problem;
-  return p ? `${p.kind}, ${count(p.d)} unknowns, ${count(p.m)} contact rows` : "";
+  return p ? `${p.kind}, ${counted(p.d, "unknown")}, ${counted(p.m, "contact row")}` : "";
 }
 
 /** How it was solved. */
 export function method_words(summary) {
   const t = summary.timings_s || {};
   const cached = summary.factor?.cached ? ", on a body that was in the cache" : "";
-  return `${summary.method}, ${summary.operator} operator, ${count(summary.iterations)} iterations` +
-    `${summary.restarts ? `, ${count(summary.restarts)} restarts` : ""}, ${seconds(t.total)}${cached}`;
+  return `${summary.method}, ${summary.operator} operator, ${counted(summary.iterations, "iteration")}` +
+    `${summary.restarts ? `, ${counted(summary.restarts, "restart")}` : ""}, ${seconds(t.total)}${cached}`;
 }
 
 /** The shortest that tells how good an ended job is, for a line of a list. */

@@ -1,5 +1,7 @@
 """The HTTP interface of the real daemon, by its contract: every route and every refusal."""
+import gzip
 import json
+import re
 import threading
 import time
 
@@ -145,6 +147,19 @@ def test_service_routes(s):
         check(reply.body == path.read_bytes(), path)
     expect(s.get("/schemas/none.json"), 404, "not_found")
     expect(s.get("/schemas/..%2FMakefile"), 404, "not_found")
+
+
+def test_page(s):
+    index = expect(s.get("/"), 200)
+    check(index.headers["content-type"] == "text/html; charset=utf-8" and index.headers["cache-control"] == "no-cache", index)
+    check("script-src 'self'" in index.headers["content-security-policy"], index.headers)
+    script = re.search(rb'src="(/page/main-\w+\.js)"', index.body).group(1).decode()
+    plain, packed = expect(s.get(script), 200), expect(s.get(script, Accept_Encoding="gzip"), 200)
+    check(packed.headers["content-encoding"] == "gzip" and gzip.decompress(packed.body) == plain.body, packed.headers)
+    check("immutable" in plain.headers["cache-control"] and plain.headers["etag"] != packed.headers["etag"], plain.headers)
+    for tag in (plain.headers["etag"], packed.headers["etag"]):
+        expect(s.get(script, If_None_Match=tag), 304)
+    check(s.request("HEAD", script).headers["content-length"] == str(len(plain.body)), script)
 
 
 def test_not_found(s):

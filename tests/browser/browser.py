@@ -20,13 +20,12 @@ from service import Skip, check, options  # noqa: E402,F401
 
 try:
     from selenium import webdriver
-    from selenium.common.exceptions import WebDriverException
+    from selenium.common.exceptions import StaleElementReferenceException
     from selenium.webdriver.chrome.service import Service as Driver
     from selenium.webdriver.common.by import By
     from selenium.webdriver.common.keys import Keys  # noqa: F401
 except ImportError:
     webdriver = None
-    WebDriverException = Exception
 
 
 def start(width=1200, height=900, dark=False):
@@ -98,7 +97,19 @@ class Browser:
         return self.all(selector)[0]
 
     def click(self, selector):
-        self.one(selector).click()
+        """Clicks on an element, also on one that is drawn anew meanwhile."""
+        for _ in range(20):
+            try:
+                self.one(selector).click()
+                return
+            except StaleElementReferenceException:
+                pass
+        raise AssertionError(f"{selector} is never the same for long")
+
+    def processor(self):
+        """Seconds of processor that the page's own thread has used, whatever else the machine does."""
+        metrics = {one["name"]: one["value"] for one in self.command("Performance.getMetrics")["metrics"]}
+        return metrics["TaskDuration"]
 
     def text(self, selector):
         """What an element shows; "" if there is none."""

@@ -91,6 +91,27 @@ def test_examples_are_all_valid(s, b):
           "the example is not what stands in its file")
 
 
+def test_the_schema_explains_the_key_at_the_caret(s, b):
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    b.write("#job-text", TEXT)
+    schema = s.get("/schemas/request.json").json
+    for part, path, says in (('"thickness"', "problem.thickness", ""), ('"young"', "problem.materials[0].young", "greater than 0"),
+                             ('"accuracy"', "solver.accuracy", schema["$defs"]["accuracy"]["description"][:60]),
+                             ('"method"', "solver.method", "one of"), ('"traction"', "problem.loads[0].traction", ""),
+                             ('"plane"', "problem.contacts[0].obstacle.plane", "Keys: point, normal")):
+        b.run("""const area = document.querySelector('#job-text'); area.focus();
+                 area.setSelectionRange(arguments[0], arguments[0]); area.dispatchEvent(new Event('click'));""", TEXT.index(part) + 2)
+        b.says("#key-help", path + ":")
+        b.says("#key-help", says)
+    b.write("#job-text", TEXT.replace('"plane"', '"plain"'))
+    b.says("#verdict", "plain")
+    b.run("const a = document.querySelector('#job-text'); a.setSelectionRange(arguments[0], arguments[0]); a.dispatchEvent(new Event('click'))",
+          TEXT.index('"plane"') + 2)
+    b.says("#key-help", "plain: not known")
+    b.console()
+
+
 def test_submits_once_and_shows_the_job(s, b):
     b.open(s, "new/gear")
     b.says("#verdict", "Valid")

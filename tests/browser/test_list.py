@@ -146,20 +146,24 @@ def test_ten_thousand_jobs_are_smooth(s, b):
     s.start()
     b.open(s)
     b.one(".sizer .row")
+    b.command("Performance.enable", timeDomain="threadTicks")
+    used = -b.processor()
     seen = b.driver.execute_async_script(SCROLL)
+    seen["processor"] = used + b.processor()
     print(f"# scrolled {seen['top']} px in 240 frames: {json.dumps(seen)}")
     check(seen["top"] > 40 * 1000, "the list ends too early", seen)  # pages come as they are looked at
     check(seen["elements"] < 100, "rows out of sight are elements", seen)
-    check(seen["median"] < 100, "frames are late", seen)  # of 17 ms, on a machine that has other things to do
-    check(seen["longest"] < 1000, "the page stands still", seen)
+    check(seen["empty"] < 24, "one sees no rows", seen)
+    check(seen["processor"] < 240 * 0.05, "frames cost too much", seen)  # of 17 ms; the clock says what the machine does besides
+    check(seen["longest"] < 2000, "the page stands still", seen)
     for _ in range(200):
         if b.run("const v = document.querySelector('.rows'); v.scrollTop = v.scrollHeight; return document.querySelector('#list-total').innerText") \
                 == f"{MANY + 1:,} jobs":
             break
         b.driver.execute_async_script("setTimeout(arguments[0], 50)")
     b.says("#list-total", f"{MANY + 1:,} jobs")
-    b.run("const v = document.querySelector('.rows'); v.scrollTop = v.scrollHeight")
-    b.wait("the oldest job", "return [...document.querySelectorAll('.tag')].some((tag) => tag.innerText === 'number-0')")
+    b.wait("the oldest job", """const v = document.querySelector('.rows'); v.scrollTop = v.scrollHeight;
+        return [...document.querySelectorAll('.tag')].some((tag) => tag.innerText === 'number-0')""")
     b.run("document.querySelector('.rows').scrollTop = 200000")
     b.wait("the jobs of the middle", """return [...document.querySelectorAll('.sizer .row')].some((row) => row.ariaRowIndex === '5002')""")
     check(b.run("return document.querySelectorAll('.sizer .row').length") < 100, "rows are left behind")
