@@ -74,10 +74,10 @@ typedef struct {
     const char *title; /* may be NULL */
 } uz_picture;
 
-/* The deformed body in colour over its undeformed outline, the obstacles (plane models), an arrow for the contact force
- * at each node that touches (at most some 80 of them), a colour bar: as SVG, with the body's colours as a PNG image in
- * it, so that the size does not grow with the mesh. Solids are seen from the front, the right and above.
- * *svg is NUL-terminated, the caller frees it. Errors: those of uz_fields_compute, _ARGUMENT. */
+/* The deformed body in colour over its undeformed outline, the obstacles, an arrow for the contact pressure at each
+ * node that touches (at most some 80 of them), a colour bar: as SVG, with the body's colours as a PNG image in it, so
+ * that the size does not grow with the mesh. Solids are seen from the front, the right and above; obstacles stand
+ * behind. *svg is NUL-terminated, the caller frees it. Errors: those of uz_fields_compute, _ARGUMENT. */
 uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
                               const uz_picture *how, const uz_hooks *hooks, uz_error *err);
 

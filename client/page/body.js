@@ -3,13 +3,14 @@
 import { Camera } from "./body_camera.js";
 import { listen } from "./body_input.js";
 import { Overlay } from "./body_overlay.js";
-import { displacement_of, forget_surface, load_surface, node_of, place_of, quantities, rows_by_vertex, shades_of, values_of, viridis } from "./body_surface.js";
+import { add_stress, displacement_of, forget_surface, load_surface, node_of, place_of, quantities, rows_by_vertex, shades_of, values_of, viridis } from "./body_surface.js";
 import { announce, h, s, show } from "./dom.js";
 import { number } from "./format.js";
 import { mountPressure } from "./pressure.js";
 import { colour } from "./theme.js";
 
 const MOST_LINED = { 2: 4000, 3: 16000 }; // elements: lines of more would hide the colours
+const MOST_AT_ONCE = 20000; // elements of a body whose stress is fetched before somebody asks for it
 const REACH = 14; // pixels around the pointer in which a node is looked for
 let mounts = 0;
 
@@ -149,7 +150,8 @@ class BodyView {
     const first = !this.surface, same = !first && this.surface.position.length === surface.position.length;
     this.surface = surface;
     if (first) this.shown.wire = surface.elements <= MOST_LINED[surface.dim];
-    if (!quantities(surface).some((one) => one.id === this.quantity)) this.quantity = "displacement";
+    const wanted = quantities(surface).some((one) => one.id === this.quantity) ? this.quantity : "displacement";
+    this.quantity = wanted === "von_mises" && !surface.von_mises ? "displacement" : wanted;
     this.values = values_of(surface, this.quantity);
     this.rows = rows_by_vertex(surface);
     this.marked = this.held = -1;
@@ -167,6 +169,10 @@ class BodyView {
     show(this.keys, surface.dim === 3 ? "Drag to turn, with Shift to move; with the picture in focus the wheel enlarges, arrows turn, Shift and arrows move, + and − enlarge, 0 shows all."
       : "Drag to move; with the picture in focus the wheel enlarges, arrows move, + and − enlarge, 0 shows all.");
     if (this.options.pressure !== false) this.show_pressure();
+    if (wanted === "von_mises" && !surface.von_mises) {
+      this.tools.querySelector(".body-colour").value = wanted;
+      this.choose(wanted);
+    }
   }
 
   async show_pressure() {
@@ -177,13 +183,27 @@ class BodyView {
     else this.pressure = pressure;
   }
 
-  choose(id) {
+  async choose(id) {
+    const { surface } = this;
     this.quantity = id;
-    this.values = values_of(this.surface, id);
-    this.gl.colour(shades_of(this.surface, this.values));
+    if (id === "von_mises" && !surface.von_mises && !(await this.fetch_stress())) return;
+    if (this.quantity !== id || this.surface !== surface || this.ends.signal.aborted) return;
+    this.values = values_of(surface, id);
+    this.gl.colour(shades_of(surface, this.values));
     this.draw_legend();
     this.redraw();
     announce(this.summary());
+  }
+
+  /** False where it does not come, which is said. */
+  async fetch_stress() {
+    try {
+      await add_stress(this.api, this.job, this.surface);
+      return true;
+    } catch (error) {
+      if (!this.ends.signal.aborted) this.say(error.message);
+      return false;
+    }
   }
 
   scale(factor) {
@@ -250,7 +270,7 @@ class BodyView {
   }
 
   resize() {
-    const { width, height } = this.frame_box.getBoundingClientRect(), ratio = Math.min(window.devicePixelRatio || 1, 3);
+    const { clientWidth: width, clientHeight: height } = this.frame_box, ratio = Math.min(window.devicePixelRatio || 1, 3);
     if (!(width > 0 && height > 0)) return;
     this.view.resize(width, height);
     this.gl.resize(width, height, ratio);
@@ -269,7 +289,9 @@ class BodyView {
     this.overlay.draw(this.view, this.factor, { colours: this.colours, obstacles: this.shown.obstacles, forces: this.shown.forces, marked: this.marked });
     this.canvas.setAttribute("aria-label", this.summary());
     this.canvas.dataset.frames = ++this.frames;
-    if (this.frames === 1) performance.mark("body:drawn");
+    if (this.frames > 1) return;
+    performance.mark("body:drawn");
+    if (this.surface.elements <= MOST_AT_ONCE) this.fetch_stress(); // so that nodes can tell theirs
   }
 
   watch() {

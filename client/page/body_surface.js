@@ -4,7 +4,6 @@
 const MAGIC = 0x46546c67, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942;
 const FLOAT = 5126;
 
-/** What each colour stands for: values by vertex, with the range that the legend shows. */
 const AXES = ["x", "y", "z"];
 
 // Nine of the colours of viridis (S. van der Walt and N. Smith, 2015, CC0), as in the service's own pictures.
@@ -72,10 +71,16 @@ export function parse_surface(buffer) {
 
 let latest = { key: "", promise: null };
 
-/** The surface of a job, or of one of its cases; the last one that was asked for is kept. */
+function surface_path(job, case_name, fields) {
+  return `/v1/jobs/${job}/surface?fields=${fields}${case_name ? `&case=${encodeURIComponent(case_name)}` : ""}`;
+}
+
+/**
+ * The surface of a job, or of one of its cases, without the stress, which takes the service longest: add_stress. The
+ * last one that was asked for is kept.
+ */
 export function load_surface(api, job, case_name) {
-  const query = case_name ? `?case=${encodeURIComponent(case_name)}` : "";
-  const path = `/v1/jobs/${job}/surface${query}`;
+  const path = surface_path(job, case_name, "displacements,pressure");
   if (latest.key === path) return latest.promise;
   const promise = api.bytes(path).then((buffer) => {
     performance.mark("surface:fetched");
@@ -90,6 +95,17 @@ export function load_surface(api, job, case_name) {
 
 export function forget_surface() {
   latest = { key: "", promise: null };
+}
+
+/** Fetches the stress of a surface, once: surface.von_mises. */
+export async function add_stress(api, job, surface) {
+  surface.stress_comes ??= api.bytes(surface_path(job, surface.case, "von_mises")).then((buffer) => {
+    surface.von_mises = parse_surface(buffer).von_mises;
+  }, (error) => {
+    surface.stress_comes = undefined;
+    throw error;
+  });
+  await surface.stress_comes;
 }
 
 /** The number of a vertex's node. */
@@ -126,7 +142,7 @@ export function push_of(surface) {
 export function quantities(surface) {
   const list = [{ id: "displacement", name: "Displacement" }];
   for (const axis of AXES.slice(0, surface.dim)) list.push({ id: axis, name: `Displacement along ${surface.axisymmetric && axis === "x" ? "the radius" : axis}` });
-  if (surface.von_mises) list.push({ id: "von_mises", name: "von Mises stress" });
+  list.push({ id: "von_mises", name: "von Mises stress" });
   if (surface.rows.pressure && surface.rows.count) list.push({ id: "pressure", name: "Contact pressure" });
   return list;
 }

@@ -7,7 +7,7 @@ import { number } from "./format.js";
 import { Chart } from "./plot.js";
 import { colour } from "./theme.js";
 
-const MOST_ROWS = 1000, MAP_HEIGHT = 300, REACH = 20, MARGIN = 12;
+const MOST_ROWS = 1000, MAP_HEIGHT = 320, REACH = 20, MARGIN = 30;
 const WHAT = [{ id: "pressure", name: "Contact pressure" }, { id: "gap", name: "Gap" }, { id: "reaction", name: "Reaction" }];
 const exact = (value) => number(value, 5);
 
@@ -194,17 +194,18 @@ class PressureMap {
     if (!this.values || width < 60) return;
     const { points, box } = this.spots, size = [Math.max(box[2] - box[0], 1e-9), Math.max(box[3] - box[1], 1e-9)];
     this.scale = Math.min((width - 2 * MARGIN) / size[0], (MAP_HEIGHT - 2 * MARGIN) / size[1]);
+    // Squares that meet where the nodes are a regular grid; the margin has room for half of one of a grid of 5 x 5.
+    const dots = Math.max(1, Math.min(MARGIN, (0.5 * this.scale * Math.sqrt(size[0] * size[1])) / Math.max(1, Math.sqrt(points.length) - 1)));
     this.height = Math.max(40, Math.ceil(this.scale * size[1]) + 2 * MARGIN);
     this.width = width;
     Object.assign(this.canvas, { width: width * ratio, height: this.height * ratio });
     Object.assign(this.canvas.style, { width: `${width}px`, height: `${this.height}px` });
     const pen = this.canvas.getContext("2d"), range = this.high - this.low;
-    const dots = Math.max(1.5, Math.min(7, 0.45 * this.scale * Math.sqrt((size[0] * size[1]) / points.length)));
     pen.scale(ratio, ratio);
     points.forEach((at, i) => {
       const [x, y] = this.pixel(at);
       pen.fillStyle = Number.isNaN(this.values[i]) ? colour("--muted") : `rgb(${viridis(range > 0 ? (this.values[i] - this.low) / range : 0.5).join(" ")})`;
-      pen.fillRect(x - dots, y - dots, 2 * dots, 2 * dots);
+      pen.fillRect(Math.round(x - dots), Math.round(y - dots), Math.ceil(2 * dots), Math.ceil(2 * dots));
     });
   }
 

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { LEGEND = 48, WIDTH = 900 };
+enum { LEGEND = 64, WIDTH = 900 };
 
 static const char STYLE[] =
     "<style>text{font:12px system-ui,sans-serif;fill:#333}.title{font-weight:600}path{fill:none}"
@@ -37,6 +37,15 @@ static uz_status make_values(double **out, uz_scenery *scenery, const uz_field_b
     return UZ_OK;
 }
 
+static uz_status make_pressure(double **out, const uz_scenery *scenery, uz_error *err)
+{
+    const uz_body_model *model = scenery->model;
+    *out = uz_alloc(model->m, sizeof **out);
+    if (!*out)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)model->m);
+    return uz_contact_pressure(*out, model, scenery->scene, scenery->answer->r, err);
+}
+
 static void measure_values(uz_scenery *scenery, uz_field colour)
 {
     scenery->low = INFINITY;
@@ -60,18 +69,31 @@ static void put_head(uz_buffer *svg, const uz_scenery *scenery, const char *titl
                     height);
 }
 
-static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_hooks *hooks, uz_error *err)
+static uz_status put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)
+{
+    uz_buffer_print(svg, "<image width=\"%d\" height=\"%d\" href=\"data:image/png;base64,", raster->width,
+                    raster->height);
+    uz_status status = uz_raster_put_png(svg, raster, err);
+    uz_buffer_print(svg, "\"/>\n");
+    return status;
+}
+
+/* From back to front: obstacles of a solid, the outline before the deformation, the body. */
+static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
+                          uz_error *err)
 {
     uz_raster raster;
     uz_status status = uz_raster_init(&raster, scenery->width, scenery->height, err);
-    if (status == UZ_OK)
-        status = uz_scenery_paint(&raster, scenery, hooks, err);
-    if (status == UZ_OK) {
-        uz_buffer_print(svg, "<image width=\"%d\" height=\"%d\" href=\"data:image/png;base64,", scenery->width,
-                        scenery->height);
-        status = uz_raster_put_png(svg, &raster, err);
-        uz_buffer_print(svg, "\"/>\n");
+    if (status == UZ_OK && uz_scenery_paint_obstacles(&raster, scenery)) {
+        status = put_image(svg, &raster, err);
+        uz_raster_wipe(&raster);
     }
+    if (status == UZ_OK)
+        status = uz_scenery_put_outline(svg, scenery, skin, err);
+    if (status == UZ_OK)
+        status = uz_scenery_paint(&raster, scenery, skin, hooks, err);
+    if (status == UZ_OK)
+        status = put_image(svg, &raster, err);
     uz_raster_clear(&raster);
     return status;
 }
@@ -79,9 +101,15 @@ static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_ho
 static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *body, const uz_picture *how,
                       const uz_hooks *hooks, uz_error *err)
 {
-    double *value = NULL;
-    uz_status status = make_values(&value, scenery, body, how->colour, hooks, err);
+    double *value = NULL, *pressure = NULL;
+    uz_skin skin;
+    uz_status status = uz_skin_build(&skin, &scenery->model->mesh, hooks, err);
+    if (status == UZ_OK)
+        status = make_values(&value, scenery, body, how->colour, hooks, err);
+    if (status == UZ_OK)
+        status = make_pressure(&pressure, scenery, err);
     scenery->value = value;
+    scenery->pressure = pressure;
     if (status == UZ_OK) {
         measure_values(scenery, how->colour);
         status = uz_scenery_fit(scenery, err);
@@ -89,8 +117,7 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
     if (status == UZ_OK) {
         put_head(svg, scenery, how->title);
         uz_buffer_print(svg, "<svg width=\"%d\" height=\"%d\">\n", scenery->width, scenery->height);
-        uz_scenery_put_outline(svg, scenery);
-        status = put_body(svg, scenery, hooks, err);
+        status = put_body(svg, scenery, &skin, hooks, err);
     }
     if (status == UZ_OK) {
         uz_scenery_put_obstacles(svg, scenery);
@@ -100,6 +127,8 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
         uz_buffer_print(svg, "</svg>\n");
     }
     free(value);
+    free(pressure);
+    uz_skin_clear(&skin);
     return status;
 }
 

@@ -1,30 +1,26 @@
 /* overlay.c: what stands around the body: its outline before, obstacles, contact forces, the legend. */
 #include "picture/scenery.h"
-#include "scene/corner_table.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { MOST_OUTLINE = 20000, MOST_ARROWS = 80, ARROW = 55, TICK = 9 };
 
-void uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery)
+uz_status uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, uz_error *err)
 {
-    const uz_mesh *mesh = &scenery->model->mesh;
-    uz_corner_table sides;
-    if (mesh->dim != 2 || uz_corner_table_build(&sides, mesh, true, NULL) != UZ_OK)
-        return; /* a picture without it is still one */
+    uz_skin_edges edges;
+    uz_status status = uz_skin_edges_build(&edges, skin, &scenery->model->mesh, err);
+    if (status != UZ_OK)
+        return status;
     uz_buffer_print(svg, "<path class=\"before\" d=\"");
-    for (int64_t i = 0, drawn = 0; i < sides.count && drawn < MOST_OUTLINE; i++) {
-        int64_t node[UZ_FACE_NODES];
-        if (sides.same[i] || uz_corner_table_shared(&sides, i))
-            continue;
-        uz_mesh_face(node, mesh, sides.item[i]);
-        const uz_raster_point a = uz_scenery_node(scenery, node[0], 0), b = uz_scenery_node(scenery, node[1], 0);
+    for (int64_t i = 0; i < edges.n_outline && i < MOST_OUTLINE; i++) {
+        const uz_raster_point a = uz_scenery_node(scenery, edges.outline[2 * i], 0),
+                              b = uz_scenery_node(scenery, edges.outline[2 * i + 1], 0);
         uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1f", a.x, a.y, b.x, b.y);
-        drawn++;
     }
     uz_buffer_print(svg, "\"/>\n");
-    uz_corner_table_clear(&sides);
+    uz_skin_edges_clear(&edges);
+    return UZ_OK;
 }
 
 /* One stroke of an obstacle's border with the obstacle on its right, and ticks into it. */
@@ -124,11 +120,18 @@ void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
             put_obstacle(svg, scenery, &scenery->scene->contacts[k]);
 }
 
-/* Force per area where there is one, so that arrows follow the pressure and not the mesh. */
+/* Arrows follow the pressure and not the mesh. */
 static double push_of(const uz_scenery *scenery, int64_t row)
 {
-    const double area = scenery->model->info.contact_area[row];
-    return area > 0 ? -scenery->answer->r[row] / area : 0;
+    return scenery->pressure[row] > 0 ? scenery->pressure[row] : 0;
+}
+
+static double largest_push(const uz_scenery *scenery)
+{
+    double largest = 0;
+    for (int64_t i = 0; i < scenery->model->m; i++)
+        largest = fmax(largest, push_of(scenery, i));
+    return largest;
 }
 
 static void put_arrow(uz_buffer *svg, const uz_scenery *scenery, int64_t row, double length)
@@ -150,12 +153,10 @@ static void put_arrow(uz_buffer *svg, const uz_scenery *scenery, int64_t row, do
 void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
 {
     const int64_t m = scenery->model->m;
-    double largest = 0;
+    const double largest = largest_push(scenery);
     int64_t pushing = 0, seen = 0;
-    for (int64_t i = 0; i < m; i++) {
-        largest = fmax(largest, push_of(scenery, i));
+    for (int64_t i = 0; i < m; i++)
         pushing += push_of(scenery, i) > 0;
-    }
     if (!(largest > 0))
         return;
     const int64_t every = (pushing + MOST_ARROWS - 1) / MOST_ARROWS;
@@ -189,5 +190,9 @@ void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char
                     scenery->what);
     uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", y + 10);
     uz_buffer_put_escaped(svg, title ? title : "");
-    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g</text>\n", y + 26, scenery->factor);
+    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", y + 26, scenery->factor);
+    if (largest_push(scenery) > 0)
+        uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure %.3g", y + 42,
+                        largest_push(scenery));
+    uz_buffer_print(svg, "</text>\n");
 }

@@ -14,13 +14,20 @@ uz_status uz_raster_init(uz_raster *raster, int width, int height, uz_error *err
 {
     const int64_t pixels = (int64_t)width * height;
     *raster = (uz_raster){.width = width, .height = height};
-    raster->rgba = uz_alloc_zero(pixels, 4);
+    raster->rgba = uz_alloc(pixels, 4);
     raster->depth = uz_alloc(pixels, sizeof *raster->depth);
     if (!raster->rgba || !raster->depth)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a picture of %d x %d pixels", width, height);
+    uz_raster_wipe(raster);
+    return UZ_OK;
+}
+
+void uz_raster_wipe(uz_raster *raster)
+{
+    const int64_t pixels = (int64_t)raster->width * raster->height;
+    memset(raster->rgba, 0, 4 * (size_t)pixels);
     for (int64_t i = 0; i < pixels; i++)
         raster->depth[i] = -INFINITY;
-    return UZ_OK;
 }
 
 void uz_raster_clear(uz_raster *raster)
@@ -37,6 +44,10 @@ void uz_colour(unsigned char rgb[3], double value)
     static const unsigned char VIRIDIS[STEPS + 1][3] = {{68, 1, 84},    {71, 44, 122},  {59, 81, 139},
                                                         {44, 113, 142}, {33, 144, 141}, {39, 173, 129},
                                                         {92, 200, 99},  {170, 220, 50}, {253, 231, 37}};
+    if (isnan(value)) {
+        rgb[0] = rgb[1] = rgb[2] = 210;
+        return;
+    }
     const double at = fmin(fmax(value, 0), 1) * STEPS;
     const int i = at < STEPS ? (int)at : STEPS - 1;
     for (int c = 0; c < 3; c++)

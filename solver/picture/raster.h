@@ -13,11 +13,14 @@ typedef struct {
 
 typedef struct {
     double x, y, z; /* pixels; z towards the eye */
-    double value;   /* in [0, 1]: the colour */
+    double value;   /* in [0, 1]: the colour; NaN: grey */
 } uz_raster_point;
 
 uz_status uz_raster_init(uz_raster *raster, int width, int height, uz_error *err);
 void uz_raster_clear(uz_raster *raster);
+
+/* Nothing is drawn any more. */
+void uz_raster_wipe(uz_raster *raster);
 
 /* Colour and depth are linear over the triangle. light: 1 as it is, 0 black. What is not finite is left out. */
 void uz_raster_triangle(uz_raster *raster, const uz_raster_point corner[3], double light);

@@ -4,21 +4,23 @@
 
 #include "fields/parts.h"
 #include "picture/raster.h"
+#include "picture/skin.h"
 
 /* Everything is drawn from this. Pixels have y downwards; depth grows towards the eye. */
 typedef struct {
     const uz_scene *scene;
     const uz_body_model *model;
     const uz_field_source *answer;
-    double factor;       /* of displacements */
-    const double *value; /* n_nodes: what is coloured */
-    double low, high;    /* range of it */
-    const char *what;    /* its name */
-    double axes[3][3];   /* rows: to the right, upwards, towards the eye */
-    double scale;        /* pixels per length */
-    double offset[2];    /* pixel = (offset[0] + scale * right, offset[1] - scale * up) */
-    int width, height;   /* of the part that the body is in */
-    double extent;       /* size of the body */
+    double factor;          /* of displacements */
+    const double *value;    /* n_nodes: what is coloured */
+    double low, high;       /* range of it */
+    const char *what;       /* its name */
+    const double *pressure; /* m: of each contact row, NaN where it has no area */
+    double axes[3][3];      /* rows: to the right, upwards, towards the eye */
+    double scale;           /* pixels per length */
+    double offset[2];       /* pixel = (offset[0] + scale * right, offset[1] - scale * up) */
+    int width, height;      /* of the part that the body is in */
+    double extent;          /* size of the body */
 } uz_scenery;
 
 /* axes, scale, offset, height and extent from the mesh, displacements and width. UZ_ERR_NOT_FINITE. */
@@ -32,12 +34,17 @@ uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x);
 /* Where a node is; its place is that before the deformation plus `factor` times the displacement. */
 uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double factor);
 
-/* The surface of the body in colour. UZ_ERR_MEMORY, _CANCELLED. */
-uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_hooks *hooks, uz_error *err);
+/* The surface of the body in colour. UZ_ERR_CANCELLED. */
+uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
+                           uz_error *err);
 
-/* SVG elements, each appended to the buffer. */
-void uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery); /* undeformed, plane models */
-void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery);
+/* Obstacles of solids, in grey. False: there are none. */
+bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery);
+
+/* SVG elements, each appended to the buffer. The outline before the deformation is the border of a plane or the sharp
+ * edges of a solid: UZ_ERR_MEMORY. */
+uz_status uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, uz_error *err);
+void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery); /* plane models */
 void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery);
 void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title);
 

@@ -2,7 +2,6 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "picture/scenery.h"
-#include "picture/skin.h"
 
 #include <math.h>
 
@@ -49,17 +48,15 @@ static void paint_cell(uz_raster *raster, const uz_scenery *scenery, const int64
         uz_raster_line(raster, &p[i], &p[(i + 1) % n], 0.5);
 }
 
-uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_hooks *hooks, uz_error *err)
+uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
+                           uz_error *err)
 {
     const uz_mesh *mesh = &scenery->model->mesh;
     const bool lined = mesh->n_elements <= (mesh->dim == 2 ? 1 : 4) * MOST_LINED;
-    uz_skin skin;
-    uz_status status = uz_skin_build(&skin, mesh, hooks, err);
-    for (int64_t i = 0; status == UZ_OK && i < skin.n_cells; i++) {
+    for (int64_t i = 0; i < skin->n_cells; i++) {
         if (i % 4096 == 0 && uz_cancelled(hooks))
-            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the picture was drawn");
-        paint_cell(raster, scenery, skin.point + skin.first[i], (int)(skin.first[i + 1] - skin.first[i]), lined);
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the picture was drawn");
+        paint_cell(raster, scenery, skin->point + skin->first[i], (int)(skin->first[i + 1] - skin->first[i]), lined);
     }
-    uz_skin_clear(&skin);
-    return status;
+    return UZ_OK;
 }

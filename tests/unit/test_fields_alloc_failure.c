@@ -45,6 +45,26 @@ static uz_status convergence(const uz_scene *scene, const uz_field_source *answe
     return status;
 }
 
+static uz_status surface(const uz_scene *scene, const uz_field_source *answer, uz_error *err)
+{
+    uz_surface out;
+    uz_status status = uz_surface_compute(&out, scene, answer, EVERYTHING, 0, NULL, err);
+    CHECK((out.position != NULL) == (status == UZ_OK) && (out.arc.x != NULL) == (status == UZ_OK));
+    uz_surface_clear(&out);
+    return status;
+}
+
+static uz_status picture(const uz_scene *scene, const uz_field_source *answer, uz_error *err)
+{
+    char *svg;
+    size_t len;
+    const uz_picture how = {.colour = UZ_FIELD_DISPLACEMENTS, .width = 200};
+    uz_status status = uz_picture_deformed(&svg, &len, scene, answer, &how, NULL, err);
+    CHECK((svg != NULL) == (status == UZ_OK) && (len > 0) == (status == UZ_OK));
+    free(svg);
+    return status;
+}
+
 static bool fail_at(attempt run, const uz_scene *scene, const uz_field_source *answer, long n)
 {
     uz_error err = {0};
@@ -107,6 +127,8 @@ static void check_element(const char *element)
     CHECK(fail_each(fields, &s, &answer) > 30);
     CHECK(fail_each(vtu, &s, &answer) > 40);
     CHECK(fail_each(convergence, &s, &answer) > 3);
+    CHECK(fail_each(surface, &s, &answer) > 40);
+    CHECK(fail_each(picture, &s, &answer) > 30);
     long n = 0;
     while (n < 1000 && evaluate_at(&s, &model, result, n))
         n++;
@@ -120,6 +142,36 @@ TEST(every_allocation_may_fail)
 {
     check_element("quad4");
     check_element("quad8");
+}
+
+/* Solids have obstacles and inner nodes to draw, or not. Nothing is solved: any answer will do. */
+TEST(every_allocation_of_a_solid_may_fail)
+{
+    static double u[3 * 60], r[20], g[20];
+    uz_scene s = body_scene(UZ_SOLID, "hex8", (double[3]){3, 2, 4}, (int64_t[3]){3, 2, 4});
+    body_hold(&s, "top", 0, 0, 0);
+    s.contacts[s.n_contacts++] =
+        (uz_contact){.on = "bottom", .kind = UZ_OBSTACLE_ROUND, .point = {1, -9, 2}, .radius = 9};
+    const uz_field_source answer = {u, r, g, 3 * 60, 20};
+    for (int i = 0; i < 20; i++)
+        r[i] = -i;
+    CHECK(fail_each(picture, &s, &answer) > 20);
+    uz_surface out;
+    uz_error err = {0};
+    for (long n = 0;; n++) {
+        heap.live = 0;
+        heap.until_failure = n;
+        heap.failed = false;
+        heap.watching = true;
+        const uz_status status = uz_surface_compute(&out, &s, &answer, EVERYTHING, 0, NULL, &err);
+        uz_surface_clear(&out);
+        heap.watching = false;
+        CHECK_MSG(status == (heap.failed ? UZ_ERR_MEMORY : UZ_OK) && heap.live == 0, "allocation %ld: %s", n,
+                  err.message);
+        if (!heap.failed)
+            break;
+    }
+    uz_scene_clear(&s);
 }
 
 static bool at_once(void *ctx)
@@ -142,6 +194,9 @@ TEST(fields_can_be_cancelled)
     CHECK_INT(uz_fields_compute(&out, &s, &answer, UZ_FIELD_STRESS_GAUSS, &hooks, NULL), UZ_ERR_CANCELLED);
     CHECK_INT(uz_vtu_write(&text, &len, &s, &answer, UZ_FIELD_DISPLACEMENTS, &hooks, NULL), UZ_ERR_CANCELLED);
     CHECK(!text && len == 0);
+    uz_surface drawn;
+    CHECK_INT(uz_surface_compute(&drawn, &s, &answer, UZ_FIELD_VON_MISES, 0, &hooks, NULL), UZ_ERR_CANCELLED);
+    CHECK(!drawn.position && !drawn.triangle);
     uz_result_free(result);
     uz_scene_clear(&s);
 }

@@ -1,4 +1,5 @@
 /* Pictures of answers: what is drawn where, and that nothing is lost when something fails. */
+#include "body_fixture.h"
 #include "harness.h"
 #include "picture/raster.h"
 #include "scene_fixture.h"
@@ -118,7 +119,8 @@ TEST(an_arrow_for_each_node_that_touches_and_the_obstacle)
     solved s = solve_scene(paper_scene(30, 10));
     char *svg = draw(&s, (uz_picture){.colour = UZ_FIELD_VON_MISES, .factor = 100});
     const char *push = strstr(svg, "class=\"push\""), *obstacle = strstr(svg, "class=\"obstacle\"");
-    CHECK(push && obstacle && strstr(svg, "von Mises stress") && strstr(svg, "displacements \u00d7 100<"));
+    CHECK(push && obstacle && strstr(svg, "von Mises stress") && strstr(svg, "displacements \u00d7 100<") &&
+          strstr(svg, "longest arrow: pressure 0.05"));
     /* Each arrow has a shaft and a head: two moves. */
     CHECK_INT(push ? count_moves(push) : 0, 2 * (int)s.result->summary.active);
     free(svg);
@@ -129,6 +131,43 @@ TEST(an_arrow_for_each_node_that_touches_and_the_obstacle)
 }
 
 /* Tall, flat, far from the origin, not deformed at all, in other units: always a picture of bounded size. */
+static int count_of(const char *text, const char *word)
+{
+    int n = 0;
+    for (const char *at = strstr(text, word); at; at = strstr(at + 1, word))
+        n++;
+    return n;
+}
+
+/* Behind the body stand the obstacle, as an image of its own, and the twelve edges of the box. */
+TEST(a_solid_stands_on_its_obstacle)
+{
+    static const uz_contact OBSTACLES[] = {
+        {.on = "bottom", .kind = UZ_OBSTACLE_PLANE, .normal = {0, 1, 0}},
+        {.on = "bottom", .kind = UZ_OBSTACLE_ROUND, .point = {1, -5, 1}, .radius = 5},
+        {.on = "bottom", .kind = UZ_OBSTACLE_CYLINDER, .point = {1, -5, 0}, .normal = {0, 0, 1}, .radius = 5},
+        {.on = "bottom", .kind = UZ_OBSTACLE_ROUND, .point = {1, 30, 1}, .radius = 30, .inside = true},
+    };
+    for (int k = 0; k < 4; k++) {
+        uz_scene scene = body_scene(UZ_SOLID, "hex8", (double[3]){2, 1, 2}, (int64_t[3]){3, 2, 3});
+        scene.contacts[scene.n_contacts++] = OBSTACLES[k];
+        body_hold(&scene, "top", 0, -1e-3, 0);
+        solved s = solve_scene(scene);
+        char *svg = draw(&s, (uz_picture){.colour = UZ_FIELD_VON_MISES, .factor = 1});
+        int width, height;
+        unsigned char *pixels = pixels_of(svg, &width, &height);
+        long grey = 0;
+        for (int64_t i = 0; i < (int64_t)width * height; i++)
+            grey += pixels[4 * i + 3] == 255 && pixels[4 * i] == pixels[4 * i + 1] && pixels[4 * i] > 150;
+        CHECK_MSG(grey > 40000, "obstacle %d: %ld grey pixels", k, grey);
+        CHECK_INT(count_of(svg, "base64,"), 2);
+        CHECK_INT(count_moves(strstr(svg, "class=\"before\"")), 4 * (3 + 2 + 3));
+        free(pixels);
+        free(svg);
+        drop(&s);
+    }
+}
+
 TEST(any_body_fits)
 {
     const double size[4][2] = {{1e-6, 1e3}, {1e3, 1e-6}, {1e-9, 1e-9}, {60, 20}};

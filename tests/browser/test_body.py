@@ -1,0 +1,228 @@
+"""The deformed body on a job's page, and the contact along its surface. usage: test_body.py BUILD_DIR [FILTER]"""
+import copy
+import json
+import time
+
+import browser
+from browser import check
+from service import MATRICES, SCENE
+
+SOLID = {"problem": {"kind": "scene", "model": "solid",
+                     "mesh": {"box": {"size": [4, 2, 4], "cells": [6, 3, 6], "element": "hex8"}},
+                     "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                     "supports": [{"on": "top", "ux": 0, "uy": -0.2, "uz": 0}], "loads": [],
+                     "contacts": [{"on": "bottom", "obstacle": {"sphere": {"center": [2, -10, 2], "radius": 10}}}]},
+         "solver": {"accuracy": {"relative_error": 1e-6}}}
+VIRIDIS = ["#440154", "#472c7a", "#3b518b", "#2c718e", "#21908d", "#27ad81", "#5cc863", "#aadc32", "#fde725"]
+
+
+def show(s, b, request):
+    """The body of a job, drawn."""
+    job = s.solve(request)
+    check(job["status"] == "successful", job)
+    b.open(s, f"jobs/{job['id']}")
+    b.click("#open-body")
+    drawn(b)
+    return job["id"]
+
+
+def drawn(b, more_than=0):
+    """Waits for a frame after so many; returns how many there are."""
+    return int(b.wait("a frame", "const f = document.querySelector('.body-canvas')?.dataset.frames; return f > arguments[0] && f",
+                      more_than))
+
+
+def after(b, act):
+    """What `act` returns, once the picture has been drawn again."""
+    before = int(b.run("return document.querySelector('.body-canvas').dataset.frames"))
+    value = act()
+    drawn(b, before)
+    return value
+
+
+def set_value(b, selector, value, event):
+    b.run("""const field = document.querySelector(arguments[0]); field.value = arguments[1];
+             field.dispatchEvent(new Event(arguments[2], {bubbles: true}));""", selector, value, event)
+
+
+def coloured(b):
+    """How many pixels of the picture are near each of the nine colours."""
+    found = [0] * len(VIRIDIS)
+    wanted = [tuple(int(text[i:i + 2], 16) for i in (1, 3, 5)) for text in VIRIDIS]
+    for pixel, n in b.pixels(".body-frame").items():
+        for i, colour in enumerate(wanted):
+            if sum((p - c) ** 2 for p, c in zip(pixel, colour)) < 900:
+                found[i] += n
+                break
+    return found
+
+
+def columns(b):
+    """First and last column of the picture with a pixel of the body's end, which is yellow; -1, -1: none."""
+    import io
+
+    from PIL import Image
+    image = Image.open(io.BytesIO(b.picture(".body-frame"))).convert("RGB")
+    pixels = image.load()
+    seen = [x for x in range(image.width) for y in range(0, image.height, 4)
+            if pixels[x, y][0] > 225 and pixels[x, y][1] > 200 and pixels[x, y][2] < 90]
+    return (min(seen), max(seen)) if seen else (-1, -1)
+
+
+def brightness(b):
+    """Of all pixels of the picture, 0..255."""
+    pixels = b.pixels(".body-frame")
+    return sum(sum(pixel) * n for pixel, n in pixels.items()) / 3 / sum(pixels.values())
+
+
+def press(b, key, shift=False):
+    b.run("""const c = document.querySelector('.body-canvas'); c.focus();
+             c.dispatchEvent(new KeyboardEvent('keydown', {key: arguments[0], shiftKey: arguments[1], bubbles: true, cancelable: true}));""",
+          key, shift)
+
+
+def test_a_plane_body(s, b):
+    """Colours, arrows and obstacle are seen; the slider moves the body; other quantities have their own numbers."""
+    job = show(s, b, SCENE)
+    found = coloured(b)
+    check(min(found) > 2000, "pixels of each colour:", found)
+    check(b.near(".body-frame", "--push", 60) > 200 and b.near(".body-frame", "--obstacle", 30) > 300, "arrows, obstacle")
+    label = b.run("return document.querySelector('.body-canvas').getAttribute('aria-label')")
+    check("300 elements" in label and "22 of 30 contact nodes touch" in label, label)
+    check("1.5439" in b.text(".body-legend"), b.text(".body-legend"))
+    end = columns(b)[1]
+    after(b, lambda: set_value(b, ".body-scale", 0, "input"))
+    still = columns(b)[1]
+    check(still > 100 and end - still > 20, "the right end stood at", end, "and stands at", still)
+    check(b.run("return document.querySelector('.body-factor').value") == "0", "the number beside it")
+    after(b, lambda: set_value(b, ".body-factor", 10000, "change"))
+    check(still + 10 < columns(b)[1] < end - 10, "the right end stands at", columns(b)[1])
+    after(b, lambda: set_value(b, ".body-colour", "von_mises", "change"))
+    stress = s.get(f"/v1/jobs/{job}/result?fields=von_mises").json["von_mises"]
+    check(f"{max(stress):.4f}" in b.text(".body-legend") and coloured(b) != found, b.text(".body-legend"), max(stress))
+    after(b, lambda: set_value(b, ".body-colour", "pressure", "change"))
+    check("Contact pressure" in b.text(".body-legend") and b.near(".body-frame", "#8a8f96", 25) > 20000, "grey within")
+
+
+def switch(b, part):
+    after(b, lambda: b.run("""[...document.querySelectorAll('.body-parts label')]
+        .find((label) => label.innerText === arguments[0]).querySelector('input').click()""", part))
+
+
+def node_under_pointer(b):
+    """What is said of the first contact node above the lower border in the middle of the picture."""
+    b.run("document.querySelector('.body-frame').scrollIntoView({block: 'center'})")
+    text = b.run("""const c = document.querySelector('.body-canvas'), r = c.getBoundingClientRect();
+        for (let y = r.bottom - 5; y > r.top; y -= 6) {
+            c.dispatchEvent(new PointerEvent('pointermove', {clientX: r.left + r.width / 2, clientY: y, pointerId: 7}));
+            const text = document.querySelector('.body-readout').innerText;
+            if (text.includes('pressure')) return text;
+        }
+        return '';""")
+    return dict(line.split(" ", 1) for line in text.splitlines())
+
+
+def test_nodes_parts_and_the_contact_along_the_surface(s, b):
+    job = show(s, b, SCENE)
+    answer = s.get(f"/v1/jobs/{job}/result?fields=nodes,pressure").json
+    said = node_under_pointer(b)
+    check(said and int(said["node"]) in answer["contact_nodes"], said)
+    pressure = answer["pressure"][answer["contact_nodes"].index(int(said["node"]))]
+    check(abs(float(said["pressure"]) - pressure) < 1e-4 * pressure, said, pressure)
+    check([float(x) for x in said["at"].split(", ")] == answer["nodes"][int(said["node"])], said)
+    for part in ("Obstacle", "Contact forces"):
+        switch(b, part)
+    check(b.near(".body-frame", "--push", 40) == 0, "arrows are still there")
+    lined = brightness(b)
+    switch(b, "Elements")
+    check(brightness(b) > lined + 0.5, "elements are still drawn:", lined, brightness(b))
+    b.one(".body-pressure .chart")
+    check(b.near(".body-pressure .chart", "--series-1", 60) > 100, "the line")
+    b.click(".pressure-table summary")
+    b.one(".pressure-table table")
+    rows = b.run("return [...document.querySelectorAll('.pressure-table tbody tr')].map((tr) => [...tr.children].map((td) => td.innerText))")
+    check([int(row[0]) for row in rows] == answer["contact_nodes"], rows)
+    check(all(abs(float(row[3]) - p) < 1e-4 * max(answer["pressure"]) for row, p in zip(rows, answer["pressure"])), rows)
+
+
+def test_a_solid_is_turned_enlarged_and_moved(s, b):
+    show(s, b, SOLID)
+    first = b.pixels(".body-frame")
+    check(sum(coloured(b)) > 5000, coloured(b))
+    check(b.near(".body-frame", "#c8c8c8", 45) > 5000, "the sphere")
+    for act in (lambda: press(b, "ArrowLeft"), lambda: press(b, "ArrowUp"), lambda: press(b, "+"), lambda: press(b, "ArrowLeft", True)):
+        after(b, act)
+        now = b.pixels(".body-frame")
+        check(now != first, "nothing changed")
+        first = now
+    after(b, lambda: press(b, "0"))
+    home = b.pixels(".body-frame")
+    after(b, lambda: b.run("""const c = document.querySelector('.body-canvas'), r = c.getBoundingClientRect();
+        const at = (x, y) => ({clientX: r.left + x, clientY: r.top + y, pointerId: 3, bubbles: true});
+        c.dispatchEvent(new PointerEvent('pointerdown', at(200, 200)));
+        c.dispatchEvent(new PointerEvent('pointermove', at(320, 200)));
+        c.dispatchEvent(new PointerEvent('pointerup', at(320, 200)));"""))
+    check(b.pixels(".body-frame") != home, "dragging turned nothing")
+    check(b.one(".pressure-map") and sum(n > 0 for n in b.pixels(".pressure-map").values()) > 5, "the map of the pressure")
+
+
+def test_cases_are_chosen_and_a_lost_graphics_card_comes_back(s, b):
+    request = copy.deepcopy(SCENE)
+    request["cases"] = [{"name": "pressed", "loads": [{"on": "top", "traction": [0, -1]}]},
+                        {"name": "pulled", "loads": [{"on": "right", "traction": [1, 0]}]}]
+    show(s, b, request)
+    before = b.text(".body-legend")
+    b.run("""const field = [...document.querySelectorAll('.body-tools select')].find((one) => [...one.options].some((o) => o.value === 'pulled'));
+             field.value = 'pulled'; field.dispatchEvent(new Event('change', {bubbles: true}));""")
+    b.wait("the other case", "return document.querySelector('.body-legend').innerText !== arguments[0]", before)
+    check(sum(coloured(b)) > 10000, coloured(b))
+    b.run("""const c = document.querySelector('.body-canvas');
+             window.card = (c.getContext('webgl2') || c.getContext('webgl')).getExtension('WEBGL_lose_context'); window.card.loseContext();""")
+    b.says(".body-readout", "lost")
+    b.run("window.card.restoreContext()")
+    b.wait("the picture", "return document.querySelector('.body-readout').hidden")
+    drawn(b)
+    time.sleep(0.3)
+    check(sum(coloured(b)) > 10000, coloured(b))
+    check(all("Context" in text for _, text in b.console()), "no other word")
+
+
+def test_dark_and_narrow_and_sharp(s, b):
+    b.media("prefers-color-scheme", "dark")
+    b.command("Emulation.setDeviceMetricsOverride", width=360, height=740, deviceScaleFactor=2, mobile=True)
+    show(s, b, SCENE)
+    size = b.run("const c = document.querySelector('.body-canvas'); return [c.width, c.clientWidth, document.documentElement.scrollWidth]")
+    check(size[0] == 2 * size[1] and size[2] <= 360, size)
+    check(min(coloured(b)) > 500 and b.near(".body-frame", "--paper", 12) > 5000, coloured(b))
+
+
+def test_without_webgl_the_service_draws(s, b):
+    script = b.command("Page.addScriptToEvaluateOnNewDocument", source="""
+        const get = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind, ...more) { return kind.startsWith("webgl") ? null : get.call(this, kind, ...more); };""")
+    try:
+        job = s.solve(SCENE)
+        b.open(s, f"jobs/{job['id']}")
+        b.click("#open-body")
+        b.wait("the picture", "const i = document.querySelector('#body img'); return i && i.complete && i.naturalWidth > 100")
+        b.one(".body-pressure .chart")
+    finally:
+        b.command("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
+
+
+def test_a_large_body_sends_only_what_is_drawn_and_matrices_have_none(s, b):
+    request = copy.deepcopy(SCENE)
+    request["problem"]["mesh"]["box"]["cells"] = [120, 40]
+    request["solver"] = {"accuracy": "quick"}
+    show(s, b, request)
+    sent = b.run("""return performance.getEntriesByType('resource').filter((e) => e.name.includes('/surface')).map((e) => [e.encodedBodySize, e.decodedBodySize, e.name])""")
+    check(sent and sent[0][1] < 4961 * 24 + 4800 * (24 + 16) + 20000, json.dumps(sent))
+    check(not b.run("return document.querySelector('.body-parts input').checked"), "4,800 elements are not lined")
+    check("von_mises" not in sent[0][2], "the stress is fetched with the shape:", sent)
+    job = s.solve(MATRICES)
+    b.open(s, f"jobs/{job['id']}")
+    b.one("#convergence")
+    check(not b.run("return document.querySelector('#open-body')?.checkVisibility()"), b.text("main"))
+
+
+browser.main(globals())
