@@ -269,7 +269,7 @@ static void check_suggestion(double share, const char *told)
              told);
     CHECK_STR(json_string_value(json_object_get(suggestion, "text")), want);
     CHECK_STR(json_string_value(json_object_get(suggestion, "level")), "balanced");
-    CHECK_INT(json_integer_value(json_object_get(suggestion, "iterations")), 48);
+    CHECK_INT(json_number_value(json_object_get(suggestion, "iterations")), 48);
     json_doc_clear(&doc);
     free(reply);
 }
@@ -311,10 +311,10 @@ TEST(what_accuracy_took_fits_the_schema)
     read_reply(&doc, reply, "work-precision.json");
     const json_t *decades = json_object_get(doc.root, "decades"), *second = json_array_get(decades, 1),
                  *eighth = json_array_get(decades, 7), *suggestion = json_object_get(doc.root, "suggestion");
-    CHECK_INT(json_integer_value(json_object_get(second, "iterations")), 70);
+    CHECK_INT(json_number_value(json_object_get(second, "iterations")), 70);
     CHECK_STR(json_string_value(json_object_get(second, "by")), "iteration");
     CHECK(json_is_null(json_object_get(eighth, "seconds")) && json_is_null(json_object_get(eighth, "by")));
-    CHECK_INT(json_integer_value(json_object_get(suggestion, "iterations")), 100); /* 2e-3 is met at 10^-2.75 */
+    CHECK_INT(json_number_value(json_object_get(suggestion, "iterations")), 100); /* 2e-3 is met at 10^-2.75 */
     json_doc_clear(&doc);
     free(reply);
 }
