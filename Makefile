@@ -15,7 +15,7 @@ PYTHON ?= /usr/bin/python3
 
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
             libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libpng-dev
-TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev
+TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev valgrind
 
 # The web page's bundler and libraries; the browser that tests it.
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
@@ -44,9 +44,10 @@ EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
 THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 FIGURES_SRC := $(sort $(wildcard tests/figures/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
+GUARD_SRC  := $(sort $(wildcard tests/guard/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(PRELOAD_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
@@ -184,6 +185,9 @@ $(BUILD)/load: $(call obj,tests/soak/load.c)
 $(BUILD)/library: $(call obj,tests/soak/library.c) $(PARTS_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
 
+$(BUILD)/guard: $(call obj,$(GUARD_SRC)) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
+
 # Stands before the heap of a whole daemon: never with a sanitizer, which has its own.
 $(BUILD)/%.so: tests/preload/%.c
 	@mkdir -p $(@D)
@@ -192,10 +196,14 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory figures numbers
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare bench-size extremes theory figures numbers
 test: deps-test ## build and pass every test
-	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
+	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
 	@tests/run.sh $(BUILD)
+
+guard: deps-test ## instructions of small problems against those kept in tests/data/guard.json; KEEP=1: keep the new ones
+	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
+	@$(PYTHON) -B tests/guard/guard.py $(BUILD) $(if $(KEEP),--keep)
 
 unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library
 
@@ -262,6 +270,10 @@ $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(BUILD)/libparts.a $(BUILD)/libuza
 bench: deps ## measured ratios in one run: a table and build/bench.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
 	@$(BUILD)/bench $(BUILD)/bench.json $(FILTER)
+	@$(if $(FILTER),,$(MAKE) --no-print-directory -s $(BUILD)/guard && $(PYTHON) -B tests/guard/guard.py $(BUILD) --into $(BUILD)/bench.json)
+
+bench-compare: ## OLD=a.json NEW=b.json: ratios of times and of instructions; fails past THRESHOLD (1.1) and 1.05
+	@$(PYTHON) -B tests/bench/compare.py "$(OLD)" "$(NEW)" $(THRESHOLD)
 
 bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/bench-size.json; minutes
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench

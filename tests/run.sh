@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Runs the test programs and counts their "ok", "not ok" and "skip" lines; the last line is "N passed, N failed".
-# usage: tests/run.sh BUILD_DIR ["unit api browser hygiene"] [FILTER] [PROGRAMS]
+# usage: tests/run.sh BUILD_DIR ["unit api browser guard hygiene"] [FILTER] [PROGRAMS]
 # FILTER goes to each program, which runs the tests whose name contains it. PROGRAMS is a list of programs ("test_store
 # api/test_http", of both kinds unless one is named); without it all run. A program that dies without a "not ok" line of its own counts as one failure.
 set -uo pipefail
-build=$1 kinds=${2:-unit api browser hygiene} filter=${3:-} programs=${4:-}
+build=$1 kinds=${2:-unit api browser guard hygiene} filter=${3:-} programs=${4:-}
 work=$(mktemp -d)
 log=$work/log
 trap 'rm -rf "$work"' EXIT
@@ -55,12 +55,20 @@ run_kind() {
                  name=$(basename "$script" .py)
                  if wanted "$name"; then run_one "$name" /usr/bin/python3 -B "$script" "$build" $filter; fi
              done ;;
+    guard) run_one guard /usr/bin/python3 -B tests/guard/guard.py "$build" ;;
     hygiene) run_one lint tests/lint.sh ;;
     esac
 }
 
-# The kinds run side by side: most programs keep one core busy.
-for kind in $kinds; do run_kind "$kind" & done
+# Two rows side by side: most programs keep one core busy.
+run_row() { # KIND...
+    local kind
+    for kind in "$@"; do
+        if [[ " $kinds " == *" $kind "* ]]; then run_kind "$kind"; fi
+    done
+}
+run_row unit guard hygiene &
+run_row api browser &
 wait
 passed=$(grep -c '^ok ' "$log") failed=$(grep -c '^not ok ' "$log") skipped=$(grep -c '^skip ' "$log")
 [ "$skipped" -eq 0 ] || echo "$skipped skipped"

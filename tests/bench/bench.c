@@ -341,6 +341,28 @@ static void bench_assemblies(report *out)
     }
 }
 
+/* Not in the solver: what it would save, and where. */
+static void bench_precisions(report *out)
+{
+    static const int sizes[] = {600, 2000, 5000};
+    static const double all[][2] = {{1e-6, 1e-10}, {1e-6, 1e-8}, {1e-2, 1e-3}}; /* minutes otherwise */
+    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; k++) {
+        const double *errors = all[k];
+        bench_mixed_row row[2];
+        char name[64], text[128];
+        if (!bench_mixed(row, 2, errors, sizes[k])) {
+            printf("mixed precision at m = %d did not converge\n", sizes[k]);
+            exit(1);
+        }
+        for (int e = 0; e < 2; e++) {
+            snprintf(name, sizeof name, "mixed_m%d_%.0e", sizes[k], errors[e]);
+            snprintf(text, sizeof text, "float64 alone, %.1f ms: %lld iterations, %lld with float32",
+                     row[e].milliseconds.median, (long long)row[e].iterations, (long long)row[e].mixed_iterations);
+            print_row(out, name, "x", row[e].ratio, text);
+        }
+    }
+}
+
 /* Memory that is given back and asked for again costs the kernel, or the host of a virtual machine, up to as much as
  * the factorization itself, now to us and now to the reference: both keep what they have touched once. */
 static void keep_memory(void)
@@ -389,6 +411,8 @@ int main(int argc, char **argv)
     if (!out.filter || strncmp(out.filter, "stop", 4) == 0)
         bench_stops(&out);
     bench_assemblies(&out);
+    if (wanted(&out, "mixed"))
+        bench_precisions(&out);
     for (int64_t nx = 300; wanted(&out, "load_cases") && nx <= 600; nx += 300)
         bench_cases(&out, nx);
     for (size_t i = 0; wanted(&out, "body") && i < sizeof sizes / sizeof sizes[0]; i++) {

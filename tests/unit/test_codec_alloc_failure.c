@@ -185,6 +185,19 @@ static bool try_results(const char *argument)
     return text != NULL;
 }
 
+/* The names of a curve are left out where there is no memory for them. */
+static bool try_trade(const char *summary)
+{
+    codec_trade of = {.job_id = "id", .case_name = "a"};
+    char method[40], op[40];
+    uz_trade_clear(&of.trade);
+    codec_read_method(method, op, sizeof method, summary);
+    const bool named = strcmp(method, "auto") == 0, read = codec_read_trade(&of, summary);
+    char *text = read ? codec_encode_trade(&of, NULL) : NULL;
+    free(text);
+    return named && text != NULL;
+}
+
 TEST(loading)
 {
     exhaust(try_init, NULL);
@@ -213,4 +226,6 @@ TEST(encoding)
     exhaust(try_results, NULL);
     exhaust(try_encode, NULL);
     exhaust(try_judge, "{\"outcome\":\"converged\",\"contact\":{\"active\":2}}");
+    json_set_alloc_funcs(malloc, free);
+    exhaust(try_trade, "{\"method\": \"auto\", \"certificate\": {\"relative_error\": 1e-9}, \"suggestion\": {}}");
 }

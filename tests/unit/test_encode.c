@@ -249,6 +249,76 @@ TEST(summary_of_matrices)
     free(reply);
 }
 
+/* A summary with a suggestion, and the record beside it. */
+static void check_suggestion(double share, const char *told)
+{
+    json_doc doc;
+    uz_summary s = paper_summary();
+    s.suggestion = (uz_suggestion){.any = true,
+                                   .relative_error = 2.2e-3,
+                                   .mesh_error = 0.022,
+                                   .solver_error = 8e-6,
+                                   .seconds = share,
+                                   .total_s = 1.0,
+                                   .share = share,
+                                   .iterations = 48};
+    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE), want[160];
+    read_reply(&doc, reply, "summary.json");
+    const json_t *suggestion = json_object_get(doc.root, "suggestion");
+    snprintf(want, sizeof want, "mesh error 2.2 %%, solver error 0.0008 %%: balanced would have taken %s of the time",
+             told);
+    CHECK_STR(json_string_value(json_object_get(suggestion, "text")), want);
+    CHECK_STR(json_string_value(json_object_get(suggestion, "level")), "balanced");
+    CHECK_INT(json_number_value(json_object_get(suggestion, "iterations")), 48);
+    json_doc_clear(&doc);
+    free(reply);
+}
+
+TEST(a_suggestion_says_at_most)
+{
+    check_suggestion(0.125, "1/8");
+    check_suggestion(0.13, "1/7");
+    check_suggestion(0.5, "1/2");
+    check_suggestion(0.501, "51 %");
+    check_suggestion(0.8, "80 %");
+    check_suggestion(1.0 / 3.0, "1/3");
+    check_suggestion(1e-3, "1/1000");
+}
+
+TEST(what_accuracy_took_fits_the_schema)
+{
+    json_doc doc;
+    codec_trade of = {.job_id = "0190f3a5c1d87d0b9e4f2a6b8c1d3e5f"};
+    uz_trade_clear(&of.trade);
+    CHECK(!codec_read_trade(&of, "{") && codec_read_trade(&of, "{}"));
+    CHECK(isnan(of.mesh_error) && isnan(of.solver_error) && !of.may_save);
+    char *reply = codec_encode_trade(&of, NULL);
+    read_reply(&doc, reply, "work-precision.json");
+    CHECK(json_is_null(json_object_get(doc.root, "mesh_error")) &&
+          json_is_null(json_object_get(doc.root, "suggestion")));
+    json_doc_clear(&doc);
+    free(reply);
+    for (int k = 0; k < 30; k++)
+        of.trade.step[k] = (uz_trade_step){.seconds = 0.01 * k, .iterations = 10 * k, .by_certificate = k > 27};
+    of.trade.iterated_s = 0.29;
+    of.trade.total_s = 0.3;
+    of.case_name = "a";
+    CHECK(codec_read_trade(
+        &of, "{\"outcome\": \"converged\", \"started_from\": \"zero\", \"method\": \"uzawa\", \"problem\": "
+             "{\"kind\": \"scene\"}, \"certificate\": {\"relative_error\": 5e-8}, \"timings_s\": {\"certify\": "
+             "0.01}, \"requested_error\": 1e-7, \"discretization_error\": 0.02}"));
+    reply = codec_encode_trade(&of, NULL);
+    read_reply(&doc, reply, "work-precision.json");
+    const json_t *decades = json_object_get(doc.root, "decades"), *second = json_array_get(decades, 1),
+                 *eighth = json_array_get(decades, 7), *suggestion = json_object_get(doc.root, "suggestion");
+    CHECK_INT(json_number_value(json_object_get(second, "iterations")), 70);
+    CHECK_STR(json_string_value(json_object_get(second, "by")), "iteration");
+    CHECK(json_is_null(json_object_get(eighth, "seconds")) && json_is_null(json_object_get(eighth, "by")));
+    CHECK_INT(json_number_value(json_object_get(suggestion, "iterations")), 100); /* 2e-3 is met at 10^-2.75 */
+    json_doc_clear(&doc);
+    free(reply);
+}
+
 TEST(every_outcome_fits_the_schema)
 {
     for (int i = UZ_CONVERGED; i <= UZ_DISMISSED; i++) {
