@@ -189,7 +189,7 @@ sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
 TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
 TSAN_API  = $(filter-out $(addprefix test_,bad_input cases client client_faults config fields gallery job_limits ladder \
-            load_cases memory readme reference refine schemas semicoercive soak verify), \
+            load_cases memory numbers readme reference refine schemas semicoercive soak verify), \
             $(notdir $(basename $(wildcard tests/api/test_*.py))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer

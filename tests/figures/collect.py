@@ -127,7 +127,11 @@ def collect(build, folder, root):
         source, target = pathlib.Path(build) / f"{name}.json", folder / f"{name.replace('-', '_')}.json"
         if not source.exists() or (target.exists() and target.stat().st_mtime >= source.stat().st_mtime):
             continue
-        raw = json.loads(source.read_text())
+        try:
+            raw = json.loads(source.read_text())
+        except ValueError:
+            print(f"{source}: not whole, left out")
+            continue
         old = json.loads(target.read_text()) if target.exists() else None
         data = kind(raw, old)
         folder.mkdir(parents=True, exist_ok=True)
