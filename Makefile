@@ -242,9 +242,9 @@ theory: deps ## stress and contact pressure against theory on finer and finer me
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory
 	@$(BUILD)/theory $(BUILD)/theory.json
 
-figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes
+figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes; FILTER="precision hertz" renews a part
 	@$(MAKE) --no-print-directory -s $(BUILD)/figures
-	@$(BUILD)/figures $(BUILD)/figures.json
+	@$(BUILD)/figures $(BUILD)/figures.json $(FILTER)
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
 numbers: ## measure everything that docs/numbers.md and the README show (hours: soak is one of it), then write them; SPARED="soak" leaves some out

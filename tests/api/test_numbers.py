@@ -136,6 +136,42 @@ def test_peers_are_drawn_where_certified(s):
     check(">a</text>" in draw.sizes(data, rows) and ">a</text>" not in draw.sizes(data, []))
 
 
+PEERS = {"machine": {"packages": {"octave": "7.3"}}, "time_limit_s": 60,
+         "runs": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "asked": 1e-7, "seconds": 2.0, "certified": 1e-8, "status": "ok"}],
+         "results": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "tolerance": 1e-6, "success": True, "seconds": 2.0, "certified": 1e-8, "why": ""},
+                     {"problem": "cases/A", "d": 6, "m": 3, "solver": "x", "tolerance": 1e-6, "success": False, "seconds": None, "certified": None,
+                      "why": "timed out"}],
+         "means": [{"solver": "x", "1e-06": {"solved": 1, "of": 2, "shift_10s": 12.0, "shift_10ms": 3.0}}],
+         "body": [{"problem": "body/30", "d": 660, "fastest": "x", "seconds": 2.0, "cold_seconds": 0.5, "cached_seconds": 0.01, "cold": 4.0, "cached": 200.0}],
+         "profiles": {"1e-06": {"x": [[1.0, 0.5], [8.0, 0.75]], "uzawa": [[1.0, 1.0]]}}}
+
+
+@options(None)
+def test_other_solvers(s):
+    measured()
+    with tempfile.TemporaryDirectory() as folder:
+        root = copy(folder)
+        (root / "peers.json").write_text(json.dumps(PEERS))
+        check(collect.collect(root, root / "docs" / "figures", root) == ["peers"])
+        with (root / "README.md").open("a") as readme:
+            readme.write("<!-- numbers:peers -->\n<!-- /numbers -->\n")
+        numbers.write(root)
+        check(numbers.stale(root)[0] == [])
+        text = (root / "docs" / "numbers.md").read_text()
+        check("| NX = 30 | 660 | x | 2 s | 500 ms | 4 | 10 ms | 200 |" in text and "| cases/A | `x` | timed out |" in text, text[-3000:])
+        check("| `x` | 1 of 2 | 12 s | 3 s |" in text and "octave 7.3" in text)
+        check("| NX = 30 |" in (root / "README.md").read_text())
+        check(">x</text>" in (root / "docs" / "figures" / "sizes.svg").read_text())
+        xml.etree.ElementTree.fromstring((root / "docs" / "figures" / "peers.svg").read_text())
+
+
+@options(None)
+def test_parts_are_renewed_alone(s):
+    old = {"history": [{"rows": [[0, 1, 2]]}], "sizes": [{"nx": 30}], "precision": [{"name": "a", "x": 1}, {"name": "b", "x": 1}]}
+    new = collect.figures({"precision": [{"name": "b", "x": 2}]}, old)
+    check(new == {**old, "precision": [{"name": "a", "x": 1}, {"name": "b", "x": 2}]}, new)
+
+
 @options(None)
 def test_collected(s):
     rows = [[k, 0, 0] for k in range(5000)]

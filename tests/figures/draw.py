@@ -14,6 +14,7 @@ WAYS = {"uzawa": ("Uzawa (Algorithm 1)", ORANGE, "6,3", "triangle"), "accelerate
         "restart_paper_step": ("with restart, step λ₁(K)", PURPLE, "8,2,2,2", "diamond"),
         "restart_factored": ("with restart, a sparse solve per iteration", SKY, "4,2", "square"),
         "auto": ("auto, certified 1e-6", BLACK, "", "circle"), "auto_cached": ("auto, factor cached", BLACK, "2,2", "circle")}
+PROFILE_COLOURS, PROFILE_DASHES = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY), ("", "6,3", "1.5,2.5")
 PEER_STYLES = [(c, s) for s in ("cross", "plus", "square", "diamond", "down") for c in ("#7a7a7a", "#4a6a8a")]
 
 
@@ -45,6 +46,29 @@ def history(data):
     return svg.document(1020, 45 + 290 * len(sizes), "Convergence of the paper's three methods", parts)
 
 
+def profiles(data):
+    """Share of all problems that each solver has solved and certified within so many times the fastest's time (Dolan and More, Math.
+    Program. 91 (2002)), by tolerance."""
+    names = sorted({name for profile in data.values() for name in profile})
+    style = {"uzawa": (BLACK, "")}
+    for k, name in enumerate(n for n in names if n not in style):
+        style[name] = (PROFILE_COLOURS[k % len(PROFILE_COLOURS)], PROFILE_DASHES[k // len(PROFILE_COLOURS) % len(PROFILE_DASHES)])
+    parts, tall = svg.legend([(n, style[n][0], style[n][1], None, False) for n in names], 70, 22, 180, 5)
+    top = 40 + tall + 20
+    longest = max((point[0] for profile in data.values() for points in profile.values() for point in points), default=10.0)
+    for k, (tolerance, profile) in enumerate(data.items()):
+        panel = Panel(75 + 325 * k, top, 260, 260, Log(1, max(longest, 10)), Linear(0, 1))
+        panel.axes(f"certified to {tolerance}", "time over that of the fastest", "share of the problems" if k == 0 else "")
+        for name in names:
+            steps, share = [], 0.0
+            for ratio, reached in profile.get(name, []):
+                steps += [(ratio, share), (ratio, reached)]
+                share = reached
+            panel.line(steps + [(longest, share)], *style[name], 2.2 if name == "uzawa" else 1.4)
+        parts += panel.out
+    return svg.document(60 + 325 * max(3, len(data)), top + 330, "Performance profiles", parts)
+
+
 def ways_of(data, rule, names):
     """{name: [(d, run)]} of runs that ended by their rule."""
     found = {}
@@ -65,7 +89,8 @@ def peers_of(peers, tolerance=1e-6):
     others are in the table."""
     best = {}
     for row in peers:
-        if row.get("nx") and row.get("seconds") and (row.get("certified") or 1) <= tolerance:
+        ours = row["solver"].startswith("uzawa")  # drawn already
+        if not ours and row.get("nx") and row.get("seconds") and (row.get("certified") or 1) <= tolerance:
             key = row["solver"], row["nx"]
             if key not in best or row["seconds"] < best[key]["seconds"]:
                 best[key] = row

@@ -46,7 +46,9 @@ def csv_files(data):
                for run in measured["history"] for row in run["rows"]]
     sizes = [{**run, "nx": s["nx"], "d": s["d"], "m": s["m"], "lambda_1": s["lambda_1"]} for s in measured["sizes"] for run in s["ways"]]
     precision = [{**run, "problem": p["name"], "d": p["d"], "m": p["m"]} for p in measured["precision"] for run in p["runs"]]
-    return {"history.csv": csv_text(history, ["nx", "method", "iteration", "dual_objective", "minimum", "residual"]),
+    peers = (data.get("peers") or {}).get("runs", [])
+    more = {"peers.csv": csv_text(peers, list(peers[0]))} if peers else {}
+    return {**more, "history.csv": csv_text(history, ["nx", "method", "iteration", "dual_objective", "minimum", "residual"]),
             "sizes.csv": csv_text(sizes, ["nx", "d", "m", "name", "rule", "outcome", "lambda_1", "alpha", "iterations", "restarts", "residual",
                                           "certified"] + TIMES),
             "precision.csv": csv_text(precision, ["problem", "d", "m", "method", "operator", "operator_used", "level", "start", "outcome",
@@ -58,6 +60,8 @@ def figure_files(data):
     measured, peers = data["figures"], (data.get("peers") or {}).get("rows", [])
     files = {"history.svg": draw.history(measured["history"]), "sizes.svg": draw.sizes(measured["sizes"], peers),
              "iterations.svg": draw.iterations(measured["sizes"])}
+    if "peers" in data:
+        files["peers.svg"] = draw.profiles(data["peers"]["profiles"])
     for problem in measured["precision"]:
         if len({(run["method"], run["operator"]) for run in problem["runs"]}) > 1:
             files[f"precision_{problem['name']}.svg"] = draw.precision(problem)
@@ -139,7 +143,12 @@ def page(data, files):
     lines += section("What digits cost", tables.digits(data))
     lines += section("Other ratios", tables.others(data))
     lines += section("Cost against size", tables.growth(data))
-    lines += section("Other solvers", tables.peers(data))
+    if "peers" in data:
+        limit = tables.sig(data["peers"]["time_limit_s"])
+        packages = ", ".join(f"{name} {version}" for name, version in data["peers"]["packages"].items())
+        lines += section("Other solvers", [*tables.peers(data), "", "![profiles](figures/peers.svg)", "", *tables.means(data), "", *tables.failures(data), "",
+                                           "[CSV of all runs](figures/peers.csv)"],
+                         f"On the same matrices, each answer certified by the same code, {limit} s for each run (`make peers`). {packages}.", "")
     lines += section("Claims at the extremes", tables.extremes(data))
     lines += section("Against theory", tables.theory_all(data))
     lines += section("The service", tables.soak(data))

@@ -341,14 +341,31 @@ def soak(data):
 
 
 def peers(data):
-    """Every run against other solvers, those that failed too."""
+    """The paper's body at certified 1e-6: the fastest other solver against ours."""
     if not data.get("peers"):
         return None
-    rows = [[r["problem"], r["solver"], sig(r["tolerance"], 1), duration(r.get("seconds")), sig(r.get("certified"), 2), r["status"]]
-            for r in data["peers"]["rows"]]
-    return table(["problem", "solver", "tolerance", "time", "certified", "how it ended"], rows)
+    rows = [[x["problem"].replace("body/", "NX = "), f"{x['d']:,}", x["fastest"] or "none", duration(x["seconds"]), duration(x["cold_seconds"]),
+             sig(x["cold"]), duration(x["cached_seconds"]), sig(x["cached"])] for x in data["peers"]["body"]]
+    return table(["paper's body", "d", "fastest other solver", "its time", "ours, cold", "ratio", "ours, cached", "ratio"], rows)
+
+
+def means(data):
+    """Shifted geometric means over all problems; what was not solved and certified counts as the limit."""
+    if not data.get("peers"):
+        return None
+    asked = [key for key in data["peers"]["means"][0] if key != "solver"]
+    rows = [[f"`{entry['solver']}`"] + [cell for key in asked for cell in (f"{entry[key]['solved']} of {entry[key]['of']}",
+                                                                          duration(entry[key]["shift_10s"]), duration(entry[key]["shift_10ms"]))]
+            for entry in data["peers"]["means"]]
+    return table(["solver"] + [f"{key}: {what}" for key in asked for what in ("solved and certified", "mean, shift 10 s", "shift 10 ms")], rows)
+
+
+def failures(data):
+    """Why answers are missing at 1e-6: nothing is dropped."""
+    rows = [[row["problem"], f"`{row['solver']}`", row["why"]] for row in data["peers"]["rows"] if row["tolerance"] == 1e-6 and not row["success"]]
+    return table(["problem", "solver", "why there is no answer certified to 1e-6"], rows) if rows else []
 
 
 # The README's blocks: name, and what fills it.
 BLOCKS = {"levels": levels, "iterations": iterations, "ratios": ratios, "sentences": sentences, "digits": digits, "growth": growth,
-          "extremes": extremes, "theory": theory, "soak": soak}
+          "extremes": extremes, "theory": theory, "soak": soak, "peers": peers, "means": means}
