@@ -15,7 +15,7 @@ WAYS = {"uzawa": ("Uzawa (Algorithm 1)", ORANGE, "6,3", "triangle"), "accelerate
         "restart_factored": ("with restart, a sparse solve per iteration", SKY, "4,2", "square"),
         "auto": ("auto, certified 1e-6", BLACK, "", "circle"), "auto_cached": ("auto, factor cached", BLACK, "2,2", "circle")}
 PROFILE_COLOURS, PROFILE_DASHES = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY), ("", "6,3", "1.5,2.5")
-PEER_STYLES = [(c, s) for s in ("cross", "plus", "square", "diamond", "down") for c in ("#7a7a7a", "#4a6a8a")]
+PEER_STYLES = [(c, s) for s in ("cross", "plus", "square", "diamond", "down") for c in ("#7a7a7a", "#4a6a8a", "#a0522d")]
 
 
 def history(data):
@@ -108,31 +108,35 @@ def sizes(data, peers):
     style = {name: PEER_STYLES[k % len(PEER_STYLES)] for k, name in enumerate(others)}
     key = [(WAYS[n][0], WAYS[n][1], WAYS[n][2], WAYS[n][3], n == "auto_cached") for n in found]
     key += [(name, style[name][0], "1,0", style[name][1], False) for name in others]
-    drawn, tall = svg.legend(key, 70, 22, 300, 3)
+    drawn, tall = svg.legend(key, 70, 22, 250, 4)
     parts, top = list(drawn), 40 + tall + 20
-    times = [run["cpu_s"] for runs in found.values() for _, run in runs] + [r["seconds"] for rows in others.values() for r in rows]
-    rests = [run["residual"] for runs in found.values() for _, run in runs]
-    rests += [r["residual"] for rows in others.values() for r in rows if r.get("residual")]
     x = Log(*spread([s["d"] for s in data], 1.05))
-    panels = [Panel(80, top, 380, 330, x, Log(*spread(times))), Panel(560, top, 380, 330, x, Log(*spread([max(v, 1e-17) for v in rests])))]
-    panels[0].axes("time", "unknowns d", "seconds of one core, cold unless said")
-    panels[1].axes("total residual (e1 to e4)", "unknowns d", "mixed units, as in the paper")
-    for panel, what in zip(panels, ("cpu_s", "residual")):
-        for name, rows in others.items():
-            pick = "seconds" if what == "cpu_s" else "residual"
-            points = [(r["d"], r[pick]) for r in rows if r.get(pick)]
+    for k, (title, what, theirs, y_label) in enumerate(SIZE_PANELS):
+        values = [max(run[what], FLOOR) for runs in found.values() for _, run in runs]
+        values += [row[theirs] for rows in others.values() for row in rows if theirs and row[theirs]]
+        panel = Panel(75 + 350 * k, top, 275, 300, x, Log(*spread(values)))
+        panel.axes(title, "unknowns d", y_label)
+        for name, rows in others.items() if theirs else ():
+            points = [(row["d"], max(row[theirs], FLOOR)) for row in rows]
             panel.line(points, style[name][0], "", 1.0)
             for point in points:
                 panel.mark(style[name][1], *point, style[name][0])
         for name, runs in found.items():
-            _, colour, dash, shape = WAYS[name]
-            ended = [(s["d"], max(run[what], 1e-17)) for s, run in runs if run["outcome"] != MISS]
-            panel.line(ended, colour, dash)
-            for s, run in runs:
-                missed = run["outcome"] == MISS
-                panel.mark("cross" if missed else shape, s["d"], max(run[what], 1e-17), colour, name == "auto_cached")
+            draw_way(panel, name, runs, what)
         parts += panel.out
-    return svg.document(980, top + 400, "Time and total residual against size", parts)
+    return svg.document(1080, top + 370, "Time and total residual against size", parts)
+
+
+SIZE_PANELS = (("time", "cpu_s", "seconds", "seconds of one core, cold unless said"),
+               ("total residual (e1 to e4)", "residual", None, "mixed units, as in the paper"),
+               ("certified error of the answer", "certified", "certified", "relative, energy norm"))
+
+
+def draw_way(panel, name, runs, what):
+    _, colour, dash, shape = WAYS[name]
+    panel.line([(s["d"], max(run[what], FLOOR)) for s, run in runs if run["outcome"] != MISS], colour, dash)
+    for s, run in runs:
+        panel.mark("cross" if run["outcome"] == MISS else shape, s["d"], max(run[what], FLOOR), colour, name == "auto_cached")
 
 
 def iterations(data):
