@@ -229,8 +229,8 @@ test-hygiene: ## formatting, static analysis, both compilers
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
 TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
-TSAN_API  = $(filter-out $(addprefix test_,bad_input cases client client_faults config examples fields gallery job_limits ladder \
-            load_cases memory readme reference refine schemas semicoercive soak verify), \
+TSAN_API  = $(filter-out $(addprefix test_,bad_input cases client client_faults assert config examples fields gallery job_limits ladder \
+            load_cases memory numbers readme reference refine schemas semicoercive soak surface terminal trade verify), \
             $(notdir $(basename $(wildcard tests/api/test_*.py))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
@@ -287,9 +287,9 @@ theory: deps ## stress and contact pressure against theory on finer and finer me
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory
 	@$(BUILD)/theory $(BUILD)/theory.json
 
-figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes
+figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes; FILTER="precision hertz" renews a part
 	@$(MAKE) --no-print-directory -s $(BUILD)/figures
-	@$(BUILD)/figures $(BUILD)/figures.json
+	@$(BUILD)/figures $(BUILD)/figures.json $(FILTER)
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
 numbers: ## measure everything that docs/numbers.md and the README show (hours: soak is one of it), then write them; SPARED="soak" leaves some out

@@ -11,6 +11,7 @@ import xml.etree.ElementTree
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "figures"))
 
 import collect  # noqa: E402  the path is set above
+import draw  # noqa: E402
 import numbers_page as numbers  # noqa: E402
 import service  # noqa: E402
 import svg  # noqa: E402
@@ -109,8 +110,8 @@ def test_figures_are_svg(s):
 
 @options(None)
 def test_numbers_as_text(s):
-    got = [tables.sig(v) for v in (None, 0, 0.0123, 1.26, 12.6, 126, 12600, 1.2e-9, 9.96e-5)]
-    check(got == ["–", "0", "0.012", "1.3", "13", "126", "12,600", "1.2e-9", "0.0001"], got)
+    got = [tables.sig(v) for v in (None, 0, 0.0123, 1.26, 12.6, 99.7, 126, 12600, 1.2e-9, 9.96e-5, 2.5e-5)]
+    check(got == ["–", "0", "0.012", "1.3", "13", "100", "126", "12,600", "1.2e-9", "0.0001", "2.5e-5"], got)
     got = [tables.duration(v) for v in (2.5, 1.0, 0.0123, 0.99999, 4.2e-5, None)]
     check(got == ["2.5 s", "1 s", "12 ms", "1 s", "42 µs", "–"], got)
     check(tables.percent(0.0213) == "2.1 %")
@@ -122,6 +123,53 @@ def test_axes(s):
     check([v for v, _ in axis.ticks()] == [1e-4, 1e-3, 1e-2, 1e-1, 1.0] and abs(axis.at(1e-2) - 0.5) < 1e-12 and axis.at(0) == 0)
     check([label for _, label in svg.Linear(-0.3, 1.1).ticks()][:2] == ["−0.4", "−0.2"] or svg.Linear(-0.3, 1.1).low <= -0.3)
     check(svg.Count(30).at(0) == 0 and svg.Count(30).at(30) == 1)
+
+
+@options(None)
+def test_peers_are_drawn_where_certified(s):
+    rows = [{"solver": "a", "nx": 60, "d": 2520, "seconds": 3.0, "certified": 1e-7}, {"solver": "a", "nx": 60, "d": 2520, "seconds": 2.0, "certified": 1e-8},
+            {"solver": "a", "nx": 30, "d": 660, "seconds": 1.0, "certified": 1e-6}, {"solver": "a", "nx": 60, "d": 2520, "seconds": 0.1, "certified": 1e-3},
+            {"solver": "b", "nx": 30, "d": 660, "seconds": 1.0, "certified": None}, {"solver": "c", "d": 5, "seconds": 1.0, "certified": 1e-9}]
+    found = draw.peers_of(rows)
+    check(list(found) == ["a"] and [r["seconds"] for r in found["a"]] == [1.0, 2.0], found)
+    data = measured()["figures"]["sizes"]
+    check(">a</text>" in draw.sizes(data, rows) and ">a</text>" not in draw.sizes(data, []))
+
+
+PEERS = {"machine": {"packages": {"octave": "7.3"}}, "time_limit_s": 60,
+         "runs": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "asked": 1e-7, "seconds": 2.0, "certified": 1e-8, "status": "ok"}],
+         "results": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "tolerance": 1e-6, "success": True, "seconds": 2.0, "certified": 1e-8, "why": ""},
+                     {"problem": "cases/A", "d": 6, "m": 3, "solver": "x", "tolerance": 1e-6, "success": False, "seconds": None, "certified": None,
+                      "why": "timed out"}],
+         "means": [{"solver": "x", "1e-06": {"solved": 1, "of": 2, "shift_10s": 12.0, "shift_10ms": 3.0}}],
+         "body": [{"problem": "body/30", "d": 660, "fastest": "x", "seconds": 2.0, "cold_seconds": 0.5, "cached_seconds": 0.01, "cold": 4.0, "cached": 200.0}],
+         "profiles": {"1e-06": {"x": [[1.0, 0.5], [8.0, 0.75]], "uzawa": [[1.0, 1.0]]}}}
+
+
+@options(None)
+def test_other_solvers(s):
+    measured()
+    with tempfile.TemporaryDirectory() as folder:
+        root = copy(folder)
+        (root / "peers.json").write_text(json.dumps(PEERS))
+        check(collect.collect(root, root / "docs" / "figures", root) == ["peers"])
+        with (root / "README.md").open("a") as readme:
+            readme.write("<!-- numbers:peers -->\n<!-- /numbers -->\n")
+        numbers.write(root)
+        check(numbers.stale(root)[0] == [])
+        text = (root / "docs" / "numbers.md").read_text()
+        check("| NX = 30 | 660 | x | 2 s | 500 ms | 4 | 10 ms | 200 |" in text and "| cases/A | `x` | timed out |" in text, text[-3000:])
+        check("| `x` | 1 of 2 | 12 s | 3 s |" in text and "octave 7.3" in text)
+        check("| NX = 30 |" in (root / "README.md").read_text())
+        check(">x</text>" in (root / "docs" / "figures" / "sizes.svg").read_text())
+        xml.etree.ElementTree.fromstring((root / "docs" / "figures" / "peers.svg").read_text())
+
+
+@options(None)
+def test_parts_are_renewed_alone(s):
+    old = {"history": [{"rows": [[0, 1, 2]]}], "sizes": [{"nx": 30}], "precision": [{"name": "a", "x": 1}, {"name": "b", "x": 1}]}
+    new = collect.figures({"precision": [{"name": "b", "x": 2}]}, old)
+    check(new == {**old, "precision": [{"name": "a", "x": 1}, {"name": "b", "x": 2}]}, new)
 
 
 @options(None)

@@ -59,10 +59,14 @@ def thin(rows, most=KEPT_ROWS):
     return [rows[k] for k in sorted(wanted | {0, last})]
 
 
-def figures(raw):
-    for run in raw["history"]:
+def figures(raw, old):
+    """Parts that were measured take the place of what was there, problems one by one."""
+    for run in raw.get("history", []):
         run["rows"] = thin(run["rows"])
-    return raw
+    problems = {problem["name"]: problem for problem in (old or {}).get("precision", [])}
+    problems.update({problem["name"]: problem for problem in raw.get("precision", [])})
+    parts = {part: raw.get(part) or (old or {}).get(part, []) for part in ("history", "sizes")}
+    return {**parts, "precision": list(problems.values())}
 
 
 def renewed_rows(key):
@@ -93,16 +97,20 @@ def extremes(raw):
 
 
 def peers(raw):
-    """A list of runs, or one under "runs" or "rows"; names of fields in lower case."""
-    rows = raw if isinstance(raw, list) else raw.get("runs", raw.get("rows", []))
-    return {"rows": [{key.lower(): value for key, value in row.items()} for row in rows]}
+    """All runs, the best of each solver by problem and tolerance, and what follows from them. nx: of the paper's body."""
+    rows = []
+    for row in raw["results"]:
+        family, _, size = row["problem"].partition("/")
+        rows.append({**row, **({"nx": int(size)} if family == "body" else {})})
+    return {"time_limit_s": raw["time_limit_s"], "packages": raw["machine"].get("packages", {}), "rows": rows, "runs": raw["runs"],
+            "means": raw["means"], "body": raw["body"], "profiles": raw["profiles"]}
 
 
 def alone(make):
     return lambda raw, old: make(raw)
 
 
-KINDS = {"figures": alone(figures), "bench": renewed_rows("ratios"), "bench-size": alone(dict), "extremes": alone(extremes),
+KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": alone(dict), "extremes": alone(extremes),
          "theory": alone(dict), "soak": renewed_rows("rows"), "peers": alone(peers)}
 
 
@@ -127,7 +135,11 @@ def collect(build, folder, root):
         source, target = pathlib.Path(build) / f"{name}.json", folder / f"{name.replace('-', '_')}.json"
         if not source.exists() or (target.exists() and target.stat().st_mtime >= source.stat().st_mtime):
             continue
-        raw = json.loads(source.read_text())
+        try:
+            raw = json.loads(source.read_text())
+        except ValueError:
+            print(f"{source}: not whole, left out")
+            continue
         old = json.loads(target.read_text()) if target.exists() else None
         data = kind(raw, old)
         folder.mkdir(parents=True, exist_ok=True)

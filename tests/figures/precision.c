@@ -6,9 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A run that takes longer of the processor than this, or than three cold solves by `auto`, is told to stop. */
-#define LIMIT_S      0.4
-#define MEMORY_LIMIT ((size_t)1200 << 20)
+/* A run that takes longer of the processor than 15 cold solves by `auto`, within these, is told to stop. */
+#define LIMIT_LEAST_S 0.4
+#define LIMIT_MOST_S  1.6
+#define MEMORY_LIMIT  ((size_t)1200 << 20)
 
 typedef struct {
     const char *name;
@@ -122,11 +123,13 @@ static void measure_series(json *out, const figure_problem *problem, const refer
             write_missing(out, s, &LEVELS[k], cached);
             continue;
         }
-        if (k == 0) { /* touches the memory, and leaves in the cache what only a body that is used again is worth */
+        if (k == 0) /* touches the memory, and leaves in the cache what only a body that is used again is worth */
             figure_solve(&run, &problem->problem, &settings, cache, limit, cached ? 2 : 1);
-            uz_result_free(run.result);
+        if (k > 0 || (run.status == UZ_OK && !run.limited)) {
+            if (k == 0)
+                uz_result_free(run.result);
+            figure_solve(&run, &problem->problem, &settings, cache, limit, 0);
         }
-        figure_solve(&run, &problem->problem, &settings, cache, limit, 0);
         write_run(out, problem, exact, s, &LEVELS[k], cached, &run);
         going = run.status == UZ_OK && !run.limited;
         uz_result_free(run.result);
@@ -162,7 +165,7 @@ static double limit_for(const figure_problem *problem)
     figure_run run;
     figure_solve(&run, &problem->problem, &settings, NULL, INFINITY, 2);
     uz_result_free(run.result);
-    return fmax(LIMIT_S, 3 * run.cpu.min);
+    return fmin(fmax(LIMIT_LEAST_S, 15 * run.cpu.min), LIMIT_MOST_S);
 }
 
 static void write_problem(json *out, const figure_problem *problem, const reference *exact, double limit)

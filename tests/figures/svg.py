@@ -108,9 +108,11 @@ class Panel:
     def py(self, value):
         return self.top + self.height * (1 - self.y.at(value))
 
-    def text(self, x, y, text, anchor="start", size=11, colour=INK, turn=False, bold=False):
+    def text(self, x, y, text, anchor="start", size=11, colour=INK, turn=False, bold=False, halo=False):
         turned = f' transform="rotate(-90 {x:.1f} {y:.1f})"' if turn else ""
         weight = ' font-weight="bold"' if bold else ""
+        if halo:
+            weight += ' stroke="white" stroke-width="3" paint-order="stroke"'
         self.out.append(f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" fill="{colour}" text-anchor="{anchor}"{weight}{turned}>'
                         f'{escape(text)}</text>')
 
@@ -149,7 +151,7 @@ class Panel:
     def draw_edge(self):
         y, label = self.edge
         self.rule(self.left, y, self.left + self.width, y, INK, 1.2, "7,4")
-        self.text(self.left + self.width - 4, y - 4, label, "end", 10)
+        self.text(self.left + self.width - 4, y - 4, label, "end", 10, halo=True)
 
     def line(self, points, colour, dash="", width=1.6):
         path = "L".join(f"{self.px(x):.1f} {self.py(y):.1f}" for x, y in points)
