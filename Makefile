@@ -39,9 +39,10 @@ BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
 EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
 THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
+PEERS_SRC  := $(sort $(wildcard tests/peers/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(SOAK_SRC) $(PRELOAD_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(SOAK_SRC) $(PRELOAD_SRC) $(PEERS_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
@@ -153,6 +154,18 @@ $(BUILD)/load: $(call obj,tests/soak/load.c)
 
 $(BUILD)/library: $(call obj,tests/soak/library.c) $(PARTS_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
+
+# What the comparison with other solvers is made with. Those need packages of their own: `make peers` installs them.
+PEER_LAB := $(BUILD)/peers/lab
+PEER_BIN := $(BUILD)/peers/ipopt $(BUILD)/peers/clp
+$(call obj,tests/peers/ipopt.c): CFLAGS += $(patsubst -I%,-isystem %,$(call pkg,--cflags ipopt))
+$(PEER_LAB): $(call obj,$(addprefix tests/peers/,lab.c problems.c condense.c peer.c files.c)) $(BUILD)/libuzawa.a
+$(PEER_BIN): $(BUILD)/peers/%: $(BUILD)/obj/tests/peers/%.o $(call obj,tests/peers/peer.c tests/peers/files.c) $(BUILD)/libuzawa.a
+$(BUILD)/peers/ipopt: PEER_LIBS = $(call pkg,--libs ipopt)
+$(BUILD)/peers/clp: PEER_LIBS = $(call pkg,--libs clp)
+$(PEER_LAB) $(PEER_BIN):
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(PEER_LIBS) -lpthread
 
 # Stands before the heap of a whole daemon: never with a sanitizer, which has its own.
 $(BUILD)/%.so: tests/preload/%.c
