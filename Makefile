@@ -17,6 +17,8 @@ PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-
             libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libpng-dev
 TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev
 
+PEER_PACKAGES := coinor-libipopt-dev coinor-libclp-dev python3-numpy python3-cvxopt octave python3-siconos python3-petsc4py
+
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
 INC  := -Isolver -Iserver -Iclient -I$(BUILD)/gen
@@ -175,17 +177,17 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size extremes theory
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size bench-deps peers extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins
 	@tests/run.sh $(BUILD)
 
-unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library
+unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library $(PEER_LAB)
 
 test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 	@tests/run.sh $(BUILD) unit $(FILTER)
 
-test-api: all $(PRELOADS) $(BUILD)/library ## the tests that drive the real daemon and client; FILTER=name runs some
+test-api: all $(PRELOADS) $(BUILD)/library $(PEER_LAB) ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
 test-hygiene: ## formatting, static analysis, both compilers
@@ -196,7 +198,7 @@ sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
 TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
 TSAN_API  = $(filter-out $(addprefix test_,bad_input cases client client_faults config fields gallery job_limits ladder \
-            load_cases memory readme reference refine schemas semicoercive soak verify), \
+            load_cases memory peers readme reference refine schemas semicoercive soak verify), \
             $(notdir $(basename $(wildcard tests/api/test_*.py))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
@@ -240,6 +242,13 @@ bench: deps ## measured ratios in one run: a table and build/bench.json
 bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/bench-size.json; minutes
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
 	@$(BUILD)/bench $(BUILD)/bench-size.json size
+
+bench-deps: ## install the Debian packages that only comparisons with other solvers use
+	@tests/deps.sh $(PEER_PACKAGES)
+
+peers: deps bench-deps ## the same problems by what Debian has, one certificate for all: tables and build/peers.json; SIZES="30 60", TIME=30, ONLY=, PROBLEMS=
+	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
+	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 
 extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes

@@ -1,16 +1,17 @@
 """Our solver and what Debian has, on the same problems, with the same certificate for everybody.
 
 usage: peers.py BUILD_DIR [SIZES=30,60,...] [TIME=seconds] [ONLY=part of a solver's name,...] [PROBLEMS=part,...]
-                [CASES=folder] [MEMORY=megabytes]
+                [CASES=folder] [MEMORY=megabytes] [OUT=folder]
 
 Each solver solves each problem in a process of its own, with one thread. Its own tolerance is tightened step by step
 until an answer is certified to 1e-9; at each of 1e-3, 1e-6 and 1e-9 its fastest run counts that is certified to it,
 whatever the solver says of it. The bound is uz_verify's, on the relative error in the energy norm, from the original
-data. Writes BUILD_DIR/peers.json, peers.csv (every run), peers-results.csv (every solver, problem and tolerance) and
+data. Writes OUT/peers.json (OUT: BUILD_DIR), peers.csv (every run), peers-results.csv (every solver, problem and tolerance) and
 peers-profile-*.svg, and prints tables.
 """
 import csv
 import json
+import math
 import pathlib
 import platform
 import subprocess
@@ -89,7 +90,7 @@ class Problem:
                               stdout=subprocess.PIPE, text=True).stdout
         size = json.loads(text)
         self.d, self.m = size["d"], size["m"]
-        self.judge = Worker([self.build / "peers/lab", "serve", name, self.file, str(DENSE_MOST / 1e6)], 1e5)
+        self.judge = Worker([self.build / "peers/lab", "serve", name, self.file, str(DENSE_MOST / 1e6)], 0)
         self.dual = None
 
     def condense(self):
@@ -106,7 +107,8 @@ class Problem:
         """(bound or None, seconds of recovering u)"""
         try:
             reply = self.judge.ask("certify", 0.0, self.answer, 1000)
-            return float(reply["status"]), reply["seconds"]
+            bound = float(reply["status"])
+            return (bound if math.isfinite(bound) else None), reply["seconds"]
         except ValueError:
             return None, 0.0
 
@@ -149,6 +151,8 @@ class Comparison:
         if problem.answer.exists():
             run["certified"], recovering = problem.certify()
             run["seconds"] += recovering
+            if run["certified"] is None and run["status"] == "ok":
+                run["status"] = "no bound"
         return run
 
     def skip(self, problem, solver, why):
@@ -284,7 +288,7 @@ def profiles(rows):
     return out
 
 
-def draw_profiles(all_profiles, build):
+def draw_profiles(all_profiles, folder):
     for tolerance, profile in all_profiles.items():
         chart = svg.Chart(f"Share of the problems solved and certified to {tolerance}",
                           svg.Axis("time over that of the fastest", log=True, low=1.0),
@@ -292,7 +296,7 @@ def draw_profiles(all_profiles, build):
         longest = max((points[-1][0] for points in profile.values()), default=10.0)
         for solver, points in sorted(profile.items(), key=lambda item: -item[1][-1][1]):
             chart.line(solver, [*points, (longest, points[-1][1])], step=True)
-        chart.write(build / f"peers-profile-{tolerance}.svg")
+        chart.write(folder / f"peers-profile-{tolerance}.svg")
 
 
 def print_tables(report):
@@ -338,11 +342,11 @@ def write_report(comparison, chosen, options):
     report = {"machine": machine(), "time_limit_s": options.time, "memory_limit_mb": options.memory,
               "runs": comparison.runs, "results": rows, "means": means(rows, options.time), "body": body_ratios(rows),
               "profiles": profiles(rows)}
-    with open(options.build / "peers.json", "w") as file:
+    with open(options.out / "peers.json", "w") as file:
         json.dump(report, file, indent=1, allow_nan=False)
-    write_csv(options.build / "peers.csv", comparison.runs)
-    write_csv(options.build / "peers-results.csv", rows)
-    draw_profiles(report["profiles"], options.build)
+    write_csv(options.out / "peers.csv", comparison.runs)
+    write_csv(options.out / "peers-results.csv", rows)
+    draw_profiles(report["profiles"], options.out)
     return report
 
 
@@ -351,9 +355,10 @@ class Options:
         self.build = pathlib.Path(arguments[0])
         given = dict(argument.split("=", 1) for argument in arguments[1:])
         words = {key: value.replace(",", " ").split() for key, value in given.items()}
+        self.out = pathlib.Path(given.get("OUT") or self.build)
         self.sizes = [int(size) for size in words.get("SIZES", [])] or SIZES
         self.time = float(given.get("TIME") or 30)
-        self.memory = float(given.get("MEMORY") or 4000)
+        self.memory = float(given.get("MEMORY") or 4000)  # 0: no limit
         self.only, self.problems = words.get("ONLY", []), words.get("PROBLEMS", [])
         shared = HERE.parents[2] / "shared/cases/qp"
         self.cases = pathlib.Path(given.get("CASES") or (shared if shared.is_dir() else HERE.parent / "data/qp"))

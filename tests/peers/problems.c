@@ -194,19 +194,31 @@ static uz_status degenerate_chain(uz_qp *out, double d, uz_error *err)
     return UZ_OK;
 }
 
-/* 3 d rows through one point in d dimensions, a d-th of them with a reaction. */
+/* Row i of N (m x d) is turned so that a way down from the vertex leads inside. */
+static void turn_row(double *row, const double *inside, int64_t d)
+{
+    double along = 0;
+    for (int64_t j = 0; j < d; j++)
+        along += row[j] * inside[j];
+    for (int64_t j = 0; along > 0 && j < d; j++)
+        row[j] = -row[j];
+}
+
+/* 3 d rows through one point in d dimensions, the apex of a cone; a sixth of them with a reaction. */
 static uz_status degenerate_vertex(uz_qp *out, double size, uz_error *err)
 {
     qp_random rng = {7};
     int64_t d = (int64_t)size, m = 3 * d;
     double *K = random_spd(&rng, d, 1e3, 1.0), *N = vector(m * d), *u = vector(d), *r = vector(m);
     (void)err;
+    for (int64_t j = 0; j < d; j++)
+        u[j] = random_signed(&rng);
     for (int64_t k = 0; k < m * d; k++)
         N[k] = random_unit(&rng) < 0.3 ? random_signed(&rng) : 0.0;
     for (int64_t i = 0; i < m; i++)
+        turn_row(N + i * d, u, d);
+    for (int64_t i = 0; i < m; i++)
         r[i] = i % 6 == 0 ? -random_unit(&rng) : 0.0;
-    for (int64_t j = 0; j < d; j++)
-        u[j] = random_signed(&rng);
     out->K = csc_from_dense(K, d, d, true);
     out->N = csc_from_dense(N, m, d, false);
     out->p = vector(d);

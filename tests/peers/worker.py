@@ -1,13 +1,17 @@
 """A solver in a process of its own, with limits of memory and time, that is asked line by line (peer.h)."""
+import ctypes
 import json
 import os
 import resource
 import select
+import signal
 import subprocess
 import time
 
 THREADS = {"OMP_NUM_THREADS": "1", "OMP_THREAD_LIMIT": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1",
            "PYTHONDONTWRITEBYTECODE": "1"}
+PR_SET_PDEATHSIG = 1  # <linux/prctl.h>: a solver does not outlive the driver
+LIBC = ctypes.CDLL(None)
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -17,11 +21,20 @@ class Ended(Exception):
 
 class Worker:
     def __init__(self, command, megabytes):
-        """Raises Ended where it does not get as far as having read its problem."""
+        """megabytes: of address space; 0: no limit. Raises Ended where it does not get as far as having read its
+        problem."""
         room = int(megabytes * 1e6)
-        self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0,
-            env={**os.environ, **THREADS}, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (room, room)))
+
+        def begin():
+            LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+            if room:
+                resource.setrlimit(resource.RLIMIT_AS, (room, room))
+        try:
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0,
+                env={**os.environ, **THREADS}, preexec_fn=begin)
+        except FileNotFoundError:
+            raise Ended("not installed") from None
         self.text = b""
         os.set_blocking(self.process.stderr.fileno(), False)
         self._reply(60)
