@@ -48,7 +48,7 @@ class Worker:
             return 0.0
 
     def _reply(self, limit):
-        """The next line that is JSON, within `limit` seconds of processor, or ten times as long by the clock. What the
+        """The next line that is JSON, within `limit` seconds of processor, or thirty times as long by the clock. What the
         libraries print between is passed over."""
         begun, spent = time.monotonic(), self._processor_seconds()
         while not (line := self._next_line()).startswith(b"{"):
@@ -60,7 +60,7 @@ class Worker:
                     raise Ended(self._how_it_ended())
                 self.text += more
             self._complaints()
-            if self._processor_seconds() - spent > limit or time.monotonic() - begun > 10 * limit:
+            if self._processor_seconds() - spent > limit or time.monotonic() - begun > 30 * limit:
                 self.close()
                 raise Ended("timed out")
         return json.loads(line)
