@@ -30,7 +30,7 @@ PYTHON = "/usr/bin/python3"
 PACKAGES = ["coinor-libipopt1v5", "libmumps-seq-5.5", "python3-cvxopt", "octave", "python3-siconos", "coinor-libclp1",
             "libpetsc-real3.18", "libcholmod3", "libopenblas0-pthread"]
 QUICK = 1.0         # seconds: a first run that takes no longer is followed by all of a solver's tolerances
-REPEATED = 1.0      # seconds: runs are repeated, to the median of three, until they took this long
+REPEATED = 0.5      # seconds: runs are repeated, to the median of nine, until they took this long
 DENSE_MOST = 500e6  # bytes of D: the solvers hold several copies of it
 
 
@@ -122,12 +122,12 @@ class Comparison:
         self.stopped = {}  # (solver, family): (step of its tolerances that ended in a time-out or so, why, size)
 
     def ask(self, worker, problem, solver, tolerance, setup):
-        """One run, the median of three where it is quick. Raises Ended."""
+        """One run, the median of up to nine where it is quick. Raises Ended."""
         limit = self.options.time - setup
         took = []
         if limit <= 0:
             raise Ended("timed out")
-        while len(took) < 3 and sum(took) < REPEATED:
+        while len(took) < 9 and sum(took) < REPEATED:
             problem.answer.unlink(missing_ok=True)
             reply = worker.ask(solver.method, tolerance, problem.answer, limit)
             took.append(reply["seconds"])
