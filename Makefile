@@ -21,6 +21,8 @@ TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl local
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
 TEST_PACKAGES += chromium chromium-driver python3-selenium python3-pil
 
+PEER_PACKAGES := coinor-libipopt-dev coinor-libclp-dev python3-numpy python3-cvxopt octave python3-siconos python3-petsc4py
+
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
 INC  := -Isolver -Iserver -Iclient -I$(BUILD)/gen
@@ -45,9 +47,10 @@ THEORY_SRC := $(sort $(wildcard tests/theory/*.c))
 FIGURES_SRC := $(sort $(wildcard tests/figures/*.c))
 SOAK_SRC   := $(sort $(wildcard tests/soak/*.c))
 GUARD_SRC  := $(sort $(wildcard tests/guard/*.c))
+PEERS_SRC  := $(sort $(wildcard tests/peers/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) tests/harness.c
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
@@ -188,6 +191,18 @@ $(BUILD)/library: $(call obj,tests/soak/library.c) $(PARTS_OBJ) $(BUILD)/libuzaw
 $(BUILD)/guard: $(call obj,$(GUARD_SRC)) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
 
+# What the comparison with other solvers is made with. Those need packages of their own: `make peers` installs them.
+PEER_LAB := $(BUILD)/peers/lab
+PEER_BIN := $(BUILD)/peers/ipopt $(BUILD)/peers/clp
+$(call obj,tests/peers/ipopt.c): CFLAGS += $(patsubst -I%,-isystem %,$(call pkg,--cflags ipopt))
+$(PEER_LAB): $(call obj,$(addprefix tests/peers/,lab.c problems.c condense.c peer.c files.c)) $(BUILD)/libuzawa.a
+$(PEER_BIN): $(BUILD)/peers/%: $(BUILD)/obj/tests/peers/%.o $(call obj,tests/peers/peer.c tests/peers/files.c) $(BUILD)/libuzawa.a
+$(BUILD)/peers/ipopt: PEER_LIBS = $(call pkg,--libs ipopt)
+$(BUILD)/peers/clp: PEER_LIBS = $(call pkg,--libs clp)
+$(PEER_LAB) $(PEER_BIN):
+	@mkdir -p $(@D)
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(PEER_LIBS) -lpthread
+
 # Stands before the heap of a whole daemon: never with a sanitizer, which has its own.
 $(BUILD)/%.so: tests/preload/%.c
 	@mkdir -p $(@D)
@@ -197,6 +212,8 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare bench-size extremes theory figures numbers
+
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size bench-deps peers extremes theory
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
 	@tests/run.sh $(BUILD)
@@ -207,10 +224,12 @@ guard: deps-test ## instructions of small problems against those kept in tests/d
 
 unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library
 
+unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library $(PEER_LAB)
+
 test-unit: all unit-bins ## the C tests only; FILTER=name runs some
 	@tests/run.sh $(BUILD) unit $(FILTER)
 
-test-api: all $(PRELOADS) $(BUILD)/library ## the tests that drive the real daemon and client; FILTER=name runs some
+test-api: all $(PRELOADS) $(BUILD)/library $(PEER_LAB) ## the tests that drive the real daemon and client; FILTER=name runs some
 	@tests/run.sh $(BUILD) api $(FILTER)
 
 .PHONY: test-browser screenshots
@@ -229,8 +248,9 @@ test-hygiene: ## formatting, static analysis, both compilers
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
 TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
-TSAN_API  = $(filter-out $(addprefix test_,bad_input cases client client_faults assert config examples fields gallery job_limits ladder \
-            load_cases memory numbers readme reference refine schemas semicoercive soak surface terminal trade verify), \
+TSAN_API  = $(filter-out $(addprefix test_,assert bad_input bench_tools cases client client_faults client_manual \
+            client_outputs client_requests config examples fields gallery job_limits ladder load_cases memory numbers peers \
+            readme reference refine schemas semicoercive soak surface terminal trade verify), \
             $(notdir $(basename $(wildcard tests/api/test_*.py))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
@@ -278,6 +298,13 @@ bench-compare: ## OLD=a.json NEW=b.json: ratios of times and of instructions; fa
 bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/bench-size.json; minutes
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
 	@$(BUILD)/bench $(BUILD)/bench-size.json size
+
+bench-deps: ## install the Debian packages that only comparisons with other solvers use
+	@tests/deps.sh $(PEER_PACKAGES)
+
+peers: deps bench-deps ## the same problems by what Debian has, one certificate for all: tables and build/peers.json; SIZES="30 60", TIME=30, ONLY=, PROBLEMS=
+	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
+	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 
 extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
