@@ -47,13 +47,24 @@ class Client:
             self.close()
             self.connection = socket.create_connection(self.where, timeout=30)
         self.connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.connection.sendall(message)
+        try:
+            self.connection.sendall(message)
+        except (BrokenPipeError, ConnectionResetError):
+            return self._early_reply()
         if alone:
             self.connection.shutdown(socket.SHUT_WR)
             reply, _ = service.read_all(self.connection)
             self.close()
             return reply
         return self._one_reply()
+
+    def _early_reply(self):
+        """Of a daemon that refused a body for its length and did not wait for all of it."""
+        reply, _ = service.read_all(self.connection)
+        self.close()
+        if not reply:
+            raise ConnectionResetError("no reply")
+        return reply
 
     def _one_reply(self):
         data = b""
