@@ -192,8 +192,8 @@ test-hygiene: ## formatting, static analysis, both compilers
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
 TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
-TSAN_API  = $(filter-out $(addprefix test_,bad_input cases client client_faults config examples fields gallery job_limits ladder \
-            load_cases memory readme reference refine schemas semicoercive soak verify), \
+TSAN_API  = $(filter-out $(addprefix test_,bad_input cases client client_faults client_manual client_outputs client_requests config examples fields gallery job_limits ladder \
+            load_cases memory readme reference refine schemas semicoercive soak terminal verify), \
             $(notdir $(basename $(wildcard tests/api/test_*.py))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer

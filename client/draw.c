@@ -106,10 +106,8 @@ void client_draw_trade(client_session *s, const json_t *trade)
     double low, high;
     int cells = drawing_width(s) - 27;
     bool any = time_range(decades, &low, &high);
-    fprintf(s->out, "%7s  %9s  %10s  %s\n", "error", "certified", "iterations",
-            any && cells >= 24 ? "time, logarithmic"
-            : cells >= 4       ? "time"
-                               : "");
+    fprintf(s->out, "%5s  %9s  %7s%s\n", "error", "certified", "steps",
+            any && cells >= 17 ? "  time, logarithmic" : "");
     for (size_t i = 0; i < json_array_size(decades); i++)
         print_decade(s->out, json_array_get(decades, i), low, high, cells > 0 ? cells : 0, ascii);
     double mesh = client_json_number(trade, "mesh_error");

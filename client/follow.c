@@ -145,7 +145,7 @@ static client_exit wait_once(client_session *s, const char *id, const char *path
     double asked = client_clock();
     if (*job && asked >= s->deadline)
         return CLIENT_WAIT_TIMEOUT;
-    if (*streams && *job)
+    if (*streams)
         *streams = watch_stream(s, id, job, watch);
     if (watch->interrupted || client_job_ended(*job))
         return CLIENT_OK;

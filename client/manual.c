@@ -160,7 +160,7 @@ static void print_environment(FILE *to)
 static void print_exit_status(FILE *to)
 {
     const client_exit_line *line;
-    fputs(".Sh EXIT STATUS\n.Bl -tag -width 130n -compact\n", to);
+    fputs(".Sh EXIT STATUS\n.Bl -tag -width Ds -compact\n", to);
     for (size_t i = 0; (line = client_exit_line_at(i)); i++) {
         fprintf(to, ".It %d\n", line->code);
         print_paragraph(to, line->about);

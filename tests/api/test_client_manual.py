@@ -44,6 +44,7 @@ def test_manual_is_well_formed(_):
         check(f"uzawa {command['name']}" in page, command["name"])
         for option in command["options"]:
             check(option["name"] in page, option)
+    check("\n     7       the job ended without converging (iteration" in page, "the list of exit codes is not legible:", page)
     for code in (0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 130):
         check(re.search(rf"^ +{code}\s", page, re.M), "no exit status", code)
 
