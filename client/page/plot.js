@@ -170,7 +170,8 @@ export class Chart {
     show(this.svg);
     draw_axes(this.svg, { x, y }, this.scales, size);
     if (!all.length) this.svg.append(s("text", { class: "label", x: width / 2, y: this.height / 2, "text-anchor": "middle" }, "nothing to show yet"));
-    for (const { one, points } of this.shown) draw_series(this.svg, one, thin(points, 4 * width), this.scales);
+    const texts_last = [...this.shown].sort((a, b) => Boolean(a.one.texts) - Boolean(b.one.texts));
+    for (const { one, points } of texts_last) draw_series(this.svg, one, thin(points, 4 * width), this.scales);
     this.cursor = s("line", { class: "cursor", y1: MARGIN.top, y2: this.height - MARGIN.bottom, visibility: "hidden" });
     this.svg.append(this.cursor);
     show(this.legend, series.map((one) => h("span", { class: "key" },

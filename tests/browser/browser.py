@@ -38,7 +38,7 @@ def start(width=1200, height=900, dark=False):
     wanted.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     wanted.binary_location = shutil.which("chromium")
     driver = webdriver.Chrome(service=Driver(shutil.which("chromedriver")), options=wanted)
-    driver.set_script_timeout(60)
+    driver.set_script_timeout(180)
     return Browser(driver, width, height, dark)
 
 

@@ -65,6 +65,8 @@ def take_all(s, b, folder):
     b.says("#verdict", "Valid")
     b.write("#job-text", b.run("return document.querySelector('#job-text').value").replace('"poisson"', '"poison"'))
     b.says("#verdict", "Did you mean")
+    b.click("#go-there")
+    b.says("#key-help", "problem.materials")
     keep(b, folder, "editor")
     b.open(s, "compare")
     b.click("#compare-start")
