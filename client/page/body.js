@@ -125,7 +125,7 @@ class BodyView {
 
   /** The colour bar with its numbers. */
   draw_legend() {
-    const { low, high } = this.values, id = `body-scale-${this.number}`;
+    const [low, high] = this.range(), id = `body-scale-${this.number}`;
     const stops = Array.from({ length: 9 }, (_, i) => s("stop", { offset: i / 8, "stop-color": `rgb(${viridis(i / 8).join(" ")})` }));
     const name = quantities(this.surface).find((one) => one.id === this.quantity).name;
     const texts = [[0, "start", low], [0.5, "middle", low + (high - low) / 2], [1, "end", high]];
@@ -135,10 +135,16 @@ class BodyView {
       this.quantity === "pressure" ? h("span", { class: "muted" }, "grey: nothing to touch") : null);
   }
 
+  /** Of the values; what is zero but for rounding is told as 0. */
+  range() {
+    const { low, high } = this.values, least = 1e-9 * Math.max(Math.abs(low), Math.abs(high));
+    return [low, high].map((value) => (Math.abs(value) < least ? 0 : value));
+  }
+
   summary() {
-    const { surface, values } = this, name = quantities(surface).find((one) => one.id === this.quantity).name.toLowerCase();
+    const { surface } = this, [low, high] = this.range(), name = quantities(surface).find((one) => one.id === this.quantity).name.toLowerCase();
     const touching = surface.rows.reaction?.values.filter((r) => r < 0).length ?? 0;
-    return `Deformed body of ${surface.elements} elements, coloured by ${name} from ${exact(values.low)} to ${exact(values.high)}; ` +
+    return `Deformed body of ${surface.elements} elements, coloured by ${name} from ${exact(low)} to ${exact(high)}; ` +
       `largest displacement ${exact(surface.largest_displacement)}, drawn ${number(this.factor, 4)} times as large` +
       (surface.rows.count ? `; ${touching} of ${surface.rows.count} contact nodes touch.` : ".");
   }

@@ -120,9 +120,9 @@ export class BodyGL {
     this.shade.needsUpdate = true;
   }
 
-  /** ink, before, obstacle: CSS colours. */
-  ink({ ink, before, obstacle }) {
-    this.wire.material.uniforms.ink.value.set(ink);
+  /** before, obstacle: CSS colours. What is drawn on the body itself does not change with the theme. */
+  ink({ before, obstacle }) {
+    this.wire.material.uniforms.ink.value.set(0x282830);
     this.before.material.uniforms.ink.value.set(before);
     for (const patch of this.patches) patch.material.uniforms.ink.value.set(obstacle);
   }

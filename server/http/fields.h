@@ -33,7 +33,7 @@ bool fields_picture(char **text, size_t *len, const field_reader *reader, int64_
 bool fields_mesh_error(double *error, const field_reader *reader, int64_t number, http_reply *reply);
 
 /* A glTF file of what a viewer draws; case_name NULL: none. 413 where it is larger than FIELDS_MOST_SURFACE. */
-#define FIELDS_MOST_SURFACE ((size_t)256 << 20) /* openapi.json says so */
+#define FIELDS_MOST_SURFACE ((size_t)256000000) /* openapi.json says so */
 bool fields_surface(char **file, size_t *len, const field_reader *reader, int64_t number, unsigned which,
                     const char *case_name, http_reply *reply);
 

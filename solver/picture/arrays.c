@@ -263,8 +263,9 @@ static uz_status check_size(const uz_surface *s, const surface_work *w, size_t m
     const double bytes = 4 * (8 * vertices + 3 * triangles + 2 * (double)(w->edges.n_lines + w->edges.n_outline) +
                               10 * (double)w->model->m);
     if (s->n_vertices >= INT32_MAX || s->n_triangles >= INT32_MAX || (most_bytes > 0 && bytes > (double)most_bytes))
-        return uz_fail(err, UZ_ERR_LIMIT, "", "the surface has %.0f triangles and would take %.0f MB; %.0f MB may be",
-                       triangles, bytes / 1e6, (double)most_bytes / 1e6);
+        return uz_fail(err, UZ_ERR_LIMIT, "",
+                       "the surface has %.0f triangles and would take more than %.0f MB; %.0f MB may be", triangles,
+                       floor(bytes / 1e6), (double)most_bytes / 1e6);
     return UZ_OK;
 }
 
@@ -289,12 +290,14 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
     uz_status status = uz_skin_build(&w->skin, mesh, hooks, err);
     if (status == UZ_OK)
         status = number_vertices(s, w, err);
-    if (status == UZ_OK)
-        status = uz_skin_edges_build(&w->edges, &w->skin, mesh, err);
     if (status == UZ_OK) {
         count_triangles(s, &w->skin);
-        status = check_size(s, w, most_bytes, err);
+        status = check_size(s, w, most_bytes, err); /* edges take several times as much while they are found */
     }
+    if (status == UZ_OK)
+        status = uz_skin_edges_build(&w->edges, &w->skin, mesh, err);
+    if (status == UZ_OK)
+        status = check_size(s, w, most_bytes, err);
     if (status == UZ_OK)
         status = uz_fields_of_body(&w->fields, body, w->answer, which & (UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE), hooks,
                                    err);

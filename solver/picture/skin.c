@@ -215,19 +215,21 @@ static bool is_border(const edge_work *w, const half_edge *half, int64_t count)
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < COSINE;
 }
 
+/* line NULL: only counts. */
 static int64_t put_edge(int64_t *line, int64_t n, int64_t low, const half_edge *edge)
 {
     const int64_t path[3] = {low, edge->middle >= 0 ? edge->middle : edge->high, edge->high};
     const int pieces = edge->middle >= 0 ? 2 : 1;
-    for (int i = 0; i < pieces; i++, n++) {
-        line[2 * n] = path[i];
-        line[2 * n + 1] = path[i + 1];
+    for (int i = 0; line && i < pieces; i++) {
+        line[2 * (n + i)] = path[i];
+        line[2 * (n + i) + 1] = path[i + 1];
     }
-    return n;
+    return n + pieces;
 }
 
 static void collect_edges(uz_skin_edges *out, const edge_work *w, int64_t n_nodes)
 {
+    out->n_lines = out->n_outline = 0;
     for (int64_t low = 0; low < n_nodes; low++)
         for (int64_t i = w->start[low], next; i < w->start[low + 1]; i = next) {
             for (next = i + 1; next < w->start[low + 1] && w->half[next].high == w->half[i].high;)
@@ -244,8 +246,9 @@ uz_status uz_skin_edges_build(uz_skin_edges *out, const uz_skin *skin, const uz_
     memset(out, 0, sizeof *out);
     uz_status status = prepare_edges(&w, mesh, err);
     if (status == UZ_OK) {
-        out->line = uz_alloc(4 * w.count, sizeof *out->line); /* two pieces of two ends each, at most */
-        out->outline = uz_alloc(4 * w.count, sizeof *out->outline);
+        collect_edges(out, &w, mesh->n_nodes); /* counts */
+        out->line = uz_alloc(2 * out->n_lines, sizeof *out->line);
+        out->outline = uz_alloc(2 * out->n_outline, sizeof *out->outline);
         if (!out->line || !out->outline)
             status = fail_memory(err, mesh->n_elements);
         else

@@ -199,6 +199,35 @@ static bool try_trade(const char *summary)
     return named && text != NULL;
 }
 
+static bool try_surface(const char *argument)
+{
+    static float at[9], u[9], r[1];
+    static double x[2], y[2], z[4];
+    static unsigned triangle[3] = {0, 1, 2}, row[1];
+    uz_contact contacts[] = {{.on = "a", .kind = UZ_OBSTACLE_HEIGHT, .n_x = 2, .n_y = 2, .x = x, .y = y, .z = z},
+                             {.on = "a", .kind = UZ_OBSTACLE_BODY, .with = "b"}};
+    const uz_scene scene = {.contacts = contacts, .n_contacts = 2};
+    const uz_surface surface = {.dim = 3,
+                                .n_vertices = 3,
+                                .n_triangles = 1,
+                                .n_rows = 1,
+                                .unit = 1,
+                                .factor = 1,
+                                .position = at,
+                                .displacement = u,
+                                .triangle = triangle,
+                                .row_vertex = row,
+                                .row_contact = row,
+                                .row_normal = at,
+                                .reaction = {.x = r, .unit = 1}};
+    const codec_surface what = {&surface, &scene, "id", argument};
+    size_t len;
+    char *file = codec_encode_surface(&what, &len);
+    CHECK(file ? len > 500 && len % 4 == 0 && memcmp(file, "glTF", 4) == 0 : len == 0);
+    free(file);
+    return file != NULL;
+}
+
 TEST(loading)
 {
     exhaust(try_init, NULL);
@@ -227,6 +256,7 @@ TEST(encoding)
     exhaust(try_results, NULL);
     exhaust(try_encode, NULL);
     exhaust(try_judge, "{\"outcome\":\"converged\",\"contact\":{\"active\":2}}");
+    exhaust(try_surface, "a case");
     json_set_alloc_funcs(malloc, free);
     exhaust(try_trade, "{\"method\": \"auto\", \"certificate\": {\"relative_error\": 1e-9}, \"suggestion\": {}}");
 }
