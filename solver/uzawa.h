@@ -1,4 +1,5 @@
-/* uzawa.h: the one public header of the contact solver library. It includes its parts on scenes and on fields.
+/* uzawa.h: the one public header of the contact solver library. It includes its parts on scenes, on fields and on the
+ * trade.
  *
  * The library answers one question: where does an elastic body touch, how hard, and how far can that
  * answer be from the exact one?  In the notation of Kanno, "An accelerated Uzawa method for application
@@ -275,39 +276,7 @@ typedef struct {
     int64_t rounds;     /* regularized problems solved to find them */
 } uz_semicoercive;
 
-/* What accuracy took: when the run first established a bound on the relative error of uz_trade_error(k) or less. The
- * bounds are those that the run makes anyway: between iterations, which the certificate at the end confirms or takes
- * back, and by that certificate itself. */
-enum { UZ_TRADE_PER_DECADE = 4, UZ_TRADE_STEPS = 48 };
-typedef struct {
-    double seconds;                   /* since the solve began; NaN: never established */
-    int64_t iterations, applications; /* up to then: iterations or active set steps; products with N K^-1 N' */
-    bool by_certificate;              /* the answer had been computed by then */
-} uz_trade_step;
-typedef struct {
-    uz_trade_step step[UZ_TRADE_STEPS];
-    double iterated_s; /* when the last iteration ended */
-    double total_s;    /* answer, certificate and outputs with it; without waiting and parsing */
-} uz_trade;
-void uz_trade_clear(uz_trade *trade); /* nothing was established */
-double uz_trade_error(int step);      /* 10^(-(step + 1) / UZ_TRADE_PER_DECADE) */
-/* The first step that is known to meet relative_error; NULL: none was reached. It may be up to a quarter of a decade
- * better than asked for. */
-const uz_trade_step *uz_trade_reach(const uz_trade *trade, double relative_error);
-/* Seconds of the whole solve if it had ended there: what follows the iterations is spent all the same. */
-double uz_trade_cost(const uz_trade *trade, const uz_trade_step *step);
-
-/* `balanced` would have served: the mesh loses more than ten times what it leaves of the error. */
-typedef struct {
-    bool any;
-    double relative_error;           /* that `balanced` asks for */
-    double mesh_error, solver_error; /* estimated; certified */
-    double seconds, total_s, share;  /* of the solve with it, at most; of this one; the former over the latter */
-    int64_t iterations;
-} uz_suggestion;
-/* mesh_error: estimated relative error of the mesh, NaN where not known; extra_s: what `balanced` does beside. Nothing
- * is suggested where it would save less than a fifth of the time. */
-uz_suggestion uz_trade_suggest(const uz_trade *trade, double mesh_error, double solver_error, double extra_s);
+#include "uzawa_trade.h" /* uz_trade: what accuracy took */
 
 /* What one form of the operator was expected to take. */
 typedef struct {

@@ -75,14 +75,14 @@ typedef struct {
 } bench_candidates;
 bool bench_candidates_left_out(bench_candidates *out, int64_t n, bool solid);
 
-/* Accelerated iterations on the dense D of m contacts to each of `count` relative errors: time with a float32 copy of D
- * and float64 corrections over that with D alone, the latter in milliseconds, and the iterations of both. false: no
- * answer. */
+/* Accelerated iterations on the dense D of m contacts: time with a float32 copy of D and float64 corrections over that
+ * with D alone, the latter in milliseconds, and the iterations of both: of iterations by themselves (milliseconds of
+ * one), and of runs to each of `count` relative errors. false: no answer. */
 typedef struct {
     bench_value ratio, milliseconds;
     int64_t iterations, mixed_iterations;
 } bench_mixed_row;
-bool bench_mixed(bench_mixed_row *out, int count, const double *errors, int m);
+bool bench_mixed(bench_mixed_row *step_row, bench_mixed_row *out, int count, const double *errors, int m);
 
 /* The paper's body with nx x nx/3 cells. The caller clears it. */
 uz_scene bench_paper_scene(int64_t nx);

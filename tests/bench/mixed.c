@@ -109,14 +109,30 @@ static double check(iterate *it, const problem_of *p, bool mixed)
     return sqrt(fmax(square, 0.0)) / p->norm;
 }
 
-/* Iterations to the error, 0: never; *seconds of this thread's processor. */
-static int64_t run(double *seconds, const problem_of *p, double error, bool mixed)
+/* r = 0 */
+static iterate begin(const problem_of *p)
 {
     double *v[VECTORS];
     memset(p->room, 0, VECTORS * (size_t)p->m * sizeof *p->room);
     for (int k = 0; k < VECTORS; k++)
         v[k] = p->room + (size_t)k * (size_t)p->m;
-    iterate it = {v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], 1.0};
+    return (iterate){v[0], v[1], v[2], v[3], v[4], v[5], v[6], v[7], v[8], 1.0};
+}
+
+/* Seconds of so many iterations, of this thread's processor, as are those below. */
+static double time_steps(const problem_of *p, int count, bool mixed)
+{
+    iterate it = begin(p);
+    const double start = processor_seconds();
+    for (int k = 0; k < count; k++)
+        step(&it, p, mixed);
+    return processor_seconds() - start;
+}
+
+/* Iterations to the error, 0: never. */
+static int64_t run(double *seconds, const problem_of *p, double error, bool mixed)
+{
+    iterate it = begin(p);
     const double start = processor_seconds();
     int64_t next_check = 1, k = 1;
     for (; k <= MOST_ITERATIONS; k++) {
@@ -211,23 +227,44 @@ static void drop(problem_of *p)
     free(p->x32);
 }
 
-bool bench_mixed(bench_mixed_row *out, int count, const double *errors, int m)
+/* Time of `steps` iterations each way, without what comes before them. */
+static void compare_steps(bench_mixed_row *out, const problem_of *p, int steps)
+{
+    double ratio[RUNS_MOST], whole[RUNS_MOST];
+    for (int k = 0; k < RUNS_MOST; k++) {
+        const double full = time_steps(p, steps, false);
+        ratio[k] = time_steps(p, steps, true) / full;
+        whole[k] = 1e3 * full / steps;
+    }
+    out->ratio = bench_summarise(ratio, RUNS_MOST);
+    out->milliseconds = bench_summarise(whole, RUNS_MOST);
+    out->iterations = out->mixed_iterations = steps;
+}
+
+static bool compare_runs(bench_mixed_row *out, const problem_of *p, double error, int runs)
+{
+    double ratio[RUNS_MOST], whole[RUNS_MOST], half, full;
+    bool good = true;
+    for (int k = 0; good && k < runs; k++) {
+        out->iterations = run(&full, p, error, false);
+        out->mixed_iterations = run(&half, p, error, true);
+        ratio[k] = half / full;
+        whole[k] = 1e3 * full;
+        good = out->iterations > 0 && out->mixed_iterations > 0;
+    }
+    out->ratio = bench_summarise(ratio, runs);
+    out->milliseconds = bench_summarise(whole, runs);
+    return good;
+}
+
+bool bench_mixed(bench_mixed_row *step_row, bench_mixed_row *out, int count, const double *errors, int m)
 {
     problem_of p;
     bool good = make(&p, m);
-    const int runs = m > 1000 ? 3 : RUNS_MOST;
-    for (int e = 0; good && e < count; e++) {
-        double ratio[RUNS_MOST], whole[RUNS_MOST], half, full;
-        for (int k = 0; good && k < runs; k++) {
-            out[e].iterations = run(&full, &p, errors[e], false);
-            out[e].mixed_iterations = run(&half, &p, errors[e], true);
-            ratio[k] = half / full;
-            whole[k] = 1e3 * full;
-            good = out[e].iterations > 0 && out[e].mixed_iterations > 0;
-        }
-        out[e].ratio = bench_summarise(ratio, runs);
-        out[e].milliseconds = bench_summarise(whole, runs);
-    }
+    if (good)
+        compare_steps(step_row, &p, m < 1000 ? 500 : 40);
+    for (int e = 0; good && e < count; e++)
+        good = compare_runs(&out[e], &p, errors[e], m < 1000 ? RUNS_MOST : 1);
     drop(&p);
     return good;
 }
