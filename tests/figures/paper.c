@@ -9,7 +9,7 @@
 #define EPSILON   1e-6 /* the paper's: a force, in N here */
 #define CERTIFIED 1e-6
 /* A run that takes longer of the processor is told to stop. */
-#define LIMIT_S 6.0
+#define LIMIT_S 15.0
 
 static void write_history(json *out, const uz_history *history)
 {
