@@ -5,8 +5,8 @@ usage: peers.py BUILD_DIR [SIZES=30,60,...] [TIME=seconds] [ONLY=part of a solve
 
 Each solver solves each problem in a process of its own, with one thread. Its own tolerance is tightened step by step
 until an answer is certified to 1e-9; at each of 1e-3, 1e-6 and 1e-9 its fastest run counts that is certified to it,
-whatever the solver says of it. (Ours counts only where it was asked for that much.) The bound is uz_verify's, on the relative error in the energy norm, from the original
-data.
+whatever the solver says of it. (Ours counts only where it was asked for that much.) The bound is uz_verify's, on the
+relative error in the energy norm, from the original data.
 
 What is counted: seconds of processor from K, N, h, p in memory to u and r; not the start of a program and the
 reading of files. Solvers of bound-constrained and complementarity problems get the condensed dual: its formation by
@@ -14,8 +14,8 @@ CHOLMOD (D in blocks of right-hand sides) and u = K^-1 (p + N'r) at the end are 
 limit in the means. A solver that ran out of time or memory on the paper's body is not run on a larger one with that
 tolerance; a dense one on no larger problem at all.
 
-Writes OUT/peers.json (OUT: BUILD_DIR), peers.csv (every run), peers-results.csv (every solver, problem and tolerance) and
-peers-profile-*.svg, and prints tables.
+Writes OUT/peers.json (OUT: BUILD_DIR), peers.csv (every run), peers-results.csv (every solver, problem and tolerance)
+and peers-profile-*.svg, and prints tables.
 """
 import csv
 import json
