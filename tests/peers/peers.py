@@ -364,7 +364,7 @@ class Options:
         words = {key: value.replace(",", " ").split() for key, value in given.items()}
         self.out = pathlib.Path(given.get("OUT") or self.build)
         self.sizes = [int(size) for size in words.get("SIZES", [])] or SIZES
-        self.time = float(given.get("TIME") or 30)
+        self.time = float(given.get("TIME") or 20)
         self.memory = float(given.get("MEMORY") or 4000)  # 0: no limit
         self.only, self.problems = words.get("ONLY", []), words.get("PROBLEMS", [])
         shared = HERE.parents[2] / "shared/cases/qp"
