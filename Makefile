@@ -302,7 +302,7 @@ bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/benc
 bench-deps: ## install the Debian packages that only comparisons with other solvers use
 	@tests/deps.sh $(PEER_PACKAGES)
 
-peers: deps bench-deps ## the same problems by what Debian has, one certificate for all: tables and build/peers.json; SIZES="30 60", TIME=30, ONLY=, PROBLEMS=
+peers: deps bench-deps ## the same problems by what Debian has, one certificate for all: tables and build/peers.json; SIZES="30 60", TIME=20, ONLY=, PROBLEMS=
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 
