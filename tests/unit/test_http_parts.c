@@ -241,7 +241,8 @@ TEST(options_have_defaults)
     server_options o;
     CHECK_INT(parse(&o, NULL, NULL), OPTIONS_RUN);
     CHECK_STR(o.listen, "127.0.0.1:8080");
-    CHECK(o.workers >= 1 && o.max_attempts == 3 && o.max_connections == 256 && o.max_body == 64u << 20);
+    CHECK(o.workers >= 1 && o.max_attempts == 3 && o.max_connections == 1024 && o.max_streams == 768 &&
+          o.max_body == 64u << 20);
     CHECK(o.drain_s == 30 && o.request_deadline_s == 30 && o.level == LOG_INFO && o.cache == 1u << 30);
 }
 
