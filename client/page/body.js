@@ -57,13 +57,20 @@ class BodyView {
 
   async start() {
     performance.mark("body:start");
-    const [surface, gl] = await Promise.all([this.load(), import("./body_gl.js").catch((error) => ({ error }))]);
+    const loading = this.load();
+    loading.catch(() => {}); // told below
+    const gl = await import("./body_gl.js").catch((error) => ({ error }));
     if (this.ends.signal.aborted) return;
     this.build();
     try {
       if (gl.error) throw gl.error;
-      this.gl = new gl.BodyGL(this.canvas);
+      this.gl = new gl.BodyGL(this.canvas); // while the service answers: a first context takes its time
     } catch {
+      this.gl = null;
+    }
+    const surface = await loading;
+    if (this.ends.signal.aborted) return;
+    if (!this.gl) {
       await this.fall_back();
       return;
     }
