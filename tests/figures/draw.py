@@ -200,7 +200,7 @@ def precision(problem):
             panel = Panel(75 + 345 * column, top + 285 * row, 275, 215, Log(*spread(reach, 1.1)), y)
             mesh = problem["mesh_error"] if measure == "energy_error" else None
             if mesh:
-                panel.shade_below(mesh, f"error of the mesh {100 * mesh:.2g} %")
+                panel.shade_below(mesh, f"– –  error of the mesh, {100 * mesh:.2g} %")
             panel.axes("", x_label, y_label if column == 0 else "")
             for method, operator, series in sorted(series_of(problem, start), key=lambda s: -list(METHODS).index(s[0])):
                 draw_series(panel, method, operator, series, pick, measure)

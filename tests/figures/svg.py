@@ -108,11 +108,9 @@ class Panel:
     def py(self, value):
         return self.top + self.height * (1 - self.y.at(value))
 
-    def text(self, x, y, text, anchor="start", size=11, colour=INK, turn=False, bold=False, halo=False):
+    def text(self, x, y, text, anchor="start", size=11, colour=INK, turn=False, bold=False):
         turned = f' transform="rotate(-90 {x:.1f} {y:.1f})"' if turn else ""
         weight = ' font-weight="bold"' if bold else ""
-        if halo:
-            weight += ' stroke="white" stroke-width="3" paint-order="stroke"'
         self.out.append(f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" fill="{colour}" text-anchor="{anchor}"{weight}{turned}>'
                         f'{escape(text)}</text>')
 
@@ -142,7 +140,7 @@ class Panel:
         self.text(self.left - room, self.top + self.height / 2, y_label, "middle", turn=True)
 
     def shade_below(self, value, label):
-        """The part under a level, its edge drawn and named."""
+        """The part under a level; its name stands above the frame, where it hides no point."""
         y, bottom = self.py(value), self.top + self.height
         self.out.append(f'<rect x="{self.left:.1f}" y="{y:.1f}" width="{self.width:.1f}" height="{bottom - y:.1f}" '
                         f'fill="#f0f0ea"/>')
@@ -151,7 +149,7 @@ class Panel:
     def draw_edge(self):
         y, label = self.edge
         self.rule(self.left, y, self.left + self.width, y, INK, 1.2, "7,4")
-        self.text(self.left + self.width - 4, y - 4, label, "end", 10, halo=True)
+        self.text(self.left + self.width, self.top - 6, label, "end", 10)
 
     def line(self, points, colour, dash="", width=1.6):
         path = "L".join(f"{self.px(x):.1f} {self.py(y):.1f}" for x, y in points)
