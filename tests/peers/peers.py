@@ -38,6 +38,7 @@ PACKAGES = ["coinor-libipopt1v5", "libmumps-seq-5.5", "python3-cvxopt", "octave"
             "libpetsc-real3.18", "libcholmod3", "libopenblas0-pthread"]
 QUICK = 1.0         # seconds: a first run that takes no longer is followed by all of a solver's tolerances
 REPEATED = 0.5      # seconds: runs are repeated, to the median of nine, until they took this long
+LARGE = 1000        # dofs from which a time-out of dense methods is put down to the size
 DENSE_MOST = 500e6  # bytes of D: the solvers hold several copies of it
 
 
@@ -173,7 +174,8 @@ class Comparison:
             try:
                 done.append(self.run(worker, problem, solver, asked[k], setup))
             except Ended as why:
-                self.stopped[solver.name, self.family(problem, solver)] = (k, str(why), problem)
+                if not solver.dense or problem.d >= LARGE:
+                    self.stopped[solver.name, self.family(problem, solver)] = (k, str(why), problem)
                 return
             if k == 0 and len(done) == 1 and asked is not solver.fine and done[0]["seconds"] < QUICK:
                 asked, k, first = solver.fine, -1, len(done)
