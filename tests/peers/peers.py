@@ -38,6 +38,7 @@ PACKAGES = ["coinor-libipopt1v5", "libmumps-seq-5.5", "python3-cvxopt", "octave"
             "libpetsc-real3.18", "libcholmod3", "libopenblas0-pthread"]
 QUICK = 1.0         # seconds: a first run that takes no longer is followed by all of a solver's tolerances
 REPEATED = 0.5      # seconds: runs are repeated, to the median of nine, until they took this long
+LARGE = 1000        # dofs from which a time-out of dense methods is put down to the size
 DENSE_MOST = 500e6  # bytes of D: the solvers hold several copies of it
 
 
@@ -71,7 +72,7 @@ def solvers():
     return [
         Solver("uzawa", "cold", lab, TOLERANCES, ours=True),
         Solver("uzawa_cached", "cached", lab, TOLERANCES, ours=True),
-        Solver("ipopt", "default", program("ipopt"), power(6, 8, 10, 13, 16, 19, 22), power(10, 16, 21)),
+        Solver("ipopt", "default", program("ipopt"), power(6, 8, 10, 13, 16, 19, 22, 24), power(10, 16, 23)),
         Solver("cvxopt", "chol2", script("cvxopt_peer.py", False), power(4, 6, 8, 10, 12, 14, 16, 18), power(7, 13, 17)),
         Solver("clp", "barrier", program("clp"), power(6, 9, 12, 14, 16), power(9, 12, 16)),
         Solver("octave_qp", "primal", octave(False), [1.0], dense=True),
@@ -173,12 +174,15 @@ class Comparison:
             try:
                 done.append(self.run(worker, problem, solver, asked[k], setup))
             except Ended as why:
-                self.stopped[solver.name, self.family(problem, solver)] = (k, str(why), problem)
+                if not solver.dense or problem.d >= LARGE:
+                    self.stopped[solver.name, self.family(problem, solver)] = (k, str(why), problem)
                 return
             if k == 0 and len(done) == 1 and asked is not solver.fine and done[0]["seconds"] < QUICK:
                 asked, k, first = solver.fine, -1, len(done)
             k += 1
-            if not solver.ours and (stats.best(done, TOLERANCES[-1]) or stalled(done[first:])):
+            if not solver.ours and stats.best(done, TOLERANCES[-1]):
+                return
+            if not solver.ours and not solver.dual and stalled(done[first:]):  # on the dual a run more costs little
                 return
 
     @staticmethod
