@@ -90,13 +90,14 @@ export class JobsSource {
   }
 
   take(jobs) {
-    let inserted = 0;
-    for (const job of jobs) {
-      // Older than all that was loaded: its page is still to come.
-      if (this.next && this.rows.length && job.id < this.rows[this.rows.length - 1].id) continue;
-      if (this.put(job)) inserted++;
-    }
+    const inserted = jobs.filter((job) => this.put(job)).length;
     this.on_change({ inserted });
+  }
+
+  /** Takes a change of a job, unless that is older than all that was loaded: its page is still to come. */
+  take_change(job) {
+    const last = this.rows[this.rows.length - 1];
+    if (this.next === null || (last && job.id >= last.id)) this.take([job]);
   }
 
   /** Loads the first page again, and whatever of the others may have changed: also the first time. */
@@ -136,7 +137,7 @@ export class JobsSource {
   on_event({ event, data, id }) {
     this.last_event = id || this.last_event;
     if (event === "job") {
-      this.take([JSON.parse(data)]);
+      this.take_change(JSON.parse(data));
     } else if (event === "deleted") {
       this.drop(JSON.parse(data).id);
       this.on_change({ inserted: 0 });
