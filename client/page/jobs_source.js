@@ -128,7 +128,12 @@ export class JobsSource {
     const seen = new Set(page.jobs.map((job) => job.id)), first = this.next === undefined;
     const oldest = page.next ? page.jobs[page.jobs.length - 1].id : "";
     for (const row of this.rows.filter((one) => one.id >= oldest && !seen.has(one.id))) this.drop(row.id);
-    if (first) this.next = page.next;
+    const gap = page.next && this.rows.length > 0 && this.rows[0].id < oldest; // more new ones than a page has
+    if (gap) {
+      this.rows.length = 0;
+      this.by_id.clear();
+    }
+    if (first || gap) this.next = page.next;
     this.take([...page.jobs, ...(await this.unsettled(oldest))]);
   }
 
