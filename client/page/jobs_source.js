@@ -27,6 +27,8 @@ export class JobsSource {
     this.by_id = new Map();
     this.next = undefined; // cursor of the next page; null: none follow
     this.loading = null;
+    this.pending = 0; // pages on their way
+    this.late = []; // changes that came meanwhile
     this.ends = new AbortController();
   }
 
@@ -78,8 +80,23 @@ export class JobsSource {
   /** Loads the next page, if there is one and none is on its way. */
   more() {
     if (this.next === null || this.loading) return this.loading;
-    this.loading = this.load().finally(() => (this.loading = null));
+    this.loading = this.settled(() => this.load()).finally(() => (this.loading = null));
     return this.loading;
+  }
+
+  /** Loads pages by f; a page may be older than a change that came while it was on its way: that is then made again. */
+  async settled(f) {
+    this.pending++;
+    try {
+      return await f();
+    } finally {
+      if (--this.pending === 0) for (const change of this.late.splice(0)) change();
+    }
+  }
+
+  change(f) {
+    f();
+    if (this.pending) this.late.push(f);
   }
 
   async load() {
@@ -90,23 +107,33 @@ export class JobsSource {
   }
 
   take(jobs) {
-    let inserted = 0;
-    for (const job of jobs) {
-      // Older than all that was loaded: its page is still to come.
-      if (this.next && this.rows.length && job.id < this.rows[this.rows.length - 1].id) continue;
-      if (this.put(job)) inserted++;
-    }
+    const inserted = jobs.filter((job) => this.put(job)).length;
     this.on_change({ inserted });
   }
 
+  /** Takes a change of a job, unless that is older than all that was loaded: its page is still to come. */
+  take_change(job) {
+    const last = this.rows[this.rows.length - 1];
+    if (this.next === null || (last && job.id >= last.id)) this.take([job]);
+  }
+
   /** Loads the first page again, and whatever of the others may have changed: also the first time. */
-  async refresh() {
+  refresh() {
+    return this.settled(() => this.load_again());
+  }
+
+  async load_again() {
     const { signal } = this.ends;
     const page = await this.api.get(this.query({}), { signal });
     const seen = new Set(page.jobs.map((job) => job.id)), first = this.next === undefined;
     const oldest = page.next ? page.jobs[page.jobs.length - 1].id : "";
     for (const row of this.rows.filter((one) => one.id >= oldest && !seen.has(one.id))) this.drop(row.id);
-    if (first) this.next = page.next;
+    const gap = page.next && this.rows.length > 0 && this.rows[0].id < oldest; // more new ones than a page has
+    if (gap) {
+      this.rows.length = 0;
+      this.by_id.clear();
+    }
+    if (first || gap) this.next = page.next;
     this.take([...page.jobs, ...(await this.unsettled(oldest))]);
   }
 
@@ -136,10 +163,14 @@ export class JobsSource {
   on_event({ event, data, id }) {
     this.last_event = id || this.last_event;
     if (event === "job") {
-      this.take([JSON.parse(data)]);
+      const job = JSON.parse(data);
+      this.change(() => this.take_change(job));
     } else if (event === "deleted") {
-      this.drop(JSON.parse(data).id);
-      this.on_change({ inserted: 0 });
+      const { id: gone } = JSON.parse(data);
+      this.change(() => {
+        this.drop(gone);
+        this.on_change({ inserted: 0 });
+      });
     } else if (event === "reset") {
       this.refresh().catch((error) => this.ends.signal.aborted || this.on_error(error));
     }
