@@ -109,6 +109,7 @@ def test_the_schema_explains_the_key_at_the_caret(s, b):
     b.run("const a = document.querySelector('#job-text'); a.setSelectionRange(arguments[0], arguments[0]); a.dispatchEvent(new Event('click'))",
           TEXT.index('"plane"') + 2)
     b.says("#key-help", "plain: not known")
+    b.says("#key-help", "plane")
     b.console()
 
 
