@@ -2,6 +2,7 @@
 #include "codec/encode_trade.h"
 
 #include "codec/codec.h"
+#include "codec/json_doc.h"
 
 #include <jansson.h>
 #include <math.h>
@@ -121,10 +122,12 @@ static bool word_is(const json_t *object, const char *key, const char *word)
 
 bool codec_read_trade(codec_trade *out, const char *summary)
 {
-    json_t *root = json_loads(summary, 0, NULL);
-    const json_t *suggestion = json_object_get(root, "suggestion"), *certificate = json_object_get(root, "certificate");
-    if (!root)
+    json_doc doc;
+    problem_details problem;
+    if (!json_scan(&doc, summary, strlen(summary), &problem))
         return false;
+    const json_t *root = doc.root;
+    const json_t *suggestion = json_object_get(root, "suggestion"), *certificate = json_object_get(root, "certificate");
     out->mesh_error = number_at(json_is_object(suggestion) ? suggestion : root,
                                 json_is_object(suggestion) ? "mesh_error" : "discretization_error");
     out->solver_error = number_at(certificate, "relative_error");
@@ -136,7 +139,7 @@ bool codec_read_trade(codec_trade *out, const char *summary)
      */
     out->may_save = out->is_scene && word_is(root, "outcome", "converged") && word_is(root, "started_from", "zero") &&
                     !word_is(root, "method", "linear") && !json_object_get(root, "mesh");
-    json_decref(root);
+    json_doc_clear(&doc);
     return true;
 }
 
@@ -148,10 +151,12 @@ static void copy_word(char *out, size_t size, const json_t *object, const char *
 
 void codec_read_method(char *method, char *op, size_t size, const char *summary)
 {
-    json_t *root = json_loads(summary, 0, NULL);
-    copy_word(method, size, root, "method");
-    copy_word(op, size, root, "operator");
-    json_decref(root);
+    json_doc doc; /* left empty where there is no memory */
+    problem_details problem;
+    json_scan(&doc, summary, strlen(summary), &problem);
+    copy_word(method, size, doc.root, "method");
+    copy_word(op, size, doc.root, "operator");
+    json_doc_clear(&doc);
 }
 
 char *codec_encode_trade(const codec_trade *of, size_t *len)

@@ -64,6 +64,14 @@ def first_words(crowd):
     return all(len(key.data) > 0 for key in crowd.selector.get_map().values())
 
 
+def settle(crowd):
+    """The rest of the first words: until nothing more comes."""
+    had = -1
+    while had < crowd.bytes:
+        had = crowd.bytes
+        crowd.read(0.3)
+
+
 def memory_mb(s):
     with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
         return next(int(line.split()[1]) for line in file if line.startswith("VmRSS")) / 1024
@@ -113,6 +121,7 @@ def crowds(build, streams=2000, polls=1000, idle_s=10, load_s=5):
         before = memory_mb(s)
         crowd = Crowd(s, streams, f"/v1/jobs/{followed}/events")
         held.append(crowd.read(30, first_words))
+        settle(crowd)
         figures["mb"] = round(memory_mb(s) - before, 1)
         figures["kb_each"] = round(1024 * figures["mb"] / streams, 1)
         begun, silent = threads_seconds(s)[0], crowd.bytes
