@@ -60,7 +60,7 @@ typedef struct {
     int workers, workers_busy;
     size_t cache_bytes, cache_max_bytes, cache_entries, body_bytes;
     unsigned connections, streams; /* streams: connections that are event streams */
-    int64_t store_free_bytes; /* < 0: not known */
+    int64_t store_free_bytes;      /* < 0: not known */
     const char *version;
 } metrics_now;
 /* The whole text, malloc'ed, *len bytes; NULL: no memory. */
