@@ -280,6 +280,12 @@ static client_exit compare_cases(client_session *s, client_checks *to, const jso
         else
             client_checks_add(to, CLIENT_FAIL, name, "baseline", "it has no load case of this name");
     }
+    json_array_foreach(json_object_get(then, "cases"), i, one)
+    {
+        const char *name = client_json_text(one, "name");
+        if (!has_case(now, name))
+            client_checks_add(to, CLIENT_FAIL, name, "baseline", "this job has no load case of this name");
+    }
     return code;
 }
 

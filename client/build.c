@@ -166,7 +166,8 @@ static void common_tag(client_session *s, char out[32], size_t jobs)
     out[0] = '\0';
     if (jobs < 2 || s->options->tags.count > 0)
         return;
-    snprintf(out, 32, "vary-%08llx", (unsigned long long)(client_clock() * 1e6) & 0xffffffffULL);
+    /* of the key, so that a repeat is the same request */
+    snprintf(out, 32, "vary-%.16s", s->options->key ? s->options->key : s->key);
     if (!s->options->json)
         fprintf(s->err, "uzawa: %zu jobs with the tag %s\n", jobs, out);
 }

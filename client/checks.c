@@ -74,13 +74,14 @@ void client_checks_outcome(client_checks *to, const json_t *job)
 {
     static const char NAME[] = "converged";
     const char *outcome = client_json_text(job, "summary.outcome"), *message = client_json_text(job, "summary.message");
-    const double bound = client_json_number(job, "summary.certificate.relative_error");
+    char bound[32];
+    client_format_bound(bound, client_json_number(job, "summary.certificate.relative_error"));
     if (!client_job_ended(job))
         client_checks_add(to, CLIENT_NO_ANSWER, "", NAME, "the job has not ended");
     else if (!*outcome)
         client_checks_add(to, CLIENT_NO_ANSWER, "", NAME, "%s", error_text(job));
     else if (strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0)
-        client_checks_add(to, CLIENT_PASS, "", NAME, "%s: certified relative error %.2g", outcome, bound);
+        client_checks_add(to, CLIENT_PASS, "", NAME, "%s: certified relative error %s", outcome, bound);
     else
         client_checks_add(to, CLIENT_FAIL, "", NAME, "%s%s%s", outcome, *message ? ": " : "", message);
 }
@@ -121,9 +122,10 @@ static void find_text(char *out, size_t size, const json_t *line)
     const double value = client_json_number(line, "value"), error = client_json_number(line, "error");
     const double failed = client_json_number(line, "cases.fail"), open = client_json_number(line, "cases.uncertain");
     const char *reason = client_json_text(line, "reason"), *of = client_json_text(line, "case");
+    char bound[32];
     int used = snprintf(out, size, "%s", reason);
     if (!*reason && error > 0)
-        used = snprintf(out, size, "%.9g, the exact one within %.2g", value, error);
+        used = snprintf(out, size, "%.9g, the exact one within %s", value, client_format_bound(bound, error));
     else if (!*reason)
         used = snprintf(out, size, "%.9g", value);
     if (*of && used > 0 && (size_t)used < size)

@@ -36,6 +36,13 @@ static const char *number_in_words(char text[32], const json_t *object, const ch
     return text;
 }
 
+/* The same of a bound, which must not be shown smaller than it is. */
+static const char *bound_in_words(char text[32], const json_t *object, const char *path)
+{
+    const double value = client_json_number(object, path);
+    return isfinite(value) ? client_format_bound(text, value) : number_in_words(text, object, path, 2);
+}
+
 static void label(FILE *to, const char *text)
 {
     fprintf(to, "%-12s", text);
@@ -275,14 +282,16 @@ static void print_request_met(FILE *to, const json_t *summary)
 /* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
 static void print_bound(FILE *to, double bound)
 {
-    double digits = floor(-log10(bound));
+    const double digits = floor(-log10(bound));
+    char text[32];
+    client_format_bound(text, bound);
     if (bound > 0 && bound < 1 && digits >= 1)
         fprintf(to,
-                "the exact displacement is within %.2g of this one, relative, in the energy norm:\n%12s"
+                "the exact displacement is within %s of this one, relative, in the energy norm:\n%12s"
                 "%.0f digit%s %s certain",
-                bound, "", fmin(digits, 15), digits > 1 ? "s" : "", digits > 1 ? "are" : "is");
+                text, "", fmin(digits, 15), digits > 1 ? "s" : "", digits > 1 ? "are" : "is");
     else
-        fprintf(to, "the exact displacement is within %.2g of this one, relative, in the energy norm", bound);
+        fprintf(to, "the exact displacement is within %s of this one, relative, in the energy norm", text);
 }
 
 static void print_certificate(FILE *to, const json_t *summary)
@@ -301,7 +310,7 @@ static void print_certificate(FILE *to, const json_t *summary)
     print_request_met(to, summary);
     label(to, "");
     fprintf(to, "absolute %s, duality gap %s, relative KKT residual %s\n",
-            number_in_words(absolute, certificate, "absolute_error", 3), number_in_words(gap, certificate, "gap", 3),
+            bound_in_words(absolute, certificate, "absolute_error"), bound_in_words(gap, certificate, "gap"),
             number_in_words(residual, certificate, "relative_residual.total", 3));
     if (isfinite(mesh)) {
         label(to, "");
@@ -458,6 +467,6 @@ void client_print_cases(FILE *to, const json_t *result)
         fprintf(to, "%*s  %10s  %8s  %s\n", 15 - (int)strlen(client_json_text(summary, "outcome")), "",
                 number_in_words(iterations, summary, "iterations", 9),
                 number_in_words(touch, summary, "contact.active", 9),
-                number_in_words(error, summary, "certificate.relative_error", 3));
+                bound_in_words(error, summary, "certificate.relative_error"));
     }
 }

@@ -2,6 +2,7 @@
 #include "files.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 const json_t *client_json_at(const json_t *object, const char *path)
@@ -76,6 +77,16 @@ const char *client_format_seconds(char *buffer, size_t size, double seconds)
         snprintf(buffer, size, "%.3g ms", seconds * 1e3);
     else
         snprintf(buffer, size, "%.3g us", seconds * 1e6);
+    return buffer;
+}
+
+const char *client_format_bound(char buffer[32], double bound)
+{
+    snprintf(buffer, 32, "%.1e", bound);
+    double shown = strtod(buffer, NULL);
+    if (bound > 0 && isfinite(bound) && shown < bound)
+        shown += pow(10, floor(log10(shown)) - 1);
+    snprintf(buffer, 32, "%.2g", shown);
     return buffer;
 }
 

@@ -29,5 +29,7 @@ void client_print_problem(FILE *to, long http_status, const json_t *problem);
 
 /* "12.3 ms"; buffer of at least 16. */
 const char *client_format_seconds(char *buffer, size_t size, double seconds);
+/* An upper bound with two digits, never shown smaller than it is; "inf" and "nan" as they are. */
+const char *client_format_bound(char buffer[32], double bound);
 
 #endif

@@ -17,6 +17,7 @@ typedef struct {
     FILE *out, *err;
     double deadline;      /* client_clock time after which the command gives up; INFINITY: never */
     client_suites suites; /* of the jobs so far, for --junit */
+    char key[33];         /* random, of the jobs that submit makes; "": --key says it, or none is needed */
 } client_session;
 
 /* A request without body or headers that is patient as the command line says. */

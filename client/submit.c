@@ -22,6 +22,12 @@ static bool make_key(char key[KEY_ROOM])
     return true;
 }
 
+/* One key for all that the command makes: whoever repeats it with that key finds what is there already. */
+static bool have_key(client_session *s)
+{
+    return s->options->key || *s->key || make_key(s->key);
+}
+
 /* A certificate is wanted at once. */
 static bool stays(const client_session *s)
 {
@@ -40,12 +46,12 @@ static void tell_of_the_key(client_session *s, const char *key)
 static client_exit post_body(client_session *s, const char *path, const client_buffer *body, client_watch *watch,
                              int number, json_t **job)
 {
-    char made[KEY_ROOM], prefer[40], *header = NULL, *key = NULL;
+    char prefer[40], *header = NULL, *key = NULL;
     client_request request = client_request_new(s, "POST", path);
     *job = NULL;
-    if (!s->options->key && !make_key(made))
+    if (!have_key(s))
         return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
-    const char *given = s->options->key ? s->options->key : made;
+    const char *given = s->options->key ? s->options->key : s->key;
     bool ok = (number < 0 ? asprintf(&key, "%s", given) : asprintf(&key, "%s-%d", given, number)) >= 0;
     if (!ok || asprintf(&header, "Idempotency-Key: %s", key) < 0) {
         if (ok)
@@ -59,7 +65,7 @@ static client_exit post_body(client_session *s, const char *path, const client_b
         client_hold(&request, prefer, sizeof prefer, client_hold_seconds(s, watch->progress));
     client_exit code = client_ask_json(s, job, &request);
     if (code == CLIENT_INTERRUPTED)
-        tell_of_the_key(s, key);
+        tell_of_the_key(s, given);
     free(header);
     free(key);
     return code;
@@ -144,12 +150,13 @@ static client_exit post_all(client_session *s, const client_bodies *bodies, clie
 static void print_job_line(client_session *s, const json_t *job, const char *label)
 {
     double error = client_json_number(job, "summary.certificate.relative_error");
+    char text[32];
     client_print_safe(s->out, client_json_text(job, "id"));
     fputs("  ", s->out);
     const char *outcome = client_json_text(job, "summary.outcome");
     fprintf(s->out, "%-15s  ", *outcome ? outcome : client_json_text(job, "status"));
     if (isfinite(error))
-        fprintf(s->out, "%-9.2g  ", error);
+        fprintf(s->out, "%-9s  ", client_format_bound(text, error));
     else
         fprintf(s->out, "%-9s  ", "unknown");
     client_print_safe(s->out, label);
@@ -202,6 +209,8 @@ static client_exit post_several(client_session *s, const client_bodies *bodies)
 client_exit client_submit(client_session *s)
 {
     client_bodies bodies;
+    if (!have_key(s))
+        return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
     client_exit code = client_build(s, &bodies);
     if (code == CLIENT_OK && bodies.count == 1)
         code = post_and_stay(s, "/v1/jobs", &bodies.item[0].body);

@@ -18,13 +18,13 @@ export UBSAN_OPTIONS="print_stacktrace=1 ${UBSAN_OPTIONS:-}"
 locale=()
 if localedef -i de_DE -f UTF-8 "$work/de_DE.UTF-8" >/dev/null 2>&1; then locale=(env "LOCPATH=$work"); fi
 
-run_one() { # NAME COMMAND...
-    local name=$1 out=$work/$kind.out status TIMEFORMAT='%U %S' user system
-    shift
+run_one() { # KIND NAME COMMAND...
+    local kind=$1 name=$2 out=$work/$1.$2.out status TIMEFORMAT='%U %S' user system
+    shift 2
     SECONDS=0
-    { time "$@" >"$out" 2>&1; } 2>"$work/$kind.time"
+    { time "$@" >"$out" 2>&1; } 2>"$out.time"
     status=$?
-    read -r user system < <(tail -1 "$work/$kind.time")
+    read -r user system < <(tail -1 "$out.time")
     if [ $status -ne 0 ] && ! grep -q '^not ok ' "$out"; then
         echo "not ok $name: exit status $status" >>"$out"
     fi
@@ -40,35 +40,38 @@ wanted() { # NAME: of this kind
     [ -z "$programs" ] || [[ " $programs " == *" $1 "* || " $programs " == *" $kind/$1 "* ]]
 }
 
-run_kind() {
-    local kind=$1 source script name
+list_kind() { # KIND: a line "KIND NAME" for each of its programs
+    local kind=$1 file
     case $kind in
-    unit) for source in tests/unit/test_*.c; do
-              name=$(basename "$source" .c)
-              if wanted "$name"; then run_one "$name" "${locale[@]}" "$build/tests/$name" $filter; fi
-          done ;;
-    api) for script in tests/api/test_*.py; do
-             name=$(basename "$script" .py)
-             if wanted "$name"; then run_one "$name" /usr/bin/python3 -B "$script" "$build" $filter; fi
-         done ;;
-    browser) for script in tests/browser/test_*.py; do
-                 name=$(basename "$script" .py)
-                 if wanted "$name"; then run_one "$name" /usr/bin/python3 -B "$script" "$build" $filter; fi
-             done ;;
-    guard) run_one guard /usr/bin/python3 -B tests/guard/guard.py "$build" ;;
-    hygiene) run_one lint tests/lint.sh ;;
+    unit | api | browser) for file in tests/"$kind"/test_*; do
+                              file=${file##*/}
+                              if wanted "${file%.*}"; then echo "$kind ${file%.*}"; fi
+                          done ;;
+    guard | hygiene) echo "$kind $kind" ;;
+    esac
+}
+run_program() { # KIND NAME
+    local kind=$1 name=$2
+    case $kind in
+    unit) run_one "$kind" "$name" "${locale[@]}" "$build/tests/$name" $filter ;;
+    api | browser) run_one "$kind" "$name" /usr/bin/python3 -B "tests/$kind/$name.py" "$build" $filter ;;
+    guard) run_one "$kind" guard /usr/bin/python3 -B tests/guard/guard.py "$build" ;;
+    hygiene) run_one "$kind" lint tests/lint.sh ;;
     esac
 }
 
-# Two rows side by side: most programs keep one core busy.
-run_row() { # KIND...
-    local kind
-    for kind in "$@"; do
-        if [[ " $kinds " == *" $kind "* ]]; then run_kind "$kind"; fi
-    done
+# Two rows, each of which takes the next program that nobody has: most keep one core busy. The long ones come first.
+for kind in browser api hygiene guard unit; do
+    if [[ " $kinds " == *" $kind "* ]]; then list_kind "$kind"; fi
+done >"$work/programs"
+run_row() {
+    local kind name
+    while read -r kind name <&3; do
+        if mkdir "$work/$kind.$name" 2>/dev/null; then run_program "$kind" "$name" 3<&-; fi
+    done 3<"$work/programs"
 }
-run_row unit guard hygiene &
-run_row api browser &
+run_row &
+run_row &
 wait
 passed=$(grep -c '^ok ' "$log") failed=$(grep -c '^not ok ' "$log") skipped=$(grep -c '^skip ' "$log")
 [ "$skipped" -eq 0 ] || echo "$skipped skipped"

@@ -100,7 +100,8 @@ class Comparison {
   draw() {
     const known = LEVELS.filter((level) => this.jobs.has(level));
     const ended = known.filter((level) => has_ended(this.jobs.get(level)));
-    show(this.said, ended.length === LEVELS.length ? "All four are solved." : known.length ? `${ended.length} of ${LEVELS.length} are solved.` : "There are no jobs of this comparison.");
+    const solved = ended.filter((level) => this.jobs.get(level).status === "successful");
+    show(this.said, solved.length === LEVELS.length ? "All four are solved." : known.length ? `${solved.length} of ${LEVELS.length} are solved.` : "There are no jobs of this comparison.");
     const points = ended.map((level) => {
       const job = this.jobs.get(level);
       return [times_of(job).solve, job.summary?.certificate?.relative_error, level];
@@ -113,7 +114,7 @@ class Comparison {
       series.push({ name: "error of the mesh, estimated", colour: 2, dash: "6 3", points: [[Math.min(...times), mesh], [Math.max(...times), mesh]] });
     }
     this.chart.update({ x: { label: "time", log: true, format: seconds }, y: { label: "certified relative error", log: true }, series,
-      label: `Time against certified error: ${points.map(([time, error, level]) => `${level} ${seconds(time)}, ${percent(error)}`).join("; ")}` });
+      label: `Time against certified error: ${points.map(([time, error, level]) => `${level} ${seconds(time)}, ${percent_up(error)}`).join("; ")}` });
     show(this.table, this.table_of(known));
   }
 

@@ -21,6 +21,14 @@ export function number(value, digits = 3) {
   return Number(value.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: Math.max(digits, Math.ceil(Math.log10(size))) });
 }
 
+/** A bound from below (way -1) or above (1) in so many digits, rounded to that side. */
+export function number_towards(value, digits, way) {
+  if (!Number.isFinite(value) || value === 0) return number(value, digits);
+  const unit = 10 ** (Math.floor(Math.log10(Math.abs(value))) - digits + 1);
+  const near = Number(value.toPrecision(digits));
+  return number(way * (near - value) < 0 ? near + way * unit : near, digits);
+}
+
 export function count(value) {
   return value === null || value === undefined ? "–" : value.toLocaleString("en");
 }

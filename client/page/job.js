@@ -3,7 +3,7 @@
 import { Convergence } from "./convergence.js";
 import { announce, h, pause, show } from "./dom.js";
 import { download_buttons, files_of } from "./download.js";
-import { elapsed, moment, number, seconds, short_id } from "./format.js";
+import { elapsed, moment, number, number_towards, seconds, short_id } from "./format.js";
 import { status_chip, sure_button } from "./list.js";
 import { show_precision } from "./precision.js";
 import { refine_form } from "./refine.js";
@@ -44,6 +44,8 @@ class JobView {
     const refines = job.links.find((link) => link.rel === "refines");
     const stop = sure_button(ended ? "Delete" : "Cancel", async () => {
       try {
+        const now = ended ? null : await this.api.get(`/v1/jobs/${this.id}`);
+        if (now && has_ended(now)) return this.take(now); // it ended meanwhile: nobody asked to delete it
         const left = await this.api.remove(`/v1/jobs/${this.id}`);
         if (left) this.take(left);
         else location.hash = "#/";
@@ -64,7 +66,7 @@ class JobView {
     if (this.progress.hidden) return;
     const words = [job.status === "running" ? `running for ${seconds(elapsed(job.started))}` : "waiting for its turn"];
     if (row?.iteration !== undefined && row.iteration !== null) words.push(`iteration ${number(row.iteration, 9)}`);
-    if (Number.isFinite(row?.error_bound)) words.push(`certified bound ${number(row.error_bound)}`);
+    if (Number.isFinite(row?.error_bound)) words.push(`certified bound ${number_towards(row.error_bound, 3, 1)}`);
     if (Number.isFinite(row?.residual_total)) words.push(`residual ${number(row.residual_total)}`);
     show(this.progress, h("progress", { value: job.progress, max: 100, "aria-label": "Progress" }), h("span", { id: "progress-text" }, words.join(", ")));
   }
@@ -151,9 +153,13 @@ class JobView {
   }
 
   async show_precision() {
+    const name = this.case_name, place = h("div");
+    this.precision.hidden = true;
     try {
       if (!(await this.api.offers("/v1/jobs/{id}/work-precision"))) return;
-      const end = await show_precision(this.precision, this.api, this.id, this.case_name, this.ends.signal);
+      const end = await show_precision(place, this.api, this.id, name, this.ends.signal);
+      if (name !== this.case_name) return end?.(); // another load case was chosen meanwhile
+      show(this.precision, place);
       this.precision.hidden = !end;
       if (end) this.parts.push(end);
     } catch (error) {
@@ -210,7 +216,7 @@ class JobView {
       } catch (error) {
         if (error.status === 503) streams = false;
         else this.complain(error);
-        if (error.status && error.status < 500) return;
+        if (error.status && error.status < 500 && error.status !== 429) return;
       }
       if (this.job && has_ended(this.job)) return;
       await pause(Math.min(5000, 500 * pauses++), signal).catch(() => {});

@@ -196,7 +196,7 @@ export class JobsSource {
         if (error.status === 503) this.streams = false; // too many streams
         else if (error.status) {
           on_error(error);
-          if (error.status < 500) return;
+          if (error.status < 500 && error.status !== 429) return;
         } else this.on_state("offline");
       }
       await pause(POLL_MS, signal).catch(() => {});

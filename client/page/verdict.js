@@ -1,7 +1,7 @@
 // verdict.js: how good the answer of a job is, in words, and its main numbers.
 
 import { h } from "./dom.js";
-import { count, number, percent_up, seconds } from "./format.js";
+import { count, number, number_towards, percent_up, seconds } from "./format.js";
 import { certificate_words, mesh_words, method_words, outcome_words, problem_words } from "./words.js";
 
 function vector(values) {
@@ -22,7 +22,7 @@ function facts_of(summary) {
     ["Largest pressure", Number.isFinite(contact?.max_pressure) ? `${number(contact.max_pressure, 4)}${at ? ` at ${vector(at)}` : ""}` : null],
     ["Contact area", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
     ["Largest penetration", contact ? number(contact.max_penetration) : null],
-    ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number(energy.dual, 6)})` : null],
+    ["Energy", energy ? `${number(energy.primal, 6)} (at least ${number_towards(energy.dual, 6, -1)})` : null],
     ["Imbalance of all forces", summary.resultants ? number(summary.resultants.imbalance) : null],
     ["Expected", summary.cost?.predicted ? `${seconds(summary.cost.predicted.seconds)} after the assembly; it took ${seconds(summary.cost.actual?.seconds)}` : null],
   ].filter(([, value]) => value);

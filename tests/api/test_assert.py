@@ -302,6 +302,8 @@ def test_cases_against_a_baseline(s):
     more = {**SCENE, "cases": [*CASES, {"name": "new", "loads": []}]}
     done = run(s, "submit", "-", "--wait", "--baseline", baseline, body=more, code=3)
     check("new: baseline: it has no load case of this name" in done.stdout, done.stdout)
+    done = run(s, "submit", "-", "--wait", "--baseline", baseline, body={**SCENE, "cases": CASES[:1]}, code=3)
+    check("baseline: this job has no load case of this name" in done.stdout, done.stdout)
     done = run(s, "submit", "-", "--wait", "--baseline", baseline, body=SCENE, code=3)
     check("it has some load cases" in done.stdout, done.stdout)
     matrices = submitted(s, MATRICES)

@@ -249,8 +249,9 @@ def test_other_values_become_jobs(server):
     ids = run(server.url, "submit", PAPER, "--vary", "materials.0.young=1e3,2e3", "--tag", "metals").stdout.split()
     listed = run(server.url, "list", "--tag", "metals", "--quiet").stdout.split()
     check(len(ids) == 2 and len(listed) == 4 and set(ids) <= set(listed), ids, listed)
-    again = [run(server.url, "submit", PAPER, "--vary", "thickness=1,2", "--key", "k", "--tag", "t").stdout for _ in range(2)]
-    check(again[0] == again[1] and len(set(again[0].split())) == 2, again)
+    again = [run(server.url, "submit", PAPER, "--vary", "thickness=1,2", "--key", key, *tags).stdout
+             for key, tags in (("k", ["--tag", "t"]), ("untagged", [])) for _ in range(2)]
+    check(again[0] == again[1] and again[2] == again[3] and len(set(" ".join(again).split())) == 4, again)
 
 
 def test_the_worst_of_several_is_the_exit_status(server):

@@ -287,6 +287,8 @@ def test_github_actions_of_a_pull_request(_):
         done = run_github(repository, GITHUB_BASE_REF="main")
         check(done.returncode != 0 and "more than 0.001" in done.stdout, done)
         check(repository.reports()["plate.xml"] > 0 and repository.reports()["springs.xml"] == 0, repository.reports())
+        done = run_github(repository, GITHUB_BASE_REF="gone")
+        check(done.returncode != 0 and "origin/gone is no revision" in done.stderr, done)
 
 
 def run_gitlab(repository, **environment):

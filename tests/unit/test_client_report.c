@@ -250,6 +250,20 @@ TEST(summary_without_certificate_says_so)
     json_decref(job);
 }
 
+TEST(bounds_are_never_shown_smaller)
+{
+    static const struct {
+        double bound;
+        const char *text;
+    } SHOWN[] = {{1.449e-8, "1.5e-08"}, {1.4e-8, "1.4e-08"}, {9.99e-3, "0.01"}, {0, "0"},
+                 {0.95, "0.95"},        {123.4, "1.3e+02"}};
+    char text[32];
+    for (size_t i = 0; i < sizeof SHOWN / sizeof SHOWN[0]; i++)
+        CHECK_STR(client_format_bound(text, SHOWN[i].bound), SHOWN[i].text);
+    for (double bound = 1e-12; bound < 10; bound *= 1.0371)
+        CHECK(strtod(client_format_bound(text, bound), NULL) >= bound && strtod(text, NULL) < 1.11 * bound);
+}
+
 TEST(exit_codes_follow_status_and_outcome)
 {
     static const struct {

@@ -8,16 +8,22 @@ tolerance=${TOLERANCE:-1e-3}
 failed=0
 mkdir -p "$reports"
 
-# The id of the same scene's job as it was in the revision; nothing where it was not there.
+if [ -n "$revision" ] && ! git -C "$folder" rev-parse --verify --quiet "$revision^{commit}" >/dev/null; then
+    echo "$revision is no revision of this checkout: nothing can be compared" >&2
+    exit 2
+fi
+
+# The id of the same scene's job as it was in the revision, however it ended: --baseline judges what it is worth.
 baseline_of() { # SCENE
-    git show "$revision:./$1" 2>/dev/null | uzawa submit - --wait --quiet
+    git -C "$folder" show "$revision:./$1" | uzawa submit - --wait --quiet
 }
 
 for scene in "$folder"/*.json; do
     name=$(basename "$scene" .json)
     compare=()
-    if [ -n "$revision" ] && git cat-file -e "$revision:./$scene" 2>/dev/null && id=$(baseline_of "$scene"); then
-        compare=(--baseline "$id" --tolerance "$tolerance")
+    if [ -n "$revision" ] && git -C "$folder" cat-file -e "$revision:./$name.json" 2>/dev/null; then
+        id=$(baseline_of "$name.json")
+        if [ -n "$id" ]; then compare=(--baseline "$id" --tolerance "$tolerance"); else failed=1; fi
     fi
     echo "== $name"
     uzawa submit "$scene" --wait --tag ci --junit "$reports/$name.xml" "${compare[@]}" || failed=1

@@ -8,6 +8,8 @@
 const ENDED = ["successful", "failed", "dismissed"];
 const pause = (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds));
 
+const key = () => Array.from({ length: 32 }, () => Math.floor(16 * Math.random()).toString(16)).join("");
+
 /** The service's reason (RFC 9457): problem has status, code, detail and a JSON pointer into the request. */
 export class Refused extends Error {
   constructor(problem) {
@@ -37,7 +39,8 @@ export class Uzawa {
       const reply = await fetch(this.server + path, options).catch((error) => error);
       const busy = reply instanceof Error || [429, 502, 503, 504].includes(reply.status);
       if (!busy && reply.ok) return reply;
-      if (!busy || Date.now() > deadline) {
+      const once = method === "DELETE" && reply instanceof Error; // the first dismisses, a second would delete
+      if (!busy || once || Date.now() > deadline) {
         if (reply instanceof Error) throw reply;
         throw new Refused(await reply.json().catch(() => ({ detail: `HTTP status ${reply.status}` })));
       }
@@ -51,8 +54,7 @@ export class Uzawa {
 
   /** Posts a job. The key makes a repeat after a lost connection the same job. */
   submit(request, wait = 0) {
-    const key = Array.from({ length: 32 }, () => Math.floor(16 * Math.random()).toString(16)).join("");
-    return this.call("POST", "/v1/jobs", request, { "Idempotency-Key": key, ...(wait ? { Prefer: `wait=${wait}` } : {}) });
+    return this.call("POST", "/v1/jobs", request, { "Idempotency-Key": key(), ...(wait ? { Prefer: `wait=${wait}` } : {}) });
   }
 
   /** Long polls until the job has ended. */
@@ -70,7 +72,7 @@ export class Uzawa {
 
   /** Certifies an answer from elsewhere; the result, whose summary has the certificate. */
   verify(request) {
-    return this.call("POST", "/v1/verify", request, { Prefer: "wait=60" });
+    return this.call("POST", "/v1/verify", request, { "Idempotency-Key": key(), Prefer: "wait=60" });
   }
 
   /** Server-Sent Events as [name, data], until the job has ended. EventSource does the same where no token is needed. */

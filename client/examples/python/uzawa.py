@@ -35,9 +35,9 @@ class Uzawa:
         data = None if body is None else json.dumps(body).encode()
         if data is not None:
             headers["Content-Type"] = "application/json"
-        if self.token:
-            headers["Authorization"] = f"Bearer {self.token}"
         request = urllib.request.Request(self.server + path, data, headers, method=method)
+        if self.token:  # not to where a redirection points
+            request.add_unredirected_header("Authorization", f"Bearer {self.token}")
         deadline = time.monotonic() + self.patience_s
         while True:
             try:
@@ -51,7 +51,7 @@ class Uzawa:
                         raise Refused({"status": error.code, "detail": text.decode(errors="replace")}) from None
                 time.sleep(pause)
             except (urllib.error.URLError, ConnectionError):
-                if time.monotonic() > deadline:
+                if method == "DELETE" or time.monotonic() > deadline:  # the first dismisses, a second would delete
                     raise
                 time.sleep(0.5)
 
@@ -79,7 +79,7 @@ class Uzawa:
 
     def verify(self, request):
         """Certifies an answer from elsewhere; the result, whose summary has the certificate."""
-        return self.call("POST", "/v1/verify", request, Prefer="wait=60")
+        return self.call("POST", "/v1/verify", request, Idempotency_Key=uuid.uuid4().hex, Prefer="wait=60")
 
     def events(self, job_id):
         """Server-Sent Events: pairs of a name ("status", "progress") and its data, until the job has ended. After a lost

@@ -10,8 +10,10 @@ id=$(jq --argjson first "$2" --argjson last "$3" --argjson n "$4" '
         .problem.loads as $loads
         | .cases = [range($n) | ($first + ($last - $first) * . / ([$n - 1, 1] | max)) as $t
                     | {name: "\($t)", loads: ($loads | .[0].traction[1] = $t)}]' "$1" |
-    call "$server/v1/jobs" -H 'Content-Type: application/json' --data-binary @- | jq -r .id)
+    call "$server/v1/jobs" -H 'Content-Type: application/json' -H "Idempotency-Key: $(od -An -N16 -tx1 /dev/urandom | tr -d ' ')" \
+        --data-binary @- | jq -r .id)
 until call "$server/v1/jobs/$id" -H 'Prefer: wait=30' | jq -e '.status != "accepted" and .status != "running"' >/dev/null; do :; done
 call "$server/v1/jobs/$id/result?fields=summary" | jq -r '
     ["traction", "contacts", "max_pressure", "certified_error"],
     (.cases[] | [.name, .summary.contact.active, .summary.contact.max_pressure, .summary.certificate.relative_error]) | @csv'
+call "$server/v1/jobs/$id" | jq -e '.summary.outcome == "converged"' >/dev/null
