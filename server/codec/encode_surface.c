@@ -373,6 +373,10 @@ static void put_json(surface_writer *w)
     v.displacement = add_array(w, FLOAT, VERTEX_DATA, s->displacement, s->n_vertices, 3);
     v.node = add_array(w, FLOAT, VERTEX_DATA, s->node, s->n_vertices, 1);
     v.von_mises = add_array(w, FLOAT, VERTEX_DATA, s->von_mises.x, s->n_vertices, 1);
+    if (v.position == NONE || v.displacement == NONE) {
+        t->failed = true; /* glTF has no mesh without vertices */
+        return;
+    }
     w->arrays[v.position].low = s->low;
     w->arrays[v.position].high = s->high;
     w->arrays[v.displacement].low = s->least;

@@ -145,10 +145,20 @@ static void judge_value(codec_finding *out, const codec_assertion *a, const json
     }
 }
 
+/* Outcomes that no case had are not in a summary. */
+static bool read_value(double *value, const json_t *summary, const char *quantity)
+{
+    if (quantity_read(value, summary, quantity))
+        return true;
+    const bool none = strncmp(quantity, "cases.", 6) == 0 && json_object_get(summary, "cases");
+    *value = none ? 0.0 : (double)NAN;
+    return none;
+}
+
 static codec_finding judge_one(const codec_assertion *a, const json_t *summary)
 {
     codec_finding out = {.verdict = CODEC_FAIL, .value = NAN, .error = NAN, .margin = -INFINITY};
-    if (quantity_read(&out.value, summary, a->quantity))
+    if (read_value(&out.value, summary, a->quantity))
         judge_value(&out, a, summary);
     else
         snprintf(out.reason, sizeof out.reason, "the summary of this job has no such number");

@@ -201,7 +201,8 @@ static double warning_value(const json_t *warnings, step s)
     {
         const char *code = json_string_value(json_object_get(item, "code"));
         if (code && step_is(s, code))
-            return json_number_value(json_object_get(item, "value"));
+            return json_is_number(json_object_get(item, "value")) ? json_number_value(json_object_get(item, "value"))
+                                                                  : (double)NAN;
     }
     return 0.0;
 }

@@ -95,13 +95,18 @@ static bool add_other(curve_list *list, api *context, const char *text, size_t l
     snprintf(id, sizeof id, "%.32s", text);
     if (len > 33)
         snprintf(case_name, sizeof case_name, "%.*s", (int)(len - 33), text + 33);
+    const char *own = reply->job;
     store_status status = store_get(context->store, id, &other);
+    if (status == STORE_OK && other.damaged)
+        status = STORE_DAMAGED;
+    reply->job = id; /* a failure is about this one, and told at once */
     bool done = status == STORE_OK && add_job(list, context, &other, case_name[0] ? case_name : NULL, reply);
     job_clear(&other);
     if (status == STORE_NOT_FOUND)
-        return refuse_with(reply, 404, "job_not_found", "there is no job %.*s; with names up to %d of them", text, len);
-    if (status != STORE_OK)
+        refuse_with(reply, 404, "job_not_found", "there is no job %.*s; with names up to %d of them", text, len);
+    else if (status != STORE_OK)
         reply_store_failure(context, status, reply);
+    reply->job = own;
     return done;
 }
 

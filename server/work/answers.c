@@ -64,6 +64,8 @@ static void add_vectors(answer_parts *to, const uz_result *result, bool is_scene
 static void add_trade(answer_parts *to, const uz_result *result, const uz_trade *earlier)
 {
     uz_trade trade = result->trade;
+    if (earlier && !(earlier->total_s > 0.0))
+        return; /* what went before is not known: nothing can be told of the whole */
     if (earlier)
         trade_join(&trade, earlier);
     add_vector(to, TRADE_VECTOR, to->trade, trade_pack(to->trade, &trade));

@@ -367,6 +367,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
 {
     run r = {.me = me, .job = claimed, .began = work_clock()};
     run_end end = END_FINISH;
+    me->told = -1;                                       /* of the job before */
     double waited = claimed->started - claimed->created; /* by the clock on the wall, which may be set back */
     r.queue_s = waited > 0.0 ? waited : 0.0;
     log_write(me->w->log, LOG_INFO, "job_started",

@@ -46,7 +46,7 @@ static store_status load_history(double **rows, int64_t *count, store *s, const 
     return status == STORE_NOT_FOUND ? STORE_OK : status;
 }
 
-/* What accuracy took that run; nothing where it was not recorded. */
+/* What accuracy took that run; nothing where it was not recorded, or is damaged: an answer does not need it. */
 static store_status load_trade(uz_trade *out, store *s, const char *id, int64_t number)
 {
     double *x = NULL;
@@ -54,7 +54,7 @@ static store_status load_trade(uz_trade *out, store *s, const char *id, int64_t 
     store_status status = store_get_vector(s, id, number, TRADE_VECTOR, &x, &count);
     trade_unpack(out, x, status == STORE_OK ? count : 0);
     free(x);
-    return status == STORE_NOT_FOUND ? STORE_OK : status;
+    return status == STORE_NOT_FOUND || status == STORE_DAMAGED ? STORE_OK : status;
 }
 
 /* The number of the case that the request names; 0: the job has no cases. */

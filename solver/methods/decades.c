@@ -4,8 +4,9 @@
 
 #include <math.h>
 
-/* Of a partial run (decades.h): with b <= KEPT t and c <= ALL t the error relative to the norm of the solution on all
- * rows, which is that on the rows kept within 2c, is at most (b + 2c) / (1 - 2c) <= t for every t <= 1. */
+/* Of a partial run (decades.h): the solution on the rows kept is within c of that on all rows, for half the square of
+ * their distance is at most the gap. So with b <= KEPT t and c <= ALL t the error is at most b (1 + c) + c <= t for
+ * every t <= 1. */
 #define KEPT 0.85
 #define ALL  0.05
 

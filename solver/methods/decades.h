@@ -22,8 +22,8 @@ void uz_decades_note(uz_decades *d, double bound, int64_t iterations, int64_t ap
  * do not confirm them. */
 void uz_decades_certify(uz_decades *d, double bound, int64_t iterations, int64_t applications);
 /* The same by the first certificate about all rows of a partial run. With c its bound and b that of an iterate on the
- * rows kept, whose solution is within 2c of that on all rows, the iterate is within b + 2c: what was noted stands where
- * that is enough. */
+ * rows kept, whose solution is within c of that on all rows, the iterate is within b (1 + c) + c: what was noted stands
+ * where that is enough. */
 void uz_decades_widen(uz_decades *d, double bound, int64_t iterations, int64_t applications);
 /* What is above this bound stands; NaN: nothing. */
 void uz_decades_drop(uz_decades *d, double bound);

@@ -290,6 +290,8 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
     uz_status status = uz_skin_build(&w->skin, mesh, hooks, err);
     if (status == UZ_OK)
         status = number_vertices(s, w, err);
+    if (status == UZ_OK && s->n_vertices == 0)
+        status = uz_fail(err, UZ_ERR_SCENE, "/mesh", "every side lies between two elements: there is no surface");
     if (status == UZ_OK) {
         count_triangles(s, &w->skin);
         status = check_size(s, w, most_bytes, err); /* edges take several times as much while they are found */

@@ -64,6 +64,9 @@ static void set_pixel(uz_raster *raster, int64_t at, double z, const unsigned ch
     raster->rgba[4 * at + 3] = 255;
 }
 
+/* Beyond this many pixels nothing is drawn: coordinates of pixels are ints. */
+#define FAR 1e8
+
 /* Twice the signed area of a, b and the point (x, y). */
 static double edge(const uz_raster_point *a, const uz_raster_point *b, double x, double y)
 {
@@ -81,7 +84,8 @@ void uz_raster_triangle(uz_raster *raster, const uz_raster_point p[3], double li
 {
     int x0, x1, y0, y1;
     const double area = edge(&p[0], &p[1], p[2].x, p[2].y);
-    if (!isfinite(area) || area == 0 || !(fabs(p[0].x) + fabs(p[1].x) + fabs(p[2].x) < 1e8))
+    if (!isfinite(area) || area == 0 || !(fabs(p[0].x) + fabs(p[1].x) + fabs(p[2].x) < FAR) ||
+        !(fabs(p[0].y) + fabs(p[1].y) + fabs(p[2].y) < FAR))
         return;
     clip_range(&x0, &x1, p[0].x, p[1].x, p[2].x, raster->width);
     clip_range(&y0, &y1, p[0].y, p[1].y, p[2].y, raster->height);

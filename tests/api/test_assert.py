@@ -223,12 +223,13 @@ def test_client_tells_other_ends_first(s):
 
 def test_report_of_cases(s):
     asserted = [{"quantity": "contact.max_pressure", "max": 0.1, "name": "a < b & \"c\""},
-                {"quantity": "cases.converged", "min": 2}]
+                {"quantity": "cases.converged", "min": 2}, {"quantity": "cases.time_limit", "max": 0}]
     report, done = report_of(s, {**SCENE, "cases": CASES, "assert": asserted}, code=3)
     check("(case heavy)" in done.stdout, done.stdout)
     found = [(case.get("classname").partition(".")[2], case.get("name"), case[0].tag) for case in report.iter("testcase")]
     name = 'a < b & "c"'
     check(found == [("", "converged", "system-out"), ("", "cases.converged at least 2", "system-out"),
+                    ("", "cases.time_limit at most 0", "system-out"),
                     ("light", "converged", "system-out"), ("light", name, "system-out"),
                     ("heavy", "converged", "system-out"), ("heavy", name, "failure")], found)
 

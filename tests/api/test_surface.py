@@ -277,4 +277,38 @@ def test_a_body_without_contacts(s):
     check(len(glb.indices(0, TRIANGLES)) == 600, "triangles")
 
 
+def test_obstacle_far_away_is_left_out_of_the_picture(s):
+    """Pixels beyond the range of ints are not painted, row by row, for days."""
+    request = {"problem": {"kind": "scene", "model": "solid",
+                           "mesh": {"box": {"size": [1, 1, 1], "cells": [2, 2, 2], "element": "hex8"}},
+                           "materials": [{"on": "all", "young": 1e3, "poisson": 0.3}],
+                           "supports": [{"on": "top", "ux": 0, "uy": 0, "uz": 0}],
+                           "loads": [{"on": "bottom", "traction": [0, -1, 0]}],
+                           "contacts": [{"on": "bottom", "obstacle": {"plane": {"point": [0, -1e8, 0], "normal": [0, 1, 0]}}}]}}
+    job = s.solve(request)
+    picture = expect(s.get(f"/v1/jobs/{job['id']}/deformed.svg"), 200)
+    check(b"<svg" in picture.body[:200], picture.body[:200])
+    expect(s.get(f"/v1/jobs/{job['id']}/surface"), 200)
+
+
+def test_body_without_a_surface(s):
+    """Five tetrahedra between five nodes, each side of which lies between two of them."""
+    nodes = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.2, 0.2]]
+
+    def volume(a, b, c, d):
+        (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = ([nodes[k][i] - nodes[a][i] for i in range(3)] for k in (b, c, d))
+        return ux * (vy * wz - vz * wy) - uy * (vx * wz - vz * wx) + uz * (vx * wy - vy * wx)
+
+    tets = [[k for k in range(5) if k != left] for left in range(5)]
+    tets = [tet if volume(*tet) > 0 else [tet[1], tet[0], *tet[2:]] for tet in tets]
+    request = {"problem": {"kind": "scene", "model": "solid",
+                           "mesh": {"nodes": nodes, "elements": {"tet4": tets}, "groups": {"three": {"nodes": [0, 1, 2]}}},
+                           "materials": [{"on": "all", "young": 1e3, "poisson": 0.3}],
+                           "supports": [{"on": "three", "ux": 0, "uy": 0, "uz": 0}],
+                           "loads": [{"node": 3, "force": [0, 0, 1]}], "contacts": []}}
+    job = s.solve(request)
+    problem = s.get(f"/v1/jobs/{job['id']}/surface")
+    check(400 <= problem.status < 500 and "no surface" in problem.json["detail"], problem.status, problem.json)
+
+
 service.main(globals())
