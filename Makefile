@@ -248,7 +248,7 @@ test-hygiene: ## formatting, static analysis, both compilers
 # Each sanitizer has a build of its own inside BUILD.
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
-TSAN_UNIT = $(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC))))
+TSAN_UNIT = $(filter-out test_trade,$(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC)))))
 TSAN_API  = $(filter-out $(addprefix test_,assert bad_input bench_tools cases client client_faults client_manual \
             client_outputs client_requests config examples fields gallery job_limits ladder load_cases memory numbers peers \
             readme reference refine schemas semicoercive soak surface terminal trade verify), \
