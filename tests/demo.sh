@@ -13,8 +13,8 @@ start_daemon
 body=tests/data/paper_body_120.json
 
 step "A steel plate, 60 x 20 x 5 mm in 120 x 40 elements, pressed on a rigid plane: $body"
-job=$("$build/uzawa" submit "$body" --wait --quiet --progress)
-"$build/uzawa" status "$job"
+job=$("$build/uzawa" submit "$body")
+"$build/uzawa" wait "$job" --progress
 
 step "How the answer converged"
 "$build/uzawa" history "$job" --plot

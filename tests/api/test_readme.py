@@ -98,5 +98,14 @@ def test_blocks_are_found(_):
     check(json_values(' {"a": 1}\n[2]\n') == [{"a": 1}, [2]] and json_values("iteration,seconds\n") == [])
 
 
+@options(None)
+def test_demo(_):
+    """What `make demo` runs, of which the first lines of the README speak."""
+    done = subprocess.run(["tests/demo.sh", str(pathlib.Path(sys.argv[1]).resolve())], cwd=ROOT, capture_output=True,
+                          text=True, timeout=120)
+    check(done.returncode == 0, done)
+    check("outcome     converged" in done.stdout and "from the cache" in done.stdout and "status 0" in done.stdout, done)
+
+
 if __name__ == "__main__":
     service.main(globals())
