@@ -1,4 +1,5 @@
 #include "codec/codec.h"
+#include "codec/json_doc.h"
 #include "codec/problem.h"
 
 #include <jansson.h>
@@ -19,17 +20,21 @@ int codec_closest(const char *name, const char *const *candidates, size_t count)
 bool codec_decode_problem(problem_details *out, const char *json)
 {
     memset(out, 0, sizeof *out);
-    json_t *object = json_loads(json, JSON_REJECT_DUPLICATES, NULL);
+    json_doc doc; /* jansson's own parser ends the process where it has no memory */
+    problem_details why;
+    if (!json_scan(&doc, json, strlen(json), &why))
+        return false;
+    const json_t *object = doc.root;
     if (!json_is_object(object)) {
-        json_decref(object);
+        json_doc_clear(&doc);
         return false;
     }
-    out->status = (int)json_integer_value(json_object_get(object, "status"));
-    out->line = json_integer_value(json_object_get(object, "line"));
+    out->status = (int)json_number_value(json_object_get(object, "status")); /* each number of a scan is a real */
+    out->line = (int64_t)json_number_value(json_object_get(object, "line"));
     copy_member(out->code, sizeof out->code, object, "code");
     copy_member(out->title, sizeof out->title, object, "title");
     copy_member(out->detail, sizeof out->detail, object, "detail");
     copy_member(out->pointer, sizeof out->pointer, object, "pointer");
-    json_decref(object);
+    json_doc_clear(&doc);
     return true;
 }

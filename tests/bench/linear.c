@@ -1,27 +1,11 @@
 /* linear.c: what a contact solve is compared with: CHOLMOD's own solve of the same K, as a user of CHOLMOD would
  * call it, with its supernodal LL' and one CHOLMOD thread (see solver/core/process.c). */
 #include "bench.h"
+#include "cholmod_view.h"
 #include "core/clock.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <suitesparse/cholmod.h>
-
-static cholmod_sparse view(const uz_csc *K)
-{
-    cholmod_sparse A;
-    memset(&A, 0, sizeof A);
-    A.nrow = A.ncol = (size_t)K->cols;
-    A.nzmax = (size_t)K->ptr[K->cols];
-    A.p = K->ptr;
-    A.i = K->idx;
-    A.x = K->val;
-    A.stype = -1;
-    A.itype = CHOLMOD_LONG;
-    A.xtype = CHOLMOD_REAL;
-    A.sorted = A.packed = 1;
-    return A;
-}
 
 bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering ordering)
 {
@@ -30,7 +14,7 @@ bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering orde
     cholmod_l_start(&common);
     common.nmethods = 1;
     common.method[0].ordering = ordering == BENCH_AMD ? CHOLMOD_AMD : CHOLMOD_METIS;
-    cholmod_sparse A = view(K);
+    cholmod_sparse A = cholmod_view(K);
     cholmod_dense *b = cholmod_l_allocate_dense((size_t)K->cols, 1, (size_t)K->cols, CHOLMOD_REAL, &common);
     memcpy(b->x, p, (size_t)K->cols * sizeof *p);
     double start = uz_seconds();

@@ -1,7 +1,6 @@
 /* clp.c: the barrier of COIN-OR's CLP through its C interface. Rows of one entry are bounds on the columns. Methods:
  * "barrier", which stops there, and "crossover", which goes on to an active set with the simplex method for QPs. */
 #include "core/alloc.h"
-#include "peers/files.h"
 #include "peers/peer.h"
 
 #include <float.h>
@@ -121,18 +120,11 @@ static void solve(peer_answer *answer, void *ctx, const char *method, double tol
 
 #else
 
-static void solve(peer_answer *answer, void *ctx, const char *method, double tolerance, const char *file)
-{
-    (void)ctx, (void)method, (void)tolerance, (void)file;
-    peer_fail(answer, "not installed");
-}
+static const peer_method solve = peer_not_installed;
 
 #endif
 
 int main(int argc, char **argv)
 {
-    uz_qp qp = {0};
-    int status = argc == 2 && peers_read_problem(&qp, argv[1]) ? peer_serve(&qp, solve, &qp) : 2;
-    uz_qp_clear(&qp);
-    return status;
+    return peer_main(argc, argv, solve);
 }

@@ -1,11 +1,11 @@
 /* condense.c: the dual problem that solvers of complementarity and bound-constrained problems get: D and g0, as a user
  * of CHOLMOD would form them: one factorization, and N' as right-hand sides in blocks that keep its BLAS 3 busy. */
+#include "cholmod_view.h"
 #include "core/alloc.h"
 #include "peers/lab.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <suitesparse/cholmod.h>
 
 enum { BLOCK = 32 };
 
@@ -15,26 +15,10 @@ struct lab_factor {
     int64_t d;
 };
 
-static cholmod_sparse view_of(const uz_csc *K)
-{
-    cholmod_sparse A;
-    memset(&A, 0, sizeof A);
-    A.nrow = A.ncol = (size_t)K->cols;
-    A.nzmax = (size_t)K->ptr[K->cols];
-    A.p = K->ptr;
-    A.i = K->idx;
-    A.x = K->val;
-    A.stype = -1;
-    A.itype = CHOLMOD_LONG;
-    A.xtype = CHOLMOD_REAL;
-    A.sorted = A.packed = 1;
-    return A;
-}
-
 lab_factor *lab_factor_new(const uz_csc *K)
 {
     lab_factor *factor = uz_alloc_zero(1, sizeof *factor);
-    cholmod_sparse A = view_of(K);
+    cholmod_sparse A = cholmod_view(K);
     if (!factor)
         return NULL;
     factor->d = K->cols;

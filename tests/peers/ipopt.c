@@ -3,7 +3,6 @@
  * default of 1e-8 is a length in whatever units the problem has), and mehrotra_algorithm is what the manual offers for
  * convex QPs: methods "mehrotra" and "default". */
 #include "core/alloc.h"
-#include "peers/files.h"
 #include "peers/peer.h"
 
 #include <stdio.h>
@@ -210,18 +209,11 @@ static void solve(peer_answer *answer, void *ctx, const char *method, double tol
 
 #else
 
-static void solve(peer_answer *answer, void *ctx, const char *method, double tolerance, const char *file)
-{
-    (void)ctx, (void)method, (void)tolerance, (void)file;
-    peer_fail(answer, "not installed");
-}
+static const peer_method solve = peer_not_installed;
 
 #endif
 
 int main(int argc, char **argv)
 {
-    uz_qp qp = {0};
-    int status = argc == 2 && peers_read_problem(&qp, argv[1]) ? peer_serve(&qp, solve, &qp) : 2;
-    uz_qp_clear(&qp);
-    return status;
+    return peer_main(argc, argv, solve);
 }

@@ -124,3 +124,17 @@ void peer_bounds_reactions(double *r, const peer_bounds *bounds, const uz_qp *qp
                 r[row] = f[j] / qp->N.val[k];
     }
 }
+
+void peer_not_installed(peer_answer *answer, void *ctx, const char *method, double tolerance, const char *file)
+{
+    (void)ctx, (void)method, (void)tolerance, (void)file;
+    peer_fail(answer, "not installed");
+}
+
+int peer_main(int argc, char **argv, peer_method solve)
+{
+    uz_qp qp = {0};
+    int status = argc == 2 && peers_read_problem(&qp, argv[1]) ? peer_serve(&qp, solve, &qp) : 2;
+    uz_qp_clear(&qp);
+    return status;
+}

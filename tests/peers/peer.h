@@ -29,6 +29,10 @@ double peer_seconds(void);
 
 /* Answers the lines of standard input; the exit status of the program. */
 int peer_serve(const uz_qp *qp, peer_method solve, void *ctx);
+/* The same of the problem that the command line names, which is also ctx. */
+int peer_main(int argc, char **argv, peer_method solve);
+/* What a program is without its library: no answer. */
+void peer_not_installed(peer_answer *answer, void *ctx, const char *method, double tolerance, const char *file);
 
 /* Each row of N has one entry: rows are bounds. lower, upper (d): the tightest; by_lower, by_upper (d): the row that
  * each comes from, -1: none, and the bound is -+`infinity`. False, with nothing to free, where a row is none, or
