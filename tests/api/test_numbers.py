@@ -280,7 +280,7 @@ def test_peers_are_drawn_where_certified(s):
     check(">a</text>" in draw.sizes(data, rows) and ">a</text>" not in draw.sizes(data, []))
 
 
-PEERS = {"machine": {"packages": {"octave": "7.3"}}, "time_limit_s": 60,
+PEERS = {"packages": {"octave": "7.3"}, "time_limit_s": 60,
          "runs": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "asked": 1e-7, "seconds": 2.0, "certified": 1e-8, "status": "ok"}],
          "results": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "tolerance": 1e-6, "success": True, "seconds": 2.0, "certified": 1e-8, "why": ""},
                      {"problem": "cases/A", "d": 6, "m": 3, "solver": "x", "tolerance": 1e-6, "success": False, "seconds": None, "certified": None,

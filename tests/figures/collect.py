@@ -74,8 +74,8 @@ def peers(raw):
     for row in raw["results"]:
         family, _, size = row["problem"].partition("/")
         rows.append({**row, **({"nx": int(size)} if family == "body" else {})})
-    return {"time_limit_s": raw["time_limit_s"], "packages": raw["machine"].get("packages", {}), "rows": rows, "runs": raw["runs"],
-            "means": raw["means"], "body": raw["body"], "profiles": raw["profiles"]}
+    return {"time_limit_s": raw["time_limit_s"], "packages": raw["packages"], "problems": raw.get("problems", []), "rows": rows,
+            "runs": raw["runs"], "means": raw["means"], "body": raw["body"], "profiles": raw["profiles"]}
 
 
 def alone(make):
