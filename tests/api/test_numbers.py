@@ -185,7 +185,10 @@ def test_measured_by_parts(s):
     with tempfile.TemporaryDirectory() as folder:
         first = run(folder, '{"ratios": [{"name": "a", "median": 1}, {"name": "b", "median": 2}], "instructions": []}')
         check(first["stamp"]["cores"] >= 1 and "stamp" not in first["ratios"][0], first)
+        path = pathlib.Path(folder) / "bench.json"
+        path.write_text(json.dumps({**first, "stamp": {**first["stamp"], "load": 99}}))
         second = run(folder, '{"ratios": [{"name": "b", "median": 3}]}', "--part")
+        check(second["ratios"][0]["stamp"]["load"] == 99 and second["stamp"]["load"] == second["ratios"][1]["stamp"]["load"] != 99, second)
         check([(row["name"], row["median"]) for row in second["ratios"]] == [("a", 1), ("b", 3)] and second["ratios"][1]["stamp"]["commit"], second)
         check(second["instructions"] == [], second)
         check(run(folder, "not JSON", "--part", status=3) == second)

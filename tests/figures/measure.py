@@ -17,10 +17,11 @@ ROWS = {"bench": ("ratios", "name"), "bench-size": ("sizes", "d")}  # programs w
 
 
 def merged(name, new, old):
-    """The old rows with the new ones in their places; the new stamp stands in each new row too."""
+    """The old rows with the new ones in their places; each has the stamp of its own run."""
     key, by = ROWS[name]
-    rows = {row[by]: row for row in old.get(key, [])}
-    rows.update({row[by]: {**row, "stamp": stamp.brief(new["stamp"])} for row in new[key]})
+    rows = {}
+    for one in (old, new):
+        rows.update({row[by]: {"stamp": stamp.brief(one.get("stamp", {})), **row} for row in one.get(key, [])})
     return {**old, **new, key: list(rows.values())}
 
 

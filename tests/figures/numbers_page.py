@@ -29,6 +29,9 @@ COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "mak
 ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems"}  # what is measured by parts
 
 
+TIMED = ("figures", "bench", "bench_size", "soak", "peers")  # what other programs on the machine can change
+
+
 def timed(make, name, key=None, shown=("",)):
     """A table of times, with a note where it was measured beside other work."""
     def lines(data):
@@ -98,7 +101,7 @@ def machine_lines(data):
             origin = ", from an earlier README" if any(one.get("origin") for one in found) else ""
             rows.append([f"`{command}`", tables.span(one.get("measured") for one in found) + origin, ", ".join(f"`{one}`" for one in commits),
                          tables.span((one.get("load") for one in found), tables.sig), tables.span((one.get("others") for one in found), tables.sig),
-                         "yes" if any(stamp.beside_other_work(one) for one in found) else "no",
+                         tables.NONE if name not in TIMED else "yes" if any(stamp.beside_other_work(one) for one in found) else "no",
                          f"{m['processor']}, {m['cores']} cores, {m['memory_bytes'] / 2**30:.0f} GiB; {m['system']}",
                          ", ".join([f"gcc {m['compiler']}"] + [f"{k} {v}" for k, v in m["packages"].items() if k != "gcc"])])
     return tables.table(["measured by", "when", "commit", "load", "processors of others", "beside other work", "machine", "versions"], rows)
