@@ -311,9 +311,9 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 
-extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json
+extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json; FILTER=name: some, into extremes-part.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
-	@$(call measured,extremes) $(BUILD)/extremes $(BUILD)/extremes.json $(FILTER)
+	@$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER)
 
 theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table and build/theory.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory
@@ -324,7 +324,7 @@ page-size: $(BUILD)/gen/page.c
 
 figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes; FILTER="precision hertz" renews a part
 	@$(MAKE) --no-print-directory -s $(BUILD)/figures
-	@$(call measured,figures) $(BUILD)/figures $(BUILD)/figures.json $(FILTER)
+	@$(call measured,figures $(if $(FILTER),--part)) $(BUILD)/figures $(BUILD)/figures.json $(FILTER)
 	@$(MAKE) --no-print-directory -s page-size
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 

@@ -117,7 +117,8 @@ def collect(build, folder):
         except ValueError:
             print(f"{source}: not whole, left out")
             continue
-        old, when = json.loads(target.read_text()) if target.exists() else None, stamp_of(raw, source)
+        whole = raw.pop("whole", False)  # then rows that are not there any more go
+        old, when = json.loads(target.read_text()) if target.exists() and not whole else None, stamp_of(raw, source)
         data = kind(raw, old, when)
         folder.mkdir(parents=True, exist_ok=True)
         target.write_text(dump({"machine": when, **data}))

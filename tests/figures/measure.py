@@ -2,8 +2,8 @@
 
 usage: measure.py BUILD NAME [--part] COMMAND...
 
---part: the program measures some of its rows; the others stay as they were, each with its own stamp. The exit status is the
-command's: where it fails, the file is what it was and BUILD/NAME.failed.json what the program wrote.
+--part: the program measures some of its rows; the others stay as they were, each with its own stamp. A file that has all rows of
+one run, or had them before a part was renewed, says "whole". The exit status is the command's: where it fails, the file is what it was and BUILD/NAME.failed.json what the program wrote.
 """
 import json
 import pathlib
@@ -22,7 +22,7 @@ def merged(name, new, old):
     rows = {}
     for one in (old, new):
         rows.update({row[by]: {"stamp": stamp.brief(one.get("stamp", {})), **row} for row in one.get(key, [])})
-    return {**old, **new, key: list(rows.values())}
+    return {**old, **new, "whole": old.get("whole", False), key: list(rows.values())}
 
 
 def main():
@@ -42,7 +42,7 @@ def main():
         if before is not None:
             target.write_bytes(before)
         sys.exit(status)
-    new = {"stamp": {**stamp.machine(), **watch.stamp(ROOT)}, **json.loads(target.read_text())}
+    new = {"stamp": {**stamp.machine(), **watch.stamp(ROOT)}, "whole": not part, **json.loads(target.read_text())}
     stamp.write_whole(target, merged(name, new, json.loads(before)) if part and before and name in ROWS else new)
 
 

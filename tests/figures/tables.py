@@ -401,5 +401,5 @@ def means(data):
 
 def failures(data):
     """Why answers are missing at 1e-6: nothing is dropped."""
-    rows = [[row["problem"], f"`{row['solver']}`", row["why"]] for row in data["peers"]["rows"] if row["tolerance"] == 1e-6 and not row["success"]]
+    rows = [[row["problem"], f"`{row['solver']}`", " ".join(row["why"].split()).replace("|", "/")] for row in data["peers"]["rows"] if row["tolerance"] == 1e-6 and not row["success"]]
     return table(["problem", "solver", "why there is no answer certified to 1e-6"], rows) if rows else []
