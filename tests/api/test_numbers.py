@@ -208,6 +208,24 @@ def test_measured_by_parts(s):
 
 
 @options(None)
+def test_of_two_measurements_the_newer_counts(s):
+    """Whatever the times of the files say: a checkout makes new files of old data."""
+    def row(name, value, measured):
+        return {"name": name, "figures": {"lost": value}, "stamp": {"measured": measured}}
+
+    with tempfile.TemporaryDirectory() as name:
+        build, docs = pathlib.Path(name), pathlib.Path(name) / "docs"
+        (build / "soak.json").write_text(json.dumps({"rows": [row("a", 1, "2026-01-02"), row("b", 1, "2026-01-02")]}))
+        (build / "theory.json").write_text(json.dumps({"stamp": {"measured": "2026-01-02"}, "rows": [1]}))
+        check(collect.collect(build, docs) == ["theory", "soak"] and collect.collect(build, docs) == [])
+        (build / "soak.json").write_text(json.dumps({"rows": [row("a", 2, "2026-01-01"), row("b", 2, "2026-01-03")]}))
+        (build / "theory.json").write_text(json.dumps({"stamp": {"measured": "2026-01-01"}, "rows": [2]}))
+        check(collect.collect(build, docs) == ["soak"])
+        check([one["figures"]["lost"] for one in json.loads((docs / "soak.json").read_text())["rows"]] == [1, 2])
+        check(json.loads((docs / "theory.json").read_text())["rows"] == [1])
+
+
+@options(None)
 def test_page_size(s):
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
@@ -308,7 +326,8 @@ def test_other_solvers(s):
     measured()
     with tempfile.TemporaryDirectory() as folder:
         root = copy(folder)
-        (root / "peers.json").write_text(json.dumps(PEERS))
+        when = {**stamp.machine(), "measured": "9999-01-01 00:00 UTC", "commit": "abc", "load": 0.5, "others": 0.0}
+        (root / "peers.json").write_text(json.dumps({**PEERS, "stamp": when}))
         check(collect.collect(root, root / "docs" / "figures") == ["peers"])
         with (root / "README.md").open("a") as readme:
             readme.write("<!-- numbers:peers -->\n<!-- /numbers -->\n")

@@ -23,13 +23,18 @@ def stamped(rows, when):
 
 
 def renewed(key, name, raw, old, when):
-    """{key: rows}: a run of a part renews its own rows only, each of which keeps when and beside what it was measured. name: of the
-    member that tells rows apart."""
-    kept = stamped((old or {}).get(key, []), (old or {}).get("machine", {}))
-    new = stamped(raw.get(key) or [], when)
-    rows = {row[name]: row for row in kept}
-    rows.update({row[name]: row for row in new})
+    """{key: rows}: a run of a part renews its own rows only, each of which keeps when and beside what it was measured; of two the newer
+    counts. name: of the member that tells rows apart."""
+    rows = {}
+    for row in stamped((old or {}).get(key, []), (old or {}).get("machine", {})) + stamped(raw.get(key) or [], when):
+        if row[name] not in rows or not older(row["stamp"], rows[row[name]]["stamp"]):
+            rows[row[name]] = row
     return {key: list(rows.values())}
+
+
+def older(one, other):
+    """By stamps, whose times compare as text."""
+    return one.get("measured", "") < other.get("measured", "")
 
 
 def renewed_rows(key, name="name"):
@@ -105,22 +110,29 @@ def stamp_of(raw, source):
     return raw.pop("stamp", None) or {**stamp.machine(), "measured": stamp.at(source.stat().st_mtime), "commit": "unknown", "load": None}
 
 
+def renew(source, target, kind, by_rows):
+    """True where the data file is another afterwards. by_rows: its rows have stamps of their own."""
+    try:
+        raw = json.loads(source.read_text())
+    except ValueError:
+        print(f"{source}: not whole, left out")
+        return False
+    before = target.read_text() if target.exists() else None
+    old, when = before and json.loads(before), stamp_of(raw, source)
+    whole = raw.pop("whole", False)  # then rows that are not there any more go
+    if old and not by_rows and older(when, old["machine"]):
+        print(f"{source}: older than {target.name}, left out")
+        return False
+    text = dump({"machine": when, **kind(raw, None if whole else old, when)})
+    if text == before:
+        return False
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(text)
+    return True
+
+
 def collect(build, folder):
     """Renews the data of every program that has run since. Returns the names renewed."""
-    renewed_names = []
-    for name, kind in KINDS.items():
-        source, target = pathlib.Path(build) / f"{name}.json", folder / f"{name.replace('-', '_')}.json"
-        if not source.exists() or (target.exists() and target.stat().st_mtime >= source.stat().st_mtime):
-            continue
-        try:
-            raw = json.loads(source.read_text())
-        except ValueError:
-            print(f"{source}: not whole, left out")
-            continue
-        whole = raw.pop("whole", False)  # then rows that are not there any more go
-        old, when = json.loads(target.read_text()) if target.exists() and not whole else None, stamp_of(raw, source)
-        data = kind(raw, old, when)
-        folder.mkdir(parents=True, exist_ok=True)
-        target.write_text(dump({"machine": when, **data}))
-        renewed_names.append(name)
-    return renewed_names
+    sources = {name: pathlib.Path(build) / f"{name}.json" for name in KINDS}
+    return [name for name, kind in KINDS.items() if sources[name].exists() and
+            renew(sources[name], folder / f"{name.replace('-', '_')}.json", kind, name == "soak")]
