@@ -87,6 +87,13 @@ def test_failures_are_listed_and_cost_the_limit(_):
 
 
 @options(None)
+def test_where_the_time_went(_):
+    runs = [{**run("x", 2.0, 1e-9), "setup": 0.5}, run("x", None, None, status="timed out"), run("y", 1.0, 1e-9),
+            {**run("y", None, None, status="not run: timed out at body/60"), "setup": None}]
+    check(peers.spent(runs, 20.0) == {"x": 21.5, "y": 1.0}, peers.spent(runs, 20.0))
+
+
+@options(None)
 def test_stalled_ladder_ends(_):
     check(not peers.stalled([run("x", 1, 1e-2), run("x", 1, 1e-3)]))
     check(not peers.stalled([run("x", 1, 1e-2), run("x", 1, 1e-2), run("x", 1, 1e-3)]))

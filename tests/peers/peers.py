@@ -378,6 +378,17 @@ def print_tables(report):
              stats.number(x["cold"]), stats.number(x["cached_seconds"]), stats.number(x["cached"])]
             for x in report["body"]]
     print(stats.table(head, rows))
+    seconds = spent(report["runs"], report["time_limit_s"])
+    print(f"\nSeconds of processor, each run once: {sum(seconds.values()):.0f}: " + ", ".join(f"{name} {s:.0f}" for name, s in seconds.items()))
+
+
+def spent(runs, limit):
+    """{solver: seconds of processor, each run once, a time-out as the limit}: where the time of a comparison goes."""
+    total = {}
+    for run in runs:
+        timed_out = run["seconds"] is None and run["status"] == "timed out"
+        total[run["solver"]] = total.get(run["solver"], 0.0) + (limit if timed_out else (run["seconds"] or 0.0) - (run["setup"] or 0.0))
+    return dict(sorted(total.items(), key=lambda item: -item[1]))
 
 
 def versions():
