@@ -77,6 +77,7 @@ demo: deps ## install what is missing, build, start the daemon, solve the paper'
 gallery: deps ## solve the five scenes of the gallery: pictures and summaries in build/gallery; KEEP=1: pictures into client/examples too
 	@$(MAKE) --no-print-directory -s all
 	@tests/gallery.sh $(BUILD) $(BUILD)/gallery $(if $(KEEP),--keep)
+	@$(call measured,gallery) $(PYTHON) -B tests/figures/gallery.py $(BUILD)/gallery $(BUILD)/gallery.json
 
 run: deps ## keep the daemon in the foreground on 127.0.0.1:8080 with ./contact.db
 	@$(MAKE) --no-print-directory -s all
@@ -212,7 +213,7 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare bench-size extremes theory figures numbers
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare bench-size extremes theory figures numbers collect page-size
 
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size bench-deps peers extremes theory
 test: deps-test ## build and pass every test
@@ -288,17 +289,20 @@ $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(BUILD)/libparts.a $(BUILD)/libuza
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS_ALL) -fsanitize=fuzzer -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS)
 
+# Runs a program that writes BUILD/NAME.json and stamps that: when, of which commit, beside what.
+measured = $(PYTHON) -B tests/figures/measure.py $(BUILD) $(1)
+
 bench: deps ## measured ratios in one run: a table and build/bench.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
-	@$(BUILD)/bench $(BUILD)/bench.json $(FILTER)
+	@$(call measured,bench $(if $(FILTER),--part)) $(BUILD)/bench $(BUILD)/bench.json $(FILTER)
 	@$(if $(FILTER),,$(MAKE) --no-print-directory -s $(BUILD)/guard && $(PYTHON) -B tests/guard/guard.py $(BUILD) --into $(BUILD)/bench.json)
 
 bench-compare: ## OLD=a.json NEW=b.json: ratios of times and of instructions; fails past THRESHOLD (1.1) and 1.05
 	@$(PYTHON) -B tests/bench/compare.py "$(OLD)" "$(NEW)" $(THRESHOLD)
 
-bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/bench-size.json; minutes
+bench-size: deps ## cost against size, to 2,000,000 dofs: a table and build/bench-size.json; minutes; CELLS="30 42" renews some
 	@$(MAKE) --no-print-directory -s $(BUILD)/bench
-	@$(BUILD)/bench $(BUILD)/bench-size.json size
+	@$(call measured,bench-size $(if $(CELLS),--part)) $(BUILD)/bench $(BUILD)/bench-size.json size $(CELLS)
 
 bench-deps: ## install the Debian packages that only comparisons with other solvers use
 	@tests/deps.sh $(PEER_PACKAGES)
@@ -307,21 +311,28 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 
-extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json
+extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json; FILTER=name: some, into extremes-part.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
-	@$(BUILD)/extremes $(BUILD)/extremes.json $(FILTER)
+	@$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER)
 
 theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table and build/theory.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory
-	@$(BUILD)/theory $(BUILD)/theory.json
+	@$(call measured,theory) $(BUILD)/theory $(BUILD)/theory.json
+
+page-size: $(BUILD)/gen/page.c
+	@$(call measured,page) $(PYTHON) -B tests/figures/page_size.py $(BUILD)/gen/page $(BUILD)/page.json
 
 figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes; FILTER="precision hertz" renews a part
 	@$(MAKE) --no-print-directory -s $(BUILD)/figures
-	@$(BUILD)/figures $(BUILD)/figures.json $(FILTER)
+	@$(call measured,figures $(if $(FILTER),--part)) $(BUILD)/figures $(BUILD)/figures.json $(FILTER)
+	@$(MAKE) --no-print-directory -s page-size
+	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
+
+collect: ## docs/numbers.md and the README's numbers from what was measured since, without measuring
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
 numbers: ## measure everything that docs/numbers.md and the README show (hours: soak is one of it), then write them; SPARED="soak" leaves some out
-	@for part in $(filter-out $(SPARED),theory extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
+	@for part in $(filter-out $(SPARED),theory gallery extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
 	    $(MAKE) --no-print-directory $$part || exit 1; done
 
 ##@ Style

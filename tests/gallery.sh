@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Starts the daemon on a free port, solves the scenes of the gallery with the client, writes summaries and pictures.
 # usage: tests/gallery.sh BUILD_DIR FOLDER [--keep]
-# FOLDER gets NAME.txt (what the client prints) and NAME.svg; --keep copies the pictures into client/examples/gallery.
+# FOLDER gets NAME.txt (what the client prints), NAME.json (the finished job) and NAME.svg; --keep copies the pictures into client/examples/gallery.
 set -euo pipefail
 build=$1 out=$2 keep=${3:-}
 # shellcheck source=tests/daemon.sh
@@ -16,6 +16,7 @@ scene() { # FILE PICTURE_OPTION...
     name=$(basename "$1" .json)
     job=$("$build/uzawa" submit "$1" --wait --quiet)
     "$build/uzawa" status "$job" >"$out/$name.txt"
+    "$build/uzawa" status "$job" --json >"$out/$name.json"
     "$build/uzawa" picture "$job" -o "$out/$name.svg" "${@:2}"
     [ "$keep" != --keep ] || cp "$out/$name.svg" "client/examples/gallery/$name.svg"
     printf '%-12s %s\n' "$name" "$(grep '^contact ' "$out/$name.txt")"

@@ -16,7 +16,7 @@
 #define LOOK_S         0.5
 #define FIRST_RETRY_S  5.0
 #define LONGEST_WAIT_S 3600.0
-#define MOST_ATTEMPTS  16 /* with waits of 5 s that double up to an hour: about 9 hours */
+#define MOST_ATTEMPTS  16 /* with waits of 5 s that double up to an hour: more than 6 hours */
 #define CONNECT_S      5L
 #define WHOLE_S        15L
 #define SECRET_MAX     4096

@@ -1,14 +1,17 @@
 """The scenes of the gallery against theory, and `make gallery`. usage: test_gallery.py BUILD_DIR [FILTER]"""
 import json
-import math
 import pathlib
 import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree
 
-import service
-from service import ROOT, check, expect, options
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "figures"))
+
+import gallery  # noqa: E402  the path is set above
+import inline  # noqa: E402
+import service  # noqa: E402
+from service import ROOT, check, expect, options  # noqa: E402
 
 FOLDER = ROOT / "client/examples/gallery"
 FILES = {**{name: FOLDER / f"{name}.json" for name in ("cylinder", "press_fit", "gear", "bracket")},
@@ -31,30 +34,18 @@ def near(got, wanted, tolerance):
 
 
 def test_cylinder_is_a_line_contact_of_hertz(s):
-    """K. L. Johnson, Contact Mechanics, 1985, section 4.2(c), for the force that the cylinder got; half of it is there."""
     contact = solved(s, "cylinder")["contact"]
-    load, radius, modulus = 2 * contact["force"][1], 50, 210e3 / (1 - 0.3 ** 2)
-    half_width = math.sqrt(4 * load * radius / (math.pi * modulus))
-    near(contact["max_pressure"], 2 * load / (math.pi * half_width), 0.03)
+    pressure, half_width = gallery.hertz(contact)
+    near(contact["max_pressure"], pressure, 0.03)
     near(contact["area"], half_width, 0.03)
-    check(contact["max_pressure_at"]["x"] == [0, -radius], contact)
+    check(contact["max_pressure_at"]["x"] == [0, -50], contact)
 
 
 def test_press_fit_has_the_pressure_of_lame(s):
-    """S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd ed. 1970, section 28: two rings, in plane strain.
-    The nodes of the rings do not meet, and chords of different lengths are on top of each other, so that single
+    """The nodes of the rings do not meet, and chords of different lengths are on top of each other, so that single
     pressures scatter about the mean."""
     contact = solved(s, "press_fit")["contact"]
-    inner, seat, outer, interference = 10, 20, 35, 0.05
-
-    def plane_strain(young, poisson):
-        return young / (1 - poisson ** 2), poisson / (1 - poisson)
-
-    shaft, shaft_poisson = plane_strain(70e3, 0.33)
-    hub, hub_poisson = plane_strain(210e3, 0.3)
-    give = seat / hub * ((outer ** 2 + seat ** 2) / (outer ** 2 - seat ** 2) + hub_poisson)
-    give += seat / shaft * ((seat ** 2 + inner ** 2) / (seat ** 2 - inner ** 2) - shaft_poisson)
-    near(-contact["reaction_sum"] / contact["area"], interference / give, 0.03)
+    near(-contact["reaction_sum"] / contact["area"], gallery.lame(), 0.03)
     check(contact["active"] == contact["candidates"], contact)
     near(contact["force"][0], contact["force"][1], 1e-6)  # the same along both axes of a quarter
 
@@ -104,15 +95,22 @@ def check_picture(path):
 
 @options(None)
 def test_make_gallery(s):
-    """The command behind `make gallery`, and that what it draws is what is kept."""
+    """The command behind `make gallery`, and that what it draws is what is kept, and its numbers are those of the README."""
+    rows = []
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(["tests/gallery.sh", s.build, folder], cwd=ROOT, capture_output=True, text=True, timeout=300)
         check(done.returncode == 0, done.stdout, done.stderr)
         for name in FILES:
             text = (pathlib.Path(folder) / f"{name}.txt").read_text()
+            rows.append(gallery.scene(name, json.loads((pathlib.Path(folder) / f"{name}.json").read_text())["summary"]))
+            check(rows[-1]["outcome"] == "converged" and rows[-1]["active"] <= rows[-1]["candidates"], rows[-1])
             check("outcome     converged" in text and "\nforces " in text, text)
             drawn = check_picture(pathlib.Path(folder) / f"{name}.svg")
             check(drawn == check_picture(FOLDER / f"{name}.svg"), name, drawn)
+    kept = json.loads((ROOT / "docs/figures/gallery.json").read_text())
+    for name, value in inline.VALUES.items():
+        if name.split(".")[0] in FILES:
+            check(value({"gallery": {"scenes": rows}}) == value({"gallery": kept}), name, rows)
 
 
 if __name__ == "__main__":

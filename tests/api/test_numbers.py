@@ -4,16 +4,26 @@ import json
 import pathlib
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import xml.etree.ElementTree
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "figures"))
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "soak"))
+
 import collect  # noqa: E402  the path is set above
+import constants  # noqa: E402
 import draw  # noqa: E402
+import inline  # noqa: E402
 import numbers_page as numbers  # noqa: E402
+import page_size  # noqa: E402
+import promises  # noqa: E402
 import service  # noqa: E402
+import service_tables  # noqa: E402
+import soak  # noqa: E402
+import stamp  # noqa: E402
 import svg  # noqa: E402
 import tables  # noqa: E402
 from service import ROOT, Skip, check, options  # noqa: E402
@@ -38,8 +48,7 @@ def measured():
 def test_nothing_is_stale(s):
     wrong, missing = numbers.stale(ROOT)
     check(not wrong, "not what the data gives (make figures):", wrong)
-    for name in missing:
-        print(f"# README block {name} has no data yet")
+    check(not missing, "the README shows what has no data:", missing)
 
 
 @options(None)
@@ -61,6 +70,171 @@ def test_a_changed_number_is_found(s):
         check(numbers.stale(root)[0] == ["docs/figures/old.svg"])
 
 
+def one_digit_more(text, begin, end):
+    """The text with the first digit between these places changed; None where there is none."""
+    found = re.compile(r"\d").search(text, begin, end)
+    return found and f"{text[:found.start()]}{(int(found[0]) + 1) % 10}{text[found.end():]}"
+
+
+@options(None)
+def test_every_block_and_mark_is_written_from_data(s):
+    data, text = measured(), (ROOT / "README.md").read_text()
+    places = [(found[1], found.span(2)) for pattern in (numbers.BLOCK, inline.MARK) for found in pattern.finditer(text)]
+    check({name for name, _ in places} == {*numbers.BLOCKS, *inline.VALUES}, "made, but not in the README, or the other way round")
+    for name, (begin, end) in places:
+        changed = one_digit_more(text, begin, end)
+        check(changed and changed != text and numbers.readme(changed, data) == (text, []), name)
+
+
+@options(None)
+def test_every_data_file_shows_in_the_readme_or_the_page(s):
+    data, text = measured(), (ROOT / "README.md").read_text()
+    for part, value in (("soak", lambda d: d["rows"][0]["figures"]), ("bench_size", lambda d: d["sizes"][0]), ("gallery", lambda d: d["scenes"][0]),
+                        ("page", lambda d: d), ("theory", lambda d: d["cook"][0])):
+        changed = json.loads(json.dumps(data))
+        row = value(changed[part])
+        for key in row:
+            row[key] = row[key] * 3 + 7 if isinstance(row[key], (int, float)) else row[key]
+        check(numbers.readme(text, changed)[0] != text, part)
+
+
+@options()
+def test_no_number_is_typed_by_hand(s):
+    """What has a unit, a point, an exponent or four digits is in a mark, or one of the constants, which are the program's own."""
+    text = (ROOT / "README.md").read_text()
+    left, unused = constants.unexplained(text)
+    check(not left, "measured? then in a mark (tests/figures/inline.py), else in tests/figures/constants.py:", left)
+    check(not unused, "not in the README any more:", unused)
+    program = constants.Program(ROOT, s.get("/v1/limits").json["limits"])
+    check(constants.wrong(program) == [], constants.wrong(program))
+    program.limits["max_body"]["value"] += 1
+    check(constants.wrong(program) == ["A request body may have 64 MiB"], constants.wrong(program))
+    for typed in ("solves in 25 ms", "3.5 times faster", "needs 12 MB", "certified to 4e-14", "1,209 jobs", "1209 clients", "about 2 % of it", "`x` 7 s"):
+        found, _ = constants.unexplained(text + "\nIt " + typed + ".\n")
+        check(len(found) == 1, typed, found)
+    for free in ("<!-- n:x -->25 ms<!-- /n -->", "`sleep 25 s`", "[x](http://h/2.5)", "```sh\nsleep 2.5\n```", "a 60 x 20 body", "quad4, 3 dofs of each"[:5]):
+        check(constants.unexplained(text + "\nIt " + free + "\n")[0] == [], free)
+
+
+@options(None)
+def test_soak_runs_keep_the_rows_of_others(s):
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "soak.json"
+        path.write_text(json.dumps({"rows": [{"name": "cancel", "figures": "as text, of an older program"}]}))
+        for name, lost in (("cancel", 1), ("500 x kill -9, 16 posting clients", 2), ("cancel", 3), ("new", 4)):
+            soak.keep(path, {"name": name, "figures": {"lost": lost}})
+        rows = json.loads(path.read_text())["rows"]
+        check([(row["name"], row["figures"]["lost"]) for row in rows] == [("500 x kill -9, 16 posting clients", 2), ("cancel", 3), ("new", 4)], rows)
+
+
+@options(None)
+def test_soak_rows_as_text(s):
+    names = {name for name, _ in soak.RUNS}
+    check(set(service_tables.SHOWN) == names, "a run has no row of its own in the README")
+    check({row["name"] for row in measured()["soak"]["rows"]} <= names, "figures of a run that there is not any more")
+    row = {"name": "cancel", "figures": {"errors": 0, "p50_ms": 2.0, "p99_ms": 63.0}, "stamp": {"load": 0.2, "others": 0.1}}
+    lines = service_tables.soak({"soak": {"rows": [row]}})
+    check(lines[-1] == "| cancel of a running job while it iterates | p50 2 ms, p99 63 ms |", lines)
+    row["stamp"]["others"], row["wrong"], row["figures"]["errors"] = 1.5, ["errors"], 3
+    lines = service_tables.soak({"soak": {"rows": [row, {"name": "another", "figures": {"a": 1, "b": {"c": 2}}, "stamp": {"load": 9}}]}})
+    check("**WRONG** **3 errors** †" in lines[2] and lines[3] == "| another | a 1, b.c 2 † |" and lines[-1].startswith("†"), lines)
+
+
+@options(None)
+def test_promises_are_computed(s):
+    body = [{"problem": "body/240", "cold": 4.99, "cached": 50.0, "cold_seconds": 1}, {"problem": "body/480", "cold": None, "cold_seconds": 1, "cached": 49.9}]
+    kept = {(what, target): verdict for what, target, _, verdict, _ in promises.peers({"peers": {"body": body}})}
+    ours = "paper's body, NX = {}: the fastest other solver over ours {}".format
+    check(kept[ours(240, "cold"), "at least 5 x"] is False and kept[ours(240, "with the factor cached"), "at least 50 x"] is True, kept)
+    check(kept[ours(480, "cold"), "at least 8 x"] is True and kept[ours(480, "with the factor cached"), "at least 50 x"] is False, kept)
+    check(kept[ours(600, "cold"), "at least 8 x"] is None, kept)
+    data = measured()
+    check({name for name, *_ in promises.SERVICE} <= {name for name, _ in soak.RUNS}, "a promise about a run that there is not")
+    for row in data["soak"]["rows"]:
+        fine = sum(verdict is True for *_, verdict, _ in promises.service(data))
+        bad = json.loads(json.dumps(data))
+        next(one for one in bad["soak"]["rows"] if one["name"] == row["name"])["wrong"] = ["lost"]
+        of_it = sum(name == row["name"] for name, *_ in promises.SERVICE)
+        check(sum(verdict is True for *_, verdict, _ in promises.service(bad)) == fine - of_it, row["name"])
+        bad["soak"]["rows"] = [one for one in bad["soak"]["rows"] if one["name"] != row["name"]]
+        check(sum(verdict is None for *_, verdict, _ in promises.service(bad)) >= of_it, row["name"])
+    check("**missed**" in "".join(promises.lines({"peers": {"body": body, "machine": {"load": 0}}})))
+
+
+@options(None)
+def test_beside_other_work(s):
+    for one, beside in (({"load": 9, "others": 0.1}, False), ({"load": 0, "others": 0.5}, True), ({"load": 1.5}, False), ({"load": 3}, True), ({}, True)):
+        check(stamp.beside_other_work(one) == beside, one)
+    watch = stamp.Watch()
+    one = watch.stamp(ROOT)
+    check(one["others"] >= 0 and one["load"] >= 0 and re.match(r"[0-9a-f]{12}\+?$|unknown$", one["commit"]), one)
+    note = numbers.tables.beside({"bench": {"machine": {"load": 0}, "ratios": [{"name": "a", "stamp": {"load": 3}}, {"name": "b"}]}}, "bench", "ratios")
+    check(note == ["", "Measured beside other work (load 3)."], note)
+    check(numbers.tables.beside({"bench": {"machine": {"load": 0}, "ratios": [{"name": "a", "stamp": {"load": 3}}]}}, "bench", "ratios", ("b",)) == [])
+
+
+@options(None)
+def test_measured_by_parts(s):
+    """Two runs of a part each leave both; one that fails leaves what was there."""
+    def run(folder, text, *more, status=0):
+        program = f"import pathlib, sys; pathlib.Path(sys.argv[1]).write_text({text!r}); sys.exit({status})"
+        path = str(pathlib.Path(folder) / "bench.json")
+        ran = subprocess.run([sys.executable, "-B", ROOT / "tests/figures/measure.py", folder, "bench", *more, sys.executable, "-c", program, path], check=False)
+        check(ran.returncode == status, ran)
+        return json.loads(pathlib.Path(path).read_text())
+
+    with tempfile.TemporaryDirectory() as folder:
+        first = run(folder, '{"ratios": [{"name": "a", "median": 1}, {"name": "b", "median": 2}], "instructions": []}')
+        check(first["stamp"]["cores"] >= 1 and "stamp" not in first["ratios"][0], first)
+        path = pathlib.Path(folder) / "bench.json"
+        path.write_text(json.dumps({**first, "stamp": {**first["stamp"], "load": 99}}))
+        second = run(folder, '{"ratios": [{"name": "b", "median": 3}]}', "--part")
+        check(second["ratios"][0]["stamp"]["load"] == 99 and second["stamp"]["load"] == second["ratios"][1]["stamp"]["load"] != 99, second)
+        check([(row["name"], row["median"]) for row in second["ratios"]] == [("a", 1), ("b", 3)] and second["ratios"][1]["stamp"]["commit"], second)
+        check(second["instructions"] == [] and second["whole"], second)
+        check(run(folder, "not JSON", "--part", status=3) == second)
+        check((pathlib.Path(folder) / "bench.failed.json").read_text() == "not JSON")
+        third = run(folder, '{"ratios": [{"name": "c", "median": 3}]}')
+        check([row["name"] for row in third["ratios"]] == ["c"], third)
+        docs = pathlib.Path(folder) / "docs"
+        for text, more, names in (('{"ratios": [{"name": "a"}, {"name": "b"}]}', (), "ab"), ('{"ratios": [{"name": "c"}]}', (), "c")):
+            run(folder, text, *more)  # a whole run leaves nothing of the ones before
+            collect.collect(folder, docs)
+            check("".join(row["name"] for row in json.loads((docs / "bench.json").read_text())["ratios"]) == names, names)
+        path.unlink()
+        check("whole" in run(folder, '{"ratios": [{"name": "d"}]}', "--part"))
+        collect.collect(folder, docs)
+        check([row["name"] for row in json.loads((docs / "bench.json").read_text())["ratios"]] == ["c", "d"])
+
+
+@options(None)
+def test_of_two_measurements_the_newer_counts(s):
+    """Whatever the times of the files say: a checkout makes new files of old data."""
+    def row(name, value, measured):
+        return {"name": name, "figures": {"lost": value}, "stamp": {"measured": measured}}
+
+    with tempfile.TemporaryDirectory() as name:
+        build, docs = pathlib.Path(name), pathlib.Path(name) / "docs"
+        (build / "soak.json").write_text(json.dumps({"rows": [row("a", 1, "2026-01-02"), row("b", 1, "2026-01-02")]}))
+        (build / "theory.json").write_text(json.dumps({"stamp": {"measured": "2026-01-02"}, "rows": [1]}))
+        check(collect.collect(build, docs) == ["theory", "soak"] and collect.collect(build, docs) == [])
+        (build / "soak.json").write_text(json.dumps({"rows": [row("a", 2, "2026-01-01"), row("b", 2, "2026-01-03")]}))
+        (build / "theory.json").write_text(json.dumps({"stamp": {"measured": "2026-01-01"}, "rows": [2]}))
+        check(collect.collect(build, docs) == ["soak"])
+        check([one["figures"]["lost"] for one in json.loads((docs / "soak.json").read_text())["rows"]] == [1, 2])
+        check(json.loads((docs / "theory.json").read_text())["rows"] == [1])
+
+
+@options(None)
+def test_page_size(s):
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for file, text in (("index.html", ""), ("page-X.css", ""), ("main-X.js", 'import{a as b}from"./chunk-A.js";import"./chunk-B.js";x(()=>import("./job-X.js"))'),
+                           ("chunk-A.js", ""), ("chunk-B.js", 'import{c}from"./chunk-A.js"'), ("job-X.js", "")):
+            (folder / file).write_text(text)
+        check(sorted(page_size.loaded(folder, "main-*.js")) == ["chunk-A.js", "chunk-B.js", "index.html", "main-X.js", "page-X.css"])
+
+
 @options(None)
 def test_blocks_without_data_stay(s):
     with tempfile.TemporaryDirectory() as folder:
@@ -69,13 +243,14 @@ def test_blocks_without_data_stay(s):
         text = "a\n<!-- numbers:growth -->\n| by hand |\n<!-- /numbers -->\nb\n"
         (root / "README.md").write_text(text)
         check(numbers.stale(root) == ([], ["growth"]))
-        rows = [{"d": 1000, "m": 10, "iterations": 4, "factor_bytes": 2500000, "linear_s": 0.5, "cold_s": 0.25, "cached_s": 0.01}]
+        rows = [{"d": d, "m": 10, "iterations": 4, "factor_bytes": 2500000, "linear_s": 0.5 * (d / 1000) ** 1.5, "cold_s": 0.25, "cached_s": 0.01}
+                for d in (10, 100, 1000, 10000)]
         (root / "docs" / "figures" / "bench_size.json").write_text(
-            json.dumps({"sizes": rows, "exponents": {"linear": 1.234, "cold": 1.3, "cached": 1.0}}))
+            json.dumps({"machine": {"load": 0.5}, "sizes": rows}))
         check(numbers.stale(root) == (["README.md"], []))
         numbers.write(root)
         new = (root / "README.md").read_text()
-        check("| 1,000 | 0.5 | 0.25 | 0.01 | 0.50 | 4 | 2.5 |" in new and "linear solve 1.23" in new, new)
+        check("| 1,000 | 0.5 | 0.25 | 0.01 | 0.50 | 4 | 2.5 |" in new and "linear solve 1.50, cold 0.00" in new and "beside" not in new, new)
         check(new.startswith("a\n<!-- numbers:growth -->\n") and new.endswith("<!-- /numbers -->\nb\n"), new)
 
 
@@ -136,7 +311,7 @@ def test_peers_are_drawn_where_certified(s):
     check(">a</text>" in draw.sizes(data, rows) and ">a</text>" not in draw.sizes(data, []))
 
 
-PEERS = {"machine": {"packages": {"octave": "7.3"}}, "time_limit_s": 60,
+PEERS = {"packages": {"octave": "7.3"}, "time_limit_s": 60,
          "runs": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "asked": 1e-7, "seconds": 2.0, "certified": 1e-8, "status": "ok"}],
          "results": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "tolerance": 1e-6, "success": True, "seconds": 2.0, "certified": 1e-8, "why": ""},
                      {"problem": "cases/A", "d": 6, "m": 3, "solver": "x", "tolerance": 1e-6, "success": False, "seconds": None, "certified": None,
@@ -151,8 +326,9 @@ def test_other_solvers(s):
     measured()
     with tempfile.TemporaryDirectory() as folder:
         root = copy(folder)
-        (root / "peers.json").write_text(json.dumps(PEERS))
-        check(collect.collect(root, root / "docs" / "figures", root) == ["peers"])
+        when = {**stamp.machine(), "measured": "9999-01-01 00:00 UTC", "commit": "abc", "load": 0.5, "others": 0.0}
+        (root / "peers.json").write_text(json.dumps({**PEERS, "stamp": when}))
+        check(collect.collect(root, root / "docs" / "figures") == ["peers"])
         with (root / "README.md").open("a") as readme:
             readme.write("<!-- numbers:peers -->\n<!-- /numbers -->\n")
         numbers.write(root)
@@ -168,8 +344,9 @@ def test_other_solvers(s):
 @options(None)
 def test_parts_are_renewed_alone(s):
     old = {"history": [{"rows": [[0, 1, 2]]}], "sizes": [{"nx": 30}], "precision": [{"name": "a", "x": 1}, {"name": "b", "x": 1}]}
-    new = collect.figures({"precision": [{"name": "b", "x": 2}]}, old)
-    check(new == {**old, "precision": [{"name": "a", "x": 1}, {"name": "b", "x": 2}]}, new)
+    new = collect.figures({"precision": [{"name": "b", "x": 2}]}, {**old, "machine": {"load": 7, "cores": 2}}, {"load": 1})
+    check([(p["name"], p["x"], p["stamp"]) for p in new["precision"]] == [("a", 1, {"load": 7}), ("b", 2, {"load": 1})], new)
+    check(new["sizes"] == [{"nx": 30, "stamp": {"load": 7}}] and new["history"][0]["rows"] == [[0, 1, 2]], new)
 
 
 @options(None)
@@ -178,8 +355,9 @@ def test_collected(s):
     thinned = collect.thin(rows)
     check(thinned[0] == rows[0] and thinned[-1] == rows[-1] and 200 < len(thinned) <= collect.KEPT_ROWS + 1, len(thinned))
     check(all(a[0] < b[0] for a, b in zip(thinned, thinned[1:])) and collect.thin(rows[:7]) == rows[:7])
-    merged = collect.renewed_rows("ratios")({"ratios": [{"name": "b", "median": 3}]}, {"ratios": [{"name": "a", "median": 1}, {"name": "b", "median": 2}]})
-    check([(r["name"], r["median"]) for r in merged["ratios"]] == [("a", 1), ("b", 3)], merged)
+    merged = collect.renewed_rows("ratios")({"ratios": [{"name": "b", "median": 3}]}, {"machine": {"load": 5}, "ratios": [{"name": "a", "median": 1},
+                                                                                   {"name": "b", "median": 2}]}, {"load": 1})
+    check([(r["name"], r["median"], r["stamp"]) for r in merged["ratios"]] == [("a", 1, {"load": 5}), ("b", 3, {"load": 1})], merged)
     value = {"machine": {"a": 1}, "list": [{"x": 1, "runs": [{"y": 2}]}, {"x": 2}], "none": []}
     check(json.loads(collect.dump(value)) == value)
 

@@ -87,6 +87,13 @@ def test_failures_are_listed_and_cost_the_limit(_):
 
 
 @options(None)
+def test_where_the_time_went(_):
+    runs = [{**run("x", 2.0, 1e-9), "setup": 0.5}, run("x", None, None, status="timed out"), run("y", 1.0, 1e-9),
+            {**run("y", None, None, status="not run: timed out at body/60"), "setup": None}]
+    check(peers.spent(runs, 20.0) == {"x": 21.5, "y": 1.0}, peers.spent(runs, 20.0))
+
+
+@options(None)
 def test_stalled_ladder_ends(_):
     check(not peers.stalled([run("x", 1, 1e-2), run("x", 1, 1e-3)]))
     check(not peers.stalled([run("x", 1, 1e-2), run("x", 1, 1e-2), run("x", 1, 1e-3)]))
@@ -146,20 +153,60 @@ def test_wrong_answers_are_not_certified(_):
 @options(None)
 def test_our_own_runs(_):
     """The whole driver without a peer: a body and a generated problem, every file that it writes."""
-    with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run([sys.executable, "-B", ROOT / "tests/peers/peers.py", BUILD, "ONLY=uzawa", "MEMORY=0",
-                               "SIZES=30", "PROBLEMS=body/,degenerate/vertex_20", "TIME=60", f"OUT={folder}"],
-                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    def run_peers(out, *more):
+        done = subprocess.run([sys.executable, "-B", ROOT / "tests/peers/peers.py", BUILD, "ONLY=uzawa", "MEMORY=0", "SIZES=30", "TIME=60",
+                               f"OUT={out}", *more], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         check(done.returncode == 0, done.stdout)
-        report = json.loads((pathlib.Path(folder) / "peers.json").read_text())
+        check("The paper's body at certified 1e-6" in done.stdout, done.stdout)
+        return json.loads((out / "peers.json").read_text())
+
+    with tempfile.TemporaryDirectory() as folder:
+        out = pathlib.Path(folder) / "not" / "there"
+        report = run_peers(out, "PROBLEMS=body/,degenerate/vertex_20")
         check(len(report["runs"]) == 2 * 2 * 3 and len(report["results"]) == 12, len(report["runs"]))
         for row in report["results"]:
             check(row["success"] and row["certified"] <= row["tolerance"] and row["asked"] <= row["tolerance"], row)
         for name, rows in (("peers.csv", 12), ("peers-results.csv", 12)):
-            with open(pathlib.Path(folder) / name) as file:
+            with open(out / name) as file:
                 check(len(list(csv.DictReader(file))) == rows, name)
-        xml.etree.ElementTree.parse(pathlib.Path(folder) / "peers-profile-1e-06.svg")
-        check("The paper's body at certified 1e-6" in done.stdout, done.stdout)
+        xml.etree.ElementTree.parse(out / "peers-profile-1e-06.svg")
+        again = run_peers(out, "PROBLEMS=vertex_20")  # a part renews its own rows
+
+        def of(one, problem):
+            return [run for run in one["runs"] if run["problem"] == problem]
+        check(of(again, "body/30") == of(report, "body/30") and of(again, "degenerate/vertex_20") != of(report, "degenerate/vertex_20"))
+        check([row["name"] for row in again["problems"]] == ["body/30", "degenerate/vertex_20"] and len(again["results"]) == 12, again["problems"])
+        check(again["problems"][0] == report["problems"][0] and again["problems"][1]["stamp"]["others"] >= 0, again["problems"])
+
+
+class FakeProblem:
+    """What a ladder asks of a problem; the answers are there and certified to 1e-2."""
+    name, d, m = "body/30", 660, 30
+
+    def __init__(self, folder):
+        self.answer = pathlib.Path(folder) / "answer"
+
+    def certify(self):
+        return 1e-2, 0.0
+
+
+@options(None)
+def test_a_run_at_its_limit_is_not_repeated(_):
+    """A tighter tolerance would make the same run again: it is listed, not made. Other ends are followed by all tolerances."""
+    solver = next(one for one in peers.solvers() if one.name == "siconos_psor")
+    for status, made in (("Siconos info 1", 1), ("ok", len(solver.fine))):
+        with tempfile.TemporaryDirectory() as folder:
+            settings = peers.Options([str(BUILD), f"OUT={folder}"])
+            comparison, problem = peers.Comparison(settings), FakeProblem(folder)
+            worker = python(f"open('{problem.answer}', 'w'); print('{{\"status\": \"{status}\", \"seconds\": 1.0, \"iterations\": 7}}', flush=True)")
+            comparison.ladder(worker, problem, solver, 0.0, 99)
+            worker.close()
+        asked = [one["asked"] for one in comparison.runs]
+        check(asked == solver.fine, asked)
+        check(sum(one["certified"] is not None for one in comparison.runs) == made, comparison.runs)
+        if made == 1:
+            check(comparison.runs[1]["status"] == "not run: at its limit of iterations for 0.001 already", comparison.runs[1])
+            check(stats.why_not(comparison.runs, 1e-6).startswith("certified 1.0e-02 only, not run"), stats.why_not(comparison.runs, 1e-6))
 
 
 @options(None)

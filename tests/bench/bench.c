@@ -40,6 +40,13 @@ static void print_row(report *out, const char *name, const char *unit, bench_val
     fflush(stdout);
 }
 
+static void print_count(report *out, const char *row, const char *what, int64_t count)
+{
+    char name[64];
+    snprintf(name, sizeof name, "%s_%s", row, what);
+    print_row(out, name, "", (bench_value){(double)count, (double)count, (double)count, 1}, "");
+}
+
 static uz_material *one_material(void)
 {
     uz_material *m = calloc(1, sizeof *m);
@@ -278,6 +285,8 @@ static void bench_surfaces(report *out)
         const bench_value ratio = {x.seconds.median / x.all_seconds.median, x.seconds.min / x.all_seconds.max,
                                    x.seconds.max / x.all_seconds.min, x.seconds.runs};
         print_row(out, rows[k].name, "x", ratio, text);
+        print_count(out, rows[k].name, "given", x.given);
+        print_count(out, rows[k].name, "kept", x.kept);
     }
 }
 
@@ -393,7 +402,7 @@ int main(int argc, char **argv)
     uz_thread_init();
     if (out.filter && strcmp(out.filter, "size") == 0) {
         fprintf(out.json, "{");
-        bench_sizes(out.json);
+        bench_sizes(out.json, argv + 3, argc - 3);
         fprintf(out.json, "}\n");
         return fclose(out.json) != 0;
     }

@@ -42,8 +42,9 @@ int bench_memory_child(const char *what, const char *problem);
 /* Cold solves on an oblique plane over those on a plane along an axis. false: no answer. */
 bool bench_oblique(bench_value *ratio, int64_t cells);
 
-/* Cost against size, 600 to 2,000,000 dofs, printed and as two members of a JSON object. Minutes, and 4 GB. */
-void bench_sizes(FILE *json);
+/* Cost against size, 600 to 2,000,000 dofs, printed and as a member of a JSON object. Minutes, and 4 GB. wanted: counts
+ * of cells along the body as text, `count` of them; 0: all sizes. */
+void bench_sizes(FILE *json, char **wanted, int count);
 /* Cold certified solves of the cube of n x n x n bricks, one dof in each row or (leaning) three, in units of CHOLMOD's
  * linear solve. false: no answer. */
 bool bench_hex8(bench_value *ratio, int64_t n, bool leaning);

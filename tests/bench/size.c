@@ -1,12 +1,9 @@
 /* size.c: what a solve costs as the paper's body is divided ever finer: seconds of CHOLMOD's linear solve with the
- * better of AMD and METIS, of a cold certified solve from the assembled matrices and of one with the factor cached, and
- * the powers of d that they grow with. */
+ * better of AMD and METIS, of a cold certified solve from the assembled matrices and of one with the factor cached. */
 #include "bench/bench.h"
 #include "core/clock.h"
 
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { RUNS = 3, SIZES = 12, COLUMNS = 3 };
 static const int64_t CELLS[SIZES] = {30, 42, 63, 90, 132, 189, 273, 396, 573, 828, 1197, 1731}; /* about x 1.45 */
@@ -105,21 +102,7 @@ static void measure(size_row *row, int64_t cells)
     uz_problem_clear(&scene);
 }
 
-/* The slope of log seconds over log d, least squares over the finer half. */
-static double exponent(const size_row rows[SIZES], int column)
-{
-    const int first = SIZES / 2;
-    double n = SIZES - first, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
-    for (int i = first; i < SIZES; i++) {
-        double log_d = log((double)rows[i].d), log_s = log(rows[i].seconds[column]);
-        x += log_d;
-        y += log_s;
-        xx += log_d * log_d;
-        xy += log_d * log_s;
-    }
-    return (n * xy - x * y) / (n * xx - x * x);
-}
-
+/* The slopes are fitted to what is written, where a part of the sizes may be from another run (tests/figures). */
 static void print_size(FILE *json, const size_row *row, bool first)
 {
     printf("%8lld %6lld %11.5f %11.5f %11.5f %7.2f %7.2f %6lld %9.1f %6s\n", (long long)row->d, (long long)row->m,
@@ -134,23 +117,26 @@ static void print_size(FILE *json, const size_row *row, bool first)
     fprintf(json, "}");
 }
 
-void bench_sizes(FILE *json)
+static bool chosen(int64_t cells, char **wanted, int count)
 {
-    size_row rows[SIZES];
-    memset(rows, 0, sizeof rows);
+    bool found = count == 0;
+    for (int k = 0; k < count; k++)
+        found = found || atoll(wanted[k]) == cells;
+    return found;
+}
+
+void bench_sizes(FILE *json, char **wanted, int count)
+{
+    int written = 0;
     printf("%8s %6s %11s %11s %11s %7s %7s %6s %9s %6s\n", "d", "m", "linear s", "cold s", "cached s", "cold/",
            "cached/", "steps", "factor MB", "linear");
     fprintf(json, "\"sizes\": [\n");
     for (int i = 0; i < SIZES; i++) {
-        measure(&rows[i], CELLS[i]);
-        print_size(json, &rows[i], i == 0);
+        size_row row = {0};
+        if (!chosen(CELLS[i], wanted, count))
+            continue;
+        measure(&row, CELLS[i]);
+        print_size(json, &row, written++ == 0);
     }
-    fprintf(json, "\n], \"exponents\": {");
-    printf("seconds grow with d to the power");
-    for (int c = 0; c < COLUMNS; c++) {
-        printf("  %s %.3f", COLUMN[c], exponent(rows, c));
-        fprintf(json, "%s\"%s\": %.4f", c ? ", " : "", COLUMN[c], exponent(rows, c));
-    }
-    printf("  (d from %lld)\n", (long long)rows[SIZES / 2].d);
-    fprintf(json, "}");
+    fprintf(json, "\n]");
 }

@@ -1,53 +1,11 @@
 """Turns what the measuring programs left in the build folder into the data files of docs/figures."""
-import datetime
 import json
 import math
-import os
 import pathlib
-import platform
-import subprocess
+
+import stamp
 
 KEPT_ROWS = 400  # of a history: more than can be drawn
-
-
-def output_of(*command):
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return ""
-
-
-def processor():
-    for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
-        if line.startswith("model name"):
-            return line.split(":", 1)[1].strip()
-    return platform.machine()
-
-
-def memory_bytes():
-    return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-
-
-def package_versions():
-    names = ["gcc", "libsuitesparse-dev", "libopenblas0-pthread", "libc6"]
-    found = {}
-    for name in names:
-        version = output_of("dpkg-query", "-W", "-f=${Version}", name)
-        if version:
-            found[name] = version
-    return found
-
-
-def machine(root):
-    """Where and of what: written beside every set of data. The commit is that of the checkout, marked where files differ."""
-    changed = output_of("git", "-C", str(root), "status", "--porcelain", "--untracked-files=no", "--", "solver", "tests", "Makefile")
-    commit = output_of("git", "-C", str(root), "rev-parse", "--short=12", "HEAD") or "unknown"
-    system = next((line.split("=", 1)[1].strip('"') for line in pathlib.Path("/etc/os-release").read_text().splitlines()
-                   if line.startswith("PRETTY_NAME=")), platform.system())
-    return {"processor": processor(), "cores": os.cpu_count(), "memory_bytes": memory_bytes(), "system": system,
-            "kernel": platform.release(), "compiler": output_of("gcc", "-dumpfullversion"), "packages": package_versions(),
-            "commit": commit + ("+" if changed else ""), "load": round(os.getloadavg()[1], 2),
-            "measured": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC")}
 
 
 def thin(rows, most=KEPT_ROWS):
@@ -59,23 +17,42 @@ def thin(rows, most=KEPT_ROWS):
     return [rows[k] for k in sorted(wanted | {0, last})]
 
 
-def figures(raw, old):
-    """Parts that were measured take the place of what was there, problems one by one."""
+def stamped(rows, when):
+    """Rows with a stamp: their own, or the one of the whole."""
+    return [{**row, "stamp": row.get("stamp") or stamp.brief(when)} for row in rows]
+
+
+def renewed(key, name, raw, old, when):
+    """{key: rows}: a run of a part renews its own rows only, each of which keeps when and beside what it was measured; of two the newer
+    counts. name: of the member that tells rows apart."""
+    rows = {}
+    for row in stamped((old or {}).get(key, []), (old or {}).get("machine", {})) + stamped(raw.get(key) or [], when):
+        if row[name] not in rows or not older(row["stamp"], rows[row[name]]["stamp"]):
+            rows[row[name]] = row
+    return {key: list(rows.values())}
+
+
+def older(one, other):
+    """By stamps, whose times compare as text."""
+    return one.get("measured", "") < other.get("measured", "")
+
+
+def renewed_rows(key, name="name"):
+    return lambda raw, old, when: renewed(key, name, raw, old, when)
+
+
+def figures(raw, old, when):
+    """Histories and sizes are measured whole, problems one by one."""
     for run in raw.get("history", []):
         run["rows"] = thin(run["rows"])
-    problems = {problem["name"]: problem for problem in (old or {}).get("precision", [])}
-    problems.update({problem["name"]: problem for problem in raw.get("precision", [])})
-    parts = {part: raw.get(part) or (old or {}).get(part, []) for part in ("history", "sizes")}
-    return {**parts, "precision": list(problems.values())}
+    parts = {part: stamped(raw[part], when) if raw.get(part) else stamped((old or {}).get(part, []), (old or {}).get("machine", {}))
+             for part in ("history", "sizes")}
+    return {**parts, **renewed("precision", "name", raw, old, when)}
 
 
-def renewed_rows(key):
-    """A filtered run renews its own rows only."""
-    def merge(raw, old):
-        rows = {row["name"]: row for row in (old or {}).get(key, [])}
-        rows.update({row["name"]: row for row in raw[key]})
-        return {key: list(rows.values())}
-    return merge
+def bench_size(raw, old, when):
+    rows = renewed("sizes", "d", raw, old, when)["sizes"]
+    return {"sizes": sorted(rows, key=lambda row: row["d"])}
 
 
 def extremes(raw):
@@ -102,16 +79,16 @@ def peers(raw):
     for row in raw["results"]:
         family, _, size = row["problem"].partition("/")
         rows.append({**row, **({"nx": int(size)} if family == "body" else {})})
-    return {"time_limit_s": raw["time_limit_s"], "packages": raw["machine"].get("packages", {}), "rows": rows, "runs": raw["runs"],
-            "means": raw["means"], "body": raw["body"], "profiles": raw["profiles"]}
+    return {"time_limit_s": raw["time_limit_s"], "packages": raw["packages"], "problems": raw.get("problems", []), "rows": rows,
+            "runs": raw["runs"], "means": raw["means"], "body": raw["body"], "profiles": raw["profiles"]}
 
 
 def alone(make):
-    return lambda raw, old: make(raw)
+    return lambda raw, old, when: make(raw)
 
 
-KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": alone(dict), "extremes": alone(extremes),
-         "theory": alone(dict), "soak": renewed_rows("rows"), "peers": alone(peers)}
+KINDS = {"figures": figures, "bench": renewed_rows("ratios"), "bench-size": bench_size, "extremes": alone(extremes),
+         "theory": alone(dict), "soak": renewed_rows("rows"), "peers": alone(peers), "gallery": alone(dict), "page": alone(dict)}
 
 
 def dump(value):
@@ -128,21 +105,34 @@ def dump(value):
     return lines(value, 0) + "\n"
 
 
-def collect(build, folder, root):
+def stamp_of(raw, source):
+    """What measure.py wrote; of data without it only the file's time is known."""
+    return raw.pop("stamp", None) or {**stamp.machine(), "measured": stamp.at(source.stat().st_mtime), "commit": "unknown", "load": None}
+
+
+def renew(source, target, kind, by_rows):
+    """True where the data file is another afterwards. by_rows: its rows have stamps of their own."""
+    try:
+        raw = json.loads(source.read_text())
+    except ValueError:
+        print(f"{source}: not whole, left out")
+        return False
+    before = target.read_text() if target.exists() else None
+    old, when = before and json.loads(before), stamp_of(raw, source)
+    whole = raw.pop("whole", False)  # then rows that are not there any more go
+    if old and not by_rows and older(when, old["machine"]):
+        print(f"{source}: older than {target.name}, left out")
+        return False
+    text = dump({"machine": when, **kind(raw, None if whole else old, when)})
+    if text == before:
+        return False
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(text)
+    return True
+
+
+def collect(build, folder):
     """Renews the data of every program that has run since. Returns the names renewed."""
-    renewed = []
-    for name, kind in KINDS.items():
-        source, target = pathlib.Path(build) / f"{name}.json", folder / f"{name.replace('-', '_')}.json"
-        if not source.exists() or (target.exists() and target.stat().st_mtime >= source.stat().st_mtime):
-            continue
-        try:
-            raw = json.loads(source.read_text())
-        except ValueError:
-            print(f"{source}: not whole, left out")
-            continue
-        old = json.loads(target.read_text()) if target.exists() else None
-        data = kind(raw, old)
-        folder.mkdir(parents=True, exist_ok=True)
-        target.write_text(dump({"machine": machine(root), **data}))
-        renewed.append(name)
-    return renewed
+    sources = {name: pathlib.Path(build) / f"{name}.json" for name in KINDS}
+    return [name for name, kind in KINDS.items() if sources[name].exists() and
+            renew(sources[name], folder / f"{name.replace('-', '_')}.json", kind, name == "soak")]

@@ -16,12 +16,35 @@ import sys
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import collect  # noqa: E402  the path is set above
 import draw  # noqa: E402
+import inline  # noqa: E402
+import promises  # noqa: E402
+import service_tables  # noqa: E402
+import stamp  # noqa: E402
 import tables  # noqa: E402
 
 ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
 BLOCK = re.compile(r"<!-- numbers:([a-z_]+) -->\n(.*?)<!-- /numbers -->", re.S)
 COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes",
-            "theory": "make theory", "soak": "make soak", "peers": "make peers"}
+            "theory": "make theory", "soak": "make soak", "peers": "make peers", "gallery": "make gallery", "page": "make figures (the page)"}
+ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems"}  # what is measured by parts
+
+
+TIMED = ("figures", "bench", "bench_size", "soak", "peers")  # what other programs on the machine can change
+
+
+def timed(make, name, key=None, shown=("",)):
+    """A table of times, with a note where it was measured beside other work."""
+    def lines(data):
+        made = make(data)
+        return made and made + tables.beside(data, name, key, shown)
+    return lines
+
+
+# The README's blocks: name, and what fills it.
+BLOCKS = {"levels": timed(tables.levels, "figures", "precision"), "iterations": tables.iterations, "ratios": timed(tables.ratios, "bench", "ratios", tables.IN_RATIOS),
+          "sentences": tables.sentences, "digits": timed(tables.digits, "bench", "ratios", tables.IN_DIGITS), "growth": timed(tables.growth, "bench_size", "sizes"),
+          "extremes": tables.extremes, "theory": tables.theory, "soak": service_tables.soak, "peers": timed(tables.peers, "peers", "problems"),
+          "means": tables.means, "elements": tables.elements}
 
 
 def load(folder):
@@ -69,14 +92,19 @@ def figure_files(data):
 
 
 def machine_lines(data):
+    """A line for each command; where parts of it were measured at different times, from the first to the last."""
     rows = []
     for name, command in COMMANDS.items():
         if name in data:
-            m = data[name]["machine"]
-            rows.append([f"`{command}`", m["measured"], f"`{m['commit']}`", m["load"],
+            m, found = data[name]["machine"], tables.stamps(data, name, ROWS.get(name))
+            commits = list(dict.fromkeys(one.get("commit", "unknown") for one in found))
+            origin = ", from an earlier README" if any(one.get("origin") for one in found) else ""
+            rows.append([f"`{command}`", tables.span(one.get("measured") for one in found) + origin, ", ".join(f"`{one}`" for one in commits),
+                         tables.span((one.get("load") for one in found), tables.sig), tables.span((one.get("others") for one in found), tables.sig),
+                         tables.NONE if name not in TIMED else "yes" if any(stamp.beside_other_work(one) for one in found) else "no",
                          f"{m['processor']}, {m['cores']} cores, {m['memory_bytes'] / 2**30:.0f} GiB; {m['system']}",
                          ", ".join([f"gcc {m['compiler']}"] + [f"{k} {v}" for k, v in m["packages"].items() if k != "gcc"])])
-    return tables.table(["measured by", "when", "commit", "load", "machine", "versions"], rows)
+    return tables.table(["measured by", "when", "commit", "load", "processors of others", "beside other work", "machine", "versions"], rows)
 
 
 def problem_lines(problem, files):
@@ -106,7 +134,8 @@ Everything here is written by `make figures` from the data in `docs/figures`; no
 data file. `make numbers` measures all of it again.
 
 Times are medians of several runs in one thread after a warm-up, of the processor's clock for that thread: on a quiet machine they are those of the wall, which stand beside them in
-the CSV files with minima and maxima. The column "load" tells how many others were running."""
+the CSV files with minima and maxima. "load" is that of the minute before (older data: of the measurement itself too), "processors of others" how many other programs kept busy
+meanwhile; where that is above """ + f"{stamp.QUIET_OTHERS}, or unknown with a load above {stamp.QUIET_LOAD:.0f}" + """, the numbers count as measured beside other work, and say so."""
 
 PRECISION = """Each line is a method (colour) on a form of the operator (line and mark); its points are the accuracies asked for, loosest first: `quick`, `balanced` (scenes), 1e-4, 1e-6, `precise`, 1e-10,
 `exact`. What is drawn is the *achieved* error against a reference of some 30 digits: the touching rows are taken as equations, the rest is solved by iterative refinement with the residual in `__float128`, and the
@@ -127,31 +156,33 @@ so λ₁(K) ends with a larger error, as the last two columns show; the second g
 def page(data, files):
     measured = data["figures"]
     lines = INTRODUCTION.splitlines() + [""] + machine_lines(data) + [""]
+    lines += section("What was promised", promises.lines(data))
     lines += section("Convergence: the paper's Figure 2", ["![convergence](figures/history.svg)", "", "[CSV](figures/history.csv)"],
                      RESIDUAL, "")
     peers = " Other solvers are drawn at the tolerance 1e-6, with what they were certified for." if "peers" in data else ""
     lines += section("Time and residual against size: the paper's Figure 3",
-                     ["![sizes](figures/sizes.svg)", "", *tables.size_rows(data), "", "[CSV](figures/sizes.csv)"],
+                     ["![sizes](figures/sizes.svg)", "", *tables.size_rows(data), *tables.beside(data, "figures", "sizes"), "", "[CSV](figures/sizes.csv)"],
                      f"From the assembled matrices; time, and total residual of the answer. A cross or `>` is a run that was stopped after "
                      f"{tables.sig(measured['sizes'][0]['limit_s'])} s of the processor.{peers}", "")
-    lines += section("Iterations", ["![iterations](figures/iterations.svg)", "", *tables.iterations_all(data), "", *tables.targets(data)],
+    lines += section("Iterations", ["![iterations](figures/iterations.svg)", "", *tables.iterations_all(data)],
                      ITERATIONS, "")
-    lines += section("Accuracy levels", tables.levels(data))
+    lines += section("Accuracy levels", BLOCKS["levels"](data))
     lines += section("Work against precision", sum((problem_lines(p, files) for p in measured["precision"]), []), PRECISION, "",
                      "[CSV of all runs](figures/precision.csv)", "")
-    lines += section("Against one linear solve", tables.ratios(data))
-    lines += section("What digits cost", tables.digits(data))
+    lines += section("Against one linear solve", BLOCKS["ratios"](data))
+    lines += section("What digits cost", BLOCKS["digits"](data))
     lines += section("Other ratios", tables.others(data))
-    lines += section("Cost against size", tables.growth(data))
+    lines += section("Cost against size", BLOCKS["growth"](data))
     if "peers" in data:
         limit = tables.sig(data["peers"]["time_limit_s"])
         packages = ", ".join(f"{name} {version}" for name, version in data["peers"]["packages"].items())
-        lines += section("Other solvers", [*tables.peers(data), "", "![profiles](figures/peers.svg)", "", *tables.means(data), "", *tables.failures(data), "",
+        lines += section("Other solvers", [*BLOCKS["peers"](data), "", "![profiles](figures/peers.svg)", "", *tables.means(data), "", *tables.failures(data), "",
                                            "[CSV of all runs](figures/peers.csv)"],
                          f"On the same matrices, each answer certified by the same code, {limit} s for each run (`make peers`). {packages}.", "")
     lines += section("Claims at the extremes", tables.extremes(data))
     lines += section("Against theory", tables.theory_all(data))
-    lines += section("The service", tables.soak(data))
+    lines += section("Elements", tables.elements_all(data))
+    lines += section("The service", service_tables.soak_all(data))
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -160,12 +191,13 @@ def readme(text, data):
     missing = []
 
     def fill(found):
-        lines = tables.BLOCKS[found[1]](data)
+        lines = BLOCKS[found[1]](data)
         if lines is None:
             missing.append(found[1])
             return found[0]
         return f"<!-- numbers:{found[1]} -->\n" + "\n".join(lines) + "\n<!-- /numbers -->"
-    return BLOCK.sub(fill, text), missing
+    text, unknown = inline.fill(BLOCK.sub(fill, text), data)
+    return text, missing + unknown
 
 
 def outputs(root):
@@ -200,7 +232,7 @@ def write(root):
 
 def tell(root, missing):
     for name in missing:
-        print(f"README block {name}: no data yet, left as it is")
+        print(f"README, {name}: no data yet, left as it is")
     for path in stale(root)[0]:
         print(f"{path}: nothing makes it")
 
@@ -208,7 +240,7 @@ def tell(root, missing):
 def main():
     command = sys.argv[1] if len(sys.argv) > 1 else ""
     if command == "collect" and len(sys.argv) == 3:
-        renewed = collect.collect(sys.argv[2], ROOT / "docs" / "figures", ROOT)
+        renewed = collect.collect(sys.argv[2], ROOT / "docs" / "figures")
         print("data renewed:", ", ".join(renewed) or "none")
         tell(ROOT, write(ROOT))
     elif command == "write":

@@ -1,5 +1,8 @@
 """The tables of docs/numbers.md and of the README's measured blocks, from the data in docs/figures. Each function returns
 Markdown lines, or None where the data it needs was not measured."""
+import math
+
+import stamp
 
 LEVELS = ["quick", "balanced", "precise", "exact"]
 NONE = "–"
@@ -33,6 +36,30 @@ def table(head, rows):
 
 def percent(value):
     return NONE if value is None else f"{sig(100 * value)} %"
+
+
+# ---- when, and beside what
+
+def stamps(data, name, key=None, shown=("",)):
+    """Of the rows of a set of data whose names begin so; of the whole, where rows have none."""
+    whole = data[name]["machine"]
+    return [row.get("stamp") or whole for row in data[name].get(key) or [] if str(row.get("name", "")).startswith(shown)] or [whole]
+
+
+def span(values, text=str):
+    found = sorted({value for value in values if value is not None})
+    return NONE if not found else text(found[0]) if len(found) == 1 else f"{text(found[0])} .. {text(found[-1])}"
+
+
+def beside(data, name, key=None, shown=("",)):
+    """A note for below a table of times, where other programs ran meanwhile."""
+    found = [one for one in stamps(data, name, key, shown) if stamp.beside_other_work(one)]
+    if not found:
+        return []
+    load, others = span((one.get("load") for one in found), sig), span((one.get("others") for one in found), sig)
+    told = [f"load {load}" if load != NONE else "", f"{others} processors" if others != NONE else ""]
+    told = ", ".join(text for text in told if text)
+    return ["", f"Measured beside other work{f' ({told})' if told else ''}."]
 
 
 # ---- work and precision
@@ -167,20 +194,6 @@ def least_ratio(data, rule, base, which):
     return min(ratios, default=None)
 
 
-def targets(data):
-    """What was promised: half of the iterations of λ₁(K), a tenth of plain Uzawa's, at every size."""
-    if not data.get("figures"):
-        return None
-    lines = []
-    for which, promised, name in ((1, 2, "with the paper's step size λ₁(K)"), (3, 10, "of plain Uzawa")):
-        for rule, base, until in RULES:
-            least = least_ratio(data, rule, base, which)
-            if least:
-                lines.append(f"- {name}, until {until}: at least {sig(least[0], 3)} times the iterations with restart (least at NX = {least[1]}); promised "
-                             f"{promised}: {'kept' if least[0] >= promised else '**missed**'}")
-    return lines
-
-
 def size_rows(data):
     """Figure 3 as a table."""
     rows = []
@@ -204,6 +217,9 @@ def ratio(data, name, digits=2):
     return NONE
 
 
+IN_RATIOS, IN_DIGITS = ("cold_nx", "cached_nx", "100_load", "memory_nx"), ("accuracy_",)
+
+
 def ratios(data):
     if not data.get("bench"):
         return None
@@ -220,9 +236,8 @@ def others(data):
     """The bench's rows that no other table has, as they are."""
     if not data.get("bench"):
         return None
-    shown = ("cold_nx", "cached_nx", "100_load", "memory_nx", "accuracy_")
     rows = [[f"`{r['name']}`", sig(r["median"], 3), f"{sig(r['min'], 3)} .. {sig(r['max'], 3)}", r["runs"], r["unit"]]
-            for r in data["bench"]["ratios"] if not r["name"].startswith(shown)]
+            for r in data["bench"]["ratios"] if not r["name"].startswith(IN_RATIOS + IN_DIGITS)]
     return table(["`make bench`", "median", "min .. max", "runs", "unit"], rows) if rows else None
 
 
@@ -255,16 +270,23 @@ def digits(data):
     return table(["relative error", "`auto`", "steps", "`accelerated_restart`", "iterations"], rows)
 
 
+def exponent(rows, key):
+    """The slope of log seconds over log d, least squares over the finer half."""
+    upper = [(math.log(row["d"]), math.log(row[key])) for row in rows[len(rows) // 2:]]
+    x, y = (sum(point[i] for point in upper) / len(upper) for i in (0, 1))
+    spread = sum((point[0] - x) ** 2 for point in upper)
+    return sum((point[0] - x) * (point[1] - y) for point in upper) / spread if spread else math.nan
+
+
 def growth(data):
     sizes = data.get("bench_size")
     if not sizes:
         return None
-    rows = [[f"{r['d']:,}", sig(r["linear_s"]), sig(r["cold_s"]), sig(r["cached_s"]), f"{r['cold_s'] / r['linear_s']:.2f}", r["iterations"],
+    rows = [[f"{r['d']:,}", sig(r["linear_s"]), sig(r["cold_s"]), sig(r["cached_s"]), f"{r.get('cold_over_linear') or r['cold_s'] / r['linear_s']:.2f}", r["iterations"],
              f"{1e-6 * r['factor_bytes']:.1f}"] for r in sizes["sizes"]]
-    exponents = sizes["exponents"]
     return table(["d", "linear solve, s", "cold to 1e-8, s", "cached, s", "cold / linear", "steps", "factor, MB"], rows) + ["", (
-        f"Fitted exponents over the upper half: linear solve {exponents['linear']:.2f}, cold {exponents['cold']:.2f}, "
-        f"cached {exponents['cached']:.2f}.")]
+        "Fitted exponents over the upper half: " + ", ".join(f"{name} {exponent(sizes['sizes'], key):.2f}" for name, key in
+                                                            (("linear solve", "linear_s"), ("cold", "cold_s"), ("cached", "cached_s"))) + ".")]
 
 
 FAMILIES = {"young": "Young's modulus 1e-6..1e15", "poisson": "Poisson's ratio -0.99..0.499999", "thickness": "thickness 1e-9..1e3",
@@ -334,10 +356,27 @@ def theory_all(data):
     return table(["body", "quantity", "cells", "error, %"], rows)
 
 
-def soak(data):
-    if not data.get("soak"):
+FORMULATIONS = (("quad4", "standard"), ("quad4", "incompatible_modes"), ("quad4", "bbar"), ("quad8", "standard"))
+
+
+def elements(data):
+    """What a formulation buys: Cook's membrane and a rubber tube."""
+    if not (data.get("theory") or {}).get("cook"):
         return None
-    return table(["`make soak`", "figures", "s"], [[r["name"], r["figures"], f"{r['seconds']:.0f}"] for r in data["soak"]["rows"]])
+    cook = {(r["element"], r["formulation"], r["cells"]): f"{r['deflection']:.2f}" if r["cells"] < 10 else f"{r['deflection']:.3f}" for r in data["theory"]["cook"]}
+    tubes = {(r["element"], r["formulation"]): percent(r["ratio"]) if r["ratio"] < 0.5 else f"{100 * r['ratio']:.1f} %" for r in data["theory"]["tubes"]}
+    rows = [[f"{kind} `{way}`" if kind == "quad4" else kind, cook.get((kind, way, 4), NONE), cook.get((kind, way, 64), NONE), tubes.get((kind, way), NONE)]
+            for kind, way in FORMULATIONS]
+    return table(["", "4 cells", "64 cells", "rubber tube, of the exact displacement"], rows)
+
+
+def elements_all(data):
+    """The patch test and the order of every element."""
+    rows = (data.get("theory") or {}).get("elements")
+    if not rows:
+        return []
+    return [*elements(data), "", *table(["element, model, formulation", "patch test, off by", "degree", "order of convergence"],
+                                        [[f"`{r['name']}`", sig(r["patch"]), r["degree"], f"{r['order']:.4f}"] for r in rows])]
 
 
 def peers(data):
@@ -362,10 +401,5 @@ def means(data):
 
 def failures(data):
     """Why answers are missing at 1e-6: nothing is dropped."""
-    rows = [[row["problem"], f"`{row['solver']}`", row["why"]] for row in data["peers"]["rows"] if row["tolerance"] == 1e-6 and not row["success"]]
+    rows = [[row["problem"], f"`{row['solver']}`", " ".join(row["why"].split()).replace("|", "/")] for row in data["peers"]["rows"] if row["tolerance"] == 1e-6 and not row["success"]]
     return table(["problem", "solver", "why there is no answer certified to 1e-6"], rows) if rows else []
-
-
-# The README's blocks: name, and what fills it.
-BLOCKS = {"levels": levels, "iterations": iterations, "ratios": ratios, "sentences": sentences, "digits": digits, "growth": growth,
-          "extremes": extremes, "theory": theory, "soak": soak, "peers": peers, "means": means}

@@ -12,42 +12,51 @@ What is counted: seconds of processor from K, N, h, p in memory to u and r; not 
 reading of files. Solvers of bound-constrained and complementarity problems get the condensed dual: its formation by
 CHOLMOD (D in blocks of right-hand sides) and u = K^-1 (p + N'r) at the end are in their time. A failure costs the time
 limit in the means. A solver that ran out of time or memory on the paper's body is not run on a larger one with that
-tolerance; a dense one on no larger problem at all.
+tolerance; a dense one on no larger problem at all. Methods that ask their tolerance only whether to stop are not run with
+a tighter one once they ended at their limit of iterations: it would be the same run again.
 
 Writes OUT/peers.json (OUT: BUILD_DIR), peers.csv (every run), peers-results.csv (every solver, problem and tolerance)
-and peers-profile-*.svg, and prints tables.
+and peers-profile-*.svg, and prints tables. A run of a part (SIZES, ONLY, PROBLEMS) renews its own rows: the others are
+those of OUT/peers.json, or of docs/figures.
 """
 import csv
 import json
 import math
 import pathlib
-import platform
 import subprocess
 import sys
 import tempfile
 
-import stats
-import svg
-from worker import Ended, Worker
-
 HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+sys.path.append(str(ROOT / "tests/figures"))  # behind this folder, whose svg is another
+
+import stamp  # noqa: E402  the path is set above
+import stats  # noqa: E402
+import svg  # noqa: E402
+from worker import Ended, Worker  # noqa: E402
+
 TOLERANCES = [1e-3, 1e-6, 1e-9]
 SIZES = [30, 60, 120, 180, 240, 300, 480, 600]
 PYTHON = "/usr/bin/python3"
 PACKAGES = ["coinor-libipopt1v5", "libmumps-seq-5.5", "python3-cvxopt", "octave", "python3-siconos", "coinor-libclp1",
             "libpetsc-real3.18", "libcholmod3", "libopenblas0-pthread"]
 QUICK = 1.0         # seconds: a first run that takes no longer is followed by all of a solver's tolerances
-REPEATED = 0.5      # seconds: runs are repeated, to the median of nine, until they took this long
+REPEATED = 0.5      # seconds: runs on the paper's body are repeated, to the median of nine, until they took this long
+REPEATED_ELSE = 0.1  # the same on others, whose times are in means only
 LARGE = 1000        # dofs from which a time-out of dense methods is put down to the size
 DENSE_MOST = 500e6  # bytes of D: the solvers hold several copies of it
+# How methods say that they ended at their limit of iterations, and that the tolerance only tells when to stop.
+AT_LIMIT = ("TAO reason -2", "Siconos info 1")
 
 
 class Solver:
     """command: from (build, problem file, condensed file, name, d). fine, coarse: its own tolerances, for problems that
-    are quick and others. dense: takes the matrices in full, so that a time-out tells about all larger problems."""
+    are quick and others. dense: takes the matrices in full, so that a time-out tells about all larger problems. shared: its
+    process may be that of another method of the same program, as its start takes longer than most of its runs."""
 
-    def __init__(self, name, method, command, fine, coarse=None, dual=False, ours=False, dense=False):
-        self.name, self.method, self.command, self.dual, self.ours = name, method, command, dual, ours
+    def __init__(self, name, method, command, fine, coarse=None, dual=False, ours=False, dense=False, shared=False):
+        self.name, self.method, self.command, self.dual, self.ours, self.shared = name, method, command, dual, ours, shared
         self.fine, self.coarse, self.dense = fine, coarse or fine, dense
 
 
@@ -77,13 +86,13 @@ def solvers():
         Solver("clp", "barrier", program("clp"), power(6, 9, 12, 14, 16), power(9, 12, 16)),
         Solver("octave_qp", "primal", octave(False), [1.0], dense=True),
         Solver("octave_qp_dual", "dual", octave(True), [1.0], dual=True),
-        Solver("siconos_lemke", "lemke", script("siconos_peer.py", True), [1e-12], dual=True),
-        Solver("siconos_newton_min", "newton_min", script("siconos_peer.py", True), dense, dual=True),
-        Solver("siconos_newton_fb", "newton_fb", script("siconos_peer.py", True), dense, dual=True),
-        Solver("siconos_psor", "psor", script("siconos_peer.py", True), dense, dual=True),
-        Solver("tao_blmvm", "blmvm", script("tao_peer.py", True), dense, dual=True),
-        Solver("tao_tron", "tron", script("tao_peer.py", True), dense, dual=True),
-        Solver("tao_bqpip", "bqpip", script("tao_peer.py", True), dense, dual=True),
+        Solver("siconos_lemke", "lemke", script("siconos_peer.py", True), [1e-12], dual=True, shared=True),
+        Solver("siconos_newton_min", "newton_min", script("siconos_peer.py", True), dense, dual=True, shared=True),
+        Solver("siconos_newton_fb", "newton_fb", script("siconos_peer.py", True), dense, dual=True, shared=True),
+        Solver("siconos_psor", "psor", script("siconos_peer.py", True), dense, dual=True, shared=True),
+        Solver("tao_blmvm", "blmvm", script("tao_peer.py", True), dense, dual=True, shared=True),
+        Solver("tao_tron", "tron", script("tao_peer.py", True), dense, dual=True, shared=True),
+        Solver("tao_bqpip", "bqpip", script("tao_peer.py", True), dense, dual=True, shared=True),
     ]
 
 
@@ -99,7 +108,7 @@ class Problem:
         size = json.loads(text)
         self.d, self.m = size["d"], size["m"]
         self.judge = Worker([self.build / "peers/lab", "serve", name, self.file, str(DENSE_MOST / 1e6)], 0)
-        self.dual = None
+        self.dual, self.workers = None, {}
 
     def condense(self):
         """Seconds, or why there is no D. Formed once; each solver's time has the seconds in it."""
@@ -120,13 +129,27 @@ class Problem:
         except ValueError:
             return None, 0.0
 
+    def worker(self, solver):
+        """A process for it: one that is left of another method of its program, or a new one. Raises Ended."""
+        command = tuple(map(str, solver.command(self)))
+        return self.workers.pop(command, None) or Worker(list(command), self.options.memory)
+
+    def keep(self, solver, worker):
+        """A process that has answered to the end may serve another method."""
+        if solver.shared and worker.process.poll() is None:
+            self.workers[tuple(map(str, solver.command(self)))] = worker
+        else:
+            worker.close()
+
     def close(self):
-        self.judge.close()
+        for worker in [self.judge, *self.workers.values()]:
+            worker.close()
 
 
 class Comparison:
     def __init__(self, options):
-        self.options, self.runs = options, []
+        self.options, self.runs, self.kept, self.stamps = options, [], *earlier(options)
+        self.watch = stamp.Watch()
         self.stopped = {}  # (solver, family): (step of its tolerances that ended in a time-out or so, why, size)
 
     def ask(self, worker, problem, solver, tolerance, setup):
@@ -135,7 +158,8 @@ class Comparison:
         took = []
         if limit <= 0:
             raise Ended("timed out")
-        while len(took) < 9 and sum(took) < REPEATED:
+        repeated = REPEATED if problem.name.startswith("body/") else REPEATED_ELSE
+        while len(took) < 9 and sum(took) < repeated:
             problem.answer.unlink(missing_ok=True)
             reply = worker.ask(solver.method, tolerance, problem.answer, limit)
             took.append(reply["seconds"])
@@ -163,8 +187,8 @@ class Comparison:
                 run["status"] = "no bound"
         return run
 
-    def skip(self, problem, solver, why):
-        self.runs.append({"problem": problem.name, "d": problem.d, "m": problem.m, "solver": solver.name, "asked": None,
+    def skip(self, problem, solver, why, asked=None):
+        self.runs.append({"problem": problem.name, "d": problem.d, "m": problem.m, "solver": solver.name, "asked": asked,
                           "seconds": None, "setup": None, "iterations": None, "certified": None, "status": why})
 
     def ladder(self, worker, problem, solver, setup, steps):
@@ -181,6 +205,10 @@ class Comparison:
                 asked, k, first = solver.fine, -1, len(done)
             k += 1
             if not solver.ours and stats.best(done, TOLERANCES[-1]):
+                return
+            if done[-1]["status"] in AT_LIMIT:
+                for tighter in asked[k:steps]:
+                    self.skip(problem, solver, f"not run: at its limit of iterations for {done[-1]['asked']:g} already", tighter)
                 return
             if not solver.ours and not solver.dual and stalled(done[first:]):  # on the dual a run more costs little
                 return
@@ -204,22 +232,47 @@ class Comparison:
             self.skip(problem, solver, status)
             return
         try:
-            worker = Worker(solver.command(problem), self.options.memory)
+            worker = problem.worker(solver)
         except Ended as why:
             self.skip(problem, solver, f"not started: {why}")
             return
         self.ladder(worker, problem, solver, setup, step)
-        worker.close()
+        problem.keep(solver, worker)
 
     def all(self, names, chosen):
         for name in names:
+            watch = stamp.Watch()
             with tempfile.TemporaryDirectory() as folder:
                 problem = Problem(self.options, pathlib.Path(folder), name)
                 for solver in chosen:
                     self.solve(problem, solver)
                     say(problem, solver, self.runs)
                 problem.close()
-            write_report(self, chosen, self.options)  # what is measured stays, whatever becomes of the rest
+            self.stamps[name] = watch.stamp(ROOT)
+            write_report(self, self.options)  # what is measured stays, whatever becomes of the rest
+
+    def all_runs(self):
+        """Those of this run, and those of earlier ones that it has not renewed, in the solvers' and the problems' order."""
+        renewed = {(run["problem"], run["solver"]) for run in self.runs}
+        runs = [run for run in self.kept if (run["problem"], run["solver"]) not in renewed] + self.runs
+        problems = {name: k for k, name in enumerate(dict.fromkeys(run["problem"] for run in self.kept + self.runs))}
+        order = {solver.name: k for k, solver in enumerate(solvers())}
+        return sorted(runs, key=lambda run: (problems[run["problem"]], order.get(run["solver"], len(order))))
+
+
+def earlier(options):
+    """(runs, stamps by problem) that a run of a part leaves as they are; of a whole run there are none."""
+    if not options.part:
+        return [], {}
+    for path in [options.out / "peers.json"] + [ROOT / "docs/figures/peers.json"] * (options.out == options.build):
+        if path.exists():
+            old = json.loads(path.read_text())
+            if old["time_limit_s"] != options.time:
+                print(f"{path} has another time limit, {old['time_limit_s']:g} s: its rows are left out")
+                return [], {}
+            when = stamp.brief(old.get("stamp") or old.get("machine") or {})
+            return old["runs"], {run["problem"]: when for run in old["runs"]} | {row["name"]: row["stamp"] for row in old.get("problems", [])}
+    return [], {}
 
 
 def stalled(done):
@@ -325,20 +378,23 @@ def print_tables(report):
              stats.number(x["cold"]), stats.number(x["cached_seconds"]), stats.number(x["cached"])]
             for x in report["body"]]
     print(stats.table(head, rows))
+    seconds = spent(report["runs"], report["time_limit_s"])
+    print(f"\nSeconds of processor, each run once: {sum(seconds.values()):.0f}: " + ", ".join(f"{name} {s:.0f}" for name, s in seconds.items()))
+
+
+def spent(runs, limit):
+    """{solver: seconds of processor, each run once, a time-out as the limit}: where the time of a comparison goes."""
+    total = {}
+    for run in runs:
+        timed_out = run["seconds"] is None and run["status"] == "timed out"
+        total[run["solver"]] = total.get(run["solver"], 0.0) + (limit if timed_out else (run["seconds"] or 0.0) - (run["setup"] or 0.0))
+    return dict(sorted(total.items(), key=lambda item: -item[1]))
 
 
 def versions():
     found = subprocess.run(["dpkg-query", "-W", "-f", "${Package} ${Version} ${Status}\n", *PACKAGES],
                            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True).stdout.splitlines()
     return {line.split()[0]: line.split()[1] for line in found if line.endswith("installed")}
-
-
-def machine():
-    model = [line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")]
-    commit = subprocess.run(["git", "-C", HERE, "rev-parse", "--short", "HEAD"], stdout=subprocess.PIPE,
-                            stderr=subprocess.DEVNULL, text=True).stdout.strip()
-    return {"processor": model[0] if model else "unknown", "cores": len(model), "system": platform.platform(),
-            "commit": commit, "packages": versions()}
 
 
 def write_csv(path, rows):
@@ -348,14 +404,16 @@ def write_csv(path, rows):
         writer.writerows(rows)
 
 
-def write_report(comparison, chosen, options):
-    rows = results(comparison.runs, chosen)
-    report = {"machine": machine(), "time_limit_s": options.time, "memory_limit_mb": options.memory,
-              "runs": comparison.runs, "results": rows, "means": means(rows, options.time), "body": body_ratios(rows),
-              "profiles": profiles(rows)}
+def write_report(comparison, options):
+    runs = comparison.all_runs()
+    rows = results(runs, solvers())
+    report = {"stamp": {**stamp.machine(), **comparison.watch.stamp(ROOT)}, "packages": versions(),
+              "time_limit_s": options.time, "memory_limit_mb": options.memory,
+              "problems": [{"name": name, "stamp": comparison.stamps[name]} for name in dict.fromkeys(run["problem"] for run in runs) if name in comparison.stamps],
+              "runs": runs, "results": rows, "means": means(rows, options.time), "body": body_ratios(rows), "profiles": profiles(rows)}
     with open(options.out / "peers.json", "w") as file:
         json.dump(report, file, indent=1, allow_nan=False)
-    write_csv(options.out / "peers.csv", comparison.runs)
+    write_csv(options.out / "peers.csv", runs)
     write_csv(options.out / "peers-results.csv", rows)
     draw_profiles(report["profiles"], options.out)
     return report
@@ -367,6 +425,8 @@ class Options:
         given = dict(argument.split("=", 1) for argument in arguments[1:])
         words = {key: value.replace(",", " ").split() for key, value in given.items()}
         self.out = pathlib.Path(given.get("OUT") or self.build)
+        self.out.mkdir(parents=True, exist_ok=True)
+        self.part = any(given.get(key) for key in ("SIZES", "ONLY", "PROBLEMS"))
         self.sizes = [int(size) for size in words.get("SIZES", [])] or SIZES
         self.time = float(given.get("TIME") or 20)
         self.memory = float(given.get("MEMORY") or 4000)  # 0: no limit
@@ -388,7 +448,7 @@ def main():
     print(f"{'':49} {'1e-3, s':>9} {'1e-6, s':>9} {'1e-9, s':>9}", flush=True)
     comparison = Comparison(options)
     comparison.all(options.names(), chosen)
-    print_tables(write_report(comparison, chosen, options))
+    print_tables(write_report(comparison, options))
 
 
 if __name__ == "__main__":

@@ -1,31 +1,39 @@
 """The long forms of what tests/api/test_soak.py does shortly: usage: soak.py BUILD_DIR [FILTER].
 
-Prints a table; exit status 1 if a figure that must be 0 is not.
+Prints a table; exit status 1 if a figure that must be 0 is not. Each run takes its row's place in BUILD_DIR/soak.json, with when, of
+which commit and beside what it was measured, and the other rows stay: what is timed may be measured alone on a quiet machine, the
+rest beside other work, several at once.
 """
+import fcntl
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "api"))
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "tests/api"), str(ROOT / "tests/figures")]
 
 import malformed  # noqa: E402  the path is set above
 import no_memory  # noqa: E402
 import overhead  # noqa: E402
 import scenarios  # noqa: E402
+import stamp  # noqa: E402
 import streams  # noqa: E402
 from scenarios import PAPER, ZERO  # noqa: E402
 
 
 def unit(build, program, times):
-    """A C test at `times` its usual length: how many of its tests failed, and what it says of itself."""
+    """A C test at `times` its usual length: how many of its tests failed, and the counts that it says of itself, "# 7 jobs"."""
     done = subprocess.run([os.path.join(build, "tests", program)], capture_output=True, text=True, check=False,
                           env={**os.environ, "SOAK": str(times)})
-    said = [line[2:] for line in done.stdout.splitlines() if line.startswith("# ")]
-    return {"errors": done.stdout.count("not ok ") + (done.returncode != 0), "": "; ".join(said[-3:])}
+    said = [part for line in done.stdout.splitlines() if line.startswith("# ") for part in line[2:].split(", ")]
+    counts = [re.fullmatch(r"(\d+) ([a-z ]+)", part) for part in said]
+    return {"errors": done.stdout.count("not ok ") + (done.returncode != 0),
+            **{found[2].replace(" ", "_"): int(found[1]) for found in counts if found}}
 
 
 RUNS = [
@@ -47,22 +55,35 @@ RUNS = [
 ]
 
 
+def as_text(figures):
+    return ", ".join(f"{key} {value}" for key, value in figures.items())
+
+
+def keep(path, row):
+    """The row in its place among those of earlier runs, and of others that run at the same time."""
+    with open(f"{path}.lock", "w", encoding="ascii") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        old = json.loads(path.read_text())["rows"] if path.exists() else []
+        rows = {one["name"]: one for one in old if isinstance(one["figures"], dict)}
+        rows[row["name"]] = row
+        order = {name: k for k, (name, _) in enumerate(RUNS)}
+        stamp.write_whole(path, {"rows": sorted(rows.values(), key=lambda one: order.get(one["name"], len(order)))})
+
+
 def main():
     build, wanted = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else ""
-    failed, rows = False, []
+    failed = False
     print("| what | figures | s |\n|---|---|---|")
     for name, run in RUNS:
         if wanted not in name:
             continue
-        begun = time.monotonic()
+        begun, watch = time.monotonic(), stamp.Watch()
         figures = run(build)
         wrong = [key for key in ZERO if figures.get(key)]
         failed = failed or bool(wrong)
-        text = ", ".join(f"{key} {value}".strip() for key, value in figures.items())
-        text = f"{'**WRONG** ' if wrong else ''}{text}"
-        rows.append({"name": name, "figures": text, "seconds": round(time.monotonic() - begun)})
-        print(f"| {name} | {text} | {rows[-1]['seconds']} |", flush=True)
-        (pathlib.Path(build) / "soak.json").write_text(json.dumps({"rows": rows}))
+        row = {"name": name, "figures": figures, "wrong": wrong, "seconds": round(time.monotonic() - begun), "stamp": watch.stamp(ROOT)}
+        print(f"| {name} | {'**WRONG** ' if wrong else ''}{as_text(figures)} | {row['seconds']} |", flush=True)
+        keep(pathlib.Path(build) / "soak.json", row)
     sys.exit(failed)
 
 

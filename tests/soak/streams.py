@@ -131,7 +131,7 @@ def crowds(build, streams=2000, polls=1000, idle_s=10, load_s=5):
         figures["idle_bytes"] = crowd.bytes - silent
         if load_s:
             beside = scenarios.load(build, s.port, 16, load_s, body, "wait=0")
-            figures["submitted_per_s"] = f"{alone['per_s']:.0f} alone, {beside['per_s']:.0f} beside"
+            figures |= {"alone_per_s": round(alone["per_s"]), "beside_per_s": round(beside["per_s"])}
         waiting = Crowd(s, polls, f"/v1/jobs/{followed}", "Prefer: wait=60\r\n")
         held.append(waiting)
         waiting.read(0.5)
