@@ -5,7 +5,8 @@
  * unconnected one takes the old number (dup2 is atomic), libmicrohttpd closes that and ends its thread, and one thread
  * here watches all sockets that were taken (epoll). It writes what their sources have to say, sees clients leave, and
  * closes: what libmicrohttpd may have read after the request is lost, so that such a reply is the last of its
- * connection and says so.
+ * connection and says so. 2,000 streams and 1,000 long polls keep 6 to 7 kB each (tests/soak/streams.py; 155 kB with a
+ * thread each, 92 of them the thread-local data of OpenBLAS and METIS) and no processor time.
  *
  * The other way, MHD_suspend_connection, was tried with a handler that blocks for 1 ms, 64 clients and 2,000 streams on
  * 2 processors: 45 kB each (its buffers stay), and 23,000 requests per second by event threads and a pool of handlers
