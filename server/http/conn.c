@@ -21,29 +21,42 @@ conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
     c->server = server;
     c->fd = fd;
     c->address_len = rate_address(address, c->address);
-    atomic_fetch_add(&server->context.connections, 1);
+    c->place = presence_begin(server->context.presences, address);
     c->deadline = deadlines_add(server->deadlines, fd, deadlines_now() + server->options.request_deadline_s);
-    if (!c->deadline) {
-        atomic_fetch_sub(&server->context.connections, 1);
+    if (!c->deadline || !c->place) {
+        deadline_remove(c->deadline);
+        presence_end(c->place);
         free(c);
         return NULL;
     }
     return c;
 }
 
-static void request_free(conn *c)
+static void drop_body(http_server *server, http_request *rq)
 {
-    http_request *rq = c->request;
-    c->request = NULL;
+    atomic_fetch_sub(&server->context.body_bytes, rq->body_capacity);
+    free(rq->body);
+    rq->body = NULL;
+    rq->body_capacity = 0;
+}
+
+static void request_free(http_server *server, http_request *rq)
+{
     if (!rq)
         return;
-    atomic_fetch_sub(&c->server->context.body_bytes, rq->body_capacity);
+    drop_body(server, rq);
     reply_clear(&rq->reply);
     store_upload_abort(rq->upload);
     target_clear(&rq->target);
+    free(rq->kept_fields);
     free(rq->raw_target);
-    free(rq->body);
     free(rq);
+}
+
+static void clear_request(conn *c)
+{
+    request_free(c->server, c->request);
+    c->request = NULL;
 }
 
 void conn_free(conn *c)
@@ -51,14 +64,14 @@ void conn_free(conn *c)
     if (!c)
         return;
     deadline_remove(c->deadline);
-    request_free(c);
-    atomic_fetch_sub(&c->server->context.connections, 1);
+    clear_request(c);
+    presence_end(c->place);
     free(c);
 }
 
 void conn_begin_request(conn *c, const char *raw_target)
 {
-    request_free(c);
+    clear_request(c);
     http_request *rq = calloc(1, sizeof *rq);
     if (!rq)
         return;
@@ -90,17 +103,10 @@ static void linger(const conn *c)
     }
 }
 
-static void note_reply(http_request *rq, http_reply *reply)
-{
-    rq->status = reply->status;
-    rq->reply_len = strcmp(rq->method, "HEAD") == 0 ? 0 : reply->len;
-    memcpy(reply->request_id, rq->id, sizeof reply->request_id);
-}
-
 static bool send_reply(conn *c, struct MHD_Connection *mhd)
 {
     http_reply *reply = &c->request->reply;
-    note_reply(c->request, reply);
+    request_note_reply(c->request);
     double allowed = c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE;
     deadline_set(c->deadline, reply->source.read ? INFINITY : deadlines_now() + allowed, false);
     return reply_send(mhd, reply);
@@ -109,14 +115,18 @@ static bool send_reply(conn *c, struct MHD_Connection *mhd)
 /* Where libmicrohttpd takes no reply: writes it and closes the connection's sending side. */
 static void send_directly(conn *c, const problem_details *problem)
 {
-    http_reply reply = {.close = true, .cors = c->request->reply.cors, .cors_origin = c->request->reply.cors_origin};
-    reply_problem(&reply, problem);
-    note_reply(c->request, &reply);
-    char *message = c->server->tls ? NULL : reply_message(&reply); /* TLS: the close must say it */
-    if (message && send(c->fd, message, strlen(message), MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
+    http_reply *reply = &c->request->reply, plain = {.cors = reply->cors, .cors_origin = reply->cors_origin};
+    size_t len;
+    reply_clear(reply);
+    *reply = plain;
+    reply->close = true;
+    reply_problem(reply, problem);
+    request_note_reply(c->request);
+    char *message = c->server->tls ? NULL : reply_message(reply, &len); /* TLS: the close must say it */
+    if (message && send(c->fd, message, len, MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
         linger(c);
     free(message);
-    reply_clear(&reply);
+    reply_clear(reply);
 }
 
 void conn_refuse(conn *c, int status)
@@ -201,6 +211,7 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
 {
     http_request *rq = c->request;
     rq->begun = true;
+    rq->can_be_held = c->server->holder && strcmp(version, "HTTP/1.1") == 0 && strcmp(method, "HEAD") != 0;
     bool framed = read_framing(c, mhd, method, version);
     cors_find(c->server, rq);
     if (framed && admit(c) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
@@ -283,6 +294,42 @@ bool conn_body(conn *c, const char *data, size_t size)
 
 /* ------------------------------------------------------------------ answer */
 
+/* Lets the reply go on without libmicrohttpd, whose connection then ends. False: nothing has happened. */
+static bool hold(conn *c)
+{
+    http_request *rq = c->request;
+    reply_source source = rq->reply.source;
+    char *head = NULL;
+    if (!source.hold || !rq->can_be_held || !request_keep_fields(rq))
+        return false;
+    if (!source.is_message) {
+        request_note_reply(rq);
+        rq->reply.close = true;
+        head = reply_head(&rq->reply);
+    }
+    rq->reply.source.read = NULL;
+    rq->place = c->place;
+    if ((source.is_message || head) && holder_take(c->server->holder, c->fd, rq, head, !source.is_message, &source)) {
+        c->place = NULL;
+        c->request = NULL;
+        return true;
+    }
+    rq->reply.source = source;
+    rq->reply.close = false;
+    rq->place = NULL;
+    free(head);
+    return false;
+}
+
+/* The thread stays: the reply that was to come as a message is waited for here. */
+static void answer_here(http_reply *reply)
+{
+    reply_source source = reply->source;
+    reply->source.read = NULL;
+    source.answer(source.ctx);
+    source.free(source.ctx);
+}
+
 bool conn_answer(conn *c, struct MHD_Connection *mhd)
 {
     http_request *rq = c->request;
@@ -292,15 +339,20 @@ bool conn_answer(conn *c, struct MHD_Connection *mhd)
         reply_problem(&rq->reply, &rq->refused);
     else
         rq->route->handler(&c->server->context, rq, &rq->reply);
+    if (rq->reply.source.read)
+        drop_body(c->server, rq); /* what takes long is not beside it */
+    if (rq->reply.source.read && hold(c))
+        return false;
+    if (rq->reply.source.read && rq->reply.source.is_message)
+        answer_here(&rq->reply);
     negotiate(rq, &rq->reply);
     return send_reply(c, mhd);
 }
 
-static void log_request(conn *c, bool completed)
+static void log_request(const http_server *server, const http_request *rq, bool completed, bool expired)
 {
-    const http_request *rq = c->request;
     char path[256];
-    if (!c->server->options.access_log && rq->status < 500)
+    if (!server->options.access_log && rq->status < 500)
         return;
     snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
     for (char *at = path; *at; at++)
@@ -314,11 +366,27 @@ static void log_request(conn *c, bool completed)
                           LOG_N("seconds", deadlines_now() - rq->started),
                           LOG_S("job", rq->job_id),
                           LOG_S("token", rq->token),
-                          LOG_S("end", completed                       ? "complete"
-                                       : deadline_expired(c->deadline) ? "deadline"
-                                                                       : "aborted"),
+                          LOG_S("end", completed ? "complete"
+                                       : expired ? "deadline"
+                                                 : "aborted"),
                           {0}};
-    log_write(c->server->context.log, LOG_INFO, "request", fields);
+    log_write(server->context.log, LOG_INFO, "request", fields);
+}
+
+static void account(const http_server *server, const http_request *rq, bool completed, bool expired)
+{
+    const route *found = rq->route;
+    log_request(server, rq, completed, expired);
+    metrics_request(server->context.metrics, found ? found->method : NULL, found ? found->pattern : NULL, rq->status,
+                    deadlines_now() - rq->started);
+}
+
+void conn_end_held(void *ctx, http_request *rq, bool completed)
+{
+    http_server *server = ctx;
+    account(server, rq, completed, false);
+    presence_end(rq->place);
+    request_free(server, rq);
 }
 
 void conn_end_request(conn *c, unsigned status, bool completed)
@@ -329,10 +397,7 @@ void conn_end_request(conn *c, unsigned status, bool completed)
         c->request->status = (int)status;
     if (c->request->unread_body && completed)
         linger(c);
-    log_request(c, completed);
-    const route *found = c->request->route;
-    metrics_request(c->server->context.metrics, found ? found->method : NULL, found ? found->pattern : NULL,
-                    c->request->status, deadlines_now() - c->request->started);
-    request_free(c);
+    account(c->server, c->request, completed, deadline_expired(c->deadline));
+    clear_request(c);
     deadline_set(c->deadline, deadlines_now() + c->server->options.request_deadline_s, false);
 }

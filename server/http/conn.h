@@ -3,7 +3,9 @@
 #define SERVER_HTTP_CONN_H
 
 #include "http/deadlines.h"
+#include "http/held.h"
 #include "http/http.h"
+#include "http/presence.h"
 #include "http/rate.h"
 #include "http/request.h"
 
@@ -22,6 +24,7 @@ struct http_server {
     http_options options;
     struct MHD_Daemon *daemon;
     deadlines *deadlines;
+    holder *holder; /* NULL: every connection keeps its thread */
     auth *auth;
     rate *rate;            /* NULL: no limit */
     bool tls;              /* nothing can be written past libmicrohttpd */
@@ -35,7 +38,8 @@ struct http_server {
 typedef struct {
     http_server *server;
     deadline *deadline;
-    http_request *request; /* NULL between requests */
+    http_request *request; /* NULL between requests, and when it is held without this connection */
+    presence *place;
     int fd;
     unsigned char address[16]; /* that counts for the rate */
     size_t address_len;
@@ -55,6 +59,9 @@ bool conn_answer(conn *c, struct MHD_Connection *mhd);
 void conn_refuse(conn *c, int status);
 /* status: of the reply that libmicrohttpd made by itself, 0 if there was none. */
 void conn_end_request(conn *c, unsigned status, bool completed);
+
+/* A request that was held, with its connection, is over: of the holder. ctx is the server. */
+void conn_end_held(void *ctx, http_request *rq, bool completed);
 
 /* admission.c: everything that can be refused before the body is read; false with rq->refused and the header fields of
  * rq->reply. */

@@ -2,7 +2,8 @@
  *
  * A connection has at most one request at a time. The request is made when its first line has come (on_target), looked
  * at when its header block has come (begin), fed with its body (take_body), answered (answer) and ended
- * (on_completed). All of this happens in the connection's own thread. */
+ * (on_completed). All of this happens in the connection's own thread; a reply that then only waits leaves both
+ * (held.h). */
 #include "http/all_events.h"
 #include "http/conn.h"
 #include "http/fields.h"
@@ -33,6 +34,18 @@ static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_c
         conn_free(*socket_context);
         *socket_context = NULL;
     }
+}
+
+/* libmicrohttpd's own limits know only the connections that it still has. */
+static enum MHD_Result on_accept(void *ctx, const struct sockaddr *address, socklen_t len)
+{
+    http_server *server = ctx;
+    const http_options *options = &server->options;
+    (void)len;
+    bool room = presences_count(server->context.presences) < options->max_connections &&
+                (options->max_client_connections == 0 ||
+                 presences_from(server->context.presences, address) < options->max_client_connections);
+    return room ? MHD_YES : MHD_NO;
 }
 
 /* The first line has come; `raw` is still as received. What is returned becomes *request_context below. */
@@ -100,7 +113,8 @@ static char *make_last_words(double deadline_s)
     http_reply reply = {.close = true};
     reply_refuse(&reply, 408, "request_timeout", "The request took too long",
                  "a request must be complete within %g s, plus the time its body needs at 100 kB/s", deadline_s);
-    char *text = reply_message(&reply);
+    size_t len;
+    char *text = reply_message(&reply, &len);
     reply_clear(&reply);
     return text;
 }
@@ -127,7 +141,7 @@ static struct MHD_Daemon *start_daemon(http_server *server, int listen_fd, const
     unsigned tls = server->tls ? MHD_USE_TLS : 0;
     return MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_THREAD_PER_CONNECTION | MHD_USE_POLL |
                                 MHD_USE_ITC | MHD_USE_ERROR_LOG | tls,
-                            0, NULL, NULL, on_request, server, MHD_OPTION_EXTERNAL_LOGGER, on_message, server,
+                            0, on_accept, server, on_request, server, MHD_OPTION_EXTERNAL_LOGGER, on_message, server,
                             MHD_OPTION_ARRAY, items, MHD_OPTION_END);
 }
 
@@ -168,7 +182,6 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
         goto fail;
     server->body_budget = BODY_BUDGET(options->max_body);
     atomic_init(&server->context.body_bytes, 0);
-    atomic_init(&server->context.connections, 0);
     pthread_mutex_init(&server->context.ready_lock, NULL);
     atomic_init(&server->id, 0);
     uint64_t random = 0;
@@ -184,7 +197,10 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     server->context.fields = field_slots_new(work_workers(parts->work));
     server->context.told = told_changes_new();
     server->deadlines = deadlines_new(words);
-    if (!server->deadlines || !server->context.fields || !server->context.told)
+    server->context.presences = presences_new();
+    if (!server->deadlines || !server->context.fields || !server->context.told || !server->context.presences)
+        goto fail;
+    if (!server->tls && !(server->holder = holder_new(options->request_deadline_s, conn_end_held, server)))
         goto fail;
     server->daemon = start_daemon(server, listen_fd, options);
     if (!server->daemon)
@@ -194,6 +210,8 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
 fail:
     snprintf(message, size, "cannot start the HTTP server: %s", errno ? strerror(errno) : "out of memory");
     if (server) {
+        holder_free(server->holder);
+        presences_free(server->context.presences);
         deadlines_free(server->deadlines);
         field_slots_free(server->context.fields);
         told_changes_free(server->context.told);
@@ -218,6 +236,8 @@ void http_stop(http_server *server)
         return;
     http_drain(server);              /* event streams end */
     MHD_stop_daemon(server->daemon); /* closes the listening socket too */
+    holder_free(server->holder);     /* nobody adds to it any more */
+    presences_free(server->context.presences);
     deadlines_free(server->deadlines);
     field_slots_free(server->context.fields);
     told_changes_free(server->context.told);

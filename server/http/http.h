@@ -2,8 +2,8 @@
  *
  * bytes -> framing (framing.h) -> target (target.h) -> route table (routes.c) -> handler (jobs.c, list.c, results.c,
  * events.c, uploads.c, service.c) -> negotiation (negotiate.h) -> reply (reply.h). One thread per connection, so a
- * handler may block; deadlines.h ends connections that are too slow. Handlers own nothing beyond their request: the
- * store and the workers own the jobs. */
+ * handler may block, and none for one that only waits (held.h); deadlines.h ends connections that are too slow.
+ * Handlers own nothing beyond their request: the store and the workers own the jobs. */
 #ifndef SERVER_HTTP_H
 #define SERVER_HTTP_H
 

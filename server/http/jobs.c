@@ -4,6 +4,7 @@
 #include "http/problem.h"
 #include "http/request.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -69,14 +70,14 @@ bool jobs_ended(const job *j)
     return j->status != JOB_ACCEPTED && j->status != JOB_RUNNING;
 }
 
-bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply)
+static void note_preference(const api *context, const http_request *rq, double seconds, http_reply *reply)
 {
-    double seconds = request_wait(rq, otherwise, context->max_wait_s);
-    if (seconds <= 0 || jobs_ended(j))
-        return true;
-    work_wait_for(context->work, j->id, seconds, rq->fd, &context->draining);
     if (request_wait(rq, -1, context->max_wait_s) >= 0)
         snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
+}
+
+static bool load_again(api *context, job *j, http_reply *reply)
+{
     char id[sizeof j->id];
     memcpy(id, j->id, sizeof id);
     job_clear(j);
@@ -84,6 +85,34 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
     if (status != STORE_OK)
         reply_store_failure(context, status, reply);
     return status == STORE_OK;
+}
+
+bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply)
+{
+    double seconds = request_wait(rq, otherwise, context->max_wait_s);
+    if (seconds <= 0 || jobs_ended(j))
+        return true;
+    work_wait_for(context->work, j->id, seconds, rq->fd, &context->draining);
+    note_preference(context, rq, seconds, reply);
+    return load_again(context, j, reply);
+}
+
+/* So long a wait keeps its thread: a connection that has given it up ends with the reply (held.h). */
+static const double SHORT_WAIT_S = 1.0;
+
+void jobs_wait_then(api *context, http_request *rq, job *j, waiting_then then, http_reply *reply)
+{
+    double seconds = request_wait(rq, 0, context->max_wait_s), rest = fmax(seconds - SHORT_WAIT_S, 0.0);
+    if (seconds <= 0 || jobs_ended(j)) {
+        then(context, j, reply);
+        return;
+    }
+    note_preference(context, rq, seconds, reply);
+    if (work_wait_for(context->work, j->id, seconds - rest, rq->fd, &context->draining) || rest == 0.0 ||
+        !waiting_begin(context, rq, j->id, rest, then)) {
+        if (load_again(context, j, reply))
+            then(context, j, reply);
+    }
 }
 
 void jobs_freshen(api *context, job *j)
@@ -190,8 +219,8 @@ void jobs_acknowledge(api *context, job *j, http_reply *reply)
 static void submit(api *context, http_request *rq, const store_request *request, http_reply *reply)
 {
     job j = {0};
-    if (jobs_store(context, rq, request, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
-        jobs_acknowledge(context, &j, reply);
+    if (jobs_store(context, rq, request, &j, reply))
+        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     job_clear(&j);
 }
 
@@ -266,12 +295,17 @@ done:
 
 /* -------------------------------------------------------------------- read */
 
+static void reply_found(api *context, job *j, http_reply *reply)
+{
+    reply_job(context, 200, j, reply);
+}
+
 void jobs_get(api *context, http_request *rq, http_reply *reply)
 {
     job j;
     reply->tag_by_body = true;
-    if (jobs_load(context, rq, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
-        reply_job(context, 200, &j, reply);
+    if (jobs_load(context, rq, &j, reply))
+        jobs_wait_then(context, rq, &j, reply_found, reply);
     job_clear(&j);
 }
 

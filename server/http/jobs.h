@@ -4,6 +4,7 @@
 
 #include "codec/codec.h"
 #include "http/request.h"
+#include "http/waiting.h"
 
 bool jobs_ended(const job *j);
 /* A running job's progress lives in the worker; the store has the one of the last lease. */
@@ -16,6 +17,9 @@ void jobs_check_still_there(api *context, const job *j, http_reply *reply);
 /* Waits as the request prefers, `otherwise` seconds where it does not say, and reads the job again; *j is replaced.
  * False with a failure in reply. */
 bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply);
+/* Waits as the request prefers and answers by `then`; a longer wait goes on after the handler's return (waiting.h), so
+ * that then must not need what the handler has. */
+void jobs_wait_then(api *context, http_request *rq, job *j, waiting_then then, http_reply *reply);
 
 /* NULL in *key: none was given; freed by the caller. False with a 400. */
 bool jobs_read_key(const http_request *rq, char **key, problem_details *problem);

@@ -58,8 +58,8 @@ static void make_request(api *context, const http_request *rq, const job *old, c
 static void submit(api *context, http_request *rq, const store_request *request, http_reply *reply)
 {
     job j = {0};
-    if (jobs_store(context, rq, request, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
-        jobs_acknowledge(context, &j, reply);
+    if (jobs_store(context, rq, request, &j, reply))
+        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     job_clear(&j);
 }
 

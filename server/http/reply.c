@@ -293,13 +293,12 @@ static void put_date(FILE *out)
                 MONTHS + 3 * t.tm_mon, t.tm_year + 1900, t.tm_hour, t.tm_min, t.tm_sec);
 }
 
-char *reply_message(const http_reply *reply)
+static char *write_message(const http_reply *reply, bool chunked, size_t *len)
 {
     field fields[MAX_FIELDS];
     field_texts texts;
     char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
+    FILE *out = open_memstream(&text, len);
     if (!out)
         return NULL;
     size_t n = list_fields(fields, reply, &texts);
@@ -307,10 +306,29 @@ char *reply_message(const http_reply *reply)
     put_date(out);
     for (size_t i = 0; i < n; i++)
         fprintf(out, "%s: %s\r\n", fields[i].name, fields[i].value);
-    fprintf(out, "Content-Length: %zu\r\n\r\n%.*s", reply->len, (int)reply->len, reply->body ? reply->body : "");
-    if (fclose(out) != 0) {
+    if (chunked)
+        fputs("Transfer-Encoding: chunked\r\n\r\n", out);
+    else if (reply->status == 204 || reply->status == 304) /* no body, nor its length (RFC 9110, section 8.6) */
+        fputs("\r\n", out);
+    else
+        fprintf(out, "Content-Length: %zu\r\n\r\n", reply->len);
+    if (!chunked && reply->len > 0)
+        fwrite(reply->body, 1, reply->len, out);
+    bool whole = !ferror(out);
+    if (fclose(out) != 0 || !whole) {
         free(text);
         return NULL;
     }
     return text;
+}
+
+char *reply_message(const http_reply *reply, size_t *len)
+{
+    return write_message(reply, false, len);
+}
+
+char *reply_head(const http_reply *reply)
+{
+    size_t len;
+    return write_message(reply, true, &len);
 }

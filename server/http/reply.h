@@ -8,12 +8,20 @@
 #include <stddef.h>
 
 /* A body that comes piece by piece. read blocks until it has written 1 to `size` bytes, and returns how many, or that
- * there are no more, or that there are no more although there should be. It is called in the connection's thread. */
+ * there are no more, or that there are no more although there should be. It is called in the connection's thread.
+ * With the second part the reply can do without that thread (held.h). */
 enum { REPLY_STREAM_ENDS = -1, REPLY_STREAM_BREAKS = -2 };
 typedef struct {
     ptrdiff_t (*read)(void *ctx, char *out, size_t size);
     void (*free)(void *ctx);
     void *ctx;
+    struct listener *listener; /* ctx's own: wakes whoever has to read */
+    void (*hold)(void *ctx);   /* from now on read returns 0 instead of blocking; NULL: it can't */
+    /* When to read again at the latest, on deadlines_now's clock; told: the listener was. */
+    double (*due)(void *ctx, bool told);
+    bool is_message; /* what read gives is the whole message, header fields included */
+    /* Of such a source whose connection keeps its thread: waits here and puts the reply. */
+    void (*answer)(void *ctx);
 } reply_source;
 
 #define REPLY_TAG 48 /* room for an entity tag without its quotes, in any coding, and a NUL */
@@ -69,8 +77,11 @@ void reply_clear(http_reply *reply);
 /* Queues the reply on a connection and consumes it; false if that failed. */
 struct MHD_Connection;
 bool reply_send(struct MHD_Connection *connection, http_reply *reply);
-/* The reply as a whole HTTP/1.1 message for a connection that then closes, for the two cases where libmicrohttpd takes
- * no reply: in the middle of a chunked body, and before the request is complete. malloc'ed; NULL: no memory. */
-char *reply_message(const http_reply *reply);
+/* The reply as a whole HTTP/1.1 message for a connection that then closes, where libmicrohttpd takes no reply: in the
+ * middle of a chunked body, before the request is complete, and where the connection waits without it. *len bytes and a
+ * NUL, malloc'ed; NULL: no memory. */
+char *reply_message(const http_reply *reply, size_t *len);
+/* The head of such a message, whose body comes in chunks. */
+char *reply_head(const http_reply *reply);
 
 #endif

@@ -166,6 +166,36 @@ bool request_client_gone(const http_request *rq)
     return poll(&p, 1, 0) > 0 && (p.revents & (POLLRDHUP | POLLHUP | POLLERR | POLLNVAL));
 }
 
+void request_note_reply(http_request *rq)
+{
+    http_reply *reply = &rq->reply;
+    rq->status = reply->status;
+    rq->reply_len = strcmp(rq->method, "HEAD") == 0 ? 0 : reply->len;
+    memcpy(reply->request_id, rq->id, sizeof reply->request_id);
+}
+
+static const char *keep_text(char **at, const char *text, size_t len)
+{
+    char *kept = memcpy(*at, text, len);
+    kept[len] = '\0';
+    *at += len + 1;
+    return kept;
+}
+
+bool request_keep_fields(http_request *rq)
+{
+    header_field *fields = rq->headers.fields;
+    size_t size = 1;
+    for (size_t i = 0; i < rq->headers.count; i++)
+        size += fields[i].name_len + fields[i].value_len + 2;
+    char *at = rq->kept_fields = malloc(size);
+    for (size_t i = 0; at && i < rq->headers.count; i++) {
+        fields[i].name = keep_text(&at, fields[i].name, fields[i].name_len);
+        fields[i].value = keep_text(&at, fields[i].value, fields[i].value_len);
+    }
+    return at != NULL;
+}
+
 bool request_integer(const http_request *rq, const char *key, int64_t least, int64_t most, int64_t *out,
                      problem_details *problem)
 {

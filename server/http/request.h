@@ -23,6 +23,7 @@ typedef struct {
     work *work;
     server_log *log;
     struct field_slots *fields;   /* turns of replies that are computed: fields.h */
+    struct presences *presences;  /* the connections that are open */
     struct told_changes *told;    /* texts of the latest changes of jobs: all_events.h */
     char run[17];                 /* a random name of this run of the daemon */
     pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
@@ -40,7 +41,6 @@ typedef struct {
     pthread_mutex_t ready_lock; /* the next two */
     double ready_until;         /* on deadlines_now's clock: until then ready_why is what /readyz says */
     char ready_why[64];         /* "": ready */
-    atomic_uint connections;    /* open now */
     atomic_size_t body_bytes;   /* of all bodies in memory */
 } api;
 
@@ -64,6 +64,9 @@ typedef struct http_request {
     size_t reply_len;
     char job_id[33];
     bool begun;              /* the header block has been looked at */
+    bool can_be_held;        /* its connection can do without libmicrohttpd (held.h) */
+    char *kept_fields;       /* what `headers` points into, where that is not the connection's buffer */
+    struct presence *place;  /* its connection's, where that is held */
     bool unread_body;        /* the reply was sent before the whole body was read */
     problem_details refused; /* status 0: none; otherwise the answer, known before the body was read */
     http_reply reply;
@@ -79,6 +82,11 @@ bool request_takes_gzip(const http_request *rq);
 bool request_is_json(const http_request *rq);
 /* The client closed its end: an answer would reach nobody. */
 bool request_client_gone(const http_request *rq);
+
+/* Notes in the request what its reply says, and the other way round. */
+void request_note_reply(http_request *rq);
+/* The header fields in memory of their own, as the connection's buffer goes. False: no memory. */
+bool request_keep_fields(http_request *rq);
 
 /* Reads a decimal integer of the query in [least, most]; absent: *out is left. False with a 400. */
 bool request_integer(const http_request *rq, const char *key, int64_t least, int64_t most, int64_t *out,

@@ -1,6 +1,7 @@
 /* service.c: routes about the service itself: what is cached, whether it lives, what is valid. */
 #include "codec/codec.h"
 #include "codec/embedded.h"
+#include "http/presence.h"
 #include "http/deadlines.h"
 #include "http/request.h"
 #include "options.h"
@@ -49,7 +50,7 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
 {
     metrics_now now = {.workers = work_workers(context->work),
                        .workers_busy = work_busy(context->work),
-                       .connections = atomic_load(&context->connections),
+                       .connections = (unsigned)presences_count(context->presences),
                        .streams = atomic_load(&context->streams),
                        .body_bytes = atomic_load(&context->body_bytes),
                        .store_free_bytes = store_free_bytes(context->store),

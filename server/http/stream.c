@@ -78,7 +78,7 @@ static void sleep_until_told(event_stream *s)
             feed_wait(s->listener, s->rq->fd, pause);
 }
 
-/* Blocks until there is something to send. */
+/* Blocks until there is something to send; does not where the stream is held. */
 static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
 {
     event_stream *s = ctx;
@@ -91,10 +91,25 @@ static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
             return REPLY_STREAM_BREAKS;
         if (s->text)
             continue;
-        if (deadlines_now() - s->spoke > HEARTBEAT_S)
+        if (deadlines_now() - s->spoke >= HEARTBEAT_S)
             return heartbeat(s, out, size);
+        if (s->held)
+            return 0;
         sleep_until_told(s);
     }
+}
+
+static void stream_hold(void *ctx)
+{
+    ((event_stream *)ctx)->held = true;
+}
+
+static double stream_due(void *ctx, bool told)
+{
+    const event_stream *s = ctx;
+    if (!told)
+        return s->spoke + HEARTBEAT_S;
+    return atomic_load(&s->context->draining) ? 0.0 : s->told + s->every_s;
 }
 
 /* ---- the reply */
@@ -127,7 +142,8 @@ void stream_reply(api *context, http_request *rq, event_stream *s, const char *i
     s->spoke = deadlines_now();
     s->listener = feed_listen(work_feed(context->work), id);
     if (s->listener) {
-        reply_stream(reply, 200, "text/event-stream", (reply_source){stream_read, stream_free, s});
+        reply_stream(reply, 200, "text/event-stream",
+                     (reply_source){stream_read, stream_free, s, s->listener, stream_hold, stream_due, false, NULL});
     } else {
         stream_free(s);
         reply_no_memory(reply);

@@ -1,16 +1,8 @@
 /* stream.h: replies of Server-Sent Events (HTML Living Standard, section 9.2), whatever they are about.
  *
- * A stream runs in its connection's own thread, as every reply does, and sleeps there until the feed (work/feed.h) says
- * that there is something to tell, its client leaves, the service ends or a heartbeat is due: nothing looks meanwhile.
- *
- * libmicrohttpd can suspend connections only where many of them share a thread. This daemon does not run it so: a
- * handler may block there for all others (a commit waits for the disk, a prediction orders a matrix, a picture is
- * drawn), and the message by which it announces a refusal of its own, which daemon.c answers instead, does not say
- * there which connection it is about. What a sleeping thread costs instead, measured with 2,000 streams and 1,000 long
- * polls at once on 2 processors (tests/soak/streams.py): 150 kB of memory each, of which 92 kB are the thread-local
- * data of OpenBLAS (61 kB) and METIS (29 kB) that every thread of a program with them has; no processor time while
- * nothing happens; 0.03 s from a job's end to the first that is told and 0.35 s to the last; as many submissions per
- * second beside them as without. */
+ * Nothing looks until the feed (work/feed.h) says that there is something to tell, the client leaves, the service ends
+ * or a heartbeat is due. A stream waits for that without a thread (held.h); over TLS, whose state is libmicrohttpd's,
+ * and for HTTP/1.0, in its connection's own. */
 #ifndef SERVER_HTTP_STREAM_H
 #define SERVER_HTTP_STREAM_H
 
@@ -26,6 +18,7 @@ typedef struct event_stream {
     api *context;
     const http_request *rq; /* lives as long as the reply */
     listener *listener;
+    bool held;  /* a read without anything to tell returns */
     char *text; /* what is being sent */
     size_t len, at;
     double told, spoke; /* on deadlines_now's clock: the last event, the last byte */

@@ -170,6 +170,11 @@ bool feed_wait(listener *l, int fd, double seconds)
     return take_signal(l);
 }
 
+int feed_descriptor(const listener *l)
+{
+    return l->wake;
+}
+
 /* ---- reading */
 
 uint64_t feed_last(feed *f)

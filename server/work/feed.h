@@ -36,6 +36,9 @@ void feed_unlisten(listener *l);
 /* Returns when there was something since the last return, when the peer of the socket fd has closed it (-1: no socket)
  * or after so many seconds. True: there was something. One thread waits for one listener. */
 bool feed_wait(listener *l, int fd, double seconds);
+/* Can be read while there is something, for those who wait for many; feed_wait with 0 seconds then takes it. -1: this
+ * one has none. */
+int feed_descriptor(const listener *l);
 
 /* The number of the last change; 0: there was none. */
 uint64_t feed_last(feed *f);

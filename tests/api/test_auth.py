@@ -256,6 +256,13 @@ def test_tls(s):
             check(status == 200 and json.loads(body)["summary"]["outcome"] == "converged", status, body)
             check(ask("GET", "/v1/jobs")[0] == 200 and ask("GET", "/nothing")[0] == 404)
             check(ask("POST", "/v1/jobs", "x" * 20000)[0] == 413)
+            # What waits keeps its thread, as nobody else can write to its connection.
+            told = ask("GET", f"/v1/jobs/{json.loads(body)['id']}/events")
+            check(told[0] == 200 and told[1].startswith(b"event: status\n") and told[1].endswith(b"\n\n"), told)
+            endless = json.loads(ask("POST", "/v1/jobs", json.dumps(ENDLESS))[1])["id"]
+            status, body = ask("GET", f"/v1/jobs/{endless}", None, {"Prefer": "wait=2"})
+            check(status == 200 and json.loads(body)["status"] == "running", status, body)
+            check(ask("DELETE", f"/v1/jobs/{endless}")[0] == 200)
             got = uzawa(s, "--server", line.split()[-1], "list", UZAWA_CA=cert)
             check(got.returncode == 0, got)
             check(uzawa(s, "--server", line.split()[-1], "--retry", "0", "list").returncode == 12, "it trusts anybody")

@@ -132,9 +132,12 @@ def crowds(build, streams=2000, polls=1000, idle_s=10, load_s=5):
         if load_s:
             beside = scenarios.load(build, s.port, 16, load_s, body, "wait=0")
             figures |= {"alone_per_s": round(alone["per_s"]), "beside_per_s": round(beside["per_s"])}
+        before = memory_mb(s)
         waiting = Crowd(s, polls, f"/v1/jobs/{followed}", "Prefer: wait=60\r\n")
         held.append(waiting)
-        waiting.read(0.5)
+        waiting.read(4)  # a long poll gives up its thread after a second
+        figures["poll_kb_each"] = round(1024 * (memory_mb(s) - before) / polls, 1)
+        figures["threads_waiting"] = threads_seconds(s)[1]
         reader = threading.Thread(target=waiting.read, args=(60, all_told))
         reader.start()
         s.request("DELETE", f"/v1/jobs/{first}")

@@ -1,0 +1,101 @@
+#include "http/presence.h"
+
+#include <netinet/in.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct presence {
+    presences *all;
+    presence *previous, *next;
+    unsigned char address[16];
+    size_t len;
+};
+
+struct presences {
+    pthread_mutex_t lock;
+    presence *first;
+    size_t count;
+};
+
+static size_t address_of(const struct sockaddr *from, unsigned char out[16])
+{
+    if (from && from->sa_family == AF_INET) {
+        memcpy(out, &((const struct sockaddr_in *)(const void *)from)->sin_addr, 4);
+        return 4;
+    }
+    if (from && from->sa_family == AF_INET6) {
+        memcpy(out, &((const struct sockaddr_in6 *)(const void *)from)->sin6_addr, 16);
+        return 16;
+    }
+    return 0;
+}
+
+presences *presences_new(void)
+{
+    presences *all = calloc(1, sizeof *all);
+    if (all)
+        pthread_mutex_init(&all->lock, NULL);
+    return all;
+}
+
+void presences_free(presences *all)
+{
+    if (!all)
+        return;
+    pthread_mutex_destroy(&all->lock);
+    free(all);
+}
+
+presence *presence_begin(presences *all, const struct sockaddr *from)
+{
+    presence *p = calloc(1, sizeof *p);
+    if (!p)
+        return NULL;
+    p->all = all;
+    p->len = address_of(from, p->address);
+    pthread_mutex_lock(&all->lock);
+    p->next = all->first;
+    if (p->next)
+        p->next->previous = p;
+    all->first = p;
+    all->count++;
+    pthread_mutex_unlock(&all->lock);
+    return p;
+}
+
+void presence_end(presence *p)
+{
+    if (!p)
+        return;
+    presences *all = p->all;
+    pthread_mutex_lock(&all->lock);
+    if (p->previous)
+        p->previous->next = p->next;
+    else
+        all->first = p->next;
+    if (p->next)
+        p->next->previous = p->previous;
+    all->count--;
+    pthread_mutex_unlock(&all->lock);
+    free(p);
+}
+
+size_t presences_count(presences *all)
+{
+    pthread_mutex_lock(&all->lock);
+    size_t count = all->count;
+    pthread_mutex_unlock(&all->lock);
+    return count;
+}
+
+size_t presences_from(presences *all, const struct sockaddr *from)
+{
+    unsigned char address[16];
+    size_t len = address_of(from, address), count = 0;
+    pthread_mutex_lock(&all->lock);
+    for (const presence *p = len > 0 ? all->first : NULL; p; p = p->next)
+        count += p->len == len && memcmp(p->address, address, len) == 0;
+    pthread_mutex_unlock(&all->lock);
+    return count;
+}
