@@ -51,7 +51,8 @@ GUARD_SRC  := $(sort $(wildcard tests/guard/*.c))
 PEERS_SRC  := $(sort $(wildcard tests/peers/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
+              $(wildcard tests/*.c)
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
@@ -162,7 +163,7 @@ $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 	     echo "    if (i == $$((n-1))) return (embedded_file){\"$$(basename $$f)\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
 	   echo '    return (embedded_file){0, 0, 0};'; echo '}'; } > $@
 
-$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(BUILD)/obj/tests/harness.o $(BUILD)/libparts.a $(BUILD)/libuzawa.a
+$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,tests/harness.c tests/harness_files.c) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -lsE '__wrap_free|failing_heap' tests/unit/$(notdir $@).c),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
 comma := ,
@@ -175,12 +176,12 @@ $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 
-$(BUILD)/theory: $(call obj,$(THEORY_SRC)) $(BUILD)/libuzawa.a
+$(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/harness_measure.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
 # Counts back-substitutions by standing between the solver's parts (tests/figures/count.c).
 FIGURES_WRAP := uz_factor_forward uz_factor_backward uz_principal_solve uz_multigrid_apply
-$(BUILD)/figures: $(call obj,$(FIGURES_SRC)) $(BUILD)/libuzawa.a
+$(BUILD)/figures: $(call obj,$(FIGURES_SRC) tests/harness_measure.c tests/harness_files.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) $(patsubst %,-Wl$(comma)--wrap=%,$(FIGURES_WRAP)) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 
 $(BUILD)/load: $(call obj,tests/soak/load.c)
@@ -212,9 +213,8 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare bench-size extremes theory figures numbers
-
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size bench-deps peers extremes theory
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
+        bench-size bench-deps peers extremes theory figures numbers
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
 	@tests/run.sh $(BUILD)
@@ -222,8 +222,6 @@ test: deps-test ## build and pass every test
 guard: deps-test ## instructions of small problems against those kept in tests/data/guard.json; KEEP=1: keep the new ones
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
 	@$(PYTHON) -B tests/guard/guard.py $(BUILD) $(if $(KEEP),--keep)
-
-unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library
 
 unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library $(PEER_LAB)
 

@@ -2,21 +2,6 @@
  * and writes it as JSON. usage: theory OUTPUT.json */
 #include "theory.h"
 
-#include <stdarg.h>
-
-/* What the harness gives to tests. */
-static int failures;
-void test_fail(const char *file, int line, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    fprintf(stderr, "%s:%d: ", file, line);
-    vfprintf(stderr, format, args);
-    fputc('\n', stderr);
-    va_end(args);
-    failures++;
-}
-
 static FILE *json;
 static int rows;
 
@@ -85,5 +70,5 @@ int main(int argc, char **argv)
     hertz();
     others();
     fprintf(json, "\n]}\n");
-    return fclose(json) != 0 || failures > 0;
+    return fclose(json) != 0 || test_has_failed();
 }
