@@ -224,7 +224,10 @@ def test_cancel_waiting_running_and_ended(server):
     run(server, "history", running, "--plot", code=0)
     run(server, "cancel", running, "--quiet", code=0)
     run(server, "wait", running, code=9)
-    check(run(server, "cancel", running, code=0).stdout == "deleted\n")
+    done = run(server, "cancel", running, code=4)
+    check("has ended already: dismissed" in done.stderr and f"uzawa delete {running}" in done.stderr, done.stderr)
+    check("dismissed" in run(server, "status", running, code=0).stdout, "an ended job is never deleted by cancel")
+    check(run(server, "delete", running, code=0).stdout == "deleted\n")
     run(server, "status", running, code=4)
 
 
