@@ -72,6 +72,22 @@ def test_convergence_is_drawn(s, b):
     check(y < 320, y)
 
 
+def test_few_iterations_and_near_names_can_be_read(s, b):
+    job = s.solve({**SCENE, "solver": {"accuracy": "precise"}})
+    check(job["summary"]["iterations"] < 10, "this is about short histories", job)
+    b.open(s, f"jobs/{job['id']}")
+    names = b.wait("names of levels", """const all = [...document.querySelectorAll('#precision .point-text')];
+        return all.length >= 4 && all.map((t) => { const r = t.getBoundingClientRect(); return [t.textContent, r.x, r.y, r.right, r.bottom]; })""")
+    for i, (one, left, top, right, bottom) in enumerate(names):
+        for other, x, y, end, under in names[:i]:
+            # A line of 12 px has boxes of more: its letters are apart where the lines are.
+            check(end <= left or x >= right or abs(y - top) >= 11, one, "lies on", other, names)
+    ticks = b.run("return [...document.querySelectorAll('#convergence .tick[text-anchor=middle]')].map((t) => t.textContent)")
+    check(len(ticks) >= 2 and all(text.isdigit() for text in ticks), "an iteration is a whole number", ticks)
+    mesh = b.run("return document.querySelector('#precision path.line.series-2')?.getBoundingClientRect().width")
+    check(mesh > 200, "the error of the mesh is a level over the whole width", mesh)
+
+
 def test_other_jobs_are_laid_over(s, b):
     job = s.solve(SCENE)
     other = s.solve({**SCENE, "solver": {"method": "accelerated", "accuracy": "quick"}})
