@@ -102,10 +102,10 @@ function draw_axes(svg, { x, y }, scales, size) {
     s("text", { class: "label", transform: `translate(13 ${(MARGIN.top + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, y.label));
 }
 
-/** Names beside points; one that would lie on another stands below its point instead of above. */
+/** Names beside points, from the top down; one that would lie on another stands below its point instead of above. */
 function draw_texts(svg, points, scales) {
-  const taken = [];
-  for (const [px, py, text] of points) {
+  const taken = [], downwards = [...points].sort((a, b) => scales.y(a[1]) - scales.y(b[1]));
+  for (const [px, py, text] of downwards) {
     const x = scales.x(px), at_right = x > scales.x.range()[1] - 90, width = 7 * text.length;
     const left = at_right ? x - 9 - width : x + 9;
     const free = (y) => taken.every((one) => Math.abs(one.y - y) > 12 || one.left > left + width || left > one.left + one.width);

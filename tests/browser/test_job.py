@@ -72,8 +72,9 @@ def test_convergence_is_drawn(s, b):
     check(y < 320, y)
 
 
-def test_few_iterations_and_near_names_can_be_read(s, b):
-    job = s.solve({**SCENE, "solver": {"accuracy": "precise"}})
+def check_few_iterations_and_near_names(s, b, cells):
+    problem = {**SCENE["problem"], "mesh": {"box": {"size": [60, 20], "cells": cells, "element": "tri3"}}}
+    job = s.solve({"problem": problem, "solver": {"accuracy": "precise"}})
     check(job["summary"]["iterations"] < 10, "this is about short histories", job)
     b.open(s, f"jobs/{job['id']}")
     names = b.wait("names of levels", """const all = [...document.querySelectorAll('#precision .point-text')];
@@ -82,10 +83,18 @@ def test_few_iterations_and_near_names_can_be_read(s, b):
         for other, x, y, end, under in names[:i]:
             # A line of 12 px has boxes of more: its letters are apart where the lines are.
             check(end <= left or x >= right or abs(y - top) >= 11, one, "lies on", other, names)
+    levels = {one["level"]: one["relative_error"] for one in s.get(f"/v1/jobs/{job['id']}/work-precision").json["levels"]}
+    downwards = [name for name, _, _, _, _ in sorted(names, key=lambda one: one[2])]
+    check(downwards == sorted(levels, key=levels.get, reverse=True), "names stand in the order of their errors", downwards, levels)
     ticks = b.run("return [...document.querySelectorAll('#convergence .tick[text-anchor=middle]')].map((t) => t.textContent)")
     check(len(ticks) >= 2 and all(text.isdigit() for text in ticks), "an iteration is a whole number", ticks)
     mesh = b.run("return document.querySelector('#precision path.line.series-2')?.getBoundingClientRect().width")
     check(mesh > 200, "the error of the mesh is a level over the whole width", mesh)
+
+
+def test_few_iterations_and_near_names_can_be_read(s, b):
+    check_few_iterations_and_near_names(s, b, [30, 10])
+    check_few_iterations_and_near_names(s, b, [6, 2])  # here balanced asks for less than quick
 
 
 def test_other_jobs_are_laid_over(s, b):
