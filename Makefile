@@ -71,16 +71,20 @@ FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 .PHONY: all demo gallery run man guide install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
 
+# After deps, which may have installed the compiler; said, since it takes a minute where nothing is built yet.
+build_programs = @$(MAKE) --no-print-directory -q all 2>/dev/null || echo "building the daemon and the client"; \
+                 $(MAKE) --no-print-directory -s -j$$(nproc) all
+
 demo: deps ## install what is missing, build, start the daemon, solve the paper's body, show the answer
-	@$(MAKE) --no-print-directory -s all
+	$(build_programs)
 	@tests/demo.sh $(BUILD)
 
 gallery: deps ## solve the five scenes of the gallery: pictures and summaries in build/gallery; KEEP=1: pictures into client/examples too
-	@$(MAKE) --no-print-directory -s all
+	$(build_programs)
 	@tests/gallery.sh $(BUILD) $(BUILD)/gallery $(if $(KEEP),--keep)
 
 run: deps ## keep the daemon in the foreground on 127.0.0.1:8080 with ./contact.db
-	@$(MAKE) --no-print-directory -s all
+	$(build_programs)
 	exec $(BUILD)/uzawad --listen 127.0.0.1:8080 --db ./contact.db
 
 deps: ## install the Debian packages that are missing
