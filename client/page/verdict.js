@@ -29,6 +29,12 @@ function facts_of(summary) {
   ].filter(([, value]) => value);
 }
 
+/** The commonest mistake in a scene is converged, certified and without a warning: the obstacle on the other side. */
+function hint_of({ problem, contact }) {
+  return problem?.kind === "scene" && contact?.candidates > 0 && contact.active === 0
+    ? h("p", { class: "warn" }, "Nothing touches. If it should: an obstacle's normal points to the body, a polyline has it on its left.") : null;
+}
+
 function warnings_of(summary) {
   if (!summary.warnings?.length) return null;
   return h("ul", { class: "warnings", "aria-label": "Warnings" }, summary.warnings.map((one) =>
@@ -68,7 +74,7 @@ export function verdict_card(summary) {
     h("p", { class: "certificate", id: "certificate" }, certificate_words(summary)),
     mesh ? h("p", null, mesh) : null,
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
-    suggestion_of(summary), warnings_of(summary), assertions_of(summary),
+    hint_of(summary), suggestion_of(summary), warnings_of(summary), assertions_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));
 }
 

@@ -203,6 +203,18 @@ def test_limits_end_without_converging(server):
     check("paper_rule" in done.stdout, done.stdout)
 
 
+def test_an_obstacle_on_the_other_side_is_hinted_at(server):
+    scene = json.load(open(PAPER))
+    words = "normal points to the body"
+    check(words not in run(server, "submit", "-", "--wait", stdin=json.dumps(scene), code=0).stdout)
+    scene["problem"]["contacts"][0]["obstacle"]["plane"]["normal"] = [0, -1]
+    done = run(server, "submit", "-", "--wait", stdin=json.dumps(scene), code=0)
+    check("0 of 30 candidates touch" in done.stdout and words in done.stdout, done.stdout)
+    matrices = {"kind": "matrices", **{name: open(f"tests/data/springs_{name}.mtx").read() for name in "KNh"}, "p": [0, 0, 0]}
+    done = run(server, "submit", "-", "--wait", stdin=json.dumps({"problem": matrices}), code=0)
+    check("0 of 2 candidates touch" in done.stdout and words not in done.stdout, done.stdout)
+
+
 def test_infeasible_is_never_called_converged(server):
     done = run(server, "submit", "-", "--wait", stdin=json.dumps(IMPOSSIBLE))
     check(done.returncode in (7, 8), done)

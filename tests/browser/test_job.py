@@ -130,6 +130,14 @@ def test_says_in_words_how_good_the_answer_is(s, b):
     check("iterations" in b.text(".timing-keys") and "factorization" in b.text(".timing-keys"), b.text(".timing-keys"))
 
 
+def test_an_obstacle_on_the_other_side_is_hinted_at(s, b):
+    plane = {"plane": {"point": [0, 0], "normal": [0, -1]}}
+    job = s.solve({"problem": {**SCENE["problem"], "contacts": [{"on": "bottom", "obstacle": plane}]}})
+    check(job["summary"]["contact"]["active"] == 0, job)
+    b.open(s, f"jobs/{job['id']}")
+    b.says(".verdict .warn", "normal points to the body")
+
+
 def test_other_endings_are_said_plainly(s, b):
     limit = s.solve({**SCENE, "solver": {"method": "uzawa", "max_iterations": 3}})
     b.open(s, f"jobs/{limit['id']}")
