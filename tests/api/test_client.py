@@ -294,6 +294,7 @@ def test_usage(_):
     for words in ([], ["frobnicate"], ["submit"], ["list", "--frob"], ["help", "frobnicate"], ["wait", "x", "--csv"]):
         done = run(None, *words, code=2)
         check(done.stdout == "" and "usage:" in done.stderr, words, done)
+    check("see: uzawa help submit" in run(None, "submit", "x", "--accuracy", "1", code=2).stderr, "of the command that was named")
     run(None, "--server", "nonsense", "list", code=2)
     for words in (["--help"], ["help"], ["submit", "--help"], ["help", "history"]):
         done = run(None, *words, code=0)
