@@ -51,7 +51,8 @@ GUARD_SRC  := $(sort $(wildcard tests/guard/*.c))
 PEERS_SRC  := $(sort $(wildcard tests/peers/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
-C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) tests/harness.c
+C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
+              $(wildcard tests/*.c)
 H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
@@ -70,17 +71,21 @@ FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 .PHONY: all demo gallery run man guide install clean help deps deps-test
 all: $(BUILD)/uzawad $(BUILD)/uzawa ## build the daemon and the client
 
+# After deps, which may have installed the compiler; said, since it takes a minute where nothing is built yet.
+build_programs = @$(MAKE) --no-print-directory -q all 2>/dev/null || echo "building the daemon and the client"; \
+                 $(MAKE) --no-print-directory -s -j$$(nproc) all
+
 demo: deps ## install what is missing, build, start the daemon, solve the paper's body, show the answer
-	@$(MAKE) --no-print-directory -s all
+	$(build_programs)
 	@tests/demo.sh $(BUILD)
 
 gallery: deps ## solve the five scenes of the gallery: pictures and summaries in build/gallery; KEEP=1: pictures into client/examples too
-	@$(MAKE) --no-print-directory -s all
+	$(build_programs)
 	@tests/gallery.sh $(BUILD) $(BUILD)/gallery $(if $(KEEP),--keep)
 	@$(call measured,gallery) $(PYTHON) -B tests/figures/gallery.py $(BUILD)/gallery $(BUILD)/gallery.json
 
 run: deps ## keep the daemon in the foreground on 127.0.0.1:8080 with ./contact.db
-	@$(MAKE) --no-print-directory -s all
+	$(build_programs)
 	exec $(BUILD)/uzawad --listen 127.0.0.1:8080 --db ./contact.db
 
 deps: ## install the Debian packages that are missing
@@ -163,7 +168,7 @@ $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 	     echo "    if (i == $$((n-1))) return (embedded_file){\"$$(basename $$f)\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
 	   echo '    return (embedded_file){0, 0, 0};'; echo '}'; } > $@
 
-$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(BUILD)/obj/tests/harness.o $(BUILD)/libparts.a $(BUILD)/libuzawa.a
+$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,tests/harness.c tests/harness_files.c) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
 	@mkdir -p $(@D)
 	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -lsE '__wrap_free|failing_heap' tests/unit/$(notdir $@).c),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
 comma := ,
@@ -176,12 +181,12 @@ $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 
-$(BUILD)/theory: $(call obj,$(THEORY_SRC)) $(BUILD)/libuzawa.a
+$(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/harness_measure.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
 # Counts back-substitutions by standing between the solver's parts (tests/figures/count.c).
 FIGURES_WRAP := uz_factor_forward uz_factor_backward uz_principal_solve uz_multigrid_apply
-$(BUILD)/figures: $(call obj,$(FIGURES_SRC)) $(BUILD)/libuzawa.a
+$(BUILD)/figures: $(call obj,$(FIGURES_SRC) tests/harness_measure.c tests/harness_files.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) $(patsubst %,-Wl$(comma)--wrap=%,$(FIGURES_WRAP)) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 
 $(BUILD)/load: $(call obj,tests/soak/load.c)
@@ -213,9 +218,8 @@ $(BUILD)/%.so: tests/preload/%.c
 .SECONDARY:
 
 ##@ Test
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare bench-size extremes theory figures numbers collect page-size
-
-.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind bench bench-size bench-deps peers extremes theory
+.PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
+        bench-size bench-deps peers extremes theory figures numbers collect page-size
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
 	@tests/run.sh $(BUILD)
@@ -223,8 +227,6 @@ test: deps-test ## build and pass every test
 guard: deps-test ## instructions of small problems against those kept in tests/data/guard.json; KEEP=1: keep the new ones
 	@$(MAKE) --no-print-directory -s -j$$(nproc) $(BUILD)/guard
 	@$(PYTHON) -B tests/guard/guard.py $(BUILD) $(if $(KEEP),--keep)
-
-unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library
 
 unit-bins: $(UNIT_BIN) $(PRELOADS) $(BUILD)/library $(PEER_LAB)
 

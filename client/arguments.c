@@ -1,4 +1,5 @@
 #include "arguments.h"
+#include "closest.h"
 
 #include <errno.h>
 #include <math.h>
@@ -121,12 +122,33 @@ static bool set_flag(parser *p, const client_option *rule, const char *value)
     return value ? fail(p, "%s takes no value", rule->name) : true;
 }
 
+/* Of the options of the command that was named, or of all before there is one. */
+static bool fail_unknown_option(parser *p, const char *word)
+{
+    const client_option *rule;
+    client_closest near = {.word = word, .len = strcspn(word, "=")};
+    for (size_t i = 0; (rule = client_option_at(i)); i++)
+        if (!p->have_command || rule->commands & CLIENT_IN(p->options->command))
+            client_closest_try(&near, rule->name);
+    return near.best ? fail(p, "unknown option %s; did you mean %s?", word, near.best)
+                     : fail(p, "unknown option %s", word);
+}
+
+static bool fail_unknown_command(parser *p, const char *word)
+{
+    client_closest near = {.word = word, .len = strlen(word)};
+    for (int i = 0; i < CLIENT_COMMANDS; i++)
+        client_closest_try(&near, client_command_name((client_command)i));
+    return near.best ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", word, near.best)
+                     : fail(p, "unknown command \"%s\"", word);
+}
+
 static bool take_option(parser *p, const char *word)
 {
     const char *value;
     const client_option *rule = find_rule(word, p->options->command, &value);
     if (!rule)
-        return fail(p, "unknown option %s", word);
+        return fail_unknown_option(p, word);
     if (rule->kind != CLIENT_FLAG && !value) {
         if (p->next == p->argc)
             return fail(p, "%s wants a value", rule->name);
@@ -143,7 +165,7 @@ static bool take_operand(parser *p, const char *word)
 {
     if (!p->have_command) {
         p->have_command = client_command_find(&p->options->command, word);
-        return p->have_command ? true : fail(p, "unknown command \"%s\"", word);
+        return p->have_command || fail_unknown_command(p, word);
     }
     if (!p->apply)
         return true;

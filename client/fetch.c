@@ -60,19 +60,46 @@ static client_exit say_gone(client_session *s, const char *what, const client_re
     return code;
 }
 
-/* A DELETE that arrived must not be sent again: the first dismisses a job, the second would delete it. */
-client_exit client_cancel(client_session *s)
+/* Asks how the job is, and goes on only where its having ended is as wanted; else says what the other command is. */
+static client_exit check_ended(client_session *s, const char *path, bool wanted)
+{
+    json_t *job = NULL;
+    char message[240];
+    client_request request = client_request_new(s, "GET", path);
+    client_exit code = client_ask_json(s, &job, &request);
+    snprintf(message, sizeof message,
+             wanted ? "the job is %.20s: delete is for ended ones; to stop it: uzawa cancel %.40s"
+                    : "the job has ended already: %.20s; cancel stops waiting and running ones. To delete it with its "
+                      "answer: uzawa delete %.40s",
+             client_json_text(job, "status"), client_json_text(job, "id"));
+    if (code == CLIENT_OK && client_job_ended(job) != wanted)
+        code = client_complain(s, CLIENT_REFUSED, message);
+    json_decref(job);
+    return code;
+}
+
+/* The service knows one DELETE, which dismisses a job or deletes an ended one. One that arrived must not be sent again:
+ * the second would delete what the first dismissed. */
+static client_exit dismiss(client_session *s, const char *path)
 {
     client_reply reply;
-    char *path = client_job_path(s, s->options->operand, "");
-    if (!path)
-        return CLIENT_LOCAL;
     client_request request = client_request_new(s, "DELETE", path);
     request.repeatable = false;
     client_exit code = client_ask(s, &reply, &request);
     if (code == CLIENT_OK)
         code = say_gone(s, reply.status == 204 ? "deleted" : "dismissed", &reply);
     client_reply_clear(&reply);
+    return code;
+}
+
+client_exit client_cancel(client_session *s)
+{
+    char *path = client_job_path(s, s->options->operand, "");
+    if (!path)
+        return CLIENT_LOCAL;
+    client_exit code = check_ended(s, path, false);
+    if (code == CLIENT_OK)
+        code = dismiss(s, path);
     free(path);
     return code;
 }
@@ -92,20 +119,12 @@ static client_exit delete_ended(client_session *s, const char *path)
 
 client_exit client_delete(client_session *s)
 {
-    json_t *job = NULL;
-    char message[200];
     char *path = client_job_path(s, s->options->operand, "");
     if (!path)
         return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask_json(s, &job, &request);
-    snprintf(message, sizeof message, "the job is %.20s: delete is for ended ones; to stop it: uzawa cancel %.40s",
-             client_json_text(job, "status"), client_json_text(job, "id"));
-    if (code == CLIENT_OK && !client_job_ended(job))
-        code = client_complain(s, CLIENT_REFUSED, message);
-    else if (code == CLIENT_OK)
+    client_exit code = check_ended(s, path, true);
+    if (code == CLIENT_OK)
         code = delete_ended(s, path);
-    json_decref(job);
     free(path);
     return code;
 }

@@ -28,9 +28,15 @@ static const command_run RUN[CLIENT_COMMANDS] = {
     [CLIENT_DELETE] = client_delete, [CLIENT_FACTORS] = client_factors, [CLIENT_DOCTOR] = client_doctor,
 };
 
-static client_exit complain_usage(const char *message)
+/* command: the one that was named, CLIENT_HELP where none was. */
+static client_exit complain_usage(const char *message, client_command command)
 {
-    fprintf(stderr, "uzawa: %s\nusage: uzawa [--server URL] [--timeout S] COMMAND ...; see: uzawa help\n", message);
+    const client_page *page = client_page_of(command);
+    fprintf(stderr, "uzawa: %s\n", message);
+    if (command == CLIENT_HELP)
+        fputs("usage: uzawa [--server URL] [--timeout S] COMMAND ...; see: uzawa help\n", stderr);
+    else
+        fprintf(stderr, "usage: uzawa %s; see: uzawa help %s\n", page->usage, page->name);
     return CLIENT_USAGE;
 }
 
@@ -46,7 +52,7 @@ static client_exit explain(const client_options *options)
     }
     if (topic == CLIENT_HELP && options->operand) {
         if (!client_command_find(&topic, options->operand))
-            return complain_usage("there is no such command");
+            return complain_usage("there is no such command", CLIENT_HELP);
     } else if (topic == CLIENT_HELP)
         topic = CLIENT_COMMANDS;
     client_help_print(stdout, topic);
@@ -66,7 +72,7 @@ static client_exit run_command(const client_options *options)
         .options = options, .out = stdout, .err = stderr, .deadline = client_clock() + options->timeout_s};
     session.http = client_http_open(options->server, message, sizeof message);
     if (!session.http)
-        return complain_usage(message);
+        return complain_usage(message, options->command);
     client_http_trust(session.http, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"));
     client_exit code = RUN[options->command](&session);
     client_suites_clear(&session.suites);
@@ -80,7 +86,7 @@ int main(int argc, char **argv)
     client_options options;
     json_set_alloc_funcs(allocate_or_end, free);
     if (!client_arguments_parse(&options, argc, argv, getenv("UZAWA_SERVER"), message, sizeof message))
-        return (int)complain_usage(message);
+        return (int)complain_usage(message, options.command);
     client_exit code = run_command(&options);
     if (fflush(stdout) != 0 || ferror(stdout)) {
         perror("uzawa: cannot write to standard output");

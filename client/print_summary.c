@@ -191,6 +191,18 @@ static void print_kept(FILE *to, const json_t *summary)
     fputc('\n', to);
 }
 
+/* The commonest mistake in a scene is converged, certified and without a warning: the obstacle on the other side. */
+static void print_nothing_touches(FILE *to, const json_t *summary)
+{
+    const bool scene = strcmp(client_json_text(client_json_at(summary, "problem"), "kind"), "scene") == 0;
+    if (!scene || client_json_number(summary, "contact.active") != 0 ||
+        !(client_json_number(summary, "contact.candidates") > 0))
+        return;
+    label(to, "");
+    fputs("nothing touches; if it should: an obstacle's normal points to the body, a polyline has it on its left\n",
+          to);
+}
+
 static void print_contact(FILE *to, const json_t *summary)
 {
     char text[32], more[32];
@@ -200,6 +212,7 @@ static void print_contact(FILE *to, const json_t *summary)
     if (json_is_number(client_json_at(summary, "contact.area")))
         fprintf(to, ", on an area of %s", number_in_words(text, summary, "contact.area", 6));
     print_kept(to, summary);
+    print_nothing_touches(to, summary);
     label(to, "reactions");
     fprintf(to, "sum %s", number_in_words(text, summary, "contact.reaction_sum", 10));
     print_vector(to, ", force ", client_json_at(summary, "contact.force"));

@@ -51,8 +51,13 @@ client_exit client_explain(client_session *s, client_http_end end, const client_
 {
     if (end == CLIENT_HTTP_INTERRUPTED)
         return CLIENT_INTERRUPTED; /* whoever was waiting knows what to say */
-    if (end != CLIENT_HTTP_ANSWERED)
-        return client_complain(s, exit_of_end(end), reply->message);
+    if (end != CLIENT_HTTP_ANSWERED) {
+        char message[sizeof reply->message + 60];
+        const bool nobody = reply->cause == CLIENT_CAUSE_CONNECTION;
+        snprintf(message, sizeof message, "%s%s", reply->message,
+                 nobody ? ". Is uzawad running there? uzawa doctor says more" : "");
+        return client_complain(s, exit_of_end(end), message);
+    }
     client_exit code = reply->status >= 400 && reply->status < 500 ? CLIENT_REFUSED : CLIENT_SERVER_ERROR;
     json_t *problem = reply->body.data ? json_loadb(reply->body.data, reply->body.len, 0, NULL) : NULL;
     if (s->options->json && json_is_object(problem))

@@ -291,6 +291,18 @@ static void take_request(flags *f, int option)
     }
 }
 
+static void refuse_flag(const char *word, bool lacks_value, char *message, size_t size)
+{
+    const size_t dashes = strspn(word, "-");
+    const char *meant = options_closest(word + dashes, strcspn(word + dashes, "="));
+    if (lacks_value)
+        snprintf(message, size, "%s needs a value", word);
+    else if (meant)
+        snprintf(message, size, "unknown option %s; did you mean --%s?", word, meant);
+    else
+        snprintf(message, size, "unknown option %s", word);
+}
+
 static options_verdict read_flags(flags *f, int argc, char **argv, char *message, size_t size)
 {
     struct option known[OPTIONS_MAX + 7];
@@ -304,7 +316,7 @@ static options_verdict read_flags(flags *f, int argc, char **argv, char *message
         if (option == ASK_VERSION)
             return OPTIONS_VERSION;
         if (option == ':' || option == '?') {
-            snprintf(message, size, option == ':' ? "%s needs a value" : "unknown option %s", argv[optind - 1]);
+            refuse_flag(argv[optind - 1], option == ':', message, size);
             return OPTIONS_WRONG;
         }
         if (option >= ASK_CHECK)

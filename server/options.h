@@ -1,4 +1,5 @@
-/* options.h: what the daemon can be told, by one table (options.c) for the command line, the environment and a file.
+/* options.h: what the daemon can be told, by one table (options_table.c) for the command line, the environment and a
+ * file.
  *
  * An option "max-body" is --max-body VALUE, UZAWAD_MAX_BODY=VALUE, or a line "max-body = VALUE" in the file that
  * --config or UZAWAD_CONFIG names. Of several the flag counts, then the environment, then the file, then the default;

@@ -22,7 +22,7 @@ static double box_nodes(const uz_box *box, const char *on)
     double nodes = 1;
     int across = -1;
     const bool known = uz_element_parse(&kind, box->element);
-    const bool middles = !known || kind == UZ_TRI6 || kind == UZ_QUAD8 || kind == UZ_TET10;
+    const bool middles = !known || uz_element_is_quadratic(kind);
     for (int k = 0; k < 6; k++)
         if (strcmp(on, sides[k]) == 0)
             across = k / 2;

@@ -16,7 +16,11 @@ typedef enum {
     UZ_FORMULATIONS              /* how many */
 } uz_formulation;
 
-/* Nodes of each in VTK order. */
+/* Nodes of each in VTK order. A new kind of element is a row in each of: scene/element_kind.c (name, nodes, sides),
+ * element/shape.c (shape functions, Gauss rules), element/geometry.c (its linear kind), fields/vtu.c (VTK's number),
+ * scene/gmsh_elements.c (Gmsh's number), scene/box_elements.c (cells of a box), fields/recover.c and patches.c (where
+ * its stress is best), and "elements" and "box" of schemas/request.json. tests/unit/test_elements_*.c say what it must
+ * satisfy. */
 typedef enum { UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8, UZ_TET4, UZ_HEX8, UZ_TET10, UZ_ELEMENT_KINDS } uz_element_kind;
 const char *uz_element_name(uz_element_kind kind); /* "quad4"; never NULL */
 bool uz_element_parse(uz_element_kind *out, const char *name);
@@ -102,6 +106,9 @@ typedef struct {
     double v[3], value;
 } uz_load;
 
+/* A new obstacle is a gap and a normal in obstacle/ (obstacle.h, check.c), bytes in assembly/body_key.c, a reader in
+ * server/codec/decode_contacts.c, a shape in schemas/request.json; and, to be seen, in picture/overlay.c (plane) or
+ * picture/patches.c (solid), server/codec/encode_surface.c and client/page/body_obstacles.js. */
 typedef enum {
     UZ_OBSTACLE_PLANE,    /* half space: point, normal (out of the obstacle) */
     UZ_OBSTACLE_ROUND,    /* circle (2D) or sphere (3D): point is the centre, radius, inside */

@@ -1,6 +1,7 @@
 /* harness.h: a test is TEST(name) { ... } in any tests/unit/test_*.c; it registers itself before main runs.
  * Each file is one program. It prints "ok FILE.name", "not ok FILE.name" or "skip FILE.name: why" and exits non-zero
- * when a test failed. An argument runs only the tests whose name contains it. */
+ * when a test failed. An argument runs only the tests whose name contains it. Programs that measure take
+ * harness_measure.c in place of harness.c. */
 #ifndef TESTS_HARNESS_H
 #define TESTS_HARNESS_H
 
@@ -19,6 +20,8 @@ typedef struct test_case {
 void test_register(test_case *test);
 /* Records a failure of the running test and prints where; the test goes on. */
 void test_fail(const char *file, int line, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/* Has anything failed so far? Only of harness_measure.c: a test goes on after a failure, and ends "not ok". */
+bool test_has_failed(void);
 /* Marks the running test as skipped; return from it afterwards. */
 void test_skip(const char *why);
 /* "../shared/cases", or NULL where it is absent: tests that read it must skip. */

@@ -1,10 +1,16 @@
 #!/usr/bin/env bash
 # Runs the test programs and counts their "ok", "not ok" and "skip" lines; the last line is "N passed, N failed".
 # usage: tests/run.sh BUILD_DIR ["unit api browser guard hygiene"] [FILTER] [PROGRAMS]
-# FILTER goes to each program, which runs the tests whose name contains it. PROGRAMS is a list of programs ("test_store
-# api/test_http", of both kinds unless one is named); without it all run. A program that dies without a "not ok" line of its own counts as one failure.
+# FILTER goes to each program, which runs the tests whose name contains it; "test_http" is all of that program,
+# "test_http.not_found" some of it, as the lines of a run name them. PROGRAMS is a list of programs ("test_store
+# api/test_http", of both kinds unless one is named); without it all run. A program that dies without a "not ok" line of
+# its own counts as one failure.
 set -uo pipefail
 build=$1 kinds=${2:-unit api browser guard hygiene} filter=${3:-} programs=${4:-}
+if [[ $filter == test_* ]]; then
+    programs=${filter%%.*}
+    if [[ $filter == *.* ]]; then filter=${filter#*.}; else filter=; fi
+fi
 work=$(mktemp -d)
 log=$work/log
 trap 'rm -rf "$work"' EXIT
@@ -29,7 +35,7 @@ run_one() { # KIND NAME COMMAND...
         echo "not ok $name: exit status $status" >>"$out"
     fi
     # Show failures with what led to them; successes stay one line per program.
-    if grep -q '^not ok ' "$out"; then cat "$out"; else
+    if grep -q '^not ok ' "$out"; then cat "$out"; elif [ -z "$filter" ] || grep -q '^ok \|^skip ' "$out"; then
         printf '%-34s %4s passed %4s s %4.0f s of processor\n' "$name" "$(grep -c '^ok ' "$out")" "$SECONDS" \
             "$(echo "$user + $system" | awk '{print $1 + $3}')"
         grep '^skip ' "$out"

@@ -58,6 +58,20 @@ static inline uz_scene paper_scene(int64_t nx, int64_t ny)
     return scene;
 }
 
+/* The matrices of the paper's body with nx x nx / 3 cells and another Young's modulus. The caller clears them. */
+static inline uz_qp paper_qp(int64_t nx, double young)
+{
+    uz_scene scene = paper_scene(nx, nx / 3);
+    uz_mesh_info info;
+    uz_error err = {0};
+    uz_qp qp;
+    scene.materials[0].young = young;
+    CHECK(uz_scene_to_qp(&qp, &info, &scene, &err) == UZ_OK);
+    uz_mesh_info_clear(&info);
+    uz_scene_clear(&scene);
+    return qp;
+}
+
 static inline double *zeros(int64_t n)
 {
     double *x = uz_alloc_zero(n, sizeof *x);

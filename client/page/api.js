@@ -11,6 +11,15 @@ export class ApiError extends Error {
   }
 }
 
+/** As window.fetch. Of a lost connection browsers say little, and each something else. */
+async function ask_service(path, init) {
+  try {
+    return await fetch(path, init);
+  } catch (error) {
+    throw error instanceof TypeError ? new Error("The service does not answer. Is it still running?") : error;
+  }
+}
+
 async function problem_of(response) {
   let problem = null;
   try {
@@ -42,7 +51,7 @@ export function make_api({ token, ask }) {
       const sent = token();
       const headers = new Headers(init.headers || {});
       if (sent) headers.set("Authorization", `Bearer ${sent}`);
-      const response = await fetch(path, { ...init, headers, credentials: "omit", referrerPolicy: "no-referrer" });
+      const response = await ask_service(path, { ...init, headers, credentials: "omit", referrerPolicy: "no-referrer" });
       if (response.status === 401 && (await new_token(sent))) continue;
       if (!response.ok && response.status !== 304) throw await problem_of(response);
       return response;

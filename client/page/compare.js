@@ -109,10 +109,7 @@ class Comparison {
     const mesh = ended.map((level) => this.jobs.get(level).summary?.discretization_error).find((value) => value > 0);
     const series = [{ name: "the four jobs", colour: 1, line: false, texts: true, size: 6, points }];
     if (this.curve?.length) series.push({ name: "within the run of the tightest", colour: 3, dots: true, size: 2.5, points: this.curve });
-    if (mesh && points.length > 1) {
-      const times = points.map(([time]) => time);
-      series.push({ name: "error of the mesh, estimated", colour: 2, dash: "6 3", points: [[Math.min(...times), mesh], [Math.max(...times), mesh]] });
-    }
+    if (mesh && points.length > 1) series.push({ name: "error of the mesh, estimated", colour: 2, dash: "6 3", across: true, points: [[points[0][0], mesh]] });
     this.chart.update({ x: { label: "time", log: true, format: seconds }, y: { label: "certified relative error", log: true }, series,
       label: `Time against certified error: ${points.map(([time, error, level]) => `${level} ${seconds(time)}, ${percent_up(error)}`).join("; ")}` });
     show(this.table, this.table_of(known));

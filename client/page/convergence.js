@@ -134,7 +134,7 @@ export class Convergence {
       series.push({ name: "restart of the momentum", colour: 6, line: false, size: 3, points: restarts });
     const rows = this.histories[0].rows;
     const label = x === "seconds" ? "time" : "iteration";
-    this.chart.update({ x: { label, log, from_zero: true, format: x === "seconds" ? seconds : null }, y: { label: "in the units of the problem", log: true }, series,
+    this.chart.update({ x: { label, log, from_zero: true, whole: x !== "seconds", format: x === "seconds" ? seconds : null }, y: { label: "in the units of the problem", log: true }, series,
       label: `Convergence over ${label === "time" ? label : "iterations"}: ${shown.map((q) => q.name).join(", ")}` });
     show(this.said, rows.length ? `${counted(last, "iteration")}, ${counted(rows[rows.length - 1][this.histories[0].at.contacts], "contact")} active in the last.`
       : "There is no history: no iteration was needed, or none was made yet.");

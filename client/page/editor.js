@@ -68,7 +68,7 @@ class Editor {
     }
     const tokens = tokens_at(text, this.field.area.selectionStart), help = help_of(this.schema, tokens);
     const keys = (help || help_of(this.schema, tokens.slice(0, -1)))?.keys || [];
-    show(this.help, tokens.length ? [h("code", null, path_words(tokens)), help ? `: ${help.text}` : ": not known to the schema", " "] : null,
+    show(this.help, tokens.length ? [h("code", null, path_words(tokens)), help ? `: ${help.text}` : ": not known to the schema.", " "] : null,
       keys.length ? [help ? "Keys: " : "Known here: ", keys.map((key, i) => [i ? ", " : "", h("code", null, key)])] : null);
   }
 

@@ -43,11 +43,16 @@ async function go() {
   mark_home(view, at);
   document.title = `${view ? view.title : "Nothing here"} · Contact solver`;
   if (!view) {
-    show(main, h("h1", null, "Nothing here"), h("p", null, "This address leads nowhere: ", h("a", { href: "#/" }, "all jobs"), "."));
+    show(main, h("h1", null, "Nothing here"), h("p", null, "This address leads nowhere. ", h("a", { href: "#/" }, "All jobs")));
     return;
   }
-  const run = await view.load();
+  const run = await view.load().catch(() => null);
   if (mine !== turn) return;
+  if (!run) { // a browser may keep what failed to load until the page is loaded anew
+    show(main, h("h1", null, view.title), h("p", { class: "bad", role: "alert" }, "The service does not answer. Is it still running?"),
+      h("button", { type: "button", onclick: () => location.reload() }, "Try again"));
+    return;
+  }
   main.replaceChildren();
   end_view = run(main, { api, token }, view.pattern.exec(at)[1]);
 }

@@ -55,6 +55,7 @@ function scale_of(axis, values, range) {
     return scaleLog().domain([low / pad, high * pad]).range(range);
   }
   if (axis.from_zero) low = Math.min(0, low);
+  if (axis.whole) high = Math.max(high, low + 1);
   if (high - low < 1e-300) [low, high] = [low - 0.5, high + 0.5];
   return scaleLinear().domain([low, high]).range(range);
 }
@@ -72,15 +73,16 @@ function fine_ticks(low, high) {
 }
 
 /** [{value, text}]: powers of ten where there are some, at most so many. format: of a value, where not a plain number. */
-function ticks_of(scale, { log, format }, most) {
+function ticks_of(scale, { log, format, whole }, most) {
   const text_of = format || ((value) => number(value, 4));
-  if (!log) return scale.ticks(most).map((value) => ({ value, text: text_of(value) }));
+  const shown = (values) => values.filter((value) => !whole || Number.isInteger(value)).map((value) => ({ value, text: text_of(value) }));
+  if (!log) return shown(scale.ticks(most));
   const [low, high] = scale.domain();
   const first = Math.ceil(Math.log10(low) - 1e-9), last = Math.floor(Math.log10(high) + 1e-9);
   const step = Math.max(1, Math.ceil((last - first + 1) / most)), powers = [];
   for (let k = last; k >= first; k -= step) powers.push(10 ** k);
   if (powers.length >= 3) return powers.map((value) => ({ value, text: format ? format(value) : power_of_ten(value) }));
-  return fine_ticks(low, high).map((value) => ({ value, text: text_of(value) }));
+  return shown(fine_ticks(low, high));
 }
 
 function draw_axes(svg, { x, y }, scales, size) {
@@ -100,8 +102,27 @@ function draw_axes(svg, { x, y }, scales, size) {
     s("text", { class: "label", transform: `translate(13 ${(MARGIN.top + bottom) / 2}) rotate(-90)`, "text-anchor": "middle" }, y.label));
 }
 
+/** Names beside points, from the top down; one that would lie on another stands below its point instead of above. */
+function draw_texts(svg, points, scales) {
+  const taken = [], downwards = [...points].sort((a, b) => scales.y(a[1]) - scales.y(b[1]));
+  for (const [px, py, text] of downwards) {
+    const x = scales.x(px), at_right = x > scales.x.range()[1] - 90, width = 7 * text.length;
+    const left = at_right ? x - 9 - width : x + 9;
+    const free = (y) => taken.every((one) => Math.abs(one.y - y) > 12 || one.left > left + width || left > one.left + one.width);
+    const above = scales.y(py) - 8, y = free(above) ? above : above + 20;
+    taken.push({ left, width, y });
+    svg.append(s("text", { class: "point-text", x: x + (at_right ? -9 : 9), y, "text-anchor": at_right ? "end" : "start" }, text));
+  }
+}
+
 function draw_series(svg, one, points, scales) {
   const colour = `series-${one.colour}`;
+  if (one.across) {
+    const [from, to] = scales.x.range();
+    for (const [, y] of points)
+      svg.append(s("path", { class: `line ${colour}`, "stroke-dasharray": one.dash || null, d: `M${from},${scales.y(y)}H${to}`, "data-series": one.name }));
+    return;
+  }
   if (one.line !== false && points.length > 1) {
     const path = line().x(([x]) => scales.x(x)).y(([, y]) => scales.y(y));
     svg.append(s("path", { class: `line ${colour}`, "stroke-dasharray": one.dash || null, d: path(points), "data-series": one.name }));
@@ -110,12 +131,7 @@ function draw_series(svg, one, points, scales) {
     for (const point of points)
       svg.append(s("circle", { class: `dot ${colour}`, cx: scales.x(point[0]), cy: scales.y(point[1]), r: one.size || 5 },
         point[2] ? s("title", null, point[2]) : null));
-  if (one.texts)
-    for (const point of points.filter((p) => p[2])) {
-      const right = scales.x(point[0]) > scales.x.range()[1] - 90;
-      svg.append(s("text", { class: "point-text", x: scales.x(point[0]) + (right ? -9 : 9), y: scales.y(point[1]) - 8,
-        "text-anchor": right ? "end" : "start" }, point[2]));
-    }
+  if (one.texts) draw_texts(svg, points.filter((p) => p[2]), scales);
 }
 
 /** The point of a list in the order of x that is nearest to x. */
@@ -130,9 +146,10 @@ function nearest(points, x) {
 }
 
 /**
- * A chart in an element, as wide as that is. update({x, y, series, label}) draws it; x, y: {label, log, from_zero, format};
- * series: [{name, colour: 1 to 6, points: [[x, y, text]], dash, line: false for dots alone, dots, texts, size}], points in
- * the order of x unless line is false; label: what it shows, for screen readers.
+ * A chart in an element, as wide as that is. update({x, y, series, label}) draws it; x, y: {label, log, from_zero, whole:
+ * numbers only without fractions, format}; series: [{name, colour: 1 to 6, points: [[x, y, text]], dash, line: false for
+ * dots alone, across: a level over the whole width, dots, texts, size}], points in the order of x unless line is false;
+ * label: what it shows, for screen readers.
  */
 export class Chart {
   constructor(element, height = 300) {

@@ -23,7 +23,7 @@ export function refine_form(api, job) {
   };
   const form = h("form", { class: "refine", hidden: true, onsubmit: send }, h("label", { for: "refine-level" }, "Relative error"), level,
     h("button", { type: "submit", class: "primary" }, "Go on from here"), trouble);
-  const open = h("button", { type: "button", id: "refine", "aria-expanded": "false", onclick: () => {
+  const open = h("button", { type: "button", id: "refine", class: "small", "aria-expanded": "false", onclick: () => {
     form.hidden = !form.hidden;
     open.setAttribute("aria-expanded", String(!form.hidden));
   } }, "Refine");

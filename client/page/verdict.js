@@ -1,7 +1,8 @@
 // verdict.js: how good the answer of a job is, in words, and its main numbers.
 
 import { h } from "./dom.js";
-import { count, number, number_towards, percent_up, seconds } from "./format.js";
+import { draft } from "./examples.js";
+import { count, counted, number, number_towards, percent_up, seconds } from "./format.js";
 import { certificate_words, mesh_words, method_words, outcome_words, problem_words } from "./words.js";
 
 function vector(values) {
@@ -17,7 +18,7 @@ function facts_of(summary) {
     ["Method", method_words(summary)],
     ["Asked for", summary.requested_error === 0 ? "rounding level" : `≤ ${percent_up(summary.requested_error)}`],
     ["Residual, relative", certificate ? number(certificate.relative_residual.total) : null],
-    ["In contact", contact ? `${count(contact.active)} of ${count(contact.candidates)} candidates` : null],
+    ["In contact", contact ? `${count(contact.active)} of ${counted(contact.candidates, "candidate")}` : null],
     ["Contact force", contact ? vector(contact.force) || number(contact.reaction_sum, 6) : null],
     ["Largest pressure", Number.isFinite(contact?.max_pressure) ? `${number(contact.max_pressure, 4)}${at ? ` at ${vector(at)}` : ""}` : null],
     ["Contact area", Number.isFinite(contact?.area) ? number(contact.area, 4) : null],
@@ -26,6 +27,12 @@ function facts_of(summary) {
     ["Imbalance of all forces", summary.resultants ? number(summary.resultants.imbalance) : null],
     ["Expected", summary.cost?.predicted ? `${seconds(summary.cost.predicted.seconds)} after the assembly; it took ${seconds(summary.cost.actual?.seconds)}` : null],
   ].filter(([, value]) => value);
+}
+
+/** The commonest mistake in a scene is converged, certified and without a warning: the obstacle on the other side. */
+function hint_of({ problem, contact }) {
+  return problem?.kind === "scene" && contact?.candidates > 0 && contact.active === 0
+    ? h("p", { class: "warn" }, "Nothing touches. If it should: an obstacle's normal points to the body, a polyline has it on its left.") : null;
 }
 
 function warnings_of(summary) {
@@ -67,7 +74,7 @@ export function verdict_card(summary) {
     h("p", { class: "certificate", id: "certificate" }, certificate_words(summary)),
     mesh ? h("p", null, mesh) : null,
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
-    suggestion_of(summary), warnings_of(summary), assertions_of(summary),
+    hint_of(summary), suggestion_of(summary), warnings_of(summary), assertions_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));
 }
 
@@ -76,5 +83,6 @@ export function failure_card(job) {
   const error = job.error || {};
   return h("div", { class: "verdict tone-bad" }, h("h2", { class: "bad" }, error.title || "Failed"),
     h("p", null, error.detail || ""), error.pointer ? h("p", { class: "muted" }, "At ", h("code", null, error.pointer), error.line ? `, line ${error.line}` : "") : null,
-    h("p", { class: "muted" }, "Code ", h("code", null, error.code || "unknown")));
+    h("p", { class: "muted" }, "Code ", h("code", null, error.code || "unknown")),
+    draft.get() ? h("a", { class: "button small", href: "#/new" }, "Back to the editor") : null);
 }

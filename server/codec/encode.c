@@ -14,22 +14,14 @@ static void put_problem(text *t, const problem_details *problem)
     text_open(t, '{');
     text_key(t, "type");
     text_format(t, "\"/schemas/problem-details.json#%s\"", problem->code);
-    text_key(t, "title");
-    text_string(t, problem->title);
-    text_key(t, "status");
-    text_integer(t, problem->status);
-    text_key(t, "code");
-    text_string(t, problem->code);
-    text_key(t, "detail");
-    text_string(t, problem->detail);
-    if (problem->pointer[0] || problem->status == 422) {
-        text_key(t, "pointer");
-        text_string(t, problem->pointer);
-    }
-    if (problem->line > 0) {
-        text_key(t, "line");
-        text_integer(t, problem->line);
-    }
+    text_member_string(t, "title", problem->title);
+    text_member_integer(t, "status", problem->status);
+    text_member_string(t, "code", problem->code);
+    text_member_string(t, "detail", problem->detail);
+    if (problem->pointer[0] || problem->status == 422)
+        text_member_string(t, "pointer", problem->pointer);
+    if (problem->line > 0)
+        text_member_integer(t, "line", problem->line);
     text_close(t, '}');
 }
 
@@ -68,8 +60,7 @@ static void put_time(text *t, const char *key, double unix_s)
 static void put_link(text *t, const char *rel, const char *id, const char *tail)
 {
     text_open(t, '{');
-    text_key(t, "rel");
-    text_string(t, rel);
+    text_member_string(t, "rel", rel);
     text_key(t, "href");
     text_format(t, "\"/v1/jobs%s%s%s\"", *id ? "/" : "", id, tail);
     text_close(t, '}');
@@ -112,19 +103,14 @@ static void put_damaged(text *t, const job *j)
 static void put_job(text *t, const job *j)
 {
     text_open(t, '{');
-    text_key(t, "id");
-    text_string(t, j->id);
-    text_key(t, "status");
-    text_string(t, job_status_name(j->status));
-    text_key(t, "progress");
-    text_integer(t, j->progress);
+    text_member_string(t, "id", j->id);
+    text_member_string(t, "status", job_status_name(j->status));
+    text_member_integer(t, "progress", j->progress);
     put_time(t, "created", j->created);
     put_time(t, "started", j->started);
     put_time(t, "finished", j->finished);
-    text_key(t, "attempts");
-    text_integer(t, j->attempts);
-    text_key(t, "priority");
-    text_integer(t, j->priority);
+    text_member_integer(t, "attempts", j->attempts);
+    text_member_integer(t, "priority", j->priority);
     text_key(t, "tags");
     text_raw(t, j->tags ? j->tags : "[]");
     text_key(t, "summary");
@@ -154,8 +140,7 @@ char *codec_encode_jobs(const job *jobs, size_t count, bool more)
     for (size_t i = 0; i < count; i++)
         put_job(&t, &jobs[i]);
     text_close(&t, ']');
-    text_key(&t, "next");
-    text_string(&t, more && count > 0 ? jobs[count - 1].id : NULL);
+    text_member_string(&t, "next", more && count > 0 ? jobs[count - 1].id : NULL);
     text_key(&t, "links");
     text_open(&t, '[');
     put_link(&t, "self", "", "");
@@ -177,25 +162,17 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
         const uz_cache_entry *e = &entries[i];
         bytes += e->bytes;
         text_open(&t, '{');
-        text_key(&t, "digest");
-        text_string(&t, e->digest);
-        text_key(&t, "d");
-        text_integer(&t, e->d);
-        text_key(&t, "m");
-        text_integer(&t, e->m);
-        text_key(&t, "nnz");
-        text_integer(&t, e->nnz);
-        text_key(&t, "bytes");
-        text_integer(&t, (int64_t)e->bytes);
-        text_key(&t, "hits");
-        text_integer(&t, e->hits);
+        text_member_string(&t, "digest", e->digest);
+        text_member_integer(&t, "d", e->d);
+        text_member_integer(&t, "m", e->m);
+        text_member_integer(&t, "nnz", e->nnz);
+        text_member_integer(&t, "bytes", (int64_t)e->bytes);
+        text_member_integer(&t, "hits", e->hits);
         text_close(&t, '}');
     }
     text_close(&t, ']');
-    text_key(&t, "bytes");
-    text_integer(&t, (int64_t)bytes);
-    text_key(&t, "max_bytes");
-    text_integer(&t, (int64_t)max_bytes);
+    text_member_integer(&t, "bytes", (int64_t)bytes);
+    text_member_integer(&t, "max_bytes", (int64_t)max_bytes);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }
@@ -204,27 +181,19 @@ char *codec_encode_valid(const uz_prediction *predicted)
 {
     text t = {0};
     text_open(&t, '{');
-    text_key(&t, "valid");
-    text_bool(&t, true);
+    text_member_bool(&t, "valid", true);
     text_key(&t, "predicted");
     if (!predicted) {
         text_raw(&t, NULL);
     } else {
         text_open(&t, '{');
-        text_key(&t, "d");
-        text_integer(&t, predicted->d);
-        text_key(&t, "m");
-        text_integer(&t, predicted->m);
-        text_key(&t, "operator");
-        text_string(&t, uz_operator_name(predicted->op));
-        text_key(&t, "factor_nnz");
-        text_integer(&t, predicted->factor_nnz);
-        text_key(&t, "bytes");
-        text_number(&t, predicted->bytes);
-        text_key(&t, "seconds");
-        text_number(&t, predicted->seconds);
-        text_key(&t, "fits");
-        text_bool(&t, predicted->fits);
+        text_member_integer(&t, "d", predicted->d);
+        text_member_integer(&t, "m", predicted->m);
+        text_member_string(&t, "operator", uz_operator_name(predicted->op));
+        text_member_integer(&t, "factor_nnz", predicted->factor_nnz);
+        text_member_number(&t, "bytes", predicted->bytes);
+        text_member_number(&t, "seconds", predicted->seconds);
+        text_member_bool(&t, "fits", predicted->fits);
         text_close(&t, '}');
     }
     text_close(&t, '}');
@@ -236,12 +205,9 @@ char *codec_encode_progress(int progress, const double *row)
     static const int SHOWN[] = {0, 2, 3, 9, 10}; /* columns of the history */
     text t = {0};
     text_open(&t, '{');
-    text_key(&t, "progress");
-    text_integer(&t, progress);
-    for (size_t i = 0; row && i < sizeof SHOWN / sizeof SHOWN[0]; i++) {
-        text_key(&t, CODEC_HISTORY_NAMES[SHOWN[i]]);
-        text_number(&t, row[SHOWN[i]]);
-    }
+    text_member_integer(&t, "progress", progress);
+    for (size_t i = 0; row && i < sizeof SHOWN / sizeof SHOWN[0]; i++)
+        text_member_number(&t, CODEC_HISTORY_NAMES[SHOWN[i]], row[SHOWN[i]]);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }
@@ -250,19 +216,15 @@ char *codec_encode_upload(const upload_info *info)
 {
     text t = {0};
     text_open(&t, '{');
-    text_key(&t, "id");
-    text_string(&t, info->id);
-    text_key(&t, "bytes");
-    text_integer(&t, info->bytes);
+    text_member_string(&t, "id", info->id);
+    text_member_integer(&t, "bytes", info->bytes);
     put_time(&t, "created", info->created);
     put_time(&t, "used", info->used);
-    text_key(&t, "used_by");
-    text_integer(&t, info->jobs);
+    text_member_integer(&t, "used_by", info->jobs);
     text_key(&t, "links");
     text_open(&t, '[');
     text_open(&t, '{');
-    text_key(&t, "rel");
-    text_string(&t, "self");
+    text_member_string(&t, "rel", "self");
     text_key(&t, "href");
     text_format(&t, "\"/v1/uploads/%s\"", info->id);
     text_close(&t, '}');
@@ -276,8 +238,7 @@ char *codec_encode_findings(const char *findings, int64_t jobs, double seconds)
     text t = {0};
     char line[512];
     text_open(&t, '{');
-    text_key(&t, "whole");
-    text_bool(&t, findings[0] == '\0');
+    text_member_bool(&t, "whole", findings[0] == '\0');
     text_key(&t, "findings");
     text_open(&t, '[');
     for (const char *at = findings; *at;) {
@@ -287,10 +248,8 @@ char *codec_encode_findings(const char *findings, int64_t jobs, double seconds)
         at += len + (at[len] == '\n');
     }
     text_close(&t, ']');
-    text_key(&t, "jobs");
-    text_integer(&t, jobs);
-    text_key(&t, "seconds");
-    text_number(&t, seconds);
+    text_member_integer(&t, "jobs", jobs);
+    text_member_number(&t, "seconds", seconds);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }
@@ -304,12 +263,9 @@ char *codec_encode_limits(const codec_limit *limits, size_t count)
     for (size_t i = 0; i < count; i++) {
         text_key(&t, limits[i].name);
         text_open(&t, '{');
-        text_key(&t, "value");
-        text_number(&t, limits[i].value);
-        text_key(&t, "unit");
-        text_string(&t, limits[i].unit);
-        text_key(&t, "description");
-        text_string(&t, limits[i].meaning);
+        text_member_number(&t, "value", limits[i].value);
+        text_member_string(&t, "unit", limits[i].unit);
+        text_member_string(&t, "description", limits[i].meaning);
         text_close(&t, '}');
     }
     text_close(&t, '}');
@@ -321,16 +277,12 @@ char *codec_encode_health(const char *status, const int64_t counts[5], int worke
 {
     text t = {0};
     text_open(&t, '{');
-    text_key(&t, "status");
-    text_string(&t, status);
-    text_key(&t, "workers");
-    text_integer(&t, workers);
+    text_member_string(&t, "status", status);
+    text_member_integer(&t, "workers", workers);
     text_key(&t, "jobs");
     text_open(&t, '{');
-    for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++) {
-        text_key(&t, job_status_name((job_status)i));
-        text_integer(&t, counts[i]);
-    }
+    for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
+        text_member_integer(&t, job_status_name((job_status)i), counts[i]);
     text_close(&t, '}');
     text_close(&t, '}');
     return text_finish(&t, NULL);

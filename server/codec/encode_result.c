@@ -21,12 +21,6 @@ static void put_vector(text *t, const char *key, const double *x, int64_t n, int
     text_close(t, ']');
 }
 
-static void put_word(text *t, const char *key, const char *value)
-{
-    text_key(t, key);
-    text_string(t, value);
-}
-
 static void put_summary(text *t, const char *summary)
 {
     text_key(t, "summary");
@@ -83,10 +77,8 @@ static void put_fields(text *t, const codec_result *result)
 
 static void put_places(text *t, const codec_result *result)
 {
-    if (result->part) {
-        text_key(t, "from");
-        text_integer(t, result->from);
-    }
+    if (result->part)
+        text_member_integer(t, "from", result->from);
     put_vector(t, "nodes", result->nodes, result->n_nodes, result->dim);
     put_vector(t, "contact_nodes", result->contact_nodes, result->m, 0);
 }
@@ -95,9 +87,9 @@ char *codec_encode_result(const codec_result *result, size_t *len)
 {
     text t = {0};
     text_open(&t, '{');
-    put_word(&t, "job", result->job_id);
+    text_member_string(&t, "job", result->job_id);
     if (result->case_name)
-        put_word(&t, "case", result->case_name);
+        text_member_string(&t, "case", result->case_name);
     put_summary(&t, result->summary);
     put_fields(&t, result);
     put_places(&t, result);
@@ -117,7 +109,7 @@ codec_results *codec_results_begin(const char *job_id, const char *summary)
     if (!all)
         return NULL;
     text_open(&all->t, '{');
-    put_word(&all->t, "job", job_id);
+    text_member_string(&all->t, "job", job_id);
     put_summary(&all->t, summary);
     text_key(&all->t, "cases");
     text_open(&all->t, '[');
@@ -127,7 +119,7 @@ codec_results *codec_results_begin(const char *job_id, const char *summary)
 void codec_results_add(codec_results *all, const codec_result *one)
 {
     text_open(&all->t, '{');
-    put_word(&all->t, "name", one->case_name);
+    text_member_string(&all->t, "name", one->case_name);
     put_summary(&all->t, one->summary);
     put_fields(&all->t, one);
     text_close(&all->t, '}');
@@ -178,7 +170,7 @@ char *codec_encode_history(const char *case_name, const double *rows, int64_t co
     text t = {0};
     text_open(&t, '{');
     if (case_name)
-        put_word(&t, "case", case_name);
+        text_member_string(&t, "case", case_name);
     text_key(&t, "columns");
     text_open(&t, '[');
     for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++)

@@ -62,24 +62,6 @@ static int add_indices(surface_writer *w, const unsigned *data, int64_t count)
 
 /* -------------------------------------------------------------------- JSON */
 
-static void put_integer(text *t, const char *key, int64_t value)
-{
-    text_key(t, key);
-    text_integer(t, value);
-}
-
-static void put_number(text *t, const char *key, double value)
-{
-    text_key(t, key);
-    text_number(t, value);
-}
-
-static void put_string(text *t, const char *key, const char *value)
-{
-    text_key(t, key);
-    text_string(t, value);
-}
-
 static void put_vector(text *t, const char *key, const double *x, int64_t n)
 {
     text_key(t, key);
@@ -102,10 +84,10 @@ static void put_accessors(surface_writer *w)
     for (int i = 0; i < w->n_arrays; i++) {
         const array *a = &w->arrays[i];
         text_open(t, '{');
-        put_integer(t, "bufferView", i);
-        put_integer(t, "componentType", a->type);
-        put_integer(t, "count", (int64_t)a->count);
-        put_string(t, "type", a->components == 3 ? "VEC3" : "SCALAR");
+        text_member_integer(t, "bufferView", i);
+        text_member_integer(t, "componentType", a->type);
+        text_member_integer(t, "count", (int64_t)a->count);
+        text_member_string(t, "type", a->components == 3 ? "VEC3" : "SCALAR");
         if (a->low) {
             put_floats(t, "min", a->low, a->components);
             put_floats(t, "max", a->high, a->components);
@@ -123,18 +105,18 @@ static void put_views(surface_writer *w)
     for (int i = 0; i < w->n_arrays; i++) {
         const array *a = &w->arrays[i];
         text_open(t, '{');
-        put_integer(t, "buffer", 0);
-        put_integer(t, "byteOffset", (int64_t)a->offset);
-        put_integer(t, "byteLength", (int64_t)(4 * a->count * a->components));
+        text_member_integer(t, "buffer", 0);
+        text_member_integer(t, "byteOffset", (int64_t)a->offset);
+        text_member_integer(t, "byteLength", (int64_t)(4 * a->count * a->components));
         if (a->target)
-            put_integer(t, "target", a->target);
+            text_member_integer(t, "target", a->target);
         text_close(t, '}');
     }
     text_close(t, ']');
     text_key(t, "buffers");
     text_open(t, '[');
     text_open(t, '{');
-    put_integer(t, "byteLength", (int64_t)w->bytes);
+    text_member_integer(t, "byteLength", (int64_t)w->bytes);
     text_close(t, '}');
     text_close(t, ']');
 }
@@ -142,7 +124,7 @@ static void put_views(surface_writer *w)
 static void put_accessor(text *t, const char *key, int accessor)
 {
     if (accessor != NONE)
-        put_integer(t, key, accessor);
+        text_member_integer(t, key, accessor);
 }
 
 /* What the primitives share. */
@@ -157,17 +139,17 @@ static void put_primitive(text *t, int mode, int indices, const vertices *v, boo
     text_open(t, '{');
     text_key(t, "attributes");
     text_open(t, '{');
-    put_integer(t, "POSITION", v->position);
+    text_member_integer(t, "POSITION", v->position);
     put_accessor(t, "_NODE", coloured ? v->node : NONE);
     put_accessor(t, "_VON_MISES", coloured ? v->von_mises : NONE);
     text_close(t, '}');
-    put_integer(t, "indices", indices);
-    put_integer(t, "mode", mode);
+    text_member_integer(t, "indices", indices);
+    text_member_integer(t, "mode", mode);
     if (moves) {
         text_key(t, "targets");
         text_open(t, '[');
         text_open(t, '{');
-        put_integer(t, "POSITION", v->displacement);
+        text_member_integer(t, "POSITION", v->displacement);
         text_close(t, '}');
         text_close(t, ']');
     }
@@ -177,8 +159,8 @@ static void put_primitive(text *t, int mode, int indices, const vertices *v, boo
 static void put_node(text *t, const char *name, int mesh, const uz_surface *s)
 {
     text_open(t, '{');
-    put_string(t, "name", name);
-    put_integer(t, "mesh", mesh);
+    text_member_string(t, "name", name);
+    text_member_integer(t, "mesh", mesh);
     put_vector(t, "translation", s->origin, 3);
     put_vector(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
     text_close(t, '}');
@@ -186,8 +168,7 @@ static void put_node(text *t, const char *name, int mesh, const uz_surface *s)
 
 static void put_nodes(text *t, const uz_surface *s, bool outline)
 {
-    text_key(t, "scene");
-    text_integer(t, 0);
+    text_member_integer(t, "scene", 0);
     text_key(t, "scenes");
     text_put(t, outline ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
     text_key(t, "nodes");
@@ -237,9 +218,9 @@ static void put_drawn(text *t, const char *key, const uz_drawn *drawn, int acces
     text_key(t, key);
     text_open(t, '{');
     put_accessor(t, "accessor", accessor);
-    put_number(t, "unit", drawn->unit);
-    put_number(t, "low", drawn->low);
-    put_number(t, "high", drawn->high);
+    text_member_number(t, "unit", drawn->unit);
+    text_member_number(t, "low", drawn->low);
+    text_member_number(t, "high", drawn->high);
     text_close(t, '}');
 }
 
@@ -250,7 +231,7 @@ static void put_contact(surface_writer *w, int row_vertex)
     text *t = &w->json;
     text_key(t, "contact");
     text_open(t, '{');
-    put_integer(t, "rows", n);
+    text_member_integer(t, "rows", n);
     put_accessor(t, "vertex", row_vertex);
     put_accessor(t, "contact", add_array(w, UNSIGNED, 0, s->row_contact, n, 1));
     put_accessor(t, "normal", add_array(w, FLOAT, 0, s->row_normal, n, 3));
@@ -269,9 +250,8 @@ static void put_round(text *t, const uz_contact *c, int dim)
     put_vector(t, c->kind == UZ_OBSTACLE_CYLINDER ? "point" : "center", c->point, dim);
     if (c->kind == UZ_OBSTACLE_CYLINDER)
         put_vector(t, "axis", c->normal, dim);
-    put_number(t, "radius", c->radius);
-    text_key(t, "inside");
-    text_bool(t, c->inside);
+    text_member_number(t, "radius", c->radius);
+    text_member_bool(t, "inside", c->inside);
     text_close(t, '}');
 }
 
@@ -309,9 +289,9 @@ static void put_height(text *t, const uz_contact *c)
 static void put_obstacle(text *t, const uz_contact *c, int dim)
 {
     text_open(t, '{');
-    put_string(t, "on", c->on);
+    text_member_string(t, "on", c->on);
     if (c->kind == UZ_OBSTACLE_BODY) {
-        put_string(t, "with", c->with);
+        text_member_string(t, "with", c->with);
         text_close(t, '}');
         return;
     }
@@ -341,19 +321,18 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     text *t = &w->json;
     text_key(t, "extras");
     text_open(t, '{');
-    put_string(t, "job", w->in->job_id);
-    put_string(t, "case", w->in->case_name);
-    put_integer(t, "dim", s->dim);
-    text_key(t, "axisymmetric");
-    text_bool(t, scene->model == UZ_AXISYMMETRIC);
-    put_integer(t, "nodes", s->n_nodes);
-    put_integer(t, "elements", s->n_elements);
+    text_member_string(t, "job", w->in->job_id);
+    text_member_string(t, "case", w->in->case_name);
+    text_member_integer(t, "dim", s->dim);
+    text_member_bool(t, "axisymmetric", scene->model == UZ_AXISYMMETRIC);
+    text_member_integer(t, "nodes", s->n_nodes);
+    text_member_integer(t, "elements", s->n_elements);
     put_vector(t, "origin", s->origin, 3);
-    put_number(t, "unit", s->unit);
-    put_number(t, "factor", s->factor);
-    put_number(t, "largest_displacement", s->largest);
-    put_integer(t, "position", v->position);
-    put_integer(t, "displacement", v->displacement);
+    text_member_number(t, "unit", s->unit);
+    text_member_number(t, "factor", s->factor);
+    text_member_number(t, "largest_displacement", s->largest);
+    text_member_integer(t, "position", v->position);
+    text_member_integer(t, "displacement", v->displacement);
     put_drawn(t, "von_mises", &s->von_mises, v->von_mises);
     put_contact(w, row_vertex);
     text_key(t, "contacts");

@@ -20,12 +20,6 @@ static void put_count(text *t, const char *key, const int64_t *value)
         text_raw(t, NULL);
 }
 
-static void put_real(text *t, const char *key, double value)
-{
-    text_key(t, key);
-    text_number(t, value);
-}
-
 /* "1/8" where it is at most that, else "70 %". */
 static void put_share(text *t, double share)
 {
@@ -42,19 +36,18 @@ void put_suggestion(text *t, const uz_suggestion *s)
         return;
     }
     text_open(t, '{');
-    text_key(t, "level");
-    text_string(t, "balanced");
+    text_member_string(t, "level", "balanced");
     text_key(t, "text");
     text_format(t, "\"mesh error %.2g %%, solver error %.2g %%: balanced would have taken ", 100.0 * s->mesh_error,
                 100.0 * s->solver_error);
     put_share(t, s->share);
     text_put(t, " of the time\"");
-    put_real(t, "relative_error", s->relative_error);
-    put_real(t, "mesh_error", s->mesh_error);
-    put_real(t, "solver_error", s->solver_error);
-    put_real(t, "seconds", s->seconds);
-    put_real(t, "total_s", s->total_s);
-    put_real(t, "share", s->share);
+    text_member_number(t, "relative_error", s->relative_error);
+    text_member_number(t, "mesh_error", s->mesh_error);
+    text_member_number(t, "solver_error", s->solver_error);
+    text_member_number(t, "seconds", s->seconds);
+    text_member_number(t, "total_s", s->total_s);
+    text_member_number(t, "share", s->share);
     put_count(t, "iterations", &s->iterations);
     text_close(t, '}');
 }
@@ -62,11 +55,10 @@ void put_suggestion(text *t, const uz_suggestion *s)
 /* seconds: when the bound was established, or what the whole solve would have taken. step NULL: it never was. */
 static void put_step(text *t, double seconds, const uz_trade_step *step)
 {
-    put_real(t, "seconds", seconds);
+    text_member_number(t, "seconds", seconds);
     put_count(t, "iterations", step ? &step->iterations : NULL);
     put_count(t, "applications", step ? &step->applications : NULL);
-    text_key(t, "by");
-    text_string(t, !step ? NULL : step->by_certificate ? "certificate" : "iteration");
+    text_member_string(t, "by", !step ? NULL : step->by_certificate ? "certificate" : "iteration");
 }
 
 static void put_decades(text *t, const uz_trade *trade)
@@ -77,7 +69,7 @@ static void put_decades(text *t, const uz_trade *trade)
     for (int k = 0; k < DECADES; k++) {
         const uz_trade_step *step = uz_trade_reach(trade, DECADE[k]);
         text_open(t, '{');
-        put_real(t, "relative_error", DECADE[k]);
+        text_member_number(t, "relative_error", DECADE[k]);
         put_step(t, step ? step->seconds : NAN, step);
         text_close(t, '}');
     }
@@ -88,9 +80,8 @@ static void put_level(text *t, const char *name, double relative_error, const uz
 {
     const uz_trade_step *step = isfinite(relative_error) ? uz_trade_reach(trade, relative_error) : NULL;
     text_open(t, '{');
-    text_key(t, "level");
-    text_string(t, name);
-    put_real(t, "relative_error", relative_error);
+    text_member_string(t, "level", name);
+    text_member_number(t, "relative_error", relative_error);
     put_step(t, step ? uz_trade_cost(trade, step) : NAN, step);
     text_close(t, '}');
 }
@@ -167,18 +158,15 @@ char *codec_encode_trade(const codec_trade *of, size_t *len)
     if (of->may_save && of->requested_error < (1.0 - 1e-9) * 0.1 * of->mesh_error)
         suggestion = uz_trade_suggest(trade, of->mesh_error, of->solver_error, of->certify_s);
     text_open(&t, '{');
-    text_key(&t, "job");
-    text_string(&t, of->job_id);
-    if (of->case_name) {
-        text_key(&t, "case");
-        text_string(&t, of->case_name);
-    }
+    text_member_string(&t, "job", of->job_id);
+    if (of->case_name)
+        text_member_string(&t, "case", of->case_name);
     put_decades(&t, trade);
     put_levels(&t, trade, of->mesh_error);
-    put_real(&t, "iterated_s", trade->iterated_s);
-    put_real(&t, "total_s", trade->total_s);
-    put_real(&t, "solver_error", of->solver_error);
-    put_real(&t, "mesh_error", of->mesh_error);
+    text_member_number(&t, "iterated_s", trade->iterated_s);
+    text_member_number(&t, "total_s", trade->total_s);
+    text_member_number(&t, "solver_error", of->solver_error);
+    text_member_number(&t, "mesh_error", of->mesh_error);
     text_key(&t, "suggestion");
     put_suggestion(&t, &suggestion);
     text_close(&t, '}');

@@ -169,18 +169,14 @@ static codec_finding judge_one(const codec_assertion *a, const json_t *summary)
 
 static void put_given(text *t, const char *key, double value)
 {
-    if (isnan(value))
-        return;
-    text_key(t, key);
-    text_number(t, value);
+    if (!isnan(value))
+        text_member_number(t, key, value);
 }
 
-static void put_member(text *t, const char *key, const char *value)
+static void put_word(text *t, const char *key, const char *value)
 {
-    if (!value[0])
-        return;
-    text_key(t, key);
-    text_string(t, value);
+    if (value[0])
+        text_member_string(t, key, value);
 }
 
 static const char *const WORDS[CODEC_VERDICTS] = {"pass", "uncertain", "fail"};
@@ -188,27 +184,23 @@ static const char *const WORDS[CODEC_VERDICTS] = {"pass", "uncertain", "fail"};
 static void put_finding(text *t, const codec_assertion *a, const codec_finding *f, bool of_cases)
 {
     text_open(t, '{');
-    put_member(t, "name", a->name);
-    put_member(t, "quantity", a->quantity);
-    put_member(t, "case", f->case_name);
+    put_word(t, "name", a->name);
+    put_word(t, "quantity", a->quantity);
+    put_word(t, "case", f->case_name);
     put_given(t, "min", a->least);
     put_given(t, "max", a->most);
     put_given(t, "near", a->near);
     put_given(t, "absolute", a->absolute);
     put_given(t, "relative", a->relative);
-    text_key(t, "value");
-    text_number(t, f->value);
-    text_key(t, "error");
-    text_number(t, f->error);
-    put_member(t, "result", WORDS[f->verdict]);
-    put_member(t, "reason", f->reason);
+    text_member_number(t, "value", f->value);
+    text_member_number(t, "error", f->error);
+    put_word(t, "result", WORDS[f->verdict]);
+    put_word(t, "reason", f->reason);
     if (of_cases) {
         text_key(t, "cases");
         text_open(t, '{');
-        for (int i = 0; i < CODEC_VERDICTS; i++) {
-            text_key(t, WORDS[i]);
-            text_integer(t, f->counts[i]);
-        }
+        for (int i = 0; i < CODEC_VERDICTS; i++)
+            text_member_integer(t, WORDS[i], f->counts[i]);
         text_close(t, '}');
     }
     text_close(t, '}');
@@ -251,8 +243,7 @@ static void begin_list(text *t, const char *summary)
 static bool end_list(text *t, bool passed, char **summary)
 {
     text_close(t, ']');
-    text_key(t, "assertions_passed");
-    text_bool(t, passed);
+    text_member_bool(t, "assertions_passed", passed);
     text_close(t, '}');
     char *longer = text_finish(t, NULL);
     if (longer) {

@@ -137,6 +137,30 @@ void text_raw(text *t, const char *json)
     text_put(t, json ? json : "null");
 }
 
+void text_member_string(text *t, const char *key, const char *string)
+{
+    text_key(t, key);
+    text_string(t, string);
+}
+
+void text_member_integer(text *t, const char *key, int64_t value)
+{
+    text_key(t, key);
+    text_integer(t, value);
+}
+
+void text_member_number(text *t, const char *key, double value)
+{
+    text_key(t, key);
+    text_number(t, value);
+}
+
+void text_member_bool(text *t, const char *key, bool value)
+{
+    text_key(t, key);
+    text_bool(t, value);
+}
+
 size_t text_shortest(char out[TEXT_DOUBLE], double x)
 {
     size_t length = uz_format_double(out, x);

@@ -1,9 +1,9 @@
 /* http.h: the daemon's HTTP side, start to stop. The only folder that knows libmicrohttpd.
  *
- * bytes -> framing (framing.h) -> target (target.h) -> route table (routes.c) -> handler (jobs.c, list.c, results.c,
- * events.c, uploads.c, service.c) -> negotiation (negotiate.h) -> reply (reply.h). One thread per connection, so a
- * handler may block, and none for one that only waits (held.h); deadlines.h ends connections that are too slow.
- * Handlers own nothing beyond their request: the store and the workers own the jobs. */
+ * bytes -> framing (framing.h) -> target (target.h) -> route table (routes.c: all handlers, each in the file of its
+ * subject) -> negotiation (negotiate.h) -> reply (reply.h). One thread per connection, so a handler may block, and none
+ * for one that only waits (held.h); deadlines.h ends connections that are too slow. Handlers own nothing beyond their
+ * request: the store and the workers own the jobs. */
 #ifndef SERVER_HTTP_H
 #define SERVER_HTTP_H
 

@@ -48,6 +48,16 @@ static int listen_on(const struct addrinfo *at)
     return -1;
 }
 
+/* What helps where a socket could not be had. */
+static const char *remedy(int cause)
+{
+    if (cause == EADDRINUSE)
+        return "; another program listens there: stop it, or give another port (0 takes a free one)";
+    if (cause == EACCES)
+        return "; ports below 1024 are for root: give another one, or start as root with --user";
+    return cause == EADDRNOTAVAIL ? "; this machine does not have that address" : "";
+}
+
 static bool describe(int fd, const char *scheme, char *url, size_t size)
 {
     struct sockaddr_storage name;
@@ -76,7 +86,7 @@ int http_listen(const char *host_port, const char *scheme, char *url, size_t url
     }
     int fd = listen_on(found);
     if (fd < 0)
-        snprintf(message, size, "cannot listen on %s: %s", host_port, strerror(errno));
+        snprintf(message, size, "cannot listen on %s: %m%s", host_port, remedy(errno));
     freeaddrinfo(found);
     if (fd >= 0 && !describe(fd, scheme, url, url_size)) {
         snprintf(message, size, "cannot tell the address of the socket on %s", host_port);

@@ -105,8 +105,8 @@ typedef struct route {
  * `submit`, what only reads for `read`, /v1/admin/ for `admin`. */
 auth_scope route_scope(const route *r);
 
-/* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. */
-/* With rq->reply.cors, OPTIONS is answered on every path that there is. */
+/* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. With rq->reply.cors, OPTIONS is
+ * answered on every path that there is. */
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem);
 /* 400 for a query key that the route does not know. */
 bool route_check_parameters(const http_request *rq, problem_details *problem);

@@ -1,4 +1,6 @@
-/* routes.c: the route table. 404, 405 with Allow and unknown query keys all follow from it; HEAD is served by GET. */
+/* routes.c: the route table. 404, 405 with Allow and unknown query keys all follow from it; HEAD is served by GET.
+ * A new route is a row here, a handler declared in request.h and defined in the file of its subject, and a path in
+ * schemas/openapi.json; tests/api/test_schemas.py compares the two. */
 #include "http/problem.h"
 #include "http/request.h"
 
@@ -58,13 +60,13 @@ static bool placeholder_matches(const char *kind, const char *text, size_t len)
     return len > 0 && len < sizeof((http_request *)0)->name;
 }
 
-/* Compares segment by segment; what stands for a placeholder is copied to name. */
-static bool path_matches(const char *pattern, const char *path, char *name, size_t size)
+/* Compares segment by segment; what stands for a placeholder is copied to name. any: whatever its form is. */
+static bool path_matches(const char *pattern, const char *path, bool any, char *name, size_t size)
 {
     while (*pattern == '/' && *path == '/') {
         size_t want = strcspn(++pattern, "/"), have = strcspn(++path, "/");
         if (*pattern == '{') {
-            if (!placeholder_matches(pattern, path, have))
+            if (any ? have == 0 : !placeholder_matches(pattern, path, have))
                 return false;
             snprintf(name, size, "%.*s", (int)have, path);
         } else if (want != have || memcmp(pattern, path, have) != 0) {
@@ -106,12 +108,28 @@ auth_scope route_scope(const route *r)
     return strcmp(r->method, "GET") == 0 ? SCOPE_READ : SCOPE_SUBMIT;
 }
 
+/* 404, and why: an id of a wrong form is told from a path that nobody serves. */
+static bool refuse_path(const http_request *rq, problem_details *problem)
+{
+    char name[sizeof rq->name];
+    for (size_t i = 0; i < N_ROUTES; i++) {
+        const char *pattern = ROUTES[i].pattern;
+        const bool of_job = strstr(pattern, "{id}"), of_upload = strstr(pattern, "{digest}");
+        if ((of_job || of_upload) && path_matches(pattern, rq->target.path, true, name, sizeof name))
+            return http_problem(problem, 404, "not_found", "Not found",
+                                "\"%.100s\" is not the id of %s: those have %d digits 0 to 9 and a to f", name,
+                                of_job ? "a job" : "an upload", of_job ? 32 : 64);
+    }
+    return http_problem(problem, 404, "not_found", "Not found",
+                        "there is nothing at %.200s: /openapi.json lists what is", rq->target.path);
+}
+
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem)
 {
     const char *method = strcmp(rq->method, "HEAD") == 0 ? "GET" : rq->method;
     allow[0] = '\0';
     for (size_t i = 0; i < N_ROUTES; i++) {
-        if (!path_matches(ROUTES[i].pattern, rq->target.path, rq->name, sizeof rq->name))
+        if (!path_matches(ROUTES[i].pattern, rq->target.path, false, rq->name, sizeof rq->name))
             continue;
         if (strcmp(ROUTES[i].method, method) == 0) {
             rq->route = &ROUTES[i];
@@ -128,8 +146,18 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
     if (allow[0])
         return http_problem(problem, 405, "method_not_allowed", "The method is not allowed here",
                             "%s is not allowed on %.200s, but %s", rq->method, rq->target.path, allow);
-    return http_problem(problem, 404, "not_found", "Not found",
-                        "there is nothing at %.200s: /openapi.json lists what is", rq->target.path);
+    return refuse_path(rq, problem);
+}
+
+static bool refuse_parameter(const http_request *rq, const char *key, problem_details *problem)
+{
+    char takes[160] = "it takes none";
+    size_t used = strlen("it takes ");
+    for (const char *const *known = rq->route->parameters; *known && used < sizeof takes; known++)
+        used += (size_t)snprintf(takes + used, sizeof takes - used, "%s%s", *known, known[1] ? ", " : "");
+    return http_problem(problem, 400, "unknown_parameter", "A query parameter is unknown",
+                        "\"%.100s\" is not a parameter of %s %s; %s", key, rq->route->method, rq->route->pattern,
+                        takes);
 }
 
 bool route_check_parameters(const http_request *rq, problem_details *problem)
@@ -139,9 +167,7 @@ bool route_check_parameters(const http_request *rq, problem_details *problem)
         while (*known && strcmp(*known, rq->target.parameters[i].key) != 0)
             known++;
         if (!*known)
-            return http_problem(problem, 400, "unknown_parameter", "A query parameter is unknown",
-                                "\"%.100s\" is not a parameter of %s %s", rq->target.parameters[i].key,
-                                rq->route->method, rq->route->pattern);
+            return refuse_parameter(rq, rq->target.parameters[i].key, problem);
     }
     return true;
 }

@@ -1,4 +1,5 @@
 #include "store/backup_uploads.h"
+#include "store/upload_file.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -25,24 +26,12 @@ static int open_folder(const char *db, bool make)
     return open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
-static bool write_all(int fd, const char *data, size_t size)
-{
-    while (size > 0) {
-        ssize_t n = write(fd, data, size);
-        if (n < 0 && errno != EINTR)
-            return false;
-        data += n > 0 ? n : 0;
-        size -= n > 0 ? (size_t)n : 0;
-    }
-    return true;
-}
-
 static bool copy_bytes(int in, int out)
 {
     char piece[65536];
     ssize_t n;
     while ((n = read(in, piece, sizeof piece)) != 0)
-        if ((n < 0 && errno != EINTR) || (n > 0 && !write_all(out, piece, (size_t)n)))
+        if ((n < 0 && errno != EINTR) || (n > 0 && !upload_write_all(out, piece, (size_t)n)))
             return false;
     return fsync(out) == 0;
 }

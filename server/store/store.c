@@ -23,7 +23,10 @@ static int lock_file(const char *path, char *message, size_t size)
     struct stat st;
     int file = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0600);
     if (file < 0) {
-        snprintf(message, size, "cannot open the file: %s", strerror(errno));
+        const char *remedy = errno == ENOENT   ? "; make its folder first, or give another path"
+                             : errno == EACCES ? "; give a path that this user may write"
+                                               : "";
+        snprintf(message, size, "cannot open the file: %m%s", remedy);
         return -1;
     }
     if (fstat(file, &st) != 0 || !S_ISREG(st.st_mode))

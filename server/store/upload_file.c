@@ -89,13 +89,14 @@ upload_file *upload_file_new(const char *folder, bool gzip, upload_room room, vo
     return NULL;
 }
 
-static bool write_all(int fd, const unsigned char *data, size_t size)
+bool upload_write_all(int fd, const void *data, size_t size)
 {
+    const unsigned char *at = data;
     while (size > 0) {
-        ssize_t n = write(fd, data, size);
+        ssize_t n = write(fd, at, size);
         if (n < 0 && errno != EINTR)
             return false;
-        data += n > 0 ? n : 0;
+        at += n > 0 ? n : 0;
         size -= n > 0 ? (size_t)n : 0;
     }
     return true;
@@ -107,7 +108,7 @@ static upload_status put(upload_file *f, const unsigned char *data, size_t size,
     if (status != UPLOAD_OK || size == 0)
         return status;
     errno = EIO;
-    if (gnutls_hash(f->hash, data, size) != 0 || !write_all(f->fd, data, size))
+    if (gnutls_hash(f->hash, data, size) != 0 || !upload_write_all(f->fd, data, size))
         return fail(message, message_size, "write");
     f->bytes += (int64_t)size;
     return UPLOAD_OK;

@@ -24,4 +24,7 @@ int64_t upload_file_bytes(const upload_file *f);
 /* Closes it, and removes what was not published. NULL is fine. */
 void upload_file_free(upload_file *f);
 
+/* All bytes, however often the system asks again; false: errno says why. */
+bool upload_write_all(int fd, const void *data, size_t size);
+
 #endif

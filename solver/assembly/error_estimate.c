@@ -138,17 +138,12 @@ static void add_linear_fit(averaging *x, const element_state *s, int64_t e)
     }
 }
 
-static bool is_quadratic(uz_element_kind kind)
-{
-    return kind == UZ_TRI6 || kind == UZ_QUAD8 || kind == UZ_TET10;
-}
-
 static void average_at_nodes(averaging *x)
 {
     element_state s;
     for (int64_t e = 0; e < x->model->mesh.n_elements; e++) {
         evaluate(&s, x, e);
-        if (is_quadratic(s.element.kind))
+        if (uz_element_is_quadratic(s.element.kind))
             add_linear_fit(x, &s, e);
         else
             add_mean(x, &s, e);

@@ -269,19 +269,6 @@ static uz_status check_size(const uz_surface *s, const surface_work *w, size_t m
     return UZ_OK;
 }
 
-static uz_status check_answer(const uz_field_source *answer, const uz_body_model *model, uz_error *err)
-{
-    const int64_t n_u = model->mesh.n_nodes * model->mesh.dim;
-    if (!answer->u || answer->n_u != n_u || answer->m != model->m || (model->m > 0 && !answer->r))
-        return uz_fail(err, UZ_ERR_SIZE, "u", "a surface needs %lld displacements and %lld reactions", (long long)n_u,
-                       (long long)model->m);
-    for (int64_t i = 0; i < n_u; i++)
-        if (!isfinite(answer->u[i]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacement %lld is not finite: there is no answer",
-                           (long long)i);
-    return UZ_OK;
-}
-
 static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body, unsigned which, size_t most_bytes,
                        const uz_hooks *hooks, uz_error *err)
 {
@@ -335,7 +322,7 @@ uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_fi
     memset(out, 0, sizeof *out);
     uz_status status = uz_body_model_outline(&model, scene, err);
     if (status == UZ_OK)
-        status = check_answer(answer, &model, err);
+        status = uz_scenery_check_answer(answer, &model, err);
     if (status == UZ_OK)
         status = uz_field_body_init(&body, scene, &model, err);
     if (status == UZ_OK)

@@ -132,17 +132,10 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
     return status;
 }
 
-static uz_status check(const uz_field_source *answer, const uz_body_model *model, const uz_picture *how, uz_error *err)
+uz_status uz_scenery_check_answer(const uz_field_source *answer, const uz_body_model *model, uz_error *err)
 {
     const int64_t n_u = model->mesh.n_nodes * model->mesh.dim;
-    if (how->width != 0 && (how->width < 200 || how->width > 4000))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a picture must lie in 200 to 4000, it is %d",
-                       how->width);
-    if (!(how->factor >= 0 && isfinite(how->factor)))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the factor of the displacements must not be negative");
-    if (how->colour != UZ_FIELD_DISPLACEMENTS && how->colour != UZ_FIELD_VON_MISES)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a picture shows displacements or von_mises");
-    if (!answer->u || answer->n_u != n_u || (model->m > 0 && (!answer->r || answer->m != model->m)))
+    if (!answer->u || answer->n_u != n_u || answer->m != model->m || (model->m > 0 && !answer->r))
         return uz_fail(err, UZ_ERR_SIZE, "u", "a picture needs %lld displacements and %lld reactions", (long long)n_u,
                        (long long)model->m);
     for (int64_t i = 0; i < n_u; i++)
@@ -150,6 +143,18 @@ static uz_status check(const uz_field_source *answer, const uz_body_model *model
             return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacement %lld is not finite: there is no answer",
                            (long long)i);
     return UZ_OK;
+}
+
+static uz_status check(const uz_field_source *answer, const uz_body_model *model, const uz_picture *how, uz_error *err)
+{
+    if (how->width != 0 && (how->width < 200 || how->width > 4000))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a picture must lie in 200 to 4000, it is %d",
+                       how->width);
+    if (!(how->factor >= 0 && isfinite(how->factor)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the factor of the displacements must not be negative");
+    if (how->colour != UZ_FIELD_DISPLACEMENTS && how->colour != UZ_FIELD_VON_MISES)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a picture shows displacements or von_mises");
+    return uz_scenery_check_answer(answer, model, err);
 }
 
 uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,

@@ -23,6 +23,9 @@ typedef struct {
     double extent;          /* size of the body */
 } uz_scenery;
 
+/* Are these the displacements and reactions of this model, and finite? Errors: UZ_ERR_SIZE, _NOT_FINITE. */
+uz_status uz_scenery_check_answer(const uz_field_source *answer, const uz_body_model *model, uz_error *err);
+
 /* axes, scale, offset, height and extent from the mesh, displacements and width. UZ_ERR_NOT_FINITE. */
 uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err);
 

@@ -125,7 +125,7 @@ uz_element_kind uz_box_element(const uz_box *box)
 
 int uz_box_order(uz_element_kind kind)
 {
-    return kind == UZ_TRI6 || kind == UZ_QUAD8 || kind == UZ_TET10 ? 2 : 1;
+    return uz_element_is_quadratic(kind) ? 2 : 1;
 }
 
 int64_t uz_box_node(const uz_box *box, uz_element_kind kind, const int64_t at[3])

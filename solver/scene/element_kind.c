@@ -76,3 +76,8 @@ int uz_face_corner_count(uz_element_kind kind)
 {
     return KINDS[kind].side_corners;
 }
+
+bool uz_element_is_quadratic(uz_element_kind kind)
+{
+    return KINDS[kind].nodes > KINDS[kind].corners;
+}

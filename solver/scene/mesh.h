@@ -77,6 +77,8 @@ int uz_element_side(const int **local, uz_element_kind kind, int side);
 /* How many nodes of an element, and of each side of it, are corners. They come first. */
 int uz_element_corner_count(uz_element_kind kind);
 int uz_face_corner_count(uz_element_kind kind);
+/* Has it nodes in the middles of its edges? */
+bool uz_element_is_quadratic(uz_element_kind kind);
 
 /* The group of that name, or NULL with UZ_ERR_SCENE at `where`, listing the names that there are. */
 const uz_group *uz_mesh_group(const uz_mesh *mesh, const char *name, const char *where, uz_error *err);

@@ -203,6 +203,18 @@ def test_limits_end_without_converging(server):
     check("paper_rule" in done.stdout, done.stdout)
 
 
+def test_an_obstacle_on_the_other_side_is_hinted_at(server):
+    scene = json.load(open(PAPER))
+    words = "normal points to the body"
+    check(words not in run(server, "submit", "-", "--wait", stdin=json.dumps(scene), code=0).stdout)
+    scene["problem"]["contacts"][0]["obstacle"]["plane"]["normal"] = [0, -1]
+    done = run(server, "submit", "-", "--wait", stdin=json.dumps(scene), code=0)
+    check("0 of 30 candidates touch" in done.stdout and words in done.stdout, done.stdout)
+    matrices = {"kind": "matrices", **{name: open(f"tests/data/springs_{name}.mtx").read() for name in "KNh"}, "p": [0, 0, 0]}
+    done = run(server, "submit", "-", "--wait", stdin=json.dumps({"problem": matrices}), code=0)
+    check("0 of 2 candidates touch" in done.stdout and words not in done.stdout, done.stdout)
+
+
 def test_infeasible_is_never_called_converged(server):
     done = run(server, "submit", "-", "--wait", stdin=json.dumps(IMPOSSIBLE))
     check(done.returncode in (7, 8), done)
@@ -224,7 +236,10 @@ def test_cancel_waiting_running_and_ended(server):
     run(server, "history", running, "--plot", code=0)
     run(server, "cancel", running, "--quiet", code=0)
     run(server, "wait", running, code=9)
-    check(run(server, "cancel", running, code=0).stdout == "deleted\n")
+    done = run(server, "cancel", running, code=4)
+    check("has ended already: dismissed" in done.stderr and f"uzawa delete {running}" in done.stderr, done.stderr)
+    check("dismissed" in run(server, "status", running, code=0).stdout, "an ended job is never deleted by cancel")
+    check(run(server, "delete", running, code=0).stdout == "deleted\n")
     run(server, "status", running, code=4)
 
 
@@ -279,6 +294,7 @@ def test_usage(_):
     for words in ([], ["frobnicate"], ["submit"], ["list", "--frob"], ["help", "frobnicate"], ["wait", "x", "--csv"]):
         done = run(None, *words, code=2)
         check(done.stdout == "" and "usage:" in done.stderr, words, done)
+    check("see: uzawa help submit" in run(None, "submit", "x", "--accuracy", "1", code=2).stderr, "of the command that was named")
     run(None, "--server", "nonsense", "list", code=2)
     for words in (["--help"], ["help"], ["submit", "--help"], ["help", "history"]):
         done = run(None, *words, code=0)

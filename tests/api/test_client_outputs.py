@@ -343,7 +343,7 @@ def test_json_of_every_command(server):
         done = run(server, *words, "--json")
         check(isinstance(json.loads(done.stdout), (dict, list)) and done.stderr == "", words, done)
     check(json.loads(run(server, "verify", "-", "--json", code=7, stdin=json.dumps(answer)).stdout)["status"] == "successful")
-    check(json.loads(run(server, "cancel", job, "--json").stdout)["status"] == "deleted")
+    check(json.loads(run(server, "delete", job, "--json").stdout)["status"] == "deleted")
     for words in (["version"], ["help"], ["help", "--format", "json"]):
         done = subprocess.run([CLIENT, *words, *([] if "--format" in words else ["--json"])], capture_output=True, text=True)
         check(json.loads(done.stdout)["version"], done)

@@ -95,6 +95,7 @@ def run(s, *arguments):
 def test_port_in_use(s):
     got = run(s, "--listen", f"127.0.0.1:{s.port}", "--db", s.db + "2")
     check(got.returncode == 1 and got.stdout == "" and "cannot listen" in got.stderr and "in use" in got.stderr, got)
+    check("give another port" in got.stderr, "no remedy", got)
 
 
 def test_database_in_use(s):
@@ -118,7 +119,11 @@ def test_command_line(s):
         got = run(s, "--listen", wrong, "--db", os.path.join(s.folder, "x.db"))
         check(got.returncode == 1 and got.stderr.startswith("uzawad: "), wrong, got)
     got = run(s, "--listen", "127.0.0.1:0", "--db", "/nonexistent/x.db")
-    check(got.returncode == 1 and "/nonexistent/x.db" in got.stderr, got)
+    check(got.returncode == 1 and "/nonexistent/x.db" in got.stderr and "make its folder first" in got.stderr, got)
+    got = run(s, "--lisen", "127.0.0.1:0")
+    check(got.returncode == 2 and "did you mean --listen?" in got.stderr, got)
+    got = run(s, "--qqqqqqqqqqqqq")
+    check(got.returncode == 2 and "unknown option --qqqqqqqqqqqqq\n" in got.stderr, got)
 
 
 @options(None)

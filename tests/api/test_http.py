@@ -51,7 +51,8 @@ def test_result_refusals(s):
     check(int(reply.headers["retry-after"]) >= 1, reply)
     expect(s.get(f"/v1/jobs/{job['id']}/result?fields=reactions,nonsense"), 400, "bad_parameter")
     expect(s.get(f"/v1/jobs/{job['id']}/result?fields="), 400, "bad_parameter")
-    expect(s.get(f"/v1/jobs/{job['id']}/result?field=gaps"), 400, "unknown_parameter")
+    reply = expect(s.get(f"/v1/jobs/{job['id']}/result?field=gaps"), 400, "unknown_parameter")
+    check("it takes fields, case, from, count" in reply.json["detail"], reply)
     expect(s.get(f"/v1/jobs/{UNKNOWN}/result"), 404, "not_found")
 
 
@@ -168,6 +169,11 @@ def test_not_found(s):
         expect(s.get(path), 404, "not_found")
     expect(s.get(f"/v1/jobs/{UNKNOWN}"), 404, "not_found")
     expect(s.get("/%ff%01"), 404, "not_found")
+    for path, words in (("/v1/jobs/xyz", '"xyz" is not the id of a job: those have 32 digits'),
+                        ("/v1/jobs/xyz/result", "is not the id of a job"), ("/v1/uploads/12", "of an upload: those have 64 digits"),
+                        ("/v1/nothing", "/openapi.json lists what is")):
+        reply = expect(s.get(path), 404, "not_found")
+        check(words in reply.json["detail"], reply)
 
 
 def test_method_not_allowed(s):

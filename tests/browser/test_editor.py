@@ -147,4 +147,15 @@ def test_a_draft_is_kept(s, b):
     b.wait("the draft", "return document.querySelector('#job-text').value === arguments[0]", TEXT.replace("60", "66"))
 
 
+def test_a_job_that_fails_leads_back_to_its_text(s, b):
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    b.write("#job-text", b.run("return document.querySelector('#job-text').value").replace('"ux": 0, "uy": 0', '"uy": 0'))
+    b.says("#verdict", "Valid")
+    b.click("#submit")
+    b.says(".verdict h2", "The body is free to move")
+    b.click(".verdict a")
+    check('"left", "uy": 0' in b.one("#job-text").get_property("value"), "the text is gone")
+
+
 browser.main(globals())

@@ -72,6 +72,31 @@ def test_convergence_is_drawn(s, b):
     check(y < 320, y)
 
 
+def check_few_iterations_and_near_names(s, b, cells):
+    problem = {**SCENE["problem"], "mesh": {"box": {"size": [60, 20], "cells": cells, "element": "tri3"}}}
+    job = s.solve({"problem": problem, "solver": {"accuracy": "precise"}})
+    check(job["summary"]["iterations"] < 10, "this is about short histories", job)
+    b.open(s, f"jobs/{job['id']}")
+    names = b.wait("names of levels", """const all = [...document.querySelectorAll('#precision .point-text')];
+        return all.length >= 4 && all.map((t) => { const r = t.getBoundingClientRect(); return [t.textContent, r.x, r.y, r.right, r.bottom]; })""")
+    for i, (one, left, top, right, bottom) in enumerate(names):
+        for other, x, y, end, under in names[:i]:
+            # A line of 12 px has boxes of more: its letters are apart where the lines are.
+            check(end <= left or x >= right or abs(y - top) >= 11, one, "lies on", other, names)
+    levels = {one["level"]: one["relative_error"] for one in s.get(f"/v1/jobs/{job['id']}/work-precision").json["levels"]}
+    downwards = [name for name, _, _, _, _ in sorted(names, key=lambda one: one[2])]
+    check(downwards == sorted(levels, key=levels.get, reverse=True), "names stand in the order of their errors", downwards, levels)
+    ticks = b.run("return [...document.querySelectorAll('#convergence .tick[text-anchor=middle]')].map((t) => t.textContent)")
+    check(len(ticks) >= 2 and all(text.isdigit() for text in ticks), "an iteration is a whole number", ticks)
+    mesh = b.run("return document.querySelector('#precision path.line.series-2')?.getBoundingClientRect().width")
+    check(mesh > 200, "the error of the mesh is a level over the whole width", mesh)
+
+
+def test_few_iterations_and_near_names_can_be_read(s, b):
+    check_few_iterations_and_near_names(s, b, [30, 10])
+    check_few_iterations_and_near_names(s, b, [6, 2])  # here balanced asks for less than quick
+
+
 def test_other_jobs_are_laid_over(s, b):
     job = s.solve(SCENE)
     other = s.solve({**SCENE, "solver": {"method": "accelerated", "accuracy": "quick"}})
@@ -103,6 +128,14 @@ def test_says_in_words_how_good_the_answer_is(s, b):
     pieces = b.run("return [...document.querySelectorAll('.timings .piece')].map((p) => p.getBoundingClientRect().width)")
     check(len(pieces) >= 4 and sum(pieces) > 500, pieces)
     check("iterations" in b.text(".timing-keys") and "factorization" in b.text(".timing-keys"), b.text(".timing-keys"))
+
+
+def test_an_obstacle_on_the_other_side_is_hinted_at(s, b):
+    plane = {"plane": {"point": [0, 0], "normal": [0, -1]}}
+    job = s.solve({"problem": {**SCENE["problem"], "contacts": [{"on": "bottom", "obstacle": plane}]}})
+    check(job["summary"]["contact"]["active"] == 0, job)
+    b.open(s, f"jobs/{job['id']}")
+    b.says(".verdict .warn", "normal points to the body")
 
 
 def test_other_endings_are_said_plainly(s, b):

@@ -163,4 +163,17 @@ def test_without_motion(s, b):
     check(not moving, moving)
 
 
+def test_a_service_that_is_gone_is_said_to_be_gone(s, b):
+    b.open(s, "new")
+    b.says("#verdict", "Valid")
+    s.end()
+    b.click("#submit")
+    b.says("#verdict", "The service does not answer")
+    b.run("location.hash = '#/compare'")
+    b.says("main h1", "Compare")
+    b.says("main [role=alert]", "The service does not answer")
+    b.one("main button")
+    b.console()  # the browser's own lines about refused connections
+
+
 browser.main(globals())

@@ -5,45 +5,7 @@
 
 #include <limits.h>
 #include <malloc.h>
-#include <stdarg.h>
 #include <string.h>
-#include <unistd.h>
-
-static int failures;
-
-/* What the harness gives to tests, for the fixtures that are shared with them. */
-void test_fail(const char *file, int line, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    fprintf(stderr, "%s:%d: ", file, line);
-    vfprintf(stderr, format, args);
-    fputc('\n', stderr);
-    va_end(args);
-    failures++;
-}
-
-const char *test_cases_dir(void)
-{
-    return access("../shared/cases", R_OK) == 0 ? "../shared/cases" : NULL;
-}
-
-char *test_read_file(const char *path, size_t *len)
-{
-    FILE *file = fopen(path, "rb");
-    long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
-    char *text = size >= 0 ? malloc((size_t)size + 1) : NULL;
-    bool ok = text && fseek(file, 0, SEEK_SET) == 0 && fread(text, 1, (size_t)size, file) == (size_t)size;
-    if (file)
-        fclose(file);
-    if (!ok) {
-        free(text);
-        return NULL;
-    }
-    text[size] = '\0';
-    *len = (size_t)size;
-    return text;
-}
 
 /* As in the benchmark: memory that is given back and asked for again costs the kernel as much as a factorization. */
 static void keep_memory(void)
@@ -76,5 +38,5 @@ int main(int argc, char **argv)
     if (wanted("precision", part))
         figure_precision(&out, argc > 3 ? argv[3] : NULL);
     fputs("\n}\n", out.file);
-    return fclose(out.file) != 0 || failures > 0;
+    return fclose(out.file) != 0 || test_has_failed();
 }

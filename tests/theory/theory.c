@@ -4,21 +4,6 @@
 #include "theory.h"
 #include "theory/theory_parts.h"
 
-#include <stdarg.h>
-
-/* What the harness gives to tests. */
-static int failures;
-void test_fail(const char *file, int line, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    fprintf(stderr, "%s:%d: ", file, line);
-    vfprintf(stderr, format, args);
-    fputc('\n', stderr);
-    va_end(args);
-    failures++;
-}
-
 static FILE *json;
 static int rows;
 
@@ -90,5 +75,5 @@ int main(int argc, char **argv)
     theory_elements(json);
     theory_ladders(json);
     fprintf(json, "}\n");
-    return fclose(json) != 0 || failures > 0;
+    return fclose(json) != 0 || test_has_failed();
 }

@@ -8,28 +8,6 @@
 
 static const uz_ordering orderings[] = {UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS};
 
-static uz_qp body_of(int64_t nx, double young)
-{
-    uz_scene scene = paper_scene(nx, nx / 3);
-    uz_mesh_info info;
-    uz_error err = {0};
-    uz_qp qp;
-    scene.materials[0].young = young;
-    CHECK(uz_scene_to_qp(&qp, &info, &scene, &err) == UZ_OK);
-    uz_mesh_info_clear(&info);
-    uz_scene_clear(&scene);
-    return qp;
-}
-
-static int64_t touched(int64_t *dofs, const uz_csc *N)
-{
-    int64_t count = 0;
-    for (int64_t j = 0; j < N->cols; j++)
-        if (N->ptr[j + 1] > N->ptr[j])
-            dofs[count++] = j;
-    return count;
-}
-
 /* x = K^-1 b by the factor's own substitutions. */
 static void solve(double *x, const uz_factor *factor, const double *b, int64_t n)
 {
@@ -48,8 +26,8 @@ TEST(shared_analysis_gives_the_same_bits)
 {
     uz_thread_init();
     for (size_t k = 0; k < sizeof orderings / sizeof orderings[0]; k++) {
-        uz_qp first = body_of(24, 200e3), second = body_of(24, 3.0);
-        int64_t n = second.K.cols, *dofs = calloc((size_t)n, sizeof *dofs), n_last = touched(dofs, &second.N);
+        uz_qp first = paper_qp(24, 200e3), second = paper_qp(24, 3.0);
+        int64_t n = second.K.cols, *dofs = calloc((size_t)n, sizeof *dofs), n_last = dofs_touched(dofs, &second.N);
         double *x = vector(n), *y = vector(n);
         uz_analysis *shared;
         uz_factor *early, *reused, *fresh;
@@ -79,8 +57,8 @@ TEST(shared_analysis_gives_the_same_bits)
 /* What was tried is told, the used one among it. */
 TEST(choices_are_told)
 {
-    uz_qp qp = body_of(24, 1.0);
-    int64_t *dofs = calloc((size_t)qp.K.cols, sizeof *dofs), n_last = touched(dofs, &qp.N);
+    uz_qp qp = paper_qp(24, 1.0);
+    int64_t *dofs = calloc((size_t)qp.K.cols, sizeof *dofs), n_last = dofs_touched(dofs, &qp.N);
     uz_thread_init();
     for (size_t k = 0; k < 8; k++) {
         uz_factor *factor;
@@ -104,7 +82,7 @@ TEST(choices_are_told)
 /* Entries outside the analysed pattern would be lost without a word. */
 TEST(another_pattern_is_refused)
 {
-    uz_qp one = body_of(6, 1.0), other = body_of(9, 1.0);
+    uz_qp one = paper_qp(6, 1.0), other = paper_qp(9, 1.0);
     uz_analysis *analysis;
     uz_factor *factor = (uz_factor *)&one;
     uz_error err = {0};
@@ -146,7 +124,7 @@ TEST(factors_of_one_analysis_in_threads)
 {
     enum { THREADS = 4 };
     pthread_t threads[THREADS];
-    uz_qp qp = body_of(24, 7.0);
+    uz_qp qp = paper_qp(24, 7.0);
     uz_analysis *analysis;
     uz_factor *factor;
     uz_error err;
@@ -202,7 +180,7 @@ TEST(numbering_of_dofs)
 {
     uz_thread_init();
     for (int way = 0; way < 2; way++) {
-        uz_qp qp = body_of(24, 200e3);
+        uz_qp qp = paper_qp(24, 200e3);
         int64_t n = qp.K.cols, *to = calloc((size_t)n, sizeof *to);
         double *b = vector(n), *x = vector(n), *y = vector(n);
         uz_factor *own, *other;

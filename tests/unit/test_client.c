@@ -98,6 +98,9 @@ TEST(arguments_refused)
     static const char *const CASES[][2] = {
         {"", "no command"},
         {"frobnicate", "unknown command"},
+        {"submti a", "did you mean \"submit\"?"},
+        {"submit a --wiat", "did you mean --wait?"},
+        {"submit a --acuracy 1", "unknown option --acuracy"},
         {"submit", "FILE"},
         {"submit a b", "one operand too many"},
         {"list a", "takes no operand"},

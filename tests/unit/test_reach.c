@@ -46,15 +46,6 @@ static uz_csc rows_of(qp_random *rng, int64_t m, int64_t n)
     return N;
 }
 
-static int64_t touched(int64_t *dofs, const uz_csc *N)
-{
-    int64_t count = 0;
-    for (int64_t j = 0; j < N->cols; j++)
-        if (N->ptr[j + 1] > N->ptr[j])
-            dofs[count++] = j;
-    return count;
-}
-
 /* x = L^-1 P N'e_i in full. */
 static void forward_row(double *x, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *N, int64_t i)
 {
@@ -130,7 +121,7 @@ TEST(reach_does_what_whole_substitutions_do)
     for (uint64_t seed = 0; seed < 60; seed++) {
         qp_random rng = {seed};
         uz_csc K = matrix_of(seed, &rng), N = rows_of(&rng, random_int(&rng, 0, 25), K.cols);
-        int64_t *dofs = calloc((size_t)K.cols, sizeof *dofs), count = touched(dofs, &N);
+        int64_t *dofs = calloc((size_t)K.cols, sizeof *dofs), count = dofs_touched(dofs, &N);
         uz_factor *factor;
         uz_reach *reach = NULL;
         uz_factor_workspace *ws = uz_factor_workspace_new();

@@ -3,19 +3,6 @@
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
-static uz_qp body_of(int64_t nx, double young)
-{
-    uz_scene scene = paper_scene(nx, nx / 3);
-    uz_mesh_info info;
-    uz_error err = {0};
-    uz_qp qp;
-    scene.materials[0].young = young;
-    CHECK(uz_scene_to_qp(&qp, &info, &scene, &err) == UZ_OK);
-    uz_mesh_info_clear(&info);
-    uz_scene_clear(&scene);
-    return qp;
-}
-
 /* Keeps the rows that `keep` names, from the first. */
 static void keep_rows(uz_qp *qp, bool (*keep)(int64_t row))
 {
@@ -86,12 +73,12 @@ static void check_reuse(uz_cache *cache, uz_qp (*make)(void), bool ordering, boo
 
 static uz_qp whole(void)
 {
-    return body_of(30, 200e3);
+    return paper_qp(30, 200e3);
 }
 
 static uz_qp softer(void)
 {
-    return body_of(30, 120e3);
+    return paper_qp(30, 120e3);
 }
 
 static uz_qp other_gaps(void)

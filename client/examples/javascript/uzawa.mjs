@@ -41,7 +41,8 @@ export class Uzawa {
       if (!busy && reply.ok) return reply;
       const once = method === "DELETE" && reply instanceof Error; // the first dismisses, a second would delete
       if (!busy || once || Date.now() > deadline) {
-        if (reply instanceof Error) throw reply;
+        if (reply instanceof Error)
+          throw new Error(`no answer from ${this.server}: ${reply.cause?.message ?? reply.message}; is uzawad running there?`);
         throw new Refused(await reply.json().catch(() => ({ detail: `HTTP status ${reply.status}` })));
       }
       await pause(reply instanceof Error ? 0.5 : Number(reply.headers.get("retry-after") ?? 0.5));

@@ -50,9 +50,10 @@ class Uzawa:
                     except ValueError:
                         raise Refused({"status": error.code, "detail": text.decode(errors="replace")}) from None
                 time.sleep(pause)
-            except (urllib.error.URLError, ConnectionError):
+            except (urllib.error.URLError, ConnectionError) as error:
                 if method == "DELETE" or time.monotonic() > deadline:  # the first dismisses, a second would delete
-                    raise
+                    why = getattr(error, "reason", error)
+                    raise ConnectionError(f"no answer from {self.server}: {why}; is uzawad running there?") from None
                 time.sleep(0.5)
 
     def call(self, method, path, body=None, **headers):
