@@ -1,4 +1,4 @@
-/* connection.h: private to server/http: the server object and one connection's state. */
+/* conn.h: private to server/http: the server object and one connection's state. */
 #ifndef SERVER_HTTP_CONN_H
 #define SERVER_HTTP_CONN_H
 
