@@ -15,9 +15,8 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
-enum { NODES = UZ_ELEMENT_NODES, LANES = UZ_STRAIN_LANES };
+enum { LANES = UZ_STRAIN_LANES };
 
 /* Averages: one place for each node and material that meet there. */
 typedef struct {
@@ -26,7 +25,6 @@ typedef struct {
     int64_t count;
     int size;                /* of a row */
     double *rows;            /* count x size, see uz_stress_group_add */
-    double *internal;        /* n_elements x dim^2; NULL: no incompatible modes */
     uz_stress_group *groups; /* one for each kind */
     bool averaged;           /* what groups are for: false the averages, true the energies */
     double eta2, energy2;
@@ -93,71 +91,6 @@ static void divide(averaging *x)
     }
 }
 
-/* ---- incompatible modes */
-
-/* The internal parameters of all elements, which both passes need. */
-static void find_internal(averaging *x)
-{
-    const uz_body_model *model = x->from.model;
-    const int dim = model->mesh.dim, count = dim * dim;
-    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        uz_element element;
-        uz_element_motion motion;
-        double xyz[3 * NODES], u[UZ_ELEMENT_DOFS];
-        int nodes;
-        const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
-        uz_body_element(&element, xyz, model, e);
-        for (int i = 0; i < nodes * dim; i++)
-            u[i] = x->from.nodal[node[i / dim] * dim + i % dim];
-        uz_element_move(&motion, &element, u);
-        memcpy(x->internal + e * count, motion.internal, (size_t)count * sizeof *u);
-    }
-}
-
-/* The same where all elements are one shape of one material: one matrix gives them. */
-static void find_internal_of_equals(averaging *x)
-{
-    const uz_body_model *model = x->from.model;
-    const int dim = model->mesh.dim, count = dim * dim;
-    uz_element element;
-    uz_element_motion motion;
-    double xyz[3 * NODES], unit[UZ_ELEMENT_DOFS] = {0}, of[UZ_ELEMENT_DOFS][UZ_ELEMENT_INTERNAL];
-    uz_body_element(&element, xyz, model, 0);
-    const int dofs = uz_element_node_count(element.kind) * dim;
-    for (int j = 0; j < dofs; j++) {
-        unit[j] = 1;
-        uz_element_move(&motion, &element, unit);
-        memcpy(of[j], motion.internal, sizeof of[j]);
-        unit[j] = 0;
-    }
-    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        double *internal = x->internal + e * count;
-        int nodes;
-        const int64_t *node = uz_mesh_element(&model->mesh, e, &nodes);
-        memset(internal, 0, (size_t)count * sizeof *internal);
-        for (int j = 0; j < dofs; j++)
-            for (int i = 0; i < count; i++)
-                internal[i] += of[j][i] * x->from.nodal[node[j / dim] * dim + j % dim];
-    }
-}
-
-/* False: no memory. */
-static bool take_internal(averaging *x)
-{
-    const uz_body_model *model = x->from.model;
-    const uz_mesh *mesh = &model->mesh;
-    if (model->formulation != UZ_FORMULATION_INCOMPATIBLE || model->kind == UZ_AXISYMMETRIC)
-        return true;
-    x->from.internal = x->internal = uz_alloc(mesh->n_elements * mesh->dim * mesh->dim, sizeof *x->internal);
-    if (x->internal && mesh->uniform && !model->material_of)
-        find_internal_of_equals(x);
-    else if (x->internal)
-        find_internal(x);
-    return x->internal != NULL;
-}
-
-/* ---- places */
-
 /* Numbers the pairs of node and material. next, material: of each pair; head: the first pair of a node, -1: none. */
 static void number_places(averaging *x, int64_t *head, int64_t *next, int32_t *material)
 {
@@ -204,7 +137,7 @@ static bool make_rows(averaging *x)
 {
     x->size = uz_stress_row_size(x->from.model->kind);
     x->groups = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *x->groups);
-    if (!x->groups || !take_internal(x) || !make_places(x))
+    if (!x->groups || !make_places(x))
         return false;
     x->rows = uz_alloc_zero(x->count * x->size, sizeof *x->rows);
     return x->rows != NULL;
@@ -219,7 +152,6 @@ static double estimate(averaging *x)
         pass(x);
     }
     free(x->groups);
-    free(x->internal);
     free(x->place);
     free(x->rows);
     return x->energy2 > 0 ? sqrt(x->eta2 / (x->energy2 + x->eta2)) : NAN;

@@ -22,8 +22,8 @@ INLINE void take_material(uz_stress_group *g, const uz_stress_source *from)
     const uz_lame *lame[LANES];
     for (int l = 0; l < LANES; l++)
         lame[l] = &uz_element_material(from->model, g->element[l])->lame;
-    g->lambda = (uz_lanes){lame[0]->lambda, lame[1]->lambda, lame[2]->lambda, lame[3]->lambda};
-    g->mu = (uz_lanes){lame[0]->mu, lame[1]->mu, lame[2]->mu, lame[3]->mu};
+    g->material.lambda = (uz_lanes){lame[0]->lambda, lame[1]->lambda, lame[2]->lambda, lame[3]->lambda};
+    g->material.mu = (uz_lanes){lame[0]->mu, lame[1]->mu, lame[2]->mu, lame[3]->mu};
     g->thermal = (uz_lanes){0};
     for (int l = 0; l < LANES && from->free_strain; l++) {
         double strain[UZ_ELEMENT_STRESSES];
@@ -62,9 +62,6 @@ INLINE void load(uz_stress_group *g, const uz_stress_source *from, int dim)
     }
     take_material(g, from);
     gather(g->u, g, from->nodal, dim);
-    for (int i = 0; i < dim * dim && g->rule.formulation == UZ_FORMULATION_INCOMPATIBLE; i++)
-        for (int l = 0; l < LANES; l++)
-            g->internal[i][l] = from->internal[g->element[l] * dim * dim + i];
     if (!g->shaped) {
         const bool equal = mesh->uniform && from->model->kind != UZ_AXISYMMETRIC;
         if (equal)
@@ -74,7 +71,7 @@ INLINE void load(uz_stress_group *g, const uz_stress_source *from, int dim)
         uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
         g->shaped = equal;
     }
-    uz_lane_strains(g->strain, &g->rule, &g->shape, g->u, g->internal);
+    uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
 }
 
 /* ---- sums at nodes */
@@ -98,7 +95,8 @@ INLINE void stress_of(uz_lanes *stress, const uz_stress_group *g, const uz_lanes
     for (int c = 0; c < direct; c++)
         trace += strain[c] - g->thermal;
     for (int c = 0; c < n; c++)
-        stress[c] = c < direct ? g->lambda * trace + 2 * g->mu * (strain[c] - g->thermal) : g->mu * strain[c];
+        stress[c] = c < direct ? g->material.lambda * trace + 2 * g->material.mu * (strain[c] - g->thermal)
+                               : g->material.mu * strain[c];
 }
 
 /* Adds one row for each lane at node a, or at all nodes where a < 0. */
@@ -242,8 +240,8 @@ INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_
                     const int64_t *const place[LANES], int n, int direct)
 {
     uz_lanes nodal[NODES][MOST_ROW], eta = {0}, energy = {0};
-    const uz_lanes twice_mu = 2 * g->mu, per_twice_mu = 1 / twice_mu,
-                   per_bulk = 1 / (direct * (direct * g->lambda + twice_mu));
+    const uz_lanes twice_mu = 2 * g->material.mu, per_twice_mu = 1 / twice_mu,
+                   per_bulk = 1 / (direct * (direct * g->material.lambda + twice_mu));
     gather_rows(nodal, rows, g, place, n < LANES ? LANES : MOST_ROW);
     for (int p = 0; p < g->rule.points; p++) {
         const uz_lanes *strain = g->strain[p];
@@ -267,7 +265,8 @@ INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_
         }
         eta += g->shape.volume[p] * (sum * sum * per_bulk + deviator * per_twice_mu);
         /* of the whole strain: ||u_h|| knows no temperature */
-        energy += g->shape.volume[p] * (g->lambda * trace * trace + twice_mu * direct_work + g->mu * shear_work);
+        energy += g->shape.volume[p] *
+                  (g->material.lambda * trace * trace + twice_mu * direct_work + g->material.mu * shear_work);
     }
     for (int l = 0; l < g->count; l++) {
         *eta2 += eta[l];

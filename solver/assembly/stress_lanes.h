@@ -14,8 +14,9 @@ typedef struct {
     const int64_t *node[UZ_STRAIN_LANES]; /* of each element */
     uz_strain_rule rule;
     uz_lane_shape shape;
-    uz_lanes lambda, mu, thermal; /* thermal: in each direct strain */
-    uz_lanes x[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS], internal[UZ_ELEMENT_INTERNAL];
+    uz_lane_material material;
+    uz_lanes thermal; /* in each direct strain */
+    uz_lanes x[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
     uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES];
 } uz_stress_group;
 
@@ -24,7 +25,6 @@ typedef struct {
     const uz_body_model *model;
     const double *nodal;       /* n_nodes x dim */
     const double *free_strain; /* n_elements; NULL: no temperature */
-    const double *internal;    /* n_elements x dim^2: of incompatible modes; NULL: there are none */
 } uz_stress_source;
 
 /* From element[0..count) and the rule to the strains. */

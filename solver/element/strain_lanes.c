@@ -10,6 +10,8 @@
 /* What is inlined into a version for each kind of processor; dim is a constant there, so that short loops unroll. */
 #define INLINE static inline __attribute__((always_inline))
 
+enum { MODES = UZ_ELEMENT_INTERNAL };
+
 typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), aligned(8)));
 
 void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
@@ -110,17 +112,79 @@ INLINE void shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_
 
 /* ---- strain */
 
-/* H[c][j] += the incompatible modes' part of the derivative of u_c by x_j (uz_mode_gradients). */
-INLINE void add_modes(uz_lanes H[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                      const uz_lanes *internal, int g, int dim)
+/* Derivatives of the incompatible mode m by x_j at a Gauss point: slope[m][j], see uz_mode_gradients. */
+INLINE void mode_slopes(uz_lanes slope[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, int g, int dim)
 {
-    const uz_lanes ratio = shape->centre_det / shape->det[g];
+    const uz_lanes ratio = -2 * shape->centre_det / shape->det[g];
     for (int m = 0; m < dim; m++)
-        for (int j = 0; j < dim; j++) {
-            const uz_lanes slope = -2 * rule->point[g][m] * ratio * shape->centre_inverse[j][m];
-            for (int c = 0; c < dim; c++)
-                H[c][j] += internal[m * dim + c] * slope;
+        for (int j = 0; j < dim; j++)
+            slope[m][j] = rule->point[g][m] * ratio * shape->centre_inverse[j][m];
+}
+
+/* A point's part of the modes' equations A internal = b: of A its lower triangle, (m, c) being row m dim + c; b is what
+ * the stress of the displacements does along the modes. */
+INLINE void add_mode_equations(uz_lanes A[MODES][MODES], uz_lanes b[MODES], uz_lanes H[3][3], uz_lanes slope[3][3],
+                               const uz_lane_material *material, const uz_lanes *volume, int dim)
+{
+    uz_lanes trace = H[0][0] + H[1][1];
+    if (dim == 3)
+        trace += H[2][2];
+    const uz_lanes lambda = *volume * material->lambda, mu = *volume * material->mu;
+    for (int m = 0; m < dim; m++)
+        for (int c = 0; c < dim; c++) {
+            b[m * dim + c] -= lambda * trace * slope[m][c];
+            for (int j = 0; j < dim; j++)
+                b[m * dim + c] -= mu * (H[c][j] + H[j][c]) * slope[m][j];
         }
+    for (int m = 0; m < dim; m++)
+        for (int n = 0; n <= m; n++) {
+            uz_lanes product = slope[m][0] * slope[n][0];
+            for (int j = 1; j < dim; j++)
+                product += slope[m][j] * slope[n][j];
+            for (int c = 0; c < dim; c++) {
+                for (int d = 0; d < dim; d++)
+                    A[m * dim + c][n * dim + d] += lambda * slope[m][c] * slope[n][d] + mu * slope[m][d] * slope[n][c];
+                A[m * dim + c][n * dim + c] += mu * product;
+            }
+        }
+}
+
+/* b = A^-1 b by A = L D L', in place; only the lower triangle of A is read. */
+INLINE void solve_modes(uz_lanes A[MODES][MODES], uz_lanes b[MODES], int count)
+{
+    for (int k = 0; k < count; k++) {
+        const uz_lanes pivot = 1 / A[k][k];
+        for (int i = k + 1; i < count; i++) {
+            const uz_lanes factor = A[i][k] * pivot;
+            for (int j = k + 1; j <= i; j++)
+                A[i][j] -= factor * A[j][k];
+            b[i] -= factor * b[k];
+        }
+    }
+    for (int k = count - 1; k >= 0; k--) {
+        for (int i = k + 1; i < count; i++)
+            b[k] -= A[i][k] * b[i];
+        b[k] /= A[k][k];
+    }
+}
+
+/* The modes take the shape of least energy, and their derivatives join in. */
+INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                      const uz_lane_material *material, int dim)
+{
+    uz_lanes A[MODES][MODES] = {{{0}}}, internal[MODES] = {{0}}, slope[3][3];
+    for (int g = 0; g < rule->points; g++) {
+        mode_slopes(slope, rule, shape, g, dim);
+        add_mode_equations(A, internal, H[g], slope, material, &shape->volume[g], dim);
+    }
+    solve_modes(A, internal, dim * dim);
+    for (int g = 0; g < rule->points; g++) {
+        mode_slopes(slope, rule, shape, g, dim);
+        for (int m = 0; m < dim; m++)
+            for (int c = 0; c < dim; c++)
+                for (int j = 0; j < dim; j++)
+                    H[g][c][j] += internal[m * dim + c] * slope[m][j];
+    }
 }
 
 /* u_r / r; on the axis the radial strain. */
@@ -154,33 +218,54 @@ INLINE void take_mean_dilatation(uz_lanes strain[][UZ_ELEMENT_STRESSES], const u
             strain[g][i] += (mean - own[g]) / n;
 }
 
-INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
-                       const uz_lanes *u, const uz_lanes *internal, int dim)
+INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_strain_rule *rule,
+                               const uz_lane_shape *shape, const uz_lanes *u, int g, int dim)
 {
-    for (int g = 0; g < rule->points; g++) {
-        uz_lanes D[3][3], H[3][3];
-        differentiate(D, rule->slope[g], u, rule->nodes, dim);
-        for (int c = 0; c < dim; c++)
-            for (int j = 0; j < dim; j++) {
-                H[c][j] = D[c][0] * shape->inverse[g][j][0];
-                for (int i = 1; i < dim; i++)
-                    H[c][j] += D[c][i] * shape->inverse[g][j][i];
-            }
-        if (rule->formulation == UZ_FORMULATION_INCOMPATIBLE)
-            add_modes(H, rule, shape, internal, g, dim);
-        strain[g][0] = H[0][0];
-        strain[g][1] = H[1][1];
-        if (dim == 3) {
-            strain[g][2] = H[2][2];
-            strain[g][3] = H[0][1] + H[1][0];
-            strain[g][4] = H[1][2] + H[2][1];
-            strain[g][5] = H[2][0] + H[0][2];
-        } else if (rule->model == UZ_AXISYMMETRIC) {
-            set_hoop(&strain[g][2], rule, shape, u, &H[0][0], g);
-            strain[g][3] = H[0][1] + H[1][0];
-        } else {
-            strain[g][2] = H[0][1] + H[1][0];
+    strain[0] = H[0][0];
+    strain[1] = H[1][1];
+    if (dim == 3) {
+        strain[2] = H[2][2];
+        strain[3] = H[0][1] + H[1][0];
+        strain[4] = H[1][2] + H[2][1];
+        strain[5] = H[2][0] + H[0][2];
+    } else if (rule->model == UZ_AXISYMMETRIC) {
+        set_hoop(&strain[2], rule, shape, u, &H[0][0], g);
+        strain[3] = H[0][1] + H[1][0];
+    } else {
+        strain[2] = H[0][1] + H[1][0];
+    }
+}
+
+/* H[c][j]: derivative of u_c by x_j. */
+INLINE void gradient_at(uz_lanes H[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
+                        int g, int dim)
+{
+    uz_lanes D[3][3];
+    differentiate(D, rule->slope[g], u, rule->nodes, dim);
+    for (int c = 0; c < dim; c++)
+        for (int j = 0; j < dim; j++) {
+            H[c][j] = D[c][0] * shape->inverse[g][j][0];
+            for (int i = 1; i < dim; i++)
+                H[c][j] += D[c][i] * shape->inverse[g][j][i];
         }
+}
+
+INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                       const uz_lane_material *material, const uz_lanes *u, int dim)
+{
+    if (rule->formulation == UZ_FORMULATION_INCOMPATIBLE) {
+        uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
+        for (int g = 0; g < rule->points; g++)
+            gradient_at(H[g], rule, shape, u, g, dim);
+        add_modes(H, rule, shape, material, dim);
+        for (int g = 0; g < rule->points; g++)
+            strain_of_gradient(strain[g], H[g], rule, shape, u, g, dim);
+        return;
+    }
+    for (int g = 0; g < rule->points; g++) {
+        uz_lanes H[3][3];
+        gradient_at(H, rule, shape, u, g, dim);
+        strain_of_gradient(strain[g], H, rule, shape, u, g, dim);
     }
     if (rule->formulation == UZ_FORMULATION_BBAR)
         take_mean_dilatation(strain, rule, shape);
@@ -197,12 +282,12 @@ INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, con
 }
 
 INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                             const uz_lane_shape *shape, const uz_lanes *u, const uz_lanes *internal)
+                             const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
 {
     if (rule->dim == 2)
-        strains_of(strain, rule, shape, u, internal, 2);
+        strains_of(strain, rule, shape, material, u, 2);
     else
-        strains_of(strain, rule, shape, u, internal, 3);
+        strains_of(strain, rule, shape, material, u, 3);
 }
 
 #ifdef __x86_64__
@@ -214,9 +299,9 @@ __attribute__((target("avx2,fma"))) static void shape_fused(uz_lane_shape *shape
 
 __attribute__((target("avx2,fma"))) static void strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES],
                                                               const uz_strain_rule *rule, const uz_lane_shape *shape,
-                                                              const uz_lanes *u, const uz_lanes *internal)
+                                                              const uz_lane_material *material, const uz_lanes *u)
 {
-    strains_in_space(strain, rule, shape, u, internal);
+    strains_in_space(strain, rule, shape, material, u);
 }
 #endif
 
@@ -232,13 +317,13 @@ void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz
 }
 
 void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                     const uz_lane_shape *shape, const uz_lanes *u, const uz_lanes *internal)
+                     const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
 {
 #ifdef __x86_64__
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        strains_fused(strain, rule, shape, u, internal);
+        strains_fused(strain, rule, shape, material, u);
         return;
     }
 #endif
-    strains_in_space(strain, rule, shape, u, internal);
+    strains_in_space(strain, rule, shape, material, u);
 }

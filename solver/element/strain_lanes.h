@@ -37,9 +37,12 @@ typedef struct {
 /* x: coordinates, nodes x dim; thickness: of plane models. */
 void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness);
 
-/* strain[point][component] of the displacements u (nodes x dim). internal (dim x dim, see uz_element_motion) is read
- * only where the formulation is UZ_FORMULATION_INCOMPATIBLE. */
+typedef struct {
+    uz_lanes lambda, mu;
+} uz_lane_material;
+
+/* strain[point][component] of the displacements u (nodes x dim); of a material only incompatible modes want to know. */
 void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
-                     const uz_lane_shape *shape, const uz_lanes *u, const uz_lanes *internal);
+                     const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u);
 
 #endif
