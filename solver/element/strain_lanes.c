@@ -14,23 +14,39 @@ enum { MODES = UZ_ELEMENT_INTERNAL };
 
 typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), aligned(8)));
 
-void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
+static void set_point(uz_strain_rule *rule, int g)
 {
-    static const double ORIGIN[3] = {0};
+    uz_element_shape(rule->N[g], rule->kind, rule->point[g]);
+    uz_local_gradients(rule->slope[g], rule->kind, rule->point[g]);
+}
+
+void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, const double point[][3], int count)
+{
     memset(rule, 0, sizeof *rule);
     rule->kind = kind;
     rule->model = model;
-    rule->formulation = formulation;
+    rule->formulation = UZ_FORMULATION_STANDARD;
     rule->dim = uz_element_dim(kind);
     rule->nodes = uz_element_node_count(kind);
-    rule->points = uz_element_gauss_count(kind, model);
+    rule->points = count;
     rule->stresses = uz_stress_count(model);
     rule->direct = rule->stresses == 3 ? 2 : 3;
+    for (int g = 0; g < count; g++) {
+        memcpy(rule->point[g], point[g], sizeof rule->point[g]);
+        set_point(rule, g);
+    }
+}
+
+void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
+{
+    static const double ORIGIN[3] = {0};
+    uz_strain_rule_at(rule, kind, model, NULL, 0);
+    rule->formulation = formulation;
+    rule->points = uz_element_gauss_count(kind, model);
     uz_local_gradients(rule->centre, kind, ORIGIN);
     for (int g = 0; g < rule->points; g++) {
         rule->weight[g] = uz_element_gauss(rule->point[g], kind, model, g);
-        uz_element_shape(rule->N[g], kind, rule->point[g]);
-        uz_local_gradients(rule->slope[g], kind, rule->point[g]);
+        set_point(rule, g);
     }
 }
 

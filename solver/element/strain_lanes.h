@@ -23,7 +23,11 @@ typedef struct {
     double N[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES], slope[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES][3];
     double centre[UZ_ELEMENT_NODES][3]; /* slope at the origin */
 } uz_strain_rule;
+/* At the Gauss points. */
 void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation);
+
+/* At other points, whose weights are 0: for UZ_FORMULATION_STANDARD alone, as the others average over the element. */
+void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, const double point[][3], int count);
 
 /* Of the elements' shape. */
 typedef struct {
