@@ -1,8 +1,9 @@
-/* The error estimate, which takes several elements at a time, against one that takes one element after the other, by
- * the functions on single elements; and the strains that both rest on. */
+/* The error estimate and the stresses, which take several elements at a time, against those that take one element after
+ * the other, by the functions on single elements; and the strains that both rest on. */
 #include "assembly/assembly.h"
 #include "body_fixture.h"
 #include "element/strain_lanes.h"
+#include "fields/parts.h"
 #include "random_scene.h"
 
 enum { NODES = UZ_ELEMENT_NODES, POINTS = UZ_ELEMENT_GAUSS, STRESSES = UZ_ELEMENT_STRESSES, LANES = UZ_STRAIN_LANES };
@@ -252,6 +253,42 @@ static void compare_estimates(const uz_body_model *model, const uz_scene *scene,
     free(u);
 }
 
+/* Stress at the Gauss points as the fields give it: plane models with zz between. */
+static void compare_stresses(const uz_body_model *model, const uz_scene *scene, qp_random *rng, const char *what)
+{
+    uz_field_body body;
+    plain_element s;
+    const int dim = model->mesh.dim;
+    double *u = body_room(model->mesh.n_nodes * dim, sizeof *u), *free_strain = NULL;
+    for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++)
+        u[i] = 1e-3 * random_signed(rng);
+    CHECK_INT(uz_field_body_init(&body, scene, model, NULL), UZ_OK);
+    CHECK_INT(uz_free_strains(&free_strain, model, scene, NULL), UZ_OK);
+    const plain x = {.model = model, .u = u, .free_strain = free_strain};
+    const int64_t n = uz_field_gauss_count(&body);
+    double *element = body_room(n, sizeof *u), *point = body_room(n * dim, sizeof *u);
+    double *stress = body_room(n * body.components, sizeof *u), *at = stress;
+    CHECK_INT(uz_field_gauss(element, point, stress, &body, u, NULL, NULL), UZ_OK);
+    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
+        look_at(&s, &x, e);
+        for (int g = 0; g < s.points; g++, at += body.components)
+            for (int c = 0; c < s.stresses; c++) {
+                double size = 0;
+                for (int k = 0; k < s.stresses; k++)
+                    size = fmax(size, fabs(s.stress[g][k]));
+                const double got = at[s.stresses == 3 && c == 2 ? 3 : c];
+                CHECK_MSG(fabs(got - s.stress[g][c]) <= 1e-9 * size, "%s, element %d: stress %d is %.17g, not %.17g",
+                          what, (int)e, c, got, s.stress[g][c]);
+            }
+    }
+    free(stress);
+    free(point);
+    free(element);
+    free(free_strain);
+    free(u);
+    uz_field_body_clear(&body);
+}
+
 /* Elements of two materials that share nodes, one of them nearly incompressible: each has averages of its own, and its
  * own formulation. */
 static void mix_materials(uz_body_model *model, qp_random *rng)
@@ -298,7 +335,7 @@ TEST(estimate_of_boxes_is_that_of_single_elements)
 }
 
 /* Meshes of two kinds, bent, of several parts; rings on their axis. */
-TEST(estimate_of_random_scenes_is_that_of_single_elements)
+TEST(random_scenes_have_the_stresses_and_estimates_of_single_elements)
 {
     for (uint64_t seed = 1; seed <= 150; seed++) {
         random_scene s = make_random_scene(seed);
@@ -308,8 +345,10 @@ TEST(estimate_of_random_scenes_is_that_of_single_elements)
         snprintf(name, sizeof name, "seed %d", (int)seed);
         if (uz_body_model_outline(&model, &s.scene, &err) == UZ_OK) {
             compare_estimates(&model, &s.scene, &s.rng, name);
+            compare_stresses(&model, &s.scene, &s.rng, name);
             mix_materials(&model, &s.rng);
             compare_estimates(&model, &s.scene, &s.rng, name);
+            compare_stresses(&model, &s.scene, &s.rng, name);
             uz_body_model_clear(&model);
         } else {
             CHECK_MSG(err.status == UZ_ERR_FREE_BODY, "%s: %s", name, err.message);
