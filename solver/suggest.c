@@ -12,9 +12,9 @@
 #define OF_MESH    0.1
 #define LEAST_GAIN 0.2
 
-/* Where the mesh's error is estimated for this alone: seconds for each node of an element, from above (0.5e-6 for quad4
- * on a machine of 2 GHz), and what it may take of the whole solve. */
-#define ESTIMATE_S   1e-6
+/* Where the mesh's error is estimated for this alone: seconds for each node of an element, from above (0.013e-6 for
+ * quad4, 0.07e-6 for hex8 with incompatible modes on a machine of 2.5 GHz), and what it may take of the whole solve. */
+#define ESTIMATE_S   1e-7
 #define MOST_OF_TIME 0.02
 
 uz_suggestion uz_trade_suggest(const uz_trade *trade, double mesh_error, double solver_error, double extra_s)

@@ -110,8 +110,11 @@ void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const
     out->u = u;
     out->kind = (uz_element_kind)model->mesh.kind[element];
     out->alike = model->mesh.uniform && model->kind != UZ_AXISYMMETRIC && !model->material_of;
-    if (!out->alike)
+    out->first = out->loaded = 0;
+    if (!out->alike) {
+        uz_strain_rule_at(&out->rule, out->kind, model->kind, (const double(*)[3])out->point, out->count);
         return;
+    }
     uz_field_element_at(&out->at, body, u, element);
     for (int k = 0; k < out->count; k++)
         uz_element_strain_operator(out->strain_of[k], &out->at.element, out->point[k]);
@@ -136,10 +139,69 @@ static void states_of_alike(uz_field_state *state, uz_field_points *points, int6
     }
 }
 
+/* Others average over the element, so that its Gauss points are needed too. */
+static bool is_standard(const uz_body_model *model, int64_t element)
+{
+    return uz_resolve_formulation(model->formulation, (uz_element_kind)model->mesh.kind[element], model->kind,
+                                  uz_element_material(model, element)->poisson) == UZ_FORMULATION_STANDARD;
+}
+
+/* Values (n_nodes x dim) at the nodes of the loaded elements; lanes that have none repeat the first. */
+static void gather_lanes(uz_lanes *out, const uz_field_points *points, const double *value)
+{
+    const uz_mesh *mesh = &points->body->model->mesh;
+    const int64_t *node[UZ_STRAIN_LANES];
+    for (int l = 0; l < UZ_STRAIN_LANES; l++)
+        node[l] = mesh->node + mesh->first[points->first + (l < points->loaded ? l : 0)];
+    for (int a = 0; a < points->rule.nodes; a++)
+        for (int c = 0; c < mesh->dim; c++)
+            *out++ = (uz_lanes){value[node[0][a] * mesh->dim + c], value[node[1][a] * mesh->dim + c],
+                                value[node[2][a] * mesh->dim + c], value[node[3][a] * mesh->dim + c]};
+}
+
+/* Strains of this element and those that follow it, as long as they are of its kind. */
+static void load_lanes(uz_field_points *points, int64_t element)
+{
+    const uz_body_model *model = points->body->model;
+    const uz_mesh *mesh = &model->mesh;
+    uz_lanes x[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
+    uz_lane_shape shape;
+    points->first = element;
+    points->loaded = 1;
+    while (points->loaded < UZ_STRAIN_LANES && element + points->loaded < mesh->n_elements &&
+           mesh->kind[element + points->loaded] == mesh->kind[element])
+        points->loaded++;
+    gather_lanes(x, points, mesh->xyz);
+    gather_lanes(u, points, points->u);
+    uz_lane_shape_of(&shape, &points->rule, x, model->thickness);
+    uz_lane_strains(points->strain, &points->rule, &shape, NULL, u);
+}
+
+static void states_of_lane(uz_field_state *state, uz_field_points *points, int64_t element)
+{
+    const uz_field_body *body = points->body;
+    uz_field_element *at = &points->at;
+    if (element < points->first || element >= points->first + points->loaded)
+        load_lanes(points, element);
+    uz_body_element(&at->element, at->xyz, body->model, element);
+    at->material = uz_element_material(body->model, element);
+    at->free_strain = body->rise ? at->material->expansion * body->rise[element] : 0;
+    for (int k = 0; k < points->count; k++) {
+        double strain[UZ_ELEMENT_STRESSES] = {0};
+        for (int c = 0; c < points->rule.stresses; c++)
+            strain[c] = points->strain[k][c][element - points->first];
+        state_of_strain(&state[k], at, strain);
+    }
+}
+
 void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element)
 {
     if (points->alike) {
         states_of_alike(state, points, element);
+        return;
+    }
+    if (is_standard(points->body->model, element)) {
+        states_of_lane(state, points, element);
         return;
     }
     uz_field_element_at(&points->at, points->body, points->u, element);

@@ -4,6 +4,7 @@
 
 #include "assembly/assembly.h"
 #include "element/element.h"
+#include "element/strain_lanes.h"
 #include "uzawa.h"
 
 enum { UZ_FIELD_COMPONENTS = 6 }; /* most components of a stress */
@@ -37,7 +38,8 @@ typedef struct {
 void uz_field_state_at(uz_field_state *out, const uz_field_element *element, const double point[3]);
 
 /* The same local points of elements of one kind, one element after another: where all are one shape of one material, by
- * one matrix for each point. count and point are the caller's; it refers to itself: not to be copied. */
+ * one matrix for each point, else a few elements at a time. count and point are the caller's; it refers to itself: not
+ * to be copied. */
 typedef struct {
     int count;
     double point[UZ_ELEMENT_GAUSS][3];
@@ -47,6 +49,9 @@ typedef struct {
     bool alike;
     uz_field_element at; /* the last element; where all are alike, any of them */
     double strain_of[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES * UZ_ELEMENT_DOFS];
+    uz_strain_rule rule;
+    int64_t first, loaded; /* the elements whose strains these are, one in each lane */
+    uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES];
 } uz_field_points;
 /* For elements of the kind that `element` is of. */
 void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const double *u, int64_t element);

@@ -21,6 +21,9 @@ typedef struct {
     int points;
     double point[POINTS][3];
     double share[UZ_ELEMENT_NODES][POINTS];
+    uz_field_points states; /* at these points, once there is an element of the kind */
+    bool known;
+    double volume; /* of each element where all are alike */
 } recovery;
 
 static bool is_simplex(uz_element_kind kind)
@@ -122,21 +125,28 @@ static bool all_done(const unsigned char *done, const uz_mesh *mesh, int64_t ele
     return count == nodes;
 }
 
-static void add_element(const nodal_sums *to, const recovery *plan, const uz_field_body *body, const double *u,
-                        int64_t element)
+static void begin_plan(recovery *plan, const uz_field_body *body, const double *u, int64_t element)
 {
-    uz_field_element at;
-    uz_field_state state;
+    make_plan(plan, (uz_element_kind)body->model->mesh.kind[element]);
+    plan->states.count = plan->points;
+    memcpy(plan->states.point, plan->point, sizeof plan->point);
+    uz_field_points_init(&plan->states, body, u, element);
+    plan->volume = plan->states.alike ? uz_element_volume(&plan->states.at.element) : 0;
+    plan->known = true;
+}
+
+static void add_element(const nodal_sums *to, recovery *plan, const uz_field_body *body, int64_t element)
+{
+    uz_field_state state[UZ_ELEMENT_GAUSS];
     double sigma[POINTS][UZ_FIELD_COMPONENTS], epsilon[POINTS][UZ_FIELD_COMPONENTS];
     int nodes;
     const int64_t *node = uz_mesh_element(&body->model->mesh, element, &nodes);
-    uz_field_element_at(&at, body, u, element);
+    uz_field_points_states(state, &plan->states, element);
     for (int k = 0; k < plan->points; k++) {
-        uz_field_state_at(&state, &at, plan->point[k]);
-        memcpy(sigma[k], state.stress, sizeof sigma[k]);
-        memcpy(epsilon[k], state.strain, sizeof epsilon[k]);
+        memcpy(sigma[k], state[k].stress, sizeof sigma[k]);
+        memcpy(epsilon[k], state[k].strain, sizeof epsilon[k]);
     }
-    const double size = uz_element_volume(&at.element);
+    const double size = plan->states.alike ? plan->volume : uz_element_volume(&plan->states.at.element);
     for (int a = 0; a < nodes; a++)
         to->volume[node[a]] += size;
     add_to_nodes(to->stress, to->done, plan, sigma, node, nodes, body->components, size);
@@ -150,18 +160,19 @@ static void divide(double *sum, const nodal_sums *by, int64_t n_nodes, int compo
             sum[a * components + c] = by->volume[a] > 0 ? sum[a * components + c] / by->volume[a] : NAN;
 }
 
-static uz_status average_the_others(const nodal_sums *to, const uz_field_body *body, const double *u,
-                                    const uz_hooks *hooks, uz_error *err)
+static uz_status average_the_others(const nodal_sums *to, recovery plan[UZ_ELEMENT_KINDS], const uz_field_body *body,
+                                    const double *u, const uz_hooks *hooks, uz_error *err)
 {
     const uz_mesh *mesh = &body->model->mesh;
-    recovery plan[UZ_ELEMENT_KINDS];
-    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
-        make_plan(&plan[kind], (uz_element_kind)kind);
     for (int64_t e = 0; e < mesh->n_elements; e++) {
+        recovery *own = &plan[mesh->kind[e]];
         if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        if (!all_done(to->done, mesh, e))
-            add_element(to, &plan[mesh->kind[e]], body, u, e);
+        if (all_done(to->done, mesh, e))
+            continue;
+        if (!own->known)
+            begin_plan(own, body, u, e);
+        add_element(to, own, body, e);
     }
     divide(to->stress, to, mesh->n_nodes, body->components);
     divide(to->strain, to, mesh->n_nodes, body->components);
@@ -176,17 +187,19 @@ uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *
     nodal_sums to = {.stress = stress, .strain = strain};
     to.volume = uz_alloc_zero(mesh->n_nodes, sizeof *to.volume);
     to.done = uz_alloc_zero(mesh->n_nodes, 1);
+    recovery *plan = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *plan);
     if (stress)
         memset(stress, 0, bytes);
     if (strain)
         memset(strain, 0, bytes);
     uz_status status = UZ_OK;
-    if (!to.volume || !to.done)
+    if (!to.volume || !to.done || !plan)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at %lld nodes", (long long)mesh->n_nodes);
     if (status == UZ_OK)
         status = uz_field_fit_patches(stress, strain, to.done, body, u, hooks, err);
     if (status == UZ_OK)
-        status = average_the_others(&to, body, u, hooks, err);
+        status = average_the_others(&to, plan, body, u, hooks, err);
+    free(plan);
     free(to.volume);
     free(to.done);
     return status;

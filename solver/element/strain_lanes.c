@@ -1,0 +1,345 @@
+#include "element/strain_lanes.h"
+
+#include "element/element_private.h"
+#include "scene/mesh.h"
+
+#include <string.h>
+
+#define TWO_PI 6.28318530717958647693
+
+/* What is inlined into a version for each kind of processor; dim is a constant there, so that short loops unroll. */
+#define INLINE static inline __attribute__((always_inline))
+
+enum { MODES = UZ_ELEMENT_INTERNAL };
+
+typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), aligned(8)));
+
+static void set_point(uz_strain_rule *rule, int g)
+{
+    uz_element_shape(rule->N[g], rule->kind, rule->point[g]);
+    uz_local_gradients(rule->slope[g], rule->kind, rule->point[g]);
+}
+
+void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, const double point[][3], int count)
+{
+    memset(rule, 0, sizeof *rule);
+    rule->kind = kind;
+    rule->model = model;
+    rule->formulation = UZ_FORMULATION_STANDARD;
+    rule->dim = uz_element_dim(kind);
+    rule->nodes = uz_element_node_count(kind);
+    rule->points = count;
+    rule->stresses = uz_stress_count(model);
+    rule->direct = rule->stresses == 3 ? 2 : 3;
+    for (int g = 0; g < count; g++) {
+        memcpy(rule->point[g], point[g], sizeof rule->point[g]);
+        set_point(rule, g);
+    }
+}
+
+void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
+{
+    static const double ORIGIN[3] = {0};
+    uz_strain_rule_at(rule, kind, model, NULL, 0);
+    rule->formulation = formulation;
+    rule->points = uz_element_gauss_count(kind, model);
+    uz_local_gradients(rule->centre, kind, ORIGIN);
+    for (int g = 0; g < rule->points; g++) {
+        rule->weight[g] = uz_element_gauss(rule->point[g], kind, model, g);
+        set_point(rule, g);
+    }
+}
+
+/* ---- shape */
+
+/* D[c][i]: derivative of component c by local axis i, of values (nodes x dim) against those of the first node: slopes
+ * of all nodes sum to 0. */
+INLINE void differentiate(uz_lanes D[3][3], const double slope[][3], const uz_lanes *value, int nodes, int dim)
+{
+    uz_lanes sum[3][3];
+    for (int c = 0; c < dim; c++)
+        for (int i = 0; i < dim; i++)
+            sum[c][i] = slope[1][i] * (value[dim + c] - value[c]);
+    for (int a = 2; a < nodes; a++)
+        for (int c = 0; c < dim; c++) {
+            const uz_lanes from_first = value[a * dim + c] - value[c];
+            for (int i = 0; i < dim; i++)
+                sum[c][i] += slope[a][i] * from_first;
+        }
+    for (int c = 0; c < dim; c++)
+        for (int i = 0; i < dim; i++)
+            D[c][i] = sum[c][i];
+}
+
+/* X[x][axis]: derivatives of position; inverse[x][axis]. */
+INLINE void invert(uz_lanes inverse[3][3], uz_lanes *det, uz_lanes X[3][3], int dim)
+{
+    if (dim == 2) {
+        *det = X[0][0] * X[1][1] - X[0][1] * X[1][0];
+        const uz_lanes scale = 1 / *det;
+        inverse[0][0] = X[1][1] * scale;
+        inverse[0][1] = -X[1][0] * scale;
+        inverse[1][0] = -X[0][1] * scale;
+        inverse[1][1] = X[0][0] * scale;
+        return;
+    }
+    *det = X[0][0] * (X[1][1] * X[2][2] - X[1][2] * X[2][1]) + X[0][1] * (X[1][2] * X[2][0] - X[1][0] * X[2][2]) +
+           X[0][2] * (X[1][0] * X[2][1] - X[1][1] * X[2][0]);
+    const uz_lanes scale = 1 / *det;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            const int p = (i + 1) % 3, q = (i + 2) % 3, s = (j + 1) % 3, t = (j + 2) % 3;
+            inverse[i][j] = (X[p][s] * X[q][t] - X[p][t] * X[q][s]) * scale;
+        }
+}
+
+/* Where the radius is at most UZ_AXIS of the largest, it counts as on the axis. */
+INLINE void set_ring(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, int g)
+{
+    uz_lanes radius = {0}, largest = {0};
+    for (int a = 0; a < rule->nodes; a++) {
+        const uz_lanes r = x[2 * a];
+        const lane_bits larger = (lane_bits)(r > largest);
+        radius += rule->N[g][a] * r;
+        largest = (uz_lanes)((larger & (lane_bits)r) | (~larger & (lane_bits)largest));
+    }
+    const uz_lanes inverse = 1 / radius;
+    shape->per_radius[g] = (uz_lanes)((lane_bits)(radius > UZ_AXIS * largest) & (lane_bits)inverse);
+    shape->volume[g] *= TWO_PI * radius;
+}
+
+INLINE void shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness, int dim)
+{
+    uz_lanes X[3][3];
+    for (int g = 0; g < rule->points; g++) {
+        differentiate(X, rule->slope[g], x, rule->nodes, dim);
+        invert(shape->inverse[g], &shape->det[g], X, dim);
+        shape->volume[g] = rule->weight[g] * shape->det[g];
+        if (rule->model == UZ_AXISYMMETRIC)
+            set_ring(shape, rule, x, g);
+        else if (rule->model != UZ_SOLID)
+            shape->volume[g] *= thickness;
+    }
+    if (rule->formulation == UZ_FORMULATION_INCOMPATIBLE) {
+        differentiate(X, rule->centre, x, rule->nodes, dim);
+        invert(shape->centre_inverse, &shape->centre_det, X, dim);
+    }
+}
+
+/* ---- strain */
+
+/* Derivatives of the incompatible mode m by x_j at a Gauss point: slope[m][j], see uz_mode_gradients. */
+INLINE void mode_slopes(uz_lanes slope[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, int g, int dim)
+{
+    const uz_lanes ratio = -2 * shape->centre_det / shape->det[g];
+    for (int m = 0; m < dim; m++)
+        for (int j = 0; j < dim; j++)
+            slope[m][j] = rule->point[g][m] * ratio * shape->centre_inverse[j][m];
+}
+
+/* A point's part of the modes' equations A internal = b: of A its lower triangle, (m, c) being row m dim + c; b is what
+ * the stress of the displacements does along the modes. */
+INLINE void add_mode_equations(uz_lanes A[MODES][MODES], uz_lanes b[MODES], uz_lanes H[3][3], uz_lanes slope[3][3],
+                               const uz_lane_material *material, const uz_lanes *volume, int dim)
+{
+    uz_lanes trace = H[0][0] + H[1][1];
+    if (dim == 3)
+        trace += H[2][2];
+    const uz_lanes lambda = *volume * material->lambda, mu = *volume * material->mu;
+    for (int m = 0; m < dim; m++)
+        for (int c = 0; c < dim; c++) {
+            b[m * dim + c] -= lambda * trace * slope[m][c];
+            for (int j = 0; j < dim; j++)
+                b[m * dim + c] -= mu * (H[c][j] + H[j][c]) * slope[m][j];
+        }
+    for (int m = 0; m < dim; m++)
+        for (int n = 0; n <= m; n++) {
+            uz_lanes product = slope[m][0] * slope[n][0];
+            for (int j = 1; j < dim; j++)
+                product += slope[m][j] * slope[n][j];
+            for (int c = 0; c < dim; c++) {
+                for (int d = 0; d < dim; d++)
+                    A[m * dim + c][n * dim + d] += lambda * slope[m][c] * slope[n][d] + mu * slope[m][d] * slope[n][c];
+                A[m * dim + c][n * dim + c] += mu * product;
+            }
+        }
+}
+
+/* b = A^-1 b by A = L D L', in place; only the lower triangle of A is read. */
+INLINE void solve_modes(uz_lanes A[MODES][MODES], uz_lanes b[MODES], int count)
+{
+    for (int k = 0; k < count; k++) {
+        const uz_lanes pivot = 1 / A[k][k];
+        for (int i = k + 1; i < count; i++) {
+            const uz_lanes factor = A[i][k] * pivot;
+            for (int j = k + 1; j <= i; j++)
+                A[i][j] -= factor * A[j][k];
+            b[i] -= factor * b[k];
+        }
+    }
+    for (int k = count - 1; k >= 0; k--) {
+        for (int i = k + 1; i < count; i++)
+            b[k] -= A[i][k] * b[i];
+        b[k] /= A[k][k];
+    }
+}
+
+/* The modes take the shape of least energy, and their derivatives join in. */
+INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                      const uz_lane_material *material, int dim)
+{
+    uz_lanes A[MODES][MODES] = {{{0}}}, internal[MODES] = {{0}}, slope[3][3];
+    for (int g = 0; g < rule->points; g++) {
+        mode_slopes(slope, rule, shape, g, dim);
+        add_mode_equations(A, internal, H[g], slope, material, &shape->volume[g], dim);
+    }
+    solve_modes(A, internal, dim * dim);
+    for (int g = 0; g < rule->points; g++) {
+        mode_slopes(slope, rule, shape, g, dim);
+        for (int m = 0; m < dim; m++)
+            for (int c = 0; c < dim; c++)
+                for (int j = 0; j < dim; j++)
+                    H[g][c][j] += internal[m * dim + c] * slope[m][j];
+    }
+}
+
+/* u_r / r; on the axis the radial strain. */
+INLINE void set_hoop(uz_lanes *hoop, const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
+                     const uz_lanes *radial, int g)
+{
+    uz_lanes displacement = {0};
+    const lane_bits on_axis = (lane_bits)(shape->per_radius[g] == 0);
+    for (int a = 0; a < rule->nodes; a++)
+        displacement += rule->N[g][a] * u[2 * a];
+    displacement *= shape->per_radius[g];
+    *hoop = (uz_lanes)((on_axis & (lane_bits)*radial) | (~on_axis & (lane_bits)displacement));
+}
+
+/* The dilatation becomes its mean over the volume: an n-th of the difference goes to each of n direct strains. */
+INLINE void take_mean_dilatation(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                 const uz_lane_shape *shape)
+{
+    uz_lanes sum = {0}, volume = {0}, own[UZ_ELEMENT_GAUSS];
+    const int n = rule->direct;
+    for (int g = 0; g < rule->points; g++) {
+        own[g] = strain[g][0] + strain[g][1];
+        if (n == 3)
+            own[g] += strain[g][2];
+        sum += shape->volume[g] * own[g];
+        volume += shape->volume[g];
+    }
+    const uz_lanes mean = sum / volume;
+    for (int g = 0; g < rule->points; g++)
+        for (int i = 0; i < n; i++)
+            strain[g][i] += (mean - own[g]) / n;
+}
+
+INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_strain_rule *rule,
+                               const uz_lane_shape *shape, const uz_lanes *u, int g, int dim)
+{
+    strain[0] = H[0][0];
+    strain[1] = H[1][1];
+    if (dim == 3) {
+        strain[2] = H[2][2];
+        strain[3] = H[0][1] + H[1][0];
+        strain[4] = H[1][2] + H[2][1];
+        strain[5] = H[2][0] + H[0][2];
+    } else if (rule->model == UZ_AXISYMMETRIC) {
+        set_hoop(&strain[2], rule, shape, u, &H[0][0], g);
+        strain[3] = H[0][1] + H[1][0];
+    } else {
+        strain[2] = H[0][1] + H[1][0];
+    }
+}
+
+/* H[c][j]: derivative of u_c by x_j. */
+INLINE void gradient_at(uz_lanes H[3][3], const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
+                        int g, int dim)
+{
+    uz_lanes D[3][3];
+    differentiate(D, rule->slope[g], u, rule->nodes, dim);
+    for (int c = 0; c < dim; c++)
+        for (int j = 0; j < dim; j++) {
+            H[c][j] = D[c][0] * shape->inverse[g][j][0];
+            for (int i = 1; i < dim; i++)
+                H[c][j] += D[c][i] * shape->inverse[g][j][i];
+        }
+}
+
+INLINE void strains_of(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule, const uz_lane_shape *shape,
+                       const uz_lane_material *material, const uz_lanes *u, int dim)
+{
+    if (rule->formulation == UZ_FORMULATION_INCOMPATIBLE) {
+        uz_lanes H[UZ_ELEMENT_GAUSS][3][3];
+        for (int g = 0; g < rule->points; g++)
+            gradient_at(H[g], rule, shape, u, g, dim);
+        add_modes(H, rule, shape, material, dim);
+        for (int g = 0; g < rule->points; g++)
+            strain_of_gradient(strain[g], H[g], rule, shape, u, g, dim);
+        return;
+    }
+    for (int g = 0; g < rule->points; g++) {
+        uz_lanes H[3][3];
+        gradient_at(H, rule, shape, u, g, dim);
+        strain_of_gradient(strain[g], H, rule, shape, u, g, dim);
+    }
+    if (rule->formulation == UZ_FORMULATION_BBAR)
+        take_mean_dilatation(strain, rule, shape);
+}
+
+/* ---- for each kind of processor */
+
+INLINE void shape_in_space(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
+{
+    if (rule->dim == 2)
+        shape_of(shape, rule, x, thickness, 2);
+    else
+        shape_of(shape, rule, x, thickness, 3);
+}
+
+INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                             const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
+{
+    if (rule->dim == 2)
+        strains_of(strain, rule, shape, material, u, 2);
+    else
+        strains_of(strain, rule, shape, material, u, 3);
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2,fma"))) static void shape_fused(uz_lane_shape *shape, const uz_strain_rule *rule,
+                                                            const uz_lanes *x, double thickness)
+{
+    shape_in_space(shape, rule, x, thickness);
+}
+
+__attribute__((target("avx2,fma"))) static void strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES],
+                                                              const uz_strain_rule *rule, const uz_lane_shape *shape,
+                                                              const uz_lane_material *material, const uz_lanes *u)
+{
+    strains_in_space(strain, rule, shape, material, u);
+}
+#endif
+
+void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
+{
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        shape_fused(shape, rule, x, thickness);
+        return;
+    }
+#endif
+    shape_in_space(shape, rule, x, thickness);
+}
+
+void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                     const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
+{
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        strains_fused(strain, rule, shape, material, u);
+        return;
+    }
+#endif
+    strains_in_space(strain, rule, shape, material, u);
+}

@@ -1,0 +1,52 @@
+/* strain_lanes.h: strains of several elements of one kind at once, one element in each lane of a vector register.
+ *
+ * The same strains and volumes at the same Gauss points as uz_element_strain, uz_element_gauss and uz_element_measure
+ * give for one element, up to rounding. What the elements' shape alone determines is kept apart, so that equal elements
+ * share it. */
+#ifndef UZ_ELEMENT_STRAIN_LANES_H
+#define UZ_ELEMENT_STRAIN_LANES_H
+
+#include "element/element.h"
+
+enum { UZ_STRAIN_LANES = 4 };
+typedef double uz_lanes __attribute__((vector_size(8 * UZ_STRAIN_LANES), aligned(8)));
+
+/* What all elements of a kind and formulation share: shape functions and their derivatives by the reference
+ * coordinates. */
+typedef struct {
+    uz_element_kind kind;
+    uz_model model;
+    uz_formulation formulation; /* as uz_resolve_formulation gave it */
+    int dim, nodes, points, stresses;
+    int direct; /* of the stresses, which come first: those that are no shear */
+    double point[UZ_ELEMENT_GAUSS][3], weight[UZ_ELEMENT_GAUSS];
+    double N[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES], slope[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES][3];
+    double centre[UZ_ELEMENT_NODES][3]; /* slope at the origin */
+} uz_strain_rule;
+/* At the Gauss points. */
+void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation);
+
+/* At other points, whose weights are 0: for UZ_FORMULATION_STANDARD alone, as the others average over the element. */
+void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, const double point[][3], int count);
+
+/* Of the elements' shape. */
+typedef struct {
+    uz_lanes inverse[UZ_ELEMENT_GAUSS][3][3]; /* of the Jacobian: [x][local axis] */
+    uz_lanes det[UZ_ELEMENT_GAUSS];
+    uz_lanes volume[UZ_ELEMENT_GAUSS];     /* that each Gauss point stands for */
+    uz_lanes per_radius[UZ_ELEMENT_GAUSS]; /* rings: 1 / r; 0 on the axis */
+    uz_lanes centre_inverse[3][3],
+        centre_det; /* UZ_FORMULATION_INCOMPATIBLE: at the origin of the reference coordinates */
+} uz_lane_shape;
+/* x: coordinates, nodes x dim; thickness: of plane models. */
+void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness);
+
+typedef struct {
+    uz_lanes lambda, mu;
+} uz_lane_material;
+
+/* strain[point][component] of the displacements u (nodes x dim); of a material only incompatible modes want to know. */
+void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                     const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u);
+
+#endif

@@ -1,0 +1,358 @@
+/* The error estimate and the stresses, which take several elements at a time, against those that take one element after
+ * the other, by the functions on single elements; and the strains that both rest on. */
+#include "assembly/assembly.h"
+#include "body_fixture.h"
+#include "element/strain_lanes.h"
+#include "fields/parts.h"
+#include "random_scene.h"
+
+enum { NODES = UZ_ELEMENT_NODES, POINTS = UZ_ELEMENT_GAUSS, STRESSES = UZ_ELEMENT_STRESSES, LANES = UZ_STRAIN_LANES };
+
+/* ------------------------------------------------------------------ strains */
+
+static const uz_model MODELS[UZ_ELEMENT_KINDS][3] = {
+    [UZ_TRI3] = {UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC},
+    [UZ_QUAD4] = {UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC},
+    [UZ_TRI6] = {UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC},
+    [UZ_QUAD8] = {UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC},
+    [UZ_TET4] = {UZ_SOLID, UZ_SOLID, UZ_SOLID},
+    [UZ_HEX8] = {UZ_SOLID, UZ_SOLID, UZ_SOLID},
+    [UZ_TET10] = {UZ_SOLID, UZ_SOLID, UZ_SOLID},
+};
+
+/* Four elements of one kind, each bent in its own way; the first of a ring stands on the axis. */
+typedef struct {
+    uz_element element[LANES];
+    double xyz[LANES][3 * NODES], u[LANES][UZ_ELEMENT_DOFS];
+    uz_lanes x[3 * NODES], displacement[UZ_ELEMENT_DOFS];
+    uz_lane_material material;
+} four_elements;
+
+static void make_four(four_elements *f, uz_element_kind kind, uz_model model, uz_formulation asked, qp_random *rng)
+{
+    const double(*local)[3] = uz_element_local_nodes(kind);
+    const int dim = uz_element_dim(kind), count = uz_element_node_count(kind) * dim;
+    for (int l = 0; l < LANES; l++) {
+        const double size = pow(10, 2 * random_signed(rng)), poisson = 0.1 * (l + 1);
+        const bool ring = model == UZ_AXISYMMETRIC;
+        for (int i = 0; i < count; i++) {
+            const bool radial = ring && i % dim == 0;
+            const double reference = local[i / dim][i % dim] + (radial ? 1 : 0);
+            const double bend = radial && reference == 0 ? 0 : 0.06 * random_signed(rng);
+            f->xyz[l][i] = size * (reference + bend + (radial ? 2 * l : 0));
+            f->u[l][i] = 1e-3 * size * random_signed(rng);
+        }
+        f->element[l] = (uz_element){.kind = kind,
+                                     .model = model,
+                                     .formulation = uz_resolve_formulation(asked, kind, model, poisson),
+                                     .lame = uz_lame_of(model, 100 * (l + 1), poisson),
+                                     .thickness = 0.7,
+                                     .xyz = f->xyz[l]};
+        CHECK_INT(uz_element_check(&f->element[l]), UZ_SHAPE_GOOD);
+        f->material.lambda[l] = f->element[l].lame.lambda;
+        f->material.mu[l] = f->element[l].lame.mu;
+        for (int i = 0; i < count; i++) {
+            f->x[i][l] = f->xyz[l][i];
+            f->displacement[i][l] = f->u[l][i];
+        }
+    }
+}
+
+static void compare_lane(const four_elements *f, const uz_strain_rule *rule, const uz_lane_shape *shape,
+                         uz_lanes strain[POINTS][STRESSES], int l)
+{
+    uz_element_motion motion;
+    const uz_element *element = &f->element[l];
+    uz_element_move(&motion, element, f->u[l]);
+    for (int g = 0; g < rule->points; g++) {
+        double point[3], grad[NODES][3], want[STRESSES], size = 0;
+        const double weight = uz_element_gauss(point, rule->kind, rule->model, g);
+        const double volume = weight * uz_element_measure(element, point, uz_element_gradients(grad, element, point));
+        uz_element_strain(want, &motion, point);
+        for (int c = 0; c < rule->stresses; c++)
+            size = fmax(size, fabs(want[c]));
+        CHECK_REL(shape->volume[g][l], volume, 1e-13);
+        for (int c = 0; c < rule->stresses; c++)
+            CHECK_MSG(fabs(strain[g][c][l] - want[c]) < 1e-12 * size,
+                      "kind %d, model %d, formulation %d: strain %d is %.17g, not %.17g", rule->kind, rule->model,
+                      rule->formulation, c, strain[g][c][l], want[c]);
+    }
+}
+
+TEST(strains_in_lanes_are_those_of_single_elements)
+{
+    static const uz_formulation ASKED[] = {UZ_FORMULATION_STANDARD, UZ_FORMULATION_BBAR, UZ_FORMULATION_INCOMPATIBLE};
+    qp_random rng = {2024};
+    uz_lanes strain[POINTS][STRESSES];
+    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
+        for (int k = 0; k < 9; k++) {
+            four_elements f;
+            uz_strain_rule rule;
+            uz_lane_shape shape;
+            make_four(&f, (uz_element_kind)kind, MODELS[kind][k / 3], ASKED[k % 3], &rng);
+            uz_strain_rule_init(&rule, f.element[0].kind, f.element[0].model, f.element[0].formulation);
+            uz_lane_shape_of(&shape, &rule, f.x, f.element[0].thickness);
+            uz_lane_strains(strain, &rule, &shape, &f.material, f.displacement);
+            for (int l = 0; l < LANES; l++)
+                compare_lane(&f, &rule, &shape, strain, l);
+        }
+}
+
+/* ----------------------------------------------------------------- estimate */
+
+/* One element after the other; averages: n_nodes x n_materials x (STRESSES and the volume). */
+typedef struct {
+    const uz_body_model *model;
+    const double *u, *free_strain;
+    double *average, eta2, energy2;
+} plain;
+
+typedef struct {
+    uz_element element;
+    double xyz[3 * NODES], u[UZ_ELEMENT_DOFS];
+    const int64_t *node;
+    int nodes, points, stresses;
+    double volume[POINTS], place[POINTS][3], N[POINTS][NODES], strain[POINTS][STRESSES], stress[POINTS][STRESSES];
+} plain_element;
+
+static void look_at(plain_element *s, const plain *x, int64_t e)
+{
+    const int dim = x->model->mesh.dim;
+    uz_element_motion motion;
+    s->node = uz_mesh_element(&x->model->mesh, e, &s->nodes);
+    uz_body_element(&s->element, s->xyz, x->model, e);
+    for (int i = 0; i < s->nodes * dim; i++)
+        s->u[i] = x->u[s->node[i / dim] * dim + i % dim];
+    uz_element_move(&motion, &s->element, s->u);
+    s->stresses = uz_stress_count(s->element.model);
+    s->points = uz_element_gauss_count(s->element.kind, s->element.model);
+    for (int g = 0; g < s->points; g++) {
+        double point[3], grad[NODES][3], strain[STRESSES] = {0};
+        const double weight = uz_element_gauss(point, s->element.kind, s->element.model, g);
+        const double det = uz_element_gradients(grad, &s->element, point);
+        s->volume[g] = weight * uz_element_measure(&s->element, point, det);
+        uz_element_shape(s->N[g], s->element.kind, point);
+        for (int c = 0; c < dim; c++) {
+            s->place[g][c] = 0;
+            for (int a = 0; a < s->nodes; a++)
+                s->place[g][c] += s->N[g][a] * s->xyz[a * dim + c];
+        }
+        uz_element_strain(s->strain[g], &motion, point);
+        uz_thermal_strain(strain, s->element.model, s->element.lame, x->free_strain ? x->free_strain[e] : 0);
+        for (int c = 0; c < s->stresses; c++)
+            strain[c] = s->strain[g][c] - strain[c];
+        uz_elastic_stress(s->stress[g], s->element.model, s->element.lame, strain);
+    }
+}
+
+static double *average_at(const plain *x, int64_t e, int64_t node)
+{
+    const int64_t material = x->model->material_of ? x->model->material_of[e] : 0;
+    return x->average + (node * x->model->n_materials + material) * (STRESSES + 1);
+}
+
+/* y = value of the linear function at x (dim) that fits component c at the Gauss points best, by volume; quadratic
+ * elements. A small system, from a middle point, by elimination with the largest pivot. */
+static double fit_at(const plain_element *s, const double *x, int c)
+{
+    const int dim = uz_element_dim(s->element.kind), n = dim + 1;
+    double A[4][5] = {{0}}, scale = 0;
+    for (int i = 0; i < dim; i++)
+        scale = fmax(scale, fabs(s->xyz[dim + i] - s->xyz[i]));
+    for (int g = 0; g < s->points; g++) {
+        double b[4] = {1};
+        for (int i = 0; i < dim; i++)
+            b[i + 1] = (s->place[g][i] - x[i]) / scale;
+        for (int i = 0; i < n; i++) {
+            for (int j = 0; j < n; j++)
+                A[i][j] += s->volume[g] * b[i] * b[j];
+            A[i][n] += s->volume[g] * b[i] * s->stress[g][c];
+        }
+    }
+    for (int k = 0; k < n; k++) {
+        int pivot = k;
+        for (int i = k; i < n; i++)
+            pivot = fabs(A[i][k]) > fabs(A[pivot][k]) ? i : pivot;
+        for (int j = 0; j <= n; j++) {
+            const double swap = A[k][j];
+            A[k][j] = A[pivot][j];
+            A[pivot][j] = swap;
+        }
+        for (int i = 0; i < n; i++)
+            for (int j = n; j >= k && i != k; j--)
+                A[i][j] -= A[i][k] / A[k][k] * A[k][j];
+    }
+    return A[0][n] / A[0][0];
+}
+
+static void add_averages(const plain *x, const plain_element *s, int64_t e)
+{
+    const bool fits = s->element.kind == UZ_TRI6 || s->element.kind == UZ_QUAD8 || s->element.kind == UZ_TET10;
+    const int dim = x->model->mesh.dim;
+    double volume = 0, mean[STRESSES] = {0};
+    for (int g = 0; g < s->points; g++) {
+        volume += s->volume[g];
+        for (int c = 0; c < s->stresses; c++)
+            mean[c] += s->volume[g] * s->stress[g][c];
+    }
+    for (int a = 0; a < s->nodes; a++) {
+        double *at = average_at(x, e, s->node[a]);
+        for (int c = 0; c < s->stresses; c++)
+            at[c] += fits ? volume * fit_at(s, s->xyz + a * dim, c) : mean[c];
+        at[STRESSES] += volume;
+    }
+}
+
+static void add_energies(plain *x, const plain_element *s, int64_t e)
+{
+    for (int g = 0; g < s->points; g++) {
+        double jump[STRESSES], whole[STRESSES], work = 0;
+        uz_elastic_stress(whole, s->element.model, s->element.lame, s->strain[g]);
+        for (int c = 0; c < s->stresses; c++) {
+            jump[c] = -s->stress[g][c];
+            for (int a = 0; a < s->nodes; a++) {
+                const double *at = average_at(x, e, s->node[a]);
+                jump[c] += s->N[g][a] * at[c] / at[STRESSES];
+            }
+            work += whole[c] * s->strain[g][c];
+        }
+        x->eta2 += s->volume[g] * uz_complementary(s->element.model, s->element.lame, jump);
+        x->energy2 += s->volume[g] * work;
+    }
+}
+
+static double plain_estimate(const uz_body_model *model, const uz_scene *scene, const double *u)
+{
+    plain x = {.model = model, .u = u};
+    plain_element s;
+    double *free_strain = NULL;
+    CHECK_INT(uz_free_strains(&free_strain, model, scene, NULL), UZ_OK);
+    x.free_strain = free_strain;
+    x.average = body_room(model->mesh.n_nodes * model->n_materials * (STRESSES + 1), sizeof *x.average);
+    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
+        look_at(&s, &x, e);
+        add_averages(&x, &s, e);
+    }
+    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
+        look_at(&s, &x, e);
+        add_energies(&x, &s, e);
+    }
+    free(x.average);
+    free(free_strain);
+    return sqrt(x.eta2 / (x.energy2 + x.eta2));
+}
+
+static void compare_estimates(const uz_body_model *model, const uz_scene *scene, qp_random *rng, const char *what)
+{
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    double *u = body_room(n, sizeof *u);
+    for (int64_t i = 0; i < n; i++)
+        u[i] = 1e-3 * (model->mesh.xyz[i] + 0.3 * random_signed(rng));
+    const double want = plain_estimate(model, scene, u), got = uz_estimate_mesh_error(model, scene, u);
+    CHECK_MSG(fabs(got - want) <= 1e-11 * want + 1e-14, "%s: %.17g, not %.17g", what, got, want);
+    free(u);
+}
+
+/* Stress at the Gauss points as the fields give it: plane models with zz between. */
+static void compare_stresses(const uz_body_model *model, const uz_scene *scene, qp_random *rng, const char *what)
+{
+    uz_field_body body;
+    plain_element s;
+    const int dim = model->mesh.dim;
+    double *u = body_room(model->mesh.n_nodes * dim, sizeof *u), *free_strain = NULL;
+    for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++)
+        u[i] = 1e-3 * random_signed(rng);
+    CHECK_INT(uz_field_body_init(&body, scene, model, NULL), UZ_OK);
+    CHECK_INT(uz_free_strains(&free_strain, model, scene, NULL), UZ_OK);
+    const plain x = {.model = model, .u = u, .free_strain = free_strain};
+    const int64_t n = uz_field_gauss_count(&body);
+    double *element = body_room(n, sizeof *u), *point = body_room(n * dim, sizeof *u);
+    double *stress = body_room(n * body.components, sizeof *u), *at = stress;
+    CHECK_INT(uz_field_gauss(element, point, stress, &body, u, NULL, NULL), UZ_OK);
+    for (int64_t e = 0; e < model->mesh.n_elements; e++) {
+        look_at(&s, &x, e);
+        for (int g = 0; g < s.points; g++, at += body.components)
+            for (int c = 0; c < s.stresses; c++) {
+                double size = 0;
+                for (int k = 0; k < s.stresses; k++)
+                    size = fmax(size, fabs(s.stress[g][k]));
+                const double got = at[s.stresses == 3 && c == 2 ? 3 : c];
+                CHECK_MSG(fabs(got - s.stress[g][c]) <= 1e-9 * size, "%s, element %d: stress %d is %.17g, not %.17g",
+                          what, (int)e, c, got, s.stress[g][c]);
+            }
+    }
+    free(stress);
+    free(point);
+    free(element);
+    free(free_strain);
+    free(u);
+    uz_field_body_clear(&body);
+}
+
+/* Elements of two materials that share nodes, one of them nearly incompressible: each has averages of its own, and its
+ * own formulation. */
+static void mix_materials(uz_body_model *model, qp_random *rng)
+{
+    uz_body_material *two = body_room(2, sizeof *two);
+    two[0] = two[1] = model->materials[0];
+    for (int k = 0; k < 2; k++) {
+        two[k].poisson = k ? 0.48 : 0.2;
+        two[k].lame = uz_lame_of(model->kind, k ? 70e3 : 200e3, two[k].poisson);
+        two[k].expansion = 1e-5 * (k + 1);
+    }
+    free(model->materials);
+    free(model->material_of);
+    model->materials = two;
+    model->n_materials = 2;
+    model->material_of = body_room(model->mesh.n_elements, sizeof *model->material_of);
+    for (int64_t e = 0; e < model->mesh.n_elements; e++)
+        model->material_of[e] = random_chance(rng, 0.5);
+}
+
+/* Boxes, whose elements may all be equal. */
+TEST(estimate_of_boxes_is_that_of_single_elements)
+{
+    static const char *const KINDS[] = {"tri3", "quad4", "tri6", "quad8", "tet4", "hex8", "tet10"};
+    static const uz_formulation ASKED[] = {UZ_FORMULATION_AUTO, UZ_FORMULATION_BBAR, UZ_FORMULATION_INCOMPATIBLE};
+    qp_random rng = {7};
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
+        for (int way = 0; way < 12; way++) {
+            const uz_model model = k >= 4 ? UZ_SOLID : MODELS[k][way % 3];
+            uz_scene s = body_scene(model, KINDS[k], (double[3]){5, 3, 2}, (int64_t[3]){5, 3, 1 + way % 2});
+            s.formulation = k == UZ_QUAD4 || k == UZ_HEX8 ? ASKED[way / 4] : UZ_FORMULATION_AUTO;
+            s.box.grading[0] = way % 4 == 3 ? 1.7 : 1;
+            s.materials[0].expansion = 1e-5;
+            body_hold(&s, "top", 0, 0, 0);
+            body_load(&s, UZ_LOAD_TEMPERATURE, "all", 30, 0, 0);
+            s.n_loads = way % 2;
+            uz_body_model outline = body_model(&s);
+            compare_estimates(&outline, &s, &rng, KINDS[k]);
+            mix_materials(&outline, &rng);
+            compare_estimates(&outline, &s, &rng, KINDS[k]);
+            uz_body_model_clear(&outline);
+            uz_scene_clear(&s);
+        }
+}
+
+/* Meshes of two kinds, bent, of several parts; rings on their axis. */
+TEST(random_scenes_have_the_stresses_and_estimates_of_single_elements)
+{
+    for (uint64_t seed = 1; seed <= 150; seed++) {
+        random_scene s = make_random_scene(seed);
+        uz_body_model model;
+        uz_error err = {0};
+        char name[32];
+        snprintf(name, sizeof name, "seed %d", (int)seed);
+        if (uz_body_model_outline(&model, &s.scene, &err) == UZ_OK) {
+            compare_estimates(&model, &s.scene, &s.rng, name);
+            compare_stresses(&model, &s.scene, &s.rng, name);
+            mix_materials(&model, &s.rng);
+            compare_estimates(&model, &s.scene, &s.rng, name);
+            compare_stresses(&model, &s.scene, &s.rng, name);
+            uz_body_model_clear(&model);
+        } else {
+            CHECK_MSG(err.status == UZ_ERR_FREE_BODY, "%s: %s", name, err.message);
+        }
+        uz_scene_clear(&s.scene);
+    }
+}
