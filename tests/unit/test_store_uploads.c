@@ -228,12 +228,44 @@ TEST(a_damaged_file_is_no_upload)
     CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
     snprintf(path, sizeof path, "%s-uploads/%s", p.path, ABC);
     CHECK_INT(truncate(path, 2), 0);
-    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_ERROR);
+    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_DAMAGED);
     store_message(p.s, message, sizeof message);
     CHECK_MSG(strstr(message, ABC), "%s", message);
     CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK); /* sending it again mends it */
     CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_OK);
     store_upload_text_done(&text);
+    FILE *file = fopen(path, "r+"); /* the same length, other bytes */
+    CHECK(file && fputc('x', file) == 'x' && fclose(file) == 0);
+    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_DAMAGED);
+    CHECK(text.data == NULL && text.len == 0);
+    CHECK_INT(unlink(path), 0);
+    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_DAMAGED);
+    end_place(&p);
+}
+
+TEST(a_check_reads_the_files_of_uploads)
+{
+    place p;
+    upload_info info;
+    store_findings found;
+    bool known;
+    char path[256], message[256];
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
+    CHECK_INT(store_check(p.s, &found), STORE_OK);
+    CHECK_MSG(strcmp(found.findings, "") == 0, "%s", found.findings);
+    free(found.findings);
+    snprintf(path, sizeof path, "%s-uploads/%s", p.path, ABC);
+    FILE *file = fopen(path, "r+");
+    CHECK(file && fputc('x', file) == 'x' && fclose(file) == 0);
+    CHECK_INT(store_check(p.s, &found), STORE_OK);
+    CHECK_MSG(strstr(found.findings, ABC), "%s", found.findings);
+    free(found.findings);
+    CHECK_INT(unlink(path), 0);
+    CHECK(store_check_file(p.path, &found, message, sizeof message));
+    CHECK_MSG(strstr(found.findings, ABC), "%s", found.findings);
+    free(found.findings);
     end_place(&p);
 }
 
