@@ -52,11 +52,12 @@ static bool is_gzip(const header_field *coding)
 
 static bool check_type(const http_request *rq, problem_details *problem)
 {
-    const header_field *coding = header_find(&rq->headers, "Content-Encoding", NULL);
+    size_t codings;
+    const header_field *coding = header_find(&rq->headers, "Content-Encoding", &codings);
     if (strcmp(rq->route->method, "POST") != 0)
         return true;
-    if (coding && !token_equal(coding->value, coding->value_len, "identity") &&
-        !(rq->route->streamed && is_gzip(coding)))
+    if (coding && (codings > 1 || (!token_equal(coding->value, coding->value_len, "identity") &&
+                                   !(rq->route->streamed && is_gzip(coding)))))
         return http_problem(problem, 415, "content_encoding", "The content coding is not supported",
                             rq->route->streamed ? "send the body as it is, or with Content-Encoding: gzip"
                                                 : "send the body without Content-Encoding");

@@ -109,7 +109,18 @@ static bool check_expect(const header_list *headers, problem_details *problem)
     return true;
 }
 
-bool framing_read(framing *out, const char *version, const header_list *headers, problem_details *problem)
+/* White space behind a value is none of it (RFC 9110, section 5.5); libmicrohttpd leaves it there. Not before the
+ * fields that say how long the body is have been read: libmicrohttpd takes those with it for something else. */
+static void trim_values(header_list *headers)
+{
+    for (size_t i = 0; i < headers->count; i++) {
+        header_field *field = &headers->fields[i];
+        while (field->value_len > 0 && strchr(" \t", field->value[field->value_len - 1]))
+            field->value_len--;
+    }
+}
+
+bool framing_read(framing *out, const char *version, header_list *headers, problem_details *problem)
 {
     size_t lengths, codings;
     memset(out, 0, sizeof *out);
@@ -126,6 +137,7 @@ bool framing_read(framing *out, const char *version, const header_list *headers,
         return refuse(problem, "Content-Length and Transfer-Encoding exclude each other");
     if ((length && !read_length(out, length, problem)) || (coding && !read_coding(out, coding, version, problem)))
         return false;
+    trim_values(headers);
     return check_expect(headers, problem);
 }
 
@@ -150,7 +162,7 @@ bool framing_tiles(const framing_layout *layout, const header_list *headers)
         for (; space < field->value; space++)
             if (*space != ' ' && *space != '\t')
                 return false;
-        next = line_end(field->value + field->value_len);
+        next = line_end(field->value + field->value_len + strspn(field->value + field->value_len, " \t"));
     }
     return next && next + 2 == end;
 }

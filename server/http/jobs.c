@@ -181,6 +181,16 @@ bool jobs_store(api *context, http_request *rq, const store_request *request, jo
     return true;
 }
 
+bool jobs_find_repeat(api *context, http_request *rq, const char *key, job *out)
+{
+    store_request request = {.body = rq->body ? rq->body : "", .body_len = rq->body_len, .idempotency_key = key};
+    memset(out, 0, sizeof *out);
+    if (!key || store_find_repeat(context->store, &request, out) != STORE_OK)
+        return false;
+    memcpy(rq->job_id, out->id, sizeof rq->job_id);
+    return true;
+}
+
 void jobs_acknowledge(api *context, job *j, http_reply *reply)
 {
     snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", j->id);
@@ -191,6 +201,18 @@ static void submit(api *context, http_request *rq, const store_request *request,
 {
     job j = {0};
     if (jobs_store(context, rq, request, &j, reply) && jobs_wait(context, rq, 0, &j, reply))
+        jobs_acknowledge(context, &j, reply);
+    job_clear(&j);
+}
+
+/* What a refused request is answered: a problem, or the job that it became when it came before. */
+static void refuse_or_repeat(api *context, http_request *rq, const char *key, const problem_details *problem,
+                             http_reply *reply)
+{
+    job j;
+    if (!jobs_find_repeat(context, rq, key, &j))
+        reply_problem(reply, problem);
+    else if (jobs_wait(context, rq, 0, &j, reply))
         jobs_acknowledge(context, &j, reply);
     job_clear(&j);
 }
@@ -245,11 +267,11 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     problem_details problem = {0};
     codec_request request = {0};
     char *key = NULL;
-    bool validate_only;
+    bool validate_only = false;
     if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
         !codec_decode_with(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
         !start_check(context, &request, rq, &problem) || !jobs_check_webhook(context, request.webhook, &problem)) {
-        reply_problem(reply, &problem);
+        refuse_or_repeat(context, rq, validate_only ? NULL : key, &problem, reply);
         goto done;
     }
     if (validate_only) {

@@ -15,6 +15,7 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     uz_cache_entry *entries = NULL;
     size_t count = 0;
     (void)rq;
+    reply->tag_by_body = true;
     if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) != UZ_OK)
         reply_no_memory(reply);
     else
@@ -25,6 +26,7 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
 void service_limits(api *context, http_request *rq, http_reply *reply)
 {
     (void)rq;
+    reply->tag_by_body = true;
     reply_json(reply, 200, codec_encode_limits(context->limits, context->n_limits));
 }
 

@@ -114,6 +114,7 @@ void uploads_get(api *context, http_request *rq, http_reply *reply)
         return;
     }
     store_status status = store_upload_get(context->store, rq->name, &info);
+    reply->tag_by_body = true;
     if (status != STORE_OK)
         reply_failure(context, status, reply);
     else

@@ -204,6 +204,19 @@ store_status store_submit(store *s, const store_request *request, job *out, bool
     return status;
 }
 
+store_status store_find_repeat(store *s, const store_request *request, job *out)
+{
+    memset(out, 0, sizeof *out);
+    submit_args a = {request, out, false};
+    connection *c = store_take_reader(s);
+    store_status status = store_give_reader(s, c, find_key(c, &a));
+    if (status == STORE_OK)
+        status = store_settle(s); /* it may have been committed a moment ago: it is told of once it is on disk */
+    if (status != STORE_OK)
+        job_clear(out);
+    return status;
+}
+
 /* ---- the request as submitted */
 
 char *store_copy_blob(statement *st, int at, size_t *len)

@@ -88,6 +88,10 @@ typedef struct {
  * not there (any more). */
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
 
+/* ---- repeat: the job that store_submit would answer this request with, without submitting it: STORE_OK, STORE_CONFLICT
+ * for another body; STORE_NOT_FOUND: the key is new. */
+store_status store_find_repeat(store *s, const store_request *request, job *out);
+
 /* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, owner and lease
  * set; *body is the request as submitted, freed by the caller, or NULL where it is not what was written any more:
  * the job can only be failed. STORE_NOT_FOUND when nothing waits. */
