@@ -33,7 +33,8 @@ typedef struct {
     uint64_t length; /* of the body when it is not chunked; 0 when there is none */
 } framing;
 
-/* Reads the framing, and takes white space behind the values of fields away; false with the problem: 400 for anything ambiguous or malformed, 417, 431, 505. */
+/* Reads the framing, and takes white space behind the values of fields away; false with the problem: 400 for anything
+ * ambiguous or malformed, 417, 431, 505. */
 bool framing_read(framing *out, const char *version, header_list *headers, problem_details *problem);
 
 /* Where libmicrohttpd left the parts of a header block in its read buffer. It parses in place and writes NULs over the

@@ -105,16 +105,16 @@ static bool solve_probe(void)
     return good;
 }
 
-/* A change of a job that does not exist goes all the way to the store's writer. */
-static bool store_takes_changes(store *s)
-{
-    return store_renew(s, "00000000000000000000000000000000", "nobody", 0, 0) == STORE_NOT_FOUND;
-}
-
 static const char *why_not_ready(api *context)
 {
-    if (!store_takes_changes(context->store))
-        return "store_unavailable";
+    char cause[256];
+    store_status status = store_try_write(context->store);
+    if (status != STORE_OK) {
+        store_message(context->store, cause, sizeof cause);
+        log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
+    }
+    if (status != STORE_OK)
+        return status == STORE_FULL ? "storage_full" : "store_unavailable";
     return solve_probe() ? "" : "solver_unavailable";
 }
 
@@ -146,6 +146,9 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
         snprintf(why, sizeof why, "store_unavailable");
     if (strcmp(why, "solver_unavailable") == 0) {
         reply_refuse(reply, 503, why, "The solver does not answer", "a problem with a known answer was not solved");
+    } else if (strcmp(why, "storage_full") == 0) {
+        reply_refuse(reply, 503, why, "The disk is full",
+                     "nothing can be stored: delete ended jobs or free disk space");
     } else if (why[0]) {
         reply_refuse(reply, 503, why, "The store does not answer", "the server's log has the cause");
     } else {

@@ -88,8 +88,8 @@ typedef struct {
  * not there (any more). */
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
 
-/* ---- repeat: the job that store_submit would answer this request with, without submitting it: STORE_OK, STORE_CONFLICT
- * for another body; STORE_NOT_FOUND: the key is new. */
+/* ---- repeat: the job that store_submit would answer this request with, without submitting it: STORE_OK,
+ * STORE_CONFLICT for another body; STORE_NOT_FOUND: the key is new. */
 store_status store_find_repeat(store *s, const store_request *request, job *out);
 
 /* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, owner and lease
@@ -193,6 +193,9 @@ store_status store_count_vectors(store *s, const char *id, const char *name, int
  * (0: the job) has no stored history; STORE_OK with a count of 0 when it has one but nothing after `after`. */
 store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
                                int64_t *columns);
+
+/* Writes something that changes nothing, all the way to the disk: what a submission would meet now. */
+store_status store_try_write(store *s);
 
 /* Jobs in each status, indexed by job_status. */
 store_status store_counts(store *s, int64_t counts[5]);

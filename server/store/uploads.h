@@ -59,8 +59,8 @@ store_status store_upload_delete(store *s, const char *id);
  * STORE_DAMAGED where it is not what was sent any more, by its digest. */
 store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes);
 
-/* The bytes of an upload, checked like that, in memory for as long as they are looked at (mapped: pages that are read come from the file).
- * data is not NUL-terminated. */
+/* The bytes of an upload, checked like that, in memory for as long as they are looked at (mapped: pages that are read
+ * come from the file). data is not NUL-terminated. */
 typedef struct {
     const char *data;
     size_t len;

@@ -101,6 +101,28 @@ def test_mistakes_name_their_place(s):
 
 
 @options(None)
+def test_a_configuration_that_could_not_start(s):
+    """The values are printed, and what is wrong with the files and the address that they name."""
+    tokens = os.path.join(s.folder, "tokens")
+    pathlib.Path(tokens).write_text("reader read secret\n", encoding="utf-8")
+    os.chmod(tokens, 0o600)
+    for arguments, words in ((["--listen", "nonsense"], "HOST:PORT"), (["--listen", "127.0.0.1:99999"], "65535"),
+                             (["--listen", "192.0.2.1:80"], "192.0.2.1"), (["--listen", "0.0.0.0:80"], "--token-file"),
+                             (["--token-file", "/nonexistent/x"], "/nonexistent/x"), (["--token-file", tokens], tokens + ":1"),
+                             (["--webhook-secret-file", "/nonexistent/y"], "/nonexistent/y"),
+                             (["--tls-cert", "/nonexistent/c", "--tls-key", "/nonexistent/k"], "/nonexistent/c")):
+        got = run(s, "--check-config", *arguments)
+        check(got.returncode == 1 and words in got.stderr and "listen = " in got.stdout, arguments, got)
+        started = run(s, "--db", s.db, *arguments)  # it is what a start would have said
+        check(started.returncode == 1 and words in started.stderr, arguments, started)
+    got = run(s, "--check-config", "--listen", "0.0.0.0:80", "--insecure-public")
+    check(got.returncode == 0 and not got.stderr, got)
+    s.start()
+    got = run(s, "--check-config", "--listen", f"{s.host}:{s.port}", "--db", s.db)  # the one that runs
+    check(got.returncode == 0 and not got.stderr, got)
+
+
+@options(None)
 def test_the_sample_is_the_table(s):
     sample = (service.ROOT / "server/uzawad.conf.example").read_text(encoding="utf-8")
     check(run(s, "--example-config").stdout == sample, "write it again: uzawad --example-config")
