@@ -2,10 +2,12 @@
 import json
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 
 import service
-from service import MATRICES, SCENE, check, expect, options
+from service import MATRICES, SCENE, Skip, check, expect, options
 
 
 def run(s, *arguments, **environment):
@@ -136,6 +138,49 @@ def test_the_sample_is_the_table(s):
     for name, (value, source) in effective(s, "--config", write(s, text)).items():
         check(value == default[name][0] or name == "config", name, value, default[name])
         check(source.endswith("of the file") or name in ("config", *computed), name, source)
+
+
+def option_names(s):
+    return set(re.findall(r"^  --([a-z-]+)", run(s, "--help").stdout, re.MULTILINE))
+
+
+@options(None)
+def test_the_unit_is_one(s):
+    """What the systemd unit says, systemd understands, also with the lines that are there to be uncommented."""
+    unit = (service.ROOT / "server/uzawad.service").read_text(encoding="utf-8")
+    used = set(re.findall(r"--([a-z][a-z-]*)", "\n".join(re.findall(r"^Exec.*", unit, re.MULTILINE))))
+    check(used and used <= option_names(s), used)
+    if not shutil.which("systemd-analyze"):
+        raise Skip("no systemd-analyze")
+    check("\n#LoadCredential=" in unit and "/usr/local/bin/uzawad" in unit, unit)
+    path = pathlib.Path(s.folder) / "uzawad.service"
+    for text in (unit, re.sub(r"^#(?=[A-Z][A-Za-z]+=)", "", unit, flags=re.MULTILINE)):
+        path.write_text(text.replace("/usr/local/bin/uzawad", str(pathlib.Path(s.build).resolve() / "uzawad")), encoding="utf-8")
+        got = subprocess.run(["systemd-analyze", "verify", str(path)], capture_output=True, text=True, timeout=60, check=False)
+        check(got.returncode == 0 and not got.stderr.strip(), got)
+
+
+@options(None)
+def test_the_container_has_what_the_daemon_needs(s):
+    text = (service.ROOT / "server/Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    named = {name.lower().replace("_", "-") for line in lines if line.startswith("ENV ")
+             for name in re.findall(r"UZAWAD_([A-Z_]+)=", line)}
+    check(named and named <= option_names(s), named)
+    image = lines[[i for i, line in enumerate(lines) if line.startswith("FROM ")][-1]:]
+    packages = set(" ".join(line for line in image if "apt-get install" in line).split())
+    if not shutil.which("dpkg-query") or not shutil.which("ldd"):
+        raise Skip("no dpkg-query or no ldd")
+    for program in ("uzawad", "uzawa"):
+        file = str(pathlib.Path(s.build).resolve() / program)
+        found = subprocess.run(["ldd", file], capture_output=True, text=True, check=True).stdout
+        direct = subprocess.run(["readelf", "-d", file], capture_output=True, text=True, check=True).stdout
+        for name in re.findall(r"NEEDED.*\[(.*)\]", direct):
+            place = re.search(re.escape(name) + r" => (\S+)", found)
+            owner = subprocess.run(["dpkg-query", "-S", os.path.realpath(place[1])], capture_output=True, text=True, check=False) if place else None
+            package = owner.stdout.split(":")[0] if owner and owner.returncode == 0 else None
+            check(package in packages or package in (None, "libc6") or name.startswith(("libasan", "libubsan", "libtsan")), name, package)
+            check(package or name.startswith(("libc.", "libm.", "libz.", "ld-")) or "san" in name, name, place)
 
 
 @options("--max-body", "100K", "--max-client-rate", "0", "--keep-days", "3", "--uploads", "1M")
