@@ -64,13 +64,26 @@ static bool check_fields(const header_list *headers, problem_details *problem)
     return true;
 }
 
+/* The characters of uri-host [":" port] (RFC 3986, section 3.2.2). */
+static bool is_host(const char *text, size_t len)
+{
+    while (len > 0 && (text[len - 1] == ' ' || text[len - 1] == '\t'))
+        len--;
+    for (size_t i = 0; i < len; i++)
+        if (strchr("\"#/<>?@\\^`{|} \t", text[i]) || (unsigned char)text[i] >= 0x7f)
+            return false;
+    return true;
+}
+
 static bool check_host(const char *version, const header_list *headers, problem_details *problem)
 {
     size_t count;
-    header_find(headers, "Host", &count);
+    const header_field *host = header_find(headers, "Host", &count);
     bool required = strcmp(version, "HTTP/1.1") == 0;
     if (count > 1 || (required && count == 0))
         return refuse(problem, "exactly one Host header field is needed");
+    if (host && !is_host(host->value, host->value_len))
+        return refuse(problem, "the Host header field is no host name or address, with a port or without");
     return true;
 }
 

@@ -152,6 +152,31 @@ def test_cors_for_all(s):
     check(s.get("/healthz", Origin="https://any.example").headers["access-control-allow-origin"] == "*")
 
 
+BROWSER = {"User-Agent": "Mozilla/5.0", "Accept-Language": "en"}
+
+
+def test_a_name_that_a_page_made_point_here(s):
+    """DNS rebinding: to its visitor's browser the service is then the page's own server."""
+    for fields in (BROWSER, {"Accept-Language": "en"}, {"Origin": "http://evil.example"}, {"User-Agent": "Mozilla/5.0 x"}):
+        for method, path in (("GET", "/"), ("GET", "/v1/jobs"), ("POST", "/v1/jobs"), ("GET", "/nothing")):
+            reply = s.request(method, path, MATRICES if method == "POST" else None, {"Host": f"evil.example:{s.port}", **fields})
+            expect(reply, 421, "unknown_host")
+            check("--cors" in reply.json["detail"] and "evil.example" in reply.json["detail"], reply)
+    check(s.get("/v1/jobs").json["jobs"] == [])
+    for host in (f"127.0.0.1:{s.port}", "localhost", f"LOCALHOST:{s.port}", "[::1]:80", "app.localhost:5173", "desk", ""):
+        expect(s.request("GET", "/v1/jobs", headers={"Host": host, **BROWSER}), 200)
+    for host in ("localhost.evil.example", "127.0.0.1.evil.example", "evillocalhost.example", "1.2.3.4.x"):
+        expect(s.request("GET", "/v1/jobs", headers={"Host": host, **BROWSER}), 421, "unknown_host")
+    expect(s.request("GET", "/v1/jobs", headers={"Host": "solver.example"}), 200)  # a program behind a proxy, say
+
+
+@options("--cors", "https://solver.example:8443")
+def test_a_name_that_is_known(s):
+    for host in ("solver.example", "Solver.Example:8443", "solver.example:80"):
+        expect(s.request("GET", "/v1/jobs", headers={"Host": host, **BROWSER}), 200)
+    expect(s.request("GET", "/v1/jobs", headers={"Host": "solver.example.org", **BROWSER}), 421, "unknown_host")
+
+
 def test_no_cors_by_default(s):
     reply = expect(s.get("/healthz", Origin=ORIGIN), 200)
     check(not any(name.startswith("access-control") for name in reply.headers) and "vary" not in reply.headers, reply)

@@ -111,6 +111,17 @@ TEST(ambiguous_framing_is_refused)
     CHECK_INT(framing_status("HTTP/1.0", (pair[]){{"Transfer-Encoding", "chunked"}}, 1, &f), 400);
 }
 
+TEST(a_host_is_a_name_or_an_address)
+{
+    framing f;
+    static const char *const GOOD[] = {"", "x", "x:80", "[::1]:8080", "a.b-c_d.example:1 ", "%41", "127.0.0.1"},
+                             *const BAD[] = {"a b", "a/b", "http://a", "user@a", "a?b", "a#b", "\xc3\xa9", "a\tb"};
+    for (size_t i = 0; i < sizeof GOOD / sizeof GOOD[0]; i++)
+        CHECK_MSG(framing_status("HTTP/1.1", (pair[]){{"Host", GOOD[i]}}, 1, &f) == 0, "%s", GOOD[i]);
+    for (size_t i = 0; i < sizeof BAD / sizeof BAD[0]; i++)
+        CHECK_MSG(framing_status("HTTP/1.1", (pair[]){{"Host", BAD[i]}}, 1, &f) == 400, "%s", BAD[i]);
+}
+
 TEST(space_behind_a_value_is_none_of_it)
 {
     framing f;
