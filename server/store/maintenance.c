@@ -226,8 +226,8 @@ static bool copy_to(const char *part, const char *to, sqlite3 *from, const char 
     bool ok = absolute && sqlite3_open_v2(part, &copy, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL) == SQLITE_OK;
     if (!ok)
         snprintf(message, size, "cannot write %s: %s", part, copy ? sqlite3_errmsg(copy) : "no memory");
-    ok = ok && backup_uploads(from, absolute, to, message, size) && copy_pages(from, copy, message, size) &&
-         backup_uploads(copy, absolute, to, message, size);
+    ok = ok && backup_uploads(from, from, absolute, to, message, size) && copy_pages(from, copy, message, size) &&
+         backup_uploads(copy, from, absolute, to, message, size);
     free(absolute);
     if (sqlite3_close(copy) != SQLITE_OK && ok) {
         snprintf(message, size, "cannot finish %s", part);
