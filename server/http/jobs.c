@@ -18,6 +18,12 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
         reply->retry_after_s = 60;
         reply_refuse(reply, 507, "storage_full", "The disk is full",
                      "nothing was stored: delete ended jobs or free disk space, then try again");
+    } else if (status == STORE_LOCKED) {
+        reply->retry_after_s = 5;
+        store_message(context->store, cause, sizeof cause);
+        log_write(context->log, LOG_ERROR, "store_locked", (log_field[]){LOG_S("cause", cause), {0}});
+        reply_refuse(reply, 503, "store_locked", "The store is in use",
+                     "another program holds the database file: nothing was changed; try again later");
     } else if (status == STORE_BUSY) {
         reply->retry_after_s = 10;
         reply_refuse(reply, 503, "queue_full", "Too many jobs wait",

@@ -211,7 +211,7 @@ store_status statement_end(statement *st)
 {
     store_status status = STORE_OK;
     if (st->rc != SQLITE_OK && st->rc != SQLITE_ROW && st->rc != SQLITE_DONE) {
-        status = means_full(st) ? STORE_FULL : STORE_ERROR;
+        status = means_full(st) ? STORE_FULL : (st->rc & 0xff) == SQLITE_BUSY ? STORE_LOCKED : STORE_ERROR;
         snprintf(st->c->message, sizeof st->c->message, "%s (SQLite code %d)", sqlite3_errmsg(st->c->db),
                  sqlite3_extended_errcode(st->c->db));
     }

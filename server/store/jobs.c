@@ -179,7 +179,9 @@ static store_status submit(store *s, connection *c, void *args)
         if (status != STORE_NOT_FOUND)
             return status;
     }
-    store_status status = check_queue(s, c);
+    store_status status = store_check_place(s, c);
+    if (status == STORE_OK)
+        status = check_queue(s, c);
     if (status != STORE_OK)
         return status;
     store_next_id(s, id);

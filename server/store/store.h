@@ -21,6 +21,7 @@ typedef enum {
     STORE_CONFLICT,  /* the job is not in a state that allows this; or the idempotency key came with another body */
     STORE_BUSY,      /* as many jobs wait as may */
     STORE_FULL,      /* the disk is full; nothing was changed */
+    STORE_LOCKED,    /* another program holds the file; nothing was changed */
     STORE_DAMAGED,   /* what is stored of this job is not what was written: store_message names the job */
     STORE_ERROR      /* anything else: store_message says what */
 } store_status;

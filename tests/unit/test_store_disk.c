@@ -270,6 +270,23 @@ TEST(a_failing_write_is_reported_as_full)
     place_end(&p);
 }
 
+/* Another program is in the middle of a change, as with the sqlite3 shell. */
+TEST(a_file_that_another_program_holds)
+{
+    place p;
+    char id[33];
+    sqlite3 *other = NULL;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(sqlite3_open(p.path, &other), SQLITE_OK);
+    CHECK_INT(sqlite3_exec(other, "BEGIN IMMEDIATE", NULL, NULL, NULL), SQLITE_OK);
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_LOCKED);
+    CHECK_INT(sqlite3_exec(other, "ROLLBACK", NULL, NULL, NULL), SQLITE_OK);
+    sqlite3_close(other);
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    place_end(&p);
+}
+
 /* What says whether submissions are possible finds that they are not, and changes nothing. */
 TEST(a_write_is_tried)
 {
