@@ -1,6 +1,7 @@
 /* service.c: routes about the service itself: what is cached, whether it lives, what is valid. */
 #include "codec/codec.h"
 #include "codec/embedded.h"
+#include "http/conn.h"
 #include "http/deadlines.h"
 #include "http/request.h"
 #include "options.h"
@@ -23,11 +24,28 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     free(entries);
 }
 
+/* Bounds that are no options: those of this folder. */
+static const codec_limit FIXED[] = {
+    {"max_header", "bytes", "request line and header fields of a request together, about", CONNECTION_MEMORY},
+    {"max_header_fields", "count", "header fields of a request", HEADERS_MAX},
+    {"max_parameters", "count", "query parameters of a request", TARGET_MAX_PARAMETERS}};
+enum { N_FIXED = sizeof FIXED / sizeof FIXED[0] };
+
 void service_limits(api *context, http_request *rq, http_reply *reply)
 {
+    size_t n = context->n_limits;
+    codec_limit *all = malloc((n + N_FIXED) * sizeof *all);
     (void)rq;
+    if (!all) {
+        reply_no_memory(reply);
+        return;
+    }
+    if (n > 0)
+        memcpy(all, context->limits, n * sizeof *all);
+    memcpy(all + n, FIXED, sizeof FIXED);
     reply->tag_by_body = true;
-    reply_json(reply, 200, codec_encode_limits(context->limits, context->n_limits));
+    reply_json(reply, 200, codec_encode_limits(all, n + N_FIXED));
+    free(all);
 }
 
 static void reply_health(api *context, const char *status, const int64_t counts[5], http_reply *reply)

@@ -191,6 +191,7 @@ def test_limits_are_shown(s):
     check(limits["keep_days"]["value"] == 3 and limits["keep_days"]["unit"] == "days", limits)
     check(limits["keep_jobs"]["value"] is None and limits["keep_bytes"]["value"] is None, limits)
     check(limits["max_queue"]["value"] is None and limits["uploads"]["value"] == 1 << 20, limits)
+    check(limits["max_header_fields"]["value"] == 128 and limits["max_header"]["unit"] == "bytes", limits)
     check(all(one["description"] for one in limits.values()) and "listen" not in limits, limits)
     expect(s.post({**MATRICES, "tags": ["x" * 60] * 2, "pad": "y" * 102400}), 413, "body_too_large")
 
