@@ -60,6 +60,7 @@ static void block_signals(sigset_t *signals)
     sigaddset(&internal, SIGUSR1);
     pthread_sigmask(SIG_BLOCK, &internal, NULL);
     signal(SIGPIPE, SIG_IGN);
+    signal(SIGXFSZ, SIG_IGN); /* a limit on the size of files is then met as a full disk is */
 }
 
 /* OpenBLAS starts threads when it is loaded, before main: a signal for the process could be delivered to one of them.
@@ -135,6 +136,17 @@ static bool read_secrets(service *s, const server_options *options, char *messag
     if (options->webhook_secret_file[0] && !webhook_read_secret(&s->hooks, options->webhook_secret_file, message, size))
         return false;
     return !options->tls_cert[0] || http_tls_read(&s->tls, options->tls_cert, options->tls_key, message, size);
+}
+
+/* After privileges went: a token file that only root can read is not read again. */
+static void check_reload(const service *s, const server_options *options)
+{
+    if (s->auth && access(options->token_file, R_OK) != 0)
+        log_write(s->log, LOG_WARN, "tokens_not_readable_again",
+                  (log_field[]){LOG_S("file", options->token_file),
+                                LOG_S("user", options->user),
+                                LOG_S("cause", strerror(errno)),
+                                {0}});
 }
 
 static bool open_store(service *s, const server_options *options, char *message, size_t size)
@@ -225,6 +237,7 @@ static bool start(service *s, const server_options *options, char *url, size_t u
         close(fd);
         return false;
     }
+    check_reload(s, options);
     return start_http(s, options, fd, message, size);
 }
 
@@ -329,6 +342,38 @@ static int run(service *s, const server_options *options)
     return EXIT_ENDED;
 }
 
+/* Tries the address with a free port: the daemon that it is meant for may be running. */
+static bool check_listen(const service *s, const server_options *options, char *message, size_t size)
+{
+    char address[OPTION_PATH], url[160];
+    snprintf(address, sizeof address, "%s", options->listen);
+    char *port = strrchr(address, ':');
+    if (port && port[1] && !port[1 + strspn(port + 1, "0123456789")] && atol(port + 1) <= 65535)
+        strcpy(port + 1, "0");
+    int fd = http_listen(address, "http", url, sizeof url, message, size);
+    bool ok = fd >= 0 && check_exposure(s, options, fd, message, size);
+    if (fd >= 0)
+        close(fd);
+    return ok;
+}
+
+/* --check-config: the values, and whether a daemon could start with them: the files that it reads, and its address. */
+static int check_config(const server_options *options)
+{
+    char message[OPTION_PATH + 512] = "";
+    service s = {.log = log_open(stderr, LOG_ERROR)};
+    options_show(options, stdout);
+    bool good = s.log && read_secrets(&s, options, message, sizeof message) &&
+                check_listen(&s, options, message, sizeof message);
+    if (!good)
+        fprintf(stderr, "uzawad: %s\n", message);
+    auth_free(s.auth);
+    http_tls_clear(&s.tls);
+    webhook_forget_secret(&s.hooks);
+    log_close(s.log);
+    return good ? EXIT_ENDED : EXIT_FAILED;
+}
+
 /* --check-db */
 static int check_db(const char *path)
 {
@@ -376,8 +421,7 @@ int main(int argc, char **argv)
         printf("uzawad %s\n", UZAWAD_VERSION);
         return EXIT_ENDED;
     case OPTIONS_CHECK:
-        options_show(&options, stdout);
-        return EXIT_ENDED;
+        return check_config(&options);
     case OPTIONS_EXAMPLE:
         options_example(stdout);
         return EXIT_ENDED;

@@ -79,7 +79,9 @@ void options_usage(FILE *to)
         describe(text, sizeof text, &rows[i]);
         write_usage_line(to, rows[i].name, placeholder(&rows[i]), text);
     }
-    write_usage_line(to, "check-config", "", "print the values in effect and where they come from, and end");
+    write_usage_line(to, "check-config", "",
+                     "print the values in effect and where they come from, look at the files and the address that they "
+                     "name, and end");
     write_usage_line(to, "example-config", "", "print a configuration file with every option, and end");
     write_usage_line(to, "check-db", "",
                      "look whether the file of --db is whole, also while a daemon uses it, and end");

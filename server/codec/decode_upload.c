@@ -47,6 +47,10 @@ bool decode_source_open(decode_source *out, json_doc *doc, const json_t *value, 
     if (status == STORE_NOT_FOUND)
         return refuse(problem, 422, "unknown_upload", where,
                       "names no upload of this server: send the text to POST /v1/uploads first.");
+    if (status == STORE_DAMAGED)
+        return refuse(problem, 500, "stored_data_damaged", where,
+                      "names an upload whose file is not what was sent, by its digest: send the text to POST "
+                      "/v1/uploads again, which mends it.");
     if (status != STORE_OK)
         return refuse(problem, 500, "store_error", where, "names an upload that could not be read.");
     out->data = out->mapped.data;

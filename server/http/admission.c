@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 void cors_find(http_server *server, http_request *rq)
 {
@@ -30,6 +31,61 @@ static bool check_site(const http_request *rq, problem_details *problem)
                         "a browser sent this for a page of another site");
 }
 
+/* ---- names that are not ours */
+
+/* The name of a Host field or of an origin, "//name:port": what stands before the port. */
+static size_t name_len(const char *text, size_t len)
+{
+    const char *colon = memchr(text, ':', len);
+    return colon ? (size_t)(colon - text) : len;
+}
+
+/* True for a name that nobody can lead here from elsewhere: an address, a name without a dot, localhost and what is
+ * below it (RFC 6761, section 6.3), the hosts of --cors. */
+static bool is_own_name(const http_server *server, const char *host, size_t len)
+{
+    static const char LOCAL[] = ".localhost";
+    const size_t n = name_len(host, len), local = sizeof LOCAL - 1;
+    if (len == 0 || host[0] == '[' || !memchr(host, '.', n) || strspn(host, "0123456789.") >= n)
+        return true;
+    if (n > local && token_equal(host + n - local, local, LOCAL))
+        return true;
+    for (size_t i = 0; i < server->context.n_cors; i++) {
+        const char *one = server->context.cors[i], *name = strstr(one, "//");
+        const size_t size = name ? name_len(name + 2, strlen(name + 2)) : 0;
+        if (strcmp(one, "*") == 0 || (size == n && strncasecmp(name + 2, host, n) == 0))
+            return true;
+    }
+    return false;
+}
+
+/* Header fields that a browser sends whatever its page wants; other programs hardly do. */
+static bool is_browser(const http_request *rq)
+{
+    static const char *const SENT[] = {"Accept-Language", "Origin", "Referer", "Sec-Fetch-Site"};
+    const header_field *agent = header_find(&rq->headers, "User-Agent", NULL);
+    for (size_t i = 0; i < sizeof SENT / sizeof SENT[0]; i++)
+        if (header_find(&rq->headers, SENT[i], NULL))
+            return true;
+    return agent && agent->value_len >= 8 && strncasecmp(agent->value, "Mozilla/", 8) == 0;
+}
+
+/* Without tokens it is the loopback address that lets nobody in. A page gets behind it where its own host name is made
+ * to point here (DNS rebinding): for its visitor's browser this service is then the page's own server. The name that
+ * it asks for tells. */
+static bool check_name(const conn *c, problem_details *problem)
+{
+    const header_field *host = header_find(&c->request->headers, "Host", NULL);
+    if (c->server->auth || !host || is_own_name(c->server, host->value, host->value_len) || !is_browser(c->request) ||
+        http_is_public(c->fd))
+        return true;
+    return http_problem(problem, 421, "unknown_host", "This service does not go by that name",
+                        "a browser asks for \"%.*s\" on an address that is for this machine only: use "
+                        "http://127.0.0.1 or localhost, give the daemon a --token-file, or name the page's origin "
+                        "with its option --cors",
+                        (int)(host->value_len < 100 ? host->value_len : 100), host->value);
+}
+
 static bool check_body(const http_server *server, const http_request *rq, problem_details *problem)
 {
     bool takes_body = strcmp(rq->route->method, "POST") == 0;
@@ -52,11 +108,12 @@ static bool is_gzip(const header_field *coding)
 
 static bool check_type(const http_request *rq, problem_details *problem)
 {
-    const header_field *coding = header_find(&rq->headers, "Content-Encoding", NULL);
+    size_t codings;
+    const header_field *coding = header_find(&rq->headers, "Content-Encoding", &codings);
     if (strcmp(rq->route->method, "POST") != 0)
         return true;
-    if (coding && !token_equal(coding->value, coding->value_len, "identity") &&
-        !(rq->route->streamed && is_gzip(coding)))
+    if (coding && (codings > 1 || (!token_equal(coding->value, coding->value_len, "identity") &&
+                                   !(rq->route->streamed && is_gzip(coding)))))
         return http_problem(problem, 415, "content_encoding", "The content coding is not supported",
                             rq->route->streamed ? "send the body as it is, or with Content-Encoding: gzip"
                                                 : "send the body without Content-Encoding");
@@ -158,6 +215,7 @@ bool admit(conn *c)
     problem_details *problem = &rq->refused;
     bool found = target_parse(&rq->target, rq->raw_target, problem) &&
                  route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem);
-    return check_client(c, found, problem) && found && check_site(rq, problem) && check_body(server, rq, problem) &&
-           route_check_parameters(rq, problem) && check_type(rq, problem) && check_draining(server, rq, problem);
+    return check_name(c, problem) && check_client(c, found, problem) && found && check_site(rq, problem) &&
+           check_body(server, rq, problem) && route_check_parameters(rq, problem) && check_type(rq, problem) &&
+           check_draining(server, rq, problem);
 }

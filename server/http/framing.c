@@ -64,13 +64,26 @@ static bool check_fields(const header_list *headers, problem_details *problem)
     return true;
 }
 
+/* The characters of uri-host [":" port] (RFC 3986, section 3.2.2). */
+static bool is_host(const char *text, size_t len)
+{
+    while (len > 0 && (text[len - 1] == ' ' || text[len - 1] == '\t'))
+        len--;
+    for (size_t i = 0; i < len; i++)
+        if (strchr("\"#/<>?@\\^`{|} \t", text[i]) || (unsigned char)text[i] >= 0x7f)
+            return false;
+    return true;
+}
+
 static bool check_host(const char *version, const header_list *headers, problem_details *problem)
 {
     size_t count;
-    header_find(headers, "Host", &count);
+    const header_field *host = header_find(headers, "Host", &count);
     bool required = strcmp(version, "HTTP/1.1") == 0;
     if (count > 1 || (required && count == 0))
         return refuse(problem, "exactly one Host header field is needed");
+    if (host && !is_host(host->value, host->value_len))
+        return refuse(problem, "the Host header field is no host name or address, with a port or without");
     return true;
 }
 
@@ -109,7 +122,18 @@ static bool check_expect(const header_list *headers, problem_details *problem)
     return true;
 }
 
-bool framing_read(framing *out, const char *version, const header_list *headers, problem_details *problem)
+/* White space behind a value is none of it (RFC 9110, section 5.5); libmicrohttpd leaves it there. Not before the
+ * fields that say how long the body is have been read: libmicrohttpd takes those with it for something else. */
+static void trim_values(header_list *headers)
+{
+    for (size_t i = 0; i < headers->count; i++) {
+        header_field *field = &headers->fields[i];
+        while (field->value_len > 0 && strchr(" \t", field->value[field->value_len - 1]))
+            field->value_len--;
+    }
+}
+
+bool framing_read(framing *out, const char *version, header_list *headers, problem_details *problem)
 {
     size_t lengths, codings;
     memset(out, 0, sizeof *out);
@@ -126,6 +150,7 @@ bool framing_read(framing *out, const char *version, const header_list *headers,
         return refuse(problem, "Content-Length and Transfer-Encoding exclude each other");
     if ((length && !read_length(out, length, problem)) || (coding && !read_coding(out, coding, version, problem)))
         return false;
+    trim_values(headers);
     return check_expect(headers, problem);
 }
 
@@ -150,7 +175,7 @@ bool framing_tiles(const framing_layout *layout, const header_list *headers)
         for (; space < field->value; space++)
             if (*space != ' ' && *space != '\t')
                 return false;
-        next = line_end(field->value + field->value_len);
+        next = line_end(field->value + field->value_len + strspn(field->value + field->value_len, " \t"));
     }
     return next && next + 2 == end;
 }

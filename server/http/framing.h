@@ -33,8 +33,9 @@ typedef struct {
     uint64_t length; /* of the body when it is not chunked; 0 when there is none */
 } framing;
 
-/* Reads the framing; false with the problem: 400 for anything ambiguous or malformed, 417, 431, 505. */
-bool framing_read(framing *out, const char *version, const header_list *headers, problem_details *problem);
+/* Reads the framing, and takes white space behind the values of fields away; false with the problem: 400 for anything
+ * ambiguous or malformed, 417, 431, 505. */
+bool framing_read(framing *out, const char *version, header_list *headers, problem_details *problem);
 
 /* Where libmicrohttpd left the parts of a header block in its read buffer. It parses in place and writes NULs over the
  * separators, so the parts must tile the block, with one byte between words and two (CR LF) between lines. A bare LF,

@@ -98,6 +98,7 @@ static void reply_history(api *context, http_request *rq, bool csv, http_reply *
     if (jobs_load(context, rq, &j, reply) &&
         history_rows(context, &j, target_value(&rq->target, "case"), after, &found, reply))
         encode(&found, csv, reply);
+    reply->takes_ranges = reply->status == 200 && jobs_ended(&j); /* while it runs every reply is another one */
     jobs_check_still_there(context, &j, reply);
     free(found.rows);
     job_clear(&j);

@@ -19,6 +19,12 @@ void reply_store_failure(api *context, store_status status, http_reply *reply)
         reply->retry_after_s = 60;
         reply_refuse(reply, 507, "storage_full", "The disk is full",
                      "nothing was stored: delete ended jobs or free disk space, then try again");
+    } else if (status == STORE_LOCKED) {
+        reply->retry_after_s = 5;
+        store_message(context->store, cause, sizeof cause);
+        log_write(context->log, LOG_ERROR, "store_locked", (log_field[]){LOG_S("cause", cause), {0}});
+        reply_refuse(reply, 503, "store_locked", "The store is in use",
+                     "another program holds the database file: nothing was changed; try again later");
     } else if (status == STORE_BUSY) {
         reply->retry_after_s = 10;
         reply_refuse(reply, 503, "queue_full", "Too many jobs wait",
@@ -210,6 +216,16 @@ bool jobs_store(api *context, http_request *rq, const store_request *request, jo
     return true;
 }
 
+bool jobs_find_repeat(api *context, http_request *rq, const char *key, job *out)
+{
+    store_request request = {.body = rq->body ? rq->body : "", .body_len = rq->body_len, .idempotency_key = key};
+    memset(out, 0, sizeof *out);
+    if (!key || store_find_repeat(context->store, &request, out) != STORE_OK)
+        return false;
+    memcpy(rq->job_id, out->id, sizeof rq->job_id);
+    return true;
+}
+
 void jobs_acknowledge(api *context, job *j, http_reply *reply)
 {
     snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", j->id);
@@ -221,6 +237,18 @@ static void submit(api *context, http_request *rq, const store_request *request,
     job j = {0};
     if (jobs_store(context, rq, request, &j, reply))
         jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
+    job_clear(&j);
+}
+
+/* What a refused request is answered: a problem, or the job that it became when it came before. */
+static void refuse_or_repeat(api *context, http_request *rq, const char *key, const problem_details *problem,
+                             http_reply *reply)
+{
+    job j;
+    if (!jobs_find_repeat(context, rq, key, &j))
+        reply_problem(reply, problem);
+    else if (jobs_wait(context, rq, 0, &j, reply))
+        jobs_acknowledge(context, &j, reply);
     job_clear(&j);
 }
 
@@ -274,11 +302,11 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     problem_details problem = {0};
     codec_request request = {0};
     char *key = NULL;
-    bool validate_only;
+    bool validate_only = false;
     if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
         !codec_decode_with(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
         !start_check(context, &request, rq, &problem) || !jobs_check_webhook(context, request.webhook, &problem)) {
-        reply_problem(reply, &problem);
+        refuse_or_repeat(context, rq, validate_only ? NULL : key, &problem, reply);
         goto done;
     }
     if (validate_only) {

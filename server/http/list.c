@@ -69,8 +69,11 @@ static bool read_time(const http_request *rq, const char *key, double *out, prob
 {
     char text[160];
     const char *value = target_value(&rq->target, key);
-    if (!value || parse_time(value, out))
+    if (!value || parse_time(value, out)) {
+        if (value) /* 0 in a query is no bound, and no job is as old as 1970 */
+            *out = fmax(*out, 1e-3);
         return true;
+    }
     snprintf(text, sizeof text, "%s must be a time of RFC 3339 such as 2026-01-31T12:00:00Z", key);
     return refuse(problem, text);
 }
@@ -131,6 +134,7 @@ void jobs_list(api *context, http_request *rq, http_reply *reply)
     }
     for (size_t i = 0; i < count; i++)
         jobs_freshen(context, &jobs[i]);
+    reply->tag_by_body = true;
     reply_json(reply, 200, codec_encode_jobs(jobs, count, more));
     for (size_t i = 0; i < count; i++)
         job_clear(&jobs[i]);

@@ -168,7 +168,7 @@ static bool apply_range(const http_request *rq, http_reply *reply)
 static bool shrinks(const http_reply *reply)
 {
     return reply->body && reply->type &&
-           (strstr(reply->type, "json") || strncmp(reply->type, "text/", 5) == 0 ||
+           (strstr(reply->type, "json") || strstr(reply->type, "svg") || strncmp(reply->type, "text/", 5) == 0 ||
             strncmp(reply->type, "model/", 6) == 0);
 }
 

@@ -1,8 +1,9 @@
 /* service.c: routes about the service itself: what is cached, whether it lives, what is valid. */
 #include "codec/codec.h"
 #include "codec/embedded.h"
-#include "http/presence.h"
+#include "http/conn.h"
 #include "http/deadlines.h"
+#include "http/presence.h"
 #include "http/request.h"
 #include "options.h"
 
@@ -16,6 +17,7 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     uz_cache_entry *entries = NULL;
     size_t count = 0;
     (void)rq;
+    reply->tag_by_body = true;
     if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) != UZ_OK)
         reply_no_memory(reply);
     else
@@ -23,10 +25,28 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     free(entries);
 }
 
+/* Bounds that are no options: those of this folder. */
+static const codec_limit FIXED[] = {
+    {"max_header", "bytes", "request line and header fields of a request together, about", CONNECTION_MEMORY},
+    {"max_header_fields", "count", "header fields of a request", HEADERS_MAX},
+    {"max_parameters", "count", "query parameters of a request", TARGET_MAX_PARAMETERS}};
+enum { N_FIXED = sizeof FIXED / sizeof FIXED[0] };
+
 void service_limits(api *context, http_request *rq, http_reply *reply)
 {
+    size_t n = context->n_limits;
+    codec_limit *all = malloc((n + N_FIXED) * sizeof *all);
     (void)rq;
-    reply_json(reply, 200, codec_encode_limits(context->limits, context->n_limits));
+    if (!all) {
+        reply_no_memory(reply);
+        return;
+    }
+    if (n > 0)
+        memcpy(all, context->limits, n * sizeof *all);
+    memcpy(all + n, FIXED, sizeof FIXED);
+    reply->tag_by_body = true;
+    reply_json(reply, 200, codec_encode_limits(all, n + N_FIXED));
+    free(all);
 }
 
 static void reply_health(api *context, const char *status, const int64_t counts[5], http_reply *reply)
@@ -104,16 +124,16 @@ static bool solve_probe(void)
     return good;
 }
 
-/* A change of a job that does not exist goes all the way to the store's writer. */
-static bool store_takes_changes(store *s)
-{
-    return store_renew(s, "00000000000000000000000000000000", "nobody", 0, 0) == STORE_NOT_FOUND;
-}
-
 static const char *why_not_ready(api *context)
 {
-    if (!store_takes_changes(context->store))
-        return "store_unavailable";
+    char cause[256];
+    store_status status = store_try_write(context->store);
+    if (status != STORE_OK) {
+        store_message(context->store, cause, sizeof cause);
+        log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
+    }
+    if (status != STORE_OK)
+        return status == STORE_FULL ? "storage_full" : "store_unavailable";
     return solve_probe() ? "" : "solver_unavailable";
 }
 
@@ -145,6 +165,9 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
         snprintf(why, sizeof why, "store_unavailable");
     if (strcmp(why, "solver_unavailable") == 0) {
         reply_refuse(reply, 503, why, "The solver does not answer", "a problem with a known answer was not solved");
+    } else if (strcmp(why, "storage_full") == 0) {
+        reply_refuse(reply, 503, why, "The disk is full",
+                     "nothing can be stored: delete ended jobs or free disk space");
     } else if (why[0]) {
         reply_refuse(reply, 503, why, "The store does not answer", "the server's log has the cause");
     } else {

@@ -76,9 +76,15 @@ void uploads_create(api *context, http_request *rq, http_reply *reply)
 
 static void reply_failure(api *context, store_status status, http_reply *reply)
 {
+    char cause[256];
     if (status == STORE_NOT_FOUND)
         reply_refuse(reply, 404, "not_found", "Not found", "there is no upload with this id");
-    else if (status == STORE_CONFLICT)
+    else if (status == STORE_DAMAGED) {
+        store_message(context->store, cause, sizeof cause);
+        log_write(context->log, LOG_ERROR, "stored_data_damaged", (log_field[]){LOG_S("cause", cause), {0}});
+        reply_refuse(reply, 500, "stored_data_damaged", "Stored data are damaged",
+                     "the file of this upload is not what was sent, by its digest: send it again, which mends it");
+    } else if (status == STORE_CONFLICT)
         reply_refuse(reply, 409, "upload_in_use", "A job uses the upload",
                      "it stays as long as the jobs that name it: delete them first");
     else
@@ -108,6 +114,7 @@ void uploads_get(api *context, http_request *rq, http_reply *reply)
         return;
     }
     store_status status = store_upload_get(context->store, rq->name, &info);
+    reply->tag_by_body = true;
     if (status != STORE_OK)
         reply_failure(context, status, reply);
     else

@@ -34,7 +34,10 @@ void verify_submit(api *context, http_request *rq, http_reply *reply)
     char *key = NULL;
     if (!jobs_read_key(rq, &key, &problem) ||
         !codec_decode_with(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem)) {
-        reply_problem(reply, &problem);
+        if (!jobs_find_repeat(context, rq, key, &j))
+            reply_problem(reply, &problem);
+        else if (jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
+            reply_end(context, &j, reply);
         goto done;
     }
     codec_request_strip(&request);

@@ -57,14 +57,51 @@ static bool put_file(const folders *f, const char *id)
     return errno != ENOENT && copy_file(f, id);
 }
 
-static bool put_files(sqlite3 *db, const folders *f, char *message, size_t size)
+/* Takes the row of an upload out of the copy, as it went from the original a moment later. False: a job of the copy
+ * needs it. */
+static bool forget(sqlite3 *copy, const char *id)
+{
+    sqlite3_stmt *stmt = NULL;
+    bool done = sqlite3_prepare_v2(copy,
+                                   "DELETE FROM upload WHERE id = ?1"
+                                   " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = ?1)",
+                                   -1, &stmt, NULL) == SQLITE_OK &&
+                sqlite3_bind_text(stmt, 1, id, -1, SQLITE_TRANSIENT) == SQLITE_OK &&
+                sqlite3_step(stmt) == SQLITE_DONE && sqlite3_changes(copy) == 1;
+    sqlite3_finalize(stmt);
+    return done;
+}
+
+static bool has_row(sqlite3 *db, const char *id)
+{
+    sqlite3_stmt *stmt = NULL;
+    bool found = sqlite3_prepare_v2(db, "SELECT 1 FROM upload WHERE id = ?1", -1, &stmt, NULL) == SQLITE_OK &&
+                 sqlite3_bind_text(stmt, 1, id, -1, SQLITE_TRANSIENT) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW;
+    sqlite3_finalize(stmt);
+    return found;
+}
+
+/* A file that is missing may have been deleted after its row had been read: of the original the copy's turn will tell,
+ * of the copy the original does. */
+static bool put_or_forget(sqlite3 *db, sqlite3 *original, const folders *f, const char *id)
+{
+    if (put_file(f, id))
+        return true;
+    int cause = errno;
+    if (cause == ENOENT && (db == original || (!has_row(original, id) && forget(db, id))))
+        return true;
+    errno = cause;
+    return false;
+}
+
+static bool put_files(sqlite3 *db, sqlite3 *original, const folders *f, char *message, size_t size)
 {
     sqlite3_stmt *stmt = NULL;
     int rc = sqlite3_prepare_v2(db, "SELECT id FROM upload", -1, &stmt, NULL);
     bool ok = rc == SQLITE_OK;
     while (ok && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
         const char *id = (const char *)sqlite3_column_text(stmt, 0);
-        ok = id && !strchr(id, '/') && put_file(f, id);
+        ok = id && !strchr(id, '/') && put_or_forget(db, original, f, id);
         if (!ok)
             snprintf(message, size, "cannot copy upload %s: %s", id ? id : "", strerror(errno));
     }
@@ -100,7 +137,7 @@ static int has_uploads(sqlite3 *db)
     return any;
 }
 
-bool backup_uploads(sqlite3 *db, const char *from, const char *to, char *message, size_t size)
+bool backup_uploads(sqlite3 *db, sqlite3 *original, const char *from, const char *to, char *message, size_t size)
 {
     folders f = {-1, -1};
     int any = has_uploads(db);
@@ -111,7 +148,7 @@ bool backup_uploads(sqlite3 *db, const char *from, const char *to, char *message
         snprintf(message, size, "cannot open the folder of uploads beside %s: %s", f.from < 0 ? from : to,
                  strerror(errno));
     else if (any > 0)
-        ok = put_files(db, &f, message, size);
+        ok = put_files(db, original, &f, message, size);
     if (f.from >= 0)
         close(f.from);
     if (f.to >= 0)

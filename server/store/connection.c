@@ -113,6 +113,8 @@ static const char *const SQL[QUERY_COUNT] = {
                           " AND NOT EXISTS (SELECT 1 FROM upload_use WHERE upload = id) ORDER BY used LIMIT 1",
     [QUERY_UPLOAD_BYTES] = "SELECT coalesce(sum(bytes), 0) FROM upload",
     [QUERY_COUNTS] = "SELECT status, jobs FROM tally",
+    [QUERY_COUNT_ONE_MORE] = "UPDATE tally SET jobs = jobs + 1 WHERE status = 0",
+    [QUERY_COUNT_ONE_LESS] = "UPDATE tally SET jobs = jobs - 1 WHERE status = 0",
 };
 
 /* Settings of every connection. secure_delete FAST: freed pages are not rewritten only to blank them. */
@@ -185,24 +187,31 @@ bool statement_row(statement *st)
 {
     if (st->rc != SQLITE_OK && st->rc != SQLITE_ROW)
         return false;
+    errno = 0;
     st->rc = sqlite3_step(st->stmt);
+    st->cause = errno;
     return st->rc == SQLITE_ROW;
 }
 
-/* A full disk shows as SQLITE_FULL, or as an I/O error whose cause is the quota or the largest file allowed. */
-static bool means_full(connection *c, int rc)
+static bool is_full(int cause)
 {
-    if ((rc & 0xff) == SQLITE_FULL)
-        return true;
-    int cause = sqlite3_system_errno(c->db);
-    return (rc & 0xff) == SQLITE_IOERR && (cause == ENOSPC || cause == EDQUOT || cause == EFBIG);
+    return cause == ENOSPC || cause == EDQUOT || cause == EFBIG;
+}
+
+/* A full disk shows as SQLITE_FULL, or as an I/O error whose cause is the quota or the largest file allowed. SQLite
+ * does not keep the cause of a COMMIT that fails: then it is what the call left in errno. */
+static bool means_full(const statement *st)
+{
+    const int rc = st->rc & 0xff;
+    return rc == SQLITE_FULL ||
+           (rc == SQLITE_IOERR && (is_full(st->cause) || is_full(sqlite3_system_errno(st->c->db))));
 }
 
 store_status statement_end(statement *st)
 {
     store_status status = STORE_OK;
     if (st->rc != SQLITE_OK && st->rc != SQLITE_ROW && st->rc != SQLITE_DONE) {
-        status = means_full(st->c, st->rc) ? STORE_FULL : STORE_ERROR;
+        status = means_full(st) ? STORE_FULL : (st->rc & 0xff) == SQLITE_BUSY ? STORE_LOCKED : STORE_ERROR;
         snprintf(st->c->message, sizeof st->c->message, "%s (SQLite code %d)", sqlite3_errmsg(st->c->db),
                  sqlite3_extended_errcode(st->c->db));
     }

@@ -58,6 +58,8 @@ typedef enum {
     QUERY_ANSWERS,
     QUERY_HISTORY,
     QUERY_COUNTS,
+    QUERY_COUNT_ONE_MORE,
+    QUERY_COUNT_ONE_LESS,
     QUERY_UPLOAD,
     QUERY_INSERT_UPLOAD,
     QUERY_TOUCH_UPLOAD,
@@ -84,6 +86,7 @@ typedef struct {
     connection *c;
     sqlite3_stmt *stmt;
     int rc;
+    int cause; /* errno after the step that failed */
 } statement;
 
 statement statement_begin(connection *c, query_id q);

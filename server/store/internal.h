@@ -55,6 +55,7 @@ struct store {
     void (*changed)(void *ctx, const char *id); /* store_listen; may be NULL */
     void *changed_ctx;
     metrics *metrics; /* may be NULL */
+    char *path;       /* absolute, of the file */
     int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
 };
 
@@ -99,6 +100,10 @@ store_status store_give_reader(store *s, connection *c, store_status status);
 
 /* Counts the uploads and removes what a crash left of one. False: the rows can't be read (writer.message). */
 bool store_open_uploads(store *s);
+
+/* STORE_ERROR: the file was deleted, moved or replaced while it is open. What is written to it then is not found by the
+ * next start, so nothing may be acknowledged. */
+store_status store_check_place(const store *s, connection *c);
 
 /* The next id, 32 hex digits: 12 of milliseconds, 4 of a counter within them, 16 random. Under writer_lock. */
 void store_next_id(store *s, char id[33]);

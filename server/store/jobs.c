@@ -179,7 +179,9 @@ static store_status submit(store *s, connection *c, void *args)
         if (status != STORE_NOT_FOUND)
             return status;
     }
-    store_status status = check_queue(s, c);
+    store_status status = store_check_place(s, c);
+    if (status == STORE_OK)
+        status = check_queue(s, c);
     if (status != STORE_OK)
         return status;
     store_next_id(s, id);
@@ -201,6 +203,19 @@ store_status store_submit(store *s, const store_request *request, job *out, bool
     *repeated = status == STORE_OK && a.repeated;
     if (status == STORE_OK && !a.repeated)
         store_tell(s, out->id);
+    return status;
+}
+
+store_status store_find_repeat(store *s, const store_request *request, job *out)
+{
+    memset(out, 0, sizeof *out);
+    submit_args a = {request, out, false};
+    connection *c = store_take_reader(s);
+    store_status status = store_give_reader(s, c, find_key(c, &a));
+    if (status == STORE_OK)
+        status = store_settle(s); /* it may have been committed a moment ago: it is told of once it is on disk */
+    if (status != STORE_OK)
+        job_clear(out);
     return status;
 }
 

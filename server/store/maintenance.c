@@ -3,6 +3,7 @@
 #include "store/checksum.h"
 #include "store/file_format.h"
 #include "store/internal.h"
+#include "store/upload_file.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -64,8 +65,62 @@ static int check_sums(sqlite3 *db, FILE *text)
     return rc;
 }
 
-/* A damaged page may end a check early: that is a finding, not a failure of the check. */
-static bool check(sqlite3 *db, store_findings *out)
+/* True if the upload has a row at this moment. */
+static bool has_upload(sqlite3 *db, const char *id)
+{
+    sqlite3_stmt *stmt = NULL;
+    bool found = sqlite3_prepare_v2(db, "SELECT 1 FROM upload WHERE id = ?1", -1, &stmt, NULL) == SQLITE_OK &&
+                 sqlite3_bind_text(stmt, 1, id, -1, SQLITE_STATIC) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW;
+    sqlite3_finalize(stmt);
+    return found;
+}
+
+/* The file of one upload. One that a daemon deletes meanwhile is none to complain about. */
+static void check_upload(sqlite3 *db, const char *folder, const char *id, FILE *text)
+{
+    char path[4096];
+    if ((size_t)snprintf(path, sizeof path, "%s/%s", folder, id) >= sizeof path)
+        return;
+    int fd = open(path, O_RDONLY | O_CLOEXEC);
+    store_status status = fd >= 0 ? upload_file_check(fd, id) : STORE_ERROR;
+    int cause = errno;
+    if (fd >= 0)
+        close(fd);
+    if (status == STORE_DAMAGED)
+        fprintf(text, "the file of upload %s is not what was sent\n", id);
+    else if (status != STORE_OK && has_upload(db, id))
+        fprintf(text, "the file of upload %s cannot be read: %s\n", id, strerror(cause));
+}
+
+/* Ids first, a page of them at a time: no read transaction stays open while files are read. */
+static int check_uploads(sqlite3 *db, const char *folder, FILE *text)
+{
+    enum { PAGE = 100 };
+    char ids[PAGE][UPLOAD_ID_LEN + 1], last[UPLOAD_ID_LEN + 1] = "";
+    int rc = SQLITE_OK;
+    if (read_integer(db, "PRAGMA user_version") < 3)
+        return SQLITE_OK;
+    for (int n = PAGE; n == PAGE && rc == SQLITE_OK;) {
+        sqlite3_stmt *stmt = NULL;
+        n = 0;
+        rc = sqlite3_prepare_v2(db, "SELECT id FROM upload WHERE id > ?1 ORDER BY id LIMIT 100", -1, &stmt, NULL);
+        if (rc == SQLITE_OK)
+            rc = sqlite3_bind_text(stmt, 1, last, -1, SQLITE_STATIC);
+        while (rc == SQLITE_OK && n < PAGE && sqlite3_step(stmt) == SQLITE_ROW)
+            snprintf(ids[n++], sizeof ids[0], "%s", (const char *)sqlite3_column_text(stmt, 0));
+        int ended = sqlite3_finalize(stmt);
+        rc = rc == SQLITE_OK ? ended : rc;
+        for (int i = 0; i < n; i++)
+            check_upload(db, folder, ids[i], text);
+        if (n > 0)
+            memcpy(last, ids[n - 1], sizeof last);
+    }
+    return rc;
+}
+
+/* A damaged page may end a check early: that is a finding, not a failure of the check. uploads: the folder of their
+ * files. */
+static bool check(sqlite3 *db, const char *uploads, store_findings *out)
 {
     size_t len = 0;
     *out = (store_findings){0};
@@ -86,6 +141,8 @@ static bool check(sqlite3 *db, store_findings *out)
             "the tally of jobs with status %s is wrong\n", text);
     if (rc == SQLITE_OK)
         rc = check_sums(db, text);
+    if (rc == SQLITE_OK)
+        rc = check_uploads(db, uploads, text);
     if (rc != SQLITE_OK)
         fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
     out->jobs = read_integer(db, "SELECT count(*) FROM job");
@@ -100,7 +157,7 @@ static bool check(sqlite3 *db, store_findings *out)
 store_status store_check(store *s, store_findings *out)
 {
     connection *c = store_take_reader(s);
-    bool ok = check(c->db, out);
+    bool ok = check(c->db, s->uploads_folder, out);
     if (!ok)
         snprintf(c->message, sizeof c->message, "no memory for the findings");
     return store_give_reader(s, c, ok ? STORE_OK : STORE_ERROR);
@@ -134,7 +191,10 @@ bool store_check_file(const char *path, store_findings *out, char *message, size
     sqlite3 *db = open_file(path, message, size);
     if (!db)
         return false;
-    bool ok = check(db, out);
+    char folder[4096], *absolute = realpath(path, NULL);
+    snprintf(folder, sizeof folder, "%s-uploads", absolute ? absolute : path);
+    free(absolute);
+    bool ok = check(db, folder, out);
     if (!ok)
         snprintf(message, size, "no memory for the findings");
     sqlite3_close(db);
@@ -166,8 +226,8 @@ static bool copy_to(const char *part, const char *to, sqlite3 *from, const char 
     bool ok = absolute && sqlite3_open_v2(part, &copy, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL) == SQLITE_OK;
     if (!ok)
         snprintf(message, size, "cannot write %s: %s", part, copy ? sqlite3_errmsg(copy) : "no memory");
-    ok = ok && backup_uploads(from, absolute, to, message, size) && copy_pages(from, copy, message, size) &&
-         backup_uploads(copy, absolute, to, message, size);
+    ok = ok && backup_uploads(from, from, absolute, to, message, size) && copy_pages(from, copy, message, size) &&
+         backup_uploads(copy, from, absolute, to, message, size);
     free(absolute);
     if (sqlite3_close(copy) != SQLITE_OK && ok) {
         snprintf(message, size, "cannot finish %s", part);

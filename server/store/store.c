@@ -107,8 +107,22 @@ static bool open_connections(store *s, const char *path, char *message, size_t s
               open_readers(s, absolute, message, size) && open_uploads(s, absolute, message, size);
     if (!absolute)
         snprintf(message, size, "cannot resolve the path: %s", strerror(errno));
-    free(absolute);
+    if (ok)
+        s->path = absolute;
+    else
+        free(absolute);
     return ok;
+}
+
+store_status store_check_place(const store *s, connection *c)
+{
+    struct stat ours, there;
+    if (fstat(s->file, &ours) == 0 && stat(s->path, &there) == 0 && ours.st_dev == there.st_dev &&
+        ours.st_ino == there.st_ino)
+        return STORE_OK;
+    snprintf(c->message, sizeof c->message,
+             "the database file was deleted, moved or replaced while it is in use: put it back, or restart");
+    return STORE_ERROR;
 }
 
 store *store_open(const char *path, char *message, size_t size)
@@ -174,6 +188,7 @@ void store_close(store *s)
     pthread_cond_destroy(&s->sync_asked);
     pthread_mutex_destroy(&s->sync_lock);
     pthread_cond_destroy(&s->reader_free);
+    free(s->path);
     free(s->uploads_folder);
     pthread_mutex_destroy(&s->upload_lock);
     pthread_mutex_destroy(&s->message_lock);

@@ -21,6 +21,7 @@ typedef enum {
     STORE_CONFLICT,  /* the job is not in a state that allows this; or the idempotency key came with another body */
     STORE_BUSY,      /* as many jobs wait as may */
     STORE_FULL,      /* the disk is full; nothing was changed */
+    STORE_LOCKED,    /* another program holds the file; nothing was changed */
     STORE_DAMAGED,   /* what is stored of this job is not what was written: store_message names the job */
     STORE_ERROR      /* anything else: store_message says what */
 } store_status;
@@ -87,6 +88,10 @@ typedef struct {
  * body, *out is the earlier job and *repeated is true; with another body STORE_CONFLICT. STORE_NOT_FOUND: an upload is
  * not there (any more). */
 store_status store_submit(store *s, const store_request *request, job *out, bool *repeated);
+
+/* ---- repeat: the job that store_submit would answer this request with, without submitting it: STORE_OK,
+ * STORE_CONFLICT for another body; STORE_NOT_FOUND: the key is new. */
+store_status store_find_repeat(store *s, const store_request *request, job *out);
 
 /* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, owner and lease
  * set; *body is the request as submitted, freed by the caller, or NULL where it is not what was written any more:
@@ -189,6 +194,9 @@ store_status store_count_vectors(store *s, const char *id, const char *name, int
  * (0: the job) has no stored history; STORE_OK with a count of 0 when it has one but nothing after `after`. */
 store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
                                int64_t *columns);
+
+/* Writes something that changes nothing, all the way to the disk: what a submission would meet now. */
+store_status store_try_write(store *s);
 
 /* Jobs in each status, indexed by job_status. */
 store_status store_counts(store *s, int64_t counts[5]);

@@ -42,9 +42,25 @@ static bool sync_folder(const char *folder)
     return ok;
 }
 
+/* The folder; a new one is in its own folder durably before anything is put into it. */
+static bool make_folder(const char *folder)
+{
+    if (mkdir(folder, 0700) != 0)
+        return errno == EEXIST;
+    const char *slash = strrchr(folder, '/');
+    char *parent = strndup(slash ? folder : ".", slash ? (size_t)(slash - folder) + 1 : 1);
+    bool ok = parent && sync_folder(parent);
+    int cause = errno;
+    free(parent);
+    if (!ok)
+        rmdir(folder); /* the next one tries again */
+    errno = cause;
+    return ok;
+}
+
 static bool open_unfinished(upload_file *f, const char *folder)
 {
-    if (mkdir(folder, 0700) != 0 && errno != EEXIST)
+    if (!make_folder(folder))
         return false;
     if (asprintf(&f->path, "%s/" UPLOAD_INCOMING "XXXXXX", folder) < 0) {
         f->path = NULL;
@@ -144,16 +160,40 @@ upload_status upload_file_write(upload_file *f, const void *data, size_t size, c
     return put_inflated(f, message, message_size);
 }
 
-upload_status upload_file_finish(upload_file *f, char id[UPLOAD_ID_LEN + 1], char *message, size_t size)
+static void write_id(char id[UPLOAD_ID_LEN + 1], gnutls_hash_hd_t hash)
 {
     unsigned char digest[32];
+    gnutls_hash_output(hash, digest);
+    for (int i = 0; i < 32; i++)
+        snprintf(id + 2 * i, 3, "%02x", digest[i]);
+}
+
+store_status upload_file_check(int fd, const char *id)
+{
+    char found[UPLOAD_ID_LEN + 1];
+    gnutls_hash_hd_t hash;
+    unsigned char piece[16384];
+    ssize_t n;
+    off_t at = 0;
+    if (gnutls_hash_init(&hash, GNUTLS_DIG_SHA256) != 0)
+        return STORE_ERROR;
+    while ((n = pread(fd, piece, sizeof piece, at)) > 0 || (n < 0 && errno == EINTR))
+        if (n > 0) {
+            gnutls_hash(hash, piece, (size_t)n);
+            at += n;
+        }
+    write_id(found, hash);
+    gnutls_hash_deinit(hash, NULL);
+    return n < 0 ? STORE_ERROR : strcmp(found, id) == 0 ? STORE_OK : STORE_DAMAGED;
+}
+
+upload_status upload_file_finish(upload_file *f, char id[UPLOAD_ID_LEN + 1], char *message, size_t size)
+{
     if (f->gzip && (!f->between || f->z.total_in == 0))
         return UPLOAD_BAD_GZIP;
     if (fsync(f->fd) != 0)
         return fail(message, size, "sync");
-    gnutls_hash_output(f->hash, digest);
-    for (int i = 0; i < 32; i++)
-        snprintf(id + 2 * i, 3, "%02x", digest[i]);
+    write_id(id, f->hash);
     return UPLOAD_OK;
 }
 

@@ -21,6 +21,9 @@ upload_status upload_file_finish(upload_file *f, char id[UPLOAD_ID_LEN + 1], cha
 /* Gives it its name, durably. */
 upload_status upload_file_publish(upload_file *f, const char *folder, const char *id, char *message, size_t size);
 int64_t upload_file_bytes(const upload_file *f);
+/* STORE_OK where all that can be read at fd has this digest, else STORE_DAMAGED; STORE_ERROR: it can't be read. Reads
+ * with read(), not by a mapping: a bad sector is an error then, and not a signal. */
+store_status upload_file_check(int fd, const char *id);
 /* Closes it, and removes what was not published. NULL is fine. */
 void upload_file_free(upload_file *f);
 

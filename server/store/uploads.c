@@ -271,10 +271,18 @@ upload_status store_upload_end(upload_writer *w, upload_info *out, bool *known)
 
 /* ---- reading */
 
+/* What the file of an upload has must be what was sent, or a matrix would silently be another one. */
+static store_status check_file(int fd, const upload_info *info)
+{
+    struct stat st;
+    if (fstat(fd, &st) != 0)
+        return STORE_ERROR;
+    return st.st_size == info->bytes ? upload_file_check(fd, info->id) : STORE_DAMAGED;
+}
+
 store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes)
 {
     upload_info info;
-    struct stat st;
     char *path = NULL, cause[256];
     *fd = -1;
     store_status status = store_upload_get(s, id, &info);
@@ -283,16 +291,21 @@ store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes
     if (asprintf(&path, "%s/%s", s->uploads_folder, id) < 0)
         path = NULL;
     *fd = path ? open(path, O_RDONLY | O_CLOEXEC) : -1;
+    status = *fd >= 0 ? check_file(*fd, &info) : path && errno == ENOENT ? STORE_DAMAGED : STORE_ERROR;
+    int reason = path ? errno : ENOMEM;
     free(path);
     *bytes = info.bytes;
-    if (*fd >= 0 && fstat(*fd, &st) == 0 && st.st_size == info.bytes)
+    if (status == STORE_OK)
         return STORE_OK;
     if (*fd >= 0)
         close(*fd);
     *fd = -1;
-    snprintf(cause, sizeof cause, "the file of upload %s is missing or not as long as it was", id);
+    if (status == STORE_DAMAGED)
+        snprintf(cause, sizeof cause, "the file of upload %s is missing or not what was sent", id);
+    else
+        snprintf(cause, sizeof cause, "cannot read the file of upload %s: %s", id, strerror(reason));
     keep_cause(s, cause);
-    return STORE_ERROR;
+    return status;
 }
 
 store_status store_upload_text(store *s, const char *id, upload_text *out)

@@ -55,11 +55,12 @@ void store_upload_abort(upload_writer *w);
 store_status store_upload_get(store *s, const char *id, upload_info *out);
 /* STORE_CONFLICT while a job refers to it. */
 store_status store_upload_delete(store *s, const char *id);
-/* A descriptor for reading that the caller closes; stays good if the upload is deleted. */
+/* A descriptor for reading that the caller closes; stays good if the upload is deleted. All of it is read first, and
+ * STORE_DAMAGED where it is not what was sent any more, by its digest. */
 store_status store_upload_open(store *s, const char *id, int *fd, int64_t *bytes);
 
-/* The bytes of an upload, in memory for as long as they are looked at (mapped: pages that are read come from the file).
- * data is not NUL-terminated. */
+/* The bytes of an upload, checked like that, in memory for as long as they are looked at (mapped: pages that are read
+ * come from the file). data is not NUL-terminated. */
 typedef struct {
     const char *data;
     size_t len;

@@ -58,6 +58,12 @@ static store_status attempt(store *s, store_change change, void *args, uint64_t 
     return status;
 }
 
+/* The change could not be made, whatever it is. */
+static bool is_failure(store_status status)
+{
+    return status == STORE_ERROR || status == STORE_FULL || status == STORE_LOCKED;
+}
+
 static void run_alone(store *s, pending *p)
 {
     p->status = attempt(s, p->change, p->args, &p->number);
@@ -65,7 +71,7 @@ static void run_alone(store *s, pending *p)
         connection_checkpoint(&s->writer);
         p->status = attempt(s, p->change, p->args, &p->number);
     }
-    if (p->status == STORE_ERROR || p->status == STORE_FULL)
+    if (is_failure(p->status))
         store_keep_message(s, &s->writer);
 }
 
@@ -76,7 +82,7 @@ static bool run_in_savepoint(store *s, pending *p)
     if (run_query(c, QUERY_SAVEPOINT) != STORE_OK)
         return false;
     p->status = p->change(s, c, p->args);
-    if (p->status == STORE_FULL || p->status == STORE_ERROR || sqlite3_get_autocommit(c->db))
+    if (is_failure(p->status) || sqlite3_get_autocommit(c->db))
         return false;
     if (p->status != STORE_OK && run_query(c, QUERY_ROLLBACK_TO) != STORE_OK)
         return false;
@@ -101,10 +107,16 @@ static bool run_together(store *s, pending *list)
 static void run_batch(store *s, pending *list)
 {
     int count = 0;
+    bool locked = false; /* that was waited for once (busy_timeout): not again for each */
     pthread_mutex_lock(&s->writer_lock);
     if (!list->next || !run_together(s, list))
-        for (pending *p = list; p; p = p->next)
-            run_alone(s, p);
+        for (pending *p = list; p; p = p->next) {
+            if (locked)
+                p->status = STORE_LOCKED;
+            else
+                run_alone(s, p);
+            locked = p->status == STORE_LOCKED;
+        }
     pthread_mutex_unlock(&s->writer_lock);
     for (pending *p = list; p; p = p->next)
         count += p->status == STORE_OK;
@@ -175,4 +187,19 @@ store_status store_write_as(store *s, write_durability durability, store_change 
 store_status store_write(store *s, store_change change, void *args)
 {
     return store_write_as(s, WRITE_DURABLE, change, args);
+}
+
+/* There and back: a row that is given the value that it has is not written (SQLite, btreeOverwriteContent). */
+static store_status write_nothing(store *s, connection *c, void *args)
+{
+    (void)args;
+    store_status status = store_check_place(s, c);
+    if (status == STORE_OK)
+        status = run_query(c, QUERY_COUNT_ONE_MORE);
+    return status == STORE_OK ? run_query(c, QUERY_COUNT_ONE_LESS) : status;
+}
+
+store_status store_try_write(store *s)
+{
+    return store_write(s, write_nothing, NULL);
 }

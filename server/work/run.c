@@ -106,6 +106,7 @@ static const char *const NO_MEMORY_JSON = "{\"type\": \"about:blank\", \"title\"
 /* The text is `encoded`, which the run then owns, or a fixed one where there was no memory for it. */
 static void set_failed(run *r, char *encoded)
 {
+    free(r->error);
     r->error = encoded;
     r->outcome = (store_outcome){.status = JOB_FAILED, .error = encoded ? encoded : NO_MEMORY_JSON};
 }
@@ -271,28 +272,75 @@ static run_end solve(run *r)
 /* Waits longer each time, 0.05 s to 3.2 s, but not at all once the service must end. */
 static void wait_before_retry(const run *r, int attempt)
 {
-    double seconds = 0.05 * (double)(1 << (2 * attempt));
+    double seconds = 0.05 * (double)(1 << (2 * (attempt < 3 ? attempt : 3)));
     for (double waited = 0.0; waited < seconds && !atomic_load(&r->me->w->interrupt); waited += 0.05)
         nanosleep(&(struct timespec){.tv_nsec = 50000000}, NULL);
 }
 
-/* A failure that lasts leaves the job running in the store, so that the next start runs it again. */
-static bool store_outcome_of(const run *r)
+static bool is_settled(store_status status)
+{
+    return status == STORE_OK || status == STORE_CONFLICT || status == STORE_NOT_FOUND;
+}
+
+/* Room may come back, and so may a file that another program holds: that is worth a while, unless nobody wants the
+ * result any more. */
+static bool is_hopeful(const run *r, store_status status, double spent, int attempts)
+{
+    bool may_pass = status == STORE_FULL || status == STORE_LOCKED;
+    return attempts < FINISH_ATTEMPTS ||
+           (may_pass && spent < r->me->w->options.room_wait_s && !atomic_load(&r->me->cancel));
+}
+
+/* Tries to store the outcome for as long as there is hope, or until the service must end. */
+static store_status try_to_store(const run *r, bool for_ever)
 {
     work *w = r->me->w;
-    for (int attempt = 0; attempt < FINISH_ATTEMPTS; attempt++) {
+    double begun = work_clock();
+    for (int attempt = 0;; attempt++) {
         store_status status = store_finish(w->store, r->job->id, r->me->owner, &r->outcome);
-        if (status == STORE_OK)
-            return true;
-        if (status == STORE_CONFLICT || status == STORE_NOT_FOUND) {
-            log_write(w->log, LOG_WARN, "result_not_wanted", (log_field[]){LOG_S("job", r->job->id), {0}});
-            return false;
-        }
-        log_store_failure(r, LOG_WARN, "store_failed");
-        if (attempt + 1 < FINISH_ATTEMPTS)
-            wait_before_retry(r, attempt);
+        if (is_settled(status))
+            return status;
+        if (attempt < FINISH_ATTEMPTS)
+            log_store_failure(r, LOG_WARN, "store_failed");
+        if (atomic_load(&w->interrupt) || !(for_ever || is_hopeful(r, status, work_clock() - begun, attempt + 1)))
+            return status;
+        wait_before_retry(r, attempt);
     }
-    log_store_failure(r, LOG_ERROR, "result_lost");
+}
+
+/* The result cannot be kept: the job ends without it, which takes hardly any room, and says why. */
+static void give_up_result(run *r, store_status status)
+{
+    problem_details problem = {.status = 500, .code = "result_not_stored", .title = "The result could not be stored"};
+    const char *why = "The store failed, and the service's log has the cause: submit the job again.";
+    if (status == STORE_FULL) {
+        problem.status = 507;
+        strcpy(problem.code, "storage_full");
+        why = "The disk had no room for the result: delete ended jobs or free disk space, then submit the job again.";
+    }
+    snprintf(problem.detail, sizeof problem.detail, "%s", why);
+    log_store_failure(r, LOG_ERROR, "result_given_up");
+    fail_from_problem(r, &problem);
+    if (atomic_load(&r->me->cancel))
+        r->outcome = (store_outcome){.status = JOB_DISMISSED};
+}
+
+/* No job stays running for want of room: without a restart nobody would take it up. Where the service must end first,
+ * the next start runs the job again. */
+static bool store_outcome_of(run *r)
+{
+    work *w = r->me->w;
+    store_status status = try_to_store(r, false);
+    if (!is_settled(status) && !atomic_load(&w->interrupt)) {
+        give_up_result(r, status);
+        status = try_to_store(r, true);
+    }
+    if (status == STORE_OK)
+        return true;
+    if (is_settled(status))
+        log_write(w->log, LOG_WARN, "result_not_wanted", (log_field[]){LOG_S("job", r->job->id), {0}});
+    else
+        log_store_failure(r, LOG_ERROR, "result_lost");
     return false;
 }
 
@@ -350,6 +398,8 @@ static void store_end(run *r, run_end end)
     }
     if (!store_outcome_of(r))
         return;
+    if (r->outcome.status == JOB_FAILED)
+        first = NULL; /* no answer was kept */
     count_job(r, first ? uz_outcome_name(first->outcome) : NULL);
     log_write(w->log, LOG_INFO, "job_ended",
               (log_field[]){LOG_S("job", r->job->id),

@@ -225,6 +225,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     w->options = *options;
     w->options.workers = options->workers > 0 ? options->workers : 1;
     w->options.max_attempts = options->max_attempts > 0 ? options->max_attempts : 3;
+    w->options.room_wait_s = options->room_wait_s > 0.0 ? options->room_wait_s : 60.0;
     w->options.lease_s = options->lease_s > 0.0 ? options->lease_s : 30.0;
     pthread_mutex_init(&w->claim_lock, NULL);
     pthread_mutex_init(&w->lock, NULL);

@@ -38,6 +38,7 @@ typedef struct {
     size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
     double max_solve_s; /* of one job, whatever it asks for; 0: no limit */
     double lease_s;
+    double room_wait_s;        /* a result that has no room on the disk waits so long before its job is failed; 0: 60 */
     store_retention retention; /* of ended jobs */
     metrics *metrics;          /* may be NULL */
 } work_options;

@@ -309,6 +309,14 @@ def test_user(s):
         status = dict(line.rstrip("\n").split(":\t", 1) for line in file if ":\t" in line)
     check(set(status["Uid"].split()) == {str(os.stat(s.db).st_uid)} != {"0"} and "0" not in status["Gid"].split(), status)
     check(s.solve(MATRICES)["status"] == "successful")
+    check(s.end() == 0 and not s.events("tokens_not_readable_again"), s.log())
+    tokens = os.path.join(s.folder, "tokens")  # root's, which nobody cannot read again
+    write_tokens("boss admin " + "b" * 20, path=tokens)
+    s.options = ("--user", "nobody", "--token-file", tokens)
+    s.start()
+    warned = s.events("tokens_not_readable_again")
+    check(len(warned) == 1 and warned[0]["file"] == tokens, s.log())
+    expect(s.get("/v1/jobs", Authorization="Bearer " + "b" * 20), 200)
 
 
 if __name__ == "__main__":

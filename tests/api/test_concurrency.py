@@ -2,6 +2,8 @@
 import copy
 import http.client
 import json
+import os
+import sqlite3
 import threading
 import time
 
@@ -371,6 +373,36 @@ def test_one_key_with_unlike_bodies(s):
             if i not in taken:
                 expect(reply, 422, "idempotency_key_reused")
     check(len(pages(s)) == 4)
+
+
+def test_another_program_holds_the_database(s):
+    """Nobody is told of a failure of the service, and what ran meanwhile is kept."""
+    job = s.post({**SCENE, "solver": {"method": "uzawa", "alpha": 1e-9, "max_iterations": 1000000000, "time_limit_s": 0.5}}).json["id"]
+    s.wait_status(job, "running")
+    other = sqlite3.connect(s.db, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    reply = expect(s.post(MATRICES), 503, "store_locked")
+    check(int(reply.headers["retry-after"]) > 0, reply)
+    check(expect(s.get(f"/v1/jobs/{job}"), 200).json["status"] == "running")  # whose end waits
+    other.execute("ROLLBACK")
+    other.close()
+    check(s.wait_status(job, "successful", "failed")["summary"]["outcome"] == "time_limit")
+    check(s.solve(MATRICES)["status"] == "successful")
+
+
+def test_the_database_goes_from_its_place(s):
+    """What would be written to a file that no start finds again is not acknowledged."""
+    kept = s.solve(MATRICES)["id"]
+    os.rename(s.db, s.db + ".away")
+    expect(s.post(MATRICES), 500, "store_error")
+    check("replaced" in s.events("store_error")[-1]["cause"], s.log())
+    time.sleep(1.1)
+    expect(s.get("/readyz"), 503, "store_unavailable")
+    expect(s.get(f"/v1/jobs/{kept}"), 200)
+    os.rename(s.db + ".away", s.db)
+    check(s.solve(MATRICES)["status"] == "successful")
+    s.restart(15)
+    check(len(s.get("/v1/jobs").json["jobs"]) == 2)
 
 
 if __name__ == "__main__":

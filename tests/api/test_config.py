@@ -2,10 +2,12 @@
 import json
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 
 import service
-from service import MATRICES, SCENE, check, expect, options
+from service import MATRICES, SCENE, Skip, check, expect, options
 
 
 def run(s, *arguments, **environment):
@@ -101,6 +103,28 @@ def test_mistakes_name_their_place(s):
 
 
 @options(None)
+def test_a_configuration_that_could_not_start(s):
+    """The values are printed, and what is wrong with the files and the address that they name."""
+    tokens = os.path.join(s.folder, "tokens")
+    pathlib.Path(tokens).write_text("reader read secret\n", encoding="utf-8")
+    os.chmod(tokens, 0o600)
+    for arguments, words in ((["--listen", "nonsense"], "HOST:PORT"), (["--listen", "127.0.0.1:99999"], "65535"),
+                             (["--listen", "192.0.2.1:80"], "192.0.2.1"), (["--listen", "0.0.0.0:80"], "--token-file"),
+                             (["--token-file", "/nonexistent/x"], "/nonexistent/x"), (["--token-file", tokens], tokens + ":1"),
+                             (["--webhook-secret-file", "/nonexistent/y"], "/nonexistent/y"),
+                             (["--tls-cert", "/nonexistent/c", "--tls-key", "/nonexistent/k"], "/nonexistent/c")):
+        got = run(s, "--check-config", *arguments)
+        check(got.returncode == 1 and words in got.stderr and "listen = " in got.stdout, arguments, got)
+        started = run(s, "--db", s.db, *arguments)  # it is what a start would have said
+        check(started.returncode == 1 and words in started.stderr, arguments, started)
+    got = run(s, "--check-config", "--listen", "0.0.0.0:80", "--insecure-public")
+    check(got.returncode == 0 and not got.stderr, got)
+    s.start()
+    got = run(s, "--check-config", "--listen", f"{s.host}:{s.port}", "--db", s.db)  # the one that runs
+    check(got.returncode == 0 and not got.stderr, got)
+
+
+@options(None)
 def test_the_sample_is_the_table(s):
     sample = (service.ROOT / "server/uzawad.conf.example").read_text(encoding="utf-8")
     check(run(s, "--example-config").stdout == sample, "write it again: uzawad --example-config")
@@ -116,6 +140,49 @@ def test_the_sample_is_the_table(s):
         check(source.endswith("of the file") or name in ("config", *computed), name, source)
 
 
+def option_names(s):
+    return set(re.findall(r"^  --([a-z-]+)", run(s, "--help").stdout, re.MULTILINE))
+
+
+@options(None)
+def test_the_unit_is_one(s):
+    """What the systemd unit says, systemd understands, also with the lines that are there to be uncommented."""
+    unit = (service.ROOT / "server/uzawad.service").read_text(encoding="utf-8")
+    used = set(re.findall(r"--([a-z][a-z-]*)", "\n".join(re.findall(r"^Exec.*", unit, re.MULTILINE))))
+    check(used and used <= option_names(s), used)
+    if not shutil.which("systemd-analyze"):
+        raise Skip("no systemd-analyze")
+    check("\n#LoadCredential=" in unit and "/usr/local/bin/uzawad" in unit, unit)
+    path = pathlib.Path(s.folder) / "uzawad.service"
+    for text in (unit, re.sub(r"^#(?=[A-Z][A-Za-z]+=)", "", unit, flags=re.MULTILINE)):
+        path.write_text(text.replace("/usr/local/bin/uzawad", str(pathlib.Path(s.build).resolve() / "uzawad")), encoding="utf-8")
+        got = subprocess.run(["systemd-analyze", "verify", str(path)], capture_output=True, text=True, timeout=60, check=False)
+        check(got.returncode == 0 and not got.stderr.strip(), got)
+
+
+@options(None)
+def test_the_container_has_what_the_daemon_needs(s):
+    text = (service.ROOT / "server/Containerfile").read_text(encoding="utf-8").replace("\\\n", " ")
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    named = {name.lower().replace("_", "-") for line in lines if line.startswith("ENV ")
+             for name in re.findall(r"UZAWAD_([A-Z_]+)=", line)}
+    check(named and named <= option_names(s), named)
+    image = lines[[i for i, line in enumerate(lines) if line.startswith("FROM ")][-1]:]
+    packages = set(" ".join(line for line in image if "apt-get install" in line).split())
+    if not shutil.which("dpkg-query") or not shutil.which("ldd"):
+        raise Skip("no dpkg-query or no ldd")
+    for program in ("uzawad", "uzawa"):
+        file = str(pathlib.Path(s.build).resolve() / program)
+        found = subprocess.run(["ldd", file], capture_output=True, text=True, check=True).stdout
+        direct = subprocess.run(["readelf", "-d", file], capture_output=True, text=True, check=True).stdout
+        for name in re.findall(r"NEEDED.*\[(.*)\]", direct):
+            place = re.search(re.escape(name) + r" => (\S+)", found)
+            owner = subprocess.run(["dpkg-query", "-S", os.path.realpath(place[1])], capture_output=True, text=True, check=False) if place else None
+            package = owner.stdout.split(":")[0] if owner and owner.returncode == 0 else None
+            check(package in packages or package in (None, "libc6") or name.startswith(("libasan", "libubsan", "libtsan")), name, package)
+            check(package or name.startswith(("libc.", "libm.", "libz.", "ld-")) or "san" in name, name, place)
+
+
 @options("--max-body", "100K", "--max-client-rate", "0", "--keep-days", "3", "--uploads", "1M")
 def test_limits_are_shown(s):
     limits = expect(s.get("/v1/limits"), 200).json["limits"]
@@ -124,6 +191,7 @@ def test_limits_are_shown(s):
     check(limits["keep_days"]["value"] == 3 and limits["keep_days"]["unit"] == "days", limits)
     check(limits["keep_jobs"]["value"] is None and limits["keep_bytes"]["value"] is None, limits)
     check(limits["max_queue"]["value"] is None and limits["uploads"]["value"] == 1 << 20, limits)
+    check(limits["max_header_fields"]["value"] == 128 and limits["max_header"]["unit"] == "bytes", limits)
     check(all(one["description"] for one in limits.values()) and "listen" not in limits, limits)
     expect(s.post({**MATRICES, "tags": ["x" * 60] * 2, "pad": "y" * 102400}), 413, "body_too_large")
 

@@ -67,6 +67,31 @@ def test_a_vector(s):
     s.start()
 
 
+@options("--workers", "1")
+def test_an_upload(s):
+    """A matrix on disk that is another one now is no matrix of anybody's problem."""
+    text = MATRICES["problem"]["K"].encode()
+    upload = s.request("POST", "/v1/uploads", text).json["id"]
+    body = {"problem": {**MATRICES["problem"], "K": {"upload": upload}}}
+    running = s.post(ENDLESS).json["id"]  # the only worker: the next job waits
+    s.wait_status(running, "running")
+    waits = s.post(body).json["id"]
+    file = pathlib.Path(s.db + "-uploads") / upload
+    file.write_bytes(text.replace(b"1 1 2", b"1 1 9"))
+    refused = expect(s.post(body), 500, "stored_data_damaged")
+    check(refused.json["pointer"] == "/problem/K/upload" and "again" in refused.json["detail"], refused)
+    expect(s.get(f"/v1/uploads/{upload}", Accept="application/octet-stream"), 500, "stored_data_damaged")
+    s.request("DELETE", f"/v1/jobs/{running}")
+    job = s.wait_status(waits, "failed", "successful")
+    check(job["status"] == "failed" and job["error"]["code"] == "stored_data_damaged", job)
+    found = expect(s.request("POST", "/v1/admin/check"), 200).json
+    check(not found["whole"] and any(upload in one for one in found["findings"]), found)
+    check(findings(s)[0] != 0, findings(s))
+    expect(s.request("POST", "/v1/uploads", text), 200)  # the way out
+    check(s.solve(body)["summary"]["outcome"] == "converged")
+    check(findings(s)[0] == 0, findings(s))
+
+
 def test_a_start(s):
     """A run does not begin where a damaged one ended."""
     job = s.solve(SCENE)["id"]

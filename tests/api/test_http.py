@@ -2,6 +2,7 @@
 import gzip
 import json
 import re
+import signal
 import threading
 import time
 
@@ -310,6 +311,29 @@ def test_idempotency(s):
     check(len(s.get("/v1/jobs").json["jobs"]) == 1)
     for wrong in ("", "x" * 256, "caf\u00e9"):
         expect(s.post(MATRICES, {"Idempotency-Key": wrong.encode("utf-8")}), 400, "bad_idempotency_key")
+
+
+def test_a_repeat_is_answered_though_it_would_be_refused_now(s):
+    key = {"Idempotency-Key": "again"}
+    start = s.solve(SCENE)["id"]
+    warm = {**SCENE, "solver": {"warm_start": {"job": start}}}
+    first = s.post(warm, {**key, "Prefer": "wait=60"}).json
+    check(first["status"] == "successful", first)
+    check_id = s.request("POST", "/v1/verify", json.loads((service.ROOT / "tests/data/verify.json").read_text()),
+                         {"Idempotency-Key": "certify"}).json["job"]
+    expect(s.request("DELETE", f"/v1/jobs/{start}"), 204)
+    expect(s.post(warm), 422, "not_allowed")
+    again = expect(s.post(warm, key), 200)
+    check(again.json["id"] == first["id"] and again.headers["location"].endswith(first["id"]), again)
+    expect(s.post({**warm, "tags": ["other"]}, key), 422, "not_allowed")
+    expect(s.post(warm, key, "?validate=true"), 422, "not_allowed")
+    s.options = ("--max-dofs", "1")
+    s.restart(signal.SIGTERM)
+    expect(s.post(SCENE), 413)
+    check(expect(s.post(warm, key), 200).json["id"] == first["id"])
+    verified = s.request("POST", "/v1/verify", json.loads((service.ROOT / "tests/data/verify.json").read_text()),
+                         {"Idempotency-Key": "certify"})
+    check(expect(verified, 200).json["job"] == check_id, verified)
 
 
 def test_idempotency_race(s):

@@ -1,5 +1,6 @@
 """What the daemon tells its operators: metrics, health, request ids."""
 import re
+import resource
 import time
 
 import service
@@ -104,10 +105,28 @@ def test_queue_and_workers(s):
 
 
 def test_ready_solves_a_problem(s):
-    commits = scrape(s)["uzawad_store_changes_total", ""]
+    commits, begun = scrape(s)["uzawad_store_changes_total", ""], time.monotonic()
     for _ in range(50):
         check(expect(s.get("/readyz"), 200).json["status"] == "ready")
-    check(scrape(s)["uzawad_jobs", 'status="successful"'] == 0 and scrape(s)["uzawad_store_changes_total", ""] == commits)
+    seconds, now = time.monotonic() - begun, scrape(s)
+    made = now["uzawad_store_changes_total", ""] - commits
+    check(1 <= made <= 1 + seconds, made, seconds)  # it is tried once a second at most
+    check(now["uzawad_jobs", 'status="successful"'] == 0)
+
+
+def test_ready_finds_a_full_disk(s):
+    """No file of the daemon may grow or be written: as on a full disk, and then there is room again."""
+    check(s.solve(MATRICES)["status"] == "successful")
+    resource.prlimit(s.process.pid, resource.RLIMIT_FSIZE, (1, resource.RLIM_INFINITY))
+    time.sleep(1.1)  # what was found out before is good for a second
+    reply = expect(s.get("/readyz"), 503, "storage_full")
+    check("retry-after" in reply.headers, reply)
+    expect(s.post(MATRICES), 507, "storage_full")
+    expect(s.get("/healthz"), 200)
+    resource.prlimit(s.process.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    time.sleep(1.1)
+    expect(s.get("/readyz"), 200)
+    check(s.solve(MATRICES)["status"] == "successful")
 
 
 @options("--workers", "1")

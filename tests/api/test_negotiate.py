@@ -10,8 +10,10 @@ UNKNOWN = "0" * 32
 def test_etags(s):
     job = s.solve(SCENE)
     base = f"/v1/jobs/{job['id']}"
+    upload = s.request("POST", "/v1/uploads", b"text").headers["location"]
     for path in (base, base + "/result", base + "/result?fields=displacements", base + "/history",
-                 base + "/history.csv", "/openapi.json", "/schemas/job.json"):
+                 base + "/history.csv", "/openapi.json", "/schemas/job.json", "/v1/jobs", "/v1/jobs?limit=1",
+                 "/v1/limits", "/v1/factors", upload):
         first = expect(s.get(path), 200)
         tag = first.headers["etag"]
         check(tag[0] == tag[-1] == '"' and len(tag) > 10, first.headers)
@@ -32,16 +34,18 @@ def test_the_tag_follows_the_job(s):
     job = s.post(ENDLESS).json
     running = s.wait_status(job["id"], "running")
     path = f"/v1/jobs/{job['id']}"
-    tag = s.get(path).headers["etag"]
+    tag, tag_of_list = s.get(path).headers["etag"], s.get("/v1/jobs").headers["etag"]
     s.request("DELETE", path)
     s.wait_status(running["id"], "dismissed")
     check(expect(s.get(path, If_None_Match=tag), 200).json["status"] == "dismissed")
+    check(expect(s.get("/v1/jobs", If_None_Match=tag_of_list), 200).json["jobs"][0]["status"] == "dismissed")
 
 
 def test_gzip(s):
     job = s.solve(SCENE)
     base = f"/v1/jobs/{job['id']}"
-    for path in (base + "/result?fields=displacements,reactions", base + "/history.csv", "/openapi.json"):
+    for path in (base + "/result?fields=displacements,reactions", base + "/history.csv", "/openapi.json",
+                 base + "/deformed.svg", base + "/convergence.svg"):
         plain = expect(s.get(path), 200)
         check("content-encoding" not in plain.headers and "accept-encoding" in plain.headers["vary"].lower(), plain)
         for takes in ("gzip", "br, gzip;q=0.5", "*", "x-gzip", "GZIP", "identity;q=0, *;q=0.1"):
@@ -65,7 +69,8 @@ def test_ranges(s):
     job = s.solve(SCENE)
     text = b"%%MatrixMarket matrix array real general\n1 1\n1\n" * 100
     upload = s.request("POST", "/v1/uploads", text).headers["location"]
-    for path, headers in ((f"/v1/jobs/{job['id']}/result", {}), (upload, {"Accept": "application/octet-stream"})):
+    base = f"/v1/jobs/{job['id']}"
+    for path, headers in ((base + "/result", {}), (base + "/history", {}), (base + "/history.csv", {}), (upload, {"Accept": "application/octet-stream"})):
         def part(wanted, **more):
             return s.request("GET", path, headers={**headers, "Range": wanted,
                                                    **{k.replace("_", "-"): v for k, v in more.items()}})
@@ -89,6 +94,9 @@ def test_ranges(s):
         for other in ('"other"', f"W/{tag}", "Sat, 01 Jan 2000 00:00:00 GMT"):
             check(part("bytes=0-3", If_Range=other).status == 200, other)
         check(part("bytes=0-3", If_None_Match=tag).status == 304)
+    live = s.post(ENDLESS).json["id"]
+    s.wait_status(live, "running")
+    check("accept-ranges" not in expect(s.get(f"/v1/jobs/{live}/history"), 200).headers)  # it is another one each time
     check(expect(s.get("/healthz", Range="bytes=0-1"), 200).json["status"] == "ok")
 
 
@@ -142,6 +150,31 @@ def test_cors(s):
 @options("--cors", "*")
 def test_cors_for_all(s):
     check(s.get("/healthz", Origin="https://any.example").headers["access-control-allow-origin"] == "*")
+
+
+BROWSER = {"User-Agent": "Mozilla/5.0", "Accept-Language": "en"}
+
+
+def test_a_name_that_a_page_made_point_here(s):
+    """DNS rebinding: to its visitor's browser the service is then the page's own server."""
+    for fields in (BROWSER, {"Accept-Language": "en"}, {"Origin": "http://evil.example"}, {"User-Agent": "Mozilla/5.0 x"}):
+        for method, path in (("GET", "/"), ("GET", "/v1/jobs"), ("POST", "/v1/jobs"), ("GET", "/nothing")):
+            reply = s.request(method, path, MATRICES if method == "POST" else None, {"Host": f"evil.example:{s.port}", **fields})
+            expect(reply, 421, "unknown_host")
+            check("--cors" in reply.json["detail"] and "evil.example" in reply.json["detail"], reply)
+    check(s.get("/v1/jobs").json["jobs"] == [])
+    for host in (f"127.0.0.1:{s.port}", "localhost", f"LOCALHOST:{s.port}", "[::1]:80", "app.localhost:5173", "desk", ""):
+        expect(s.request("GET", "/v1/jobs", headers={"Host": host, **BROWSER}), 200)
+    for host in ("localhost.evil.example", "127.0.0.1.evil.example", "evillocalhost.example", "1.2.3.4.x"):
+        expect(s.request("GET", "/v1/jobs", headers={"Host": host, **BROWSER}), 421, "unknown_host")
+    expect(s.request("GET", "/v1/jobs", headers={"Host": "solver.example"}), 200)  # a program behind a proxy, say
+
+
+@options("--cors", "https://solver.example:8443")
+def test_a_name_that_is_known(s):
+    for host in ("solver.example", "Solver.Example:8443", "solver.example:80"):
+        expect(s.request("GET", "/v1/jobs", headers={"Host": host, **BROWSER}), 200)
+    expect(s.request("GET", "/v1/jobs", headers={"Host": "solver.example.org", **BROWSER}), 421, "unknown_host")
 
 
 def test_no_cors_by_default(s):

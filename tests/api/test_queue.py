@@ -49,6 +49,8 @@ def test_list_by_time_and_order(s):
         check(listed(s, since=text, status="successful", order="asc") == all_ids[3:], text)
     check(ids(s.get(f"/v1/jobs?since={later.astimezone(zone).isoformat()}")) == all_ids[:2:-1])  # '+' not escaped
     check(listed(s, since="2099-01-01T00:00:00Z") == [] and listed(s, until="1999-01-01T00:00:00-11:00") == [])
+    for first in ("1970-01-01T00:00:00Z", "1969-12-31T23:59:59Z", "0001-01-01T00:00:00Z"):
+        check(listed(s, until=first) == [] and listed(s, since=first) == all_ids[::-1], first)
     for key in ("since", "until"):
         for wrong in ("", "yesterday", "2026-01-31", "2026-02-30T00:00:00Z", "2026-01-31T24:00:00Z", "1769860800",
                       "2026-01-31T12:00:00", "2026-01-31T12:00:00.Z", "2026-01-31T12:00:00+1:00", "2026-13-01T00:00:00Z"):

@@ -66,6 +66,12 @@ def test_gzip(s):
     for wrong in (K, squeezed[:-3], squeezed + b"x", squeezed[:10], squeezed[:-6] + bytes(6)):
         expect(send(s, wrong, Content_Encoding="gzip"), 400, "bad_gzip")
     expect(send(s, K, Content_Encoding="br"), 415, "content_encoding")
+    for two in ((b"gzip", b"gzip"), (b"identity", b"gzip")):  # one list of codings (RFC 9110, section 5.3)
+        fields = b"".join(b"Content-Encoding: " + one + b"\r\n" for one in two)
+        data, _ = s.raw(b"POST /v1/uploads HTTP/1.1\r\nHost: x\r\nConnection: close\r\n" + fields +
+                        b"Content-Length: %d\r\n\r\n" % len(squeezed) + squeezed)
+        check(service.head_of(data)[0] == 415, data)
+    check(expect(send(s, squeezed, Content_Encoding="gzip "), 200).json["id"] == digest(K))
     expect(send(s, b""), 400, "empty_upload")
     check(len(files(s)) == 2, files(s))
 

@@ -111,6 +111,34 @@ TEST(ambiguous_framing_is_refused)
     CHECK_INT(framing_status("HTTP/1.0", (pair[]){{"Transfer-Encoding", "chunked"}}, 1, &f), 400);
 }
 
+TEST(a_host_is_a_name_or_an_address)
+{
+    framing f;
+    static const char *const GOOD[] = {"", "x", "x:80", "[::1]:8080", "a.b-c_d.example:1 ", "%41", "127.0.0.1"},
+                             *const BAD[] = {"a b", "a/b", "http://a", "user@a", "a?b", "a#b", "\xc3\xa9", "a\tb"};
+    for (size_t i = 0; i < sizeof GOOD / sizeof GOOD[0]; i++)
+        CHECK_MSG(framing_status("HTTP/1.1", (pair[]){{"Host", GOOD[i]}}, 1, &f) == 0, "%s", GOOD[i]);
+    for (size_t i = 0; i < sizeof BAD / sizeof BAD[0]; i++)
+        CHECK_MSG(framing_status("HTTP/1.1", (pair[]){{"Host", BAD[i]}}, 1, &f) == 400, "%s", BAD[i]);
+}
+
+TEST(space_behind_a_value_is_none_of_it)
+{
+    framing f;
+    header_list list;
+    problem_details problem = {0};
+    set_headers(&list, (pair[]){{"Host", "x \t "}, {"A", " "}, {"B", "b c"}, {"Expect", "100-continue "}}, 4);
+    CHECK(framing_read(&f, "HTTP/1.1", &list, &problem));
+    CHECK(list.fields[0].value_len == 1 && list.fields[1].value_len == 0 && list.fields[2].value_len == 3);
+    set_headers(&list, (pair[]){{"Host", "x"}, {"Transfer-Encoding", "chunked "}}, 2);
+    CHECK(!framing_read(&f, "HTTP/1.1", &list, &problem) && problem.status == 400);
+    list.count = 1;
+    char block[] = "GET\0/a\0HTTP/1.1\0\0Host\0 x \t\0\0\0\0"; /* the layout allows it too */
+    list.fields[0] = (header_field){block + 17, block + 23, 4, 1};
+    framing_layout layout = {block, block + 4, block + 7, 2, sizeof block - 1};
+    CHECK(framing_tiles(&layout, &list));
+}
+
 /* A block as the parser leaves it: '0' stands for NUL. */
 static bool tiles(const char *text)
 {

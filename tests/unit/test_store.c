@@ -174,7 +174,16 @@ TEST(idempotency_key)
               STORE_CONFLICT);
     CHECK(!repeated && !second.tags && !second.id[0]);
     CHECK_INT(submit_text(p.s, "{\"a\": 1} ", "[]", "key-1", id), STORE_CONFLICT); /* a longer body */
-    CHECK_INT(submit_text(p.s, "{\"a\": 2}", "[]", "key-2", id), STORE_OK);        /* another key */
+    store_request request = {.body = "{\"a\": 1}", .body_len = 8, .idempotency_key = "key-1"};
+    CHECK_INT(store_find_repeat(p.s, &request, &second), STORE_OK);
+    CHECK_STR(second.id, first.id);
+    job_clear(&second);
+    request.body_len = 7;
+    CHECK_INT(store_find_repeat(p.s, &request, &second), STORE_CONFLICT);
+    CHECK(!second.tags && !second.id[0]);
+    request.idempotency_key = "key-0";
+    CHECK_INT(store_find_repeat(p.s, &request, &second), STORE_NOT_FOUND);
+    CHECK_INT(submit_text(p.s, "{\"a\": 2}", "[]", "key-2", id), STORE_OK); /* another key */
     CHECK(place_reopen(&p));
     CHECK_INT(submit_text(p.s, "{\"a\": 1}", "[]", "key-1", id), STORE_OK);
     CHECK_STR(id, first.id);

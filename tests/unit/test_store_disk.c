@@ -270,6 +270,60 @@ TEST(a_failing_write_is_reported_as_full)
     place_end(&p);
 }
 
+/* Another program is in the middle of a change, as with the sqlite3 shell. */
+TEST(a_file_that_another_program_holds)
+{
+    place p;
+    char id[33];
+    sqlite3 *other = NULL;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(sqlite3_open(p.path, &other), SQLITE_OK);
+    CHECK_INT(sqlite3_exec(other, "BEGIN IMMEDIATE", NULL, NULL, NULL), SQLITE_OK);
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_LOCKED);
+    CHECK_INT(sqlite3_exec(other, "ROLLBACK", NULL, NULL, NULL), SQLITE_OK);
+    sqlite3_close(other);
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    place_end(&p);
+}
+
+/* What says whether submissions are possible finds that they are not, and changes nothing. */
+TEST(a_write_is_tried)
+{
+    place p;
+    char id[33];
+    int64_t counts[5];
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(store_try_write(p.s), STORE_OK);
+    CHECK_INT(store_counts(p.s, counts), STORE_OK);
+    CHECK_INT(counts[JOB_ACCEPTED], 1);
+    store_close(p.s);
+    p.s = NULL;
+    pid_t child = fork();
+    if (child == 0) {
+        struct rlimit none = {1, RLIM_INFINITY}, all = {RLIM_INFINITY, RLIM_INFINITY};
+        char message[300];
+        signal(SIGXFSZ, SIG_IGN);
+        store *s = store_open(p.path, message, sizeof message);
+        if (!s || setrlimit(RLIMIT_FSIZE, &none) != 0)
+            _exit(1);
+        if (store_try_write(s) != STORE_FULL || store_counts(s, counts) != STORE_OK || counts[JOB_ACCEPTED] != 1)
+            _exit(2);
+        if (setrlimit(RLIMIT_FSIZE, &all) != 0 || store_try_write(s) != STORE_OK)
+            _exit(3);
+        store_close(s);
+        _exit(0);
+    }
+    int status = -1;
+    waitpid(child, &status, 0);
+    CHECK(WIFEXITED(status));
+    CHECK_INT(WEXITSTATUS(status), 0);
+    CHECK(place_open(&p));
+    place_end(&p);
+}
+
 /* ---- the journal stays small and only the writer's settings are in force */
 
 TEST(journal_is_wal_and_is_cut)

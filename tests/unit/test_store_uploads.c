@@ -1,4 +1,5 @@
 /* Uploads, expiry, retention and webhooks in the store: what the API tests can't reach or would wait for. */
+#include "store/backup_uploads.h"
 #include "store/maintenance.h"
 #include "store_place.h"
 #include "store/uploads.h"
@@ -122,6 +123,57 @@ TEST(a_backup_has_the_uploads)
     end_place(&p);
 }
 
+/* What backup_uploads makes of a copy: 2 done, and the row is there; 1 done, without it; 0 refused. */
+static int second_pass(const char *from, const char *to)
+{
+    sqlite3 *original = NULL, *copy = NULL;
+    sqlite3_stmt *stmt = NULL;
+    char message[300] = "";
+    CHECK_INT(sqlite3_open(from, &original), SQLITE_OK);
+    CHECK_INT(sqlite3_open(to, &copy), SQLITE_OK);
+    bool ok = backup_uploads(copy, original, from, to, message, sizeof message);
+    CHECK_MSG(ok || strstr(message, ABC), "%s", message);
+    CHECK_INT(sqlite3_prepare_v2(copy, "SELECT 1 FROM upload", -1, &stmt, NULL), SQLITE_OK);
+    bool row = sqlite3_step(stmt) == SQLITE_ROW;
+    sqlite3_finalize(stmt);
+    sqlite3_close(copy);
+    sqlite3_close(original);
+    return ok ? 1 + row : 0;
+}
+
+/* An upload that is deleted between the copy of the pages and that of its file. */
+TEST(a_backup_while_an_upload_goes)
+{
+    for (int used = 0; used < 2; used++) {
+        place p;
+        upload_info info;
+        job j = {0};
+        job_status was;
+        bool known, repeated;
+        char copy[256], file[400], message[300] = "", ids[1][65] = {ABC};
+        if (!place_begin(&p))
+            return;
+        snprintf(copy, sizeof copy, "%s/copy.db", p.folder);
+        CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
+        store_request request = {.body = "{}", .body_len = 2, .uploads = ids, .n_uploads = 1};
+        if (used)
+            CHECK_INT(store_submit(p.s, &request, &j, &repeated), STORE_OK);
+        CHECK_MSG(store_backup_file(p.path, copy, NULL, message, sizeof message), "%s", message);
+        snprintf(file, sizeof file, "%s-uploads/" ABC, copy);
+        CHECK_INT(unlink(file), 0);
+        CHECK_INT(second_pass(p.path, copy), 2); /* it is linked again: the original has it */
+        CHECK_INT(unlink(file), 0);
+        if (used)
+            CHECK(store_dismiss(p.s, j.id, &was) == STORE_OK && store_dismiss(p.s, j.id, &was) == STORE_OK);
+        CHECK_INT(store_upload_delete(p.s, ABC), STORE_OK);
+        CHECK_INT(second_pass(p.path, copy), !used);
+        job_clear(&j);
+        snprintf(file, sizeof file, "rm -r '%s'*", copy);
+        CHECK_INT(system(file), 0);
+        end_place(&p);
+    }
+}
+
 static size_t squeeze(unsigned char *out, size_t room, const char *text, size_t len)
 {
     z_stream z = {.next_in = (unsigned char *)(uintptr_t)text, .avail_in = (unsigned)len, .next_out = out};
@@ -228,12 +280,44 @@ TEST(a_damaged_file_is_no_upload)
     CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
     snprintf(path, sizeof path, "%s-uploads/%s", p.path, ABC);
     CHECK_INT(truncate(path, 2), 0);
-    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_ERROR);
+    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_DAMAGED);
     store_message(p.s, message, sizeof message);
     CHECK_MSG(strstr(message, ABC), "%s", message);
     CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK); /* sending it again mends it */
     CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_OK);
     store_upload_text_done(&text);
+    FILE *file = fopen(path, "r+"); /* the same length, other bytes */
+    CHECK(file && fputc('x', file) == 'x' && fclose(file) == 0);
+    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_DAMAGED);
+    CHECK(text.data == NULL && text.len == 0);
+    CHECK_INT(unlink(path), 0);
+    CHECK_INT(store_upload_text(p.s, ABC, &text), STORE_DAMAGED);
+    end_place(&p);
+}
+
+TEST(a_check_reads_the_files_of_uploads)
+{
+    place p;
+    upload_info info;
+    store_findings found;
+    bool known;
+    char path[256], message[256];
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(send(p.s, "abc", 3, 3, false, &info, &known), UPLOAD_OK);
+    CHECK_INT(store_check(p.s, &found), STORE_OK);
+    CHECK_MSG(strcmp(found.findings, "") == 0, "%s", found.findings);
+    free(found.findings);
+    snprintf(path, sizeof path, "%s-uploads/%s", p.path, ABC);
+    FILE *file = fopen(path, "r+");
+    CHECK(file && fputc('x', file) == 'x' && fclose(file) == 0);
+    CHECK_INT(store_check(p.s, &found), STORE_OK);
+    CHECK_MSG(strstr(found.findings, ABC), "%s", found.findings);
+    free(found.findings);
+    CHECK_INT(unlink(path), 0);
+    CHECK(store_check_file(p.path, &found, message, sizeof message));
+    CHECK_MSG(strstr(found.findings, ABC), "%s", found.findings);
+    free(found.findings);
     end_place(&p);
 }
 

@@ -23,13 +23,14 @@ static const char *const NOT_SPD =
     "{\"problem\": {\"kind\": \"matrices\","
     " \"K\": \"%%MatrixMarket matrix coordinate real symmetric\\n2 2 3\\n1 1 1\\n2 1 2\\n2 2 1\\n\","
     " \"N\": \"%%MatrixMarket matrix coordinate real general\\n1 2 1\\n1 1 1\\n\", \"h\": [1], \"p\": [3, 1]}}";
-static const char *const SCENE =
-    "{\"problem\": {\"kind\": \"scene\", \"model\": \"plane_stress\", \"thickness\": 5,"
-    " \"mesh\": {\"box\": {\"size\": [60, 20], \"cells\": [30, 10], \"element\": \"quad4\"}},"
-    " \"materials\": [{\"on\": \"all\", \"young\": 200e3, \"poisson\": 0.3}],"
-    " \"supports\": [{\"on\": \"left\", \"ux\": 0, \"uy\": 0}],"
-    " \"loads\": [{\"on\": \"top\", \"traction\": [0, -0.05]}, {\"on\": \"right\", \"traction\": [0.5, 0]}],"
-    " \"contacts\": [{\"on\": \"bottom\", \"obstacle\": {\"plane\": {\"point\": [0, 0], \"normal\": [0, 1]}}}]}}";
+#define SCENE_OF(cells)                                                                                                \
+    "{\"problem\": {\"kind\": \"scene\", \"model\": \"plane_stress\", \"thickness\": 5,"                               \
+    " \"mesh\": {\"box\": {\"size\": [60, 20], \"cells\": [" cells "], \"element\": \"quad4\"}},"                      \
+    " \"materials\": [{\"on\": \"all\", \"young\": 200e3, \"poisson\": 0.3}],"                                         \
+    " \"supports\": [{\"on\": \"left\", \"ux\": 0, \"uy\": 0}],"                                                       \
+    " \"loads\": [{\"on\": \"top\", \"traction\": [0, -0.05]}, {\"on\": \"right\", \"traction\": [0.5, 0]}],"          \
+    " \"contacts\": [{\"on\": \"bottom\", \"obstacle\": {\"plane\": {\"point\": [0, 0], \"normal\": [0, 1]}}}]}}"
+static const char *const SCENE = SCENE_OF("30, 10"), *const LARGE = SCENE_OF("120, 40");
 
 /* ---- a store with workers */
 
@@ -422,6 +423,65 @@ TEST(a_result_that_cannot_be_stored_is_reported_and_run_again)
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_SUCCESSFUL && j.attempts == 2);
     job_clear(&j);
+    service_end(&v);
+}
+
+/* No restart is needed: the result waits for its room. */
+TEST(a_result_waits_for_room)
+{
+    service v;
+    char id[33];
+    job j;
+    if (!service_begin(&v))
+        return;
+    submit(&v, SCENE, id);
+    CHECK_INT(store_limit_bytes(v.place.s, 1), STORE_OK);
+    if (!service_start(&v, &TWO_WORKERS))
+        return;
+    for (int i = 0; i < 2000 && count_in_log(&v, "store_failed") < 5; i++)
+        short_sleep();
+    CHECK_INT(count_in_log(&v, "store_failed"), 5); /* and it goes on */
+    CHECK_INT(status_of(v.place.s, id), JOB_RUNNING);
+    CHECK_INT(store_limit_bytes(v.place.s, 0), STORE_OK);
+    CHECK(work_wait(v.w, id, 20.0));
+    CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
+    CHECK(j.status == JOB_SUCCESSFUL && j.attempts == 1);
+    job_clear(&j);
+    service_end(&v);
+}
+
+/* A result for which there never is room: its job ends all the same, and says why. */
+TEST(a_result_without_room_is_given_up)
+{
+    static char body[64 << 10];
+    service v;
+    char id[33], padding[33];
+    job j;
+    job_status was;
+    work_options options = TWO_WORKERS;
+    if (!service_begin(&v))
+        return;
+    memset(body, ' ', sizeof body - 1);
+    memcpy(body, "{}", 2);
+    submit(&v, body, padding); /* leaves pages that are free, for what is small */
+    CHECK(store_dismiss(v.place.s, padding, &was) == STORE_OK && store_dismiss(v.place.s, padding, &was) == STORE_OK);
+    submit(&v, LARGE, id);
+    CHECK_INT(store_limit_bytes(v.place.s, 1), STORE_OK);
+    options.room_wait_s = 0.1;
+    if (!service_start(&v, &options))
+        return;
+    CHECK(work_wait(v.w, id, 60.0));
+    CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
+    CHECK_STR(job_status_name(j.status), "failed");
+    check_part(j.error, "\"storage_full\"");
+    CHECK(!j.summary);
+    job_clear(&j);
+    CHECK_INT(count_in_log(&v, "result_given_up"), 1);
+    CHECK_INT(store_limit_bytes(v.place.s, 0), STORE_OK);
+    submit(&v, SMALL, id);
+    work_wake(v.w);
+    CHECK(work_wait(v.w, id, 20.0));
+    CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
     service_end(&v);
 }
 
