@@ -181,6 +181,16 @@ static uz_status need_room(const cholmod_factor *L, uz_factor_workspace *ws, uz_
     return uz_need_panel(ws, (size_t)most, err);
 }
 
+/* Loads act on few dofs: what is eliminated before any of them has nothing to pass on (Gilbert and Peierls, SIAM J. Sci.
+ * Stat. Comput. 9 (1988) 862: L^-1 b is nonzero on the reach of b only). */
+static bool all_zero(const double *x, int64_t n)
+{
+    for (int64_t i = 0; i < n; i++)
+        if (x[i] != 0.0)
+            return false;
+    return true;
+}
+
 uz_status uz_single_substitute(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
@@ -193,6 +203,8 @@ uz_status uz_single_substitute(const uz_factor *factor, uz_factor_workspace *ws,
         const SuiteSparse_long *row = s + pi[k];
         panel_of panel = {(const double *)L->x + px[k], pi[k + 1] - pi[k], super[k + 1] - super[k], ws->panel};
         double *own = x + super[k]; /* the first rows of a supernode are its columns */
+        if (forward && all_zero(own, panel.cols))
+            continue;
         memcpy(panel.b, own, (size_t)panel.cols * sizeof *own);
         for (int64_t i = panel.cols; i < panel.rows; i++)
             panel.b[i] = x[row[i]];
