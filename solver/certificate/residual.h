@@ -4,8 +4,8 @@
 
 #include "uzawa.h"
 
-/* One pass over K for v = u + c: e (d) = K v - p - N'r and e_u (d) = K u - p - N'r; Ku and Kc (d) in passing.
- * K is the lower triangle; c is small beside u and enters in double precision. */
+/* One pass over K (rows ascending in each column) for v = u + c: e (d) = K v - p - N'r and e_u (d) = K u - p - N'r; Ku
+ * and Kc (d) in passing. K is the lower triangle; c is small beside u and enters in double precision. */
 typedef struct {
     double *e, *e_u, *Ku, *Kc;
 } uz_residuals;
