@@ -5,30 +5,49 @@
 
 #define TWOFOLD_ROUNDING 0x1p-98
 
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
+
+/* The largest magnitude, which passes over what is not a number, and the sum of squares. */
+static void look_at(double *largest, double *squares, const double *x, int64_t n)
+{
+    four most = {0.0}, sum = {0.0};
+    int64_t i = 0;
+    *largest = *squares = 0.0;
+    for (; i + 4 <= n; i += 4) {
+        const four part = *(const four *)(x + i);
+        const bits magnitude = (bits)part & INT64_MAX, more = (four)magnitude > most;
+        most = (four)((magnitude & more) | ((bits)most & ~more));
+        sum += part * part;
+    }
+    for (; i < n; i++) {
+        *largest = fabs(x[i]) > *largest ? fabs(x[i]) : *largest;
+        *squares += x[i] * x[i];
+    }
+    for (int l = 0; l < 4; l++) {
+        *largest = most[l] > *largest ? most[l] : *largest;
+        *squares += sum[l];
+    }
+}
+
 double uz_bound_norm(const double *x, int64_t n)
 {
-    double scale = 0.0, sum = 0.0;
-    bool number = true;
-    for (int64_t i = 0; i < n; i++) {
-        scale = fabs(x[i]) > scale ? fabs(x[i]) : scale;
-        number = number && x[i] == x[i];
-    }
-    if (!number) /* comparisons pass over it */
+    double scale, sum;
+    look_at(&scale, &sum, x, n);
+    if (sum != sum) /* one of them is not a number */
         return NAN;
-    bool safe = scale > 0x1p-400 && scale < 0x1p400; /* squares, and sums of 2^63 of them, are in range */
-    double unit = safe ? 1.0 : scale;
-    for (int64_t i = 0; safe && i < n; i++)
-        sum += x[i] * x[i];
-    for (int64_t i = 0; !safe && scale > 0.0 && i < n; i++)
+    if (scale > 0x1p-400 && scale < 0x1p400) /* squares, and sums of 2^63 of them, are in range */
+        return sqrt(sum);
+    sum = 0.0;
+    for (int64_t i = 0; scale > 0.0 && i < n; i++)
         sum += (x[i] / scale) * (x[i] / scale);
-    return unit * sqrt(sum);
+    return scale * sqrt(sum);
 }
 
 double uz_bound_largest(const double *x, int64_t n)
 {
-    double largest = 0.0;
-    for (int64_t i = 0; i < n; i++)
-        largest = fmax(largest, fabs(x[i]));
+    double largest, squares;
+    look_at(&largest, &squares, x, n);
     return largest;
 }
 

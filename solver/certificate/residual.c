@@ -67,6 +67,7 @@ typedef struct {
     const double *x, *c;
     int64_t first, last; /* of c's entries that are not zero */
     double *hi, *lo, *y;
+    double *weight; /* NULL: not wanted */
 } product_of;
 
 /* What column j adds to row j, in lanes. */
@@ -144,6 +145,8 @@ static inline __attribute__((always_inline)) void symmetric_product(const produc
         int64_t k = A->ptr[j];
         if (j <= q->last && k < end && A->idx[end - 1] >= q->first)
             add_correction(q, j, k, end);
+        if (q->weight)
+            q->weight[j] = uz_dof_weight(A, j);
         if (k < end && A->idx[k] == j)
             twofold_add_product(&s.hi, &s.lo, A->val[k++], x_j, fused);
         while (k < end) {
@@ -191,12 +194,12 @@ static inline __attribute__((always_inline)) void finish_four(const uz_residuals
     AT(four, out->Ku + j) = Ku;
 }
 
-static inline __attribute__((always_inline)) void finish(const uz_residuals *out, const double *lo, const uz_csc *N,
-                                                         const double *p, const double *r)
+static inline __attribute__((always_inline)) void finish(const uz_residuals *out, int64_t d, const double *lo,
+                                                         const uz_csc *N, const double *p, const double *r)
 {
     int64_t j = 0;
-    while (j < N->cols)
-        if (j + 4 <= N->cols && N->ptr[j + 4] == N->ptr[j]) {
+    while (j < d)
+        if (j + 4 <= d && N->ptr[j + 4] == N->ptr[j]) {
             finish_four(out, j, lo, p);
             j += 4;
         } else {
@@ -208,7 +211,7 @@ static inline __attribute__((always_inline)) void run(const uz_residuals *out, c
                                                       const double *p, const double *r, int fused)
 {
     symmetric_product(q, fused);
-    finish(out, q->lo, N, p, r);
+    finish(out, q->A->cols, q->lo, N, p, r);
 }
 
 #ifdef __x86_64__
@@ -244,7 +247,8 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a residual of %lld dofs", (long long)d);
     memset(out->Ku, 0, (size_t)d * sizeof *lo);
     memset(out->Kc, 0, (size_t)d * sizeof *lo);
-    product_of product = {.A = K, .x = u, .c = c, .last = d - 1, .hi = out->Ku, .lo = lo, .y = out->Kc};
+    product_of product = {
+        .A = K, .x = u, .c = c, .last = d - 1, .hi = out->Ku, .lo = lo, .y = out->Kc, .weight = out->weight};
     while (product.first < d && c[product.first] == 0.0)
         product.first++;
     while (product.last >= 0 && c[product.last] == 0.0)
