@@ -8,46 +8,61 @@
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
 
-/* The largest magnitude, which passes over what is not a number, and the sum of squares. */
-static void look_at(double *largest, double *squares, const double *x, int64_t n)
+static double sum_of_squares(const double *x, int64_t n)
 {
-    four most = {0.0}, sum = {0.0};
+    four sum = {0.0}, other = {0.0};
+    double rest = 0.0;
     int64_t i = 0;
-    *largest = *squares = 0.0;
-    for (; i + 4 <= n; i += 4) {
-        const four part = *(const four *)(x + i);
-        const bits magnitude = (bits)part & INT64_MAX, more = (four)magnitude > most;
-        most = (four)((magnitude & more) | ((bits)most & ~more));
-        sum += part * part;
+    for (; i + 8 <= n; i += 8) {
+        sum += *(const four *)(x + i) * *(const four *)(x + i);
+        other += *(const four *)(x + i + 4) * *(const four *)(x + i + 4);
     }
-    for (; i < n; i++) {
-        *largest = fabs(x[i]) > *largest ? fabs(x[i]) : *largest;
-        *squares += x[i] * x[i];
-    }
-    for (int l = 0; l < 4; l++) {
-        *largest = most[l] > *largest ? most[l] : *largest;
-        *squares += sum[l];
-    }
+    for (; i < n; i++)
+        rest += x[i] * x[i];
+    sum += other;
+    return ((sum[0] + sum[1]) + (sum[2] + sum[3])) + rest;
 }
 
-double uz_bound_norm(const double *x, int64_t n)
+/* Squares that left the range of double, or may have. */
+static double norm_by_scaling(const double *x, int64_t n)
 {
-    double scale, sum;
-    look_at(&scale, &sum, x, n);
-    if (sum != sum) /* one of them is not a number */
-        return NAN;
-    if (scale > 0x1p-400 && scale < 0x1p400) /* squares, and sums of 2^63 of them, are in range */
-        return sqrt(sum);
-    sum = 0.0;
+    double scale = 0.0, sum = 0.0;
+    for (int64_t i = 0; i < n; i++) {
+        if (x[i] != x[i]) /* comparisons pass over it */
+            return NAN;
+        scale = fabs(x[i]) > scale ? fabs(x[i]) : scale;
+    }
     for (int64_t i = 0; scale > 0.0 && i < n; i++)
         sum += (x[i] / scale) * (x[i] / scale);
     return scale * sqrt(sum);
 }
 
+double uz_bound_norm(const double *x, int64_t n)
+{
+    const double sum = sum_of_squares(x, n);
+    return sum > 0x1p-800 && sum < 0x1p800 ? sqrt(sum) : norm_by_scaling(x, n);
+}
+
+/* most = max(most, |x|), lane by lane; passes over what is not a number. */
+static inline __attribute__((always_inline)) void keep_largest(four *most, const double *x)
+{
+    const bits magnitude = *(const bits *)x & INT64_MAX, more = (four)magnitude > *most;
+    *most = (four)((magnitude & more) | ((bits)*most & ~more));
+}
+
 double uz_bound_largest(const double *x, int64_t n)
 {
-    double largest, squares;
-    look_at(&largest, &squares, x, n);
+    enum { APART = 4 }; /* that a comparison need not wait for the one before */
+    four most[APART] = {{0.0}};
+    double largest = 0.0;
+    int64_t i = 0;
+    for (; i + 4 * APART <= n; i += 4 * APART)
+        for (int k = 0; k < APART; k++)
+            keep_largest(&most[k], x + i + 4 * k);
+    for (; i < n; i++)
+        largest = fabs(x[i]) > largest ? fabs(x[i]) : largest;
+    for (int k = 0; k < 4 * APART; k++)
+        largest = most[k / 4][k % 4] > largest ? most[k / 4][k % 4] : largest;
     return largest;
 }
 
