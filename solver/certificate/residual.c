@@ -135,34 +135,163 @@ static inline __attribute__((always_inline)) void add_correction(const product_o
     q->y[j] += sum;
 }
 
-static inline __attribute__((always_inline)) void symmetric_product(const product_of *q, int fused)
+/* Entries k to end of column j, which lie below the diagonal. */
+static inline __attribute__((always_inline)) void take_runs(row_sums *s, const product_of *q, int64_t k, int64_t end,
+                                                            double x_j, int fused)
+{
+    const int64_t *idx = q->A->idx;
+    while (k < end) {
+        const int64_t i = idx[k];
+        if (k + 3 < end && idx[k + 3] == i + 3) {
+            take_four(s, q, q->A->val + k, i, x_j, fused);
+            k += 4;
+        } else if (k + 1 < end && idx[k + 1] == i + 1) {
+            take_two(s, q, q->A->val + k, i, x_j, fused);
+            k += 2;
+        } else {
+            take_one(s, q, q->A->val + k, i, x_j, fused);
+            k++;
+        }
+    }
+}
+
+static inline __attribute__((always_inline)) void prepare_column(const product_of *q, int64_t j)
 {
     const uz_csc *A = q->A;
-    for (int64_t j = 0; j < A->cols; j++) {
-        const int64_t end = A->ptr[j + 1];
-        const double x_j = q->x[j];
-        row_sums s = {.hi = q->hi[j], .lo = q->lo[j]};
-        int64_t k = A->ptr[j];
-        if (j <= q->last && k < end && A->idx[end - 1] >= q->first)
-            add_correction(q, j, k, end);
-        if (q->weight)
-            q->weight[j] = uz_dof_weight(A, j);
-        if (k < end && A->idx[k] == j)
-            twofold_add_product(&s.hi, &s.lo, A->val[k++], x_j, fused);
-        while (k < end) {
-            const int64_t i = A->idx[k];
-            if (k + 3 < end && A->idx[k + 3] == i + 3) {
-                take_four(&s, q, A->val + k, i, x_j, fused);
-                k += 4;
-            } else if (k + 1 < end && A->idx[k + 1] == i + 1) {
-                take_two(&s, q, A->val + k, i, x_j, fused);
-                k += 2;
-            } else {
-                take_one(&s, q, A->val + k, i, x_j, fused);
-                k++;
-            }
+    const int64_t k = A->ptr[j], end = A->ptr[j + 1];
+    if (j <= q->last && k < end && A->idx[end - 1] >= q->first)
+        add_correction(q, j, k, end);
+    if (q->weight)
+        q->weight[j] = uz_dof_weight(A, j);
+}
+
+static inline __attribute__((always_inline)) void take_column(const product_of *q, int64_t j, int fused)
+{
+    const uz_csc *A = q->A;
+    row_sums s = {.hi = q->hi[j], .lo = q->lo[j]};
+    int64_t k = A->ptr[j];
+    if (k < A->ptr[j + 1] && A->idx[k] == j)
+        twofold_add_product(&s.hi, &s.lo, A->val[k++], q->x[j], fused);
+    take_runs(&s, q, k, A->ptr[j + 1], q->x[j], fused);
+    add_lanes(q, j, &s);
+}
+
+/* ---- the columns of a node, two at a time
+ *
+ * They meet the same rows. What is left where they do not is taken by column. */
+
+/* Columns j and j + 1: sums in lanes, of both columns in one where a name has both. */
+typedef struct {
+    two hi_both, lo_both;
+    four hi2_both, lo2_both; /* two lanes of the first, two of the second */
+    four hi4[2], lo4[2];
+} pair_sums;
+
+static inline __attribute__((always_inline)) bool is_pair(const uz_csc *A, int64_t j)
+{
+    if (j + 1 >= A->cols)
+        return false;
+    const int64_t k = A->ptr[j], l = A->ptr[j + 1], end = A->ptr[j + 2];
+    return l - k == end - l + 1 && l - k >= 2 && A->idx[k] == j && A->idx[k + 1] == j + 1 && A->idx[l] == j + 1;
+}
+
+static inline __attribute__((always_inline)) void take_two_of_pair(pair_sums *s, const product_of *q, int64_t k,
+                                                                   int64_t l, const double x_j[2], int fused)
+{
+    const int64_t i = q->A->idx[k];
+    const two a = READ(two, q->A->val + k), b = READ(two, q->A->val + l), x = READ(two, q->x + i),
+              x_a = {x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1]};
+    const four both = __builtin_shufflevector(a, b, 0, 1, 2, 3), twice = __builtin_shufflevector(x, x, 0, 1, 0, 1);
+    two hi = AT(two, q->hi + i), lo = AT(two, q->lo + i);
+    add_product4(&s->hi2_both, &s->lo2_both, &both, &twice, fused);
+    add_product2(&hi, &lo, &a, &x_a, fused);
+    add_product2(&hi, &lo, &b, &x_b, fused);
+    AT(two, q->hi + i) = hi;
+    AT(two, q->lo + i) = lo;
+}
+
+static inline __attribute__((always_inline)) void take_four_of_pair(pair_sums *s, const product_of *q, int64_t k,
+                                                                    int64_t l, const double x_j[2], int fused)
+{
+    const int64_t i = q->A->idx[k];
+    const four a = READ(four, q->A->val + k), b = READ(four, q->A->val + l), x = READ(four, q->x + i),
+               x_a = {x_j[0], x_j[0], x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1], x_j[1], x_j[1]};
+    four hi = AT(four, q->hi + i), lo = AT(four, q->lo + i);
+    add_product4(&s->hi4[0], &s->lo4[0], &a, &x, fused);
+    add_product4(&s->hi4[1], &s->lo4[1], &b, &x, fused);
+    add_product4(&hi, &lo, &a, &x_a, fused);
+    add_product4(&hi, &lo, &b, &x_b, fused);
+    AT(four, q->hi + i) = hi;
+    AT(four, q->lo + i) = lo;
+}
+
+/* Rows j and j + 1 += their lanes: in fours two of the first beside two of the second. */
+static inline __attribute__((always_inline)) void add_pair_lanes(const product_of *q, int64_t j, const pair_sums *s)
+{
+    const four high = __builtin_shufflevector(s->hi4[0], s->hi4[1], 2, 3, 6, 7);
+    four hi = __builtin_shufflevector(s->hi4[0], s->hi4[1], 0, 1, 4, 5),
+         lo = __builtin_shufflevector(s->lo4[0], s->lo4[1], 0, 1, 4, 5) +
+              __builtin_shufflevector(s->lo4[0], s->lo4[1], 2, 3, 6, 7) + s->lo2_both;
+    add4(&hi, &lo, &high);
+    add4(&hi, &lo, &s->hi2_both);
+    const two even = __builtin_shufflevector(hi, hi, 0, 2), odd = __builtin_shufflevector(hi, hi, 1, 3);
+    two sum = s->hi_both, rest = s->lo_both + __builtin_shufflevector(lo, lo, 0, 2);
+    rest += __builtin_shufflevector(lo, lo, 1, 3);
+    add2(&sum, &rest, &even);
+    add2(&sum, &rest, &odd);
+    AT(two, q->hi + j) = sum;
+    AT(two, q->lo + j) = rest;
+}
+
+/* What is left of one column of a pair. */
+static inline __attribute__((always_inline)) void take_rest(const product_of *q, int64_t j, int64_t k, int fused)
+{
+    if (k == q->A->ptr[j + 1])
+        return;
+    row_sums s = {.hi = q->hi[j], .lo = q->lo[j]};
+    take_runs(&s, q, k, q->A->ptr[j + 1], q->x[j], fused);
+    add_lanes(q, j, &s);
+}
+
+static inline __attribute__((always_inline)) void take_pair(const product_of *q, int64_t j, int fused)
+{
+    const uz_csc *A = q->A;
+    const int64_t *idx = A->idx, middle = A->ptr[j + 1];
+    const double x_j[2] = {q->x[j], q->x[j + 1]};
+    const two x_a = {x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1]};
+    int64_t k = A->ptr[j], l = middle;
+    const two first = READ(two, A->val + k), second = {first[1], A->val[l]}; /* the rows of their own */
+    pair_sums s = {.hi_both = READ(two, q->hi + j), .lo_both = READ(two, q->lo + j)};
+    add_product2(&s.hi_both, &s.lo_both, &first, &x_a, fused);
+    add_product2(&s.hi_both, &s.lo_both, &second, &x_b, fused);
+    k += 2;
+    l++;
+    while (k + 1 < middle && idx[k] == idx[l] && idx[k + 1] == idx[k] + 1 && idx[l + 1] == idx[k] + 1) {
+        if (k + 3 < middle && idx[k + 3] == idx[k] + 3 && idx[l + 3] == idx[k] + 3) {
+            take_four_of_pair(&s, q, k, l, x_j, fused);
+            k += 4;
+            l += 4;
+        } else {
+            take_two_of_pair(&s, q, k, l, x_j, fused);
+            k += 2;
+            l += 2;
         }
-        add_lanes(q, j, &s);
+    }
+    add_pair_lanes(q, j, &s);
+    take_rest(q, j, k, fused);
+    take_rest(q, j + 1, l, fused);
+}
+
+static inline __attribute__((always_inline)) void symmetric_product(const product_of *q, int fused)
+{
+    for (int64_t j = 0; j < q->A->cols; j++) {
+        prepare_column(q, j);
+        if (is_pair(q->A, j)) {
+            prepare_column(q, j + 1);
+            take_pair(q, j++, fused);
+        } else {
+            take_column(q, j, fused);
+        }
     }
 }
 

@@ -85,8 +85,9 @@ static inline __attribute__((always_inline)) void eliminate_rows(const panel_of 
 }
 
 /* b_j.. = L_jj^-1 b_j.. on the strip's own rows, and b -= L b_j.. below them. What a strip leaves is what the next
- * begins with, so where supernodes are small the steps between count: reciprocals of the diagonal don't wait for them,
- * and no group of rows is loaded that was stored in parts. */
+ * begins with, so where supernodes are small the steps between count: no group of rows is loaded that was stored in
+ * parts. (Products with reciprocals would not wait for divisions, but their second rounding costs answers: of matrices
+ * conditioned as 1e13 some can't be certified then.) */
 static inline __attribute__((always_inline)) void eliminate_strip(four *edge, const panel_of *s, int64_t j, int width,
                                                                   layout at)
 {
@@ -96,7 +97,7 @@ static inline __attribute__((always_inline)) void eliminate_strip(four *edge, co
         double sum = s->b[j + k];
         for (int l = 0; l < k; l++)
             sum -= L[l * s->rows + j + k] * x[l];
-        x[k] = sum * (1.0 / L[k * s->rows + j + k]);
+        x[k] = sum / L[k * s->rows + j + k];
         s->b[j + k] = x[k];
     }
     eliminate_rows(s, L, width, x, j + width, at.columns);
@@ -153,7 +154,7 @@ static inline __attribute__((always_inline)) void substitute_strip(const four *e
         double rest = s->b[j + k] - total[k];
         for (int l = k + 1; l < width; l++)
             rest -= L[k * s->rows + j + l] * x[l];
-        x[k] = rest * (1.0 / L[k * s->rows + j + k]);
+        x[k] = rest / L[k * s->rows + j + k];
     }
     if (width == PANEL)
         *(four *)(s->b + j) = (four){x[0], x[1], x[2], x[3]};
