@@ -46,7 +46,7 @@ double uz_bound_norm(const double *x, int64_t n)
 /* most = max(most, |x|), lane by lane; passes over what is not a number. */
 static inline __attribute__((always_inline)) void keep_largest(four *most, const double *x)
 {
-    const bits magnitude = *(const bits *)x & INT64_MAX, more = (four)magnitude > *most;
+    const bits magnitude = (bits) * (const four *)x & INT64_MAX, more = (four)magnitude > *most;
     *most = (four)((magnitude & more) | ((bits)*most & ~more));
 }
 

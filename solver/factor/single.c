@@ -29,9 +29,12 @@ typedef void (*panel_step)(const panel_of *s);
 /* Four entries from x on; a function that returned them would have another ABI without AVX. */
 #define AT(x) (*(const four *)(x))
 
-/* The last `count` of four entries from x on, zero for the others. */
-#define LAST(x, count) ((four)(*(const lanes_at *)(x) & ((lanes){0, 1, 2, 3} >= 4 - (count))))
-typedef int64_t lanes_at __attribute__((vector_size(32), aligned(8), may_alias));
+/* out = the last `count` of four entries from x on, zero for the others. */
+static inline __attribute__((always_inline)) void keep_last(four *out, const double *x, int count)
+{
+    const lanes place = {0, 1, 2, 3}, kept = place >= 4 - count;
+    *out = (four)((lanes)AT(x) & kept);
+}
 
 /* The columns of a strip are neighbours in memory, so the next strip's lines are found from this one's. */
 static inline __attribute__((always_inline)) void fetch(const double *entry, int64_t ahead)
@@ -101,8 +104,11 @@ static inline __attribute__((always_inline)) void eliminate_strip(four *edge, co
         s->b[j + k] = x[k];
     }
     eliminate_rows(s, L, width, x, j + width, at.columns);
-    for (int k = 0; k < width && at.edge; k++)
-        *edge -= LAST(L + k * s->rows + at.whole - 4, at.edge) * x[k];
+    for (int k = 0; k < width && at.edge; k++) {
+        four part;
+        keep_last(&part, L + k * s->rows + at.whole - 4, at.edge);
+        *edge -= part * x[k];
+    }
     eliminate_rows(s, L, width, x, at.whole, s->rows);
 }
 
@@ -145,8 +151,10 @@ static inline __attribute__((always_inline)) void substitute_strip(const four *e
     const double *L = s->L + j * s->rows;
     double total[PANEL], x[PANEL] = {0};
     four sum[PANEL] = {{0}};
-    for (int k = 0; k < width && at.edge; k++)
-        sum[k] = LAST(L + k * s->rows + at.whole - 4, at.edge) * *edge;
+    for (int k = 0; k < width && at.edge; k++) {
+        keep_last(&sum[k], L + k * s->rows + at.whole - 4, at.edge);
+        sum[k] *= *edge;
+    }
     add_rows(sum, s, L, width, at.whole, s->rows);
     add_rows(sum, s, L, width, j + width, at.columns);
     add_lanes(total, sum);
@@ -185,7 +193,9 @@ static inline __attribute__((always_inline)) void eliminate_rest(const panel_of 
 static inline __attribute__((always_inline)) void substitute_rest(const panel_of *s, int64_t j)
 {
     const layout at = layout_of(s, s->cols);
-    const four edge = at.edge ? LAST(s->b + at.whole - 4, at.edge) : (four){0};
+    four edge = {0};
+    if (at.edge)
+        keep_last(&edge, s->b + at.whole - 4, at.edge);
     switch (s->cols - j) {
     case 3:
         substitute_strip(&edge, s, j, 3, at);
@@ -242,7 +252,9 @@ static inline __attribute__((always_inline)) void substitute_back(const panel_of
     }
     if (at.columns < s->cols)
         substitute_rest(s, at.columns);
-    const four edge = at.edge && at.columns ? LAST(s->b + at.whole - 4, at.edge) : (four){0};
+    four edge = {0};
+    if (at.edge && at.columns)
+        keep_last(&edge, s->b + at.whole - 4, at.edge);
     for (int64_t j = at.columns - PANEL; j >= 0; j -= PANEL)
         substitute_strip(&edge, s, j, PANEL, at);
 }

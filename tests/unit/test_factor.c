@@ -197,59 +197,6 @@ TEST(solves_are_accurate)
     }
 }
 
-/* Largest difference of the substitutions for one vector and of those for several, relative to the largest entry. */
-static double single_against_several(const uz_factor *factor, uz_factor_workspace *ws, const double *b, int64_t n)
-{
-    uz_error err;
-    double most = 0, size = 0, *x = vector(n), *y = vector(2 * n);
-    for (int c = 0; c < 2; c++)
-        memcpy(y + c * n, b, (size_t)n * sizeof *b);
-    memcpy(x, b, (size_t)n * sizeof *b);
-    for (int half = 0; half < 2; half++) {
-        uz_status (*run)(const uz_factor *, uz_factor_workspace *, double *, int64_t, uz_error *) =
-            half ? uz_factor_backward : uz_factor_forward;
-        CHECK_INT(run(factor, ws, x, 1, &err), UZ_OK);
-        CHECK_INT(run(factor, ws, y, 2, &err), UZ_OK);
-        for (int64_t i = 0; i < n; i++) {
-            most = fmax(most, fabs(x[i] - y[i]));
-            size = fmax(size, fabs(y[i]));
-        }
-    }
-    free(x);
-    free(y);
-    return most / size;
-}
-
-/* Supernodes of all shapes: with few and many columns and rows, and numbers of them that four does not divide. Vectors
- * with one nonzero pass over what is eliminated before it. */
-TEST(one_vector_is_solved_as_several_are)
-{
-    qp_random rng = {7};
-    for (int64_t w = 1; w <= 12; w++)
-        for (int64_t h = 1; h <= 12; h++) {
-            const int64_t n = w * h;
-            uz_csc K = grid(w, h);
-            uz_factor *factor;
-            uz_error err;
-            uz_factor_workspace *ws = uz_factor_workspace_new();
-            double *b = vector(n);
-            const uz_ordering ordering = orderings[h % 3];
-            CHECK_INT(factor_of(&factor, &K, NULL, 0, ordering, 0, &err), UZ_OK);
-            for (int64_t i = 0; i < n; i++)
-                b[i] = random_signed(&rng);
-            CHECK(single_against_several(factor, ws, b, n) < 1e-15);
-            for (int64_t one = 0; one < n; one += 1 + n / 5) {
-                memset(b, 0, (size_t)n * sizeof *b);
-                b[one] = 1;
-                CHECK(single_against_several(factor, ws, b, n) < 1e-15);
-            }
-            uz_factor_workspace_free(ws);
-            uz_factor_free(factor);
-            uz_csc_clear(&K);
-            free(b);
-        }
-}
-
 /* The Schur complement of dense K on `last`, by elimination of the others one by one. */
 static double *schur_complement(const double *K, int64_t n, const int64_t *last, int64_t n_last)
 {
