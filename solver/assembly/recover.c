@@ -26,7 +26,11 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal)
 {
     const int dim = model->mesh.dim;
-    for (int64_t a = 0; a < model->mesh.n_nodes; a++) {
+    const int64_t total = model->mesh.n_nodes * dim;
+    for (int64_t i = 0; !model->frame_of && i < total; i++)
+        if (model->dof[i] >= 0)
+            u[model->dof[i]] = nodal[i];
+    for (int64_t a = 0; model->frame_of && a < model->mesh.n_nodes; a++) {
         double local[3];
         uz_to_frame(local, model, a, nodal + a * dim);
         for (int c = 0; c < dim; c++)

@@ -282,22 +282,29 @@ uz_status uz_internal_forces(double *f, const uz_body_model *model, const double
 
 /* An element's displacements against those of its first node: a translation strains nothing, and what it would leave by
  * rounding grows with it. Not along the radius. */
-static void take_relative(double *d, const uz_body_model *model, const double *nodal, const int64_t *node, int count)
+static inline __attribute__((always_inline)) void take_relative(double *d, bool along_radius, const double *nodal,
+                                                                const int64_t *node, int count, int dim)
 {
-    const int dim = model->mesh.dim;
     double first[3] = {0};
-    memcpy(first, nodal + node[0] * dim, (size_t)dim * sizeof *first);
-    if (model->kind == UZ_AXISYMMETRIC)
+    for (int c = 0; c < dim; c++)
+        first[c] = nodal[node[0] * dim + c];
+    if (along_radius)
         first[0] = 0;
     for (int a = 0; a < count; a++)
         for (int c = 0; c < dim; c++)
             *d++ = nodal[node[a] * dim + c] - first[c];
 }
 
-/* d'ke d by one triangle of the symmetric ke; the rows do not wait for each other. */
-static double element_energy(const double *ke, const double *d, int n)
+/* d'ke d of one element, by one triangle of the symmetric ke; the rows do not wait for each other. */
+typedef double (*energy_of)(const uz_body_model *model, const double *ke, const double *nodal, int64_t e);
+
+static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
 {
-    double sum = 0;
+    double d[DOFS], sum = 0;
+    int count;
+    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+    const int n = count * model->mesh.dim;
+    take_relative(d, model->kind == UZ_AXISYMMETRIC, nodal, node, count, model->mesh.dim);
     for (int i = 0; i < n; i++) {
         double row = 0;
         for (int j = 0; j < i; j++)
@@ -307,21 +314,65 @@ static double element_energy(const double *ke, const double *d, int n)
     return sum;
 }
 
+typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+
+/* The same for quad4, the element of most meshes: ke by columns, in two registers each, and d in two. */
+static inline __attribute__((always_inline)) double energy_quad4(const uz_body_model *model, const double *ke,
+                                                                 const double *nodal, int64_t e)
+{
+    enum { N = 8 };
+    const int64_t *node = model->mesh.node + model->mesh.first[e];
+    two u[4];
+    for (int a = 0; a < 4; a++)
+        u[a] = *(const two *)(nodal + 2 * node[a]);
+    const double first = model->kind == UZ_AXISYMMETRIC ? 0 : u[0][0];
+    const four origin = {first, u[0][1], first, u[0][1]};
+    const four d[2] = {__builtin_shufflevector(u[0], u[1], 0, 1, 2, 3) - origin,
+                       __builtin_shufflevector(u[2], u[3], 0, 1, 2, 3) - origin};
+    four low = {0}, high = {0};
+    for (int j = 0; j < N; j++) {
+        low += *(const four *)(ke + j * N) * d[j / 4][j % 4];
+        high += *(const four *)(ke + j * N + 4) * d[j / 4][j % 4];
+    }
+    const four sum = low * d[0] + high * d[1];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2,fma"))) static double energy_quad4_wide(const uz_body_model *model, const double *ke,
+                                                                    const double *nodal, int64_t e)
+{
+    return energy_quad4(model, ke, nodal, e);
+}
+#endif
+
+static double energy_quad4_plain(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
+{
+    return energy_quad4(model, ke, nodal, e);
+}
+
+static energy_of best_for_quad4(void)
+{
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+        return energy_quad4_wide;
+#endif
+    return energy_quad4_plain;
+}
+
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
+    const energy_of of_quad4 = best_for_quad4();
     stiffness_source source;
     const double *ke;
     double twice = 0;
     uz_status status = source_init(&source, model, err);
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
-        double d[DOFS];
-        int count;
-        const int64_t *node = uz_mesh_element(mesh, e, &count);
-        take_relative(d, model, nodal, node, count);
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            twice += element_energy(ke, d, count * mesh->dim);
+            twice += (mesh->kind[e] == UZ_QUAD4 ? of_quad4 : energy_any)(model, ke, nodal, e);
     }
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && model->spring; i++)
         twice += model->spring[i] * nodal[i] * nodal[i];

@@ -207,14 +207,9 @@ INLINE void add_linear_fit(double *rows, const uz_stress_group *g, const int64_t
     }
 }
 
-INLINE bool is_quadratic(uz_element_kind kind)
-{
-    return kind == UZ_TRI6 || kind == UZ_QUAD8 || kind == UZ_TET10;
-}
-
 INLINE void add(double *rows, const uz_stress_group *g, const int64_t *const place[LANES], int n, int direct, int dim)
 {
-    if (is_quadratic(g->rule.kind))
+    if (uz_element_is_quadratic(g->rule.kind))
         add_linear_fit(rows, g, place, n, direct, dim);
     else
         add_mean(rows, g, place, n, direct);

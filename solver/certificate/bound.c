@@ -5,30 +5,64 @@
 
 #define TWOFOLD_ROUNDING 0x1p-98
 
-double uz_bound_norm(const double *x, int64_t n)
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
+
+static double sum_of_squares(const double *x, int64_t n)
+{
+    four sum = {0.0}, other = {0.0};
+    double rest = 0.0;
+    int64_t i = 0;
+    for (; i + 8 <= n; i += 8) {
+        sum += *(const four *)(x + i) * *(const four *)(x + i);
+        other += *(const four *)(x + i + 4) * *(const four *)(x + i + 4);
+    }
+    for (; i < n; i++)
+        rest += x[i] * x[i];
+    sum += other;
+    return ((sum[0] + sum[1]) + (sum[2] + sum[3])) + rest;
+}
+
+/* Squares that left the range of double, or may have. */
+static double norm_by_scaling(const double *x, int64_t n)
 {
     double scale = 0.0, sum = 0.0;
-    bool number = true;
     for (int64_t i = 0; i < n; i++) {
+        if (x[i] != x[i]) /* comparisons pass over it */
+            return NAN;
         scale = fabs(x[i]) > scale ? fabs(x[i]) : scale;
-        number = number && x[i] == x[i];
     }
-    if (!number) /* comparisons pass over it */
-        return NAN;
-    bool safe = scale > 0x1p-400 && scale < 0x1p400; /* squares, and sums of 2^63 of them, are in range */
-    double unit = safe ? 1.0 : scale;
-    for (int64_t i = 0; safe && i < n; i++)
-        sum += x[i] * x[i];
-    for (int64_t i = 0; !safe && scale > 0.0 && i < n; i++)
+    for (int64_t i = 0; scale > 0.0 && i < n; i++)
         sum += (x[i] / scale) * (x[i] / scale);
-    return unit * sqrt(sum);
+    return scale * sqrt(sum);
+}
+
+double uz_bound_norm(const double *x, int64_t n)
+{
+    const double sum = sum_of_squares(x, n);
+    return sum > 0x1p-800 && sum < 0x1p800 ? sqrt(sum) : norm_by_scaling(x, n);
+}
+
+/* most = max(most, |x|), lane by lane; passes over what is not a number. */
+static inline __attribute__((always_inline)) void keep_largest(four *most, const double *x)
+{
+    const bits magnitude = (bits) * (const four *)x & INT64_MAX, more = (four)magnitude > *most;
+    *most = (four)((magnitude & more) | ((bits)*most & ~more));
 }
 
 double uz_bound_largest(const double *x, int64_t n)
 {
+    enum { APART = 4 }; /* that a comparison need not wait for the one before */
+    four most[APART] = {{0.0}};
     double largest = 0.0;
-    for (int64_t i = 0; i < n; i++)
-        largest = fmax(largest, fabs(x[i]));
+    int64_t i = 0;
+    for (; i + 4 * APART <= n; i += 4 * APART)
+        for (int k = 0; k < APART; k++)
+            keep_largest(&most[k], x + i + 4 * k);
+    for (; i < n; i++)
+        largest = fabs(x[i]) > largest ? fabs(x[i]) : largest;
+    for (int k = 0; k < 4 * APART; k++)
+        largest = most[k / 4][k % 4] > largest ? most[k / 4][k % 4] : largest;
     return largest;
 }
 

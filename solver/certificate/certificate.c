@@ -15,65 +15,76 @@
 typedef struct {
     const uz_certify_input *in;
     const double *u;      /* d: the answer */
-    uz_csc Nt;            /* d x m */
+    uz_csc Nt;            /* n_b x m: N' on the dofs that N touches */
+    int64_t *dof;         /* n_b: these */
+    double *u_b;          /* n_b: u there */
+    double *weight_b;     /* n_b */
     double *weight;       /* d: W = diag(K)^-1 */
-    uz_feasible feasible; /* v = u + c */
+    double *c;            /* d: correction, zero elsewhere */
+    uz_feasible feasible; /* v = u + c, on n_b dofs */
     uz_residuals res;     /* d each */
-    int64_t d, m;
+    double energy;        /* u'Ku */
+    double weighted;      /* e'W e */
+    double noise;         /* see uz_bound_noise */
+    int64_t d, m, n_b;
 } certifier;
 
-static uz_status prepare(certifier *c, const uz_certify_input *in, uz_error *err)
+static bool allocate(certifier *c)
+{
+    double **of_d[] = {&c->res.e, &c->res.e_u, &c->res.Ku, &c->res.Kc, &c->weight};
+    bool ok = true;
+    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
+        ok = (*of_d[k] = uz_alloc(c->d, sizeof(double))) && ok;
+    c->c = uz_alloc_zero(c->d, sizeof(double));
+    c->u_b = uz_alloc(c->n_b, sizeof(double));
+    c->weight_b = uz_alloc(c->n_b, sizeof(double));
+    c->res.weight = c->weight;
+    return ok && c->c && c->u_b && c->weight_b;
+}
+
+static uz_status prepare(certifier *c, const uz_certify_input *in, const double *u, uz_error *err)
 {
     memset(c, 0, sizeof *c);
     c->in = in;
+    c->u = u;
     c->d = in->K->rows;
     c->m = in->N->rows;
-    c->weight = uz_alloc(c->d, sizeof(double));
-    double **room[] = {&c->res.e, &c->res.e_u, &c->res.Ku, &c->res.Kc};
-    bool ok = c->weight != NULL;
-    for (int k = 0; k < 4; k++)
-        ok = (*room[k] = uz_alloc(c->d, sizeof(double))) && ok;
-    uz_status status = uz_csc_transpose(&c->Nt, in->N, err);
+    uz_status status = uz_touched_dofs(&c->Nt, &c->dof, in->N, err);
     if (status != UZ_OK)
         return status;
-    if (!ok || !uz_feasible_init(&c->feasible, &c->Nt, c->weight))
+    c->n_b = c->Nt.rows;
+    if (!allocate(c) || !uz_feasible_init(&c->feasible, &c->Nt, c->weight_b))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)c->d);
-    uz_certify_weights(c->weight, in->K);
+    for (int64_t b = 0; b < c->n_b; b++) {
+        c->weight_b[b] = uz_dof_weight(in->K, c->dof[b]);
+        c->u_b[b] = u[c->dof[b]];
+    }
     return UZ_OK;
 }
 
 void uz_certify_weights(double *weight, const uz_csc *K)
 {
-    for (int64_t j = 0; j < K->cols; j++) {
-        int64_t first = K->ptr[j];
-        bool diagonal = first < K->ptr[j + 1] && K->idx[first] == j && K->val[first] > 0.0;
-        weight[j] = diagonal ? 1.0 / K->val[first] : 1.0;
-    }
+    for (int64_t j = 0; j < K->cols; j++)
+        weight[j] = uz_dof_weight(K, j);
 }
 
 static void release(certifier *c)
 {
+    double *room[] = {c->res.e, c->res.e_u, c->res.Ku, c->res.Kc, c->weight, c->weight_b, c->u_b, c->c};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
     uz_csc_clear(&c->Nt);
-    free(c->weight);
+    free(c->dof);
     uz_feasible_clear(&c->feasible);
-    free(c->res.e);
-    free(c->res.e_u);
-    free(c->res.Ku);
-    free(c->res.Kc);
 }
 
 /* e'K^-1 e from the norm of K^-1 where that is good enough. */
-static bool bound_cheaply(const certifier *c, double *square, const double *u)
+static bool bound_cheaply(const certifier *c, double *square)
 {
-    double weighted = 0.0, energy = 0.0;
     if (!isfinite(c->in->inverse_bound))
         return false;
-    for (int64_t j = 0; j < c->d; j++) {
-        weighted += c->res.e[j] * c->weight[j] * c->res.e[j];
-        energy += u[j] * c->res.Ku[j];
-    }
-    *square = c->in->inverse_bound * weighted;
-    return *square <= c->in->sharp * c->in->sharp * energy;
+    *square = c->in->inverse_bound * c->weighted;
+    return *square <= c->in->sharp * c->in->sharp * c->energy;
 }
 
 static double doubt(const certifier *c, double spread)
@@ -100,45 +111,104 @@ static double spread_of_solution(const certifier *c, double square)
     return square > 0.0 ? weighted / square : 0.0;
 }
 
-static double twofold_noise(const certifier *c, const double *u, double spread)
-{
-    double sum = 0.0;
-    for (int64_t j = 0; j < c->d; j++) {
-        double force = fabs(c->res.Ku[j]) + fabs(c->in->p[j]);
-        sum += u[j] / c->weight[j] * u[j] + force * c->weight[j] * force;
-    }
-    return uz_bound_noise(spread, sum);
-}
-
 /* ||v - u_r||_K^2 = e'K^-1 e, enlarged by what rounding may hide. e is lost. */
-static uz_status distance(certifier *c, double *square, const double *u, uz_error *err)
+static uz_status distance(certifier *c, double *square, uz_error *err)
 {
     double spread = c->in->inverse_bound;
-    bool measured = !bound_cheaply(c, square, u), exact = doubt(c, assumed_spread(c)) > HARMLESS;
+    bool measured = !bound_cheaply(c, square), exact = doubt(c, assumed_spread(c)) > HARMLESS;
     uz_status status = UZ_OK;
     if (measured) {
         status = c->in->inverse_norm(c->in->ctx, square, c->res.e, exact, err);
         spread = exact ? spread_of_solution(c, *square) : assumed_spread(c);
     }
-    *square = uz_bound_enlarge(*square, doubt(c, spread), twofold_noise(c, u, spread));
+    *square = uz_bound_enlarge(*square, doubt(c, spread), uz_bound_noise(spread, c->noise));
     return status;
 }
 
+/* ------------------------------------------------- sums over the dofs, four at a time */
+
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
+
+typedef struct {
+    four stiffness, load, change, correction_energy, weighted, noise;
+    bits anything;
+} sums;
+
+enum { VECTORS = 8 };
+
+/* From entry j on of u, p, c, K u, K c, e, e_u and the weights. */
+static inline __attribute__((always_inline)) void add_four(sums *s, const double *const x[VECTORS], int64_t j)
+{
+    four v[VECTORS];
+    for (int k = 0; k < VECTORS; k++)
+        v[k] = *(const four *)(x[k] + j);
+    const four u = v[0], p = v[1], c = v[2], Ku = v[3], Kc = v[4], e = v[5], e_u = v[6], weight = v[7];
+    const four force = (four)((bits)Ku & INT64_MAX) + (four)((bits)p & INT64_MAX);
+    s->stiffness += u * Ku;
+    s->load += u * p;
+    s->change += c * (Ku - p + 0.5 * Kc);
+    s->correction_energy += c * Kc;
+    s->weighted += e * weight * e;
+    s->noise += u / weight * u + force * weight * force;
+    s->anything |= ((bits)u | (bits)c | (bits)e_u) & INT64_MAX;
+}
+
+static inline __attribute__((always_inline)) void add_all(sums *s, const double *const x[VECTORS], int64_t d)
+{
+    double rest[VECTORS][4] = {{0}};
+    const double *last[VECTORS];
+    int64_t j = 0;
+    for (; j + 4 <= d; j += 4)
+        add_four(s, x, j);
+    for (int k = 0; k < VECTORS; k++) {
+        last[k] = rest[k];
+        for (int l = 0; l < 4; l++)
+            rest[k][l] = j + l < d ? x[k][j + l] : k == VECTORS - 1;
+    }
+    add_four(s, last, 0);
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2"))) static void add_all_wide(sums *s, const double *const x[VECTORS], int64_t d)
+{
+    add_all(s, x, d);
+}
+#endif
+
+static void add_all_plain(sums *s, const double *const x[VECTORS], int64_t d)
+{
+    add_all(s, x, d);
+}
+
+static double total(const four *x)
+{
+    return ((*x)[0] + (*x)[1]) + ((*x)[2] + (*x)[3]);
+}
+
 /* The terms that are sums over the dofs. */
-static void add_up(const certifier *c, uz_bound_terms *t, const double *u)
+static void add_up(certifier *c, uz_bound_terms *t)
 {
     const uz_residuals *res = &c->res;
-    const double *p = c->in->p, *correction = c->feasible.correction;
-    for (int64_t j = 0; j < c->d; j++) {
-        t->stiffness += u[j] * res->Ku[j];
-        t->load += u[j] * p[j];
-        t->change += correction[j] * (res->Ku[j] - p[j] + 0.5 * res->Kc[j]);
-        t->correction_energy += correction[j] * res->Kc[j];
-        t->anything = t->anything || u[j] != 0.0 || correction[j] != 0.0 || res->e_u[j] != 0.0;
-    }
+    const double *const x[VECTORS] = {c->u, c->in->p, c->c, res->Ku, res->Kc, res->e, res->e_u, c->weight};
+    void (*add)(sums *, const double *const[VECTORS], int64_t) = add_all_plain;
+    sums s;
+    memset(&s, 0, sizeof s);
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2"))
+        add = add_all_wide;
+#endif
+    add(&s, x, c->d);
+    t->stiffness = c->energy = total(&s.stiffness);
+    t->load = total(&s.load);
+    t->change = total(&s.change);
+    t->correction_energy = total(&s.correction_energy);
+    t->anything = (s.anything[0] | s.anything[1] | s.anything[2] | s.anything[3]) != 0;
+    c->weighted = total(&s.weighted);
+    c->noise = total(&s.noise);
     t->e1 = uz_bound_norm(res->e_u, c->d);
-    t->force = uz_bound_norm(p, c->d);
-    t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest(u, c->d);
+    t->force = uz_bound_norm(c->in->p, c->d);
+    t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest(c->u, c->d);
 }
 
 static void add_dot(twofold *sum, double factor, const double *x, const double *y, int64_t n)
@@ -148,36 +218,37 @@ static void add_dot(twofold *sum, double factor, const double *x, const double *
 }
 
 /* u'Ku = u'e_u + u'p + r'N u with e_u = K u - p - N'r, which is known in twofold precision, and N u = h - g. */
-static void sharpen_energies(const certifier *c, uz_bound_terms *t, const double *u, const double *r, const double *g)
+static void sharpen_energies(const certifier *c, uz_bound_terms *t, const double *r, const double *g)
 {
     twofold load = {0.0, 0.0};
-    add_dot(&load, 1.0, u, c->in->p, c->d);
+    add_dot(&load, 1.0, c->u, c->in->p, c->d);
     twofold stiffness = load;
-    add_dot(&stiffness, 1.0, u, c->res.e_u, c->d);
+    add_dot(&stiffness, 1.0, c->u, c->res.e_u, c->d);
     add_dot(&stiffness, 1.0, r, c->in->h, c->m);
     add_dot(&stiffness, -1.0, r, g, c->m);
     t->load = load.hi + load.lo;
     t->stiffness = stiffness.hi + stiffness.lo;
 }
 
-static uz_status measure(certifier *c, uz_certificate *out, const double *u, const double *r, double *g,
-                         double positive_part, uz_error *err)
+static uz_status measure(certifier *c, uz_certificate *out, const double *r, double *g, double positive_part,
+                         uz_error *err)
 {
     uz_bound_terms terms = {.square = INFINITY, .positive_part = positive_part};
     for (int64_t i = 0; i < c->m; i++)
-        g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, u, NULL);
-    c->feasible.u = u;
+        g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, c->u_b, NULL);
+    c->feasible.u = c->u_b;
     c->feasible.h = c->in->h;
     bool feasible = uz_make_feasible(&c->feasible, r);
-    uz_status status =
-        uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, u, c->feasible.correction, r, err);
+    for (int64_t b = 0; b < c->n_b; b++)
+        c->c[c->dof[b]] = c->feasible.correction[b];
+    uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, c->u, c->c, r, err);
     if (status != UZ_OK)
         return status;
-    add_up(c, &terms, u);
+    add_up(c, &terms);
     if (c->in->twofold_energies && isfinite(terms.stiffness) && isfinite(terms.load))
-        sharpen_energies(c, &terms, u, r, g);
+        sharpen_energies(c, &terms, r, g);
     if (feasible)
-        status = distance(c, &terms.square, u, err);
+        status = distance(c, &terms.square, err);
     for (int64_t i = 0; i < c->m; i++)
         terms.complementarity -= r[i] * fabs(uz_feasible_gap(&c->feasible, i));
     uz_bound_conclude(out, &terms, feasible, r, g, c->in->h, c->m);
@@ -200,9 +271,9 @@ uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u,
 {
     certifier c;
     memset(out, 0, sizeof *out);
-    uz_status status = prepare(&c, input, err);
+    uz_status status = prepare(&c, input, u, err);
     if (status == UZ_OK)
-        status = measure(&c, out, u, r, g, uz_certify_cut(r, c.m), err);
+        status = measure(&c, out, r, g, uz_certify_cut(r, c.m), err);
     release(&c);
     return status;
 }

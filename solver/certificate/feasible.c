@@ -4,6 +4,7 @@
 #include "certificate/residual.h"
 #include "certificate/row_relax.h"
 #include "core/alloc.h"
+#include "core/error.h"
 
 #include <float.h>
 #include <math.h>
@@ -17,6 +18,34 @@ enum { LEAST_ROUNDS = 2, CLOSING_ROUNDS = 8, MAX_ROUNDS = 40 };
 
 /* Corrections up to this many times as large, squared, as the moves of single rows are taken. */
 #define STRETCH 64.0
+
+uz_status uz_touched_dofs(uz_csc *Nt, int64_t **dof, const uz_csc *N, uz_error *err)
+{
+    uz_csc touched = *N; /* without its empty columns */
+    memset(Nt, 0, sizeof *Nt);
+    touched.cols = 0;
+    touched.ptr = uz_alloc(N->cols + 1, sizeof *touched.ptr);
+    *dof = uz_alloc(N->cols, sizeof **dof);
+    uz_status status = UZ_OK;
+    if (touched.ptr && *dof) {
+        touched.ptr[0] = 0;
+        for (int64_t j = 0; N->ptr && j < N->cols; j++) {
+            if (N->ptr[j + 1] == N->ptr[j])
+                continue;
+            (*dof)[touched.cols++] = j;
+            touched.ptr[touched.cols] = N->ptr[j + 1];
+        }
+        status = uz_csc_transpose(Nt, &touched, err);
+    } else {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)N->cols);
+    }
+    free(touched.ptr);
+    if (status != UZ_OK) {
+        free(*dof);
+        *dof = NULL;
+    }
+    return status;
+}
 
 bool uz_feasible_init(uz_feasible *c, const uz_csc *Nt, const double *weight)
 {

@@ -16,6 +16,10 @@ typedef struct {
     int64_t d, m;
 } uz_feasible;
 
+/* N' (n_b x m) of the rows of N on the n_b dofs that they touch, `dof` (n_b, ascending): all that a correction moves.
+ */
+uz_status uz_touched_dofs(uz_csc *Nt, int64_t **dof, const uz_csc *N, uz_error *err);
+
 /* Nt and weight are borrowed. false: no memory; uz_feasible_clear may follow. */
 bool uz_feasible_init(uz_feasible *f, const uz_csc *Nt, const double *weight);
 void uz_feasible_clear(uz_feasible *f);

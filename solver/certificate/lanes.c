@@ -86,22 +86,16 @@ static uz_status extract_columns(uz_lane_certifier *c, uz_error *err)
 
 static uz_status compress(uz_lane_certifier *c, uz_error *err)
 {
-    const uz_csc *N = c->N;
-    uz_csc Nt;
-    for (int64_t j = 0; j < c->K->cols; j++) {
-        c->place[j] = N->rows > 0 && N->ptr[j + 1] > N->ptr[j] ? c->n_b : -1;
-        if (c->place[j] >= 0)
-            c->dof[c->n_b++] = j;
-    }
-    uz_status status = uz_csc_transpose(&Nt, N, err);
+    uz_status status = uz_touched_dofs(&c->Nt_b, &c->dof, c->N, err);
     if (status != UZ_OK)
         return status;
-    for (int64_t k = 0; k < Nt.ptr[Nt.cols]; k++)
-        Nt.idx[k] = c->place[Nt.idx[k]];
-    Nt.rows = c->n_b;
-    c->Nt_b = Nt;
-    for (int64_t k = 0; k < c->n_b; k++)
-        c->weight_b[k] = c->weight[c->dof[k]];
+    c->n_b = c->Nt_b.rows;
+    for (int64_t j = 0; j < c->K->cols; j++)
+        c->place[j] = -1;
+    for (int64_t b = 0; b < c->n_b; b++) {
+        c->place[c->dof[b]] = b;
+        c->weight_b[b] = c->weight[c->dof[b]];
+    }
     return extract_columns(c, err);
 }
 
@@ -109,7 +103,6 @@ static bool allocate(uz_lane_certifier *c)
 {
     int64_t d = c->K->cols, m = c->N->rows;
     c->weight = uz_alloc(d, sizeof(double));
-    c->dof = uz_alloc(d, sizeof(int64_t));
     c->place = uz_alloc(d, sizeof(int64_t));
     c->weight_b = uz_alloc(d, sizeof(double));
     c->u_b = uz_alloc(d, sizeof(double));
@@ -117,7 +110,7 @@ static bool allocate(uz_lane_certifier *c)
     c->Kc = uz_alloc_zero(d, WIDTH * sizeof(double));
     c->hi = uz_alloc_zero(d, WIDTH * sizeof(double));
     c->lo = uz_alloc_zero(d, WIDTH * sizeof(double));
-    return c->weight && c->dof && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo;
+    return c->weight && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo;
 }
 
 uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double rcond,

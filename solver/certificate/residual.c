@@ -1,3 +1,7 @@
+/* residual.c: one pass over K, in registers of two and four lanes.
+ *
+ * The dofs of a node stand together, and so do those of nodes in a row of a mesh: the rows that a column meets come in
+ * runs, and what is done to a run is done in lanes. Sums in lanes are twofold too, and are added up as such. */
 #include "certificate/residual.h"
 
 #include "certificate/twofold.h"
@@ -7,72 +11,378 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* hi + lo += A x and y += A c for symmetric A by its lower triangle: A is read once. */
-static inline __attribute__((always_inline)) void symmetric_product(double *hi, double *lo, double *y, const uz_csc *A,
-                                                                    const double *x, const double *c, int fused)
+typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
+
+/* A function that returned lanes would have another ABI without AVX. */
+#define AT(type, x)   (*(type *)(x))
+#define READ(type, x) (*(const type *)(x))
+#define LOW_HALF(x)   __builtin_shufflevector(x, x, 0, 1)
+#define HIGH_HALF(x)  __builtin_shufflevector(x, x, 2, 3)
+
+/* twofold_add_product, lane by lane. */
+static inline __attribute__((always_inline)) void add_product4(four *hi, four *lo, const four *a, const four *b,
+                                                               int fused)
 {
-    for (int64_t j = 0; j < A->cols; j++) {
-        double x_j = x[j], c_j = c[j], sum_hi = hi[j], sum_lo = lo[j], sum = y[j];
-        int64_t k = A->ptr[j];
-        if (k < A->ptr[j + 1] && A->idx[k] == j) {
-            sum += A->val[k] * c_j;
-            twofold_add_product(&sum_hi, &sum_lo, A->val[k++], x_j, fused);
+    const four product = *a * *b;
+    four error = {0.0};
+    for (int l = 0; l < 4; l++)
+        error[l] =
+            fused ? __builtin_fma((*a)[l], (*b)[l], -product[l]) : product_error_split((*a)[l], (*b)[l], product[l]);
+    const four sum = *hi + product, back = sum - *hi;
+    *lo += ((*hi - (sum - back)) + (product - back)) + error;
+    *hi = sum;
+}
+
+static inline __attribute__((always_inline)) void add_product2(two *hi, two *lo, const two *a, const two *b, int fused)
+{
+    const two product = *a * *b;
+    two error = {0.0};
+    for (int l = 0; l < 2; l++)
+        error[l] =
+            fused ? __builtin_fma((*a)[l], (*b)[l], -product[l]) : product_error_split((*a)[l], (*b)[l], product[l]);
+    const two sum = *hi + product, back = sum - *hi;
+    *lo += ((*hi - (sum - back)) + (product - back)) + error;
+    *hi = sum;
+}
+
+/* twofold_add, lane by lane. */
+static inline __attribute__((always_inline)) void add4(four *hi, four *lo, const four *x)
+{
+    const four sum = *hi + *x, back = sum - *hi;
+    *lo += (*hi - (sum - back)) + (*x - back);
+    *hi = sum;
+}
+
+static inline __attribute__((always_inline)) void add2(two *hi, two *lo, const two *x)
+{
+    const two sum = *hi + *x, back = sum - *hi;
+    *lo += (*hi - (sum - back)) + (*x - back);
+    *hi = sum;
+}
+
+/* hi + lo += A x and y += A c for symmetric A by its lower triangle. */
+typedef struct {
+    const uz_csc *A;
+    const double *x, *c;
+    int64_t first, last; /* of c's entries that are not zero */
+    double *hi, *lo, *y;
+    double *weight; /* NULL: not wanted */
+} product_of;
+
+/* What column j adds to row j, in lanes. */
+typedef struct {
+    double hi, lo;
+    two hi2, lo2;
+    four hi4, lo4;
+} row_sums;
+
+/* The entries a of column j at row i, or at rows from i on: to row j goes a x_i, to row i goes a x_j. */
+static inline __attribute__((always_inline)) void take_one(row_sums *s, const product_of *q, const double *val,
+                                                           int64_t i, double x_j, int fused)
+{
+    twofold_add_product(&s->hi, &s->lo, *val, q->x[i], fused);
+    twofold_add_product(&q->hi[i], &q->lo[i], *val, x_j, fused);
+}
+
+static inline __attribute__((always_inline)) void take_two(row_sums *s, const product_of *q, const double *val,
+                                                           int64_t i, double x_j, int fused)
+{
+    const two a = READ(two, val), all_x = {x_j, x_j};
+    two hi = AT(two, q->hi + i), lo = AT(two, q->lo + i);
+    add_product2(&s->hi2, &s->lo2, &a, (const two *)(q->x + i), fused);
+    add_product2(&hi, &lo, &a, &all_x, fused);
+    AT(two, q->hi + i) = hi;
+    AT(two, q->lo + i) = lo;
+}
+
+static inline __attribute__((always_inline)) void take_four(row_sums *s, const product_of *q, const double *val,
+                                                            int64_t i, double x_j, int fused)
+{
+    const four a = READ(four, val), all_x = {x_j, x_j, x_j, x_j};
+    four hi = AT(four, q->hi + i), lo = AT(four, q->lo + i);
+    add_product4(&s->hi4, &s->lo4, &a, (const four *)(q->x + i), fused);
+    add_product4(&hi, &lo, &a, &all_x, fused);
+    AT(four, q->hi + i) = hi;
+    AT(four, q->lo + i) = lo;
+}
+
+/* Row j += its lanes. */
+static inline __attribute__((always_inline)) void add_lanes(const product_of *q, int64_t j, const row_sums *s)
+{
+    const two high = HIGH_HALF(s->hi4);
+    two hi = LOW_HALF(s->hi4), lo = (LOW_HALF(s->lo4) + HIGH_HALF(s->lo4)) + s->lo2;
+    add2(&hi, &lo, &high);
+    add2(&hi, &lo, &s->hi2);
+    twofold sum = {s->hi, s->lo + (lo[0] + lo[1])};
+    twofold_add(&sum, hi[0]);
+    twofold_add(&sum, hi[1]);
+    q->hi[j] = sum.hi;
+    q->lo[j] = sum.lo;
+}
+
+/* c is small beside x, and zero but at the contact. */
+static inline __attribute__((always_inline)) void add_correction(const product_of *q, int64_t j, int64_t k, int64_t end)
+{
+    const double c_j = q->c[j];
+    double sum = 0.0;
+    if (k < end && q->A->idx[k] == j)
+        sum = q->A->val[k++] * c_j;
+    for (; k < end; k++) {
+        sum += q->A->val[k] * q->c[q->A->idx[k]];
+        q->y[q->A->idx[k]] += q->A->val[k] * c_j;
+    }
+    q->y[j] += sum;
+}
+
+/* Entries k to end of column j, which lie below the diagonal. */
+static inline __attribute__((always_inline)) void take_runs(row_sums *s, const product_of *q, int64_t k, int64_t end,
+                                                            double x_j, int fused)
+{
+    const int64_t *idx = q->A->idx;
+    while (k < end) {
+        const int64_t i = idx[k];
+        if (k + 3 < end && idx[k + 3] == i + 3) {
+            take_four(s, q, q->A->val + k, i, x_j, fused);
+            k += 4;
+        } else if (k + 1 < end && idx[k + 1] == i + 1) {
+            take_two(s, q, q->A->val + k, i, x_j, fused);
+            k += 2;
+        } else {
+            take_one(s, q, q->A->val + k, i, x_j, fused);
+            k++;
         }
-        for (; k < A->ptr[j + 1]; k++) {
-            int64_t i = A->idx[k];
-            double a = A->val[k];
-            sum += a * c[i];
-            y[i] += a * c_j;
-            twofold_add_product(&sum_hi, &sum_lo, a, x[i], fused);
-            twofold_add_product(&hi[i], &lo[i], a, x_j, fused);
-        }
-        hi[j] = sum_hi;
-        lo[j] = sum_lo;
-        y[j] = sum;
     }
 }
 
-__attribute__((target("fma"))) static void symmetric_product_fused(double *hi, double *lo, double *y, const uz_csc *A,
-                                                                   const double *x, const double *c)
+static inline __attribute__((always_inline)) void prepare_column(const product_of *q, int64_t j)
 {
-    symmetric_product(hi, lo, y, A, x, c, 1);
+    const uz_csc *A = q->A;
+    const int64_t k = A->ptr[j], end = A->ptr[j + 1];
+    if (j <= q->last && k < end && A->idx[end - 1] >= q->first)
+        add_correction(q, j, k, end);
+    if (q->weight)
+        q->weight[j] = uz_dof_weight(A, j);
 }
 
-static void symmetric_product_split(double *hi, double *lo, double *y, const uz_csc *A, const double *x,
-                                    const double *c)
+static inline __attribute__((always_inline)) void take_column(const product_of *q, int64_t j, int fused)
 {
-    symmetric_product(hi, lo, y, A, x, c, 0);
+    const uz_csc *A = q->A;
+    row_sums s = {.hi = q->hi[j], .lo = q->lo[j]};
+    int64_t k = A->ptr[j];
+    if (k < A->ptr[j + 1] && A->idx[k] == j)
+        twofold_add_product(&s.hi, &s.lo, A->val[k++], q->x[j], fused);
+    take_runs(&s, q, k, A->ptr[j + 1], q->x[j], fused);
+    add_lanes(q, j, &s);
 }
 
-/* hi + lo -= p + N'r in column j */
-static twofold subtract_forces(twofold sum, int64_t j, const uz_csc *N, const double *p, const double *r)
+/* ---- the columns of a node, two at a time
+ *
+ * They meet the same rows. What is left where they do not is taken by column. */
+
+/* Columns j and j + 1: sums in lanes, of both columns in one where a name has both. */
+typedef struct {
+    two hi_both, lo_both;
+    four hi2_both, lo2_both; /* two lanes of the first, two of the second */
+    four hi4[2], lo4[2];
+} pair_sums;
+
+static inline __attribute__((always_inline)) bool is_pair(const uz_csc *A, int64_t j)
 {
+    if (j + 1 >= A->cols)
+        return false;
+    const int64_t k = A->ptr[j], l = A->ptr[j + 1], end = A->ptr[j + 2];
+    return l - k == end - l + 1 && l - k >= 2 && A->idx[k] == j && A->idx[k + 1] == j + 1 && A->idx[l] == j + 1;
+}
+
+static inline __attribute__((always_inline)) void take_two_of_pair(pair_sums *s, const product_of *q, int64_t k,
+                                                                   int64_t l, const double x_j[2], int fused)
+{
+    const int64_t i = q->A->idx[k];
+    const two a = READ(two, q->A->val + k), b = READ(two, q->A->val + l), x = READ(two, q->x + i),
+              x_a = {x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1]};
+    const four both = __builtin_shufflevector(a, b, 0, 1, 2, 3), twice = __builtin_shufflevector(x, x, 0, 1, 0, 1);
+    two hi = AT(two, q->hi + i), lo = AT(two, q->lo + i);
+    add_product4(&s->hi2_both, &s->lo2_both, &both, &twice, fused);
+    add_product2(&hi, &lo, &a, &x_a, fused);
+    add_product2(&hi, &lo, &b, &x_b, fused);
+    AT(two, q->hi + i) = hi;
+    AT(two, q->lo + i) = lo;
+}
+
+static inline __attribute__((always_inline)) void take_four_of_pair(pair_sums *s, const product_of *q, int64_t k,
+                                                                    int64_t l, const double x_j[2], int fused)
+{
+    const int64_t i = q->A->idx[k];
+    const four a = READ(four, q->A->val + k), b = READ(four, q->A->val + l), x = READ(four, q->x + i),
+               x_a = {x_j[0], x_j[0], x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1], x_j[1], x_j[1]};
+    four hi = AT(four, q->hi + i), lo = AT(four, q->lo + i);
+    add_product4(&s->hi4[0], &s->lo4[0], &a, &x, fused);
+    add_product4(&s->hi4[1], &s->lo4[1], &b, &x, fused);
+    add_product4(&hi, &lo, &a, &x_a, fused);
+    add_product4(&hi, &lo, &b, &x_b, fused);
+    AT(four, q->hi + i) = hi;
+    AT(four, q->lo + i) = lo;
+}
+
+/* Rows j and j + 1 += their lanes: in fours two of the first beside two of the second. */
+static inline __attribute__((always_inline)) void add_pair_lanes(const product_of *q, int64_t j, const pair_sums *s)
+{
+    const four high = __builtin_shufflevector(s->hi4[0], s->hi4[1], 2, 3, 6, 7);
+    four hi = __builtin_shufflevector(s->hi4[0], s->hi4[1], 0, 1, 4, 5),
+         lo = __builtin_shufflevector(s->lo4[0], s->lo4[1], 0, 1, 4, 5) +
+              __builtin_shufflevector(s->lo4[0], s->lo4[1], 2, 3, 6, 7) + s->lo2_both;
+    add4(&hi, &lo, &high);
+    add4(&hi, &lo, &s->hi2_both);
+    const two even = __builtin_shufflevector(hi, hi, 0, 2), odd = __builtin_shufflevector(hi, hi, 1, 3);
+    two sum = s->hi_both, rest = s->lo_both + __builtin_shufflevector(lo, lo, 0, 2);
+    rest += __builtin_shufflevector(lo, lo, 1, 3);
+    add2(&sum, &rest, &even);
+    add2(&sum, &rest, &odd);
+    AT(two, q->hi + j) = sum;
+    AT(two, q->lo + j) = rest;
+}
+
+/* What is left of one column of a pair. */
+static inline __attribute__((always_inline)) void take_rest(const product_of *q, int64_t j, int64_t k, int fused)
+{
+    if (k == q->A->ptr[j + 1])
+        return;
+    row_sums s = {.hi = q->hi[j], .lo = q->lo[j]};
+    take_runs(&s, q, k, q->A->ptr[j + 1], q->x[j], fused);
+    add_lanes(q, j, &s);
+}
+
+static inline __attribute__((always_inline)) void take_pair(const product_of *q, int64_t j, int fused)
+{
+    const uz_csc *A = q->A;
+    const int64_t *idx = A->idx, middle = A->ptr[j + 1];
+    const double x_j[2] = {q->x[j], q->x[j + 1]};
+    const two x_a = {x_j[0], x_j[0]}, x_b = {x_j[1], x_j[1]};
+    int64_t k = A->ptr[j], l = middle;
+    const two first = READ(two, A->val + k), second = {first[1], A->val[l]}; /* the rows of their own */
+    pair_sums s = {.hi_both = READ(two, q->hi + j), .lo_both = READ(two, q->lo + j)};
+    add_product2(&s.hi_both, &s.lo_both, &first, &x_a, fused);
+    add_product2(&s.hi_both, &s.lo_both, &second, &x_b, fused);
+    k += 2;
+    l++;
+    while (k + 1 < middle && idx[k] == idx[l] && idx[k + 1] == idx[k] + 1 && idx[l + 1] == idx[k] + 1) {
+        if (k + 3 < middle && idx[k + 3] == idx[k] + 3 && idx[l + 3] == idx[k] + 3) {
+            take_four_of_pair(&s, q, k, l, x_j, fused);
+            k += 4;
+            l += 4;
+        } else {
+            take_two_of_pair(&s, q, k, l, x_j, fused);
+            k += 2;
+            l += 2;
+        }
+    }
+    add_pair_lanes(q, j, &s);
+    take_rest(q, j, k, fused);
+    take_rest(q, j + 1, l, fused);
+}
+
+static inline __attribute__((always_inline)) void symmetric_product(const product_of *q, int fused)
+{
+    for (int64_t j = 0; j < q->A->cols; j++) {
+        prepare_column(q, j);
+        if (is_pair(q->A, j)) {
+            prepare_column(q, j + 1);
+            take_pair(q, j++, fused);
+        } else {
+            take_column(q, j, fused);
+        }
+    }
+}
+
+/* hi + lo -= p + N'r in row j */
+static inline __attribute__((always_inline)) void finish_row(const uz_residuals *out, int64_t j, const double *lo,
+                                                             const uz_csc *N, const double *p, const double *r)
+{
+    twofold sum = {out->Ku[j], lo[j]};
     twofold_add(&sum, -p[j]);
     for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
         twofold_add_product(&sum.hi, &sum.lo, -N->val[k], r[N->idx[k]], 0);
-    return sum;
+    out->e_u[j] = sum.hi + sum.lo;
+    twofold_add(&sum, out->Kc[j]);
+    out->e[j] = sum.hi + sum.lo;
+    out->Ku[j] += lo[j];
+}
+
+/* The same in rows j to j + 3, which N does not touch. */
+static inline __attribute__((always_inline)) void finish_four(const uz_residuals *out, int64_t j, const double *lo,
+                                                              const double *p)
+{
+    const four load = -READ(four, p + j), Kc = READ(four, out->Kc + j);
+    four hi = READ(four, out->Ku + j), low = READ(four, lo + j);
+    const four Ku = hi + low;
+    add4(&hi, &low, &load);
+    AT(four, out->e_u + j) = hi + low;
+    add4(&hi, &low, &Kc);
+    AT(four, out->e + j) = hi + low;
+    AT(four, out->Ku + j) = Ku;
+}
+
+static inline __attribute__((always_inline)) void finish(const uz_residuals *out, int64_t d, const double *lo,
+                                                         const uz_csc *N, const double *p, const double *r)
+{
+    int64_t j = 0;
+    while (j < d)
+        if (j + 4 <= d && N->ptr[j + 4] == N->ptr[j]) {
+            finish_four(out, j, lo, p);
+            j += 4;
+        } else {
+            finish_row(out, j++, lo, N, p, r);
+        }
+}
+
+static inline __attribute__((always_inline)) void run(const uz_residuals *out, const product_of *q, const uz_csc *N,
+                                                      const double *p, const double *r, int fused)
+{
+    symmetric_product(q, fused);
+    finish(out, q->A->cols, q->lo, N, p, r);
+}
+
+#ifdef __x86_64__
+__attribute__((target("avx2,fma"))) static void run_fused(const uz_residuals *out, const product_of *q, const uz_csc *N,
+                                                          const double *p, const double *r)
+{
+    run(out, q, N, p, r, 1);
+}
+#endif
+
+static void run_split(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p, const double *r)
+{
+    run(out, q, N, p, r, 0);
+}
+
+static void run_best(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p, const double *r)
+{
+#ifdef __x86_64__
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
+        run_fused(out, q, N, p, r);
+        return;
+    }
+#endif
+    run_split(out, q, N, p, r);
 }
 
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
                                   const double *c, const double *r, uz_error *err)
 {
     int64_t d = K->rows;
-    double *lo = uz_alloc_zero(d, sizeof *lo), *hi = out->Ku;
+    double *lo = uz_alloc_zero(d, sizeof *lo);
     if (!lo)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a residual of %lld dofs", (long long)d);
-    memset(hi, 0, (size_t)d * sizeof *hi);
-    memset(out->Kc, 0, (size_t)d * sizeof *hi);
-    if (__builtin_cpu_supports("fma"))
-        symmetric_product_fused(hi, lo, out->Kc, K, u, c);
-    else
-        symmetric_product_split(hi, lo, out->Kc, K, u, c);
-    for (int64_t j = 0; j < d; j++) {
-        twofold sum = subtract_forces((twofold){hi[j], lo[j]}, j, N, p, r);
-        out->e_u[j] = sum.hi + sum.lo;
-        twofold_add(&sum, out->Kc[j]);
-        out->e[j] = sum.hi + sum.lo;
-        hi[j] += lo[j];
-    }
+    memset(out->Ku, 0, (size_t)d * sizeof *lo);
+    memset(out->Kc, 0, (size_t)d * sizeof *lo);
+    product_of product = {
+        .A = K, .x = u, .c = c, .last = d - 1, .hi = out->Ku, .lo = lo, .y = out->Kc, .weight = out->weight};
+    while (product.first < d && c[product.first] == 0.0)
+        product.first++;
+    while (product.last >= 0 && c[product.last] == 0.0)
+        product.last--;
+    run_best(out, &product, N, p, r);
     free(lo);
     return UZ_OK;
 }

@@ -4,13 +4,22 @@
 
 #include "uzawa.h"
 
-/* One pass over K for v = u + c: e (d) = K v - p - N'r and e_u (d) = K u - p - N'r; Ku and Kc (d) in passing.
- * K is the lower triangle; c is small beside u and enters in double precision. */
+/* One pass over K (rows ascending in each column) for v = u + c: e (d) = K v - p - N'r and e_u (d) = K u - p - N'r; Ku
+ * and Kc (d) in passing. K is the lower triangle; c is small beside u and enters in double precision. */
 typedef struct {
     double *e, *e_u, *Ku, *Kc;
+    double *weight; /* d: uz_dof_weight of each, in passing; NULL: not wanted */
 } uz_residuals;
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,
                                   const double *c, const double *r, uz_error *err);
+
+/* 1 / K_jj; 1 where that is not positive. */
+static inline double uz_dof_weight(const uz_csc *K, int64_t j)
+{
+    const int64_t first = K->ptr[j];
+    const bool diagonal = first < K->ptr[j + 1] && K->idx[first] == j && K->val[first] > 0.0;
+    return diagonal ? 1.0 / K->val[first] : 1.0;
+}
 
 /* h_i - n_i'(u + c) for row i of N, given as column i of N'; c NULL: zero. One twofold sum from the original data: a
  * gap rounded before c is taken away would hide contradictions as large as its rounding. */

@@ -168,6 +168,12 @@ uz_dual_info uz_dual_describe(const uz_dual *dual)
     return dual->info;
 }
 
+/* The other forms begin iterations there. */
+static double *vector_of(int64_t n, bool condensed)
+{
+    return condensed ? uz_alloc(n, sizeof(double)) : uz_alloc_zero(n, sizeof(double));
+}
+
 /* What a case in a block does without, it takes from the block. */
 static bool allocate_vectors(uz_case *load, bool whole)
 {
@@ -175,13 +181,13 @@ static bool allocate_vectors(uz_case *load, bool whole)
     int64_t d = load->dual->info.d, m = load->dual->info.m, n_b = condensed ? load->dual->dense.n_b : 0;
     int64_t contact = m > n_b ? m : n_b, room = whole && d > contact ? d : contact;
     load->ws = uz_factor_workspace_new();
-    load->base = whole ? uz_alloc_zero(d, sizeof(double)) : NULL;
+    load->base = whole ? vector_of(d, condensed) : NULL;
     load->h = uz_alloc_zero(m, sizeof(double));
     load->g0 = uz_alloc_zero(m, sizeof(double));
     load->response = uz_alloc_zero(condensed ? 0 : d, sizeof(double));
     load->apply_room = uz_alloc_zero(n_b, sizeof(double));
-    load->work = uz_alloc_zero(room, sizeof(double));
-    load->work2 = uz_alloc_zero(room, sizeof(double));
+    load->work = vector_of(condensed ? contact : room, condensed);
+    load->work2 = vector_of(room, condensed);
     load->push = uz_alloc_zero(condensed ? contact : d, sizeof(double));
     load->kept = uz_alloc_zero(condensed ? contact : d, sizeof(double));
     return load->ws && load->apply_room && load->h && (load->base || !whole) && load->g0 && load->response &&

@@ -51,6 +51,27 @@ static inline double squared_distance(const double *x, const double *y, int dim)
     return a * a + b * b + c * c;
 }
 
+/* At most how steep u is where all elements are equal boxes with nodes at their corners only: the range of u over the
+ * shortest edge. INFINITY: not such a mesh. */
+static double slope_by_range(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const int dim = mesh->dim;
+    double range2 = 0, shortest = INFINITY;
+    if (!mesh->uniform)
+        return INFINITY;
+    for (int c = 0; c < dim; c++) {
+        double least = d->u[c], most = d->u[c];
+        for (int64_t i = c; i < mesh->n_nodes * dim; i += dim) {
+            least = d->u[i] < least ? d->u[i] : least;
+            most = d->u[i] > most ? d->u[i] : most;
+        }
+        range2 += (most - least) * (most - least);
+        shortest = fmin(shortest, mesh->cell[c]);
+    }
+    return sqrt(range2) / shortest;
+}
+
 /* The largest change of u over a distance between an element's first node and the others: every strain and rotation
  * shows in it, if not in full. */
 static double largest_slope(const doubts *d)
@@ -278,7 +299,8 @@ uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const u
                          const double *r, uz_error *err)
 {
     const doubts d = {model, scene, u, r, out};
-    if (largest_slope(&d) > 0.25 * fmin(MOST_STRAIN, MOST_ROTATION))
+    const double noticed = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
+    if (!(slope_by_range(&d) < 0.99 * noticed) && largest_slope(&d) > noticed)
         look_at_elements(&d);
     look_at_mesh(&d);
     return look_at_contact(&d, err);

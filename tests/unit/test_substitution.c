@@ -1,0 +1,80 @@
+/* Substitutions for one vector, which have kernels of their own. */
+#include "factor_fixture.h"
+#include "harness.h"
+#include "qp_fixture.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const uz_ordering orderings[] = {UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS};
+
+/* The five-point Laplacian of a w x h grid. */
+static uz_csc grid(int64_t w, int64_t h)
+{
+    const int64_t n = w * h;
+    double *K = vector(n * n);
+    for (int64_t i = 0; i < n; i++) {
+        K[i * n + i] = 4.1;
+        if (i % w > 0)
+            K[i * n + i - 1] = K[(i - 1) * n + i] = -1;
+        if (i >= w)
+            K[i * n + i - w] = K[(i - w) * n + i] = -1;
+    }
+    uz_csc made = csc_from_dense(K, n, n, true);
+    free(K);
+    return made;
+}
+
+/* Largest difference of the substitutions for one vector and of those for several, relative to the largest entry. */
+static double single_against_several(const uz_factor *factor, uz_factor_workspace *ws, const double *b, int64_t n)
+{
+    uz_error err;
+    double most = 0, size = 0, *x = vector(n), *y = vector(2 * n);
+    for (int c = 0; c < 2; c++)
+        memcpy(y + c * n, b, (size_t)n * sizeof *b);
+    memcpy(x, b, (size_t)n * sizeof *b);
+    for (int half = 0; half < 2; half++) {
+        uz_status (*run)(const uz_factor *, uz_factor_workspace *, double *, int64_t, uz_error *) =
+            half ? uz_factor_backward : uz_factor_forward;
+        CHECK_INT(run(factor, ws, x, 1, &err), UZ_OK);
+        CHECK_INT(run(factor, ws, y, 2, &err), UZ_OK);
+        for (int64_t i = 0; i < n; i++) {
+            most = fmax(most, fabs(x[i] - y[i]));
+            size = fmax(size, fabs(y[i]));
+        }
+    }
+    free(x);
+    free(y);
+    return most / size;
+}
+
+/* Supernodes of all shapes: with few and many columns and rows, and numbers of them that four does not divide. Vectors
+ * with one nonzero pass over what is eliminated before it. */
+TEST(one_vector_is_solved_as_several_are)
+{
+    qp_random rng = {7};
+    for (int64_t w = 1; w <= 12; w++)
+        for (int64_t h = 1; h <= 12; h++) {
+            const int64_t n = w * h;
+            uz_csc K = grid(w, h);
+            uz_factor *factor;
+            uz_error err;
+            uz_factor_workspace *ws = uz_factor_workspace_new();
+            double *b = vector(n);
+            const uz_ordering ordering = orderings[h % 3];
+            CHECK_INT(factor_by(&factor, &K, NULL, 0, ordering, 0, &err), UZ_OK);
+            for (int64_t i = 0; i < n; i++)
+                b[i] = random_signed(&rng);
+            CHECK(single_against_several(factor, ws, b, n) < 1e-15);
+            for (int64_t one = 0; one < n; one += 1 + n / 5) {
+                memset(b, 0, (size_t)n * sizeof *b);
+                b[one] = 1;
+                CHECK(single_against_several(factor, ws, b, n) < 1e-15);
+            }
+            uz_factor_workspace_free(ws);
+            uz_factor_free(factor);
+            uz_csc_clear(&K);
+            free(b);
+        }
+}
