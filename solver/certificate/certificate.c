@@ -73,6 +73,8 @@ static bool bound_cheaply(const certifier *c, double *square, const double *u)
         energy += u[j] * c->res.Ku[j];
     }
     *square = c->in->inverse_bound * weighted;
+    if (c->in->moved)
+        energy = c->in->whole_norm * c->in->whole_norm;
     return *square <= c->in->sharp * c->in->sharp * energy;
 }
 
@@ -163,7 +165,8 @@ static void sharpen_energies(const certifier *c, uz_bound_terms *t, const double
 static uz_status measure(certifier *c, uz_certificate *out, const double *u, const double *r, double *g,
                          double positive_part, uz_error *err)
 {
-    uz_bound_terms terms = {.square = INFINITY, .positive_part = positive_part};
+    uz_bound_terms terms = {
+        .square = INFINITY, .positive_part = positive_part, .moved = c->in->moved, .whole_norm = c->in->whole_norm};
     for (int64_t i = 0; i < c->m; i++)
         g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, u, NULL);
     c->feasible.u = u;

@@ -1,4 +1,5 @@
 /* outcome.c: what a semicoercive solve leaves behind, or why it is refused. */
+#include "certificate/bound.h"
 #include "certificate/certificate.h"
 #include "core/alloc.h"
 #include "core/clock.h"
@@ -16,17 +17,23 @@
 /* The null space of matrices is known by iterations on a factor: its rounding allows no more. */
 #define BALANCED 1e-7
 
-double uz_semi_energy(const uz_semi *s, const double *u, const double *g, double *springs)
+uz_status uz_semi_norms(double *norm, double *augmented, const uz_semi *s, double error, uz_error *err)
 {
     const uz_csc *K = s->of.K;
-    double energy = 0.0;
+    const double *u = s->last->u, *g = s->last->g;
+    double energy = 0.0, springs = 0.0, whole;
     for (int64_t j = 0; j < s->d; j++)
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
             energy += (K->idx[q] == j ? 1.0 : 2.0) * K->val[q] * u[j] * u[K->idx[q]];
-    *springs = 0.0;
     for (int64_t i = 0; i < s->m; i++)
-        *springs += s->weight[i] * (s->of.h[i] - g[i]) * (s->of.h[i] - g[i]);
-    return fmax(0.0, energy);
+        springs += s->weight[i] * (s->of.h[i] - g[i]) * (s->of.h[i] - g[i]);
+    *norm = sqrt(fmax(0.0, energy));
+    *augmented = sqrt(fmax(0.0, energy) + springs);
+    if (!s->is_scene || !uz_is_moved(&s->model, s->prescribed))
+        return UZ_OK;
+    uz_status status = uz_whole_norm(&whole, &s->model, u, s->prescribed, err);
+    *norm = uz_bound_reference(whole, *norm, error);
+    return status;
 }
 
 /* The dofs that the motion moves most: "dof 7 (+1), dof 3 (-0.5)". */
@@ -122,7 +129,9 @@ static uz_status certify(uz_semi *s, uz_error *err)
         return status;
     c->gap = c->absolute_error = c->relative_error = INFINITY;
     if (s->proved) {
-        double norm = c->energy_norm;
+        double norm, augmented;
+        status = uz_semi_norms(&norm, &augmented, s, s->absolute, err);
+        c->energy_norm = norm;
         c->gap = gap;
         c->absolute_error = s->absolute;
         c->relative_error = s->absolute < norm ? s->absolute / (norm - s->absolute) : INFINITY;
@@ -130,7 +139,7 @@ static uz_status certify(uz_semi *s, uz_error *err)
             c->relative_error = 0.0;
     }
     c->energy_dual = c->energy_primal - c->gap;
-    return UZ_OK;
+    return status;
 }
 
 static void name_rows(const uz_semi *s, uz_semicoercive *out)
