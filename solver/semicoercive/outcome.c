@@ -194,6 +194,25 @@ static void report_trade(uz_result *result)
     result->summary.suggestion.any = false;
 }
 
+/* A sum of loads that is no more than their rounding. */
+#define NO_LOAD 1e-12
+
+/* Does the load leave all motions without stiffness alone? Then nothing says where in their room they end. */
+static bool is_loose(const uz_semi *s)
+{
+    bool loose = s->Z != NULL;
+    for (int64_t c = 0; loose && c < s->k; c++) {
+        double work = 0.0, size = 0.0, largest = 0.0;
+        for (int64_t j = 0; j < s->d; j++) {
+            work += s->Z[c * s->d + j] * s->of.p[j];
+            size += fabs(s->of.p[j]);
+            largest = fmax(largest, fabs(s->Z[c * s->d + j]));
+        }
+        loose = fabs(work) <= NO_LOAD * size * largest;
+    }
+    return loose;
+}
+
 uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
 {
     uz_result *result = s->last;
@@ -212,9 +231,11 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     summary->message[0] = '\0';
     uz_explain_outcome(result, UZ_END_STALLED);
     if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT)
-        snprintf(summary->message, sizeof summary->message,
-                 "no rows could be proved to hold the body, which no support does: it may be balanced on the edge of "
-                 "its contact");
+        snprintf(summary->message, sizeof summary->message, "%s",
+                 is_loose(s) ? "no load moves the body along a motion that no support holds: where the obstacles on "
+                               "both sides leave it room it may lie anywhere, and this is one such place"
+                             : "no rows could be proved to hold the body, which no support does: it may be balanced on "
+                               "the edge of its contact");
     summary->timings.assemble += s->assemble_s;
     summary->timings.total = uz_seconds() - s->started;
     report_trade(s->last);
