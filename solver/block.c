@@ -159,25 +159,35 @@ static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
     return status;
 }
 
-static void certify_lanes(uz_block *block, int64_t first, int64_t count, bool *certified)
+static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bool *certified, uz_error *err)
 {
+    uz_status status = UZ_OK;
     const double *P = uz_case_block_loads(block->loads) + first * block->d;
     const double *U = uz_case_block_displacements(block->loads) + first * block->d;
     uz_lane_answer answers[UZ_LANES];
     uz_run *runs = block->runs + first;
     separate(runs, count, U, block->d);
-    for (int64_t k = 0; k < count; k++) {
+    for (int64_t k = 0; status == UZ_OK && k < count; k++) {
         const double *scale = uz_case_row_scale(runs[k].load);
+        double whole_norm;
         for (int64_t i = 0; i < runs[k].m; i++)
             runs[k].answer.r[i] = scale[i] * block->r[first + k][i];
-        answers[k] = (uz_lane_answer){
-            .r = runs[k].answer.r, .g = runs[k].answer.g, .h = runs[k].h, .sharp = 0.5 * runs[k].requested};
+        status = uz_run_whole_norm(&whole_norm, &runs[k], runs[k].answer.u, err);
+        answers[k] = (uz_lane_answer){.r = runs[k].answer.r,
+                                      .g = runs[k].answer.g,
+                                      .h = runs[k].h,
+                                      .sharp = 0.5 * runs[k].requested,
+                                      .moved = runs[k].moved,
+                                      .whole_norm = whole_norm};
     }
+    if (status != UZ_OK)
+        return status;
     uz_certify_lanes(block->certifier, answers, (int)count, U, P);
     for (int64_t k = 0; k < count; k++) {
         certified[k] = answers[k].certified;
         runs[k].answer.certificate = answers[k].certificate;
     }
+    return UZ_OK;
 }
 
 static uz_status recover_and_certify(uz_block *block, int64_t count, bool *certified, uz_error *err)
@@ -185,7 +195,7 @@ static uz_status recover_and_certify(uz_block *block, int64_t count, bool *certi
     double start = uz_seconds();
     uz_status status = uz_case_block_recover(block->loads, block->cases, block->r, block->with_push, count, err);
     for (int64_t first = 0; status == UZ_OK && first < count; first += UZ_LANES)
-        certify_lanes(block, first, lanes_from(first, count), certified + first);
+        status = certify_lanes(block, first, lanes_from(first, count), certified + first, err);
     share_time(block, count, uz_seconds() - start, true);
     return status;
 }

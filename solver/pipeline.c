@@ -43,6 +43,7 @@ static uz_status make_load(uz_run *run, uz_error *err)
     run->h = run->h_all = h;
     run->prescribed = h + run->all;
     uz_status status = uz_body_model_load(run->owned, h, run->prescribed, &body->model, &scene, err);
+    run->moved = status == UZ_OK && uz_is_moved(&body->model, run->prescribed);
     if (status == UZ_OK && body->rows.in) {
         uz_candidates_gather(run->prescribed + n_fixed, h, &body->rows);
         run->h = run->prescribed + n_fixed;
@@ -126,11 +127,20 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
     return status;
 }
 
-uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *err)
+uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err)
+{
+    *norm = 0.0;
+    return run->moved ? uz_whole_norm(norm, &run->body->model, u, run->prescribed, err) : UZ_OK;
+}
+
+uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const double *u, uz_error *err)
 {
     const uz_csc *K = uz_body_K(run->body, run->problem);
     const uz_leave leave = {run->hooks, run->deadline};
+    double whole_norm = 0.0;
     uz_status status = need_workspace(run, err);
+    if (status == UZ_OK)
+        status = uz_run_whole_norm(&whole_norm, run, u, err);
     if (status != UZ_OK)
         return status;
     *input = (uz_certify_input){
@@ -143,6 +153,8 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *e
         .rcond = run->result->summary.rcond,
         .inverse_bound =
             run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws, &leave) : INFINITY,
+        .moved = run->moved,
+        .whole_norm = whole_norm,
         .sharp = 0.5 * run->requested,
     };
     return UZ_OK;
@@ -151,7 +163,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *e
 uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
 {
     uz_certify_input input;
-    uz_status status = uz_run_certify_input(&input, run, err);
+    uz_status status = uz_run_certify_input(&input, run, answer->u, err);
     if (status == UZ_OK)
         status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
     return status;
@@ -206,7 +218,7 @@ void uz_run_balance_request(uz_run *run)
     summary->discretization_error = uz_estimate_mesh_error(&run->body->model, &scene, nodal);
     free(nodal);
     if (summary->discretization_error > 0.0)
-        run->requested = fmin(1.0, 0.1 * summary->discretization_error);
+        run->requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * summary->discretization_error));
 }
 
 /* The rows that contradict each other, checked by the certificate's code on the original data. */
@@ -278,7 +290,7 @@ static uz_status judge(bool *done, uz_run *run, uz_error *err)
     *done = run->result->ray || certificate->relative_error <= run->requested || run->end != UZ_END_TARGET;
     run->again = true;
     if (!*done && run->it.best_relative <= run->target)
-        run->target = 0.25 * run->it.best_relative;
+        run->target = fmin(0.25, 0.5 * run->requested / certificate->relative_error) * run->it.best_relative;
     return status;
 }
 
@@ -351,7 +363,7 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     uz_status status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
         status = uz_iterate_init(&run->it, run->m, run->settings->alpha, err);
-    run->it.decades = &run->decades;
+    run->it.decades = run->moved ? NULL : &run->decades; /* bounds of iterations are relative to another norm */
     uz_decades_resume(&run->decades, uz_run_time(run));
     if (status == UZ_OK && run->start)
         status = take_start(run, err);

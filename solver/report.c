@@ -14,9 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* `exact` means rounding level: no certificate in double precision can be expected below this. */
-#define EXACT_RELATIVE_ERROR 1e-12
-
 /* An enumerator that has a name. */
 static bool is_known(const char *name)
 {
@@ -41,7 +38,7 @@ uz_status uz_check_settings(const uz_settings *s, uz_error *err)
 
 double uz_requested_error(const uz_settings *settings)
 {
-    return settings->relative_error > 0.0 ? settings->relative_error : EXACT_RELATIVE_ERROR;
+    return settings->relative_error > 0.0 ? settings->relative_error : UZ_EXACT_RELATIVE_ERROR;
 }
 
 uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,

@@ -34,6 +34,7 @@ typedef struct {
     const double *h_all; /* all */
     double *owned;       /* scenes: room of p, h_all, prescribed and h */
     double *prescribed;  /* scenes: n_fixed */
+    bool moved;          /* some of them are not zero */
     uz_case *load;
     uz_iterate it;
     uz_decades decades;
@@ -58,8 +59,10 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
 void uz_run_take_body(uz_run *run, uz_reuse reused);
 /* p, h and prescribed values of the case. */
 uz_status uz_run_make_load(uz_run *run, uz_error *err);
-/* What a certificate of this load starts from; needs the load. */
-uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, uz_error *err);
+/* What a certificate of u (d) starts from; needs the load. */
+uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const double *u, uz_error *err);
+/* What a certificate of u says relative errors are relative to, where supports move the body; else 0. */
+uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err);
 /* Scenes, `balanced`: the request from the estimated discretization error of answer.u. */
 void uz_run_balance_request(uz_run *run);
 /* From p and h to a certified answer; ends in uz_run_report. It is make_load, the creation of run->load, and these: */
@@ -91,6 +94,8 @@ void uz_run_end(uz_run *run);
 /* The problem's matrices and load cases, as far as they can be checked before anything is computed. */
 uz_status uz_check_problem(const uz_problem *problem, uz_error *err);
 
+/* `exact` means rounding level: no certificate in double precision can be expected below this. */
+#define UZ_EXACT_RELATIVE_ERROR 1e-12
 /* The relative error that a certificate has to meet, before `balanced` knows better. */
 double uz_requested_error(const uz_settings *settings);
 /* There is no answer: nothing that looks like one may be left. */

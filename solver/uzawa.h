@@ -185,7 +185,7 @@ typedef struct {
     uz_operator op;
     uz_ordering ordering;
     uz_stopping stopping;
-    double relative_error;  /* certified: ||u - u*||_K / ||u||_K asked for, in (0, 1]; 0: rounding level */
+    double relative_error;  /* certified: ||u - u*||_K / ||u||_K (uz_certificate) asked for, in (0, 1]; 0: rounding */
     bool balanced;          /* scenes: relative_error is a tenth of the estimated discretization error instead */
     double epsilon;         /* UZ_STOP_PAPER: stop when ||rho - r|| <= epsilon, a force */
     double alpha;           /* step size; 0: 1 / lambda_max(D) */
@@ -235,7 +235,8 @@ typedef struct {
     double gap;            /* pi(v) - psi(r) for the feasible v that the certificate built */
     double energy_primal;  /* pi(v) */
     double energy_dual;    /* psi(r) */
-    double energy_norm;    /* ||u||_K */
+    double energy_norm;    /* ||u||_K, of the relative error. Where supports move a scene's body: over all of its dofs,
+                            * so that rigid motion is no part of it; if nothing else is left (1e-10), over the free */
     uz_residual residual;  /* absolute */
     uz_residual relative_residual; /* force by ||p||, length by the gap scale, energy by |psi| */
 } uz_certificate;

@@ -60,7 +60,7 @@ static uz_status certify(uz_run *run, const double *r, uz_error *err)
     if (run->settings->balanced && run->body->is_scene)
         uz_run_balance_request(run);
     uz_certify_input input;
-    uz_status status = uz_run_certify_input(&input, run, err);
+    uz_status status = uz_run_certify_input(&input, run, answer->u, err);
     input.twofold_energies = true;
     if (status == UZ_OK)
         status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);

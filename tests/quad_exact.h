@@ -234,7 +234,10 @@ static inline bool quad_add_row(quad_exact *x, int64_t *rows, int64_t *count, in
             gap -= x->D[q * m + rows[k]] * x->r[rows[k]];
         }
         gap += x->D[q * m + q] * pushed;
-        bool free_to_move = curvature > QUAD_DEPENDENT * x->D[q * m + q];
+        quad size = quad_sqrt(x->D[q * m + q]); /* what the curvature is the difference of, squared */
+        for (int64_t k = 0; k < n; k++)
+            size += quad_abs(w[k]) * quad_sqrt(x->D[rows[k] * m + rows[k]]);
+        bool free_to_move = curvature > QUAD_DEPENDENT * x->D[q * m + q] && curvature > QUAD_ROUNDING * size * size;
         quad step = free_to_move ? -gap / curvature : -1;
         for (int64_t k = 0; k < n; k++)
             if (w[k] > 0 && (step < 0 || -x->r[rows[k]] < step * w[k])) {

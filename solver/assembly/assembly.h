@@ -119,6 +119,13 @@ uz_status uz_internal_forces(double *f, const uz_body_model *model, const double
 /* 1/2 u'K u over all dofs, springs included. */
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err);
 
+/* Do supports move the body: is a prescribed value (n_fixed; NULL: none) not zero? Then ||u||_K over the free dofs
+ * alone is not the norm of the deformation. */
+bool uz_is_moved(const uz_body_model *model, const double *prescribed);
+/* ||u||_K over all dofs, springs included, from the free dofs u (d) and the prescribed values. */
+uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
+                        uz_error *err);
+
 /* What turning a vector at a node from its dofs to the axes may round in each component: 0 where they are the same. */
 double uz_turning_error(const uz_body_model *model, int64_t node, const double *v);
 /* A bound on delta' K delta, over all dofs, for the errors delta that turning leaves in nodal (n_nodes x dim): the sum

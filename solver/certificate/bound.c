@@ -142,6 +142,13 @@ static double relative_to_exact(double error, double norm)
     return norm > error ? error / (norm - error) : INFINITY;
 }
 
+#define RIGID 1e-10
+
+double uz_bound_reference(double whole_norm, double free_norm, double error)
+{
+    return whole_norm + error <= RIGID * free_norm ? free_norm : whole_norm;
+}
+
 /* Below this energy the squares of its rounding errors leave the range of double, and a bound would be zero for
  * nothing. Above it they keep all of the digits that matter. */
 #define ENERGY_LEAST 0x1p-850
@@ -166,6 +173,8 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
         out->gap = INFINITY;
     out->energy_dual = out->energy_primal - out->gap;
     out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;
+    if (t->moved)
+        out->energy_norm = uz_bound_reference(t->whole_norm, out->energy_norm, out->absolute_error);
     out->relative_error = relative_to_exact(out->absolute_error, out->energy_norm);
     residuals(&out->residual, t, r, g, m);
     scale_residuals(out, t, r, g, h, m);

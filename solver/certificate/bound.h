@@ -13,6 +13,8 @@ typedef struct {
     double span;              /* the largest |N_ij| times the largest |u_j| */
     double complementarity;   /* -r'g(v) */
     double positive_part;     /* of the reactions that were given */
+    bool moved;               /* supports move the body: */
+    double whole_norm;        /* ||u||_K with the supported dofs */
     bool anything;            /* some entry of u, c or K u - p - N'r is not zero */
 } uz_bound_terms;
 
@@ -33,6 +35,11 @@ double uz_bound_doubt(double spread, double rcond, int64_t d);
 /* What the rounding of twofold sums may hide of e, in the norm of K^-1: it matters only where rounding hit u* by
  * chance. sum: of u_j^2 K_jj + (|K u|_j + |p_j|)^2 / K_jj. */
 double uz_bound_noise(double spread, double sum);
+
+/* What an error is relative to where supports move the body. u'Ku over the free dofs counts that motion as if it tore
+ * the body off its supports: an error relative to free_norm says nothing of strain and reactions. So it is whole_norm,
+ * of which rigid motions are no part; but for a body that is surely not deformed beyond the rounding of its motion. */
+double uz_bound_reference(double whole_norm, double free_norm, double error);
 
 /* 2-norm without overflow. */
 double uz_bound_norm(const double *x, int64_t n);

@@ -84,7 +84,8 @@ static bool bound_cheaply(const certifier *c, double *square)
     if (!isfinite(c->in->inverse_bound))
         return false;
     *square = c->in->inverse_bound * c->weighted;
-    return *square <= c->in->sharp * c->in->sharp * c->energy;
+    const double energy = c->in->moved ? c->in->whole_norm * c->in->whole_norm : c->energy;
+    return *square <= c->in->sharp * c->in->sharp * energy;
 }
 
 static double doubt(const certifier *c, double spread)
@@ -233,7 +234,8 @@ static void sharpen_energies(const certifier *c, uz_bound_terms *t, const double
 static uz_status measure(certifier *c, uz_certificate *out, const double *r, double *g, double positive_part,
                          uz_error *err)
 {
-    uz_bound_terms terms = {.square = INFINITY, .positive_part = positive_part};
+    uz_bound_terms terms = {
+        .square = INFINITY, .positive_part = positive_part, .moved = c->in->moved, .whole_norm = c->in->whole_norm};
     for (int64_t i = 0; i < c->m; i++)
         g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, c->u_b, NULL);
     c->feasible.u = c->u_b;

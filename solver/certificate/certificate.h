@@ -31,6 +31,8 @@ typedef struct {
     double inverse_bound; /* e'K^-1 e <= inverse_bound sum e_j^2 / K_jj; INFINITY: unknown. Spares inverse_norm where it
                              is sharp enough: */
     bool twofold_energies; /* u'Ku and u'p in twofold precision too: what is shown, not what is bounded, needs it */
+    bool moved;            /* supports move the body; relative errors are then beside */
+    double whole_norm;     /* ||u||_K with the supported dofs */
     double sharp;          /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
 } uz_certify_input;
 

@@ -336,9 +336,12 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     const sums *s = &c->sum[lane / 4];
     const int l = lane % 4;
     const double square = c->inverse_bound * s->weighted[l];
-    bool sharp = square <= a->sharp * a->sharp * s->stiffness[l];
+    const double energy = a->moved ? a->whole_norm * a->whole_norm : s->stiffness[l];
+    bool sharp = square <= a->sharp * a->sharp * energy;
     if (!feasible || !sharp || !within_range(s->sizes[l], s->residuals[l], s->force[l]))
         return;
+    terms->moved = a->moved;
+    terms->whole_norm = a->whole_norm;
     terms->stiffness = s->stiffness[l];
     terms->load = s->load[l];
     terms->change = s->change[l];

@@ -21,6 +21,8 @@ typedef struct {
     double *g;       /* m: out */
     const double *h; /* m */
     double sharp;    /* see uz_certify_input */
+    bool moved;      /* the same */
+    double whole_norm;
     uz_certificate certificate;
     bool certified; /* false: certificate is not filled */
 } uz_lane_answer;

@@ -193,12 +193,17 @@ static void forgive_rounding(double *r, double *g, const uz_case *load, const bo
 }
 
 /* Rows are independent where the compliance that each keeps when those before it are held stands out from the rounding
- * of D: a pivot that is noise makes reactions that are noise, of the right signs often enough. */
+ * of D: a pivot that is noise makes reactions that are noise, of the right signs often enough. Rows that come after two
+ * that nearly depend on each other take over their rounding, divided by the share that these keep. */
 static bool are_independent(const double *chol, const double *D, const int64_t *rows, int64_t count, int64_t m)
 {
-    for (int64_t k = 0; k < count; k++)
-        if (!(chol[k + k * count] * chol[k + k * count] > UZ_DEPENDENT * D[rows[k] + rows[k] * m]))
+    double least = 1.0;
+    for (int64_t k = 0; k < count; k++) {
+        double kept = chol[k + k * count] * chol[k + k * count] / D[rows[k] + rows[k] * m];
+        if (!(kept > fmax(UZ_DEPENDENT, NOISE / least)))
             return false;
+        least = fmin(least, kept);
+    }
     return true;
 }
 

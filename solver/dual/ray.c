@@ -5,6 +5,7 @@
 #include "core/blas.h"
 #include "core/error.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +13,7 @@
 enum { MAX_STEPS = 300 };
 
 typedef struct {
-    double *s, *direction, *image; /* d, d, m */
+    double *s, *direction, *image, *best; /* d, d, m, m */
 } least_squares;
 
 /* s = N'y over the rows of the support, which are those with y < 0 or kept zero. */
@@ -23,10 +24,26 @@ static double normal_residual(double *s, const uz_csc *N, const double *y)
     return uz_dot(N->cols, s, s);
 }
 
-/* y -= its part in the range of N_S (rows S only), by CGLS: what is left has N'y = 0 (Paige and Saunders 1982). */
+/* The square of what the rounding of N'y may be. */
+static double residual_noise(double *s, const uz_csc *N, const double *y)
+{
+    double sum = 0.0;
+    for (int64_t j = 0; j < N->cols; j++) {
+        s[j] = 0.0;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+            s[j] += 0.5 * DBL_EPSILON * fabs(N->val[k] * y[N->idx[k]]);
+        sum += s[j] * s[j];
+    }
+    return sum;
+}
+
+/* y -= its part in the range of N_S (rows S only), by CGLS: what is left has N'y = 0 (Paige and Saunders 1982). Steps
+ * on rounding alone lead anywhere: a y that is as good as that stays, and otherwise the best of all is kept. */
 static void project(least_squares *ls, double *y, const bool *support, const uz_csc *N)
 {
-    double gamma = normal_residual(ls->s, N, y), stop = 1e-32 * gamma;
+    double noise = residual_noise(ls->s, N, y), gamma = normal_residual(ls->s, N, y), least = gamma;
+    double stop = fmax(1e-32 * gamma, noise);
+    memcpy(ls->best, y, (size_t)N->rows * sizeof *y);
     memcpy(ls->direction, ls->s, (size_t)N->cols * sizeof *ls->s);
     for (int step = 0; step < MAX_STEPS && gamma > stop; step++) {
         memset(ls->image, 0, (size_t)N->rows * sizeof *ls->image);
@@ -41,18 +58,23 @@ static void project(least_squares *ls, double *y, const bool *support, const uz_
         for (int64_t j = 0; j < N->cols; j++)
             ls->direction[j] = ls->s[j] + next / gamma * ls->direction[j];
         gamma = next;
+        if (gamma < least) {
+            least = gamma;
+            memcpy(ls->best, y, (size_t)N->rows * sizeof *y);
+        }
     }
+    memcpy(y, ls->best, (size_t)N->rows * sizeof *y);
 }
 
 uz_status uz_case_project_ray(const uz_case *load, double *y, uz_error *err)
 {
     const uz_csc *N = &load->dual->N;
     least_squares ls = {uz_alloc(N->cols, sizeof(double)), uz_alloc(N->cols, sizeof(double)),
-                        uz_alloc(N->rows, sizeof(double))};
+                        uz_alloc(N->rows, sizeof(double)), uz_alloc(N->rows, sizeof(double))};
     bool *support = uz_alloc(N->rows, sizeof *support);
     uz_status status = UZ_OK;
     double largest = 0.0;
-    if (ls.s && ls.direction && ls.image && support) {
+    if (ls.s && ls.direction && ls.image && ls.best && support) {
         for (int64_t i = 0; i < N->rows; i++)
             largest = fmax(largest, -y[i]);
         for (int64_t i = 0; i < N->rows; i++) {
@@ -68,6 +90,7 @@ uz_status uz_case_project_ray(const uz_case *load, double *y, uz_error *err)
     free(ls.s);
     free(ls.direction);
     free(ls.image);
+    free(ls.best);
     free(support);
     return status;
 }

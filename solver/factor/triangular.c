@@ -95,14 +95,15 @@ uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, d
 }
 
 /* rank[k]: the place of position k among the last dofs, -1 for the others. */
-static void rank_last(const uz_factor *factor, int64_t *rank, int64_t *order, int64_t *where)
+static void rank_last(const uz_factor *factor, const int64_t *last, int64_t n_last, int64_t *rank, int64_t *order,
+                      int64_t *where)
 {
     const SuiteSparse_long *perm = factor->L.Perm;
     int64_t count = 0;
     for (int64_t k = 0; k < factor->n; k++)
         rank[k] = -1;
-    for (int64_t i = 0; i < factor->analysis->n_last; i++)
-        rank[factor->analysis->position[factor->analysis->last[i]]] = 0;
+    for (int64_t i = 0; i < n_last; i++)
+        rank[factor->analysis->position[last[i]]] = 0;
     for (int64_t k = 0; k < factor->n; k++) {
         if (rank[k] < 0)
             continue;
@@ -139,15 +140,16 @@ uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *
 {
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
-    int64_t *rank = uz_alloc(factor->n, sizeof *rank);
+    int64_t n_last, *rank = uz_alloc(factor->n, sizeof *rank);
+    const int64_t *last = uz_factor_last_dofs(factor, &n_last); /* none of the analysis' where they are not last */
     if (!rank)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)factor->n);
-    rank_last(factor, rank, order, where);
-    memset(block, 0, (size_t)factor->analysis->n_last * (size_t)factor->analysis->n_last * sizeof *block);
+    rank_last(factor, last, n_last, rank, order, where);
+    memset(block, 0, (size_t)n_last * (size_t)n_last * sizeof *block);
     bool ok = true;
     for (size_t k = 0; ok && k < L->nsuper; k++)
-        ok = copy_supernode(block, factor->analysis->n_last, rank, s + pi[k], pi[k + 1] - pi[k], super[k],
-                            super[k + 1] - super[k], (const double *)L->x + px[k]);
+        ok = copy_supernode(block, n_last, rank, s + pi[k], pi[k + 1] - pi[k], super[k], super[k + 1] - super[k],
+                            (const double *)L->x + px[k]);
     free(rank);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_INTERNAL, "", "the contact dofs are not last in the elimination");
 }

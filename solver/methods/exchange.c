@@ -117,9 +117,14 @@ static void yield_to(exchange *x, int64_t q)
     x->compliance = x->incoming[q] - uz_dot(x->count, x->l, x->l);
 }
 
+/* What is left of the compliance is that of n_q - N_A'w: where rows in contact nearly depend on each other w is large,
+ * and the rounding of D stands beside (sqrt(D_qq) + sum |w_k| sqrt(D_kk))^2. */
 static bool depends(const exchange *x, int64_t q)
 {
-    return !(x->compliance > UZ_DEPENDENT * x->incoming[q]);
+    double size = sqrt(x->incoming[q]);
+    for (int64_t k = 0; k < x->count; k++)
+        size += fabs(x->w[k]) * sqrt(x->column[k][x->rows[k]]);
+    return !(x->compliance > fmax(UZ_DEPENDENT * x->incoming[q], NOISE * size * size));
 }
 
 /* q, pressed last and independent, joins the rows in contact, unless there was no leave to make room for it. */

@@ -1,4 +1,5 @@
 /* outcome.c: what a semicoercive solve leaves behind, or why it is refused. */
+#include "certificate/bound.h"
 #include "certificate/certificate.h"
 #include "core/alloc.h"
 #include "core/clock.h"
@@ -16,17 +17,23 @@
 /* The null space of matrices is known by iterations on a factor: its rounding allows no more. */
 #define BALANCED 1e-7
 
-double uz_semi_energy(const uz_semi *s, const double *u, const double *g, double *springs)
+uz_status uz_semi_norms(double *norm, double *augmented, const uz_semi *s, double error, uz_error *err)
 {
     const uz_csc *K = s->of.K;
-    double energy = 0.0;
+    const double *u = s->last->u, *g = s->last->g;
+    double energy = 0.0, springs = 0.0, whole;
     for (int64_t j = 0; j < s->d; j++)
         for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
             energy += (K->idx[q] == j ? 1.0 : 2.0) * K->val[q] * u[j] * u[K->idx[q]];
-    *springs = 0.0;
     for (int64_t i = 0; i < s->m; i++)
-        *springs += s->weight[i] * (s->of.h[i] - g[i]) * (s->of.h[i] - g[i]);
-    return fmax(0.0, energy);
+        springs += s->weight[i] * (s->of.h[i] - g[i]) * (s->of.h[i] - g[i]);
+    *norm = sqrt(fmax(0.0, energy));
+    *augmented = sqrt(fmax(0.0, energy) + springs);
+    if (!s->is_scene || !uz_is_moved(&s->model, s->prescribed))
+        return UZ_OK;
+    uz_status status = uz_whole_norm(&whole, &s->model, u, s->prescribed, err);
+    *norm = uz_bound_reference(whole, *norm, error);
+    return status;
 }
 
 /* The dofs that the motion moves most: "dof 7 (+1), dof 3 (-0.5)". */
@@ -122,7 +129,9 @@ static uz_status certify(uz_semi *s, uz_error *err)
         return status;
     c->gap = c->absolute_error = c->relative_error = INFINITY;
     if (s->proved) {
-        double norm = c->energy_norm;
+        double norm, augmented;
+        status = uz_semi_norms(&norm, &augmented, s, s->absolute, err);
+        c->energy_norm = norm;
         c->gap = gap;
         c->absolute_error = s->absolute;
         c->relative_error = s->absolute < norm ? s->absolute / (norm - s->absolute) : INFINITY;
@@ -130,7 +139,7 @@ static uz_status certify(uz_semi *s, uz_error *err)
             c->relative_error = 0.0;
     }
     c->energy_dual = c->energy_primal - c->gap;
-    return UZ_OK;
+    return status;
 }
 
 static void name_rows(const uz_semi *s, uz_semicoercive *out)
@@ -185,6 +194,25 @@ static void report_trade(uz_result *result)
     result->summary.suggestion.any = false;
 }
 
+/* A sum of loads that is no more than their rounding. */
+#define NO_LOAD 1e-12
+
+/* Does the load leave all motions without stiffness alone? Then nothing says where in their room they end. */
+static bool is_loose(const uz_semi *s)
+{
+    bool loose = s->Z != NULL;
+    for (int64_t c = 0; loose && c < s->k; c++) {
+        double work = 0.0, size = 0.0, largest = 0.0;
+        for (int64_t j = 0; j < s->d; j++) {
+            work += s->Z[c * s->d + j] * s->of.p[j];
+            size += fabs(s->of.p[j]);
+            largest = fmax(largest, fabs(s->Z[c * s->d + j]));
+        }
+        loose = fabs(work) <= NO_LOAD * size * largest;
+    }
+    return loose;
+}
+
 uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
 {
     uz_result *result = s->last;
@@ -203,9 +231,11 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     summary->message[0] = '\0';
     uz_explain_outcome(result, UZ_END_STALLED);
     if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT)
-        snprintf(summary->message, sizeof summary->message,
-                 "no rows could be proved to hold the body, which no support does: it may be balanced on the edge of "
-                 "its contact");
+        snprintf(summary->message, sizeof summary->message, "%s",
+                 is_loose(s) ? "no load moves the body along a motion that no support holds: where the obstacles on "
+                               "both sides leave it room it may lie anywhere, and this is one such place"
+                             : "no rows could be proved to hold the body, which no support does: it may be balanced on "
+                               "the edge of its contact");
     summary->timings.assemble += s->assemble_s;
     summary->timings.total = uz_seconds() - s->started;
     report_trade(s->last);

@@ -37,8 +37,8 @@ typedef struct {
     double discretization_error; /* NaN: not estimated */
 } uz_semi;
 
-/* ||x||_K, and sum of weight (N x)^2 beside its square. */
-double uz_semi_energy(const uz_semi *s, const double *u, const double *g, double *springs);
+/* Of the last answer: what an error of it is relative to, and its norm in the last augmented problem. */
+uz_status uz_semi_norms(double *norm, double *augmented, const uz_semi *s, double error, uz_error *err);
 
 /* Makes s->last the result of the problem itself: its certificate from the original data, names, sums. `ended`: how the
  * last augmented problem did. */

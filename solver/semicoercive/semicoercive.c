@@ -320,7 +320,7 @@ static uz_status prove_contact(uz_semi *s, uz_contact_verdict *verdict, uz_error
 /* Is the answer of the augmented problem one of the problem itself, and how far is it from the exact one? */
 static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *relative, uz_error *err)
 {
-    double springs, noise = INFINITY;
+    double norm, augmented, noise = INFINITY;
     s->proved = false;
     *relative = INFINITY;
     *verdict = UZ_CONTACT_TOO_COARSE;
@@ -332,23 +332,31 @@ static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *re
     s->absolute = s->last->summary.certificate.absolute_error * (1.0 + 1e-9) + noise;
     status = prove_contact(s, verdict, err);
     s->proved = status == UZ_OK && *verdict == UZ_CONTACT_PROVED;
-    double norm = sqrt(uz_semi_energy(s, s->last->u, s->last->g, &springs));
+    if (status == UZ_OK)
+        status = uz_semi_norms(&norm, &augmented, s, s->absolute, err);
+    if (status != UZ_OK)
+        return status;
     *relative = s->absolute < norm ? s->absolute / (norm - s->absolute) : INFINITY;
     return status;
 }
 
-/* What to ask of the augmented problem, whose norm counts the springs too. */
-static double first_request(const uz_semi *s)
+/* What to ask of the augmented problem, whose norm counts the springs, and motions of the supports, too. */
+static uz_status first_request(double *request, const uz_semi *s, uz_error *err)
 {
-    double springs, energy = uz_semi_energy(s, s->last->u, s->last->g, &springs);
-    return fmax(1e-15, 0.5 * s->requested * sqrt(energy / fmax(energy + springs, DBL_MIN)));
+    double norm, augmented;
+    uz_status status = uz_semi_norms(&norm, &augmented, s, 0.0, err);
+    *request = status == UZ_OK ? fmin(1.0, fmax(1e-15, 0.5 * s->requested * (norm / fmax(augmented, DBL_MIN)))) : 1.0;
+    return status;
 }
 
 /* Phase 2 on the rows that stand in s->weight. *done: s->last is what there is to tell. UZ_ERR_NOT_SPD: these rows
  * don't hold the body. */
 static uz_status solve_exact(uz_semi *s, bool *done, uz_contact_verdict *verdict, uz_error *err)
 {
-    double request = first_request(s), relative = INFINITY;
+    double request, relative = INFINITY;
+    uz_status first = first_request(&request, s, err);
+    if (first != UZ_OK)
+        return first;
     for (int attempt = 0; attempt < EXACT_TRIES; attempt++) {
         uz_settings settings = settings_of(s, true, request);
         uz_status status = solve_augmented(s, &settings, s->hooks, err);
@@ -408,7 +416,7 @@ static void balance_request(uz_semi *s)
     free(nodal);
     s->discretization_error = error;
     if (error > 0.0)
-        s->requested = fmin(1.0, 0.1 * error);
+        s->requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * error));
 }
 
 static uz_status run_rounds(uz_semi *s, uz_error *err)

@@ -2,6 +2,7 @@
 #include "extremes.h"
 
 #include "assembly/assembly.h"
+#include "scene_norm.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -118,6 +119,8 @@ static void run_ways(const task *t)
     if (t->qp) {
         bool *touch = guess_contact(t->problem, t->qp->N.rows);
         known = find_truth(t->qp, touch);
+        if (t->model)
+            take_whole_norm(&known, t->model, &t->problem->scene);
         free(touch);
     }
     run_way(t, &known, WAY_DEFAULT, cache);

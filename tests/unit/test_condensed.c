@@ -169,3 +169,29 @@ TEST(leaning_normals_are_certified)
     }
     uz_qp_clear(&qp);
 }
+
+/* The factor of a body whose contact is not last serves one of the same K whose rows touch nothing. */
+TEST(rows_of_zeros_on_a_factor_from_the_cache)
+{
+    uz_problem leaning = {.kind = UZ_PROBLEM_MATRICES, .qp = leaning_cube(8)}, idle = {.kind = UZ_PROBLEM_MATRICES};
+    uz_settings settings = uz_settings_default();
+    uz_cache *cache = uz_cache_new((size_t)1 << 28);
+    uz_result *first = NULL, *second = NULL;
+    const int64_t d = leaning.qp.K.cols;
+    uz_thread_init();
+    CHECK_INT(uz_csc_copy(&idle.qp.K, &leaning.qp.K, NULL), UZ_OK);
+    CHECK_INT(uz_csc_init(&idle.qp.N, 2, d, 0, NULL), UZ_OK);
+    idle.qp.p = vector(d);
+    idle.qp.h = vector(2);
+    idle.qp.p[0] = idle.qp.h[0] = idle.qp.h[1] = 1;
+    CHECK_INT(uz_solve(&first, &leaning, &settings, cache, NULL, NULL), UZ_OK);
+    CHECK_INT(uz_solve(&second, &idle, &settings, cache, NULL, NULL), UZ_OK);
+    CHECK(first && !first->summary.contact_last);
+    CHECK(second && second->summary.reused.factor && second->summary.outcome == UZ_CONVERGED);
+    CHECK(second && second->g[0] == 1 && second->r[1] == 0);
+    uz_result_free(first);
+    uz_result_free(second);
+    uz_cache_free(cache);
+    uz_problem_clear(&leaning);
+    uz_problem_clear(&idle);
+}

@@ -166,6 +166,36 @@ TEST(contradictions_of_many_rows_are_proved)
     }
 }
 
+/* A node between a floor and a ceiling at a small angle, and a wall that keeps it where they are too close. What the
+ * wall adds to the two is nothing but their rounding, which the angle makes large. */
+static uz_qp corner(double angle, double overlap, uint64_t seed)
+{
+    qp_random rng = {seed};
+    const double tilt = 0.1 * random_signed(&rng), K[] = {3 + tilt, -1, 0, -1, 2, -1, 0, -1, 4};
+    double N[] = {-angle, 1, 0, 0, -1, 0, 1, tilt, 0};
+    uz_qp qp = {.p = vector(3), .h = vector(3)};
+    qp.p[0] = random_signed(&rng);
+    qp.p[1] = random_signed(&rng);
+    qp.h[0] = -overlap;
+    qp.h[2] = 0.1 * overlap;
+    qp.K = csc_from_dense(K, 3, 3, true);
+    qp.N = csc_from_dense(N, 3, 3, false);
+    return qp;
+}
+
+TEST(a_corner_with_a_small_angle)
+{
+    static const double angles[] = {0.1, 1e-2, 4e-4, 1e-4};
+    for (size_t k = 0; k < 50 * COUNT(angles); k++) {
+        uz_problem no_room = problem_of(corner(angles[k / 50], 0.006, k)),
+                   room = problem_of(corner(angles[k / 50], -0.006, k));
+        check_solved(&no_room, "no room", UZ_INFEASIBLE, 400);
+        check_solved(&room, "room", UZ_CONVERGED, 400);
+        uz_problem_clear(&no_room);
+        uz_problem_clear(&room);
+    }
+}
+
 /* One unit in the last place of h: told as what it is. */
 TEST(contradictions_below_rounding_are_named)
 {

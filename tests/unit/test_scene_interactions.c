@@ -4,6 +4,7 @@
 #include "harness.h"
 
 #include "scene_move.h"
+#include "scene_norm.h"
 
 #include "assembly/assembly.h"
 
@@ -56,6 +57,7 @@ static void check_certificate(examined *e, tally *t)
     for (int64_t i = 0; i < qp.N.rows; i++)
         touch[i] = e->x->r[i] < 0;
     truth known = find_truth(&qp, touch);
+    take_whole_norm(&known, &e->model, scene);
     uz_restrict_nodal(u, &e->model, e->x->u);
     const judgement j = judge(&known, &qp, e->x, u);
     HOLDS(e, j.verdict != JUDGED_WRONG, "%s (certified %g, error %g)", j.why, j.certified, j.error);

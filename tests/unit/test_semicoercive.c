@@ -58,6 +58,23 @@ TEST(pressed_block_rests_on_the_floor)
     check_uniform(1e-3, UZ_OPERATOR_CONDENSED);
 }
 
+/* Between floor and ceiling with room for both, and nothing that moves it either way: no answer is the only one. */
+TEST(loose_block_is_said_to_be_loose)
+{
+    uz_problem problem = problem_in(rolled_block(6, 2, 0.1, 0));
+    uz_settings settings = uz_settings_default();
+    add_plane(&problem.scene, "top", 0, 20.1, 0, -1);
+    uz_result *result = solve_problem(&problem, &settings);
+    CHECK(result && result->summary.outcome == UZ_PRECISION_LIMIT);
+    CHECK(result && strstr(result->summary.message, "may lie anywhere"));
+    uz_result_free(result);
+    problem.scene.loads[0].v[1] = -0.05;
+    result = solve_problem(&problem, &settings);
+    CHECK(result && result->summary.outcome == UZ_CONVERGED);
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
 /* No support at all: two walls and a floor. */
 TEST(corner_holds_a_block_without_supports)
 {

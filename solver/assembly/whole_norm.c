@@ -1,0 +1,34 @@
+/* whole_norm.c: the energy norm of a body with its supported dofs. */
+#include "assembly/assembly.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+bool uz_is_moved(const uz_body_model *model, const double *prescribed)
+{
+    bool moved = false;
+    for (int64_t i = 0; prescribed && i < model->n_fixed && !moved; i++)
+        moved = prescribed[i] != 0;
+    return moved;
+}
+
+/* By elements: u'Ku from the blocks of free and supported dofs would cancel. */
+uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *u, const double *prescribed,
+                        uz_error *err)
+{
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    double energy = 0, *nodal = uz_alloc(n, sizeof *nodal);
+    *norm = 0;
+    if (!nodal)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
+                       (long long)model->mesh.n_nodes);
+    uz_recover_nodal(nodal, model, u, prescribed);
+    uz_status status = uz_strain_energy(&energy, model, nodal, err);
+    free(nodal);
+    if (status == UZ_OK)
+        *norm = sqrt(fmax(0, 2 * energy));
+    return status;
+}

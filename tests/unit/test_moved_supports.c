@@ -1,0 +1,158 @@
+/* Supports that move a body: errors are relative to what deforms it, not to how far it is carried. */
+#include "body_fixture.h"
+
+/* The plate of the paper, its left side held and carried along the plane that it is pressed on: displacements but for
+ * the ride, reactions and contacts are those of the plate that stays (sum r = -10.51371700, 22 contacts). */
+static uz_scene carried_plate(double ride)
+{
+    uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){60, 20, 0}, (int64_t[3]){30, 10, 0});
+    s.thickness = 5;
+    body_hold(&s, "left", ride, 0, NAN);
+    body_load(&s, UZ_LOAD_TRACTION, "top", 0, -0.05, 0);
+    body_load(&s, UZ_LOAD_TRACTION, "right", 0.5, 0, 0);
+    body_plane(&s, "bottom", (double[3]){0, 0, 0}, (double[3]){0, 1, 0});
+    return s;
+}
+
+static const double REACTION_SUM = -10.513717, STRAIN_ENERGY = 3.9608186040e-3;
+
+/* An error of the norm of `relative` changes the sum of the reactions by a few times that part of it. */
+static void check_answer(const uz_result *x, double ride, double relative)
+{
+    const uz_summary *s = &x->summary;
+    CHECK_INT(s->outcome, UZ_CONVERGED);
+    CHECK_MSG(fabs(s->reaction_sum - REACTION_SUM) <= (20 * relative + 1e-6) * fabs(REACTION_SUM),
+              "carried by %g, asked for %g: the reactions sum to %.9g", ride, relative, s->reaction_sum);
+    CHECK_REL(s->certificate.energy_norm, sqrt(2 * STRAIN_ENERGY), 2 * relative + 1e-6);
+}
+
+TEST(an_answer_is_as_good_when_the_body_is_carried_far)
+{
+    static const double rides[] = {0, 0.01, 1, 1000}, errors[] = {1e-2, 1e-4, 1e-6};
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET};
+    for (int k = 0; k < 4 * 3 * 3; k++) {
+        const double ride = rides[k / 9];
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = carried_plate(ride)};
+        uz_settings settings = uz_settings_default();
+        uz_result *x = NULL;
+        uz_error err = {0};
+        settings.relative_error = errors[k / 3 % 3];
+        settings.method = methods[k % 3];
+        CHECK_MSG(uz_solve(&x, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+        check_answer(x, ride, settings.relative_error);
+        uz_result_free(x);
+        uz_scene_clear(&problem.scene);
+    }
+}
+
+TEST(a_tenth_of_the_mesh_error_is_of_the_deformation)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = carried_plate(1)};
+    uz_settings settings = uz_settings_default();
+    uz_result *x = NULL;
+    settings.balanced = true;
+    CHECK(uz_solve(&x, &problem, &settings, NULL, NULL, NULL) == UZ_OK);
+    check_answer(x, 1, x->summary.requested_error);
+    uz_result_free(x);
+    uz_scene_clear(&problem.scene);
+}
+
+/* In lanes, certified by a bound on K^-1. */
+TEST(load_cases_of_a_carried_body)
+{
+    uz_scene s = carried_plate(1);
+    enum { CASES = 5 };
+    uz_load_case *cases = body_room(CASES, sizeof *cases);
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = s, .cases = cases, .n_cases = CASES};
+    uz_settings settings = uz_settings_default();
+    uz_result **x = NULL;
+    uz_error err = {0};
+    for (int k = 0; k < CASES; k++) {
+        snprintf(cases[k].name, sizeof cases[k].name, "%d", k);
+        cases[k].loads = body_room(s.n_loads, sizeof *cases[k].loads);
+        memcpy(cases[k].loads, s.loads, (size_t)s.n_loads * sizeof *s.loads);
+        cases[k].n_loads = s.n_loads;
+    }
+    settings.relative_error = 1e-4;
+    CHECK_MSG(uz_solve_cases(&x, &problem, &settings, NULL, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+    for (int k = 0; x && k < CASES; k++)
+        check_answer(x[k], 1, settings.relative_error);
+    uz_results_free(x, CASES);
+    uz_problem_clear(&problem);
+}
+
+/* The answer without any contact: 5 % of the strain energy is missing however far the body rides. */
+TEST(verify_is_not_impressed_by_the_ride)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = carried_plate(1000)};
+    uz_scene *s = &problem.scene;
+    uz_settings settings = uz_settings_default();
+    uz_result *x = NULL;
+    s->n_contacts = 0;
+    uz_result *loose = body_solve(s, 1e-6);
+    s->n_contacts = 1;
+    double *r = body_room(31, sizeof *r);
+    settings.relative_error = 1e-2;
+    CHECK(uz_verify(&x, &problem, loose->u, r, &settings, NULL, NULL, NULL) == UZ_OK);
+    CHECK_INT(x->summary.outcome, UZ_NOT_VERIFIED);
+    free(r);
+    uz_result_free(loose);
+    uz_result_free(x);
+    uz_scene_clear(s);
+}
+
+/* Nothing is deformed: the ride itself is what there is to measure by. */
+TEST(a_body_that_is_only_carried_converges)
+{
+    for (int k = 0; k < 3; k++) {
+        uz_scene s = carried_plate(k == 0 ? 1e-6 : k == 1 ? 1 : 1e6);
+        s.n_loads = 0;
+        s.contacts[0].point[1] = -1;
+        uz_result *x = body_solve(&s, 1e-8);
+        CHECK_INT(x->summary.active, 0);
+        uz_result_free(x);
+        uz_scene_clear(&s);
+    }
+}
+
+/* Only the plane holds it up; the ride is what a support without vertical hold makes. */
+TEST(a_carried_body_that_the_obstacle_holds)
+{
+    static const double rides[] = {0, 1, 100};
+    double sum[3];
+    for (int k = 0; k < 3; k++) {
+        uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = carried_plate(rides[k])};
+        uz_settings settings = uz_settings_default();
+        uz_result *x = NULL;
+        uz_error err = {0};
+        problem.scene.supports[0].u[1] = NAN;
+        settings.relative_error = 1e-3;
+        CHECK_MSG(uz_solve(&x, &problem, &settings, NULL, NULL, &err) == UZ_OK, "%s", err.message);
+        CHECK_INT(x->summary.outcome, UZ_CONVERGED);
+        CHECK_REL(x->summary.reaction_sum, -15.0, 1e-6);
+        sum[k] = x->summary.certificate.energy_norm;
+        CHECK_REL(sum[k], sum[0], 2e-3);
+        uz_result_free(x);
+        uz_scene_clear(&problem.scene);
+    }
+}
+
+/* A uniform strain, which the mesh has exactly: a tenth of its error is nothing that doubles could meet. */
+TEST(balanced_asks_for_no_more_than_exact)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE};
+    uz_scene *s = &problem.scene;
+    *s = body_scene(UZ_SOLID, "tet4", (double[3]){1, 1, 1}, (int64_t[3]){2, 2, 2});
+    body_hold(s, "bottom", NAN, 0, NAN);
+    body_hold(s, "left", 0, NAN, NAN);
+    body_hold(s, "back", NAN, NAN, 0);
+    body_hold(s, "top", NAN, -0.001, NAN);
+    uz_settings settings = uz_settings_default();
+    uz_result *x = NULL;
+    settings.balanced = true;
+    CHECK(uz_solve(&x, &problem, &settings, NULL, NULL, NULL) == UZ_OK);
+    CHECK_INT(x->summary.outcome, UZ_CONVERGED);
+    CHECK(x->summary.requested_error >= 1e-12);
+    uz_result_free(x);
+    uz_scene_clear(s);
+}
