@@ -7,6 +7,7 @@ import http.client
 import json
 import os
 import random
+import resource
 import signal
 import sqlite3
 import threading
@@ -348,6 +349,21 @@ def test_database_copied_while_it_ran_is_usable(s):
     s.db = target
     s.restart()
     check(s.get(f"/v1/jobs/{job['id']}").json == job, json.dumps(job))
+
+
+@options("--workers", "1", "--max-solve-s", "0.5")
+def test_a_result_waits_for_room_on_the_disk(s):
+    """A disk that is full when a job ends: once there is room the result is kept, without a restart and another run."""
+    job = s.post(ENDLESS).json["id"]
+    s.wait_status(job, "running")
+    no_limit = resource.RLIM_INFINITY
+    resource.prlimit(s.process.pid, resource.RLIMIT_FSIZE, (1, no_limit))
+    time.sleep(6)  # longer than a failure of the store that is none of room is put up with
+    check(s.get(f"/v1/jobs/{job}").json["status"] == "running")
+    resource.prlimit(s.process.pid, resource.RLIMIT_FSIZE, (no_limit, no_limit))
+    job = s.wait_status(job, "successful", "failed")
+    check(job["attempts"] == 1 and job["summary"]["outcome"] == "time_limit", job)
+    check(s.solve(MATRICES)["status"] == "successful")
 
 
 if __name__ == "__main__":

@@ -426,30 +426,6 @@ TEST(a_result_that_cannot_be_stored_is_reported_and_run_again)
     service_end(&v);
 }
 
-/* No restart is needed: the result waits for its room. */
-TEST(a_result_waits_for_room)
-{
-    service v;
-    char id[33];
-    job j;
-    if (!service_begin(&v))
-        return;
-    submit(&v, SCENE, id);
-    CHECK_INT(store_limit_bytes(v.place.s, 1), STORE_OK);
-    if (!service_start(&v, &TWO_WORKERS))
-        return;
-    for (int i = 0; i < 2000 && count_in_log(&v, "store_failed") < 5; i++)
-        short_sleep();
-    CHECK_INT(count_in_log(&v, "store_failed"), 5); /* and it goes on */
-    CHECK_INT(status_of(v.place.s, id), JOB_RUNNING);
-    CHECK_INT(store_limit_bytes(v.place.s, 0), STORE_OK);
-    CHECK(work_wait(v.w, id, 20.0));
-    CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
-    CHECK(j.status == JOB_SUCCESSFUL && j.attempts == 1);
-    job_clear(&j);
-    service_end(&v);
-}
-
 /* A result for which there never is room: its job ends all the same, and says why. */
 TEST(a_result_without_room_is_given_up)
 {
