@@ -5,7 +5,6 @@
 #include "core/blas.h"
 #include "core/error.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,25 +23,11 @@ static double normal_residual(double *s, const uz_csc *N, const double *y)
     return uz_dot(N->cols, s, s);
 }
 
-/* The square of what the rounding of N'y may be. */
-static double residual_noise(double *s, const uz_csc *N, const double *y)
-{
-    double sum = 0.0;
-    for (int64_t j = 0; j < N->cols; j++) {
-        s[j] = 0.0;
-        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
-            s[j] += 0.5 * DBL_EPSILON * fabs(N->val[k] * y[N->idx[k]]);
-        sum += s[j] * s[j];
-    }
-    return sum;
-}
-
 /* y -= its part in the range of N_S (rows S only), by CGLS: what is left has N'y = 0 (Paige and Saunders 1982). Steps
- * on rounding alone lead anywhere: a y that is as good as that stays, and otherwise the best of all is kept. */
+ * on rounding alone lead anywhere: the best y of all is kept. */
 static void project(least_squares *ls, double *y, const bool *support, const uz_csc *N)
 {
-    double noise = residual_noise(ls->s, N, y), gamma = normal_residual(ls->s, N, y), least = gamma;
-    double stop = fmax(1e-32 * gamma, noise);
+    double gamma = normal_residual(ls->s, N, y), stop = 1e-32 * gamma, least = gamma;
     memcpy(ls->best, y, (size_t)N->rows * sizeof *y);
     memcpy(ls->direction, ls->s, (size_t)N->cols * sizeof *ls->s);
     for (int step = 0; step < MAX_STEPS && gamma > stop; step++) {
