@@ -71,7 +71,8 @@ PHRASES = {
     "up to 10,000 loads on one body": lambda program: program.schema("properties", "cases", "maxItems") == 10000,
     "names of 1 to 63 bytes": None, "have at most 4 million numbers": constant(4e6, "server/http/results.c", r"#define MOST_NUMBERS (\d+)"),
     "tried 16 times in more than 6 hours": webhook_hours,
-    "lock from Poisson's ratio 0.4 on": None,
+    "lock as Poisson's ratio nears 0.5, visibly from 0.4 on": None,
+    "the summary warns from 0.45 on": constant(0.45, "solver/fields/warnings.c", r"LOCKS = ([\d.]+)"), "Over TLS and HTTP/1.0": None,
     "A scene may have 20 million unknowns": constant(20e6, "solver/scene/mesh.h", r"UZ_SCENE_MAX_DOFS (\d+)"),
     "1000 items in each list": None, "4096 groups": constant(4096, "solver/scene/given.h", r"UZ_MESH_MAX_GROUPS (\d+)"),
     "estimate that fails with a probability below 1e-12": None, "bound: it fails with a probability below 1e-12": None,  # of the theorem used
