@@ -173,6 +173,7 @@ typedef enum {
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
     UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
+    UZ_METHOD_CONJUGATE,           /* projected conjugate gradients on the dual */
     UZ_METHOD_GIVEN,               /* results of uz_verify only: the answer is the caller's */
     UZ_METHOD_LINEAR /* results only: without contact rows u is one linear solve, whatever was asked for */
 } uz_method;

@@ -17,7 +17,8 @@ static const struct {
                {1, UZ_METHOD_UZAWA},
                {2, UZ_METHOD_ACCELERATED},
                {3, UZ_METHOD_ACCELERATED_RESTART},
-               {4, UZ_METHOD_ACTIVE_SET}};
+               {4, UZ_METHOD_ACTIVE_SET},
+               {5, UZ_METHOD_CONJUGATE}};
 enum { N_METHODS = sizeof METHODS / sizeof METHODS[0] };
 
 static double method_number(uz_method method)

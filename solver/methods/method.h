@@ -34,7 +34,7 @@ typedef struct {
     double alpha, tau;
     double *r, *Dr; /* r(k) <= 0 and D r(k) */
     double *r_next, *Dr_next;
-    double *rho, *Drho;   /* extrapolated point */
+    double *rho, *Drho;   /* extrapolated point; of `conjugate` see conjugate.h */
     double *gamma;        /* gap at rho, or at r while a bound is computed */
     bool *close;          /* rows whose gap the pushed answer closes */
     double *anchor;       /* r at the last power of two, where a ray is looked for */
@@ -85,7 +85,8 @@ typedef struct {
 uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                         uz_history *history, uz_error *err);
 
-/* The engines behind it: projected gradient steps (uzawa, accelerated, accelerated_restart) and the active set. */
+/* The engines behind it: steps on the dual with one application of D each (uzawa, accelerated, accelerated_restart,
+ * conjugate) and the active set. */
 uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                           uz_history *history, uz_error *err);
 uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,

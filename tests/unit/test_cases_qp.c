@@ -179,6 +179,7 @@ static void check_case(const char *root, const char *name, bool exactly, double 
     if (load_known(&k, root, name, exactly)) {
         check_auto(&k);
         uz_result_free(run(&k, UZ_METHOD_ACCELERATED_RESTART, 100000, seconds));
+        uz_result_free(run(&k, UZ_METHOD_CONJUGATE, 100000, seconds));
         uz_result_free(run(&k, UZ_METHOD_ACCELERATED, 3000, seconds));
         uz_result_free(run(&k, UZ_METHOD_UZAWA, 3000, seconds));
         uz_result_free(run(&k, UZ_METHOD_ACTIVE_SET, 1000, seconds));
