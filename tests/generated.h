@@ -141,8 +141,9 @@ static inline uz_qp generated_qp(uint64_t seed, bool *active)
 static inline uz_settings generated_settings(uint64_t seed)
 {
     static const double errors[] = {1e-8, 0, 1e-2, 1e-12};
-    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET,
-                                        UZ_METHOD_ACCELERATED, UZ_METHOD_UZAWA, UZ_METHOD_CONJUGATE};
+    static const uz_method methods[] = {UZ_METHOD_AUTO,       UZ_METHOD_ACCELERATED_RESTART,
+                                        UZ_METHOD_ACTIVE_SET, UZ_METHOD_ACCELERATED,
+                                        UZ_METHOD_UZAWA,      UZ_METHOD_CONJUGATE};
     qp_random rng = {seed + 77};
     uz_settings s = uz_settings_default();
     s.max_iterations = 2000;
