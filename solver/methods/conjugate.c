@@ -84,11 +84,26 @@ static double best_length(double *bound, const uz_iterate *it, double rise)
     return isinf(*bound) ? it->alpha : 2.0 * *bound;
 }
 
+/* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near r,
+ * a plain step's length away. Where D is exact the difference of two points would only lose digits. Overwrites gamma.
+ */
+static uz_status apply_to_direction(uz_iterate *it, uz_case *load, uz_error *err)
+{
+    if (!uz_case_is_inexact(load))
+        return uz_case_apply(load, it->Dr_next, it->r_next, err);
+    for (int64_t i = 0; i < it->m; i++)
+        it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
+    uz_status status = uz_case_apply(load, it->Dr_next, it->gamma, err);
+    for (int64_t i = 0; i < it->m; i++)
+        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
+    return status;
+}
+
 static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_case *load, uz_error *err)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
     double rise = make_direction(it), bound;
-    uz_status status = uz_case_apply(load, it->Dr_next, it->r_next, err);
+    uz_status status = apply_to_direction(it, load, err);
     if (status != UZ_OK)
         return status;
     double length = best_length(&bound, it, rise), taken = fmin(length, bound);
