@@ -177,8 +177,7 @@ uz_status uz_conjugate_step(uz_iterate *it, uz_case *load, double *step_norm, bo
 
 uz_status uz_conjugate_settle(uz_iterate *it, uz_case *load, bool due, uz_error *err)
 {
-    bool by_last_step = it->tau > 1.0 && memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
-    if (by_last_step || !(due || it->iteration % SETTLED_FOR == 0))
+    if (!due && it->iteration % SETTLED_FOR != 0)
         return UZ_OK;
     return uz_case_apply(load, it->Dr, it->r, err);
 }

@@ -24,7 +24,7 @@
  * *restart: a direction was given up, or a step was not taken. */
 uz_status uz_conjugate_step(uz_iterate *it, uz_case *load, double *step_norm, bool *restart, uz_error *err);
 
-/* Applies D to r, unless the last step did: where a bound is `due`, which is of the r of the last apply, and every so
+/* Applies D to r: where a bound is `due`, which is of the r of the last apply, and every so
  * often, as D r is carried along from the directions and gathers rounding. */
 uz_status uz_conjugate_settle(uz_iterate *it, uz_case *load, bool due, uz_error *err);
 

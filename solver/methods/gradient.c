@@ -165,6 +165,8 @@ static uz_status bound_last(uz_iterate *it, uz_case *load, uz_method method, uz_
 {
     if (method != UZ_METHOD_CONJUGATE)
         return uz_iterate_bound(it, load, method, err);
+    if (isfinite(it->best_bound) && it->best_iteration == it->iteration)
+        return UZ_OK; /* it is the best, and has its bound */
     uz_status status = uz_case_apply(load, it->Dr_next, it->r, err);
     uz_iterate_swap(&it->Dr, &it->Dr_next);
     if (status == UZ_OK)
