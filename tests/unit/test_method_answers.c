@@ -6,8 +6,9 @@
 
 #define COUNT(list) (sizeof(list) / sizeof((list)[0]))
 
-static const uz_method all_methods[] = {UZ_METHOD_AUTO, UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED,
-                                        UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_CONJUGATE, UZ_METHOD_ACTIVE_SET};
+static const uz_method all_methods[] = {UZ_METHOD_AUTO,        UZ_METHOD_UZAWA,
+                                        UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART,
+                                        UZ_METHOD_CONJUGATE,   UZ_METHOD_ACTIVE_SET};
 
 static uz_result *solve_for(const uz_problem *problem, uz_method method, uz_operator op, double relative_error,
                             int64_t iterations)
