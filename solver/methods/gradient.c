@@ -213,6 +213,23 @@ static uz_status resume(uz_iterate *it, uz_case *load, uz_error *err)
     return status;
 }
 
+/* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the correction
+ * that it had in the run that found it. Its numbers stay those of the state. */
+static uz_status correct_again(uz_iterate *it, uz_case *load, uz_error *err)
+{
+    double bound = it->best_bound, relative = it->best_relative;
+    int64_t iteration = it->best_iteration;
+    bool wanted = it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET;
+    it->resumed = false;
+    if (!wanted)
+        return UZ_OK;
+    uz_status status = uz_iterate_bound_best(it, load, err);
+    it->best_bound = bound;
+    it->best_relative = relative;
+    it->best_iteration = iteration;
+    return status;
+}
+
 /* A start with reactions may be the solution: it is bounded before anything is prepared. */
 static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
                        uz_error *err)
@@ -227,6 +244,8 @@ static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *o
         status = prepare(it, load, options, err);
     if (status == UZ_OK && !it->begun)
         return uz_iterate_begin(it, load, options, history, err);
+    if (status == UZ_OK)
+        status = correct_again(it, load, err);
     if (status == UZ_OK && !it->fresh)
         status = resume(it, load, err);
     if (status == UZ_OK && it->warm && it->iteration == 0) /* with the step size it may be bounded better */

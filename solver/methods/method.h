@@ -50,6 +50,7 @@ typedef struct {
     uz_origin origin;  /* what was taken of the caller's start */
     bool begun;        /* there is a row 0, in this run's history or in that of the run it continues */
     bool fresh;        /* D r and rho are those of r as they stand: nothing is to be made again before the next step */
+    bool resumed;      /* another run's state, with the correction of its best answer made before D was prepared */
     int32_t phase;     /* of auto */
     int64_t phase_end;
     struct uz_decades *decades; /* where bounds are noted; NULL: nowhere */
