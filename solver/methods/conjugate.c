@@ -6,6 +6,8 @@
 
 /* A direction along which psi curves by less than this part of lambda_max has no curvature, only rounding. */
 #define FLAT 1e-14
+/* Along which reactions only grow, with less curvature than this: looked at as a ray. */
+#define RAY 1e-8
 /* A direction must rise by this part of what the gradient alone would: rounding, or a rho that another method left, may
  * have made it a bad one. */
 #define RISE 1e-2
@@ -67,8 +69,9 @@ static double make_direction(uz_iterate *it)
 }
 
 /* The length that maximizes psi along d; *bound: that at which the first row stops to press. Along what is flat the
- * step goes beyond the bound, or as far as a plain one. */
-static double best_length(double *bound, const uz_iterate *it, double rise)
+ * step goes beyond the bound, unless what curvature there is says less; without a bound it goes as far as a plain one:
+ * rise / curvature would be the quotient of two roundings. */
+static double best_length(double *bound, uz_iterate *it, double rise)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
     double curvature = 0.0, square = 0.0;
@@ -79,9 +82,14 @@ static double best_length(double *bound, const uz_iterate *it, double rise)
         if (d[i] > 0.0)
             *bound = fmin(*bound, -it->r[i] / d[i]);
     }
+    it->along_ray = isinf(*bound) && it->alpha * curvature <= RAY * square;
+    if (it->along_ray)
+        memcpy(it->ray, d, (size_t)it->m * sizeof *d);
     if (it->alpha * curvature > FLAT * square)
         return rise / curvature;
-    return isinf(*bound) ? it->alpha : 2.0 * *bound;
+    if (isinf(*bound))
+        return it->alpha;
+    return curvature > 0.0 ? fmin(rise / curvature, 2.0 * *bound) : 2.0 * *bound;
 }
 
 /* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near r,

@@ -43,7 +43,7 @@ bool uz_iterate_shorten(uz_iterate *it)
         size += it->r_next[i] * it->r_next[i];
     }
     bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
-    if (noise || it->alpha * curvature <= square * (1.0 + 1e-6))
+    if (noise || !(it->alpha * curvature > square * (1.0 + 1e-6))) /* nor where it is NaN: no step size follows */
         return false;
     it->alpha = 0.9 * square / curvature;
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
@@ -127,17 +127,8 @@ static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *op
     return UZ_OK;
 }
 
-/* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
- * Looked for at powers of two, from the growth since the last one. */
-static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status try_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
 {
-    bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
-    *found = false;
-    if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
-        return UZ_OK;
-    for (int64_t i = 0; i < it->m; i++)
-        it->ray[i] = it->r[i] - it->anchor[i];
-    memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
     uz_status status = uz_case_project_ray(load, it->ray, err);
     if (status != UZ_OK)
         return status;
@@ -145,6 +136,27 @@ static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_err
     double radius;
     *found = uz_ray_proves(&radius, it->ray, uz_case_N(load), uz_case_h(load), length);
     return UZ_OK;
+}
+
+/* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
+ * Looked for at powers of two, from the growth since the last one. */
+static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
+    if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
+        return UZ_OK;
+    for (int64_t i = 0; i < it->m; i++)
+        it->ray[i] = it->r[i] - it->anchor[i];
+    memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
+    return try_ray(found, it, load, err);
+}
+
+/* And at once where a conjugate step went along one: so far that what is bounded afterwards is rounding. */
+static uz_status look_along(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    bool wanted = it->along_ray && isinf(it->best_bound);
+    it->along_ray = false;
+    return wanted ? try_ray(found, it, load, err) : UZ_OK;
 }
 
 /* The bound of a run's last answer is out of turn: a run that goes on from there as if it had not ended must not know
@@ -213,8 +225,8 @@ static uz_status resume(uz_iterate *it, uz_case *load, uz_error *err)
     return status;
 }
 
-/* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the correction
- * that it had in the run that found it. Its numbers stay those of the state. */
+/* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the
+ * correction that it had in the run that found it. Its numbers stay those of the state. */
 static uz_status correct_again(uz_iterate *it, uz_case *load, uz_error *err)
 {
     double bound = it->best_bound, relative = it->best_relative;
@@ -285,8 +297,10 @@ uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
         it->fresh = false;
         status = step(it, load, options, &it->step_norm, &restart, err);
         if (status == UZ_OK)
-            status = check(it, load, options, err);
+            status = look_along(&ray, it, load, err);
         if (status == UZ_OK)
+            status = check(it, load, options, err);
+        if (status == UZ_OK && !ray)
             status = look_for_ray(&ray, it, load, err);
         if (status == UZ_OK)
             status = record(it, load, options, history, restart, err);

@@ -38,7 +38,7 @@ typedef struct {
     double *gamma;        /* gap at rho, or at r while a bound is computed */
     bool *close;          /* rows whose gap the pushed answer closes */
     double *anchor;       /* r at the last power of two, where a ray is looked for */
-    double *ray;          /* UZ_END_RAY: y <= 0, N'y = 0, h'y > 0 */
+    double *ray;          /* UZ_END_RAY: y <= 0, N'y = 0, h'y > 0; before, a candidate */
     double *best_r;       /* the r whose bound is best; its push is kept in the uz_case */
     double best_bound;    /* on the energy-norm error; INFINITY before the first */
     double best_relative; /* the same over the energy norm of the answer */
@@ -50,6 +50,7 @@ typedef struct {
     uz_origin origin;  /* what was taken of the caller's start */
     bool begun;        /* there is a row 0, in this run's history or in that of the run it continues */
     bool fresh;        /* D r and rho are those of r as they stand: nothing is to be made again before the next step */
+    bool along_ray;    /* the last conjugate step: psi rises along `ray`, no bound ends it, and D hardly curves it */
     bool resumed;      /* another run's state, with the correction of its best answer made before D was prepared */
     int32_t phase;     /* of auto */
     int64_t phase_end;

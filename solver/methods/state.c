@@ -109,8 +109,8 @@ static void take_numbers(uz_iterate *it, const uz_state *s)
     it->phase_end = s->phase_end;
 }
 
-/* Makes the correction of the best answer, which a state does not have, and its bound with it. *same false: the bound is
- * another than the state's. */
+/* Makes the correction of the best answer, which a state does not have, and its bound with it. *same false: the bound
+ * is another than the state's. */
 static uz_status bound_best_again(bool *same, uz_iterate *it, uz_case *load, const uz_state *s, uz_error *err)
 {
     *same = true;

@@ -170,3 +170,67 @@ TEST(states_go_from_method_to_method)
         }
     uz_problem_clear(&problem);
 }
+
+/* Rows in general position but for one, minus a combination of the first few: they contradict it by `overlap`, or leave
+ * room where that is negative. More rows than dofs: D is singular. */
+static uz_problem dependent_rows(uint64_t seed, double overlap)
+{
+    enum { D = 12, OTHERS = 10 };
+    qp_random rng = {seed * 77 + 1};
+    int64_t first = 3 + (int64_t)(seed % 5), m = first + 1 + OTHERS;
+    double *K = random_spd(&rng, D, 10, 1), *N = vector(m * D), u[D];
+    uz_qp qp = {.p = vector(D), .h = vector(m)};
+    for (int64_t j = 0; j < D; j++) {
+        u[j] = random_signed(&rng);
+        qp.p[j] = random_signed(&rng);
+    }
+    for (int64_t i = 0; i < m * D; i++)
+        N[i] = random_signed(&rng);
+    for (int64_t j = 0; j < D; j++) {
+        N[first * D + j] = 0;
+        for (int64_t i = 0; i < first; i++)
+            N[first * D + j] -= N[i * D + j] * (double)(1 + i % 2);
+    }
+    qp.K = csc_from_dense(K, D, D, true);
+    qp.N = csc_from_dense(N, m, D, false);
+    uz_csc_gaxpy(qp.h, &qp.N, 1, u);
+    for (int64_t i = first + 1; i < m; i++)
+        qp.h[i] += random_unit(&rng);
+    qp.h[first] -= overlap;
+    free(K);
+    free(N);
+    return problem_of(qp);
+}
+
+static int64_t count_of(uz_outcome outcome, uz_method method, uz_operator op, double overlap)
+{
+    int64_t count = 0;
+    for (uint64_t seed = 0; seed < 20; seed++) {
+        uz_problem problem = dependent_rows(seed, overlap);
+        uz_settings settings = settings_for(method, 1e-6);
+        settings.op = op;
+        settings.max_iterations = 20000;
+        uz_result *result = solve_problem(&problem, &settings);
+        CHECK(result->summary.outcome != UZ_CONVERGED || overlap <= 0);
+        CHECK(result->summary.outcome != UZ_INFEASIBLE || overlap > 0);
+        count += result->summary.outcome == outcome;
+        uz_result_free(result);
+        uz_problem_clear(&problem);
+    }
+    return count;
+}
+
+/* A step along a ray goes as far as rounding has it: the ray is looked at before anything is bounded there. */
+TEST(contradictions_are_found_along_a_direction)
+{
+    CHECK_INT(count_of(UZ_ITERATION_LIMIT, UZ_METHOD_CONJUGATE, UZ_OPERATOR_FACTORED, 1e-2), 0);
+    int64_t proved = count_of(UZ_INFEASIBLE, UZ_METHOD_CONJUGATE, UZ_OPERATOR_FACTORED, 1e-2);
+    CHECK_MSG(proved >= 18, "%lld of 20", (long long)proved);
+}
+
+/* Without a factor what inner iterations leave is more than the curvature of such directions. */
+TEST(auto_without_a_factor_takes_dependent_rows)
+{
+    CHECK_INT(count_of(UZ_CONVERGED, UZ_METHOD_AUTO, UZ_OPERATOR_MATRIX_FREE, -1e-2), 20);
+    CHECK_INT(count_of(UZ_CONVERGED, UZ_METHOD_CONJUGATE, UZ_OPERATOR_FACTORED, -1e-6), 20);
+}
