@@ -168,7 +168,7 @@ void uz_problem_clear(uz_problem *problem);
 /* -------------------------------------------------------------- settings */
 
 typedef enum {
-    UZ_METHOD_AUTO,                /* active_set; conjugate where that fails. The paper's rule: accelerated_restart */
+    UZ_METHOD_AUTO,                /* active_set, else conjugate; no factor or paper rule: accelerated_restart */
     UZ_METHOD_UZAWA,               /* Kanno, Algorithm 1 */
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
