@@ -10,6 +10,7 @@ static const char *const METHODS[] = {
     [UZ_METHOD_ACCELERATED] = "accelerated",
     [UZ_METHOD_ACCELERATED_RESTART] = "accelerated_restart",
     [UZ_METHOD_ACTIVE_SET] = "active_set",
+    [UZ_METHOD_CONJUGATE] = "conjugate",
     [UZ_METHOD_GIVEN] = "given",
     [UZ_METHOD_LINEAR] = "linear",
 };

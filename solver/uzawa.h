@@ -168,11 +168,12 @@ void uz_problem_clear(uz_problem *problem);
 /* -------------------------------------------------------------- settings */
 
 typedef enum {
-    UZ_METHOD_AUTO,                /* accelerated_restart, handed to active_set when that is cheaper */
+    UZ_METHOD_AUTO,                /* active_set, else conjugate; no factor or paper rule: accelerated_restart */
     UZ_METHOD_UZAWA,               /* Kanno, Algorithm 1 */
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
     UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
+    UZ_METHOD_CONJUGATE,           /* projected conjugate gradients on the dual */
     UZ_METHOD_GIVEN,               /* results of uz_verify only: the answer is the caller's */
     UZ_METHOD_LINEAR /* results only: without contact rows u is one linear solve, whatever was asked for */
 } uz_method;

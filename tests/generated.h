@@ -141,15 +141,16 @@ static inline uz_qp generated_qp(uint64_t seed, bool *active)
 static inline uz_settings generated_settings(uint64_t seed)
 {
     static const double errors[] = {1e-8, 0, 1e-2, 1e-12};
-    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET,
-                                        UZ_METHOD_ACCELERATED, UZ_METHOD_UZAWA};
+    static const uz_method methods[] = {UZ_METHOD_AUTO,       UZ_METHOD_ACCELERATED_RESTART,
+                                        UZ_METHOD_ACTIVE_SET, UZ_METHOD_ACCELERATED,
+                                        UZ_METHOD_UZAWA,      UZ_METHOD_CONJUGATE};
     qp_random rng = {seed + 77};
     uz_settings s = uz_settings_default();
     s.max_iterations = 2000;
     if (seed % 2 == 0)
         return s;
     s.relative_error = errors[random_int(&rng, 0, 4)];
-    s.method = methods[random_int(&rng, 0, 5)];
+    s.method = methods[random_int(&rng, 0, 6)];
     if (s.method != UZ_METHOD_ACTIVE_SET && random_chance(&rng, 0.3))
         s.op = UZ_OPERATOR_FACTORED;
     return s;

@@ -290,6 +290,11 @@ bool uz_case_steps_are_small(const uz_case *load)
     return load->dual->info.op == UZ_OPERATOR_CONDENSED;
 }
 
+bool uz_case_is_inexact(const uz_case *load)
+{
+    return load->inexact != NULL;
+}
+
 bool uz_case_rows_may_depend(const uz_case *load)
 {
     if (load->dual->info.op == UZ_OPERATOR_CONDENSED)

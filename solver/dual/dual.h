@@ -138,6 +138,9 @@ const uz_csc *uz_case_N(const uz_case *load);
  * reaction is scale x the one here. */
 const double *uz_case_row_scale(const uz_case *load);
 
+/* Whether D is applied by inner iterations, which are the nearer the closer r is to that of the last apply. */
+bool uz_case_is_inexact(const uz_case *load);
+
 /* Whether solve_active works on the contact only, so that a step costs little beside a linear solve. */
 bool uz_case_steps_are_small(const uz_case *load);
 

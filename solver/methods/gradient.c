@@ -1,8 +1,9 @@
 /* gradient.c: projected gradient steps on the dual: Kanno's Algorithm 1 (uzawa) and Algorithm 2 (accelerated, with and
- * without restart), with the corrections of the design: tau from 1 + 4 tau^2, rho from r(k+1).
+ * without restart), with the corrections of the design: tau from 1 + 4 tau^2, rho from r(k+1). `conjugate` has other
+ * steps (conjugate.h) in the same loop.
  *
  * D is applied once per iteration, to r(k+1); D rho follows from D r(k+1) and D r(k), rho being their combination. */
-#include "methods/iterate.h"
+#include "methods/conjugate.h"
 
 #include "certificate/infeasible.h"
 
@@ -10,7 +11,7 @@
 #include <math.h>
 #include <string.h>
 
-static void swap(double **a, double **b)
+void uz_iterate_swap(double **a, double **b)
 {
     double *t = *a;
     *a = *b;
@@ -31,10 +32,8 @@ static double project(uz_iterate *it, const uz_case *load)
     return sqrt(square);
 }
 
-/* psi must curve by no more than 1/alpha along the step: s'Ds <= s's / alpha for s = r(k+1) - rho (Beck and Teboulle
- * 2009, Lemma 2.3). Where it curves more, the step was too long: alpha is shortened to what was seen and the step is
- * not taken. */
-static bool step_too_long(uz_iterate *it)
+/* s'Ds <= s's / alpha for s = r(k+1) - rho? */
+bool uz_iterate_shorten(uz_iterate *it)
 {
     double curvature = 0.0, square = 0.0, size = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
@@ -44,7 +43,7 @@ static bool step_too_long(uz_iterate *it)
         size += it->r_next[i] * it->r_next[i];
     }
     bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
-    if (noise || it->alpha * curvature <= square * (1.0 + 1e-6))
+    if (noise || !(it->alpha * curvature > square * (1.0 + 1e-6))) /* nor where it is NaN: no step size follows */
         return false;
     it->alpha = 0.9 * square / curvature;
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
@@ -67,8 +66,8 @@ static bool extrapolate(uz_iterate *it, uz_method method)
         it->Drho[i] = it->Dr_next[i] + omega * (it->Dr_next[i] - it->Dr[i]);
     }
     it->tau = restart ? 1.0 : tau;
-    swap(&it->r, &it->r_next);
-    swap(&it->Dr, &it->Dr_next);
+    uz_iterate_swap(&it->r, &it->r_next);
+    uz_iterate_swap(&it->Dr, &it->Dr_next);
     it->restarts += restart;
     return restart;
 }
@@ -111,10 +110,12 @@ static bool should_end(uz_end *end, const uz_iterate *it, const uz_case *load, c
 static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *options, double *step_norm, bool *restart,
                       uz_error *err)
 {
+    if (options->method == UZ_METHOD_CONJUGATE)
+        return uz_conjugate_step(it, load, step_norm, restart, err);
     *step_norm = project(it, load);
     uz_status status = uz_case_apply(load, it->Dr_next, it->r_next, err);
     it->iteration++;
-    *restart = status == UZ_OK && step_too_long(it);
+    *restart = status == UZ_OK && uz_iterate_shorten(it);
     if (status != UZ_OK)
         return status;
     if (*restart) {
@@ -126,17 +127,8 @@ static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *op
     return UZ_OK;
 }
 
-/* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
- * Looked for at powers of two, from the growth since the last one. */
-static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status try_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
 {
-    bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
-    *found = false;
-    if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
-        return UZ_OK;
-    for (int64_t i = 0; i < it->m; i++)
-        it->ray[i] = it->r[i] - it->anchor[i];
-    memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
     uz_status status = uz_case_project_ray(load, it->ray, err);
     if (status != UZ_OK)
         return status;
@@ -144,6 +136,27 @@ static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_err
     double radius;
     *found = uz_ray_proves(&radius, it->ray, uz_case_N(load), uz_case_h(load), length);
     return UZ_OK;
+}
+
+/* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
+ * Looked for at powers of two, from the growth since the last one. */
+static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
+    if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
+        return UZ_OK;
+    for (int64_t i = 0; i < it->m; i++)
+        it->ray[i] = it->r[i] - it->anchor[i];
+    memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
+    return try_ray(found, it, load, err);
+}
+
+/* And at once where a conjugate step went along one: so far that what is bounded afterwards is rounding. */
+static uz_status look_along(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    bool wanted = it->along_ray && isinf(it->best_bound);
+    it->along_ray = false;
+    return wanted ? try_ray(found, it, load, err) : UZ_OK;
 }
 
 /* The bound of a run's last answer is out of turn: a run that goes on from there as if it had not ended must not know
@@ -159,6 +172,21 @@ static void set_aside(uz_iterate *it)
     memcpy(before->r, it->best_r, (size_t)it->m * sizeof *it->r);
 }
 
+/* `conjugate` carries D r along: the bound is with the one that an apply gives, the run goes on with its own. */
+static uz_status bound_last(uz_iterate *it, uz_case *load, uz_method method, uz_error *err)
+{
+    if (method != UZ_METHOD_CONJUGATE)
+        return uz_iterate_bound(it, load, method, err);
+    if (isfinite(it->best_bound) && it->best_iteration == it->iteration)
+        return UZ_OK; /* it is the best, and has its bound */
+    uz_status status = uz_case_apply(load, it->Dr_next, it->r, err);
+    uz_iterate_swap(&it->Dr, &it->Dr_next);
+    if (status == UZ_OK)
+        status = uz_iterate_bound(it, load, method, err);
+    uz_iterate_swap(&it->Dr, &it->Dr_next);
+    return status;
+}
+
 /* The answer of the paper's rule is its last r, good or bad; otherwise the last r may still be the best. */
 static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
                         uz_error *err)
@@ -166,7 +194,7 @@ static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *
     set_aside(it);
     if (options->stopping == UZ_STOP_PAPER)
         it->best_bound = INFINITY;
-    uz_status status = uz_iterate_bound(it, load, options->method, err);
+    uz_status status = bound_last(it, load, options->method, err);
     if (isinf(it->best_bound)) /* nothing could be bounded: the last r is as good as any */
         memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
     if (history->count > 0) /* none in a run that continued another and ended at once */
@@ -197,6 +225,23 @@ static uz_status resume(uz_iterate *it, uz_case *load, uz_error *err)
     return status;
 }
 
+/* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the
+ * correction that it had in the run that found it. Its numbers stay those of the state. */
+static uz_status correct_again(uz_iterate *it, uz_case *load, uz_error *err)
+{
+    double bound = it->best_bound, relative = it->best_relative;
+    int64_t iteration = it->best_iteration;
+    bool wanted = it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET;
+    it->resumed = false;
+    if (!wanted)
+        return UZ_OK;
+    uz_status status = uz_iterate_bound_best(it, load, err);
+    it->best_bound = bound;
+    it->best_relative = relative;
+    it->best_iteration = iteration;
+    return status;
+}
+
 /* A start with reactions may be the solution: it is bounded before anything is prepared. */
 static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
                        uz_error *err)
@@ -211,11 +256,35 @@ static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *o
         status = prepare(it, load, options, err);
     if (status == UZ_OK && !it->begun)
         return uz_iterate_begin(it, load, options, history, err);
+    if (status == UZ_OK)
+        status = correct_again(it, load, err);
     if (status == UZ_OK && !it->fresh)
         status = resume(it, load, err);
     if (status == UZ_OK && it->warm && it->iteration == 0) /* with the step size it may be bounded better */
         status = uz_iterate_bound(it, load, options->method, err);
     return status;
+}
+
+/* The bound, where it is due. */
+static uz_status check(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_error *err)
+{
+    bool due = options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check;
+    uz_status status = UZ_OK;
+    if (options->method == UZ_METHOD_CONJUGATE)
+        status = uz_conjugate_settle(it, load, due, err);
+    if (status != UZ_OK || !due)
+        return status;
+    status = uz_iterate_bound(it, load, options->method, err);
+    plan_next_check(it);
+    return status;
+}
+
+static uz_status record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                        bool restart, uz_error *err)
+{
+    if (options->method == UZ_METHOD_CONJUGATE)
+        return uz_conjugate_record(it, load, options, history, restart, err);
+    return uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
 }
 
 uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
@@ -227,14 +296,14 @@ uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     while (status == UZ_OK && !ray && !should_end(end, it, load, options, it->step_norm)) {
         it->fresh = false;
         status = step(it, load, options, &it->step_norm, &restart, err);
-        if (status == UZ_OK && options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check) {
-            status = uz_iterate_bound(it, load, options->method, err);
-            plan_next_check(it);
-        }
         if (status == UZ_OK)
+            status = look_along(&ray, it, load, err);
+        if (status == UZ_OK)
+            status = check(it, load, options, err);
+        if (status == UZ_OK && !ray)
             status = look_for_ray(&ray, it, load, err);
         if (status == UZ_OK)
-            status = uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
+            status = record(it, load, options, history, restart, err);
     }
     if (ray)
         *end = UZ_END_RAY;

@@ -72,6 +72,21 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_case *load, uz_method by, uz_error
     return UZ_OK;
 }
 
+uz_status uz_iterate_bound_best(uz_iterate *it, uz_case *load, uz_error *err)
+{
+    double *r = it->r, *Dr = it->Dr;
+    it->r = it->r_next;
+    it->Dr = it->Dr_next;
+    memcpy(it->r, it->best_r, (size_t)it->m * sizeof *r);
+    it->best_bound = INFINITY;
+    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    if (status == UZ_OK)
+        status = uz_iterate_bound(it, load, it->made_by, err);
+    it->r = r;
+    it->Dr = Dr;
+    return status;
+}
+
 /* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
 static uz_residual residual(uz_iterate *it, uz_case *load)
 {

@@ -17,6 +17,13 @@ uz_status uz_iterate_record(uz_iterate *it, uz_case *load, const uz_method_optio
 /* Goes back to the best answer's r, or to 0 where there is none: guesses that failed may have left r anywhere. D r is
  * not made. */
 void uz_iterate_go_back(uz_iterate *it);
+/* Makes the correction of the best answer (best_r) again; best_bound and the rest are then those of it. Uses r_next and
+ * Dr_next. */
+uz_status uz_iterate_bound_best(uz_iterate *it, uz_case *load, uz_error *err);
+/* After a projected step from rho to r_next: psi must curve by no more than 1/alpha along it (Beck and Teboulle 2009,
+ * Lemma 2.3). true: it curves more, the step was too long. alpha is shortened to what was seen, and rho is r again. */
+bool uz_iterate_shorten(uz_iterate *it);
+void uz_iterate_swap(double **a, double **b);
 /* The limits that every method honours: cancel, iterations, time. */
 bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options);
 

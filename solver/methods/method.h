@@ -34,11 +34,11 @@ typedef struct {
     double alpha, tau;
     double *r, *Dr; /* r(k) <= 0 and D r(k) */
     double *r_next, *Dr_next;
-    double *rho, *Drho;   /* extrapolated point */
+    double *rho, *Drho;   /* extrapolated point; of `conjugate` see conjugate.h */
     double *gamma;        /* gap at rho, or at r while a bound is computed */
     bool *close;          /* rows whose gap the pushed answer closes */
     double *anchor;       /* r at the last power of two, where a ray is looked for */
-    double *ray;          /* UZ_END_RAY: y <= 0, N'y = 0, h'y > 0 */
+    double *ray;          /* UZ_END_RAY: y <= 0, N'y = 0, h'y > 0; before, a candidate */
     double *best_r;       /* the r whose bound is best; its push is kept in the uz_case */
     double best_bound;    /* on the energy-norm error; INFINITY before the first */
     double best_relative; /* the same over the energy norm of the answer */
@@ -50,6 +50,8 @@ typedef struct {
     uz_origin origin;  /* what was taken of the caller's start */
     bool begun;        /* there is a row 0, in this run's history or in that of the run it continues */
     bool fresh;        /* D r and rho are those of r as they stand: nothing is to be made again before the next step */
+    bool along_ray;    /* the last conjugate step: psi rises along `ray`, no bound ends it, and D hardly curves it */
+    bool resumed;      /* another run's state, with the correction of its best answer made before D was prepared */
     int32_t phase;     /* of auto */
     int64_t phase_end;
     struct uz_decades *decades; /* where bounds are noted; NULL: nowhere */
@@ -85,7 +87,8 @@ typedef struct {
 uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                         uz_history *history, uz_error *err);
 
-/* The engines behind it: projected gradient steps (uzawa, accelerated, accelerated_restart) and the active set. */
+/* The engines behind it: steps on the dual with one application of D each (uzawa, accelerated, accelerated_restart,
+ * conjugate) and the active set. */
 uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
                           uz_history *history, uz_error *err);
 uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,

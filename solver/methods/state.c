@@ -109,23 +109,15 @@ static void take_numbers(uz_iterate *it, const uz_state *s)
     it->phase_end = s->phase_end;
 }
 
-/* Makes the correction of the best answer again, which a state does not have, and its bound with it. *same false: the
- * bound is another than the state's. Uses r_next and Dr_next. */
+/* Makes the correction of the best answer, which a state does not have, and its bound with it. *same false: the bound
+ * is another than the state's. */
 static uz_status bound_best_again(bool *same, uz_iterate *it, uz_case *load, const uz_state *s, uz_error *err)
 {
-    double *r = it->r, *Dr = it->Dr;
     *same = true;
     if (isinf(s->best_bound))
         return UZ_OK;
-    it->r = it->r_next;
-    it->Dr = it->Dr_next;
-    memcpy(it->r, it->best_r, (size_t)it->m * sizeof *r);
-    it->best_bound = INFINITY;
-    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
-    if (status == UZ_OK)
-        status = uz_iterate_bound(it, load, s->made_by, err);
-    it->r = r;
-    it->Dr = Dr;
+    it->made_by = s->made_by;
+    uz_status status = uz_iterate_bound_best(it, load, err);
     *same = it->best_bound <= (1.0 + 1e-3) * s->best_bound && s->best_bound <= (1.0 + 1e-3) * it->best_bound;
     /* what rounding alone leaves of a bound is another number each time */
     *same = *same || (it->best_relative <= 1e-11 && s->best_relative <= 1e-11);
@@ -146,7 +138,7 @@ static uz_status restore(bool *same, uz_iterate *it, uz_case *load, const uz_sta
     it->best_relative = s->best_relative;
     it->best_iteration = s->best_iteration;
     it->made_by = s->made_by;
-    it->begun = it->fresh = true;
+    it->begun = it->fresh = it->resumed = true;
     return UZ_OK;
 }
 

@@ -227,7 +227,7 @@ def test_rows_without_entries(s):
 def test_one_unknown(s):
     K, N = symmetric(1, "1 1 4"), BANNER + "general\n1 1 1\n1 1 1\n"
     for operator in ("condensed", "factored", "auto"):
-        for method in ("uzawa", "accelerated", "accelerated_restart", "auto"):
+        for method in ("uzawa", "accelerated", "accelerated_restart", "conjugate", "auto"):
             request = {**matrices(K=K, N=N, h=[0.25], p=[2]), "solver": {"operator": operator, "method": method}}
             summary, result = solved(s, request)
             check(abs(result["displacements"][0] - 0.25) < 1e-9 and abs(result["reactions"][0] + 1) < 1e-7, result)

@@ -106,7 +106,7 @@ def test_reference_cases(s):
 def test_every_method_and_operator(s):
     for name in ("FC_CubeH8", "FEM_skfem_box", "MM_HS118", "MM_HS21", "MM_HS268", "MM_HS35", "MM_HS76"):
         case = Case(folder("qp", name))
-        for method in ("uzawa", "accelerated", "accelerated_restart"):
+        for method in ("uzawa", "accelerated", "accelerated_restart", "conjugate"):
             for operator in ("condensed", "factored"):
                 summary, _ = solve(s, case, method=method, operator=operator)
                 what = (name, method, operator, summary)

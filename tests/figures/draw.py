@@ -3,14 +3,14 @@ import svg
 from svg import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, Count, Linear, Log, Panel
 
 METHODS = {"auto": ("auto", BLACK), "active_set": ("active_set", BLUE), "accelerated_restart": ("accelerated_restart", VERMILION),
-           "accelerated": ("accelerated", GREEN), "uzawa": ("uzawa", ORANGE)}
+           "accelerated": ("accelerated", GREEN), "uzawa": ("uzawa", ORANGE), "conjugate": ("conjugate", PURPLE)}
 OPERATORS = {"auto": ("", "circle"), "condensed": ("", "circle"), "factored": ("6,3", "square"), "matrix_free": ("1.5,2.5", "triangle")}
 LEVELS = ["quick", "balanced", "1e-4", "1e-6", "precise", "1e-10", "exact"]
 FLOOR = 1e-17  # what is smaller is drawn here
 MISS = "time_limit"
 
 WAYS = {"uzawa": ("Uzawa (Algorithm 1)", ORANGE, "6,3", "triangle"), "accelerated": ("accelerated", GREEN, "1.5,2.5", "down"),
-        "restart": ("accelerated with restart", VERMILION, "", "circle"),
+        "restart": ("accelerated with restart", VERMILION, "", "circle"), "conjugate": ("conjugate", BLUE, "", "square"),
         "restart_paper_step": ("with restart, step λ₁(K)", PURPLE, "8,2,2,2", "diamond"),
         "restart_factored": ("with restart, a sparse solve per iteration", SKY, "4,2", "square"),
         "auto": ("auto, certified 1e-6", BLACK, "", "circle"), "auto_cached": ("auto, factor cached", BLACK, "2,2", "circle")}
@@ -102,7 +102,7 @@ def peers_of(peers, tolerance=1e-6):
 
 def sizes(data, peers):
     """Figure 3 of the paper: time and total residual against size; peers where they were measured."""
-    names = ["uzawa", "accelerated", "restart", "restart_factored"]
+    names = ["uzawa", "accelerated", "restart", "restart_factored", "conjugate"]
     found = {**ways_of(data, "paper", names), **ways_of(data, "certified", ["auto", "auto_cached"])}
     others = peers_of(peers)
     style = {name: PEER_STYLES[k % len(PEER_STYLES)] for k, name in enumerate(others)}
@@ -140,7 +140,7 @@ def draw_way(panel, name, runs, what):
 
 
 def iterations(data):
-    names = ["uzawa", "accelerated", "restart_paper_step", "restart"]
+    names = ["uzawa", "accelerated", "restart_paper_step", "restart", "conjugate"]
     key = [(WAYS[n][0], WAYS[n][1], WAYS[n][2], WAYS[n][3], False) for n in names]
     drawn, tall = svg.legend(key, 70, 22, 220)
     parts, top = list(drawn), 40 + tall + 20

@@ -150,7 +150,8 @@ RESIDUAL = """The paper's body and stopping rule, with the step 1/λ_max(N K⁻�
 
 
 ITERATIONS = """Uzawa and the accelerated methods take the step 1/λ_max(N K⁻¹ N') unless it says λ₁(K), the step of the paper. The paper's rule stops when ‖ρ − r‖ ≤ 1e-6 N: a shorter step makes that small sooner,
-so λ₁(K) ends with a larger error, as the last two columns show; the second group of rows asks of both what λ₁(K) had then. Certified errors are looked at in growing intervals, so those counts come in steps."""
+so λ₁(K) ends with a larger error, as the last columns show; the second group of rows asks of all what λ₁(K) had then. Certified errors are looked at in growing intervals, so those counts come in steps.
+`accelerated_restart` is Algorithm 2 as published, with its counts. `conjugate` applies D once in an iteration as well; its ‖ρ − r‖ is that of a plain step from the r it has, and for each bound it applies D once more."""
 
 
 def page(data, files):

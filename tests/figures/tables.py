@@ -104,14 +104,14 @@ def cheapest(problem):
     rows = []
     for level in ["quick", "balanced", "1e-4", "1e-6", "precise", "1e-10", "exact"]:
         row = [f"`{level}`"]
-        for method in ("auto", "active_set", "accelerated_restart", "accelerated", "uzawa"):
+        for method in ("auto", "active_set", "conjugate", "accelerated_restart", "accelerated", "uzawa"):
             met = [run for run in problem["runs"] if run["method"] == method and run["level"] == level and
                    run["start"] == "cached" and run["outcome"] == "converged"]
             best = min(met, key=lambda run: run["cpu_s"], default=None)
             row.append(f"{duration(best['cpu_s'])} ({best['operator_used']})" if best else NONE)
         if any(cell != NONE for cell in row[1:]):
             rows.append(row)
-    return table(["cached, cheapest form", "auto", "active_set", "accelerated_restart", "accelerated", "uzawa"], rows)
+    return table(["cached, cheapest form", "auto", "active_set", "conjugate", "accelerated_restart", "accelerated", "uzawa"], rows)
 
 
 def ends(problem):
@@ -144,7 +144,7 @@ def count_cell(run):
 
 
 def over(run, base):
-    """Iterations over those of the accelerated method with restart."""
+    """Iterations over those of another way."""
     if not run or not base or base["outcome"] == "time_limit":
         return NONE
     return ("> " if run["outcome"] == "time_limit" else "") + sig(run["iterations"] / base["iterations"], 3)
@@ -154,17 +154,17 @@ RULES = (("paper", "restart", "the paper's rule"), ("as_far", "restart_as_far", 
 
 
 def iteration_runs(size, rule, base):
-    """The runs of a row: with restart, and what it is compared with."""
+    """The runs of a row: with restart, what it is compared with, and conjugate steps."""
     if rule == "as_far":
-        return way(size, base, "certified"), way(size, "restart_paper_step", "paper"), None, None
-    return tuple(way(size, name, rule) for name in (base, "restart_paper_step", "accelerated", "uzawa"))
+        return way(size, base, "certified"), way(size, "restart_paper_step", "paper"), None, None, way(size, "conjugate_as_far", "certified")
+    return tuple(way(size, name, rule) for name in (base, "restart_paper_step", "accelerated", "uzawa", "conjugate"))
 
 
 def iterations(data):
     """By size: counts until the paper's rule and until a certified error."""
     if not data.get("figures"):
         return None
-    names = [("restart", "with restart"), ("restart_paper_step", "λ₁(K)"), ("accelerated", "without restart"), ("uzawa", "Uzawa")]
+    names = [("conjugate", "`conjugate`"), ("restart", "with restart"), ("restart_paper_step", "λ₁(K)"), ("accelerated", "without restart"), ("uzawa", "Uzawa")]
     rows = [[f"{size['nx']} x {size['nx'] // 3}"] + [count_cell(way(size, n, rule)) for rule in ("paper", "certified") for n, _ in names]
             for size in data["figures"]["sizes"]]
     head = [title if k else f"{until}: {title}" for until in ("paper's rule", "certified 1e-6") for k, (_, title) in enumerate(names)]
@@ -176,21 +176,21 @@ def iterations_all(data):
     rows = []
     for rule, base, name in RULES:
         for size in data["figures"]["sizes"]:
-            restart, step, plain, uzawa = iteration_runs(size, rule, base)
-            reached = [sig(run["certified"]) if run else NONE for run in (restart, step)]
-            rows.append([name, f"{size['nx']} x {size['nx'] // 3}"] + [count_cell(run) for run in (restart, step, plain, uzawa)] +
-                        [over(step, restart), over(uzawa, restart)] + reached)
-    return table(["until", "cells", "with restart", "with restart, step λ₁(K)", "without restart", "Uzawa", "λ₁(K) / restart", "Uzawa / restart",
-                  "certified: restart", "λ₁(K)"], rows)
+            restart, step, plain, uzawa, conjugate = iteration_runs(size, rule, base)
+            reached = [sig(run["certified"]) if run else NONE for run in (conjugate, restart, step)]
+            rows.append([name, f"{size['nx']} x {size['nx'] // 3}"] + [count_cell(run) for run in (conjugate, restart, step, plain, uzawa)] +
+                        [over(step, restart), over(uzawa, restart), over(step, conjugate), over(uzawa, conjugate)] + reached)
+    return table(["until", "cells", "`conjugate`", "with restart", "with restart, step λ₁(K)", "without restart", "Uzawa", "λ₁(K) / restart",
+                  "Uzawa / restart", "λ₁(K) / `conjugate`", "Uzawa / `conjugate`", "certified: `conjugate`", "restart", "λ₁(K)"], rows)
 
 
-def least_ratio(data, rule, base, which):
-    """(ratio, NX) of the size at which the accelerated method with restart saves least."""
+def least_ratio(data, rule, base, which, saver=0):
+    """(ratio, NX) of the size at which the accelerated method with restart (saver 4: conjugate steps) saves least."""
     ratios = []
     for size in data["figures"]["sizes"]:
         runs = iteration_runs(size, rule, base)
-        if runs[0] and runs[which]:
-            ratios.append((runs[which]["iterations"] / runs[0]["iterations"], size["nx"]))
+        if runs[saver] and runs[which]:
+            ratios.append((runs[which]["iterations"] / runs[saver]["iterations"], size["nx"]))
     return min(ratios, default=None)
 
 

@@ -90,6 +90,8 @@ TEST(iterations_with_inner_iterations)
     uz_problem problem = matrix_problem(45, 15);
     check_against_factor(&problem, UZ_METHOD_ACCELERATED_RESTART, 1e-3);
     check_against_factor(&problem, UZ_METHOD_ACCELERATED_RESTART, 1e-7);
+    check_against_factor(&problem, UZ_METHOD_CONJUGATE, 1e-3);
+    check_against_factor(&problem, UZ_METHOD_CONJUGATE, 1e-7);
     uz_problem_clear(&problem);
 }
 

@@ -6,8 +6,9 @@
 
 #define COUNT(list) (sizeof(list) / sizeof((list)[0]))
 
-static const uz_method all_methods[] = {UZ_METHOD_AUTO, UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED,
-                                        UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET};
+static const uz_method all_methods[] = {UZ_METHOD_AUTO,        UZ_METHOD_UZAWA,
+                                        UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART,
+                                        UZ_METHOD_CONJUGATE,   UZ_METHOD_ACTIVE_SET};
 
 static uz_result *solve_for(const uz_problem *problem, uz_method method, uz_operator op, double relative_error,
                             int64_t iterations)
@@ -84,13 +85,14 @@ static void check_bounds_of_rows(const uz_problem *problem, uz_method method, uz
 
 TEST(bounds_in_the_history_hold)
 {
-    static const uz_method methods[] = {UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART};
-    for (uint64_t seed = 0; seed < 12; seed++) {
+    static const uz_method methods[] = {UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART,
+                                        UZ_METHOD_CONJUGATE};
+    for (uint64_t seed = 0; seed < 16; seed++) {
         qp_random rng = {seed + 5};
         qp_kind kind = {.d = 8, .m = 6 + (int64_t)seed, .condition = 30, .dependent = seed % 3 == 0};
         uz_problem problem = problem_of(seed < 2 ? random_obstacle(&rng, 25, 2) : random_qp(&rng, &kind));
-        check_bounds_of_rows(&problem, methods[seed % 3], UZ_OPERATOR_CONDENSED);
-        check_bounds_of_rows(&problem, methods[seed % 3], UZ_OPERATOR_FACTORED);
+        check_bounds_of_rows(&problem, methods[seed % 4], UZ_OPERATOR_CONDENSED);
+        check_bounds_of_rows(&problem, methods[seed % 4], UZ_OPERATOR_FACTORED);
         uz_problem_clear(&problem);
     }
 }
@@ -102,10 +104,10 @@ TEST(dual_objective_is_that_of_the_reactions)
     uz_problem problem = problem_of(random_obstacle(&rng, 20, 1));
     quad_exact exact;
     CHECK(quad_exact_solve(&exact, &problem.qp, NULL));
-    for (int64_t limit = 0; limit < 20; limit++) {
+    for (int64_t limit = 0; limit < 40; limit++) {
         uz_settings settings = uz_settings_default();
         settings.stopping = UZ_STOP_PAPER;
-        settings.method = UZ_METHOD_ACCELERATED_RESTART;
+        settings.method = limit < 20 ? UZ_METHOD_ACCELERATED_RESTART : UZ_METHOD_CONJUGATE;
         settings.max_iterations = limit;
         uz_result *result = solve_problem(&problem, &settings); /* of the last r */
         if (result)
@@ -247,7 +249,7 @@ TEST(unknown_choices_are_refused)
 {
     qp_random rng = {11};
     uz_problem problem = problem_of(random_obstacle(&rng, 6, 1));
-    static const int bad[] = {-1, 5, 99};
+    static const int bad[] = {-1, UZ_METHOD_GIVEN, 99};
     for (size_t k = 0; k < COUNT(bad); k++) {
         uz_settings s = uz_settings_default();
         s.method = (uz_method)bad[k];

@@ -5,8 +5,9 @@
 
 #define COUNT(list) (sizeof(list) / sizeof((list)[0]))
 
-static const uz_method all_methods[] = {UZ_METHOD_AUTO, UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED,
-                                        UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET};
+static const uz_method all_methods[] = {UZ_METHOD_AUTO,        UZ_METHOD_UZAWA,
+                                        UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART,
+                                        UZ_METHOD_CONJUGATE,   UZ_METHOD_ACTIVE_SET};
 static const uz_operator both_operators[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED};
 
 static uz_settings settings_for(uz_method method, uz_operator op)

@@ -223,8 +223,8 @@ TEST(no_time_and_no_iterations_are_outcomes)
 TEST(every_method_gives_the_certified_answer)
 {
     static const uz_method methods[] = {UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART,
-                                        UZ_METHOD_ACTIVE_SET};
-    for (size_t k = 0; k < 4; k++) {
+                                        UZ_METHOD_CONJUGATE, UZ_METHOD_ACTIVE_SET};
+    for (size_t k = 0; k < 5; k++) {
         uz_scene scene = rolled_block(6, 2, 0, -0.05);
         add_load(&scene, "right", 0.5, 0.11);
         uz_problem problem = problem_in(scene);

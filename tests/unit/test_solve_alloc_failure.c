@@ -169,6 +169,8 @@ TEST(matrices)
     check_scenario("obstacle", obstacle_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_CONDENSED, UZ_ORDERING_AMD, false);
     check_scenario("iterated obstacle", obstacle_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_CONDENSED,
                    UZ_ORDERING_AMD, true);
+    check_scenario("conjugate obstacle", obstacle_problem(), UZ_METHOD_CONJUGATE, UZ_OPERATOR_CONDENSED,
+                   UZ_ORDERING_AMD, false);
     check_scenario("sparse active set", obstacle_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_FACTORED, UZ_ORDERING_AMD,
                    false);
     check_scenario("cached factored obstacle", obstacle_problem(), UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_FACTORED,

@@ -92,13 +92,14 @@ static void check_continued(const uz_problem *problem, const uz_settings *settin
 
 TEST(gradient_runs_continue_bit_for_bit)
 {
-    static const uz_method methods[] = {UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART};
+    static const uz_method methods[] = {UZ_METHOD_UZAWA, UZ_METHOD_ACCELERATED, UZ_METHOD_ACCELERATED_RESTART,
+                                        UZ_METHOD_CONJUGATE};
     static const uz_operator ops[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED};
-    static const int64_t stops[] = {0, 1, 2, 5, 16, 33, 100};
+    static const int64_t stops[] = {0, 1, 2, 5, 16, 33, 100, 400}; /* some have ended by then */
     uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(12, 4)};
-    for (int mo = 0; mo < 3; mo++)
+    for (int mo = 0; mo < 4; mo++)
         for (int op = 0; op < 2; op++)
-            for (int k = 0; k < 7; k++) {
+            for (int k = 0; k < 8; k++) {
                 uz_settings settings = uz_settings_default();
                 settings.method = methods[mo];
                 settings.op = ops[op];
@@ -115,12 +116,12 @@ TEST(gradient_runs_continue_bit_for_bit)
 /* Rows of many sizes: scaled inside, as they were outside. A step size too long, so that it is shortened on the way. */
 TEST(scaled_rows_and_shortened_steps_continue_bit_for_bit)
 {
-    for (uint64_t seed = 0; seed < 20; seed++) {
+    for (uint64_t seed = 0; seed < 40; seed++) {
         qp_random rng = {seed + 70};
         qp_kind kind = {.d = 12, .m = 6, .condition = 30, .badly_scaled = seed % 2 == 1, .dependent = seed % 3 == 0};
         uz_problem problem = problem_of(random_qp(&rng, &kind));
         uz_settings settings = uz_settings_default();
-        settings.method = UZ_METHOD_ACCELERATED_RESTART;
+        settings.method = seed < 20 ? UZ_METHOD_ACCELERATED_RESTART : UZ_METHOD_CONJUGATE;
         settings.max_iterations = 300;
         settings.alpha = seed % 2 ? 0 : 100;
         check_continued(&problem, &settings, (int64_t)(seed % 7) * 3);
@@ -268,11 +269,12 @@ TEST(auto_continues_in_its_phase)
 TEST(the_solution_itself_takes_no_iteration)
 {
     static const uz_operator ops[] = {UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED};
-    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET};
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET,
+                                        UZ_METHOD_CONJUGATE};
     static const double errors[] = {1e-4, 1e-8};
     uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(30, 10)};
     for (int op = 0; op < 2; op++)
-        for (int mo = 0; mo < 3; mo++)
+        for (int mo = 0; mo < 4; mo++)
             for (int e = 0; e < 2; e++) {
                 uz_settings settings = uz_settings_default();
                 settings.method = methods[mo];
@@ -295,13 +297,14 @@ TEST(the_solution_itself_takes_no_iteration)
 /* Any reactions: cut at 0, and no worse an answer for it. */
 TEST(any_reactions_may_be_a_start)
 {
-    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET};
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_ACTIVE_SET,
+                                        UZ_METHOD_CONJUGATE};
     uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(12, 4)};
     qp_random rng = {77};
     double r[64];
     for (int trial = 0; trial < 30; trial++) {
         uz_settings settings = uz_settings_default();
-        settings.method = methods[trial % 3];
+        settings.method = methods[trial / 2 % 4];
         settings.op = trial % 2 ? UZ_OPERATOR_CONDENSED : UZ_OPERATOR_FACTORED;
         uz_result *cold = solve_from(&problem, &settings, NULL, NULL);
         for (int64_t i = 0; i < cold->m; i++)
@@ -384,8 +387,8 @@ TEST(a_neighbouring_load_is_a_good_start)
 {
     uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(30, 10)};
     uz_problem other = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(30, 10)};
-    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART};
-    for (int mo = 0; mo < 2; mo++) {
+    static const uz_method methods[] = {UZ_METHOD_AUTO, UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_CONJUGATE};
+    for (int mo = 0; mo < 3; mo++) {
         int64_t no_worse = 0;
         for (int k = 1; k <= 9; k++) {
             uz_settings settings = uz_settings_default();

@@ -85,6 +85,7 @@ TEST(runs_cut_where_a_bound_is_recorded_have_it)
 {
     check_cut_runs(UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_CONDENSED);
     check_cut_runs(UZ_METHOD_ACCELERATED_RESTART, UZ_OPERATOR_MATRIX_FREE);
+    check_cut_runs(UZ_METHOD_CONJUGATE, UZ_OPERATOR_CONDENSED);
     check_cut_runs(UZ_METHOD_ACTIVE_SET, UZ_OPERATOR_CONDENSED);
     check_cut_runs(UZ_METHOD_AUTO, UZ_OPERATOR_FACTORED);
 }

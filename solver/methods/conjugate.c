@@ -1,0 +1,203 @@
+/* conjugate.c: see conjugate.h. */
+#include "methods/conjugate.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A direction along which psi curves by less than this part of lambda_max has no curvature, only rounding. */
+#define FLAT 1e-14
+/* Along which reactions only grow, with less curvature than this: looked at as a ray. */
+#define RAY 1e-8
+/* A direction must rise by this part of what the gradient alone would: rounding, or a rho that another method left, may
+ * have made it a bad one. */
+#define RISE 1e-2
+
+/* Iterations after which D r is made again. */
+enum { SETTLED_FOR = 64 };
+
+/* Where there is no direction to go on from. */
+static void forget(uz_iterate *it)
+{
+    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+    it->tau = 1.0;
+}
+
+static void make_gaps(uz_iterate *it, const uz_case *load)
+{
+    const double *g0 = uz_case_g0(load);
+    for (int64_t i = 0; i < it->m; i++)
+        it->gamma[i] = g0[i] - it->Dr[i];
+}
+
+/* Is there more to be had from rows that should come into contact than from those that press? Of the latter only what
+ * a plain step would leave them counts (the reduced free gradient). */
+static bool out_of_proportion(const uz_iterate *it)
+{
+    double asked = 0.0, left = 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        double g = it->gamma[i];
+        if (it->r[i] < 0.0)
+            left += g * fmin(g, -it->r[i] / it->alpha);
+        else if (g < 0.0)
+            asked += g * g;
+    }
+    return !(left > 0.0) || asked > left;
+}
+
+/* The direction (r_next): the gradient on the rows that press, made conjugate to the last step. Returns gamma'd. */
+static double make_direction(uz_iterate *it)
+{
+    double curvature = 0.0, cross = 0.0, rise = 0.0, gradient = 0.0, *d = it->r_next;
+    for (int64_t i = 0; i < it->m; i++) {
+        if (it->r[i] < 0.0) {
+            curvature += (it->r[i] - it->rho[i]) * (it->Dr[i] - it->Drho[i]);
+            cross += it->gamma[i] * (it->Dr[i] - it->Drho[i]);
+            gradient += it->gamma[i] * it->gamma[i];
+        }
+    }
+    double beta = curvature > 0.0 ? -cross / curvature : 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        d[i] = it->r[i] < 0.0 ? it->gamma[i] + beta * (it->r[i] - it->rho[i]) : 0.0;
+        rise += it->gamma[i] * d[i];
+    }
+    if (rise > RISE * gradient)
+        return rise;
+    for (int64_t i = 0; i < it->m; i++)
+        d[i] = it->r[i] < 0.0 ? it->gamma[i] : 0.0;
+    return gradient;
+}
+
+/* The length that maximizes psi along d; *bound: that at which the first row stops to press. Along what is flat the
+ * step goes beyond the bound, unless what curvature there is says less; without a bound it goes as far as a plain one:
+ * rise / curvature would be the quotient of two roundings. */
+static double best_length(double *bound, uz_iterate *it, double rise)
+{
+    const double *d = it->r_next, *Dd = it->Dr_next;
+    double curvature = 0.0, square = 0.0;
+    *bound = INFINITY;
+    for (int64_t i = 0; i < it->m; i++) {
+        curvature += d[i] * Dd[i];
+        square += d[i] * d[i];
+        if (d[i] > 0.0)
+            *bound = fmin(*bound, -it->r[i] / d[i]);
+    }
+    it->along_ray = isinf(*bound) && it->alpha * curvature <= RAY * square;
+    if (it->along_ray)
+        memcpy(it->ray, d, (size_t)it->m * sizeof *d);
+    if (it->alpha * curvature > FLAT * square)
+        return rise / curvature;
+    if (isinf(*bound))
+        return it->alpha;
+    return curvature > 0.0 ? fmin(rise / curvature, 2.0 * *bound) : 2.0 * *bound;
+}
+
+/* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near r,
+ * a plain step's length away. Where D is exact the difference of two points would only lose digits. Overwrites gamma.
+ */
+static uz_status apply_to_direction(uz_iterate *it, uz_case *load, uz_error *err)
+{
+    if (!uz_case_is_inexact(load))
+        return uz_case_apply(load, it->Dr_next, it->r_next, err);
+    for (int64_t i = 0; i < it->m; i++)
+        it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
+    uz_status status = uz_case_apply(load, it->Dr_next, it->gamma, err);
+    for (int64_t i = 0; i < it->m; i++)
+        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
+    return status;
+}
+
+static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    const double *d = it->r_next, *Dd = it->Dr_next;
+    double rise = make_direction(it), bound;
+    uz_status status = apply_to_direction(it, load, err);
+    if (status != UZ_OK)
+        return status;
+    double length = best_length(&bound, it, rise), taken = fmin(length, bound);
+    *restart = length > bound;
+    for (int64_t i = 0; i < it->m; i++) {
+        double r = it->r[i], Dr = it->Dr[i];
+        bool stops = *restart && d[i] > 0.0 && -r / d[i] <= bound;
+        it->r[i] = stops ? 0.0 : fmin(0.0, r + taken * d[i]);
+        it->Dr[i] = Dr + taken * Dd[i];
+        it->rho[i] = *restart ? r + length * d[i] : r;
+        it->Drho[i] = *restart ? Dr + length * Dd[i] : Dr;
+    }
+    it->tau = *restart ? 1.0 : 2.0;
+    return UZ_OK;
+}
+
+/* psi(r_next) - psi(r) */
+static double gain(const uz_iterate *it, const uz_case *load)
+{
+    const double *g0 = uz_case_g0(load);
+    double sum = 0.0;
+    for (int64_t i = 0; i < it->m; i++)
+        sum += (it->r_next[i] - it->r[i]) * (g0[i] - 0.5 * (it->Dr_next[i] + it->Dr[i]));
+    return sum;
+}
+
+/* Not taken where it is too long, or where it led down. */
+static uz_status projected_step(bool *restart, uz_iterate *it, uz_case *load, uz_error *err)
+{
+    bool plain = memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
+    for (int64_t i = 0; i < it->m; i++)
+        it->r_next[i] = fmin(0.0, it->rho[i] + (plain ? it->alpha * it->gamma[i] : 0.0));
+    uz_status status = uz_case_apply(load, it->Dr_next, it->r_next, err);
+    if (status != UZ_OK)
+        return status;
+    bool taken = plain ? !uz_iterate_shorten(it) : gain(it, load) >= 0.0;
+    if (taken) {
+        uz_iterate_swap(&it->r, &it->r_next);
+        uz_iterate_swap(&it->Dr, &it->Dr_next);
+    }
+    forget(it);
+    it->tau = taken ? 2.0 : 1.0;
+    *restart = *restart || !taken;
+    return UZ_OK;
+}
+
+static double remaining(uz_iterate *it, const uz_case *load)
+{
+    const double *scale = uz_case_row_scale(load);
+    double square = 0.0;
+    make_gaps(it, load);
+    for (int64_t i = 0; i < it->m; i++) {
+        double step = scale[i] * (it->r[i] - fmin(0.0, it->r[i] + it->alpha * it->gamma[i]));
+        square += step * step;
+    }
+    return sqrt(square);
+}
+
+uz_status uz_conjugate_step(uz_iterate *it, uz_case *load, double *step_norm, bool *restart, uz_error *err)
+{
+    make_gaps(it, load);
+    *restart = it->tau > 1.0 && out_of_proportion(it);
+    if (*restart)
+        forget(it);
+    uz_status status = it->tau > 1.0 ? conjugate_step(restart, it, load, err) : projected_step(restart, it, load, err);
+    it->iteration++;
+    it->restarts += *restart;
+    *step_norm = remaining(it, load);
+    return status;
+}
+
+uz_status uz_conjugate_settle(uz_iterate *it, uz_case *load, bool due, uz_error *err)
+{
+    if (!due && it->iteration % SETTLED_FOR != 0)
+        return UZ_OK;
+    return uz_case_apply(load, it->Dr, it->r, err);
+}
+
+uz_status uz_conjugate_record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+                              bool restart, uz_error *err)
+{
+    double *rho = it->rho, *Drho = it->Drho;
+    it->rho = it->r;
+    it->Drho = it->Dr;
+    uz_status status = uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
+    it->rho = rho;
+    it->Drho = Drho;
+    return status;
+}
