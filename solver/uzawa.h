@@ -236,8 +236,7 @@ typedef struct {
     double gap;            /* pi(v) - psi(r) for the feasible v that the certificate built */
     double energy_primal;  /* pi(v) */
     double energy_dual;    /* psi(r) */
-    double energy_norm;    /* ||u||_K, of the relative error. Where supports move a scene's body: over all of its dofs,
-                            * so that rigid motion is no part of it; if nothing else is left (1e-10), over the free */
+    double energy_norm;    /* ||u||_K; where supports move: over all dofs, without rigid motion (uz_bound_reference) */
     uz_residual residual;  /* absolute */
     uz_residual relative_residual; /* force by ||p||, length by the gap scale, energy by |psi| */
 } uz_certificate;
