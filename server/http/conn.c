@@ -117,6 +117,7 @@ static void send_directly(conn *c, const problem_details *problem)
 {
     http_reply *reply = &c->request->reply, plain = {.cors = reply->cors, .cors_origin = reply->cors_origin};
     size_t len;
+    plain.retry_after_s = reply->retry_after_s;
     reply_clear(reply);
     *reply = plain;
     reply->close = true;
@@ -129,15 +130,26 @@ static void send_directly(conn *c, const problem_details *problem)
     reply_clear(reply);
 }
 
+static bool refuse_header(problem_details *problem, int status)
+{
+    return http_problem(problem, status, "header_too_large", "The header is too large",
+                        "request line and header fields together may have %d bytes", HEADER_BYTES);
+}
+
 void conn_refuse(conn *c, int status)
 {
     http_request *rq = c->request;
     problem_details problem;
     if (!rq || rq->status)
         return;
-    if (status == 413 || status == 414 || status == 431)
-        http_problem(&problem, status, "header_too_large", "The header is too large",
-                     "request line and header fields together may have about %d bytes", CONNECTION_MEMORY / 2);
+    if (status == 413 && rq->begun)
+        http_problem(&problem, status, "body_too_large", "The request body is too large",
+                     "a chunk of it says that it is larger than any body may be");
+    else if (status == 413 || status == 414 || status == 431)
+        refuse_header(&problem, status);
+    else if (status >= 500 && rq->framing.chunked)
+        http_problem(&problem, 400, "bad_request_framing", "The request is malformed or ambiguous",
+                     "the line before a chunk is too long");
     else if (status >= 500)
         http_problem(&problem, status, "http_error", "The request could not be served", "try again later");
     else
@@ -161,14 +173,19 @@ static enum MHD_Result collect_header(void *ctx, enum MHD_ValueKind kind, const 
     return MHD_YES;
 }
 
-static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
+static size_t header_size(struct MHD_Connection *mhd)
 {
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    return info ? info->header_size : 0;
+}
+
+static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
+{
     if (!c->server->check_layout)
         return true;
     c->layout.method = method;
     c->layout.version = version;
-    c->layout.block_len = info ? info->header_size : 0;
+    c->layout.block_len = header_size(mhd);
     return framing_tiles(&c->layout, &c->request->headers);
 }
 
@@ -214,6 +231,13 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
     rq->can_be_held = c->server->holder && strcmp(version, "HTTP/1.1") == 0 && strcmp(method, "HEAD") != 0;
     bool framed = read_framing(c, mhd, method, version);
     cors_find(c->server, rq);
+    if (header_size(mhd) > HEADER_BYTES) {
+        framed = refuse_header(&rq->refused, 431);
+        if (!c->server->tls) { /* libmicrohttpd may have no room for a reply */
+            send_directly(c, &rq->refused);
+            return false;
+        }
+    }
     if (framed && admit(c) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
         deadline_set(c->deadline,
                      rq->started + c->server->options.request_deadline_s + (double)rq->framing.length / SLOWEST_RATE,
@@ -241,6 +265,7 @@ static bool reserve(conn *c, size_t more)
     size_t added = capacity - rq->body_capacity;
     if (atomic_fetch_add(&c->server->context.body_bytes, added) + added > c->server->body_budget) {
         atomic_fetch_sub(&c->server->context.body_bytes, added);
+        rq->reply.retry_after_s = 5;
         return http_problem(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
     }
     char *grown = realloc(rq->body, capacity);
