@@ -12,6 +12,7 @@
 
 /* Lingering after an early reply: long enough for the reply to cross the network. */
 static const double LINGER_S = 2.0;
+#define LOOK_MS 50 /* so soon it sees that the service ends */
 
 conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
 {
@@ -29,6 +30,7 @@ conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
         free(c);
         return NULL;
     }
+    atomic_fetch_add(&server->conns, 1);
     return c;
 }
 
@@ -66,6 +68,8 @@ void conn_free(conn *c)
     deadline_remove(c->deadline);
     clear_request(c);
     presence_end(c->place);
+    atomic_fetch_sub(&c->server->refusing, c->refusing);
+    atomic_fetch_sub(&c->server->conns, 1);
     free(c);
 }
 
@@ -96,9 +100,10 @@ static void linger(const conn *c)
     char dropped[16384];
     double end = deadlines_now() + LINGER_S;
     shutdown(c->fd, SHUT_WR);
-    for (double left = LINGER_S; left > 0; left = end - deadlines_now()) {
+    while (deadlines_now() < end && !atomic_load(&c->server->stopping)) {
         struct pollfd p = {.fd = c->fd, .events = POLLIN};
-        if (poll(&p, 1, (int)(left * 1e3) + 1) <= 0 || recv(c->fd, dropped, sizeof dropped, MSG_DONTWAIT) <= 0)
+        int ready = poll(&p, 1, LOOK_MS);
+        if (ready < 0 || (ready > 0 && recv(c->fd, dropped, sizeof dropped, MSG_DONTWAIT) <= 0))
             return;
     }
 }
@@ -142,6 +147,9 @@ void conn_refuse(conn *c, int status)
     problem_details problem;
     if (!rq || rq->status)
         return;
+    if (!c->refusing)
+        atomic_fetch_add(&c->server->refusing, 1);
+    c->refusing = true;
     if (status == 413 && rq->begun)
         http_problem(&problem, status, "body_too_large", "The request body is too large",
                      "a chunk of it says that it is larger than any body may be");

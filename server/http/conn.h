@@ -36,6 +36,9 @@ struct http_server {
     size_t body_budget;
     char id_prefix[17];      /* of the request ids made here; random */
     atomic_uint_fast64_t id; /* the last one's number */
+    atomic_uint conns;       /* connections of libmicrohttpd's */
+    atomic_uint refusing;    /* those of them that it refuses by itself: http_stop */
+    atomic_bool stopping;
 };
 
 typedef struct {
@@ -46,6 +49,7 @@ typedef struct {
     int fd;
     unsigned char address[16]; /* that counts for the rate */
     size_t address_len;
+    bool refusing;
     framing_layout layout;
 } conn;
 

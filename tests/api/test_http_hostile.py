@@ -120,6 +120,21 @@ def test_chunked(s):
         check(json.loads(body)["code"] == code and "header" not in json.loads(body)["detail"], body)
 
 
+def test_the_service_ends_while_it_refuses(s):
+    """What libmicrohttpd refuses by itself must not be in the making when it is stopped."""
+    malformed = (POST + b"Transfer-Encoding: chunked\r\n\r\nzz\r\n{}\r\n",
+                 b"GET /healthz HTTP/1.1\r\nContent-Length: x\r\n\r\n",
+                 POST + b"Transfer-Encoding: chunked\r\n\r\n2;" + b"x" * 100000)
+    asked = [s.connect() for _ in range(6)]
+    for i, c in enumerate(asked):
+        c.sendall(malformed[i % 3])
+    for c in asked:
+        check(c.recv(65536).startswith(b"HTTP/1.1 4"))
+    check(s.end() == 0, s.log())
+    for c in asked:
+        c.close()
+
+
 def test_connection_ends_early(s):
     for data in (b"", b"GET", b"GET / HTTP/1.1\r\nHost", POST + b"Content-Length: 100\r\n\r\n{",
                  POST + b"Transfer-Encoding: chunked\r\n\r\n5\r\nab"):
