@@ -261,7 +261,7 @@ void http_stop(http_server *server)
     MHD_stop_daemon(server->daemon);
     if (listening != MHD_INVALID_SOCKET)
         close(listening);
-    holder_free(server->holder);     /* nobody adds to it any more */
+    holder_free(server->holder); /* nobody adds to it any more */
     presences_free(server->context.presences);
     deadlines_free(server->deadlines);
     field_slots_free(server->context.fields);

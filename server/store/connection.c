@@ -39,8 +39,8 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
     [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, finished = 0,"
-                    " owner = ?2, lease = ?1 + ?3 WHERE id = (SELECT id FROM job INDEXED BY job_by_turn WHERE status = 0"
-                    " AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
+                    " owner = ?2, lease = ?1 + ?3 WHERE id = (SELECT id FROM job INDEXED BY job_by_turn"
+                    " WHERE status = 0 AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
                     " RETURNING " JOB_COLUMNS,
     [QUERY_BODY] = "SELECT body, " SUM_IS("sum", SUM_REQUEST) " FROM request WHERE job = ?1",
     [QUERY_RENEW] = "UPDATE job SET lease = ?3, progress = ?4 WHERE id = ?1 AND status = 1 AND owner = ?2",
