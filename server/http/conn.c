@@ -12,6 +12,7 @@
 
 /* Lingering after an early reply: long enough for the reply to cross the network. */
 static const double LINGER_S = 2.0;
+#define LOOK_MS 50 /* so soon it sees that the service ends */
 
 conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
 {
@@ -29,6 +30,7 @@ conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
         free(c);
         return NULL;
     }
+    atomic_fetch_add(&server->conns, 1);
     return c;
 }
 
@@ -66,6 +68,8 @@ void conn_free(conn *c)
     deadline_remove(c->deadline);
     clear_request(c);
     presence_end(c->place);
+    atomic_fetch_sub(&c->server->refusing, c->refusing);
+    atomic_fetch_sub(&c->server->conns, 1);
     free(c);
 }
 
@@ -96,9 +100,10 @@ static void linger(const conn *c)
     char dropped[16384];
     double end = deadlines_now() + LINGER_S;
     shutdown(c->fd, SHUT_WR);
-    for (double left = LINGER_S; left > 0; left = end - deadlines_now()) {
+    while (deadlines_now() < end && !atomic_load(&c->server->stopping)) {
         struct pollfd p = {.fd = c->fd, .events = POLLIN};
-        if (poll(&p, 1, (int)(left * 1e3) + 1) <= 0 || recv(c->fd, dropped, sizeof dropped, MSG_DONTWAIT) <= 0)
+        int ready = poll(&p, 1, LOOK_MS);
+        if (ready < 0 || (ready > 0 && recv(c->fd, dropped, sizeof dropped, MSG_DONTWAIT) <= 0))
             return;
     }
 }
@@ -117,6 +122,7 @@ static void send_directly(conn *c, const problem_details *problem)
 {
     http_reply *reply = &c->request->reply, plain = {.cors = reply->cors, .cors_origin = reply->cors_origin};
     size_t len;
+    plain.retry_after_s = reply->retry_after_s;
     reply_clear(reply);
     *reply = plain;
     reply->close = true;
@@ -129,15 +135,29 @@ static void send_directly(conn *c, const problem_details *problem)
     reply_clear(reply);
 }
 
+static bool refuse_header(problem_details *problem, int status)
+{
+    return http_problem(problem, status, "header_too_large", "The header is too large",
+                        "request line and header fields together may have %d bytes", HEADER_BYTES);
+}
+
 void conn_refuse(conn *c, int status)
 {
     http_request *rq = c->request;
     problem_details problem;
     if (!rq || rq->status)
         return;
-    if (status == 413 || status == 414 || status == 431)
-        http_problem(&problem, status, "header_too_large", "The header is too large",
-                     "request line and header fields together may have about %d bytes", CONNECTION_MEMORY / 2);
+    if (!c->refusing)
+        atomic_fetch_add(&c->server->refusing, 1);
+    c->refusing = true;
+    if (status == 413 && rq->begun)
+        http_problem(&problem, status, "body_too_large", "The request body is too large",
+                     "a chunk of it says that it is larger than any body may be");
+    else if (status == 413 || status == 414 || status == 431)
+        refuse_header(&problem, status);
+    else if (status >= 500 && rq->framing.chunked)
+        http_problem(&problem, 400, "bad_request_framing", "The request is malformed or ambiguous",
+                     "the line before a chunk is too long");
     else if (status >= 500)
         http_problem(&problem, status, "http_error", "The request could not be served", "try again later");
     else
@@ -161,14 +181,19 @@ static enum MHD_Result collect_header(void *ctx, enum MHD_ValueKind kind, const 
     return MHD_YES;
 }
 
-static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
+static size_t header_size(struct MHD_Connection *mhd)
 {
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_REQUEST_HEADER_SIZE);
+    return info ? info->header_size : 0;
+}
+
+static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
+{
     if (!c->server->check_layout)
         return true;
     c->layout.method = method;
     c->layout.version = version;
-    c->layout.block_len = info ? info->header_size : 0;
+    c->layout.block_len = header_size(mhd);
     return framing_tiles(&c->layout, &c->request->headers);
 }
 
@@ -214,6 +239,13 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
     rq->can_be_held = c->server->holder && strcmp(version, "HTTP/1.1") == 0 && strcmp(method, "HEAD") != 0;
     bool framed = read_framing(c, mhd, method, version);
     cors_find(c->server, rq);
+    if (header_size(mhd) > HEADER_BYTES) {
+        framed = refuse_header(&rq->refused, 431);
+        if (!c->server->tls) { /* libmicrohttpd may have no room for a reply */
+            send_directly(c, &rq->refused);
+            return false;
+        }
+    }
     if (framed && admit(c) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
         deadline_set(c->deadline,
                      rq->started + c->server->options.request_deadline_s + (double)rq->framing.length / SLOWEST_RATE,
@@ -241,6 +273,7 @@ static bool reserve(conn *c, size_t more)
     size_t added = capacity - rq->body_capacity;
     if (atomic_fetch_add(&c->server->context.body_bytes, added) + added > c->server->body_budget) {
         atomic_fetch_sub(&c->server->context.body_bytes, added);
+        rq->reply.retry_after_s = 5;
         return http_problem(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
     }
     char *grown = realloc(rq->body, capacity);

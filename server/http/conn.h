@@ -12,8 +12,11 @@
 #include <microhttpd.h>
 #include <pthread.h>
 
-/* Bytes of each connection's buffer: bounds the header block, and is the piece in which a body arrives. */
+/* Bytes of each connection's buffer, in which libmicrohttpd keeps the header block, 64 bytes for each of its fields and
+ * the head of the reply, and the piece in which a body arrives. */
 #define CONNECTION_MEMORY (64 * 1024)
+/* The largest header block: with HEADERS_MAX fields too there is room left for a reply. */
+#define HEADER_BYTES (CONNECTION_MEMORY / 4 * 3)
 /* All bodies in memory at once; a request beyond it is told to come back later. */
 #define BODY_BUDGET(max_body) ((max_body) < SIZE_MAX / 8 ? 8 * (max_body) : SIZE_MAX)
 /* Slowest transfer that is waited for, bytes per second: the allowance that a body's length adds to a deadline. */
@@ -33,6 +36,9 @@ struct http_server {
     size_t body_budget;
     char id_prefix[17];      /* of the request ids made here; random */
     atomic_uint_fast64_t id; /* the last one's number */
+    atomic_uint conns;       /* connections of libmicrohttpd's */
+    atomic_uint refusing;    /* those of them that it refuses by itself: http_stop */
+    atomic_bool stopping;
 };
 
 typedef struct {
@@ -43,6 +49,7 @@ typedef struct {
     int fd;
     unsigned char address[16]; /* that counts for the rate */
     size_t address_len;
+    bool refusing;
     framing_layout layout;
 } conn;
 

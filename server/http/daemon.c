@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
+#include <time.h>
 #include <unistd.h>
 
 static conn *connection_of(struct MHD_Connection *mhd)
@@ -184,6 +185,9 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     atomic_init(&server->context.body_bytes, 0);
     pthread_mutex_init(&server->context.ready_lock, NULL);
     atomic_init(&server->id, 0);
+    atomic_init(&server->conns, 0);
+    atomic_init(&server->refusing, 0);
+    atomic_init(&server->stopping, false);
     uint64_t random = 0;
     if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
         random = (uint64_t)(deadlines_now() * 1e9);
@@ -230,13 +234,34 @@ void http_drain(http_server *server)
     feed_wake_all(work_feed(server->context.work)); /* those who wait there see it */
 }
 
+static const double REPLY_S = 0.5, REFUSE_S = 5.0;
+
+/* Nothing more is heard, and what is being said gets a moment. libmicrohttpd 0.9.75 must not be stopped while it
+ * refuses a request by itself: MHD_queue_response then takes no reply but says that it did, and the reply that is not
+ * there is read (transmit_error_response_len). */
+static void let_end(http_server *server)
+{
+    double begun = deadlines_now(), spent = 0.0;
+    deadlines_hear_no_more(server->deadlines);
+    while (atomic_load(&server->conns) > 0 &&
+           (spent < REPLY_S || (atomic_load(&server->refusing) > 0 && spent < REFUSE_S))) {
+        nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
+        spent = deadlines_now() - begun;
+    }
+}
+
 void http_stop(http_server *server)
 {
     if (!server)
         return;
-    http_drain(server);              /* event streams end */
-    MHD_stop_daemon(server->daemon); /* closes the listening socket too */
-    holder_free(server->holder);     /* nobody adds to it any more */
+    http_drain(server); /* event streams end */
+    atomic_store(&server->stopping, true);
+    MHD_socket listening = MHD_quiesce_daemon(server->daemon);
+    let_end(server);
+    MHD_stop_daemon(server->daemon);
+    if (listening != MHD_INVALID_SOCKET)
+        close(listening);
+    holder_free(server->holder); /* nobody adds to it any more */
     presences_free(server->context.presences);
     deadlines_free(server->deadlines);
     field_slots_free(server->context.fields);

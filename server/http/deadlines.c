@@ -118,6 +118,14 @@ void deadlines_free(deadlines *all)
     free(all);
 }
 
+void deadlines_hear_no_more(deadlines *all)
+{
+    pthread_mutex_lock(&all->mutex);
+    for (const deadline *d = all->first; d; d = d->next)
+        shutdown(d->fd, SHUT_RD);
+    pthread_mutex_unlock(&all->mutex);
+}
+
 /* Under the mutex. */
 static void wake_for(deadlines *all, double at)
 {

@@ -28,6 +28,8 @@ deadline *deadlines_add(deadlines *all, int fd, double at);
 void deadline_set(deadline *d, double at, bool speak);
 /* True once it has expired. */
 bool deadline_expired(deadline *d);
+/* All connections read as closed by their clients from now on; what is being sent to them goes on. */
+void deadlines_hear_no_more(deadlines *all);
 /* Before fd is closed. NULL is fine. */
 void deadline_remove(deadline *d);
 

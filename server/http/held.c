@@ -170,14 +170,15 @@ static void begin_end(held *one)
     shutdown(one->fd, SHUT_WR);
 }
 
-/* Drops what still comes. False: the client has closed too. */
+/* Drops what still comes, some of it at a time: who sends without end keeps nobody else waiting. False: the client has
+ * closed too, or had its time. */
 static bool linger(holder *h, const held *one)
 {
-    ssize_t n;
-    do
+    ssize_t n = 1;
+    for (int i = 0; n > 0 && i < PIECES; i++)
         n = recv(one->fd, h->buffer, PIECE, MSG_DONTWAIT);
-    while (n > 0);
-    return n < 0 && errno == EAGAIN && deadlines_now() < one->due;
+    bool open = n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
+    return open && deadlines_now() < one->due;
 }
 
 /* Does what can be done now. False: it is over. */

@@ -348,7 +348,7 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
     job_status was;
     snprintf(rq->job_id, sizeof rq->job_id, "%.32s", rq->name);
     store_status status = store_dismiss(context->store, rq->job_id, &was);
-    if (status != STORE_OK) {
+    if (status != STORE_OK && was != JOB_RUNNING) { /* one that runs is told, also where that can't be kept */
         reply_store_failure(context, status, reply);
         return;
     }
@@ -360,7 +360,11 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
         metrics_job(context->metrics, job_status_name(JOB_DISMISSED), NULL, 1);
     if (was == JOB_RUNNING && work_cancel(context->work, rq->job_id))
         work_wait(context->work, rq->job_id, DISMISS_WAIT_S);
-    if (jobs_load(context, rq, &j, reply))
+    if (!jobs_load(context, rq, &j, reply))
+        return;
+    if (status != STORE_OK && !jobs_ended(&j))
+        reply_store_failure(context, status, reply);
+    else
         reply_job(context, 200, &j, reply);
     job_clear(&j);
 }

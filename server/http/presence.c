@@ -1,6 +1,6 @@
 #include "http/presence.h"
+#include "http/rate.h"
 
-#include <netinet/in.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,19 +17,6 @@ struct presences {
     presence *first;
     size_t count;
 };
-
-static size_t address_of(const struct sockaddr *from, unsigned char out[16])
-{
-    if (from && from->sa_family == AF_INET) {
-        memcpy(out, &((const struct sockaddr_in *)(const void *)from)->sin_addr, 4);
-        return 4;
-    }
-    if (from && from->sa_family == AF_INET6) {
-        memcpy(out, &((const struct sockaddr_in6 *)(const void *)from)->sin6_addr, 16);
-        return 16;
-    }
-    return 0;
-}
 
 presences *presences_new(void)
 {
@@ -53,7 +40,7 @@ presence *presence_begin(presences *all, const struct sockaddr *from)
     if (!p)
         return NULL;
     p->all = all;
-    p->len = address_of(from, p->address);
+    p->len = rate_address(from, p->address);
     pthread_mutex_lock(&all->lock);
     p->next = all->first;
     if (p->next)
@@ -92,7 +79,7 @@ size_t presences_count(presences *all)
 size_t presences_from(presences *all, const struct sockaddr *from)
 {
     unsigned char address[16];
-    size_t len = address_of(from, address), count = 0;
+    size_t len = rate_address(from, address), count = 0;
     pthread_mutex_lock(&all->lock);
     for (const presence *p = len > 0 ? all->first : NULL; p; p = p->next)
         count += p->len == len && memcmp(p->address, address, len) == 0;

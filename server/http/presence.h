@@ -12,7 +12,8 @@ typedef struct presence presence;
 presences *presences_new(void); /* NULL: no memory */
 void presences_free(presences *all);
 
-/* One more connection from this address (NULL or of another family than IP: from none). NULL: no memory. */
+/* One more connection from this address, as rate.h counts them: one network of 64 bits is one client (NULL or of
+ * another family than IP: from none). NULL: no memory. */
 presence *presence_begin(presences *all, const struct sockaddr *from);
 void presence_end(presence *p); /* NULL is fine */
 

@@ -27,7 +27,7 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
 
 /* Bounds that are no options: those of this folder. */
 static const codec_limit FIXED[] = {
-    {"max_header", "bytes", "request line and header fields of a request together, about", CONNECTION_MEMORY},
+    {"max_header", "bytes", "request line and header fields of a request together", HEADER_BYTES},
     {"max_header_fields", "count", "header fields of a request", HEADERS_MAX},
     {"max_parameters", "count", "query parameters of a request", TARGET_MAX_PARAMETERS}};
 enum { N_FIXED = sizeof FIXED / sizeof FIXED[0] };

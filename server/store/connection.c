@@ -38,9 +38,9 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_INSERT_REQUEST] = "INSERT INTO request(job, body, sum) VALUES(?1, ?2, " SUM_OF("?1, ?2") ")",
     [QUERY_INSERT_TAGS] = "INSERT OR IGNORE INTO tag(tag, job)"
                           " SELECT value, ?1 FROM json_each(?2) WHERE type = 'text'",
-    [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, owner = ?2,"
-                    " lease = ?1 + ?3 WHERE id = (SELECT id FROM job INDEXED BY job_by_turn WHERE status = 0"
-                    " AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
+    [QUERY_CLAIM] = "UPDATE job SET status = 1, attempts = attempts + 1, progress = 0, started = ?1, finished = 0,"
+                    " owner = ?2, lease = ?1 + ?3 WHERE id = (SELECT id FROM job INDEXED BY job_by_turn"
+                    " WHERE status = 0 AND (queue_until = 0 OR queue_until >= ?1) ORDER BY priority DESC, id LIMIT 1)"
                     " RETURNING " JOB_COLUMNS,
     [QUERY_BODY] = "SELECT body, " SUM_IS("sum", SUM_REQUEST) " FROM request WHERE job = ?1",
     [QUERY_RENEW] = "UPDATE job SET lease = ?3, progress = ?4 WHERE id = ?1 AND status = 1 AND owner = ?2",
@@ -61,6 +61,9 @@ static const char *const SQL[QUERY_COUNT] = {
                            " WHERE status = 1 AND attempts >= ?1",
     [QUERY_RECOVER_REQUEUE] = "UPDATE job SET status = 0, progress = 0, started = 0, owner = NULL, lease = 0,"
                               " queue_until = 0 WHERE status = 1",
+    [QUERY_DISMISS_RUNNING] = "UPDATE job SET finished = ?2 WHERE id = ?1 AND status = 1 AND finished = 0",
+    [QUERY_END_DISMISSED] = "UPDATE job SET status = 4, owner = NULL, lease = 0 WHERE status = 1 AND finished > 0"
+                            " AND (?1 IS NULL OR (id = ?1 AND owner = ?2))",
     [QUERY_DISMISS] = "UPDATE job SET status = 4, finished = ?2 WHERE id = ?1 AND status = 0",
     [QUERY_DELETE] = "DELETE FROM job WHERE id = ?1",
     [QUERY_JOB] = "SELECT " JOB_COLUMNS " FROM job WHERE id = ?1",

@@ -15,9 +15,9 @@
  *     the reader keeps every number it ever wrote.
  *
  * job      what a listing needs, in small rows. Times are Unix seconds, 0: not yet. lease is when the owner's claim
- * ends. refines is the job whose run this one continues, which may be gone. priority:
- * larger ones run first. queue_until: it fails if it has not begun by then, 0: never. bytes: of its request and its
- * results once it has ended.
+ * ends. finished of a running job: when it was told to end. refines is the job whose run this one continues, which may
+ * be gone. priority: larger ones run first. queue_until: it fails if it has not begun by then, 0: never. bytes: of its
+ * request and its results once it has ended.
  * request  the body as it was sent; in its own table, so that a listing never reads past it.
  * tag      one row for each tag of a job, so that a filter by tag is a range of an index.
  * answer   one row for each load case of an ended job, numbered from 1 in the order of the request.

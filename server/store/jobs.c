@@ -372,10 +372,26 @@ store_status store_finish(store *s, const char *id, const char *owner, const sto
     return store_write_as(s, WRITE_SOON, finish, &a);
 }
 
+/* Of the running jobs those that were told to end, or the one of them with this id and owner: no run comes any more
+ * that could end them. */
+static store_status end_dismissed(connection *c, const char *id, const char *owner, int64_t *count)
+{
+    statement st = statement_begin(c, QUERY_END_DISMISSED);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, owner);
+    store_status status = statement_run(&st);
+    *count = status == STORE_OK ? connection_changes(c) : 0;
+    return status;
+}
+
 static store_status release(store *s, connection *c, void *args)
 {
     (void)s;
     const owner_args *a = args;
+    int64_t ended;
+    store_status status = end_dismissed(c, a->id, a->owner, &ended);
+    if (status != STORE_OK || ended > 0)
+        return status;
     statement st = statement_begin(c, QUERY_RELEASE);
     bind_text(&st, 1, a->id);
     bind_text(&st, 2, a->owner);
@@ -400,11 +416,15 @@ static store_status recover(store *s, connection *c, void *args)
 {
     (void)s;
     recover_args *a = args;
+    int64_t dismissed;
+    store_status status = end_dismissed(c, NULL, NULL, &dismissed);
+    if (status != STORE_OK)
+        return status;
     statement st = statement_begin(c, QUERY_RECOVER_FAIL);
     bind_integer(&st, 1, a->max_attempts);
     bind_real(&st, 2, store_now());
     bind_text(&st, 3, a->error_json);
-    store_status status = statement_run(&st);
+    status = statement_run(&st);
     if (status != STORE_OK)
         return status;
     a->failed = connection_changes(c);
@@ -443,11 +463,11 @@ static store_status dismiss(store *s, connection *c, void *args)
         return status;
     a->was = j.status;
     job_clear(&j);
-    if (a->was == JOB_RUNNING)
-        return STORE_OK;
-    statement st = statement_begin(c, a->was == JOB_ACCEPTED ? QUERY_DISMISS : QUERY_DELETE);
+    statement st = statement_begin(c, a->was == JOB_ACCEPTED  ? QUERY_DISMISS
+                                      : a->was == JOB_RUNNING ? QUERY_DISMISS_RUNNING
+                                                              : QUERY_DELETE);
     bind_text(&st, 1, a->id);
-    if (a->was == JOB_ACCEPTED)
+    if (a->was == JOB_ACCEPTED || a->was == JOB_RUNNING)
         bind_real(&st, 2, store_now());
     return statement_run(&st);
 }

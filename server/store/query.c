@@ -29,7 +29,7 @@ store_status store_read_job(statement *st, job *out)
     out->attempts = sqlite3_column_int(row, 3);
     out->created = sqlite3_column_double(row, 4);
     out->started = sqlite3_column_double(row, 5);
-    out->finished = sqlite3_column_double(row, 6);
+    out->finished = out->status == JOB_RUNNING ? 0.0 : sqlite3_column_double(row, 6);
     out->tags = store_copy_text(st, 7, &ok);
     out->summary = store_copy_text(st, 8, &ok);
     out->error = store_copy_text(st, 9, &ok);

@@ -133,7 +133,8 @@ store_status store_finish(store *s, const char *id, const char *owner, const sto
 
 /* ---- requeue. store_release: one running job of ours goes back to accepted (shutdown), the attempt is not counted.
  * store_recover, once at start before any claim: jobs left running by owners that are gone become accepted again, or
- * failed with the given error JSON when attempts >= max_attempts. Counts may be NULL. */
+ * failed with the given error JSON when attempts >= max_attempts. Counts may be NULL. Both: a job that was told to end
+ * becomes dismissed instead. */
 store_status store_release(store *s, const char *id, const char *owner);
 store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 
@@ -150,8 +151,9 @@ typedef struct {
 } store_retention;
 store_status store_retain(store *s, const store_retention *limits, int64_t *count);
 
-/* ---- dismiss: an accepted job becomes dismissed and *was is JOB_ACCEPTED; a running one is only reported (*was is
- * JOB_RUNNING: the caller tells the worker); an ended one is deleted with its result and *was is its status. */
+/* ---- dismiss: an accepted job becomes dismissed and *was is JOB_ACCEPTED; of a running one it is kept that it is not
+ * to run again (*was is JOB_RUNNING, also where that could not be kept: the caller tells the worker); an ended one is
+ * deleted with its result and *was is its status. */
 store_status store_dismiss(store *s, const char *id, job_status *was);
 
 /* ---- read */

@@ -73,6 +73,27 @@ def test_malformed_requests(s):
     check(s.get("/healthz").status == 200)
 
 
+def header_block(size, fields):
+    """A request of so many bytes with so many header fields."""
+    start = b"GET /healthz HTTP/1.1\r\nHost: x\r\nConnection: close\r\n"
+    room = size - len(start) - 2
+    lines = [b"X-%03d: " % i + b"y" * (room // (fields - 2) - 9) + b"\r\n" for i in range(fields - 2)]
+    lines[-1] = lines[-1][:-2] + b"y" * (room - sum(map(len, lines))) + b"\r\n"
+    return start + b"".join(lines) + b"\r\n"
+
+
+def test_header_too_large(s):
+    """The limit is what /v1/limits says, to the byte, and what is beyond it is told so."""
+    limits = s.get("/v1/limits").json["limits"]
+    most = limits["max_header"]["value"]
+    for fields in (3, 20, limits["max_header_fields"]["value"]):
+        check(head_of(s.raw(header_block(most, fields))[0])[0] == 200, fields)
+        for size in (most + 1, 60000, *range(65000, 65537, 67)):
+            body = refused(s, header_block(size, fields), (431, 413))[1]
+            problem = json.loads(body)
+            check(problem["code"] == "header_too_large" and str(most) in problem["detail"], size, fields, problem)
+
+
 def test_pipelining(s):
     body = json.dumps(MATRICES).encode()
     one = POST + b"Content-Length: %d\r\n\r\n" % len(body) + body
@@ -93,6 +114,25 @@ def test_chunked(s):
     for broken in (b"2\r\n{}X0\r\n\r\n", b"zz\r\n{}\r\n0\r\n\r\n", b"-2\r\n{}\r\n0\r\n\r\n",
                    b"fffffffffffffffff\r\n{}\r\n0\r\n\r\n"):
         refused(s, POST + b"Transfer-Encoding: chunked\r\n\r\n" + broken + SMUGGLED, (400, 413))
+    for broken, status, code in ((b"fffffffffffffffff\r\n", 413, "body_too_large"),
+                                 (b"2;" + b"x" * 100000 + b"\r\n", 400, "bad_request_framing")):
+        _, body = refused(s, POST + b"Transfer-Encoding: chunked\r\n\r\n" + broken, (status,))
+        check(json.loads(body)["code"] == code and "header" not in json.loads(body)["detail"], body)
+
+
+def test_the_service_ends_while_it_refuses(s):
+    """What libmicrohttpd refuses by itself must not be in the making when it is stopped."""
+    malformed = (POST + b"Transfer-Encoding: chunked\r\n\r\nzz\r\n{}\r\n",
+                 b"GET /healthz HTTP/1.1\r\nContent-Length: x\r\n\r\n",
+                 POST + b"Transfer-Encoding: chunked\r\n\r\n2;" + b"x" * 100000)
+    asked = [s.connect() for _ in range(6)]
+    for i, c in enumerate(asked):
+        c.sendall(malformed[i % 3])
+    for c in asked:
+        check(c.recv(65536).startswith(b"HTTP/1.1 4"))
+    check(s.end() == 0, s.log())
+    for c in asked:
+        c.close()
 
 
 def test_connection_ends_early(s):

@@ -4,6 +4,7 @@ import hashlib
 import os
 import pathlib
 import random
+import resource
 import sqlite3
 import threading
 import time
@@ -99,6 +100,14 @@ def test_limit_of_all(s):
     expect(send(s, bytes(50000)), 201)
     check(files(s) == [digest(bytes(50000))], files(s))
     expect(s.get(f"/v1/uploads/{digest(bytes(60000))}"), 404, "not_found")
+
+
+def test_a_full_disk(s):
+    """What is refused in the middle of a body says when to come again."""
+    resource.prlimit(s.process.pid, resource.RLIMIT_FSIZE, (100000, resource.RLIM_INFINITY))
+    reply = expect(send(s, bytes(1000000)), 507, "storage_full")
+    check(int(reply.headers["retry-after"]) > 0, reply)
+    check(not files(s), files(s))
 
 
 def test_in_a_job(s):

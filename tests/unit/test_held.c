@@ -299,6 +299,16 @@ TEST(connections_are_counted_by_address)
     presence_end(p[3]);
     presence_end(NULL);
     CHECK(presences_count(all) == 0);
+    struct sockaddr_in6 near = six, far = six, mapped = six;
+    near.sin6_addr.s6_addr[15] = 9; /* one client has all of a network of 64 bits */
+    far.sin6_addr.s6_addr[7] = 1;
+    memcpy(mapped.sin6_addr.s6_addr, "\0\0\0\0\0\0\0\0\0\0\xff\xff\x7f\0\0\1", 16);
+    p[0] = presence_begin(all, (struct sockaddr *)&six);
+    p[1] = presence_begin(all, (struct sockaddr *)&a);
+    CHECK(presences_from(all, (struct sockaddr *)&near) == 1 && presences_from(all, (struct sockaddr *)&far) == 0);
+    CHECK(presences_from(all, (struct sockaddr *)&mapped) == 1);
+    presence_end(p[0]);
+    presence_end(p[1]);
     presences_free(all);
     presences_free(NULL);
 }

@@ -362,7 +362,12 @@ TEST(dismiss_by_state)
     CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
     CHECK_INT(was, JOB_RUNNING);
-    CHECK_INT(status_of(p.s, id), JOB_RUNNING); /* only reported */
+    CHECK_INT(store_get(p.s, id, &j), STORE_OK);
+    CHECK(j.status == JOB_RUNNING && j.finished == 0); /* it ends when its run does */
+    job_clear(&j);
+    CHECK_INT(store_release(p.s, id, "a"), STORE_OK);
+    CHECK_INT(status_of(p.s, id), JOB_DISMISSED); /* nobody runs it again */
+    CHECK_INT(claim_id(p.s, "a", other), STORE_NOT_FOUND);
     place_end(&p);
 }
 

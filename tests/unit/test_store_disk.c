@@ -83,6 +83,35 @@ TEST(a_submitted_job_survives_a_kill)
     place_end(&p);
 }
 
+TEST(recover_ends_a_job_that_was_dismissed_while_it_ran)
+{
+    place p;
+    char ids[3][33], claimed[33];
+    int64_t requeued, failed;
+    job_status was;
+    job j = {0};
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 3; i++) {
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, ids[i]), STORE_OK);
+        CHECK_INT(claim_id(p.s, "a", claimed), STORE_OK);
+    }
+    CHECK_INT(store_dismiss(p.s, ids[0], &was), STORE_OK);
+    CHECK_INT(was, JOB_RUNNING);
+    CHECK_INT(store_dismiss(p.s, ids[1], &was), STORE_OK);
+    CHECK_INT(store_finish(p.s, ids[1], "a", &(store_outcome){.status = JOB_SUCCESSFUL}), STORE_OK); /* was sooner */
+    if (!place_reopen(&p))
+        return;
+    CHECK_INT(store_recover(p.s, 1, "{}", &requeued, &failed), STORE_OK); /* before attempts count */
+    CHECK(requeued == 0 && failed == 1);
+    CHECK_INT(store_get(p.s, ids[0], &j), STORE_OK);
+    CHECK(j.status == JOB_DISMISSED && j.finished > 0 && !j.error);
+    job_clear(&j);
+    CHECK_INT(status_of(p.s, ids[1]), JOB_SUCCESSFUL);
+    CHECK_INT(status_of(p.s, ids[2]), JOB_FAILED);
+    place_end(&p);
+}
+
 TEST(recover_fails_a_job_that_used_up_its_attempts)
 {
     place p;
