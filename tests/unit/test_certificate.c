@@ -346,6 +346,29 @@ TEST(rounded_solution_is_certified_to_rounding)
     }
 }
 
+/* Wherever in the vectors, of whatever length, it stands: sums in lanes and comparisons pass over nothing. */
+TEST(what_is_not_a_number_bounds_nothing)
+{
+    static const double values[] = {NAN, INFINITY, -INFINITY};
+    qp_random rng = {19};
+    for (int d = 1; d <= 21; d++) {
+        qp_kind kind = {.d = d, .m = 1 + d / 3, .condition = 10};
+        bench b = make_bench(random_qp(&rng, &kind));
+        uz_certify_input in = input_of(&b);
+        for (int at = 0; at < 3 * d; at++) {
+            uz_certificate c;
+            const double kept = b.u[at / 3];
+            b.u[at / 3] = values[at % 3];
+            CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+            CHECK_MSG(c.relative_error == INFINITY && c.absolute_error == INFINITY && c.gap == INFINITY,
+                      "u_%d of %d is %g: %g, %g", at / 3, d, values[at % 3], c.relative_error, c.absolute_error);
+            CHECK(!(c.residual.e1 < INFINITY));
+            b.u[at / 3] = kept;
+        }
+        free_bench(&b);
+    }
+}
+
 TEST(pulling_reactions_are_cut_and_counted)
 {
     qp_random rng = {17};
