@@ -1,4 +1,5 @@
 /* The certificate against the truth: no bound may be below the error of the answer that it bounds. */
+#include "certificate/bound.h"
 #include "certificate/certificate.h"
 #include "harness.h"
 #include "qp_fixture.h"
@@ -344,6 +345,20 @@ TEST(rounded_solution_is_certified_to_rounding)
         }
         free_bench(&b);
     }
+}
+
+TEST(the_largest_and_the_norm_of_any_length)
+{
+    double x[41] = {0};
+    for (int n = 1; n <= 41; n++)
+        for (int at = 0; at < n; at++) {
+            x[at] = -3;
+            x[(at + n / 2) % n] += 1; /* the same where n is 1 */
+            const double rest = n > 1 ? 1 : 0, most = n > 1 ? 3 : 2;
+            CHECK(uz_bound_largest(x, n) == most);
+            CHECK_REL(uz_bound_norm(x, n), sqrt(most * most + rest), 1e-15);
+            memset(x, 0, sizeof x);
+        }
 }
 
 /* Wherever in the vectors, of whatever length, it stands: sums in lanes and comparisons pass over nothing. */

@@ -243,8 +243,9 @@ TEST(large_deformation_is_doubted)
         CHECK(!warning(result, "large_strain"));
         clear(&s, result);
     }
-    for (int i = 0; i < 2; i++) {
-        uz_scene s = body_scene(UZ_PLANE_STRESS, "tri3", size, (int64_t[3]){20, 2, 0});
+    for (int k = 0; k < 4; k++) {
+        const int i = k % 2;
+        uz_scene s = body_scene(UZ_PLANE_STRESS, k < 2 ? "tri3" : "quad4", size, (int64_t[3]){20, 2, 0});
         const double strain = i == 0 ? 0.04 : 0.06;
         body_hold(&s, "left", 0, NAN, NAN);
         body_hold(&s, "bottom", NAN, 0, NAN);
