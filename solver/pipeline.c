@@ -278,6 +278,16 @@ static uz_status improve(uz_run *run, uz_error *err)
     return status == UZ_OK && found_ray ? prove_infeasible(run, err) : status;
 }
 
+/* By how much the bound of iterations, which is relative to another norm than the certificate where supports move the
+ * body, has to fall. */
+static double share_of_request(const uz_run *run)
+{
+    const uz_certificate *c = &run->answer.certificate;
+    double share = isfinite(c->relative_error) ? run->requested / c->relative_error
+                                               : run->requested * c->energy_norm / c->absolute_error;
+    return share > 0.0 ? fmin(0.25, 0.5 * share) : 0.25;
+}
+
 /* Is the certified answer the one to give? Otherwise the target of the next round is set. */
 static uz_status judge(bool *done, uz_run *run, uz_error *err)
 {
@@ -290,7 +300,7 @@ static uz_status judge(bool *done, uz_run *run, uz_error *err)
     *done = run->result->ray || certificate->relative_error <= run->requested || run->end != UZ_END_TARGET;
     run->again = true;
     if (!*done && run->it.best_relative <= run->target)
-        run->target = fmin(0.25, 0.5 * run->requested / certificate->relative_error) * run->it.best_relative;
+        run->target = share_of_request(run) * run->it.best_relative;
     return status;
 }
 

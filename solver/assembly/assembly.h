@@ -116,8 +116,10 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
  * where they are. Less the loads and the springs' -k u it is what supports and obstacles do. */
 uz_status uz_internal_forces(double *f, const uz_body_model *model, const double *nodal, uz_error *err);
 
-/* 1/2 u'K u over all dofs, springs included. */
-uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err);
+/* 1/2 u'K u over all dofs, springs included. carried: rigid motion may be most of u; elements are then turned back one
+ * by one, so that its rounding is none of the energy. */
+uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried,
+                           uz_error *err);
 
 /* Do supports move the body: is a prescribed value (n_fixed; NULL: none) not zero? Then ||u||_K over the free dofs
  * alone is not the norm of the deformation. */

@@ -295,16 +295,48 @@ static inline __attribute__((always_inline)) void take_relative(double *d, bool 
             *d++ = nodal[node[a] * dim + c] - first[c];
 }
 
+/* The same less the rotation that fits it best, which strains nothing either: what it leaves by rounding is eps of its
+ * square, while the strain beside it may be a millionth of it. Minimizes sum |d_a - w x x_a|^2, with x and d from the
+ * first node. */
+static void take_unturned(double *d, const uz_mesh *mesh, const int64_t *node, int count)
+{
+    const int dim = mesh->dim;
+    double x[UZ_ELEMENT_NODES][3] = {{0}}, u[UZ_ELEMENT_NODES][3] = {{0}}, J[3][3] = {{0}}, w[3] = {0};
+    for (int a = 0; a < count; a++) {
+        for (int c = 0; c < dim; c++) {
+            x[a][c] = mesh->xyz[node[a] * dim + c] - mesh->xyz[node[0] * dim + c];
+            u[a][c] = d[a * dim + c];
+        }
+        for (int i = 0; i < 3; i++) {
+            const int j = (i + 1) % 3, k = (i + 2) % 3;
+            J[i][i] += x[a][j] * x[a][j] + x[a][k] * x[a][k];
+            J[i][j] = J[j][i] -= x[a][i] * x[a][j];
+            w[i] += x[a][j] * u[a][k] - x[a][k] * u[a][j];
+        }
+    }
+    for (int i = dim == 3 ? 0 : 2; i < 3; i++) /* elimination; in the plane the third axis stands alone */
+        for (int k = i + 1; k < 3; k++) {
+            const double factor = J[k][i] / J[i][i];
+            for (int j = i; j < 3; j++)
+                J[k][j] -= factor * J[i][j];
+            w[k] -= factor * w[i];
+        }
+    for (int i = 2; i >= 0; i--) {
+        for (int j = i + 1; j < 3; j++)
+            w[i] -= J[i][j] * w[j];
+        w[i] = dim == 3 || i == 2 ? w[i] / J[i][i] : 0;
+    }
+    for (int a = 0; a < count; a++)
+        for (int c = 0; c < dim; c++)
+            d[a * dim + c] -= w[(c + 1) % 3] * x[a][(c + 2) % 3] - w[(c + 2) % 3] * x[a][(c + 1) % 3];
+}
+
 /* d'ke d of one element, by one triangle of the symmetric ke; the rows do not wait for each other. */
 typedef double (*energy_of)(const uz_body_model *model, const double *ke, const double *nodal, int64_t e);
 
-static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
+static double product_with(const double *ke, const double *d, int n)
 {
-    double d[DOFS], sum = 0;
-    int count;
-    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
-    const int n = count * model->mesh.dim;
-    take_relative(d, model->kind == UZ_AXISYMMETRIC, nodal, node, count, model->mesh.dim);
+    double sum = 0;
     for (int i = 0; i < n; i++) {
         double row = 0;
         for (int j = 0; j < i; j++)
@@ -312,6 +344,27 @@ static double energy_any(const uz_body_model *model, const double *ke, const dou
         sum += d[i] * (2 * row + ke[i * n + i] * d[i]);
     }
     return sum;
+}
+
+static double energy_any(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
+{
+    double d[DOFS];
+    int count;
+    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+    take_relative(d, model->kind == UZ_AXISYMMETRIC, nodal, node, count, model->mesh.dim);
+    return product_with(ke, d, count * model->mesh.dim);
+}
+
+static double energy_unturned(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
+{
+    double d[DOFS];
+    int count;
+    const int64_t *node = uz_mesh_element(&model->mesh, e, &count);
+    const bool rings = model->kind == UZ_AXISYMMETRIC;
+    take_relative(d, rings, nodal, node, count, model->mesh.dim);
+    if (!rings)
+        take_unturned(d, &model->mesh, node, count);
+    return product_with(ke, d, count * model->mesh.dim);
 }
 
 typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
@@ -361,10 +414,10 @@ static energy_of best_for_quad4(void)
     return energy_quad4_plain;
 }
 
-uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err)
+uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
-    const energy_of of_quad4 = best_for_quad4();
+    const energy_of of_any = carried ? energy_unturned : energy_any, of_quad4 = carried ? of_any : best_for_quad4();
     stiffness_source source;
     const double *ke;
     double twice = 0;
@@ -372,7 +425,7 @@ uz_status uz_strain_energy(double *energy, const uz_body_model *model, const dou
     for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++) {
         status = source_get(&ke, &source, e, err);
         if (status == UZ_OK)
-            twice += (mesh->kind[e] == UZ_QUAD4 ? of_quad4 : energy_any)(model, ke, nodal, e);
+            twice += (mesh->kind[e] == UZ_QUAD4 ? of_quad4 : of_any)(model, ke, nodal, e);
     }
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim && model->spring; i++)
         twice += model->spring[i] * nodal[i] * nodal[i];

@@ -26,7 +26,7 @@ uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)model->mesh.n_nodes);
     uz_recover_nodal(nodal, model, u, prescribed);
-    uz_status status = uz_strain_energy(&energy, model, nodal, err);
+    uz_status status = uz_strain_energy(&energy, model, nodal, true, err);
     free(nodal);
     if (status == UZ_OK)
         *norm = sqrt(fmax(0, 2 * energy));

@@ -142,11 +142,14 @@ static double relative_to_exact(double error, double norm)
     return norm > error ? error / (norm - error) : INFINITY;
 }
 
-#define RIGID 1e-10
+/* Of free_norm: the rounding of K alone strains a body that is only carried by so much; and an error that iterations
+ * left is no rounding, so that what is small beside the motion, but not beside the strains, is not taken for it. */
+#define RIGID    1e-10
+#define ROUNDING 1e-12
 
 double uz_bound_reference(double whole_norm, double free_norm, double error)
 {
-    return whole_norm + error <= RIGID * free_norm ? free_norm : whole_norm;
+    return whole_norm <= RIGID * free_norm && error <= ROUNDING * free_norm ? free_norm : whole_norm;
 }
 
 /* Below this energy the squares of its rounding errors leave the range of double, and a bound would be zero for

@@ -348,6 +348,15 @@ static uz_status make_room(balance *b, uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes", (long long)n);
 }
 
+/* Supports move the body, or do not hold it: then most of u may be rigid motion. */
+static bool is_carried(const balance *b)
+{
+    bool carried = b->model->n_modes > 0;
+    for (int64_t i = 0; i < b->model->mesh.n_nodes * b->dim && !carried; i++)
+        carried = b->model->dof[i] < 0 && b->u[i] != 0;
+    return carried;
+}
+
 static uz_status add_everything(balance *b, uz_error *err)
 {
     double thermal = 0, energy = 0;
@@ -359,7 +368,7 @@ static uz_status add_everything(balance *b, uz_error *err)
     if (status == UZ_OK)
         status = thermal_energy(&thermal, b, err);
     if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the whole body */
-        status = uz_strain_energy(&energy, b->model, b->u, err);
+        status = uz_strain_energy(&energy, b->model, b->u, is_carried(b), err);
     b->out->strain_energy = energy + thermal;
     b->out->imbalance = imbalance(b);
     return status;

@@ -228,10 +228,57 @@ static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obs
     }
 }
 
+/* Out of the body, in the middle of a face, and that place. */
+static void outward_normal(double n[3], double middle[3], const uz_mesh *mesh, uz_face face)
+{
+    int64_t node[UZ_FACE_NODES];
+    double side[2][3] = {{0}};
+    const int dim = mesh->dim, corners = uz_face_corner_count((uz_element_kind)mesh->kind[face.element]);
+    uz_mesh_face(node, mesh, face);
+    memset(middle, 0, 3 * sizeof *middle);
+    for (int a = 0; a < corners; a++)
+        for (int c = 0; c < dim; c++)
+            middle[c] += mesh->xyz[node[a] * dim + c] / corners;
+    for (int c = 0; c < dim; c++) {
+        side[0][c] = mesh->xyz[node[1] * dim + c] - mesh->xyz[node[0] * dim + c];
+        side[1][c] = dim == 3 ? mesh->xyz[node[2] * dim + c] - mesh->xyz[node[0] * dim + c] : 0;
+    }
+    if (dim == 2)
+        side[1][2] = 1; /* the element on the left */
+    for (int c = 0; c < 3; c++)
+        n[c] = side[0][(c + 1) % 3] * side[1][(c + 2) % 3] - side[0][(c + 2) % 3] * side[1][(c + 1) % 3];
+    const double size = length(n);
+    for (int c = 0; c < 3; c++)
+        n[c] /= size;
+}
+
+/* The least cosine between the faces' normals and the obstacle's, which points to where the body may be: where none is
+ * against it the faces look away from the obstacle, and never meet it. -1: no faces. */
+static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz_contact *contact)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const uz_group *group = uz_mesh_group(mesh, contact->on, "", NULL);
+    const bool faces = group && group->kind == UZ_GROUP_FACES && group->n_faces > 0;
+    const double size = length(contact->normal);
+    double least = faces ? 1 : -1;
+    for (int64_t i = 0; faces && i < group->n_faces && least > MOST_TURN; i++) {
+        double n[3], middle[3], along = 0;
+        uz_gap there;
+        outward_normal(n, middle, mesh, group->face[i]);
+        if (obstacle && uz_obstacle_gap(&there, obstacle, middle, NULL) != UZ_OK)
+            return -1;
+        for (int c = 0; c < mesh->dim; c++)
+            along += n[c] * (obstacle ? there.normal[c] : contact->normal[c] / size);
+        least = fmin(least, along);
+    }
+    return least;
+}
+
 static uz_status look_at_contact(const doubts *d, uz_error *err)
 {
     findings most = {0};
-    int64_t row = 0;
+    int64_t row = 0, behind = -1;
+    double away = 0;
     uz_status status = UZ_OK;
     for (int64_t k = 0; k < d->scene->n_contacts && status == UZ_OK; k++) {
         const uz_contact *contact = &d->scene->contacts[k];
@@ -239,8 +286,19 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
         if (contact->kind != UZ_OBSTACLE_PLANE && contact->kind != UZ_OBSTACLE_BODY)
             status = uz_obstacle_new(&obstacle, contact, k, d->scene->model, err);
         look_at_rows(&most, d, obstacle, k, &row);
+        const double least =
+            status == UZ_OK && contact->kind != UZ_OBSTACLE_BODY && behind < 0 ? turned_away(d, obstacle, contact) : -1;
+        if (least > MOST_TURN) {
+            behind = k;
+            away = least;
+        }
         uz_obstacle_free(obstacle);
     }
+    if (behind >= 0)
+        warn(d->out, "obstacle_behind", away,
+             "all faces of contact %lld look away from its obstacle and never meet it; its normal must point to the "
+             "body",
+             (long long)behind);
     if (most.turn > MOST_TURN)
         warn(d->out, "large_sliding", most.turn,
              "a node slides so far on an obstacle that the normal there is turned by %.2g rad from the one that was "

@@ -1,4 +1,5 @@
 /* The certificate against the truth: no bound may be below the error of the answer that it bounds. */
+#include "certificate/bound.h"
 #include "certificate/certificate.h"
 #include "harness.h"
 #include "qp_fixture.h"
@@ -341,6 +342,43 @@ TEST(rounded_solution_is_certified_to_rounding)
             CHECK_MSG(c.relative_error < 1e-13, "relative error %g", c.relative_error);
             CHECK_REL(c.energy_primal, (double)b.exact.energy, 1e-12);
             CHECK_REL(c.energy_norm, (double)quad_sqrt(b.exact.norm2), 1e-13);
+        }
+        free_bench(&b);
+    }
+}
+
+TEST(the_largest_and_the_norm_of_any_length)
+{
+    double x[41] = {0};
+    for (int n = 1; n <= 41; n++)
+        for (int at = 0; at < n; at++) {
+            x[at] = -3;
+            x[(at + n / 2) % n] += 1; /* the same where n is 1 */
+            const double rest = n > 1 ? 1 : 0, most = n > 1 ? 3 : 2;
+            CHECK(uz_bound_largest(x, n) == most);
+            CHECK_REL(uz_bound_norm(x, n), sqrt(most * most + rest), 1e-15);
+            memset(x, 0, sizeof x);
+        }
+}
+
+/* Wherever in the vectors, of whatever length, it stands: sums in lanes and comparisons pass over nothing. */
+TEST(what_is_not_a_number_bounds_nothing)
+{
+    static const double values[] = {NAN, INFINITY, -INFINITY};
+    qp_random rng = {19};
+    for (int d = 1; d <= 21; d++) {
+        qp_kind kind = {.d = d, .m = 1 + d / 3, .condition = 10};
+        bench b = make_bench(random_qp(&rng, &kind));
+        uz_certify_input in = input_of(&b);
+        for (int at = 0; at < 3 * d; at++) {
+            uz_certificate c;
+            const double kept = b.u[at / 3];
+            b.u[at / 3] = values[at % 3];
+            CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+            CHECK_MSG(c.relative_error == INFINITY && c.absolute_error == INFINITY && c.gap == INFINITY,
+                      "u_%d of %d is %g: %g, %g", at / 3, d, values[at % 3], c.relative_error, c.absolute_error);
+            CHECK(!(c.residual.e1 < INFINITY));
+            b.u[at / 3] = kept;
         }
         free_bench(&b);
     }

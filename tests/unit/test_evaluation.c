@@ -243,8 +243,9 @@ TEST(large_deformation_is_doubted)
         CHECK(!warning(result, "large_strain"));
         clear(&s, result);
     }
-    for (int i = 0; i < 2; i++) {
-        uz_scene s = body_scene(UZ_PLANE_STRESS, "tri3", size, (int64_t[3]){20, 2, 0});
+    for (int k = 0; k < 4; k++) {
+        const int i = k % 2;
+        uz_scene s = body_scene(UZ_PLANE_STRESS, k < 2 ? "tri3" : "quad4", size, (int64_t[3]){20, 2, 0});
         const double strain = i == 0 ? 0.04 : 0.06;
         body_hold(&s, "left", 0, NAN, NAN);
         body_hold(&s, "bottom", NAN, 0, NAN);
@@ -344,6 +345,33 @@ TEST(a_deep_overlap_is_doubted)
         CHECK_INT(w != NULL, i);
         if (w)
             CHECK_REL(w->value, 1.2, 1e-9);
+        clear(&s, result);
+    }
+}
+
+/* A plane, a circle and a ball below a block, whose bottom is to meet them, and above it. */
+TEST(an_obstacle_on_the_wrong_side_is_doubted)
+{
+    for (int i = 0; i < 8; i++) {
+        const bool solid = i >= 4, round = i / 2 % 2, above = i % 2;
+        uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRESS,
+                                solid   ? "tet4"
+                                : round ? "tri6"
+                                        : "quad4",
+                                (double[3]){2, 1, 2}, (int64_t[3]){2, 2, 2});
+        body_hold(&s, "top", 0, 0, solid ? 0 : NAN);
+        uz_contact *x =
+            body_plane(&s, "bottom", (double[3]){0, above ? 3 : -0.1, 0}, (double[3]){0, above ? -2 : 2, 0});
+        if (round) {
+            memcpy(x->point, (double[3]){1, above ? 3 : -1.1, solid ? 1 : 0}, sizeof x->point);
+            x->kind = UZ_OBSTACLE_ROUND;
+            x->radius = 1;
+        }
+        body_load(&s, UZ_LOAD_TRACTION, "right", 0, -1, 0);
+        uz_result *result = body_solve(&s, 1e-8);
+        const uz_warning *w = warning(result, "obstacle_behind");
+        CHECK_MSG((w != NULL) == above, "scene %d: %s", i, w ? w->message : "no warning");
+        CHECK_INT(result->summary.active, 0);
         clear(&s, result);
     }
 }
