@@ -16,7 +16,7 @@
  * the head of the reply, and the piece in which a body arrives. */
 #define CONNECTION_MEMORY (64 * 1024)
 /* The largest header block: with HEADERS_MAX fields too there is room left for a reply. */
-#define HEADER_BYTES (CONNECTION_MEMORY / 4 * 3)
+#define HEADER_BYTES (48 * 1024)
 /* All bodies in memory at once; a request beyond it is told to come back later. */
 #define BODY_BUDGET(max_body) ((max_body) < SIZE_MAX / 8 ? 8 * (max_body) : SIZE_MAX)
 /* Slowest transfer that is waited for, bytes per second: the allowance that a body's length adds to a deadline. */
