@@ -294,6 +294,7 @@ def main(names):
     """Runs every test_* in names; prints a line for each and exits with 1 if one failed."""
     if len(sys.argv) < 2:
         sys.exit("usage: PROGRAM BUILD_DIR [FILTER]")
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background job, and so in its children
     program = pathlib.Path(sys.argv[0]).stem
     wanted = sys.argv[2] if len(sys.argv) > 2 else ""
     failed = False
