@@ -14,7 +14,7 @@ typedef struct {
     int64_t k_entries; /* of K's lower triangle */
     int64_t n_entries; /* of N */
     int modes;         /* of the near-null space */
-    bool bounds;       /* each row has one entry: the active set solves with free dofs only */
+    bool bounds;       /* uz_cost_bounds */
     int64_t cases;     /* loads on the body */
 } uz_cost_size;
 
@@ -45,6 +45,10 @@ uz_cost_rates uz_cost_measure_rates(void);
 uz_cost_estimate uz_cost_direct(uz_operator op, const uz_cost_size *size, const uz_factor_info *predicted,
                                 uz_operator of, const uz_cost_rates *rates);
 uz_cost_estimate uz_cost_free(const uz_cost_size *size, const uz_cost_rates *rates);
+
+/* Is the active set to solve with the free dofs only? Where each row has one entry, unless gradient steps were asked
+ * for, which take hundreds of solves. */
+bool uz_cost_bounds(const uz_csc *N, const uz_settings *settings);
 
 /* Bytes that ordering and symbolic analysis take beside K, at most. */
 double uz_cost_analysis_bytes(const uz_cost_size *size);

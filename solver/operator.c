@@ -228,7 +228,7 @@ uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const 
                             .k_entries = m.K->ptr[m.K->cols],
                             .n_entries = m.N->ptr[m.N->cols],
                             .modes = body->is_scene && body->model.mesh.dim == 3 ? 6 : 3,
-                            .bounds = uz_dual_bounds_dofs(m.N),
+                            .bounds = uz_cost_bounds(m.N, settings),
                             .cases = problem->n_cases};
     status = make_operator(&m, err);
     free(dofs);

@@ -102,7 +102,7 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
                              .k_entries = qp->K.ptr[qp->K.cols],
                              .n_entries = qp->N.ptr[qp->N.cols],
                              .modes = scene && problem->scene.box.dim == 3 ? 6 : 3,
-                             .bounds = uz_dual_bounds_dofs(&qp->N),
+                             .bounds = uz_cost_bounds(&qp->N, settings),
                              .cases = problem->n_cases};
         out->d = size.d;
         out->m = m;

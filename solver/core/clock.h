@@ -1,4 +1,4 @@
-/* clock.h: seconds on a clock that never goes back. */
+/* clock.h: seconds on clocks that never go back. */
 #ifndef UZ_CORE_CLOCK_H
 #define UZ_CORE_CLOCK_H
 
@@ -8,6 +8,14 @@ static inline double uz_seconds(void)
 {
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* That this thread had a processor: what others do on the machine is not in it. */
+static inline double uz_thread_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 

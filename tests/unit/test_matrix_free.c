@@ -283,6 +283,24 @@ static const uz_cost_option *considered(const uz_summary *s, uz_operator op)
     return NULL;
 }
 
+/* Rates are measured once, so that the predictions of one program compare. */
+TEST(gradient_steps_without_a_factor_are_known_to_be_many)
+{
+    uz_problem problem = scene_problem(30, 10);
+    uz_settings s = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-8);
+    uz_prediction free, steps;
+    uz_error err = {0};
+    CHECK_INT(uz_predict(&free, &problem, &s, NULL, &err), UZ_OK);
+    s.method = UZ_METHOD_ACCELERATED_RESTART;
+    CHECK_INT(uz_predict(&steps, &problem, &s, NULL, &err), UZ_OK);
+    CHECK(steps.seconds > 4.0 * free.seconds);
+    s.method = UZ_METHOD_AUTO;
+    s.stopping = UZ_STOP_PAPER;
+    CHECK_INT(uz_predict(&free, &problem, &s, NULL, &err), UZ_OK);
+    CHECK_REL(free.seconds, steps.seconds, 1e-12);
+    uz_problem_clear(&problem);
+}
+
 TEST(what_does_not_fit_goes_on_without_a_factor)
 {
     uz_problem problem = scene_problem(90, 30);
