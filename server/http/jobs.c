@@ -247,8 +247,8 @@ static void refuse_or_repeat(api *context, http_request *rq, const char *key, co
     job j;
     if (!jobs_find_repeat(context, rq, key, &j))
         reply_problem(reply, problem);
-    else if (jobs_wait(context, rq, 0, &j, reply))
-        jobs_acknowledge(context, &j, reply);
+    else
+        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     job_clear(&j);
 }
 

@@ -17,6 +17,8 @@ typedef struct {
     char id[33];
     double until;
     waiting_then then;
+    store_status status; /* of the last look at the job, and what it found */
+    job found;
     char *message;
     size_t len, at;
 } waiting;
@@ -25,34 +27,27 @@ static void waiting_free(void *ctx)
 {
     waiting *w = ctx;
     feed_unlisten(w->listener);
+    job_clear(&w->found);
     free(w->message);
     free(w);
 }
 
+/* From the job that is_over looked at last. */
 static void put_reply(waiting *w)
 {
-    job j = {0};
     http_reply *reply = &w->rq->reply;
-    store_status status = store_get(w->context->store, w->id, &j);
-    if (status == STORE_OK)
-        w->then(w->context, &j, reply);
+    if (w->status == STORE_OK)
+        w->then(w->context, &w->found, reply);
     else
-        reply_store_failure(w->context, status, reply);
-    job_clear(&j);
-}
-
-static bool has_ended(waiting *w)
-{
-    job j = {0};
-    store_status status = store_get(w->context->store, w->id, &j);
-    bool ended = status == STORE_NOT_FOUND || (status == STORE_OK && jobs_ended(&j));
-    job_clear(&j);
-    return ended;
+        reply_store_failure(w->context, w->status, reply);
 }
 
 static bool is_over(waiting *w)
 {
-    return deadlines_now() >= w->until || atomic_load(&w->context->draining) || has_ended(w);
+    job_clear(&w->found);
+    w->status = store_get(w->context->store, w->id, &w->found);
+    bool ended = w->status == STORE_NOT_FOUND || (w->status == STORE_OK && jobs_ended(&w->found));
+    return ended || deadlines_now() >= w->until || atomic_load(&w->context->draining);
 }
 
 /* ---- without a thread */

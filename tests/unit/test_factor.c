@@ -9,30 +9,6 @@
 
 static const uz_ordering orderings[] = {UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS};
 
-/* The five-point Laplacian of a w x h grid, in the lower triangle of a dense n x n block that starts at dof `first` of
- * a matrix of order `total`. */
-static void add_grid(double *K, int64_t total, int64_t first, int64_t w, int64_t h)
-{
-    for (int64_t y = 0; y < h; y++)
-        for (int64_t x = 0; x < w; x++) {
-            int64_t i = first + y * w + x;
-            K[i * total + i] = 4.1;
-            if (x > 0)
-                K[i * total + i - 1] = K[(i - 1) * total + i] = -1;
-            if (y > 0)
-                K[i * total + i - w] = K[(i - w) * total + i] = -1;
-        }
-}
-
-static uz_csc grid(int64_t w, int64_t h)
-{
-    double *K = vector(w * h * w * h);
-    add_grid(K, w * h, 0, w, h);
-    uz_csc A = csc_from_dense(K, w * h, w * h, true);
-    free(K);
-    return A;
-}
-
 static uz_status factor_of(uz_factor **out, const uz_csc *K, const int64_t *last, int64_t n_last, uz_ordering ordering,
                            size_t limit, uz_error *err)
 {

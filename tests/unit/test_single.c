@@ -3,23 +3,6 @@
 #include "harness.h"
 #include "qp_fixture.h"
 
-/* The five-point Laplacian of a w x h grid. */
-static uz_csc grid(int64_t w, int64_t h)
-{
-    int64_t n = w * h;
-    double *K = vector(n * n);
-    for (int64_t i = 0; i < n; i++) {
-        K[i * n + i] = 4.1;
-        if (i % w > 0)
-            K[i * n + i - 1] = K[(i - 1) * n + i] = -1;
-        if (i >= w)
-            K[i * n + i - w] = K[(i - w) * n + i] = -1;
-    }
-    uz_csc A = csc_from_dense(K, n, n, true);
-    free(K);
-    return A;
-}
-
 /* One right-hand side goes through another code than several do. Column 0 alone is what it is beside 1, up
  * to rounding. */
 static void check_single(const uz_csc *K, uz_ordering ordering, uint64_t seed)

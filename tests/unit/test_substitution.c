@@ -9,23 +9,6 @@
 
 static const uz_ordering orderings[] = {UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS};
 
-/* The five-point Laplacian of a w x h grid. */
-static uz_csc grid(int64_t w, int64_t h)
-{
-    const int64_t n = w * h;
-    double *K = vector(n * n);
-    for (int64_t i = 0; i < n; i++) {
-        K[i * n + i] = 4.1;
-        if (i % w > 0)
-            K[i * n + i - 1] = K[(i - 1) * n + i] = -1;
-        if (i >= w)
-            K[i * n + i - w] = K[(i - w) * n + i] = -1;
-    }
-    uz_csc made = csc_from_dense(K, n, n, true);
-    free(K);
-    return made;
-}
-
 /* Largest difference of the substitutions for one vector and of those for several, relative to the largest entry. */
 static double single_against_several(const uz_factor *factor, uz_factor_workspace *ws, const double *b, int64_t n)
 {
