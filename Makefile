@@ -26,7 +26,7 @@ PEER_PACKAGES := coinor-libipopt-dev coinor-libclp-dev python3-numpy python3-cvx
 
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
-INC  := -Isolver -Iserver -Iclient -I$(BUILD)/gen
+INC  := -Isolver/include -Isolver -Iserver -Iclient -I$(BUILD)/gen
 
 # Package flags are asked for once, when first needed, so that `make deps` works on a bare machine.
 pkg = $(shell pkg-config $(1) 2>/dev/null)
@@ -37,7 +37,7 @@ CLIENT_LIBS   = $(call pkg,--libs libcurl jansson gnutls) -lm
 CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)
 LDFLAGS_ALL   = $(SAN) -pthread $(LDFLAGS)
 
-SOLVER_SRC := $(sort $(wildcard solver/*.c solver/*/*.c))
+SOLVER_SRC := $(sort $(wildcard solver/*/*.c))
 SERVER_SRC := $(sort $(wildcard server/*.c server/*/*.c))
 CLIENT_SRC := $(sort $(wildcard client/*.c))
 UNIT_SRC   := $(sort $(wildcard tests/unit/test_*.c))
@@ -53,7 +53,7 @@ PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
 C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
               $(wildcard tests/*.c)
-H_FILES    := $(wildcard solver/*.h solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
+H_FILES    := $(wildcard solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 
@@ -141,7 +141,7 @@ $(BUILD)/obj/%.o: %.c
 # Contraction only saves roundings there; the twofold arithmetic of certificates must never have it.
 $(call obj,solver/factor/blocked.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c): CFLAGS += -ffp-contract=fast
 # Short loops of known length around the registers are unrolled.
-$(call obj,solver/factor/single.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/element/*.c solver/fields/*.c)): CFLAGS += -O3
+$(call obj,solver/factor/single.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/element/*.c solver/post/*.c) solver/io/vtu.c): CFLAGS += -O3
 
 $(BUILD)/obj/gen/embedded.o: $(BUILD)/gen/embedded.c $(SCHEMAS)
 	@mkdir -p $(@D)

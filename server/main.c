@@ -3,9 +3,9 @@
  * exit status: 0 ended by a signal, 1 could not start or failed, 2 wrong usage. */
 #include "codec/codec.h"
 #include "http/http.h"
-#include "log.h"
-#include "metrics.h"
-#include "options.h"
+#include "base/log.h"
+#include "base/metrics.h"
+#include "options/options.h"
 #include "privileges.h"
 #include "store/maintenance.h"
 #include "store/store.h"

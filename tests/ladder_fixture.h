@@ -2,7 +2,7 @@
 #ifndef TESTS_LADDER_FIXTURE_H
 #define TESTS_LADDER_FIXTURE_H
 
-#include "adaptive/grids.h"
+#include "scene/grids.h"
 #include "body_fixture.h"
 
 /* The body of the paper's example, its cells to be chosen. */

@@ -7,7 +7,7 @@
 #ifndef SERVER_CODEC_H
 #define SERVER_CODEC_H
 
-#include "problem_details.h"
+#include "base/problem_details.h"
 #include "store/store.h"
 #include "store/uploads.h"
 #include "uzawa.h"

@@ -5,7 +5,7 @@
 #ifndef SERVER_CODEC_JSON_DOC_H
 #define SERVER_CODEC_JSON_DOC_H
 
-#include "problem_details.h"
+#include "base/problem_details.h"
 
 #include <jansson.h>
 #include <stdbool.h>

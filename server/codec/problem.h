@@ -3,7 +3,7 @@
 #define SERVER_CODEC_PROBLEM_H
 
 #include "codec/json_doc.h"
-#include "problem_details.h"
+#include "base/problem_details.h"
 
 #include <stddef.h>
 

@@ -6,7 +6,7 @@
 #ifndef SERVER_HTTP_FRAMING_H
 #define SERVER_HTTP_FRAMING_H
 
-#include "problem_details.h"
+#include "base/problem_details.h"
 
 #include <stdbool.h>
 #include <stddef.h>

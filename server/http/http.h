@@ -9,8 +9,8 @@
 
 #include "codec/codec.h"
 #include "http/auth.h"
-#include "log.h"
-#include "metrics.h"
+#include "base/log.h"
+#include "base/metrics.h"
 #include "store/store.h"
 #include "work/webhook.h"
 #include "work/work.h"

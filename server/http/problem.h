@@ -2,7 +2,7 @@
 #ifndef SERVER_HTTP_PROBLEM_H
 #define SERVER_HTTP_PROBLEM_H
 
-#include "problem_details.h"
+#include "base/problem_details.h"
 
 /* Returns false, so that a failing check ends in `return http_problem(...)`. */
 _Bool http_problem(problem_details *out, int status, const char *code, const char *title, const char *format, ...)

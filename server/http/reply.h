@@ -2,7 +2,7 @@
 #ifndef SERVER_HTTP_REPLY_H
 #define SERVER_HTTP_REPLY_H
 
-#include "problem_details.h"
+#include "base/problem_details.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -6,7 +6,7 @@
 #include "http/problem.h"
 #include "http/request.h"
 #include "http/results.h"
-#include "options.h"
+#include "options/options.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 #include "http/deadlines.h"
 #include "http/presence.h"
 #include "http/request.h"
-#include "options.h"
+#include "options/options.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #ifndef SERVER_HTTP_TARGET_H
 #define SERVER_HTTP_TARGET_H
 
-#include "problem_details.h"
+#include "base/problem_details.h"
 
 #include <stdbool.h>
 #include <stddef.h>

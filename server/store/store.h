@@ -7,7 +7,7 @@
 #ifndef SERVER_STORE_H
 #define SERVER_STORE_H
 
-#include "metrics.h"
+#include "base/metrics.h"
 
 #include <stdbool.h>
 #include <stddef.h>

@@ -10,8 +10,8 @@
 #ifndef SERVER_WORK_WEBHOOK_H
 #define SERVER_WORK_WEBHOOK_H
 
-#include "log.h"
-#include "metrics.h"
+#include "base/log.h"
+#include "base/metrics.h"
 #include "store/store.h"
 
 #include <stdbool.h>

@@ -20,8 +20,8 @@
 #ifndef SERVER_WORK_H
 #define SERVER_WORK_H
 
-#include "log.h"
-#include "metrics.h"
+#include "base/log.h"
+#include "base/metrics.h"
 #include "store/store.h"
 #include "uzawa.h"
 #include "work/feed.h"

@@ -4,7 +4,7 @@
 
 #include "assembly/parts.h"
 #include "core/alloc.h"
-#include "core/buffer.h"
+#include "text/buffer.h"
 #include "core/digest.h"
 #include "core/error.h"
 #include "scene/scene.h"

@@ -1,7 +1,7 @@
 /* body_model.c: the chain from a scene to matrices. */
 #include "assembly/parts.h"
 
-#include "adaptive/grids.h"
+#include "scene/grids.h"
 #include "core/alloc.h"
 #include "core/error.h"
 #include "scene/scene.h"

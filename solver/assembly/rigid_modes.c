@@ -5,7 +5,7 @@
 #include "assembly/body_parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
-#include "semicoercive/pressed.h"
+#include "assembly/pressed.h"
 
 #include <math.h>
 #include <stdio.h>

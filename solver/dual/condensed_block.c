@@ -2,7 +2,7 @@
 #include "dual/dual_private.h"
 
 #include "core/alloc.h"
-#include "core/blas.h"
+#include "linalg/blas.h"
 #include "core/error.h"
 
 #include <stdlib.h>

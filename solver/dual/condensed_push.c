@@ -2,7 +2,7 @@
 #include "dual/dual_private.h"
 
 #include "core/alloc.h"
-#include "core/blas.h"
+#include "linalg/blas.h"
 
 #include <float.h>
 #include <math.h>

@@ -15,7 +15,7 @@
 
 #include "core/hooks.h"
 #include "factor/factor.h"
-#include "krylov/krylov.h"
+#include "amg/krylov.h"
 #include "uzawa.h"
 
 /* A row whose compliance D_ii falls to this part of itself when others are held depends on them: what is left is the

@@ -2,7 +2,7 @@
  * conjugate gradients on the dofs that are free, with a multigrid of their own. */
 #include "dual/dual_private.h"
 
-#include "core/blas.h"
+#include "linalg/blas.h"
 #include "core/error.h"
 
 #include <math.h>

@@ -6,7 +6,7 @@
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
-#include "core/blas.h"
+#include "linalg/blas.h"
 #include "core/error.h"
 
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 
 #include "certificate/infeasible.h"
 #include "core/alloc.h"
-#include "core/blas.h"
+#include "linalg/blas.h"
 #include "core/error.h"
 
 #include <float.h>

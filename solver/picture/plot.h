@@ -2,7 +2,7 @@
 #ifndef UZ_PICTURE_PLOT_H
 #define UZ_PICTURE_PLOT_H
 
-#include "core/buffer.h"
+#include "text/buffer.h"
 
 /* count numbers, `stride` doubles from one to the next. */
 typedef struct {

@@ -2,7 +2,7 @@
 #ifndef UZ_PICTURE_RASTER_H
 #define UZ_PICTURE_RASTER_H
 
-#include "core/buffer.h"
+#include "text/buffer.h"
 
 /* Pixel (x, y) is at y * width + x, row 0 at the top; its centre has the coordinates x + 0.5, y + 0.5. */
 typedef struct {

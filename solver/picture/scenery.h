@@ -2,7 +2,7 @@
 #ifndef UZ_PICTURE_SCENERY_H
 #define UZ_PICTURE_SCENERY_H
 
-#include "fields/parts.h"
+#include "post/parts.h"
 #include "picture/raster.h"
 #include "picture/skin.h"
 

@@ -1,7 +1,7 @@
 #include "semicoercive/null_space.h"
 
 #include "core/alloc.h"
-#include "core/blas.h"
+#include "linalg/blas.h"
 #include "core/error.h"
 #include "core/hooks.h"
 

@@ -1,5 +1,5 @@
 /* linear.c: what a contact solve is compared with: CHOLMOD's own solve of the same K, as a user of CHOLMOD would
- * call it, with its supernodal LL' and one CHOLMOD thread (see solver/core/process.c). */
+ * call it, with its supernodal LL' and one CHOLMOD thread (see solver/run/process.c). */
 #include "bench.h"
 #include "cholmod_view.h"
 #include "core/clock.h"

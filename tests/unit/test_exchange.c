@@ -1,5 +1,5 @@
 /* Rows that depend on each other: exchanges, proofs of contradiction, and refinement by the original data. */
-#include "core/blas.h"
+#include "linalg/blas.h"
 #include "harness.h"
 #include "judge.h"
 #include "qp_fixture.h"

@@ -1,6 +1,6 @@
 /* Fields against what theory says of the answers they are made from. */
 #include "assembly/parts.h"
-#include "fields/parts.h"
+#include "post/parts.h"
 #include "scene_fixture.h"
 
 #include "core/random.h"

@@ -4,7 +4,7 @@
 /* first: the heap's names */
 #include "assembly/assembly.h"
 #include "body_fixture.h"
-#include "fields/evaluate.h"
+#include "post/evaluate.h"
 
 static const unsigned EVERYTHING = (1u << 11) - 1;
 

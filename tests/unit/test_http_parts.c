@@ -2,7 +2,7 @@
 #include "harness.h"
 #include "http/deadlines.h"
 #include "http/request.h"
-#include "options.h"
+#include "options/options.h"
 
 #include <sys/socket.h>
 #include <unistd.h>

@@ -2,7 +2,7 @@
 #include "brick.h"
 #include "factor/factor.h"
 #include "harness.h"
-#include "krylov/krylov.h"
+#include "amg/krylov.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 

@@ -1,5 +1,5 @@
 /* Boxes whose cells are chosen: which grids there are, which are tried, what their answers are worth. */
-#include "adaptive/transfer.h"
+#include "run/transfer.h"
 #include "ladder_fixture.h"
 
 enum { X, Y };

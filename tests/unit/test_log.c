@@ -1,6 +1,6 @@
 /* Log lines: valid JSON whatever is put in, and whole even from many threads. */
 #include "harness.h"
-#include "log.h"
+#include "base/log.h"
 
 #include <pthread.h>
 

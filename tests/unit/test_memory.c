@@ -1,7 +1,7 @@
 /* What a solve may take of the machine. */
 #include "harness.h"
-#include "memory.h"
-#include "options.h"
+#include "base/memory.h"
+#include "options/options.h"
 
 #include <stdio.h>
 

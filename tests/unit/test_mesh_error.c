@@ -3,7 +3,7 @@
 #include "assembly/assembly.h"
 #include "body_fixture.h"
 #include "element/strain_lanes.h"
-#include "fields/parts.h"
+#include "post/parts.h"
 #include "random_scene.h"
 
 enum { NODES = UZ_ELEMENT_NODES, POINTS = UZ_ELEMENT_GAUSS, STRESSES = UZ_ELEMENT_STRESSES, LANES = UZ_STRAIN_LANES };

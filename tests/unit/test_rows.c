@@ -1,7 +1,7 @@
 /* Scenes that are solved with a part of their contact rows: what they say holds for all of them. */
 #include "body_fixture.h"
 #include "quad_exact.h"
-#include "rows.h"
+#include "run/rows.h"
 
 #include <string.h>
 

@@ -1,0 +1,133 @@
+/* options.h: what the daemon can be told, by one table (options_table.c) for the command line, the environment and a
+ * file.
+ *
+ * An option "max-body" is --max-body VALUE, UZAWAD_MAX_BODY=VALUE, or a line "max-body = VALUE" in the file that
+ * --config or UZAWAD_CONFIG names. Of several the flag counts, then the environment, then the file, then the default;
+ * but every value that is given must be valid, wherever it stands. */
+#ifndef SERVER_OPTIONS_H
+#define SERVER_OPTIONS_H
+
+#include "base/log.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+
+#define UZAWAD_VERSION "0.1.0"
+
+enum { OPTION_PATH = 1024, OPTIONS_MAX = 64, OPTION_WORDS = 32 };
+
+typedef enum { FROM_DEFAULT, FROM_FILE, FROM_ENVIRONMENT, FROM_FLAG } option_source;
+
+typedef struct {
+    /* where */
+    char listen[OPTION_PATH], db[OPTION_PATH], config[OPTION_PATH];
+    /* who may: "" where there is none */
+    char token_file[OPTION_PATH], tls_cert[OPTION_PATH], tls_key[OPTION_PATH], user[OPTION_PATH];
+    bool insecure_public;
+    /* work */
+    int workers, max_attempts;
+    size_t cache, memory; /* bytes; memory: of one solve */
+    double max_solve_s;   /* of one job; 0: no limit */
+    int max_queue;        /* jobs that wait; 0: no limit */
+    /* ended jobs that are kept; 0: no limit */
+    double keep_days;
+    int keep_jobs;
+    size_t keep_bytes;
+    /* whom the end of a job may be told, and a file with what signs it; "" where there is none */
+    char webhook_allow[OPTION_PATH], webhook_secret_file[OPTION_PATH];
+    /* uploads */
+    size_t max_upload, uploads; /* bytes of one, and of all */
+    double upload_days;         /* one that no job uses is kept so long */
+    /* requests */
+    int max_connections, max_client_connections, max_client_rate; /* the last two: 0 is no limit */
+    int max_streams;                                              /* of the connections */
+    int max_json_depth;
+    size_t max_body, max_dofs, max_rows, max_nonzeros;
+    double request_deadline_s, max_wait_s;
+    char cors[OPTION_PATH];
+    /* end, log */
+    double drain_s;
+    log_level level;
+    bool access_log;
+
+    option_source source[OPTIONS_MAX]; /* in the order of the table */
+    int line[OPTIONS_MAX];             /* in the file, where the value comes from there */
+} server_options;
+
+typedef enum {
+    OPTIONS_RUN,
+    OPTIONS_HELP,
+    OPTIONS_VERSION,
+    OPTIONS_CHECK,    /* --check-config: only say what the values are */
+    OPTIONS_EXAMPLE,  /* --example-config */
+    OPTIONS_CHECK_DB, /* --check-db */
+    OPTIONS_BACKUP,   /* --backup FILE */
+    OPTIONS_WRONG     /* the reason is in message */
+} options_verdict;
+
+/* Reads argv, the environment and the file. backup (OPTION_PATH bytes, may be NULL) takes the FILE of --backup. */
+options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size);
+/* The same without backup. */
+options_verdict options_parse(server_options *out, int argc, char **argv, char *message, size_t size);
+
+/* The words of a list of words, as options_parse leaves it: separated by single spaces. */
+typedef struct {
+    char text[OPTION_PATH];
+    const char *words[OPTION_WORDS];
+    size_t n;
+} option_words;
+void options_split(option_words *out, const char *list);
+
+void options_usage(FILE *to);
+/* Every option as "name = value  # where it comes from"; what is printed can be read again. */
+void options_show(const server_options *o, FILE *to);
+/* A file with every option, its meaning and its default, commented out (uzawad.conf.example). */
+void options_example(FILE *to);
+
+/* ---- limits, as GET /v1/limits shows them */
+typedef struct {
+    char name[40]; /* max_body */
+    double value;  /* of a limit that is off: infinity */
+    const char *unit, *meaning;
+    bool is_set; /* to something else than the default */
+} option_limit;
+/* The options that are limits; at most `most`. Returns how many. */
+size_t options_limits(const server_options *o, option_limit *out, size_t most);
+
+/* ---- the table (options_table.c), for options.c, options_show.c and options_file.c */
+typedef enum {
+    OPTION_TEXT,
+    OPTION_FILE,
+    OPTION_INTEGER,
+    OPTION_BYTES,
+    OPTION_COUNT,
+    OPTION_SECONDS, /* or days: the unit says it */
+    OPTION_LEVEL,
+    OPTION_SWITCH,
+    OPTION_ORIGINS, /* this and the next: words; a flag may be given several times, elsewhere spaces separate them */
+    OPTION_HOSTS
+} option_kind;
+typedef struct {
+    const char *name;
+    option_kind kind;
+    size_t offset; /* of the value in server_options */
+    double least, most;
+    const char *normal; /* the default as text; NULL: computed, `otherwise` says how */
+    const char *otherwise;
+    const char *unit; /* of a limit; NULL: the option is none */
+    bool zero_is_off;
+    const char *meaning; /* one sentence; lines are broken where it is printed */
+} option_row;
+bool options_is_list(const option_row *row);
+size_t options_table(const option_row **rows);
+/* The row of that name; NULL: none. */
+const option_row *options_find(const char *name, size_t len);
+/* Gives a value to an option; false with what it takes instead in message. */
+bool options_set(server_options *o, const option_row *row, const char *text, char *message, size_t size);
+/* options_file.c: reads the file into *o; false with "FILE:LINE: what is wrong; what to do" in message. */
+bool options_read_file(server_options *o, const char *path, char *message, size_t size);
+/* The name that was probably meant; NULL: none is close. */
+const char *options_closest(const char *name, size_t len);
+
+#endif

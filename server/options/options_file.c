@@ -1,0 +1,129 @@
+/* options_file.c: the configuration file.
+ *
+ * One "name = value" a line. Spaces around both are dropped. A value may stand in double quotes, with \" and \\ inside.
+ * '#' begins a comment at the start of a line, or after a space outside quotes. */
+#include "options/options.h"
+
+#include <errno.h>
+#include <string.h>
+
+typedef struct {
+    const char *path;
+    int number;
+    char *message;
+    size_t size;
+} line_place;
+
+static bool refuse(const line_place *at, const char *what)
+{
+    snprintf(at->message, at->size, "%s:%d: %s", at->path, at->number, what);
+    return false;
+}
+
+static char *trim(char *text)
+{
+    static const char SPACE[] = " \t\r\n";
+    text += strspn(text, SPACE);
+    size_t len = strlen(text);
+    while (len > 0 && strchr(SPACE, text[len - 1]))
+        len--;
+    text[len] = '\0';
+    return text;
+}
+
+/* The value without its quotes, in place; false where the quotes are not closed or something follows them. */
+static bool unquote(char *text)
+{
+    char *out = text, *in = text + 1;
+    while (*in && *in != '"') {
+        if (*in == '\\' && (in[1] == '"' || in[1] == '\\'))
+            in++;
+        *out++ = *in++;
+    }
+    bool closed = *in == '"';
+    in += closed + strspn(in + closed, " \t");
+    bool ends = *in == '\0' || *in == '#';
+    *out = '\0';
+    return closed && ends;
+}
+
+static bool read_value(char *text)
+{
+    if (text[0] == '"')
+        return unquote(text);
+    for (char *at = text; *at; at++)
+        if (*at == '#' && (at == text || at[-1] == ' ' || at[-1] == '\t')) {
+            *at = '\0';
+            break;
+        }
+    trim(text); /* its start is trimmed already */
+    return true;
+}
+
+static bool refuse_name(const line_place *at, const char *name)
+{
+    char what[256];
+    const char *meant = options_closest(name, strlen(name));
+    if (meant)
+        snprintf(what, sizeof what, "there is no option \"%.60s\": did you mean \"%s\"?", name, meant);
+    else
+        snprintf(what, sizeof what, "there is no option \"%.60s\": uzawad --help lists them", name);
+    return refuse(at, what);
+}
+
+static bool take_line(server_options *o, char *text, const line_place *at)
+{
+    const option_row *rows;
+    char why[256];
+    options_table(&rows);
+    text = trim(text);
+    if (!text[0] || text[0] == '#')
+        return true;
+    char *equals = strchr(text, '=');
+    if (!equals)
+        return refuse(at, "a line must be \"name = value\", or begin with '#'");
+    *equals = '\0';
+    char *name = trim(text), *value = trim(equals + 1);
+    const option_row *row = options_find(name, strlen(name));
+    if (!row)
+        return refuse_name(at, name);
+    if (strcmp(name, "config") == 0)
+        return refuse(at, "a file can't name another one: take this line out");
+    int *line = &o->line[row - rows];
+    if (*line) {
+        snprintf(why, sizeof why, "%s stands in line %d already: keep one of them", name, *line);
+        return refuse(at, why);
+    }
+    if (!read_value(value))
+        return refuse(at, "the quotes of this value are not closed, or something follows them");
+    if (!options_set(o, row, value, why, sizeof why))
+        return refuse(at, why);
+    o->source[row - rows] = FROM_FILE;
+    *line = at->number;
+    return true;
+}
+
+bool options_read_file(server_options *o, const char *path, char *message, size_t size)
+{
+    char text[OPTION_PATH + 256];
+    line_place at = {.path = path, .message = message, .size = size};
+    FILE *file = fopen(path, "re");
+    if (!file) {
+        snprintf(message, size, "cannot read the configuration %s: %s", path, strerror(errno));
+        return false;
+    }
+    bool ok = true;
+    while (ok && fgets(text, sizeof text, file)) {
+        at.number++;
+        if (!strchr(text, '\n') && !feof(file))
+            ok = refuse(&at, "this line is too long, or has a NUL byte");
+        else
+            ok = take_line(o, text, &at);
+    }
+    if (ok && ferror(file)) {
+        snprintf(message, size, "cannot read the configuration %s: %s", path, strerror(errno));
+        ok = false;
+    }
+    fclose(file);
+    return ok;
+}

@@ -1,0 +1,150 @@
+/* cycle.c: one V-cycle. */
+#include "amg/multigrid_private.h"
+
+#include "core/alloc.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+uz_multigrid_room *uz_multigrid_room_new(const uz_multigrid *mg)
+{
+    uz_multigrid_room *room = uz_alloc_zero(1, sizeof *room);
+    if (!room)
+        return NULL;
+    bool ok = (room->ws = uz_factor_workspace_new()) != NULL;
+    for (int l = 0; ok && l < mg->levels; l++) {
+        int64_t n = mg->level[l].n;
+        room->t[l] = uz_alloc(n, sizeof(double));
+        room->x[l] = uz_alloc(l > 0 ? n : 0, sizeof(double));
+        room->b[l] = uz_alloc(l > 0 ? n : 0, sizeof(double));
+        ok = room->t[l] && room->x[l] && room->b[l];
+    }
+    if (ok)
+        return room;
+    uz_multigrid_room_free(room);
+    return NULL;
+}
+
+void uz_multigrid_room_free(uz_multigrid_room *room)
+{
+    if (!room)
+        return;
+    uz_factor_workspace_free(room->ws);
+    for (int l = 0; l < UZ_LEVELS_MOST; l++) {
+        free(room->t[l]);
+        free(room->x[l]);
+        free(room->b[l]);
+    }
+    free(room);
+}
+
+/* x = (D + L)^-1 b; t is used up. A dof whose inverse is 0 stays at 0. */
+static void sweep_forward(double *x, double *t, const uz_csc *A, const double *inverse, const double *b)
+{
+    memcpy(t, b, (size_t)A->cols * sizeof *t);
+    for (int64_t j = 0; j < A->cols; j++) {
+        double value = x[j] = inverse[j] * t[j];
+        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
+            t[A->idx[k]] -= A->val[k] * value;
+    }
+}
+
+/* t = b - A x after a forward sweep from 0: all of it but -L'x is 0. */
+static void residual_after_sweep(double *t, const uz_csc *A, const double *x)
+{
+    for (int64_t j = 0; j < A->cols; j++) {
+        double sum = 0.0;
+        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
+            sum += A->val[k] * x[A->idx[k]];
+        t[j] = -sum;
+    }
+}
+
+/* x = (D + L')^-1 (b - L x), through t. */
+static void sweep_backward(double *x, double *t, const uz_csc *A, const double *inverse, const double *b)
+{
+    memcpy(t, b, (size_t)A->cols * sizeof *t);
+    for (int64_t j = 0; j < A->cols; j++) {
+        double value = x[j];
+        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
+            t[A->idx[k]] -= A->val[k] * value;
+    }
+    for (int64_t j = A->cols - 1; j >= 0; j--) {
+        double sum = t[j];
+        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
+            sum -= A->val[k] * x[A->idx[k]];
+        x[j] = inverse[j] * sum;
+    }
+}
+
+/* b = P't */
+static void restrict_to(double *b, const uz_level *level, const double *t, int k)
+{
+    memset(b, 0, (size_t)(level->aggregates * k) * sizeof *b);
+    for (int64_t i = 0; i < level->n; i++)
+        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
+            double *to = b + (int64_t)level->block[e] * k;
+            const float *value = level->value + e * k;
+            for (int c = 0; c < k; c++)
+                to[c] += t[i] * (double)value[c];
+        }
+}
+
+/* x += P y */
+static void prolong(double *x, const uz_level *level, const double *y, int k)
+{
+    for (int64_t i = 0; i < level->n; i++) {
+        double sum = 0.0;
+        for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
+            const double *from = y + (int64_t)level->block[e] * k;
+            const float *value = level->value + e * k;
+            for (int c = 0; c < k; c++)
+                sum += from[c] * (double)value[c];
+        }
+        x[i] += sum;
+    }
+}
+
+static uz_status solve_coarsest(const uz_multigrid *mg, uz_multigrid_room *room, double *x, const double *b,
+                                uz_error *err)
+{
+    double *t = room->t[mg->levels - 1];
+    uz_factor_permute(mg->coarsest, t, b);
+    uz_status status = uz_factor_forward(mg->coarsest, room->ws, t, 1, err);
+    if (status == UZ_OK)
+        status = uz_factor_backward(mg->coarsest, room->ws, t, 1, err);
+    uz_factor_unpermute(mg->coarsest, x, t);
+    return status;
+}
+
+/* Where K itself is the coarsest matrix: held dofs are rows of the unit matrix there. */
+static void clear_held(double *z, const uz_level *level)
+{
+    for (int64_t j = 0; j < level->n; j++)
+        z[j] = level->inverse[j] > 0.0 ? z[j] : 0.0;
+}
+
+uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
+                             const double *r, uz_error *err)
+{
+    int last = mg->levels - 1;
+    for (int l = 0; l < last; l++) {
+        const uz_level *level = &mg->level[l];
+        const uz_csc *A = l == 0 ? K : &level->A;
+        double *x = l == 0 ? z : room->x[l];
+        sweep_forward(x, room->t[l], A, level->inverse, l == 0 ? r : room->b[l]);
+        residual_after_sweep(room->t[l], A, x);
+        restrict_to(room->b[l + 1], level, room->t[l], mg->k);
+    }
+    uz_status status =
+        last == 0 ? solve_coarsest(mg, room, z, r, err) : solve_coarsest(mg, room, room->x[last], room->b[last], err);
+    if (last == 0)
+        clear_held(z, &mg->level[0]);
+    for (int l = last - 1; l >= 0; l--) {
+        const uz_level *level = &mg->level[l];
+        double *x = l == 0 ? z : room->x[l];
+        prolong(x, level, room->x[l + 1], mg->k);
+        sweep_backward(x, room->t[l], l == 0 ? K : &level->A, level->inverse, l == 0 ? r : room->b[l]);
+    }
+    return status;
+}

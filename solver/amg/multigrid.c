@@ -1,0 +1,327 @@
+/* multigrid.c: levels by smoothed aggregation, and the V-cycle on them.
+ *
+ * The cycle smooths by one Gauss-Seidel sweep forwards before the coarse correction and one backwards after it, so it
+ * is symmetric, and positive definite because every coarse matrix is P'A P with the very P that is used. */
+#include "amg/multigrid_private.h"
+
+#include "core/alloc.h"
+#include "linalg/blas.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "core/random.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { COARSEST = 1200, POWER_STEPS = 8 };
+
+/* A level that keeps more than this share of the dofs is not worth having. */
+#define LEAST_GAIN 0.7
+
+static uz_status invert_diagonal(uz_level *level, const uz_csc *A, const bool *held, uz_error *err)
+{
+    level->n = A->cols;
+    level->inverse = uz_alloc(level->n, sizeof *level->inverse);
+    if (!level->inverse)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)level->n);
+    for (int64_t j = 0; j < level->n; j++) {
+        int64_t k = A->ptr[j];
+        bool positive = k < A->ptr[j + 1] && A->idx[k] == j && A->val[k] > 0.0;
+        if (!positive && !(held && held[j]))
+            return uz_fail(err, UZ_ERR_NOT_SPD, "K",
+                           "K is not positive definite: its diagonal entry of dof %lld (numbered from 0) is not "
+                           "positive. Support the body so that it can't move freely, or check the signs of K.",
+                           (long long)j);
+        level->inverse[j] = held && held[j] ? 0.0 : 1.0 / A->val[k];
+    }
+    return UZ_OK;
+}
+
+/* lambda_max(D^-1 A), a little too large: power iterations reach it within some per cent from below. */
+static double smoothing_range(const uz_level *level, const uz_csc *A, double *x, double *y)
+{
+    uint64_t state = 1;
+    double value = 1.0;
+    for (int64_t i = 0; i < level->n; i++)
+        x[i] = level->inverse[i] > 0.0 ? uz_uniform(&state) - 0.5 : 0.0;
+    for (int step = 0; step < POWER_STEPS; step++) {
+        double before = uz_norm(level->n, x);
+        memset(y, 0, (size_t)level->n * sizeof *y);
+        uz_csc_symv(y, A, 1.0, x);
+        for (int64_t i = 0; i < level->n; i++)
+            y[i] *= level->inverse[i];
+        double after = uz_norm(level->n, y);
+        if (!(before > 0.0) || !(after > 0.0))
+            return 1.0;
+        value = after / before;
+        for (int64_t i = 0; i < level->n; i++)
+            x[i] = y[i] / after;
+    }
+    return 1.1 * value;
+}
+
+/* Dofs of nodes in aggregates, but for those that are held. */
+static void spread_aggregates(int32_t *of, const int32_t *aggregate, const int32_t *node, const double *inverse,
+                              int64_t n)
+{
+    for (int64_t i = 0; i < n; i++)
+        of[i] = inverse[i] > 0.0 ? aggregate[node[i]] : -1;
+}
+
+/* What a level is made of; the modes and nodes of level 0 are the caller's. */
+typedef struct {
+    int32_t *node;
+    int64_t n_nodes;
+    float *modes;
+    double strong;
+} sources;
+
+static void clear_sources(sources *s)
+{
+    free(s->node);
+    free(s->modes);
+    memset(s, 0, sizeof *s);
+}
+
+/* The prolongation of the level and the modes of the next. coarse NULL on success: the level can't be coarsened. */
+static uz_status build_prolongation(uz_level *level, float **coarse, const uz_csc *A, const sources *from,
+                                    double threshold, int k, const uz_leave *leave, uz_error *err)
+{
+    int64_t n = level->n;
+    int32_t *aggregate = uz_alloc(from->n_nodes, sizeof *aggregate), *of = uz_alloc(n, sizeof *of);
+    float *basis = uz_alloc(n * k, sizeof *basis);
+    double *x = uz_alloc(n, sizeof *x), *y = uz_alloc(n, sizeof *y);
+    uz_status status = UZ_OK;
+    *coarse = NULL;
+    if (!aggregate || !of || !basis || !x || !y)
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
+    if (status == UZ_OK)
+        status =
+            uz_aggregate(aggregate, &level->aggregates, A, level->inverse, from->node, from->n_nodes, threshold, err);
+    bool gain = status == UZ_OK && level->aggregates > 0 && (double)(level->aggregates * k) < LEAST_GAIN * (double)n;
+    if (gain) {
+        *coarse = uz_alloc(level->aggregates * k * k, sizeof **coarse);
+        spread_aggregates(of, aggregate, from->node, level->inverse, n);
+        if (uz_leave_is_over(leave))
+            status = uz_no_leave(err);
+        else if (!*coarse)
+            status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
+        else
+            status = uz_tentative(basis, *coarse, from->modes, of, n, level->aggregates, k, err);
+        if (status == UZ_OK)
+            status =
+                uz_prolong_smoothed(level, A, basis, of, 4.0 / 3.0 / smoothing_range(level, A, x, y), k, leave, err);
+    }
+    free(aggregate);
+    free(of);
+    free(basis);
+    free(x);
+    free(y);
+    return status;
+}
+
+static uz_status next_sources(sources *s, float *modes, int64_t aggregates, int k, uz_error *err)
+{
+    free(s->node);
+    free(s->modes);
+    s->modes = modes;
+    s->n_nodes = aggregates;
+    s->node = uz_alloc(aggregates * k, sizeof *s->node);
+    if (!s->node)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld aggregates", (long long)aggregates);
+    for (int64_t i = 0; i < aggregates * k; i++)
+        s->node[i] = (int32_t)(i / k);
+    return UZ_OK;
+}
+
+static const uz_csc *level_matrix(const uz_multigrid *mg, const uz_csc *K, int l)
+{
+    return l == 0 ? K : &mg->level[l].A;
+}
+
+/* Held dofs of a matrix that is small enough to be the coarsest: their rows become those of the unit matrix. */
+static uz_status isolate_held(uz_csc *out, const uz_csc *K, const bool *held, uz_error *err)
+{
+    uz_status status = uz_csc_copy(out, K, err);
+    for (int64_t j = 0; status == UZ_OK && j < K->cols; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            if (held && (held[j] || held[K->idx[k]]))
+                out->val[k] = K->idx[k] == j ? 1.0 : 0.0;
+    return status;
+}
+
+static uz_status factor_coarsest(uz_multigrid *mg, const uz_csc *K, const bool *held, size_t memory_limit,
+                                 const uz_leave *leave, uz_error *err)
+{
+    int last = mg->levels - 1;
+    uz_csc alone = {0};
+    uz_error inner = {0};
+    uz_status status = last == 0 ? isolate_held(&alone, K, held, err) : UZ_OK;
+    if (status == UZ_OK)
+        status = uz_factor_plain(&mg->coarsest, last == 0 ? &alone : &mg->level[last].A, UZ_ORDERING_AMD, memory_limit,
+                                 leave ? leave->hooks : NULL, last == 0 ? err : &inner);
+    uz_csc_clear(&alone);
+    if (status == UZ_OK || last == 0)
+        return status;
+    if (status == UZ_ERR_NOT_SPD)
+        return uz_fail(err, status, "K",
+                       "K is not positive definite to working precision: on smooth displacements it resists too "
+                       "little. Support the body so that it can't move freely, or check the signs of K.");
+    return uz_fail(err, status, inner.where, "%s", inner.message);
+}
+
+static size_t level_bytes(const uz_level *level, int k)
+{
+    size_t n = (size_t)level->n, bytes = 8 * n, blocks = level->ptr ? (size_t)level->ptr[n] : 0;
+    if (level->A.ptr)
+        bytes += 8 * n + 16 * (size_t)level->A.ptr[n];
+    return bytes + (level->ptr ? 8 * n + blocks * (4 + 4 * (size_t)k) : 0);
+}
+
+/* All so far; what the limit is compared with on the way. */
+static size_t count_bytes(const uz_multigrid *mg)
+{
+    size_t bytes = sizeof *mg;
+    for (int l = 0; l < mg->levels; l++)
+        bytes += level_bytes(&mg->level[l], mg->k);
+    return bytes + (mg->coarsest ? uz_factor_describe(mg->coarsest).bytes : 0);
+}
+
+/* M <= (D + L) D^-1 (D + L') for a cycle that smooths so, and for K itself; the norm of D^-1/2 L D^-1/2 is at most the
+ * root of its largest row sum times its largest column sum. */
+static double bound_by_diagonal(const uz_level *level, const uz_csc *K, double *row)
+{
+    double by_row = 0.0, by_column = 0.0;
+    memset(row, 0, (size_t)level->n * sizeof *row);
+    for (int64_t j = 0; j < level->n; j++) {
+        double sum = 0.0;
+        for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
+            double scaled = fabs(K->val[k]) * sqrt(level->inverse[j]) * sqrt(level->inverse[K->idx[k]]);
+            sum += scaled;
+            row[K->idx[k]] += scaled;
+        }
+        by_column = fmax(by_column, sum);
+    }
+    for (int64_t j = 0; j < level->n; j++)
+        by_row = fmax(by_row, row[j]);
+    double norm = 1.0 + sqrt(by_row * by_column);
+    return norm * norm;
+}
+
+/* Level l + 1 from level l; *done: level l is the coarsest. */
+static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_csc *K, size_t memory_limit,
+                         const uz_leave *leave, uz_error *err)
+{
+    int l = mg->levels - 1;
+    uz_level *level = &mg->level[l], *next = level + 1;
+    const uz_csc *A = level_matrix(mg, K, l);
+    float *modes = NULL;
+    *done = level->n <= COARSEST || l + 1 == UZ_LEVELS_MOST;
+    if (*done)
+        return UZ_OK;
+    uz_status status = build_prolongation(level, &modes, A, from, from->strong * ldexp(1.0, -l), mg->k, leave, err);
+    *done = status == UZ_OK && !modes;
+    if (status != UZ_OK || *done) {
+        free(modes);
+        return status;
+    }
+    status = uz_galerkin(&next->A, level, A, mg->k, leave, err);
+    if (status == UZ_OK) {
+        status = invert_diagonal(next, &next->A, NULL, err);
+        mg->levels++;
+    }
+    if (status == UZ_OK && memory_limit > 0 && count_bytes(mg) > memory_limit)
+        status =
+            uz_fail(err, UZ_ERR_LIMIT, "K", "the coarse levels take more than the %zu bytes allowed", memory_limit);
+    uz_status taken = next_sources(from, modes, level->aggregates, mg->k, err);
+    return status == UZ_OK ? taken : status;
+}
+
+static uz_status copy_sources(sources *s, const uz_modes *modes, int64_t n, uz_error *err)
+{
+    s->n_nodes = modes->n_nodes;
+    s->strong = modes->strong;
+    s->node = uz_alloc(n, sizeof *s->node);
+    s->modes = uz_alloc(n * modes->count, sizeof *s->modes);
+    if (!s->node || !s->modes)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)n);
+    memcpy(s->node, modes->node, (size_t)n * sizeof *s->node);
+    memcpy(s->modes, modes->value, (size_t)(n * modes->count) * sizeof *s->modes);
+    return UZ_OK;
+}
+
+static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes, const bool *held, size_t memory_limit,
+                       const uz_leave *leave, uz_error *err)
+{
+    sources from = {0};
+    bool done = false;
+    mg->k = modes->count;
+    mg->levels = 1;
+    uz_status status = K->cols < INT32_MAX
+                           ? UZ_OK
+                           : uz_fail(err, UZ_ERR_UNSUPPORTED, "K",
+                                     "matrix_free holds up to 2^31 - 2 dofs, these are %lld", (long long)K->cols);
+    if (status == UZ_OK)
+        status = invert_diagonal(&mg->level[0], K, held, err);
+    if (status == UZ_OK)
+        status = copy_sources(&from, modes, K->cols, err);
+    while (status == UZ_OK && !done) {
+        status = uz_leave_is_over(leave) ? uz_no_leave(err) : coarsen(mg, &done, &from, K, memory_limit, leave, err);
+    }
+    clear_sources(&from);
+    double *row = status == UZ_OK ? uz_alloc(K->cols, sizeof *row) : NULL;
+    if (status == UZ_OK && !row)
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)K->cols);
+    if (status == UZ_OK)
+        mg->most = bound_by_diagonal(&mg->level[0], K, row);
+    free(row);
+    return status == UZ_OK ? factor_coarsest(mg, K, held, memory_limit, leave, err) : status;
+}
+
+uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
+                              size_t memory_limit, const uz_leave *leave, uz_error *err)
+{
+    *out = NULL;
+    uz_multigrid *mg = uz_alloc_zero(1, sizeof *mg);
+    if (!mg)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid");
+    uz_status status = build(mg, K, modes, held, memory_limit, leave, err);
+    if (status == UZ_OK) {
+        mg->bytes = count_bytes(mg);
+        *out = mg;
+    } else {
+        uz_multigrid_free(mg);
+    }
+    return status;
+}
+
+void uz_multigrid_free(uz_multigrid *mg)
+{
+    if (!mg)
+        return;
+    for (int l = 0; l < UZ_LEVELS_MOST; l++) {
+        uz_csc_clear(&mg->level[l].A);
+        free(mg->level[l].inverse);
+        free(mg->level[l].ptr);
+        free(mg->level[l].block);
+        free(mg->level[l].value);
+    }
+    uz_factor_free(mg->coarsest);
+    free(mg);
+}
+
+size_t uz_multigrid_bytes(const uz_multigrid *mg)
+{
+    return mg->bytes;
+}
+
+int uz_multigrid_levels(const uz_multigrid *mg)
+{
+    return mg->levels;
+}
+
+double uz_multigrid_most(const uz_multigrid *mg)
+{
+    return mg->most;
+}

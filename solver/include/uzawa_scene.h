@@ -1,0 +1,182 @@
+/* uzawa_scene.h: the part of uzawa.h on scenes: an elastic body, its supports and loads, and what it may touch.
+ * Included by uzawa.h, after the types that it uses. */
+#ifndef UZAWA_SCENE_H
+#define UZAWA_SCENE_H
+
+/* A scene: what a person says about a body. Plain data; strings are group names.
+ * Numbers that a scene leaves out are NaN where the text says so. */
+typedef enum { UZ_PLANE_STRESS, UZ_PLANE_STRAIN, UZ_AXISYMMETRIC /* x is the radius */, UZ_SOLID } uz_model;
+
+/* How a stiffness is integrated where plain displacement elements lock. */
+typedef enum {
+    UZ_FORMULATION_AUTO,         /* mean dilatation where Poisson's ratio asks for it, else standard */
+    UZ_FORMULATION_STANDARD,     /* full integration of the displacement's own strain */
+    UZ_FORMULATION_BBAR,         /* quad4, hex8: mean dilatation (B-bar), for nearly incompressible material */
+    UZ_FORMULATION_INCOMPATIBLE, /* quad4, hex8: incompatible modes, for bending */
+    UZ_FORMULATIONS              /* how many */
+} uz_formulation;
+
+/* Nodes of each in VTK order. A new kind of element is a row in each of: element/element_kind.c (name, nodes, sides),
+ * element/shape.c (shape functions, Gauss rules), element/geometry.c (its linear kind), io/vtu.c (VTK's number),
+ * io/gmsh_elements.c (Gmsh's number), scene/box_elements.c (cells of a box), post/recover.c and patches.c (where
+ * its stress is best), and "elements" and "box" of schemas/request.json. tests/unit/test_elements_*.c say what it must
+ * satisfy. */
+typedef enum { UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8, UZ_TET4, UZ_HEX8, UZ_TET10, UZ_ELEMENT_KINDS } uz_element_kind;
+const char *uz_element_name(uz_element_kind kind); /* "quad4"; never NULL */
+bool uz_element_parse(uz_element_kind *out, const char *name);
+int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */
+int uz_element_node_count(uz_element_kind kind); /* 3 to 10 */
+
+/* A rectangle or a cuboid in cells along the axes. Its sides are the groups left and right (x), bottom and top (y),
+ * back and front (z, 3D only). */
+typedef struct {
+    double origin[3], size[3];
+    int64_t cells[3];
+    double grading[3]; /* last cell over first cell along each axis, > 0; 1 (or 0: not given): all equal */
+    char element[16];  /* "quad4", "hex8", ... */
+    int dim;           /* 2 or 3 */
+    bool automatic;    /* uz_solve and uz_solve_cases choose the cells; those above are not read */
+} uz_box;
+
+/* A named part of a mesh as somebody gave it: by nodes, by edges or faces, or by elements. */
+typedef struct {
+    char name[64];
+    int64_t n_nodes, *node;
+    int64_t n_faces, *face_first, *face_node; /* nodes of face i: face_node[face_first[i]..face_first[i + 1]) */
+    int64_t n_elements, *element;
+} uz_given_group;
+
+/* A mesh in numbers: of a request, or read from a file. Elements of all kinds are numbered together. */
+typedef struct {
+    int dim;
+    int64_t n_nodes;
+    double *xyz; /* n_nodes x dim */
+    int64_t n_elements;
+    unsigned char *kind;   /* n_elements: uz_element_kind */
+    int64_t *first, *node; /* nodes of element e: node[first[e]..first[e + 1]); first has n_elements + 1 */
+    uz_given_group *groups;
+    int64_t n_groups;
+    bool from_file; /* nodes that no element uses (construction points) are left out, not refused */
+} uz_given_mesh;
+void uz_given_mesh_clear(uz_given_mesh *mesh);
+
+/* Reads a whole Gmsh file, version 2.2 or 4.1, ASCII or binary. Nodes and elements are numbered from 0 in the order of
+ * the file; only the elements of the highest dimension are elements. Physical groups of that dimension become groups of
+ * elements, of one less groups of edges or faces, of still less groups of nodes; one without a name is "physical_7", or
+ * "physical_7_dim1" if a nameless one of higher dimension has that number too. A flat mesh (all z equal) is plane;
+ * other surfaces are refused. max_bytes (0: none) bounds what the result may take. Errors: UZ_ERR_FORMAT, _UNSUPPORTED,
+ * _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
+ * Source: Gmsh reference manual, section "Gmsh file formats". */
+uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
+
+typedef struct {
+    char on[64];
+    double young, poisson;
+    double density;   /* mass per volume: 0 where no gravity asks for it */
+    double expansion; /* strain per unit of temperature */
+} uz_material;
+
+typedef enum {
+    UZ_SUPPORT_COMPONENTS, /* u along the axes */
+    UZ_SUPPORT_NORMAL,     /* u along one direction: a symmetry plane, a slide */
+    UZ_SUPPORT_SPRING      /* elastic ground along the axes */
+} uz_support_kind;
+typedef struct {
+    uz_support_kind kind;
+    char on[64];
+    double u[3];             /* components; NaN: that direction is free */
+    double normal[3], value; /* normal: u . normal / ||normal|| = value */
+    double spring[3];        /* force per length, of the whole group, spread over it by area; >= 0 */
+} uz_support;
+
+typedef enum {
+    UZ_LOAD_TRACTION,    /* v: force per area on edges or faces */
+    UZ_LOAD_PRESSURE,    /* value: force per area against the outward normal */
+    UZ_LOAD_FORCE,       /* v: the sum, spread over edges or faces by area; over nodes equally */
+    UZ_LOAD_BODY_FORCE,  /* v: force per volume of elements */
+    UZ_LOAD_GRAVITY,     /* v: acceleration; times the density of each material */
+    UZ_LOAD_NODE_FORCE,  /* v: at `node`; refused where nodes of a file are left out, as the others are numbered anew */
+    UZ_LOAD_TEMPERATURE, /* value: rise of temperature of elements */
+    UZ_LOAD_KINDS
+} uz_load_kind;
+typedef struct {
+    uz_load_kind kind;
+    char on[64];
+    int64_t node;
+    double v[3], value;
+} uz_load;
+
+/* A new obstacle is a gap and a normal in obstacle/ (obstacle.h, check.c), bytes in assembly/body_key.c, a reader in
+ * server/codec/decode_contacts.c, a shape in schemas/request.json; and, to be seen, in picture/overlay.c (plane) or
+ * picture/patches.c (solid), server/codec/encode_surface.c and client/page/body_obstacles.js. */
+typedef enum {
+    UZ_OBSTACLE_PLANE,    /* half space: point, normal (out of the obstacle) */
+    UZ_OBSTACLE_ROUND,    /* circle (2D) or sphere (3D): point is the centre, radius, inside */
+    UZ_OBSTACLE_CYLINDER, /* 3D: point on the axis, normal is the axis, radius, inside */
+    UZ_OBSTACLE_POLYLINE, /* 2D: n_x points (x[i], y[i]), the obstacle on the right of the line as it goes on */
+    UZ_OBSTACLE_HEIGHT,   /* z over x (2D: n_y = 0, z has n_x) or over x and y (z[j * n_x + i]): the obstacle below */
+    UZ_OBSTACLE_BODY      /* the group `with` of another part of the mesh */
+} uz_obstacle_kind;
+typedef struct {
+    char on[64];
+    uz_obstacle_kind kind;
+    double point[3], normal[3];
+    double radius;
+    bool inside; /* the body is within: a hole, a bowl */
+    int64_t n_x, n_y;
+    double *x, *y, *z;
+    char with[64];
+} uz_contact;
+
+typedef enum { UZ_MESH_BOX, UZ_MESH_GIVEN } uz_mesh_source;
+
+typedef struct {
+    uz_model model;
+    uz_formulation formulation;
+    double thickness; /* plane models */
+    uz_mesh_source source;
+    uz_box box;
+    uz_given_mesh given;
+    uz_material *materials;
+    int64_t n_materials;
+    uz_support *supports;
+    int64_t n_supports;
+    uz_load *loads;
+    int64_t n_loads;
+    uz_contact *contacts;
+    int64_t n_contacts;
+    bool all_candidates; /* solve with every contact row, also those far from any obstacle */
+} uz_scene;
+void uz_scene_clear(uz_scene *scene);
+/* Dimensions of the bodies that its model is for: 2 or 3. */
+int uz_scene_dim(const uz_scene *scene);
+
+/* Where a scene's unknowns live. */
+typedef struct {
+    int dim;
+    int64_t n_nodes, n_elements;
+    double *xyz;           /* n_nodes x dim, row by row */
+    int64_t *contact_node; /* m: the node of each contact row */
+    double *contact_area;  /* m: tributary area of each contact node (length x thickness in 2D; of a ring all around) */
+    double *contact_normal; /* m x dim: unit normal of the obstacle at the contact, pointing towards the body */
+    int64_t *contact_of;    /* m: which contact of the scene */
+    int64_t *contact_face;  /* m x 2: element and side that the node meets of another part of the body, else -1, -1 */
+    int64_t n_turned;       /* uz_scene_to_qp only: nodes whose dofs are not along the axes */
+    int64_t *turned_node;   /* n_turned */
+    double *frame;          /* n_turned x dim x dim: row c of a node's matrix is the direction of its dof c */
+} uz_mesh_info;
+void uz_mesh_info_clear(uz_mesh_info *info);
+
+/* Mesh, assembly, boundary conditions: the scene as matrices. Their dofs are the free ones, node by node, along x, y,
+ * z; at a node with a support along an inclined normal along that normal and tangents (info->frame), and so at one
+ * whose first contact has an oblique normal: an obstacle's row of N then has one entry. Errors: UZ_ERR_SCENE,
+ * _FREE_BODY (message names the modes), _NOT_FINITE, with `where` a JSON pointer into the problem. Nothing is factored.
+ */
+uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err);
+/* The same refusals without the stiffness matrix: milliseconds where the assembly takes seconds. A box whose cells are
+ * chosen here is checked on the first grid that would be tried; the other functions of a scene refuse it. */
+uz_status uz_scene_check(const uz_scene *scene, uz_error *err);
+/* What an answer's vectors measure, without the stiffness matrix: directions, nodes and contact rows m. */
+uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene *scene, uz_error *err);
+
+#endif

@@ -1,0 +1,253 @@
+/* gmsh.c: a whole Gmsh file, and the mesh that it is. */
+#include "io/gmsh.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- the file */
+
+static uz_status check_version(gmsh_file *file, double version, int64_t binary, int64_t size)
+{
+    const gmsh_text *text = &file->text;
+    if (version != 2.2 && version != 4.1)
+        return gmsh_fail(text, UZ_ERR_UNSUPPORTED,
+                         "version %g of the format is not read; save as version 2.2 or 4.1 (Mesh.MshFileVersion)",
+                         version);
+    if (binary != 0 && binary != 1)
+        return gmsh_fail(text, UZ_ERR_FORMAT, "the file type is %lld; it is 0 (ASCII) or 1 (binary)",
+                         (long long)binary);
+    if (size != 8)
+        return gmsh_fail(text, UZ_ERR_UNSUPPORTED, "numbers of %lld bytes are not read; only those of 8",
+                         (long long)size);
+    file->version = version == 2.2 ? 22 : 41;
+    return UZ_OK;
+}
+
+/* version file-type data-size, in a binary file followed by the integer 1 in the byte order of the file. */
+static uz_status read_header(gmsh_file *file)
+{
+    gmsh_text *text = &file->text;
+    char name[GMSH_NAME];
+    double version = 0;
+    int64_t binary = 0, size = 0, one = 1;
+    uz_status status = gmsh_section(text, name);
+    if (status == UZ_OK && strcmp(name, "MeshFormat") != 0)
+        status = gmsh_fail(text, UZ_ERR_FORMAT, "a Gmsh file begins with $MeshFormat%s",
+                           strcmp(name, "NOD") == 0 ? "; this is version 1, save as version 4.1" : "");
+    if (status == UZ_OK)
+        status = gmsh_real_text(text, &version);
+    if (status == UZ_OK)
+        status = gmsh_int_text(text, &binary, "the file type");
+    if (status == UZ_OK)
+        status = gmsh_int_text(text, &size, "the data size");
+    if (status == UZ_OK)
+        status = check_version(file, version, binary, size);
+    if (status == UZ_OK)
+        status = gmsh_end_line(text);
+    if (status != UZ_OK)
+        return status;
+    text->binary = binary == 1;
+    if (text->binary)
+        status = gmsh_int(text, &one, "the number 1");
+    if (status == UZ_OK && one != 1)
+        return gmsh_fail(text, UZ_ERR_UNSUPPORTED, "the bytes of numbers are in the other order; save as ASCII");
+    return status == UZ_OK ? gmsh_section_end(text, "MeshFormat") : status;
+}
+
+static uz_status read_section(gmsh_file *file, const char *name)
+{
+    uz_status status;
+    if (strcmp(name, "PhysicalNames") == 0)
+        status = gmsh_read_names(file);
+    else if (strcmp(name, "Nodes") == 0)
+        status = gmsh_read_nodes(file);
+    else if (strcmp(name, "Elements") == 0)
+        status = gmsh_read_elements(file);
+    else if (file->version == 41 && strcmp(name, "Entities") == 0)
+        status = gmsh_read_entities(file, false);
+    else if (file->version == 41 && strcmp(name, "PartitionedEntities") == 0)
+        status = gmsh_read_entities(file, true);
+    else
+        return gmsh_skip_section(&file->text, name);
+    return status == UZ_OK ? gmsh_section_end(&file->text, name) : status;
+}
+
+static uz_status read_file(gmsh_file *file)
+{
+    char name[GMSH_NAME];
+    uz_status status = read_header(file);
+    while (status == UZ_OK) {
+        status = gmsh_section(&file->text, name);
+        if (status != UZ_OK || !name[0])
+            break;
+        status = read_section(file, name);
+    }
+    if (status == UZ_OK && !file->tag)
+        status = gmsh_fail(&file->text, UZ_ERR_FORMAT, "the file has no $Nodes");
+    if (status == UZ_OK && file->n_elements == 0)
+        status = gmsh_fail(&file->text, UZ_ERR_FORMAT, "the file has no elements; mesh it in Gmsh before saving it");
+    return status;
+}
+
+static void clear_file(gmsh_file *file)
+{
+    free(file->xyz);
+    free(file->tag);
+    free(file->by_tag);
+    free(file->type);
+    free(file->part_tag);
+    free(file->first);
+    free(file->node);
+    free(file->parts);
+    free(file->physical);
+    free(file->names);
+}
+
+/* ---- the body */
+
+static int highest_dim(const gmsh_file *file)
+{
+    int highest = 0;
+    for (int64_t e = 0; e < file->n_elements; e++) {
+        const int dim = gmsh_type_of(file->type[e]).dim;
+        highest = dim > highest ? dim : highest;
+    }
+    return highest;
+}
+
+/* Do all surfaces lie in one plane z = constant, but for rounding? */
+static bool is_flat(const gmsh_file *file)
+{
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int64_t e = 0; e < file->n_elements; e++)
+        for (int64_t q = file->first[e]; q < file->first[e + 1] && gmsh_type_of(file->type[e]).dim == 2; q++)
+            for (int c = 0; c < 3; c++) {
+                low[c] = fmin(low[c], file->xyz[3 * file->node[q] + c]);
+                high[c] = fmax(high[c], file->xyz[3 * file->node[q] + c]);
+            }
+    return high[2] - low[2] <= 1e-9 * hypot(high[0] - low[0], high[1] - low[1]);
+}
+
+static uz_status choose_dim(int *dim, const gmsh_file *file)
+{
+    *dim = highest_dim(file);
+    if (*dim < 2)
+        return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
+                            "there are only %s; mesh the surface of a plane body, or the volume of a solid",
+                            *dim == 1 ? "lines" : "points");
+    if (*dim == 2 && !is_flat(file))
+        return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
+                            "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
+                            "modelled: mesh the volume (and save it: as a physical volume, or with Mesh.SaveAll), or "
+                            "turn a plane body into the plane of x and y");
+    return UZ_OK;
+}
+
+/* Version 2.2 repeats an element for each of its physical groups. */
+static bool repeats_last(const gmsh_file *file, int64_t last, int64_t e)
+{
+    const int64_t count = file->first[e + 1] - file->first[e];
+    return file->version == 22 && last >= 0 && file->type[last] == file->type[e] &&
+           memcmp(file->node + file->first[last], file->node + file->first[e], (size_t)count * sizeof(int64_t)) == 0;
+}
+
+/* The numbers of the elements of the body; counts them and their nodes. */
+static void number_elements(int64_t *new_element, uz_given_mesh *out, const gmsh_file *file, int dim, int64_t *places)
+{
+    int64_t last = -1;
+    *places = 0;
+    for (int64_t e = 0; e < file->n_elements; e++) {
+        new_element[e] = -1;
+        if (gmsh_type_of(file->type[e]).dim != dim)
+            continue;
+        if (repeats_last(file, last, e)) {
+            new_element[e] = out->n_elements - 1;
+            continue;
+        }
+        new_element[e] = out->n_elements++;
+        *places += file->first[e + 1] - file->first[e];
+        last = e;
+    }
+}
+
+/* Gmsh's order of nodes is VTK's but for the last two of the quadratic tetrahedron. */
+static void copy_element(int64_t *to, const gmsh_file *file, int64_t e)
+{
+    const int64_t count = file->first[e + 1] - file->first[e];
+    memcpy(to, file->node + file->first[e], (size_t)count * sizeof *to);
+    if (gmsh_type_of(file->type[e]).kind == UZ_TET10) {
+        to[8] = file->node[file->first[e] + 9];
+        to[9] = file->node[file->first[e] + 8];
+    }
+}
+
+static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const int64_t *new_element, int64_t places)
+{
+    int64_t at = 0;
+    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
+    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
+    out->node = uz_alloc(places, sizeof *out->node);
+    if (!out->kind || !out->first || !out->node)
+        return gmsh_no_memory(file);
+    out->first[0] = 0;
+    for (int64_t e = 0, done = 0; e < file->n_elements; e++) {
+        if (new_element[e] < done)
+            continue; /* no element of the body, or repeated */
+        copy_element(out->node + at, file, e);
+        at += file->first[e + 1] - file->first[e];
+        out->kind[done++] = (unsigned char)gmsh_type_of(file->type[e]).kind;
+        out->first[done] = at;
+    }
+    return UZ_OK;
+}
+
+static uz_status fill_nodes(uz_given_mesh *out, const gmsh_file *file, int dim)
+{
+    out->dim = dim;
+    out->n_nodes = file->n_nodes;
+    out->from_file = true;
+    out->xyz = uz_alloc(file->n_nodes * dim, sizeof *out->xyz);
+    if (!out->xyz)
+        return gmsh_no_memory(file);
+    for (int64_t i = 0; i < file->n_nodes; i++)
+        memcpy(out->xyz + i * dim, file->xyz + 3 * i, (size_t)dim * sizeof(double));
+    return UZ_OK;
+}
+
+uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file)
+{
+    int dim = 0;
+    int64_t places = 0, *new_element = NULL;
+    uz_status status = choose_dim(&dim, file);
+    if (status != UZ_OK)
+        return status;
+    new_element = uz_alloc(file->n_elements, sizeof *new_element);
+    if (!new_element)
+        return gmsh_no_memory(file);
+    number_elements(new_element, out, file, dim, &places);
+    status = fill_nodes(out, file, dim);
+    if (status == UZ_OK)
+        status = fill_elements(out, file, new_element, places);
+    if (status == UZ_OK)
+        status = gmsh_make_groups(out, file, dim, new_element);
+    free(new_element);
+    return status;
+}
+
+uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err)
+{
+    gmsh_file file = {.text = {text, text, text + len, 1, false, err}, .max_bytes = max_bytes};
+    uz_error_reset(err);
+    memset(out, 0, sizeof *out);
+    uz_status status = read_file(&file);
+    if (status == UZ_OK)
+        status = gmsh_to_given(out, &file);
+    if (status != UZ_OK)
+        uz_given_mesh_clear(out);
+    clear_file(&file);
+    return status;
+}

@@ -1,0 +1,272 @@
+/* gmsh_groups.c: physical groups of a Gmsh file as groups of a mesh.
+ *
+ * A physical group of the body's dimension is one of elements, of one dimension less one of faces, of still less one of
+ * nodes. Its name is the file's; without one "physical_7", or "physical_7_dim1" for those of lower dimension where
+ * several dimensions have a nameless 7. */
+#include "io/gmsh.h"
+
+#include "core/alloc.h"
+#include "scene/given.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A physical group, and how much of the mesh it has. */
+typedef struct {
+    int dim;
+    int64_t tag;
+    int64_t items, nodes; /* elements or faces, and the nodes of faces */
+} physical_group;
+
+typedef struct {
+    gmsh_file *file;
+    uz_given_mesh *out;
+    const int64_t *new_element;
+    int dim;
+    physical_group *group; /* sorted by dimension and tag */
+    int64_t n_groups;
+} grouping;
+
+static uz_status fail_groups(const gmsh_file *file, const char *what)
+{
+    return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED, "%s", what);
+}
+
+static int compare_keys(int dim, int64_t tag, int other_dim, int64_t other_tag)
+{
+    if (dim != other_dim)
+        return dim < other_dim ? -1 : 1;
+    return (tag > other_tag) - (tag < other_tag);
+}
+
+static int compare_groups(const void *a, const void *b)
+{
+    const physical_group *x = a, *y = b;
+    return compare_keys(x->dim, x->tag, y->dim, y->tag);
+}
+
+static int compare_parts(const void *a, const void *b)
+{
+    const gmsh_part *x = a, *y = b;
+    return compare_keys(x->dim, x->tag, y->dim, y->tag);
+}
+
+/* ---- parts */
+
+static int64_t unique_parts(gmsh_part *part, int64_t count)
+{
+    int64_t kept = 0;
+    if (count > 1)
+        qsort(part, (size_t)count, sizeof *part, compare_parts);
+    for (int64_t i = 0; i < count; i++)
+        if (i == 0 || compare_parts(&part[i], &part[kept - 1]) != 0)
+            part[kept++] = part[i];
+    return kept;
+}
+
+/* In version 2.2 elements name their physical group themselves: each is a part of one group. */
+static uz_status parts_of_tags(gmsh_file *file)
+{
+    for (int64_t e = 0; e < file->n_elements; e++) {
+        const gmsh_part part = {.dim = gmsh_type_of(file->type[e]).dim, .tag = file->part_tag[e]};
+        if (part.tag == 0 || (file->n_parts > 0 && compare_parts(&part, &file->parts[file->n_parts - 1]) == 0))
+            continue;
+        if (!gmsh_grow((void **)&file->parts, file->n_parts, &file->part_room, sizeof *file->parts))
+            return gmsh_no_memory(file);
+        file->parts[file->n_parts++] = part;
+    }
+    file->n_parts = unique_parts(file->parts, file->n_parts);
+    free(file->physical);
+    file->physical = uz_alloc(file->n_parts, sizeof *file->physical);
+    if (!file->physical)
+        return gmsh_no_memory(file);
+    for (int64_t i = 0; i < file->n_parts; i++) {
+        file->physical[i] = file->parts[i].tag;
+        file->parts[i].first = i;
+        file->parts[i].count = 1;
+    }
+    return UZ_OK;
+}
+
+/* The part that an element belongs to, NULL: none. *last is where the one before was. */
+static gmsh_part *part_of(const gmsh_file *file, int64_t e, gmsh_part **last)
+{
+    const gmsh_part key = {.dim = gmsh_type_of(file->type[e]).dim, .tag = file->part_tag[e]};
+    if (*last && compare_parts(&key, *last) == 0)
+        return *last;
+    if (file->n_parts == 0)
+        return NULL;
+    gmsh_part *found = bsearch(&key, file->parts, (size_t)file->n_parts, sizeof key, compare_parts);
+    *last = found ? found : *last;
+    return found;
+}
+
+/* ---- groups */
+
+/* All groups of parts that elements belong to. */
+static uz_status list_groups(grouping *g)
+{
+    gmsh_file *file = g->file;
+    gmsh_part *last = NULL;
+    int64_t room = 0, kept = 0;
+    for (int64_t e = 0; e < file->n_elements; e++) {
+        gmsh_part *part = part_of(file, e, &last);
+        if (part)
+            part->used = true;
+    }
+    for (int64_t i = 0; i < file->n_parts; i++)
+        for (int64_t k = 0; file->parts[i].used && k < file->parts[i].count; k++) {
+            if (!gmsh_grow((void **)&g->group, g->n_groups, &room, sizeof *g->group))
+                return gmsh_no_memory(file);
+            g->group[g->n_groups++] =
+                (physical_group){file->parts[i].dim, file->physical[file->parts[i].first + k], 0, 0};
+        }
+    if (g->n_groups > 1)
+        qsort(g->group, (size_t)g->n_groups, sizeof *g->group, compare_groups);
+    for (int64_t i = 0; i < g->n_groups; i++)
+        if (i == 0 || compare_groups(&g->group[i], &g->group[kept - 1]) != 0)
+            g->group[kept++] = g->group[i];
+    g->n_groups = kept;
+    return kept > UZ_MESH_MAX_GROUPS ? fail_groups(file, "there are more than 4096 physical groups") : UZ_OK;
+}
+
+/* Which group the k-th physical tag of a part is. */
+static int64_t group_of(const grouping *g, const gmsh_part *part, int64_t k)
+{
+    const physical_group key = {part->dim, g->file->physical[part->first + k], 0, 0};
+    const physical_group *found = bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups);
+    return found - g->group;
+}
+
+/* One element as a member of its group: counts it, or puts it into its place. */
+static void count_member(physical_group *group, int64_t nodes)
+{
+    group->items++;
+    group->nodes += nodes;
+}
+
+static void add_member(uz_given_group *to, const grouping *g, int64_t e)
+{
+    const gmsh_file *file = g->file;
+    const int dim = gmsh_type_of(file->type[e]).dim;
+    if (dim == g->dim) {
+        to->element[to->n_elements++] = g->new_element[e];
+        return;
+    }
+    for (int64_t q = file->first[e]; q < file->first[e + 1]; q++)
+        if (dim == g->dim - 1)
+            to->face_node[to->face_first[to->n_faces] + (q - file->first[e])] = file->node[q];
+        else
+            to->node[to->n_nodes++] = file->node[q];
+    if (dim == g->dim - 1) {
+        to->n_faces++;
+        to->face_first[to->n_faces] = to->face_first[to->n_faces - 1] + file->first[e + 1] - file->first[e];
+    }
+}
+
+static void walk_members(grouping *g, bool add)
+{
+    gmsh_part *last = NULL;
+    for (int64_t e = 0; e < g->file->n_elements; e++) {
+        const gmsh_part *part = part_of(g->file, e, &last);
+        for (int64_t k = 0; part && k < part->count; k++) {
+            const int64_t i = group_of(g, part, k);
+            if (add)
+                add_member(&g->out->groups[i], g, e);
+            else
+                count_member(&g->group[i], g->file->first[e + 1] - g->file->first[e]);
+        }
+    }
+}
+
+/* ---- names */
+
+/* Names by dimension and tag, for many groups. */
+static int compare_names(const void *a, const void *b)
+{
+    const gmsh_name *x = a, *y = b;
+    return compare_keys(x->dim, x->tag, y->dim, y->tag);
+}
+
+static const gmsh_name *find_name(const gmsh_file *file, int dim, int64_t tag)
+{
+    const gmsh_name key = {dim, tag, ""};
+    if (file->n_names == 0)
+        return NULL;
+    return bsearch(&key, file->names, (size_t)file->n_names, sizeof key, compare_names);
+}
+
+/* Has a nameless group of higher dimension the same tag? */
+static bool shares_tag(const grouping *g, int64_t i)
+{
+    for (int dim = g->group[i].dim + 1; dim <= 3; dim++) {
+        const physical_group key = {dim, g->group[i].tag, 0, 0};
+        if (!find_name(g->file, dim, key.tag) &&
+            bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups))
+            return true;
+    }
+    return false;
+}
+
+static void name_group(char out[64], const grouping *g, int64_t i)
+{
+    const physical_group *group = &g->group[i];
+    const gmsh_name *found = find_name(g->file, group->dim, group->tag);
+    if (found)
+        memcpy(out, found->name, sizeof found->name);
+    else if (shares_tag(g, i))
+        snprintf(out, 64, "physical_%lld_dim%d", (long long)group->tag, group->dim);
+    else
+        snprintf(out, 64, "physical_%lld", (long long)group->tag);
+}
+
+static uz_status make_group(const grouping *g, int64_t i)
+{
+    const physical_group *from = &g->group[i];
+    uz_given_group *to = &g->out->groups[i];
+    bool good;
+    name_group(to->name, g, i);
+    if (from->dim == g->dim) {
+        good = (to->element = uz_alloc(from->items, sizeof *to->element)) != NULL;
+    } else if (from->dim == g->dim - 1) {
+        to->face_first = uz_alloc(from->items + 1, sizeof *to->face_first);
+        to->face_node = uz_alloc(from->nodes, sizeof *to->face_node);
+        good = to->face_first && to->face_node;
+        if (good)
+            to->face_first[0] = 0;
+    } else {
+        good = (to->node = uz_alloc(from->nodes, sizeof *to->node)) != NULL;
+    }
+    return good ? UZ_OK : gmsh_no_memory(g->file);
+}
+
+static uz_status fill_groups(grouping *g)
+{
+    uz_given_mesh *out = g->out;
+    uz_status status = list_groups(g);
+    if (status != UZ_OK)
+        return status;
+    out->groups = uz_alloc_zero(g->n_groups, sizeof *out->groups);
+    if (!out->groups)
+        return gmsh_no_memory(g->file);
+    out->n_groups = g->n_groups;
+    walk_members(g, false);
+    if (g->file->n_names > 1)
+        qsort(g->file->names, (size_t)g->file->n_names, sizeof *g->file->names, compare_names);
+    for (int64_t i = 0; i < g->n_groups && status == UZ_OK; i++)
+        status = make_group(g, i);
+    if (status == UZ_OK)
+        walk_members(g, true);
+    return status;
+}
+
+uz_status gmsh_make_groups(uz_given_mesh *out, gmsh_file *file, int dim, const int64_t *new_element)
+{
+    grouping g = {.file = file, .out = out, .new_element = new_element, .dim = dim};
+    uz_status status = file->version == 22 ? parts_of_tags(file) : UZ_OK;
+    if (status == UZ_OK)
+        status = fill_groups(&g);
+    free(g.group);
+    return status;
+}

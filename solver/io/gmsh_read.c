@@ -1,0 +1,365 @@
+/* gmsh_read.c: the sections of a Gmsh file. */
+#include "io/gmsh.h"
+
+#include "core/alloc.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+bool gmsh_grow(void **list, int64_t count, int64_t *room, size_t size)
+{
+    if (count < *room)
+        return true;
+    const int64_t wanted = 2 * *room + 64;
+    void *grown = uz_realloc(*list, wanted, size);
+    if (!grown)
+        return false;
+    *list = grown;
+    *room = wanted;
+    return true;
+}
+
+uz_status gmsh_no_memory(const gmsh_file *file)
+{
+    return gmsh_fail(&file->text, UZ_ERR_MEMORY, "no memory for the mesh");
+}
+
+static uz_status check_limit(const gmsh_file *file, int64_t count, size_t each)
+{
+    if (file->max_bytes == 0 || (uint64_t)count <= file->max_bytes / each)
+        return UZ_OK;
+    return gmsh_fail(&file->text, UZ_ERR_LIMIT, "the mesh needs more memory than is allowed");
+}
+
+/* ---- names of physical groups: text also in binary files */
+
+uz_status gmsh_read_names(gmsh_file *file)
+{
+    int64_t count = 0, dim = 0;
+    uz_status status = gmsh_int_text(&file->text, &count, "the number of physical names");
+    if (status == UZ_OK && file->names)
+        status = gmsh_fail(&file->text, UZ_ERR_FORMAT, "a second $PhysicalNames");
+    if (status == UZ_OK)
+        status = gmsh_count(&file->text, count, 7, "physical names"); /* 0 1 "a" */
+    if (status != UZ_OK)
+        return status;
+    file->names = uz_alloc_zero(count, sizeof *file->names);
+    if (!file->names)
+        return gmsh_no_memory(file);
+    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
+        gmsh_name *name = &file->names[i];
+        status = gmsh_int_text(&file->text, &dim, "the dimension of a physical group");
+        if (status == UZ_OK && (dim < 0 || dim > 3))
+            status = gmsh_fail(&file->text, UZ_ERR_FORMAT, "a physical group has no dimension %lld", (long long)dim);
+        name->dim = (int)dim;
+        if (status == UZ_OK)
+            status = gmsh_int_text(&file->text, &name->tag, "the number of a physical group");
+        if (status == UZ_OK)
+            status = gmsh_quoted(&file->text, name->name);
+    }
+    file->n_names = status == UZ_OK ? count : 0;
+    return status;
+}
+
+/* ---- entities (4.1) */
+
+/* Skips so many numbers: real, or whole. */
+static uz_status skip_reals(gmsh_text *text, int count)
+{
+    double value;
+    uz_status status = UZ_OK;
+    for (int i = 0; i < count && status == UZ_OK; i++)
+        status = gmsh_real(text, &value);
+    return status;
+}
+
+static uz_status skip_ints(gmsh_text *text, int64_t count)
+{
+    int64_t value;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < count && status == UZ_OK; i++)
+        status = gmsh_int(text, &value, "a number");
+    return status;
+}
+
+static size_t int_bytes(const gmsh_text *text)
+{
+    return text->binary ? 4 : 2;
+}
+
+/* The physical tags of an entity. A negative one asks for the opposite sense, which groups have not. */
+static uz_status read_physicals(gmsh_file *file, gmsh_part *part)
+{
+    gmsh_text *text = &file->text;
+    int64_t count = 0, tag = 0;
+    uz_status status = gmsh_size(text, &count, "the number of physical groups of an entity");
+    if (status == UZ_OK)
+        status = gmsh_count(text, count, int_bytes(text), "physical groups");
+    part->first = file->n_physical;
+    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
+        status = gmsh_int(text, &tag, "the number of a physical group");
+        if (status != UZ_OK)
+            break;
+        if (!gmsh_grow((void **)&file->physical, file->n_physical, &file->physical_room, sizeof *file->physical))
+            return gmsh_no_memory(file);
+        file->physical[file->n_physical++] = tag < 0 ? -tag : tag;
+        part->count++;
+    }
+    return status;
+}
+
+/* parentDim parentTag numPartitions partitionTag... */
+static uz_status skip_partition(gmsh_text *text)
+{
+    int64_t count = 0;
+    uz_status status = skip_ints(text, 2);
+    if (status == UZ_OK)
+        status = gmsh_size(text, &count, "the number of partitions of an entity");
+    return status == UZ_OK ? skip_ints(text, count) : status;
+}
+
+/* tag [partition] box (a point for points) physical groups [bounding entities] */
+static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
+{
+    gmsh_text *text = &file->text;
+    gmsh_part part = {.dim = dim};
+    int64_t count = 0;
+    uz_status status = gmsh_int(text, &part.tag, "the number of an entity");
+    if (status == UZ_OK && partitioned)
+        status = skip_partition(text);
+    if (status == UZ_OK)
+        status = skip_reals(text, dim == 0 ? 3 : 6);
+    if (status == UZ_OK)
+        status = read_physicals(file, &part);
+    if (status == UZ_OK && dim > 0)
+        status = gmsh_size(text, &count, "the number of bounding entities");
+    if (status == UZ_OK)
+        status = skip_ints(text, count);
+    if (status != UZ_OK)
+        return status;
+    if (!gmsh_grow((void **)&file->parts, file->n_parts, &file->part_room, sizeof *file->parts))
+        return gmsh_no_memory(file);
+    file->parts[file->n_parts++] = part;
+    return UZ_OK;
+}
+
+/* numPartitions numGhosts (tag partition)... */
+static uz_status skip_ghosts(gmsh_text *text)
+{
+    int64_t partitions = 0, ghosts = 0;
+    uz_status status = gmsh_size(text, &partitions, "the number of partitions");
+    if (status == UZ_OK)
+        status = gmsh_size(text, &ghosts, "the number of ghost entities");
+    if (status == UZ_OK)
+        status = gmsh_count(text, ghosts, 2 * int_bytes(text), "ghost entities");
+    return status == UZ_OK ? skip_ints(text, 2 * ghosts) : status;
+}
+
+static int compare_parts(const void *a, const void *b)
+{
+    const gmsh_part *x = a, *y = b;
+    if (x->dim != y->dim)
+        return x->dim < y->dim ? -1 : 1;
+    return (x->tag > y->tag) - (x->tag < y->tag);
+}
+
+/* Elements of a partitioned mesh name partitioned entities, which have the physical groups of their parents. */
+uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
+{
+    int64_t count[4] = {0};
+    uz_status status = UZ_OK;
+    if (file->n_elements > 0 || (!partitioned && file->entities_read))
+        return gmsh_fail(&file->text, UZ_ERR_FORMAT, "entities a second time, or after $Elements");
+    if (partitioned)
+        status = skip_ghosts(&file->text);
+    for (int dim = 0; dim < 4 && status == UZ_OK; dim++)
+        status = gmsh_size(&file->text, &count[dim], "a number of entities");
+    if (partitioned)
+        file->n_parts = file->n_physical = 0; /* numbered anew, instead of the others */
+    for (int dim = 0; dim < 4 && status == UZ_OK; dim++) {
+        status = gmsh_count(&file->text, count[dim], file->text.binary ? 36 : 8, "entities");
+        for (int64_t i = 0; i < count[dim] && status == UZ_OK; i++)
+            status = read_entity(file, dim, partitioned);
+    }
+    if (status == UZ_OK && file->n_parts > 1)
+        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, compare_parts);
+    file->entities_read = true;
+    return status;
+}
+
+/* ---- nodes */
+
+static uz_status make_nodes(gmsh_file *file, int64_t count)
+{
+    const size_t least = file->text.binary ? 28 : 7; /* 1 0 0 0 */
+    if (file->tag)
+        return gmsh_fail(&file->text, UZ_ERR_FORMAT, "a second $Nodes");
+    uz_status status = gmsh_count(&file->text, count, least, "nodes");
+    if (status == UZ_OK)
+        status = check_limit(file, count, 8 * sizeof(double));
+    if (status != UZ_OK)
+        return status;
+    file->xyz = uz_alloc(3 * count, sizeof *file->xyz);
+    file->tag = uz_alloc(count, sizeof *file->tag);
+    if (!file->xyz || !file->tag)
+        return gmsh_no_memory(file);
+    return UZ_OK;
+}
+
+static uz_status read_point(gmsh_text *text, double *xyz)
+{
+    uz_status status = UZ_OK;
+    for (int c = 0; c < 3 && status == UZ_OK; c++)
+        status = gmsh_real(text, &xyz[c]);
+    return status;
+}
+
+static uz_status read_nodes_2(gmsh_file *file)
+{
+    gmsh_text *text = &file->text;
+    int64_t count = 0;
+    uz_status status = gmsh_int_text(text, &count, "the number of nodes");
+    if (status == UZ_OK)
+        status = gmsh_end_line(text);
+    if (status == UZ_OK)
+        status = make_nodes(file, count);
+    for (; file->n_nodes < count && status == UZ_OK; file->n_nodes += status == UZ_OK) {
+        status = gmsh_int(text, &file->tag[file->n_nodes], "the number of a node");
+        if (status == UZ_OK)
+            status = read_point(text, file->xyz + 3 * file->n_nodes);
+    }
+    return status;
+}
+
+/* entityDim entityTag parametric numNodes, the tags of all, the coordinates of all. */
+static uz_status read_node_block(gmsh_file *file, int64_t count)
+{
+    gmsh_text *text = &file->text;
+    int64_t head[3] = {0}, n = 0;
+    uz_status status = UZ_OK;
+    for (int i = 0; i < 3 && status == UZ_OK; i++)
+        status = gmsh_int(text, &head[i], "the head of a block of nodes");
+    if (status == UZ_OK)
+        status = gmsh_size(text, &n, "the number of nodes of a block");
+    if (status == UZ_OK && (n > count - file->n_nodes || head[0] < 0 || head[0] > 3))
+        status = gmsh_fail(text, UZ_ERR_FORMAT,
+                           n > count - file->n_nodes ? "more nodes than are announced"
+                                                     : "a block of nodes has no such dimension");
+    for (int64_t i = 0; i < n && status == UZ_OK; i++)
+        status = gmsh_size(text, &file->tag[file->n_nodes + i], "the number of a node");
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        status = read_point(text, file->xyz + 3 * (file->n_nodes + i));
+        if (status == UZ_OK && head[2])
+            status = skip_reals(text, (int)head[0]);
+    }
+    file->n_nodes += status == UZ_OK ? n : 0;
+    return status;
+}
+
+static uz_status read_nodes_4(gmsh_file *file)
+{
+    gmsh_text *text = &file->text;
+    int64_t blocks = 0, count = 0, ends = 0;
+    uz_status status = gmsh_size(text, &blocks, "the number of blocks of nodes");
+    if (status == UZ_OK)
+        status = gmsh_size(text, &count, "the number of nodes");
+    for (int i = 0; i < 2 && status == UZ_OK; i++)
+        status = gmsh_size(text, &ends, "the number of a node");
+    if (status == UZ_OK)
+        status = make_nodes(file, count);
+    for (int64_t b = 0; b < blocks && status == UZ_OK; b++)
+        status = read_node_block(file, count);
+    if (status == UZ_OK && file->n_nodes < count)
+        status = gmsh_fail(text, UZ_ERR_FORMAT, "%lld nodes are announced, but there are %lld", (long long)count,
+                           (long long)file->n_nodes);
+    return status;
+}
+
+typedef struct {
+    int64_t tag, index;
+} tagged_node;
+
+static int compare_tagged(const void *a, const void *b)
+{
+    const tagged_node *x = a, *y = b;
+    return (x->tag > y->tag) - (x->tag < y->tag);
+}
+
+static uz_status twice(const gmsh_file *file, int64_t tag)
+{
+    return gmsh_fail(&file->text, UZ_ERR_FORMAT, "$Nodes has two nodes with the number %lld", (long long)tag);
+}
+
+/* Tags with few gaps: a table over their range. */
+static uz_status list_dense(gmsh_file *file, int64_t range)
+{
+    file->by_tag = uz_alloc(range, sizeof *file->by_tag);
+    if (!file->by_tag)
+        return gmsh_no_memory(file);
+    file->dense = true;
+    file->n_by_tag = range;
+    memset(file->by_tag, 0xff, (size_t)range * sizeof *file->by_tag);
+    for (int64_t i = 0; i < file->n_nodes; i++) {
+        int64_t *at = &file->by_tag[file->tag[i] - file->low_tag];
+        if (*at >= 0)
+            return twice(file, file->tag[i]);
+        *at = i;
+    }
+    return UZ_OK;
+}
+
+/* Other tags: the nodes in the order of their tags. */
+static uz_status list_sorted(gmsh_file *file)
+{
+    tagged_node *node = uz_alloc(file->n_nodes, sizeof *node);
+    file->by_tag = uz_alloc(file->n_nodes, sizeof *file->by_tag);
+    uz_status status = node && file->by_tag ? UZ_OK : gmsh_no_memory(file);
+    for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++)
+        node[i] = (tagged_node){file->tag[i], i};
+    if (status == UZ_OK)
+        qsort(node, (size_t)file->n_nodes, sizeof *node, compare_tagged);
+    for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++) {
+        file->by_tag[i] = node[i].index;
+        if (i > 0 && node[i].tag == node[i - 1].tag)
+            status = twice(file, node[i].tag);
+    }
+    free(node);
+    return status;
+}
+
+static uz_status list_tags(gmsh_file *file)
+{
+    int64_t low = INT64_MAX, high = -1;
+    for (int64_t i = 0; i < file->n_nodes; i++) {
+        if (file->tag[i] < 0)
+            return gmsh_fail(&file->text, UZ_ERR_FORMAT, "$Nodes has a node with the number %lld",
+                             (long long)file->tag[i]);
+        low = file->tag[i] < low ? file->tag[i] : low;
+        high = file->tag[i] > high ? file->tag[i] : high;
+    }
+    file->low_tag = file->n_nodes > 0 ? low : 0;
+    if (file->n_nodes == 0 || high - low < 2 * file->n_nodes + 1024)
+        return list_dense(file, file->n_nodes > 0 ? high - low + 1 : 0);
+    return list_sorted(file);
+}
+
+uz_status gmsh_read_nodes(gmsh_file *file)
+{
+    uz_status status = file->version == 22 ? read_nodes_2(file) : read_nodes_4(file);
+    return status == UZ_OK ? list_tags(file) : status;
+}
+
+int64_t gmsh_find_node(const gmsh_file *file, int64_t tag)
+{
+    if (file->dense)
+        return tag >= file->low_tag && tag - file->low_tag < file->n_by_tag ? file->by_tag[tag - file->low_tag] : -1;
+    int64_t low = 0, high = file->by_tag ? file->n_nodes : 0;
+    while (low < high) {
+        const int64_t middle = low + (high - low) / 2;
+        if (file->tag[file->by_tag[middle]] < tag)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    return file->by_tag && low < file->n_nodes && file->tag[file->by_tag[low]] == tag ? file->by_tag[low] : -1;
+}

@@ -1,0 +1,268 @@
+/* gmsh_text.c: words, bytes and sections of a Gmsh file. */
+#include "io/gmsh.h"
+
+#include "core/error.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* ---- failures */
+
+static uz_status fail_there(const gmsh_text *text, const gmsh_text *place, uz_status status, const char *format,
+                            va_list args)
+{
+    char message[400];
+    vsnprintf(message, sizeof message, format, args);
+    if (place->binary)
+        return uz_fail(text->err, status, "", "at byte %lld of the file: %s", (long long)(place->at - place->begin),
+                       message);
+    return uz_fail_line(text->err, status, place->line, "%s", message);
+}
+
+uz_status gmsh_fail(const gmsh_text *text, uz_status status, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    status = fail_there(text, text, status, format, args);
+    va_end(args);
+    return status;
+}
+
+uz_status gmsh_fail_at(const gmsh_text *text, const gmsh_text *place, uz_status status, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    status = fail_there(text, place, status, format, args);
+    va_end(args);
+    return status;
+}
+
+/* ---- words */
+
+static bool is_space(char c)
+{
+    return c == ' ' || c == '\t' || c == '\n' || c == '\r';
+}
+
+static void skip_space(gmsh_text *text)
+{
+    for (; text->at < text->end && is_space(*text->at); text->at++)
+        text->line += *text->at == '\n';
+}
+
+enum { SHOWN = 24 };
+
+/* "expected a node number, found "abc"". */
+static uz_status fail_word(gmsh_text *text, const char *what)
+{
+    char word[SHOWN + 1];
+    size_t used = 0;
+    for (const char *at = text->at; at < text->end && !is_space(*at) && used < SHOWN; at++)
+        word[used++] = *at >= ' ' && *at <= '~' ? *at : '?';
+    word[used] = '\0';
+    if (used == 0)
+        return gmsh_fail(text, UZ_ERR_FORMAT, "%s was expected, but the file ends", what);
+    return gmsh_fail(text, UZ_ERR_FORMAT, "%s was expected, found \"%s\"", what, word);
+}
+
+static bool word_ends(const char *at, const gmsh_text *text)
+{
+    return at == text->end || is_space(*at);
+}
+
+uz_status gmsh_int_text(gmsh_text *text, int64_t *value, const char *what)
+{
+    skip_space(text);
+    const char *at = text->at + (text->at < text->end && *text->at == '-'), *digits = at;
+    int64_t number = 0;
+    bool fits = true;
+    for (; at < text->end && *at >= '0' && *at <= '9'; at++)
+        fits =
+            fits && !__builtin_mul_overflow(number, 10, &number) && !__builtin_add_overflow(number, *at - '0', &number);
+    if (at == digits || !fits || !word_ends(at, text))
+        return fail_word(text, what);
+    *value = *text->at == '-' ? -number : number;
+    text->at = at;
+    return UZ_OK;
+}
+
+static uz_status not_finite(const gmsh_text *text)
+{
+    return gmsh_fail(text, UZ_ERR_NOT_FINITE, "a coordinate is not a finite number");
+}
+
+static bool is_no_number(const gmsh_text *text)
+{
+    const char *at = text->at + (text->at < text->end && (*text->at == '-' || *text->at == '+'));
+    return text->end - at >= 3 && ((at[0] | 32) == 'n' || (at[0] | 32) == 'i') && (at[1] | 32) != 'o';
+}
+
+uz_status gmsh_real_text(gmsh_text *text, double *value)
+{
+    skip_space(text);
+    const size_t used = uz_parse_double(value, text->at, gmsh_left(text));
+    if (used == 0 && is_no_number(text))
+        return not_finite(text);
+    if (used == 0 || !word_ends(text->at + used, text))
+        return fail_word(text, "a number");
+    if (!isfinite(*value))
+        return not_finite(text);
+    text->at += used;
+    return UZ_OK;
+}
+
+/* Length of the well-formed UTF-8 character at text[0..len), 0: none (The Unicode Standard, table 3-7). */
+static size_t utf8_length(const unsigned char *text, size_t len)
+{
+    const unsigned char c = text[0];
+    const size_t need = c < 0x80                ? 1
+                        : c >= 0xc2 && c < 0xe0 ? 2
+                        : c >= 0xe0 && c < 0xf0 ? 3
+                        : c >= 0xf0 && c < 0xf5 ? 4
+                                                : 0;
+    if (need == 0 || need > len)
+        return 0;
+    for (size_t i = 1; i < need; i++)
+        if ((text[i] & 0xc0) != 0x80)
+            return 0;
+    if ((c == 0xe0 && text[1] < 0xa0) || (c == 0xed && text[1] > 0x9f) || (c == 0xf0 && text[1] < 0x90) ||
+        (c == 0xf4 && text[1] > 0x8f))
+        return 0;
+    return need;
+}
+
+uz_status gmsh_quoted(gmsh_text *text, char out[64])
+{
+    skip_space(text);
+    if (text->at == text->end || *text->at != '"')
+        return fail_word(text, "a name in double quotes");
+    const char *from = text->at + 1, *to = memchr(from, '"', (size_t)(text->end - from));
+    const char *newline = memchr(from, '\n', (size_t)(text->end - from));
+    if (!to || (newline && newline < to))
+        return gmsh_fail(text, UZ_ERR_FORMAT, "the name of a physical group has no closing quote");
+    const size_t len = (size_t)(to - from);
+    if (len == 0 || len > 63)
+        return gmsh_fail(text, UZ_ERR_UNSUPPORTED, "the name of a physical group has %zu bytes; names have 1 to 63",
+                         len);
+    for (size_t i = 0, step; i < len; i += step) {
+        step = utf8_length((const unsigned char *)from + i, len - i);
+        if (step == 0 || (unsigned char)from[i] < 0x20 || from[i] == 0x7f)
+            return gmsh_fail(text, UZ_ERR_UNSUPPORTED,
+                             "the name of a physical group has a control character or is not UTF-8");
+    }
+    memcpy(out, from, len);
+    out[len] = '\0';
+    text->at = to + 1;
+    return UZ_OK;
+}
+
+/* ---- bytes */
+
+size_t gmsh_left(const gmsh_text *text)
+{
+    return (size_t)(text->end - text->at);
+}
+
+static uz_status take_bytes(gmsh_text *text, void *to, size_t size, const char *what)
+{
+    if (gmsh_left(text) < size)
+        return gmsh_fail(text, UZ_ERR_FORMAT, "%s was expected, but the file ends", what);
+    memcpy(to, text->at, size);
+    text->at += size;
+    return UZ_OK;
+}
+
+uz_status gmsh_int(gmsh_text *text, int64_t *value, const char *what)
+{
+    int32_t number = 0;
+    if (!text->binary)
+        return gmsh_int_text(text, value, what);
+    const uz_status status = take_bytes(text, &number, sizeof number, what);
+    *value = number;
+    return status;
+}
+
+uz_status gmsh_size(gmsh_text *text, int64_t *value, const char *what)
+{
+    const gmsh_text before = *text;
+    const uz_status status =
+        text->binary ? take_bytes(text, value, sizeof *value, what) : gmsh_int_text(text, value, what);
+    if (status == UZ_OK && *value < 0)
+        return gmsh_fail_at(text, &before, UZ_ERR_FORMAT, "%s was expected, found %lld", what, (long long)*value);
+    return status;
+}
+
+uz_status gmsh_real(gmsh_text *text, double *value)
+{
+    const gmsh_text before = *text;
+    if (!text->binary)
+        return gmsh_real_text(text, value);
+    uz_status status = take_bytes(text, value, sizeof *value, "a coordinate");
+    return status == UZ_OK && !isfinite(*value) ? not_finite(&before) : status;
+}
+
+uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const char *what)
+{
+    if (count >= 0 && (uint64_t)count <= gmsh_left(text) / each)
+        return UZ_OK;
+    return gmsh_fail(text, UZ_ERR_FORMAT, "%lld %s are announced, but the rest of the file has %zu bytes",
+                     (long long)count, what, gmsh_left(text));
+}
+
+/* ---- sections */
+
+uz_status gmsh_end_line(gmsh_text *text)
+{
+    while (text->at < text->end && (*text->at == ' ' || *text->at == '\t' || *text->at == '\r'))
+        text->at++;
+    if (text->at == text->end)
+        return UZ_OK;
+    if (*text->at != '\n')
+        return fail_word(text, "the end of the line");
+    text->at++;
+    text->line++;
+    return UZ_OK;
+}
+
+uz_status gmsh_section(gmsh_text *text, char name[GMSH_NAME])
+{
+    size_t used = 0;
+    name[0] = '\0';
+    skip_space(text);
+    if (text->at == text->end)
+        return UZ_OK;
+    if (*text->at != '$')
+        return fail_word(text, "a section such as $Nodes");
+    for (const char *at = text->at + 1; !word_ends(at, text) && used < GMSH_NAME - 8; at++)
+        name[used++] = *at;
+    name[used] = '\0';
+    if (used == 0 || !word_ends(text->at + 1 + used, text) || memchr(name, '\0', used))
+        return fail_word(text, "the name of a section");
+    text->at += 1 + used;
+    return gmsh_end_line(text);
+}
+
+uz_status gmsh_section_end(gmsh_text *text, const char *name)
+{
+    char end[GMSH_NAME + 8];
+    const int len = snprintf(end, sizeof end, "$End%s", name);
+    skip_space(text);
+    if (gmsh_left(text) < (size_t)len || memcmp(text->at, end, (size_t)len) != 0 || !word_ends(text->at + len, text))
+        return fail_word(text, end);
+    text->at += len;
+    return UZ_OK;
+}
+
+uz_status gmsh_skip_section(gmsh_text *text, const char *name)
+{
+    char end[GMSH_NAME + 8];
+    const int len = snprintf(end, sizeof end, "$End%s", name);
+    const char *at = memmem(text->at, gmsh_left(text), end, (size_t)len);
+    if (!at)
+        return gmsh_fail(text, UZ_ERR_FORMAT, "the section $%.*s has no end; %s is missing", GMSH_NAME, name, end);
+    for (; text->at < at; text->at++)
+        text->line += *text->at == '\n';
+    return gmsh_section_end(text, name);
+}

@@ -1,0 +1,149 @@
+/* The entries of a coordinate text. Entries that come in column order are stored where they belong as they are read;
+ * from the first one that does not, columns are remembered and everything is sorted at the end. */
+#include "io/mm_text.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "io/mm_sort.h"
+
+#include <stdlib.h>
+
+typedef struct {
+    int64_t row, col; /* 0-based */
+    double value;
+} entry;
+
+/* While reading: A->idx and A->val in the order of the text, A->ptr[1 + j] the number of entries of column j. */
+typedef struct {
+    uz_csc *A;
+    int64_t capacity, count;
+    int64_t last_row, last_col;
+    int64_t *col; /* column of each entry; NULL while the entries are in order */
+} gather;
+
+static uz_status read_index(mm_text *text, int64_t size, const char *what, int64_t *index)
+{
+    mm_skip_blanks(text);
+    const char *start = text->at;
+    *index = mm_count(text) - 1;
+    if (*index >= 0 && *index < size && mm_word_ends(text))
+        return UZ_OK;
+    text->at = start;
+    return mm_fail(text, what, "each line is ROW COLUMN VALUE, counted from 1 and within the announced sizes");
+}
+
+static uz_status read_entry(mm_text *text, const uz_mm_info *info, entry *e)
+{
+    uz_status status = read_index(text, info->rows, "a row number was expected", &e->row);
+    if (status == UZ_OK)
+        status = read_index(text, info->cols, "a column number was expected", &e->col);
+    if (status != UZ_OK)
+        return status;
+    if (info->symmetry == UZ_MM_SYMMETRIC && e->row < e->col)
+        return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line,
+                            "entry (%lld, %lld) is above the diagonal; a symmetric text holds the lower triangle only",
+                            (long long)e->row + 1, (long long)e->col + 1);
+    mm_skip_blanks(text);
+    return mm_read_value(text, info->integer, &e->value);
+}
+
+static uz_status fail_repeated(const mm_text *text, const entry *e)
+{
+    return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line,
+                        "entry (%lld, %lld) was given before; write each place once, with the sum if that is meant",
+                        (long long)e->row + 1, (long long)e->col + 1);
+}
+
+/* Leaves the ordered way: the columns of the entries so far follow from their counts. */
+static uz_status remember_columns(gather *g, uz_error *err)
+{
+    int64_t at = 0;
+    g->col = uz_alloc(g->capacity, sizeof *g->col);
+    if (!g->col)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to sort %lld entries", (long long)g->capacity);
+    for (int64_t j = 0; j <= g->last_col; j++) {
+        for (int64_t k = 0; k < g->A->ptr[1 + j]; k++)
+            g->col[at++] = j;
+    }
+    return UZ_OK;
+}
+
+static uz_status store_entry(gather *g, const mm_text *text, const entry *e)
+{
+    if (!g->col && e->col <= g->last_col && (e->col < g->last_col || e->row <= g->last_row)) {
+        if (e->col == g->last_col && e->row == g->last_row)
+            return fail_repeated(text, e);
+        uz_status status = remember_columns(g, text->err);
+        if (status != UZ_OK)
+            return status;
+    }
+    if (g->count == g->capacity)
+        return uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
+    g->A->idx[g->count] = e->row;
+    g->A->val[g->count] = e->value;
+    g->A->ptr[1 + e->col]++;
+    if (g->col)
+        g->col[g->count] = e->col;
+    g->count++;
+    g->last_row = e->row;
+    g->last_col = e->col;
+    return UZ_OK;
+}
+
+static uz_status read_entries(gather *g, mm_text *text, const uz_mm_info *info)
+{
+    uz_status status = UZ_OK;
+    while (status == UZ_OK && g->count < info->entries) {
+        entry e;
+        bool found;
+        status = mm_next_line(text, &found);
+        if (status == UZ_OK && !found)
+            status = mm_fail_missing(text, info, g->count);
+        if (status == UZ_OK)
+            status = read_entry(text, info, &e);
+        if (status == UZ_OK)
+            status = store_entry(g, text, &e);
+        if (status == UZ_OK)
+            status = mm_end_line(text);
+    }
+    return status == UZ_OK ? mm_expect_end(text, info) : status;
+}
+
+/* Reads again from the first data line, which was found correct, to name the line of entry k. */
+static uz_status fail_at_entry(mm_text body, const uz_mm_info *info, int64_t k)
+{
+    entry e = {0};
+    for (bool found; mm_next_line(&body, &found) == UZ_OK && found; k--) {
+        if (read_entry(&body, info, &e) != UZ_OK || k == 0)
+            break;
+        if (mm_end_line(&body) != UZ_OK)
+            break;
+    }
+    return fail_repeated(&body, &e);
+}
+
+static uz_status sort_entries(gather *g, const mm_text *body, const uz_mm_info *info)
+{
+    int64_t repeated;
+    uz_status status = mm_sort_columns(g->A, &g->col, g->count, &repeated, body->err);
+    return status == UZ_OK && repeated >= 0 ? fail_at_entry(*body, info, repeated) : status;
+}
+
+static void sum_counts(uz_csc *A)
+{
+    for (int64_t j = 0; j < A->cols; j++)
+        A->ptr[j + 1] += A->ptr[j];
+}
+
+uz_status mm_read_coordinate(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
+{
+    gather g = {.A = A, .capacity = room, .last_row = -1, .last_col = -1};
+    mm_text body = *text;
+    uz_status status = read_entries(&g, text, info);
+    if (status == UZ_OK && g.col)
+        status = sort_entries(&g, &body, info);
+    else if (status == UZ_OK)
+        sum_counts(A);
+    free(g.col);
+    return status;
+}

@@ -1,0 +1,169 @@
+/* Matrix Market text as a matrix or a vector. */
+#include "io/mm_text.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Without a limit from the caller an almost empty matrix may still take this much, and this much per byte of text,
+ * for its column starts: enough for contact normals of 10^8 dofs in one line, and no way to ask for all memory. */
+static const int64_t FREE_BYTES = INT64_C(1) << 30;
+static const int64_t BYTES_PER_TEXT_BYTE = 64;
+
+/* The shortest lines: "1 1 1" and "1", each with its end. */
+enum { COORDINATE_LINE = 6, ARRAY_LINE = 2 };
+
+static int64_t smaller(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* How many entries to make room for: no more than are announced, and no more than the rest of the text can hold. */
+static int64_t entry_room(const mm_text *text, const uz_mm_info *info)
+{
+    int64_t line = info->format == UZ_MM_COORDINATE ? COORDINATE_LINE : ARRAY_LINE;
+    int64_t left = (int64_t)(text->end - text->at);
+    return smaller(info->entries, left / line + 1); /* the last line may lack its end */
+}
+
+static uz_status fail_limit(const uz_mm_info *info, int64_t line, uz_error *err)
+{
+    return uz_fail_line(err, UZ_ERR_LIMIT, line,
+                        "a %lld x %lld matrix with %lld entries takes more memory than is allowed here",
+                        (long long)info->rows, (long long)info->cols, (long long)info->entries);
+}
+
+/* Whether `slots` starts or numbers of 8 bytes and `room` entries of 16 may be allocated for this text. */
+static bool within_limit(int64_t slots, int64_t room, size_t len, size_t max_bytes)
+{
+    int64_t dense, bytes;
+    if (__builtin_mul_overflow(slots, 8, &dense) || __builtin_add_overflow(dense, 16 * room, &bytes))
+        return false;
+    if (max_bytes > 0 && (uint64_t)bytes > max_bytes)
+        return false;
+    return max_bytes > 0 || dense <= FREE_BYTES + BYTES_PER_TEXT_BYTE * (int64_t)len;
+}
+
+static uz_status read_number_line(mm_text *text, const uz_mm_info *info, int64_t read, double *value)
+{
+    bool found;
+    uz_status status = mm_next_line(text, &found);
+    if (status == UZ_OK && !found)
+        status = mm_fail_missing(text, info, read);
+    if (status == UZ_OK)
+        status = mm_read_value(text, info->integer, value);
+    return status == UZ_OK ? mm_end_line(text) : status;
+}
+
+/* Column by column, all rows or those from the diagonal down; a symmetric array is its lower triangle. */
+static uz_status read_array(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
+{
+    uz_status status = UZ_OK;
+    int64_t at = 0;
+    for (int64_t j = 0; j < A->cols; j++) {
+        for (int64_t i = info->symmetry == UZ_MM_SYMMETRIC ? j : 0; i < A->rows; i++) {
+            double value;
+            status = read_number_line(text, info, at, &value);
+            if (status != UZ_OK)
+                return status;
+            if (at == room)
+                return uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
+            A->idx[at] = i;
+            A->val[at++] = value;
+        }
+        A->ptr[j + 1] = at;
+    }
+    return mm_expect_end(text, info);
+}
+
+static uz_status read_body(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
+{
+    uz_status status = uz_csc_init(A, info->rows, info->cols, room, text->err);
+    if (status == UZ_OK && info->format == UZ_MM_COORDINATE)
+        status = mm_read_coordinate(A, text, info, room);
+    else if (status == UZ_OK)
+        status = read_array(A, text, info, room);
+    if (status != UZ_OK)
+        uz_csc_clear(A);
+    return status;
+}
+
+static mm_text start_of(const char *text, size_t len, uz_error *err)
+{
+    const char *first = text ? text : ""; /* no bytes may come without an address */
+    uz_error_reset(err);
+    return (mm_text){.at = first, .end = first + len, .line = 1, .err = err};
+}
+
+uz_status uz_mm_read(uz_csc *out, uz_mm_info *info, const char *text, size_t len, size_t max_bytes, uz_error *err)
+{
+    mm_text t = start_of(text, len, err);
+    uz_mm_info head = {0};
+    uz_csc A = {0};
+    memset(out, 0, sizeof *out);
+    if (info)
+        *info = head;
+    uz_status status = mm_read_header(&t, &head);
+    if (status != UZ_OK)
+        return status;
+    int64_t room = entry_room(&t, &head);
+    if (!within_limit(head.cols + 1, room, len, max_bytes))
+        return fail_limit(&head, t.size_line, err);
+    status = read_body(&A, &t, &head, room);
+    if (status != UZ_OK)
+        return status;
+    *out = A;
+    if (info)
+        *info = head;
+    return UZ_OK;
+}
+
+/* The numbers of a matrix of one row or one column; an array's values are taken as they are. */
+static double *take_numbers(uz_csc *A, const uz_mm_info *info, int64_t n)
+{
+    double *x = NULL;
+    if (info->format == UZ_MM_ARRAY) {
+        x = A->val;
+        A->val = NULL;
+        return x;
+    }
+    x = uz_alloc_zero(n, sizeof *x);
+    for (int64_t j = 0; x && j < A->cols; j++) {
+        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++)
+            x[A->cols == 1 ? A->idx[k] : j] = A->val[k];
+    }
+    return x;
+}
+
+uz_status uz_mm_read_vector(double **out, int64_t *n, const char *text, size_t len, size_t max_bytes, uz_error *err)
+{
+    mm_text t = start_of(text, len, err);
+    uz_mm_info head = {0};
+    uz_csc A = {0};
+    *out = NULL;
+    *n = 0;
+    uz_status status = mm_read_header(&t, &head);
+    if (status != UZ_OK)
+        return status;
+    if (head.rows != 1 && head.cols != 1)
+        return uz_fail_line(err, UZ_ERR_SIZE, t.size_line,
+                            "a vector was expected, this matrix is %lld x %lld; send n x 1 or 1 x n",
+                            (long long)head.rows, (long long)head.cols);
+    int64_t size = head.cols == 1 ? head.rows : head.cols, room = entry_room(&t, &head);
+    int64_t numbers = head.format == UZ_MM_COORDINATE ? size : 0, wanted;
+    if (__builtin_add_overflow(head.cols, 1, &wanted) || __builtin_add_overflow(wanted, numbers, &wanted) ||
+        !within_limit(wanted, room, len, max_bytes))
+        return fail_limit(&head, t.size_line, err);
+    status = read_body(&A, &t, &head, room);
+    double *x = status == UZ_OK ? take_numbers(&A, &head, size) : NULL;
+    uz_csc_clear(&A);
+    if (status != UZ_OK)
+        return status;
+    if (!x)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vector of %lld numbers", (long long)size);
+    *out = x;
+    *n = size;
+    return UZ_OK;
+}

@@ -1,0 +1,328 @@
+#include "linalg/blas.h"
+
+#include "core/alloc.h"
+
+#include <cblas.h>
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Dense orders stay far below 2^31: they are bounded by the memory of an n x n array. */
+static int narrow(int64_t n)
+{
+    return (int)n;
+}
+
+double uz_dot(int64_t n, const double *x, const double *y)
+{
+    return cblas_ddot(narrow(n), x, 1, y, 1);
+}
+
+double uz_norm(int64_t n, const double *x)
+{
+    return cblas_dnrm2(narrow(n), x, 1);
+}
+
+void uz_axpy(int64_t n, double alpha, const double *x, double *y)
+{
+    cblas_daxpy(narrow(n), alpha, x, 1, y, 1);
+}
+
+void uz_symv_lower(int64_t n, const double *A, const double *x, double *y)
+{
+    if (n > 0)
+        cblas_dsymv(CblasColMajor, CblasLower, narrow(n), 1.0, A, narrow(n), x, 1, 0.0, y, 1);
+}
+
+void uz_trsv_lower(int64_t n, const double *L, double *x)
+{
+    if (n > 0)
+        cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
+}
+
+void uz_trsv_lower_t(int64_t n, const double *L, double *x)
+{
+    if (n > 0)
+        cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
+}
+
+void uz_trmv_lower_t(int64_t n, const double *L, double *x)
+{
+    if (n > 0)
+        cblas_dtrmv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
+}
+
+bool uz_potrf_lower(int64_t n, double *A)
+{
+    return n == 0 || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(n), A, narrow(n)) == 0;
+}
+
+void uz_potrs_lower(int64_t n, const double *L, double *x)
+{
+    uz_trsv_lower(n, L, x);
+    uz_trsv_lower_t(n, L, x);
+}
+
+void uz_trsv_leading(int64_t n, int64_t stride, const double *L, double *x, bool transposed)
+{
+    if (n > 0)
+        cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
+                    narrow(stride), x, 1);
+}
+
+void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x)
+{
+    uz_trsv_leading(n, stride, L, x, false);
+    uz_trsv_leading(n, stride, L, x, true);
+}
+
+void uz_block_trsv(int64_t n, const double *L, int64_t ld, double *x, bool transposed)
+{
+    cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
+                narrow(ld), x, 1);
+}
+
+void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, const double *x, double *y,
+                   bool transposed)
+{
+    if (rows > 0)
+        cblas_dgemv(CblasColMajor, transposed ? CblasTrans : CblasNoTrans, narrow(rows), narrow(columns), -1.0, A,
+                    narrow(ld), x, 1, 1.0, y, 1);
+}
+
+void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx)
+{
+    if (columns == 0)
+        return;
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), narrow(columns), 1.0, L,
+                narrow(ld), X, narrow(ldx));
+    if (rows > 0)
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, narrow(rows), narrow(columns), narrow(n), -1.0, L + n,
+                    narrow(ld), X, narrow(ldx), 1.0, X + n, narrow(ldx));
+}
+
+void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C)
+{
+    if (n > 0)
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k), 1.0, Z, narrow(ld), 0.0, C, narrow(n));
+}
+
+/* Units of work between two questions take about PANEL_FLOPS, a few milliseconds: a panel of b columns against n b
+ * entries. Wider ones would wait longer, narrower ones would read the whole matrix for little work. */
+#define PANEL_FLOPS 5e7
+enum { LEAST_PANEL = 16, MOST_PANEL = 128 };
+
+static int64_t panel_width(int64_t n)
+{
+    double width = sqrt(PANEL_FLOPS / fmax(1.0, (double)n));
+    return width < LEAST_PANEL ? LEAST_PANEL : width > MOST_PANEL ? MOST_PANEL : (int64_t)width;
+}
+
+static int64_t least_of(int64_t a, int64_t b)
+{
+    return a < b ? a : b;
+}
+
+/* Doubles cleared between two questions, a megabyte: pages of a new block are made when they are first written, which
+ * took 1 to 3 ms for each 2 MB on a virtual machine. */
+enum { CLEARED = 1 << 17 };
+
+bool uz_clear_while(int64_t n, double *x, const uz_leave *leave)
+{
+    for (int64_t k = 0; k < n; k += CLEARED) {
+        if (uz_leave_is_over(leave))
+            return false;
+        memset(x + k, 0, (size_t)least_of(n - k, CLEARED) * sizeof *x);
+    }
+    return true;
+}
+
+/* C (lower, n x n, ldc) = beta C + alpha A A' with A n x k, or alpha A'A with A k x n where transposed, by panels of
+ * columns of C. */
+static bool syrk_while(int64_t n, int64_t k, double alpha, const double *A, int64_t lda, bool transposed, double beta,
+                       double *C, int64_t ldc, const uz_leave *leave)
+{
+    CBLAS_TRANSPOSE left = transposed ? CblasTrans : CblasNoTrans, right = transposed ? CblasNoTrans : CblasTrans;
+    double most = PANEL_FLOPS / fmax(1.0, (double)n * (double)k);
+    int64_t width = most < LEAST_PANEL ? LEAST_PANEL
+                    : most < (double)n ? (int64_t)most
+                                       : n,
+            step = transposed ? lda : 1;
+    for (int64_t j = 0; j < n; j += width) {
+        int64_t b = least_of(n - j, width), below = n - j - b;
+        const double *A_j = A + j * step;
+        double *C_j = C + j + j * ldc;
+        if (uz_leave_is_over(leave))
+            return false;
+        cblas_dsyrk(CblasColMajor, CblasLower, left, narrow(b), narrow(k), alpha, A_j, narrow(lda), beta, C_j,
+                    narrow(ldc));
+        if (below > 0)
+            cblas_dgemm(CblasColMajor, left, right, narrow(below), narrow(b), narrow(k), alpha, A_j + b * step,
+                        narrow(lda), A_j, narrow(lda), beta, C_j + b, narrow(ldc));
+    }
+    return true;
+}
+
+/* X (n x columns, ldx) = L^-1 X with L n x n lower, ld, by panels of rows. */
+static bool forward_while(int64_t n, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx,
+                          const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    for (int64_t i = 0; i < n; i += width) {
+        int64_t b = least_of(n - i, width);
+        if (uz_leave_is_over(leave))
+            return false;
+        uz_block_eliminate(b, n - i - b, columns, L + i + i * ld, ld, X + i, ldx);
+    }
+    return true;
+}
+
+/* Rows and columns i < k change places in the lower triangle. */
+static void swap_rows(int64_t n, double *A, int64_t i, int64_t k)
+{
+    double diagonal = A[i + i * n];
+    A[i + i * n] = A[k + k * n];
+    A[k + k * n] = diagonal;
+    cblas_dswap(narrow(i), A + i, narrow(n), A + k, narrow(n));
+    cblas_dswap(narrow(k - i - 1), A + i + 1 + i * n, 1, A + k + (i + 1) * n, narrow(n));
+    cblas_dswap(narrow(n - k - 1), A + k + 1 + i * n, 1, A + k + 1 + k * n, 1);
+}
+
+/* Column j of L, of a panel that begins with column k: what is right of it has not seen the panel's columns yet,
+ * squares has those of each row added up. false: the largest pivot left is not above `stop`. */
+static bool pivot_column(int64_t n, double *A, int64_t *pivot, double *squares, int64_t k, int64_t j, double stop)
+{
+    int64_t best = j;
+    for (int64_t i = j; i < n; i++) {
+        double last = j > k ? A[i + (j - 1) * n] : 0.0;
+        squares[i] += last * last;
+        if (A[i + i * n] - squares[i] > A[best + best * n] - squares[best])
+            best = i;
+    }
+    double left = A[best + best * n] - squares[best];
+    if (!(left > stop))
+        return false;
+    if (best != j) {
+        int64_t index = pivot[j];
+        swap_rows(n, A, j, best);
+        squares[best] = squares[j];
+        pivot[j] = pivot[best];
+        pivot[best] = index;
+    }
+    A[j + j * n] = sqrt(left);
+    cblas_dgemv(CblasColMajor, CblasNoTrans, narrow(n - j - 1), narrow(j - k), -1.0, A + j + 1 + k * n, narrow(n),
+                A + j + k * n, narrow(n), 1.0, A + j + 1 + j * n, 1);
+    cblas_dscal(narrow(n - j - 1), 1.0 / A[j + j * n], A + j + 1 + j * n, 1);
+    return true;
+}
+
+enum { PIVOTED_PANEL = 64 };
+
+int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least, const uz_leave *leave)
+{
+    int64_t width = least_of(panel_width(n), PIVOTED_PANEL);
+    double *squares = uz_alloc(n, sizeof *squares), largest = 0.0;
+    for (int64_t i = 0; i < n; i++) {
+        pivot[i] = i;
+        largest = fmax(largest, A[i + i * n]);
+    }
+    int64_t rank = squares ? 0 : -1, end = squares ? n : 0;
+    for (int64_t k = 0; k < end && rank == k; k += width) {
+        int64_t next = least_of(k + width, n);
+        memset(squares, 0, (size_t)n * sizeof *squares);
+        while (rank < next && !uz_leave_is_over(leave) && pivot_column(n, A, pivot, squares, k, rank, least * largest))
+            rank++;
+        if (rank == next &&
+            !syrk_while(n - next, next - k, -1.0, A + next + k * n, n, false, 1.0, A + next + next * n, n, leave))
+            break;
+    }
+    free(squares);
+    return rank;
+}
+
+bool uz_trsm_lower_while(int64_t n, int64_t k, const double *L, double *X, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    for (int64_t j = 0; j < k && n > 0; j += width)
+        if (!forward_while(n, least_of(k - j, width), L, n, X + j * n, n, leave))
+            return false;
+    return true;
+}
+
+bool uz_syrk_lower_t_while(int64_t n, int64_t k, const double *Z, double *C, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    if (k == 0)
+        return uz_clear_while(n * n, C, leave);
+    for (int64_t j = 0; j < k && n > 0; j += width)
+        if (!syrk_while(n, least_of(k - j, width), 1.0, Z + j, k, true, j > 0 ? 1.0 : 0.0, C, n, leave))
+            return false;
+    return true;
+}
+
+/* Right-looking (Golub and Van Loan, Matrix Computations, 4.2): factor a panel, take it away from what is right of it.
+ */
+bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = least_of(n - k, width), rest = n - k - b;
+        double *top = A + k + k * n, *below = top + b, *right = below + b * n;
+        if (uz_leave_is_over(leave) || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(b), top, narrow(n)) != 0)
+            return false;
+        if (rest == 0)
+            break;
+        cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, narrow(rest), narrow(b), 1.0, top,
+                    narrow(n), below, narrow(n));
+        if (!syrk_while(rest, b, -1.0, below, n, false, 1.0, right, n, leave))
+            return false;
+    }
+    return true;
+}
+
+bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    if (!uz_clear_while(n * n, A, leave))
+        return false;
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = least_of(n - k, width), rows = n - k;
+        for (int64_t j = 0; j < b; j++) {
+            memset(panel + j * rows, 0, (size_t)j * sizeof *panel);
+            memcpy(panel + j + j * rows, L + k + j + (k + j) * n, (size_t)(rows - j) * sizeof *panel);
+        }
+        if (!syrk_while(rows, b, 1.0, panel, rows, false, 1.0, A + k + k * n, n, leave))
+            return false;
+    }
+    return true;
+}
+
+/* X = L^-1 by panels of columns, then X'X by panels of rows of X. */
+bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const uz_leave *leave)
+{
+    int64_t width = panel_width(n);
+    if (!uz_clear_while(n * n, A, leave) || !uz_clear_while(n * n, X, leave))
+        return false;
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = least_of(n - k, width);
+        for (int64_t j = k; j < k + b; j++) {
+            if (!(L[j + j * n] > 0.0))
+                return false;
+            X[j + j * n] = 1.0;
+        }
+        if (!forward_while(n - k, b, L + k + k * n, n, X + k + k * n, n, leave))
+            return false;
+    }
+    for (int64_t k = 0; k < n; k += width) {
+        int64_t b = least_of(n - k, width);
+        if (!syrk_while(k + b, b, 1.0, X + k, n, true, 1.0, A, n, leave))
+            return false;
+    }
+    return true;
+}
+
+bool uz_stev(int64_t n, double *d, double *e, double *V)
+{
+    return LAPACKE_dstev(LAPACK_COL_MAJOR, 'V', narrow(n), d, e, V, narrow(n)) == 0;
+}

@@ -1,0 +1,391 @@
+/* balance.c: what acts on the body, and whether it balances.
+ *
+ * At a node that supports hold, f_int = f_loads + f_contact - k u + R: the elements' forces less everything known is
+ * what the supports do. Only elements that touch such nodes are looked at. Everywhere else equilibrium is the solver's
+ * matter, so that the sum of all forces and moments is what its residual comes to. */
+#include "post/balance.h"
+
+#include "assembly/parts.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "post/parts.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DIM = 3, MOST_KE = UZ_ELEMENT_DOFS * UZ_ELEMENT_DOFS };
+
+typedef struct {
+    const uz_body_model *model;
+    const uz_scene *scene;
+    const double *u, *r;
+    uz_evaluation *out;
+    int dim;
+    double *load, *contact, *inner; /* n_nodes x dim; inner: f_int at held nodes */
+    bool *held;                     /* n_nodes */
+    int64_t *first, *support;       /* supports of each node: support[first[a]..first[a + 1]) */
+    double centre[DIM];
+    double force[DIM], moment[DIM]; /* of everything, the moment about the centre: the first node */
+    double size;
+} balance;
+
+static void add_moment(double moment[DIM], const double x[DIM], const double f[DIM])
+{
+    for (int c = 0; c < DIM; c++)
+        moment[c] += x[(c + 1) % DIM] * f[(c + 2) % DIM] - x[(c + 2) % DIM] * f[(c + 1) % DIM];
+}
+
+/* `to` NULL: only to the sum of everything. */
+static void add_force(balance *b, uz_resultant *to, int64_t node, const double *force)
+{
+    double x[DIM] = {0}, arm[DIM] = {0}, f[DIM] = {0};
+    for (int c = 0; c < b->dim; c++) {
+        f[c] = force[c];
+        x[c] = b->model->mesh.xyz[node * b->dim + c];
+        arm[c] = x[c] - b->centre[c];
+        b->force[c] += f[c];
+        b->size += fabs(f[c]);
+        if (to)
+            to->force[c] += f[c];
+    }
+    if (b->model->kind == UZ_AXISYMMETRIC)
+        return;
+    add_moment(b->moment, arm, f);
+    if (to)
+        add_moment(to->moment, x, f);
+}
+
+/* ---- contact */
+
+/* The obstacle pushes along its normal by -r; another part of the body is pushed back. */
+static void add_row(balance *b, int64_t row, const uz_contact_sites *sites, int64_t place)
+{
+    const uz_mesh_info *info = &b->model->info;
+    const int64_t k = info->contact_of[row], node = info->contact_node[row];
+    double f[DIM] = {0};
+    for (int c = 0; c < b->dim; c++) {
+        f[c] = -b->r[row] * info->contact_normal[row * b->dim + c];
+        b->contact[node * b->dim + c] += f[c];
+    }
+    add_force(b, &b->out->contacts[k], node, f);
+    for (int64_t j = sites && sites->first ? sites->first[place] : 0;
+         sites && sites->first && j < sites->first[place + 1]; j++) {
+        double back[DIM] = {0};
+        for (int c = 0; c < b->dim; c++) {
+            back[c] = -sites->weight[j] * f[c];
+            b->contact[sites->node[j] * b->dim + c] += back[c];
+        }
+        add_force(b, NULL, sites->node[j], back);
+    }
+}
+
+/* Rows come contact by contact, in the order of the group's nodes; some nodes have none. */
+static void add_contacts(balance *b)
+{
+    const uz_body_model *model = b->model;
+    int64_t row = 0;
+    for (int64_t k = 0; k < b->scene->n_contacts; k++) {
+        const uz_group *group = uz_mesh_group(&model->mesh, b->scene->contacts[k].on, "", NULL);
+        const int64_t count = group ? uz_group_node_count(&model->mesh, group) : 0;
+        for (int64_t i = 0; i < count && row < model->m && model->info.contact_of[row] == k; i++)
+            if (model->info.contact_node[row] == uz_group_node_at(group, i)) {
+                add_row(b, row, model->sites ? &model->sites[k] : NULL, i);
+                row++;
+            }
+    }
+}
+
+/* ---- loads */
+
+static uz_status add_loads(balance *b, uz_error *err)
+{
+    uz_status status = uz_nodal_loads(b->load, b->model, b->scene, err);
+    for (int64_t a = 0; a < b->model->mesh.n_nodes && status == UZ_OK; a++) {
+        const double *f = b->load + a * b->dim;
+        if (f[0] != 0 || f[1] != 0 || (b->dim == 3 && f[2] != 0))
+            add_force(b, &b->out->loads, a, f);
+    }
+    return status;
+}
+
+/* ---- supports */
+
+/* The springs of one support: -k u. */
+static uz_status add_springs(balance *b, double *share, int64_t s, uz_error *err)
+{
+    const uz_mesh *mesh = &b->model->mesh;
+    const uz_support *support = &b->scene->supports[s];
+    const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
+    memset(share, 0, (size_t)mesh->n_nodes * sizeof *share);
+    uz_status status = group ? uz_spread_over_group(share, b->model, group, "/supports", err) : UZ_ERR_SCENE;
+    for (int64_t a = 0; a < mesh->n_nodes && status == UZ_OK; a++) {
+        double f[DIM] = {0};
+        for (int c = 0; c < b->dim; c++)
+            f[c] = support->spring[c] > 0 ? -fmax(0, share[a]) * support->spring[c] * b->u[a * b->dim + c] : 0;
+        if (share[a] > 0)
+            add_force(b, &b->out->supports[s], a, f);
+    }
+    return status;
+}
+
+static uz_status add_all_springs(balance *b, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    double *share = NULL;
+    for (int64_t s = 0; s < b->scene->n_supports && status == UZ_OK && b->model->spring; s++) {
+        if (b->scene->supports[s].kind != UZ_SUPPORT_SPRING)
+            continue;
+        if (!share && !(share = uz_alloc(b->model->mesh.n_nodes, sizeof *share)))
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of springs");
+        else
+            status = add_springs(b, share, s, err);
+    }
+    free(share);
+    return status;
+}
+
+/* Which supports hold each node, in the scene's order. False: no memory. */
+static bool list_supports(balance *b)
+{
+    const uz_mesh *mesh = &b->model->mesh;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int64_t s = 0; s < b->scene->n_supports; s++) {
+            const uz_support *support = &b->scene->supports[s];
+            const uz_group *group =
+                support->kind == UZ_SUPPORT_SPRING ? NULL : uz_mesh_group(mesh, support->on, "", NULL);
+            for (int64_t i = 0; group && i < uz_group_node_count(mesh, group); i++) {
+                const int64_t a = uz_group_node_at(group, i);
+                if (pass == 0)
+                    b->first[a + 2]++;
+                else
+                    b->support[b->first[a + 1]++] = s;
+                b->held[a] = true;
+            }
+        }
+        for (int64_t a = 0; pass == 0 && a < mesh->n_nodes; a++)
+            b->first[a + 2] += b->first[a + 1];
+        if (pass == 0 && !(b->support = uz_alloc(b->first[mesh->n_nodes + 1], sizeof *b->support)))
+            return false;
+    }
+    return true;
+}
+
+/* f_int of one element at its held nodes. */
+static void add_element(balance *b, const double *ke, const int64_t *node, int count)
+{
+    const int dim = b->dim, n = count * dim;
+    for (int i = 0; i < n; i++) {
+        double sum = 0;
+        if (!b->held[node[i / dim]])
+            continue;
+        for (int j = 0; j < n; j++)
+            sum += ke[i * n + j] * b->u[node[j / dim] * dim + j % dim];
+        b->inner[node[i / dim] * dim + i % dim] += sum;
+        b->size += fabs(sum);
+    }
+}
+
+static void add_elements(balance *b)
+{
+    const uz_body_model *model = b->model;
+    const uz_mesh *mesh = &model->mesh;
+    const bool alike = mesh->uniform && model->kind != UZ_AXISYMMETRIC;
+    const uz_body_material *made = NULL; /* of which ke is */
+    uz_element element;
+    double xyz[3 * UZ_ELEMENT_NODES], ke[MOST_KE];
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        bool touches = false;
+        for (int a = 0; a < count; a++)
+            touches = touches || b->held[node[a]];
+        if (!touches)
+            continue;
+        if (!alike || made != uz_element_material(model, e)) {
+            uz_body_element(&element, xyz, model, e);
+            uz_element_stiffness(ke, &element);
+            made = uz_element_material(model, e);
+        }
+        add_element(b, ke, node, count);
+    }
+}
+
+/* Directions that supports hold at a node: d = q R with orthonormal q. */
+typedef struct {
+    int n;
+    int64_t support[DIM];
+    double d[DIM][DIM], q[DIM][DIM], R[DIM][DIM];
+} held_directions;
+
+static void hold(held_directions *h, int64_t support, const double d[DIM])
+{
+    double rest[DIM] = {d[0], d[1], d[2]}, along[DIM] = {0};
+    for (int pass = 0; pass < 2; pass++) /* twice: orthogonal to rounding (Giraud et al., Numer. Math. 101 (2005) 87) */
+        for (int i = 0; i < h->n; i++) {
+            const double s = rest[0] * h->q[i][0] + rest[1] * h->q[i][1] + rest[2] * h->q[i][2];
+            along[i] += s;
+            for (int c = 0; c < DIM; c++)
+                rest[c] -= s * h->q[i][c];
+        }
+    const double length = sqrt(rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2]);
+    if (h->n == DIM || length <= UZ_DEPENDENT)
+        return;
+    for (int i = 0; i < h->n; i++)
+        h->R[i][h->n] = along[i];
+    h->R[h->n][h->n] = length;
+    h->support[h->n] = support;
+    for (int c = 0; c < DIM; c++) {
+        h->d[h->n][c] = d[c];
+        h->q[h->n][c] = rest[c] / length;
+    }
+    h->n++;
+}
+
+static void gather(held_directions *h, const balance *b, int64_t node)
+{
+    h->n = 0;
+    for (int64_t i = b->first[node]; i < b->first[node + 1]; i++) {
+        const uz_support *support = &b->scene->supports[b->support[i]];
+        double n[DIM] = {0}, u[DIM] = {NAN, NAN, NAN};
+        if (uz_support_is_inclined(n, support, b->dim)) {
+            hold(h, b->support[i], n);
+            continue;
+        }
+        uz_support_values(u, support, b->dim);
+        for (int c = 0; c < b->dim; c++) {
+            const double axis[DIM] = {c == 0, c == 1, c == 2};
+            if (!isnan(u[c]))
+                hold(h, b->support[i], axis);
+        }
+    }
+}
+
+/* What the supports do at a node, each along its own directions; what is left over is the residual of free dofs. */
+static void add_reaction(balance *b, int64_t node)
+{
+    held_directions h;
+    double R[DIM] = {0}, a[DIM] = {0};
+    for (int c = 0; c < b->dim; c++) {
+        const int64_t i = node * b->dim + c;
+        R[c] = b->inner[i] - b->load[i] - b->contact[i] + (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
+    }
+    gather(&h, b, node);
+    for (int i = h.n - 1; i >= 0; i--) {
+        double f[DIM];
+        a[i] = R[0] * h.q[i][0] + R[1] * h.q[i][1] + R[2] * h.q[i][2];
+        for (int j = i + 1; j < h.n; j++)
+            a[i] -= h.R[i][j] * a[j];
+        a[i] /= h.R[i][i];
+        for (int c = 0; c < DIM; c++)
+            f[c] = a[i] * h.d[i][c];
+        add_force(b, &b->out->supports[h.support[i]], node, f);
+    }
+}
+
+static uz_status add_supports(balance *b, uz_error *err)
+{
+    if (!list_supports(b))
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
+    add_elements(b);
+    for (int64_t a = 0; a < b->model->mesh.n_nodes; a++)
+        if (b->held[a])
+            add_reaction(b, a);
+    return add_all_springs(b, err);
+}
+
+/* ---- all together */
+
+/* A ring pushes its parts apart and is whole: only the axial sum must vanish. */
+static double imbalance(const balance *b)
+{
+    const bool ring = b->model->kind == UZ_AXISYMMETRIC;
+    double largest = 0;
+    for (int c = ring ? 1 : 0; c < (ring ? 2 : DIM); c++)
+        largest = fmax(largest, fmax(fabs(b->force[c]), fabs(b->moment[c]) / b->model->mesh.extent));
+    return b->size > 0 ? largest / b->size : 0;
+}
+
+/* With thermal strain e: 1/2 (strain - e)' C (strain - e) = 1/2 u'K u - u'f + 1/2 e' C e, f the thermal forces. */
+static uz_status thermal_energy(double *energy, const balance *b, uz_error *err)
+{
+    uz_field_body body = {.scene = b->scene};
+    uz_status status = uz_field_body_init(&body, b->scene, b->model, err);
+    const uz_mesh *mesh = &b->model->mesh;
+    *energy = 0;
+    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK && body.rise; e++) {
+        uz_element element;
+        double xyz[3 * UZ_ELEMENT_NODES], strain[UZ_ELEMENT_STRESSES], f[UZ_ELEMENT_DOFS] = {0},
+                                                                       stress[UZ_ELEMENT_STRESSES];
+        const uz_body_material *material = uz_element_material(b->model, e);
+        int count;
+        const int64_t *node = uz_mesh_element(mesh, e, &count);
+        if (body.rise[e] == 0)
+            continue;
+        uz_body_element(&element, xyz, b->model, e);
+        uz_thermal_strain(strain, element.model, element.lame, material->expansion * body.rise[e]);
+        uz_element_add_thermal_load(f, &element, strain);
+        for (int i = 0; i < count * b->dim; i++)
+            *energy -= f[i] * b->u[node[i / b->dim] * b->dim + i % b->dim];
+        uz_elastic_stress(stress, element.model, element.lame, strain);
+        for (int i = 0; i < uz_stress_count(element.model); i++)
+            *energy += 0.5 * stress[i] * strain[i] * uz_element_volume(&element);
+    }
+    uz_field_body_clear(&body);
+    return status;
+}
+
+static uz_status make_room(balance *b, uz_error *err)
+{
+    const int64_t n = b->model->mesh.n_nodes;
+    b->load = uz_alloc_zero(n * b->dim, sizeof *b->load);
+    b->contact = uz_alloc_zero(n * b->dim, sizeof *b->contact);
+    b->inner = uz_alloc_zero(n * b->dim, sizeof *b->inner);
+    b->held = uz_alloc_zero(n, sizeof *b->held);
+    b->first = uz_alloc_zero(n + 2, sizeof *b->first);
+    if (b->load && b->contact && b->inner && b->held && b->first)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes", (long long)n);
+}
+
+/* Supports move the body, or do not hold it: then most of u may be rigid motion. */
+static bool is_carried(const balance *b)
+{
+    bool carried = b->model->n_modes > 0;
+    for (int64_t i = 0; i < b->model->mesh.n_nodes * b->dim && !carried; i++)
+        carried = b->model->dof[i] < 0 && b->u[i] != 0;
+    return carried;
+}
+
+static uz_status add_everything(balance *b, uz_error *err)
+{
+    double thermal = 0, energy = 0;
+    memcpy(b->centre, b->model->mesh.xyz, (size_t)b->dim * sizeof *b->centre);
+    add_contacts(b);
+    uz_status status = add_loads(b, err);
+    if (status == UZ_OK)
+        status = add_supports(b, err);
+    if (status == UZ_OK)
+        status = thermal_energy(&thermal, b, err);
+    if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the whole body */
+        status = uz_strain_energy(&energy, b->model, b->u, is_carried(b), err);
+    b->out->strain_energy = energy + thermal;
+    b->out->imbalance = imbalance(b);
+    return status;
+}
+
+uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
+                            const double *r, uz_error *err)
+{
+    balance b = {.model = model, .scene = scene, .u = u, .r = r, .out = out, .dim = model->mesh.dim};
+    uz_status status = make_room(&b, err);
+    if (status == UZ_OK)
+        status = add_everything(&b, err);
+    free(b.load);
+    free(b.contact);
+    free(b.inner);
+    free(b.held);
+    free(b.first);
+    free(b.support);
+    return status;
+}

@@ -1,0 +1,151 @@
+/* contact_pressure.c: pressure per area from the reactions at nodes.
+ *
+ * Let p be the pressure and r_i = -integral phi_i p the reactions, phi_i the sides' shape functions. For each corner a
+ * of the sides let psi_a be the continuous piecewise linear function that is 1 there: psi_a = sum_i psi_a(x_i) phi_i
+ * holds on linear and quadratic sides alike, so that
+ *     p_a = integral psi_a p / integral psi_a = -sum_i psi_a(x_i) r_i / integral psi_a,
+ * the mean of p around the corner, weighted with psi_a. On linear sides this is reaction over tributary area; on
+ * quadratic ones half of what a middle carries counts for each end of its edge, and the middle gets the mean of the two
+ * ends. So a uniform pressure is found exactly, the total force is kept, reactions <= 0 give pressures >= 0, and
+ * neither the corners of six-node triangles, which carry nothing, nor the 1 : 4 : 1 of a three-node edge make p jump.
+ */
+#include "post/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* By node; zero where the contact at hand is not. */
+typedef struct {
+    double *area, *force; /* of corners */
+    int64_t *end;         /* 2 by node: 1 + the ends of the edge of which it is the middle; NULL: there is none */
+    bool *has_row;
+} pressure_work;
+
+static bool is_quadratic(const uz_side *side)
+{
+    return side->dim == 2 ? side->nodes == 3 : side->nodes == 6;
+}
+
+static bool need_ends(pressure_work *w, int64_t n_nodes)
+{
+    if (!w->end)
+        w->end = uz_alloc_zero(2 * n_nodes, sizeof *w->end);
+    return w->end != NULL;
+}
+
+/* Middle j of a side lies between its corners j and j + 1. */
+static void add_side(pressure_work *w, const uz_side *side, const int64_t *node)
+{
+    double weight[UZ_FACE_NODES];
+    const int corners = is_quadratic(side) ? side->dim : side->nodes;
+    uz_side_weights(weight, side);
+    for (int a = 0; a < corners; a++)
+        w->area[node[a]] += weight[a];
+    for (int j = 0; j < side->nodes - corners; j++) {
+        const int64_t middle = node[corners + j], ends[2] = {node[j], node[(j + 1) % corners]};
+        for (int k = 0; k < 2; k++) {
+            w->area[ends[k]] += 0.5 * weight[corners + j];
+            w->end[2 * middle + k] = 1 + ends[k];
+        }
+    }
+}
+
+static bool add_sides(pressure_work *w, const uz_body_model *model, const uz_group *group)
+{
+    uz_side side;
+    double xyz[3 * UZ_FACE_NODES];
+    int64_t node[UZ_FACE_NODES];
+    for (int64_t f = 0; f < group->n_faces; f++) {
+        uz_body_side(&side, xyz, node, model, group->face[f]);
+        if (is_quadratic(&side) && !need_ends(w, model->mesh.n_nodes))
+            return false;
+        add_side(w, &side, node);
+    }
+    return true;
+}
+
+static const int64_t *ends_of(const pressure_work *w, int64_t node)
+{
+    return w->end && w->end[2 * node] > 0 ? w->end + 2 * node : NULL;
+}
+
+static void add_reaction(pressure_work *w, int64_t node, double r)
+{
+    const int64_t *end = ends_of(w, node);
+    w->has_row[node] = true;
+    if (!end) {
+        w->force[node] -= r;
+        return;
+    }
+    w->force[end[0] - 1] -= 0.5 * r;
+    w->force[end[1] - 1] -= 0.5 * r;
+}
+
+static double at_corner(const pressure_work *w, int64_t node)
+{
+    return w->area[node] > 0 ? w->force[node] / w->area[node] : NAN;
+}
+
+/* An end that a support holds has no row, and what it carries went into the support. */
+static double pressure_at(const pressure_work *w, int64_t node)
+{
+    const int64_t *end = ends_of(w, node);
+    if (!end)
+        return at_corner(w, node);
+    const double first = at_corner(w, end[0] - 1), second = at_corner(w, end[1] - 1);
+    if (w->has_row[end[0] - 1] == w->has_row[end[1] - 1])
+        return 0.5 * (first + second);
+    return w->has_row[end[0] - 1] ? first : second;
+}
+
+static void forget(pressure_work *w, const uz_mesh *mesh, const uz_group *group)
+{
+    for (int64_t i = 0; i < uz_group_node_count(mesh, group); i++) {
+        const int64_t node = uz_group_node_at(group, i);
+        w->area[node] = w->force[node] = 0;
+        w->has_row[node] = false;
+        if (w->end)
+            w->end[2 * node] = w->end[2 * node + 1] = 0;
+    }
+}
+
+/* Rows [first, last) are those of contact k. */
+static bool press(double *pressure, pressure_work *w, const uz_body_model *model, const uz_scene *scene, int64_t k,
+                  const double *r, int64_t first, int64_t last)
+{
+    const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
+    if (!group)
+        return true;
+    if (!add_sides(w, model, group))
+        return false;
+    for (int64_t i = first; i < last; i++)
+        add_reaction(w, model->info.contact_node[i], r[i]);
+    for (int64_t i = first; i < last; i++)
+        pressure[i] = pressure_at(w, model->info.contact_node[i]);
+    forget(w, &model->mesh, group);
+    return true;
+}
+
+uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
+                              uz_error *err)
+{
+    const int64_t m = model->m, n_nodes = model->mesh.n_nodes;
+    pressure_work w = {uz_alloc_zero(n_nodes, sizeof *w.area), uz_alloc_zero(n_nodes, sizeof *w.force), NULL,
+                       uz_alloc_zero(n_nodes, sizeof *w.has_row)};
+    const int64_t *contact = model->info.contact_of;
+    bool done = w.area && w.force && w.has_row;
+    for (int64_t first = 0, last; done && first < m; first = last) {
+        for (last = first; last < m && contact[last] == contact[first];)
+            last++;
+        done = press(pressure, &w, model, scene, contact[first], r, first, last);
+    }
+    free(w.area);
+    free(w.force);
+    free(w.end);
+    free(w.has_row);
+    return done ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)m);
+}

@@ -1,0 +1,187 @@
+/* fields.c: what an answer means, computed from the scene, the displacements and the reactions. */
+#include "post/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const struct {
+    uz_field field;
+    const char *name;
+} NAMES[] = {
+    {UZ_FIELD_PRESSURE, "pressure"},
+    {UZ_FIELD_CONTACT_STATUS, "contact_status"},
+    {UZ_FIELD_STRESS, "stress"},
+    {UZ_FIELD_PRINCIPAL, "principal"},
+    {UZ_FIELD_VON_MISES, "von_mises"},
+    {UZ_FIELD_STRAIN, "strain"},
+    {UZ_FIELD_STRESS_GAUSS, "stress_gauss"},
+    {UZ_FIELD_DISPLACEMENTS, "displacements"},
+    {UZ_FIELD_REACTIONS, "reactions"},
+    {UZ_FIELD_GAPS, "gaps"},
+    {UZ_FIELD_MATERIALS, "materials"},
+};
+enum { N_NAMES = sizeof NAMES / sizeof NAMES[0] };
+
+const char *uz_field_name(uz_field field)
+{
+    for (int i = 0; i < N_NAMES; i++)
+        if (NAMES[i].field == field)
+            return NAMES[i].name;
+    return "unknown";
+}
+
+bool uz_field_parse(uz_field *out, const char *name, size_t len)
+{
+    for (int i = 0; i < N_NAMES; i++)
+        if (strlen(NAMES[i].name) == len && memcmp(NAMES[i].name, name, len) == 0) {
+            *out = NAMES[i].field;
+            return true;
+        }
+    return false;
+}
+
+const char *const *uz_field_components(int dim)
+{
+    static const char *const PLANE[] = {"xx", "yy", "zz", "xy"}, *const SPACE[] = {"xx", "yy", "zz", "xy", "yz", "zx"};
+    return dim == 2 ? PLANE : SPACE;
+}
+
+void uz_fields_clear(uz_fields *fields)
+{
+    if (!fields)
+        return;
+    free(fields->pressure);
+    free(fields->contact_status);
+    free(fields->stress);
+    free(fields->principal);
+    free(fields->von_mises);
+    free(fields->strain);
+    free(fields->gauss_element);
+    free(fields->gauss_point);
+    free(fields->gauss_stress);
+    memset(fields, 0, sizeof *fields);
+}
+
+/* Room for what is wanted; UZ_OK leaves the others NULL. */
+static uz_status make_room(double **out, bool wanted, int64_t count, int components, uz_error *err)
+{
+    if (wanted && !(*out = uz_alloc_zero(count * components, sizeof **out)))
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a field of %lld numbers",
+                       (long long)count * (long long)components);
+    return UZ_OK;
+}
+
+static uz_status contact_fields(uz_fields *out, const uz_field_body *body, const double *r, unsigned which,
+                                uz_error *err)
+{
+    uz_status status = make_room(&out->pressure, which & UZ_FIELD_PRESSURE, out->m, 1, err);
+    if (status == UZ_OK)
+        status = make_room(&out->contact_status, which & UZ_FIELD_CONTACT_STATUS, out->m, 1, err);
+    if (status == UZ_OK && out->pressure)
+        status = uz_contact_pressure(out->pressure, body->model, body->scene, r, err);
+    for (int64_t i = 0; status == UZ_OK && out->contact_status && i < out->m; i++)
+        out->contact_status[i] = r[i] < 0;
+    return status;
+}
+
+static const unsigned OF_STRESS = UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES;
+
+static uz_status nodal_fields(uz_fields *out, const uz_field_body *body, const double *u, unsigned which,
+                              const uz_hooks *hooks, uz_error *err)
+{
+    const int components = out->components;
+    uz_status status = make_room(&out->stress, which & OF_STRESS, out->n_nodes, components, err);
+    if (status == UZ_OK)
+        status = make_room(&out->strain, which & UZ_FIELD_STRAIN, out->n_nodes, components, err);
+    if (status == UZ_OK)
+        status = make_room(&out->principal, which & UZ_FIELD_PRINCIPAL, out->n_nodes, 3, err);
+    if (status == UZ_OK)
+        status = make_room(&out->von_mises, which & UZ_FIELD_VON_MISES, out->n_nodes, 1, err);
+    if (status == UZ_OK && (out->stress || out->strain))
+        status = uz_field_recover(out->stress, out->strain, body, u, hooks, err);
+    if (status != UZ_OK)
+        return status;
+    for (int64_t a = 0; out->principal && a < out->n_nodes; a++)
+        uz_principal(out->principal + 3 * a, out->stress + a * components, components);
+    for (int64_t a = 0; out->von_mises && a < out->n_nodes; a++)
+        out->von_mises[a] = uz_von_mises(out->stress + a * components, components);
+    if (!(which & UZ_FIELD_STRESS)) {
+        free(out->stress);
+        out->stress = NULL;
+    }
+    return UZ_OK;
+}
+
+static uz_status gauss_fields(uz_fields *out, const uz_field_body *body, const double *u, unsigned which,
+                              const uz_hooks *hooks, uz_error *err)
+{
+    if (!(which & UZ_FIELD_STRESS_GAUSS))
+        return UZ_OK;
+    out->n_points = uz_field_gauss_count(body);
+    uz_status status = make_room(&out->gauss_element, true, out->n_points, 1, err);
+    if (status == UZ_OK)
+        status = make_room(&out->gauss_point, true, out->n_points, out->dim, err);
+    if (status == UZ_OK)
+        status = make_room(&out->gauss_stress, true, out->n_points, out->components, err);
+    if (status == UZ_OK)
+        status = uz_field_gauss(out->gauss_element, out->gauss_point, out->gauss_stress, body, u, hooks, err);
+    return status;
+}
+
+static const unsigned OF_BODY = OF_STRESS | UZ_FIELD_STRAIN | UZ_FIELD_STRESS_GAUSS | UZ_FIELD_DISPLACEMENTS;
+static const unsigned OF_CONTACT = UZ_FIELD_PRESSURE | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_REACTIONS;
+
+static uz_status check_source(const uz_field_source *answer, const uz_body_model *model, unsigned which, uz_error *err)
+{
+    const int64_t n_u = model->mesh.n_nodes * model->mesh.dim;
+    if (which & OF_BODY && (!answer->u || answer->n_u != n_u))
+        return uz_fail(err, UZ_ERR_SIZE, "u", "the fields of the body need %lld displacements", (long long)n_u);
+    if (which & OF_CONTACT && model->m > 0 && (!answer->r || answer->m != model->m))
+        return uz_fail(err, UZ_ERR_SIZE, "r", "the fields of the contact need %lld reactions", (long long)model->m);
+    if (which & UZ_FIELD_GAPS && model->m > 0 && (!answer->g || answer->m != model->m))
+        return uz_fail(err, UZ_ERR_SIZE, "g", "the fields of the contact need %lld gaps", (long long)model->m);
+    return UZ_OK;
+}
+
+uz_status uz_fields_of_body(uz_fields *out, const uz_field_body *body, const uz_field_source *answer, unsigned which,
+                            const uz_hooks *hooks, uz_error *err)
+{
+    const uz_body_model *model = body->model;
+    memset(out, 0, sizeof *out);
+    uz_status status = check_source(answer, model, which, err);
+    if (status != UZ_OK)
+        return status;
+    out->dim = model->mesh.dim;
+    out->components = body->components;
+    out->n_nodes = model->mesh.n_nodes;
+    out->n_elements = model->mesh.n_elements;
+    out->m = model->m;
+    status = contact_fields(out, body, answer->r, which, err);
+    if (status == UZ_OK)
+        status = nodal_fields(out, body, answer->u, which, hooks, err);
+    if (status == UZ_OK)
+        status = gauss_fields(out, body, answer->u, which, hooks, err);
+    if (status != UZ_OK)
+        uz_fields_clear(out);
+    return status;
+}
+
+uz_status uz_fields_compute(uz_fields *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                            const uz_hooks *hooks, uz_error *err)
+{
+    uz_body_model model;
+    uz_field_body body = {.scene = scene};
+    uz_error_reset(err);
+    memset(out, 0, sizeof *out);
+    uz_status status = uz_body_model_outline(&model, scene, err);
+    if (status == UZ_OK)
+        status = uz_field_body_init(&body, scene, &model, err);
+    if (status == UZ_OK)
+        status = uz_fields_of_body(out, &body, answer, which, hooks, err);
+    uz_field_body_clear(&body);
+    uz_body_model_clear(&model);
+    return status;
+}

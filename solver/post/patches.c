@@ -1,0 +1,343 @@
+/* patches.c: nodal stress and strain of linear elements.
+ *
+ * Within a linear element only the strain in its middle is second order accurate: what its shape functions say beyond
+ * that point has the wrong slope in general, and at a boundary no neighbour on the other side makes up for it. So a
+ * polynomial of degree 1 is fitted to the middles of the elements around the node by least squares and read at the node
+ * (Zienkiewicz and Zhu, "The superconvergent patch recovery", Int. J. Numer. Meth. Engng 33 (1992) 1331-1364). Where
+ * the node lies at the rim of its elements' middles, the next ring of elements joins in. Materials are fitted by
+ * themselves, and averaged by volume where they meet. */
+#include "post/parts.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "core/hooks.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DIM = 3, BETWEEN_QUESTIONS = 1024, MOST_VALUES = 2 * UZ_FIELD_COMPONENTS, MOST_MATERIALS = 8 };
+
+/* An element's middle. */
+typedef struct {
+    double x[DIM], volume, value[MOST_VALUES]; /* stress, strain */
+} sample;
+
+typedef struct {
+    const uz_field_body *body;
+    int dim, values;
+    sample *of;              /* n_elements */
+    unsigned char *plain;    /* n_elements: is_plain */
+    int64_t *first, *around; /* elements around each node */
+    int64_t *seen;           /* n_elements: 1 + the last patch that it was in */
+    int64_t patches;
+    int64_t *patch; /* elements of the patch at hand; capacity of them */
+    int64_t count, capacity;
+} patches;
+
+/* Incompatible modes have the whole slope, quadratic elements too: their own points serve better. */
+static bool is_plain(const uz_field_body *body, int64_t e)
+{
+    const uz_body_model *model = body->model;
+    const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
+    if (kind == UZ_TRI3 || kind == UZ_TET4)
+        return true;
+    return (kind == UZ_QUAD4 || kind == UZ_HEX8) &&
+           uz_resolve_formulation(model->formulation, kind, model->kind, uz_element_material(model, e)->poisson) !=
+               UZ_FORMULATION_INCOMPATIBLE;
+}
+
+static const double *middle_of(uz_element_kind kind)
+{
+    static const double TRI[3] = {1.0 / 3, 1.0 / 3}, TET[3] = {0.25, 0.25, 0.25}, BOX[3] = {0};
+    return kind == UZ_TRI3 ? TRI : kind == UZ_TET4 ? TET : BOX;
+}
+
+static void take_sample(sample *to, uz_field_points *middle, int64_t e, double volume)
+{
+    const uz_field_body *body = middle->body;
+    const uz_mesh *mesh = &body->model->mesh;
+    const size_t bytes = (size_t)body->components * sizeof(double);
+    uz_field_state state;
+    int nodes;
+    const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+    uz_field_points_states(&state, middle, e);
+    memset(to->x, 0, sizeof to->x);
+    to->volume = volume > 0 ? volume : uz_element_volume(&middle->at.element);
+    memcpy(to->value, state.stress, bytes);
+    memcpy(to->value + body->components, state.strain, bytes);
+    for (int a = 0; a < nodes; a++)
+        for (int c = 0; c < mesh->dim; c++)
+            to->x[c] += mesh->xyz[node[a] * mesh->dim + c];
+    for (int c = 0; c < mesh->dim; c++)
+        to->x[c] /= nodes;
+}
+
+static bool list_around(patches *p)
+{
+    const uz_mesh *mesh = &p->body->model->mesh;
+    const int64_t total = mesh->first[mesh->n_elements];
+    p->first = uz_alloc_zero(mesh->n_nodes + 2, sizeof *p->first);
+    p->around = uz_alloc(total, sizeof *p->around);
+    p->seen = uz_alloc_zero(mesh->n_elements, sizeof *p->seen);
+    if (!p->first || !p->around || !p->seen)
+        return false;
+    for (int64_t i = 0; i < total; i++)
+        p->first[mesh->node[i] + 2]++;
+    for (int64_t a = 0; a < mesh->n_nodes; a++)
+        p->first[a + 2] += p->first[a + 1];
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        for (int64_t i = mesh->first[e]; i < mesh->first[e + 1]; i++)
+            p->around[p->first[mesh->node[i] + 1]++] = e;
+    return true;
+}
+
+static int32_t material_of(const patches *p, int64_t e)
+{
+    return p->body->model->material_of ? p->body->model->material_of[e] : 0;
+}
+
+/* Adds the plain elements of the material around a node. False: no memory. */
+static bool add_ring(patches *p, int64_t node, int32_t material)
+{
+    for (int64_t i = p->first[node]; i < p->first[node + 1]; i++) {
+        const int64_t e = p->around[i];
+        if (p->seen[e] == p->patches || material_of(p, e) != material || !p->plain[e])
+            continue;
+        if (p->count == p->capacity) {
+            int64_t *more = uz_realloc(p->patch, 2 * p->capacity + 64, sizeof *more);
+            if (!more)
+                return false;
+            p->patch = more;
+            p->capacity = 2 * p->capacity + 64;
+        }
+        p->seen[e] = p->patches;
+        p->patch[p->count++] = e;
+    }
+    return true;
+}
+
+static bool add_next_ring(patches *p, int32_t material)
+{
+    const int64_t inner = p->count;
+    for (int64_t i = 0; i < inner; i++) {
+        int nodes;
+        const int64_t *node = uz_mesh_element(&p->body->model->mesh, p->patch[i], &nodes);
+        for (int a = 0; a < nodes; a++)
+            if (!add_ring(p, node[a], material))
+                return false;
+    }
+    return true;
+}
+
+/* Volume of the patch and the mean of its values; returns how far the node is from the middle of the patch, in parts of
+ * its radius. */
+static double average(double value[MOST_VALUES], double *volume, const patches *p, const double *x)
+{
+    double centre[DIM] = {0}, offset = 0, radius = 0;
+    *volume = 0;
+    memset(value, 0, MOST_VALUES * sizeof *value);
+    for (int64_t i = 0; i < p->count; i++) {
+        const sample *s = &p->of[p->patch[i]];
+        double distance = 0;
+        *volume += s->volume;
+        for (int v = 0; v < p->values; v++)
+            value[v] += s->volume * s->value[v];
+        for (int c = 0; c < p->dim; c++) {
+            centre[c] += s->volume * (s->x[c] - x[c]);
+            distance += (s->x[c] - x[c]) * (s->x[c] - x[c]);
+        }
+        radius = fmax(radius, distance);
+    }
+    for (int v = 0; v < p->values; v++)
+        value[v] /= *volume;
+    for (int c = 0; c < p->dim; c++)
+        offset += centre[c] / *volume * (centre[c] / *volume);
+    return sqrt(offset / radius);
+}
+
+/* Solves G a = b for a[0] of each right-hand side. False: the samples do not determine a slope. */
+static bool solve_fit(double G[DIM + 1][DIM + 1], double b[DIM + 1][MOST_VALUES], int n, int values, double *at_node)
+{
+    const double least = 1e-3 * G[0][0];
+    for (int j = n - 1; j >= 0; j--) { /* from the last, so that the first unknown needs no substitution */
+        if (!(G[j][j] > least) && j > 0)
+            return false;
+        for (int i = 0; i < j; i++) {
+            const double factor = G[i][j] / G[j][j];
+            for (int k = 0; k <= j; k++)
+                G[i][k] -= factor * G[j][k];
+            for (int v = 0; v < values; v++)
+                b[i][v] -= factor * b[j][v];
+        }
+    }
+    if (!(G[0][0] > 1e-3 * least))
+        return false;
+    for (int v = 0; v < values; v++)
+        at_node[v] = b[0][v] / G[0][0];
+    return true;
+}
+
+static bool fit(double at_node[MOST_VALUES], const patches *p, const double *x)
+{
+    double G[DIM + 1][DIM + 1] = {{0}}, b[DIM + 1][MOST_VALUES] = {{0}}, scale[DIM] = {0};
+    for (int64_t i = 0; i < p->count; i++)
+        for (int c = 0; c < p->dim; c++)
+            scale[c] = fmax(scale[c], fabs(p->of[p->patch[i]].x[c] - x[c]));
+    for (int64_t i = 0; i < p->count; i++) {
+        const sample *s = &p->of[p->patch[i]];
+        double basis[DIM + 1] = {1};
+        for (int c = 0; c < p->dim; c++)
+            basis[c + 1] = scale[c] > 0 ? (s->x[c] - x[c]) / scale[c] : 0;
+        for (int r = 0; r <= p->dim; r++) {
+            for (int c = 0; c <= p->dim; c++)
+                G[r][c] += basis[r] * basis[c];
+            for (int v = 0; v < p->values; v++)
+                b[r][v] += basis[r] * s->value[v];
+        }
+    }
+    return solve_fit(G, b, p->dim + 1, p->values, at_node);
+}
+
+enum { IN_THE_MIDDLE, FITTED, UNKNOWN, NO_MEMORY };
+
+/* The node's value in one material. */
+static int recover_material(double value[MOST_VALUES], double *volume, patches *p, int64_t node, int32_t material)
+{
+    const double CENTRED = 0.02, RIM = 0.3;
+    const double *x = p->body->model->mesh.xyz + node * p->dim;
+    double unused, mean[MOST_VALUES];
+    p->patches++;
+    p->count = 0;
+    if (!add_ring(p, node, material))
+        return NO_MEMORY;
+    const double offset = average(mean, volume, p, x);
+    memcpy(value, mean, sizeof mean);
+    if (offset <= CENTRED)
+        return IN_THE_MIDDLE;
+    if (offset <= RIM && fit(value, p, x))
+        return FITTED;
+    if (!add_next_ring(p, material))
+        return NO_MEMORY;
+    average(mean, &unused, p, x);
+    return fit(value, p, x) ? FITTED : UNKNOWN;
+}
+
+/* Which materials there are around a node; 0 where some element is not plain, or there are too many. */
+static int list_materials(int32_t list[MOST_MATERIALS], const patches *p, int64_t node)
+{
+    int count = 0;
+    for (int64_t i = p->first[node]; i < p->first[node + 1]; i++) {
+        const int32_t material = material_of(p, p->around[i]);
+        int k = 0;
+        while (k < count && list[k] != material)
+            k++;
+        if (!p->plain[p->around[i]] || k == MOST_MATERIALS)
+            return 0;
+        list[k] = material;
+        count += k == count;
+    }
+    return count;
+}
+
+/* *done false: no slope can be told, and nothing is written. False: no memory. */
+static bool recover_node(double *stress, double *strain, unsigned char *done, patches *p, int64_t node)
+{
+    const int components = p->values / 2;
+    double sum[MOST_VALUES] = {0}, total = 0, value[MOST_VALUES], volume;
+    int32_t list[MOST_MATERIALS];
+    const int count = list_materials(list, p, node);
+    for (int k = 0; k < count; k++) {
+        const int how = recover_material(value, &volume, p, node, list[k]);
+        if (how == NO_MEMORY || how == UNKNOWN)
+            return how == UNKNOWN;
+        total += volume;
+        for (int v = 0; v < p->values; v++)
+            sum[v] += volume * value[v];
+    }
+    for (int c = 0; c < components && count > 0; c++) {
+        if (stress)
+            stress[node * components + c] = sum[c] / total;
+        if (strain)
+            strain[node * components + c] = sum[components + c] / total;
+    }
+    *done = count > 0;
+    return true;
+}
+
+static uz_status no_memory(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at nodes");
+}
+
+static uz_status take_samples(patches *p, uz_field_points *middle, const double *u, const uz_hooks *hooks,
+                              uz_error *err)
+{
+    const uz_mesh *mesh = &p->body->model->mesh;
+    bool known[UZ_ELEMENT_KINDS] = {false};
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
+        if (!p->plain[e])
+            continue;
+        if (!known[kind]) {
+            middle[kind].count = 1;
+            memcpy(middle[kind].point[0], middle_of(kind), sizeof middle[kind].point[0]);
+            uz_field_points_init(&middle[kind], p->body, u, e);
+            known[kind] = true;
+        }
+        take_sample(&p->of[e], &middle[kind], e, middle[kind].alike && e > 0 ? p->of[0].volume : 0);
+    }
+    return UZ_OK;
+}
+
+static uz_status recover_all(double *stress, double *strain, unsigned char *done, patches *p, const uz_hooks *hooks,
+                             uz_error *err)
+{
+    const uz_mesh *mesh = &p->body->model->mesh;
+    for (int64_t a = 0; a < mesh->n_nodes; a++) {
+        if (a % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
+        if (!recover_node(stress, strain, &done[a], p, a))
+            return no_memory(err);
+    }
+    return UZ_OK;
+}
+
+/* False: no memory. */
+static bool find_plain(bool *any, patches *p)
+{
+    const int64_t n = p->body->model->mesh.n_elements;
+    *any = false;
+    p->plain = uz_alloc(n, 1);
+    for (int64_t e = 0; p->plain && e < n; e++) {
+        p->plain[e] = is_plain(p->body, e);
+        *any = *any || p->plain[e];
+    }
+    return p->plain != NULL;
+}
+
+uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *done, const uz_field_body *body,
+                               const double *u, const uz_hooks *hooks, uz_error *err)
+{
+    patches p = {.body = body, .dim = body->model->mesh.dim, .values = 2 * body->components};
+    uz_field_points *middle = NULL;
+    bool any;
+    uz_status status = find_plain(&any, &p) ? UZ_OK : no_memory(err);
+    if (status == UZ_OK && any) {
+        p.of = uz_alloc(body->model->mesh.n_elements, sizeof *p.of);
+        middle = uz_alloc(UZ_ELEMENT_KINDS, sizeof *middle);
+        status = p.of && middle && list_around(&p) ? take_samples(&p, middle, u, hooks, err) : no_memory(err);
+        if (status == UZ_OK)
+            status = recover_all(stress, strain, done, &p, hooks, err);
+    }
+    free(middle);
+    free(p.of);
+    free(p.plain);
+    free(p.first);
+    free(p.around);
+    free(p.seen);
+    free(p.patch);
+    return status;
+}

@@ -1,0 +1,365 @@
+/* warnings.c: does the answer fit the assumptions it was computed under? Strains and rotations are taken to be small,
+ * normals and the places where bodies meet to be those of the undeformed body. */
+#include "post/balance.h"
+
+#include "post/parts.h"
+#include "obstacle/obstacle.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* A rotation by w makes strains of w^2 / 2 that are not there: at 0.1 half a per cent. */
+static const double MOST_ROTATION = 0.1, MOST_STRAIN = 0.05;
+/* Of the obstacle's normal, from where the node was to where it is: the row kept the first. */
+static const double MOST_TURN = 0.1;
+/* Of a face of the other body, in parts of its size. */
+static const double MOST_FACE = 0.5;
+
+/* Poisson's ratio from which on plain linear elements are much too stiff: on Cook's membrane in plane strain quad4 has
+ * 17 % too little energy there (element/stiffness.c). */
+static const double LOCKS = 0.45;
+
+typedef struct {
+    const uz_body_model *model;
+    const uz_scene *scene;
+    const double *u, *r;
+    uz_evaluation *out;
+} doubts;
+
+__attribute__((format(printf, 4, 5))) static void warn(uz_evaluation *out, const char *code, double value,
+                                                       const char *format, ...)
+{
+    enum { MOST = sizeof out->warnings / sizeof out->warnings[0] };
+    va_list args;
+    if (out->n_warnings == MOST)
+        return;
+    uz_warning *w = &out->warnings[out->n_warnings++];
+    w->value = value;
+    snprintf(w->code, sizeof w->code, "%s", code);
+    va_start(args, format);
+    vsnprintf(w->message, sizeof w->message, format, args);
+    va_end(args);
+}
+
+/* ---- strain and rotation */
+
+static inline double squared_distance(const double *x, const double *y, int dim)
+{
+    const double a = x[0] - y[0], b = x[1] - y[1], c = dim == 3 ? x[2] - y[2] : 0;
+    return a * a + b * b + c * c;
+}
+
+/* At most how steep u is where all elements are equal boxes with nodes at their corners only: the range of u over the
+ * shortest edge. INFINITY: not such a mesh. */
+static double slope_by_range(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const int dim = mesh->dim;
+    double range2 = 0, shortest = INFINITY;
+    if (!mesh->uniform)
+        return INFINITY;
+    for (int c = 0; c < dim; c++) {
+        double least = d->u[c], most = d->u[c];
+        for (int64_t i = c; i < mesh->n_nodes * dim; i += dim) {
+            least = d->u[i] < least ? d->u[i] : least;
+            most = d->u[i] > most ? d->u[i] : most;
+        }
+        range2 += (most - least) * (most - least);
+        shortest = fmin(shortest, mesh->cell[c]);
+    }
+    return sqrt(range2) / shortest;
+}
+
+/* The largest change of u over a distance between an element's first node and the others: every strain and rotation
+ * shows in it, if not in full. */
+static double largest_slope(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const int dim = mesh->dim;
+    const double *x = mesh->xyz, *u = d->u;
+    double largest = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const int64_t first = mesh->node[mesh->first[e]] * dim;
+        for (int64_t k = mesh->first[e] + 1; k < mesh->first[e + 1]; k++) {
+            const int64_t i = mesh->node[k] * dim;
+            const double du = squared_distance(u + i, u + first, dim), dx = squared_distance(x + i, x + first, dim);
+            if (du > largest * dx)
+                largest = du / dx;
+        }
+    }
+    return sqrt(largest);
+}
+
+/* |curl u| / 2 from the gradients at a point. */
+static double rotation_at(const uz_field_element *at, const double point[3])
+{
+    double grad[UZ_ELEMENT_NODES][3], G[3][3] = {{0}};
+    const int dim = uz_element_dim(at->element.kind);
+    uz_element_gradients(grad, &at->element, point);
+    for (int a = 0; a < uz_element_node_count(at->element.kind); a++)
+        for (int i = 0; i < dim; i++)
+            for (int j = 0; j < dim; j++)
+                G[i][j] += at->u[a * dim + i] * grad[a][j];
+    const double x = G[2][1] - G[1][2], y = G[0][2] - G[2][0], z = G[1][0] - G[0][1];
+    return 0.5 * sqrt(x * x + y * y + z * z);
+}
+
+static void look_at_elements(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const uz_field_body body = {.scene = d->scene, .model = d->model, .components = mesh->dim == 2 ? 4 : 6};
+    double rotation = 0, strain = 0, principal[3];
+    int64_t turned = 0, strained = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        uz_field_element at;
+        uz_field_state state;
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+        const bool box = kind == UZ_QUAD4 || kind == UZ_QUAD8 || kind == UZ_HEX8;
+        const double middle = box ? 0 : 1.0 / (mesh->dim + 1), point[3] = {middle, middle, middle};
+        uz_field_element_at(&at, &body, d->u, e);
+        uz_field_state_at(&state, &at, point);
+        uz_principal(principal, state.strain, body.components);
+        const double here = fmax(fabs(principal[0]), fabs(principal[2])), turn = rotation_at(&at, point);
+        if (here > strain) {
+            strain = here;
+            strained = e;
+        }
+        if (turn > rotation) {
+            rotation = turn;
+            turned = e;
+        }
+    }
+    if (rotation > MOST_ROTATION)
+        warn(d->out, "large_rotation", rotation,
+             "element %lld turns by %.2g rad; small rotations were assumed, and beyond %g they are not small",
+             (long long)turned, rotation, MOST_ROTATION);
+    if (strain > MOST_STRAIN)
+        warn(d->out, "large_strain", strain,
+             "element %lld is strained by %.2g; small strains were assumed, and beyond %g they are not small",
+             (long long)strained, strain, MOST_STRAIN);
+}
+
+/* ---- sliding */
+
+/* Across the normal, of a node against the point of the face that it meets. */
+static void relative_motion(double v[3], const doubts *d, int64_t row, const uz_contact_sites *sites, int64_t place)
+{
+    const int dim = d->model->mesh.dim;
+    const double *n = d->model->info.contact_normal + row * dim;
+    double along = 0;
+    memset(v, 0, 3 * sizeof *v);
+    for (int c = 0; c < dim; c++) {
+        v[c] = d->u[d->model->info.contact_node[row] * dim + c];
+        for (int64_t j = sites->first[place]; j < sites->first[place + 1]; j++)
+            v[c] -= sites->weight[j] * d->u[sites->node[j] * dim + c];
+        along += v[c] * n[c];
+    }
+    for (int c = 0; c < dim; c++)
+        v[c] -= along * n[c];
+}
+
+static double length(const double v[3])
+{
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* By how much the obstacle's normal where the node has come to differs from the one that was kept. */
+static double turn_of(const doubts *d, const uz_obstacle *obstacle, int64_t row)
+{
+    const int dim = d->model->mesh.dim;
+    const int64_t first = d->model->info.contact_node[row] * dim;
+    double x[3] = {0}, chord = 0;
+    uz_gap there;
+    for (int c = 0; c < dim; c++)
+        x[c] = d->model->mesh.xyz[first + c] + d->u[first + c];
+    if (uz_obstacle_gap(&there, obstacle, x, NULL) != UZ_OK)
+        return 0;
+    for (int c = 0; c < dim; c++)
+        chord = hypot(chord, there.normal[c] - d->model->info.contact_normal[row * dim + c]);
+    return 2 * asin(fmin(1, 0.5 * chord));
+}
+
+/* Of the face that a node meets: its longest distance between corners. */
+static double size_of_face(const uz_mesh *mesh, uz_face face)
+{
+    int64_t node[UZ_FACE_NODES];
+    double largest = 0;
+    const int count = uz_mesh_face(node, mesh, face);
+    for (int a = 0; a < count; a++)
+        for (int b = 0; b < a; b++)
+            largest = fmax(
+                largest, squared_distance(mesh->xyz + node[a] * mesh->dim, mesh->xyz + node[b] * mesh->dim, mesh->dim));
+    return sqrt(largest);
+}
+
+/* The most of each that was seen. */
+typedef struct {
+    double turn;  /* of the normal */
+    double part;  /* slid, of a face */
+    double depth; /* at which a node begins in the other body, in lengths of the face */
+    int64_t deepest;
+} findings;
+
+/* The rows of contact k from *row on. */
+static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obstacle, int64_t k, int64_t *row)
+{
+    const uz_mesh_info *info = &d->model->info;
+    const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
+    const uz_group *group = uz_mesh_group(&d->model->mesh, d->scene->contacts[k].on, "", NULL);
+    const int64_t count = group ? uz_group_node_count(&d->model->mesh, group) : 0;
+    for (int64_t i = 0; i < count && *row < d->model->m && info->contact_of[*row] == k; i++) {
+        double v[3];
+        if (info->contact_node[*row] != uz_group_node_at(group, i))
+            continue;
+        const double face = sites && sites->first ? size_of_face(&d->model->mesh, sites->face[i]) : 0;
+        if (d->r[*row] < 0 && obstacle)
+            most->turn = fmax(most->turn, turn_of(d, obstacle, *row));
+        if (d->r[*row] < 0 && face > 0) {
+            relative_motion(v, d, *row, sites, i);
+            most->part = fmax(most->part, length(v) / face);
+        }
+        if (face > 0 && -sites->gap[i] > most->depth * face) {
+            most->depth = -sites->gap[i] / face;
+            most->deepest = info->contact_node[*row];
+        }
+        ++*row;
+    }
+}
+
+/* Out of the body, in the middle of a face, and that place. */
+static void outward_normal(double n[3], double middle[3], const uz_mesh *mesh, uz_face face)
+{
+    int64_t node[UZ_FACE_NODES];
+    double side[2][3] = {{0}};
+    const int dim = mesh->dim, corners = uz_face_corner_count((uz_element_kind)mesh->kind[face.element]);
+    uz_mesh_face(node, mesh, face);
+    memset(middle, 0, 3 * sizeof *middle);
+    for (int a = 0; a < corners; a++)
+        for (int c = 0; c < dim; c++)
+            middle[c] += mesh->xyz[node[a] * dim + c] / corners;
+    for (int c = 0; c < dim; c++) {
+        side[0][c] = mesh->xyz[node[1] * dim + c] - mesh->xyz[node[0] * dim + c];
+        side[1][c] = dim == 3 ? mesh->xyz[node[2] * dim + c] - mesh->xyz[node[0] * dim + c] : 0;
+    }
+    if (dim == 2)
+        side[1][2] = 1; /* the element on the left */
+    for (int c = 0; c < 3; c++)
+        n[c] = side[0][(c + 1) % 3] * side[1][(c + 2) % 3] - side[0][(c + 2) % 3] * side[1][(c + 1) % 3];
+    const double size = length(n);
+    for (int c = 0; c < 3; c++)
+        n[c] /= size;
+}
+
+/* The least cosine between the faces' normals and the obstacle's, which points to where the body may be: where none is
+ * against it the faces look away from the obstacle, and never meet it. -1: no faces. */
+static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz_contact *contact)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    const uz_group *group = uz_mesh_group(mesh, contact->on, "", NULL);
+    const bool faces = group && group->kind == UZ_GROUP_FACES && group->n_faces > 0;
+    const double size = length(contact->normal);
+    double least = faces ? 1 : -1;
+    for (int64_t i = 0; faces && i < group->n_faces && least > MOST_TURN; i++) {
+        double n[3], middle[3], along = 0;
+        uz_gap there;
+        outward_normal(n, middle, mesh, group->face[i]);
+        if (obstacle && uz_obstacle_gap(&there, obstacle, middle, NULL) != UZ_OK)
+            return -1;
+        for (int c = 0; c < mesh->dim; c++)
+            along += n[c] * (obstacle ? there.normal[c] : contact->normal[c] / size);
+        least = fmin(least, along);
+    }
+    return least;
+}
+
+static uz_status look_at_contact(const doubts *d, uz_error *err)
+{
+    findings most = {0};
+    int64_t row = 0, behind = -1;
+    double away = 0;
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; k < d->scene->n_contacts && status == UZ_OK; k++) {
+        const uz_contact *contact = &d->scene->contacts[k];
+        uz_obstacle *obstacle = NULL;
+        if (contact->kind != UZ_OBSTACLE_PLANE && contact->kind != UZ_OBSTACLE_BODY)
+            status = uz_obstacle_new(&obstacle, contact, k, d->scene->model, err);
+        look_at_rows(&most, d, obstacle, k, &row);
+        const double least =
+            status == UZ_OK && contact->kind != UZ_OBSTACLE_BODY && behind < 0 ? turned_away(d, obstacle, contact) : -1;
+        if (least > MOST_TURN) {
+            behind = k;
+            away = least;
+        }
+        uz_obstacle_free(obstacle);
+    }
+    if (behind >= 0)
+        warn(d->out, "obstacle_behind", away,
+             "all faces of contact %lld look away from its obstacle and never meet it; its normal must point to the "
+             "body",
+             (long long)behind);
+    if (most.turn > MOST_TURN)
+        warn(d->out, "large_sliding", most.turn,
+             "a node slides so far on an obstacle that the normal there is turned by %.2g rad from the one that was "
+             "kept",
+             most.turn);
+    if (most.part > MOST_FACE)
+        warn(d->out, "sliding_off_face", most.part,
+             "a node slides by %.2g of the face of the other body that it was set against", most.part);
+    if (most.depth > 1)
+        warn(d->out, "deep_overlap", most.depth,
+             "node %lld begins %.2g lengths of the face that it meets deep in the other body: another face may be the "
+             "one "
+             "that it should meet",
+             (long long)most.deepest, most.depth);
+    return status;
+}
+
+/* ---- mesh */
+
+/* Is it linear, of its own strain, and kept from changing its volume in all directions? */
+static bool may_lock(const uz_body_model *model, int64_t e)
+{
+    const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
+    const double poisson = uz_element_material(model, e)->poisson;
+    if (model->kind == UZ_PLANE_STRESS || poisson < LOCKS)
+        return false;
+    if (kind == UZ_TRI3 || kind == UZ_TET4)
+        return true;
+    return (kind == UZ_QUAD4 || kind == UZ_HEX8) &&
+           uz_resolve_formulation(model->formulation, kind, model->kind, poisson) == UZ_FORMULATION_STANDARD;
+}
+
+static void look_at_mesh(const doubts *d)
+{
+    const uz_mesh *mesh = &d->model->mesh;
+    double poisson = 0;
+    int64_t stiff = 0;
+    for (int64_t e = 0; e < mesh->n_elements; e++)
+        if (may_lock(d->model, e) && uz_element_material(d->model, e)->poisson > poisson) {
+            poisson = uz_element_material(d->model, e)->poisson;
+            stiff = e;
+        }
+    if (poisson > 0)
+        warn(d->out, "locking", poisson,
+             "element %lld (%s) has Poisson's ratio %.5g: plain linear elements are too stiff there; use %s",
+             (long long)stiff, uz_element_name((uz_element_kind)mesh->kind[stiff]), poisson,
+             mesh->dim == 2 ? "quad4 with bbar, tri6 or quad8" : "hex8 with bbar, or tet10");
+    if (mesh->n_unused > 0)
+        warn(
+            d->out, "unused_nodes", (double)mesh->n_unused,
+            "%lld nodes of the file belong to no element and are left out; the others are numbered anew in their order",
+            (long long)mesh->n_unused);
+}
+
+uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
+                         const double *r, uz_error *err)
+{
+    const doubts d = {model, scene, u, r, out};
+    const double noticed = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
+    if (!(slope_by_range(&d) < 0.99 * noticed) && largest_slope(&d) > noticed)
+        look_at_elements(&d);
+    look_at_mesh(&d);
+    return look_at_contact(&d, err);
+}

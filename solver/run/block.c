@@ -1,0 +1,227 @@
+/* block.c: the pipeline of pipeline.c for several loads at once.
+ *
+ *     p -> y, g0            forward substitution of all loads, once through L
+ *     r                     iterations, load by load: they live on the contact
+ *     u                     backward substitution of all loads, once through L
+ *     (u, r) -> bound       certificates of UZ_LANES loads with one pass over K
+ *
+ * A case whose bound misses the request goes on by itself, as a single one would. */
+#include "run/block.h"
+
+#include "certificate/lanes.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+_Static_assert((int)UZ_LANES == (int)UZ_CERTIFY_LANES, "what comes out of the factor is certified as it lies");
+
+struct uz_block {
+    const uz_csc *K;
+    int64_t d, width;
+    uz_case_block *loads;
+    uz_lane_certifier *certifier;
+    uz_run *runs;     /* width */
+    uz_case **cases;  /* width: those of the runs */
+    const double **r; /* width: scaled reactions to recover from */
+    bool *with_push;  /* width */
+};
+
+/* Without a finite bound on K^-1 no lane can be certified; the cases are then certified one by one. */
+static uz_status make_certifier(uz_block *block, uz_body *body, const uz_problem *problem, uz_error *err)
+{
+    uz_factor_workspace *ws = uz_factor_workspace_new();
+    if (!ws)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a linear solve");
+    double bound = uz_body_inverse_bound(body, block->K, ws, NULL);
+    uz_factor_workspace_free(ws);
+    return uz_lane_certifier_create(&block->certifier, block->K, uz_body_N(body, problem),
+                                    uz_factor_describe(body->factor).rcond, bound, err);
+}
+
+uz_status uz_block_create(uz_block **out, uz_body *body, const uz_problem *problem, int64_t blocks, uz_error *err)
+{
+    *out = NULL;
+    uz_block *block = uz_alloc_zero(1, sizeof *block);
+    if (!block)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+    block->K = uz_body_K(body, problem);
+    block->d = block->K->cols;
+    block->width = blocks * UZ_LANES;
+    block->runs = uz_alloc_zero(block->width, sizeof *block->runs);
+    block->cases = uz_alloc_zero(block->width, sizeof(uz_case *));
+    block->r = uz_alloc_zero(block->width, sizeof(double *));
+    block->with_push = uz_alloc_zero(block->width, sizeof(bool));
+    uz_status status = UZ_OK;
+    if (!block->runs || !block->cases || !block->r || !block->with_push)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+    if (status == UZ_OK)
+        status = uz_case_block_create(&block->loads, body->dual, blocks, err);
+    if (status == UZ_OK)
+        status = make_certifier(block, body, problem, err);
+    if (status == UZ_OK)
+        *out = block;
+    else
+        uz_block_free(block);
+    return status;
+}
+
+void uz_block_free(uz_block *block)
+{
+    if (!block)
+        return;
+    uz_case_block_free(block->loads);
+    uz_lane_certifier_free(block->certifier);
+    free(block->runs);
+    free(block->cases);
+    free(block->r);
+    free(block->with_push);
+    free(block);
+}
+
+uz_run *uz_block_runs(uz_block *block)
+{
+    return block->runs;
+}
+
+enum { TILE = 512 }; /* rows at a time: what is read and written by turns stays in the first cache */
+
+/* The loads of UZ_LANES runs side by side; missing ones are zero. */
+static void interleave(double *P, const uz_run *runs, int64_t count, int64_t d)
+{
+    for (int64_t first = 0; first < d; first += TILE) {
+        int64_t last = first + TILE < d ? first + TILE : d;
+        for (int64_t lane = 0; lane < UZ_LANES; lane++) {
+            const double *p = lane < count ? runs[lane].p : NULL;
+            for (int64_t j = first; j < last; j++)
+                P[j * UZ_LANES + lane] = p ? p[j] : 0.0;
+        }
+    }
+}
+
+static void separate(uz_run *runs, int64_t count, const double *U, int64_t d)
+{
+    for (int64_t first = 0; first < d; first += TILE) {
+        int64_t last = first + TILE < d ? first + TILE : d;
+        for (int64_t lane = 0; lane < count; lane++)
+            for (int64_t j = first; j < last; j++)
+                runs[lane].answer.u[j] = U[j * UZ_LANES + lane];
+    }
+}
+
+/* How many of the runs are in the 8 lanes from `first` on. */
+static int64_t lanes_from(int64_t first, int64_t count)
+{
+    return count - first < UZ_LANES ? count - first : UZ_LANES;
+}
+
+/* Every load pays its share of what was done for all. */
+static void share_time(uz_block *block, int64_t count, double seconds, bool certify)
+{
+    for (int64_t k = 0; k < count; k++) {
+        uz_timings *t = &block->runs[k].result->summary.timings;
+        *(certify ? &t->certify : &t->iterate) += seconds / (double)count;
+    }
+}
+
+static uz_status load_all(uz_block *block, int64_t count, int64_t *failed, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    for (int64_t k = 0; status == UZ_OK && k < count; k++) {
+        *failed = block->runs[k].index;
+        status = uz_run_make_load(&block->runs[k], err);
+    }
+    if (status != UZ_OK)
+        return status;
+    double start = uz_seconds(), *P = uz_case_block_loads(block->loads);
+    for (int64_t first = 0; first < block->width; first += UZ_LANES)
+        interleave(P + first * block->d, block->runs + first, count - first, block->d);
+    status = uz_case_block_load(block->loads, err);
+    share_time(block, count, uz_seconds() - start, false);
+    return status;
+}
+
+static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
+{
+    uz_run *run = &block->runs[k];
+    run->in_block = true;
+    uz_status status = uz_case_create_in_block(&run->load, block->loads, k, block->K, run->h, err);
+    if (status == UZ_OK)
+        status = uz_run_start(run, err);
+    if (status == UZ_OK)
+        status = uz_run_iterate(run, err);
+    block->cases[k] = run->load;
+    block->r[k] = run->it.best_r;
+    block->with_push[k] = isfinite(run->it.best_bound);
+    return status;
+}
+
+static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bool *certified, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    const double *P = uz_case_block_loads(block->loads) + first * block->d;
+    const double *U = uz_case_block_displacements(block->loads) + first * block->d;
+    uz_lane_answer answers[UZ_LANES];
+    uz_run *runs = block->runs + first;
+    separate(runs, count, U, block->d);
+    for (int64_t k = 0; status == UZ_OK && k < count; k++) {
+        const double *scale = uz_case_row_scale(runs[k].load);
+        double whole_norm;
+        for (int64_t i = 0; i < runs[k].m; i++)
+            runs[k].answer.r[i] = scale[i] * block->r[first + k][i];
+        status = uz_run_whole_norm(&whole_norm, &runs[k], runs[k].answer.u, err);
+        answers[k] = (uz_lane_answer){.r = runs[k].answer.r,
+                                      .g = runs[k].answer.g,
+                                      .h = runs[k].h,
+                                      .sharp = 0.5 * runs[k].requested,
+                                      .moved = runs[k].moved,
+                                      .whole_norm = whole_norm};
+    }
+    if (status != UZ_OK)
+        return status;
+    uz_certify_lanes(block->certifier, answers, (int)count, U, P);
+    for (int64_t k = 0; k < count; k++) {
+        certified[k] = answers[k].certified;
+        runs[k].answer.certificate = answers[k].certificate;
+    }
+    return UZ_OK;
+}
+
+static uz_status recover_and_certify(uz_block *block, int64_t count, bool *certified, uz_error *err)
+{
+    double start = uz_seconds();
+    uz_status status = uz_case_block_recover(block->loads, block->cases, block->r, block->with_push, count, err);
+    for (int64_t first = 0; status == UZ_OK && first < count; first += UZ_LANES)
+        status = certify_lanes(block, first, lanes_from(first, count), certified + first, err);
+    share_time(block, count, uz_seconds() - start, true);
+    return status;
+}
+
+static uz_status finish_one(uz_run *run, bool certified, uz_error *err)
+{
+    uz_status status = certified ? UZ_OK : uz_run_certify(run, err);
+    return status == UZ_OK ? uz_run_finish(run, err) : status;
+}
+
+uz_status uz_block_solve(uz_block *block, int64_t count, int64_t *failed, uz_error *err)
+{
+    bool *certified = uz_alloc_zero(count, sizeof *certified);
+    if (!certified)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+    uz_status status = load_all(block, count, failed, err);
+    for (int64_t k = 0; status == UZ_OK && k < count; k++) {
+        *failed = block->runs[k].index;
+        status = iterate_one(block, k, err);
+    }
+    if (status == UZ_OK)
+        status = recover_and_certify(block, count, certified, err);
+    for (int64_t k = 0; status == UZ_OK && k < count; k++) {
+        *failed = block->runs[k].index;
+        status = finish_one(&block->runs[k], certified[k], err);
+    }
+    free(certified);
+    return status;
+}

@@ -1,0 +1,239 @@
+#include "run/body.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/digest.h"
+#include "core/error.h"
+#include "core/lock.h"
+#include "linalg/linalg.h"
+#include "run/rows.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void add_matrix(uz_digest *digest, const uz_csc *A)
+{
+    int64_t shape[2] = {A->rows, A->cols};
+    uz_digest_add(digest, shape, sizeof shape);
+    if (!A->ptr)
+        return;
+    size_t nnz = (size_t)A->ptr[A->cols];
+    uz_digest_add(digest, A->ptr, (size_t)(A->cols + 1) * sizeof *A->ptr);
+    uz_digest_add(digest, A->idx, nnz * sizeof *A->idx);
+    uz_digest_add(digest, A->val, nnz * sizeof *A->val);
+}
+
+static uz_status add_scene(uz_digest *digest, const uz_scene *scene, uz_error *err)
+{
+    unsigned char *key = NULL;
+    size_t len = 0;
+    uz_status status = uz_scene_body_key(&key, &len, scene, err);
+    if (status == UZ_OK)
+        uz_digest_add(digest, key, len);
+    free(key);
+    return status;
+}
+
+/* Where the choice of rows begins: initial gaps follow from the places of planes and the values of supports, which the
+ * key of the model leaves out. */
+static void add_rows(uz_digest *digest, const uz_problem *problem, const uz_candidates *wanted)
+{
+    const uz_scene *scene = &problem->scene;
+    if (!uz_may_omit_rows(problem))
+        return;
+    for (int64_t k = 0; k < scene->n_contacts; k++)
+        uz_digest_add(digest, scene->contacts[k].point, sizeof scene->contacts[k].point);
+    for (int64_t i = 0; i < scene->n_supports; i++) {
+        uz_digest_add(digest, scene->supports[i].u, sizeof scene->supports[i].u);
+        uz_digest_add(digest, &scene->supports[i].value, sizeof scene->supports[i].value);
+    }
+    if (wanted && wanted->in)
+        uz_digest_add(digest, wanted->in, (size_t)wanted->m);
+}
+
+uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_candidates *wanted,
+                         const uz_settings *settings, uz_error *err)
+{
+    memset(key, 0, sizeof *key);
+    uz_digest *state = uz_digest_new();
+    if (!state)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a digest");
+    int choices[3] = {(int)problem->kind, (int)settings->op, (int)settings->ordering};
+    uz_status status = UZ_OK;
+    uz_digest_add(state, choices, sizeof choices);
+    uz_digest_add(state, &settings->memory_limit, sizeof settings->memory_limit);
+    if (problem->kind == UZ_PROBLEM_SCENE) {
+        status = add_scene(state, &problem->scene, err);
+        add_rows(state, problem, wanted);
+    } else {
+        status = uz_matrix_digest(&key->K, &problem->qp.K, err);
+        uz_digest_add(state, key->K.values, sizeof key->K.values);
+        add_matrix(state, &problem->qp.N);
+    }
+    if (!uz_digest_end(state, key->digest) && status == UZ_OK)
+        status = uz_fail(err, UZ_ERR_INTERNAL, "", "hashing failed");
+    return status;
+}
+
+const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem)
+{
+    return body->is_scene ? &body->model.K : &problem->qp.K;
+}
+
+const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
+{
+    return body->rows.in ? &body->N_in : uz_body_all_rows(body, problem);
+}
+
+const uz_csc *uz_body_all_rows(const uz_body *body, const uz_problem *problem)
+{
+    if (body->no_rows.ptr)
+        return &body->no_rows;
+    return body->is_scene ? &body->model.N : &problem->qp.N;
+}
+
+/* The key of K: known for matrices; of a scene's only when there is a cache to look into. */
+static uz_status find_key(uz_matrix_key *K_key, const uz_body_key *key, const uz_body *body, uz_error *err)
+{
+    if (key && !body->is_scene)
+        *K_key = key->K;
+    return key && body->is_scene ? uz_matrix_digest(K_key, &body->model.K, err) : UZ_OK;
+}
+
+/* The fewest bytes that a box of this many cells can be solved with: told before the mesh is made. */
+static uz_status refuse_large_box(const uz_problem *problem, const uz_settings *settings, uz_error *err)
+{
+    const uz_box *box = &problem->scene.box;
+    double nodes = 1.0, entries = 1.0;
+    if (settings->memory_limit == 0 || problem->kind != UZ_PROBLEM_SCENE)
+        return UZ_OK;
+    for (int axis = 0; axis < box->dim; axis++) {
+        nodes *= (double)box->cells[axis] + 1.0;
+        entries *= 3.0; /* a node and its neighbours in a row */
+    }
+    double dofs = nodes * box->dim, least = dofs * (8.0 * (entries * box->dim) + 200.0);
+    if (least <= (double)settings->memory_limit)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_LIMIT, "/mesh",
+                   "%.0f nodes take at least %.3g bytes, and the limit is %zu: use a coarser "
+                   "mesh or raise the limit",
+                   nodes, least, settings->memory_limit);
+}
+
+/* Matrices without contacts may come with an N that is a zeroed struct. */
+static uz_status take_matrices(uz_body *body, const uz_problem *problem, const uz_settings *settings, uz_error *err)
+{
+    double start = uz_seconds();
+    uz_status status = UZ_OK;
+    body->is_scene = problem->kind == UZ_PROBLEM_SCENE;
+    if (body->is_scene)
+        status = refuse_large_box(problem, settings, err);
+    if (status == UZ_OK && body->is_scene)
+        status = uz_body_model_build(&body->model, &problem->scene, err);
+    else if (status == UZ_OK && problem->qp.N.rows == 0)
+        status = uz_csc_init(&body->no_rows, 0, problem->qp.K.cols, 0, err);
+    body->assemble_s = uz_seconds() - start;
+    return status;
+}
+
+/* The initial gaps of a scene's rows follow from its supports; of its loads there may be several lists. */
+static uz_status choose_by_gaps(uz_body *body, const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
+{
+    const uz_body_model *model = &body->model;
+    uz_scene unloaded = *scene;
+    unloaded.loads = NULL;
+    unloaded.n_loads = 0;
+    double *p = uz_alloc(model->d, sizeof *p), *h = uz_alloc(model->m, sizeof *h);
+    uz_error refusal = {0};
+    uz_status status = UZ_ERR_MEMORY;
+    if (p && h)
+        status = uz_body_model_load(p, h, NULL, model, &unloaded, &refusal);
+    if (status == UZ_OK)
+        status = uz_choose_rows(&body->rows, h, model->m, &model->info, scene, wanted, err);
+    else if (status == UZ_ERR_MEMORY)
+        status = uz_fail(err, status, "", "no memory for the gaps of %lld contacts", (long long)model->m);
+    else
+        status = UZ_OK; /* the load will tell what is wrong with it */
+    free(p);
+    free(h);
+    return status;
+}
+
+static uz_status choose_rows(uz_body *body, const uz_problem *problem, const uz_candidates *wanted, uz_error *err)
+{
+    if (!body->is_scene || !uz_may_omit_rows(problem))
+        return UZ_OK;
+    uz_status status = choose_by_gaps(body, &problem->scene, wanted, err);
+    if (status == UZ_OK && body->rows.in)
+        status = uz_candidates_reduce(&body->N_in, &body->model.N, &body->rows, err);
+    return status;
+}
+
+static void describe(uz_body *body)
+{
+    size_t form = body->krylov ? uz_krylov_describe(body->krylov).bytes : uz_factor_describe(body->factor).bytes;
+    body->bytes = sizeof *body + (body->shared.item ? 0 : form) + uz_dual_describe(body->dual).bytes;
+    if (body->is_scene)
+        body->bytes += uz_body_model_bytes(&body->model);
+    if (body->rows.in)
+        body->bytes += (size_t)body->rows.m + uz_csc_bytes(&body->N_in);
+    body->reused.ordering = body->shared.analysis_reused;
+    body->reused.factor = body->shared.factor_reused;
+}
+
+uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_candidates *wanted, const uz_body_key *key,
+                         const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    uz_matrix_key K_key;
+    *out = NULL;
+    uz_body *body = uz_alloc_zero(1, sizeof *body);
+    if (!body)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+    pthread_mutex_init(&body->mutex, NULL);
+    body->inverse_bound = NAN;
+    uz_status status = take_matrices(body, problem, settings, err);
+    if (status == UZ_OK)
+        status = choose_rows(body, problem, wanted, err);
+    if (status == UZ_OK)
+        status = find_key(&K_key, key, body, err);
+    if (status == UZ_OK)
+        status = uz_body_make_operator(body, problem, &K_key, settings, cache, hooks, err);
+    if (status == UZ_OK) {
+        describe(body);
+        *out = body;
+    } else {
+        uz_body_free(body);
+    }
+    return status;
+}
+
+double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_leave *leave)
+{
+    uz_error ignored = {0};
+    double bound;
+    if (!uz_lock_while(&body->mutex, leave))
+        return INFINITY;
+    if (isnan(body->inverse_bound) &&
+        uz_factor_inverse_norm(&bound, body->factor, ws, K, leave, &ignored) != UZ_ERR_CANCELLED)
+        body->inverse_bound = bound;
+    bound = isnan(body->inverse_bound) ? INFINITY : body->inverse_bound;
+    pthread_mutex_unlock(&body->mutex);
+    return bound;
+}
+
+void uz_body_free(uz_body *body)
+{
+    if (!body)
+        return;
+    pthread_mutex_destroy(&body->mutex);
+    uz_dual_free(body->dual);
+    uz_shared_factor_release(&body->shared);
+    uz_krylov_free(body->krylov);
+    if (body->is_scene)
+        uz_body_model_clear(&body->model);
+    uz_csc_clear(&body->no_rows);
+    uz_csc_clear(&body->N_in);
+    uz_candidates_clear(&body->rows);
+    free(body);
+}

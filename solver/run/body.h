@@ -1,0 +1,63 @@
+/* body.h: what is known of a body before its load: the part of a problem that is worth caching. */
+#ifndef UZ_BODY_H
+#define UZ_BODY_H
+
+#include "assembly/assembly.h"
+#include "cache/parts.h"
+#include "run/cost.h"
+#include "dual/dual.h"
+#include "factor/factor.h"
+#include "obstacle/candidates.h"
+#include "uzawa.h"
+
+#include <pthread.h>
+
+/* Immutable once built, but for what is under the mutex; shared by threads. */
+typedef struct {
+    bool is_scene;
+    uz_body_model model; /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
+    uz_csc no_rows;      /* matrices without contacts: 0 x d, as the problem's N may be a zeroed struct */
+    uz_candidates rows;  /* which of the model's rows it is solved with (rows.h); in NULL: all */
+    uz_csc N_in;         /* these, where some are left out */
+    uz_shared_factor shared;
+    const uz_factor *factor; /* shared.factor; NULL: matrix_free */
+    uz_krylov *krylov;       /* matrix_free, else NULL */
+    uz_dual *dual;
+    pthread_mutex_t mutex; /* guards inverse_bound */
+    double inverse_bound;  /* NaN until somebody asks */
+    double assemble_s, condense_s;
+    uz_cost_plan plan; /* which form of the operator, and why */
+    uz_reuse reused;   /* when it was made */
+    size_t bytes;      /* its own, without a factor that the cache counts */
+    uz_item *item;     /* its place in the cache, or NULL */
+} uz_body;
+
+/* SHA-256, hex: of everything the body is built from, the asked operator, ordering and memory limit included, and of
+ * what the choice of its rows follows from; of K, for matrices (a scene's K has to be assembled first). */
+typedef struct {
+    char digest[65];
+    uz_matrix_key K;
+} uz_body_key;
+uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_candidates *wanted,
+                         const uz_settings *settings, uz_error *err);
+
+/* Assembles (scenes), chooses rows (`wanted` among them; NULL: none in particular), factors and condenses; with a cache
+ * the factor and its analysis are found or kept there, and key is that of uz_body_digest. */
+uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_candidates *wanted, const uz_body_key *key,
+                         const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+/* The part of it that follows the assembly: the form of the operator by predicted cost and memory, and what it needs.
+ * key: of K; read only where there is a cache. UZ_ERR_LIMIT with the predicted bytes where no form fits. */
+uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const uz_matrix_key *key,
+                                const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+void uz_body_free(uz_body *body);
+
+/* What the certificate of a body that is used again and again saves by: uz_factor_inverse_norm, made at the first call.
+ * INFINITY when that failed, or leave (NULL: for ever) was over before it was known. */
+double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_leave *leave);
+
+/* The body's matrices: the model's for a scene, the problem's otherwise. N has the rows it is solved with. */
+const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem);
+const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem);
+const uz_csc *uz_body_all_rows(const uz_body *body, const uz_problem *problem);
+
+#endif

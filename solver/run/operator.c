@@ -1,0 +1,236 @@
+/* operator.c: which form of the operator a body gets, and the making of it: a factor, or a multigrid in its place. */
+#include "run/body.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Modes at a node whose dofs are along its normal and tangents. `axes` has them along the axes: it numbers all of a
+ * turned node's dofs, also those that are held. */
+static void turn_modes(uz_modes *modes, const uz_modes *axes, const uz_body_model *model)
+{
+    const int dim = model->mesh.dim, count = modes->count;
+    for (int64_t t = 0; t < model->info.n_turned; t++) {
+        const int64_t *dof = model->dof + model->info.turned_node[t] * dim;
+        const double *Q = model->info.frame + t * dim * dim;
+        for (int c = 0; c < dim; c++)
+            for (int k = 0; k < count && dof[c] >= 0; k++) {
+                double turned = 0.0;
+                for (int axis = 0; axis < dim; axis++)
+                    turned += Q[c * dim + axis] * (double)axes->value[(t * dim + axis) * count + k];
+                modes->value[dof[c] * count + k] = (float)turned;
+            }
+    }
+}
+
+/* Their modes along the axes. */
+static uz_status modes_of_turned(uz_modes *axes, const uz_body_model *model, uz_error *err)
+{
+    const int dim = model->mesh.dim;
+    const int64_t total = model->mesh.n_nodes * dim;
+    int64_t *number = uz_alloc(total, sizeof *number);
+    if (!number)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the modes of %lld dofs", (long long)total);
+    for (int64_t i = 0; i < total; i++)
+        number[i] = -1;
+    for (int64_t t = 0; t < model->info.n_turned; t++)
+        for (int c = 0; c < dim; c++)
+            number[model->info.turned_node[t] * dim + c] = t * dim + c;
+    uz_status status =
+        uz_modes_of_body(axes, model->info.xyz, number, model->mesh.n_nodes, dim, model->info.n_turned * dim, err);
+    free(number);
+    return status;
+}
+
+/* The near-null space: rigid-body modes where the mesh is known. */
+static uz_status find_modes(uz_modes *modes, const uz_body *body, const uz_csc *K, uz_error *err)
+{
+    const uz_body_model *model = &body->model;
+    if (!body->is_scene)
+        return uz_modes_of_matrix(modes, K, err);
+    uz_status status =
+        uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim, model->d, err);
+    if (status != UZ_OK || model->info.n_turned == 0)
+        return status;
+    uz_modes axes;
+    status = modes_of_turned(&axes, model, err);
+    if (status == UZ_OK) {
+        turn_modes(modes, &axes, model);
+        uz_modes_clear(&axes);
+    } else {
+        uz_modes_clear(modes);
+    }
+    return status;
+}
+
+/* What the operator is made of. */
+typedef struct {
+    uz_body *body;
+    const uz_csc *K, *N;
+    const int64_t *dofs; /* that N touches */
+    uz_cost_size size;
+    const uz_matrix_key *key; /* of K, where there is a cache */
+    const uz_settings *settings;
+    uz_cache *cache;
+    const uz_hooks *hooks;
+    uz_operator direct; /* the form that a factor is analysed for */
+    uz_operator asked;  /* the settings', until conjugate gradients have failed where a factor fits */
+} making;
+
+/* What a multigrid may take so that the whole stays within the limit: a load with bounds has a second one. */
+static size_t levels_budget(const making *m)
+{
+    const uz_cost_plan *plan = &m->body->plan;
+    double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0;
+    if (m->settings->memory_limit == 0)
+        return 0;
+    double predicted = uz_krylov_predict_bytes(m->size.d, m->size.k_entries, m->size.modes);
+    return (size_t)(predicted + fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies);
+}
+
+static uz_status precondition(making *m, uz_error *err)
+{
+    uz_body *body = m->body;
+    uz_modes modes;
+    uz_status status = find_modes(&modes, body, m->K, err);
+    if (status == UZ_OK)
+        status = uz_krylov_create(&body->krylov, m->K, &modes, levels_budget(m), m->hooks, err);
+    double start = uz_seconds();
+    if (status == UZ_OK)
+        status = uz_dual_create_free(&body->dual, m->N, body->krylov, m->hooks, err);
+    body->condense_s = uz_seconds() - start;
+    return status;
+}
+
+/* Between analysis and factorization: is this still the form to take? An error that says nothing means no. */
+static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_error *err)
+{
+    making *m = ctx;
+    uz_cost_plan *plan = &m->body->plan;
+    (void)err;
+    uz_cost_decide(plan, &m->size, predicted, m->direct, m->asked, m->settings->memory_limit);
+    return plan->chosen >= 0 && plan->form[plan->chosen].op == m->direct ? UZ_OK : UZ_ERR_LIMIT;
+}
+
+/* Each contact dof has a row of its own: the trailing block of a factor with these dofs last is then all of the
+ * operator. Otherwise the contact may stand anywhere in it, whichever is cheaper. */
+static bool is_one_to_one(const uz_csc *N, int64_t n_b)
+{
+    return N->rows == n_b && N->ptr[N->cols] == n_b;
+}
+
+/* *taken false on success: the plan speaks for another form now, or for none. */
+static uz_status factor_and_condense(making *m, bool *taken, uz_error *err)
+{
+    uz_body *body = m->body;
+    int64_t n_dofs = m->direct == UZ_OPERATOR_CONDENSED ? m->size.n_b : 0;
+    int64_t rows = is_one_to_one(m->N, n_dofs) ? 0 : m->N->rows;
+    body->plan.chosen = -1;
+    uz_status status = uz_shared_factor_get(&body->shared, m->cache, m->key, m->K, m->dofs, n_dofs, rows,
+                                            m->settings->ordering, accept_factor, m, m->hooks, err);
+    bool accepted = body->plan.chosen >= 0 && body->plan.form[body->plan.chosen].op == m->direct;
+    *taken = status != UZ_ERR_LIMIT || accepted;
+    if (status != UZ_OK)
+        return *taken ? status : UZ_OK;
+    body->factor = body->shared.factor;
+    double start = uz_seconds();
+    status = uz_dual_create(&body->dual, m->N, body->factor, m->direct, m->hooks, err);
+    body->condense_s = uz_seconds() - start;
+    return status;
+}
+
+/* The plan where no factor was analysed. */
+static void plan_without_factor(making *m)
+{
+    uz_cost_decide(&m->body->plan, &m->size, NULL, m->direct, m->settings->op, m->settings->memory_limit);
+}
+
+/* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
+#define LAMBDA_LEAST 1e-3
+
+/* The plan took matrix_free for its price only, and the matrix is one of those that it is not cheap for, or that tell
+ * more to a factorization. */
+static bool regrets(const making *m, uz_status status)
+{
+    const uz_cost_plan *plan = &m->body->plan;
+    bool choice = m->asked == UZ_OPERATOR_AUTO && plan->count > 1 && plan->form[0].fits;
+    if (status != UZ_OK)
+        return choice && status == UZ_ERR_NOT_SPD;
+    return choice && uz_krylov_describe(m->body->krylov).lambda < LAMBDA_LEAST;
+}
+
+static void undo_precondition(making *m, uz_error *err)
+{
+    uz_dual_free(m->body->dual);
+    uz_krylov_free(m->body->krylov);
+    m->body->dual = NULL;
+    m->body->krylov = NULL;
+    if (err)
+        uz_error_reset(err);
+}
+
+enum { TRIES = 4 };
+
+/* The form that was asked for, or the one that the plan chooses once the analysis of a factor has shown its size. */
+static uz_status make_operator(making *m, uz_error *err)
+{
+    uz_body *body = m->body;
+    const uz_settings *settings = m->settings;
+    bool no_factor = settings->op == UZ_OPERATOR_MATRIX_FREE;
+    m->direct = uz_dual_choose(m->N, m->size.n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
+    no_factor =
+        no_factor || (settings->memory_limit > 0 && uz_cost_analysis_bytes(&m->size) > (double)settings->memory_limit);
+    for (int k = 0; k < TRIES; k++) {
+        bool taken = false;
+        uz_status status = UZ_OK;
+        if (no_factor)
+            plan_without_factor(m);
+        else
+            status = factor_and_condense(m, &taken, err);
+        if (taken || status != UZ_OK)
+            return status;
+        if (body->plan.chosen < 0)
+            break;
+        if (body->plan.form[body->plan.chosen].op == UZ_OPERATOR_MATRIX_FREE) {
+            status = precondition(m, err);
+            if (!regrets(m, status))
+                return status;
+            undo_precondition(m, err);
+            m->asked = m->direct;
+        } else {
+            m->direct = body->plan.form[body->plan.chosen].op;
+        }
+    }
+    return uz_cost_refuse(&body->plan, settings->op, settings->memory_limit, err);
+}
+
+uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const uz_matrix_key *key,
+                                const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    making m = {.body = body,
+                .K = uz_body_K(body, problem),
+                .N = uz_body_N(body, problem),
+                .key = key,
+                .settings = settings,
+                .cache = cache,
+                .hooks = hooks,
+                .asked = settings->op};
+    int64_t *dofs = NULL, n_b = 0;
+    uz_status status = uz_dual_contact_dofs(&dofs, &n_b, m.N, err);
+    if (status != UZ_OK)
+        return status;
+    m.dofs = dofs;
+    m.size = (uz_cost_size){.d = m.K->cols,
+                            .m = m.N->rows,
+                            .n_b = n_b,
+                            .k_entries = m.K->ptr[m.K->cols],
+                            .n_entries = m.N->ptr[m.N->cols],
+                            .modes = body->is_scene && body->model.mesh.dim == 3 ? 6 : 3,
+                            .bounds = uz_cost_bounds(m.N, settings),
+                            .cases = problem->n_cases};
+    status = make_operator(&m, err);
+    free(dofs);
+    return status;
+}

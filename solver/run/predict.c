@@ -1,0 +1,113 @@
+/* predict.c: what a solve will take, from the pattern of its matrices: nothing is factored. */
+#include "core/error.h"
+#include "run/cost.h"
+#include "dual/dual.h"
+#include "factor/factor.h"
+#include "run/rows.h"
+#include "run/solve.h"
+#include "uzawa.h"
+
+#include <stdlib.h>
+
+static bool is_one_to_one(const uz_csc *N, int64_t n_b)
+{
+    return N->rows == n_b && N->ptr[N->cols] == n_b;
+}
+
+static void take_plan(uz_prediction *out, const uz_cost_plan *plan, const uz_cost_size *size)
+{
+    const uz_cost_estimate *e = &plan->form[plan->chosen >= 0 ? plan->chosen : 0];
+    out->fits = plan->chosen >= 0;
+    out->op = e->op;
+    out->bytes = e->bytes;
+    out->seconds = e->setup_s + (double)(size->cases > 0 ? size->cases : 1) * e->case_s;
+}
+
+/* The analysis of a factor for this form, and the plan that follows from it. */
+static uz_status analyse(uz_prediction *out, uz_cost_plan *plan, const uz_csc *K, const uz_csc *N, const int64_t *dofs,
+                         const uz_cost_size *size, uz_operator form, const uz_settings *settings, const uz_hooks *hooks,
+                         uz_error *err)
+{
+    uz_analysis *analysis = NULL;
+    int64_t last = form == UZ_OPERATOR_CONDENSED ? size->n_b : 0, rows = is_one_to_one(N, last) ? 0 : N->rows;
+    uz_status status = uz_analysis_choose(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
+    if (status != UZ_OK)
+        return status;
+    uz_factor_info info = uz_analysis_describe(analysis);
+    uz_analysis_free(analysis);
+    out->factor_nnz = info.nnz;
+    uz_cost_decide(plan, size, &info, form, settings->op, settings->memory_limit);
+    return UZ_OK;
+}
+
+static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, uz_cost_size *size,
+                         const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+{
+    uz_cost_plan plan = {.chosen = -1};
+    int64_t *dofs = NULL;
+    uz_status status = uz_dual_contact_dofs(&dofs, &size->n_b, N, err);
+    if (status != UZ_OK)
+        return status;
+    bool free_only = settings->op == UZ_OPERATOR_MATRIX_FREE ||
+                     (settings->memory_limit > 0 && uz_cost_analysis_bytes(size) > (double)settings->memory_limit);
+    uz_operator form = uz_dual_choose(N, size->n_b, free_only ? UZ_OPERATOR_AUTO : settings->op);
+    if (free_only)
+        uz_cost_decide(&plan, size, NULL, form, settings->op, settings->memory_limit);
+    else
+        status = analyse(out, &plan, K, N, dofs, size, form, settings, hooks, err);
+    free(dofs);
+    if (status == UZ_OK)
+        take_plan(out, &plan, size);
+    if (status == UZ_OK && out->op == UZ_OPERATOR_MATRIX_FREE)
+        out->factor_nnz = 0;
+    return status;
+}
+
+/* The matrices of a scene with the rows that its solve begins with. */
+static uz_status make_scene(uz_qp *qp, int64_t *m, const uz_scene *scene, uz_error *err)
+{
+    uz_mesh_info info = {0};
+    uz_candidates rows = {0};
+    uz_csc N = {0};
+    uz_status status = uz_scene_to_qp(qp, &info, scene, err);
+    *m = qp->N.rows;
+    if (status == UZ_OK)
+        status = uz_choose_rows(&rows, qp->h, *m, &info, scene, NULL, err);
+    if (status == UZ_OK && rows.in) {
+        status = uz_candidates_reduce(&N, &qp->N, &rows, err);
+        uz_csc_clear(&qp->N);
+        qp->N = N;
+    }
+    uz_candidates_clear(&rows);
+    uz_mesh_info_clear(&info);
+    return status;
+}
+
+uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                     uz_error *err)
+{
+    uz_qp made = {.p = NULL};
+    const uz_qp *qp = &problem->qp;
+    bool scene = problem->kind == UZ_PROBLEM_SCENE;
+    *out = (uz_prediction){.d = 0};
+    uz_status status = uz_check_settings(settings, err);
+    int64_t m = problem->qp.N.rows;
+    if (status == UZ_OK && scene) {
+        status = make_scene(&made, &m, &problem->scene, err);
+        qp = &made;
+    }
+    if (status == UZ_OK) {
+        uz_cost_size size = {.d = qp->K.cols,
+                             .m = qp->N.rows,
+                             .k_entries = qp->K.ptr[qp->K.cols],
+                             .n_entries = qp->N.ptr[qp->N.cols],
+                             .modes = scene && problem->scene.box.dim == 3 ? 6 : 3,
+                             .bounds = uz_cost_bounds(&qp->N, settings),
+                             .cases = problem->n_cases};
+        out->d = size.d;
+        out->m = m;
+        status = predict(out, &qp->K, &qp->N, &size, settings, hooks, err);
+    }
+    uz_qp_clear(&made);
+    return status;
+}

@@ -1,0 +1,191 @@
+/* refine.c: iterative refinement of an answer whose certificate misses the request.
+ *
+ * With u and r given, e = p + N'r - K u and f = h - N u in twofold precision, what is missing is the solution of the
+ * contact problem of the correction: K c = e + N's with gaps f - N c >= 0 and r + s <= 0. It is solved on the factor
+ * that is there, with the relative error that u itself was found with; so each pass takes as many digits again, while
+ * the condition of K leaves any (Higham, Accuracy and Stability of Numerical Algorithms, chapter 12). The rows in
+ * contact are chosen anew at the size of the correction: of rows that repeat each other up to rounding it is the
+ * tightest that has to bear the reaction. */
+#include "certificate/residual.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "methods/exchange.h"
+#include "run/solve.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_PASSES = 20, FEW_ROWS = 1024 };
+
+/* At this relative error there is nothing to gain: u itself is rounded. */
+#define ROUNDED (16.0 * DBL_EPSILON)
+
+/* So many passes that do not gain this much are the last. A pass in which rows change places is one: it only resolves
+ * what the reactions that moved leave, and the next one is exact again. */
+#define LEAST_GAIN 0.5
+enum { PATIENCE = 3 };
+
+typedef struct {
+    uz_run *run;
+    uz_csc Nt;
+    uz_residuals res;     /* d each */
+    double *zero, *e, *c; /* d */
+    double *f, *s, *r;    /* m; s, r in scaled rows */
+    double *g, *ray;      /* m */
+    bool *active;         /* m */
+    bool contradictory;   /* the rows of the last correction are, `ray` says why */
+} refinement;
+
+static uz_status begin(refinement *x, uz_run *run, uz_error *err)
+{
+    x->run = run;
+    double **of_d[] = {&x->res.e, &x->res.e_u, &x->res.Ku, &x->res.Kc, &x->zero, &x->e, &x->c};
+    double **of_m[] = {&x->f, &x->s, &x->r, &x->g, &x->ray};
+    bool ok = true;
+    for (size_t k = 0; k < sizeof of_d / sizeof of_d[0]; k++)
+        ok = (*of_d[k] = uz_alloc_zero(run->d, sizeof(double))) && ok;
+    for (size_t k = 0; k < sizeof of_m / sizeof of_m[0]; k++)
+        ok = (*of_m[k] = uz_alloc_zero(run->m, sizeof(double))) && ok;
+    x->active = uz_alloc_zero(run->m, sizeof *x->active);
+    if (!ok || !x->active)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld dofs", (long long)run->d);
+    return uz_csc_transpose(&x->Nt, uz_body_N(run->body, run->problem), err);
+}
+
+static void end(refinement *x)
+{
+    double *room[] = {x->res.e, x->res.e_u, x->res.Ku, x->res.Kc, x->zero, x->e, x->c, x->f, x->s, x->r, x->g, x->ray};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    free(x->active);
+    uz_csc_clear(&x->Nt);
+}
+
+/* e and f of the answer; r and the rows that press, scaled. */
+static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
+{
+    const uz_run *run = x->run;
+    const double *scale = uz_case_row_scale(run->load);
+    uz_status status =
+        uz_equilibrium_residual(&x->res, uz_body_K(run->body, run->problem), uz_body_N(run->body, run->problem), run->p,
+                                answer->u, x->zero, answer->r, err);
+    for (int64_t j = 0; j < run->d; j++)
+        x->e[j] = -x->res.e_u[j];
+    for (int64_t i = 0; i < run->m; i++) {
+        x->f[i] = uz_gap_of_row(&x->Nt, i, run->h, answer->u, NULL);
+        x->r[i] = answer->r[i] / scale[i];
+        x->active[i] = answer->r[i] < 0.0;
+    }
+    return status;
+}
+
+/* Rows that can't depend on each other, or are too many to exchange: those that press stay, the others are left out. */
+static uz_status keep_rows(refinement *x, uz_case *correction, uz_error *err)
+{
+    bool solved = false;
+    uz_status status = uz_case_solve_active(correction, x->s, x->g, &solved, x->active, err);
+    for (int64_t i = 0; i < x->run->m; i++)
+        x->s[i] = solved ? x->s[i] : 0.0;
+    return status;
+}
+
+static uz_status exchange_rows(refinement *x, uz_case *correction, uz_error *err)
+{
+    uz_leave leave = {x->run->hooks, x->run->deadline};
+    uz_exchange_end ended;
+    int64_t steps = INT64_MAX;
+    uz_status status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, correction, &leave, err);
+    x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_BLURRED;
+    return status;
+}
+
+/* c and s for e and f. */
+static uz_status correct(refinement *x, uz_error *err)
+{
+    const uz_run *run = x->run;
+    bool small = uz_case_steps_are_small(run->load) || run->m <= FEW_ROWS,
+         exchange = uz_case_rows_may_depend(run->load) && small;
+    uz_case *correction = NULL;
+    for (int64_t i = 0; i < run->m; i++)
+        x->f[i] = exchange || x->active[i] ? x->f[i] : INFINITY;
+    uz_status status =
+        uz_case_create(&correction, run->body->dual, uz_body_K(run->body, run->problem), x->e, x->f, err);
+    uz_leave leave = {run->hooks, run->deadline};
+    if (status == UZ_OK)
+        uz_case_set_leave(correction, &leave);
+    if (status == UZ_OK)
+        status = exchange ? exchange_rows(x, correction, err) : keep_rows(x, correction, err);
+    if (status == UZ_OK)
+        status = uz_case_recover(correction, x->c, x->s, false, err);
+    uz_case_free(correction);
+    return status;
+}
+
+/* One pass: the refined answer takes the place of the latest, unless the rows contradict each other or the run was told
+ * to stop. */
+static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
+{
+    uz_run *run = x->run;
+    const double *scale = uz_case_row_scale(run->load);
+    uz_status status = measure(x, latest, err);
+    if (status == UZ_OK)
+        status = correct(x, err);
+    uz_leave leave = {run->hooks, run->deadline};
+    if (status != UZ_OK || x->contradictory || uz_leave_is_over(&leave)) /* half a correction is none */
+        return status;
+    for (int64_t j = 0; j < run->d; j++)
+        latest->u[j] += x->c[j];
+    for (int64_t i = 0; i < run->m; i++)
+        latest->r[i] = fmin(0.0, scale[i] * (x->r[i] + x->s[i]));
+    return uz_run_certify_answer(run, latest, err);
+}
+
+static void copy_answer(uz_answer *to, const uz_answer *from, const uz_run *run)
+{
+    memcpy(to->u, from->u, (size_t)run->d * sizeof(double));
+    memcpy(to->r, from->r, (size_t)run->m * sizeof(double));
+    memcpy(to->g, from->g, (size_t)run->m * sizeof(double));
+    to->certificate = from->certificate;
+}
+
+/* Where the method ended because it can't do better; elsewhere it is asked for more, or nothing is asked for. */
+static bool is_worth_it(const uz_run *run)
+{
+    double error = run->answer.certificate.relative_error;
+    bool ended = run->end == UZ_END_SOLVED || run->end == UZ_END_BLURRED || run->end == UZ_END_STALLED;
+    uz_leave leave = {run->hooks, run->deadline};
+    return ended && error > run->requested && error > ROUNDED && !uz_leave_is_over(&leave);
+}
+
+uz_status uz_run_refine(uz_run *run, uz_error *err)
+{
+    refinement x = {0};
+    uz_answer latest = {0};
+    if (!is_worth_it(run))
+        return UZ_OK;
+    uz_status status = begin(&x, run, err);
+    if (status == UZ_OK)
+        status = uz_answer_allocate(&latest, run->d, run->m, err);
+    if (status == UZ_OK)
+        copy_answer(&latest, &run->answer, run);
+    for (int pass = 0, idle = 0;
+         status == UZ_OK && idle < PATIENCE && !x.contradictory && pass < MAX_PASSES && is_worth_it(run); pass++) {
+        double before = run->answer.certificate.relative_error;
+        status = refine_once(&x, &latest, err);
+        bool unbounded = isinf(before), better = latest.certificate.relative_error < before;
+        if (status == UZ_OK && (better || unbounded)) {
+            copy_answer(&run->answer, &latest, run);
+            run->result->summary.refinements += better;
+        }
+        idle = unbounded || run->answer.certificate.relative_error < LEAST_GAIN * before ? 0 : idle + 1;
+    }
+    if (x.contradictory && isinf(run->answer.certificate.relative_error)) {
+        memcpy(run->it.ray, x.ray, (size_t)run->m * sizeof *x.ray);
+        run->end = UZ_END_RAY; /* to be proved by the original data */
+    }
+    uz_answer_clear(&latest);
+    end(&x);
+    return status;
+}

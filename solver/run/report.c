@@ -1,0 +1,412 @@
+/* report.c: what a solve leaves behind. */
+#include "run/solve.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "post/evaluate.h"
+#include "linalg/linalg.h"
+#include "run/rows.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* An enumerator that has a name. */
+static bool is_known(const char *name)
+{
+    return strcmp(name, "unknown") != 0;
+}
+
+uz_status uz_check_settings(const uz_settings *s, uz_error *err)
+{
+    if (!(s->relative_error >= 0.0 && s->relative_error <= 1.0))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "relative_error must lie in [0, 1], it is %g", s->relative_error);
+    if (!(s->epsilon >= 0.0 && isfinite(s->epsilon)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "epsilon must be finite and not negative, it is %g", s->epsilon);
+    if (!(s->alpha >= 0.0 && isfinite(s->alpha)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
+    if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
+    if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
+        !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "method, operator, ordering or stopping is not one of the known ones");
+    return UZ_OK;
+}
+
+double uz_requested_error(const uz_settings *settings)
+{
+    return settings->relative_error > 0.0 ? settings->relative_error : UZ_EXACT_RELATIVE_ERROR;
+}
+
+uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
+                       uz_error *err)
+{
+    memset(run, 0, sizeof *run);
+    run->problem = problem;
+    run->settings = settings;
+    run->hooks = hooks;
+    run->started = uz_seconds();
+    run->deadline = run->started + settings->time_limit_s;
+    run->requested = uz_requested_error(settings);
+    run->target = settings->balanced ? 1e-2 : run->requested;
+    run->result = uz_alloc_zero(1, sizeof *run->result);
+    if (!run->result)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
+    run->result->summary.discretization_error = NAN;
+    run->result->summary.max_pressure = NAN;
+    uz_decades_init(&run->decades, false);
+    return UZ_OK;
+}
+
+/* What stands in the factor's place: no entries of L, but bytes and a condition. */
+static uz_factor_info describe_factor(const uz_body *body)
+{
+    if (body->factor)
+        return uz_factor_describe(body->factor);
+    uz_krylov_info krylov = uz_krylov_describe(body->krylov);
+    return (uz_factor_info){
+        .bytes = krylov.bytes, .rcond = krylov.rcond, .factor_s = krylov.create_s + krylov.spectrum_s};
+}
+
+void uz_run_take_body(uz_run *run, uz_reuse reused)
+{
+    uz_summary *summary = &run->result->summary;
+    uz_factor_info factor = describe_factor(run->body);
+    uz_dual_info dual = uz_dual_describe(run->body->dual);
+    run->d = summary->d = run->result->d = dual.d;
+    run->m = run->all = summary->kept = dual.m;
+    if (run->body->rows.in)
+        run->all = run->body->rows.m;
+    summary->m = run->result->m = run->all;
+    summary->rounds = 1;
+    summary->op = dual.op;
+    summary->ordering = factor.ordering;
+    uz_decades_init(&run->decades, run->body->rows.in != NULL);
+    run->hit = run->serves_many = summary->factor_cached = reused.op;
+    summary->reused = reused;
+    summary->contact_last = factor.contact_last;
+    summary->factor_flops = factor.flops;
+    summary->factor_nnz = factor.nnz;
+    summary->factor_bytes = factor.bytes;
+    summary->rcond = factor.rcond;
+    if (run->hit)
+        return;
+    summary->timings.assemble = run->body->assemble_s;
+    summary->timings.order = reused.ordering ? 0.0 : factor.order_s;
+    summary->timings.factor = reused.factor ? 0.0 : factor.factor_s;
+    summary->timings.condense = run->body->condense_s;
+}
+
+/* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
+#define RUN_VECTORS 10.0
+
+/* A cached body has spared the setup, of prediction and of what is measured alike. */
+static void report_cost(uz_run *run)
+{
+    const uz_cost_plan *plan = &run->body->plan;
+    const uz_timings *t = &run->result->summary.timings;
+    uz_cost *cost = &run->result->summary.cost;
+    cost->n_considered = plan->count;
+    for (int k = 0; k < plan->count; k++) {
+        const uz_cost_estimate *form = &plan->form[k];
+        double seconds = form->case_s + (run->hit ? 0.0 : form->setup_s);
+        cost->considered[k] = (uz_cost_option){form->op, seconds, form->bytes, form->fits};
+        if (k != plan->chosen)
+            continue;
+        cost->seconds = seconds;
+        cost->bytes = form->bytes;
+        cost->flops = form->flops;
+    }
+    cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
+    cost->actual_bytes =
+        (double)run->body->bytes + (run->load ? (double)uz_case_bytes(run->load) : 0.0) +
+        (run->body->is_scene ? 0.0 : (double)(uz_csc_bytes(&run->problem->qp.K) + uz_csc_bytes(&run->problem->qp.N))) +
+        8.0 * RUN_VECTORS * (double)run->d;
+}
+
+uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err)
+{
+    answer->u = uz_alloc_zero(d, sizeof(double));
+    answer->r = uz_alloc_zero(m, sizeof(double));
+    answer->g = uz_alloc_zero(m, sizeof(double));
+    if (answer->u && answer->r && answer->g)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)d);
+}
+
+void uz_answer_clear(uz_answer *answer)
+{
+    free(answer->u);
+    free(answer->r);
+    free(answer->g);
+    memset(answer, 0, sizeof *answer);
+}
+
+static void report_contact(uz_run *run)
+{
+    uz_result *result = run->result;
+    uz_summary *summary = &result->summary;
+    for (int64_t i = 0; i < run->m; i++) {
+        summary->active += result->r[i] < 0.0;
+        summary->reaction_sum += result->r[i];
+        summary->max_penetration = fmax(summary->max_penetration, -result->g[i]);
+    }
+}
+
+uz_scene uz_run_scene(const uz_run *run)
+{
+    uz_scene scene = run->problem->scene;
+    if (run->load_case && run->load_case->loads) {
+        scene.loads = run->load_case->loads;
+        scene.n_loads = run->load_case->n_loads;
+    }
+    return scene;
+}
+
+static uz_status report_displacements(uz_run *run, uz_error *err)
+{
+    uz_result *result = run->result;
+    const uz_body_model *model = &run->body->model;
+    if (!run->body->is_scene) {
+        result->u = run->answer.u;
+        run->answer.u = NULL;
+        return UZ_OK;
+    }
+    uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, run->m, err);
+    result->n_nodes = model->mesh.n_nodes;
+    result->u = uz_alloc(result->n_nodes * model->mesh.dim, sizeof(double));
+    if (!result->u)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
+                       (long long)result->n_nodes);
+    uz_recover_nodal(result->u, model, run->answer.u, run->prescribed);
+    const uz_scene scene = uz_run_scene(run);
+    return status == UZ_OK ? uz_evaluate(result, model, &scene, err) : status;
+}
+
+static void blank(double *x, int64_t n)
+{
+    for (int64_t i = 0; x && i < n; i++)
+        x[i] = NAN;
+}
+
+void uz_blank_answer(uz_result *result)
+{
+    uz_summary *s = &result->summary;
+    int64_t n_u = result->mesh.dim > 0 ? result->n_nodes * result->mesh.dim : result->d;
+    blank(result->u, n_u);
+    blank(result->r, result->m);
+    blank(result->g, result->m);
+    blank(result->pressure, result->m);
+    uz_evaluation_free(result->evaluation);
+    result->evaluation = NULL;
+    s->evaluation = NULL;
+    blank(s->force, 3);
+    s->reaction_sum = s->max_penetration = s->max_pressure = NAN;
+    s->active = 0;
+    memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
+}
+
+/* The rows with a share in the contradiction. */
+static void explain_infeasible(const uz_result *result, char *text, size_t size)
+{
+    int64_t named = 0, count = 0;
+    size_t at = (size_t)snprintf(text, size, "no displacement meets all contact conditions: these rows contradict:");
+    for (int64_t i = 0; i < result->m; i++) {
+        if (!(result->ray[i] < -1e-9))
+            continue;
+        count++;
+        if (named < 8 && at < size) {
+            at += (size_t)snprintf(text + at, size - at, "%s %lld", named ? "," : "", (long long)i);
+            named++;
+        }
+    }
+    if (count > named && at < size)
+        snprintf(text + at, size - at, " and %lld more", (long long)(count - named));
+}
+
+void uz_explain_outcome(uz_result *result, uz_end end)
+{
+    uz_summary *s = &result->summary;
+    const char *why = "";
+    switch (s->outcome) {
+    case UZ_INFEASIBLE:
+        explain_infeasible(result, s->message, sizeof s->message);
+        return;
+    case UZ_ITERATION_LIMIT:
+        why = "the iterations allowed were used up: raise max_iterations";
+        break;
+    case UZ_TIME_LIMIT:
+        why = "the time allowed was used up: raise time_limit_s";
+        break;
+    case UZ_PRECISION_LIMIT:
+        why = end == UZ_END_UNSOLVED
+                  ? "active_set solves on the condensed operator, with one entry in each row, or with few rows"
+              : end == UZ_END_BLURRED ? "rows contradict each other by less than rounding can tell from touching"
+                                      : "double precision holds no more digits for this method and problem";
+        break;
+    case UZ_PAPER_RULE:
+        why = "the paper's stopping rule was met; it bounds a force, not an error";
+        break;
+    case UZ_NOT_VERIFIED:
+        why = "the bound on the error of this answer is larger than asked for";
+        break;
+    case UZ_DISMISSED:
+        why = "stopped by request";
+        break;
+    default:
+        return;
+    }
+    const uz_certificate *c = &s->certificate;
+    if (isfinite(c->relative_error))
+        snprintf(s->message, sizeof s->message, "%s. Certified: relative error at most %.3g, asked for %.3g.", why,
+                 c->relative_error, s->requested_error);
+    else if (isfinite(c->absolute_error))
+        snprintf(
+            s->message, sizeof s->message,
+            "%s. Certified: error at most %.3g in the energy norm, which is too much to bound a relative error; asked "
+            "for %.3g.",
+            why, c->absolute_error, s->requested_error);
+    else
+        snprintf(s->message, sizeof s->message, "%s. Nothing could be certified; asked for a relative error of %.3g.",
+                 why, s->requested_error);
+}
+
+double uz_run_time(const uz_run *run)
+{
+    const uz_timings *t = &run->result->summary.timings;
+    if (run->in_block)
+        return t->assemble + t->order + t->factor + t->condense + t->iterate + t->certify;
+    return uz_seconds() - run->started;
+}
+
+/* Displacements are told along x, y and z: where a node's dofs are not, turning them rounds by delta, and the error by
+ * ||delta||_K, over supported dofs too, as theirs are told as well. The bound is on what is told. */
+static uz_status widen_by_turning(uz_run *run, uz_error *err)
+{
+    const uz_body_model *model = &run->body->model;
+    uz_summary *s = &run->result->summary;
+    uz_certificate *c = &s->certificate;
+    double energy;
+    if (!run->body->is_scene || model->info.n_turned == 0)
+        return UZ_OK;
+    uz_status status = uz_turning_energy(&energy, model, run->result->u, err);
+    if (status != UZ_OK)
+        return status;
+    c->absolute_error += sqrt(energy);
+    c->relative_error += c->energy_norm > 0.0 ? sqrt(energy) / c->energy_norm : 0.0;
+    if (c->relative_error > run->requested && s->outcome == UZ_CONVERGED)
+        s->outcome = UZ_PRECISION_LIMIT;
+    if (c->relative_error > run->requested && s->outcome == UZ_VERIFIED)
+        s->outcome = UZ_NOT_VERIFIED;
+    return UZ_OK;
+}
+
+/* Displacements that were turned have a larger bound, and a problem without an answer has none. */
+static void report_trade(uz_run *run)
+{
+    uz_decades_drop(&run->decades, run->result->summary.certificate.relative_error);
+    run->result->trade = run->decades.trade;
+    run->result->trade.total_s = uz_run_time(run);
+}
+
+uz_status uz_run_publish(uz_run *run, uz_error *err)
+{
+    uz_summary *summary = &run->result->summary;
+    summary->requested_error = run->requested;
+    run->result->r = run->answer.r;
+    run->result->g = run->answer.g;
+    run->answer.r = run->answer.g = NULL;
+    report_contact(run);
+    uz_status status = report_displacements(run, err);
+    if (status == UZ_OK)
+        status = widen_by_turning(run, err);
+    if (run->result->ray)
+        uz_blank_answer(run->result);
+    uz_explain_outcome(run->result, run->end);
+    report_cost(run);
+    report_trade(run);
+    if (status == UZ_OK)
+        uz_run_suggest(run);
+    summary->timings.total = uz_run_time(run);
+    return status;
+}
+
+/* Where the iterations stood, in all rows. */
+static uz_status report_state(uz_run *run, uz_error *err)
+{
+    uz_state *part = NULL;
+    uz_status status = uz_iterate_state(&part, &run->it, run->load, run->settings->method, err);
+    if (status != UZ_OK || !run->body->rows.in) {
+        run->result->state = part;
+        return status;
+    }
+    status = uz_state_scatter(&run->result->state, part, &run->body->rows, err);
+    uz_state_free(part);
+    return status;
+}
+
+uz_status uz_run_report(uz_run *run, uz_error *err)
+{
+    uz_summary *summary = &run->result->summary;
+    summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
+    if (run->all == 0)
+        summary->method = UZ_METHOD_LINEAR;
+    summary->origin = run->it.origin;
+    summary->iterations = run->it.iteration;
+    summary->restarts = run->it.restarts;
+    summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;
+    summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
+    uz_status status = UZ_OK;
+    if (!run->result->ray)
+        status = report_state(run, err);
+    return status == UZ_OK ? uz_run_publish(run, err) : status;
+}
+
+void uz_run_end(uz_run *run)
+{
+    uz_case_free(run->load);
+    uz_iterate_clear(&run->it);
+    uz_factor_workspace_free(run->ws);
+    free(run->owned);
+    uz_answer_clear(&run->answer);
+    uz_candidates_clear(&run->wants);
+    free(run->work);
+    uz_result_free(run->result);
+}
+
+void uz_result_free(uz_result *result)
+{
+    if (!result)
+        return;
+    free(result->ray);
+    free(result->u);
+    free(result->r);
+    free(result->g);
+    free(result->pressure);
+    uz_evaluation_free(result->evaluation);
+    free(result->history.rows);
+    uz_state_free(result->state);
+    uz_mesh_info_clear(&result->mesh);
+    free(result->ladder);
+    free(result);
+}
+
+void uz_problem_clear(uz_problem *problem)
+{
+    if (!problem)
+        return;
+    if (problem->kind == UZ_PROBLEM_SCENE)
+        uz_scene_clear(&problem->scene);
+    else
+        uz_qp_clear(&problem->qp);
+    for (int64_t i = 0; problem->cases && i < problem->n_cases; i++) {
+        free(problem->cases[i].p);
+        free(problem->cases[i].h);
+        free(problem->cases[i].loads);
+    }
+    free(problem->cases);
+    memset(problem, 0, sizeof *problem);
+}

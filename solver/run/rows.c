@@ -1,0 +1,201 @@
+#include "run/rows.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "scene/mesh.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* With fewer rows than these there is nothing to save; and nothing worth another certificate where more than this part
+ * of them stays. */
+enum { FEW_ROWS = 512 };
+#define MOST_KEPT 0.75
+
+/* ---------------------------------------------------------------- how many rows there may be */
+
+static double box_nodes(const uz_box *box, const char *on)
+{
+    static const char *const sides[] = {"left", "right", "bottom", "top", "back", "front"};
+    uz_element_kind kind = UZ_QUAD4;
+    double nodes = 1;
+    int across = -1;
+    const bool known = uz_element_parse(&kind, box->element);
+    const bool middles = !known || uz_element_is_quadratic(kind);
+    for (int k = 0; k < 6; k++)
+        if (strcmp(on, sides[k]) == 0)
+            across = k / 2;
+    for (int axis = 0; axis < box->dim && axis < 3; axis++)
+        nodes *= axis == across ? 1 : (middles ? 2 : 1) * (double)box->cells[axis] + 1;
+    return nodes;
+}
+
+/* Several groups may have one name. */
+static double given_nodes(const uz_given_mesh *mesh, const char *on)
+{
+    double nodes = 0;
+    bool found = false;
+    for (int64_t i = 0; i < mesh->n_groups; i++) {
+        const uz_given_group *group = &mesh->groups[i];
+        if (strcmp(on, group->name) != 0)
+            continue;
+        found = true;
+        nodes += (double)(group->n_nodes + (group->n_faces > 0 ? group->face_first[group->n_faces] : 0));
+        if (group->n_elements > 0)
+            return (double)mesh->n_nodes;
+    }
+    return found ? fmin(nodes, (double)mesh->n_nodes) : (double)mesh->n_nodes;
+}
+
+bool uz_may_omit_rows(const uz_problem *problem)
+{
+    const uz_scene *scene = &problem->scene;
+    double rows = 0;
+    if (problem->kind != UZ_PROBLEM_SCENE || scene->all_candidates)
+        return false;
+    for (int64_t k = 0; k < scene->n_contacts; k++)
+        rows += scene->source == UZ_MESH_GIVEN ? given_nodes(&scene->given, scene->contacts[k].on)
+                                               : box_nodes(&scene->box, scene->contacts[k].on);
+    return rows > FEW_ROWS;
+}
+
+/* ---------------------------------------------------------------- the choice */
+
+/* The diagonal of the box around the body. */
+static double extent_of(const uz_mesh_info *info)
+{
+    double square = 0;
+    for (int axis = 0; axis < info->dim; axis++) {
+        double low = INFINITY, high = -INFINITY;
+        for (int64_t i = 0; i < info->n_nodes; i++) {
+            low = fmin(low, info->xyz[i * info->dim + axis]);
+            high = fmax(high, info->xyz[i * info->dim + axis]);
+        }
+        square += (high - low) * (high - low);
+    }
+    return sqrt(square);
+}
+
+/* The farthest that a support pushes its nodes, and with them perhaps the whole body. */
+static double pushed_by_supports(const uz_scene *scene, int dim)
+{
+    double most = 0;
+    for (int64_t i = 0; i < scene->n_supports; i++) {
+        const uz_support *s = &scene->supports[i];
+        double u = 0;
+        for (int c = 0; c < dim && s->kind == UZ_SUPPORT_COMPONENTS; c++)
+            u = isnan(s->u[c]) ? u : hypot(u, s->u[c]);
+        most = fmax(most, s->kind == UZ_SUPPORT_NORMAL ? fabs(s->value) : u);
+    }
+    return most;
+}
+
+uz_status uz_choose_rows(uz_candidates *rows, const double *h, int64_t m, const uz_mesh_info *info,
+                         const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
+{
+    *rows = (uz_candidates){.m = m, .count = m};
+    if (m <= FEW_ROWS || scene->all_candidates)
+        return UZ_OK;
+    const double reach = UZ_CANDIDATES_REACH * extent_of(info) + pushed_by_supports(scene, info->dim);
+    uz_status status = uz_candidates_first(rows, h, m, reach, err);
+    if (status == UZ_OK && wanted && wanted->in && wanted->m == m)
+        status = uz_candidates_add(rows, wanted, err);
+    if (status == UZ_OK && (double)rows->count <= MOST_KEPT * (double)m)
+        return UZ_OK;
+    uz_candidates_clear(rows);
+    *rows = (uz_candidates){.m = m, .count = m};
+    return status;
+}
+
+/* ---------------------------------------------------------------- sets */
+
+static uz_status make_set(uz_candidates *set, int64_t m, uz_error *err)
+{
+    if (set->in)
+        return UZ_OK;
+    *set = (uz_candidates){.m = m, .in = uz_alloc_zero(m, 1)};
+    return set->in ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact candidates", (long long)m);
+}
+
+static void include(uz_candidates *set, int64_t i)
+{
+    set->count += !set->in[i];
+    set->in[i] = 1;
+}
+
+uz_status uz_candidates_add(uz_candidates *to, const uz_candidates *from, uz_error *err)
+{
+    const uz_status status = make_set(to, from->m, err);
+    for (int64_t i = 0; i < from->m && status == UZ_OK; i++)
+        if (from->in[i])
+            include(to, i);
+    return status;
+}
+
+uz_status uz_candidates_add_start(uz_candidates *to, const uz_state *start, uz_error *err)
+{
+    const double *forces[] = {start->r, start->rho, start->best_r, start->anchor};
+    const uz_status status = make_set(to, start->m, err);
+    for (size_t k = 0; k < sizeof forces / sizeof forces[0] && status == UZ_OK; k++)
+        for (int64_t i = 0; i < start->m && forces[k]; i++)
+            if (forces[k][i] != 0)
+                include(to, i);
+    return status;
+}
+
+bool uz_candidates_has(const uz_candidates *a, const uz_candidates *b)
+{
+    for (int64_t i = 0; b->in && a->in && i < b->m; i++)
+        if (b->in[i] && !a->in[i])
+            return false;
+    return true;
+}
+
+/* ---------------------------------------------------------------- states */
+
+enum { STATE_VECTORS = 6 };
+
+static void list_vectors(double **list[STATE_VECTORS], uz_state *s)
+{
+    double **vectors[STATE_VECTORS] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
+    memcpy(list, vectors, sizeof vectors);
+}
+
+static uz_status copy_rows(uz_state **out, const uz_state *from, const uz_candidates *rows, bool gather, uz_error *err)
+{
+    uz_state source = *from, *s = uz_alloc_zero(1, sizeof *s);
+    double **to[STATE_VECTORS], **given[STATE_VECTORS];
+    *out = NULL;
+    if (!s)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a state");
+    *s = *from;
+    s->m = gather ? rows->count : rows->m;
+    list_vectors(to, s);
+    list_vectors(given, &source);
+    bool ok = true;
+    for (int k = 0; k < STATE_VECTORS; k++) {
+        *to[k] = *given[k] ? uz_alloc(s->m, sizeof(double)) : NULL;
+        ok = ok && (*to[k] || !*given[k]);
+        if (*to[k] && gather)
+            uz_candidates_gather(*to[k], *given[k], rows);
+        else if (*to[k])
+            uz_candidates_scatter(*to[k], *given[k], rows);
+    }
+    if (ok) {
+        *out = s;
+        return UZ_OK;
+    }
+    uz_state_free(s);
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)rows->m);
+}
+
+uz_status uz_state_gather(uz_state **out, const uz_state *all, const uz_candidates *rows, uz_error *err)
+{
+    return copy_rows(out, all, rows, true, err);
+}
+
+uz_status uz_state_scatter(uz_state **out, const uz_state *part, const uz_candidates *rows, uz_error *err)
+{
+    return copy_rows(out, part, rows, false, err);
+}

@@ -1,0 +1,245 @@
+/* outcome.c: what a semicoercive solve leaves behind, or why it is refused. */
+#include "certificate/bound.h"
+#include "certificate/certificate.h"
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "post/evaluate.h"
+#include "assembly/pressed.h"
+#include "run/semicoercive_private.h"
+#include "run/solve.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The null space of matrices is known by iterations on a factor: its rounding allows no more. */
+#define BALANCED 1e-7
+
+uz_status uz_semi_norms(double *norm, double *augmented, const uz_semi *s, double error, uz_error *err)
+{
+    const uz_csc *K = s->of.K;
+    const double *u = s->last->u, *g = s->last->g;
+    double energy = 0.0, springs = 0.0, whole;
+    for (int64_t j = 0; j < s->d; j++)
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            energy += (K->idx[q] == j ? 1.0 : 2.0) * K->val[q] * u[j] * u[K->idx[q]];
+    for (int64_t i = 0; i < s->m; i++)
+        springs += s->weight[i] * (s->of.h[i] - g[i]) * (s->of.h[i] - g[i]);
+    *norm = sqrt(fmax(0.0, energy));
+    *augmented = sqrt(fmax(0.0, energy) + springs);
+    if (!s->is_scene)
+        return UZ_OK;
+    /* of matrices what a fall leaves by rounding can't be told from strain */
+    uz_status status = uz_whole_norm(&whole, &s->model, u, s->prescribed, err);
+    *norm = uz_is_moved(&s->model, s->prescribed) ? uz_bound_reference(whole, *norm, error) : whole;
+    return status;
+}
+
+/* The dofs that the motion moves most: "dof 7 (+1), dof 3 (-0.5)". */
+static void name_dofs(char *text, size_t size, const double *z, int64_t d)
+{
+    int64_t named[4] = {0};
+    double largest = 0.0;
+    size_t at = 0;
+    text[0] = '\0';
+    for (int n = 0; n < 4; n++) {
+        int64_t best = -1;
+        for (int64_t j = 0; j < d; j++) {
+            bool taken = false;
+            for (int k = 0; k < n; k++)
+                taken = taken || named[k] == j;
+            if (!taken && (best < 0 || fabs(z[j]) > fabs(z[best])))
+                best = j;
+        }
+        if (best < 0 || fabs(z[best]) <= 1e-6 * largest)
+            break;
+        named[n] = best;
+        largest = fmax(largest, fabs(z[best]));
+        at += (size_t)snprintf(text + at, size - at, "%sdof %lld (%+.3g)", n ? ", " : "", (long long)best,
+                               z[best] / largest);
+    }
+}
+
+static uz_status refuse(const uz_semi *s, uz_pressing how, const double *y, uz_error *err)
+{
+    char dofs[200];
+    double *z = uz_alloc_zero(s->d, sizeof *z);
+    if (!z)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)s->d);
+    for (int64_t c = 0; c < s->k; c++)
+        for (int64_t j = 0; j < s->d; j++)
+            z[j] += y[c] * s->Z[c * s->d + j];
+    name_dofs(dofs, sizeof dofs, z, s->d);
+    free(z);
+    if (how == UZ_PUSHED_AWAY)
+        return uz_fail(err, UZ_ERR_FREE_BODY, "p",
+                       "K is singular and the load pushes a part of the body away along a motion without stiffness "
+                       "that no row of N stands in the way of; it moves most: %s. Support it there, add a row of N "
+                       "that stops this motion, or load it towards the rows that are there.",
+                       dofs);
+    return uz_fail(
+        err, UZ_ERR_FREE_BODY, "K",
+        "K is singular and the load does not press the body on: a motion without stiffness that no row of N "
+        "stands in the way of costs nothing; it moves most: %s. Support it there, or add a row of N or a load "
+        "that stops this motion.",
+        dofs);
+}
+
+uz_status uz_semi_check_pressed(const uz_semi *s, bool strict, uz_error *err)
+{
+    uz_pressing how = UZ_PRESSED_ON;
+    if (s->is_scene)
+        return uz_check_pressed(&s->model, s->of.p, err);
+    if (!s->Z)
+        return UZ_OK;
+    double *y = uz_alloc_zero(s->k, sizeof *y);
+    if (!y)
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld null vectors", (long long)s->k);
+    uz_status status = uz_load_on_modes(&how, y, s->Z, s->k, s->of.N, s->of.p, BALANCED, strict, err);
+    if (status == UZ_OK && how != UZ_PRESSED_ON)
+        status = refuse(s, how, y, err);
+    free(y);
+    return status;
+}
+
+/* The singular K bounds nothing by its inverse. */
+static uz_status no_inverse(void *ctx, double *value, double *e, bool solve, uz_error *err)
+{
+    (void)ctx, (void)e, (void)solve, (void)err;
+    *value = INFINITY;
+    return UZ_OK;
+}
+
+/* Residuals, gaps and energies of the original data; the bound is that of the augmented problem. */
+static uz_status certify(uz_semi *s, uz_error *err)
+{
+    uz_result *result = s->last;
+    uz_certificate *c = &result->summary.certificate;
+    double gap = c->gap;
+    uz_certify_input input = {.K = s->of.K,
+                              .N = s->of.N,
+                              .p = s->of.p,
+                              .h = s->of.h,
+                              .inverse_norm = no_inverse,
+                              .rcond = 1.0,
+                              .inverse_bound = INFINITY};
+    uz_status status = uz_certify(c, result->r, result->g, result->u, &input, err);
+    if (status != UZ_OK)
+        return status;
+    c->gap = c->absolute_error = c->relative_error = INFINITY;
+    if (s->proved) {
+        double norm = c->energy_norm, augmented;
+        if (s->is_scene)
+            status = uz_semi_norms(&norm, &augmented, s, s->absolute, err);
+        c->energy_norm = norm;
+        c->gap = gap;
+        c->absolute_error = s->absolute;
+        c->relative_error = s->absolute < norm ? s->absolute / (norm - s->absolute) : INFINITY;
+        if (s->absolute == 0.0)
+            c->relative_error = 0.0;
+    }
+    c->energy_dual = c->energy_primal - c->gap;
+    return status;
+}
+
+static void name_rows(const uz_semi *s, uz_semicoercive *out)
+{
+    const int64_t most = (int64_t)(sizeof out->held_by / sizeof out->held_by[0]);
+    *out = (uz_semicoercive){.free_modes = s->k, .rounds = s->rounds};
+    for (int64_t i = 0; s->proved && i < s->m; i++)
+        if (s->weight[i] > 0.0) {
+            if (out->held < most)
+                out->held_by[out->held] = i;
+            out->held++;
+        }
+}
+
+/* Displacements by node, forces, pressures. */
+static uz_status describe_scene(uz_semi *s, uz_error *err)
+{
+    uz_result *result = s->last;
+    const uz_mesh *mesh = &s->model.mesh;
+    double *nodal = uz_alloc(mesh->n_nodes * mesh->dim, sizeof *nodal);
+    if (!nodal)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
+                       (long long)mesh->n_nodes);
+    uz_recover_nodal(nodal, &s->model, result->u, s->prescribed);
+    free(result->u);
+    result->u = nodal;
+    result->n_nodes = mesh->n_nodes;
+    uz_status status = uz_mesh_info_copy(&result->mesh, &s->model.info, s->m, err);
+    return status == UZ_OK ? uz_evaluate(result, &s->model, &s->problem->scene, err) : status;
+}
+
+static uz_outcome outcome_of(const uz_semi *s)
+{
+    const uz_summary *summary = &s->last->summary;
+    if (s->last->ray)
+        return UZ_INFEASIBLE;
+    if (s->proved && summary->certificate.relative_error <= s->requested)
+        return UZ_CONVERGED;
+    return summary->outcome == UZ_CONVERGED ? UZ_PRECISION_LIMIT : summary->outcome;
+}
+
+/* Bounds of iterations were about regularized problems; that of the certificate alone is about this one. */
+static void report_trade(uz_result *result)
+{
+    uz_decades decades;
+    uz_decades_init(&decades, false);
+    uz_decades_resume(&decades, result->summary.timings.total);
+    uz_decades_pause(&decades);
+    uz_decades_certify(&decades, result->summary.certificate.relative_error, result->summary.iterations, 0);
+    result->trade = decades.trade;
+    result->trade.total_s = decades.trade.iterated_s;
+    result->summary.suggestion.any = false;
+}
+
+/* A sum of loads that is no more than their rounding. */
+#define NO_LOAD 1e-12
+
+/* Does the load leave all motions without stiffness alone? Then nothing says where in their room they end. */
+static bool is_loose(const uz_semi *s)
+{
+    bool loose = s->Z != NULL;
+    for (int64_t c = 0; loose && c < s->k; c++) {
+        double work = 0.0, size = 0.0, largest = 0.0;
+        for (int64_t j = 0; j < s->d; j++) {
+            work += s->Z[c * s->d + j] * s->of.p[j];
+            size += fabs(s->of.p[j]);
+            largest = fmax(largest, fabs(s->Z[c * s->d + j]));
+        }
+        loose = fabs(work) <= NO_LOAD * size * largest;
+    }
+    return loose;
+}
+
+uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
+{
+    uz_result *result = s->last;
+    uz_summary *summary = &result->summary;
+    uz_status status = result->ray ? UZ_OK : certify(s, err);
+    if (status != UZ_OK)
+        return status;
+    summary->outcome = outcome_of(s);
+    summary->requested_error = s->requested;
+    summary->discretization_error = s->discretization_error;
+    name_rows(s, &summary->semicoercive);
+    if (s->is_scene)
+        status = describe_scene(s, err);
+    if (result->ray)
+        uz_blank_answer(result);
+    summary->message[0] = '\0';
+    uz_explain_outcome(result, UZ_END_STALLED);
+    if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT)
+        snprintf(summary->message, sizeof summary->message, "%s",
+                 is_loose(s) ? "no load moves the body along a motion that no support holds: where the obstacles on "
+                               "both sides leave it room it may lie anywhere, and this is one such place"
+                             : "no rows could be proved to hold the body, which no support does: it may be balanced on "
+                               "the edge of its contact");
+    summary->timings.assemble += s->assemble_s;
+    summary->timings.total = uz_seconds() - s->started;
+    report_trade(s->last);
+    return status;
+}

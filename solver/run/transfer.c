@@ -1,0 +1,131 @@
+#include "run/transfer.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+#include "scene/box.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Weights below this are rounding: quad8 has no node in the middle of its cells, and none is needed on its sides. */
+#define NO_WEIGHT 1e-9
+
+/* The lattice of the coarse grid with a pressure at each of its nodes. */
+typedef struct {
+    const uz_box *box;
+    uz_element_kind kind;
+    int order;
+    double *line[3];
+    double *pressure; /* n_nodes; of the contact that is transferred */
+} field;
+
+static void clear(field *f)
+{
+    for (int axis = 0; axis < 3; axis++)
+        free(f->line[axis]);
+    free(f->pressure);
+}
+
+static uz_status make(field *f, const uz_box *box, int64_t n_nodes, uz_error *err)
+{
+    f->box = box;
+    f->kind = uz_box_element(box);
+    f->order = uz_box_order(f->kind);
+    f->pressure = uz_alloc_zero(n_nodes, sizeof *f->pressure);
+    bool room = f->pressure != NULL;
+    for (int axis = 0; axis < box->dim; axis++)
+        room = (f->line[axis] = uz_box_lines(box, axis, f->order)) && room;
+    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
+}
+
+/* The lattice cell that x lies in along an axis, and where in it, 0 to 1. */
+static int64_t locate(double *share, const field *f, int axis, double x)
+{
+    const double *line = f->line[axis];
+    int64_t low = 0, high = f->order * f->box->cells[axis];
+    while (high - low > 1) {
+        const int64_t middle = low + (high - low) / 2;
+        if (line[middle] <= x)
+            low = middle;
+        else
+            high = middle;
+    }
+    *share = fmin(1.0, fmax(0.0, (x - line[low]) / (line[low + 1] - line[low])));
+    return low;
+}
+
+/* Linear along each axis between the nodes of the lattice. */
+static double pressure_at(const field *f, const double *x)
+{
+    const int dim = f->box->dim;
+    int64_t low[3] = {0};
+    double share[3] = {0}, sum = 0.0;
+    for (int axis = 0; axis < dim; axis++)
+        low[axis] = locate(&share[axis], f, axis, x[axis]);
+    for (int corner = 0; corner < 1 << dim; corner++) {
+        int64_t at[3] = {0};
+        double weight = 1.0;
+        for (int axis = 0; axis < dim; axis++) {
+            const int up = corner >> axis & 1;
+            at[axis] = low[axis] + up;
+            weight *= up ? share[axis] : 1.0 - share[axis];
+        }
+        const bool missing = f->kind == UZ_QUAD8 && at[0] % 2 && at[1] % 2;
+        if (weight > NO_WEIGHT && !missing)
+            sum += weight * f->pressure[uz_box_node(f->box, f->kind, at)];
+    }
+    return sum;
+}
+
+/* Puts the pressure of one contact at the nodes, or takes it away again. */
+static void spread(field *f, const uz_result *result, int64_t contact, bool put)
+{
+    for (int64_t i = 0; i < result->m; i++)
+        if (result->mesh.contact_of[i] == contact)
+            f->pressure[result->mesh.contact_node[i]] = put ? result->pressure[i] : 0.0;
+}
+
+static bool has_pressure(const uz_result *result)
+{
+    for (int64_t i = 0; result->pressure && i < result->m; i++)
+        if (!isfinite(result->pressure[i]))
+            return false; /* infeasible */
+    return result->pressure && result->mesh.contact_of;
+}
+
+static void transfer(double *r, field *f, const uz_result *result, const uz_mesh_info *fine, int64_t m)
+{
+    int64_t contact = -1;
+    for (int64_t i = 0; i < m; i++) { /* rows come contact by contact */
+        if (fine->contact_of[i] != contact) {
+            spread(f, result, contact, false);
+            contact = fine->contact_of[i];
+            spread(f, result, contact, true);
+        }
+        r[i] = -pressure_at(f, fine->xyz + fine->contact_node[i] * fine->dim) * fine->contact_area[i];
+    }
+}
+
+uz_status uz_transfer_start(uz_state **out, const uz_result *result, const uz_box *coarse, const uz_mesh_info *fine,
+                            int64_t m, uz_error *err)
+{
+    field f = {.box = NULL};
+    *out = NULL;
+    if (!has_pressure(result))
+        return UZ_OK;
+    uz_state *state = uz_alloc_zero(1, sizeof *state);
+    uz_status status = make(&f, coarse, result->mesh.n_nodes, err);
+    if (state)
+        state->r = uz_alloc(m, sizeof *state->r);
+    if (status == UZ_OK && (!state || !state->r))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
+    if (status == UZ_OK) {
+        state->m = m;
+        transfer(state->r, &f, result, fine, m);
+        *out = state;
+        state = NULL;
+    }
+    uz_state_free(state);
+    clear(&f);
+    return status;
+}

@@ -1,0 +1,136 @@
+/* verify.c: the certificate of an answer that somebody else made. */
+#include "run/cache.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "linalg/linalg.h"
+#include "run/solve.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static uz_status check_given(const double *x, int64_t n, const char *name, uz_error *err)
+{
+    if (n > 0 && !x)
+        return uz_fail(err, UZ_ERR_ARGUMENT, name, "there is no %s to verify", name);
+    return uz_check_finite(x, n, name, err);
+}
+
+/* The free dofs of a nodal u. Supported ones must be where the scene holds them: the error that is bounded is one among
+ * displacements that meet the supports, and no other has an energy that could be compared. */
+static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
+{
+    const uz_body_model *model = &run->body->model;
+    int dim = model->mesh.dim;
+    uz_restrict_nodal(run->answer.u, model, u);
+    for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
+        int64_t dof = model->dof[i], node = i / dim;
+        double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
+        double rounding = uz_dof_rounding(model, node, u + node * dim);
+        if (dof < 0 && !(fabs(given - run->prescribed[-1 - dof]) <= rounding))
+            return uz_fail(err, UZ_ERR_SCENE, "u",
+                           "node %lld is supported: its displacement along %s must be %.17g, it is given as %.17g",
+                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), run->prescribed[-1 - dof], given);
+    }
+    return UZ_OK;
+}
+
+static uz_status take_answer(uz_run *run, const double *u, const double *r, uz_error *err)
+{
+    const uz_mesh *mesh = &run->body->model.mesh;
+    bool scene = run->body->is_scene;
+    uz_status status = check_given(u, scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
+    if (status == UZ_OK)
+        status = check_given(r, run->m, "r", err);
+    if (status != UZ_OK)
+        return status;
+    if (run->m > 0)
+        memcpy(run->answer.r, r, (size_t)run->m * sizeof *r);
+    if (scene)
+        return take_nodal(run, u, err);
+    memcpy(run->answer.u, u, (size_t)run->d * sizeof *u);
+    return UZ_OK;
+}
+
+/* The certificate cuts reactions at 0; the result shows what was given. */
+static uz_status certify(uz_run *run, const double *r, uz_error *err)
+{
+    uz_answer *answer = &run->answer;
+    if (run->settings->balanced && run->body->is_scene)
+        uz_run_balance_request(run);
+    uz_certify_input input;
+    uz_status status = uz_run_certify_input(&input, run, answer->u, err);
+    input.twofold_energies = true;
+    if (status == UZ_OK)
+        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
+    run->result->summary.certificate = answer->certificate;
+    if (run->m > 0)
+        memcpy(answer->r, r, (size_t)run->m * sizeof *r);
+    return status;
+}
+
+static uz_status verify(uz_run *run, const double *u, const double *r, uz_error *err)
+{
+    uz_summary *summary = &run->result->summary;
+    uz_status status = uz_run_make_load(run, err);
+    uz_run_take_all_rows(run);
+    if (status == UZ_OK)
+        status = uz_answer_allocate(&run->answer, run->d, run->m, err);
+    if (status == UZ_OK)
+        status = take_answer(run, u, r, err);
+    double start = uz_seconds();
+    if (status == UZ_OK && run->body->krylov) /* its certificate solves with what a load keeps */
+        status = uz_case_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
+    if (status == UZ_OK)
+        status = certify(run, r, err);
+    summary->timings.certify = uz_seconds() - start;
+    if (status != UZ_OK)
+        return status;
+    uz_decades_resume(&run->decades, uz_run_time(run));
+    uz_decades_pause(&run->decades);
+    uz_decades_certify(&run->decades, summary->certificate.relative_error, 0, 0);
+    summary->outcome = summary->certificate.relative_error <= run->requested ? UZ_VERIFIED : UZ_NOT_VERIFIED;
+    summary->method = UZ_METHOD_GIVEN;
+    summary->alpha = NAN;
+    summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
+    return uz_run_publish(run, err);
+}
+
+static uz_status check(const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+{
+    if (problem->n_cases > 0)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "an answer to one load is verified, not to load cases");
+    uz_status status = uz_check_settings(settings, err);
+    if (status == UZ_OK)
+        status = uz_check_problem(problem, err);
+    if (status == UZ_OK && uz_cancelled(hooks))
+        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
+    return status;
+}
+
+uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
+                    const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    uz_run run;
+    uz_reuse reused = {0};
+    *out = NULL;
+    uz_error_reset(err);
+    uz_status status = check(problem, settings, hooks, err);
+    if (status != UZ_OK)
+        return status;
+    status = uz_run_begin(&run, problem, settings, hooks, err);
+    if (status == UZ_OK)
+        status = uz_cache_acquire(&run.body, &reused, cache, problem, settings, hooks, err);
+    if (status == UZ_OK) {
+        uz_run_take_body(&run, reused);
+        status = verify(&run, u, r, err);
+    }
+    if (status == UZ_OK) {
+        *out = run.result;
+        run.result = NULL;
+    }
+    uz_cache_release(cache, run.body);
+    uz_run_end(&run);
+    return status;
+}

@@ -1,0 +1,114 @@
+/* widen.c: from an answer with some of the contact rows to one with all of them.
+ *
+ * Rows that were left out have no reaction and the gap that u leaves; what is certified is the full problem, on its own
+ * K, N, p and h (obstacle/candidates.h says why that bound is one). Where it misses the request although that of the
+ * rows kept met it, or a gap left out is negative, the run says which rows another round has to have. */
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "linalg/linalg.h"
+#include "run/rows.h"
+#include "run/solve.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Gaps left out may be negative by this part of what they are the difference of. */
+#define ROUNDING (64.0 * DBL_EPSILON)
+
+void uz_run_take_all_rows(uz_run *run)
+{
+    run->m = run->all;
+    run->wide = true;
+}
+
+static uz_status widen_vector(double **x, const uz_candidates *rows, uz_error *err)
+{
+    double *all = *x ? uz_alloc(rows->m, sizeof *all) : NULL;
+    if (!*x)
+        return UZ_OK;
+    if (!all)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contacts", (long long)rows->m);
+    uz_candidates_scatter(all, *x, rows);
+    free(*x);
+    *x = all;
+    return UZ_OK;
+}
+
+/* What each gap is the difference of: |h| + |N| |u|. */
+static void add_sizes(double *size, const uz_csc *N, const double *h, const double *u)
+{
+    for (int64_t i = 0; i < N->rows; i++)
+        size[i] = fabs(h[i]);
+    for (int64_t j = 0; j < N->cols; j++)
+        for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++)
+            size[N->idx[q]] += fabs(N->val[q] * u[j]);
+}
+
+/* Where no gap left out is negative at u, but some may be at the feasible displacement: what stays nearest. */
+static void take_nearest(uz_candidates *wants, const double *g)
+{
+    double nearest = INFINITY;
+    for (int64_t i = 0; i < wants->m; i++)
+        nearest = wants->in[i] ? nearest : fmin(nearest, fmax(g[i], 0.0));
+    for (int64_t i = 0; i < wants->m; i++)
+        if (!wants->in[i] && !(g[i] > 2.0 * nearest)) {
+            wants->in[i] = 1;
+            wants->count++;
+        }
+}
+
+/* The rows of another round: those of this one, those that are penetrated, and those that would be next. */
+static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
+{
+    const uz_candidates *rows = &run->body->rows;
+    uz_candidates wants = {0};
+    double *size = uz_alloc(rows->m, sizeof *size);
+    uz_status status =
+        size ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contacts", (long long)rows->m);
+    if (status == UZ_OK)
+        status = uz_candidates_add(&wants, rows, err);
+    if (status == UZ_OK) {
+        add_sizes(size, uz_body_all_rows(run->body, run->problem), run->h_all, run->answer.u);
+        int64_t added = uz_candidates_extend(&wants, run->answer.g, size, ROUNDING);
+        if (added == 0 && suspect)
+            take_nearest(&wants, run->answer.g);
+    }
+    free(size);
+    if (status == UZ_OK && wants.count > rows->count)
+        run->wants = wants;
+    else
+        uz_candidates_clear(&wants);
+    return status;
+}
+
+uz_status uz_run_widen(uz_run *run, uz_error *err)
+{
+    const uz_candidates *rows = &run->body->rows;
+    uz_certificate *certificate = &run->result->summary.certificate;
+    if (!rows->in)
+        return UZ_OK;
+    double start = uz_seconds();
+    bool met = certificate->relative_error <= run->requested;
+    uz_status status = widen_vector(&run->answer.r, rows, err);
+    if (status == UZ_OK)
+        status = widen_vector(&run->answer.g, rows, err);
+    if (status == UZ_OK)
+        status = widen_vector(&run->result->ray, rows, err);
+    if (status != UZ_OK)
+        return status;
+    uz_run_take_all_rows(run);
+    if (!run->result->ray)
+        status = uz_run_certify_answer(run, &run->answer, err);
+    if (status == UZ_OK && !run->result->ray)
+        *certificate = run->answer.certificate;
+    if (status == UZ_OK && !run->result->ray && certificate->relative_error > run->requested)
+        status = want_rows(run, met, err);
+    run->result->summary.timings.certify += uz_seconds() - start;
+    uz_decades_resume(&run->decades, uz_run_time(run));
+    uz_decades_widen(&run->decades, certificate->relative_error, run->it.iteration, uz_case_applications(run->load));
+    return status;
+}

@@ -1,0 +1,148 @@
+#include "scene/grids.h"
+
+#include "scene/box.h"
+
+#include <math.h>
+
+/* With fewer cells across, the averages of the stresses have too little to be compared with: the estimate would say too
+ * little. */
+enum { FIRST_LINEAR = 4, FIRST_QUADRATIC = 2 };
+
+/* A coarsest grid of square cells beyond these has longer ones instead. */
+#define FIRST_CELLS_2D 4096.0
+#define FIRST_CELLS_3D 8192.0
+
+/* The next grid is aimed at a little less than what is asked for: missing it by a hair would take another one. */
+#define AIM 0.97
+
+/* A step back must save this share of the dofs. */
+#define WORTH_SAVING 0.25
+
+/* ---- the family */
+
+/* Cells of a grid whose cells have this length. */
+static double count_cells(const uz_box *box, double length, int64_t least)
+{
+    double count = 1.0;
+    for (int axis = 0; axis < box->dim; axis++)
+        count *= fmax((double)least, box->size[axis] / length);
+    return count;
+}
+
+/* The length of the cells of the coarsest grid. */
+static double first_length(const uz_grids *grids)
+{
+    const uz_box *box = &grids->box;
+    const double most = box->dim == 3 ? FIRST_CELLS_3D : FIRST_CELLS_2D;
+    double shortest = INFINITY, longest = 0.0;
+    for (int axis = 0; axis < box->dim; axis++) {
+        shortest = fmin(shortest, box->size[axis]);
+        longest = fmax(longest, box->size[axis]);
+    }
+    double low = shortest / (double)grids->first, high = longest;
+    if (!(low > 0.0) || !isfinite(high) || count_cells(box, low, grids->least) <= most)
+        return low;
+    for (int i = 0; i < 60; i++) {
+        const double middle = sqrt(low) * sqrt(high);
+        if (count_cells(box, middle, grids->least) > most)
+            low = middle;
+        else
+            high = middle;
+    }
+    return high;
+}
+
+uz_grids uz_grids_of_box(const uz_box *box, double most_dofs)
+{
+    uz_grids grids = {.box = *box, .order = uz_box_order(uz_box_element(box)), .most_dofs = UZ_SCENE_MAX_DOFS};
+    if (most_dofs > 0.0)
+        grids.most_dofs = fmin(most_dofs, grids.most_dofs);
+    grids.box.automatic = false;
+    grids.first = grids.order == 2 ? FIRST_QUADRATIC : FIRST_LINEAR;
+    grids.least = grids.order == 2 ? 1 : 2;
+    const double length = first_length(&grids);
+    for (int axis = 0; axis < box->dim && axis < 3; axis++) {
+        const double cells = box->size[axis] / length / (double)grids.first;
+        grids.per_n[axis] = cells > 0.0 && isfinite(cells) ? cells : 1.0;
+    }
+    return grids;
+}
+
+uz_box uz_grid(const uz_grids *grids, int64_t n)
+{
+    uz_box box = grids->box;
+    for (int axis = 0; axis < 3; axis++) {
+        const double cells = fmin((double)UZ_SCENE_MAX_DOFS, round((double)n * grids->per_n[axis]));
+        box.cells[axis] = axis >= box.dim ? 0 : cells > (double)grids->least ? (int64_t)cells : grids->least;
+    }
+    return box;
+}
+
+double uz_grid_dofs(const uz_grids *grids, int64_t n)
+{
+    const uz_box box = uz_grid(grids, n);
+    double nodes = 1.0, cells = 1.0;
+    for (int axis = 0; axis < box.dim; axis++) {
+        nodes *= (double)(grids->order * box.cells[axis]) + 1.0;
+        cells *= (double)box.cells[axis];
+    }
+    if (uz_box_element(&box) == UZ_QUAD8)
+        nodes -= cells;
+    return nodes * box.dim;
+}
+
+/* ---- the next one */
+
+double uz_observed_rate(const uz_tried *coarse, const uz_tried *fine, int order)
+{
+    const double rate = log(coarse->error / fine->error) / log((double)fine->n / (double)coarse->n);
+    return isnan(rate) ? (double)order : fmin(order + 0.25, fmax(0.25, rate));
+}
+
+/* The n at which the error is expected to be what is aimed at. */
+static double expect(const uz_tried *from, double rate, double requested)
+{
+    return (double)from->n * pow(from->error / (AIM * requested), 1.0 / rate);
+}
+
+/* The largest n whose grid is allowed, from `low`, which is. */
+static int64_t largest_allowed(const uz_grids *grids, int64_t low)
+{
+    int64_t high = low + 1;
+    while (uz_grid_dofs(grids, high) <= grids->most_dofs)
+        high *= 2;
+    while (high - low > 1) {
+        const int64_t middle = low + (high - low) / 2;
+        if (uz_grid_dofs(grids, middle) <= grids->most_dofs)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, double requested)
+{
+    const uz_tried *last = &tried[count - 1];
+    const bool solid = grids->box.dim == 3;
+    const double rate = count > 1 ? uz_observed_rate(last - 1, last, grids->order) : grids->order;
+    /* little is known after one grid, and a solid grows with the cube */
+    const double growth = count > 1 ? (solid ? 2.0 : 3.0) : (solid ? 1.6 : 2.0);
+    const double wanted = expect(last, rate, requested);
+    const int64_t top = largest_allowed(grids, last->n);
+    if (top <= last->n || (count > 2 && wanted > 2.0 * (double)top))
+        return 0;
+    const double next = fmin(fmin(ceil(wanted), ceil(growth * (double)last->n)), (double)top);
+    return next > (double)last->n ? (int64_t)next : last->n + 1;
+}
+
+int64_t uz_grid_between(const uz_grids *grids, const uz_tried *failed, const uz_tried *passed, double requested)
+{
+    const double rate = uz_observed_rate(failed, passed, grids->order);
+    const double wanted = ceil(expect(failed, rate, requested));
+    if (!(wanted < (double)passed->n))
+        return 0;
+    const int64_t n = wanted > (double)failed->n ? (int64_t)wanted : failed->n + 1;
+    const bool saves = uz_grid_dofs(grids, n) <= (1.0 - WORTH_SAVING) * uz_grid_dofs(grids, passed->n);
+    return n < passed->n && saves ? n : 0;
+}
