@@ -31,8 +31,8 @@ tidy() { # the quick checks that find mistakes; those left out see one in correc
         grep -Ev '^[0-9]+ warnings? (generated|treated as error)'
     return "${PIPESTATUS[1]}"
 }
-long_files() { # names every source of more than 520 lines
-    wc -l $sources | awk '$2 != "total" && $1 > 520 {print; bad = 1} END {exit bad}'
+long_files() { # names every source of more than 1,000 lines
+    wc -l $sources | awk '$2 != "total" && $1 > 1000 {print; bad = 1} END {exit bad}'
 }
 long_functions() { # names every function of more than 80 lines: its braces stand alone in column one
     awk 'FNR == 1 {start = 0}
@@ -48,12 +48,19 @@ shell_syntax() {
 only_in() { # HEADER PATTERN: the header is included nowhere but in files that match
     ! grep -ln "include [<\"]$1" $(printf '%s\n' $sources | grep -v '^tests/') | grep -Ev "$2"
 }
+headers_alone() { # a header says all that it needs
+    printf '%s\n' $sources | grep '\.h$' | xargs -P "$cores" -n 4 sh -c 'options=$1; shift; status=0
+        for header; do printf "#include \"%s\"\n" "$header" | gcc -fsyntax-only -x c $options -I. - || status=255; done
+        exit $status' headers "$strict $includes $cflags -Itests"
+}
 check format clang-format --dry-run -Werror $sources
 check gcc each_c_file gcc -fsyntax-only $strict $includes $cflags -Itests
 check clang each_c_file clang -fsyntax-only $strict $includes $cflags -Itests
 check clang_tidy tidy
 check cppcheck cppcheck -j "$cores" --quiet --std=c11 --error-exitcode=1 --inline-suppr --enable=warning,portability \
     --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes $c_files
+check headers_alone headers_alone
+check rooms python3 -B tests/rooms.py
 check file_length long_files
 check function_length long_functions
 check shell shell_syntax

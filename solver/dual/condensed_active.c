@@ -200,7 +200,7 @@ static bool are_independent(const double *chol, const double *D, const int64_t *
     double least = 1.0;
     for (int64_t k = 0; k < count; k++) {
         double kept = chol[k + k * count] * chol[k + k * count] / D[rows[k] + rows[k] * m];
-        if (!(kept > fmax(UZ_DEPENDENT, 4.0 * DBL_EPSILON / least)))
+        if (!(kept > fmax(UZ_DEPENDENT_ROW, 4.0 * DBL_EPSILON / least)))
             return false;
         least = fmin(least, kept);
     }

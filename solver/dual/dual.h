@@ -20,7 +20,7 @@
 
 /* A row whose compliance D_ii falls to this part of itself when others are held depends on them: what is left is the
  * rounding of D. */
-#define UZ_DEPENDENT 1e-13
+#define UZ_DEPENDENT_ROW 1e-13
 
 typedef struct uz_dual uz_dual;
 

@@ -1,6 +1,6 @@
 /* element_kind.c: names, sizes and sides of the elements. Nodes in VTK order: corners, then middles of the edges
  * (Schroeder, Martin, Lorensen, "The Visualization Toolkit", cell types). */
-#include "scene/mesh.h"
+#include "element/element_kind.h"
 
 #include <string.h>
 

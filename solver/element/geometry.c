@@ -2,7 +2,7 @@
  * shape is one that can be integrated. */
 #include "element/element_private.h"
 
-#include "scene/mesh.h"
+#include "element/element_kind.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* motion.c: the strain of a deformed element, as its stiffness takes it. */
 #include "element/element_private.h"
 
-#include "scene/mesh.h"
+#include "element/element_kind.h"
 
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* shape.c: shape functions on the reference elements, and their Gauss rules. */
 #include "element/element_private.h"
 
-#include "scene/mesh.h"
+#include "element/element_kind.h"
 
 #include <string.h>
 

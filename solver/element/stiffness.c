@@ -17,7 +17,7 @@
  * Incompatible modes are further shape functions without nodes (element_private.h), condensed at once. */
 #include "element/element_private.h"
 
-#include "scene/mesh.h"
+#include "element/element_kind.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 #include "element/strain_lanes.h"
 
 #include "element/element_private.h"
-#include "scene/mesh.h"
+#include "element/element_kind.h"
 
 #include <string.h>
 

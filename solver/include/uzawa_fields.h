@@ -1,7 +1,12 @@
-/* uzawa_fields.h: the part of uzawa.h on what an answer to a scene means: fields, files, pictures. Included by uzawa.h,
- * after the types that it uses. */
+/* uzawa_fields.h: what an answer to a scene means: fields, files, pictures. Part of uzawa.h. */
 #ifndef UZAWA_FIELDS_H
 #define UZAWA_FIELDS_H
+
+#include "uzawa_results.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* ------------------------------------------------------------------ fields */
 
@@ -152,5 +157,9 @@ typedef struct {
  * frees it. Errors: UZ_ERR_ARGUMENT, _MEMORY. */
 uz_status uz_picture_convergence(char **svg, size_t *len, const uz_curve *curves, int n, const uz_plot *how,
                                  uz_error *err);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

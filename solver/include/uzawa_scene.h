@@ -1,7 +1,13 @@
-/* uzawa_scene.h: the part of uzawa.h on scenes: an elastic body, its supports and loads, and what it may touch.
- * Included by uzawa.h, after the types that it uses. */
+/* uzawa_scene.h: an elastic body, its supports and loads, and what it may touch.
+ * Part of uzawa.h. */
 #ifndef UZAWA_SCENE_H
 #define UZAWA_SCENE_H
+
+#include "uzawa_matrices.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* A scene: what a person says about a body. Plain data; strings are group names.
  * Numbers that a scene leaves out are NaN where the text says so. */
@@ -178,5 +184,9 @@ uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, u
 uz_status uz_scene_check(const uz_scene *scene, uz_error *err);
 /* What an answer's vectors measure, without the stiffness matrix: directions, nodes and contact rows m. */
 uz_status uz_scene_sizes(int *dim, int64_t *n_nodes, int64_t *m, const uz_scene *scene, uz_error *err);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

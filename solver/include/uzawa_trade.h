@@ -1,6 +1,12 @@
-/* uzawa_trade.h: the part of uzawa.h on what accuracy took. Included by uzawa.h. */
+/* uzawa_trade.h: what accuracy took. Part of uzawa.h. */
 #ifndef UZAWA_TRADE_H
 #define UZAWA_TRADE_H
+
+#include "uzawa_base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 /* What accuracy took: when the run first established a bound on the relative error of uz_trade_error(k) or less. The
  * bounds are those that the run makes anyway: between iterations, which the certificate at the end confirms or takes
@@ -35,5 +41,9 @@ typedef struct {
 /* mesh_error: estimated relative error of the mesh, NaN where not known; extra_s: what `balanced` does beside. Nothing
  * is suggested where it would save less than a fifth of the time. */
 uz_suggestion uz_trade_suggest(const uz_trade *trade, double mesh_error, double solver_error, double extra_s);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -124,7 +124,7 @@ static bool depends(const exchange *x, int64_t q)
     double size = sqrt(x->incoming[q]);
     for (int64_t k = 0; k < x->count; k++)
         size += fabs(x->w[k]) * sqrt(x->column[k][x->rows[k]]);
-    return !(x->compliance > fmax(UZ_DEPENDENT * x->incoming[q], 4.0 * DBL_EPSILON * size * size));
+    return !(x->compliance > fmax(UZ_DEPENDENT_ROW * x->incoming[q], 4.0 * DBL_EPSILON * size * size));
 }
 
 /* q, pressed last and independent, joins the rows in contact, unless there was no leave to make room for it. */

@@ -2,6 +2,7 @@
 #ifndef UZ_SCENE_MESH_H
 #define UZ_SCENE_MESH_H
 
+#include "element/element_kind.h"
 #include "uzawa.h"
 
 /* Most unknowns that a scene may have: beyond it no factor fits in the memory of one machine. */
@@ -70,15 +71,6 @@ const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count)
  */
 enum { UZ_FACE_NODES = 8 };
 int uz_mesh_face(int64_t node[UZ_FACE_NODES], const uz_mesh *mesh, uz_face face);
-
-/* Sides of an element; the local nodes of one of them, corners first: [2] or [3] in 2D, [3], [4] or [6] in 3D. */
-int uz_element_side_count(uz_element_kind kind);
-int uz_element_side(const int **local, uz_element_kind kind, int side);
-/* How many nodes of an element, and of each side of it, are corners. They come first. */
-int uz_element_corner_count(uz_element_kind kind);
-int uz_face_corner_count(uz_element_kind kind);
-/* Has it nodes in the middles of its edges? */
-bool uz_element_is_quadratic(uz_element_kind kind);
 
 /* The group of that name, or NULL with UZ_ERR_SCENE at `where`, listing the names that there are. */
 const uz_group *uz_mesh_group(const uz_mesh *mesh, const char *name, const char *where, uz_error *err);

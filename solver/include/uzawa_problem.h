@@ -1,0 +1,80 @@
+/* uzawa_problem.h: what is asked: a problem, its load cases, and how to solve it. Part of uzawa.h. */
+#ifndef UZAWA_PROBLEM_H
+#define UZAWA_PROBLEM_H
+
+#include "uzawa_matrices.h"
+#include "uzawa_scene.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* -------------------------------------------------------------- problems */
+
+typedef enum { UZ_PROBLEM_MATRICES, UZ_PROBLEM_SCENE } uz_problem_kind;
+
+/* One of several loads on the body of a problem. What it leaves out (NULL) is the problem's own. */
+typedef struct {
+    char name[64];  /* unique in its problem */
+    double *p, *h;  /* matrices: d, m */
+    uz_load *loads; /* scenes: in place of all of the scene's loads; an empty list may be non-NULL: no load */
+    int64_t n_loads;
+} uz_load_case;
+
+typedef struct {
+    uz_problem_kind kind;
+    uz_qp qp;            /* UZ_PROBLEM_MATRICES */
+    uz_scene scene;      /* UZ_PROBLEM_SCENE */
+    uz_load_case *cases; /* n_cases of them; none: the problem's own load is the only one */
+    int64_t n_cases;
+} uz_problem;
+void uz_problem_clear(uz_problem *problem);
+
+/* -------------------------------------------------------------- settings */
+
+typedef enum {
+    UZ_METHOD_AUTO,                /* active_set, else conjugate; no factor or paper rule: accelerated_restart */
+    UZ_METHOD_UZAWA,               /* Kanno, Algorithm 1 */
+    UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
+    UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
+    UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
+    UZ_METHOD_CONJUGATE,           /* projected conjugate gradients on the dual */
+    UZ_METHOD_GIVEN,               /* results of uz_verify only: the answer is the caller's */
+    UZ_METHOD_LINEAR /* results only: without contact rows u is one linear solve, whatever was asked for */
+} uz_method;
+typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE } uz_operator;
+typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;
+typedef enum { UZ_STOP_CERTIFIED, UZ_STOP_PAPER } uz_stopping;
+
+typedef struct {
+    uz_method method;
+    uz_operator op;
+    uz_ordering ordering;
+    uz_stopping stopping;
+    double relative_error;  /* certified: ||u - u*||_K / ||u||_K (uz_certificate) asked for, in (0, 1]; 0: rounding */
+    bool balanced;          /* scenes: relative_error is a tenth of the estimated discretization error instead */
+    double epsilon;         /* UZ_STOP_PAPER: stop when ||rho - r|| <= epsilon, a force */
+    double alpha;           /* step size; 0: 1 / lambda_max(D) */
+    int64_t max_iterations; /* >= 0 */
+    double time_limit_s;    /* of the whole solve; INFINITY: none */
+    bool semidefinite;      /* matrices: K is meant to be singular, its eigenvalues within rounding of 0 being 0 */
+    size_t memory_limit; /* bytes for all of a solve; 0: none. AUTO goes on without a factor where one does not fit */
+} uz_settings;
+/* auto, certified 1e-8, 100000 iterations, no time limit. */
+uz_settings uz_settings_default(void);
+
+/* Names as in the HTTP interface ("accelerated_restart"); never NULL. uz_*_parse: false if the name is unknown. */
+const char *uz_method_name(uz_method);
+const char *uz_operator_name(uz_operator);
+const char *uz_ordering_name(uz_ordering);
+const char *uz_stopping_name(uz_stopping);
+bool uz_method_parse(uz_method *out, const char *name);
+bool uz_operator_parse(uz_operator *out, const char *name);
+bool uz_ordering_parse(uz_ordering *out, const char *name);
+bool uz_stopping_parse(uz_stopping *out, const char *name);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

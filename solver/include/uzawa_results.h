@@ -1,0 +1,237 @@
+/* uzawa_results.h: what is answered: summary, certificate, history, state, and the hooks of a running solve. Part of
+ * uzawa.h. */
+#ifndef UZAWA_RESULTS_H
+#define UZAWA_RESULTS_H
+
+#include "uzawa_problem.h"
+#include "uzawa_trade.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --------------------------------------------------------------- results */
+
+/* How a solve ended. */
+typedef enum {
+    UZ_CONVERGED, /* the certificate meets the request; nothing else is called converged */
+    UZ_ITERATION_LIMIT,
+    UZ_TIME_LIMIT,
+    UZ_PRECISION_LIMIT, /* more was asked than double precision holds here */
+    UZ_PAPER_RULE,      /* the paper's stopping rule ended it before the certificate met the request */
+    UZ_INFEASIBLE,
+    UZ_DISMISSED,
+    UZ_VERIFIED,     /* uz_verify: the certificate of the given answer meets the request */
+    UZ_NOT_VERIFIED, /* uz_verify: it does not; the bound says how far it reaches */
+    UZ_MESH_LIMIT    /* cells chosen here: the grid that would meet the request is larger than allowed */
+} uz_outcome;
+const char *uz_outcome_name(uz_outcome);
+
+/* KKT residual of the paper, section 4: e1 = Ku - p - N'r, e2 = min(g, 0), e3 = max(r, 0), e4 = -g.r; 2-norms. */
+typedef struct {
+    double total, e1, e2, e3, e4;
+} uz_residual;
+
+typedef struct {
+    double relative_error; /* bound on ||u - u*||_K over the energy norm of u*; INFINITY: nothing could be certified */
+    double absolute_error; /* bound on ||u - u*||_K, sqrt(2 gap) */
+    double gap;            /* pi(v) - psi(r) for the feasible v that the certificate built */
+    double energy_primal;  /* pi(v) */
+    double energy_dual;    /* psi(r) */
+    double energy_norm;    /* ||u||_K; where supports move: over all dofs, without rigid motion (uz_bound_reference) */
+    uz_residual residual;  /* absolute */
+    uz_residual relative_residual; /* force by ||p||, length by the gap scale, energy by |psi| */
+} uz_certificate;
+
+typedef struct {
+    double queue, parse, assemble, order, factor, condense, iterate, certify, total;
+} uz_timings; /* seconds; queue and parse are the caller's */
+
+/* One row of the convergence history. Columns as in the HTTP interface. */
+typedef struct {
+    int64_t iteration;
+    double seconds;        /* since the first iteration */
+    double dual_objective; /* psi(r) */
+    uz_residual residual;
+    double step_norm;   /* ||rho - r||, the paper's stopping quantity; 0 in row 0 */
+    double error_bound; /* bound on ||u - u*||_K of the best answer held so far; INFINITY until there is one */
+    int64_t contacts;   /* rows with r < 0 */
+    bool restart;
+} uz_history_row;
+
+typedef struct {
+    uz_history_row *rows;
+    int64_t count, capacity;
+    int64_t stride; /* iterations between rows: 1 until the history is thinned */
+} uz_history;
+
+/* What an earlier solve had left in the cache: matrices of a scene; ordering and symbolic analysis (same pattern of K);
+ * factor (same K); operator (same K and N). */
+typedef struct {
+    bool assembly, ordering, factor, op;
+} uz_reuse;
+
+/* A body that only the obstacle holds: K is singular, and the load presses the body on. */
+typedef struct {
+    int64_t free_modes; /* motions without stiffness, the null space of K; 0: the body is held by its supports */
+    int64_t held;       /* rows proved to be in contact, on which the answer's uniqueness and its bound rest */
+    int64_t held_by[8]; /* the first of them */
+    int64_t rounds;     /* regularized problems solved to find them */
+} uz_semicoercive;
+
+/* What one form of the operator was expected to take. */
+typedef struct {
+    uz_operator op;
+    double seconds, bytes;
+    bool fits; /* the memory limit */
+} uz_cost_option;
+
+/* What a solve was expected to take after assembly, and what it took. bytes: matrices, factor and vectors together. */
+typedef struct {
+    double seconds, bytes, flops;
+    double actual_seconds, actual_bytes;
+    uz_cost_option considered[3];
+    int n_considered;
+} uz_cost;
+
+/* Where the iterations began. A state that is not one of this problem gives no more than its reactions, and a body that
+ * only the obstacle holds begins at zero whatever was given. */
+typedef enum { UZ_FROM_ZERO, UZ_FROM_REACTIONS, UZ_FROM_STATE } uz_origin;
+
+/* What acts on the body at a group: force by direction and moment about the origin (plane: moment[2] alone). Rings: the
+ * force along y; that along x is its sum around the ring, and there is no moment. */
+typedef struct {
+    char on[64];
+    double force[3], moment[3];
+} uz_resultant;
+
+/* Something that makes the answer doubtful: as one of small deformation on a fixed contact geometry, or by its mesh. */
+typedef struct {
+    char code[24];     /* "large_rotation", ... */
+    double value;      /* what was found, without unit */
+    char message[160]; /* one sentence */
+} uz_warning;
+
+/* Scenes: what the answer comes to. */
+typedef struct {
+    double strain_energy; /* with that of springs */
+    double contact_area;  /* tributary area of the rows with r < 0 */
+    int64_t peak_node;    /* where max_pressure is; -1: no pressure */
+    double peak_at[3];
+    int64_t n_contacts, n_supports;
+    uz_resultant *contacts,
+        *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
+    uz_resultant loads; /* all of them; on is "" */
+    /* What the forces and moments (about the first node, by the body's extent) leave over, relative to the sum of the
+     * forces' sizes. */
+    double imbalance;
+    int n_warnings;
+    uz_warning warnings[8];
+} uz_evaluation;
+void uz_evaluation_free(uz_evaluation *evaluation);
+
+/* One grid that was tried for a box whose cells are chosen here. Of several load cases: the worst errors. */
+typedef struct {
+    int64_t cells[3], d, iterations;
+    double discretization_error; /* estimated */
+    double certified_error;      /* bound, of what the equations of this grid leave */
+    double seconds;
+} uz_rung;
+
+enum { UZ_LADDER_RUNGS = 16 };
+
+/* The grids in the order in which they were tried; the answer is on `cells`, which need not be the last of them. */
+typedef struct {
+    int dim, count;
+    uz_rung rung[UZ_LADDER_RUNGS];
+    int64_t cells[3];
+} uz_ladder;
+
+typedef struct {
+    uz_outcome outcome;
+    uz_origin origin;
+    uz_method method;
+    uz_operator op;
+    uz_ordering ordering;
+    int64_t d, m, iterations, restarts;
+    int64_t refinements; /* corrections by the residual of the original data that made the certificate better */
+    int64_t active;      /* rows with r < 0 */
+    int64_t kept;        /* rows that the last round solved with, of m; the others are proved not to matter */
+    int64_t added;       /* those of them that the first round had left out */
+    int64_t rounds;      /* bodies that were solved: 1 unless a row that was left out turned out to matter */
+    double reaction_sum, max_penetration;
+    int dim;                     /* scene: 2 or 3, else 0 */
+    double force[3];             /* scene: force of the body on the obstacle's normal side, sum of -r n */
+    double max_pressure;         /* scene: the largest of the result's pressure; NaN otherwise */
+    double alpha, lambda_max;    /* NaN where no gradient step was taken */
+    double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
+    double total_error;       /* cells chosen here: sqrt(discretization_error^2 + the certificate's relative_error^2) */
+    double infeasible_radius; /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
+    double requested_error;   /* the relative error that `converged` had to meet */
+    uz_certificate certificate;
+    uz_semicoercive semicoercive;
+    bool factor_cached; /* everything about the body was */
+    uz_reuse reused;
+    bool contact_last; /* the dofs that N touches are eliminated after all others */
+    int64_t factor_nnz;
+    size_t factor_bytes;
+    double factor_flops; /* additions and multiplications */
+    double rcond;
+    uz_cost cost;
+    uz_timings timings;
+    char message[256];               /* one sentence on the outcome where it is not `converged`; "" otherwise */
+    const uz_evaluation *evaluation; /* scenes with an answer: the result's own; else NULL */
+    const uz_ladder *ladder;         /* cells chosen here: the result's own; else NULL */
+    uz_suggestion suggestion;        /* scenes */
+} uz_summary;
+
+/* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.
+ * A start that knows no more than reactions has rho NULL: a warm start. */
+typedef struct {
+    int64_t m;
+    double *r;                           /* m, reactions; a warm start's are cut at 0 */
+    double *rho;                         /* m or NULL: everything else below means something only beside it */
+    double *Dr, *Drho, *best_r, *anchor; /* m */
+    double alpha, tau;                   /* alpha 0: not chosen yet */
+    double step_norm;                    /* of the last iteration, as in the history; NaN: no step was taken */
+    double best_bound, best_relative;    /* of best_r; INFINITY: nothing was bounded yet */
+    int64_t iteration, restarts, next_check, best_iteration;
+    int64_t phase_end; /* iteration at which the phase ends; private to the methods, as is */
+    int32_t phase;     /* of `auto` */
+    uz_method method, made_by;
+} uz_state;
+void uz_state_free(uz_state *state);
+
+typedef struct {
+    uz_summary summary;
+    int64_t d, m, n_nodes;
+    double *u;         /* d; a scene's is n_nodes x dim by node, with the supported dofs, which d does not count */
+    double *r;         /* m */
+    double *g;         /* m */
+    double *pressure;  /* scene: m, as UZ_FIELD_PRESSURE; else NULL */
+    double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof; u, r, g are then NaN. Else NULL */
+    uz_mesh_info mesh; /* scene only */
+    uz_evaluation *evaluation;
+    uz_ladder *ladder; /* box whose cells were chosen here */
+    uz_history history;
+    uz_trade trade;
+    uz_state *state; /* where the iterations stood; NULL: nothing to continue */
+} uz_result;
+void uz_result_free(uz_result *result);
+
+/* Asked between iterations and before every expensive step; from the solving thread. */
+typedef struct {
+    void *ctx;
+    bool (*cancelled)(void *ctx);                           /* may be NULL */
+    void (*progress)(void *ctx, const uz_history_row *row); /* may be NULL; after each iteration */
+    void (*begins)(void *ctx, int64_t load_case);           /* may be NULL; before the first iteration of a case */
+    /* may be NULL; cells chosen here: before each grid, the shares of the whole, 0 to 1, that it begins and ends with,
+     * by estimate */
+    void (*grid)(void *ctx, double from, double to);
+} uz_hooks;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
