@@ -40,7 +40,7 @@ LDFLAGS_ALL   = $(SAN) -pthread $(LDFLAGS)
 SOLVER_SRC := $(sort $(wildcard solver/*/*.c))
 SERVER_SRC := $(sort $(wildcard server/*.c server/*/*.c))
 CLIENT_SRC := $(sort $(wildcard client/*.c))
-UNIT_SRC   := $(sort $(wildcard tests/unit/test_*.c))
+UNIT_SRC   := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c))
 FUZZ_SRC   := $(sort $(wildcard tests/fuzz/fuzz_*.c))
 BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
 EXTREMES_SRC := $(sort $(wildcard tests/extremes/*.c))
@@ -52,8 +52,8 @@ PEERS_SRC  := $(sort $(wildcard tests/peers/*.c))
 PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
 C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
-              $(wildcard tests/*.c)
-H_FILES    := $(wildcard solver/*/*.h server/*.h server/*/*.h client/*.h tests/*.h tests/*/*.h)
+              $(wildcard tests/support/*.c)
+H_FILES    := $(wildcard solver/*/*.h server/*.h server/*/*.h client/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 
@@ -63,7 +63,7 @@ SERVER_OBJ := $(call obj,$(SERVER_SRC)) $(BUILD)/obj/gen/embedded.o $(BUILD)/obj
 CLIENT_OBJ := $(call obj,$(CLIENT_SRC))
 # What unit tests may link: everything but the two mains.
 PARTS_OBJ  := $(filter-out $(BUILD)/obj/server/main.o,$(SERVER_OBJ)) $(filter-out $(BUILD)/obj/client/main.o,$(CLIENT_OBJ))
-UNIT_BIN   := $(patsubst tests/unit/%.c,$(BUILD)/tests/%,$(UNIT_SRC))
+UNIT_BIN   := $(addprefix $(BUILD)/tests/,$(notdir $(basename $(UNIT_SRC))))
 PRELOADS   := $(patsubst tests/preload/%.c,$(BUILD)/%.so,$(PRELOAD_SRC))
 FUZZ_BIN   := $(patsubst tests/fuzz/%.c,$(BUILD)/fuzz/%,$(FUZZ_SRC))
 
@@ -136,7 +136,7 @@ $(BUILD)/uzawa: $(CLIENT_OBJ)
 
 $(BUILD)/obj/%.o: %.c
 	@mkdir -p $(@D)
-	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests) -c -o $@ $<
+	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests -Itests/support) -c -o $@ $<
 
 # Contraction only saves roundings there; the twofold arithmetic of certificates must never have it.
 $(call obj,solver/factor/blocked.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c): CFLAGS += -ffp-contract=fast
@@ -168,9 +168,12 @@ $(BUILD)/gen/embedded.c: $(SCHEMAS) Makefile
 	     echo "    if (i == $$((n-1))) return (embedded_file){\"$$(basename $$f)\", embedded_$$n, (size_t)(embedded_$${n}_end - embedded_$$n)};"; done; \
 	   echo '    return (embedded_file){0, 0, 0};'; echo '}'; } > $@
 
-$(BUILD)/tests/%: $(BUILD)/obj/tests/unit/%.o $(call obj,tests/harness.c tests/harness_files.c) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
+# A test program stands in BUILD/tests by its name alone, wherever its source is.
+unit_source = $(filter %/$(1).c,$(UNIT_SRC))
+.SECONDEXPANSION:
+$(UNIT_BIN): $(BUILD)/tests/%: $$(call obj,$$(call unit_source,$$*)) $(call obj,tests/support/harness.c tests/support/harness_files.c) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
 	@mkdir -p $(@D)
-	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -lsE '__wrap_free|failing_heap' tests/unit/$(notdir $@).c),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
+	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -lsE '__wrap_free|failing_heap' $(call unit_source,$*)),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
 comma := ,
 
 # Ipopt is what obstacle problems are compared with, where it is installed; nothing else needs it.
@@ -181,12 +184,12 @@ $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 
-$(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/harness_measure.c) $(BUILD)/libuzawa.a
+$(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/support/harness_measure.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
 
 # Counts back-substitutions by standing between the solver's parts (tests/figures/count.c).
 FIGURES_WRAP := uz_factor_forward uz_factor_backward uz_principal_solve uz_multigrid_apply
-$(BUILD)/figures: $(call obj,$(FIGURES_SRC) tests/harness_measure.c tests/harness_files.c) $(BUILD)/libuzawa.a
+$(BUILD)/figures: $(call obj,$(FIGURES_SRC) tests/support/harness_measure.c tests/support/harness_files.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) $(patsubst %,-Wl$(comma)--wrap=%,$(FIGURES_WRAP)) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
 
 $(BUILD)/load: $(call obj,tests/soak/load.c)
@@ -250,12 +253,11 @@ test-hygiene: ## formatting, static analysis, both compilers
 
 # Each sanitizer has a build of its own inside BUILD.
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
-# Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that are about answers.
-TSAN_UNIT = $(filter-out test_trade,$(notdir $(basename $(shell grep -lE 'pthread_create|"(http|log|store|work)' $(UNIT_SRC)))))
-TSAN_API  = $(filter-out $(addprefix test_,assert bad_input bench_tools cases client client_faults client_manual \
-            client_outputs client_requests config examples fields gallery job_limits ladder load_cases memory numbers peers \
-            readme reference refine schemas semicoercive soak surface terminal trade verify), \
-            $(notdir $(basename $(wildcard tests/api/test_*.py))))
+# Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
+# "not under ThreadSanitizer".
+without_tsan = $(shell grep -L 'not under ThreadSanitizer' $(1))
+TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|"(http|base/log|store|work)' $(UNIT_SRC)))))
+TSAN_API  = $(notdir $(basename $(call without_tsan,$(wildcard tests/api/test_*.py))))
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(call sanitized,asan,-fsanitize=address$(comma)undefined -fno-sanitize-recover=all) all unit-bins

@@ -27,7 +27,7 @@ tidy() { # the quick checks that find mistakes; those left out see one in correc
             -bugprone-easily-swappable-parameters,-bugprone-implicit-widening-of-multiplication-result,
             -bugprone-misplaced-widening-cast,-bugprone-narrowing-conversions,-bugprone-not-null-terminated-result,
             -bugprone-reserved-identifier,-bugprone-sizeof-expression,-bugprone-suspicious-memory-comparison" \
-        "$@" -- $options 2>&1' tidy "-std=c11 -D_GNU_SOURCE $includes $cflags -Itests" |
+        "$@" -- $options 2>&1' tidy "-std=c11 -D_GNU_SOURCE $includes $cflags -Itests -Itests/support" |
         grep -Ev '^[0-9]+ warnings? (generated|treated as error)'
     return "${PIPESTATUS[1]}"
 }
@@ -51,11 +51,11 @@ only_in() { # HEADER PATTERN: the header is included nowhere but in files that m
 headers_alone() { # a header says all that it needs
     printf '%s\n' $sources | grep '\.h$' | xargs -P "$cores" -n 4 sh -c 'options=$1; shift; status=0
         for header; do printf "#include \"%s\"\n" "$header" | gcc -fsyntax-only -x c $options -I. - || status=255; done
-        exit $status' headers "$strict $includes $cflags -Itests"
+        exit $status' headers "$strict $includes $cflags -Itests -Itests/support"
 }
 check format clang-format --dry-run -Werror $sources
-check gcc each_c_file gcc -fsyntax-only $strict $includes $cflags -Itests
-check clang each_c_file clang -fsyntax-only $strict $includes $cflags -Itests
+check gcc each_c_file gcc -fsyntax-only $strict $includes $cflags -Itests -Itests/support
+check clang each_c_file clang -fsyntax-only $strict $includes $cflags -Itests -Itests/support
 check clang_tidy tidy
 check cppcheck cppcheck -j "$cores" --quiet --std=c11 --error-exitcode=1 --inline-suppr --enable=warning,portability \
     --suppress=missingIncludeSystem --suppress=normalCheckLevelMaxBranches $includes $c_files

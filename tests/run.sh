@@ -49,8 +49,7 @@ wanted() { # NAME: of this kind
 list_kind() { # KIND: a line "KIND NAME" for each of its programs
     local kind=$1 file
     case $kind in
-    unit | api | browser) for file in tests/"$kind"/test_*; do
-                              file=${file##*/}
+    unit | api | browser) for file in $(find tests/"$kind" -name 'test_*.c' -printf '%f\n' -o -name 'test_*.py' -printf '%f\n' | sort); do
                               if wanted "${file%.*}"; then echo "$kind ${file%.*}"; fi
                           done ;;
     guard | hygiene) echo "$kind $kind" ;;

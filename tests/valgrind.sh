@@ -10,7 +10,7 @@ trap 'rm -f "$log"' EXIT
 # Instructions that valgrind knows, and one thread: it runs them in turn.
 export OPENBLAS_CORETYPE=Haswell OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 passed=0 failed=0 cut=0
-for source in tests/unit/test_*.c; do
+for source in $(find tests/unit -name 'test_*.c' | sort); do
     name=$(basename "$source" .c)
     [[ $name == *"$filter"* ]] || continue
     SECONDS=0

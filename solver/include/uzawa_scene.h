@@ -25,7 +25,7 @@ typedef enum {
 /* Nodes of each in VTK order. A new kind of element is a row in each of: element/element_kind.c (name, nodes, sides),
  * element/shape.c (shape functions, Gauss rules), element/geometry.c (its linear kind), io/vtu.c (VTK's number),
  * io/gmsh_elements.c (Gmsh's number), scene/box_elements.c (cells of a box), post/recover.c and patches.c (where
- * its stress is best), and "elements" and "box" of schemas/request.json. tests/unit/test_elements_*.c say what it must
+ * its stress is best), and "elements" and "box" of schemas/request.json. tests/unit/solver/element say what it must
  * satisfy. */
 typedef enum { UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8, UZ_TET4, UZ_HEX8, UZ_TET10, UZ_ELEMENT_KINDS } uz_element_kind;
 const char *uz_element_name(uz_element_kind kind); /* "quad4"; never NULL */

@@ -1,5 +1,6 @@
 """Assertions in jobs, and what the client makes of them: summary, exit status, JUnit, baselines.
 usage: test_assert.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import os
 import re

@@ -2,6 +2,7 @@
 
 After every refusal the daemon must be well: it answers /healthz and solves the springs, whose answer is known.
 """
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import socket

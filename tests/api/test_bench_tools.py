@@ -1,4 +1,5 @@
 """What compares benchmarks and counts instructions. usage: test_bench_tools.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import os
 import pathlib

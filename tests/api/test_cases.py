@@ -3,6 +3,7 @@
 The small problems are in tests/data/qp; the rest is read from ../shared/cases where that folder exists. The references
 have the reactions with the opposite sign and were solved by other programs.
 """
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import math

@@ -1,4 +1,5 @@
 """Every command of the client against the real daemon. usage: test_client.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import gzip
 import hashlib
 import json

@@ -1,4 +1,5 @@
 """The client against a server that fails in every way it can. usage: test_client_faults.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import email.utils
 import json
 import os

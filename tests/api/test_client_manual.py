@@ -1,5 +1,6 @@
 """The manual page and the completion of the client: up to date, well formed, and true.
 usage: test_client_manual.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import os
 import pathlib

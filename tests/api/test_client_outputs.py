@@ -1,5 +1,6 @@
 """What the client fetches and prints: tables, pictures, the price of digits, factors, the doctor, JSON everywhere.
 usage: test_client_outputs.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import csv
 import datetime
 import email.utils

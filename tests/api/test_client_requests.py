@@ -1,5 +1,6 @@
 """Requests that the client makes itself: from matrices and meshes, with values put in and varied.
 usage: test_client_requests.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import gzip
 import hashlib
 import json

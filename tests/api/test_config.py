@@ -1,4 +1,5 @@
 """Options by flag, environment and file; what is in effect; limits."""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import os
 import pathlib

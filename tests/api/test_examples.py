@@ -1,5 +1,6 @@
 """The examples run as they are against a real daemon: programs in three languages, CI pipelines, the scene guide.
 usage: test_examples.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import os
 import pathlib

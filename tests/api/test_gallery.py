@@ -1,4 +1,5 @@
 """The scenes of the gallery against theory, and `make gallery`. usage: test_gallery.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import pathlib
 import subprocess

@@ -1,5 +1,6 @@
 """What becomes of a job that needs more time or memory than it may have, before its first iteration.
 usage: test_job_limits.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import math
 import re

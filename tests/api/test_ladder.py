@@ -1,4 +1,5 @@
 """Boxes whose cells the service chooses. usage: test_ladder.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import os

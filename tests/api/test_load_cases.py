@@ -1,4 +1,5 @@
 """Many loads on one body in one job, and starts near the answer. usage: test_load_cases.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import subprocess

@@ -1,6 +1,7 @@
 """The memory that one solve may take: what does not fit with a factor goes on without one, what fits in no form is
 refused, and the daemon lives through both. usage: test_memory.py BUILD_DIR [FILTER]
 """
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import http.client
 import threading

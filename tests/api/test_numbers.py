@@ -1,5 +1,6 @@
 """Every measured number of docs/numbers.md and of the README's blocks is that of its data file, and the tables say what the data does.
 usage: test_numbers.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import pathlib
 import re

@@ -1,4 +1,5 @@
 """The comparison with other solvers: what it makes of runs, and a run of our solver alone. usage: test_peers.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import csv
 import json
 import math

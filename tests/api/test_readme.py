@@ -3,6 +3,7 @@
 A block counts when the line before its ```sh is <!-- test -->. The daemon's port is put in for 127.0.0.1:8080 and the
 build folder for build/. JSON that a block prints must meet its schema. README_FILE names another file than README.md.
 """
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import os
 import pathlib

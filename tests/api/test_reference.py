@@ -3,6 +3,7 @@
 The numbers come from an independent program (mm, N, MPa). Energies and sums are compared at 1e-8 relative, counts
 exactly, iterations and restarts within 2 %.
 """
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import os
 

@@ -1,4 +1,5 @@
 """Runs that go on where others stopped. usage: test_refine.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import subprocess

@@ -1,8 +1,9 @@
 """The schema files against another implementation of JSON Schema: usage: test_schemas.py BUILD_DIR [FILTER].
 
 Each schema is itself valid, its examples are, references resolve, and the requests that the C checker takes or refuses
-(tests/data/requests.json, also read by tests/unit/test_schema.c) are taken or refused here too.
+(tests/data/requests.json, also read by tests/unit/server/codec/test_schema.c) are taken or refused here too.
 """
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import pathlib
 import sys

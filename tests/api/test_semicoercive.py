@@ -1,4 +1,5 @@
 """Bodies that only the obstacle holds, as a client sees them. usage: test_semicoercive.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import subprocess

@@ -1,5 +1,6 @@
 """Short forms of `make soak`: a daemon that is ended under load, slow clients, cancels, many jobs. Nothing is timed:
 usage: test_soak.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import pathlib
 import signal
 import sys

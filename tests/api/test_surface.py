@@ -1,4 +1,5 @@
 """What a viewer draws of a deformed body: GET /v1/jobs/{id}/surface. usage: test_surface.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import array
 import copy
 import gzip

@@ -1,5 +1,6 @@
 """The client on a pseudo-terminal: the progress line, drawings, Ctrl-C, windows that change.
 usage: test_terminal.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 import os
 import signal

@@ -1,4 +1,5 @@
 """What accuracy took, and how a run converged. usage: test_trade.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import math
 import re

@@ -1,4 +1,5 @@
 """The certificate of answers from elsewhere. usage: test_verify.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 import json
 import subprocess

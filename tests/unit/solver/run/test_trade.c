@@ -1,4 +1,5 @@
-/* What accuracy took: that what a run records is what its own certificates say, and what follows from it. */
+/* not under ThreadSanitizer: one thread, and long
+ * What accuracy took: that what a run records is what its own certificates say, and what follows from it. */
 #include "methods/decades.h"
 #include "scene_fixture.h"
 #include "work/trade.h"
