@@ -80,5 +80,6 @@ run_row &
 wait
 passed=$(grep -c '^ok ' "$log") failed=$(grep -c '^not ok ' "$log") skipped=$(grep -c '^skip ' "$log")
 [ "$skipped" -eq 0 ] || echo "$skipped skipped"
+[ -z "$filter$programs" ] || [ $((passed + failed + skipped)) -gt 0 ] || echo "no test's name contains '${3:-$4}'"
 echo "$passed passed, $failed failed"
 [ "$failed" -eq 0 ] && [ "$passed" -gt 0 ]

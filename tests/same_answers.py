@@ -153,6 +153,8 @@ def main():
     finally:
         for s in builds:
             s.stop()
+    if filters and same + different == 0:
+        print(f"no request's name contains any of {filters}")
     print(f"{same} requests answered alike bit for bit, {different} differently")
     return different > 0 or same == 0
 

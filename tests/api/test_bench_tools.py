@@ -100,5 +100,16 @@ def test_costs_are_read(s):
     check(sum(count for here, called, count, _ in found if here == "/lib/libc.so.6" and not called) == 500, found)
 
 
+@options(None)
+def test_a_filter_that_matches_nothing_is_an_error(s):
+    for command in (["tests/soak/soak.py", s.build, "nonsense"], ["tests/peers/peers.py", s.build, "ONLY=nonsense"],
+                    ["tests/same_answers.py", s.build, s.build, "nonsense"]):
+        ran = subprocess.run([sys.executable, "-B", *map(str, command)], cwd=ROOT, capture_output=True, text=True, check=False)
+        check(ran.returncode != 0, command, ran.stdout, ran.stderr)
+        check("nonsense" in ran.stderr + ran.stdout, command, ran.stdout, ran.stderr)
+    ran = subprocess.run(["tests/run.sh", str(s.build), "unit", "nonsense"], cwd=ROOT, capture_output=True, text=True, check=False)
+    check(ran.returncode != 0 and "nonsense" in ran.stdout, ran.stdout)
+
+
 if __name__ == "__main__":
     service.main(globals())

@@ -433,5 +433,7 @@ int main(int argc, char **argv)
         bench_body(&out, sizes[i], 1e-8);
     }
     fprintf(out.json, "\n]}\n");
-    return fclose(out.json) != 0;
+    if (out.rows == 0)
+        fprintf(stderr, "bench: no row's name contains '%s'\n", out.filter);
+    return fclose(out.json) != 0 || out.rows == 0;
 }

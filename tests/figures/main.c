@@ -23,6 +23,10 @@ int main(int argc, char **argv)
 {
     const char *part = argc > 2 ? argv[2] : NULL;
     json out = {.first = true};
+    if (part && strcmp(part, "history") != 0 && strcmp(part, "sizes") != 0 && strcmp(part, "precision") != 0) {
+        fprintf(stderr, "figures: there is no part '%s': history, sizes or precision\n", part);
+        return 2;
+    }
     if (argc < 2 || !(out.file = fopen(argv[1], "w"))) {
         fprintf(stderr, "usage: figures OUTPUT.json [history|sizes|precision [problem]]\n");
         return 2;

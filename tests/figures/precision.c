@@ -210,12 +210,14 @@ static void measure_problem(json *out, const figure_problem *problem)
 
 void figure_precision(json *out, const char *filter)
 {
+    bool any = false;
     json_open(out, "precision", '[');
     for (int k = 0; k < FIGURE_PROBLEMS; k++) {
         figure_problem problem;
         const char *why;
         if (filter && strcmp(filter, figure_problem_name(k)) != 0)
             continue;
+        any = true;
         if (figure_problem_make(&problem, k, &why))
             measure_problem(out, &problem);
         else
@@ -223,4 +225,6 @@ void figure_precision(json *out, const char *filter)
         figure_problem_clear(&problem);
     }
     json_close(out, ']');
+    if (!any)
+        test_fail(__FILE__, __LINE__, "precision: there is no problem '%s'", filter);
 }

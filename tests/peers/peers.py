@@ -445,6 +445,10 @@ class Options:
 def main():
     options = Options(sys.argv[1:])
     chosen = [solver for solver in solvers() if not options.only or any(part in solver.name for part in options.only)]
+    if not chosen:
+        sys.exit(f"peers: no solver's name contains any of {options.only}; there are: {[one.name for one in solvers()]}")
+    if not options.names():
+        sys.exit(f"peers: no problem's name contains any of {options.problems}")
     print(f"{'':49} {'1e-3, s':>9} {'1e-6, s':>9} {'1e-9, s':>9}", flush=True)
     comparison = Comparison(options)
     comparison.all(options.names(), chosen)

@@ -72,7 +72,9 @@ def keep(path, row):
 
 def main():
     build, wanted = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else ""
-    failed = False
+    failed, names = False, [name for name, _ in RUNS]
+    if not any(wanted in name for name in names):
+        sys.exit(f"soak: no name contains {wanted!r}; there are: {', '.join(names)}")
     print("| what | figures | s |\n|---|---|---|")
     for name, run in RUNS:
         if wanted not in name:
