@@ -3,6 +3,7 @@
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 
 #include <float.h>
@@ -392,32 +393,19 @@ static inline __attribute__((always_inline)) double energy_quad4(const uz_body_m
     return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-#ifdef __x86_64__
-__attribute__((target("avx2,fma"))) static double energy_quad4_wide(const uz_body_model *model, const double *ke,
-                                                                    const double *nodal, int64_t e)
+UZ_AVX2_FMA static double energy_quad4_wide(const uz_body_model *model, const double *ke, const double *nodal,
+                                            int64_t e)
 {
     return energy_quad4(model, ke, nodal, e);
-}
-#endif
-
-static double energy_quad4_plain(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
-{
-    return energy_quad4(model, ke, nodal, e);
-}
-
-static energy_of best_for_quad4(void)
-{
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
-        return energy_quad4_wide;
-#endif
-    return energy_quad4_plain;
 }
 
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
-    const energy_of of_any = carried ? energy_unturned : energy_any, of_quad4 = carried ? of_any : best_for_quad4();
+    const energy_of of_any = carried ? energy_unturned : energy_any, of_quad4 = carried ? of_any
+                                                                                : uz_cpu_has_avx2_fma()
+                                                                                    ? energy_quad4_wide
+                                                                                    : energy_quad4;
     stiffness_source source;
     const double *ke;
     double twice = 0;

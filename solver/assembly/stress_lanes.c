@@ -1,5 +1,6 @@
 #include "assembly/stress_lanes.h"
 
+#include "core/cpu.h"
 #include "scene/mesh.h"
 
 #include <string.h>
@@ -300,61 +301,34 @@ INLINE void compare_of_model(double *eta2, double *energy2, const double *rows, 
         compare(eta2, energy2, rows, g, place, 6, 3);
 }
 
-#ifdef __x86_64__
-#define FUSED __attribute__((target("avx2,fma")))
-
-FUSED static void load_fused(uz_stress_group *g, const uz_stress_source *from)
+UZ_AVX2_FMA static void load_fused(uz_stress_group *g, const uz_stress_source *from)
 {
     load_in_space(g, from);
 }
 
-FUSED static void add_fused(double *rows, const uz_stress_group *g, const int64_t *const place[LANES])
+UZ_AVX2_FMA static void add_fused(double *rows, const uz_stress_group *g, const int64_t *const place[LANES])
 {
     add_of_model(rows, g, place);
 }
 
-FUSED static void compare_fused(double *eta2, double *energy2, const double *rows, const uz_stress_group *g,
-                                const int64_t *const place[LANES])
+UZ_AVX2_FMA static void compare_fused(double *eta2, double *energy2, const double *rows, const uz_stress_group *g,
+                                      const int64_t *const place[LANES])
 {
     compare_of_model(eta2, energy2, rows, g, place);
 }
 
-static bool has_fused(void)
-{
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-}
-#endif
-
 void uz_stress_group_load(uz_stress_group *group, const uz_stress_source *from)
 {
-#ifdef __x86_64__
-    if (has_fused()) {
-        load_fused(group, from);
-        return;
-    }
-#endif
-    load_in_space(group, from);
+    (uz_cpu_has_avx2_fma() ? load_fused : load_in_space)(group, from);
 }
 
 void uz_stress_group_add(double *rows, const uz_stress_group *group, const int64_t *const place[UZ_STRAIN_LANES])
 {
-#ifdef __x86_64__
-    if (has_fused()) {
-        add_fused(rows, group, place);
-        return;
-    }
-#endif
-    add_of_model(rows, group, place);
+    (uz_cpu_has_avx2_fma() ? add_fused : add_of_model)(rows, group, place);
 }
 
 void uz_stress_group_compare(double *eta2, double *energy2, const double *rows, const uz_stress_group *group,
                              const int64_t *const place[UZ_STRAIN_LANES])
 {
-#ifdef __x86_64__
-    if (has_fused()) {
-        compare_fused(eta2, energy2, rows, group, place);
-        return;
-    }
-#endif
-    compare_of_model(eta2, energy2, rows, group, place);
+    (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(eta2, energy2, rows, group, place);
 }

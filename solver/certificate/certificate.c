@@ -5,6 +5,7 @@
 #include "certificate/residual.h"
 #include "certificate/twofold.h"
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 
 #include <float.h>
@@ -170,14 +171,7 @@ static inline __attribute__((always_inline)) void add_all(sums *s, const double 
     add_four(s, last, 0);
 }
 
-#ifdef __x86_64__
-__attribute__((target("avx2"))) static void add_all_wide(sums *s, const double *const x[VECTORS], int64_t d)
-{
-    add_all(s, x, d);
-}
-#endif
-
-static void add_all_plain(sums *s, const double *const x[VECTORS], int64_t d)
+UZ_AVX2 static void add_all_wide(sums *s, const double *const x[VECTORS], int64_t d)
 {
     add_all(s, x, d);
 }
@@ -192,14 +186,9 @@ static void add_up(certifier *c, uz_bound_terms *t)
 {
     const uz_residuals *res = &c->res;
     const double *const x[VECTORS] = {c->u, c->in->p, c->c, res->Ku, res->Kc, res->e, res->e_u, c->weight};
-    void (*add)(sums *, const double *const[VECTORS], int64_t) = add_all_plain;
     sums s;
     memset(&s, 0, sizeof s);
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2"))
-        add = add_all_wide;
-#endif
-    add(&s, x, c->d);
+    (uz_cpu_has_avx2() ? add_all_wide : add_all)(&s, x, c->d);
     t->stiffness = c->energy = total(&s.stiffness);
     t->load = total(&s.load);
     t->change = total(&s.change);

@@ -6,6 +6,7 @@
 #include "certificate/residual.h"
 #include "certificate/twofold.h"
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 
 #include <math.h>
@@ -266,12 +267,10 @@ static inline __attribute__((always_inline)) void pass(uz_lane_certifier *c, con
     }
 }
 
-#ifdef __x86_64__
-__attribute__((target("avx2,fma"))) static void pass_fused(uz_lane_certifier *c, const double *U, const double *P)
+UZ_AVX2_FMA static void pass_fused(uz_lane_certifier *c, const double *U, const double *P)
 {
     pass(c, U, P, 1);
 }
-#endif
 
 static void pass_split(uz_lane_certifier *c, const double *U, const double *P)
 {
@@ -281,13 +280,7 @@ static void pass_split(uz_lane_certifier *c, const double *U, const double *P)
 static void run_pass(uz_lane_certifier *c, const double *U, const double *P)
 {
     memset(c->sum, 0, sizeof c->sum);
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        pass_fused(c, U, P);
-        return;
-    }
-#endif
-    pass_split(c, U, P);
+    (uz_cpu_has_avx2_fma() ? pass_fused : pass_split)(c, U, P);
 }
 
 /* Kc of a lane: zero but for the rows that contact dofs couple to. */

@@ -6,6 +6,7 @@
 
 #include "certificate/twofold.h"
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 
 #include <stdlib.h>
@@ -343,13 +344,11 @@ static inline __attribute__((always_inline)) void run(const uz_residuals *out, c
     finish(out, q->A->cols, q->lo, N, p, r);
 }
 
-#ifdef __x86_64__
-__attribute__((target("avx2,fma"))) static void run_fused(const uz_residuals *out, const product_of *q, const uz_csc *N,
-                                                          const double *p, const double *r)
+UZ_AVX2_FMA static void run_fused(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p,
+                                  const double *r)
 {
     run(out, q, N, p, r, 1);
 }
-#endif
 
 static void run_split(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p, const double *r)
 {
@@ -358,13 +357,7 @@ static void run_split(const uz_residuals *out, const product_of *q, const uz_csc
 
 static void run_best(const uz_residuals *out, const product_of *q, const uz_csc *N, const double *p, const double *r)
 {
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        run_fused(out, q, N, p, r);
-        return;
-    }
-#endif
-    run_split(out, q, N, p, r);
+    (uz_cpu_has_avx2_fma() ? run_fused : run_split)(out, q, N, p, r);
 }
 
 uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_csc *N, const double *p, const double *u,

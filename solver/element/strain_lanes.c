@@ -1,5 +1,6 @@
 #include "element/strain_lanes.h"
 
+#include "core/cpu.h"
 #include "element/element_private.h"
 #include "element/element_kind.h"
 
@@ -306,40 +307,25 @@ INLINE void strains_in_space(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_st
         strains_of(strain, rule, shape, material, u, 3);
 }
 
-#ifdef __x86_64__
-__attribute__((target("avx2,fma"))) static void shape_fused(uz_lane_shape *shape, const uz_strain_rule *rule,
-                                                            const uz_lanes *x, double thickness)
+UZ_AVX2_FMA static void shape_fused(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x,
+                                    double thickness)
 {
     shape_in_space(shape, rule, x, thickness);
 }
 
-__attribute__((target("avx2,fma"))) static void strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES],
-                                                              const uz_strain_rule *rule, const uz_lane_shape *shape,
-                                                              const uz_lane_material *material, const uz_lanes *u)
+UZ_AVX2_FMA static void strains_fused(uz_lanes strain[][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
+                                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
 {
     strains_in_space(strain, rule, shape, material, u);
 }
-#endif
 
 void uz_lane_shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness)
 {
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        shape_fused(shape, rule, x, thickness);
-        return;
-    }
-#endif
-    shape_in_space(shape, rule, x, thickness);
+    (uz_cpu_has_avx2_fma() ? shape_fused : shape_in_space)(shape, rule, x, thickness);
 }
 
 void uz_lane_strains(uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES], const uz_strain_rule *rule,
                      const uz_lane_shape *shape, const uz_lane_material *material, const uz_lanes *u)
 {
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) {
-        strains_fused(strain, rule, shape, material, u);
-        return;
-    }
-#endif
-    strains_in_space(strain, rule, shape, material, u);
+    (uz_cpu_has_avx2_fma() ? strains_fused : strains_in_space)(strain, rule, shape, material, u);
 }

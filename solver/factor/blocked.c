@@ -7,6 +7,7 @@
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
+#include "core/cpu.h"
 #include "core/error.h"
 
 #include <stdlib.h>
@@ -124,24 +125,12 @@ static inline __attribute__((always_inline)) void substitute_back(const panel_of
     }
 }
 
-#ifdef __x86_64__
-__attribute__((target("avx2,fma"))) static void eliminate_fused(const panel_of *s)
+UZ_AVX2_FMA static void eliminate_fused(const panel_of *s)
 {
     eliminate(s);
 }
 
-__attribute__((target("avx2,fma"))) static void substitute_back_fused(const panel_of *s)
-{
-    substitute_back(s);
-}
-#endif
-
-static void eliminate_any(const panel_of *s)
-{
-    eliminate(s);
-}
-
-static void substitute_back_any(const panel_of *s)
+UZ_AVX2_FMA static void substitute_back_fused(const panel_of *s)
 {
     substitute_back(s);
 }
@@ -150,11 +139,9 @@ typedef void (*panel_step)(const panel_of *s);
 
 static panel_step best_step(bool forward)
 {
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    if (uz_cpu_has_avx2_fma())
         return forward ? eliminate_fused : substitute_back_fused;
-#endif
-    return forward ? eliminate_any : substitute_back_any;
+    return forward ? eliminate : substitute_back;
 }
 
 /* Rows of the block to and from room. */

@@ -8,6 +8,7 @@
  * allowed (see the Makefile): here it only saves roundings. */
 #include "factor/factor_private.h"
 
+#include "core/cpu.h"
 #include "core/error.h"
 
 #include <string.h>
@@ -259,35 +260,21 @@ static inline __attribute__((always_inline)) void substitute_back(const panel_of
         substitute_strip(&edge, s, j, PANEL, at);
 }
 
-#ifdef __x86_64__
-__attribute__((target("avx2,fma"))) static void eliminate_fused(const panel_of *s)
+UZ_AVX2_FMA static void eliminate_fused(const panel_of *s)
 {
     eliminate(s);
 }
 
-__attribute__((target("avx2,fma"))) static void substitute_back_fused(const panel_of *s)
-{
-    substitute_back(s);
-}
-#endif
-
-static void eliminate_any(const panel_of *s)
-{
-    eliminate(s);
-}
-
-static void substitute_back_any(const panel_of *s)
+UZ_AVX2_FMA static void substitute_back_fused(const panel_of *s)
 {
     substitute_back(s);
 }
 
 static panel_step best_step(bool forward)
 {
-#ifdef __x86_64__
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    if (uz_cpu_has_avx2_fma())
         return forward ? eliminate_fused : substitute_back_fused;
-#endif
-    return forward ? eliminate_any : substitute_back_any;
+    return forward ? eliminate : substitute_back;
 }
 
 /* Room for the rows of any supernode. */

@@ -1,0 +1,41 @@
+/* cpu.h: the one place that knows which instructions a processor has.
+ *
+ * A kernel is written once, as a function that is always inlined. Beside it stands a copy that is compiled for wider
+ * registers, and the caller takes the one that the processor has:
+ *
+ *     static inline __attribute__((always_inline)) void add(double *y, ...) { ... }
+ *     UZ_AVX2_FMA static void add_fused(double *y, ...) { add(y, ...); }
+ *     ...
+ *     (uz_cpu_has_avx2_fma() ? add_fused : add)(y, ...);
+ *
+ * Whether products and sums are contracted is not decided here: the Makefile says for which files they may be. */
+#ifndef UZ_CORE_CPU_H
+#define UZ_CORE_CPU_H
+
+#include <stdbool.h>
+
+#ifdef __x86_64__
+#define UZ_AVX2     __attribute__((target("avx2")))
+#define UZ_AVX2_FMA __attribute__((target("avx2,fma")))
+static inline bool uz_cpu_has_avx2(void)
+{
+    return __builtin_cpu_supports("avx2");
+}
+static inline bool uz_cpu_has_avx2_fma(void)
+{
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+}
+#else
+#define UZ_AVX2
+#define UZ_AVX2_FMA
+static inline bool uz_cpu_has_avx2(void)
+{
+    return false;
+}
+static inline bool uz_cpu_has_avx2_fma(void)
+{
+    return false;
+}
+#endif
+
+#endif
