@@ -187,7 +187,7 @@ void uz_condensed_clear(uz_condensed *dense)
 }
 
 /* g0 from y = L^-1 P p, whose entry k stands at y[k stride]. x (d) is room where the contact is not last. */
-uz_status uz_condensed_begin(uz_case *load, const double *y, int64_t stride, double *x, uz_error *err)
+uz_status uz_condensed_begin(uz_dual_load *load, const double *y, int64_t stride, double *x, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     const uz_condensed *dense = &dual->dense;
@@ -208,7 +208,7 @@ uz_status uz_condensed_begin(uz_case *load, const double *y, int64_t stride, dou
 }
 
 /* y = L^-1 P p is half a linear solve; the other half waits until the reactions are known. */
-uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err)
+uz_status uz_condensed_load(uz_dual_load *load, const double *p, uz_error *err)
 {
     const uz_factor *factor = load->dual->factor;
     uz_factor_permute(factor, load->base, p);
@@ -227,7 +227,7 @@ void uz_condensed_response(double *z, const uz_condensed *dense, const double *w
 }
 
 /* Without D two triangular solves do: slower each, but there is nothing to form. */
-void uz_condensed_apply(const uz_case *load, double *Dr, const double *r)
+void uz_condensed_apply(const uz_dual_load *load, double *Dr, const double *r)
 {
     const uz_condensed *dense = &load->dual->dense;
     int64_t m = load->dual->info.m;
@@ -242,7 +242,7 @@ void uz_condensed_apply(const uz_case *load, double *Dr, const double *r)
 }
 
 /* x (d) = L^-1 P N'(r + w) by the paths, w the kept correction or nothing. */
-static uz_status spread_along_reach(double *x, const uz_case *load, const double *r, bool with_push, uz_error *err)
+static uz_status spread_along_reach(double *x, const uz_dual_load *load, const double *r, bool with_push, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
     double *force = load->apply_room; /* n_b */
@@ -256,7 +256,7 @@ static uz_status spread_along_reach(double *x, const uz_case *load, const double
     return uz_reach_forward(dense->reach, load->ws, x, err);
 }
 
-uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_case *load, const double *r,
+uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_dual_load *load, const double *r,
                                      bool with_push, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
@@ -273,7 +273,7 @@ uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_ca
     return UZ_OK;
 }
 
-uz_status uz_condensed_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
+uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     int64_t d = dual->info.d;

@@ -51,8 +51,8 @@ static bool form_inverse(double *D_inverse, double *room, const uz_condensed *de
 
 typedef bool (*former)(double *out, double *room, const uz_condensed *dense, const uz_leave *leave);
 
-/* *slot once and for all; *out is the case's own copy of the pointer, NULL where there was no leave to make it. */
-static uz_status need(const double **out, double **slot, uz_case *load, former form, uz_error *err)
+/* *slot once and for all; *out is the load's own copy of the pointer, NULL where there was no leave to make it. */
+static uz_status need(const double **out, double **slot, uz_dual_load *load, former form, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
     int64_t size = dense->n_b * dense->n_b;
@@ -79,7 +79,7 @@ static uz_status need(const double **out, double **slot, uz_case *load, former f
     return status;
 }
 
-uz_status uz_condensed_need_operator(uz_case *load, uz_error *err)
+uz_status uz_condensed_need_operator(uz_dual_load *load, uz_error *err)
 {
     return need(&load->D, &load->dual->lazy->D, load, form_operator, err);
 }
@@ -96,7 +96,7 @@ int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
 /* r_A from D_AA r_A = g0_A. false: no leave to go on. */
-static bool solve_by_operator(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
+static bool solve_by_operator(uz_dual_load *load, double *r, double *g, const double *chol, const int64_t *rows,
                               int64_t count)
 {
     int64_t m = load->dual->info.m;
@@ -133,7 +133,7 @@ static void solve_block(double *x, double *room, const double *chol, const int64
 /* With T = D^-1 and x = g0 - g: r = T x, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
  * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
  * through the factor: T is badly conditioned, its answer is not yet that of the body. false: no leave to go on. */
-static bool solve_by_inverse(uz_case *load, double *r, double *g, const double *chol, const int64_t *rows,
+static bool solve_by_inverse(uz_dual_load *load, double *r, double *g, const double *chol, const int64_t *rows,
                              int64_t count)
 {
     int64_t m = load->dual->info.m;
@@ -180,7 +180,7 @@ static double largest(const double *x, int64_t n)
     return value;
 }
 
-static void forgive_rounding(double *r, double *g, const uz_case *load, const bool *active)
+static void forgive_rounding(double *r, double *g, const uz_dual_load *load, const bool *active)
 {
     int64_t m = load->dual->info.m;
     double r_noise = NOISE * largest(r, m), g_noise = NOISE * largest(load->g0, m);
@@ -207,7 +207,7 @@ static bool are_independent(const double *chol, const double *D, const int64_t *
     return true;
 }
 
-uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active,
+uz_status uz_condensed_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, const bool *active,
                                     uz_error *err)
 {
     bool scaled = load->dual->dense.scaled;

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-struct uz_case_block {
+struct uz_dual_block {
     const uz_dual *dual;
     int64_t blocks;
     double *P, *U; /* blocks x d x UZ_LANES: loads and displacements, in the order of the dofs */
@@ -17,10 +17,10 @@ struct uz_case_block {
     double *room;  /* d */
 };
 
-uz_status uz_case_block_create(uz_case_block **out, const uz_dual *dual, int64_t blocks, uz_error *err)
+uz_status uz_dual_block_create(uz_dual_block **out, const uz_dual *dual, int64_t blocks, uz_error *err)
 {
     *out = NULL;
-    uz_case_block *block = uz_alloc_zero(1, sizeof *block);
+    uz_dual_block *block = uz_alloc_zero(1, sizeof *block);
     int64_t d = dual->info.d;
     bool ok = block != NULL;
     for (int k = 0; ok && k < 4; k++) {
@@ -34,12 +34,12 @@ uz_status uz_case_block_create(uz_case_block **out, const uz_dual *dual, int64_t
         *out = block;
         return UZ_OK;
     }
-    uz_case_block_free(block);
+    uz_dual_block_free(block);
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld loads on %lld dofs", (long long)(blocks * UZ_LANES),
                    (long long)d);
 }
 
-void uz_case_block_free(uz_case_block *block)
+void uz_dual_block_free(uz_dual_block *block)
 {
     if (!block)
         return;
@@ -51,23 +51,23 @@ void uz_case_block_free(uz_case_block *block)
     free(block);
 }
 
-double *uz_case_block_loads(uz_case_block *block)
+double *uz_dual_block_loads(uz_dual_block *block)
 {
     return block->P;
 }
 
-const double *uz_case_block_displacements(const uz_case_block *block)
+const double *uz_dual_block_displacements(const uz_dual_block *block)
 {
     return block->U;
 }
 
 /* Where a lane's entry 0 stands. */
-static int64_t lane_start(const uz_case_block *block, int64_t lane)
+static int64_t lane_start(const uz_dual_block *block, int64_t lane)
 {
     return lane / UZ_LANES * block->dual->info.d * UZ_LANES + lane % UZ_LANES;
 }
 
-uz_status uz_case_block_load(uz_case_block *block, uz_error *err)
+uz_status uz_dual_block_load(uz_dual_block *block, uz_error *err)
 {
     const uz_factor *factor = block->dual->factor;
     const int64_t size = block->dual->info.d * UZ_LANES;
@@ -76,13 +76,13 @@ uz_status uz_case_block_load(uz_case_block *block, uz_error *err)
     return uz_factor_forward_lanes(factor, block->Y, block->blocks, err);
 }
 
-uz_status uz_case_create_in_block(uz_case **out, const uz_case_block *block, int64_t lane, const uz_csc *K,
-                                  const double *h, uz_error *err)
+uz_status uz_dual_load_create_in_block(uz_dual_load **out, const uz_dual_block *block, int64_t lane, const uz_csc *K,
+                                       const double *h, uz_error *err)
 {
     const uz_dual *dual = block->dual;
-    uz_case *load = NULL;
+    uz_dual_load *load = NULL;
     *out = NULL;
-    uz_status status = uz_case_allocate(&load, dual, K, h, false, err);
+    uz_status status = uz_dual_load_allocate(&load, dual, K, h, false, err);
     if (status != UZ_OK)
         return status;
     load->lane = block->Y + lane_start(block, lane);
@@ -94,11 +94,11 @@ uz_status uz_case_create_in_block(uz_case **out, const uz_case_block *block, int
     if (status == UZ_OK)
         *out = load;
     else
-        uz_case_free(load);
+        uz_dual_load_free(load);
     return status;
 }
 
-uz_status uz_case_block_recover(uz_case_block *block, uz_case *const *loads, const double *const *r,
+uz_status uz_dual_block_recover(uz_dual_block *block, uz_dual_load *const *loads, const double *const *r,
                                 const bool *with_push, int64_t count, uz_error *err)
 {
     const uz_dual *dual = block->dual;

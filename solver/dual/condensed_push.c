@@ -35,8 +35,8 @@ enum { REFINEMENTS = 2 };
 /* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
  * inverse of a stiffness and as badly conditioned. Dw (m) is D w, also where there was no leave to get w right. D_AA is
  * room for count^2. */
-static bool solve_rows(double *w, double *Dw, double *D_AA, uz_case *load, const double *target, const int64_t *rows,
-                       int64_t count)
+static bool solve_rows(double *w, double *Dw, double *D_AA, uz_dual_load *load, const double *target,
+                       const int64_t *rows, int64_t count)
 {
     int64_t m = load->dual->info.m, *pivot = uz_alloc(count, sizeof *pivot);
     double *x = uz_alloc(count, sizeof *x);
@@ -72,7 +72,7 @@ static double rounding_sum(const double *D, const double *w, int64_t m)
 
 /* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
  * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
-static bool push_rows(uz_case *load, double *w, double *target, const double *g, const bool *close)
+static bool push_rows(uz_dual_load *load, double *w, double *target, const double *g, const bool *close)
 {
     int64_t m = load->dual->info.m, *rows = uz_alloc(m, sizeof *rows);
     const double *D = load->D;
@@ -99,7 +99,7 @@ static bool push_rows(uz_case *load, double *w, double *target, const double *g,
 }
 
 /* The correction K^-1 N'w as it is kept, and its square in the energy norm. target (m): D w. */
-static double keep_weights(uz_case *load, const double *w, const double *target)
+static double keep_weights(uz_dual_load *load, const double *w, const double *target)
 {
     const uz_condensed *dense = &load->dual->dense;
     if (dense->reach) {
@@ -110,7 +110,7 @@ static double keep_weights(uz_case *load, const double *w, const double *target)
     return uz_dot(dense->n_b, load->push, load->push);
 }
 
-uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close)
+uz_status uz_condensed_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
 {
     const uz_condensed *dense = &load->dual->dense;
     int64_t m = load->dual->info.m;

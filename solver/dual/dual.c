@@ -174,8 +174,8 @@ static double *vector_of(int64_t n, bool condensed)
     return condensed ? uz_alloc(n, sizeof(double)) : uz_alloc_zero(n, sizeof(double));
 }
 
-/* What a case in a block does without, it takes from the block. */
-static bool allocate_vectors(uz_case *load, bool whole)
+/* What a load in a block does without, it takes from the block. */
+static bool allocate_vectors(uz_dual_load *load, bool whole)
 {
     bool condensed = load->dual->info.op == UZ_OPERATOR_CONDENSED;
     int64_t d = load->dual->info.d, m = load->dual->info.m, n_b = condensed ? load->dual->dense.n_b : 0;
@@ -194,18 +194,18 @@ static bool allocate_vectors(uz_case *load, bool whole)
            load->work && load->work2 && load->push && load->kept;
 }
 
-uz_status uz_case_allocate(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
-                           uz_error *err)
+uz_status uz_dual_load_allocate(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
+                                uz_error *err)
 {
     *out = NULL;
-    uz_case *load = uz_alloc_zero(1, sizeof *load);
+    uz_dual_load *load = uz_alloc_zero(1, sizeof *load);
     if (!load)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
     load->dual = dual;
     load->K = K;
     load->leave.deadline = INFINITY;
     if (!allocate_vectors(load, whole)) {
-        uz_case_free(load);
+        uz_dual_load_free(load);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->info.d);
     }
     for (int64_t i = 0; i < dual->info.m; i++)
@@ -214,23 +214,23 @@ uz_status uz_case_allocate(uz_case **out, const uz_dual *dual, const uz_csc *K, 
     return UZ_OK;
 }
 
-uz_status uz_case_create(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *p, const double *h,
-                         uz_error *err)
+uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p,
+                              const double *h, uz_error *err)
 {
     *out = NULL;
-    uz_case *load = NULL;
-    uz_status status = uz_case_allocate(&load, dual, K, h, true, err);
+    uz_dual_load *load = NULL;
+    uz_status status = uz_dual_load_allocate(&load, dual, K, h, true, err);
     if (status == UZ_OK)
         status =
             dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_load(load, p, err) : uz_factored_load(load, p, err);
     if (status == UZ_OK)
         *out = load;
     else
-        uz_case_free(load);
+        uz_dual_load_free(load);
     return status;
 }
 
-void uz_case_free(uz_case *load)
+void uz_dual_load_free(uz_dual_load *load)
 {
     if (!load)
         return;
@@ -250,12 +250,12 @@ void uz_case_free(uz_case *load)
     free(load);
 }
 
-void uz_case_set_leave(uz_case *load, const uz_leave *leave)
+void uz_dual_load_set_leave(uz_dual_load *load, const uz_leave *leave)
 {
     load->leave = *leave;
 }
 
-size_t uz_case_bytes(const uz_case *load)
+size_t uz_dual_load_bytes(const uz_dual_load *load)
 {
     const uz_dual_info *info = &load->dual->info;
     size_t d = (size_t)info->d, m = (size_t)info->m, vectors = info->op == UZ_OPERATOR_CONDENSED ? 5 : 7;
@@ -265,49 +265,49 @@ size_t uz_case_bytes(const uz_case *load)
     return bytes + (load->inexact ? 8 * 8 * d : 0);
 }
 
-const double *uz_case_g0(const uz_case *load)
+const double *uz_dual_load_g0(const uz_dual_load *load)
 {
     return load->g0;
 }
 
-const double *uz_case_row_scale(const uz_case *load)
+const double *uz_dual_load_row_scale(const uz_dual_load *load)
 {
     return load->dual->row_scale;
 }
 
-const double *uz_case_h(const uz_case *load)
+const double *uz_dual_load_h(const uz_dual_load *load)
 {
     return load->h;
 }
 
-const uz_csc *uz_case_N(const uz_case *load)
+const uz_csc *uz_dual_load_N(const uz_dual_load *load)
 {
     return &load->dual->N;
 }
 
-bool uz_case_steps_are_small(const uz_case *load)
+bool uz_dual_load_steps_are_small(const uz_dual_load *load)
 {
     return load->dual->info.op == UZ_OPERATOR_CONDENSED;
 }
 
-bool uz_case_is_inexact(const uz_case *load)
+bool uz_dual_load_is_inexact(const uz_dual_load *load)
 {
     return load->inexact != NULL;
 }
 
-bool uz_case_rows_may_depend(const uz_case *load)
+bool uz_dual_load_rows_may_depend(const uz_dual_load *load)
 {
     if (load->dual->info.op == UZ_OPERATOR_CONDENSED)
         return !load->dual->dense.scaled;
     return !load->box && !load->inexact; /* each row that joins would cost an inexact solve */
 }
 
-bool uz_case_guess_active(uz_case *load, bool *active)
+bool uz_dual_load_guess_active(uz_dual_load *load, bool *active)
 {
     return load->box && uz_bounded_guess(load, active);
 }
 
-bool uz_case_crossed_bounds(const uz_case *load, double *y)
+bool uz_dual_load_crossed_bounds(const uz_dual_load *load, double *y)
 {
     return load->box && uz_bounded_crossed(load, y);
 }
@@ -322,17 +322,17 @@ double uz_dual_known_lambda_max(const uz_dual *dual)
 
 static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
 {
-    const uz_case *load = ctx;
+    const uz_dual_load *load = ctx;
     if (uz_leave_is_over(&load->leave))
         return UZ_ERR_CANCELLED;
-    return uz_case_apply(ctx, y, x, err);
+    return uz_dual_load_apply(ctx, y, x, err);
 }
 
 /* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
 #define LAMBDA_TOLERANCE 1e-4
 
 /* Kept for the body's other runs, unless applications may have been cut short: then 0. Under `making`. */
-static uz_status find_lambda_max(uz_case *load, double *lambda_max, uz_error *err)
+static uz_status find_lambda_max(uz_dual_load *load, double *lambda_max, uz_error *err)
 {
     uz_dual_lazy *lazy = load->dual->lazy;
     uz_inexact_probe(load, true, 0.1 * LAMBDA_TOLERANCE);
@@ -348,7 +348,7 @@ static uz_status find_lambda_max(uz_case *load, double *lambda_max, uz_error *er
     return UZ_OK;
 }
 
-uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error *err)
+uz_status uz_dual_load_prepare_iterations(uz_dual_load *load, double *lambda_max, uz_error *err)
 {
     uz_dual_lazy *lazy = load->dual->lazy;
     uz_status status = UZ_OK;
@@ -368,7 +368,7 @@ uz_status uz_case_prepare_iterations(uz_case *load, double *lambda_max, uz_error
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 
-double uz_case_force_norm(uz_case *load, const double *x)
+double uz_dual_load_force_norm(uz_dual_load *load, const double *x)
 {
     bool condensed = load->dual->info.op == UZ_OPERATOR_CONDENSED;
     const uz_csc *N = condensed ? &load->dual->dense.N_b : &load->dual->N;
@@ -383,7 +383,7 @@ double uz_case_force_norm(uz_case *load, const double *x)
 }
 
 /* psi(r) = psi0 + r'g0 - 1/2 r'Dr, and psi(r) = -1/2 ||u(r)||_K^2 + r'h. */
-void uz_case_energies(const uz_case *load, double *psi, double *norm2, const double *r, const double *Dr)
+void uz_dual_load_energies(const uz_dual_load *load, double *psi, double *norm2, const double *r, const double *Dr)
 {
     double linear = 0.0, quadratic = 0.0, work = 0.0;
     for (int64_t i = 0; i < load->dual->info.m; i++) {
@@ -395,7 +395,7 @@ void uz_case_energies(const uz_case *load, double *psi, double *norm2, const dou
     *norm2 = fmax(0.0, 2.0 * (work - *psi));
 }
 
-uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
+uz_status uz_dual_load_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
     load->applications++;
     if (load->dual->info.op != UZ_OPERATOR_CONDENSED)
@@ -404,12 +404,12 @@ uz_status uz_case_apply(uz_case *load, double *Dr, const double *r, uz_error *er
     return UZ_OK;
 }
 
-int64_t uz_case_applications(const uz_case *load)
+int64_t uz_dual_load_applications(const uz_dual_load *load)
 {
     return load->applications;
 }
 
-uz_status uz_case_column(uz_case *load, double *column, int64_t i, uz_error *err)
+uz_status uz_dual_load_column(uz_dual_load *load, double *column, int64_t i, uz_error *err)
 {
     int64_t m = load->dual->info.m;
     if (!load->D) {
@@ -417,7 +417,7 @@ uz_status uz_case_column(uz_case *load, double *column, int64_t i, uz_error *err
         if (!unit)
             return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a column of %lld contacts", (long long)m);
         unit[i] = 1.0;
-        uz_status status = uz_case_apply(load, column, unit, err);
+        uz_status status = uz_dual_load_apply(load, column, unit, err);
         free(unit);
         return status;
     }
@@ -427,8 +427,8 @@ uz_status uz_case_column(uz_case *load, double *column, int64_t i, uz_error *err
     return UZ_OK;
 }
 
-uz_status uz_case_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close,
-                       uz_error *err)
+uz_status uz_dual_load_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close,
+                            uz_error *err)
 {
     (void)err;
     *bound2 = INFINITY;
@@ -436,7 +436,7 @@ uz_status uz_case_push(uz_case *load, double *bound2, const double *r, const dou
                                                         : uz_factored_push(load, bound2, r, g, close);
 }
 
-void uz_case_keep_push(uz_case *load)
+void uz_dual_load_keep_push(uz_dual_load *load)
 {
     double *swap = load->kept;
     load->kept = load->push;
@@ -444,7 +444,7 @@ void uz_case_keep_push(uz_case *load)
     load->has_kept = true;
 }
 
-uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
+uz_status uz_dual_load_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
 {
     *solved = false;
     if (load->dual->info.op == UZ_OPERATOR_CONDENSED)
@@ -452,7 +452,7 @@ uz_status uz_case_solve_active(uz_case *load, double *r, double *g, bool *solved
     return load->box ? uz_bounded_solve_active(load, r, g, solved, active, err) : UZ_OK;
 }
 
-uz_status uz_case_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
+uz_status uz_dual_load_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err)
 {
     bool push = with_push && load->has_kept;
     return load->dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_recover(load, u, r, push, err)

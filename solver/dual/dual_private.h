@@ -62,7 +62,7 @@ typedef struct {
     double *right;     /* d: a right-hand side */
 } uz_inexact;
 
-/* What is made at the first need, by whoever needs it, under the mutex `making`; pointers are published to cases under
+/* What is made at the first need, by whoever needs it, under the mutex `making`; pointers are published to loads under
  * it and never change. It may be held for seconds: see uz_lock_while. lambda_max is written under both and may be read
  * under either. Order: making, known. */
 typedef struct {
@@ -84,7 +84,7 @@ struct uz_dual {
     uz_dual_lazy *lazy;
 };
 
-struct uz_case {
+struct uz_dual_load {
     const uz_dual *dual;
     const uz_csc *K; /* d x d lower triangle, borrowed */
     double *h;       /* m: scaled */
@@ -101,7 +101,7 @@ struct uz_case {
     uz_bounded *box;             /* FACTORED with bounds, else NULL */
     double *push, *kept; /* correction: CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
     bool has_kept;
-    int64_t applications; /* of D by uz_case_apply */
+    int64_t applications; /* of D by uz_dual_load_apply */
     uz_inexact *inexact;  /* MATRIX_FREE, else NULL */
     uz_leave leave;       /* of the run: asked inside dense work of n^3 */
 };
@@ -115,33 +115,33 @@ int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m);
 /* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D; false: no leave to go on. */
 bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m,
                      const uz_leave *leave);
-uz_status uz_condensed_load(uz_case *load, const double *p, uz_error *err);
+uz_status uz_condensed_load(uz_dual_load *load, const double *p, uz_error *err);
 /* g0 from y = L^-1 P p, whose entry k stands at y[k stride]; x (d) is room. */
-uz_status uz_condensed_begin(uz_case *load, const double *y, int64_t stride, double *x, uz_error *err);
+uz_status uz_condensed_begin(uz_dual_load *load, const double *y, int64_t stride, double *x, uz_error *err);
 /* y (d, the same) += L^-1 P N'r and, with_push, the kept correction; x (d) is room. */
-uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_case *load, const double *r,
+uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_dual_load *load, const double *r,
                                      bool with_push, uz_error *err);
-/* A case with everything but its load. whole: with room for vectors of d. */
-uz_status uz_case_allocate(uz_case **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
-                           uz_error *err);
-void uz_condensed_apply(const uz_case *load, double *Dr, const double *r);
-uz_status uz_condensed_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close);
-uz_status uz_condensed_solve_active(uz_case *load, double *r, double *g, bool *solved, const bool *active,
+/* A load with everything but p. whole: with room for vectors of d. */
+uz_status uz_dual_load_allocate(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
+                                uz_error *err);
+void uz_condensed_apply(const uz_dual_load *load, double *Dr, const double *r);
+uz_status uz_condensed_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
+uz_status uz_condensed_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, const bool *active,
                                     uz_error *err);
-uz_status uz_condensed_need_operator(uz_case *load, uz_error *err);
-uz_status uz_condensed_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
+uz_status uz_condensed_need_operator(uz_dual_load *load, uz_error *err);
+uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err);
 
-uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err);
-uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
-uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close);
-uz_status uz_factored_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err);
+uz_status uz_factored_load(uz_dual_load *load, const double *p, uz_error *err);
+uz_status uz_factored_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
+uz_status uz_factored_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
+uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err);
 
 uz_status uz_bounds_create(uz_dual *dual, uz_error *err);
 void uz_bounds_clear(uz_bounds *bounds);
-uz_status uz_bounded_create(uz_case *load, const double *p, uz_error *err);
+uz_status uz_bounded_create(uz_dual_load *load, const double *p, uz_error *err);
 void uz_bounded_free(uz_bounded *box);
-bool uz_bounded_crossed(const uz_case *load, double *y);
-bool uz_bounded_guess(uz_case *load, bool *active);
+bool uz_bounded_crossed(const uz_dual_load *load, double *y);
+bool uz_bounded_guess(uz_dual_load *load, bool *active);
 /* Steps of it: holds the dofs of the active rows at their bounds, the others at 0 or where they were (keep); force = K
  * u
  * - p and size = |K| |u| + |p|, what its rounding is in proportion to; r from what holds the dofs, `active` the rows
@@ -149,21 +149,21 @@ bool uz_bounded_guess(uz_case *load, bool *active);
 void uz_bounded_hold(uz_bounded *box, const uz_bounds *bounds, const bool *active, bool keep, int64_t d, int64_t m);
 void uz_bounded_balance(uz_bounded *box, const uz_csc *K);
 void uz_bounded_react(uz_bounded *box, bool *active, const uz_bounds *bounds, int64_t d, int64_t m);
-void uz_bounded_measure_gaps(double *g, const uz_case *load, const bool *active);
-uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
+void uz_bounded_measure_gaps(double *g, const uz_dual_load *load, const bool *active);
+uz_status uz_bounded_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 /* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */
-bool uz_bounded_recover(const uz_case *load, double *u, const double *r);
+bool uz_bounded_recover(const uz_dual_load *load, double *u, const double *r);
 
 /* Makes load->base and load->response what `factored` makes them, within the aim. */
-uz_status uz_inexact_create(uz_case *load, const double *p, uz_error *err);
+uz_status uz_inexact_create(uz_dual_load *load, const double *p, uz_error *err);
 void uz_inexact_free(uz_inexact *inexact);
 /* Between begin true and false D is applied to vectors of about one size, which is not that of reactions, to this
  * relative accuracy. Overwrites the response. */
-void uz_inexact_probe(uz_case *load, bool begin, double accuracy);
-uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err);
+void uz_inexact_probe(uz_dual_load *load, bool begin, double accuracy);
+uz_status uz_inexact_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
 /* Solves for the free dofs of box->u, those held standing at their bounds: r, g, solved, active as
- * uz_case_solve_active. A guess that is seen to be wrong at a looser tolerance is not solved to the end. */
-uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
+ * uz_dual_load_solve_active. A guess that is seen to be wrong at a looser tolerance is not solved to the end. */
+uz_status uz_inexact_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, bool *active, uz_error *err);
 
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Lanczos makes cases without K: they never push. */
-static uz_status weigh(uz_case *load, uz_error *err)
+/* Lanczos makes loads without K: they never push. */
+static uz_status weigh(uz_dual_load *load, uz_error *err)
 {
     int64_t d = load->dual->info.d;
     load->push_weight = uz_alloc(d, sizeof(double));
@@ -20,7 +20,7 @@ static uz_status weigh(uz_case *load, uz_error *err)
 }
 
 /* x = K^-1 x, through load->work2. MATRIX_FREE never comes here. */
-static uz_status solve(uz_case *load, double *x, uz_error *err)
+static uz_status solve(uz_dual_load *load, double *x, uz_error *err)
 {
     const uz_factor *factor = load->dual->factor;
     uz_factor_permute(factor, load->work2, x);
@@ -31,7 +31,7 @@ static uz_status solve(uz_case *load, double *x, uz_error *err)
     return status;
 }
 
-uz_status uz_factored_load(uz_case *load, const double *p, uz_error *err)
+uz_status uz_factored_load(uz_dual_load *load, const double *p, uz_error *err)
 {
     int64_t d = load->dual->info.d, m = load->dual->info.m;
     uz_status status = weigh(load, err);
@@ -59,7 +59,7 @@ static bool all_zero(const double *x, int64_t n)
     return true;
 }
 
-uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
+uz_status uz_factored_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     if (load->inexact)
@@ -75,7 +75,7 @@ uz_status uz_factored_apply(uz_case *load, double *Dr, const double *r, uz_error
     return status;
 }
 
-uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const double *g, const bool *close)
+uz_status uz_factored_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
 {
     const uz_dual *dual = load->dual;
     double *c = load->push, *Nc = load->work, *Kc = load->work2, square = 0.0, complementarity = 0.0;
@@ -92,7 +92,7 @@ uz_status uz_factored_push(uz_case *load, double *bound2, const double *r, const
     return UZ_OK;
 }
 
-uz_status uz_factored_recover(uz_case *load, double *u, const double *r, bool with_push, uz_error *err)
+uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err)
 {
     int64_t d = load->dual->info.d;
     uz_status status = UZ_OK;

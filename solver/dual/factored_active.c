@@ -52,7 +52,7 @@ void uz_bounded_balance(uz_bounded *box, const uz_csc *K)
 
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
-static uz_status solve_free(uz_case *load, bool *solved, uz_error *err)
+static uz_status solve_free(uz_dual_load *load, bool *solved, uz_error *err)
 {
     uz_bounded *box = load->box;
     uz_principal *part = NULL;
@@ -92,7 +92,7 @@ void uz_bounded_react(uz_bounded *box, bool *active, const uz_bounds *bounds, in
     }
 }
 
-void uz_bounded_measure_gaps(double *g, const uz_case *load, const bool *active)
+void uz_bounded_measure_gaps(double *g, const uz_dual_load *load, const bool *active)
 {
     const uz_bounds *bounds = &load->dual->bounds;
     for (int64_t i = 0; i < load->dual->info.m; i++) {
@@ -103,7 +103,7 @@ void uz_bounded_measure_gaps(double *g, const uz_case *load, const bool *active)
     }
 }
 
-uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
+uz_status uz_bounded_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
 {
     uz_bounded *box = load->box;
     const uz_dual *dual = load->dual;
@@ -129,7 +129,7 @@ uz_status uz_bounded_solve_active(uz_case *load, double *r, double *g, bool *sol
     return UZ_OK;
 }
 
-bool uz_bounded_recover(const uz_case *load, double *u, const double *r)
+bool uz_bounded_recover(const uz_dual_load *load, double *u, const double *r)
 {
     const uz_bounded *box = load->box;
     if (!box || !box->has_exact)

@@ -72,7 +72,7 @@ static void find_tightest(uz_bounded *box, const uz_bounds *bounds, const double
             box->contradictory || box->bottom[j] > box->top[j] || isinf(box->top[j]) < 0 || isinf(box->bottom[j]) > 0;
 }
 
-uz_status uz_bounded_create(uz_case *load, const double *p, uz_error *err)
+uz_status uz_bounded_create(uz_dual_load *load, const double *p, uz_error *err)
 {
     int64_t d = load->dual->info.d, m = load->dual->info.m;
     uz_bounded *box = load->box = uz_alloc_zero(1, sizeof *box);
@@ -111,7 +111,7 @@ void uz_bounded_free(uz_bounded *box)
 }
 
 /* a u <= h_a and b u <= h_b with a > 0 > b: y = (b, -a) has N'y = a b - b a = 0 exactly. */
-bool uz_bounded_crossed(const uz_case *load, double *y)
+bool uz_bounded_crossed(const uz_dual_load *load, double *y)
 {
     const uz_bounded *box = load->box;
     const uz_bounds *bounds = &load->dual->bounds;
@@ -186,7 +186,7 @@ static void choose_start(uz_bounded *box, const uz_csc *K, const double *exact)
         memcpy(box->point, cut, (size_t)K->cols * sizeof *cut);
 }
 
-bool uz_bounded_guess(uz_case *load, bool *active)
+bool uz_bounded_guess(uz_dual_load *load, bool *active)
 {
     uz_bounded *box = load->box;
     if (box->contradictory)

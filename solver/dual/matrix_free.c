@@ -35,13 +35,13 @@ static uz_cg_stop stop_at(const uz_inexact *x, double relative, double absolute)
     return stop;
 }
 
-static double root_of_lambda(const uz_case *load)
+static double root_of_lambda(const uz_dual_load *load)
 {
     return sqrt(uz_krylov_describe(load->dual->krylov).lambda);
 }
 
 /* base = K^-1 p to the aim, from where it stands; psi0 and g0 with it. */
-static uz_status solve_base(uz_case *load, double aim, uz_error *err)
+static uz_status solve_base(uz_dual_load *load, double aim, uz_error *err)
 {
     uz_inexact *x = load->inexact;
     int64_t d = load->dual->info.d;
@@ -60,7 +60,7 @@ static uz_status solve_base(uz_case *load, double aim, uz_error *err)
     return UZ_OK;
 }
 
-uz_status uz_inexact_create(uz_case *load, const double *p, uz_error *err)
+uz_status uz_inexact_create(uz_dual_load *load, const double *p, uz_error *err)
 {
     int64_t d = load->dual->info.d;
     uz_inexact *x = load->inexact = uz_alloc_zero(1, sizeof *x);
@@ -90,7 +90,8 @@ void uz_inexact_free(uz_inexact *inexact)
     free(inexact);
 }
 
-uz_status uz_case_aim(uz_case *load, double relative_error, const uz_hooks *hooks, double deadline, uz_error *err)
+uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_hooks *hooks, double deadline,
+                           uz_error *err)
 {
     uz_inexact *x = load->inexact;
     if (!x)
@@ -103,16 +104,16 @@ uz_status uz_case_aim(uz_case *load, double relative_error, const uz_hooks *hook
 }
 
 /* ||u(r)||_K about, with the response as it stands; Dr is room. */
-static double expected_norm(const uz_case *load, const double *r, double *Dr)
+static double expected_norm(const uz_dual_load *load, const double *r, double *Dr)
 {
     double base = uz_root(-2.0 * load->psi0), psi, norm2;
     memset(Dr, 0, (size_t)load->dual->info.m * sizeof *Dr);
     uz_csc_gaxpy(Dr, &load->dual->N, 1.0, load->response);
-    uz_case_energies(load, &psi, &norm2, r, Dr);
+    uz_dual_load_energies(load, &psi, &norm2, r, Dr);
     return fmax(1e-3 * base, fmin(base, sqrt(norm2)));
 }
 
-void uz_inexact_probe(uz_case *load, bool begin, double accuracy)
+void uz_inexact_probe(uz_dual_load *load, bool begin, double accuracy)
 {
     uz_inexact *x = load->inexact;
     if (!x)
@@ -123,7 +124,7 @@ void uz_inexact_probe(uz_case *load, bool begin, double accuracy)
     memset(load->response, 0, (size_t)load->dual->info.d * sizeof *load->response);
 }
 
-uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error *err)
+uz_status uz_inexact_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     uz_inexact *x = load->inexact;
@@ -141,7 +142,7 @@ uz_status uz_inexact_apply(uz_case *load, double *Dr, const double *r, uz_error 
     return UZ_OK;
 }
 
-uz_status uz_case_inverse_norm(uz_case *load, double *value, double *e, uz_error *err)
+uz_status uz_dual_load_inverse_norm(uz_dual_load *load, double *value, double *e, uz_error *err)
 {
     uz_inexact *x = load->inexact;
     return uz_krylov_inverse_norm(value, e, load->dual->krylov, &x->cg, load->K, x->hooks, x->deadline, err);

@@ -17,7 +17,7 @@
 enum { STEPS_MOST = 5000 };
 
 /* right = p - K u of the dofs that are held, and no others. */
-static void load_free(uz_case *load)
+static void load_free(uz_dual_load *load)
 {
     uz_inexact *x = load->inexact;
     double *held = x->cg.p;
@@ -28,7 +28,7 @@ static void load_free(uz_case *load)
 }
 
 /* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears. */
-static uz_status measure_slack(uz_case *load, uz_error *err)
+static uz_status measure_slack(uz_dual_load *load, uz_error *err)
 {
     uz_inexact *x = load->inexact;
     const uz_bounded *box = load->box;
@@ -60,7 +60,8 @@ static bool looks_wrong(const double *r, const double *g, const bool *active, in
 }
 
 /* u, r, g and active at this tolerance of the energy norm. */
-static uz_status solve_to(uz_case *load, uz_cg *cg, double tolerance, double *g, bool *active, bool *met, uz_error *err)
+static uz_status solve_to(uz_dual_load *load, uz_cg *cg, double tolerance, double *g, bool *active, bool *met,
+                          uz_error *err)
 {
     uz_inexact *x = load->inexact;
     uz_bounded *box = load->box;
@@ -84,7 +85,7 @@ static uz_status solve_to(uz_case *load, uz_cg *cg, double tolerance, double *g,
     return UZ_OK;
 }
 
-static uz_status solve_stepwise(uz_case *load, uz_cg *cg, double *r, double *g, bool *active, uz_error *err)
+static uz_status solve_stepwise(uz_dual_load *load, uz_cg *cg, double *r, double *g, bool *active, uz_error *err)
 {
     uz_inexact *x = load->inexact;
     double least = FLOOR * x->aim, tolerance = fmax(least, x->coarse);
@@ -102,7 +103,7 @@ static uz_status solve_stepwise(uz_case *load, uz_cg *cg, double *r, double *g, 
     return status == UZ_OK ? measure_slack(load, err) : status;
 }
 
-uz_status uz_inexact_solve_active(uz_case *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
+uz_status uz_inexact_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, bool *active, uz_error *err)
 {
     uz_inexact *x = load->inexact;
     const uz_bounded *box = load->box;

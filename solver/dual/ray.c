@@ -51,7 +51,7 @@ static void project(least_squares *ls, double *y, const bool *support, const uz_
     memcpy(y, ls->best, (size_t)N->rows * sizeof *y);
 }
 
-uz_status uz_case_project_ray(const uz_case *load, double *y, uz_error *err)
+uz_status uz_dual_load_project_ray(const uz_dual_load *load, double *y, uz_error *err)
 {
     const uz_csc *N = &load->dual->N;
     least_squares ls = {uz_alloc(N->cols, sizeof(double)), uz_alloc(N->cols, sizeof(double)),

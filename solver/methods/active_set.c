@@ -56,10 +56,10 @@ static void release(pivoting *p)
 
 /* From the start: the operator's own guess, where it has one. Else the rows that a projected gradient step would leave
  * in contact. */
-static void guess(pivoting *p, const uz_iterate *it, uz_case *load)
+static void guess(pivoting *p, const uz_iterate *it, uz_dual_load *load)
 {
-    const double *g0 = uz_case_g0(load);
-    if (it->iteration == 0 && !it->warm && uz_case_guess_active(load, p->active))
+    const double *g0 = uz_dual_load_g0(load);
+    if (it->iteration == 0 && !it->warm && uz_dual_load_guess_active(load, p->active))
         return;
     for (int64_t i = 0; i < it->m; i++) {
         double gap = g0[i] - it->Dr[i];
@@ -89,7 +89,7 @@ static void judge_move(pivoting *p)
 }
 
 /* The next guess: all wrong rows change places, or the operator makes a guess of its own, whichever has done better. */
-static void exchange(pivoting *p, uz_case *load, int64_t m)
+static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
 {
     bool better = p->wrong < p->fewest, all = better || p->patience > 0;
     judge_move(p);
@@ -97,7 +97,7 @@ static void exchange(pivoting *p, uz_case *load, int64_t m)
     p->move = EXCHANGE;
     if (better)
         p->fewest = p->wrong;
-    if (all && p->rate[GUESS] <= p->rate[EXCHANGE] && uz_case_guess_active(load, p->active)) {
+    if (all && p->rate[GUESS] <= p->rate[EXCHANGE] && uz_dual_load_guess_active(load, p->active)) {
         p->move = GUESS;
         return;
     }
@@ -111,16 +111,16 @@ static void exchange(pivoting *p, uz_case *load, int64_t m)
 }
 
 /* The guess's answer as an iterate: r <= 0, D r, and the bound on it. */
-static uz_status take(uz_iterate *it, const pivoting *p, uz_case *load, uz_error *err)
+static uz_status take(uz_iterate *it, const pivoting *p, uz_dual_load *load, uz_error *err)
 {
-    const double *g0 = uz_case_g0(load);
+    const double *g0 = uz_dual_load_g0(load);
     bool cut = false;
     for (int64_t i = 0; i < it->m; i++) {
         cut = cut || p->r[i] > 0.0;
         it->r[i] = fmin(0.0, p->r[i]);
         it->Dr[i] = g0[i] - p->g[i];
     }
-    uz_status status = cut ? uz_case_apply(load, it->Dr, it->r, err) : UZ_OK;
+    uz_status status = cut ? uz_dual_load_apply(load, it->Dr, it->r, err) : UZ_OK;
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     it->tau = 1.0;
@@ -130,9 +130,9 @@ static uz_status take(uz_iterate *it, const pivoting *p, uz_case *load, uz_error
     return status == UZ_OK ? uz_iterate_bound(it, load, UZ_METHOD_ACTIVE_SET, err) : status;
 }
 
-static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    uz_status status = uz_case_solve_active(load, p->r, p->g, solved, p->active, err);
+    uz_status status = uz_dual_load_solve_active(load, p->r, p->g, solved, p->active, err);
     if (status != UZ_OK || !*solved)
         return status;
     p->wrong = count_wrong(p, it->m);
@@ -147,13 +147,13 @@ static bool is_stuck(const pivoting *p)
 }
 
 /* Where each row that joins costs a linear solve, and they are not few, the iterations do better. */
-static bool may_exchange(const uz_iterate *it, const uz_case *load)
+static bool may_exchange(const uz_iterate *it, const uz_dual_load *load)
 {
-    return uz_case_rows_may_depend(load) && (uz_case_steps_are_small(load) || it->m <= FEW_ROWS);
+    return uz_dual_load_rows_may_depend(load) && (uz_dual_load_steps_are_small(load) || it->m <= FEW_ROWS);
 }
 
 /* Solves exactly from the guess, whatever rows depend on each other. */
-static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load,
+static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_dual_load *load,
                                    const uz_method_options *options, uz_history *history, uz_error *err)
 {
     static const uz_end ends[] = {[UZ_EXCHANGE_SOLVED] = UZ_END_SOLVED,
@@ -177,7 +177,7 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
 }
 
 /* One step: the answer of the guess, and the next guess. *over: a wrong guess is not left, or none can be solved. */
-static uz_status step(pivoting *p, bool *over, uz_end *end, uz_iterate *it, uz_case *load,
+static uz_status step(pivoting *p, bool *over, uz_end *end, uz_iterate *it, uz_dual_load *load,
                       const uz_method_options *options, uz_history *history, uz_error *err)
 {
     bool solved = false;
@@ -195,13 +195,13 @@ static uz_status step(pivoting *p, bool *over, uz_end *end, uz_iterate *it, uz_c
     return status;
 }
 
-static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                        uz_history *history, uz_error *err)
 {
     *end = it->best_relative <= options->target ? UZ_END_TARGET : UZ_END_STALLED;
     if (*end == UZ_END_TARGET)
         return UZ_OK;
-    int extra = uz_case_steps_are_small(load) ? EXTRA_STEPS : 0;
+    int extra = uz_dual_load_steps_are_small(load) ? EXTRA_STEPS : 0;
     bool over = false;
     for (int k = 0; k < MAX_STEPS && !over; k++) {
         if (uz_should_stop(end, it, options))
@@ -218,7 +218,7 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, 
     }
     if (uz_should_stop(end, it, options))
         return UZ_OK;
-    if (over && uz_case_crossed_bounds(load, it->ray)) {
+    if (over && uz_dual_load_crossed_bounds(load, it->ray)) {
         *end = UZ_END_RAY;
         return UZ_OK;
     }
@@ -228,7 +228,7 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_case *load, 
     return UZ_OK;
 }
 
-uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                             uz_history *history, uz_error *err)
 {
     pivoting p;

@@ -23,9 +23,9 @@ static void forget(uz_iterate *it)
     it->tau = 1.0;
 }
 
-static void make_gaps(uz_iterate *it, const uz_case *load)
+static void make_gaps(uz_iterate *it, const uz_dual_load *load)
 {
-    const double *g0 = uz_case_g0(load);
+    const double *g0 = uz_dual_load_g0(load);
     for (int64_t i = 0; i < it->m; i++)
         it->gamma[i] = g0[i] - it->Dr[i];
 }
@@ -95,19 +95,19 @@ static double best_length(double *bound, uz_iterate *it, double rise)
 /* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near r,
  * a plain step's length away. Where D is exact the difference of two points would only lose digits. Overwrites gamma.
  */
-static uz_status apply_to_direction(uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status apply_to_direction(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    if (!uz_case_is_inexact(load))
-        return uz_case_apply(load, it->Dr_next, it->r_next, err);
+    if (!uz_dual_load_is_inexact(load))
+        return uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     for (int64_t i = 0; i < it->m; i++)
         it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
-    uz_status status = uz_case_apply(load, it->Dr_next, it->gamma, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->gamma, err);
     for (int64_t i = 0; i < it->m; i++)
         it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
     return status;
 }
 
-static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
     double rise = make_direction(it), bound;
@@ -129,9 +129,9 @@ static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_case *load, uz
 }
 
 /* psi(r_next) - psi(r) */
-static double gain(const uz_iterate *it, const uz_case *load)
+static double gain(const uz_iterate *it, const uz_dual_load *load)
 {
-    const double *g0 = uz_case_g0(load);
+    const double *g0 = uz_dual_load_g0(load);
     double sum = 0.0;
     for (int64_t i = 0; i < it->m; i++)
         sum += (it->r_next[i] - it->r[i]) * (g0[i] - 0.5 * (it->Dr_next[i] + it->Dr[i]));
@@ -139,12 +139,12 @@ static double gain(const uz_iterate *it, const uz_case *load)
 }
 
 /* Not taken where it is too long, or where it led down. */
-static uz_status projected_step(bool *restart, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     bool plain = memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
     for (int64_t i = 0; i < it->m; i++)
         it->r_next[i] = fmin(0.0, it->rho[i] + (plain ? it->alpha * it->gamma[i] : 0.0));
-    uz_status status = uz_case_apply(load, it->Dr_next, it->r_next, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     if (status != UZ_OK)
         return status;
     bool taken = plain ? !uz_iterate_shorten(it) : gain(it, load) >= 0.0;
@@ -158,9 +158,9 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_case *load, uz
     return UZ_OK;
 }
 
-static double remaining(uz_iterate *it, const uz_case *load)
+static double remaining(uz_iterate *it, const uz_dual_load *load)
 {
-    const double *scale = uz_case_row_scale(load);
+    const double *scale = uz_dual_load_row_scale(load);
     double square = 0.0;
     make_gaps(it, load);
     for (int64_t i = 0; i < it->m; i++) {
@@ -170,7 +170,7 @@ static double remaining(uz_iterate *it, const uz_case *load)
     return sqrt(square);
 }
 
-uz_status uz_conjugate_step(uz_iterate *it, uz_case *load, double *step_norm, bool *restart, uz_error *err)
+uz_status uz_conjugate_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
 {
     make_gaps(it, load);
     *restart = it->tau > 1.0 && out_of_proportion(it);
@@ -183,14 +183,14 @@ uz_status uz_conjugate_step(uz_iterate *it, uz_case *load, double *step_norm, bo
     return status;
 }
 
-uz_status uz_conjugate_settle(uz_iterate *it, uz_case *load, bool due, uz_error *err)
+uz_status uz_conjugate_settle(uz_iterate *it, uz_dual_load *load, bool due, uz_error *err)
 {
     if (!due && it->iteration % SETTLED_FOR != 0)
         return UZ_OK;
-    return uz_case_apply(load, it->Dr, it->r, err);
+    return uz_dual_load_apply(load, it->Dr, it->r, err);
 }
 
-uz_status uz_conjugate_record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+uz_status uz_conjugate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                               bool restart, uz_error *err)
 {
     double *rho = it->rho, *Drho = it->Drho;

@@ -22,14 +22,14 @@
 
 /* *step_norm: ||r - min(0, r + alpha g)|| at the new r, in the caller's forces: the paper's ||rho - r|| where rho is r.
  * *restart: a direction was given up, or a step was not taken. */
-uz_status uz_conjugate_step(uz_iterate *it, uz_case *load, double *step_norm, bool *restart, uz_error *err);
+uz_status uz_conjugate_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err);
 
 /* Applies D to r: where a bound is `due`, which is of the r of the last apply, and every so
  * often, as D r is carried along from the directions and gathers rounding. */
-uz_status uz_conjugate_settle(uz_iterate *it, uz_case *load, bool due, uz_error *err);
+uz_status uz_conjugate_settle(uz_iterate *it, uz_dual_load *load, bool due, uz_error *err);
 
 /* The row of (u(r), r): rho is none of which there was a displacement. */
-uz_status uz_conjugate_record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+uz_status uz_conjugate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                               bool restart, uz_error *err);
 
 #endif

@@ -16,7 +16,7 @@
 enum { FIRST_ROOM = 16, PASSES = 2, CIRCLES = 20 };
 
 typedef struct {
-    uz_case *load;
+    uz_dual_load *load;
     int64_t m, count, room;
     int64_t *rows;     /* room: the rows in contact, in the order of L */
     double **column;   /* room: their columns of D, m each */
@@ -103,7 +103,7 @@ static void release(exchange *x)
 /* incoming = D_q. */
 static uz_status press(exchange *x, int64_t q, uz_error *err)
 {
-    return uz_case_column(x->load, x->incoming, q, err);
+    return uz_dual_load_column(x->load, x->incoming, q, err);
 }
 
 /* With the rows in contact held: w, how they yield when q is pressed, and what compliance q has left. */
@@ -192,7 +192,7 @@ static double reaction(const exchange *x, int64_t k)
 /* g = open - D s, and its size. */
 static void measure(exchange *x)
 {
-    const double *h = uz_case_h(x->load);
+    const double *h = uz_dual_load_h(x->load);
     for (int64_t i = 0; i < x->m; i++) {
         x->g[i] = x->open[i];
         x->size[i] = fabs(h[i]) + fabs(x->open[i]);
@@ -299,14 +299,14 @@ static void advance(exchange *x, int64_t q, double step)
 /* The direction in which q is pressed for ever, if it proves that the rows contradict. */
 static uz_status look_at_ray(bool *proven, double *ray, exchange *x, int64_t q, uz_error *err)
 {
-    const uz_csc *N = uz_case_N(x->load);
-    const double *h = uz_case_h(x->load);
+    const uz_csc *N = uz_dual_load_N(x->load);
+    const double *h = uz_dual_load_h(x->load);
     memset(ray, 0, (size_t)x->m * sizeof *ray);
     ray[q] = -1.0;
     for (int64_t k = 0; k < x->count; k++)
         ray[x->rows[k]] = fmin(0.0, x->w[k]);
-    uz_status status = uz_case_project_ray(x->load, ray, err);
-    double length = status == UZ_OK ? uz_gap_length(N, h, uz_case_g0(x->load), x->size) : 0.0, radius;
+    uz_status status = uz_dual_load_project_ray(x->load, ray, err);
+    double length = status == UZ_OK ? uz_gap_length(N, h, uz_dual_load_g0(x->load), x->size) : 0.0, radius;
     *proven = status == UZ_OK && uz_ray_proves(&radius, ray, N, h, length);
     return status;
 }
@@ -357,14 +357,14 @@ static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *e
 }
 
 uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, double *g, double *ray, bool *active,
-                          const double *base, uz_case *load, const uz_leave *leave, uz_error *err)
+                          const double *base, uz_dual_load *load, const uz_leave *leave, uz_error *err)
 {
-    int64_t m = uz_case_N(load)->rows;
+    int64_t m = uz_dual_load_N(load)->rows;
     exchange x = {.load = load, .s = s, .g = g, .leave = leave, .most = *steps};
     *end = UZ_EXCHANGE_STOPPED;
     uz_status status = allocate(&x, m, err);
     if (status == UZ_OK) {
-        memcpy(x.open, uz_case_g0(load), (size_t)m * sizeof *x.open);
+        memcpy(x.open, uz_dual_load_g0(load), (size_t)m * sizeof *x.open);
         if (base)
             memcpy(x.base, base, (size_t)m * sizeof *x.base);
         memset(s, 0, (size_t)m * sizeof *s);

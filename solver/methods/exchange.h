@@ -23,9 +23,9 @@ typedef enum {
  * contact. base (m, <= 0; NULL: zero): reactions that are already in the load, whose g0 is the gap that they leave: a
  * correction is solved with the digits of its own size. s (m): out; the reactions are base + s. g (m): out.
  * steps: in, the most; out, how often a row joined or was let go. ray (m): UZ_EXCHANGE_RAY. leave is asked between
- * steps of O(m |A|). A row that joins costs one uz_case_column; memory is m |A| + |A|^2 doubles for |A| rows in
+ * steps of O(m |A|). A row that joins costs one uz_dual_load_column; memory is m |A| + |A|^2 doubles for |A| rows in
  * contact. Overwrites what the last apply left. */
 uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, double *g, double *ray, bool *active,
-                          const double *base, uz_case *load, const uz_leave *leave, uz_error *err);
+                          const double *base, uz_dual_load *load, const uz_leave *leave, uz_error *err);
 
 #endif

@@ -19,9 +19,9 @@ void uz_iterate_swap(double **a, double **b)
 }
 
 /* r(k+1) = min(0, rho + alpha gamma). Returns ||rho - r(k+1)||, in the caller's forces. */
-static double project(uz_iterate *it, const uz_case *load)
+static double project(uz_iterate *it, const uz_dual_load *load)
 {
-    const double *g0 = uz_case_g0(load), *scale = uz_case_row_scale(load);
+    const double *g0 = uz_dual_load_g0(load), *scale = uz_dual_load_row_scale(load);
     double square = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
         it->gamma[i] = g0[i] - it->Drho[i];
@@ -79,9 +79,9 @@ static void plan_next_check(uz_iterate *it)
 }
 
 /* step_norm is in the units of the problem's own rows, r in those of the scaled ones. */
-static bool stalled(const uz_iterate *it, const uz_case *load, double step_norm)
+static bool stalled(const uz_iterate *it, const uz_dual_load *load, double step_norm)
 {
-    const double *scale = uz_case_row_scale(load);
+    const double *scale = uz_dual_load_row_scale(load);
     double size = 0.0;
     for (int64_t i = 0; i < it->m; i++)
         size += scale[i] * it->r[i] * (scale[i] * it->r[i]);
@@ -90,7 +90,7 @@ static bool stalled(const uz_iterate *it, const uz_case *load, double step_norm)
            (isfinite(it->best_bound) && it->iteration - it->best_iteration > patience);
 }
 
-static bool should_end(uz_end *end, const uz_iterate *it, const uz_case *load, const uz_method_options *options,
+static bool should_end(uz_end *end, const uz_iterate *it, const uz_dual_load *load, const uz_method_options *options,
                        double step_norm)
 {
     bool started = it->iteration > 0, paper = options->stopping == UZ_STOP_PAPER;
@@ -107,13 +107,13 @@ static bool should_end(uz_end *end, const uz_iterate *it, const uz_case *load, c
     return true;
 }
 
-static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *options, double *step_norm, bool *restart,
-                      uz_error *err)
+static uz_status step(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, double *step_norm,
+                      bool *restart, uz_error *err)
 {
     if (options->method == UZ_METHOD_CONJUGATE)
         return uz_conjugate_step(it, load, step_norm, restart, err);
     *step_norm = project(it, load);
-    uz_status status = uz_case_apply(load, it->Dr_next, it->r_next, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     it->iteration++;
     *restart = status == UZ_OK && uz_iterate_shorten(it);
     if (status != UZ_OK)
@@ -121,26 +121,26 @@ static uz_status step(uz_iterate *it, uz_case *load, const uz_method_options *op
     if (*restart) {
         it->restarts++;
         *step_norm = NAN; /* no step was taken */
-        return uz_case_apply(load, it->Dr, it->r, err);
+        return uz_dual_load_apply(load, it->Dr, it->r, err);
     }
     *restart = extrapolate(it, options->method);
     return UZ_OK;
 }
 
-static uz_status try_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status try_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    uz_status status = uz_case_project_ray(load, it->ray, err);
+    uz_status status = uz_dual_load_project_ray(load, it->ray, err);
     if (status != UZ_OK)
         return status;
-    double length = uz_gap_length(uz_case_N(load), uz_case_h(load), uz_case_g0(load), it->gamma);
+    double length = uz_gap_length(uz_dual_load_N(load), uz_dual_load_h(load), uz_dual_load_g0(load), it->gamma);
     double radius;
-    *found = uz_ray_proves(&radius, it->ray, uz_case_N(load), uz_case_h(load), length);
+    *found = uz_ray_proves(&radius, it->ray, uz_dual_load_N(load), uz_dual_load_h(load), length);
     return UZ_OK;
 }
 
 /* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
  * Looked for at powers of two, from the growth since the last one. */
-static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status look_for_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
     if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
@@ -152,7 +152,7 @@ static uz_status look_for_ray(bool *found, uz_iterate *it, uz_case *load, uz_err
 }
 
 /* And at once where a conjugate step went along one: so far that what is bounded afterwards is rounding. */
-static uz_status look_along(bool *found, uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status look_along(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     bool wanted = it->along_ray && isinf(it->best_bound);
     it->along_ray = false;
@@ -173,13 +173,13 @@ static void set_aside(uz_iterate *it)
 }
 
 /* `conjugate` carries D r along: the bound is with the one that an apply gives, the run goes on with its own. */
-static uz_status bound_last(uz_iterate *it, uz_case *load, uz_method method, uz_error *err)
+static uz_status bound_last(uz_iterate *it, uz_dual_load *load, uz_method method, uz_error *err)
 {
     if (method != UZ_METHOD_CONJUGATE)
         return uz_iterate_bound(it, load, method, err);
     if (isfinite(it->best_bound) && it->best_iteration == it->iteration)
         return UZ_OK; /* it is the best, and has its bound */
-    uz_status status = uz_case_apply(load, it->Dr_next, it->r, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
     uz_iterate_swap(&it->Dr, &it->Dr_next);
     if (status == UZ_OK)
         status = uz_iterate_bound(it, load, method, err);
@@ -188,7 +188,7 @@ static uz_status bound_last(uz_iterate *it, uz_case *load, uz_method method, uz_
 }
 
 /* The answer of the paper's rule is its last r, good or bad; otherwise the last r may still be the best. */
-static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                         uz_error *err)
 {
     set_aside(it);
@@ -204,20 +204,20 @@ static uz_status finish(uz_iterate *it, uz_case *load, const uz_method_options *
 
 /* alpha = 1 / lambda_max(D) where the user gave none. A run that is told to stop before lambda_max is known has no
  * alpha: who goes on with it chooses. */
-static uz_status prepare(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_error *err)
+static uz_status prepare(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_error *err)
 {
     const uz_leave leave = {options->hooks, options->deadline};
     double lambda = 0.0;
-    uz_status status = uz_case_prepare_iterations(load, it->alpha > 0.0 ? NULL : &lambda, err);
+    uz_status status = uz_dual_load_prepare_iterations(load, it->alpha > 0.0 ? NULL : &lambda, err);
     if (it->alpha <= 0.0 && (lambda > 0.0 || !uz_leave_is_over(&leave)))
         it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
     return status;
 }
 
 /* r may have been changed by another engine, and preparing overwrites what the last apply left. */
-static uz_status resume(uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status resume(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr, it->r, err);
     if (it->tau == 1.0) {
         memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
         memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
@@ -227,7 +227,7 @@ static uz_status resume(uz_iterate *it, uz_case *load, uz_error *err)
 
 /* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the
  * correction that it had in the run that found it. Its numbers stay those of the state. */
-static uz_status correct_again(uz_iterate *it, uz_case *load, uz_error *err)
+static uz_status correct_again(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     double bound = it->best_bound, relative = it->best_relative;
     int64_t iteration = it->best_iteration;
@@ -243,7 +243,7 @@ static uz_status correct_again(uz_iterate *it, uz_case *load, uz_error *err)
 }
 
 /* A start with reactions may be the solution: it is bounded before anything is prepared. */
-static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                        uz_error *err)
 {
     uz_status status = UZ_OK;
@@ -266,7 +266,7 @@ static uz_status begin(uz_iterate *it, uz_case *load, const uz_method_options *o
 }
 
 /* The bound, where it is due. */
-static uz_status check(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_error *err)
+static uz_status check(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_error *err)
 {
     bool due = options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check;
     uz_status status = UZ_OK;
@@ -279,7 +279,7 @@ static uz_status check(uz_iterate *it, uz_case *load, const uz_method_options *o
     return status;
 }
 
-static uz_status record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+static uz_status record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                         bool restart, uz_error *err)
 {
     if (options->method == UZ_METHOD_CONJUGATE)
@@ -287,7 +287,7 @@ static uz_status record(uz_iterate *it, uz_case *load, const uz_method_options *
     return uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
 }
 
-uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                           uz_history *history, uz_error *err)
 {
     bool restart = false, ray = false;

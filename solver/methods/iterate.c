@@ -48,38 +48,38 @@ void uz_iterate_clear(uz_iterate *it)
 /* Rows that a projected step would keep in contact are closed, so that the complementarity term of the bound vanishes
  * there; the prediction is that of the primal-dual active set (Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2003)).
  */
-uz_status uz_iterate_bound(uz_iterate *it, uz_case *load, uz_method by, uz_error *err)
+uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_error *err)
 {
-    const double *g0 = uz_case_g0(load);
+    const double *g0 = uz_dual_load_g0(load);
     double bound2, psi, norm2;
     for (int64_t i = 0; i < it->m; i++) {
         it->gamma[i] = g0[i] - it->Dr[i];
         it->close[i] = it->r[i] + it->alpha * it->gamma[i] < 0.0;
     }
-    uz_status status = uz_case_push(load, &bound2, it->r, it->gamma, it->close, err);
+    uz_status status = uz_dual_load_push(load, &bound2, it->r, it->gamma, it->close, err);
     double bound = sqrt(bound2);
     if (status != UZ_OK || !(bound < it->best_bound))
         return status;
-    uz_case_energies(load, &psi, &norm2, it->r, it->Dr);
+    uz_dual_load_energies(load, &psi, &norm2, it->r, it->Dr);
     double norm = sqrt(norm2);
     it->best_bound = bound;
     it->best_relative = bound == 0.0 ? 0.0 : norm > 2.0 * bound ? bound / (norm - 2.0 * bound) : INFINITY;
     it->best_iteration = it->iteration;
     it->made_by = by;
     memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
-    uz_case_keep_push(load);
-    uz_decades_note(it->decades, it->best_relative, it->iteration, uz_case_applications(load));
+    uz_dual_load_keep_push(load);
+    uz_decades_note(it->decades, it->best_relative, it->iteration, uz_dual_load_applications(load));
     return UZ_OK;
 }
 
-uz_status uz_iterate_bound_best(uz_iterate *it, uz_case *load, uz_error *err)
+uz_status uz_iterate_bound_best(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     double *r = it->r, *Dr = it->Dr;
     it->r = it->r_next;
     it->Dr = it->Dr_next;
     memcpy(it->r, it->best_r, (size_t)it->m * sizeof *r);
     it->best_bound = INFINITY;
-    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr, it->r, err);
     if (status == UZ_OK)
         status = uz_iterate_bound(it, load, it->made_by, err);
     it->r = r;
@@ -88,9 +88,9 @@ uz_status uz_iterate_bound_best(uz_iterate *it, uz_case *load, uz_error *err)
 }
 
 /* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
-static uz_residual residual(uz_iterate *it, uz_case *load)
+static uz_residual residual(uz_iterate *it, uz_dual_load *load)
 {
-    const double *g0 = uz_case_g0(load), *scale = uz_case_row_scale(load);
+    const double *g0 = uz_dual_load_g0(load), *scale = uz_dual_load_row_scale(load);
     uz_residual e = {0};
     double e2 = 0.0, e4 = 0.0, *difference = it->r_next;
     for (int64_t i = 0; i < it->m; i++) {
@@ -99,18 +99,18 @@ static uz_residual residual(uz_iterate *it, uz_case *load)
         e2 += penetration * penetration;
         e4 += complementarity * complementarity;
     }
-    e.e1 = uz_case_force_norm(load, difference);
+    e.e1 = uz_dual_load_force_norm(load, difference);
     e.e2 = sqrt(e2);
     e.e4 = sqrt(e4);
     e.total = sqrt(e.e1 * e.e1 + e2 + e4);
     return e;
 }
 
-static uz_history_row describe(uz_iterate *it, uz_case *load, double step_norm, bool restart)
+static uz_history_row describe(uz_iterate *it, uz_dual_load *load, double step_norm, bool restart)
 {
     uz_history_row row = {.iteration = it->iteration, .step_norm = step_norm, .restart = restart};
     double norm2;
-    uz_case_energies(load, &row.dual_objective, &norm2, it->r, it->Dr);
+    uz_dual_load_energies(load, &row.dual_objective, &norm2, it->r, it->Dr);
     row.residual = residual(it, load);
     for (int64_t i = 0; i < it->m; i++)
         row.contacts += it->r[i] < 0.0;
@@ -119,7 +119,7 @@ static uz_history_row describe(uz_iterate *it, uz_case *load, double step_norm, 
     return row;
 }
 
-uz_status uz_iterate_record(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+uz_status uz_iterate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                             double step_norm, bool restart, uz_error *err)
 {
     uz_history_row row = describe(it, load, step_norm, restart);
@@ -129,11 +129,11 @@ uz_status uz_iterate_record(uz_iterate *it, uz_case *load, const uz_method_optio
     return status;
 }
 
-uz_status uz_iterate_begin(uz_iterate *it, uz_case *load, const uz_method_options *options, uz_history *history,
+uz_status uz_iterate_begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                            uz_error *err)
 {
     it->started = uz_seconds();
-    uz_status status = uz_case_apply(load, it->Dr, it->r, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr, it->r, err);
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     if (status == UZ_OK)

@@ -17,11 +17,11 @@ static bool gave_up(uz_end end)
 /* Where auto stands: kept in the iterate, so that a run can go on from there. */
 enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING };
 
-static uz_status run_phase(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+static uz_status run_phase(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                            uz_history *history, uz_error *err)
 {
     uz_method_options phase = *options;
-    phase.method = uz_case_is_inexact(load) ? UZ_METHOD_ACCELERATED_RESTART : UZ_METHOD_CONJUGATE;
+    phase.method = uz_dual_load_is_inexact(load) ? UZ_METHOD_ACCELERATED_RESTART : UZ_METHOD_CONJUGATE;
     if (it->phase == FIRST_GUESS || it->phase == SECOND_GUESS)
         return uz_active_set_run(end, it, load, &phase, history, err);
     if (it->phase == WARMING_UP && it->phase_end < options->max_iterations)
@@ -54,7 +54,7 @@ static void next_phase(uz_iterate *it)
         uz_iterate_go_back(it);
 }
 
-static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+static uz_status run_auto(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                           uz_history *history, uz_error *err)
 {
     uz_method_options engine = *options;
@@ -71,11 +71,11 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_case *load, const uz_m
     return status;
 }
 
-uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                         uz_history *history, uz_error *err)
 {
     uz_leave leave = {options->hooks, options->deadline};
-    uz_case_set_leave(load, &leave);
+    uz_dual_load_set_leave(load, &leave);
     if (options->method == UZ_METHOD_AUTO)
         return run_auto(end, it, load, options, history, err);
     if (options->method == UZ_METHOD_ACTIVE_SET)

@@ -39,7 +39,7 @@ typedef struct {
     bool *close;          /* rows whose gap the pushed answer closes */
     double *anchor;       /* r at the last power of two, where a ray is looked for */
     double *ray;          /* UZ_END_RAY: y <= 0, N'y = 0, h'y > 0; before, a candidate */
-    double *best_r;       /* the r whose bound is best; its push is kept in the uz_case */
+    double *best_r;       /* the r whose bound is best; its push is kept in the uz_dual_load */
     double best_bound;    /* on the energy-norm error; INFINITY before the first */
     double best_relative; /* the same over the energy norm of the answer */
     int64_t best_iteration;
@@ -65,11 +65,12 @@ void uz_iterate_clear(uz_iterate *it);
 /* Takes over where a run stood, or the reactions of a warm start, before the first call of uz_method_run. What the
  * state says is checked against this problem: where D r or the bound of its best answer differ, it is that of another
  * one, and only its reactions are taken. Errors: UZ_ERR_SIZE (another m), _NOT_FINITE, _ARGUMENT. */
-uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start, uz_error *err);
+uz_status uz_iterate_start(uz_iterate *it, uz_dual_load *load, const uz_state *start, uz_error *err);
 /* Can it be the state of a run on m contacts? Errors as above. */
 uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err);
 /* Where the iterate stands, for the caller of the library. */
-uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_case *load, uz_method method, uz_error *err);
+uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_load *load, uz_method method,
+                           uz_error *err);
 
 typedef struct {
     uz_method method;
@@ -84,14 +85,14 @@ typedef struct {
 
 /* Iterates until an end is reached; appends a row per iteration to history (row 0 is the start; a run that continues
  * another one goes on with the row after that one's last). */
-uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                         uz_history *history, uz_error *err);
 
 /* The engines behind it: steps on the dual with one application of D each (uzawa, accelerated, accelerated_restart,
  * conjugate) and the active set. */
-uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                           uz_history *history, uz_error *err);
-uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_case *load, const uz_method_options *options,
+uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                             uz_history *history, uz_error *err);
 
 /* Appends a row; grows by doubling. Beyond UZ_HISTORY_ROWS rows every second one is dropped, again and again: a run of

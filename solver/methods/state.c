@@ -111,7 +111,7 @@ static void take_numbers(uz_iterate *it, const uz_state *s)
 
 /* Makes the correction of the best answer, which a state does not have, and its bound with it. *same false: the bound
  * is another than the state's. */
-static uz_status bound_best_again(bool *same, uz_iterate *it, uz_case *load, const uz_state *s, uz_error *err)
+static uz_status bound_best_again(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
 {
     *same = true;
     if (isinf(s->best_bound))
@@ -124,11 +124,11 @@ static uz_status bound_best_again(bool *same, uz_iterate *it, uz_case *load, con
     return status;
 }
 
-static uz_status restore(bool *same, uz_iterate *it, uz_case *load, const uz_state *s, uz_error *err)
+static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
 {
-    take_vectors(it, s, uz_case_row_scale(load));
+    take_vectors(it, s, uz_dual_load_row_scale(load));
     take_numbers(it, s);
-    uz_status status = uz_case_apply(load, it->Dr_next, it->r, err);
+    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
     *same = status == UZ_OK && alike(it->Dr, it->Dr_next, it->m);
     if (*same)
         status = bound_best_again(same, it, load, s, err);
@@ -159,7 +159,7 @@ static void take_reactions(uz_iterate *it, const uz_state *s, const double *scal
     it->phase = 0;
 }
 
-uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start, uz_error *err)
+uz_status uz_iterate_start(uz_iterate *it, uz_dual_load *load, const uz_state *start, uz_error *err)
 {
     double alpha = it->alpha;
     bool same = false;
@@ -168,7 +168,7 @@ uz_status uz_iterate_start(uz_iterate *it, uz_case *load, const uz_state *start,
     if (status == UZ_OK && start->rho)
         status = restore(&same, it, load, start, err);
     if (status == UZ_OK && !same)
-        take_reactions(it, start, uz_case_row_scale(load), alpha);
+        take_reactions(it, start, uz_dual_load_row_scale(load), alpha);
     it->origin = same ? UZ_FROM_STATE : UZ_FROM_REACTIONS;
     return status;
 }
@@ -210,7 +210,8 @@ static void give_numbers(uz_state *s, const uz_iterate *it)
     s->made_by = before->kept ? before->made_by : it->made_by;
 }
 
-uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_case *load, uz_method method, uz_error *err)
+uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_load *load, uz_method method,
+                           uz_error *err)
 {
     *out = NULL;
     uz_state *s = uz_alloc_zero(1, sizeof *s);
@@ -218,7 +219,7 @@ uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_case *
         uz_state_free(s);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
     }
-    give_vectors(s, it, uz_case_row_scale(load));
+    give_vectors(s, it, uz_dual_load_row_scale(load));
     give_numbers(s, it);
     s->method = method;
     *out = s;

@@ -22,12 +22,12 @@ _Static_assert((int)UZ_LANES == (int)UZ_CERTIFY_LANES, "what comes out of the fa
 struct uz_block {
     const uz_csc *K;
     int64_t d, width;
-    uz_case_block *loads;
+    uz_dual_block *loads;
     uz_lane_certifier *certifier;
-    uz_run *runs;     /* width */
-    uz_case **cases;  /* width: those of the runs */
-    const double **r; /* width: scaled reactions to recover from */
-    bool *with_push;  /* width */
+    uz_run *runs;         /* width */
+    uz_dual_load **cases; /* width: those of the runs */
+    const double **r;     /* width: scaled reactions to recover from */
+    bool *with_push;      /* width */
 };
 
 /* Without a finite bound on K^-1 no lane can be certified; the cases are then certified one by one. */
@@ -52,14 +52,14 @@ uz_status uz_block_create(uz_block **out, uz_body *body, const uz_problem *probl
     block->d = block->K->cols;
     block->width = blocks * UZ_LANES;
     block->runs = uz_alloc_zero(block->width, sizeof *block->runs);
-    block->cases = uz_alloc_zero(block->width, sizeof(uz_case *));
+    block->cases = uz_alloc_zero(block->width, sizeof(uz_dual_load *));
     block->r = uz_alloc_zero(block->width, sizeof(double *));
     block->with_push = uz_alloc_zero(block->width, sizeof(bool));
     uz_status status = UZ_OK;
     if (!block->runs || !block->cases || !block->r || !block->with_push)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)
-        status = uz_case_block_create(&block->loads, body->dual, blocks, err);
+        status = uz_dual_block_create(&block->loads, body->dual, blocks, err);
     if (status == UZ_OK)
         status = make_certifier(block, body, problem, err);
     if (status == UZ_OK)
@@ -73,7 +73,7 @@ void uz_block_free(uz_block *block)
 {
     if (!block)
         return;
-    uz_case_block_free(block->loads);
+    uz_dual_block_free(block->loads);
     uz_lane_certifier_free(block->certifier);
     free(block->runs);
     free(block->cases);
@@ -136,10 +136,10 @@ static uz_status load_all(uz_block *block, int64_t count, int64_t *failed, uz_er
     }
     if (status != UZ_OK)
         return status;
-    double start = uz_seconds(), *P = uz_case_block_loads(block->loads);
+    double start = uz_seconds(), *P = uz_dual_block_loads(block->loads);
     for (int64_t first = 0; first < block->width; first += UZ_LANES)
         interleave(P + first * block->d, block->runs + first, count - first, block->d);
-    status = uz_case_block_load(block->loads, err);
+    status = uz_dual_block_load(block->loads, err);
     share_time(block, count, uz_seconds() - start, false);
     return status;
 }
@@ -148,7 +148,7 @@ static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
 {
     uz_run *run = &block->runs[k];
     run->in_block = true;
-    uz_status status = uz_case_create_in_block(&run->load, block->loads, k, block->K, run->h, err);
+    uz_status status = uz_dual_load_create_in_block(&run->load, block->loads, k, block->K, run->h, err);
     if (status == UZ_OK)
         status = uz_run_start(run, err);
     if (status == UZ_OK)
@@ -162,13 +162,13 @@ static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
 static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bool *certified, uz_error *err)
 {
     uz_status status = UZ_OK;
-    const double *P = uz_case_block_loads(block->loads) + first * block->d;
-    const double *U = uz_case_block_displacements(block->loads) + first * block->d;
+    const double *P = uz_dual_block_loads(block->loads) + first * block->d;
+    const double *U = uz_dual_block_displacements(block->loads) + first * block->d;
     uz_lane_answer answers[UZ_LANES];
     uz_run *runs = block->runs + first;
     separate(runs, count, U, block->d);
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
-        const double *scale = uz_case_row_scale(runs[k].load);
+        const double *scale = uz_dual_load_row_scale(runs[k].load);
         double whole_norm;
         for (int64_t i = 0; i < runs[k].m; i++)
             runs[k].answer.r[i] = scale[i] * block->r[first + k][i];
@@ -193,7 +193,7 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
 static uz_status recover_and_certify(uz_block *block, int64_t count, bool *certified, uz_error *err)
 {
     double start = uz_seconds();
-    uz_status status = uz_case_block_recover(block->loads, block->cases, block->r, block->with_push, count, err);
+    uz_status status = uz_dual_block_recover(block->loads, block->cases, block->r, block->with_push, count, err);
     for (int64_t first = 0; status == UZ_OK && first < count; first += UZ_LANES)
         status = certify_lanes(block, first, lanes_from(first, count), certified + first, err);
     share_time(block, count, uz_seconds() - start, true);

@@ -85,7 +85,7 @@ static uz_status iterate(uz_run *run, uz_error *err)
 {
     uz_method_options options = method_options(run);
     double start = uz_seconds();
-    uz_status status = uz_case_aim(run->load, run->target, run->hooks, run->deadline, err);
+    uz_status status = uz_dual_load_aim(run->load, run->target, run->hooks, run->deadline, err);
     if (status == UZ_OK)
         status = uz_method_run(&run->end, &run->it, run->load, &options, &run->result->history, err);
     run->result->summary.timings.iterate += uz_seconds() - start;
@@ -110,7 +110,7 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
     uz_run *run = ctx;
     const uz_factor *factor = run->body->factor;
     if (!factor)
-        return uz_case_inverse_norm(run->load, value, e, err);
+        return uz_dual_load_inverse_norm(run->load, value, e, err);
     uz_status status = need_workspace(run, err);
     if (status != UZ_OK)
         return status;
@@ -172,8 +172,8 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
 /* The answer that r (m, scaled rows) gives, with the kept correction or without, and its certificate. */
 static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_push, uz_error *err)
 {
-    const double *scale = uz_case_row_scale(run->load);
-    uz_status status = uz_case_recover(run->load, answer->u, r, with_push, err);
+    const double *scale = uz_dual_load_row_scale(run->load);
+    uz_status status = uz_dual_load_recover(run->load, answer->u, r, with_push, err);
     for (int64_t i = 0; i < run->m; i++)
         answer->r[i] = scale[i] * r[i];
     return status == UZ_OK ? uz_run_certify_answer(run, answer, err) : status;
@@ -226,7 +226,7 @@ static uz_status prove_infeasible(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
     const uz_csc *N = uz_body_N(run->body, run->problem);
-    const double *scale = uz_case_row_scale(run->load), *g0 = uz_case_g0(run->load);
+    const double *scale = uz_dual_load_row_scale(run->load), *g0 = uz_dual_load_g0(run->load);
     for (int64_t i = 0; i < run->m; i++) {
         run->it.ray[i] *= scale[i];
         run->it.r_next[i] = g0[i] / scale[i];
@@ -250,7 +250,7 @@ static void note_certificate(uz_run *run)
 {
     uz_decades_resume(&run->decades, uz_run_time(run));
     uz_decades_certify(&run->decades, run->answer.certificate.relative_error, run->it.iteration,
-                       uz_case_applications(run->load));
+                       uz_dual_load_applications(run->load));
 }
 
 uz_status uz_run_iterate(uz_run *run, uz_error *err)
@@ -398,7 +398,8 @@ uz_status uz_run_solve(uz_run *run, uz_error *err)
     uz_status status = uz_run_make_load(run, err);
     double start = uz_seconds();
     if (status == UZ_OK)
-        status = uz_case_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
+        status =
+            uz_dual_load_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
     if (status == UZ_OK)
         status = uz_run_start(run, err);
     run->result->summary.timings.iterate += uz_seconds() - start;

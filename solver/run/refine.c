@@ -67,7 +67,7 @@ static void end(refinement *x)
 static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
 {
     const uz_run *run = x->run;
-    const double *scale = uz_case_row_scale(run->load);
+    const double *scale = uz_dual_load_row_scale(run->load);
     uz_status status =
         uz_equilibrium_residual(&x->res, uz_body_K(run->body, run->problem), uz_body_N(run->body, run->problem), run->p,
                                 answer->u, x->zero, answer->r, err);
@@ -82,16 +82,16 @@ static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
 }
 
 /* Rows that can't depend on each other, or are too many to exchange: those that press stay, the others are left out. */
-static uz_status keep_rows(refinement *x, uz_case *correction, uz_error *err)
+static uz_status keep_rows(refinement *x, uz_dual_load *correction, uz_error *err)
 {
     bool solved = false;
-    uz_status status = uz_case_solve_active(correction, x->s, x->g, &solved, x->active, err);
+    uz_status status = uz_dual_load_solve_active(correction, x->s, x->g, &solved, x->active, err);
     for (int64_t i = 0; i < x->run->m; i++)
         x->s[i] = solved ? x->s[i] : 0.0;
     return status;
 }
 
-static uz_status exchange_rows(refinement *x, uz_case *correction, uz_error *err)
+static uz_status exchange_rows(refinement *x, uz_dual_load *correction, uz_error *err)
 {
     uz_leave leave = {x->run->hooks, x->run->deadline};
     uz_exchange_end ended;
@@ -105,21 +105,21 @@ static uz_status exchange_rows(refinement *x, uz_case *correction, uz_error *err
 static uz_status correct(refinement *x, uz_error *err)
 {
     const uz_run *run = x->run;
-    bool small = uz_case_steps_are_small(run->load) || run->m <= FEW_ROWS,
-         exchange = uz_case_rows_may_depend(run->load) && small;
-    uz_case *correction = NULL;
+    bool small = uz_dual_load_steps_are_small(run->load) || run->m <= FEW_ROWS,
+         exchange = uz_dual_load_rows_may_depend(run->load) && small;
+    uz_dual_load *correction = NULL;
     for (int64_t i = 0; i < run->m; i++)
         x->f[i] = exchange || x->active[i] ? x->f[i] : INFINITY;
     uz_status status =
-        uz_case_create(&correction, run->body->dual, uz_body_K(run->body, run->problem), x->e, x->f, err);
+        uz_dual_load_create(&correction, run->body->dual, uz_body_K(run->body, run->problem), x->e, x->f, err);
     uz_leave leave = {run->hooks, run->deadline};
     if (status == UZ_OK)
-        uz_case_set_leave(correction, &leave);
+        uz_dual_load_set_leave(correction, &leave);
     if (status == UZ_OK)
         status = exchange ? exchange_rows(x, correction, err) : keep_rows(x, correction, err);
     if (status == UZ_OK)
-        status = uz_case_recover(correction, x->c, x->s, false, err);
-    uz_case_free(correction);
+        status = uz_dual_load_recover(correction, x->c, x->s, false, err);
+    uz_dual_load_free(correction);
     return status;
 }
 
@@ -128,7 +128,7 @@ static uz_status correct(refinement *x, uz_error *err)
 static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
 {
     uz_run *run = x->run;
-    const double *scale = uz_case_row_scale(run->load);
+    const double *scale = uz_dual_load_row_scale(run->load);
     uz_status status = measure(x, latest, err);
     if (status == UZ_OK)
         status = correct(x, err);

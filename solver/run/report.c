@@ -122,7 +122,7 @@ static void report_cost(uz_run *run)
     }
     cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
     cost->actual_bytes =
-        (double)run->body->bytes + (run->load ? (double)uz_case_bytes(run->load) : 0.0) +
+        (double)run->body->bytes + (run->load ? (double)uz_dual_load_bytes(run->load) : 0.0) +
         (run->body->is_scene ? 0.0 : (double)(uz_csc_bytes(&run->problem->qp.K) + uz_csc_bytes(&run->problem->qp.N))) +
         8.0 * RUN_VECTORS * (double)run->d;
 }
@@ -367,7 +367,7 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
 
 void uz_run_end(uz_run *run)
 {
-    uz_case_free(run->load);
+    uz_dual_load_free(run->load);
     uz_iterate_clear(&run->it);
     uz_factor_workspace_free(run->ws);
     free(run->owned);

@@ -35,7 +35,7 @@ typedef struct {
     double *owned;       /* scenes: room of p, h_all, prescribed and h */
     double *prescribed;  /* scenes: n_fixed */
     bool moved;          /* some of them are not zero */
-    uz_case *load;
+    uz_dual_load *load;
     uz_iterate it;
     uz_decades decades;
     uz_factor_workspace *ws;

@@ -81,7 +81,8 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
         status = take_answer(run, u, r, err);
     double start = uz_seconds();
     if (status == UZ_OK && run->body->krylov) /* its certificate solves with what a load keeps */
-        status = uz_case_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
+        status =
+            uz_dual_load_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
     if (status == UZ_OK)
         status = certify(run, r, err);
     summary->timings.certify = uz_seconds() - start;

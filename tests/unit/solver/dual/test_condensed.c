@@ -40,7 +40,7 @@ static uz_qp leaning_cube(int64_t n)
 typedef struct {
     uz_factor *factor;
     uz_dual *dual;
-    uz_case *load;
+    uz_dual_load *load;
 } form;
 
 static form form_of(const uz_qp *qp, bool contact_last)
@@ -52,14 +52,14 @@ static form form_of(const uz_qp *qp, bool contact_last)
     CHECK(factor_by(&f.factor, &qp->K, dofs, contact_last ? count : 0, UZ_ORDERING_AUTO, 0, &err) == UZ_OK);
     CHECK_INT(uz_factor_describe(f.factor).contact_last, contact_last);
     CHECK(uz_dual_create(&f.dual, &qp->N, f.factor, UZ_OPERATOR_CONDENSED, NULL, &err) == UZ_OK);
-    CHECK(uz_case_create(&f.load, f.dual, &qp->K, qp->p, qp->h, &err) == UZ_OK);
+    CHECK(uz_dual_load_create(&f.load, f.dual, &qp->K, qp->p, qp->h, &err) == UZ_OK);
     free(dofs);
     return f;
 }
 
 static void free_form(form *f)
 {
-    uz_case_free(f->load);
+    uz_dual_load_free(f->load);
     uz_dual_free(f->dual);
     uz_factor_free(f->factor);
 }
@@ -87,27 +87,27 @@ static void compare(const uz_qp *qp)
         r[i] = i % 3 == 0 ? -1e-4 * (double)(i % 7) : 0;
         close[i] = r[i] < 0;
     }
-    check_close(uz_case_g0(any.load), uz_case_g0(last.load), m, 1e-12, "g0");
-    CHECK(uz_case_prepare_iterations(last.load, &lambda[0], &err) == UZ_OK);
-    CHECK(uz_case_prepare_iterations(any.load, &lambda[1], &err) == UZ_OK);
+    check_close(uz_dual_load_g0(any.load), uz_dual_load_g0(last.load), m, 1e-12, "g0");
+    CHECK(uz_dual_load_prepare_iterations(last.load, &lambda[0], &err) == UZ_OK);
+    CHECK(uz_dual_load_prepare_iterations(any.load, &lambda[1], &err) == UZ_OK);
     CHECK_REL(lambda[1], lambda[0], 1e-6);
-    CHECK(uz_case_apply(last.load, Dr, r, &err) == UZ_OK && uz_case_apply(any.load, other, r, &err) == UZ_OK);
+    CHECK(uz_dual_load_apply(last.load, Dr, r, &err) == UZ_OK && uz_dual_load_apply(any.load, other, r, &err) == UZ_OK);
     check_close(other, Dr, m, 1e-12, "D r");
-    uz_case_energies(last.load, &psi[0], &norm2[0], r, Dr);
-    uz_case_energies(any.load, &psi[1], &norm2[1], r, other);
+    uz_dual_load_energies(last.load, &psi[0], &norm2[0], r, Dr);
+    uz_dual_load_energies(any.load, &psi[1], &norm2[1], r, other);
     CHECK_REL(psi[1], psi[0], 1e-12);
     CHECK_REL(norm2[1], norm2[0], 1e-12);
     for (int64_t i = 0; i < m; i++)
-        g[i] = uz_case_g0(last.load)[i] - Dr[i];
-    CHECK(uz_case_push(last.load, &bound[0], r, g, close, &err) == UZ_OK);
-    CHECK(uz_case_push(any.load, &bound[1], r, g, close, &err) == UZ_OK);
+        g[i] = uz_dual_load_g0(last.load)[i] - Dr[i];
+    CHECK(uz_dual_load_push(last.load, &bound[0], r, g, close, &err) == UZ_OK);
+    CHECK(uz_dual_load_push(any.load, &bound[1], r, g, close, &err) == UZ_OK);
     CHECK(isfinite(bound[0]) && bound[0] > 0);
     CHECK_REL(bound[1], bound[0], 1e-8);
-    uz_case_keep_push(last.load);
-    uz_case_keep_push(any.load);
+    uz_dual_load_keep_push(last.load);
+    uz_dual_load_keep_push(any.load);
     for (int with = 0; with < 2; with++) {
-        CHECK(uz_case_recover(last.load, u, r, with, &err) == UZ_OK);
-        CHECK(uz_case_recover(any.load, v, r, with, &err) == UZ_OK);
+        CHECK(uz_dual_load_recover(last.load, u, r, with, &err) == UZ_OK);
+        CHECK(uz_dual_load_recover(any.load, v, r, with, &err) == UZ_OK);
         check_close(v, u, d, 1e-9, with ? "corrected displacements" : "displacements");
     }
     free_form(&last);
