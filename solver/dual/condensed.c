@@ -242,13 +242,13 @@ void uz_condensed_apply(const uz_dual_load *load, double *Dr, const double *r)
 }
 
 /* x (d) = L^-1 P N'(r + w) by the paths, w the kept correction or nothing. */
-static uz_status spread_along_reach(double *x, const uz_dual_load *load, const double *r, bool with_push, uz_error *err)
+static uz_status spread_along_reach(double *x, const uz_dual_load *load, const double *r, bool corrected, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
     double *force = load->apply_room; /* n_b */
     memset(force, 0, (size_t)dense->n_b * sizeof *force);
     uz_csc_gaxpy_t(force, &dense->N_b, 1.0, r);
-    if (with_push)
+    if (corrected)
         uz_csc_gaxpy_t(force, &dense->N_b, 1.0, load->kept);
     memset(x, 0, (size_t)load->dual->info.d * sizeof *x);
     for (int64_t k = 0; k < dense->n_b; k++)
@@ -257,23 +257,23 @@ static uz_status spread_along_reach(double *x, const uz_dual_load *load, const d
 }
 
 uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_dual_load *load, const double *r,
-                                     bool with_push, uz_error *err)
+                                     bool corrected, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
     double *z = load->work;
     if (dense->reach) {
-        uz_status status = spread_along_reach(x, load, r, with_push, err);
+        uz_status status = spread_along_reach(x, load, r, corrected, err);
         for (int64_t k = 0; k < load->dual->info.d; k++)
             y[k * stride] += x[k];
         return status;
     }
     uz_condensed_response(z, dense, r);
     for (int64_t k = 0; k < dense->n_b; k++)
-        y[dense->position[k] * stride] += z[k] + (with_push ? load->kept[k] : 0.0);
+        y[dense->position[k] * stride] += z[k] + (corrected ? load->kept[k] : 0.0);
     return UZ_OK;
 }
 
-uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err)
+uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
 {
     const uz_dual *dual = load->dual;
     int64_t d = dual->info.d;
@@ -282,7 +282,7 @@ uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, b
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld dofs", (long long)d);
     for (int64_t k = 0; k < d; k++)
         x[k] = load->base ? load->base[k] : load->lane[k * UZ_LANES];
-    uz_status status = uz_condensed_add_reactions(x, 1, u, load, r, with_push, err); /* u is room */
+    uz_status status = uz_condensed_add_reactions(x, 1, u, load, r, corrected, err); /* u is room */
     if (status == UZ_OK)
         status = uz_factor_backward(dual->factor, load->ws, x, 1, err);
     if (status == UZ_OK)

@@ -99,7 +99,7 @@ uz_status uz_dual_load_create_in_block(uz_dual_load **out, const uz_dual_block *
 }
 
 uz_status uz_dual_block_recover(uz_dual_block *block, uz_dual_load *const *loads, const double *const *r,
-                                const bool *with_push, int64_t count, uz_error *err)
+                                const bool *corrected, int64_t count, uz_error *err)
 {
     const uz_dual *dual = block->dual;
     const int64_t size = dual->info.d * UZ_LANES;
@@ -107,7 +107,7 @@ uz_status uz_dual_block_recover(uz_dual_block *block, uz_dual_load *const *loads
     memcpy(block->X, block->Y, (size_t)(block->blocks * size) * sizeof *block->X);
     for (int64_t lane = 0; status == UZ_OK && lane < count; lane++)
         status = uz_condensed_add_reactions(block->X + lane_start(block, lane), UZ_LANES, block->room, loads[lane],
-                                            r[lane], with_push[lane] && loads[lane]->has_kept, err);
+                                            r[lane], corrected[lane] && loads[lane]->has_kept, err);
     if (status == UZ_OK)
         status = uz_factor_backward_lanes(dual->factor, block->X, block->blocks, err);
     for (int64_t b = 0; status == UZ_OK && b < block->blocks; b++)

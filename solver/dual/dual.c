@@ -188,10 +188,10 @@ static bool allocate_vectors(uz_dual_load *load, bool whole)
     load->apply_room = uz_alloc_zero(n_b, sizeof(double));
     load->work = vector_of(condensed ? contact : room, condensed);
     load->work2 = vector_of(room, condensed);
-    load->push = uz_alloc_zero(condensed ? contact : d, sizeof(double));
+    load->correction = uz_alloc_zero(condensed ? contact : d, sizeof(double));
     load->kept = uz_alloc_zero(condensed ? contact : d, sizeof(double));
     return load->ws && load->apply_room && load->h && (load->base || !whole) && load->g0 && load->response &&
-           load->work && load->work2 && load->push && load->kept;
+           load->work && load->work2 && load->correction && load->kept;
 }
 
 uz_status uz_dual_load_allocate(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
@@ -242,10 +242,10 @@ void uz_dual_load_free(uz_dual_load *load)
     free(load->apply_room);
     free(load->work);
     free(load->work2);
-    free(load->push_weight);
+    free(load->correction_weight);
     uz_bounded_free(load->box);
     uz_inexact_free(load->inexact);
-    free(load->push);
+    free(load->correction);
     free(load->kept);
     free(load);
 }
@@ -427,20 +427,20 @@ uz_status uz_dual_load_column(uz_dual_load *load, double *column, int64_t i, uz_
     return UZ_OK;
 }
 
-uz_status uz_dual_load_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close,
-                            uz_error *err)
+uz_status uz_dual_load_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close,
+                               uz_error *err)
 {
     (void)err;
     *bound2 = INFINITY;
-    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_push(load, bound2, r, g, close)
-                                                        : uz_factored_push(load, bound2, r, g, close);
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_correct(load, bound2, r, g, close)
+                                                        : uz_factored_correct(load, bound2, r, g, close);
 }
 
-void uz_dual_load_keep_push(uz_dual_load *load)
+void uz_dual_load_keep_correction(uz_dual_load *load)
 {
     double *swap = load->kept;
-    load->kept = load->push;
-    load->push = swap;
+    load->kept = load->correction;
+    load->correction = swap;
     load->has_kept = true;
 }
 
@@ -452,9 +452,9 @@ uz_status uz_dual_load_solve_active(uz_dual_load *load, double *r, double *g, bo
     return load->box ? uz_bounded_solve_active(load, r, g, solved, active, err) : UZ_OK;
 }
 
-uz_status uz_dual_load_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err)
+uz_status uz_dual_load_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
 {
-    bool push = with_push && load->has_kept;
-    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_recover(load, u, r, push, err)
-                                                        : uz_factored_recover(load, u, r, push, err);
+    bool with = corrected && load->has_kept;
+    return load->dual->info.op == UZ_OPERATOR_CONDENSED ? uz_condensed_recover(load, u, r, with, err)
+                                                        : uz_factored_recover(load, u, r, with, err);
 }

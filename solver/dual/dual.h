@@ -2,7 +2,7 @@
  *
  *     psi(r) = psi0 + r'g0 - 1/2 r'D r,   gap g(u(r)) = g0 - D r,   K u(r) = p + N'r
  *
- * The methods see only this interface: apply, push, recover, and the numbers of uz_dual_load. Behind it stand three
+ * The methods see only this interface: apply, correct, recover, and the numbers of uz_dual_load. Behind it stand three
  * forms: condensed  dense D on the contact, from the trailing block of a factor with the contact dofs last; factored
  * one sparse solve per application (Kanno's form); matrix_free  the same by conjugate gradients, without a factor:
  * every answer carries a bound on what is left. Rows of N are scaled to a norm of about 1 by powers of two, so that how
@@ -87,7 +87,7 @@ uz_status uz_dual_load_create_in_block(uz_dual_load **out, const uz_dual_block *
                                        const double *h, uz_error *err);
 /* uz_dual_load_recover for the loads of lanes 0 .. count - 1, r[lane] (m): displacements laid out as the loads are. */
 uz_status uz_dual_block_recover(uz_dual_block *block, uz_dual_load *const *loads, const double *const *r,
-                                const bool *with_push, int64_t count, uz_error *err);
+                                const bool *corrected, int64_t count, uz_error *err);
 const double *uz_dual_block_displacements(const uz_dual_block *block);
 
 /* Makes what only many applications of D pay for, once per body: the dense D. lambda_max (may be NULL: not wanted): of
@@ -109,13 +109,13 @@ uz_status uz_dual_load_column(uz_dual_load *load, double *column, int64_t i, uz_
  * rows that `close` names and lifts every penetrating row, and keeps it. *bound2 = ||c||_K^2 - 2 r'g(v), so that
  * ||u(r) - u*||_K and ||v - u*||_K are both at most sqrt(*bound2) (design: the gap formula); INFINITY when no feasible
  * v was found. */
-uz_status uz_dual_load_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close,
-                            uz_error *err);
+uz_status uz_dual_load_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close,
+                               uz_error *err);
 
-/* Keeps the correction of the last push; uz_dual_load_recover adds the kept one when it is asked to: u = u(r) + c (d).
- */
-void uz_dual_load_keep_push(uz_dual_load *load);
-uz_status uz_dual_load_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err);
+/* Keeps what the last uz_dual_load_correct found; uz_dual_load_recover adds the kept one when it is asked to:
+ * u = u(r) + c (d). */
+void uz_dual_load_keep_correction(uz_dual_load *load);
+uz_status uz_dual_load_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);
 
 /* r (m) with D_AA r_A = g0_A on the active rows and 0 elsewhere: the contact problem with these rows as equations; g
  * (m) its gaps, 0 on the active rows. A reaction above 0 or a gap below 0 is a row guessed wrong: signs that rounding

@@ -97,9 +97,9 @@ struct uz_dual_load {
     double *response;            /* FACTORED: d, K^-1 N'r of the last apply */
     double *apply_room;          /* CONDENSED: n_b */
     double *work, *work2;        /* max(d, m, n_b) each; in a block max(m, n_b) */
-    double *push_weight;         /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
+    double *correction_weight;   /* FACTORED: d, 1 / K_ii: the metric in which penetrating rows are lifted */
     uz_bounded *box;             /* FACTORED with bounds, else NULL */
-    double *push, *kept; /* correction: CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
+    double *correction, *kept;   /* CONDENSED L_bb'c (n_b), with a reach w (m), c = K^-1 N'w; FACTORED c (d) */
     bool has_kept;
     int64_t applications; /* of D by uz_dual_load_apply */
     uz_inexact *inexact;  /* MATRIX_FREE, else NULL */
@@ -118,23 +118,23 @@ bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t
 uz_status uz_condensed_load(uz_dual_load *load, const double *p, uz_error *err);
 /* g0 from y = L^-1 P p, whose entry k stands at y[k stride]; x (d) is room. */
 uz_status uz_condensed_begin(uz_dual_load *load, const double *y, int64_t stride, double *x, uz_error *err);
-/* y (d, the same) += L^-1 P N'r and, with_push, the kept correction; x (d) is room. */
+/* y (d, the same) += L^-1 P N'r and, where `corrected`, the kept correction; x (d) is room. */
 uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_dual_load *load, const double *r,
-                                     bool with_push, uz_error *err);
+                                     bool corrected, uz_error *err);
 /* A load with everything but p. whole: with room for vectors of d. */
 uz_status uz_dual_load_allocate(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *h, bool whole,
                                 uz_error *err);
 void uz_condensed_apply(const uz_dual_load *load, double *Dr, const double *r);
-uz_status uz_condensed_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
+uz_status uz_condensed_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_condensed_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, const bool *active,
                                     uz_error *err);
 uz_status uz_condensed_need_operator(uz_dual_load *load, uz_error *err);
-uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err);
+uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);
 
 uz_status uz_factored_load(uz_dual_load *load, const double *p, uz_error *err);
 uz_status uz_factored_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
-uz_status uz_factored_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
-uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err);
+uz_status uz_factored_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
+uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);
 
 uz_status uz_bounds_create(uz_dual *dual, uz_error *err);
 void uz_bounds_clear(uz_bounds *bounds);
@@ -168,6 +168,7 @@ uz_status uz_inexact_solve_active(uz_dual_load *load, double *r, double *g, bool
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
  * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.
  * True when no row is left penetrating by more than rounding; c (rows of Nt) and Nc (m) are outputs. */
-bool uz_push_sweeps(double *c, double *Nc, const uz_csc *Nt, const double *weight, const double *g, const bool *close);
+bool uz_correct_by_sweeps(double *c, double *Nc, const uz_csc *Nt, const double *weight, const double *g,
+                          const bool *close);
 
 #endif

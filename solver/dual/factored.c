@@ -7,15 +7,15 @@
 #include <math.h>
 #include <string.h>
 
-/* Lanczos makes loads without K: they never push. */
+/* Lanczos makes loads without K: they are never corrected. */
 static uz_status weigh(uz_dual_load *load, uz_error *err)
 {
     int64_t d = load->dual->info.d;
-    load->push_weight = uz_alloc(d, sizeof(double));
-    if (!load->push_weight)
+    load->correction_weight = uz_alloc(d, sizeof(double));
+    if (!load->correction_weight)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)d);
     for (int64_t j = 0; load->K && j < d; j++) /* sorted lower triangle: the diagonal comes first */
-        load->push_weight[j] = 1.0 / load->K->val[load->K->ptr[j]];
+        load->correction_weight[j] = 1.0 / load->K->val[load->K->ptr[j]];
     return UZ_OK;
 }
 
@@ -75,11 +75,11 @@ uz_status uz_factored_apply(uz_dual_load *load, double *Dr, const double *r, uz_
     return status;
 }
 
-uz_status uz_factored_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
+uz_status uz_factored_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
 {
     const uz_dual *dual = load->dual;
-    double *c = load->push, *Nc = load->work, *Kc = load->work2, square = 0.0, complementarity = 0.0;
-    if (!uz_push_sweeps(c, Nc, &dual->Nt, load->push_weight, g, close))
+    double *c = load->correction, *Nc = load->work, *Kc = load->work2, square = 0.0, complementarity = 0.0;
+    if (!uz_correct_by_sweeps(c, Nc, &dual->Nt, load->correction_weight, g, close))
         return UZ_OK;
     for (int64_t i = 0; i < dual->info.m; i++)
         complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
@@ -92,7 +92,7 @@ uz_status uz_factored_push(uz_dual_load *load, double *bound2, const double *r, 
     return UZ_OK;
 }
 
-uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bool with_push, uz_error *err)
+uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
 {
     int64_t d = load->dual->info.d;
     uz_status status = UZ_OK;
@@ -101,7 +101,7 @@ uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bo
         for (int64_t j = 0; j < d; j++)
             u[j] = load->base[j] + load->response[j];
     }
-    for (int64_t j = 0; with_push && j < d; j++)
+    for (int64_t j = 0; corrected && j < d; j++)
         u[j] += load->kept[j];
     return status;
 }

@@ -150,7 +150,7 @@ static double energy(uz_bounded *box, const uz_csc *K, const double *u)
 enum { SWEEPS = 6 };
 
 /* x += (K without its diagonal)_ij times u_j for i > j */
-static void push_down(double *x, const uz_csc *K, int64_t j, double u)
+static void add_below(double *x, const uz_csc *K, int64_t j, double u)
 {
     for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++)
         x[K->idx[k]] += K->val[k] * u;
@@ -163,7 +163,7 @@ static void sweep(uz_bounded *box, const uz_csc *K, bool backwards)
     double *u = box->point, *above = box->size;
     memset(above, 0, (size_t)K->cols * sizeof *above);
     for (int64_t j = 0; backwards && j < K->cols; j++)
-        push_down(above, K, j, u[j]);
+        add_below(above, K, j, u[j]);
     for (int64_t k = 0; k < K->cols; k++) {
         int64_t j = backwards ? K->cols - 1 - k : k;
         double pull = box->p[j] - above[j];
@@ -171,7 +171,7 @@ static void sweep(uz_bounded *box, const uz_csc *K, bool backwards)
             pull -= K->val[q] * u[K->idx[q]];
         u[j] = clip(u[j] + OVERRELAXATION * pull / K->val[K->ptr[j]], box->bottom[j], box->top[j]);
         if (!backwards)
-            push_down(above, K, j, u[j]);
+            add_below(above, K, j, u[j]);
     }
 }
 

@@ -56,7 +56,7 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_
         it->gamma[i] = g0[i] - it->Dr[i];
         it->close[i] = it->r[i] + it->alpha * it->gamma[i] < 0.0;
     }
-    uz_status status = uz_dual_load_push(load, &bound2, it->r, it->gamma, it->close, err);
+    uz_status status = uz_dual_load_correct(load, &bound2, it->r, it->gamma, it->close, err);
     double bound = sqrt(bound2);
     if (status != UZ_OK || !(bound < it->best_bound))
         return status;
@@ -67,7 +67,7 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_
     it->best_iteration = it->iteration;
     it->made_by = by;
     memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
-    uz_dual_load_keep_push(load);
+    uz_dual_load_keep_correction(load);
     uz_decades_note(it->decades, it->best_relative, it->iteration, uz_dual_load_applications(load));
     return UZ_OK;
 }

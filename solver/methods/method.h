@@ -36,10 +36,10 @@ typedef struct {
     double *r_next, *Dr_next;
     double *rho, *Drho;   /* extrapolated point; of `conjugate` see conjugate.h */
     double *gamma;        /* gap at rho, or at r while a bound is computed */
-    bool *close;          /* rows whose gap the pushed answer closes */
+    bool *close;          /* rows whose gap the corrected answer closes */
     double *anchor;       /* r at the last power of two, where a ray is looked for */
     double *ray;          /* UZ_END_RAY: y <= 0, N'y = 0, h'y > 0; before, a candidate */
-    double *best_r;       /* the r whose bound is best; its push is kept in the uz_dual_load */
+    double *best_r;       /* the r whose bound is best; its correction is kept in the uz_dual_load */
     double best_bound;    /* on the energy-norm error; INFINITY before the first */
     double best_relative; /* the same over the energy norm of the answer */
     int64_t best_iteration;

@@ -27,7 +27,7 @@ struct uz_block {
     uz_run *runs;         /* width */
     uz_dual_load **cases; /* width: those of the runs */
     const double **r;     /* width: scaled reactions to recover from */
-    bool *with_push;      /* width */
+    bool *corrected;      /* width */
 };
 
 /* Without a finite bound on K^-1 no lane can be certified; the cases are then certified one by one. */
@@ -54,9 +54,9 @@ uz_status uz_block_create(uz_block **out, uz_body *body, const uz_problem *probl
     block->runs = uz_alloc_zero(block->width, sizeof *block->runs);
     block->cases = uz_alloc_zero(block->width, sizeof(uz_dual_load *));
     block->r = uz_alloc_zero(block->width, sizeof(double *));
-    block->with_push = uz_alloc_zero(block->width, sizeof(bool));
+    block->corrected = uz_alloc_zero(block->width, sizeof(bool));
     uz_status status = UZ_OK;
-    if (!block->runs || !block->cases || !block->r || !block->with_push)
+    if (!block->runs || !block->cases || !block->r || !block->corrected)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)
         status = uz_dual_block_create(&block->loads, body->dual, blocks, err);
@@ -78,7 +78,7 @@ void uz_block_free(uz_block *block)
     free(block->runs);
     free(block->cases);
     free(block->r);
-    free(block->with_push);
+    free(block->corrected);
     free(block);
 }
 
@@ -155,7 +155,7 @@ static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
         status = uz_run_iterate(run, err);
     block->cases[k] = run->load;
     block->r[k] = run->it.best_r;
-    block->with_push[k] = isfinite(run->it.best_bound);
+    block->corrected[k] = isfinite(run->it.best_bound);
     return status;
 }
 
@@ -193,7 +193,7 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
 static uz_status recover_and_certify(uz_block *block, int64_t count, bool *certified, uz_error *err)
 {
     double start = uz_seconds();
-    uz_status status = uz_dual_block_recover(block->loads, block->cases, block->r, block->with_push, count, err);
+    uz_status status = uz_dual_block_recover(block->loads, block->cases, block->r, block->corrected, count, err);
     for (int64_t first = 0; status == UZ_OK && first < count; first += UZ_LANES)
         status = certify_lanes(block, first, lanes_from(first, count), certified + first, err);
     share_time(block, count, uz_seconds() - start, true);

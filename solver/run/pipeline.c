@@ -170,10 +170,10 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
 }
 
 /* The answer that r (m, scaled rows) gives, with the kept correction or without, and its certificate. */
-static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_push, uz_error *err)
+static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool corrected, uz_error *err)
 {
     const double *scale = uz_dual_load_row_scale(run->load);
-    uz_status status = uz_dual_load_recover(run->load, answer->u, r, with_push, err);
+    uz_status status = uz_dual_load_recover(run->load, answer->u, r, corrected, err);
     for (int64_t i = 0; i < run->m; i++)
         answer->r[i] = scale[i] * r[i];
     return status == UZ_OK ? uz_run_certify_answer(run, answer, err) : status;

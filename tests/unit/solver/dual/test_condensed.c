@@ -99,12 +99,12 @@ static void compare(const uz_qp *qp)
     CHECK_REL(norm2[1], norm2[0], 1e-12);
     for (int64_t i = 0; i < m; i++)
         g[i] = uz_dual_load_g0(last.load)[i] - Dr[i];
-    CHECK(uz_dual_load_push(last.load, &bound[0], r, g, close, &err) == UZ_OK);
-    CHECK(uz_dual_load_push(any.load, &bound[1], r, g, close, &err) == UZ_OK);
+    CHECK(uz_dual_load_correct(last.load, &bound[0], r, g, close, &err) == UZ_OK);
+    CHECK(uz_dual_load_correct(any.load, &bound[1], r, g, close, &err) == UZ_OK);
     CHECK(isfinite(bound[0]) && bound[0] > 0);
     CHECK_REL(bound[1], bound[0], 1e-8);
-    uz_dual_load_keep_push(last.load);
-    uz_dual_load_keep_push(any.load);
+    uz_dual_load_keep_correction(last.load);
+    uz_dual_load_keep_correction(any.load);
     for (int with = 0; with < 2; with++) {
         CHECK(uz_dual_load_recover(last.load, u, r, with, &err) == UZ_OK);
         CHECK(uz_dual_load_recover(any.load, v, r, with, &err) == UZ_OK);

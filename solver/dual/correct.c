@@ -1,4 +1,4 @@
-/* push.c: a small displacement that closes or opens gaps, row by row. */
+/* correct.c: a small displacement that closes or opens gaps, row by row. */
 #include "dual/dual_private.h"
 
 #include <float.h>
@@ -42,7 +42,8 @@ static double sweep(double *c, const uz_csc *Nt, const double *weight, const dou
     return moved;
 }
 
-bool uz_push_sweeps(double *c, double *Nc, const uz_csc *Nt, const double *weight, const double *g, const bool *close)
+bool uz_correct_by_sweeps(double *c, double *Nc, const uz_csc *Nt, const double *weight, const double *g,
+                          const bool *close)
 {
     double scale = 0.0;
     memset(c, 0, (size_t)Nt->rows * sizeof *c);

@@ -1,4 +1,4 @@
-/* condensed_push.c: feasible displacements near u(r), on the contact. */
+/* condensed_correct.c: feasible displacements near u(r), on the contact. */
 #include "dual/dual_private.h"
 
 #include "core/alloc.h"
@@ -25,10 +25,10 @@ bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t
     return true;
 }
 
-enum { PUSH_ROUNDS = 6 };
+enum { CORRECTION_ROUNDS = 6 };
 
 /* What may be left of a penetration, relative to the largest gap moved: the certificate sees to the rest. */
-#define PUSH_TOLERANCE 1e-9
+#define CORRECTION_TOLERANCE 1e-9
 
 enum { REFINEMENTS = 2 };
 
@@ -72,7 +72,7 @@ static double rounding_sum(const double *D, const double *w, int64_t m)
 
 /* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
  * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
-static bool push_rows(uz_dual_load *load, double *w, double *target, const double *g, const bool *close)
+static bool correct_rows(uz_dual_load *load, double *w, double *target, const double *g, const bool *close)
 {
     int64_t m = load->dual->info.m, *rows = uz_alloc(m, sizeof *rows);
     const double *D = load->D;
@@ -82,12 +82,13 @@ static bool push_rows(uz_dual_load *load, double *w, double *target, const doubl
         in[i] = close[i] || g[i] < 0.0;
         scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
     }
-    for (int round = 0; D_AA && ok && !feasible && round < PUSH_ROUNDS && !uz_leave_is_over(&load->leave); round++) {
+    for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_leave_is_over(&load->leave);
+         round++) {
         ok = solve_rows(w, target, D_AA, load, g, rows, uz_list_rows(rows, in, true, m));
         double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
         feasible = ok;
         for (int64_t i = 0; i < m; i++) {
-            bool wrong = g[i] - target[i] < -PUSH_TOLERANCE * scale - sqrt(D[i + i * m]) * noise;
+            bool wrong = g[i] - target[i] < -CORRECTION_TOLERANCE * scale - sqrt(D[i + i * m]) * noise;
             feasible = feasible && !wrong;
             in[i] = in[i] || wrong;
         }
@@ -103,18 +104,18 @@ static double keep_weights(uz_dual_load *load, const double *w, const double *ta
 {
     const uz_condensed *dense = &load->dual->dense;
     if (dense->reach) {
-        memcpy(load->push, w, (size_t)load->dual->info.m * sizeof *w);
+        memcpy(load->correction, w, (size_t)load->dual->info.m * sizeof *w);
         return fmax(0.0, uz_dot(load->dual->info.m, w, target));
     }
-    uz_condensed_response(load->push, dense, w);
-    return uz_dot(dense->n_b, load->push, load->push);
+    uz_condensed_response(load->correction, dense, w);
+    return uz_dot(dense->n_b, load->correction, load->correction);
 }
 
-uz_status uz_condensed_push(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
+uz_status uz_condensed_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
 {
     const uz_condensed *dense = &load->dual->dense;
     int64_t m = load->dual->info.m;
-    double *target = load->work, *z = load->push, square = 0.0, complementarity = 0.0;
+    double *target = load->work, *z = load->correction, square = 0.0, complementarity = 0.0;
     for (int64_t i = 0; i < m; i++)
         target[i] = close[i] ? g[i] : fmin(g[i], 0.0);
     if (dense->scaled) {
@@ -126,7 +127,7 @@ uz_status uz_condensed_push(uz_dual_load *load, double *bound2, const double *r,
         memcpy(load->work2, target, (size_t)m * sizeof *target);
         uz_potrs_lower(m, dense->D_chol, load->work2);
         square = keep_weights(load, load->work2, target);
-    } else if (push_rows(load, load->work2, target, g, close)) {
+    } else if (correct_rows(load, load->work2, target, g, close)) {
         square = keep_weights(load, load->work2, target);
     } else {
         return UZ_OK;
