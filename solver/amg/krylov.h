@@ -47,9 +47,9 @@ typedef struct uz_multigrid_room uz_multigrid_room; /* one per thread */
 /* A symmetric positive definite V-cycle for K (lower triangle), or for K_FF where held (n, NULL: none) marks the dofs
  * that are not in F: vectors are then n long, and what they hold at held dofs is ignored and returned as 0.
  * Errors: NOT_SPD where a diagonal entry or the coarsest matrix shows it; LIMIT where memory_limit (0: none) would be
- * passed; CANCELLED where leave (NULL: for ever) was over. */
+ * passed; CANCELLED where it had to stop (stop NULL: never). */
 uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
-                              size_t memory_limit, const uz_leave *leave, uz_error *err);
+                              size_t memory_limit, const uz_stop *stop, uz_error *err);
 void uz_multigrid_free(uz_multigrid *mg);
 size_t uz_multigrid_bytes(const uz_multigrid *mg);
 int uz_multigrid_levels(const uz_multigrid *mg);

@@ -86,7 +86,7 @@ static void clear_sources(sources *s)
 
 /* The prolongation of the level and the modes of the next. coarse NULL on success: the level can't be coarsened. */
 static uz_status build_prolongation(uz_level *level, float **coarse, const uz_csc *A, const sources *from,
-                                    double threshold, int k, const uz_leave *leave, uz_error *err)
+                                    double threshold, int k, const uz_stop *stop, uz_error *err)
 {
     int64_t n = level->n;
     int32_t *aggregate = uz_alloc(from->n_nodes, sizeof *aggregate), *of = uz_alloc(n, sizeof *of);
@@ -103,15 +103,15 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
     if (gain) {
         *coarse = uz_alloc(level->aggregates * k * k, sizeof **coarse);
         spread_aggregates(of, aggregate, from->node, level->inverse, n);
-        if (uz_leave_is_over(leave))
-            status = uz_no_leave(err);
+        if (uz_stop_is_due(stop))
+            status = uz_fail_stopped(err);
         else if (!*coarse)
             status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
         else
             status = uz_tentative(basis, *coarse, from->modes, of, n, level->aggregates, k, err);
         if (status == UZ_OK)
             status =
-                uz_prolong_smoothed(level, A, basis, of, 4.0 / 3.0 / smoothing_range(level, A, x, y), k, leave, err);
+                uz_prolong_smoothed(level, A, basis, of, 4.0 / 3.0 / smoothing_range(level, A, x, y), k, stop, err);
     }
     free(aggregate);
     free(of);
@@ -152,7 +152,7 @@ static uz_status isolate_held(uz_csc *out, const uz_csc *K, const bool *held, uz
 }
 
 static uz_status factor_coarsest(uz_multigrid *mg, const uz_csc *K, const bool *held, size_t memory_limit,
-                                 const uz_leave *leave, uz_error *err)
+                                 const uz_stop *stop, uz_error *err)
 {
     int last = mg->levels - 1;
     uz_csc alone = {0};
@@ -160,7 +160,7 @@ static uz_status factor_coarsest(uz_multigrid *mg, const uz_csc *K, const bool *
     uz_status status = last == 0 ? isolate_held(&alone, K, held, err) : UZ_OK;
     if (status == UZ_OK)
         status = uz_factor_plain(&mg->coarsest, last == 0 ? &alone : &mg->level[last].A, UZ_ORDERING_AMD, memory_limit,
-                                 leave ? leave->hooks : NULL, last == 0 ? err : &inner);
+                                 stop ? stop->hooks : NULL, last == 0 ? err : &inner);
     uz_csc_clear(&alone);
     if (status == UZ_OK || last == 0)
         return status;
@@ -211,7 +211,7 @@ static double bound_by_diagonal(const uz_level *level, const uz_csc *K, double *
 
 /* Level l + 1 from level l; *done: level l is the coarsest. */
 static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_csc *K, size_t memory_limit,
-                         const uz_leave *leave, uz_error *err)
+                         const uz_stop *stop, uz_error *err)
 {
     int l = mg->levels - 1;
     uz_level *level = &mg->level[l], *next = level + 1;
@@ -220,13 +220,13 @@ static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_c
     *done = level->n <= COARSEST || l + 1 == UZ_LEVELS_MOST;
     if (*done)
         return UZ_OK;
-    uz_status status = build_prolongation(level, &modes, A, from, from->strong * ldexp(1.0, -l), mg->k, leave, err);
+    uz_status status = build_prolongation(level, &modes, A, from, from->strong * ldexp(1.0, -l), mg->k, stop, err);
     *done = status == UZ_OK && !modes;
     if (status != UZ_OK || *done) {
         free(modes);
         return status;
     }
-    status = uz_galerkin(&next->A, level, A, mg->k, leave, err);
+    status = uz_galerkin(&next->A, level, A, mg->k, stop, err);
     if (status == UZ_OK) {
         status = invert_diagonal(next, &next->A, NULL, err);
         mg->levels++;
@@ -252,7 +252,7 @@ static uz_status copy_sources(sources *s, const uz_modes *modes, int64_t n, uz_e
 }
 
 static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes, const bool *held, size_t memory_limit,
-                       const uz_leave *leave, uz_error *err)
+                       const uz_stop *stop, uz_error *err)
 {
     sources from = {0};
     bool done = false;
@@ -267,7 +267,7 @@ static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes,
     if (status == UZ_OK)
         status = copy_sources(&from, modes, K->cols, err);
     while (status == UZ_OK && !done) {
-        status = uz_leave_is_over(leave) ? uz_no_leave(err) : coarsen(mg, &done, &from, K, memory_limit, leave, err);
+        status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
     }
     clear_sources(&from);
     double *row = status == UZ_OK ? uz_alloc(K->cols, sizeof *row) : NULL;
@@ -276,17 +276,17 @@ static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes,
     if (status == UZ_OK)
         mg->most = bound_by_diagonal(&mg->level[0], K, row);
     free(row);
-    return status == UZ_OK ? factor_coarsest(mg, K, held, memory_limit, leave, err) : status;
+    return status == UZ_OK ? factor_coarsest(mg, K, held, memory_limit, stop, err) : status;
 }
 
 uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
-                              size_t memory_limit, const uz_leave *leave, uz_error *err)
+                              size_t memory_limit, const uz_stop *stop, uz_error *err)
 {
     *out = NULL;
     uz_multigrid *mg = uz_alloc_zero(1, sizeof *mg);
     if (!mg)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a multigrid");
-    uz_status status = build(mg, K, modes, held, memory_limit, leave, err);
+    uz_status status = build(mg, K, modes, held, memory_limit, stop, err);
     if (status == UZ_OK) {
         mg->bytes = count_bytes(mg);
         *out = mg;

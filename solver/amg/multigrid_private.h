@@ -58,14 +58,14 @@ uz_status uz_tentative(float *basis, float *coarse, const float *modes, const in
                        int64_t aggregates, int k, uz_error *err);
 /* Fills the prolongation (I - omega D^-1 A) basis of the level. */
 uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *basis, const int32_t *of, double omega,
-                              int k, const uz_leave *leave, uz_error *err);
+                              int k, const uz_stop *stop, uz_error *err);
 /* coarse = P'A P, lower triangle. */
-uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, int k, const uz_leave *leave,
+uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, int k, const uz_stop *stop,
                       uz_error *err);
 
 /* Rows between two questions whether to go on: a millisecond or so. */
 enum { UZ_ROWS_AT_ONCE = 1024 };
-/* Both functions above, and uz_multigrid_create, where there is no leave to go on: UZ_ERR_CANCELLED. */
-uz_status uz_no_leave(uz_error *err);
+/* Both functions above, and uz_multigrid_create, where it had to stop: UZ_ERR_CANCELLED. */
+uz_status uz_fail_stopped(uz_error *err);
 
 #endif

@@ -146,15 +146,15 @@ static double *block_of(block_row *row, int32_t aggregate)
 
 /* ------------------------------------------------------------------- smoothing */
 
-uz_status uz_no_leave(uz_error *err)
+uz_status uz_fail_stopped(uz_error *err)
 {
     return uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the multigrid was made");
 }
 
 /* Asked for each row, and asks for every UZ_ROWS_AT_ONCE-th. */
-static bool must_leave(int64_t row, const uz_leave *leave)
+static bool must_stop(int64_t row, const uz_stop *stop)
 {
-    return row % UZ_ROWS_AT_ONCE == 0 && uz_leave_is_over(leave);
+    return row % UZ_ROWS_AT_ONCE == 0 && uz_stop_is_due(stop);
 }
 
 typedef struct {
@@ -213,7 +213,7 @@ static void shrink(prolongation *p, int k)
 }
 
 uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *basis, const int32_t *of, double omega,
-                              int k, const uz_leave *leave, uz_error *err)
+                              int k, const uz_stop *stop, uz_error *err)
 {
     int64_t n = level->n;
     uz_row_walk walk;
@@ -223,7 +223,7 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *bas
     ok = block_row_init(&row, level->aggregates, k) && ok;
     level->ptr = uz_alloc_zero(n + 1, sizeof *level->ptr);
     ok = ok && level->ptr && reserve_blocks(&p, 2 * n, k);
-    for (int64_t i = 0; ok && !(over = must_leave(i, leave)) && i < n; i++) {
+    for (int64_t i = 0; ok && !(over = must_stop(i, stop)) && i < n; i++) {
         uz_row_walk_read(&walk, i);
         if (level->inverse[i] > 0.0)
             ok = smooth_row(&p, &row, &walk, basis, of, i, omega * level->inverse[i]);
@@ -235,7 +235,7 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *bas
     uz_row_walk_clear(&walk);
     block_row_clear(&row);
     if (over)
-        return uz_no_leave(err);
+        return uz_fail_stopped(err);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to coarsen %lld dofs", (long long)n);
 }
 
@@ -413,22 +413,21 @@ static uz_status convert(uz_csc *coarse, block_table *table, int64_t aggregates,
     return status;
 }
 
-uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, int k, const uz_leave *leave,
-                      uz_error *err)
+uz_status uz_galerkin(uz_csc *coarse, const uz_level *level, const uz_csc *A, int k, const uz_stop *stop, uz_error *err)
 {
     uz_row_walk walk;
     block_row row;
     block_table table = {.k = k};
     bool ok = uz_row_walk_init(&walk, A), over = false;
     ok = block_row_init(&row, level->aggregates, k) && ok;
-    for (int64_t i = 0; ok && !(over = must_leave(i, leave)) && i < level->n; i++) {
+    for (int64_t i = 0; ok && !(over = must_stop(i, stop)) && i < level->n; i++) {
         uz_row_walk_read(&walk, i);
         if (level->ptr[i] == level->ptr[i + 1])
             continue;
         ok = multiply_row(&row, &walk, level) && add_outer(&table, &row, level, i);
         block_row_empty(&row);
     }
-    uz_status status = over ? uz_no_leave(err)
+    uz_status status = over ? uz_fail_stopped(err)
                        : ok ? convert(coarse, &table, level->aggregates, err)
                             : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a coarse matrix of %lld aggregates",
                                       (long long)level->aggregates);

@@ -181,11 +181,11 @@ static uz_status try_threshold(uz_krylov *krylov, const uz_csc *K, double strong
 {
     double start = uz_seconds();
     uz_krylov_info *info = &krylov->info;
-    uz_leave leave = {hooks, INFINITY};
+    uz_stop stop = {hooks, INFINITY};
     uz_cg cg = {0};
     size_t n = (size_t)K->cols;
     krylov->modes.strong = strong;
-    uz_status status = uz_multigrid_create(&krylov->mg, K, &krylov->modes, NULL, memory_limit, &leave, err);
+    uz_status status = uz_multigrid_create(&krylov->mg, K, &krylov->modes, NULL, memory_limit, &stop, err);
     info->create_s += uz_seconds() - start;
     if (status != UZ_OK)
         return status;

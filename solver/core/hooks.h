@@ -11,16 +11,16 @@ static inline bool uz_cancelled(const uz_hooks *hooks)
     return hooks && hooks->cancelled && hooks->cancelled(hooks->ctx);
 }
 
-/* How long work that takes a while may go on: until it is cancelled, or deadline (uz_seconds()) has come. Asked between
- * units of work of a few milliseconds. NULL: for ever. */
+/* When work that takes a while has to stop: once it is cancelled, or deadline (uz_seconds()) has come. Asked at the
+ * cancellation points: between units of work of a few milliseconds. NULL: never. */
 typedef struct {
     const uz_hooks *hooks;
     double deadline;
-} uz_leave;
+} uz_stop;
 
-static inline bool uz_leave_is_over(const uz_leave *leave)
+static inline bool uz_stop_is_due(const uz_stop *stop)
 {
-    return leave && (uz_cancelled(leave->hooks) || uz_seconds() >= leave->deadline);
+    return stop && (uz_cancelled(stop->hooks) || uz_seconds() >= stop->deadline);
 }
 
 #endif

@@ -1,4 +1,4 @@
-/* lock.h: waiting for another thread's work only as long as there is leave to. */
+/* lock.h: waiting for another thread's work only until it has to stop. */
 #ifndef UZ_CORE_LOCK_H
 #define UZ_CORE_LOCK_H
 
@@ -6,8 +6,8 @@
 
 #include <pthread.h>
 
-/* Locks the mutex, under which another thread may work for seconds; false, and not locked: leave (NULL: for ever) was
- * over first. It is asked every few milliseconds. */
-bool uz_lock_while(pthread_mutex_t *mutex, const uz_leave *leave);
+/* Locks the mutex, under which another thread may work for seconds; false, and not locked: it had to stop first.
+ * A cancellation point every few milliseconds. */
+bool uz_lock_while(pthread_mutex_t *mutex, const uz_stop *stop);
 
 #endif

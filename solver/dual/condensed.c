@@ -52,13 +52,13 @@ static bool find_scaled(uz_condensed *dense, int64_t m)
 }
 
 /* D_chol, or NULL where D is singular to working precision (dependent rows of N). */
-static void factor_operator(uz_condensed *dense, const double *D, int64_t m, const uz_leave *leave)
+static void factor_operator(uz_condensed *dense, const double *D, int64_t m, const uz_stop *stop)
 {
     double *chol = malloc((size_t)m * (size_t)m * sizeof *chol + 1), least = INFINITY, largest = 0.0;
     bool ok = chol != NULL;
     if (ok) {
         memcpy(chol, D, (size_t)m * (size_t)m * sizeof *chol);
-        ok = uz_potrf_lower_while(m, chol, leave);
+        ok = uz_potrf_lower_while(m, chol, stop);
     }
     for (int64_t i = 0; ok && i < m; i++) {
         least = fmin(least, chol[i + i * m]);
@@ -71,7 +71,7 @@ static void factor_operator(uz_condensed *dense, const double *D, int64_t m, con
     free(chol);
 }
 
-static uz_status multiply_out(const uz_condensed *dense, double *D, int64_t m, const uz_leave *leave, uz_error *err)
+static uz_status multiply_out(const uz_condensed *dense, double *D, int64_t m, const uz_stop *stop, uz_error *err)
 {
     int64_t n_b = dense->n_b;
     double *Z = uz_alloc_zero(n_b * m, sizeof *Z);
@@ -81,7 +81,7 @@ static uz_status multiply_out(const uz_condensed *dense, double *D, int64_t m, c
     for (int64_t k = 0; k < n_b; k++)
         for (int64_t e = dense->N_b.ptr[k]; e < dense->N_b.ptr[k + 1]; e++)
             Z[k + dense->N_b.idx[e] * n_b] = dense->N_b.val[e];
-    bool done = uz_trsm_lower_while(n_b, m, dense->L_bb, Z, leave) && uz_syrk_lower_t_while(m, n_b, Z, D, leave);
+    bool done = uz_trsm_lower_while(n_b, m, dense->L_bb, Z, stop) && uz_syrk_lower_t_while(m, n_b, Z, D, stop);
     free(Z);
     if (!done)
         return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
@@ -103,7 +103,7 @@ static bool allocate(uz_condensed *dense, int64_t n_b, bool contact_last)
 
 /* Where N_b is a scaled permutation, and the contact last, D waits until somebody iterates; otherwise every bound needs
  * it. */
-static uz_status make_operator(uz_dual *dual, const uz_leave *leave, uz_error *err)
+static uz_status make_operator(uz_dual *dual, const uz_stop *stop, uz_error *err)
 {
     uz_condensed *dense = &dual->dense;
     int64_t m = dual->info.m, size;
@@ -115,10 +115,10 @@ static uz_status make_operator(uz_dual *dual, const uz_leave *leave, uz_error *e
     if (!dual->lazy->D)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)m);
     uz_status status = dense->reach ? uz_reach_gram(dual->lazy->D, dense->reach, &dual->N, err)
-                                    : multiply_out(dense, dual->lazy->D, m, leave, err);
+                                    : multiply_out(dense, dual->lazy->D, m, stop, err);
     if (status == UZ_OK)
-        factor_operator(dense, dual->lazy->D, m, leave);
-    if (status == UZ_OK && uz_leave_is_over(leave))
+        factor_operator(dense, dual->lazy->D, m, stop);
+    if (status == UZ_OK && uz_stop_is_due(stop))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
     return status;
 }
@@ -156,7 +156,7 @@ static uz_status list_contact(int64_t **order, int64_t *n_b, bool *last, const u
     return UZ_OK;
 }
 
-uz_status uz_condensed_create(uz_dual *dual, const uz_leave *leave, uz_error *err)
+uz_status uz_condensed_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
 {
     uz_condensed *dense = &dual->dense;
     int64_t m = dual->info.m, n_b = 0, *order = NULL;
@@ -169,7 +169,7 @@ uz_status uz_condensed_create(uz_dual *dual, const uz_leave *leave, uz_error *er
     if (status == UZ_OK)
         status = restrict_columns(&dense->N_b, &dual->N, order, n_b, err);
     if (status == UZ_OK)
-        status = make_operator(dual, leave, err);
+        status = make_operator(dual, stop, err);
     dual->info.bytes += 8 * (size_t)((last ? n_b * n_b : 0) + 2 * m * m);
     free(order);
     return status;

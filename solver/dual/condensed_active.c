@@ -15,11 +15,11 @@ enum { PLACED = 64 }; /* columns between questions whether to go on: their entri
 
 /* to = scale_k scale_l from_kl at the rows of k and l: from the factor's order to the order of the rows. */
 static bool place_rows(double *to, const uz_condensed *dense, const double *from, bool invert_scale,
-                       const uz_leave *leave)
+                       const uz_stop *stop)
 {
     int64_t m = dense->n_b;
     for (int64_t l = 0; l < m; l++) {
-        if (l % PLACED == 0 && uz_leave_is_over(leave))
+        if (l % PLACED == 0 && uz_stop_is_due(stop))
             return false;
         double scale_l = invert_scale ? 1.0 / dense->scale[l] : dense->scale[l];
         for (int64_t k = l; k < m; k++) {
@@ -32,26 +32,26 @@ static bool place_rows(double *to, const uz_condensed *dense, const double *from
 }
 
 /* D = N_b S^-1 N_b': the inverse from the factor, then signs and places. */
-static bool form_operator(double *D, double *room, const uz_condensed *dense, const uz_leave *leave)
+static bool form_operator(double *D, double *room, const uz_condensed *dense, const uz_stop *stop)
 {
-    if (!uz_invert_llt_while(dense->n_b, dense->L_bb, room, D, leave))
+    if (!uz_invert_llt_while(dense->n_b, dense->L_bb, room, D, stop))
         return false;
-    return place_rows(D, dense, room, false, leave);
+    return place_rows(D, dense, room, false, stop);
 }
 
 /* D^-1 = N_b^-T S N_b^-1 with S = L_bb L_bb'. */
-static bool form_inverse(double *D_inverse, double *room, const uz_condensed *dense, const uz_leave *leave)
+static bool form_inverse(double *D_inverse, double *room, const uz_condensed *dense, const uz_stop *stop)
 {
-    if (!uz_multiply_llt_while(dense->n_b, dense->L_bb, room, D_inverse, leave))
+    if (!uz_multiply_llt_while(dense->n_b, dense->L_bb, room, D_inverse, stop))
         return false;
-    if (!uz_clear_while(dense->n_b * dense->n_b, D_inverse, leave)) /* its pages, in order */
+    if (!uz_clear_while(dense->n_b * dense->n_b, D_inverse, stop)) /* its pages, in order */
         return false;
-    return place_rows(D_inverse, dense, room, true, leave);
+    return place_rows(D_inverse, dense, room, true, stop);
 }
 
-typedef bool (*former)(double *out, double *room, const uz_condensed *dense, const uz_leave *leave);
+typedef bool (*former)(double *out, double *room, const uz_condensed *dense, const uz_stop *stop);
 
-/* *slot once and for all; *out is the load's own copy of the pointer, NULL where there was no leave to make it. */
+/* *slot once and for all; *out is the load's own copy of the pointer, NULL where making it had to stop. */
 static uz_status need(const double **out, double **slot, uz_dual_load *load, former form, uz_error *err)
 {
     const uz_condensed *dense = &load->dual->dense;
@@ -59,17 +59,17 @@ static uz_status need(const double **out, double **slot, uz_dual_load *load, for
     uz_status status = UZ_OK;
     if (*out)
         return UZ_OK;
-    if (!uz_lock_while(&load->dual->lazy->making, &load->leave))
+    if (!uz_lock_while(&load->dual->lazy->making, &load->stop))
         return UZ_OK;
     if (!*slot) {
         double *made = uz_alloc(size, sizeof *made), *room = uz_alloc(size, sizeof *room);
         if (!made || !room)
             status =
                 uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)dense->n_b);
-        else if (!form(made, room, dense, &load->leave) && !uz_leave_is_over(&load->leave))
+        else if (!form(made, room, dense, &load->stop) && !uz_stop_is_due(&load->stop))
             status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "the Schur complement on the contact is singular");
         free(room);
-        if (status == UZ_OK && !uz_leave_is_over(&load->leave))
+        if (status == UZ_OK && !uz_stop_is_due(&load->stop))
             *slot = made;
         else
             free(made);
@@ -95,7 +95,7 @@ int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
 
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
-/* r_A from D_AA r_A = g0_A. false: no leave to go on. */
+/* r_A from D_AA r_A = g0_A. false: it had to stop. */
 static bool solve_by_operator(uz_dual_load *load, double *r, double *g, const double *chol, const int64_t *rows,
                               int64_t count)
 {
@@ -107,14 +107,14 @@ static bool solve_by_operator(uz_dual_load *load, double *r, double *g, const do
         for (int64_t k = 0; k < count; k++)
             x[k] = g[rows[k]];
         uz_potrs_lower(count, chol, x);
-        if (uz_leave_is_over(&load->leave))
+        if (uz_stop_is_due(&load->stop))
             return false;
         for (int64_t k = 0; k < count; k++)
             r[rows[k]] += x[k];
         uz_symv_lower(m, load->D, r, load->work2);
         for (int64_t i = 0; i < m; i++)
             g[i] = load->g0[i] - load->work2[i];
-        if (uz_leave_is_over(&load->leave))
+        if (uz_stop_is_due(&load->stop))
             return false;
     }
     return true;
@@ -132,7 +132,7 @@ static void solve_block(double *x, double *room, const double *chol, const int64
 
 /* With T = D^-1 and x = g0 - g: r = T x, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
  * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
- * through the factor: T is badly conditioned, its answer is not yet that of the body. false: no leave to go on. */
+ * through the factor: T is badly conditioned, its answer is not yet that of the body. false: it had to stop. */
 static bool solve_by_inverse(uz_dual_load *load, double *r, double *g, const double *chol, const int64_t *rows,
                              int64_t count)
 {
@@ -147,22 +147,22 @@ static bool solve_by_inverse(uz_dual_load *load, double *r, double *g, const dou
         uz_symv_lower(m, load->D_inverse, x, change);
         for (int64_t k = 0; k < count; k++)
             x[rows[k]] = change[rows[k]];
-        if (uz_leave_is_over(&load->leave))
+        if (uz_stop_is_due(&load->stop))
             return false;
         solve_block(x, change, chol, rows, count);
-        if (uz_leave_is_over(&load->leave))
+        if (uz_stop_is_due(&load->stop))
             return false;
         uz_symv_lower(m, load->D_inverse, x, change);
         for (int64_t k = 0; k < count; k++)
             change[rows[k]] = 0.0;
         for (int64_t i = 0; i < m; i++)
             r[i] += change[i];
-        if (uz_leave_is_over(&load->leave))
+        if (uz_stop_is_due(&load->stop))
             return false;
         uz_condensed_apply(load, change, r);
         for (int64_t i = 0; i < m; i++)
             g[i] = load->g0[i] - change[i];
-        if (uz_leave_is_over(&load->leave))
+        if (uz_stop_is_due(&load->stop))
             return false;
     }
     return true;
@@ -223,8 +223,8 @@ uz_status uz_condensed_solve_active(uz_dual_load *load, double *r, double *g, bo
     if (status == UZ_OK && !block)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)count);
     if (status == UZ_OK && formed) {
-        *solved = uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m, &load->leave) &&
-                  uz_potrf_lower_while(count, block, &load->leave) &&
+        *solved = uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m, &load->stop) &&
+                  uz_potrf_lower_while(count, block, &load->stop) &&
                   (scaled || are_independent(block, load->D, rows, count, m)) &&
                   (scaled ? solve_by_inverse : solve_by_operator)(load, r, g, block, rows, count);
         if (*solved)

@@ -11,12 +11,11 @@
 
 enum { GATHERED = 1 << 17 }; /* entries between questions whether to go on: a megabyte of a new block */
 
-bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m,
-                     const uz_leave *leave)
+bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m, const uz_stop *stop)
 {
     int64_t since = GATHERED;
     for (int64_t l = 0; l < count; l++) {
-        if (since >= GATHERED && uz_leave_is_over(leave))
+        if (since >= GATHERED && uz_stop_is_due(stop))
             return false;
         since = since >= GATHERED ? count : since + count; /* a column's upper part may be made with its page */
         for (int64_t k = l; k < count; k++)
@@ -33,7 +32,7 @@ enum { CORRECTION_ROUNDS = 6 };
 enum { REFINEMENTS = 2 };
 
 /* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
- * inverse of a stiffness and as badly conditioned. Dw (m) is D w, also where there was no leave to get w right. D_AA is
+ * inverse of a stiffness and as badly conditioned. Dw (m) is D w, also where it had to stop before w was right. D_AA is
  * room for count^2. */
 static bool solve_rows(double *w, double *Dw, double *D_AA, uz_dual_load *load, const double *target,
                        const int64_t *rows, int64_t count)
@@ -44,10 +43,10 @@ static bool solve_rows(double *w, double *Dw, double *D_AA, uz_dual_load *load, 
     memset(w, 0, (size_t)m * sizeof *w);
     memset(Dw, 0, (size_t)m * sizeof *Dw);
     if (ok) {
-        bool gathered = uz_gather_lower(D_AA, load->D, rows, count, m, &load->leave);
-        int64_t rank = gathered ? uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, &load->leave) : 0;
+        bool gathered = uz_gather_lower(D_AA, load->D, rows, count, m, &load->stop);
+        int64_t rank = gathered ? uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, &load->stop) : 0;
         ok = rank >= 0;
-        for (int pass = 0; ok && pass <= REFINEMENTS && !uz_leave_is_over(&load->leave); pass++) {
+        for (int pass = 0; ok && pass <= REFINEMENTS && !uz_stop_is_due(&load->stop); pass++) {
             for (int64_t k = 0; k < rank; k++)
                 x[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
             uz_potrs_leading(rank, count, D_AA, x);
@@ -82,8 +81,7 @@ static bool correct_rows(uz_dual_load *load, double *w, double *target, const do
         in[i] = close[i] || g[i] < 0.0;
         scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
     }
-    for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_leave_is_over(&load->leave);
-         round++) {
+    for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_stop_is_due(&load->stop); round++) {
         ok = solve_rows(w, target, D_AA, load, g, rows, uz_list_rows(rows, in, true, m));
         double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
         feasible = ok;

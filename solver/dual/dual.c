@@ -108,7 +108,7 @@ static uz_status create(uz_dual **out, const uz_csc *N, const uz_factor *factor,
     uz_dual *dual = uz_alloc_zero(1, sizeof *dual);
     if (!dual)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
-    uz_leave leave = {hooks, INFINITY};
+    uz_stop stop = {hooks, INFINITY};
     dual->info.op = op;
     dual->info.d = N->cols;
     dual->info.m = N->rows;
@@ -126,7 +126,7 @@ static uz_status create(uz_dual **out, const uz_csc *N, const uz_factor *factor,
         status = uz_csc_transpose(&dual->Nt, &dual->N, err);
     dual->info.bytes = 48 * (size_t)N->ptr[N->cols];
     if (status == UZ_OK && op == UZ_OPERATOR_CONDENSED)
-        status = uz_condensed_create(dual, &leave, err);
+        status = uz_condensed_create(dual, &stop, err);
     if (status == UZ_OK && op != UZ_OPERATOR_CONDENSED)
         status = uz_bounds_create(dual, err);
     if (status == UZ_OK && uz_cancelled(hooks))
@@ -203,7 +203,7 @@ uz_status uz_dual_load_allocate(uz_dual_load **out, const uz_dual *dual, const u
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
     load->dual = dual;
     load->K = K;
-    load->leave.deadline = INFINITY;
+    load->stop.deadline = INFINITY;
     if (!allocate_vectors(load, whole)) {
         uz_dual_load_free(load);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)dual->info.d);
@@ -250,9 +250,9 @@ void uz_dual_load_free(uz_dual_load *load)
     free(load);
 }
 
-void uz_dual_load_set_leave(uz_dual_load *load, const uz_leave *leave)
+void uz_dual_load_set_stop(uz_dual_load *load, const uz_stop *stop)
 {
-    load->leave = *leave;
+    load->stop = *stop;
 }
 
 size_t uz_dual_load_bytes(const uz_dual_load *load)
@@ -323,7 +323,7 @@ double uz_dual_known_lambda_max(const uz_dual *dual)
 static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
 {
     const uz_dual_load *load = ctx;
-    if (uz_leave_is_over(&load->leave))
+    if (uz_stop_is_due(&load->stop))
         return UZ_ERR_CANCELLED;
     return uz_dual_load_apply(ctx, y, x, err);
 }
@@ -338,7 +338,7 @@ static uz_status find_lambda_max(uz_dual_load *load, double *lambda_max, uz_erro
     uz_inexact_probe(load, true, 0.1 * LAMBDA_TOLERANCE);
     uz_status status = uz_lanczos_max(lambda_max, load->dual->info.m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
     uz_inexact_probe(load, false, 0.0);
-    if (status != UZ_OK || uz_leave_is_over(&load->leave)) {
+    if (status != UZ_OK || uz_stop_is_due(&load->stop)) {
         *lambda_max = 0.0;
         return status;
     }
@@ -358,7 +358,7 @@ uz_status uz_dual_load_prepare_iterations(uz_dual_load *load, double *lambda_max
         status = uz_condensed_need_operator(load, err);
     if (status != UZ_OK || !lambda_max)
         return status;
-    if (!uz_lock_while(&lazy->making, &load->leave))
+    if (!uz_lock_while(&lazy->making, &load->stop))
         return UZ_OK;
     if (isnan(lazy->lambda_max))
         status = find_lambda_max(load, lambda_max, err);

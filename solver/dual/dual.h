@@ -58,7 +58,7 @@ void uz_dual_load_free(uz_dual_load *load);
 /* How long dense work of n^3 on this load may go on; without: for ever. Where it is over solve_active comes back not
  * solved, and preparing leaves D to be applied by its factors and lambda_max 0: nothing is wrong, and whoever asks next
  * finds that it is over. */
-void uz_dual_load_set_leave(uz_dual_load *load, const uz_leave *leave);
+void uz_dual_load_set_stop(uz_dual_load *load, const uz_stop *stop);
 /* What it holds now, but for a factor of the free dofs, which comes and goes. */
 size_t uz_dual_load_bytes(const uz_dual_load *load);
 /* What the answers will be needed for: a relative error in the energy norm, and who may end inner iterations (hooks are

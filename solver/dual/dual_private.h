@@ -103,18 +103,17 @@ struct uz_dual_load {
     bool has_kept;
     int64_t applications; /* of D by uz_dual_load_apply */
     uz_inexact *inexact;  /* MATRIX_FREE, else NULL */
-    uz_leave leave;       /* of the run: asked inside dense work of n^3 */
+    uz_stop stop;         /* of the run: asked inside dense work of n^3 */
 };
 
-uz_status uz_condensed_create(uz_dual *dual, const uz_leave *leave, uz_error *err);
+uz_status uz_condensed_create(uz_dual *dual, const uz_stop *stop, uz_error *err);
 void uz_condensed_clear(uz_condensed *dense);
 /* z (n_b) = L_bb^-1 N_b'w; contact last. */
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
 /* Lists in `rows` the rows with in == which, ascending; their number. */
 int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m);
-/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D; false: no leave to go on. */
-bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m,
-                     const uz_leave *leave);
+/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D; false: it had to stop. */
+bool uz_gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m, const uz_stop *stop);
 uz_status uz_condensed_load(uz_dual_load *load, const double *p, uz_error *err);
 /* g0 from y = L^-1 P p, whose entry k stands at y[k stride]; x (d) is room. */
 uz_status uz_condensed_begin(uz_dual_load *load, const double *y, int64_t stride, double *x, uz_error *err);

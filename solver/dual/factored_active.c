@@ -56,14 +56,14 @@ static uz_status solve_free(uz_dual_load *load, bool *solved, uz_error *err)
 {
     uz_bounded *box = load->box;
     uz_principal *part = NULL;
-    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, load->ws, &load->leave, err);
-    *solved = part && !uz_leave_is_over(&load->leave);
+    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, load->ws, &load->stop, err);
+    *solved = part && !uz_stop_is_due(&load->stop);
     for (int pass = 0; status == UZ_OK && *solved && pass < PASSES; pass++) {
         uz_bounded_balance(box, load->K);
         status = uz_principal_solve(box->force, part, err);
         for (int64_t j = 0; status == UZ_OK && j < load->K->cols; j++)
             box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
-        *solved = !uz_leave_is_over(&load->leave);
+        *solved = !uz_stop_is_due(&load->stop);
     }
     uz_principal_free(part);
     return status;

@@ -111,9 +111,9 @@ uz_status uz_inexact_solve_active(uz_dual_load *load, double *r, double *g, bool
     uz_cg cg = {0};
     if (x->coarse <= 0.0)
         x->coarse = FIRST_TOLERANCE;
-    uz_leave leave = {x->hooks, x->deadline};
+    uz_stop stop = {x->hooks, x->deadline};
     uz_status status =
-        uz_multigrid_create(&mg, load->K, uz_krylov_modes(load->dual->krylov), box->fixed, 0, &leave, err);
+        uz_multigrid_create(&mg, load->K, uz_krylov_modes(load->dual->krylov), box->fixed, 0, &stop, err);
     if (status == UZ_OK)
         status = uz_cg_init(&cg, mg, box->fixed, load->dual->info.d, err);
     if (status == UZ_OK)

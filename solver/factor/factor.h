@@ -85,10 +85,10 @@ uz_status uz_factor_forward_lanes(const uz_factor *factor, double *X, int64_t bl
 uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
 
 /* *bound >= lambda_max(D_K^1/2 K^-1 D_K^1/2) with D_K = diag(K), except with a probability below 1e-12; so e'K^-1 e is
- * at most *bound times the sum of e_j^2 / K_jj. Some six linear solves, between which leave (NULL: for ever) is asked:
- * UZ_ERR_CANCELLED. */
+ * at most *bound times the sum of e_j^2 / K_jj. Some six linear solves, cancellation points between them (stop NULL:
+ * none): UZ_ERR_CANCELLED. */
 uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
-                                 const uz_leave *leave, uz_error *err);
+                                 const uz_stop *stop, uz_error *err);
 
 /* Where dof i stands in the factor's order: position[i], n. */
 const int64_t *uz_factor_position(const uz_factor *factor);
@@ -113,10 +113,10 @@ uz_status uz_reach_gram(double *D, const uz_reach *reach, const uz_csc *N, uz_er
 
 /* The factor of K_FF, F the dofs that are not fixed (n): K (lower triangle) with these dofs held. factor: of K, whose
  * order is used; ws is borrowed for the object's life. *out is NULL on success when K_FF is not positive definite to
- * working precision, or where leave (NULL: for ever) was over. */
+ * working precision, or where it had to stop (stop NULL: never). */
 typedef struct uz_principal uz_principal;
 uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
-                              uz_factor_workspace *ws, const uz_leave *leave, uz_error *err);
+                              uz_factor_workspace *ws, const uz_stop *stop, uz_error *err);
 void uz_principal_free(uz_principal *part);
 /* x_F = K_FF^-1 x_F in place; x (n) at fixed dofs is neither read nor written. */
 uz_status uz_principal_solve(double *x, uz_principal *part, uz_error *err);

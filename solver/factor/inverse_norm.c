@@ -31,13 +31,13 @@ static double normal(uint64_t *state)
 
 /* Y = B Y in the factor's order, B = D_K^1/2 K^-1 D_K^1/2; root: the square roots of diag(K) in that order. */
 static uz_status apply_scaled(double *Y, const uz_factor *factor, uz_factor_workspace *ws, const double *root,
-                              const uz_leave *leave, uz_error *err)
+                              const uz_stop *stop, uz_error *err)
 {
     for (int v = 0; v < VECTORS; v++)
         for (int64_t k = 0; k < factor->n; k++)
             Y[k + v * factor->n] *= root[k];
     uz_status status = uz_factor_forward(factor, ws, Y, VECTORS, err);
-    if (status == UZ_OK && uz_leave_is_over(leave))
+    if (status == UZ_OK && uz_stop_is_due(stop))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the norm of the inverse was known");
     if (status == UZ_OK)
         status = uz_factor_backward(factor, ws, Y, VECTORS, err);
@@ -48,7 +48,7 @@ static uz_status apply_scaled(double *Y, const uz_factor *factor, uz_factor_work
 }
 
 uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
-                                 const uz_leave *leave, uz_error *err)
+                                 const uz_stop *stop, uz_error *err)
 {
     const SuiteSparse_long *perm = factor->L.Perm;
     uint64_t state = 0x9E3779B97F4A7C15u;
@@ -61,9 +61,9 @@ uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_fact
         for (int64_t k = 0; k < factor->n * VECTORS; k++)
             Y[k] = normal(&state);
         for (int power = 0; status == UZ_OK && power < POWER; power++)
-            status = uz_leave_is_over(leave)
+            status = uz_stop_is_due(stop)
                          ? uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the norm of the inverse was known")
-                         : apply_scaled(Y, factor, ws, root, leave, err);
+                         : apply_scaled(Y, factor, ws, root, stop, err);
     } else {
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to bound the inverse of %lld dofs", (long long)factor->n);
     }

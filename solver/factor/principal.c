@@ -73,7 +73,7 @@ static cholmod_sparse *reduce(const uz_principal *part, const uz_csc *K, const i
 }
 
 /* Few flops for each entry of L make supernodes a burden: CHOLMOD_AUTO decides by that ratio. */
-static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A, const uz_leave *leave, uz_error *err)
+static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A, const uz_stop *stop, uz_error *err)
 {
     cholmod_common *common = &part->ws->common;
     common->supernodal = CHOLMOD_AUTO;
@@ -81,7 +81,7 @@ static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A
     part->L = cholmod_l_analyze(A, common);
     common->supernodal = CHOLMOD_SUPERNODAL;
     common->method[0].ordering = CHOLMOD_GIVEN;
-    if (part->L && uz_leave_is_over(leave)) {
+    if (part->L && uz_stop_is_due(stop)) {
         *positive = false;
         return UZ_OK;
     }
@@ -96,7 +96,7 @@ static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A
 }
 
 static uz_status build(uz_principal *part, bool *positive, const uz_csc *K, const bool *fixed, const uz_factor *factor,
-                       const uz_leave *leave, uz_error *err)
+                       const uz_stop *stop, uz_error *err)
 {
     int64_t n = factor->n, *place = uz_alloc(n, sizeof *place);
     uz_status status = UZ_OK;
@@ -113,17 +113,17 @@ static uz_status build(uz_principal *part, bool *positive, const uz_csc *K, cons
     }
     if (!ok)
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
-    else if (uz_leave_is_over(leave))
+    else if (uz_stop_is_due(stop))
         *positive = false;
     else if (A)
-        status = factorize(part, positive, A, leave, err);
+        status = factorize(part, positive, A, stop, err);
     cholmod_l_free_sparse(&A, &part->ws->common);
     free(place);
     return status;
 }
 
 uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
-                              uz_factor_workspace *ws, const uz_leave *leave, uz_error *err)
+                              uz_factor_workspace *ws, const uz_stop *stop, uz_error *err)
 {
     *out = NULL;
     uz_principal *part = uz_alloc_zero(1, sizeof *part);
@@ -131,7 +131,7 @@ uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *f
     if (!part)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     part->ws = ws;
-    uz_status status = build(part, &positive, K, fixed, factor, leave, err);
+    uz_status status = build(part, &positive, K, fixed, factor, stop, err);
     if (status == UZ_OK && positive)
         *out = part;
     else

@@ -128,10 +128,10 @@ static int64_t least_of(int64_t a, int64_t b)
  * took 1 to 3 ms for each 2 MB on a virtual machine. */
 enum { CLEARED = 1 << 17 };
 
-bool uz_clear_while(int64_t n, double *x, const uz_leave *leave)
+bool uz_clear_while(int64_t n, double *x, const uz_stop *stop)
 {
     for (int64_t k = 0; k < n; k += CLEARED) {
-        if (uz_leave_is_over(leave))
+        if (uz_stop_is_due(stop))
             return false;
         memset(x + k, 0, (size_t)least_of(n - k, CLEARED) * sizeof *x);
     }
@@ -141,7 +141,7 @@ bool uz_clear_while(int64_t n, double *x, const uz_leave *leave)
 /* C (lower, n x n, ldc) = beta C + alpha A A' with A n x k, or alpha A'A with A k x n where transposed, by panels of
  * columns of C. */
 static bool syrk_while(int64_t n, int64_t k, double alpha, const double *A, int64_t lda, bool transposed, double beta,
-                       double *C, int64_t ldc, const uz_leave *leave)
+                       double *C, int64_t ldc, const uz_stop *stop)
 {
     CBLAS_TRANSPOSE left = transposed ? CblasTrans : CblasNoTrans, right = transposed ? CblasNoTrans : CblasTrans;
     double most = PANEL_FLOPS / fmax(1.0, (double)n * (double)k);
@@ -153,7 +153,7 @@ static bool syrk_while(int64_t n, int64_t k, double alpha, const double *A, int6
         int64_t b = least_of(n - j, width), below = n - j - b;
         const double *A_j = A + j * step;
         double *C_j = C + j + j * ldc;
-        if (uz_leave_is_over(leave))
+        if (uz_stop_is_due(stop))
             return false;
         cblas_dsyrk(CblasColMajor, CblasLower, left, narrow(b), narrow(k), alpha, A_j, narrow(lda), beta, C_j,
                     narrow(ldc));
@@ -166,12 +166,12 @@ static bool syrk_while(int64_t n, int64_t k, double alpha, const double *A, int6
 
 /* X (n x columns, ldx) = L^-1 X with L n x n lower, ld, by panels of rows. */
 static bool forward_while(int64_t n, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx,
-                          const uz_leave *leave)
+                          const uz_stop *stop)
 {
     int64_t width = panel_width(n);
     for (int64_t i = 0; i < n; i += width) {
         int64_t b = least_of(n - i, width);
-        if (uz_leave_is_over(leave))
+        if (uz_stop_is_due(stop))
             return false;
         uz_block_eliminate(b, n - i - b, columns, L + i + i * ld, ld, X + i, ldx);
     }
@@ -219,7 +219,7 @@ static bool pivot_column(int64_t n, double *A, int64_t *pivot, double *squares, 
 
 enum { PIVOTED_PANEL = 64 };
 
-int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least, const uz_leave *leave)
+int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least, const uz_stop *stop)
 {
     int64_t width = least_of(panel_width(n), PIVOTED_PANEL);
     double *squares = uz_alloc(n, sizeof *squares), largest = 0.0;
@@ -231,60 +231,60 @@ int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least,
     for (int64_t k = 0; k < end && rank == k; k += width) {
         int64_t next = least_of(k + width, n);
         memset(squares, 0, (size_t)n * sizeof *squares);
-        while (rank < next && !uz_leave_is_over(leave) && pivot_column(n, A, pivot, squares, k, rank, least * largest))
+        while (rank < next && !uz_stop_is_due(stop) && pivot_column(n, A, pivot, squares, k, rank, least * largest))
             rank++;
         if (rank == next &&
-            !syrk_while(n - next, next - k, -1.0, A + next + k * n, n, false, 1.0, A + next + next * n, n, leave))
+            !syrk_while(n - next, next - k, -1.0, A + next + k * n, n, false, 1.0, A + next + next * n, n, stop))
             break;
     }
     free(squares);
     return rank;
 }
 
-bool uz_trsm_lower_while(int64_t n, int64_t k, const double *L, double *X, const uz_leave *leave)
+bool uz_trsm_lower_while(int64_t n, int64_t k, const double *L, double *X, const uz_stop *stop)
 {
     int64_t width = panel_width(n);
     for (int64_t j = 0; j < k && n > 0; j += width)
-        if (!forward_while(n, least_of(k - j, width), L, n, X + j * n, n, leave))
+        if (!forward_while(n, least_of(k - j, width), L, n, X + j * n, n, stop))
             return false;
     return true;
 }
 
-bool uz_syrk_lower_t_while(int64_t n, int64_t k, const double *Z, double *C, const uz_leave *leave)
+bool uz_syrk_lower_t_while(int64_t n, int64_t k, const double *Z, double *C, const uz_stop *stop)
 {
     int64_t width = panel_width(n);
     if (k == 0)
-        return uz_clear_while(n * n, C, leave);
+        return uz_clear_while(n * n, C, stop);
     for (int64_t j = 0; j < k && n > 0; j += width)
-        if (!syrk_while(n, least_of(k - j, width), 1.0, Z + j, k, true, j > 0 ? 1.0 : 0.0, C, n, leave))
+        if (!syrk_while(n, least_of(k - j, width), 1.0, Z + j, k, true, j > 0 ? 1.0 : 0.0, C, n, stop))
             return false;
     return true;
 }
 
 /* Right-looking (Golub and Van Loan, Matrix Computations, 4.2): factor a panel, take it away from what is right of it.
  */
-bool uz_potrf_lower_while(int64_t n, double *A, const uz_leave *leave)
+bool uz_potrf_lower_while(int64_t n, double *A, const uz_stop *stop)
 {
     int64_t width = panel_width(n);
     for (int64_t k = 0; k < n; k += width) {
         int64_t b = least_of(n - k, width), rest = n - k - b;
         double *top = A + k + k * n, *below = top + b, *right = below + b * n;
-        if (uz_leave_is_over(leave) || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(b), top, narrow(n)) != 0)
+        if (uz_stop_is_due(stop) || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(b), top, narrow(n)) != 0)
             return false;
         if (rest == 0)
             break;
         cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, narrow(rest), narrow(b), 1.0, top,
                     narrow(n), below, narrow(n));
-        if (!syrk_while(rest, b, -1.0, below, n, false, 1.0, right, n, leave))
+        if (!syrk_while(rest, b, -1.0, below, n, false, 1.0, right, n, stop))
             return false;
     }
     return true;
 }
 
-bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel, const uz_leave *leave)
+bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel, const uz_stop *stop)
 {
     int64_t width = panel_width(n);
-    if (!uz_clear_while(n * n, A, leave))
+    if (!uz_clear_while(n * n, A, stop))
         return false;
     for (int64_t k = 0; k < n; k += width) {
         int64_t b = least_of(n - k, width), rows = n - k;
@@ -292,17 +292,17 @@ bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel,
             memset(panel + j * rows, 0, (size_t)j * sizeof *panel);
             memcpy(panel + j + j * rows, L + k + j + (k + j) * n, (size_t)(rows - j) * sizeof *panel);
         }
-        if (!syrk_while(rows, b, 1.0, panel, rows, false, 1.0, A + k + k * n, n, leave))
+        if (!syrk_while(rows, b, 1.0, panel, rows, false, 1.0, A + k + k * n, n, stop))
             return false;
     }
     return true;
 }
 
 /* X = L^-1 by panels of columns, then X'X by panels of rows of X. */
-bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const uz_leave *leave)
+bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const uz_stop *stop)
 {
     int64_t width = panel_width(n);
-    if (!uz_clear_while(n * n, A, leave) || !uz_clear_while(n * n, X, leave))
+    if (!uz_clear_while(n * n, A, stop) || !uz_clear_while(n * n, X, stop))
         return false;
     for (int64_t k = 0; k < n; k += width) {
         int64_t b = least_of(n - k, width);
@@ -311,12 +311,12 @@ bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const
                 return false;
             X[j + j * n] = 1.0;
         }
-        if (!forward_while(n - k, b, L + k + k * n, n, X + k + k * n, n, leave))
+        if (!forward_while(n - k, b, L + k + k * n, n, X + k + k * n, n, stop))
             return false;
     }
     for (int64_t k = 0; k < n; k += width) {
         int64_t b = least_of(n - k, width);
-        if (!syrk_while(k + b, b, 1.0, X + k, n, true, 1.0, A, n, leave))
+        if (!syrk_while(k + b, b, 1.0, X + k, n, true, 1.0, A, n, stop))
             return false;
     }
     return true;

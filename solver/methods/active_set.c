@@ -160,10 +160,10 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
                                   [UZ_EXCHANGE_BLURRED] = UZ_END_BLURRED,
                                   [UZ_EXCHANGE_RAY] = UZ_END_RAY,
                                   [UZ_EXCHANGE_STOPPED] = UZ_END_STALLED};
-    uz_leave leave = {options->hooks, options->deadline};
+    uz_stop stop = {options->hooks, options->deadline};
     uz_exchange_end exchanged;
     int64_t n = options->max_iterations - it->iteration;
-    uz_status status = uz_exchange_run(&exchanged, &n, p->r, p->g, it->ray, p->active, NULL, load, &leave, err);
+    uz_status status = uz_exchange_run(&exchanged, &n, p->r, p->g, it->ray, p->active, NULL, load, &stop, err);
     if (status != UZ_OK)
         return status;
     *end = ends[exchanged];

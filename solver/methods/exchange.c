@@ -31,13 +31,13 @@ typedef struct {
     bool *barred;      /* m: in contact, or can't be */
     bool blurred;
     int64_t steps, most;
-    const uz_leave *leave;
+    const uz_stop *stop;
 } exchange;
 
 /* Columns of L moved between two questions: the pages of the new room are made on the way. */
 enum { MOVED = 16 };
 
-/* Twice the room. Where there is no leave to go on the old one stays, and that is no error. */
+/* Twice the room. Where it had to stop the old one stays, and that is no error. */
 static uz_status grow(exchange *x, uz_error *err)
 {
     int64_t room = x->room ? 2 * x->room : FIRST_ROOM;
@@ -46,7 +46,7 @@ static uz_status grow(exchange *x, uz_error *err)
     double *l = uz_alloc(room, sizeof *l), *w = uz_alloc(room, sizeof *w);
     bool got = rows && column && L && l && w, ok = got;
     for (int64_t k = 0; ok && k < x->count; k++) {
-        if (k % MOVED == MOVED - 1 && uz_leave_is_over(x->leave)) {
+        if (k % MOVED == MOVED - 1 && uz_stop_is_due(x->stop)) {
             ok = false;
             break;
         }
@@ -127,7 +127,7 @@ static bool depends(const exchange *x, int64_t q)
     return !(x->compliance > fmax(UZ_DEPENDENT_ROW * x->incoming[q], 4.0 * DBL_EPSILON * size * size));
 }
 
-/* q, pressed last and independent, joins the rows in contact, unless there was no leave to make room for it. */
+/* q, pressed last and independent, joins the rows in contact, unless it had to stop before there was room for it. */
 static uz_status join(exchange *x, int64_t q, uz_error *err)
 {
     uz_status status = x->count == x->room ? grow(x, err) : UZ_OK;
@@ -221,12 +221,12 @@ static void close_gaps(exchange *x)
 /* s for the rows in contact, without those that pull. */
 static void settle(exchange *x)
 {
-    for (bool pulls = true; pulls && !uz_leave_is_over(x->leave);) {
+    for (bool pulls = true; pulls && !uz_stop_is_due(x->stop);) {
         pulls = false;
         measure(x);
-        for (int pass = 0; pass < PASSES && !uz_leave_is_over(x->leave); pass++)
+        for (int pass = 0; pass < PASSES && !uz_stop_is_due(x->stop); pass++)
             close_gaps(x);
-        for (int64_t k = x->count - 1; k >= 0 && !uz_leave_is_over(x->leave); k--)
+        for (int64_t k = x->count - 1; k >= 0 && !uz_stop_is_due(x->stop); k--)
             if (reaction(x, k) > 0.0) {
                 let_go(x, k);
                 pulls = true;
@@ -234,14 +234,14 @@ static void settle(exchange *x)
     }
 }
 
-/* From the rows asked for: an independent part of them. Where there is no leave to go on, what has come together. */
+/* From the rows asked for: an independent part of them. Where it had to stop, what has come together. */
 static uz_status begin(exchange *x, const bool *active, uz_error *err)
 {
     uz_status status = UZ_OK;
     for (int64_t i = 0; status == UZ_OK && i < x->m; i++) {
         if (!active[i] && x->base[i] == 0.0)
             continue;
-        if (uz_leave_is_over(x->leave))
+        if (uz_stop_is_due(x->stop))
             break;
         status = press(x, i, err);
         if (status != UZ_OK)
@@ -315,7 +315,7 @@ static uz_status look_at_ray(bool *proven, double *ray, exchange *x, int64_t q, 
 static uz_status admit(exchange *x, int64_t q, bool *proven, double *ray, uz_error *err)
 {
     uz_status status = press(x, q, err);
-    while (status == UZ_OK && !uz_leave_is_over(x->leave)) {
+    while (status == UZ_OK && !uz_stop_is_due(x->stop)) {
         yield_to(x, q);
         bool dependent = depends(x, q);
         double step = dependent ? INFINITY : fmax(0.0, -x->g[q]) / x->compliance;
@@ -340,7 +340,7 @@ static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *e
     bool proven = false;
     for (int64_t k = 0; x->steps < x->most && k < CIRCLES * (x->m + 1); k++) {
         settle(x);
-        if (uz_leave_is_over(x->leave))
+        if (uz_stop_is_due(x->stop))
             return UZ_OK;
         int64_t q = choose(x);
         if (q < 0) {
@@ -350,17 +350,17 @@ static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *e
         uz_status status = admit(x, q, &proven, ray, err);
         if (proven)
             *end = UZ_EXCHANGE_RAY;
-        if (status != UZ_OK || proven || uz_leave_is_over(x->leave))
+        if (status != UZ_OK || proven || uz_stop_is_due(x->stop))
             return status;
     }
     return UZ_OK;
 }
 
 uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, double *g, double *ray, bool *active,
-                          const double *base, uz_dual_load *load, const uz_leave *leave, uz_error *err)
+                          const double *base, uz_dual_load *load, const uz_stop *stop, uz_error *err)
 {
     int64_t m = uz_dual_load_N(load)->rows;
-    exchange x = {.load = load, .s = s, .g = g, .leave = leave, .most = *steps};
+    exchange x = {.load = load, .s = s, .g = g, .stop = stop, .most = *steps};
     *end = UZ_EXCHANGE_STOPPED;
     uz_status status = allocate(&x, m, err);
     if (status == UZ_OK) {

@@ -206,10 +206,10 @@ static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_opti
  * alpha: who goes on with it chooses. */
 static uz_status prepare(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_error *err)
 {
-    const uz_leave leave = {options->hooks, options->deadline};
+    const uz_stop stop = {options->hooks, options->deadline};
     double lambda = 0.0;
     uz_status status = uz_dual_load_prepare_iterations(load, it->alpha > 0.0 ? NULL : &lambda, err);
-    if (it->alpha <= 0.0 && (lambda > 0.0 || !uz_leave_is_over(&leave)))
+    if (it->alpha <= 0.0 && (lambda > 0.0 || !uz_stop_is_due(&stop)))
         it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
     return status;
 }

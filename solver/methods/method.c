@@ -74,8 +74,8 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_dual_load *load, const
 uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                         uz_history *history, uz_error *err)
 {
-    uz_leave leave = {options->hooks, options->deadline};
-    uz_dual_load_set_leave(load, &leave);
+    uz_stop stop = {options->hooks, options->deadline};
+    uz_dual_load_set_stop(load, &stop);
     if (options->method == UZ_METHOD_AUTO)
         return run_auto(end, it, load, options, history, err);
     if (options->method == UZ_METHOD_ACTIVE_SET)

@@ -208,14 +208,14 @@ uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_cand
     return status;
 }
 
-double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_leave *leave)
+double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)
 {
     uz_error ignored = {0};
     double bound;
-    if (!uz_lock_while(&body->mutex, leave))
+    if (!uz_lock_while(&body->mutex, stop))
         return INFINITY;
     if (isnan(body->inverse_bound) &&
-        uz_factor_inverse_norm(&bound, body->factor, ws, K, leave, &ignored) != UZ_ERR_CANCELLED)
+        uz_factor_inverse_norm(&bound, body->factor, ws, K, stop, &ignored) != UZ_ERR_CANCELLED)
         body->inverse_bound = bound;
     bound = isnan(body->inverse_bound) ? INFINITY : body->inverse_bound;
     pthread_mutex_unlock(&body->mutex);

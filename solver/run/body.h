@@ -52,8 +52,8 @@ uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const 
 void uz_body_free(uz_body *body);
 
 /* What the certificate of a body that is used again and again saves by: uz_factor_inverse_norm, made at the first call.
- * INFINITY when that failed, or leave (NULL: for ever) was over before it was known. */
-double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_leave *leave);
+ * INFINITY when that failed, or it had to stop (stop NULL: never) before it was known. */
+double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop);
 
 /* The body's matrices: the model's for a scene, the problem's otherwise. N has the rows it is solved with. */
 const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem);

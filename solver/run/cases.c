@@ -262,8 +262,8 @@ static uz_status solve_round(batch *b, uz_cache *cache, uz_error *err)
 /* There are answers with bounds: whoever ends the solve now gets these. */
 static bool is_over(const batch *b)
 {
-    uz_leave leave = {b->hooks, b->started + b->settings->time_limit_s};
-    return uz_leave_is_over(&leave);
+    uz_stop stop = {b->hooks, b->started + b->settings->time_limit_s};
+    return uz_stop_is_due(&stop);
 }
 
 static void end_before_round(batch *b)

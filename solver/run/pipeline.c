@@ -136,7 +136,7 @@ uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const double *u, uz_error *err)
 {
     const uz_csc *K = uz_body_K(run->body, run->problem);
-    const uz_leave leave = {run->hooks, run->deadline};
+    const uz_stop stop = {run->hooks, run->deadline};
     double whole_norm = 0.0;
     uz_status status = need_workspace(run, err);
     if (status == UZ_OK)
@@ -152,7 +152,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const doubl
         .ctx = run,
         .rcond = run->result->summary.rcond,
         .inverse_bound =
-            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws, &leave) : INFINITY,
+            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws, &stop) : INFINITY,
         .moved = run->moved,
         .whole_norm = whole_norm,
         .sharp = 0.5 * run->requested,

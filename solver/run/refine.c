@@ -93,10 +93,10 @@ static uz_status keep_rows(refinement *x, uz_dual_load *correction, uz_error *er
 
 static uz_status exchange_rows(refinement *x, uz_dual_load *correction, uz_error *err)
 {
-    uz_leave leave = {x->run->hooks, x->run->deadline};
+    uz_stop stop = {x->run->hooks, x->run->deadline};
     uz_exchange_end ended;
     int64_t steps = INT64_MAX;
-    uz_status status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, correction, &leave, err);
+    uz_status status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, correction, &stop, err);
     x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_BLURRED;
     return status;
 }
@@ -112,9 +112,9 @@ static uz_status correct(refinement *x, uz_error *err)
         x->f[i] = exchange || x->active[i] ? x->f[i] : INFINITY;
     uz_status status =
         uz_dual_load_create(&correction, run->body->dual, uz_body_K(run->body, run->problem), x->e, x->f, err);
-    uz_leave leave = {run->hooks, run->deadline};
+    uz_stop stop = {run->hooks, run->deadline};
     if (status == UZ_OK)
-        uz_dual_load_set_leave(correction, &leave);
+        uz_dual_load_set_stop(correction, &stop);
     if (status == UZ_OK)
         status = exchange ? exchange_rows(x, correction, err) : keep_rows(x, correction, err);
     if (status == UZ_OK)
@@ -132,8 +132,8 @@ static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
     uz_status status = measure(x, latest, err);
     if (status == UZ_OK)
         status = correct(x, err);
-    uz_leave leave = {run->hooks, run->deadline};
-    if (status != UZ_OK || x->contradictory || uz_leave_is_over(&leave)) /* half a correction is none */
+    uz_stop stop = {run->hooks, run->deadline};
+    if (status != UZ_OK || x->contradictory || uz_stop_is_due(&stop)) /* half a correction is none */
         return status;
     for (int64_t j = 0; j < run->d; j++)
         latest->u[j] += x->c[j];
@@ -155,8 +155,8 @@ static bool is_worth_it(const uz_run *run)
 {
     double error = run->answer.certificate.relative_error;
     bool ended = run->end == UZ_END_SOLVED || run->end == UZ_END_BLURRED || run->end == UZ_END_STALLED;
-    uz_leave leave = {run->hooks, run->deadline};
-    return ended && error > run->requested && error > ROUNDED && !uz_leave_is_over(&leave);
+    uz_stop stop = {run->hooks, run->deadline};
+    return ended && error > run->requested && error > ROUNDED && !uz_stop_is_due(&stop);
 }
 
 uz_status uz_run_refine(uz_run *run, uz_error *err)

@@ -242,7 +242,7 @@ TEST(refinement_wins_back_the_digits_that_the_condition_takes)
     }
 }
 
-/* ------------------------------------------------------------------ leave */
+/* ------------------------------------------------------------------ cancellation */
 
 typedef struct {
     int64_t asked, refuse_after;
@@ -332,20 +332,20 @@ TEST(pivoted_factor_finds_the_rank)
     }
 }
 
-/* How often leave is asked: at least once for 2e8 flops of n^3 / 3, and what is refused ends at once. */
+/* How often it asks whether to stop: at least once for 2e8 flops of n^3 / 3, and what is refused ends at once. */
 TEST(dense_work_asks_between_panels)
 {
     enum { N = 1600 };
     double *A = dominant(N);
     patience p = {.refuse_after = INT64_MAX};
     uz_hooks hooks = {.ctx = &p, .cancelled = ask};
-    uz_leave leave = {&hooks, INFINITY};
-    CHECK(uz_potrf_lower_while(N, A, &leave));
+    uz_stop stop = {&hooks, INFINITY};
+    CHECK(uz_potrf_lower_while(N, A, &stop));
     CHECK(p.asked >= 20);
     free(A);
     A = dominant(N);
     p = (patience){.refuse_after = 2};
-    CHECK(!uz_potrf_lower_while(N, A, &leave));
+    CHECK(!uz_potrf_lower_while(N, A, &stop));
     CHECK_INT(p.asked, 3);
     free(A);
 }

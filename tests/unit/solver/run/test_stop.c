@@ -236,11 +236,11 @@ TEST(who_waits_for_anothers_work_can_be_stopped)
     pthread_t other;
     pause p = {.began = true, .stop_at = 3};
     uz_hooks hooks = {.ctx = &p, .cancelled = ask};
-    uz_leave leave = {&hooks, INFINITY}, late = {NULL, 0.0};
-    CHECK(uz_lock_while(&mutex, &leave) && pthread_mutex_unlock(&mutex) == 0);
+    uz_stop stop = {&hooks, INFINITY}, late = {NULL, 0.0};
+    CHECK(uz_lock_while(&mutex, &stop) && pthread_mutex_unlock(&mutex) == 0);
     CHECK_INT(p.asked, 0);
     CHECK(pthread_create(&other, NULL, hold, &mutex) == 0 && pthread_join(other, NULL) == 0);
-    CHECK(!uz_lock_while(&mutex, &leave));
+    CHECK(!uz_lock_while(&mutex, &stop));
     CHECK_INT(p.asked, 4);
     CHECK(!uz_lock_while(&mutex, &late));
 }
