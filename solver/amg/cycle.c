@@ -117,13 +117,6 @@ static uz_status solve_coarsest(const uz_multigrid *mg, uz_multigrid_room *room,
     return status;
 }
 
-/* Where K itself is the coarsest matrix: held dofs are rows of the unit matrix there. */
-static void clear_held(double *z, const uz_level *level)
-{
-    for (int64_t j = 0; j < level->n; j++)
-        z[j] = level->inverse[j] > 0.0 ? z[j] : 0.0;
-}
-
 uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
                              const double *r, uz_error *err)
 {
@@ -138,8 +131,12 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
     }
     uz_status status =
         last == 0 ? solve_coarsest(mg, room, z, r, err) : solve_coarsest(mg, room, room->x[last], room->b[last], err);
-    if (last == 0)
-        clear_held(z, &mg->level[0]);
+    if (last == 0) {
+        /* Where K itself is the coarsest matrix: held dofs are rows of the unit matrix there. */
+        const uz_level *level = &mg->level[0];
+        for (int64_t j = 0; j < level->n; j++)
+            z[j] = level->inverse[j] > 0.0 ? z[j] : 0.0;
+    }
     for (int l = last - 1; l >= 0; l--) {
         const uz_level *level = &mg->level[l];
         double *x = l == 0 ? z : room->x[l];

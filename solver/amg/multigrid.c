@@ -77,13 +77,6 @@ typedef struct {
     double strong;
 } sources;
 
-static void clear_sources(sources *s)
-{
-    free(s->node);
-    free(s->modes);
-    memset(s, 0, sizeof *s);
-}
-
 /* The prolongation of the level and the modes of the next. coarse NULL on success: the level can't be coarsened. */
 static uz_status build_prolongation(uz_level *level, float **coarse, const uz_csc *A, const sources *from,
                                     double threshold, int k, const uz_stop *stop, uz_error *err)
@@ -133,11 +126,6 @@ static uz_status next_sources(sources *s, float *modes, int64_t aggregates, int 
     for (int64_t i = 0; i < aggregates * k; i++)
         s->node[i] = (int32_t)(i / k);
     return UZ_OK;
-}
-
-static const uz_csc *level_matrix(const uz_multigrid *mg, const uz_csc *K, int l)
-{
-    return l == 0 ? K : &mg->level[l].A;
 }
 
 /* Held dofs of a matrix that is small enough to be the coarsest: their rows become those of the unit matrix. */
@@ -215,7 +203,7 @@ static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_c
 {
     int l = mg->levels - 1;
     uz_level *level = &mg->level[l], *next = level + 1;
-    const uz_csc *A = level_matrix(mg, K, l);
+    const uz_csc *A = l == 0 ? K : &mg->level[l].A;
     float *modes = NULL;
     *done = level->n <= COARSEST || l + 1 == UZ_LEVELS_MOST;
     if (*done)
@@ -269,7 +257,9 @@ static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes,
     while (status == UZ_OK && !done) {
         status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
     }
-    clear_sources(&from);
+    free(from.node);
+    free(from.modes);
+    memset(&from, 0, sizeof from);
     double *row = status == UZ_OK ? uz_alloc(K->cols, sizeof *row) : NULL;
     if (status == UZ_OK && !row)
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)K->cols);

@@ -204,14 +204,6 @@ static bool smooth_row(prolongation *p, block_row *row, const uz_row_walk *walk,
     return true;
 }
 
-static void shrink(prolongation *p, int k)
-{
-    int32_t *block = uz_realloc(p->level->block, p->count, sizeof *block);
-    float *value = uz_realloc(p->level->value, p->count * k, sizeof *value);
-    p->level->block = block ? block : p->level->block;
-    p->level->value = value ? value : p->level->value;
-}
-
 uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *basis, const int32_t *of, double omega,
                               int k, const uz_stop *stop, uz_error *err)
 {
@@ -230,8 +222,12 @@ uz_status uz_prolong_smoothed(uz_level *level, const uz_csc *A, const float *bas
         level->ptr[i + 1] = p.count;
         block_row_empty(&row);
     }
-    if (ok)
-        shrink(&p, k);
+    if (ok) {
+        int32_t *block = uz_realloc(p.level->block, p.count, sizeof *block);
+        float *value = uz_realloc(p.level->value, p.count * k, sizeof *value);
+        p.level->block = block ? block : p.level->block;
+        p.level->value = value ? value : p.level->value;
+    }
     uz_row_walk_clear(&walk);
     block_row_clear(&row);
     if (over)

@@ -23,25 +23,6 @@ bool uz_cholmod_start(cholmod_common *common)
     return true;
 }
 
-static cholmod_sparse view_lower(const uz_csc *K)
-{
-    cholmod_sparse A;
-    memset(&A, 0, sizeof A);
-    A.nrow = (size_t)K->rows;
-    A.ncol = (size_t)K->cols;
-    A.nzmax = (size_t)K->ptr[K->cols];
-    A.p = K->ptr;
-    A.i = K->idx;
-    A.x = K->val;
-    A.stype = -1;
-    A.itype = CHOLMOD_LONG;
-    A.xtype = CHOLMOD_REAL;
-    A.dtype = CHOLMOD_DOUBLE;
-    A.sorted = 1;
-    A.packed = 1;
-    return A;
-}
-
 static uz_status analyze(uz_analysis *analysis, cholmod_sparse *A, int64_t rows, uz_ordering ordering,
                          cholmod_common *common, uz_error *err)
 {
@@ -92,7 +73,20 @@ static uz_status create(uz_analysis **out, const uz_csc *K, const int64_t *dofs,
         free(analysis);
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
     }
-    cholmod_sparse A = view_lower(K);
+    cholmod_sparse A;
+    memset(&A, 0, sizeof A);
+    A.nrow = (size_t)K->rows;
+    A.ncol = (size_t)K->cols;
+    A.nzmax = (size_t)K->ptr[K->cols];
+    A.p = K->ptr;
+    A.i = K->idx;
+    A.x = K->val;
+    A.stype = -1;
+    A.itype = CHOLMOD_LONG;
+    A.xtype = CHOLMOD_REAL;
+    A.dtype = CHOLMOD_DOUBLE;
+    A.sorted = 1;
+    A.packed = 1;
     uz_status status = begin(analysis, K, dofs, n_dofs, err);
     if (status == UZ_OK)
         status = analyze(analysis, &A, rows, ordering, &common, err);

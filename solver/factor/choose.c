@@ -20,19 +20,6 @@ typedef struct {
     cholmod_common *common;
 } chooser;
 
-/* To what size and up to which share of zeros small supernodes are merged (Ashcraft and Grimes, ACM TOMS 15 (1989); for
- * CHOLMOD's own numbers see its guide, `nrelax`). Sizes are in columns, and supernodes are counted in groups here. A
- * little more than CHOLMOD's: 7 % more entries, a tenth less time on the paper's body. */
-static void relax_supernodes(cholmod_common *common, int64_t n, int64_t groups)
-{
-    static const size_t columns[3] = {8, 24, 48};
-    static const double zeros[3] = {0.8, 0.15, 0.08};
-    for (int k = 0; k < 3; k++) {
-        common->nrelax[k] = (columns[k] * (size_t)groups + (size_t)n / 2) / (size_t)n;
-        common->zrelax[k] = zeros[k];
-    }
-}
-
 /* Additions and multiplications of the supernodal factorization, filled-in zeros included. */
 static double count_flops(const cholmod_factor *L)
 {
@@ -160,7 +147,15 @@ uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t 
     c.metis = uz_alloc(c.groups, sizeof *c.metis);
     c.last = uz_alloc(analysis->n_last, sizeof *c.last);
     uz_status status = UZ_OK;
-    relax_supernodes(common, analysis->n, c.groups);
+    /* To what size and up to which share of zeros small supernodes are merged (Ashcraft and Grimes, ACM TOMS 15 (1989);
+     * for CHOLMOD's own numbers see its guide, `nrelax`). Sizes are in columns, and supernodes are counted in groups
+     * here. A little more than CHOLMOD's: 7 % more entries, a tenth less time on the paper's body. */
+    static const size_t columns[3] = {8, 24, 48};
+    static const double zeros[3] = {0.8, 0.15, 0.08};
+    for (int k = 0; k < 3; k++) {
+        common->nrelax[k] = (columns[k] * (size_t)c.groups + (size_t)analysis->n / 2) / (size_t)analysis->n;
+        common->zrelax[k] = zeros[k];
+    }
     if (c.perm && c.metis && c.last && list_groups(&c))
         status = try_all(&c, ordering, err);
     else

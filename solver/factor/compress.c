@@ -103,35 +103,6 @@ static void drop_repeated(cholmod_sparse *graph, int64_t *mark)
     }
 }
 
-static cholmod_sparse *group_graph(const cholmod_sparse *A, const int64_t *group, int64_t groups,
-                                   cholmod_common *common)
-{
-    SuiteSparse_long *next = uz_alloc_zero(groups + 1, sizeof *next), *mark = uz_alloc(groups, sizeof *mark);
-    cholmod_sparse *graph = NULL;
-    int64_t edges = 0;
-    if (next && mark) {
-        collect_edges(next, NULL, mark, A, group, groups);
-        for (int64_t g = 0; g <= groups; g++) { /* from counts to where columns begin */
-            int64_t count = next[g];
-            next[g] = edges;
-            edges += count;
-        }
-        graph =
-            cholmod_l_allocate_sparse((size_t)groups, (size_t)groups, (size_t)edges, 0, 1, -1, CHOLMOD_PATTERN, common);
-    }
-    if (graph) {
-        SuiteSparse_long *ptr = graph->p;
-        collect_edges(next, graph->i, mark, A, group, groups);
-        ptr[0] = 0;
-        for (int64_t g = 0; g < groups; g++) /* each column was filled up to where it ends */
-            ptr[g + 1] = next[g];
-        drop_repeated(graph, mark);
-    }
-    free(next);
-    free(mark);
-    return graph;
-}
-
 cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
                             cholmod_common *common)
 {
@@ -141,7 +112,30 @@ cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64
     if (sum) {
         sum_neighbourhoods(sum, A->p, A->i, n, last, n_last);
         find_heads(group, sum, A->p, A->i, n);
-        graph = group_graph(A, group, number_groups(group, n), common);
+        int64_t groups = number_groups(group, n);
+        SuiteSparse_long *next = uz_alloc_zero(groups + 1, sizeof *next), *mark = uz_alloc(groups, sizeof *mark);
+        graph = NULL;
+        int64_t edges = 0;
+        if (next && mark) {
+            collect_edges(next, NULL, mark, A, group, groups);
+            for (int64_t g = 0; g <= groups; g++) { /* from counts to where columns begin */
+                int64_t count = next[g];
+                next[g] = edges;
+                edges += count;
+            }
+            graph = cholmod_l_allocate_sparse((size_t)groups, (size_t)groups, (size_t)edges, 0, 1, -1, CHOLMOD_PATTERN,
+                                              common);
+        }
+        if (graph) {
+            SuiteSparse_long *ptr = graph->p;
+            collect_edges(next, graph->i, mark, A, group, groups);
+            ptr[0] = 0;
+            for (int64_t g = 0; g < groups; g++) /* each column was filled up to where it ends */
+                ptr[g + 1] = next[g];
+            drop_repeated(graph, mark);
+        }
+        free(next);
+        free(mark);
     }
     free(sum);
     return graph;

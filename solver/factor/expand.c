@@ -8,37 +8,6 @@
 
 #include <stdlib.h>
 
-/* first[g] (groups + 1): where group g's dofs begin in `member` (n), ascending within a group. */
-static void list_members(int64_t *first, int64_t *member, const int64_t *group, int64_t n, int64_t groups)
-{
-    for (int64_t g = 0; g <= groups; g++)
-        first[g] = 0;
-    for (int64_t i = 0; i < n; i++)
-        first[group[i] + 1]++;
-    for (int64_t g = 0; g < groups; g++)
-        first[g + 1] += first[g];
-    for (int64_t i = 0; i < n; i++)
-        member[first[group[i]]++] = i;
-    for (int64_t g = groups; g > 0; g--)
-        first[g] = first[g - 1];
-    first[0] = 0;
-}
-
-/* start[k] (groups + 1): the position of the first dof of the k-th group in the order of elimination. */
-static void place_groups(cholmod_factor *L, int64_t *start, const cholmod_factor *G, const int64_t *first,
-                         const int64_t *member)
-{
-    const SuiteSparse_long *order = G->Perm;
-    SuiteSparse_long *perm = L->Perm;
-    int64_t at = 0;
-    for (int64_t k = 0; k < (int64_t)G->n; k++) {
-        start[k] = at;
-        for (int64_t e = first[order[k]]; e < first[order[k] + 1]; e++)
-            perm[at++] = member[e];
-    }
-    start[G->n] = at;
-}
-
 /* The sizes of all supernodes: super, pi, px, and the largest. */
 static void size_supernodes(cholmod_factor *L, const cholmod_factor *G, const int64_t *start)
 {
@@ -109,8 +78,28 @@ cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t
     cholmod_factor *L = first && start && room ? cholmod_l_allocate_factor((size_t)n, common) : NULL;
     bool ok = L && allocate(L, G, common);
     if (ok) {
-        list_members(first, room, group, n, groups);
-        place_groups(L, start, G, first, room);
+        /* first[g] (groups + 1): where group g's dofs begin in `member` (n), ascending within a group. */
+        for (int64_t g = 0; g <= groups; g++)
+            first[g] = 0;
+        for (int64_t i = 0; i < n; i++)
+            first[group[i] + 1]++;
+        for (int64_t g = 0; g < groups; g++)
+            first[g + 1] += first[g];
+        for (int64_t i = 0; i < n; i++)
+            room[first[group[i]]++] = i;
+        for (int64_t g = groups; g > 0; g--)
+            first[g] = first[g - 1];
+        first[0] = 0;
+        /* start[k] (groups + 1): the position of the first dof of the k-th group in the order of elimination. */
+        const SuiteSparse_long *order = G->Perm;
+        SuiteSparse_long *perm = L->Perm;
+        int64_t at = 0;
+        for (int64_t k = 0; k < (int64_t)G->n; k++) {
+            start[k] = at;
+            for (int64_t e = first[order[k]]; e < first[order[k] + 1]; e++)
+                perm[at++] = room[e];
+        }
+        start[G->n] = at;
         size_supernodes(L, G, start);
         L->s = cholmod_l_malloc(L->ssize, sizeof(SuiteSparse_long), common);
         L->ordering = G->ordering;

@@ -22,19 +22,6 @@ static uz_status check_memory(const uz_factor *factor, size_t memory_limit, uz_e
                    bytes, memory_limit);
 }
 
-/* Where each column of P K P' begins, lower triangle: next (n + 1). */
-static void count_permuted(SuiteSparse_long *next, const uz_csc *K, const int64_t *position)
-{
-    memset(next, 0, (size_t)(K->cols + 1) * sizeof *next);
-    for (int64_t j = 0; j < K->cols; j++)
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
-            int64_t a = position[j], b = position[K->idx[k]];
-            next[(a < b ? a : b) + 1]++;
-        }
-    for (int64_t j = 0; j < K->cols; j++)
-        next[j + 1] += next[j];
-}
-
 /* P K P' (lower triangle, columns unsorted), as cholmod_factorize makes it by two transpositions with five passes over
  * the entries: of a body in two dimensions they take a tenth of the factorization. NULL: no memory. */
 static cholmod_sparse *permute(const uz_csc *K, const int64_t *position, cholmod_common *common)
@@ -45,7 +32,15 @@ static cholmod_sparse *permute(const uz_csc *K, const int64_t *position, cholmod
         return NULL;
     SuiteSparse_long *next = S->p, *row = S->i;
     double *value = S->x;
-    count_permuted(next, K, position);
+    /* Where each column of P K P' begins, lower triangle: next (n + 1). */
+    memset(next, 0, (size_t)(K->cols + 1) * sizeof *next);
+    for (int64_t j = 0; j < K->cols; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
+            int64_t a = position[j], b = position[K->idx[k]];
+            next[(a < b ? a : b) + 1]++;
+        }
+    for (int64_t j = 0; j < K->cols; j++)
+        next[j + 1] += next[j];
     for (int64_t j = 0; j < K->cols; j++)
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++) {
             int64_t a = position[j], b = position[K->idx[k]], at = next[a < b ? a : b]++;
@@ -97,11 +92,13 @@ static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *c
  * move, rounding was seen to leave up to half of n eps. */
 #define RCOND_LEAST DBL_EPSILON
 
-/* min_j L_jj^2 / K_jj: what elimination left of each diagonal entry. It does not depend on the units of single dofs,
- * and the accuracy of a Cholesky factorization is governed by the condition after diagonal scaling (Demmel 1989; Higham
- * 2002, section 10.1). */
-static double least_pivot_share(const uz_factor *factor, const uz_csc *K)
+static uz_status describe(uz_factor *factor, const uz_csc *K, uz_error *err)
 {
+    uz_factor_info *info = &factor->info;
+    *info = uz_analysis_describe(factor->analysis);
+    /* min_j L_jj^2 / K_jj: what elimination left of each diagonal entry. It does not depend on the units of single
+     * dofs, and the accuracy of a Cholesky factorization is governed by the condition after diagonal scaling (Demmel
+     * 1989; Higham 2002, section 10.1). */
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *perm = L->Perm;
     const double *x = L->x;
@@ -112,35 +109,13 @@ static double least_pivot_share(const uz_factor *factor, const uz_csc *K)
             double pivot = x[px[s] + j + j * rows], share = pivot * pivot / K->val[K->ptr[perm[k]]];
             least = share < least || isnan(share) ? share : least;
         }
-    return least;
-}
-
-static uz_status describe(uz_factor *factor, const uz_csc *K, uz_error *err)
-{
-    uz_factor_info *info = &factor->info;
-    *info = uz_analysis_describe(factor->analysis);
-    info->rcond = least_pivot_share(factor, K);
+    info->rcond = least;
     if (!(info->rcond >= RCOND_LEAST * (double)factor->n))
         return uz_fail(err, UZ_ERR_NOT_SPD, "K",
                        "K is singular to working precision (reciprocal condition %.2g): the body can move without "
                        "resistance, or its stiffnesses differ by more than double precision can hold",
                        info->rcond);
     return UZ_OK;
-}
-
-static uz_status build(uz_factor *factor, const uz_csc *K, size_t memory_limit, const uz_hooks *hooks,
-                       cholmod_common *common, uz_error *err)
-{
-    double start = uz_seconds();
-    uz_status status = check_memory(factor, memory_limit, err);
-    if (status == UZ_OK && uz_cancelled(hooks))
-        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
-    if (status == UZ_OK)
-        status = factorize(factor, K, common, err);
-    if (status == UZ_OK)
-        status = describe(factor, K, err);
-    factor->info.factor_s = uz_seconds() - start;
-    return status;
 }
 
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
@@ -158,7 +133,15 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     factor->n = analysis->n;
     factor->analysis = uz_analysis_hold(analysis);
     factor->L = *analysis->L;
-    uz_status status = build(factor, K, memory_limit, hooks, &common, err);
+    double start = uz_seconds();
+    uz_status status = check_memory(factor, memory_limit, err);
+    if (status == UZ_OK && uz_cancelled(hooks))
+        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
+    if (status == UZ_OK)
+        status = factorize(factor, K, &common, err);
+    if (status == UZ_OK)
+        status = describe(factor, K, err);
+    factor->info.factor_s = uz_seconds() - start;
     cholmod_l_finish(&common);
     if (status == UZ_OK)
         *out = factor;

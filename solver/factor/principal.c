@@ -19,18 +19,6 @@ struct uz_principal {
     cholmod_dense *X, *Y, *E; /* CHOLMOD's room, kept between solves */
 };
 
-/* place (n): the row of a free dof in the reduced matrix, -1 for the others. */
-static void number_free(uz_principal *part, int64_t *place, const bool *fixed, const uz_factor *factor)
-{
-    const SuiteSparse_long *perm = factor->L.Perm;
-    for (int64_t k = 0; k < factor->n; k++) {
-        int64_t i = perm[k];
-        place[i] = fixed[i] ? -1 : part->n_free;
-        if (!fixed[i])
-            part->dof[part->n_free++] = i;
-    }
-}
-
 /* Counts (values false) or places (values true) the entries of the reduced matrix's upper triangle; next (n_free + 1)
  * is where each column's next entry goes, or one past its count. */
 static void scatter(cholmod_sparse *A, SuiteSparse_long *next, const uz_csc *K, const int64_t *place, bool values)
@@ -105,8 +93,16 @@ static uz_status build(uz_principal *part, bool *positive, const uz_csc *K, cons
     part->room = uz_alloc(n, sizeof *part->room);
     bool ok = place && part->dof && part->room;
     *positive = true;
-    if (ok)
-        number_free(part, place, fixed, factor);
+    if (ok) {
+        /* place (n): the row of a free dof in the reduced matrix, -1 for the others. */
+        const SuiteSparse_long *perm = factor->L.Perm;
+        for (int64_t k = 0; k < factor->n; k++) {
+            int64_t i = perm[k];
+            place[i] = fixed[i] ? -1 : part->n_free;
+            if (!fixed[i])
+                part->dof[part->n_free++] = i;
+        }
+    }
     if (ok && part->n_free > 0) {
         A = reduce(part, K, place);
         ok = A != NULL;

@@ -222,21 +222,6 @@ static bool collect_columns(gathering *g, int64_t k, const supernode *s)
     return true;
 }
 
-/* Adds what a child left, row by row where it belongs, and frees it. */
-static void take_over(gathering *g, share *own, const supernode *s, share *child, const supernode *from)
-{
-    for (int64_t q = 0; q < child->count; q++) {
-        double *to = own->block + g->slot[child->column[q]] * s->rows;
-        const double *left = child->block + q * from->rows;
-        for (int64_t i = from->columns; i < from->rows; i++)
-            to[g->local[from->row[i]]] += left[i];
-    }
-    free(child->column);
-    free(child->block);
-    child->column = NULL;
-    child->block = NULL;
-}
-
 static void fill_block(gathering *g, int64_t k, const supernode *s)
 {
     const cholmod_factor *L = &g->reach->factor->L;
@@ -249,20 +234,19 @@ static void fill_block(gathering *g, int64_t k, const supernode *s)
             own->block[j + g->slot[g->N->idx[e]] * s->rows] += g->N->val[e];
     for (int64_t c = g->child[k]; c >= 0; c = g->shares[c].next) {
         supernode from = at(L, g->reach->node[c]);
-        take_over(g, own, s, &g->shares[c], &from);
-    }
-}
-
-/* D += Z_s'Z_s */
-static void add_gram(gathering *g, const share *own, const supernode *s)
-{
-    int64_t m = g->N->rows, count = own->count;
-    uz_block_syrk_t(count, s->columns, own->block, s->rows, g->gram);
-    for (int64_t q = 0; q < count; q++)
-        for (int64_t p = q; p < count; p++) {
-            int64_t a = own->column[p], b = own->column[q];
-            g->D[a > b ? a + b * m : b + a * m] += g->gram[p + q * count];
+        /* What the child left goes row by row where it belongs. */
+        share *child = &g->shares[c];
+        for (int64_t q = 0; q < child->count; q++) {
+            double *to = own->block + g->slot[child->column[q]] * s->rows;
+            const double *left = child->block + q * from.rows;
+            for (int64_t i = from.columns; i < from.rows; i++)
+                to[g->local[from.row[i]]] += left[i];
         }
+        free(child->column);
+        free(child->block);
+        child->column = NULL;
+        child->block = NULL;
+    }
 }
 
 static bool visit(gathering *g, int64_t k)
@@ -274,7 +258,14 @@ static bool visit(gathering *g, int64_t k)
         return false;
     fill_block(g, k, &s);
     uz_block_eliminate(s.columns, s.rows - s.columns, own->count, s.value, s.rows, own->block, s.rows);
-    add_gram(g, own, &s);
+    /* D += Z_s'Z_s */
+    int64_t m = g->N->rows, count = own->count;
+    uz_block_syrk_t(count, s.columns, own->block, s.rows, g->gram);
+    for (int64_t q = 0; q < count; q++)
+        for (int64_t p = q; p < count; p++) {
+            int64_t a = own->column[p], b = own->column[q];
+            g->D[a > b ? a + b * m : b + a * m] += g->gram[p + q * count];
+        }
     for (int64_t q = 0; q < own->count; q++)
         g->slot[own->column[q]] = -1;
     if (parent >= 0) {

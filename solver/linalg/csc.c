@@ -115,29 +115,6 @@ static uz_status check_triplets(int64_t rows, int64_t cols, int64_t count, const
     return UZ_OK;
 }
 
-/* order[0..count) lists the triplets by ascending row, in the order given within a row. start: rows + 1, zero. */
-static void order_by_row(int64_t *order, int64_t *start, int64_t rows, int64_t count, const int64_t *row)
-{
-    for (int64_t k = 0; k < count; k++)
-        start[1 + row[k]]++;
-    counts_to_starts(start, rows);
-    for (int64_t k = 0; k < count; k++)
-        order[start[1 + row[k]]++] = k;
-}
-
-static void fill_columns(uz_csc *A, int64_t count, const int64_t *order, const int64_t *row, const int64_t *col,
-                         const double *val)
-{
-    for (int64_t k = 0; k < count; k++)
-        A->ptr[1 + col[k]]++;
-    counts_to_starts(A->ptr, A->cols);
-    for (int64_t k = 0; k < count; k++) {
-        int64_t at = A->ptr[1 + col[order[k]]]++;
-        A->idx[at] = row[order[k]];
-        A->val[at] = val[order[k]];
-    }
-}
-
 /* Adds up entries that stand next to each other with the same row; the arrays keep their room. */
 static void sum_duplicates(uz_csc *A)
 {
@@ -174,8 +151,20 @@ uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t 
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to sort %lld entries", (long long)count);
         goto done;
     }
-    order_by_row(order, start, rows, count, row);
-    fill_columns(&made, count, order, row, col, val);
+    /* order[0..count) lists the triplets by ascending row, in the order given within a row. start: rows + 1, zero. */
+    for (int64_t k = 0; k < count; k++)
+        start[1 + row[k]]++;
+    counts_to_starts(start, rows);
+    for (int64_t k = 0; k < count; k++)
+        order[start[1 + row[k]]++] = k;
+    for (int64_t k = 0; k < count; k++)
+        made.ptr[1 + col[k]]++;
+    counts_to_starts(made.ptr, made.cols);
+    for (int64_t k = 0; k < count; k++) {
+        int64_t at = made.ptr[1 + col[order[k]]]++;
+        made.idx[at] = row[order[k]];
+        made.val[at] = val[order[k]];
+    }
     sum_duplicates(&made);
 done:
     free(order);

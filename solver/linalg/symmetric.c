@@ -87,19 +87,6 @@ static int64_t inspect(const uz_csc *K, const uz_csc *T, pair *worst, double *wo
     return count;
 }
 
-static void fill_lower(uz_csc *lower, const uz_csc *K, const uz_csc *T)
-{
-    int64_t at = 0;
-    for (int64_t j = 0; j < K->cols; j++) {
-        pair_walk walk = walk_column(K, T, j);
-        for (pair p; walk_next(&walk, &p); at++) {
-            lower->idx[at] = p.i;
-            lower->val[at] = p.a + 0.5 * (p.b - p.a); /* exactly a where a = b */
-        }
-        lower->ptr[j + 1] = at;
-    }
-}
-
 static uz_status check_square_and_finite(const uz_csc *K, uz_error *err)
 {
     if (K->rows != K->cols)
@@ -136,8 +123,17 @@ uz_status uz_symmetric_lower(uz_csc *K, uz_error *err)
     status = uz_csc_init(&lower, K->rows, K->cols, count, err);
     if (status != UZ_OK)
         goto done;
-    if (K->ptr)
-        fill_lower(&lower, K, &T);
+    if (K->ptr) {
+        int64_t at = 0;
+        for (int64_t j = 0; j < K->cols; j++) {
+            pair_walk walk = walk_column(K, &T, j);
+            for (pair p; walk_next(&walk, &p); at++) {
+                lower.idx[at] = p.i;
+                lower.val[at] = p.a + 0.5 * (p.b - p.a); /* exactly a where a = b */
+            }
+            lower.ptr[j + 1] = at;
+        }
+    }
     uz_csc_clear(K);
     *K = lower;
     memset(&lower, 0, sizeof lower);

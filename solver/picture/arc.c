@@ -67,28 +67,6 @@ static void walk_group(arc_walk *w)
         }
 }
 
-static void begin_contact(arc_walk *w)
-{
-    for (int64_t i = 0; i < w->model->mesh.n_nodes; i++) {
-        w->next[i] = 0;
-        w->follows[i] = false;
-        w->at[i] = NAN;
-    }
-    w->length = 0;
-    w->parts = 0;
-}
-
-/* Rows [first, last) are those of one contact. */
-static void place_rows(double *arc, unsigned *part, arc_walk *w, int64_t first, int64_t last)
-{
-    for (int64_t i = first; i < last; i++) {
-        const int64_t node = w->model->info.contact_node[i];
-        const bool reached = !isnan(w->at[node]);
-        arc[i] = reached ? w->at[node] : w->length;
-        part[i] = reached ? w->part[node] : w->parts;
-    }
-}
-
 uz_status uz_contact_arc(double *arc, unsigned *part, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const int64_t n = model->mesh.n_nodes, m = model->m, *contact = model->info.contact_of;
@@ -101,11 +79,23 @@ uz_status uz_contact_arc(double *arc, unsigned *part, const uz_body_model *model
     for (int64_t first = 0, last; room && first < m; first = last) {
         for (last = first; last < m && contact[last] == contact[first];)
             last++;
-        begin_contact(&w);
+        for (int64_t i = 0; i < w.model->mesh.n_nodes; i++) {
+            w.next[i] = 0;
+            w.follows[i] = false;
+            w.at[i] = NAN;
+        }
+        w.length = 0;
+        w.parts = 0;
         w.group = uz_mesh_group(&model->mesh, scene->contacts[contact[first]].on, "", NULL);
         if (w.group)
             walk_group(&w);
-        place_rows(arc, part, &w, first, last);
+        /* Rows [first, last) are those of one contact. */
+        for (int64_t i = first; i < last; i++) {
+            const int64_t node = w.model->info.contact_node[i];
+            const bool reached = !isnan(w.at[node]);
+            arc[i] = reached ? w.at[node] : w.length;
+            part[i] = reached ? w.part[node] : w.parts;
+        }
     }
     free(w.next);
     free(w.follows);

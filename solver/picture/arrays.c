@@ -86,49 +86,12 @@ static unsigned *as_vertices(const surface_work *w, const int64_t *node, int64_t
     return out;
 }
 
-static uz_status fill_edges(uz_surface *s, const surface_work *w, uz_error *err)
-{
-    s->n_lines = w->edges.n_lines;
-    s->n_outline = w->edges.n_outline;
-    s->line = as_vertices(w, w->edges.line, 2 * s->n_lines);
-    s->outline = as_vertices(w, w->edges.outline, 2 * s->n_outline);
-    return s->line && s->outline ? UZ_OK : fail_memory(err, s);
-}
-
 /* ---------------------------------------------------------------- vertices */
-
-/* The middle of the body and the size of what is drawn. */
-static void choose_unit(uz_surface *s, const uz_mesh *mesh)
-{
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
-        low[i % mesh->dim] = fmin(low[i % mesh->dim], mesh->xyz[i]);
-        high[i % mesh->dim] = fmax(high[i % mesh->dim], mesh->xyz[i]);
-    }
-    for (int c = 0; c < mesh->dim; c++)
-        s->origin[c] = 0.5 * low[c] + 0.5 * high[c];
-    s->unit = unit_of(mesh->extent);
-}
 
 static void extend(float *low, float *high, float x)
 {
     *low = fminf(*low, x);
     *high = fmaxf(*high, x);
-}
-
-/* The middle of the body is at 0, so that low <= 0 <= high from the beginning. */
-static void put_vertex(uz_surface *s, int64_t vertex, const double *x, const double *u)
-{
-    double length = 0;
-    for (int c = 0; c < s->dim; c++) {
-        const float at = (float)((x[c] - s->origin[c]) / s->unit), by = (float)(u[c] / s->unit);
-        s->position[3 * vertex + c] = at;
-        s->displacement[3 * vertex + c] = by;
-        extend(&s->low[c], &s->high[c], at);
-        extend(&s->least[c], &s->most[c], by);
-        length = hypot(length, u[c]);
-    }
-    s->largest = fmax(s->largest, length);
 }
 
 static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *err)
@@ -140,7 +103,15 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
     s->node = renumbered ? uz_alloc(s->n_vertices, sizeof *s->node) : NULL;
     if (!s->position || !s->displacement || (renumbered && !s->node))
         return fail_memory(err, s);
-    choose_unit(s, mesh);
+    /* The middle of the body and the size of what is drawn. */
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++) {
+        low[i % mesh->dim] = fmin(low[i % mesh->dim], mesh->xyz[i]);
+        high[i % mesh->dim] = fmax(high[i % mesh->dim], mesh->xyz[i]);
+    }
+    for (int c = 0; c < mesh->dim; c++)
+        s->origin[c] = 0.5 * low[c] + 0.5 * high[c];
+    s->unit = unit_of(mesh->extent);
     for (int c = 0; c < 3; c++) {
         s->least[c] = c < s->dim ? INFINITY : 0;
         s->most[c] = c < s->dim ? -INFINITY : 0;
@@ -149,7 +120,19 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
         const int64_t vertex = w->vertex_of[a];
         if (vertex < 0)
             continue;
-        put_vertex(s, vertex, mesh->xyz + a * s->dim, w->answer->u + a * s->dim);
+        /* The middle of the body is at 0, so that low <= 0 <= high from the beginning. */
+        const double *x = mesh->xyz + a * s->dim;
+        const double *u = w->answer->u + a * s->dim;
+        double length = 0;
+        for (int c = 0; c < s->dim; c++) {
+            const float at = (float)((x[c] - s->origin[c]) / s->unit), by = (float)(u[c] / s->unit);
+            s->position[3 * vertex + c] = at;
+            s->displacement[3 * vertex + c] = by;
+            extend(&s->low[c], &s->high[c], at);
+            extend(&s->least[c], &s->most[c], by);
+            length = hypot(length, u[c]);
+        }
+        s->largest = fmax(s->largest, length);
         if (renumbered)
             s->node[vertex] = (float)a;
     }
@@ -292,24 +275,18 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
                                    err);
     if (status == UZ_OK)
         status = fill_triangles(s, w, err);
-    if (status == UZ_OK)
-        status = fill_edges(s, w, err);
+    if (status == UZ_OK) {
+        s->n_lines = w->edges.n_lines;
+        s->n_outline = w->edges.n_outline;
+        s->line = as_vertices(w, w->edges.line, 2 * s->n_lines);
+        s->outline = as_vertices(w, w->edges.outline, 2 * s->n_outline);
+        status = s->line && s->outline ? UZ_OK : fail_memory(err, s);
+    }
     if (status == UZ_OK)
         status = fill_vertices(s, w, err);
     if (status == UZ_OK)
         status = fill_stress(s, w, err);
     return status == UZ_OK ? fill_rows(s, w, err) : status;
-}
-
-static void clear_work(surface_work *w)
-{
-    uz_fields_clear(&w->fields);
-    uz_skin_clear(&w->skin);
-    uz_skin_edges_clear(&w->edges);
-    free(w->vertex_of);
-    free(w->drawn);
-    free(w->arc);
-    free(w->part);
 }
 
 uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
@@ -327,7 +304,13 @@ uz_status uz_surface_compute(uz_surface *out, const uz_scene *scene, const uz_fi
         status = uz_field_body_init(&body, scene, &model, err);
     if (status == UZ_OK)
         status = build(out, &w, &body, which, most_bytes, hooks, err);
-    clear_work(&w);
+    uz_fields_clear(&w.fields);
+    uz_skin_clear(&w.skin);
+    uz_skin_edges_clear(&w.edges);
+    free(w.vertex_of);
+    free(w.drawn);
+    free(w.arc);
+    free(w.part);
     uz_field_body_clear(&body);
     uz_body_model_clear(&model);
     if (status != UZ_OK)

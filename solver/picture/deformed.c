@@ -46,29 +46,6 @@ static uz_status make_pressure(double **out, const uz_scenery *scenery, uz_error
     return uz_contact_pressure(*out, model, scenery->scene, scenery->answer->r, err);
 }
 
-static void measure_values(uz_scenery *scenery, uz_field colour)
-{
-    scenery->low = INFINITY;
-    scenery->high = -INFINITY;
-    for (int64_t a = 0; a < scenery->model->mesh.n_nodes; a++) {
-        scenery->low = fmin(scenery->low, scenery->value[a]);
-        scenery->high = fmax(scenery->high, scenery->value[a]);
-    }
-    scenery->what = colour == UZ_FIELD_VON_MISES ? "von Mises stress" : "displacement";
-}
-
-static void put_head(uz_buffer *svg, const uz_scenery *scenery, const char *title)
-{
-    const int height = scenery->height + LEGEND;
-    uz_buffer_print(svg,
-                    "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
-                    "role=\"img\">\n<title>",
-                    scenery->width, height, scenery->width, height);
-    uz_buffer_put_escaped(svg, title ? title : "deformed body");
-    uz_buffer_print(svg, "</title>\n%s<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n", STYLE, scenery->width,
-                    height);
-}
-
 static uz_status put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)
 {
     uz_buffer_print(svg, "<image width=\"%d\" height=\"%d\" href=\"data:image/png;base64,", raster->width,
@@ -111,11 +88,24 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
     scenery->value = value;
     scenery->pressure = pressure;
     if (status == UZ_OK) {
-        measure_values(scenery, how->colour);
+        scenery->low = INFINITY;
+        scenery->high = -INFINITY;
+        for (int64_t a = 0; a < scenery->model->mesh.n_nodes; a++) {
+            scenery->low = fmin(scenery->low, scenery->value[a]);
+            scenery->high = fmax(scenery->high, scenery->value[a]);
+        }
+        scenery->what = how->colour == UZ_FIELD_VON_MISES ? "von Mises stress" : "displacement";
         status = uz_scenery_fit(scenery, err);
     }
     if (status == UZ_OK) {
-        put_head(svg, scenery, how->title);
+        const int height = scenery->height + LEGEND;
+        uz_buffer_print(svg,
+                        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
+                        "role=\"img\">\n<title>",
+                        scenery->width, height, scenery->width, height);
+        uz_buffer_put_escaped(svg, how->title ? how->title : "deformed body");
+        uz_buffer_print(svg, "</title>\n%s<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n", STYLE, scenery->width,
+                        height);
         uz_buffer_print(svg, "<svg width=\"%d\" height=\"%d\">\n", scenery->width, scenery->height);
         status = put_body(svg, scenery, &skin, hooks, err);
     }

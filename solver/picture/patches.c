@@ -178,26 +178,22 @@ static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const patc
         }
 }
 
-static void measure_body(patch *p, const uz_mesh *mesh)
-{
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int64_t i = 0; i < 3 * mesh->n_nodes; i++) {
-        low[i % 3] = fmin(low[i % 3], mesh->xyz[i]);
-        high[i % 3] = fmax(high[i % 3], mesh->xyz[i]);
-    }
-    for (int c = 0; c < 3; c++)
-        p->middle[c] = 0.5 * low[c] + 0.5 * high[c];
-    p->size = mesh->extent;
-}
-
 bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery)
 {
     const uz_mesh *mesh = &scenery->model->mesh;
     bool painted = false;
     patch p;
     memset(&p, 0, sizeof p);
-    if (mesh->dim == 3)
-        measure_body(&p, mesh);
+    if (mesh->dim == 3) {
+        double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+        for (int64_t i = 0; i < 3 * mesh->n_nodes; i++) {
+            low[i % 3] = fmin(low[i % 3], mesh->xyz[i]);
+            high[i % 3] = fmax(high[i % 3], mesh->xyz[i]);
+        }
+        for (int c = 0; c < 3; c++)
+            p.middle[c] = 0.5 * low[c] + 0.5 * high[c];
+        p.size = mesh->extent;
+    }
     for (int64_t k = 0; mesh->dim == 3 && k < scenery->scene->n_contacts; k++) {
         p.contact = &scenery->scene->contacts[k];
         if (p.contact->kind == UZ_OBSTACLE_BODY)

@@ -8,22 +8,6 @@
 /* Grids of more elements than this would hide their colours behind the lines. */
 enum { MOST_LINED = 4000 };
 
-/* A convex polygon of corners with the middles of its edges, as a fan about its mean: `count` points in order. */
-static void paint_polygon(uz_raster *raster, const uz_raster_point *p, int count, double light)
-{
-    uz_raster_point mean = {0, 0, 0, 0};
-    for (int i = 0; i < count; i++) {
-        mean.x += p[i].x / count;
-        mean.y += p[i].y / count;
-        mean.z += p[i].z / count;
-        mean.value += p[i].value / count;
-    }
-    for (int i = 0; i < count; i++) {
-        const uz_raster_point triangle[3] = {p[i], p[(i + 1) % count], mean};
-        uz_raster_triangle(raster, triangle, light);
-    }
-}
-
 static void paint_cell(uz_raster *raster, const uz_scenery *scenery, const int64_t *around, int n, bool lined)
 {
     uz_raster_point p[UZ_CELL_POINTS];
@@ -43,7 +27,18 @@ static void paint_cell(uz_raster *raster, const uz_scenery *scenery, const int64
             return;
         light = 0.55 + 0.45 * fmin(1, -area / (2 * size * size));
     }
-    paint_polygon(raster, p, n, light);
+    /* A convex polygon of corners with the middles of its edges, as a fan about its mean: `count` points in order. */
+    uz_raster_point mean = {0, 0, 0, 0};
+    for (int i = 0; i < n; i++) {
+        mean.x += p[i].x / n;
+        mean.y += p[i].y / n;
+        mean.z += p[i].z / n;
+        mean.value += p[i].value / n;
+    }
+    for (int i = 0; i < n; i++) {
+        const uz_raster_point triangle[3] = {p[i], p[(i + 1) % n], mean};
+        uz_raster_triangle(raster, triangle, light);
+    }
     for (int i = 0; lined && i < n; i++)
         uz_raster_line(raster, &p[i], &p[(i + 1) % n], 0.5);
 }

@@ -31,16 +31,6 @@ uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double 
     return point;
 }
 
-/* The plane as it is; a solid from a corner, 30 degrees from the right and 25 from above. */
-static void choose_axes(uz_scenery *scenery)
-{
-    static const double PLANE[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    const double a = 30 * 3.14159265358979 / 180, b = 25 * 3.14159265358979 / 180;
-    const double solid[3][3] = {
-        {cos(a), 0, -sin(a)}, {-sin(a) * sin(b), cos(b), -cos(a) * sin(b)}, {sin(a) * cos(b), sin(b), cos(a) * cos(b)}};
-    memcpy(scenery->axes, scenery->model->mesh.dim == 2 ? PLANE : solid, sizeof scenery->axes);
-}
-
 /* Adds where the nodes are, drawn with this factor, to the box low..high in lengths. */
 static void extend_box(double low[2], double high[2], const uz_scenery *scenery, double factor)
 {
@@ -73,7 +63,12 @@ double uz_show_factor(const uz_mesh *mesh, const double *u)
 uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
 {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    choose_axes(scenery);
+    /* The plane as it is; a solid from a corner, 30 degrees from the right and 25 from above. */
+    static const double PLANE[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const double a = 30 * 3.14159265358979 / 180, b = 25 * 3.14159265358979 / 180;
+    const double solid[3][3] = {
+        {cos(a), 0, -sin(a)}, {-sin(a) * sin(b), cos(b), -cos(a) * sin(b)}, {sin(a) * cos(b), sin(b), cos(a) * cos(b)}};
+    memcpy(scenery->axes, scenery->model->mesh.dim == 2 ? PLANE : solid, sizeof scenery->axes);
     scenery->extent = scenery->model->mesh.extent;
     if (!(scenery->factor > 0))
         scenery->factor = uz_show_factor(&scenery->model->mesh, scenery->answer->u);
