@@ -3,7 +3,7 @@
  * With the contact dofs B last, the trailing block L_bb of the factor is the Cholesky factor of the Schur complement S
  * of K on B, and N touches B only:  D = N K^-1 N' = N_b S^-1 N_b' = Z'Z,  Z = L_bb^-1 N_b'.
  * With B anywhere Z = L^-1 P N' is sparse: it lives on the reach of B, and so does all that the contact asks for. */
-#include "dual/dual_private.h"
+#include "dual/condensed.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
@@ -94,30 +94,30 @@ static bool allocate(uz_condensed *dense, int64_t n_b, bool contact_last)
     if (__builtin_mul_overflow(n_b, n_b, &block))
         return false;
     dense->n_b = n_b;
+    dense->made = uz_alloc_zero(1, sizeof *dense->made);
     dense->position = uz_alloc(n_b, sizeof(int64_t));
     dense->L_bb = contact_last ? uz_alloc(block, sizeof(double)) : NULL;
     dense->row_of = uz_alloc(n_b, sizeof(int64_t));
     dense->scale = uz_alloc(n_b, sizeof(double));
-    return dense->position && (dense->L_bb || !contact_last) && dense->row_of && dense->scale;
+    return dense->made && dense->position && (dense->L_bb || !contact_last) && dense->row_of && dense->scale;
 }
 
 /* Where N_b is a scaled permutation, and the contact last, D waits until somebody iterates; otherwise every bound needs
  * it. */
-static uz_status make_operator(uz_dual *dual, const uz_stop *stop, uz_error *err)
+static uz_status make_operator(uz_condensed *dense, const uz_stop *stop, uz_error *err)
 {
-    uz_condensed *dense = &dual->dense;
-    int64_t m = dual->info.m, size;
+    int64_t m = dense->dual.m, size;
     dense->scaled = !dense->reach && find_scaled(dense, m);
     if (dense->scaled)
         return UZ_OK;
     bool fits = !__builtin_mul_overflow(m, m, &size);
-    dual->lazy->D = fits ? uz_alloc_zero(size, sizeof(double)) : NULL;
-    if (!dual->lazy->D)
+    double *D = dense->made->D = fits ? uz_alloc_zero(size, sizeof(double)) : NULL;
+    if (!D)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)m);
-    uz_status status = dense->reach ? uz_reach_gram(dual->lazy->D, dense->reach, &dual->N, err)
-                                    : multiply_out(dense, dual->lazy->D, m, stop, err);
+    uz_status status =
+        dense->reach ? uz_reach_gram(D, dense->reach, &dense->dual.N, err) : multiply_out(dense, D, m, stop, err);
     if (status == UZ_OK)
-        factor_operator(dense, dual->lazy->D, m, stop);
+        factor_operator(dense, D, m, stop);
     if (status == UZ_OK && uz_stop_is_due(stop))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the first iteration");
     return status;
@@ -156,10 +156,10 @@ static uz_status list_contact(int64_t **order, int64_t *n_b, bool *last, const u
     return UZ_OK;
 }
 
-uz_status uz_condensed_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
+static uz_status create(uz_dual *dual, const uz_stop *stop, uz_error *err)
 {
-    uz_condensed *dense = &dual->dense;
-    int64_t m = dual->info.m, n_b = 0, *order = NULL;
+    uz_condensed *dense = (uz_condensed *)dual;
+    int64_t m = dual->m, n_b = 0, *order = NULL;
     bool last = false;
     uz_status status = list_contact(&order, &n_b, &last, dual, err);
     if (status == UZ_OK && !allocate(dense, n_b, last))
@@ -169,14 +169,17 @@ uz_status uz_condensed_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
     if (status == UZ_OK)
         status = restrict_columns(&dense->N_b, &dual->N, order, n_b, err);
     if (status == UZ_OK)
-        status = make_operator(dual, stop, err);
-    dual->info.bytes += 8 * (size_t)((last ? n_b * n_b : 0) + 2 * m * m);
+        status = make_operator(dense, stop, err);
+    dual->bytes += 8 * (size_t)((last ? n_b * n_b : 0) + 2 * m * m);
+    dual->rows_may_depend = !dense->scaled;
+    dual->touched = &dense->N_b;
     free(order);
     return status;
 }
 
-void uz_condensed_clear(uz_condensed *dense)
+static void clear(uz_dual *dual)
 {
+    uz_condensed *dense = (uz_condensed *)dual;
     uz_csc_clear(&dense->N_b);
     free(dense->position);
     free(dense->L_bb);
@@ -184,39 +187,90 @@ void uz_condensed_clear(uz_condensed *dense)
     free(dense->D_chol);
     free(dense->row_of);
     free(dense->scale);
+    if (dense->made) {
+        free(dense->made->D);
+        free(dense->made->D_inverse);
+    }
+    free(dense->made);
 }
 
-/* g0 from y = L^-1 P p, whose entry k stands at y[k stride]. x (d) is room where the contact is not last. */
-uz_status uz_condensed_begin(uz_dual_load *load, const double *y, int64_t stride, double *x, uz_error *err)
+/* whole: with room for vectors of d; a load in a block takes them from the block. */
+static uz_status allocate_load(uz_condensed_load *x, bool whole, uz_error *err)
 {
-    const uz_dual *dual = load->dual;
-    const uz_condensed *dense = &dual->dense;
-    double *u_b = load->work; /* displacements of the contact without reactions */
+    const uz_dual *dual = x->load.dual;
+    x->dense = (const uz_condensed *)dual;
+    int64_t d = dual->d, n_b = x->dense->n_b, contact = dual->m > n_b ? dual->m : n_b;
+    x->ws = uz_factor_workspace_new();
+    x->base = whole ? uz_alloc(d, sizeof(double)) : NULL;
+    x->apply_room = uz_alloc_zero(n_b, sizeof(double));
+    x->work = uz_alloc(contact, sizeof(double));
+    x->work2 = uz_alloc(whole && d > contact ? d : contact, sizeof(double));
+    x->load.correction = uz_alloc_zero(contact, sizeof(double));
+    x->load.kept = uz_alloc_zero(contact, sizeof(double));
+    x->load.bytes = 8 * (5 * (size_t)d + 2 * (size_t)dual->m);
+    if (x->ws && (x->base || !whole) && x->apply_room && x->work && x->work2 && x->load.correction && x->load.kept)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
+}
+
+/* g0 from y = L^-1 P p, whose entry k stands at y[k stride]. room (d) is used where the contact is not last. */
+static uz_status find_gaps(uz_condensed_load *x, const double *y, int64_t stride, double *room, uz_error *err)
+{
+    const uz_condensed *dense = x->dense;
+    double *u_b = x->work; /* displacements of the contact without reactions */
     uz_status status = UZ_OK;
-    load->D = dense->scaled ? NULL : dual->lazy->D;
-    for (int64_t k = 0; dense->reach && k < dual->info.d; k++)
-        x[k] = y[k * stride];
+    x->D = dense->scaled ? NULL : dense->made->D;
+    for (int64_t k = 0; dense->reach && k < dense->dual.d; k++)
+        room[k] = y[k * stride];
     if (dense->reach)
-        status = uz_reach_backward(dense->reach, load->ws, x, err);
+        status = uz_reach_backward(dense->reach, x->ws, room, err);
     for (int64_t k = 0; k < dense->n_b; k++)
-        u_b[k] = dense->reach ? x[dense->position[k]] : y[dense->position[k] * stride];
+        u_b[k] = dense->reach ? room[dense->position[k]] : y[dense->position[k] * stride];
     if (!dense->reach)
         uz_trsv_lower_t(dense->n_b, dense->L_bb, u_b);
-    memcpy(load->g0, load->h, (size_t)dual->info.m * sizeof *load->g0);
-    uz_csc_gaxpy(load->g0, &dense->N_b, -1.0, u_b);
+    memcpy(x->load.g0, x->load.h, (size_t)dense->dual.m * sizeof *x->load.g0);
+    uz_csc_gaxpy(x->load.g0, &dense->N_b, -1.0, u_b);
     return status;
 }
 
 /* y = L^-1 P p is half a linear solve; the other half waits until the reactions are known. */
-uz_status uz_condensed_load(uz_dual_load *load, const double *p, uz_error *err)
+static uz_status load_whole(uz_dual_load *load, const double *p, uz_error *err)
 {
+    uz_condensed_load *x = (uz_condensed_load *)load;
     const uz_factor *factor = load->dual->factor;
-    uz_factor_permute(factor, load->base, p);
-    uz_status status = uz_factor_forward(factor, load->ws, load->base, 1, err);
+    uz_status status = allocate_load(x, true, err);
     if (status != UZ_OK)
         return status;
-    load->psi0 = -0.5 * uz_dot(load->dual->info.d, load->base, load->base);
-    return uz_condensed_begin(load, load->base, 1, load->work2, err);
+    uz_factor_permute(factor, x->base, p);
+    status = uz_factor_forward(factor, x->ws, x->base, 1, err);
+    if (status != UZ_OK)
+        return status;
+    load->psi0 = -0.5 * uz_dot(load->dual->d, x->base, x->base);
+    return find_gaps(x, x->base, 1, x->work2, err);
+}
+
+static uz_status load_lane(uz_dual_load *load, const double *y, int64_t stride, double *room, uz_error *err)
+{
+    uz_condensed_load *x = (uz_condensed_load *)load;
+    uz_status status = allocate_load(x, false, err);
+    if (status != UZ_OK)
+        return status;
+    x->lane = y;
+    double square = 0.0;
+    for (int64_t k = 0; k < load->dual->d; k++)
+        square += y[k * stride] * y[k * stride];
+    load->psi0 = -0.5 * square;
+    return find_gaps(x, y, stride, room, err);
+}
+
+static void unload(uz_dual_load *load)
+{
+    uz_condensed_load *x = (uz_condensed_load *)load;
+    uz_factor_workspace_free(x->ws);
+    free(x->base);
+    free(x->apply_room);
+    free(x->work);
+    free(x->work2);
 }
 
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w)
@@ -227,44 +281,65 @@ void uz_condensed_response(double *z, const uz_condensed *dense, const double *w
 }
 
 /* Without D two triangular solves do: slower each, but there is nothing to form. */
-void uz_condensed_apply(const uz_dual_load *load, double *Dr, const double *r)
+void uz_condensed_multiply(const uz_condensed_load *x, double *Dr, const double *r)
 {
-    const uz_condensed *dense = &load->dual->dense;
-    int64_t m = load->dual->info.m;
-    if (load->D) {
-        uz_symv_lower(m, load->D, r, Dr);
+    const uz_condensed *dense = x->dense;
+    int64_t m = dense->dual.m;
+    if (x->D) {
+        uz_symv_lower(m, x->D, r, Dr);
         return;
     }
-    uz_condensed_response(load->apply_room, dense, r);
-    uz_trsv_lower_t(dense->n_b, dense->L_bb, load->apply_room);
+    uz_condensed_response(x->apply_room, dense, r);
+    uz_trsv_lower_t(dense->n_b, dense->L_bb, x->apply_room);
     memset(Dr, 0, (size_t)m * sizeof *Dr);
-    uz_csc_gaxpy(Dr, &dense->N_b, 1.0, load->apply_room);
+    uz_csc_gaxpy(Dr, &dense->N_b, 1.0, x->apply_room);
 }
 
-/* x (d) = L^-1 P N'(r + w) by the paths, w the kept correction or nothing. */
-static uz_status spread_along_reach(double *x, const uz_dual_load *load, const double *r, bool corrected, uz_error *err)
+static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
-    const uz_condensed *dense = &load->dual->dense;
-    double *force = load->apply_room; /* n_b */
+    (void)err;
+    uz_condensed_multiply((const uz_condensed_load *)load, Dr, r);
+    return UZ_OK;
+}
+
+static bool column(uz_dual_load *load, double *out, int64_t i)
+{
+    const double *D = ((const uz_condensed_load *)load)->D;
+    int64_t m = load->dual->m;
+    if (!D)
+        return false;
+    for (int64_t k = 0; k < i; k++)
+        out[k] = D[i + k * m];
+    memcpy(out + i, D + i + i * m, (size_t)(m - i) * sizeof *out);
+    return true;
+}
+
+/* room (d) = L^-1 P N'(r + w) by the paths, w the kept correction or nothing. */
+static uz_status spread_along_reach(double *room, const uz_condensed_load *x, const double *r, bool corrected,
+                                    uz_error *err)
+{
+    const uz_condensed *dense = x->dense;
+    double *force = x->apply_room; /* n_b */
     memset(force, 0, (size_t)dense->n_b * sizeof *force);
     uz_csc_gaxpy_t(force, &dense->N_b, 1.0, r);
     if (corrected)
-        uz_csc_gaxpy_t(force, &dense->N_b, 1.0, load->kept);
-    memset(x, 0, (size_t)load->dual->info.d * sizeof *x);
+        uz_csc_gaxpy_t(force, &dense->N_b, 1.0, x->load.kept);
+    memset(room, 0, (size_t)dense->dual.d * sizeof *room);
     for (int64_t k = 0; k < dense->n_b; k++)
-        x[dense->position[k]] = force[k];
-    return uz_reach_forward(dense->reach, load->ws, x, err);
+        room[dense->position[k]] = force[k];
+    return uz_reach_forward(dense->reach, x->ws, room, err);
 }
 
-uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_dual_load *load, const double *r,
-                                     bool corrected, uz_error *err)
+static uz_status add_reactions(uz_dual_load *load, double *y, int64_t stride, double *room, const double *r,
+                               bool corrected, uz_error *err)
 {
-    const uz_condensed *dense = &load->dual->dense;
-    double *z = load->work;
+    const uz_condensed_load *x = (const uz_condensed_load *)load;
+    const uz_condensed *dense = x->dense;
+    double *z = x->work;
     if (dense->reach) {
-        uz_status status = spread_along_reach(x, load, r, corrected, err);
-        for (int64_t k = 0; k < load->dual->info.d; k++)
-            y[k * stride] += x[k];
+        uz_status status = spread_along_reach(room, x, r, corrected, err);
+        for (int64_t k = 0; k < load->dual->d; k++)
+            y[k * stride] += room[k];
         return status;
     }
     uz_condensed_response(z, dense, r);
@@ -273,20 +348,58 @@ uz_status uz_condensed_add_reactions(double *y, int64_t stride, double *x, uz_du
     return UZ_OK;
 }
 
-uz_status uz_condensed_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
+static uz_status recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
 {
+    const uz_condensed_load *x = (const uz_condensed_load *)load;
     const uz_dual *dual = load->dual;
-    int64_t d = dual->info.d;
-    double *own = load->base ? NULL : uz_alloc(d, sizeof *own), *x = load->base ? load->work2 : own;
-    if (!x)
+    int64_t d = dual->d;
+    double *own = x->base ? NULL : uz_alloc(d, sizeof *own), *y = x->base ? x->work2 : own;
+    if (!y)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld dofs", (long long)d);
     for (int64_t k = 0; k < d; k++)
-        x[k] = load->base ? load->base[k] : load->lane[k * UZ_LANES];
-    uz_status status = uz_condensed_add_reactions(x, 1, u, load, r, corrected, err); /* u is room */
+        y[k] = x->base ? x->base[k] : x->lane[k * UZ_LANES];
+    uz_status status = add_reactions(load, y, 1, u, r, corrected, err); /* u is room */
     if (status == UZ_OK)
-        status = uz_factor_backward(dual->factor, load->ws, x, 1, err);
+        status = uz_factor_backward(dual->factor, x->ws, y, 1, err);
     if (status == UZ_OK)
-        uz_factor_unpermute(dual->factor, u, x);
+        uz_factor_unpermute(dual->factor, u, y);
     free(own);
     return status;
 }
+
+/* Dense work is about 2 n^3 flops once, at a rate some 30 times that of sparse substitutions; the factored form pays a
+ * sparse solve of about 60 d flops for each of some 300 iterations. In between the choice matters little. Where rows
+ * bound single dofs, a few sparse factorizations take the place of the iterations, at about the same price; they get
+ * cheaper the more dofs are held. Measured, bounds on both sides of all of 900 dofs: 1.5 ms and 320 ms; on one side of
+ * 450 of them: 11 and 12 ms. */
+static bool suits(const uz_dual_shape *shape)
+{
+    const int64_t small = 1024;
+    double n = (double)shape->m;
+    bool cheap = 2.0 * n * n * n / 30.0 <= 300.0 * 60.0 * (double)shape->d;
+    return shape->bounds ? cheap && 2 * shape->n_b <= shape->d : shape->m <= small || cheap;
+}
+
+const uz_dual_form uz_dual_condensed = {
+    .can = {.op = UZ_OPERATOR_CONDENSED,
+            .needs_factor = true,
+            .contact_last = true,
+            .exact = true,
+            .cheap_steps = true,
+            .lanes = true},
+    .dual_size = sizeof(uz_condensed),
+    .load_size = sizeof(uz_condensed_load),
+    .suits = suits,
+    .create = create,
+    .clear = clear,
+    .load = load_whole,
+    .unload = unload,
+    .prepare = uz_condensed_prepare,
+    .apply = apply,
+    .column = column,
+    .correct = uz_condensed_correct,
+    .recover = recover,
+    .solve_active = uz_condensed_solve_active,
+    .load_lane = load_lane,
+    .add_reactions = add_reactions,
+};

@@ -1,5 +1,6 @@
-/* condensed_active.c: the contact problem with given rows as equations, and the dense matrices made on demand. */
-#include "dual/dual_private.h"
+/* condensed_active.c: what takes dense work with some rows of the contact: the problem with these rows as equations,
+ * and feasible displacements near u(r); and the dense matrices made on demand. */
+#include "dual/condensed.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
@@ -52,39 +53,42 @@ static bool form_inverse(double *D_inverse, double *room, const uz_condensed *de
 typedef bool (*former)(double *out, double *room, const uz_condensed *dense, const uz_stop *stop);
 
 /* *slot once and for all; *out is the load's own copy of the pointer, NULL where making it had to stop. */
-static uz_status need(const double **out, double **slot, uz_dual_load *load, former form, uz_error *err)
+static uz_status need(const double **out, double **slot, uz_condensed_load *x, former form, uz_error *err)
 {
-    const uz_condensed *dense = &load->dual->dense;
+    const uz_condensed *dense = x->dense;
+    const uz_stop *stop = &x->load.stop;
     int64_t size = dense->n_b * dense->n_b;
     uz_status status = UZ_OK;
     if (*out)
         return UZ_OK;
-    if (!uz_lock_while(&load->dual->lazy->making, &load->stop))
+    if (!uz_lock_while(&dense->dual.lazy->making, stop))
         return UZ_OK;
     if (!*slot) {
         double *made = uz_alloc(size, sizeof *made), *room = uz_alloc(size, sizeof *room);
         if (!made || !room)
             status =
                 uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)dense->n_b);
-        else if (!form(made, room, dense, &load->stop) && !uz_stop_is_due(&load->stop))
+        else if (!form(made, room, dense, stop) && !uz_stop_is_due(stop))
             status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "the Schur complement on the contact is singular");
         free(room);
-        if (status == UZ_OK && !uz_stop_is_due(&load->stop))
+        if (status == UZ_OK && !uz_stop_is_due(stop))
             *slot = made;
         else
             free(made);
     }
     *out = *slot;
-    pthread_mutex_unlock(&load->dual->lazy->making);
+    pthread_mutex_unlock(&dense->dual.lazy->making);
     return status;
 }
 
-uz_status uz_condensed_need_operator(uz_dual_load *load, uz_error *err)
+uz_status uz_condensed_prepare(uz_dual_load *load, uz_error *err)
 {
-    return need(&load->D, &load->dual->lazy->D, load, form_operator, err);
+    uz_condensed_load *x = (uz_condensed_load *)load;
+    return need(&x->D, &x->dense->made->D, x, form_operator, err);
 }
 
-int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
+/* Lists in `rows` the rows with in == which, ascending; their number. */
+static int64_t list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
 {
     int64_t count = 0;
     for (int64_t i = 0; i < m; i++)
@@ -93,76 +97,93 @@ int64_t uz_list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
     return count;
 }
 
+enum { GATHERED = 1 << 17 }; /* entries between questions whether to go on: a megabyte of a new block */
+
+/* D_AA (count x count, lower) = rows and columns `rows` of the symmetric m x m matrix D; false: it had to stop. */
+static bool gather_lower(double *D_AA, const double *D, const int64_t *rows, int64_t count, int64_t m,
+                         const uz_stop *stop)
+{
+    int64_t since = GATHERED;
+    for (int64_t l = 0; l < count; l++) {
+        if (since >= GATHERED && uz_stop_is_due(stop))
+            return false;
+        since = since >= GATHERED ? count : since + count; /* a column's upper part may be made with its page */
+        for (int64_t k = l; k < count; k++)
+            D_AA[k + l * count] = D[rows[k] + rows[l] * m];
+    }
+    return true;
+}
+
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
 /* r_A from D_AA r_A = g0_A. false: it had to stop. */
-static bool solve_by_operator(uz_dual_load *load, double *r, double *g, const double *chol, const int64_t *rows,
+static bool solve_by_operator(const uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
                               int64_t count)
 {
-    int64_t m = load->dual->info.m;
-    double *x = load->work;
+    int64_t m = x->load.dual->m;
+    double *v = x->work;
     memset(r, 0, (size_t)m * sizeof *r);
-    memcpy(g, load->g0, (size_t)m * sizeof *g);
+    memcpy(g, x->load.g0, (size_t)m * sizeof *g);
     for (int pass = 0; pass < PASSES; pass++) {
         for (int64_t k = 0; k < count; k++)
-            x[k] = g[rows[k]];
-        uz_potrs_lower(count, chol, x);
-        if (uz_stop_is_due(&load->stop))
+            v[k] = g[rows[k]];
+        uz_potrs_lower(count, chol, v);
+        if (uz_stop_is_due(&x->load.stop))
             return false;
         for (int64_t k = 0; k < count; k++)
-            r[rows[k]] += x[k];
-        uz_symv_lower(m, load->D, r, load->work2);
+            r[rows[k]] += v[k];
+        uz_symv_lower(m, x->D, r, x->work2);
         for (int64_t i = 0; i < m; i++)
-            g[i] = load->g0[i] - load->work2[i];
-        if (uz_stop_is_due(&load->stop))
+            g[i] = x->load.g0[i] - x->work2[i];
+        if (uz_stop_is_due(&x->load.stop))
             return false;
     }
     return true;
 }
 
-/* x at the rows = -(block)^-1 x there. */
-static void solve_block(double *x, double *room, const double *chol, const int64_t *rows, int64_t count)
+/* v at the rows = -(block)^-1 v there. */
+static void solve_block(double *v, double *room, const double *chol, const int64_t *rows, int64_t count)
 {
     for (int64_t k = 0; k < count; k++)
-        room[k] = x[rows[k]];
+        room[k] = v[rows[k]];
     uz_potrs_lower(count, chol, room);
     for (int64_t k = 0; k < count; k++)
-        x[rows[k]] = -room[k];
+        v[rows[k]] = -room[k];
 }
 
-/* With T = D^-1 and x = g0 - g: r = T x, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
+/* With T = D^-1 and v = g0 - g: r = T v, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
  * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
  * through the factor: T is badly conditioned, its answer is not yet that of the body. false: it had to stop. */
-static bool solve_by_inverse(uz_dual_load *load, double *r, double *g, const double *chol, const int64_t *rows,
+static bool solve_by_inverse(const uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
                              int64_t count)
 {
-    int64_t m = load->dual->info.m;
-    double *x = load->work, *change = load->work2;
+    int64_t m = x->load.dual->m;
+    double *v = x->work, *change = x->work2;
     memset(r, 0, (size_t)m * sizeof *r);
-    memcpy(g, load->g0, (size_t)m * sizeof *g);
+    memcpy(g, x->load.g0, (size_t)m * sizeof *g);
     for (int pass = 0; pass < PASSES; pass++) {
-        memcpy(x, g, (size_t)m * sizeof *x);
+        memcpy(v, g, (size_t)m * sizeof *v);
         for (int64_t k = 0; k < count; k++)
-            x[rows[k]] = 0.0;
-        uz_symv_lower(m, load->D_inverse, x, change);
+            v[rows[k]] = 0.0;
+        uz_symv_lower(m, x->D_inverse, v, change);
         for (int64_t k = 0; k < count; k++)
-            x[rows[k]] = change[rows[k]];
-        if (uz_stop_is_due(&load->stop))
+            v[rows[k]] = change[rows[k]];
+        if (uz_stop_is_due(&x->load.stop))
             return false;
-        solve_block(x, change, chol, rows, count);
-        if (uz_stop_is_due(&load->stop))
+        solve_block(v, change, chol, rows, count);
+        if (uz_stop_is_due(&x->load.stop))
             return false;
-        uz_symv_lower(m, load->D_inverse, x, change);
+        uz_symv_lower(m, x->D_inverse, v, change);
         for (int64_t k = 0; k < count; k++)
             change[rows[k]] = 0.0;
         for (int64_t i = 0; i < m; i++)
             r[i] += change[i];
-        if (uz_stop_is_due(&load->stop))
+        if (uz_stop_is_due(&x->load.stop))
             return false;
-        uz_condensed_apply(load, change, r);
+        uz_condensed_multiply(x, change, r);
         for (int64_t i = 0; i < m; i++)
-            g[i] = load->g0[i] - change[i];
-        if (uz_stop_is_due(&load->stop))
+            g[i] = x->load.g0[i] - change[i];
+        if (uz_stop_is_due(&x->load.stop))
             return false;
     }
     return true;
@@ -180,10 +201,10 @@ static double largest(const double *x, int64_t n)
     return value;
 }
 
-static void forgive_rounding(double *r, double *g, const uz_dual_load *load, const bool *active)
+static void forgive_rounding(double *r, double *g, const uz_condensed_load *x, const bool *active)
 {
-    int64_t m = load->dual->info.m;
-    double r_noise = NOISE * largest(r, m), g_noise = NOISE * largest(load->g0, m);
+    int64_t m = x->load.dual->m;
+    double r_noise = NOISE * largest(r, m), g_noise = NOISE * largest(x->load.g0, m);
     for (int64_t i = 0; i < m; i++) {
         if (active[i] && r[i] > 0.0 && r[i] <= r_noise)
             r[i] = 0.0;
@@ -207,30 +228,144 @@ static bool are_independent(const double *chol, const double *D, const int64_t *
     return true;
 }
 
-uz_status uz_condensed_solve_active(uz_dual_load *load, double *r, double *g, bool *solved, const bool *active,
+uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active,
                                     uz_error *err)
 {
-    bool scaled = load->dual->dense.scaled;
-    int64_t m = load->dual->info.m, count, *rows = uz_alloc(m, sizeof *rows);
+    uz_condensed_load *x = (uz_condensed_load *)load;
+    const uz_stop *stop = &load->stop;
+    bool scaled = x->dense->scaled;
+    int64_t m = load->dual->m, count, *rows = uz_alloc(m, sizeof *rows);
     uz_status status = UZ_OK;
     if (!rows)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
-    count = uz_list_rows(rows, active, !scaled, m);
+    count = list_rows(rows, active, !scaled, m);
     if (scaled)
-        status = need(&load->D_inverse, &load->dual->lazy->D_inverse, load, form_inverse, err);
-    bool formed = scaled ? load->D_inverse != NULL : load->D != NULL;
+        status = need(&x->D_inverse, &x->dense->made->D_inverse, x, form_inverse, err);
+    const double *matrix = scaled ? x->D_inverse : x->D;
     double *block = uz_alloc(count * count, sizeof *block);
     if (status == UZ_OK && !block)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)count);
-    if (status == UZ_OK && formed) {
-        *solved = uz_gather_lower(block, scaled ? load->D_inverse : load->D, rows, count, m, &load->stop) &&
-                  uz_potrf_lower_while(count, block, &load->stop) &&
-                  (scaled || are_independent(block, load->D, rows, count, m)) &&
-                  (scaled ? solve_by_inverse : solve_by_operator)(load, r, g, block, rows, count);
-        if (*solved)
-            forgive_rounding(r, g, load, active);
+    if (status == UZ_OK && matrix && gather_lower(block, matrix, rows, count, m, stop) &&
+        uz_potrf_lower_while(count, block, stop) && (scaled || are_independent(block, x->D, rows, count, m)) &&
+        (scaled ? solve_by_inverse : solve_by_operator)(x, r, g, block, rows, count)) {
+        *end = UZ_ACTIVE_SOLVED;
+        forgive_rounding(r, g, x, active);
     }
     free(block);
     free(rows);
     return status;
+}
+
+enum { CORRECTION_ROUNDS = 6 };
+
+/* What may be left of a penetration, relative to the largest gap moved: the certificate sees to the rest. */
+#define CORRECTION_TOLERANCE 1e-9
+
+enum { REFINEMENTS = 2 };
+
+/* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
+ * inverse of a stiffness and as badly conditioned. Dw (m) is D w, also where it had to stop before w was right. D_AA is
+ * room for count^2. */
+static bool solve_rows(double *w, double *Dw, double *D_AA, const uz_condensed_load *x, const double *target,
+                       const int64_t *rows, int64_t count)
+{
+    int64_t m = x->load.dual->m, *pivot = uz_alloc(count, sizeof *pivot);
+    double *part = uz_alloc(count, sizeof *part);
+    bool ok = pivot && part;
+    memset(w, 0, (size_t)m * sizeof *w);
+    memset(Dw, 0, (size_t)m * sizeof *Dw);
+    if (ok) {
+        bool gathered = gather_lower(D_AA, x->D, rows, count, m, &x->load.stop);
+        int64_t rank = gathered ? uz_pstrf_lower_while(count, D_AA, pivot, UZ_PIVOT_LEAST, &x->load.stop) : 0;
+        ok = rank >= 0;
+        for (int pass = 0; ok && pass <= REFINEMENTS && !uz_stop_is_due(&x->load.stop); pass++) {
+            for (int64_t k = 0; k < rank; k++)
+                part[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
+            uz_potrs_leading(rank, count, D_AA, part);
+            for (int64_t k = 0; k < rank; k++)
+                w[rows[pivot[k]]] += part[k];
+            uz_condensed_multiply(x, Dw, w);
+        }
+    }
+    free(pivot);
+    free(part);
+    return ok;
+}
+
+/* |D| |w| row by row is at most sqrt(D_ii) times this sum: what rounding leaves of D w is in proportion. */
+static double rounding_sum(const double *D, const double *w, int64_t m)
+{
+    double sum = 0.0;
+    for (int64_t j = 0; j < m; j++)
+        sum += sqrt(D[j + j * m]) * fabs(w[j]);
+    return sum;
+}
+
+/* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
+ * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
+static bool correct_rows(const uz_condensed_load *x, double *w, double *target, const double *g, const bool *close)
+{
+    int64_t m = x->load.dual->m, *rows = uz_alloc(m, sizeof *rows);
+    const double *D = x->D;
+    bool *in = uz_alloc(m, sizeof *in), feasible = false, ok = rows && in;
+    double *D_AA = ok ? uz_alloc(m * m, sizeof *D_AA) : NULL, scale = 0.0;
+    for (int64_t i = 0; D_AA && i < m; i++) {
+        in[i] = close[i] || g[i] < 0.0;
+        scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
+    }
+    for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_stop_is_due(&x->load.stop);
+         round++) {
+        ok = solve_rows(w, target, D_AA, x, g, rows, list_rows(rows, in, true, m));
+        double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
+        feasible = ok;
+        for (int64_t i = 0; i < m; i++) {
+            bool wrong = g[i] - target[i] < -CORRECTION_TOLERANCE * scale - sqrt(D[i + i * m]) * noise;
+            feasible = feasible && !wrong;
+            in[i] = in[i] || wrong;
+        }
+    }
+    free(rows);
+    free(in);
+    free(D_AA);
+    return feasible;
+}
+
+/* The correction K^-1 N'w as it is kept, and its square in the energy norm. target (m): D w. */
+static double keep_weights(const uz_condensed_load *x, const double *w, const double *target)
+{
+    const uz_condensed *dense = x->dense;
+    if (dense->reach) {
+        memcpy(x->load.correction, w, (size_t)x->load.dual->m * sizeof *w);
+        return fmax(0.0, uz_dot(x->load.dual->m, w, target));
+    }
+    uz_condensed_response(x->load.correction, dense, w);
+    return uz_dot(dense->n_b, x->load.correction, x->load.correction);
+}
+
+uz_status uz_condensed_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
+{
+    uz_condensed_load *x = (uz_condensed_load *)load;
+    const uz_condensed *dense = x->dense;
+    int64_t m = x->load.dual->m;
+    double *target = x->work, *z = x->load.correction, square = 0.0, complementarity = 0.0;
+    for (int64_t i = 0; i < m; i++)
+        target[i] = close[i] ? g[i] : fmin(g[i], 0.0);
+    if (dense->scaled) {
+        for (int64_t k = 0; k < m; k++)
+            z[k] = target[dense->row_of[k]] / dense->scale[k];
+        uz_trmv_lower_t(m, dense->L_bb, z);
+        square = uz_dot(m, z, z);
+    } else if (dense->D_chol) {
+        memcpy(x->work2, target, (size_t)m * sizeof *target);
+        uz_potrs_lower(m, dense->D_chol, x->work2);
+        square = keep_weights(x, x->work2, target);
+    } else if (correct_rows(x, x->work2, target, g, close)) {
+        square = keep_weights(x, x->work2, target);
+    } else {
+        return UZ_OK;
+    }
+    for (int64_t i = 0; i < m; i++)
+        complementarity -= r[i] * fmax(0.0, g[i] - target[i]);
+    *bound2 = square + 2.0 * complementarity;
+    return UZ_OK;
 }

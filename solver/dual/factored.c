@@ -1,54 +1,49 @@
-/* factored.c: the dual operator by one sparse solve per application, the form of Kanno's algorithm. */
-#include "dual/dual_private.h"
+/* factored.c: the dual operator by one sparse solve per application, the form of Kanno's algorithm. Where each row
+ * bounds a single dof, the contact problem with given rows as equations holds the dofs that touch at their bounds,
+ * solves K u = p on the others, and the reactions are what holds them. */
+#include "dual/sparse.h"
 
-#include "core/alloc.h"
 #include "core/error.h"
 
-#include <math.h>
 #include <string.h>
 
-/* Lanczos makes loads without K: they are never corrected. */
-static uz_status weigh(uz_dual_load *load, uz_error *err)
-{
-    int64_t d = load->dual->info.d;
-    load->correction_weight = uz_alloc(d, sizeof(double));
-    if (!load->correction_weight)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)d);
-    for (int64_t j = 0; load->K && j < d; j++) /* sorted lower triangle: the diagonal comes first */
-        load->correction_weight[j] = 1.0 / load->K->val[load->K->ptr[j]];
-    return UZ_OK;
-}
+typedef struct {
+    uz_sparse_load sparse;
+    uz_factor_workspace *ws;
+} factored_load;
 
-/* x = K^-1 x, through load->work2. MATRIX_FREE never comes here. */
-static uz_status solve(uz_dual_load *load, double *x, uz_error *err)
+/* v = K^-1 v, through work2. */
+static uz_status solve(factored_load *x, double *v, uz_error *err)
 {
-    const uz_factor *factor = load->dual->factor;
-    uz_factor_permute(factor, load->work2, x);
-    uz_status status = uz_factor_forward(factor, load->ws, load->work2, 1, err);
+    const uz_factor *factor = x->sparse.load.dual->factor;
+    double *room = x->sparse.work2;
+    uz_factor_permute(factor, room, v);
+    uz_status status = uz_factor_forward(factor, x->ws, room, 1, err);
     if (status == UZ_OK)
-        status = uz_factor_backward(factor, load->ws, load->work2, 1, err);
-    uz_factor_unpermute(factor, x, load->work2);
+        status = uz_factor_backward(factor, x->ws, room, 1, err);
+    uz_factor_unpermute(factor, v, room);
     return status;
 }
 
-uz_status uz_factored_load(uz_dual_load *load, const double *p, uz_error *err)
+static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
 {
-    int64_t d = load->dual->info.d, m = load->dual->info.m;
-    uz_status status = weigh(load, err);
-    if (status == UZ_OK && load->dual->krylov) {
-        status = uz_inexact_create(load, p, err);
-    } else if (status == UZ_OK) {
-        memcpy(load->base, p, (size_t)d * sizeof *p);
-        status = solve(load, load->base, err);
-    }
+    factored_load *x = (factored_load *)load;
+    uz_status status = uz_sparse_load_begin(&x->sparse, err);
+    x->ws = uz_factor_workspace_new();
+    if (status == UZ_OK && !x->ws)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)load->dual->d);
     if (status != UZ_OK)
         return status;
-    load->psi0 = 0.0;
-    for (int64_t j = 0; j < d; j++)
-        load->psi0 -= 0.5 * p[j] * load->base[j];
-    memcpy(load->g0, load->h, (size_t)m * sizeof *load->g0);
-    uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, load->base);
-    return load->dual->bounds.dof ? uz_bounded_create(load, p, err) : UZ_OK;
+    memcpy(x->sparse.base, p, (size_t)load->dual->d * sizeof *p);
+    status = solve(x, x->sparse.base, err);
+    return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
+}
+
+static void unload(uz_dual_load *load)
+{
+    factored_load *x = (factored_load *)load;
+    uz_factor_workspace_free(x->ws);
+    uz_sparse_unload(&x->sparse);
 }
 
 static bool all_zero(const double *x, int64_t n)
@@ -59,49 +54,88 @@ static bool all_zero(const double *x, int64_t n)
     return true;
 }
 
-uz_status uz_factored_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
+static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
+    factored_load *x = (factored_load *)load;
     const uz_dual *dual = load->dual;
-    if (load->inexact)
-        return uz_inexact_apply(load, Dr, r, err);
-    memset(load->response, 0, (size_t)dual->info.d * sizeof(double));
-    memset(Dr, 0, (size_t)dual->info.m * sizeof *Dr);
-    if (all_zero(r, dual->info.m))
+    double *response = x->sparse.response;
+    memset(response, 0, (size_t)dual->d * sizeof *response);
+    memset(Dr, 0, (size_t)dual->m * sizeof *Dr);
+    if (all_zero(r, dual->m))
         return UZ_OK;
-    uz_csc_gaxpy_t(load->response, &dual->N, 1.0, r);
-    uz_status status = solve(load, load->response, err);
+    uz_csc_gaxpy_t(response, &dual->N, 1.0, r);
+    uz_status status = solve(x, response, err);
     if (status == UZ_OK)
-        uz_csc_gaxpy(Dr, &dual->N, 1.0, load->response);
+        uz_csc_gaxpy(Dr, &dual->N, 1.0, response);
     return status;
 }
 
-uz_status uz_factored_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
+static uz_status correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
 {
-    const uz_dual *dual = load->dual;
-    double *c = load->correction, *Nc = load->work, *Kc = load->work2, square = 0.0, complementarity = 0.0;
-    if (!uz_correct_by_sweeps(c, Nc, &dual->Nt, load->correction_weight, g, close))
+    return uz_sparse_correct((uz_sparse_load *)load, bound2, 0.0, r, g, close);
+}
+
+enum { PASSES = 2 }; /* solve, and once more for the residual */
+
+/* box->u on the dofs that are not held. */
+static uz_status solve_free(factored_load *x, bool *solved, uz_error *err)
+{
+    uz_dual_load *load = &x->sparse.load;
+    uz_bounded *box = x->sparse.box;
+    uz_principal *part = NULL;
+    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, x->ws, &load->stop, err);
+    *solved = part && !uz_stop_is_due(&load->stop);
+    for (int pass = 0; status == UZ_OK && *solved && pass < PASSES; pass++) {
+        uz_bounded_balance(box, load->K);
+        status = uz_principal_solve(box->force, part, err);
+        for (int64_t j = 0; status == UZ_OK && j < load->K->cols; j++)
+            box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
+        *solved = !uz_stop_is_due(&load->stop);
+    }
+    uz_principal_free(part);
+    return status;
+}
+
+static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)
+{
+    factored_load *x = (factored_load *)load;
+    uz_bounded *box = x->sparse.box;
+    bool solved = false;
+    if (!box)
         return UZ_OK;
-    for (int64_t i = 0; i < dual->info.m; i++)
-        complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
-    memset(Kc, 0, (size_t)dual->info.d * sizeof *Kc);
-    uz_csc_symv(Kc, load->K, 1.0, c);
-    for (int64_t j = 0; j < dual->info.d; j++)
-        square += c[j] * Kc[j];
-    double distance = sqrt(fmax(0.0, square)) + (load->inexact ? load->inexact->slack : 0.0);
-    *bound2 = distance * distance + 2.0 * complementarity;
+    if (!uz_bounded_hold(&x->sparse, active, false)) {
+        *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
+        return UZ_OK;
+    }
+    uz_status status = solve_free(x, &solved, err);
+    if (status != UZ_OK || !solved)
+        return status;
+    uz_bounded_balance(box, load->K);
+    uz_bounded_react(&x->sparse, g, active);
+    memcpy(r, box->r, (size_t)load->dual->m * sizeof *r);
+    box->has_exact = true;
+    *end = UZ_ACTIVE_SOLVED;
     return UZ_OK;
 }
 
-uz_status uz_factored_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
+static bool suits(const uz_dual_shape *shape)
 {
-    int64_t d = load->dual->info.d;
-    uz_status status = UZ_OK;
-    if (!uz_bounded_recover(load, u, r)) {
-        status = uz_factored_apply(load, load->work, r, err);
-        for (int64_t j = 0; j < d; j++)
-            u[j] = load->base[j] + load->response[j];
-    }
-    for (int64_t j = 0; corrected && j < d; j++)
-        u[j] += load->kept[j];
-    return status;
+    (void)shape;
+    return true;
 }
+
+const uz_dual_form uz_dual_factored = {
+    .can = {.op = UZ_OPERATOR_FACTORED, .needs_factor = true, .exact = true},
+    .dual_size = sizeof(uz_sparse),
+    .load_size = sizeof(factored_load),
+    .suits = suits,
+    .create = uz_sparse_create,
+    .clear = uz_sparse_clear,
+    .load = make_load,
+    .unload = unload,
+    .apply = apply,
+    .correct = correct,
+    .recover = uz_sparse_recover,
+    .solve_active = solve_active,
+    .guess_active = uz_sparse_guess_active,
+};

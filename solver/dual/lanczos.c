@@ -1,5 +1,5 @@
 /* lanczos.c: the largest eigenvalue of the dual operator. */
-#include "dual/dual.h"
+#include "dual/lanczos.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"

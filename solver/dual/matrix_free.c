@@ -8,12 +8,15 @@
  * (N delta)'(r - r*) <= ||delta||_K ||u(r) - u*||_K, so the iteration comes as near as delta, and no step of it should
  * be falsified by more than a share of its own size (Schmidt, Le Roux, Bach, NIPS 2011, for proximal gradients with
  * decreasing errors). Each solve starts at the last response and reduces the residual, which is the size of the change,
- * by UZ_CHANGE_KEPT, unless a FLOOR of the aim is reached before. */
-#include "dual/dual_private.h"
+ * by CHANGE_KEPT, unless a FLOOR of the aim is reached before.
+ *
+ * Given rows as equations, where each row bounds a single dof: conjugate gradients on the dofs that are free, with a
+ * multigrid of their own. */
+#include "dual/sparse.h"
 
 #include "core/alloc.h"
-#include "linalg/blas.h"
 #include "core/error.h"
+#include "linalg/blas.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -23,16 +26,32 @@
 /* The base may be far larger than the answer: a body without its obstacle sags much further. */
 #define BASE_FLOOR 1e-5
 #define FIRST_AIM  1e-10
+/* Share of a change of the response that an application of D may leave unsolved. */
+#define CHANGE_KEPT 0.01
 enum { STEPS_MOST = 5000 };
 
-static uz_cg_stop stop_at(const uz_inexact *x, double relative, double absolute)
+/* How well the equations of a load are solved. Slacks are bounds in the energy norm. */
+typedef struct {
+    uz_sparse_load sparse;
+    uz_cg cg;   /* of the whole body */
+    double *p;  /* d */
+    double aim; /* relative */
+    uz_stop stop;
+    double base_slack; /* of base = K^-1 p */
+    double slack;      /* of what the last apply or solve_active left */
+    double tight;      /* relative accuracy of a change of the response */
+    bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
+    double coarse;     /* accuracy at which the next guess of the active rows is judged */
+    double *right;     /* d: a right-hand side */
+} free_load;
+
+static uz_cg_stop stop_at(const free_load *x, double relative, double absolute)
 {
-    uz_cg_stop stop = {.relative = relative,
-                       .absolute = absolute,
-                       .max_iterations = STEPS_MOST,
-                       .hooks = x->hooks,
-                       .deadline = x->deadline};
-    return stop;
+    return (uz_cg_stop){.relative = relative,
+                        .absolute = absolute,
+                        .max_iterations = STEPS_MOST,
+                        .hooks = x->stop.hooks,
+                        .deadline = x->stop.deadline};
 }
 
 static double root_of_lambda(const uz_dual_load *load)
@@ -41,109 +60,249 @@ static double root_of_lambda(const uz_dual_load *load)
 }
 
 /* base = K^-1 p to the aim, from where it stands; psi0 and g0 with it. */
-static uz_status solve_base(uz_dual_load *load, double aim, uz_error *err)
+static uz_status solve_base(free_load *x, double aim, uz_error *err)
 {
-    uz_inexact *x = load->inexact;
-    int64_t d = load->dual->info.d;
+    uz_dual_load *load = &x->sparse.load;
+    double *base = x->sparse.base;
+    int64_t d = load->dual->d;
     uz_cg_info info;
-    double root = root_of_lambda(load), norm = uz_root(uz_dot(d, x->p, load->base));
+    double root = root_of_lambda(load), norm = uz_root(uz_dot(d, x->p, base));
     /* From 0 the first residual has the size of the solution. */
     uz_cg_stop stop = stop_at(x, norm > 0.0 ? 0.0 : aim * root, aim * norm * root);
-    uz_status status = uz_cg_solve(&info, load->base, &x->cg, load->K, x->p, &stop, err);
+    uz_status status = uz_cg_solve(&info, base, &x->cg, load->K, x->p, &stop, err);
     if (status != UZ_OK)
         return status;
     x->base_slack = info.last / root;
     x->slack = x->base_slack;
-    load->psi0 = -0.5 * uz_dot(d, x->p, load->base);
-    memcpy(load->g0, load->h, (size_t)load->dual->info.m * sizeof *load->g0);
-    uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, load->base);
+    load->psi0 = -0.5 * uz_dot(d, x->p, base);
+    memcpy(load->g0, load->h, (size_t)load->dual->m * sizeof *load->g0);
+    uz_csc_gaxpy(load->g0, &load->dual->N, -1.0, base);
     return UZ_OK;
 }
 
-uz_status uz_inexact_create(uz_dual_load *load, const double *p, uz_error *err)
+static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
 {
-    int64_t d = load->dual->info.d;
-    uz_inexact *x = load->inexact = uz_alloc_zero(1, sizeof *x);
-    if (!x)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
+    free_load *x = (free_load *)load;
+    int64_t d = load->dual->d;
+    uz_status status = uz_sparse_load_begin(&x->sparse, err);
+    if (status != UZ_OK)
+        return status;
     x->aim = FIRST_AIM;
-    x->deadline = INFINITY;
-    x->tight = UZ_CHANGE_KEPT;
+    x->stop.deadline = INFINITY;
+    x->tight = CHANGE_KEPT;
     x->p = uz_alloc(d, sizeof *x->p);
     x->right = uz_alloc(d, sizeof *x->right);
-    uz_status status = x->p && x->right
-                           ? uz_cg_init(&x->cg, uz_krylov_multigrid(load->dual->krylov), NULL, d, err)
-                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
+    load->bytes += 8 * 8 * (size_t)d;
+    status = x->p && x->right ? uz_cg_init(&x->cg, uz_krylov_multigrid(load->dual->krylov), NULL, d, err)
+                              : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
     if (status != UZ_OK)
         return status;
     memcpy(x->p, p, (size_t)d * sizeof *p);
-    return solve_base(load, BASE_FLOOR * x->aim, err);
+    status = solve_base(x, BASE_FLOOR * x->aim, err);
+    return status == UZ_OK ? uz_sparse_load_end(&x->sparse, p, err) : status;
 }
 
-void uz_inexact_free(uz_inexact *inexact)
+static void unload(uz_dual_load *load)
 {
-    if (!inexact)
-        return;
-    uz_cg_clear(&inexact->cg);
-    free(inexact->p);
-    free(inexact->right);
-    free(inexact);
+    free_load *x = (free_load *)load;
+    uz_cg_clear(&x->cg);
+    free(x->p);
+    free(x->right);
+    uz_sparse_unload(&x->sparse);
 }
 
-uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_hooks *hooks, double deadline,
-                           uz_error *err)
+static uz_status aim_at(uz_dual_load *load, double relative_error, uz_error *err)
 {
-    uz_inexact *x = load->inexact;
-    if (!x)
-        return UZ_OK;
+    free_load *x = (free_load *)load;
     bool finer = relative_error < x->aim;
     x->aim = relative_error;
-    x->hooks = hooks;
-    x->deadline = deadline;
-    return finer ? solve_base(load, BASE_FLOOR * relative_error, err) : UZ_OK;
+    x->stop = load->stop;
+    return finer ? solve_base(x, BASE_FLOOR * relative_error, err) : UZ_OK;
 }
 
 /* ||u(r)||_K about, with the response as it stands; Dr is room. */
-static double expected_norm(const uz_dual_load *load, const double *r, double *Dr)
+static double expected_norm(const free_load *x, const double *r, double *Dr)
 {
+    const uz_dual_load *load = &x->sparse.load;
     double base = uz_root(-2.0 * load->psi0), psi, norm2;
-    memset(Dr, 0, (size_t)load->dual->info.m * sizeof *Dr);
-    uz_csc_gaxpy(Dr, &load->dual->N, 1.0, load->response);
+    memset(Dr, 0, (size_t)load->dual->m * sizeof *Dr);
+    uz_csc_gaxpy(Dr, &load->dual->N, 1.0, x->sparse.response);
     uz_dual_load_energies(load, &psi, &norm2, r, Dr);
     return fmax(1e-3 * base, fmin(base, sqrt(norm2)));
 }
 
-void uz_inexact_probe(uz_dual_load *load, bool begin, double accuracy)
+static void probe(uz_dual_load *load, bool begin, double accuracy)
 {
-    uz_inexact *x = load->inexact;
-    if (!x)
-        return;
+    free_load *x = (free_load *)load;
     x->probing = begin;
-    x->tight = begin ? accuracy : UZ_CHANGE_KEPT;
+    x->tight = begin ? accuracy : CHANGE_KEPT;
     /* Of another size than what comes: no start for it. */
-    memset(load->response, 0, (size_t)load->dual->info.d * sizeof *load->response);
+    memset(x->sparse.response, 0, (size_t)load->dual->d * sizeof *x->sparse.response);
 }
 
-uz_status uz_inexact_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
+static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
+    free_load *x = (free_load *)load;
     const uz_dual *dual = load->dual;
-    uz_inexact *x = load->inexact;
-    double root = root_of_lambda(load), norm = expected_norm(load, r, Dr);
+    double root = root_of_lambda(load), norm = expected_norm(x, r, Dr);
     uz_cg_stop stop = stop_at(x, x->tight, x->probing ? 0.0 : FLOOR * x->aim * norm * root);
     uz_cg_info info;
-    memset(x->right, 0, (size_t)dual->info.d * sizeof *x->right);
+    memset(x->right, 0, (size_t)dual->d * sizeof *x->right);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, r);
-    uz_status status = uz_cg_solve(&info, load->response, &x->cg, load->K, x->right, &stop, err);
-    memset(Dr, 0, (size_t)dual->info.m * sizeof *Dr);
+    uz_status status = uz_cg_solve(&info, x->sparse.response, &x->cg, load->K, x->right, &stop, err);
+    memset(Dr, 0, (size_t)dual->m * sizeof *Dr);
     if (status != UZ_OK)
         return status;
-    uz_csc_gaxpy(Dr, &dual->N, 1.0, load->response);
+    uz_csc_gaxpy(Dr, &dual->N, 1.0, x->sparse.response);
     x->slack = x->base_slack + info.last / root;
     return UZ_OK;
 }
 
-uz_status uz_dual_load_inverse_norm(uz_dual_load *load, double *value, double *e, uz_error *err)
+static uz_status correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close)
 {
-    uz_inexact *x = load->inexact;
-    return uz_krylov_inverse_norm(value, e, load->dual->krylov, &x->cg, load->K, x->hooks, x->deadline, err);
+    free_load *x = (free_load *)load;
+    return uz_sparse_correct(&x->sparse, bound2, x->slack, r, g, close);
 }
+
+static uz_status inverse_norm(uz_dual_load *load, double *value, double *e, uz_error *err)
+{
+    free_load *x = (free_load *)load;
+    return uz_krylov_inverse_norm(value, e, load->dual->krylov, &x->cg, load->K, x->stop.hooks, x->stop.deadline, err);
+}
+
+/* ------------------------------------------------------------- given rows as equations */
+
+/* A guess is first judged at a tolerance of 1e-2, the next one at 1e-3, and so on: an early guess is wrong in many
+ * rows, which shows at once, and each digit that a step adds is taken over by the next. */
+#define FIRST_TOLERANCE 1e-2
+#define NEXT_TOLERANCE  0.1
+/* Of the aim: below this a solve is as good as exact. */
+#define ACTIVE_FLOOR 0.02
+
+/* right = p - K u of the dofs that are held, and no others. */
+static void load_free(free_load *x)
+{
+    const uz_dual_load *load = &x->sparse.load;
+    const uz_bounded *box = x->sparse.box;
+    double *held = x->cg.p;
+    for (int64_t j = 0; j < load->K->cols; j++)
+        held[j] = box->fixed[j] ? box->u[j] : 0.0;
+    memcpy(x->right, x->p, (size_t)load->K->cols * sizeof *x->right);
+    uz_csc_symv(x->right, load->K, -1.0, held);
+}
+
+/* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears. */
+static uz_status measure_slack(free_load *x, uz_error *err)
+{
+    const uz_dual_load *load = &x->sparse.load;
+    const uz_bounded *box = x->sparse.box;
+    const uz_bounds *bounds = box->bounds;
+    double *e = x->cg.r;
+    memcpy(e, box->force, (size_t)load->K->cols * sizeof *e);
+    for (int64_t i = 0; i < load->dual->m; i++)
+        e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
+    uz_status status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
+    double square = uz_dot(load->K->cols, e, x->cg.z);
+    x->slack = uz_root(square / uz_krylov_describe(load->dual->krylov).lambda);
+    return status;
+}
+
+static double energy_norm(const uz_bounded *box, int64_t d)
+{
+    double square = 0.0;
+    for (int64_t j = 0; j < d; j++)
+        square += box->u[j] * (box->force[j] + box->p[j]);
+    return uz_root(square);
+}
+
+static bool looks_wrong(const double *r, const double *g, const bool *active, int64_t m)
+{
+    for (int64_t i = 0; i < m; i++)
+        if (active[i] ? r[i] > 0.0 : g[i] < 0.0)
+            return true;
+    return false;
+}
+
+/* u, r, g and active at this tolerance of the energy norm. */
+static uz_status solve_to(free_load *x, uz_cg *cg, double tolerance, double *g, bool *active, bool *met, uz_error *err)
+{
+    const uz_dual_load *load = &x->sparse.load;
+    uz_bounded *box = x->sparse.box;
+    const uz_dual *dual = load->dual;
+    double root = root_of_lambda(load), most = uz_root(-2.0 * load->psi0), norm;
+    uz_bounded_balance(box, load->K);
+    norm = fmin(energy_norm(box, dual->d), most > 0.0 ? most : INFINITY);
+    uz_cg_stop stop = stop_at(x, 0.0, tolerance * norm * root);
+    uz_cg_info info;
+    uz_status status = uz_cg_solve(&info, box->u, cg, load->K, x->right, &stop, err);
+    if (status != UZ_OK)
+        return status;
+    *met = info.met;
+    uz_bounded_balance(box, load->K);
+    uz_bounded_react(&x->sparse, g, active);
+    return UZ_OK;
+}
+
+static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, bool *active, uz_error *err)
+{
+    const uz_bounded *box = x->sparse.box;
+    const int64_t m = x->sparse.load.dual->m;
+    double least = ACTIVE_FLOOR * x->aim, tolerance = fmax(least, x->coarse);
+    bool met = true;
+    uz_status status = UZ_OK;
+    load_free(x);
+    do {
+        status = solve_to(x, cg, tolerance, g, active, &met, err);
+        if (status != UZ_OK || !met || tolerance <= least || looks_wrong(box->r, g, active, m))
+            break;
+        tolerance = least;
+    } while (true);
+    memcpy(r, box->r, (size_t)m * sizeof *r);
+    x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
+    return status == UZ_OK ? measure_slack(x, err) : status;
+}
+
+static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)
+{
+    free_load *x = (free_load *)load;
+    uz_bounded *box = x->sparse.box;
+    const uz_krylov *krylov = load->dual->krylov;
+    uz_multigrid *mg = NULL;
+    uz_cg cg = {0};
+    if (!box)
+        return UZ_OK;
+    if (!uz_bounded_hold(&x->sparse, active, true)) {
+        *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
+        return UZ_OK;
+    }
+    if (x->coarse <= 0.0)
+        x->coarse = FIRST_TOLERANCE;
+    uz_status status = uz_multigrid_create(&mg, load->K, uz_krylov_modes(krylov), box->fixed, 0, &x->stop, err);
+    if (status == UZ_OK)
+        status = uz_cg_init(&cg, mg, box->fixed, load->dual->d, err);
+    if (status == UZ_OK)
+        status = solve_stepwise(x, &cg, r, g, active, err);
+    uz_cg_clear(&cg);
+    uz_multigrid_free(mg);
+    box->has_exact = status == UZ_OK;
+    *end = status == UZ_OK ? UZ_ACTIVE_SOLVED : UZ_ACTIVE_UNSOLVED;
+    return status == UZ_ERR_CANCELLED ? UZ_OK : status;
+}
+
+const uz_dual_form uz_dual_matrix_free = {
+    .can = {.op = UZ_OPERATOR_MATRIX_FREE},
+    .dual_size = sizeof(uz_sparse),
+    .load_size = sizeof(free_load),
+    .create = uz_sparse_create,
+    .clear = uz_sparse_clear,
+    .load = make_load,
+    .unload = unload,
+    .aim = aim_at,
+    .probe = probe,
+    .apply = apply,
+    .correct = correct,
+    .recover = uz_sparse_recover,
+    .solve_active = solve_active,
+    .guess_active = uz_sparse_guess_active,
+    .inverse_norm = inverse_norm,
+};

@@ -1,5 +1,5 @@
 /* ray.c: from reactions that grow without end to the rows that contradict each other. */
-#include "dual/dual_private.h"
+#include "dual/ray.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
@@ -51,9 +51,8 @@ static void project(least_squares *ls, double *y, const bool *support, const uz_
     memcpy(y, ls->best, (size_t)N->rows * sizeof *y);
 }
 
-uz_status uz_dual_load_project_ray(const uz_dual_load *load, double *y, uz_error *err)
+uz_status uz_ray_project(double *y, const uz_csc *N, uz_error *err)
 {
-    const uz_csc *N = &load->dual->N;
     least_squares ls = {uz_alloc(N->cols, sizeof(double)), uz_alloc(N->cols, sizeof(double)),
                         uz_alloc(N->rows, sizeof(double)), uz_alloc(N->rows, sizeof(double))};
     bool *support = uz_alloc(N->rows, sizeof *support);

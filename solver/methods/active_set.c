@@ -27,8 +27,9 @@ typedef enum { GUESS, EXCHANGE, N_MOVES } move;
 
 typedef struct {
     bool *active; /* m: the current guess */
-    double *r;    /* m: its solution, signs unchecked */
-    double *g;    /* m: its gaps */
+    uz_active_end solved;
+    double *r; /* m: its solution, signs unchecked */
+    double *g; /* m: its gaps */
     int64_t wrong, fewest, patience;
     move move;            /* the last one */
     double rate[N_MOVES]; /* wrong rows after the last move of each kind over those before */
@@ -58,7 +59,7 @@ static void release(pivoting *p)
  * in contact. */
 static void guess(pivoting *p, const uz_iterate *it, uz_dual_load *load)
 {
-    const double *g0 = uz_dual_load_g0(load);
+    const double *g0 = load->g0;
     if (it->iteration == 0 && !it->warm && uz_dual_load_guess_active(load, p->active))
         return;
     for (int64_t i = 0; i < it->m; i++) {
@@ -113,7 +114,7 @@ static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
 /* The guess's answer as an iterate: r <= 0, D r, and the bound on it. */
 static uz_status take(uz_iterate *it, const pivoting *p, uz_dual_load *load, uz_error *err)
 {
-    const double *g0 = uz_dual_load_g0(load);
+    const double *g0 = load->g0;
     bool cut = false;
     for (int64_t i = 0; i < it->m; i++) {
         cut = cut || p->r[i] > 0.0;
@@ -130,15 +131,6 @@ static uz_status take(uz_iterate *it, const pivoting *p, uz_dual_load *load, uz_
     return status == UZ_OK ? uz_iterate_bound(it, load, UZ_METHOD_ACTIVE_SET, err) : status;
 }
 
-static uz_status solve_guess(pivoting *p, bool *solved, uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    uz_status status = uz_dual_load_solve_active(load, p->r, p->g, solved, p->active, err);
-    if (status != UZ_OK || !*solved)
-        return status;
-    p->wrong = count_wrong(p, it->m);
-    return status;
-}
-
 /* Only single exchanges are left. Each costs a factorization here, and a small part of one where factors are updated.
  */
 static bool is_stuck(const pivoting *p)
@@ -149,7 +141,7 @@ static bool is_stuck(const pivoting *p)
 /* Where each row that joins costs a linear solve, and they are not few, the iterations do better. */
 static bool may_exchange(const uz_iterate *it, const uz_dual_load *load)
 {
-    return uz_dual_load_rows_may_depend(load) && (uz_dual_load_steps_are_small(load) || it->m <= FEW_ROWS);
+    return load->dual->rows_may_depend && (load->dual->can->cheap_steps || it->m <= FEW_ROWS);
 }
 
 /* Solves exactly from the guess, whatever rows depend on each other. */
@@ -180,11 +172,11 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
 static uz_status step(pivoting *p, bool *over, uz_end *end, uz_iterate *it, uz_dual_load *load,
                       const uz_method_options *options, uz_history *history, uz_error *err)
 {
-    bool solved = false;
-    uz_status status = solve_guess(p, &solved, it, load, err);
-    *over = !solved;
-    if (status != UZ_OK || !solved)
+    uz_status status = uz_dual_load_solve_active(load, &p->solved, p->r, p->g, p->active, err);
+    *over = p->solved != UZ_ACTIVE_SOLVED;
+    if (status != UZ_OK || *over)
         return status; /* too little time is found by whoever goes on */
+    p->wrong = count_wrong(p, it->m);
     status = take(it, p, load, err);
     if (status == UZ_OK)
         status = uz_iterate_record(it, load, options, history, 0.0, false, err);
@@ -201,7 +193,7 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_dual_load *l
     *end = it->best_relative <= options->target ? UZ_END_TARGET : UZ_END_STALLED;
     if (*end == UZ_END_TARGET)
         return UZ_OK;
-    int extra = uz_dual_load_steps_are_small(load) ? EXTRA_STEPS : 0;
+    int extra = load->dual->can->cheap_steps ? EXTRA_STEPS : 0;
     bool over = false;
     for (int k = 0; k < MAX_STEPS && !over; k++) {
         if (uz_should_stop(end, it, options))
@@ -218,7 +210,8 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_dual_load *l
     }
     if (uz_should_stop(end, it, options))
         return UZ_OK;
-    if (over && uz_dual_load_crossed_bounds(load, it->ray)) {
+    if (over && p->solved == UZ_ACTIVE_RAY) {
+        memcpy(it->ray, p->r, (size_t)it->m * sizeof *it->ray);
         *end = UZ_END_RAY;
         return UZ_OK;
     }

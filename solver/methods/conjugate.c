@@ -25,7 +25,7 @@ static void forget(uz_iterate *it)
 
 static void make_gaps(uz_iterate *it, const uz_dual_load *load)
 {
-    const double *g0 = uz_dual_load_g0(load);
+    const double *g0 = load->g0;
     for (int64_t i = 0; i < it->m; i++)
         it->gamma[i] = g0[i] - it->Dr[i];
 }
@@ -97,7 +97,7 @@ static double best_length(double *bound, uz_iterate *it, double rise)
  */
 static uz_status apply_to_direction(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    if (!uz_dual_load_is_inexact(load))
+    if (load->dual->can->exact)
         return uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     for (int64_t i = 0; i < it->m; i++)
         it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
@@ -131,7 +131,7 @@ static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *loa
 /* psi(r_next) - psi(r) */
 static double gain(const uz_iterate *it, const uz_dual_load *load)
 {
-    const double *g0 = uz_dual_load_g0(load);
+    const double *g0 = load->g0;
     double sum = 0.0;
     for (int64_t i = 0; i < it->m; i++)
         sum += (it->r_next[i] - it->r[i]) * (g0[i] - 0.5 * (it->Dr_next[i] + it->Dr[i]));
@@ -160,7 +160,7 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
 
 static double remaining(uz_iterate *it, const uz_dual_load *load)
 {
-    const double *scale = uz_dual_load_row_scale(load);
+    const double *scale = load->dual->row_scale;
     double square = 0.0;
     make_gaps(it, load);
     for (int64_t i = 0; i < it->m; i++) {

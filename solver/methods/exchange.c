@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "linalg/blas.h"
 #include "core/error.h"
+#include "dual/ray.h"
 
 #include <float.h>
 #include <math.h>
@@ -192,7 +193,7 @@ static double reaction(const exchange *x, int64_t k)
 /* g = open - D s, and its size. */
 static void measure(exchange *x)
 {
-    const double *h = uz_dual_load_h(x->load);
+    const double *h = x->load->h;
     for (int64_t i = 0; i < x->m; i++) {
         x->g[i] = x->open[i];
         x->size[i] = fabs(h[i]) + fabs(x->open[i]);
@@ -299,14 +300,14 @@ static void advance(exchange *x, int64_t q, double step)
 /* The direction in which q is pressed for ever, if it proves that the rows contradict. */
 static uz_status look_at_ray(bool *proven, double *ray, exchange *x, int64_t q, uz_error *err)
 {
-    const uz_csc *N = uz_dual_load_N(x->load);
-    const double *h = uz_dual_load_h(x->load);
+    const uz_csc *N = &x->load->dual->N;
+    const double *h = x->load->h;
     memset(ray, 0, (size_t)x->m * sizeof *ray);
     ray[q] = -1.0;
     for (int64_t k = 0; k < x->count; k++)
         ray[x->rows[k]] = fmin(0.0, x->w[k]);
-    uz_status status = uz_dual_load_project_ray(x->load, ray, err);
-    double length = status == UZ_OK ? uz_gap_length(N, h, uz_dual_load_g0(x->load), x->size) : 0.0, radius;
+    uz_status status = uz_ray_project(ray, N, err);
+    double length = status == UZ_OK ? uz_gap_length(N, h, x->load->g0, x->size) : 0.0, radius;
     *proven = status == UZ_OK && uz_ray_proves(&radius, ray, N, h, length);
     return status;
 }
@@ -359,12 +360,12 @@ static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *e
 uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, double *g, double *ray, bool *active,
                           const double *base, uz_dual_load *load, const uz_stop *stop, uz_error *err)
 {
-    int64_t m = uz_dual_load_N(load)->rows;
+    int64_t m = load->dual->N.rows;
     exchange x = {.load = load, .s = s, .g = g, .stop = stop, .most = *steps};
     *end = UZ_EXCHANGE_STOPPED;
     uz_status status = allocate(&x, m, err);
     if (status == UZ_OK) {
-        memcpy(x.open, uz_dual_load_g0(load), (size_t)m * sizeof *x.open);
+        memcpy(x.open, load->g0, (size_t)m * sizeof *x.open);
         if (base)
             memcpy(x.base, base, (size_t)m * sizeof *x.base);
         memset(s, 0, (size_t)m * sizeof *s);

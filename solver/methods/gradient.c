@@ -6,6 +6,7 @@
 #include "methods/conjugate.h"
 
 #include "certificate/infeasible.h"
+#include "dual/ray.h"
 
 #include <float.h>
 #include <math.h>
@@ -21,7 +22,7 @@ void uz_iterate_swap(double **a, double **b)
 /* r(k+1) = min(0, rho + alpha gamma). Returns ||rho - r(k+1)||, in the caller's forces. */
 static double project(uz_iterate *it, const uz_dual_load *load)
 {
-    const double *g0 = uz_dual_load_g0(load), *scale = uz_dual_load_row_scale(load);
+    const double *g0 = load->g0, *scale = load->dual->row_scale;
     double square = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
         it->gamma[i] = g0[i] - it->Drho[i];
@@ -81,7 +82,7 @@ static void plan_next_check(uz_iterate *it)
 /* step_norm is in the units of the problem's own rows, r in those of the scaled ones. */
 static bool stalled(const uz_iterate *it, const uz_dual_load *load, double step_norm)
 {
-    const double *scale = uz_dual_load_row_scale(load);
+    const double *scale = load->dual->row_scale;
     double size = 0.0;
     for (int64_t i = 0; i < it->m; i++)
         size += scale[i] * it->r[i] * (scale[i] * it->r[i]);
@@ -129,12 +130,12 @@ static uz_status step(uz_iterate *it, uz_dual_load *load, const uz_method_option
 
 static uz_status try_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    uz_status status = uz_dual_load_project_ray(load, it->ray, err);
+    uz_status status = uz_ray_project(it->ray, &load->dual->N, err);
     if (status != UZ_OK)
         return status;
-    double length = uz_gap_length(uz_dual_load_N(load), uz_dual_load_h(load), uz_dual_load_g0(load), it->gamma);
+    double length = uz_gap_length(&load->dual->N, load->h, load->g0, it->gamma);
     double radius;
-    *found = uz_ray_proves(&radius, it->ray, uz_dual_load_N(load), uz_dual_load_h(load), length);
+    *found = uz_ray_proves(&radius, it->ray, &load->dual->N, load->h, length);
     return UZ_OK;
 }
 
@@ -208,7 +209,7 @@ static uz_status prepare(uz_iterate *it, uz_dual_load *load, const uz_method_opt
 {
     const uz_stop stop = {options->hooks, options->deadline};
     double lambda = 0.0;
-    uz_status status = uz_dual_load_prepare_iterations(load, it->alpha > 0.0 ? NULL : &lambda, err);
+    uz_status status = uz_dual_load_prepare(load, it->alpha > 0.0 ? NULL : &lambda, err);
     if (it->alpha <= 0.0 && (lambda > 0.0 || !uz_stop_is_due(&stop)))
         it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
     return status;

@@ -50,14 +50,13 @@ void uz_iterate_clear(uz_iterate *it)
  */
 uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_error *err)
 {
-    const double *g0 = uz_dual_load_g0(load);
-    double bound2, psi, norm2;
+    const double *g0 = load->g0;
+    double bound, psi, norm2;
     for (int64_t i = 0; i < it->m; i++) {
         it->gamma[i] = g0[i] - it->Dr[i];
         it->close[i] = it->r[i] + it->alpha * it->gamma[i] < 0.0;
     }
-    uz_status status = uz_dual_load_correct(load, &bound2, it->r, it->gamma, it->close, err);
-    double bound = sqrt(bound2);
+    uz_status status = uz_dual_load_correct(load, &bound, it->best_bound, it->r, it->gamma, it->close, err);
     if (status != UZ_OK || !(bound < it->best_bound))
         return status;
     uz_dual_load_energies(load, &psi, &norm2, it->r, it->Dr);
@@ -67,8 +66,7 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_
     it->best_iteration = it->iteration;
     it->made_by = by;
     memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
-    uz_dual_load_keep_correction(load);
-    uz_decades_note(it->decades, it->best_relative, it->iteration, uz_dual_load_applications(load));
+    uz_decades_note(it->decades, it->best_relative, it->iteration, load->applications);
     return UZ_OK;
 }
 
@@ -87,10 +85,24 @@ uz_status uz_iterate_bound_best(uz_iterate *it, uz_dual_load *load, uz_error *er
     return status;
 }
 
+/* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
+static double force_norm(const uz_dual *dual, const double *x)
+{
+    const uz_csc *N = dual->touched;
+    double sum = 0.0;
+    for (int64_t j = 0; j < N->cols; j++) {
+        double force = 0.0;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+            force += N->val[k] * x[N->idx[k]];
+        sum += force * force;
+    }
+    return sqrt(sum);
+}
+
 /* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
 static uz_residual residual(uz_iterate *it, uz_dual_load *load)
 {
-    const double *g0 = uz_dual_load_g0(load), *scale = uz_dual_load_row_scale(load);
+    const double *g0 = load->g0, *scale = load->dual->row_scale;
     uz_residual e = {0};
     double e2 = 0.0, e4 = 0.0, *difference = it->r_next;
     for (int64_t i = 0; i < it->m; i++) {
@@ -99,7 +111,7 @@ static uz_residual residual(uz_iterate *it, uz_dual_load *load)
         e2 += penetration * penetration;
         e4 += complementarity * complementarity;
     }
-    e.e1 = uz_dual_load_force_norm(load, difference);
+    e.e1 = force_norm(load->dual, difference);
     e.e2 = sqrt(e2);
     e.e4 = sqrt(e4);
     e.total = sqrt(e.e1 * e.e1 + e2 + e4);

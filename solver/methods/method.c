@@ -21,7 +21,7 @@ static uz_status run_phase(uz_end *end, uz_iterate *it, uz_dual_load *load, cons
                            uz_history *history, uz_error *err)
 {
     uz_method_options phase = *options;
-    phase.method = uz_dual_load_is_inexact(load) ? UZ_METHOD_ACCELERATED_RESTART : UZ_METHOD_CONJUGATE;
+    phase.method = load->dual->can->exact ? UZ_METHOD_CONJUGATE : UZ_METHOD_ACCELERATED_RESTART;
     if (it->phase == FIRST_GUESS || it->phase == SECOND_GUESS)
         return uz_active_set_run(end, it, load, &phase, history, err);
     if (it->phase == WARMING_UP && it->phase_end < options->max_iterations)
@@ -74,8 +74,6 @@ static uz_status run_auto(uz_end *end, uz_iterate *it, uz_dual_load *load, const
 uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                         uz_history *history, uz_error *err)
 {
-    uz_stop stop = {options->hooks, options->deadline};
-    uz_dual_load_set_stop(load, &stop);
     if (options->method == UZ_METHOD_AUTO)
         return run_auto(end, it, load, options, history, err);
     if (options->method == UZ_METHOD_ACTIVE_SET)

@@ -126,7 +126,7 @@ static uz_status bound_best_again(bool *same, uz_iterate *it, uz_dual_load *load
 
 static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
 {
-    take_vectors(it, s, uz_dual_load_row_scale(load));
+    take_vectors(it, s, load->dual->row_scale);
     take_numbers(it, s);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
     *same = status == UZ_OK && alike(it->Dr, it->Dr_next, it->m);
@@ -168,7 +168,7 @@ uz_status uz_iterate_start(uz_iterate *it, uz_dual_load *load, const uz_state *s
     if (status == UZ_OK && start->rho)
         status = restore(&same, it, load, start, err);
     if (status == UZ_OK && !same)
-        take_reactions(it, start, uz_dual_load_row_scale(load), alpha);
+        take_reactions(it, start, load->dual->row_scale, alpha);
     it->origin = same ? UZ_FROM_STATE : UZ_FROM_REACTIONS;
     return status;
 }
@@ -219,7 +219,7 @@ uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_l
         uz_state_free(s);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
     }
-    give_vectors(s, it, uz_dual_load_row_scale(load));
+    give_vectors(s, it, load->dual->row_scale);
     give_numbers(s, it);
     s->method = method;
     *out = s;

@@ -12,6 +12,7 @@
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
+#include "dual/block.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -136,10 +137,10 @@ static uz_status load_all(uz_block *block, int64_t count, int64_t *failed, uz_er
     }
     if (status != UZ_OK)
         return status;
-    double start = uz_seconds(), *P = uz_dual_block_loads(block->loads);
+    double start = uz_seconds(), *P = block->loads->P;
     for (int64_t first = 0; first < block->width; first += UZ_LANES)
         interleave(P + first * block->d, block->runs + first, count - first, block->d);
-    status = uz_dual_block_load(block->loads, err);
+    status = uz_dual_block_forward(block->loads, err);
     share_time(block, count, uz_seconds() - start, false);
     return status;
 }
@@ -148,7 +149,7 @@ static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
 {
     uz_run *run = &block->runs[k];
     run->in_block = true;
-    uz_status status = uz_dual_load_create_in_block(&run->load, block->loads, k, block->K, run->h, err);
+    uz_status status = uz_dual_block_open(&run->load, block->loads, k, block->K, run->h, err);
     if (status == UZ_OK)
         status = uz_run_start(run, err);
     if (status == UZ_OK)
@@ -162,13 +163,13 @@ static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
 static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bool *certified, uz_error *err)
 {
     uz_status status = UZ_OK;
-    const double *P = uz_dual_block_loads(block->loads) + first * block->d;
-    const double *U = uz_dual_block_displacements(block->loads) + first * block->d;
+    const double *P = block->loads->P + first * block->d;
+    const double *U = block->loads->U + first * block->d;
     uz_lane_answer answers[UZ_LANES];
     uz_run *runs = block->runs + first;
     separate(runs, count, U, block->d);
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
-        const double *scale = uz_dual_load_row_scale(runs[k].load);
+        const double *scale = runs[k].load->dual->row_scale;
         double whole_norm;
         for (int64_t i = 0; i < runs[k].m; i++)
             runs[k].answer.r[i] = scale[i] * block->r[first + k][i];

@@ -173,7 +173,7 @@ static uz_status choose_rows(uz_body *body, const uz_problem *problem, const uz_
 static void describe(uz_body *body)
 {
     size_t form = body->krylov ? uz_krylov_describe(body->krylov).bytes : uz_factor_describe(body->factor).bytes;
-    body->bytes = sizeof *body + (body->shared.item ? 0 : form) + uz_dual_describe(body->dual).bytes;
+    body->bytes = sizeof *body + (body->shared.item ? 0 : form) + body->dual->bytes;
     if (body->is_scene)
         body->bytes += uz_body_model_bytes(&body->model);
     if (body->rows.in)

@@ -96,11 +96,11 @@ static void describe_one(const void *object, const char *digest, int64_t hits, s
     entries *to = ctx;
     if (to->count == to->room)
         return; /* came in since they were counted */
-    uz_dual_info dual = uz_dual_describe(body->dual);
+    const uz_dual *dual = body->dual;
     uz_cache_entry *entry = &to->list[to->count];
     memcpy(entry->digest, digest, sizeof entry->digest);
-    entry->d = dual.d;
-    entry->m = dual.m;
+    entry->d = dual->d;
+    entry->m = dual->m;
     entry->nnz = body->factor ? uz_factor_describe(body->factor).nnz : 0;
     entry->hits = hits;
     entry->bytes = bytes + factor_bytes(to, body->factor);

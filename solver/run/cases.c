@@ -189,11 +189,11 @@ static uz_status solve_in_blocks(batch *b, int64_t n, uz_error *err)
 /* What the results take that this call returns, and while it works the vectors of a block. */
 static uz_status check_memory(const batch *b, uz_error *err)
 {
-    uz_dual_info dual = uz_dual_describe(b->body->dual);
+    const uz_dual *dual = b->body->dual;
     const uz_mesh *mesh = &b->body->model.mesh;
-    double nodal = b->body->is_scene ? (double)(mesh->n_nodes * mesh->dim) : (double)dual.d;
-    double lanes = 7.0 * (double)(blocks_for(b) * UZ_LANES) * (double)dual.d;
-    double each = (b->body->is_scene ? 2.0 : 1.0) * nodal + 8.0 * (double)dual.m;
+    double nodal = b->body->is_scene ? (double)(mesh->n_nodes * mesh->dim) : (double)dual->d;
+    double lanes = 7.0 * (double)(blocks_for(b) * UZ_LANES) * (double)dual->d;
+    double each = (b->body->is_scene ? 2.0 : 1.0) * nodal + 8.0 * (double)dual->m;
     double bytes = (double)b->body->bytes + 8.0 * ((double)b->n * each + lanes);
     if (b->n == 1 || b->settings->memory_limit == 0 || bytes <= (double)b->settings->memory_limit)
         return UZ_OK;
@@ -248,8 +248,8 @@ static uz_status solve_round(batch *b, uz_cache *cache, uz_error *err)
     if (status == UZ_OK)
         status = check_memory(b, err);
     if (status == UZ_OK && b->round == 1)
-        b->kept = uz_dual_describe(b->body->dual).m;
-    bool in_blocks = status == UZ_OK && n > 1 && uz_dual_describe(b->body->dual).op == UZ_OPERATOR_CONDENSED;
+        b->kept = b->body->dual->m;
+    bool in_blocks = status == UZ_OK && n > 1 && b->body->dual->can->lanes;
     if (in_blocks)
         status = solve_in_blocks(b, n, err);
     for (int64_t i = 0; status == UZ_OK && !in_blocks && i < n; i++)

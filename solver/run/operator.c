@@ -90,6 +90,16 @@ static size_t levels_budget(const making *m)
     return (size_t)(predicted + fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies);
 }
 
+static uz_status make_dual(making *m, uz_operator op, uz_error *err)
+{
+    uz_body *body = m->body;
+    const uz_dual_source source = {op, m->N, body->factor, body->krylov};
+    double start = uz_seconds();
+    uz_status status = uz_dual_create(&body->dual, &source, m->hooks, err);
+    body->condense_s = uz_seconds() - start;
+    return status;
+}
+
 static uz_status precondition(making *m, uz_error *err)
 {
     uz_body *body = m->body;
@@ -97,11 +107,7 @@ static uz_status precondition(making *m, uz_error *err)
     uz_status status = find_modes(&modes, body, m->K, err);
     if (status == UZ_OK)
         status = uz_krylov_create(&body->krylov, m->K, &modes, levels_budget(m), m->hooks, err);
-    double start = uz_seconds();
-    if (status == UZ_OK)
-        status = uz_dual_create_free(&body->dual, m->N, body->krylov, m->hooks, err);
-    body->condense_s = uz_seconds() - start;
-    return status;
+    return status == UZ_OK ? make_dual(m, body->plan.form[body->plan.chosen].op, err) : status;
 }
 
 /* Between analysis and factorization: is this still the form to take? An error that says nothing means no. */
@@ -125,7 +131,7 @@ static bool is_one_to_one(const uz_csc *N, int64_t n_b)
 static uz_status factor_and_condense(making *m, bool *taken, uz_error *err)
 {
     uz_body *body = m->body;
-    int64_t n_dofs = m->direct == UZ_OPERATOR_CONDENSED ? m->size.n_b : 0;
+    int64_t n_dofs = uz_dual_abilities_of(m->direct)->contact_last ? m->size.n_b : 0;
     int64_t rows = is_one_to_one(m->N, n_dofs) ? 0 : m->N->rows;
     body->plan.chosen = -1;
     uz_status status = uz_shared_factor_get(&body->shared, m->cache, m->key, m->K, m->dofs, n_dofs, rows,
@@ -135,10 +141,7 @@ static uz_status factor_and_condense(making *m, bool *taken, uz_error *err)
     if (status != UZ_OK)
         return *taken ? status : UZ_OK;
     body->factor = body->shared.factor;
-    double start = uz_seconds();
-    status = uz_dual_create(&body->dual, m->N, body->factor, m->direct, m->hooks, err);
-    body->condense_s = uz_seconds() - start;
-    return status;
+    return make_dual(m, m->direct, err);
 }
 
 /* The plan where no factor was analysed. */
@@ -178,7 +181,7 @@ static uz_status make_operator(making *m, uz_error *err)
 {
     uz_body *body = m->body;
     const uz_settings *settings = m->settings;
-    bool no_factor = settings->op == UZ_OPERATOR_MATRIX_FREE;
+    bool no_factor = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor;
     m->direct = uz_dual_choose(m->N, m->size.n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
     no_factor =
         no_factor || (settings->memory_limit > 0 && uz_cost_analysis_bytes(&m->size) > (double)settings->memory_limit);
@@ -193,7 +196,7 @@ static uz_status make_operator(making *m, uz_error *err)
             return status;
         if (body->plan.chosen < 0)
             break;
-        if (body->plan.form[body->plan.chosen].op == UZ_OPERATOR_MATRIX_FREE) {
+        if (!uz_dual_abilities_of(body->plan.form[body->plan.chosen].op)->needs_factor) {
             status = precondition(m, err);
             if (!regrets(m, status))
                 return status;

@@ -84,8 +84,9 @@ static uz_method_options method_options(const uz_run *run)
 static uz_status iterate(uz_run *run, uz_error *err)
 {
     uz_method_options options = method_options(run);
+    const uz_stop stop = {run->hooks, run->deadline};
     double start = uz_seconds();
-    uz_status status = uz_dual_load_aim(run->load, run->target, run->hooks, run->deadline, err);
+    uz_status status = uz_dual_load_aim(run->load, run->target, &stop, err);
     if (status == UZ_OK)
         status = uz_method_run(&run->end, &run->it, run->load, &options, &run->result->history, err);
     run->result->summary.timings.iterate += uz_seconds() - start;
@@ -172,7 +173,7 @@ uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
 /* The answer that r (m, scaled rows) gives, with the kept correction or without, and its certificate. */
 static uz_status certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool corrected, uz_error *err)
 {
-    const double *scale = uz_dual_load_row_scale(run->load);
+    const double *scale = run->load->dual->row_scale;
     uz_status status = uz_dual_load_recover(run->load, answer->u, r, corrected, err);
     for (int64_t i = 0; i < run->m; i++)
         answer->r[i] = scale[i] * r[i];
@@ -226,7 +227,7 @@ static uz_status prove_infeasible(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
     const uz_csc *N = uz_body_N(run->body, run->problem);
-    const double *scale = uz_dual_load_row_scale(run->load), *g0 = uz_dual_load_g0(run->load);
+    const double *scale = run->load->dual->row_scale, *g0 = run->load->g0;
     for (int64_t i = 0; i < run->m; i++) {
         run->it.ray[i] *= scale[i];
         run->it.r_next[i] = g0[i] / scale[i];
@@ -250,7 +251,7 @@ static void note_certificate(uz_run *run)
 {
     uz_decades_resume(&run->decades, uz_run_time(run));
     uz_decades_certify(&run->decades, run->answer.certificate.relative_error, run->it.iteration,
-                       uz_dual_load_applications(run->load));
+                       run->load->applications);
 }
 
 uz_status uz_run_iterate(uz_run *run, uz_error *err)

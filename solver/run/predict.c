@@ -29,7 +29,8 @@ static uz_status analyse(uz_prediction *out, uz_cost_plan *plan, const uz_csc *K
                          uz_error *err)
 {
     uz_analysis *analysis = NULL;
-    int64_t last = form == UZ_OPERATOR_CONDENSED ? size->n_b : 0, rows = is_one_to_one(N, last) ? 0 : N->rows;
+    int64_t last = uz_dual_abilities_of(form)->contact_last ? size->n_b : 0,
+            rows = is_one_to_one(N, last) ? 0 : N->rows;
     uz_status status = uz_analysis_choose(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
     if (status != UZ_OK)
         return status;
@@ -48,7 +49,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, u
     uz_status status = uz_dual_contact_dofs(&dofs, &size->n_b, N, err);
     if (status != UZ_OK)
         return status;
-    bool free_only = settings->op == UZ_OPERATOR_MATRIX_FREE ||
+    bool free_only = (settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor) ||
                      (settings->memory_limit > 0 && uz_cost_analysis_bytes(size) > (double)settings->memory_limit);
     uz_operator form = uz_dual_choose(N, size->n_b, free_only ? UZ_OPERATOR_AUTO : settings->op);
     if (free_only)
@@ -58,7 +59,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, u
     free(dofs);
     if (status == UZ_OK)
         take_plan(out, &plan, size);
-    if (status == UZ_OK && out->op == UZ_OPERATOR_MATRIX_FREE)
+    if (status == UZ_OK && !uz_dual_abilities_of(out->op)->needs_factor)
         out->factor_nnz = 0;
     return status;
 }

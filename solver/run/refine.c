@@ -67,7 +67,7 @@ static void end(refinement *x)
 static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
 {
     const uz_run *run = x->run;
-    const double *scale = uz_dual_load_row_scale(run->load);
+    const double *scale = run->load->dual->row_scale;
     uz_status status =
         uz_equilibrium_residual(&x->res, uz_body_K(run->body, run->problem), uz_body_N(run->body, run->problem), run->p,
                                 answer->u, x->zero, answer->r, err);
@@ -84,10 +84,10 @@ static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
 /* Rows that can't depend on each other, or are too many to exchange: those that press stay, the others are left out. */
 static uz_status keep_rows(refinement *x, uz_dual_load *correction, uz_error *err)
 {
-    bool solved = false;
-    uz_status status = uz_dual_load_solve_active(correction, x->s, x->g, &solved, x->active, err);
+    uz_active_end end;
+    uz_status status = uz_dual_load_solve_active(correction, &end, x->s, x->g, x->active, err);
     for (int64_t i = 0; i < x->run->m; i++)
-        x->s[i] = solved ? x->s[i] : 0.0;
+        x->s[i] = end == UZ_ACTIVE_SOLVED ? x->s[i] : 0.0;
     return status;
 }
 
@@ -105,8 +105,8 @@ static uz_status exchange_rows(refinement *x, uz_dual_load *correction, uz_error
 static uz_status correct(refinement *x, uz_error *err)
 {
     const uz_run *run = x->run;
-    bool small = uz_dual_load_steps_are_small(run->load) || run->m <= FEW_ROWS,
-         exchange = uz_dual_load_rows_may_depend(run->load) && small;
+    bool small = run->load->dual->can->cheap_steps || run->m <= FEW_ROWS,
+         exchange = run->load->dual->rows_may_depend && small;
     uz_dual_load *correction = NULL;
     for (int64_t i = 0; i < run->m; i++)
         x->f[i] = exchange || x->active[i] ? x->f[i] : INFINITY;
@@ -114,7 +114,7 @@ static uz_status correct(refinement *x, uz_error *err)
         uz_dual_load_create(&correction, run->body->dual, uz_body_K(run->body, run->problem), x->e, x->f, err);
     uz_stop stop = {run->hooks, run->deadline};
     if (status == UZ_OK)
-        uz_dual_load_set_stop(correction, &stop);
+        status = uz_dual_load_aim(correction, NAN, &stop, err);
     if (status == UZ_OK)
         status = exchange ? exchange_rows(x, correction, err) : keep_rows(x, correction, err);
     if (status == UZ_OK)
@@ -128,7 +128,7 @@ static uz_status correct(refinement *x, uz_error *err)
 static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
 {
     uz_run *run = x->run;
-    const double *scale = uz_dual_load_row_scale(run->load);
+    const double *scale = run->load->dual->row_scale;
     uz_status status = measure(x, latest, err);
     if (status == UZ_OK)
         status = correct(x, err);

@@ -75,14 +75,14 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
 {
     uz_summary *summary = &run->result->summary;
     uz_factor_info factor = describe_factor(run->body);
-    uz_dual_info dual = uz_dual_describe(run->body->dual);
-    run->d = summary->d = run->result->d = dual.d;
-    run->m = run->all = summary->kept = dual.m;
+    const uz_dual *dual = run->body->dual;
+    run->d = summary->d = run->result->d = dual->d;
+    run->m = run->all = summary->kept = dual->m;
     if (run->body->rows.in)
         run->all = run->body->rows.m;
     summary->m = run->result->m = run->all;
     summary->rounds = 1;
-    summary->op = dual.op;
+    summary->op = dual->can->op;
     summary->ordering = factor.ordering;
     uz_decades_init(&run->decades, run->body->rows.in != NULL);
     run->hit = run->serves_many = summary->factor_cached = reused.op;
@@ -122,7 +122,7 @@ static void report_cost(uz_run *run)
     }
     cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
     cost->actual_bytes =
-        (double)run->body->bytes + (run->load ? (double)uz_dual_load_bytes(run->load) : 0.0) +
+        (double)run->body->bytes + (run->load ? (double)run->load->bytes : 0.0) +
         (run->body->is_scene ? 0.0 : (double)(uz_csc_bytes(&run->problem->qp.K) + uz_csc_bytes(&run->problem->qp.N))) +
         8.0 * RUN_VECTORS * (double)run->d;
 }

@@ -64,7 +64,7 @@ static uz_status build_scene(uz_semi *s, uz_error *err)
 static uz_status keep_a_factor(uz_semi *s, uz_error *err)
 {
     int64_t *dofs = NULL, n_b = 0;
-    if (s->with_factor.op != UZ_OPERATOR_AUTO && s->with_factor.op != UZ_OPERATOR_MATRIX_FREE)
+    if (s->with_factor.op != UZ_OPERATOR_AUTO && uz_dual_abilities_of(s->with_factor.op)->needs_factor)
         return UZ_OK;
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, s->of.N, err);
     if (status == UZ_OK)

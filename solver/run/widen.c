@@ -109,7 +109,6 @@ uz_status uz_run_widen(uz_run *run, uz_error *err)
         status = want_rows(run, met, err);
     run->result->summary.timings.certify += uz_seconds() - start;
     uz_decades_resume(&run->decades, uz_run_time(run));
-    uz_decades_widen(&run->decades, certificate->relative_error, run->it.iteration,
-                     uz_dual_load_applications(run->load));
+    uz_decades_widen(&run->decades, certificate->relative_error, run->it.iteration, run->load->applications);
     return status;
 }

@@ -166,13 +166,13 @@ static bool read_operator(problem_of *p, const uz_problem *problem, uz_body *bod
     uz_mesh_info info = {0};
     bool good = uz_scene_to_qp(&qp, &info, &problem->scene, &err) == UZ_OK &&
                 uz_dual_load_create(&load, body->dual, K, qp.p, qp.h, &err) == UZ_OK &&
-                uz_dual_load_prepare_iterations(load, &lambda, &err) == UZ_OK && lambda > 0.0;
+                uz_dual_load_prepare(load, &lambda, &err) == UZ_OK && lambda > 0.0;
     for (int i = 0; good && i < p->m; i++)
         good = uz_dual_load_column(load, p->D + (size_t)i * (size_t)p->m, i, &err) == UZ_OK;
     for (size_t k = 0; good && k < (size_t)p->m * (size_t)p->m; k++)
         p->D32[k] = (float)p->D[k];
     if (good)
-        memcpy(p->g0, uz_dual_load_g0(load), (size_t)p->m * sizeof *p->g0);
+        memcpy(p->g0, load->g0, (size_t)p->m * sizeof *p->g0);
     p->alpha = 1.0 / lambda;
     uz_dual_load_free(load);
     uz_mesh_info_clear(&info);

@@ -1,5 +1,5 @@
 /* The largest eigenvalue of the dual operator: never too small, so that no step is too long. */
-#include "dual/dual.h"
+#include "dual/lanczos.h"
 #include "harness.h"
 #include "qp_fixture.h"
 

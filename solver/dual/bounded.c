@@ -1,56 +1,19 @@
-/* factored_bounds.c: rows that bound a single dof each, as in obstacle problems: what is known of them, and a guess of
- * those that touch. */
-#include "dual/dual_private.h"
+/* bounded.c: rows that bound a single dof each, as in obstacle problems: what is known of them, what holding some of
+ * them as equations takes, and a guess of those that touch. */
+#include "dual/sparse.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* The one nonzero entry of row i; false when there is none or another. */
-static bool single_entry(int64_t *dof, double *scale, const uz_csc *Nt, int64_t i)
-{
-    *scale = 0.0;
-    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++) {
-        if (Nt->val[k] == 0.0)
-            continue;
-        if (*scale != 0.0)
-            return false;
-        *dof = Nt->idx[k];
-        *scale = Nt->val[k];
-    }
-    return *scale != 0.0;
-}
-
-uz_status uz_bounds_create(uz_dual *dual, uz_error *err)
-{
-    uz_bounds *bounds = &dual->bounds;
-    int64_t m = dual->info.m, i = 0;
-    bounds->dof = uz_alloc(m, sizeof *bounds->dof);
-    bounds->scale = uz_alloc(m, sizeof *bounds->scale);
-    if (!bounds->dof || !bounds->scale)
-        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
-    while (i < m && single_entry(&bounds->dof[i], &bounds->scale[i], &dual->Nt, i))
-        i++;
-    if (i < m)
-        uz_bounds_clear(bounds);
-    else
-        dual->info.bytes += 16 * (size_t)m;
-    return UZ_OK;
-}
-
-void uz_bounds_clear(uz_bounds *bounds)
-{
-    free(bounds->dof);
-    free(bounds->scale);
-    memset(bounds, 0, sizeof *bounds);
-}
-
 /* The tightest row of each dof on either side. A bound that overflows holds nothing, or nothing can meet it. */
-static void find_tightest(uz_bounded *box, const uz_bounds *bounds, const double *h, int64_t d, int64_t m)
+static void find_tightest(uz_bounded *box, const double *h, int64_t d, int64_t m)
 {
+    const uz_bounds *bounds = box->bounds;
     for (int64_t j = 0; j < d; j++) {
         box->upper[j] = box->lower[j] = -1;
         box->top[j] = INFINITY;
@@ -72,10 +35,10 @@ static void find_tightest(uz_bounded *box, const uz_bounds *bounds, const double
             box->contradictory || box->bottom[j] > box->top[j] || isinf(box->top[j]) < 0 || isinf(box->bottom[j]) > 0;
 }
 
-uz_status uz_bounded_create(uz_dual_load *load, const double *p, uz_error *err)
+uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const double *p, uz_error *err)
 {
-    int64_t d = load->dual->info.d, m = load->dual->info.m;
-    uz_bounded *box = load->box = uz_alloc_zero(1, sizeof *box);
+    int64_t d = x->load.dual->d, m = x->load.dual->m;
+    uz_bounded *box = x->box = uz_alloc_zero(1, sizeof *box);
     if (!box)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load");
     double **room[] = {&box->p, &box->top, &box->bottom, &box->u, &box->force, &box->size, &box->point};
@@ -91,8 +54,10 @@ uz_status uz_bounded_create(uz_dual_load *load, const double *p, uz_error *err)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for bounds on %lld dofs", (long long)d);
     memcpy(box->p, p, (size_t)d * sizeof *p);
     box->point_energy = INFINITY;
-    find_tightest(box, &load->dual->bounds, load->h, d, m);
-    memcpy(box->u, load->base, (size_t)d * sizeof *box->u);
+    box->bounds = bounds;
+    find_tightest(box, x->load.h, d, m);
+    memcpy(box->u, x->base, (size_t)d * sizeof *box->u);
+    x->load.bytes += 8 * (10 * (size_t)d + (size_t)m);
     return UZ_OK;
 }
 
@@ -110,16 +75,100 @@ void uz_bounded_free(uz_bounded *box)
     free(box);
 }
 
-/* a u <= h_a and b u <= h_b with a > 0 > b: y = (b, -a) has N'y = a b - b a = 0 exactly. */
-bool uz_bounded_crossed(const uz_dual_load *load, double *y)
+/* Which row holds each dof. Of several rows on a dof the tightest counts; a dof is not held from both sides. */
+bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep)
 {
-    const uz_bounded *box = load->box;
-    const uz_bounds *bounds = &load->dual->bounds;
-    for (int64_t j = 0; j < load->dual->info.d; j++) {
+    uz_bounded *box = x->box;
+    const uz_bounds *bounds = box->bounds;
+    const int64_t d = x->load.dual->d, m = x->load.dual->m;
+    if (box->contradictory)
+        return false;
+    box->has_exact = false;
+    for (int64_t j = 0; j < d; j++)
+        box->holder[j] = -1;
+    for (int64_t i = 0; i < m; i++) {
+        int64_t j = bounds->dof[i];
+        if (!active[i])
+            continue;
+        if (bounds->scale[i] > 0.0)
+            box->holder[j] = box->upper[j];
+        else if (box->holder[j] < 0)
+            box->holder[j] = box->lower[j];
+    }
+    for (int64_t j = 0; j < d; j++) {
+        box->fixed[j] = box->holder[j] >= 0;
+        double free = keep ? box->u[j] : 0.0;
+        box->u[j] = !box->fixed[j] ? free : bounds->scale[box->holder[j]] > 0.0 ? box->top[j] : box->bottom[j];
+    }
+    return true;
+}
+
+/* force = K u - p, and size = |K| |u| + |p|, what its rounding is in proportion to. */
+void uz_bounded_balance(uz_bounded *box, const uz_csc *K)
+{
+    for (int64_t j = 0; j < K->cols; j++) {
+        box->force[j] = -box->p[j];
+        box->size[j] = fabs(box->p[j]);
+    }
+    for (int64_t j = 0; j < K->cols; j++) {
+        /* Rows above have added their terms; the diagonal comes first in a sorted column. */
+        double u = box->u[j], own = K->val[K->ptr[j]] * u, force = box->force[j] + own, size = box->size[j] + fabs(own);
+        for (int64_t k = K->ptr[j] + 1; k < K->ptr[j + 1]; k++) {
+            int64_t i = K->idx[k];
+            double below = K->val[k] * u, across = K->val[k] * box->u[i];
+            box->force[i] += below;
+            box->size[i] += fabs(below);
+            force += across;
+            size += fabs(across);
+        }
+        box->force[j] = force;
+        box->size[j] = size;
+    }
+}
+
+/* Signs below this, relative to the terms of a sum, are rounding: weakly active rows must not make the steps chatter.
+ */
+#define NOISE (64.0 * DBL_EPSILON)
+
+/* r from what holds the dofs; `active` becomes the rows that do. A dof whose bounds meet is held from the side that it
+ * leans on. */
+void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active)
+{
+    uz_bounded *box = x->box;
+    const uz_bounds *bounds = box->bounds;
+    const double *h = x->load.h;
+    const int64_t d = x->load.dual->d, m = x->load.dual->m;
+    memset(box->r, 0, (size_t)m * sizeof *box->r);
+    memset(active, 0, (size_t)m * sizeof *active);
+    for (int64_t j = 0; j < d; j++) {
+        int64_t row = box->holder[j];
+        if (row < 0)
+            continue;
+        if (box->top[j] <= box->bottom[j])
+            row = box->force[j] > 0.0 ? box->lower[j] : box->upper[j];
+        active[row] = true;
+        box->r[row] = box->force[j] / bounds->scale[row];
+        if (box->r[row] > 0.0 && fabs(box->force[j]) <= NOISE * box->size[j])
+            box->r[row] = 0.0;
+    }
+    for (int64_t i = 0; i < m; i++) {
+        double reach = bounds->scale[i] * box->u[bounds->dof[i]];
+        g[i] = h[i] - reach;
+        if (active[i] || (g[i] < 0.0 && -g[i] <= NOISE * (fabs(h[i]) + fabs(reach))))
+            g[i] = 0.0;
+    }
+}
+
+/* a u <= h_a and b u <= h_b with a > 0 > b: y = (b, -a) has N'y = a b - b a = 0 exactly. */
+bool uz_bounded_crossed(const uz_sparse_load *x, double *y)
+{
+    const uz_bounded *box = x->box;
+    const uz_bounds *bounds = box->bounds;
+    for (int64_t j = 0; j < x->load.dual->d; j++) {
         int64_t a = box->upper[j], b = box->lower[j];
         if (a < 0 || b < 0 || !(box->bottom[j] > box->top[j]))
             continue;
-        memset(y, 0, (size_t)load->dual->info.m * sizeof *y);
+        memset(y, 0, (size_t)x->load.dual->m * sizeof *y);
         y[a] = bounds->scale[b];
         y[b] = -bounds->scale[a];
         return true;
@@ -186,16 +235,17 @@ static void choose_start(uz_bounded *box, const uz_csc *K, const double *exact)
         memcpy(box->point, cut, (size_t)K->cols * sizeof *cut);
 }
 
-bool uz_bounded_guess(uz_dual_load *load, bool *active)
+bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
 {
-    uz_bounded *box = load->box;
-    if (box->contradictory)
+    const uz_sparse_load *x = (const uz_sparse_load *)load;
+    uz_bounded *box = x->box;
+    if (!box || box->contradictory)
         return false;
-    choose_start(box, load->K, box->has_exact ? box->u : load->base);
+    choose_start(box, load->K, box->has_exact ? box->u : x->base);
     for (int k = 0; k < SWEEPS; k++)
         sweep(box, load->K, k % 2 == 1);
     box->point_energy = energy(box, load->K, box->point);
-    memset(active, 0, (size_t)load->dual->info.m * sizeof *active);
+    memset(active, 0, (size_t)load->dual->m * sizeof *active);
     for (int64_t j = 0; j < load->K->cols; j++) {
         if (box->point[j] >= box->top[j] && box->force[j] > 0.0)
             active[box->upper[j]] = true;

@@ -1,27 +1,18 @@
-/* condensed_block.c: several loads with one pass over the factor, and their displacements with another. */
-#include "dual/dual_private.h"
+/* block.c: several loads with one pass over the factor, and their displacements with another. */
+#include "dual/block.h"
 
 #include "core/alloc.h"
-#include "linalg/blas.h"
 #include "core/error.h"
+#include "dual/form.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-struct uz_dual_block {
-    const uz_dual *dual;
-    int64_t blocks;
-    double *P, *U; /* blocks x d x UZ_LANES: loads and displacements, in the order of the dofs */
-    double *Y;     /* the same in the factor's order: L^-1 P p */
-    double *X;     /* room */
-    double *room;  /* d */
-};
 
 uz_status uz_dual_block_create(uz_dual_block **out, const uz_dual *dual, int64_t blocks, uz_error *err)
 {
     *out = NULL;
     uz_dual_block *block = uz_alloc_zero(1, sizeof *block);
-    int64_t d = dual->info.d;
+    int64_t d = dual->d;
     bool ok = block != NULL;
     for (int k = 0; ok && k < 4; k++) {
         double **room[] = {&block->P, &block->U, &block->Y, &block->X};
@@ -51,46 +42,29 @@ void uz_dual_block_free(uz_dual_block *block)
     free(block);
 }
 
-double *uz_dual_block_loads(uz_dual_block *block)
-{
-    return block->P;
-}
-
-const double *uz_dual_block_displacements(const uz_dual_block *block)
-{
-    return block->U;
-}
-
-/* Where a lane's entry 0 stands. */
-static int64_t lane_start(const uz_dual_block *block, int64_t lane)
-{
-    return lane / UZ_LANES * block->dual->info.d * UZ_LANES + lane % UZ_LANES;
-}
-
-uz_status uz_dual_block_load(uz_dual_block *block, uz_error *err)
+uz_status uz_dual_block_forward(uz_dual_block *block, uz_error *err)
 {
     const uz_factor *factor = block->dual->factor;
-    const int64_t size = block->dual->info.d * UZ_LANES;
+    const int64_t size = block->dual->d * UZ_LANES;
     for (int64_t b = 0; b < block->blocks; b++)
         uz_factor_permute_lanes(factor, block->Y + b * size, block->P + b * size);
     return uz_factor_forward_lanes(factor, block->Y, block->blocks, err);
 }
 
-uz_status uz_dual_load_create_in_block(uz_dual_load **out, const uz_dual_block *block, int64_t lane, const uz_csc *K,
-                                       const double *h, uz_error *err)
+/* Where a lane's entry 0 stands. */
+static int64_t lane_start(const uz_dual_block *block, int64_t lane)
 {
-    const uz_dual *dual = block->dual;
+    return lane / UZ_LANES * block->dual->d * UZ_LANES + lane % UZ_LANES;
+}
+
+uz_status uz_dual_block_open(uz_dual_load **out, const uz_dual_block *block, int64_t lane, const uz_csc *K,
+                             const double *h, uz_error *err)
+{
     uz_dual_load *load = NULL;
     *out = NULL;
-    uz_status status = uz_dual_load_allocate(&load, dual, K, h, false, err);
-    if (status != UZ_OK)
-        return status;
-    load->lane = block->Y + lane_start(block, lane);
-    double square = 0.0;
-    for (int64_t k = 0; k < dual->info.d; k++)
-        square += load->lane[k * UZ_LANES] * load->lane[k * UZ_LANES];
-    load->psi0 = -0.5 * square;
-    status = uz_condensed_begin(load, load->lane, UZ_LANES, block->room, err);
+    uz_status status = uz_dual_load_begin(&load, block->dual, K, h, err);
+    if (status == UZ_OK)
+        status = block->dual->form->load_lane(load, block->Y + lane_start(block, lane), UZ_LANES, block->room, err);
     if (status == UZ_OK)
         *out = load;
     else
@@ -102,12 +76,12 @@ uz_status uz_dual_block_recover(uz_dual_block *block, uz_dual_load *const *loads
                                 const bool *corrected, int64_t count, uz_error *err)
 {
     const uz_dual *dual = block->dual;
-    const int64_t size = dual->info.d * UZ_LANES;
+    const int64_t size = dual->d * UZ_LANES;
     uz_status status = UZ_OK;
     memcpy(block->X, block->Y, (size_t)(block->blocks * size) * sizeof *block->X);
     for (int64_t lane = 0; status == UZ_OK && lane < count; lane++)
-        status = uz_condensed_add_reactions(block->X + lane_start(block, lane), UZ_LANES, block->room, loads[lane],
-                                            r[lane], corrected[lane] && loads[lane]->has_kept, err);
+        status = dual->form->add_reactions(loads[lane], block->X + lane_start(block, lane), UZ_LANES, block->room,
+                                           r[lane], corrected[lane] && loads[lane]->has_kept, err);
     if (status == UZ_OK)
         status = uz_factor_backward_lanes(dual->factor, block->X, block->blocks, err);
     for (int64_t b = 0; status == UZ_OK && b < block->blocks; b++)

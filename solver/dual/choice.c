@@ -1,0 +1,65 @@
+/* choice.c: the table of the forms of the dual operator, and the choice of one. */
+#include "dual/form.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <stdlib.h>
+
+/* In the order of preference among those that suit. */
+static const uz_dual_form *const forms[UZ_DUAL_FORMS] = {&uz_dual_condensed, &uz_dual_factored, &uz_dual_matrix_free};
+
+const uz_dual_abilities *uz_dual_abilities_at(int k)
+{
+    return &forms[k]->can;
+}
+
+const uz_dual_form *uz_dual_form_of(uz_operator op)
+{
+    int k = 0;
+    while (k < UZ_DUAL_FORMS - 1 && forms[k]->can.op != op)
+        k++;
+    return forms[k];
+}
+
+const uz_dual_abilities *uz_dual_abilities_of(uz_operator op)
+{
+    return &uz_dual_form_of(op)->can;
+}
+
+enum { SMALL_BOUNDS = 128 };
+
+uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked)
+{
+    if (asked != UZ_OPERATOR_AUTO)
+        return asked;
+    uz_dual_shape shape = {N->cols, N->rows, n_b, N->rows > SMALL_BOUNDS && uz_dual_bounds_dofs(N)};
+    int k = 0;
+    while (k < UZ_DUAL_FORMS - 1 && !(forms[k]->suits && forms[k]->suits(&shape)))
+        k++;
+    return forms[k]->can.op;
+}
+
+uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err)
+{
+    *dofs = uz_alloc(N->cols, sizeof **dofs);
+    *count = 0;
+    if (!*dofs)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld dofs", (long long)N->cols);
+    for (int64_t j = 0; j < N->cols; j++)
+        if (N->ptr[j + 1] > N->ptr[j])
+            (*dofs)[(*count)++] = j;
+    return UZ_OK;
+}
+
+bool uz_dual_bounds_dofs(const uz_csc *N)
+{
+    int64_t nnz = N->ptr[N->cols];
+    bool *seen = nnz == N->rows ? uz_alloc_zero(N->rows, sizeof *seen) : NULL, single = seen != NULL;
+    for (int64_t k = 0; single && k < nnz; k++) {
+        single = !seen[N->idx[k]];
+        seen[N->idx[k]] = true;
+    }
+    free(seen);
+    return single;
+}

@@ -1,0 +1,33 @@
+/* choice.h: the forms of the dual operator that there are, what each can do, and which one to take. */
+#ifndef UZ_DUAL_CHOICE_H
+#define UZ_DUAL_CHOICE_H
+
+#include "uzawa.h"
+
+/* What a form of the operator needs, and what it can do. */
+typedef struct {
+    uz_operator op;
+    bool needs_factor; /* it is made from a factor of K, else from a uz_krylov */
+    bool contact_last; /* a factor whose order ends with the contact dofs serves it best */
+    bool exact;        /* it solves to rounding; else within the aim, each solve the nearer the closer r is to that of
+                        * the last apply, and with a bound on what is left in every answer */
+    bool cheap_steps;  /* solve_active works on the contact only: a step costs little beside a linear solve */
+    bool lanes;        /* several loads with one pass over the factor: block.h */
+} uz_dual_abilities;
+
+enum { UZ_DUAL_FORMS = 3 };
+/* Of form k < UZ_DUAL_FORMS, in the order of preference of uz_dual_choose. */
+const uz_dual_abilities *uz_dual_abilities_at(int k);
+/* Of a form by its name, not AUTO. */
+const uz_dual_abilities *uz_dual_abilities_of(uz_operator op);
+
+/* The form that AUTO stands for, among those with a factor, from the sizes (n_b: dofs that N touches) and whether
+ * each row bounds one dof. */
+uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked);
+
+/* The dofs that N touches, ascending; the caller frees *dofs. */
+uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err);
+/* Whether each row has one entry: it bounds a dof. False also where there is no memory to tell. */
+bool uz_dual_bounds_dofs(const uz_csc *N);
+
+#endif

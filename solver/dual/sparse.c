@@ -1,0 +1,199 @@
+/* sparse.c: what the forms without a dense operator share. */
+#include "dual/sparse.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The one nonzero entry of row i; false when there is none or another. */
+static bool single_entry(int64_t *dof, double *scale, const uz_csc *Nt, int64_t i)
+{
+    *scale = 0.0;
+    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++) {
+        if (Nt->val[k] == 0.0)
+            continue;
+        if (*scale != 0.0)
+            return false;
+        *dof = Nt->idx[k];
+        *scale = Nt->val[k];
+    }
+    return *scale != 0.0;
+}
+
+uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err)
+{
+    (void)stop;
+    uz_bounds *bounds = &((uz_sparse *)dual)->bounds;
+    int64_t m = dual->m, i = 0;
+    bounds->dof = uz_alloc(m, sizeof *bounds->dof);
+    bounds->scale = uz_alloc(m, sizeof *bounds->scale);
+    if (!bounds->dof || !bounds->scale)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
+    while (i < m && single_entry(&bounds->dof[i], &bounds->scale[i], &dual->Nt, i))
+        i++;
+    if (i < m)
+        uz_sparse_clear(dual);
+    else
+        dual->bytes += 16 * (size_t)m;
+    dual->rows_may_depend = dual->can->exact && !bounds->dof;
+    return UZ_OK;
+}
+
+void uz_sparse_clear(uz_dual *dual)
+{
+    uz_bounds *bounds = &((uz_sparse *)dual)->bounds;
+    free(bounds->dof);
+    free(bounds->scale);
+    memset(bounds, 0, sizeof *bounds);
+}
+
+uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err)
+{
+    uz_dual_load *load = &x->load;
+    int64_t d = load->dual->d, room = load->dual->m > d ? load->dual->m : d;
+    x->base = uz_alloc_zero(d, sizeof(double));     /* iterations begin there, */
+    x->response = uz_alloc_zero(d, sizeof(double)); /* and there */
+    x->work = uz_alloc_zero(room, sizeof(double));
+    x->work2 = uz_alloc_zero(room, sizeof(double));
+    x->weight = uz_alloc(d, sizeof(double));
+    load->correction = uz_alloc_zero(d, sizeof(double));
+    load->kept = uz_alloc_zero(d, sizeof(double));
+    load->bytes = 8 * (7 * (size_t)d + 2 * (size_t)load->dual->m);
+    if (!x->base || !x->response || !x->work || !x->work2 || !x->weight || !load->correction || !load->kept)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
+    for (int64_t j = 0; j < d; j++) /* sorted lower triangle: the diagonal comes first */
+        x->weight[j] = 1.0 / load->K->val[load->K->ptr[j]];
+    return UZ_OK;
+}
+
+uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err)
+{
+    uz_dual_load *load = &x->load;
+    const uz_dual *dual = load->dual;
+    const uz_bounds *bounds = &((const uz_sparse *)dual)->bounds;
+    load->psi0 = 0.0;
+    for (int64_t j = 0; j < dual->d; j++)
+        load->psi0 -= 0.5 * p[j] * x->base[j];
+    memcpy(load->g0, load->h, (size_t)dual->m * sizeof *load->g0);
+    uz_csc_gaxpy(load->g0, &dual->N, -1.0, x->base);
+    return bounds->dof ? uz_bounded_create(x, bounds, p, err) : UZ_OK;
+}
+
+void uz_sparse_unload(uz_sparse_load *x)
+{
+    free(x->base);
+    free(x->response);
+    free(x->work);
+    free(x->work2);
+    free(x->weight);
+    uz_bounded_free(x->box);
+}
+
+enum { MAX_SWEEPS = 60 };
+
+static double column_dot(const uz_csc *Nt, int64_t i, const double *x)
+{
+    double sum = 0.0;
+    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+        sum += Nt->val[k] * x[Nt->idx[k]];
+    return sum;
+}
+
+/* n_i'W n_i */
+static double row_weight(const uz_csc *Nt, int64_t i, const double *weight)
+{
+    double sum = 0.0;
+    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+        sum += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
+    return sum;
+}
+
+/* One pass; returns the largest move relative to the largest target. */
+static double sweep(double *c, const uz_csc *Nt, const double *weight, const double *g, const bool *close,
+                    bool only_lift)
+{
+    double moved = 0.0;
+    for (int64_t i = 0; i < Nt->cols; i++) {
+        bool closing = close[i] && !only_lift;
+        double miss = g[i] - column_dot(Nt, i, c);
+        double weighted = row_weight(Nt, i, weight);
+        if (weighted <= 0.0 || (!closing && miss >= 0.0))
+            continue;
+        for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+            c[Nt->idx[k]] += miss / weighted * weight[Nt->idx[k]] * Nt->val[k];
+        moved = fmax(moved, fabs(miss));
+    }
+    return moved;
+}
+
+/* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
+ * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.
+ * True when no row is left penetrating by more than rounding; c (rows of Nt) and Nc (m) are outputs. */
+static bool correct_by_sweeps(double *c, double *Nc, const uz_csc *Nt, const double *weight, const double *g,
+                              const bool *close)
+{
+    double scale = 0.0;
+    memset(c, 0, (size_t)Nt->rows * sizeof *c);
+    for (int64_t i = 0; i < Nt->cols; i++)
+        if (close[i] || g[i] < 0.0)
+            scale = fmax(scale, fabs(g[i]));
+    double small = 8.0 * DBL_EPSILON * scale, moved = scale;
+    for (int k = 0; k < MAX_SWEEPS && moved > small; k++)
+        moved = sweep(c, Nt, weight, g, close, k >= MAX_SWEEPS / 2);
+    bool feasible = true;
+    for (int64_t i = 0; i < Nt->cols; i++) {
+        Nc[i] = column_dot(Nt, i, c);
+        if (g[i] - Nc[i] < -4.0 * small)
+            feasible = false;
+    }
+    return feasible;
+}
+
+uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, const double *r, const double *g,
+                            const bool *close)
+{
+    const uz_dual *dual = x->load.dual;
+    double *c = x->load.correction, *Nc = x->work, *Kc = x->work2, square = 0.0, complementarity = 0.0;
+    if (!correct_by_sweeps(c, Nc, &dual->Nt, x->weight, g, close))
+        return UZ_OK;
+    for (int64_t i = 0; i < dual->m; i++)
+        complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
+    memset(Kc, 0, (size_t)dual->d * sizeof *Kc);
+    uz_csc_symv(Kc, x->load.K, 1.0, c);
+    for (int64_t j = 0; j < dual->d; j++)
+        square += c[j] * Kc[j];
+    double distance = sqrt(fmax(0.0, square)) + slack;
+    *bound2 = distance * distance + 2.0 * complementarity;
+    return UZ_OK;
+}
+
+/* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */
+static bool recover_guess(const uz_bounded *box, double *u, const double *r, int64_t d, int64_t m)
+{
+    if (!box || !box->has_exact)
+        return false;
+    for (int64_t i = 0; i < m; i++)
+        if (r[i] != box->r[i])
+            return false;
+    memcpy(u, box->u, (size_t)d * sizeof *u);
+    return true;
+}
+
+uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
+{
+    uz_sparse_load *x = (uz_sparse_load *)load;
+    int64_t d = load->dual->d;
+    uz_status status = UZ_OK;
+    if (!recover_guess(x->box, u, r, d, load->dual->m)) {
+        status = load->dual->form->apply(load, x->work, r, err);
+        for (int64_t j = 0; j < d; j++)
+            u[j] = x->base[j] + x->response[j];
+    }
+    for (int64_t j = 0; corrected && j < d; j++)
+        u[j] += load->kept[j];
+    return status;
+}

@@ -1,0 +1,70 @@
+/* sparse.h: what the forms without a dense operator share: loads that keep displacements, and rows that bound a single
+ * dof each, as in obstacle problems. */
+#ifndef UZ_DUAL_SPARSE_H
+#define UZ_DUAL_SPARSE_H
+
+#include "dual/form.h"
+
+/* Row i is scale_i u_dof. NULL where some row of N has more or fewer than one nonzero entry. */
+typedef struct {
+    int64_t *dof;  /* m */
+    double *scale; /* m */
+} uz_bounds;
+
+/* The same problem as minimize 1/2 u'Ku - p'u, bottom <= u <= top, of one load. */
+typedef struct {
+    const uz_bounds *bounds;
+    double *p;              /* d */
+    double *top, *bottom;   /* d: +-INFINITY where there is none */
+    int64_t *upper, *lower; /* d: the row that says so, the tightest; -1: none */
+    bool contradictory;     /* some bottom lies above its top */
+    int64_t *holder;        /* d: the row that holds the dof in the current guess, -1: free */
+    bool *fixed;            /* d: holder >= 0 */
+    bool has_exact;         /* u and r are those of the last guess, to rounding */
+    double *u, *r;          /* d, m */
+    double *force, *size;   /* d: a residual of equilibrium and what its rounding is in proportion to */
+    double *point;          /* d: where the sweeps ended; energy INFINITY before the first */
+    double point_energy;
+} uz_bounded;
+
+typedef struct {
+    uz_dual dual;
+    uz_bounds bounds;
+} uz_sparse;
+
+/* Corrections are c (d). */
+typedef struct {
+    uz_dual_load load;
+    double *base;         /* d: u0 = K^-1 p */
+    double *response;     /* d: K^-1 N'r of the last apply */
+    double *work, *work2; /* max(d, m) each */
+    double *weight;       /* d: 1 / K_ii: the metric in which penetrating rows are lifted */
+    uz_bounded *box;      /* with bounds, else NULL */
+} uz_sparse_load;
+
+/* Operations, or most of them: create, clear; load: with a base of zeros, and then from the base. */
+uz_status uz_sparse_create(uz_dual *dual, const uz_stop *stop, uz_error *err);
+void uz_sparse_clear(uz_dual *dual);
+uz_status uz_sparse_load_begin(uz_sparse_load *x, uz_error *err);
+uz_status uz_sparse_load_end(uz_sparse_load *x, const double *p, uz_error *err);
+void uz_sparse_unload(uz_sparse_load *x);
+/* slack: how far u(r) is from what the last apply left, in the energy norm. */
+uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, const double *r, const double *g,
+                            const bool *close);
+uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err);
+bool uz_sparse_guess_active(uz_dual_load *load, bool *active);
+
+/* x->box, once base, h and g0 are there. */
+uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const double *p, uz_error *err);
+void uz_bounded_free(uz_bounded *box);
+
+/* Steps of solve_active: holds the dofs of the active rows at their bounds, the others at 0 or where they were (keep);
+ * false: the bounds contradict each other. force = K u - p and size = |K| |u| + |p|, what its rounding is in proportion
+ * to; r from what holds the dofs, `active` the rows that do; the gaps. */
+bool uz_bounded_hold(uz_sparse_load *x, const bool *active, bool keep);
+void uz_bounded_balance(uz_bounded *box, const uz_csc *K);
+void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active);
+/* y (m): the ray of two bounds on one dof that cross; false, y untouched: none do. */
+bool uz_bounded_crossed(const uz_sparse_load *x, double *y);
+
+#endif
