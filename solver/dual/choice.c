@@ -40,6 +40,12 @@ uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked)
     return forms[k]->can.op;
 }
 
+void uz_dual_add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
+                      const uz_cost_rates *rates)
+{
+    uz_dual_form_of(cost->op)->add_cost(cost, size, factor, rates);
+}
+
 uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err)
 {
     *dofs = uz_alloc(N->cols, sizeof **dofs);

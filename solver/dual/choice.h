@@ -2,6 +2,7 @@
 #ifndef UZ_DUAL_CHOICE_H
 #define UZ_DUAL_CHOICE_H
 
+#include "dual/cost.h"
 #include "uzawa.h"
 
 /* What a form of the operator needs, and what it can do. */
@@ -24,6 +25,10 @@ const uz_dual_abilities *uz_dual_abilities_of(uz_operator op);
 /* The form that AUTO stands for, among those with a factor, from the sizes (n_b: dofs that N touches) and whether
  * each row bounds one dof. */
 uz_operator uz_dual_choose(const uz_csc *N, int64_t n_b, uz_operator asked);
+
+/* Adds what the form cost->op takes to *cost (form.h). */
+void uz_dual_add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
+                      const uz_cost_rates *rates);
 
 /* The dofs that N touches, ascending; the caller frees *dofs. */
 uz_status uz_dual_contact_dofs(int64_t **dofs, int64_t *count, const uz_csc *N, uz_error *err);

@@ -380,6 +380,28 @@ static bool suits(const uz_dual_shape *shape)
     return shape->bounds ? cheap && 2 * shape->n_b <= shape->d : shape->m <= small || cheap;
 }
 
+/* Substitutions of a load: forwards, backwards, and the certificate's. */
+#define SOLVES 4.0
+/* Steps of the active set. */
+#define STEPS 6.0
+
+static double cube(double x)
+{
+    return x * x * x;
+}
+
+static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
+                     const uz_cost_rates *rates)
+{
+    double n_b = (double)size->n_b, m = (double)size->m, entries = (double)factor->nnz;
+    double dense = cube(fmax(n_b, m)), step = cube(m) / 3.0;
+    cost->flops += dense + STEPS * step + 2.0 * SOLVES * entries;
+    cost->setup_s += dense * rates->flop_s;
+    cost->case_s += STEPS * step * rates->flop_s + SOLVES * UZ_COST_SOLVE_PASSES * entries * rates->entry_s;
+    cost->bytes += 8.0 * UZ_COST_VECTORS * (double)size->d;
+    cost->bytes += 8.0 * (n_b * n_b + 2.0 * m * m + n_b * m);
+}
+
 const uz_dual_form uz_dual_condensed = {
     .can = {.op = UZ_OPERATOR_CONDENSED,
             .needs_factor = true,
@@ -390,6 +412,7 @@ const uz_dual_form uz_dual_condensed = {
     .dual_size = sizeof(uz_condensed),
     .load_size = sizeof(uz_condensed_load),
     .suits = suits,
+    .add_cost = add_cost,
     .create = create,
     .clear = clear,
     .load = load_whole,

@@ -124,11 +124,36 @@ static bool suits(const uz_dual_shape *shape)
     return true;
 }
 
+/* Steps of the active set, those that refactor, each analysed anew: passes of K. */
+#define STEPS           4.0
+#define ANALYSIS_PASSES 60.0
+
+static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
+                     const uz_cost_rates *rates)
+{
+    double entries = (double)factor->nnz, one_solve = 2.0 * UZ_COST_SOLVE_PASSES * entries * rates->entry_s;
+    double share = 1.0 - 0.5 * (double)size->n_b / (double)size->d; /* of the dofs that are free, about */
+    cost->bytes += 8.0 * UZ_COST_VECTORS * (double)size->d;
+    if (!size->bounds) {
+        cost->case_s += UZ_COST_ITERATIONS * one_solve;
+        cost->flops += 4.0 * UZ_COST_ITERATIONS * entries;
+        return;
+    }
+    double again =
+        share * share * UZ_COST_FACTOR_FLOPS * factor->flops * rates->flop_s +
+        (share * UZ_COST_FACTOR_PASSES * entries + ANALYSIS_PASSES * (double)size->k_entries) * rates->entry_s;
+    cost->case_s += 2.0 * one_solve + STEPS * (again + 2.0 * share * one_solve);
+    cost->flops += STEPS * share * share * factor->flops + 8.0 * (1.0 + STEPS) * entries;
+    cost->bytes +=
+        share * (double)factor->bytes + 16.0 * (double)size->k_entries; /* the factor and the matrix of the free dofs */
+}
+
 const uz_dual_form uz_dual_factored = {
     .can = {.op = UZ_OPERATOR_FACTORED, .needs_factor = true, .exact = true},
     .dual_size = sizeof(uz_sparse),
     .load_size = sizeof(factored_load),
     .suits = suits,
+    .add_cost = add_cost,
     .create = uz_sparse_create,
     .clear = uz_sparse_clear,
     .load = make_load,

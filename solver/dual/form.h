@@ -11,6 +11,7 @@
 #ifndef UZ_DUAL_FORM_H
 #define UZ_DUAL_FORM_H
 
+#include "dual/cost.h"
 #include "dual/dual.h"
 
 #include <pthread.h>
@@ -23,19 +24,21 @@ typedef struct uz_dual_lazy {
     double lambda_max; /* NaN until known */
 } uz_dual_lazy;
 
-/* Sizes that a choice goes by. */
 typedef struct {
-    int64_t d, m, n_b;
-    bool bounds; /* each row bounds a dof, and they are more than a few */
+    int64_t d, m, n_b; /* n_b: dofs that N touches */
+    bool bounds;       /* each row bounds a dof, and they are more than a few */
 } uz_dual_shape;
 
 /* Operations: as the function of this name in dual.h, unless it says more. Those that may be NULL say so. */
 struct uz_dual_form {
     uz_dual_abilities can;
-    size_t dual_size, load_size; /* of its structs */
+    size_t dual_size, load_size;               /* of its structs */
+    bool (*suits)(const uz_dual_shape *shape); /* is it the one to take? NULL: only when asked for, or for its price */
 
-    /* Is it the one to take? NULL: only when asked for. */
-    bool (*suits)(const uz_dual_shape *shape);
+    /* Adds what the form takes to a cost that holds what K, N, the factor (predicted for this form; NULL: it needs
+     * none) and the vectors of certificates take. */
+    void (*add_cost)(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
+                     const uz_cost_rates *rates);
 
     uz_status (*create)(uz_dual *dual, const uz_stop *stop, uz_error *err); /* also `bytes`, `rows_may_depend` */
     void (*clear)(uz_dual *dual);                                           /* half-built ones too */

@@ -289,10 +289,42 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 
+/* ------------------------------------------------------------- its price */
+
+/* A cycle and a product: 5 passes of K and what the coarse levels add. The other numbers are cycles: making a
+ * multigrid, bounding the spectrum, solving once, a step of the active set (with a multigrid of its own), an iteration
+ * that starts at the last one's answer. Plane bodies and obstacles. */
+#define CYCLE_PASSES    6.5
+#define CREATE_CYCLES   16.0
+#define SPECTRUM_CYCLES 55.0
+#define SOLVE_CYCLES    22.0
+#define STEPS           6.0
+#define STEP_CYCLES     30.0
+#define CHANGE_CYCLES   6.0
+/* As UZ_COST_VECTORS, with conjugate gradients. */
+#define VECTORS 52.0
+
+static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
+                     const uz_cost_rates *rates)
+{
+    (void)factor;
+    double cycle = CYCLE_PASSES * (double)size->k_entries * rates->entry_s, setup = CREATE_CYCLES + SPECTRUM_CYCLES;
+    double load = SOLVE_CYCLES + (size->m == 0   ? 0.0
+                                  : size->bounds ? STEPS * STEP_CYCLES
+                                                 : UZ_COST_ITERATIONS * CHANGE_CYCLES);
+    double levels = uz_krylov_predict_bytes(size->d, size->k_entries, size->modes);
+    cost->setup_s += setup * cycle;
+    cost->case_s += load * cycle;
+    cost->flops += (setup + load) * CYCLE_PASSES * 4.0 * (double)size->k_entries;
+    cost->bytes += (size->bounds ? 2.0 : 1.0) * levels;
+    cost->bytes += 8.0 * VECTORS * (double)size->d;
+}
+
 const uz_dual_form uz_dual_matrix_free = {
     .can = {.op = UZ_OPERATOR_MATRIX_FREE},
     .dual_size = sizeof(uz_sparse),
     .load_size = sizeof(free_load),
+    .add_cost = add_cost,
     .create = uz_sparse_create,
     .clear = uz_sparse_clear,
     .load = make_load,

@@ -341,7 +341,7 @@ TEST(the_table_is_complete)
         CHECK(uz_operator_parse(&named, uz_operator_name(can->op)) && named == can->op);
         CHECK(form->dual_size >= sizeof(uz_dual) && form->load_size >= sizeof(uz_dual_load));
         CHECK(form->create && form->clear && form->load && form->unload && form->apply && form->correct);
-        CHECK(form->recover && form->solve_active);
+        CHECK(form->recover && form->solve_active && form->add_cost);
         CHECK(can->exact || (form->aim && form->probe));
         CHECK(can->needs_factor || form->inverse_norm);
         CHECK(can->lanes == (form->load_lane != NULL) && can->lanes == (form->add_reactions != NULL));

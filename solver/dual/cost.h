@@ -1,0 +1,41 @@
+/* cost.h: what a form of the dual operator is expected to take: seconds, bytes and flops. Models count the work that
+ * dominates: flops of the factorization, entries of K and L that are passed through. */
+#ifndef UZ_DUAL_COST_H
+#define UZ_DUAL_COST_H
+
+#include "factor/factor.h"
+#include "uzawa.h"
+
+typedef struct {
+    int64_t d, m, n_b; /* dofs, rows, dofs that rows touch */
+    int64_t k_entries; /* of K's lower triangle */
+    int64_t n_entries; /* of N */
+    int modes;         /* of the near-null space */
+    bool bounds;       /* uz_cost_bounds */
+    int64_t cases;     /* loads on the body */
+} uz_cost_size;
+
+typedef struct {
+    uz_operator op;
+    double setup_s, case_s; /* once for the body, and for each load */
+    double bytes;           /* K and N included */
+    double flops;           /* of the setup and one load */
+    bool fits;
+} uz_cost_estimate;
+
+typedef struct {
+    double flop_s;  /* seconds for each flop of a dense kernel */
+    double entry_s; /* for each stored entry of a sparse symmetric matrix, times a vector */
+} uz_cost_rates;
+
+/* CHOLMOD's supernodes reach 1 / 1.3 of a dense kernel's rate, and each entry of L costs assembling and page faults as
+ * much as ten passes; a substitution 1.3. Measured on plane bodies with 15,000 to 540,000 dofs. */
+#define UZ_COST_FACTOR_FLOPS  1.3
+#define UZ_COST_FACTOR_PASSES 10.0
+#define UZ_COST_SOLVE_PASSES  1.3
+/* Iterations that are needed where rows have several entries. */
+#define UZ_COST_ITERATIONS 330.0
+/* Vectors of d numbers that are alive together at the most crowded moment of a load, with a factor. */
+#define UZ_COST_VECTORS 36.0
+
+#endif
