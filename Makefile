@@ -94,9 +94,9 @@ deps: ## install the Debian packages that are missing
 deps-test: ## the same with what only the tests use
 	@tests/deps.sh $(PACKAGES) $(TEST_PACKAGES)
 
-guide: ## renew client/examples/scene_guide.md, whose tables follow from schemas/request.json
-	@$(PYTHON) -B client/examples/make_guide.py >$(BUILD)/scene_guide.md
-	@mv $(BUILD)/scene_guide.md client/examples/scene_guide.md
+guide: ## renew docs/scenes.md, whose tables follow from schemas/request.json
+	@$(PYTHON) -B tests/figures/scenes_page.py >$(BUILD)/scenes.md
+	@mv $(BUILD)/scenes.md docs/scenes.md
 
 man: $(BUILD)/uzawa ## renew client/uzawa.1 and client/uzawa.bash, which follow from the client's table of commands
 	@$(BUILD)/uzawa help --format man >client/uzawa.1

@@ -313,41 +313,41 @@ def test_gitlab_ci(_):
         check(done.returncode != 0 and repository.reports() == {"plate.xml": 1, "springs.xml": 0}, done)
 
 
-# ---- the scene guide
+# ---- the page about scenes
 
-GUIDE = EXAMPLES / "scene_guide.md"
+GUIDE, TEMPLATE = ROOT / "docs/scenes.md", ROOT / "docs/scenes.in.md"
 BLOCK = re.compile(r"(?:^<!-- put: (\S+) -->\n)?^```json\n(.*?)^```$", re.M | re.S)
 
 
 def make_guide(*words):
-    return subprocess.run([*PYTHON, EXAMPLES / "make_guide.py", *words], capture_output=True, text=True, timeout=60)
+    return subprocess.run([*PYTHON, ROOT / "tests/figures/scenes_page.py", *words], capture_output=True, text=True, timeout=60)
 
 
 @options(None)
 def test_the_guide_is_what_the_schema_says(_):
     made = make_guide()
     check(made.returncode == 0, made.stderr)
-    check(made.stdout == GUIDE.read_text(), "scene_guide.md is not what make_guide.py makes: run it again")
+    check(made.stdout == GUIDE.read_text(), "docs/scenes.md is not what its template and the schema give: make guide")
 
 
 @options(None)
 def test_the_guide_leaves_out_no_key(_):
-    """A key that gets into the schema without a word about it, or without a table, is told."""
+    """A key that gets into the schema without a word about it, or without a list, is told."""
     schema = json.loads((service.SCHEMAS / "request.json").read_text())
     schema["$defs"]["material"]["properties"]["yield"] = {"type": "number"}
-    text = (EXAMPLES / "scene_guide.in.md").read_text()
+    text = TEMPLATE.read_text()
     with tempfile.TemporaryDirectory() as folder:
         changed, template = pathlib.Path(folder) / "request.json", pathlib.Path(folder) / "guide.md"
         changed.write_text(json.dumps(schema))
-        made = make_guide(EXAMPLES / "scene_guide.in.md", changed)
+        made = make_guide(TEMPLATE, changed)
         check(made.returncode == 1 and "/$defs/material/properties/yield has no description" in made.stderr, made)
         schema["$defs"]["material"]["properties"]["yield"]["description"] = "Where it begins to flow."
         changed.write_text(json.dumps(schema))
-        made = make_guide(EXAMPLES / "scene_guide.in.md", changed)
-        check(made.returncode == 0 and "| `yield` | number | Where it begins to flow. |" in made.stdout, made)
+        made = make_guide(TEMPLATE, changed)
+        check(made.returncode == 0 and "- `yield` (number): Where it begins to flow." in made.stdout, made)
         template.write_text(text.replace("<!-- keys: /$defs/scene_case -->", ""))
         made = make_guide(template)
-        check(made.returncode == 1 and "no table has the keys of /$defs/scene_case" in made.stderr, made)
+        check(made.returncode == 1 and "no list has the keys of /$defs/scene_case" in made.stderr, made)
 
 
 def put(request, pointer, value):

@@ -1,17 +1,19 @@
-"""Makes scene_guide.md of scene_guide.in.md, whose lines `<!-- keys: PLACE ... -->` become tables of keys from
-schemas/request.json, so that the guide says what the service checks.
+"""Makes docs/scenes.md of docs/scenes.in.md, whose lines `<!-- keys: PLACE ... -->` become lists of keys from
+schemas/request.json, so that the page says what the service checks.
 
-usage: make_guide.py [TEMPLATE [SCHEMA]]        to standard output
+usage: scenes_page.py [TEMPLATE [SCHEMA]]        to standard output
 
-A PLACE is a JSON pointer into the schema. A table has the properties of each place and of the objects in them that have
-no place of their own. Every key of a request must be in exactly one table: else this fails and says which is not.
+A PLACE is a JSON pointer into the schema. A list has the properties of each place and of the objects in them that have
+no place of their own. Every key of a request must be in exactly one list: else this fails and says which is not.
 """
 import json
 import pathlib
 import re
 import sys
+import textwrap
 
-HERE = pathlib.Path(__file__).resolve().parent
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+WIDTH = 119
 MARK = re.compile(r"^<!-- keys: (.*) -->$", re.M)
 
 
@@ -20,7 +22,7 @@ class Guide:
         self.schema = schema
         self.template = template
         self.places = [place for found in MARK.findall(template) for place in self.places_of(found)]
-        self.told = {}  # place of an object -> the table it is in
+        self.told = {}  # place of an object -> the list it is in
 
     @staticmethod
     def places_of(text):
@@ -88,18 +90,18 @@ class Guide:
             return "`true` or `false`"
         return {"string": f"text{s}", "object": f"object{s}"}.get(kind, "anything")
 
-    # ---- tables
+    # ---- lists
 
     def row(self, key, node, place, required, depth_name):
         target, where, description = self.follow(node, place)
         if not description:
             raise ValueError(f"{place} has no description")
-        said = [description.replace("|", "\\|")]
+        said = [description]
         if "default" in node or "default" in target:
             said.append(f"Default: `{json.dumps(node.get('default', target.get('default')))}`.")
         name = f"{depth_name}{key}"
-        cells = [f"`{name}`" + (" (needed)" if required else ""), self.shape(target, where), " ".join(filter(None, said))]
-        return "| " + " | ".join(cells) + " |"
+        shape = self.shape(target, where) + (", needed" if required else "")
+        return textwrap.fill(f"- `{name}` ({shape}): {' '.join(said)}", WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
     def inner(self, node, place):
         """The objects that a value may hold, with their places and what stands between its key and theirs."""
@@ -113,7 +115,7 @@ class Guide:
             yield from ((found, where, "[]" + dot) for found, where, dot in self.inner(node["items"], f"{place}/items"))
 
     def rows(self, node, place, table, name=""):
-        """The keys of an object, and those of the objects in it that no table of their own tells."""
+        """The keys of an object, and those of the objects in it that no list of their own has."""
         if place in self.told:
             return
         self.told[place] = table
@@ -134,7 +136,7 @@ class Guide:
         rows = [row for place in self.places_of(mark.group(1)) for row in self.rows(self.at(place), place, mark.group(1))]
         if not rows:
             raise ValueError(f"{mark.group(0)}: nothing is left to tell there")
-        return "\n".join(["| key | value | meaning |", "|---|---|---|", *rows])
+        return "\n".join(rows)
 
     def objects(self, node=None, place=""):
         """Every object that a request may hold."""
@@ -159,14 +161,14 @@ class Guide:
         text = MARK.sub(self.table, self.template)
         missing = sorted(self.objects() - set(self.told))
         if missing:
-            raise ValueError("no table has the keys of " + ", ".join(missing))
+            raise ValueError("no list has the keys of " + ", ".join(missing))
         return text
 
 
-def main(template=HERE / "scene_guide.in.md", schema=HERE.parents[1] / "schemas/request.json"):
+def main(template=ROOT / "docs/scenes.in.md", schema=ROOT / "schemas/request.json"):
     text = pathlib.Path(template).read_text(encoding="utf-8")
     made = Guide(json.loads(pathlib.Path(schema).read_text(encoding="utf-8")), text).make()
-    head = f"<!-- made by make_guide.py from {pathlib.Path(template).name} and schemas/request.json: change those -->\n"
+    head = f"<!-- made by `make guide` from {pathlib.Path(template).name} and schemas/request.json: change those -->\n"
     sys.stdout.write(head + made)
 
 
@@ -174,4 +176,4 @@ if __name__ == "__main__":
     try:
         main(*sys.argv[1:])
     except ValueError as error:
-        sys.exit(f"make_guide.py: {error}")
+        sys.exit(f"scenes_page.py: {error}")
