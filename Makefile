@@ -244,7 +244,7 @@ test-browser: deps-test ## the web page in headless Chromium; FILTER=name runs s
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all
 	@tests/run.sh $(BUILD) browser $(FILTER)
 
-screenshots: deps-test ## the pictures of the README, from the running page, into client/page/screenshots
+screenshots: deps-test ## the pictures of the web page in docs, from the running page, into client/page/screenshots
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all
 	@$(PYTHON) -B tests/browser/screenshots.py $(BUILD) client/page/screenshots
 
@@ -326,16 +326,16 @@ theory: deps ## stress and contact pressure against theory on finer and finer me
 page-size: $(BUILD)/gen/page.c
 	@$(call measured,page) $(PYTHON) -B tests/figures/page_size.py $(BUILD)/gen/page $(BUILD)/page.json
 
-figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and the README's tables; minutes; FILTER="precision hertz" renews a part
+figures: deps ## measure work against precision, iterations and time: docs/numbers.md with its figures, and what other pages cite; minutes; FILTER="precision hertz" renews a part
 	@$(MAKE) --no-print-directory -s $(BUILD)/figures
 	@$(call measured,figures $(if $(FILTER),--part)) $(BUILD)/figures $(BUILD)/figures.json $(FILTER)
 	@$(MAKE) --no-print-directory -s page-size
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
-collect: ## docs/numbers.md and the README's numbers from what was measured since, without measuring
+collect: ## docs/numbers.md and what other pages cite of it, from what was measured since, without measuring
 	@$(PYTHON) -B tests/figures/numbers_page.py collect $(BUILD)
 
-numbers: ## measure everything that docs/numbers.md and the README show (hours: soak is one of it), then write them; SPARED="soak" leaves some out
+numbers: ## measure everything that docs/numbers.md shows (hours: soak is one of it), then write them; SPARED="soak" leaves some out
 	@for part in $(filter-out $(SPARED),theory gallery extremes bench bench-size $(if $(wildcard tests/peers/*),peers) soak figures); do \
 	    $(MAKE) --no-print-directory $$part || exit 1; done
 

@@ -25,5 +25,5 @@ again=$("$build/uzawa" submit "$body" --wait --quiet)
 
 stop_daemon
 [ "$status" -eq 0 ] || echo "the daemon ended with status $status"
-step "Go on: \"make run\" starts the service, http://127.0.0.1:8080/ in a browser is its page, the README has lines for curl"
+step "Go on: \"make run\" starts the service, http://127.0.0.1:8080/ in a browser is its page, docs/tutorial.md goes on from here"
 exit "$status"

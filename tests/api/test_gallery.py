@@ -96,7 +96,7 @@ def check_picture(path):
 
 @options(None)
 def test_make_gallery(s):
-    """The command behind `make gallery`, and that what it draws is what is kept, and its numbers are those of the README."""
+    """The command behind `make gallery`, and that what it draws is what is kept, and its numbers are those of the tutorial."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(["tests/gallery.sh", s.build, folder], cwd=ROOT, capture_output=True, text=True, timeout=300)

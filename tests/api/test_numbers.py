@@ -1,4 +1,5 @@
-"""Every measured number of docs/numbers.md and of the README's blocks is that of its data file, and the tables say what the data does.
+"""Every measured number of docs/numbers.md, and those that README.md and the other pages of docs cite, are those of their data files, and
+the tables say what the data does.
 usage: test_numbers.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
 import json
@@ -49,7 +50,7 @@ def measured():
 def test_nothing_is_stale(s):
     wrong, missing = numbers.stale(ROOT)
     check(not wrong, "not what the data gives (make figures):", wrong)
-    check(not missing, "the README shows what has no data:", missing)
+    check(not missing, "a page shows what has no data:", missing)
 
 
 @options(None)
@@ -58,11 +59,11 @@ def test_a_changed_number_is_found(s):
     with tempfile.TemporaryDirectory() as folder:
         root = copy(folder)
         check(numbers.stale(root)[0] == [], "a copy is as good")
-        for name in ("docs/numbers.md", "docs/figures/sizes.csv", "docs/figures/history.svg", "README.md"):
+        for name in ("docs/numbers.md", "docs/figures/sizes.csv", "docs/figures/history.svg", "docs/accuracy.md", "docs/scenes.md"):
             path = root / name
             text = path.read_text()
-            place = re.search(r"numbers:iterations.*?(\d)\d*,\d{3} \|", text, re.S) if name == "README.md" else re.search(r"[^\d](\d)\d*\.\d+", text)
-            at = place.start(1)
+            cites = name in ("docs/accuracy.md", "docs/scenes.md")
+            at = re.search(r"<!-- n:[a-z0-9_.]+ -->[^<\d]*(\d)" if cites else r"[^\d](\d)\d*\.\d+", text).start(1)
             path.write_text(text[:at] + str((int(text[at]) + 1) % 10) + text[at + 1:])
             check(numbers.stale(root)[0] == [name], name, numbers.stale(root)[0])
             numbers.write(root)
@@ -78,43 +79,53 @@ def one_digit_more(text, begin, end):
 
 
 @options(None)
-def test_every_block_and_mark_is_written_from_data(s):
-    data, text = measured(), (ROOT / "README.md").read_text()
-    places = [(found[1], found.span(2)) for pattern in (numbers.BLOCK, inline.MARK) for found in pattern.finditer(text)]
-    check({name for name, _ in places} == {*numbers.BLOCKS, *inline.VALUES}, "made, but not in the README, or the other way round")
-    for name, (begin, end) in places:
-        changed = one_digit_more(text, begin, end)
-        check(changed and changed != text and numbers.readme(changed, data) == (text, []), name)
+def test_every_mark_is_written_from_data(s):
+    data, used = measured(), set()
+    for path in numbers.pages(ROOT):
+        text = path.read_text()
+        for found in inline.MARK.finditer(text):
+            changed = one_digit_more(text, *found.span(2))
+            check(changed and changed != text and inline.fill(changed, data) == (text, []), path.name, found[1])
+            used.add(found[1])
+        check(len(inline.MARK.findall(text)) == len(re.findall("<!-- (?:n:|/n)", re.sub("`[^`\n]*`", "", text))) / 2, path.name, "has a mark that is not whole, or broken over two lines")
+    check(used == {*inline.VALUES}, "made, but on no page, or the other way round")
 
 
 @options(None)
-def test_every_data_file_shows_in_the_readme_or_the_page(s):
-    data, text = measured(), (ROOT / "README.md").read_text()
+def test_every_data_file_shows_on_a_page(s):
+    data = measured()
+    files = numbers.figure_files(data)
+
+    def shown(data):
+        return [numbers.page(data, files)] + [inline.fill(path.read_text(), data)[0] for path in numbers.pages(ROOT)]
+
+    before = shown(data)
     for part, value in (("soak", lambda d: d["rows"][0]["figures"]), ("bench_size", lambda d: d["sizes"][0]), ("gallery", lambda d: d["scenes"][0]),
                         ("page", lambda d: d), ("theory", lambda d: d["cook"][0])):
         changed = json.loads(json.dumps(data))
         row = value(changed[part])
         for key in row:
             row[key] = row[key] * 3 + 7 if isinstance(row[key], (int, float)) else row[key]
-        check(numbers.readme(text, changed)[0] != text, part)
+        check(shown(changed) != before, part)
 
 
 @options()
 def test_no_number_is_typed_by_hand(s):
     """What has a unit, a point, an exponent or four digits is in a mark, or one of the constants, which are the program's own."""
-    text = (ROOT / "README.md").read_text()
-    left, unused = constants.unexplained(text)
+    pages = {path.name: path.read_text() for path in numbers.pages(ROOT) if path.name != "scenes.md"}  # made of scenes.in.md and the schema
+    check({"README.md", "scenes.in.md", "http.md", "operations.md", "theory.md", "accuracy.md"} <= set(pages), sorted(pages))
+    left, unused = constants.unexplained(pages)
     check(not left, "measured? then in a mark (tests/figures/inline.py), else in tests/figures/constants.py:", left)
-    check(not unused, "not in the README any more:", unused)
+    check(not unused, "on no page any more:", unused)
     program = constants.Program(ROOT, s.get("/v1/limits").json["limits"])
     check(constants.wrong(program) == [], constants.wrong(program))
     program.limits["max_body"]["value"] += 1
     check(constants.wrong(program) == ["A request body may have 64 MiB"], constants.wrong(program))
     for typed in ("solves in 25 ms", "3.5 times faster", "needs 12 MB", "certified to 4e-14", "1,209 jobs", "1209 clients", "about 2 % of it", "`x` 7 s"):
-        found, _ = constants.unexplained(text + "\nIt " + typed + ".\n")
+        found, _ = constants.unexplained({**pages, "a.md": "It " + typed + ".\n"})
         check(len(found) == 1, typed, found)
-    for free in ("<!-- n:x -->25 ms<!-- /n -->", "`sleep 25 s`", "[x](http://h/2.5)", "```sh\nsleep 2.5\n```", "a 60 x 20 body", "quad4, 3 dofs of each"[:5]):
-        check(constants.unexplained(text + "\nIt " + free + "\n")[0] == [], free)
+    for free in ("<!-- n:x -->25 ms<!-- /n -->", "`sleep 25 s`", "[x](http://h/2.5)", "```sh\nsleep 2.5\n```", "a 60 x 20 body", "quad4, 3 dofs of each"[:5], "a 60 x\n20 body"):
+        check(constants.unexplained({**pages, "a.md": "It " + free + "\n"})[0] == [], free)
 
 
 @options(None)
@@ -131,11 +142,12 @@ def test_soak_runs_keep_the_rows_of_others(s):
 @options(None)
 def test_soak_rows_as_text(s):
     names = {name for name, _ in soak.RUNS}
-    check(set(service_tables.SHOWN) == names, "a run has no row of its own in the README")
+    check(set(service_tables.SHOWN) == names, "a run has no words of its own on the page")
     check({row["name"] for row in measured()["soak"]["rows"]} <= names, "figures of a run that there is not any more")
     row = {"name": "cancel", "figures": {"errors": 0, "p50_ms": 2.0, "p99_ms": 63.0}, "stamp": {"load": 0.2, "others": 0.1}}
     lines = service_tables.soak({"soak": {"rows": [row]}})
-    check(lines[-1] == "| cancel of a running job while it iterates | p50 2 ms, p99 63 ms |", lines)
+    check(lines[2] == "| cancel of a running job while it iterates | p50 2 ms, p99 63 ms |" and not any("†" in line for line in lines), lines)
+    check(lines[-1].startswith("| cancel | errors 0, p50_ms 2.0, p99_ms 63.0 |"), lines)
     row["stamp"]["others"], row["wrong"], row["figures"]["errors"] = 1.5, ["errors"], 3
     lines = service_tables.soak({"soak": {"rows": [row, {"name": "another", "figures": {"a": 1, "b": {"c": 2}}, "stamp": {"load": 9}}]}})
     check("**WRONG** **3 errors** †" in lines[2] and lines[3] == "| another | a 1, b.c 2 † |" and lines[-1].startswith("†"), lines)
@@ -237,22 +249,31 @@ def test_page_size(s):
 
 
 @options(None)
-def test_blocks_without_data_stay(s):
+def test_marks_without_data_stay(s):
     with tempfile.TemporaryDirectory() as folder:
         root = pathlib.Path(folder)
         (root / "docs" / "figures").mkdir(parents=True)
-        text = "a\n<!-- numbers:growth -->\n| by hand |\n<!-- /numbers -->\nb\n"
-        (root / "README.md").write_text(text)
-        check(numbers.stale(root) == ([], ["growth"]))
+        (root / "README.md").write_text("nothing\n")
+        (root / "docs" / "a.md").write_text("a <!-- n:linear.100000 -->by hand<!-- /n --> b\n")
+        check(numbers.stale(root) == ([], ["docs/a.md: n:linear.100000"]))
         rows = [{"d": d, "m": 10, "iterations": 4, "factor_bytes": 2500000, "linear_s": 0.5 * (d / 1000) ** 1.5, "cold_s": 0.25, "cached_s": 0.01}
                 for d in (10, 100, 1000, 10000)]
-        (root / "docs" / "figures" / "bench_size.json").write_text(
-            json.dumps({"machine": {"load": 0.5}, "sizes": rows}))
-        check(numbers.stale(root) == (["README.md"], []))
+        data = {"machine": {"load": 0.5}, "sizes": rows}
+        (root / "docs" / "figures" / "bench_size.json").write_text(json.dumps(data))
+        check(numbers.stale(root) == (["docs/a.md"], []))
         numbers.write(root)
-        new = (root / "README.md").read_text()
+        check((root / "docs" / "a.md").read_text() == "a <!-- n:linear.100000 -->16 s at 10,000 dofs<!-- /n --> b\n")
+        new = "\n".join(numbers.timed(tables.growth({"bench_size": data}), {"bench_size": data}, "bench_size", "sizes"))
         check("| 1,000 | 0.5 | 0.25 | 0.01 | 0.50 | 4 | 2.5 |" in new and "linear solve 1.50, cold 0.00" in new and "beside" not in new, new)
-        check(new.startswith("a\n<!-- numbers:growth -->\n") and new.endswith("<!-- /numbers -->\nb\n"), new)
+
+
+@options(None)
+def test_prose_is_wrapped(s):
+    long = " ".join(["word"] * 60)
+    text = numbers.wrapped(f"## {long}\n\n{long}\n\n| {long} |\n")
+    lines = text.split("\n")
+    check(lines[0] == f"## {long}" and lines[-2] == f"| {long} |" and " ".join(lines[2:-3]) == long, text)
+    check(all(len(line) < 120 for line in lines[2:-3]) and len(lines) == 8, text)
 
 
 @options(None)
@@ -317,7 +338,7 @@ PEERS = {"packages": {"octave": "7.3"}, "time_limit_s": 60,
          "results": [{"problem": "body/30", "d": 660, "m": 30, "solver": "x", "tolerance": 1e-6, "success": True, "seconds": 2.0, "certified": 1e-8, "why": ""},
                      {"problem": "cases/A", "d": 6, "m": 3, "solver": "x", "tolerance": 1e-6, "success": False, "seconds": None, "certified": None,
                       "why": "timed out"}],
-         "means": [{"solver": "x", "1e-06": {"solved": 1, "of": 2, "shift_10s": 12.0, "shift_10ms": 3.0}}],
+         "means": [{"solver": name, "1e-06": {"solved": 1, "of": 2, "shift_10s": 12.0, "shift_10ms": 3.0}} for name in ("uzawa", "x")],
          "body": [{"problem": "body/30", "d": 660, "fastest": "x", "seconds": 2.0, "cold_seconds": 0.5, "cached_seconds": 0.01, "cold": 4.0, "cached": 200.0}],
          "profiles": {"1e-06": {"x": [[1.0, 0.5], [8.0, 0.75]], "uzawa": [[1.0, 1.0]]}}}
 
@@ -330,14 +351,12 @@ def test_other_solvers(s):
         when = {**stamp.machine(), "measured": "9999-01-01 00:00 UTC", "commit": "abc", "load": 0.5, "others": 0.0}
         (root / "peers.json").write_text(json.dumps({**PEERS, "stamp": when}))
         check(collect.collect(root, root / "docs" / "figures") == ["peers"])
-        with (root / "README.md").open("a") as readme:
-            readme.write("<!-- numbers:peers -->\n<!-- /numbers -->\n")
         numbers.write(root)
         check(numbers.stale(root)[0] == [])
         text = (root / "docs" / "numbers.md").read_text()
         check("| NX = 30 | 660 | x | 2 s | 500 ms | 4 | 10 ms | 200 |" in text and "| cases/A | `x` | timed out |" in text, text[-3000:])
         check("| `x` | 1 of 2 | 12 s | 3 s |" in text and "octave 7.3" in text)
-        check("| NX = 30 |" in (root / "README.md").read_text())
+        check("-->4 to 4 times<!--" in (root / "docs" / "comparison.md").read_text())
         check(">x</text>" in (root / "docs" / "figures" / "sizes.svg").read_text())
         xml.etree.ElementTree.fromstring((root / "docs" / "figures" / "peers.svg").read_text())
 

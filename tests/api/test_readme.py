@@ -1,7 +1,8 @@
-"""Runs the README's marked shell blocks, in order, in one shell. usage: test_readme.py BUILD_DIR [FILTER]
+"""README.md and the pages of docs: every command runs as printed, links lead somewhere, lines are short. usage: test_readme.py BUILD_DIR
+[FILTER]
 
-A block counts when the line before its ```sh is <!-- test -->. The daemon's port is put in for 127.0.0.1:8080 and the
-build folder for build/. JSON that a block prints must meet its schema. README_FILE names another file than README.md.
+Each page has a daemon and a shell of its own, in which its ```sh blocks run in order; a block with a line <!-- not run: REASON --> before
+it does not. The daemon's port is put in for 127.0.0.1:8080 and the build folder for build/. JSON that a block prints must meet its schema.
 """
 # not under ThreadSanitizer: about answers, not about threads
 import json
@@ -16,13 +17,22 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import service
 from service import ROOT, Skip, check, options
 
-README = ROOT / os.environ.get("README_FILE", "README.md")
-MARKED = re.compile(r"^<!-- test -->\n```sh\n(.*?)^```$", re.M | re.S)
-UNFINISHED = re.compile(r"^<!-- test -->\n(?!```sh\n)", re.M)
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+BLOCK = re.compile(r"^(<!-- not run: [^\n]+ -->\n)?```sh\n(.*?)^```$", re.M | re.S)
+FENCE = re.compile(r"^```.*?^```$", re.M | re.S)
+UNFINISHED = re.compile(r"^<!-- not run(?!: [^\n]+ -->\n```sh\n)", re.M)
+MOST_NOT_RUN = 4  # of all pages
+OF_MAKE = ("BUILD", "CC", "OPT", "SAN", "CFLAGS", "LDFLAGS", "FILTER")  # given to the make that runs the tests, not to one of a block
+MOST_LINES, WIDTH = 150, 120
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+# Pages of the plug points, which come with the changes that they describe.
+TO_COME = {f"docs/architecture/{name}.md" for name in ("element-type", "mesh-reader", "dual-form", "contact-law", "method", "contact-discretization",
+                                                       "obstacle", "store", "http", "output", "run")}
 
 
 def blocks(text):
-    return [found.group(1) for found in MARKED.finditer(text)]
+    """Those that are to be run."""
+    return [block for spared, block in BLOCK.findall(text) if not spared]
 
 
 def mirror(folder):
@@ -60,7 +70,8 @@ def run_blocks(found, root, address):
     for i, block in enumerate(found):
         (root / f".block{i}").write_text(block.replace("127.0.0.1:8080", address))
         script += f". ./.block{i} >.out{i} 2>.err{i}\ntouch .done{i}\n"
-    environment = {**os.environ, "UZAWA_SERVER": "http://" + address}
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS")) and name not in OF_MAKE}
+    environment["UZAWA_SERVER"] = "http://" + address
     done = subprocess.run(["bash", "-c", script], cwd=root, env=environment, timeout=120)
     return done.returncode
 
@@ -70,15 +81,10 @@ def read(root, name):
     return path.read_text() if path.exists() else ""
 
 
-@options(None)
-def test_blocks(server):
-    if not README.exists():
-        raise Skip(f"{README.name} is not there")
+def run_page(server, page):
     if not shutil.which("jq") or not shutil.which("curl"):
         raise Skip("curl or jq is not installed")
-    found = blocks(README.read_text())
-    check(found, "the README has no marked block")
-    check(not UNFINISHED.search(README.read_text()), "a marker stands before something that is no sh block")
+    found = blocks(page.read_text())
     server.start()
     root = mirror(server.folder)
     status = run_blocks(found, root, f"{server.host}:{server.port}")
@@ -91,17 +97,118 @@ def test_blocks(server):
             service.validate(Printed(value))
 
 
+def of_page(page):
+    @options(None)
+    def test(server):
+        run_page(server, page)
+    return test
+
+
+for one in PAGES:
+    if blocks(one.read_text()):
+        globals()[f"test_blocks_of_{one.stem.replace('-', '_')}"] = of_page(one)
+
+
 @options(None)
 def test_blocks_are_found(_):
-    text = "a\n<!-- test -->\n```sh\nx\ny\n```\n```sh\nnot this\n```\n<!-- test -->\n```sh\nz\n```\n"
+    text = "a\n```sh\nx\ny\n```\n<!-- not run: why -->\n```sh\nnot this\n```\n```json\n{}\n```\n```sh\nz\n```\n"
     check(blocks(text) == ["x\ny\n", "z\n"], blocks(text))
-    check(UNFINISHED.search("<!-- test -->\n\n```sh\n") and not UNFINISHED.search(text))
+    for bad in ("<!-- not run: why -->\n\n```sh\n", "<!-- not run -->\n```sh\n", "<!-- not run: -->\n```sh\n"):
+        check(UNFINISHED.search(bad), bad)
+    check(not UNFINISHED.search(text))
     check(json_values(' {"a": 1}\n[2]\n') == [{"a": 1}, [2]] and json_values("iteration,seconds\n") == [])
+    for name in ("README.md", "docs/tutorial.md", "docs/http.md", "docs/operations.md", "docs/contributing.md"):
+        check(blocks((ROOT / name).read_text()), name, "has no block that is run")
+    texts = [page.read_text() for page in PAGES]
+    check(not any(UNFINISHED.search(text) for text in texts), "a mark stands before something that is no sh block, or gives no reason")
+    spared = [block for text in texts for mark, block in BLOCK.findall(text) if mark]
+    check(len(spared) <= MOST_NOT_RUN, "too many blocks are not run:", spared)
+
+
+# ---- links and lines
+
+def anchor(title):
+    """As GitHub makes it of a heading."""
+    plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", title).replace("`", "")
+    return re.sub(r"[^\w\- ]", "", plain.lower()).replace(" ", "-")
+
+
+def anchors(text):
+    found = {}
+    for title in re.findall(r"^#+ (.*)$", FENCE.sub("", text), re.M):
+        name = anchor(title)
+        found[name] = found.get(name, -1) + 1
+    return {f"{name}-{i}" if i else name for name, count in found.items() for i in range(count + 1)}
+
+
+def broken_links(page, text, root=ROOT):
+    """Of a page's links those to files that are not there, or to headings that their page has not."""
+    bad = []
+    for link in LINK.findall(FENCE.sub("", text)):
+        path, _, heading = link.partition("#")
+        if re.match(r"[a-z]+:", link):
+            continue
+        target = (page.parent / path).resolve() if path else page
+        if target == page:
+            bad += [] if heading in anchors(text) else [link]
+        elif not target.exists():
+            bad += [] if str(target.relative_to(root)) in TO_COME else [link]
+        elif heading and heading not in anchors(target.read_text()):
+            bad.append(link)
+    return bad
+
+
+@options(None)
+def test_links(_):
+    for page in PAGES:
+        check(broken_links(page, page.read_text()) == [], page, broken_links(page, page.read_text()))
+    text = "# A b, `c`: d\n[1](#a-b-c-d) [2](#a) [3](faq.md#general) [4](faq.md#genera) [5](no.md) [6](http://h/x) ![7](figures/no.svg)\n```sh\n[8](no)\n```\n"
+    check(broken_links(ROOT / "docs/x.md", text) == ["#a", "faq.md#genera", "no.md", "figures/no.svg"], broken_links(ROOT / "docs/x.md", text))
+    check(anchors("# A\n## A\n") == {"a", "a-1"})
+
+
+@options(None)
+def test_every_page_is_reached(_):
+    """From the README, link by link."""
+    seen, left = set(), [ROOT / "README.md"]
+    while left:
+        page = left.pop()
+        seen.add(page)
+        for link in LINK.findall(page.read_text()):
+            target = (page.parent / link.partition("#")[0]).resolve()
+            if target.suffix == ".md" and target.is_file() and target not in seen:
+                left.append(target)
+    missing = [page.name for page in PAGES if page not in seen and not page.name.endswith(".in.md")]
+    check(not missing, "no page links to", missing)
+
+
+def long_lines(text):
+    """Rows of tables cannot be broken."""
+    return [line for line in text.splitlines() if len(line) >= WIDTH and not line.startswith("|")]
+
+
+@options(None)
+def test_lines(_):
+    for page in PAGES:
+        check(long_lines(page.read_text()) == [], page, long_lines(page.read_text()))
+    check(long_lines("x" * 119 + "\n" + "y" * 120 + "\n|" + "z" * 200) == ["y" * 120])
+    check(len((ROOT / "README.md").read_text().splitlines()) <= MOST_LINES, "the README is for a reader in a hurry")
+
+
+@options(None)
+def test_every_error_code_is_explained(_):
+    sources = "".join(path.read_text() for path in sorted((ROOT / "server").rglob("*.c")))
+    codes = set(re.findall(r'\b[45]\d\d,\s*"([a-z]+(?:_[a-z]+)*)"', sources))
+    codes |= set(re.findall(r"([a-z]+(?:_[a-z]+)+)[,;]", json.loads((service.SCHEMAS / "problem-details.json").read_text())["properties"]["code"]["description"]))
+    check(len(codes) > 60, sorted(codes))
+    explained = (ROOT / "docs/faq.md").read_text()
+    missing = sorted(code for code in codes if f"`{code}`" not in explained)
+    check(not missing, "docs/faq.md says nothing about", missing)
 
 
 @options(None)
 def test_demo(_):
-    """What `make demo` runs, of which the first lines of the README speak."""
+    """What `make demo` runs, of whose answer the README has the lines."""
     done = subprocess.run(["tests/demo.sh", str(pathlib.Path(sys.argv[1]).resolve())], cwd=ROOT, capture_output=True,
                           text=True, timeout=120)
     check(done.returncode == 0, done)

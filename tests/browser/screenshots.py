@@ -1,4 +1,4 @@
-"""The pictures of the README, from the running product. usage: screenshots.py BUILD_DIR FOLDER"""
+"""The pictures of the web page in docs, from the running product. usage: screenshots.py BUILD_DIR FOLDER"""
 import io
 import json
 import pathlib

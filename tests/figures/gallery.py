@@ -34,7 +34,7 @@ def lame():
 
 
 def scene(name, summary):
-    """What the README says of a scene."""
+    """What the tutorial says of a scene."""
     contact = summary["contact"]
     got = {"name": name, "outcome": summary["outcome"], "d": summary["problem"]["d"], "active": contact["active"], "candidates": contact["candidates"],
            "reaction_sum": contact["reaction_sum"], "max_pressure": contact["max_pressure"], "area": contact["area"]}

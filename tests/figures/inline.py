@@ -1,4 +1,4 @@
-"""Measured numbers within the README's sentences: <!-- n:NAME -->text<!-- /n -->, which Markdown does not show, is filled with what
+"""Measured numbers within the sentences of README.md and docs: <!-- n:NAME -->text<!-- /n -->, which Markdown does not show, is filled with what
 VALUES gives for NAME."""
 import re
 
@@ -83,12 +83,38 @@ def of_soak(name, text):
     return value
 
 
-def machine(data):
-    """Of the bench: what most of the README's times are of."""
-    if not data.get("bench"):
+def mesh_error(problem):
+    """Of the plate at a size."""
+    def value(data):
+        row = next((row for row in (data.get("figures") or {"precision": []})["precision"] if row["name"] == problem), None)
+        return row and tables.percent(row["mesh_error"])
+    return value
+
+
+def gradient_digits(data):
+    counts = [tables.ratio(data, f"accuracy_accelerated_restart_{error}_iterations", 0) for error in ("1e-02", "1e-10")]
+    return None if tables.NONE in counts else f"{counts[0]} iterations to 1e-2 and {counts[1]} to 1e-10"
+
+
+def over_peers(key):
+    """The fastest other solver over ours on the paper's plate, from the least to the largest ratio."""
+    def value(data):
+        found = [row[key] for row in (data.get("peers") or {}).get("body", []) if row[key] is not None]
+        return f"{sig(min(found))} to {sig(max(found))} times" if found else None
+    return value
+
+
+def solved_of_all(data):
+    means = {row["solver"]: row["1e-06"] for row in (data.get("peers") or {}).get("means", [])}
+    others = [row["solved"] for name, row in means.items() if not name.startswith("uzawa")]
+    if "uzawa" not in means or not others:
         return None
-    m = data["bench"]["machine"]
-    return f"{m['cores']} cores of an {m['processor']}, {m['system'].split(' (')[0].replace('GNU/Linux ', '')}"
+    return f"{means['uzawa']['solved']} of {means['uzawa']['of']} are solved and certified to 1e-6, where the best other solver has {max(others)}"
+
+
+def claims(data):
+    total = data.get("extremes")
+    return total and f"{total['passed'] + total['failed']:,} claims {total['failed'] or 'none'}"
 
 
 def steps_of_auto(data):
@@ -107,7 +133,10 @@ VALUES = {
     "candidates.kept": of_bench("candidates_cube_n24_kept", "{:,.0f}".format), "candidates.given": of_bench("candidates_cube_n24_given", "{:,.0f}".format),
     "candidates.ratio": of_bench("candidates_cube_n24", "{:.2f} times".format), "patch.worst": worst_patch,
     "order.1": orders(1), "order.2": orders(2), "linear.100000": linear_near(100000), "streams.kb": of_soak("2,000 event streams, 1,000 long polls", lambda f: f"{sig(f['kb_each'])} kB"),
-    "machine": machine, "digits.steps": steps_of_auto,
+    "digits.steps": steps_of_auto, "digits.gradient": gradient_digits, "mesh_error.30": mesh_error("paper_30"), "mesh_error.600": mesh_error("paper_600"),
+    "cold.600": of_bench("cold_nx600_1e-08", "{:.2f}".format), "cached.600": of_bench("cached_nx600_1e-08", "{:.2f}".format),
+    "cold.cube": of_bench("cold_hex8_d101277", "{:.2f}".format), "peers.cold": over_peers("cold"), "peers.cached": over_peers("cached"),
+    "peers.solved": solved_of_all, "extremes.claims": claims,
 }
 
 

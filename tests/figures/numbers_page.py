@@ -1,4 +1,4 @@
-"""Makes docs/numbers.md, the figures and CSV files beside it, and the README's measured blocks, from the data in docs/figures.
+"""Makes docs/numbers.md, the figures and CSV files beside it, and the measured numbers that other pages cite, from the data in docs/figures.
 
 usage: numbers_page.py collect BUILD   renew the data from what BUILD/*.json holds, then write everything
        numbers_page.py write           write everything from the data that is there
@@ -10,8 +10,8 @@ import io
 import json
 import os
 import pathlib
-import re
 import sys
+import textwrap
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import collect  # noqa: E402  the path is set above
@@ -23,7 +23,7 @@ import stamp  # noqa: E402
 import tables  # noqa: E402
 
 ROOT = pathlib.Path(os.environ.get("NUMBERS_ROOT") or pathlib.Path(__file__).resolve().parent.parent.parent)
-BLOCK = re.compile(r"<!-- numbers:([a-z_]+) -->\n(.*?)<!-- /numbers -->", re.S)
+WIDTH = 119
 COMMANDS = {"figures": "make figures", "bench": "make bench", "bench_size": "make bench-size", "extremes": "make extremes",
             "theory": "make theory", "soak": "make soak", "peers": "make peers", "gallery": "make gallery", "page": "make figures (the page)"}
 ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak": "rows", "peers": "problems"}  # what is measured by parts
@@ -32,19 +32,9 @@ ROWS = {"figures": "precision", "bench": "ratios", "bench_size": "sizes", "soak"
 TIMED = ("figures", "bench", "bench_size", "soak", "peers")  # what other programs on the machine can change
 
 
-def timed(make, name, key=None, shown=("",)):
+def timed(lines, data, name, key=None, shown=("",)):
     """A table of times, with a note where it was measured beside other work."""
-    def lines(data):
-        made = make(data)
-        return made and made + tables.beside(data, name, key, shown)
-    return lines
-
-
-# The README's blocks: name, and what fills it.
-BLOCKS = {"levels": timed(tables.levels, "figures", "precision"), "iterations": tables.iterations, "ratios": timed(tables.ratios, "bench", "ratios", tables.IN_RATIOS),
-          "sentences": tables.sentences, "digits": timed(tables.digits, "bench", "ratios", tables.IN_DIGITS), "growth": timed(tables.growth, "bench_size", "sizes"),
-          "extremes": tables.extremes, "theory": tables.theory, "soak": service_tables.soak, "peers": timed(tables.peers, "peers", "problems"),
-          "means": tables.means, "elements": tables.elements}
+    return lines and lines + tables.beside(data, name, key, shown)
 
 
 def load(folder):
@@ -124,99 +114,125 @@ def problem_lines(problem, files):
     return lines
 
 
-def section(title, lines, *before):
-    return [f"## {title}", "", *before, *lines, ""] if lines else []
+INTRODUCTION = f"""Everything here is written by `make figures` from the data in `docs/figures`; nothing is typed by hand, and a test fails where a number is not
+that of its data file. `make numbers` measures all of it again.
+
+Times are medians of several runs in one thread after a warm-up, of the processor's clock for that thread: on a quiet machine they are those of the wall, which stand beside
+them in the CSV files with minima and maxima. "load" is that of the minute before (older data: of the measurement itself too), "processors of others" how many other programs
+kept busy meanwhile; where that is above {stamp.QUIET_OTHERS}, or unknown with a load above {stamp.QUIET_LOAD:.0f}, the numbers count as measured beside other work, and say so.
+
+*Cold* is a solve with nothing in the cache, *cached* one whose factor is there; d is the number of unknowns, m of contact rows. The paper's body is the plate of [the
+paper](theory.md#the-paper)."""
+
+RESIDUAL = """The paper's body and stopping rule, with the step 1/λ_max(N K⁻¹ N'). The residual is the paper's: of r with the displacement of that iteration, which in the
+accelerated methods belongs to the extrapolated ρ: e1 = N'(ρ − r) is most of it, and vanishes for an iteration where a restart sets ρ = r."""
+
+ITERATIONS = """Uzawa and the accelerated methods take the step 1/λ_max(N K⁻¹ N') unless it says λ₁(K), the step of the paper. The paper's rule stops when ‖ρ − r‖ ≤ 1e-6 N: a shorter
+step makes that small sooner, so λ₁(K) ends with a larger error, as the last columns show; the second group of rows asks of all what λ₁(K) had then. Certified errors are
+looked at in growing intervals, so those counts come in steps. `accelerated_restart` is Algorithm 2 as published, with its counts. `conjugate` applies D once in an iteration
+as well; its ‖ρ − r‖ is that of a plain step from the r it has, and for each bound it applies D once more."""
+
+LEVELS = "What each accuracy level costs with `auto`, and the energy-norm error that the answer then has."
+
+PRECISION = """Each line is a method (colour) on a form of the operator (line and mark); its points are the accuracies asked for, loosest first: `quick`, `balanced` (scenes),
+1e-4, 1e-6, `precise`, 1e-10, `exact`. What is drawn is the *achieved* error against a reference of some 30 digits: the touching rows are taken as equations, the rest is
+solved by iterative refinement with the residual in `__float128`, and the optimality conditions are checked in `__float128` (`tests/figures/reference.h`). Three measures: the
+energy norm; the largest error of a reaction over the largest reaction; rows wrongly in or out of contact. Work is seconds, cold and with the factor cached, from the scene
+(or the matrices, where there is no scene) to the certified answer with everything that the summary says; and passes over the factor, one forward and one backward being one
+back-substitution (those along the paths of a few dofs and those with the factor of the free dofs count as whole ones), for `matrix_free` cycles of multigrid. A cross is a
+run that was stopped by the limit on its time, at the error that it had reached; tighter levels of such a line are not run. `balanced` stands hollow beside its line, as it
+pays for the estimate of the mesh's error too."""
+
+LINEAR = """Ratios within one run. The reference is CHOLMOD's own analyse + factorise + solve of the same K with the better of AMD and METIS and one thread, in the same
+process and with the same huge-page allocator; both keep the memory that they have touched. A certified contact solve costs less than CHOLMOD's linear solve where ordering
+and symbolic analysis on the graph of nodes, and substitutions in strips, save more than the contact costs."""
+
+DIGITS = """The paper's body at 300 x 100 elements with its factor cached: time in units of one `cholmod_solve`, and iterations (`make bench FILTER=accuracy`)."""
+
+GROWTH = """The paper's body, medians of 3 (`make bench-size`); the linear solve has the better of AMD and METIS."""
+
+EXTREMES = """Problems at the extremes, in six ways each (default, `exact`, cached, `factored`, `active_set`, `matrix_free`); every claim is held against a reference in `__float128`
+(`make extremes`). "Other" are named outcomes (`precision_limit`, `iteration_limit`, `infeasible`), "short" those of them where doubles could have held the answer; the last
+column is the least ratio of bound to true error among the converged."""
+
+THEORY = """Scenes against theory (`make theory`), errors in %, meshes side by side. The half width of a contact is taken twice: from the second moment of the reactions, and
+from the reported area, which on these meshes (a node at the edge of the contact) is half a cell too large."""
+
+ELEMENTS = """What a formulation buys: Cook's membrane, tip displacement (converged 23.96), and a rubber tube at Poisson's ratio 0.4999; then the patch test and the order of
+convergence of every element. The stiffness of CalculiX's tetrahedra is reproduced to rounding."""
+
+SERVICE = "What was done to the service (`make soak`), and what came of it; below, the figures as they are."
 
 
-INTRODUCTION = """# Numbers
-
-Everything here is written by `make figures` from the data in `docs/figures`; nothing is typed by hand, and a test fails where a number is not that of its
-data file. `make numbers` measures all of it again.
-
-Times are medians of several runs in one thread after a warm-up, of the processor's clock for that thread: on a quiet machine they are those of the wall, which stand beside them in
-the CSV files with minima and maxima. "load" is that of the minute before (older data: of the measurement itself too), "processors of others" how many other programs kept busy
-meanwhile; where that is above """ + f"{stamp.QUIET_OTHERS}, or unknown with a load above {stamp.QUIET_LOAD:.0f}" + """, the numbers count as measured beside other work, and say so."""
-
-PRECISION = """Each line is a method (colour) on a form of the operator (line and mark); its points are the accuracies asked for, loosest first: `quick`, `balanced` (scenes), 1e-4, 1e-6, `precise`, 1e-10,
-`exact`. What is drawn is the *achieved* error against a reference of some 30 digits: the touching rows are taken as equations, the rest is solved by iterative refinement with the residual in `__float128`, and the
-optimality conditions are checked in `__float128` (`tests/figures/reference.h`). Three measures: the energy norm; the largest error of a reaction over the largest reaction; rows wrongly in or out of
-contact. Work is seconds, cold and with the factor cached, from the scene (or the matrices, where there is no scene) to the certified answer with everything that the summary says; and passes over the
-factor, one forward and one backward being one back-substitution (those along the paths of a few dofs and those with the factor of the free dofs count as whole ones), for `matrix_free` cycles of multigrid.
-A cross is a run that was stopped by the limit on its time, at the error that it had reached; tighter levels of such a line are not run. `balanced` stands hollow beside its line, as it pays for the estimate
-of the mesh's error too."""
-
-RESIDUAL = """The paper's body and stopping rule, with the step 1/λ_max(N K⁻¹ N'). The residual is the paper's: of r with the displacement of that iteration, which in the accelerated methods belongs to the extrapolated
-ρ: e1 = N'(ρ − r) is most of it, and vanishes for an iteration where a restart sets ρ = r."""
+def wrapped(text):
+    """The text with its lines of prose broken; rows of tables, pictures and headings stay."""
+    return "\n".join(line if line[:1] in "|#!" else textwrap.fill(line, WIDTH, break_long_words=False, break_on_hyphens=False) for line in text.split("\n"))
 
 
-ITERATIONS = """Uzawa and the accelerated methods take the step 1/λ_max(N K⁻¹ N') unless it says λ₁(K), the step of the paper. The paper's rule stops when ‖ρ − r‖ ≤ 1e-6 N: a shorter step makes that small sooner,
-so λ₁(K) ends with a larger error, as the last columns show; the second group of rows asks of all what λ₁(K) had then. Certified errors are looked at in growing intervals, so those counts come in steps.
-`accelerated_restart` is Algorithm 2 as published, with its counts. `conjugate` applies D once in an iteration as well; its ‖ρ − r‖ is that of a plain step from the r it has, and for each bound it applies D once more."""
+def prose(*texts):
+    """Paragraphs as lines, each with an empty one behind it."""
+    return [line for text in texts for part in text.split("\n\n") for line in (" ".join(part.split()), "")]
 
 
 def page(data, files):
     measured = data["figures"]
-    lines = INTRODUCTION.splitlines() + [""] + machine_lines(data) + [""]
-    lines += section("What was promised", promises.lines(data))
-    lines += section("Convergence: the paper's Figure 2", ["![convergence](figures/history.svg)", "", "[CSV](figures/history.csv)"],
-                     RESIDUAL, "")
+    lines = ["# Numbers", "", *prose(INTRODUCTION), *machine_lines(data), ""]
+
+    def add(title, table, *before):
+        if table:
+            lines.extend([f"## {title}", "", *prose(*before), *table, ""])
+
     peers = " Other solvers are drawn at the tolerance 1e-6, with what they were certified for." if "peers" in data else ""
-    lines += section("Time and residual against size: the paper's Figure 3",
-                     ["![sizes](figures/sizes.svg)", "", *tables.size_rows(data), *tables.beside(data, "figures", "sizes"), "", "[CSV](figures/sizes.csv)"],
-                     f"From the assembled matrices; time, and total residual of the answer. A cross or `>` is a run that was stopped after "
-                     f"{tables.sig(measured['sizes'][0]['limit_s'])} s of the processor.{peers}", "")
-    lines += section("Iterations", ["![iterations](figures/iterations.svg)", "", *tables.iterations_all(data)],
-                     ITERATIONS, "")
-    lines += section("Accuracy levels", BLOCKS["levels"](data))
-    lines += section("Work against precision", sum((problem_lines(p, files) for p in measured["precision"]), []), PRECISION, "",
-                     "[CSV of all runs](figures/precision.csv)", "")
-    lines += section("Against one linear solve", BLOCKS["ratios"](data))
-    lines += section("What digits cost", BLOCKS["digits"](data))
-    lines += section("Other ratios", tables.others(data))
-    lines += section("Cost against size", BLOCKS["growth"](data))
+    add("What was promised", promises.lines(data))
+    add("Convergence: the paper's Figure 2", ["![convergence](figures/history.svg)", "", "[CSV](figures/history.csv)"], RESIDUAL)
+    add("Time and residual against size: the paper's Figure 3",
+        ["![sizes](figures/sizes.svg)", "", *tables.size_rows(data), *tables.beside(data, "figures", "sizes"), "", "[CSV](figures/sizes.csv)"],
+        f"From the assembled matrices; time, and total residual of the answer. A cross or `>` is a run that was stopped after "
+        f"{tables.sig(measured['sizes'][0]['limit_s'])} s of the processor.{peers}")
+    add("Iterations", ["![iterations](figures/iterations.svg)", "", *tables.iterations(data)], ITERATIONS)
+    add("Accuracy levels", timed(tables.levels(data), data, "figures", "precision"), LEVELS)
+    add("Work against precision", sum((problem_lines(p, files) for p in measured["precision"]), []), PRECISION, "[CSV of all runs](figures/precision.csv)")
+    add("Against one linear solve", timed(tables.ratios(data), data, "bench", "ratios", tables.IN_RATIOS), LINEAR)
+    add("In sentences", tables.sentences(data))
+    add("What digits cost", timed(tables.digits(data), data, "bench", "ratios", tables.IN_DIGITS), DIGITS)
+    add("Other ratios", tables.others(data))
+    add("Cost against size", timed(tables.growth(data), data, "bench_size", "sizes"), GROWTH)
     if "peers" in data:
         limit = tables.sig(data["peers"]["time_limit_s"])
         packages = ", ".join(f"{name} {version}" for name, version in data["peers"]["packages"].items())
-        lines += section("Other solvers", [*BLOCKS["peers"](data), "", "![profiles](figures/peers.svg)", "", *tables.means(data), "", *tables.failures(data), "",
-                                           "[CSV of all runs](figures/peers.csv)"],
-                         f"On the same matrices, each answer certified by the same code, {limit} s for each run (`make peers`). {packages}.", "")
-    lines += section("Claims at the extremes", tables.extremes(data))
-    lines += section("Against theory", tables.theory_all(data))
-    lines += section("Elements", tables.elements_all(data))
-    lines += section("The service", service_tables.soak_all(data))
-    return "\n".join(lines).rstrip() + "\n"
+        add("Other solvers", [*timed(tables.peers(data), data, "peers", "problems"), "", "![profiles](figures/peers.svg)", "", *tables.means(data), "",
+                              *tables.failures(data), "", "[CSV of all runs](figures/peers.csv)"],
+            f"On the same matrices, each asked until the same external certificate holds, processor seconds of one thread, {limit} s for each run (`make peers`). "
+            f"The paper's body is certified to 1e-6. Means are shifted geometric ones over all problems, where a failure costs the limit. {packages}.")
+    add("Claims at the extremes", tables.extremes(data), EXTREMES)
+    add("Against theory", tables.theory(data), THEORY)
+    add("Elements", tables.elements(data), ELEMENTS)
+    add("The service", service_tables.soak(data), SERVICE)
+    return wrapped("\n".join(lines).rstrip()) + "\n"
 
 
-def readme(text, data):
-    """The README with its measured blocks renewed. Returns it and the names of blocks whose data is not there: those stay."""
-    missing = []
-
-    def fill(found):
-        lines = BLOCKS[found[1]](data)
-        if lines is None:
-            missing.append(found[1])
-            return found[0]
-        return f"<!-- numbers:{found[1]} -->\n" + "\n".join(lines) + "\n<!-- /numbers -->"
-    text, unknown = inline.fill(BLOCK.sub(fill, text), data)
-    return text, missing + unknown
+def pages(root):
+    """The pages that may cite measured numbers."""
+    return [root / "README.md", *sorted(path for path in (root / "docs").glob("*.md") if path.name != "numbers.md")]
 
 
 def outputs(root):
-    """{path: text} of all that is made, and the README's blocks without data."""
+    """{path: text} of all that is made, and the marks without data."""
     folder = root / "docs" / "figures"
     data = load(folder)
-    made = {}
+    made, missing = {}, []
     if "figures" in data:
         files = {**figure_files(data), **csv_files(data)}
         made = {folder / name: text for name, text in files.items()}
         made[root / "docs" / "numbers.md"] = page(data, files)
-    text, missing = readme((root / "README.md").read_text(), data)
-    made[root / "README.md"] = text
+    for path in pages(root):
+        made[path], unfilled = inline.fill(path.read_text(), data)
+        missing += [f"{path.relative_to(root)}: {name}" for name in unfilled]
     return made, missing
 
 
 def stale(root):
-    """Files that differ from what the data gives, and files that nothing makes."""
+    """Files that differ from what the data gives, and files that nothing makes; the marks without data."""
     made, missing = outputs(root)
     wrong = [str(path.relative_to(root)) for path, text in made.items() if not path.exists() or path.read_text() != text]
     extra = [path for kind in ("*.svg", "*.csv") for path in (root / "docs" / "figures").glob(kind) if path not in made]
@@ -224,7 +240,7 @@ def stale(root):
 
 
 def write(root):
-    """Returns the README's blocks without data."""
+    """Returns the marks without data."""
     made, missing = outputs(root)
     for path, text in made.items():
         path.write_text(text)
@@ -233,7 +249,7 @@ def write(root):
 
 def tell(root, missing):
     for name in missing:
-        print(f"README, {name}: no data yet, left as it is")
+        print(f"{name}: no data yet, left as it is")
     for path in stale(root)[0]:
         print(f"{path}: nothing makes it")
 

@@ -1,4 +1,4 @@
-"""What `make soak` measured, as the README's table and as the whole table of docs/numbers.md."""
+"""What `make soak` measured: in words, and the figures as they are."""
 import stamp
 from tables import NONE, sig, table
 
@@ -103,17 +103,12 @@ def footnote(rows):
 
 
 def soak(data):
-    """The README's table."""
+    """Two tables: what was done and what came of it; the figures of every run."""
     rows = (data.get("soak") or {}).get("rows")
     if not rows:
         return None
-    return table(["", ""], [shown(row) if row["name"] in SHOWN else [row["name"], figures_text(row) + mark(row)] for row in rows]) + footnote(rows)
-
-
-def soak_all(data):
-    rows = (data.get("soak") or {}).get("rows")
-    if not rows:
-        return None
-    lines = [[row["name"], figures_text(row) + mark(row), NONE if row.get("seconds") is None else f"{row['seconds']:.0f}", row["stamp"].get("measured", NONE),
-              f"`{row['stamp'].get('commit', 'unknown')}`", sig(row["stamp"].get("load")), sig(row["stamp"].get("others"))] for row in rows]
-    return table(["`make soak`", "figures", "s", "when", "commit", "load before", "processors of others"], lines) + footnote(rows)
+    words = [shown(row) if row["name"] in SHOWN else [row["name"], figures_text(row) + mark(row)] for row in rows]
+    figures = [[row["name"], figures_text(row) + mark(row), NONE if row.get("seconds") is None else f"{row['seconds']:.0f}", row["stamp"].get("measured", NONE),
+                f"`{row['stamp'].get('commit', 'unknown')}`", sig(row["stamp"].get("load")), sig(row["stamp"].get("others"))] for row in rows]
+    return [*table(["what was done", "what came of it"], words), "",
+            *table(["`make soak`", "figures", "s", "when", "commit", "load before", "processors of others"], figures), *footnote(rows)]

@@ -1,4 +1,4 @@
-"""The tables of docs/numbers.md and of the README's measured blocks, from the data in docs/figures. Each function returns
+"""The tables of docs/numbers.md, from the data in docs/figures. Each function returns
 Markdown lines, or None where the data it needs was not measured."""
 import math
 
@@ -161,18 +161,7 @@ def iteration_runs(size, rule, base):
 
 
 def iterations(data):
-    """By size: counts until the paper's rule and until a certified error."""
-    if not data.get("figures"):
-        return None
-    names = [("conjugate", "`conjugate`"), ("restart", "with restart"), ("restart_paper_step", "λ₁(K)"), ("accelerated", "without restart"), ("uzawa", "Uzawa")]
-    rows = [[f"{size['nx']} x {size['nx'] // 3}"] + [count_cell(way(size, n, rule)) for rule in ("paper", "certified") for n, _ in names]
-            for size in data["figures"]["sizes"]]
-    head = [title if k else f"{until}: {title}" for until in ("paper's rule", "certified 1e-6") for k, (_, title) in enumerate(names)]
-    return table(["cells"] + head, rows)
-
-
-def iterations_all(data):
-    """The same with the ratios, and with what was certified of the two answers whose ratio says least."""
+    """By size and rule: counts, their ratios, and what was certified of the answers whose ratio says least."""
     rows = []
     for rule, base, name in RULES:
         for size in data["figures"]["sizes"]:
@@ -242,8 +231,11 @@ def others(data):
 
 
 SENTENCES = """A scene of 200,000 dofs (546 x 182 `quad4`) is assembled in {assembly_quad4_matrices} s; all fields and the `.vtu` with most of them again take {assembly_quad4_outputs} s: together {assembly_quad4} times CHOLMOD's analysis and factorization (`make bench FILTER=assembly`).
+
 In three dimensions (a cube of 32^3 `hex8` bricks, d = 101,277) cold takes {cold_hex8_d101277} times the linear solve, and {memory_hex8_32} times its memory.
+
 An oblique plane costs {oblique_nx600} times one along an axis.
+
 Matrix Market: {matrix_market_read} MB/s read, {matrix_market_write} MB/s written. The obstacle problem OBSTCLAE (d = 9,604, m = 19,208) to certified 1e-8: {obstclae} ms, {ipopt_over_uzawa_obstclae} times faster than Ipopt to its default tolerance."""
 
 
@@ -328,25 +320,6 @@ def side_by_side(errors):
 
 
 def theory(data):
-    """The contact bodies, a body's meshes side by side."""
-    if not data.get("theory"):
-        return None
-    rows = []
-    for name, quantities in theory_bodies(data).items():
-        pressure = quantities.get("p0") or quantities.get("p(0)")
-        if pressure:
-            rows.append([name, " / ".join(c for c, _ in pressure), side_by_side(pressure), side_by_side(quantities.get("a, by moment")),
-                         side_by_side(quantities.get("a, by area"))])
-    lines = table(["errors, %", "cells in the contact", "pressure, peak or middle", "half width by moment", "by area"], rows)
-    tube = theory_bodies(data).get("thick tube, plane strain, quad4")
-    if tube:
-        cells, hoop = tube["hoop"][-1]
-        lines += ["", f"A thick tube of quad4 ({cells} cells across) has its hoop and radial stress at the bore within {sig(hoop)} % and "
-                      f"{sig(tube['radial'][-1][1])} %."]
-    return lines
-
-
-def theory_all(data):
     """Errors in percent of every quantity."""
     if not data.get("theory"):
         return None
@@ -359,10 +332,8 @@ def theory_all(data):
 FORMULATIONS = (("quad4", "standard"), ("quad4", "incompatible_modes"), ("quad4", "bbar"), ("quad8", "standard"))
 
 
-def elements(data):
+def formulations(data):
     """What a formulation buys: Cook's membrane and a rubber tube."""
-    if not (data.get("theory") or {}).get("cook"):
-        return None
     cook = {(r["element"], r["formulation"], r["cells"]): f"{r['deflection']:.2f}" if r["cells"] < 10 else f"{r['deflection']:.3f}" for r in data["theory"]["cook"]}
     tubes = {(r["element"], r["formulation"]): percent(r["ratio"]) if r["ratio"] < 0.5 else f"{100 * r['ratio']:.1f} %" for r in data["theory"]["tubes"]}
     rows = [[f"{kind} `{way}`" if kind == "quad4" else kind, cook.get((kind, way, 4), NONE), cook.get((kind, way, 64), NONE), tubes.get((kind, way), NONE)]
@@ -370,12 +341,12 @@ def elements(data):
     return table(["", "4 cells", "64 cells", "rubber tube, of the exact displacement"], rows)
 
 
-def elements_all(data):
-    """The patch test and the order of every element."""
+def elements(data):
+    """What a formulation buys; the patch test and the order of every element."""
     rows = (data.get("theory") or {}).get("elements")
     if not rows:
-        return []
-    return [*elements(data), "", *table(["element, model, formulation", "patch test, off by", "degree", "order of convergence"],
+        return None
+    return [*formulations(data), "", *table(["element, model, formulation", "patch test, off by", "degree", "order of convergence"],
                                         [[f"`{r['name']}`", sig(r["patch"]), r["degree"], f"{r['order']:.4f}"] for r in rows])]
 
 
