@@ -87,6 +87,7 @@ def test_every_mark_is_written_from_data(s):
             changed = one_digit_more(text, *found.span(2))
             check(changed and changed != text and inline.fill(changed, data) == (text, []), path.name, found[1])
             used.add(found[1])
+        check(not re.search("^ *<!-- n:", text, re.M), path.name, "has a mark at the beginning of a line: Markdown ends the paragraph there")
         check(len(inline.MARK.findall(text)) == len(re.findall("<!-- (?:n:|/n)", re.sub("`[^`\n]*`", "", text))) / 2, path.name, "has a mark that is not whole, or broken over two lines")
     check(used == {*inline.VALUES}, "made, but on no page, or the other way round")
 

@@ -86,7 +86,7 @@ PHRASES = {
     "| `\"quick\"` | 1e-2 |": constant(1e-2, r'\{"quick", ([\de.-]+)'),
     "(default) | 1e-8 |": constant(1e-8, r'\{"precise", ([\de.-]+)'),
     "rounding level, 1e-12": None, "beyond 1e-9 the certificate solves once more": None, "when the certificate is within 1e-2": None,
-    "certified to 1e-6,": None,
+    "certified to 1e-6,": None, "certified to 1e-6;": None,
     "by default 80 % of the machine or its control group": None,
     "up to 10,000 loads on one body": lambda program: program.schema("properties", "cases", "maxItems") == 10000,
     "name of 1 to 63 bytes": None, "have at most 4 million numbers": constant(4e6, r"#define MOST_NUMBERS (\d+)"),
