@@ -82,19 +82,25 @@ def figure_files(data):
 
 
 def machine_lines(data):
-    """A line for each command; where parts of it were measured at different times, from the first to the last."""
-    rows = []
+    """The machines with their versions, and a line for each command; where parts of it were measured at different times, from the first to
+    the last."""
+    lines, machines = [], {}
     for name, command in COMMANDS.items():
-        if name in data:
-            m, found = data[name]["machine"], tables.stamps(data, name, ROWS.get(name))
-            commits = list(dict.fromkeys(one.get("commit", "unknown") for one in found))
-            origin = ", from an earlier README" if any(one.get("origin") for one in found) else ""
-            rows.append([f"`{command}`", tables.span(one.get("measured") for one in found) + origin, ", ".join(f"`{one}`" for one in commits),
-                         tables.span((one.get("load") for one in found), tables.sig), tables.span((one.get("others") for one in found), tables.sig),
-                         tables.NONE if name not in TIMED else "yes" if any(stamp.beside_other_work(one) for one in found) else "no",
-                         f"{m['processor']}, {m['cores']} cores, {m['memory_bytes'] / 2**30:.0f} GiB; {m['system']}",
-                         ", ".join([f"gcc {m['compiler']}"] + [f"{k} {v}" for k, v in m["packages"].items() if k != "gcc"])])
-    return tables.table(["measured by", "when", "commit", "load", "processors of others", "beside other work", "machine", "versions"], rows)
+        if name not in data:
+            continue
+        m, found = data[name]["machine"], tables.stamps(data, name, ROWS.get(name))
+        text = (f"{m['processor']}, {m['cores']} cores, {m['memory_bytes'] / 2**30:.0f} GiB; {m['system']}; " +
+                ", ".join([f"gcc {m['compiler']}"] + [f"{k} {v}" for k, v in m["packages"].items() if k != "gcc"]))
+        machines.setdefault(text, []).append(f"`{command}`")
+        said = [tables.span(one.get("measured") for one in found) + (", from an earlier README" if any(one.get("origin") for one in found) else ""),
+                "commit " + ", ".join(dict.fromkeys(f"`{one.get('commit', 'unknown')}`" for one in found)),
+                f"load {tables.span((one.get('load') for one in found), tables.sig)}",
+                f"processors of others {tables.span((one.get('others') for one in found), tables.sig)}"]
+        if name in TIMED:
+            said.append("beside other work" if any(stamp.beside_other_work(one) for one in found) else "on a quiet machine")
+        lines.append(f"- `{command}`: {', '.join(said)}")
+    told = [f"Machine{'' if len(machines) == 1 else ' of ' + ', '.join(names)}: {text}." for text, names in machines.items()]
+    return [*prose(*told), *lines]
 
 
 def problem_lines(problem, files):
@@ -166,7 +172,7 @@ SERVICE = "What was done to the service (`make soak`), and what came of it; belo
 
 def wrapped(text):
     """The text with its lines of prose broken; rows of tables, pictures and headings stay."""
-    return "\n".join(line if line[:1] in "|#!" else textwrap.fill(line, WIDTH, break_long_words=False, break_on_hyphens=False) for line in text.split("\n"))
+    return "\n".join(line if line[:1] in "|#!" else textwrap.fill(line, WIDTH, subsequent_indent="  " if line.startswith("- ") else "", break_long_words=False, break_on_hyphens=False) for line in text.split("\n"))
 
 
 def prose(*texts):
@@ -193,7 +199,7 @@ def page(data, files):
     add("Accuracy levels", timed(tables.levels(data), data, "figures", "precision"), LEVELS)
     add("Work against precision", sum((problem_lines(p, files) for p in measured["precision"]), []), PRECISION, "[CSV of all runs](figures/precision.csv)")
     add("Against one linear solve", timed(tables.ratios(data), data, "bench", "ratios", tables.IN_RATIOS), LINEAR)
-    add("In sentences", tables.sentences(data))
+    add("Single measurements", tables.sentences(data))
     add("What digits cost", timed(tables.digits(data), data, "bench", "ratios", tables.IN_DIGITS), DIGITS)
     add("Other ratios", tables.others(data))
     add("Cost against size", timed(tables.growth(data), data, "bench_size", "sizes"), GROWTH)
