@@ -65,7 +65,7 @@ check file_length long_files
 check function_length long_functions
 check shell shell_syntax
 check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'
-check sqlite_only_in_store only_in 'sqlite3' '^server/store/'
+check sqlite_only_in_its_engine only_in 'sqlite3' '^server/store/sqlite/'
 check microhttpd_only_in_http only_in 'microhttpd' '^server/http/'
 check jansson_only_in_codec only_in 'jansson' '^(server/codec|client)/'
 exit $status

@@ -1,5 +1,5 @@
 /* Uploads, expiry, retention and webhooks in the store: what the API tests can't reach or would wait for. */
-#include "store/backup_uploads.h"
+#include "store/sqlite/backup_uploads.h"
 #include "store/maintenance.h"
 #include "store_place.h"
 #include "store/uploads.h"

@@ -7,7 +7,7 @@
  * ends, so that any number of them share one turn, and the next ones are committed meanwhile.
  * Sources: SQLite documentation, "Write-Ahead Logging" and PRAGMA synchronous; Helland et al., "Group Commit Timers and
  * High Volume Transaction Systems", 1987. */
-#include "store/internal.h"
+#include "store/sqlite/internal.h"
 
 #include <string.h>
 

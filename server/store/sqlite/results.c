@@ -1,6 +1,6 @@
 /* results.c: vectors and histories as rows of little-endian doubles, in parts of bounded size. */
-#include "store/internal.h"
-#include "store/file_format.h"
+#include "store/sqlite/internal.h"
+#include "store/sqlite/file_format.h"
 
 #include <endian.h>
 #include <stdio.h>

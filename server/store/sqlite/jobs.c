@@ -1,5 +1,5 @@
 /* jobs.c: the life of a job, each step one transaction. */
-#include "store/internal.h"
+#include "store/sqlite/internal.h"
 
 #include <math.h>
 #include <stdio.h>

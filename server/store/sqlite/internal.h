@@ -1,8 +1,8 @@
 /* internal.h: what the files of the store share. */
-#ifndef SERVER_STORE_INTERNAL_H
-#define SERVER_STORE_INTERNAL_H
+#ifndef SERVER_STORE_SQLITE_INTERNAL_H
+#define SERVER_STORE_SQLITE_INTERNAL_H
 
-#include "store/connection.h"
+#include "store/sqlite/connection.h"
 #include "store/store.h"
 #include "store/uploads.h"
 

@@ -1,4 +1,4 @@
-#include "store/backup_uploads.h"
+#include "store/sqlite/backup_uploads.h"
 #include "store/upload_file.h"
 
 #include <dirent.h>

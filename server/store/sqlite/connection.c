@@ -1,6 +1,6 @@
-#include "store/connection.h"
-#include "store/checksum.h"
-#include "store/file_format.h"
+#include "store/sqlite/connection.h"
+#include "store/sqlite/checksum.h"
+#include "store/sqlite/file_format.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
  * While one change is under way others come, and wait. Whoever is first among them then carries out all of them in one
  * transaction, each in a savepoint of its own, so that one that fails takes nothing with it. What many changes touch
  * alike (the ends of tables and indexes) is so written once for all. What they wait for next is the disk: sync.c. */
-#include "store/internal.h"
+#include "store/sqlite/internal.h"
 
 #include <string.h>
 

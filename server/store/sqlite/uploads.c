@@ -1,6 +1,6 @@
 /* uploads.c: the rows of uploads, and what becomes of their files. */
 #include "store/uploads.h"
-#include "store/internal.h"
+#include "store/sqlite/internal.h"
 #include "store/upload_file.h"
 
 #include <dirent.h>

@@ -1,4 +1,4 @@
-#include "store/file_format.h"
+#include "store/sqlite/file_format.h"
 
 #include "store/store.h"
 

@@ -1,6 +1,6 @@
 /* file_format.h: the format of the database file, and the rule for changing it. */
-#ifndef SERVER_STORE_FILE_FORMAT_H
-#define SERVER_STORE_FILE_FORMAT_H
+#ifndef SERVER_STORE_SQLITE_FILE_FORMAT_H
+#define SERVER_STORE_SQLITE_FILE_FORMAT_H
 
 #include <sqlite3.h>
 #include <stdbool.h>

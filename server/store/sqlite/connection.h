@@ -1,6 +1,6 @@
 /* connection.h: one SQLite connection and the statements prepared on it. Used by one thread at a time. */
-#ifndef SERVER_STORE_CONNECTION_H
-#define SERVER_STORE_CONNECTION_H
+#ifndef SERVER_STORE_SQLITE_CONNECTION_H
+#define SERVER_STORE_SQLITE_CONNECTION_H
 
 #include "store/store.h"
 

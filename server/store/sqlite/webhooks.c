@@ -1,5 +1,5 @@
 #include "store/webhooks.h"
-#include "store/internal.h"
+#include "store/sqlite/internal.h"
 
 #include <stdio.h>
 

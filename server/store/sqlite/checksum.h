@@ -5,8 +5,8 @@
  * values with their types and lengths: it finds every single error of up to 32 bits in a row, and misses one in 2^32 of
  * the others. With the keys in it, contents that appear under another job or another name are found too.
  * A NULL instead was written by a format that had none (file_format.c). */
-#ifndef SERVER_STORE_CHECKSUM_H
-#define SERVER_STORE_CHECKSUM_H
+#ifndef SERVER_STORE_SQLITE_CHECKSUM_H
+#define SERVER_STORE_SQLITE_CHECKSUM_H
 
 #include <sqlite3.h>
 #include <stdbool.h>

@@ -1,5 +1,5 @@
 /* retention.c: jobs that waited too long, and ended ones that were kept long enough. */
-#include "store/internal.h"
+#include "store/sqlite/internal.h"
 
 #include <stdio.h>
 #include <stdlib.h>

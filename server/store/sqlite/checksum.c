@@ -1,4 +1,4 @@
-#include "store/checksum.h"
+#include "store/sqlite/checksum.h"
 
 #include <endian.h>
 #include <stdint.h>

@@ -1,8 +1,8 @@
 #include "store/maintenance.h"
-#include "store/backup_uploads.h"
-#include "store/checksum.h"
-#include "store/file_format.h"
-#include "store/internal.h"
+#include "store/sqlite/backup_uploads.h"
+#include "store/sqlite/checksum.h"
+#include "store/sqlite/file_format.h"
+#include "store/sqlite/internal.h"
 #include "store/upload_file.h"
 
 #include <errno.h>

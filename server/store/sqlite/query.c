@@ -1,5 +1,5 @@
 /* query.c: jobs read in rows. */
-#include "store/internal.h"
+#include "store/sqlite/internal.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* backup_uploads.h: the files of uploads that belong to a copy of the database. */
-#ifndef SERVER_STORE_BACKUP_UPLOADS_H
-#define SERVER_STORE_BACKUP_UPLOADS_H
+#ifndef SERVER_STORE_SQLITE_BACKUP_UPLOADS_H
+#define SERVER_STORE_SQLITE_BACKUP_UPLOADS_H
 
 #include <sqlite3.h>
 #include <stdbool.h>

@@ -1,5 +1,5 @@
-#include "store/internal.h"
-#include "store/file_format.h"
+#include "store/sqlite/internal.h"
+#include "store/sqlite/file_format.h"
 
 #include <errno.h>
 #include <fcntl.h>
