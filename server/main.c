@@ -7,9 +7,7 @@
 #include "base/metrics.h"
 #include "options/options.h"
 #include "privileges.h"
-#include "store/maintenance.h"
-#include "store/store.h"
-#include "store/uploads.h"
+#include "store/engines/engines.h"
 #include "uzawa.h"
 #include "work/webhook.h"
 #include "work/work.h"
@@ -154,11 +152,11 @@ static bool open_store(service *s, const server_options *options, char *message,
     s->store = store_open(options->db, message, size);
     if (!s->store)
         return false;
-    store_observe(s->store, s->metrics);
-    store_limit_uploads(s->store, &(upload_limits){.one = (int64_t)options->max_upload,
-                                                   .all = (int64_t)options->uploads,
-                                                   .keep_s = options->upload_days * 86400});
-    store_limit_queue(s->store, options->max_queue);
+    store_configure(s->store, &(store_settings){.metrics = s->metrics,
+                                                .max_queue = options->max_queue,
+                                                .uploads = {.one = (int64_t)options->max_upload,
+                                                            .all = (int64_t)options->uploads,
+                                                            .keep_s = options->upload_days * 86400}});
     return true;
 }
 

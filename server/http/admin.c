@@ -1,7 +1,6 @@
 /* admin.c: what only an administrator asks for. */
 #include "codec/codec.h"
 #include "http/request.h"
-#include "store/maintenance.h"
 
 #include <stdlib.h>
 

@@ -1,9 +1,9 @@
-/* store.h: jobs, results and histories that survive a restart.
+/* store.h: jobs, results and histories that survive a restart, for who uses a store.
  *
  * The interface is narrow on purpose: each operation is one whole transaction, claims carry an owner and a lease, and
- * nothing of SQLite shows, so that a shared engine (PostgreSQL) can stand behind the same calls.
- * Every function may be called from any thread. Writes go through one connection under one mutex; reads use their own
- * read-only connections. All strings are UTF-8; JSON texts are stored as given. Times are Unix seconds, 0: not yet. */
+ * nothing of an engine shows. engine.h is the interface for who writes one; engines/engines.h opens a store.
+ * Every function may be called from any thread. All strings are UTF-8; JSON texts are stored as given. Times are Unix
+ * seconds, 0: not yet. */
 #ifndef SERVER_STORE_H
 #define SERVER_STORE_H
 
@@ -45,30 +45,35 @@ typedef struct {
 } job;
 void job_clear(job *j); /* frees the texts, zeroes *j; NULL is fine */
 
-/* Opens or creates the database file. NULL on failure with the reason in message[0..size). Refuses, with a clear
- * message, a file that is not its own or has a newer schema version. */
-store *store_open(const char *path, char *message, size_t size);
-void store_close(store *s);
-/* The last STORE_ERROR's cause, for the log; copied to buffer. */
-void store_message(store *s, char *buffer, size_t size);
-/* The largest size of the database file (never less than it has), without its journal; 0: no limit. More is
- * STORE_FULL, as a full disk is. Not kept in the file. */
-store_status store_limit_bytes(store *s, int64_t bytes);
+/* Bytes of uploads, and for how long they are kept (uploads.h). */
+typedef struct {
+    int64_t one;   /* bytes of one upload, after decompression; 0: no limit */
+    int64_t all;   /* bytes of all together; what no job uses goes to make room; 0: no limit */
+    double keep_s; /* one that no job uses goes so long after it was last used; 0: no limit */
+} upload_limits;
 
-/* What a program without privileges may still write to the disk of the database file; -1: not known. */
+/* Kept nowhere: each start gives them. */
+typedef struct {
+    metrics *metrics;  /* counts commits and changes there; may be NULL */
+    int64_t max_queue; /* so many jobs may wait; a submission beyond it is STORE_BUSY; 0: no limit */
+    upload_limits uploads;
+} store_settings;
+/* Before other threads use the store; until then nothing is limited or counted. */
+void store_configure(store *s, const store_settings *settings);
+/* NULL is fine. */
+void store_close(store *s);
+
+/* The last failure's cause, for the log; copied to buffer. */
+void store_message(store *s, char *buffer, size_t size);
+
+/* What a program without privileges may still write to the store's disk; -1: not known. */
 int64_t store_free_bytes(store *s);
 
-/* So many jobs may wait; a submission beyond it is STORE_BUSY. 0: no limit. Not kept in the file. */
-void store_limit_queue(store *s, int64_t jobs);
-
-/* Counts commits and changes there from now on; before other threads use the store. */
-void store_observe(store *s, metrics *m);
-
 /* From now on changed(ctx, id) is called after every change of a job that anybody but its owner makes (submitted,
- * dismissed, expired, deleted) was committed, by the thread that made it, without a lock; what owners do (claim,
- * finish, release) they tell themselves. NULL: nobody is told. Before other threads use the store, and after they did.
- */
-void store_listen(store *s, void (*changed)(void *ctx, const char *id), void *ctx);
+ * dismissed, expired, deleted) was committed, without a lock; what owners do (claim, finish, release) they tell
+ * themselves. NULL: nobody is told. Before other threads use the store, and after they did. */
+typedef void store_listener(void *ctx, const char *id);
+void store_listen(store *s, store_listener *changed, void *ctx);
 
 /* What is submitted. */
 typedef struct {
@@ -80,7 +85,7 @@ typedef struct {
     const char (*uploads)[65];   /* n_uploads ids of uploads that the body names */
     size_t n_uploads;
     int priority;         /* -10..10: larger ones run first, of the same the older one */
-    const char *webhook;  /* address to tell of its end (webhooks.h), or NULL */
+    const char *webhook;  /* address to tell of its end, or NULL */
     double queue_limit_s; /* it fails if it has not begun so long after it came; 0: no limit */
 } store_request;
 
@@ -202,5 +207,32 @@ store_status store_try_write(store *s);
 
 /* Jobs in each status, indexed by job_status. */
 store_status store_counts(store *s, int64_t counts[5]);
+
+/* What a check found. */
+typedef struct {
+    char *findings; /* one a line; "" when the store is whole; freed by the caller, NULL on failure */
+    int64_t jobs;   /* in the store */
+    double seconds;
+} store_findings;
+/* Reads everything and looks at every reference, while others go on. */
+store_status store_check(store *s, store_findings *out);
+
+/* ---- webhooks: whom to tell of the end of which job. What is due stands in the store from the transaction that ends
+ * the job until somebody was told, so that no crash forgets it; a crash in between may tell twice. */
+typedef struct {
+    char job[33];
+    char *url;    /* freed by the caller */
+    int attempts; /* made yet */
+} webhook_due;
+/* The one that has been due for longest, STORE_NOT_FOUND: none is. */
+store_status store_webhook_next(store *s, webhook_due *out);
+
+typedef enum { WEBHOOK_TOLD = 2, WEBHOOK_GIVEN_UP = 3, WEBHOOK_AGAIN = 1 } webhook_end;
+/* Is there anybody to be told, now or later? */
+store_status store_webhooks_open(store *s, bool *any);
+/* All that is due at this address waits for delay_s: nobody answers there. */
+store_status store_webhook_postpone(store *s, const char *url, double delay_s);
+/* How an attempt ended; again: not before delay_s are over. */
+store_status store_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s);
 
 #endif

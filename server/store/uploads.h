@@ -1,9 +1,7 @@
 /* uploads.h: texts that are sent once and named by their digest in many requests.
  *
- * An upload is a file in the folder "FILE-uploads" beside the database FILE, named by the SHA-256 of its bytes, and a
- * row that says it is complete. It is written under another name, synced and renamed before the row is committed, so
- * that a file without a row, or under another name, is what a crash left: it is removed when the store opens. A job
- * that uses an upload keeps a reference until it is deleted; what no job uses goes by age, or to make room.
+ * An upload is a blob (blobs.h), named by the SHA-256 of its bytes, and a row that says it is complete. A job that uses
+ * an upload keeps a reference until it is deleted; what no job uses goes by age, or to make room.
  *
  * Functions may be called from any thread, but a writer belongs to one. */
 #ifndef SERVER_STORE_UPLOADS_H
@@ -23,15 +21,6 @@ typedef struct {
     double created, used; /* used: last sent, or put into a job */
 } upload_info;
 
-typedef struct {
-    int64_t one;   /* bytes of one upload, after decompression */
-    int64_t all;   /* bytes of all together; what no job uses goes to make room */
-    double keep_s; /* one that no job uses goes so long after it was last used */
-} upload_limits;
-
-/* Before the first upload. */
-void store_limit_uploads(store *s, const upload_limits *limits);
-
 typedef enum {
     UPLOAD_OK,
     UPLOAD_TOO_LARGE, /* beyond the limit of one */
@@ -42,6 +31,7 @@ typedef enum {
 } upload_status;
 
 typedef struct upload_writer upload_writer;
+typedef struct store_uploads store_uploads; /* what a store knows of its uploads */
 
 /* NULL on failure: *status. gzip: what is written is compressed (RFC 1952) and kept decompressed. */
 upload_writer *store_upload_begin(store *s, bool gzip, upload_status *status);

@@ -1,6 +1,5 @@
 #include "work/webhook.h"
 #include "codec/codec.h"
-#include "store/webhooks.h"
 #include "work/internal.h"
 
 #include <curl/curl.h>

@@ -3,7 +3,7 @@
 #define TESTS_STORE_PLACE_H
 
 #include "harness.h"
-#include "store/store.h"
+#include "store/engines/engines.h"
 
 #include <sqlite3.h>
 #include <unistd.h>

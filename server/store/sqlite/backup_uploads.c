@@ -1,5 +1,5 @@
 #include "store/sqlite/backup_uploads.h"
-#include "store/upload_file.h"
+#include "store/blobs.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -31,7 +31,7 @@ static bool copy_bytes(int in, int out)
     char piece[65536];
     ssize_t n;
     while ((n = read(in, piece, sizeof piece)) != 0)
-        if ((n < 0 && errno != EINTR) || (n > 0 && !upload_write_all(out, piece, (size_t)n)))
+        if ((n < 0 && errno != EINTR) || (n > 0 && !blob_write_all(out, piece, (size_t)n)))
             return false;
     return fsync(out) == 0;
 }

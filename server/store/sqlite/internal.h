@@ -1,25 +1,23 @@
-/* internal.h: what the files of the store share. */
+/* internal.h: what the files of this engine share. */
 #ifndef SERVER_STORE_SQLITE_INTERNAL_H
 #define SERVER_STORE_SQLITE_INTERNAL_H
 
 #include "store/sqlite/connection.h"
-#include "store/store.h"
-#include "store/uploads.h"
+#include "store/engine.h"
 
 #include <pthread.h>
 
 #define STORE_READERS 4
 
-/* Lock order: none of these is taken while another is held, except message and sync under writer_lock, and any under
- * upload_lock. */
+/* Lock order: none of these is taken while another is held, except message and sync under writer_lock. */
 typedef struct pending pending;
 
-struct store {
-    pthread_mutex_t writer_lock; /* writer, last_ms, sequence, max_queue */
+typedef struct {
+    store base;
+    pthread_mutex_t writer_lock; /* writer, last_ms, sequence */
     connection writer;           /* the only one that writes and checkpoints */
     uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
     unsigned sequence;
-    int64_t max_queue; /* 0: no limit */
 
     pthread_mutex_t queue_lock; /* everything down to leading; write.c */
     pending *queue, **queue_end;
@@ -44,85 +42,101 @@ struct store {
     sqlite3_file *log; /* the writer's write-ahead log, set before the thread starts */
     pthread_t syncer;
 
-    pthread_mutex_t message_lock; /* message */
-    char message[256];
-    pthread_mutex_t upload_lock; /* everything down to uploads_pending, and the files of uploads with their rows */
-    upload_limits upload_limits;
-    int64_t uploads_bytes;   /* of all that have rows */
-    int64_t uploads_pending; /* of those that are being written */
-    char *uploads_folder;    /* absolute; made with the first upload */
+    char *path; /* absolute, of the file */
+    int file;   /* holds the lock that keeps a second daemon out; closed after every connection (see sqlite_open) */
+} sqlite_store;
 
-    void (*changed)(void *ctx, const char *id); /* store_listen; may be NULL */
-    void *changed_ctx;
-    metrics *metrics; /* may be NULL */
-    char *path;       /* absolute, of the file */
-    int file; /* holds the lock that keeps a second daemon out; closed after every connection (see store_open) */
-};
+static inline sqlite_store *sqlite_of(store *s)
+{
+    return (sqlite_store *)s;
+}
 
 /* Runs `change` on the writer, alone or with others in one transaction: STORE_OK commits, anything else takes back what
  * it did. It may run more than once, so it must reset what it publishes; on a full disk it runs again once the journal
  * is moved into the database. */
-typedef store_status (*store_change)(store *s, connection *c, void *args);
+typedef store_status (*store_change)(sqlite_store *s, connection *c, void *args);
 /* When the caller is told. */
 typedef enum {
     WRITE_DURABLE, /* when it is on disk */
     WRITE_SOON, /* when it is committed: a power loss may undo it for a moment longer, but whoever reads what it wrote
-                   waits (store_settle) */
+                   waits (sqlite_settle) */
     WRITE_LAZY  /* when it is committed; it reaches the disk with whatever comes next. Right for what the start
                    after a crash undoes by itself: claims and leases */
 } write_durability;
-store_status store_write_as(store *s, write_durability durability, store_change change, void *args);
-store_status store_write(store *s, store_change change, void *args); /* WRITE_DURABLE */
+store_status sqlite_write_as(sqlite_store *s, write_durability durability, store_change change, void *args);
+store_status sqlite_write(sqlite_store *s, store_change change, void *args); /* WRITE_DURABLE */
 
 /* ---- sync.c */
-bool store_sync_begin(store *s); /* once the writer has read the file; false: no thread, or no log */
-void store_sync_end(store *s);
+bool sqlite_sync_begin(sqlite_store *s); /* once the writer has read the file; false: no thread, or no log */
+void sqlite_sync_end(sqlite_store *s);
 /* Around a COMMIT, however it ends; under writer_lock. The second returns its number. */
-void store_begin_commit(store *s);
-uint64_t store_note_commit(store *s);
-void store_want_sync(store *s, uint64_t number);
-store_status store_await_sync(store *s, uint64_t number);
-store_status store_settle(store *s); /* returns when all that anybody may have read is on disk */
+void sqlite_begin_commit(sqlite_store *s);
+uint64_t sqlite_note_commit(sqlite_store *s);
+void sqlite_want_sync(sqlite_store *s, uint64_t number);
+store_status sqlite_await_sync(sqlite_store *s, uint64_t number);
+store_status sqlite_settle(sqlite_store *s); /* returns when all that anybody may have read is on disk */
 
 /* Before jobs are told that were read: returns when the end of each is on disk. */
-store_status store_settle_jobs(store *s, const job *jobs, size_t count);
-
-/* Calls who listens (store_listen). */
-void store_tell(const store *s, const char *id);
-
-/* Keeps the connection's message as the store's last one. */
-void store_keep_message(store *s, const connection *c);
-double store_clock(void); /* seconds, CLOCK_MONOTONIC */
+store_status sqlite_settle_jobs(sqlite_store *s, const job *jobs, size_t count);
 
 /* A reader for the calling thread alone, until it is given back with how the read ended, which is returned. */
-connection *store_take_reader(store *s);
-store_status store_give_reader(store *s, connection *c, store_status status);
-
-/* Counts the uploads and removes what a crash left of one. False: the rows can't be read (writer.message). */
-bool store_open_uploads(store *s);
+connection *sqlite_take_reader(sqlite_store *s);
+store_status sqlite_give_reader(sqlite_store *s, connection *c, store_status status);
 
 /* STORE_ERROR: the file was deleted, moved or replaced while it is open. What is written to it then is not found by the
  * next start, so nothing may be acknowledged. */
-store_status store_check_place(const store *s, connection *c);
-
-/* The next id, 32 hex digits: 12 of milliseconds, 4 of a counter within them, 16 random. Under writer_lock. */
-void store_next_id(store *s, char id[33]);
-
-double store_now(void); /* Unix seconds */
+store_status sqlite_check_place(const sqlite_store *s, connection *c);
 
 /* The job in the current row, whose first columns are the job's. Failure leaves *out zero. */
-store_status store_read_job(statement *st, job *out);
+store_status sqlite_read_job(statement *st, job *out);
 
 /* STORE_CONFLICT if the job exists, else STORE_NOT_FOUND: why an update found nothing to change. */
-store_status store_why_unchanged(connection *c, const char *id);
+store_status sqlite_why_unchanged(connection *c, const char *id);
 
 /* A copy of the blob in column `at`, NUL-terminated; NULL: no memory. */
-char *store_copy_blob(statement *st, int at, size_t *len);
+char *sqlite_copy_blob(statement *st, int at, size_t *len);
 
 /* A copy of a text column; NULL for SQL NULL, and *ok false when there is no memory. */
-char *store_copy_text(statement *st, int at, bool *ok);
+char *sqlite_copy_text(statement *st, int at, bool *ok);
 
 /* Inserts the vectors, the histories and the cases' answers of a job that has none. */
-store_status store_insert_results(connection *c, const char *id, const store_outcome *outcome);
+store_status sqlite_insert_results(connection *c, const char *id, const store_outcome *outcome);
+
+/* ---- the operations of the engine (engine.h), by the files that have them */
+store *sqlite_open(const char *address, char *message, size_t size);
+void sqlite_close(store *s);
+store_status sqlite_submit(store *s, const store_request *request, job *out, bool *repeated);
+store_status sqlite_find_repeat(store *s, const store_request *request, job *out);
+store_status sqlite_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
+store_status sqlite_renew(store *s, const char *id, const char *owner, double lease_s, int progress);
+store_status sqlite_finish(store *s, const char *id, const char *owner, const store_outcome *outcome);
+store_status sqlite_release(store *s, const char *id, const char *owner);
+store_status sqlite_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
+store_status sqlite_expire(store *s, const char *error_json, int64_t *count);
+store_status sqlite_retain(store *s, const store_retention *limits, int64_t *count);
+store_status sqlite_dismiss(store *s, const char *id, job_status *was);
+store_status sqlite_get(store *s, const char *id, job *out);
+store_status sqlite_list(store *s, const store_query *query, job *jobs, size_t *count);
+store_status sqlite_get_body(store *s, const char *id, char **body, size_t *len);
+store_status sqlite_get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count);
+store_status sqlite_get_vector(store *s, const char *id, int64_t number, const char *name, double **x, int64_t *count);
+store_status sqlite_count_vectors(store *s, const char *id, const char *name, int64_t *total);
+store_status sqlite_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
+                                int64_t *columns);
+store_status sqlite_counts(store *s, int64_t counts[5]);
+store_status sqlite_webhook_next(store *s, webhook_due *out);
+store_status sqlite_webhooks_open(store *s, bool *any);
+store_status sqlite_webhook_postpone(store *s, const char *url, double delay_s);
+store_status sqlite_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s);
+store_status sqlite_upload_get(store *s, const char *id, upload_info *out);
+store_status sqlite_upload_add(store *s, const char *id, int64_t bytes, upload_info *out, bool *known);
+store_status sqlite_upload_forget(store *s, const char *id);
+store_status sqlite_upload_idle(store *s, double before, upload_info *out);
+store_status sqlite_upload_total(store *s, int64_t *bytes);
+store_status sqlite_try_write(store *s);
+int64_t sqlite_free_bytes(store *s);
+store_status sqlite_check(store *s, store_findings *out);
+bool sqlite_check_file(const char *address, store_findings *out, char *message, size_t size);
+bool sqlite_backup_file(const char *address, const char *to, int64_t *bytes, char *message, size_t size);
 
 #endif

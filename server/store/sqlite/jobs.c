@@ -6,40 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const STATUS_NAMES[] = {"accepted", "running", "successful", "failed", "dismissed"};
-#define STATUS_COUNT (sizeof STATUS_NAMES / sizeof STATUS_NAMES[0])
-
-const char *job_status_name(job_status status)
-{
-    return (size_t)status < STATUS_COUNT ? STATUS_NAMES[status] : "unknown";
-}
-
-bool job_status_parse(job_status *out, const char *name)
-{
-    for (size_t i = 0; i < STATUS_COUNT; i++)
-        if (strcmp(name, STATUS_NAMES[i]) == 0) {
-            *out = (job_status)i;
-            return true;
-        }
-    return false;
-}
-
-void job_clear(job *j)
-{
-    if (!j)
-        return;
-    free(j->tags);
-    free(j->summary);
-    free(j->error);
-    memset(j, 0, sizeof *j);
-}
-
 static bool has_ended(job_status status)
 {
     return status == JOB_SUCCESSFUL || status == JOB_FAILED || status == JOB_DISMISSED;
 }
 
-store_status store_why_unchanged(connection *c, const char *id)
+store_status sqlite_why_unchanged(connection *c, const char *id)
 {
     statement st = statement_begin(c, QUERY_JOB);
     bind_text(&st, 1, id);
@@ -53,7 +25,7 @@ static store_status run_update(statement *st, const char *id)
 {
     connection *c = st->c;
     store_status status = statement_run(st);
-    return status == STORE_OK && connection_changes(c) == 0 ? store_why_unchanged(c, id) : status;
+    return status == STORE_OK && connection_changes(c) == 0 ? sqlite_why_unchanged(c, id) : status;
 }
 
 /* ---- submit */
@@ -74,7 +46,7 @@ static store_status find_key(connection *c, submit_args *a)
     bind_integer(&st, 2, (int64_t)a->request->body_len);
     bind_blob(&st, 3, a->request->body, a->request->body_len);
     if (statement_row(&st))
-        status = sqlite3_column_int(st.stmt, 13) ? store_read_job(&st, a->out) : STORE_CONFLICT;
+        status = sqlite3_column_int(st.stmt, 13) ? sqlite_read_job(&st, a->out) : STORE_CONFLICT;
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
 }
@@ -143,31 +115,24 @@ static store_status read_by_id(connection *c, const char *id, job *out)
     statement st = statement_begin(c, QUERY_JOB);
     bind_text(&st, 1, id);
     if (statement_row(&st))
-        status = store_read_job(&st, out);
+        status = sqlite_read_job(&st, out);
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
 }
 
-static store_status check_queue(store *s, connection *c)
+static store_status check_queue(sqlite_store *s, connection *c)
 {
     int64_t waiting = 0;
-    if (s->max_queue <= 0)
+    if (s->base.settings.max_queue <= 0)
         return STORE_OK;
     statement st = statement_begin(c, QUERY_WAITING);
     if (statement_row(&st))
         waiting = sqlite3_column_int64(st.stmt, 0);
     store_status status = statement_end(&st);
-    return status == STORE_OK && waiting >= s->max_queue ? STORE_BUSY : status;
+    return status == STORE_OK && waiting >= s->base.settings.max_queue ? STORE_BUSY : status;
 }
 
-void store_limit_queue(store *s, int64_t jobs)
-{
-    pthread_mutex_lock(&s->writer_lock);
-    s->max_queue = jobs;
-    pthread_mutex_unlock(&s->writer_lock);
-}
-
-static store_status submit(store *s, connection *c, void *args)
+static store_status submit(sqlite_store *s, connection *c, void *args)
 {
     submit_args *a = args;
     char id[33];
@@ -179,12 +144,12 @@ static store_status submit(store *s, connection *c, void *args)
         if (status != STORE_NOT_FOUND)
             return status;
     }
-    store_status status = store_check_place(s, c);
+    store_status status = sqlite_check_place(s, c);
     if (status == STORE_OK)
         status = check_queue(s, c);
     if (status != STORE_OK)
         return status;
-    store_next_id(s, id);
+    store_next_id(&s->last_ms, &s->sequence, id);
     status = insert_job(c, a->request, id);
     if (status == STORE_OK)
         status = use_uploads(c, a->request, id);
@@ -193,35 +158,28 @@ static store_status submit(store *s, connection *c, void *args)
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 
-store_status store_submit(store *s, const store_request *request, job *out, bool *repeated)
+store_status sqlite_submit(store *base, const store_request *request, job *out, bool *repeated)
 {
-    memset(out, 0, sizeof *out);
     submit_args a = {request, out, false};
-    store_status status = store_write(s, submit, &a);
-    if (status != STORE_OK)
-        job_clear(out);
-    *repeated = status == STORE_OK && a.repeated;
+    store_status status = sqlite_write(sqlite_of(base), submit, &a);
+    *repeated = a.repeated;
     if (status == STORE_OK && !a.repeated)
-        store_tell(s, out->id);
+        store_tell(base, out->id);
     return status;
 }
 
-store_status store_find_repeat(store *s, const store_request *request, job *out)
+store_status sqlite_find_repeat(store *base, const store_request *request, job *out)
 {
-    memset(out, 0, sizeof *out);
+    sqlite_store *s = sqlite_of(base);
     submit_args a = {request, out, false};
-    connection *c = store_take_reader(s);
-    store_status status = store_give_reader(s, c, find_key(c, &a));
-    if (status == STORE_OK)
-        status = store_settle(s); /* it may have been committed a moment ago: it is told of once it is on disk */
-    if (status != STORE_OK)
-        job_clear(out);
-    return status;
+    connection *c = sqlite_take_reader(s);
+    store_status status = sqlite_give_reader(s, c, find_key(c, &a));
+    return status == STORE_OK ? sqlite_settle(s) : status; /* it may have been committed a moment ago */
 }
 
 /* ---- the request as submitted */
 
-char *store_copy_blob(statement *st, int at, size_t *len)
+char *sqlite_copy_blob(statement *st, int at, size_t *len)
 {
     size_t size = (size_t)sqlite3_column_bytes(st->stmt, at);
     const void *data = sqlite3_column_blob(st->stmt, at);
@@ -242,7 +200,7 @@ static store_status read_body(connection *c, const char *id, char **body, size_t
     bind_text(&st, 1, id);
     bool found = statement_row(&st), good = found && sqlite3_column_int(st.stmt, 1);
     if (good)
-        *body = store_copy_blob(&st, 0, len);
+        *body = sqlite_copy_blob(&st, 0, len);
     store_status ended = statement_end(&st);
     if (ended != STORE_OK || *body)
         return ended;
@@ -254,12 +212,11 @@ static store_status read_body(connection *c, const char *id, char **body, size_t
     return found ? STORE_ERROR : STORE_NOT_FOUND;
 }
 
-store_status store_get_body(store *s, const char *id, char **body, size_t *len)
+store_status sqlite_get_body(store *base, const char *id, char **body, size_t *len)
 {
-    *body = NULL;
-    *len = 0;
-    connection *c = store_take_reader(s);
-    return store_give_reader(s, c, read_body(c, id, body, len));
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
+    return sqlite_give_reader(s, c, read_body(c, id, body, len));
 }
 
 /* ---- claim */
@@ -272,7 +229,7 @@ typedef struct {
     size_t body_len;
 } claim_args;
 
-static store_status claim(store *s, connection *c, void *args)
+static store_status claim(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     claim_args *a = args;
@@ -285,7 +242,7 @@ static store_status claim(store *s, connection *c, void *args)
     bind_text(&st, 2, a->owner);
     bind_real(&st, 3, a->lease_s);
     if (statement_row(&st))
-        status = store_read_job(&st, a->out);
+        status = sqlite_read_job(&st, a->out);
     store_status ended = statement_end(&st);
     if (ended != STORE_OK)
         status = ended;
@@ -297,21 +254,13 @@ static store_status claim(store *s, connection *c, void *args)
     return status == STORE_NOT_FOUND ? STORE_ERROR : status; /* a job without its request is a damaged file */
 }
 
-store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len)
+store_status sqlite_claim(store *base, const char *owner, double lease_s, job *out, char **body, size_t *body_len)
 {
-    memset(out, 0, sizeof *out);
-    *body = NULL;
-    *body_len = 0;
     claim_args a = {owner, lease_s, out, NULL, 0};
-    store_status status = store_write_as(s, WRITE_LAZY, claim, &a);
-    if (status != STORE_OK) {
-        job_clear(out);
-        free(a.body);
-        return status;
-    }
+    store_status status = sqlite_write_as(sqlite_of(base), WRITE_LAZY, claim, &a);
     *body = a.body;
     *body_len = a.body_len;
-    return STORE_OK;
+    return status;
 }
 
 /* ---- while it runs and when it ends */
@@ -323,7 +272,7 @@ typedef struct {
     const store_outcome *outcome;
 } owner_args;
 
-static store_status renew(store *s, connection *c, void *args)
+static store_status renew(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     const owner_args *a = args;
@@ -331,24 +280,21 @@ static store_status renew(store *s, connection *c, void *args)
     bind_text(&st, 1, a->id);
     bind_text(&st, 2, a->owner);
     bind_real(&st, 3, store_now() + a->lease_s);
-    bind_integer(&st, 4, a->progress < 0 ? 0 : a->progress > 100 ? 100 : a->progress);
+    bind_integer(&st, 4, a->progress);
     return run_update(&st, a->id);
 }
 
-store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress)
+store_status sqlite_renew(store *base, const char *id, const char *owner, double lease_s, int progress)
 {
+    sqlite_store *s = sqlite_of(base);
     owner_args a = {id, owner, lease_s, progress, NULL};
-    return store_write_as(s, WRITE_LAZY, renew, &a);
+    return sqlite_write_as(s, WRITE_LAZY, renew, &a);
 }
 
-static store_status finish(store *s, connection *c, void *args)
+static store_status finish(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     const owner_args *a = args;
-    if (!has_ended(a->outcome->status)) {
-        strcpy(c->message, "a job cannot be finished with a status that is not an end");
-        return STORE_ERROR;
-    }
     statement st = statement_begin(c, QUERY_FINISH);
     bind_text(&st, 1, a->id);
     bind_text(&st, 2, a->owner);
@@ -358,7 +304,7 @@ static store_status finish(store *s, connection *c, void *args)
     bind_text(&st, 6, a->outcome->error);
     store_status status = run_update(&st, a->id);
     if (status == STORE_OK)
-        status = store_insert_results(c, a->id, a->outcome);
+        status = sqlite_insert_results(c, a->id, a->outcome);
     if (status != STORE_OK)
         return status;
     st = statement_begin(c, QUERY_ADD_BYTES);
@@ -366,10 +312,11 @@ static store_status finish(store *s, connection *c, void *args)
     return statement_run(&st);
 }
 
-store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome)
+store_status sqlite_finish(store *base, const char *id, const char *owner, const store_outcome *outcome)
 {
+    sqlite_store *s = sqlite_of(base);
     owner_args a = {id, owner, 0.0, 0, outcome};
-    return store_write_as(s, WRITE_SOON, finish, &a);
+    return sqlite_write_as(s, WRITE_SOON, finish, &a);
 }
 
 /* Of the running jobs those that were told to end, or the one of them with this id and owner: no run comes any more
@@ -384,7 +331,7 @@ static store_status end_dismissed(connection *c, const char *id, const char *own
     return status;
 }
 
-static store_status release(store *s, connection *c, void *args)
+static store_status release(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     const owner_args *a = args;
@@ -398,10 +345,11 @@ static store_status release(store *s, connection *c, void *args)
     return run_update(&st, a->id);
 }
 
-store_status store_release(store *s, const char *id, const char *owner)
+store_status sqlite_release(store *base, const char *id, const char *owner)
 {
+    sqlite_store *s = sqlite_of(base);
     owner_args a = {id, owner, 0.0, 0, NULL};
-    return store_write_as(s, WRITE_SOON, release, &a);
+    return sqlite_write_as(s, WRITE_SOON, release, &a);
 }
 
 /* ---- recover */
@@ -412,7 +360,7 @@ typedef struct {
     int64_t requeued, failed;
 } recover_args;
 
-static store_status recover(store *s, connection *c, void *args)
+static store_status recover(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     recover_args *a = args;
@@ -435,14 +383,12 @@ static store_status recover(store *s, connection *c, void *args)
 }
 
 /* The lock on the file proves that no owner of a running job is alive, whatever its lease says. */
-store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)
+store_status sqlite_recover(store *base, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)
 {
     recover_args a = {max_attempts, error_json, 0, 0};
-    store_status status = store_write(s, recover, &a);
-    if (requeued)
-        *requeued = status == STORE_OK ? a.requeued : 0;
-    if (failed)
-        *failed = status == STORE_OK ? a.failed : 0;
+    store_status status = sqlite_write(sqlite_of(base), recover, &a);
+    *requeued = a.requeued;
+    *failed = a.failed;
     return status;
 }
 
@@ -453,7 +399,7 @@ typedef struct {
     job_status was;
 } dismiss_args;
 
-static store_status dismiss(store *s, connection *c, void *args)
+static store_status dismiss(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     dismiss_args *a = args;
@@ -472,13 +418,14 @@ static store_status dismiss(store *s, connection *c, void *args)
     return statement_run(&st);
 }
 
-store_status store_dismiss(store *s, const char *id, job_status *was)
+store_status sqlite_dismiss(store *base, const char *id, job_status *was)
 {
+    sqlite_store *s = sqlite_of(base);
     dismiss_args a = {id, JOB_ACCEPTED};
-    store_status status = store_write(s, dismiss, &a);
+    store_status status = sqlite_write(s, dismiss, &a);
     *was = a.was;
     if (status == STORE_OK && a.was != JOB_RUNNING)
-        store_tell(s, id);
+        store_tell(base, id);
     return status;
 }
 
@@ -487,22 +434,18 @@ store_status store_dismiss(store *s, const char *id, job_status *was)
 /* What has just ended is told once it is on disk. After this long it is, even if nobody asked for it. */
 static const double UNSETTLED_S = 60.0;
 
-store_status store_settle_jobs(store *s, const job *jobs, size_t count)
+store_status sqlite_settle_jobs(sqlite_store *s, const job *jobs, size_t count)
 {
     bool fresh = false;
     for (size_t i = 0; i < count; i++)
         fresh = fresh || (has_ended(jobs[i].status) && fabs(store_now() - jobs[i].finished) < UNSETTLED_S);
-    return fresh ? store_settle(s) : STORE_OK;
+    return fresh ? sqlite_settle(s) : STORE_OK;
 }
 
-store_status store_get(store *s, const char *id, job *out)
+store_status sqlite_get(store *base, const char *id, job *out)
 {
-    memset(out, 0, sizeof *out);
-    connection *c = store_take_reader(s);
-    store_status status = store_give_reader(s, c, read_by_id(c, id, out));
-    if (status == STORE_OK)
-        status = store_settle_jobs(s, out, 1);
-    if (status != STORE_OK)
-        job_clear(out);
-    return status;
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
+    store_status status = sqlite_give_reader(s, c, read_by_id(c, id, out));
+    return status == STORE_OK ? sqlite_settle_jobs(s, out, 1) : status;
 }

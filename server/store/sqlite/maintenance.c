@@ -1,9 +1,8 @@
-#include "store/maintenance.h"
 #include "store/sqlite/backup_uploads.h"
 #include "store/sqlite/checksum.h"
 #include "store/sqlite/file_format.h"
 #include "store/sqlite/internal.h"
-#include "store/upload_file.h"
+#include "store/blobs.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -29,13 +28,6 @@ static int collect(sqlite3 *db, const char *sql, const char *format, FILE *out)
     }
     sqlite3_finalize(stmt);
     return rc == SQLITE_DONE ? SQLITE_OK : rc;
-}
-
-static double seconds_now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 static int64_t read_integer(sqlite3 *db, const char *sql)
@@ -82,7 +74,7 @@ static void check_upload(sqlite3 *db, const char *folder, const char *id, FILE *
     if ((size_t)snprintf(path, sizeof path, "%s/%s", folder, id) >= sizeof path)
         return;
     int fd = open(path, O_RDONLY | O_CLOEXEC);
-    store_status status = fd >= 0 ? upload_file_check(fd, id) : STORE_ERROR;
+    store_status status = fd >= 0 ? blob_check(fd, id) : STORE_ERROR;
     int cause = errno;
     if (fd >= 0)
         close(fd);
@@ -93,13 +85,15 @@ static void check_upload(sqlite3 *db, const char *folder, const char *id, FILE *
 }
 
 /* Ids first, a page of them at a time: no read transaction stays open while files are read. */
-static int check_uploads(sqlite3 *db, const char *folder, FILE *text)
+static int check_uploads(sqlite3 *db, const char *file, FILE *text)
 {
+    char folder[4096];
     enum { PAGE = 100 };
     char ids[PAGE][UPLOAD_ID_LEN + 1], last[UPLOAD_ID_LEN + 1] = "";
     int rc = SQLITE_OK;
     if (read_integer(db, "PRAGMA user_version") < 3)
         return SQLITE_OK;
+    snprintf(folder, sizeof folder, "%s-uploads", file);
     for (int n = PAGE; n == PAGE && rc == SQLITE_OK;) {
         sqlite3_stmt *stmt = NULL;
         n = 0;
@@ -118,13 +112,13 @@ static int check_uploads(sqlite3 *db, const char *folder, FILE *text)
     return rc;
 }
 
-/* A damaged page may end a check early: that is a finding, not a failure of the check. uploads: the folder of their
- * files. */
-static bool check(sqlite3 *db, const char *uploads, store_findings *out)
+/* A damaged page may end a check early: that is a finding, not a failure of the check. file: the name of the
+ * database. */
+static bool check(sqlite3 *db, const char *file, store_findings *out)
 {
     size_t len = 0;
     *out = (store_findings){0};
-    double begun = seconds_now();
+    double begun = store_clock();
     FILE *text = open_memstream(&out->findings, &len);
     if (!text)
         return false;
@@ -142,11 +136,11 @@ static bool check(sqlite3 *db, const char *uploads, store_findings *out)
     if (rc == SQLITE_OK)
         rc = check_sums(db, text);
     if (rc == SQLITE_OK)
-        rc = check_uploads(db, uploads, text);
+        rc = check_uploads(db, file, text);
     if (rc != SQLITE_OK)
         fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
     out->jobs = read_integer(db, "SELECT count(*) FROM job");
-    out->seconds = seconds_now() - begun;
+    out->seconds = store_clock() - begun;
     if (fclose(text) == 0)
         return true;
     free(out->findings);
@@ -154,13 +148,14 @@ static bool check(sqlite3 *db, const char *uploads, store_findings *out)
     return false;
 }
 
-store_status store_check(store *s, store_findings *out)
+store_status sqlite_check(store *base, store_findings *out)
 {
-    connection *c = store_take_reader(s);
-    bool ok = check(c->db, s->uploads_folder, out);
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
+    bool ok = check(c->db, s->path, out);
     if (!ok)
         snprintf(c->message, sizeof c->message, "no memory for the findings");
-    return store_give_reader(s, c, ok ? STORE_OK : STORE_ERROR);
+    return sqlite_give_reader(s, c, ok ? STORE_OK : STORE_ERROR);
 }
 
 /* A connection that only reads, on a file of ours. NULL with the reason. */
@@ -185,16 +180,15 @@ static sqlite3 *open_file(const char *path, char *message, size_t size)
     return NULL;
 }
 
-bool store_check_file(const char *path, store_findings *out, char *message, size_t size)
+bool sqlite_check_file(const char *path, store_findings *out, char *message, size_t size)
 {
     *out = (store_findings){0};
     sqlite3 *db = open_file(path, message, size);
     if (!db)
         return false;
-    char folder[4096], *absolute = realpath(path, NULL);
-    snprintf(folder, sizeof folder, "%s-uploads", absolute ? absolute : path);
+    char *absolute = realpath(path, NULL);
+    bool ok = check(db, absolute ? absolute : path, out);
     free(absolute);
-    bool ok = check(db, folder, out);
     if (!ok)
         snprintf(message, size, "no memory for the findings");
     sqlite3_close(db);
@@ -269,7 +263,7 @@ static bool is_taken(const char *to)
            lstat(folder, &st) == 0;
 }
 
-bool store_backup_file(const char *path, const char *to, int64_t *bytes, char *message, size_t size)
+bool sqlite_backup_file(const char *path, const char *to, int64_t *bytes, char *message, size_t size)
 {
     char part[4096];
     struct stat st;
@@ -293,7 +287,7 @@ bool store_backup_file(const char *path, const char *to, int64_t *bytes, char *m
         backup_uploads_undo(to);
     }
     sqlite3_close(from);
-    if (ok && bytes)
+    if (ok)
         *bytes = stat(to, &st) == 0 ? (int64_t)st.st_size : 0;
     return ok;
 }

@@ -1,5 +1,8 @@
-#include "store/sqlite/internal.h"
+/* open.c: opening and closing a database, its connections, and the table of the engine. */
+#include "store/blobs.h"
 #include "store/sqlite/file_format.h"
+#include "store/sqlite/internal.h"
+#include "store/sqlite/sqlite.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -7,9 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/random.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 #include <sys/statvfs.h>
 
@@ -51,7 +52,7 @@ static bool set_wal(sqlite3 *db, char *message, size_t size)
     return ok;
 }
 
-static bool open_writer(store *s, const char *path, char *message, size_t size)
+static bool open_writer(sqlite_store *s, const char *path, char *message, size_t size)
 {
     int version;
     return connection_open(&s->writer, path, true, message, size) &&
@@ -59,7 +60,7 @@ static bool open_writer(store *s, const char *path, char *message, size_t size)
            file_format_upgrade(s->writer.db, version, message, size);
 }
 
-static bool open_readers(store *s, const char *path, char *message, size_t size)
+static bool open_readers(sqlite_store *s, const char *path, char *message, size_t size)
 {
     for (int i = 0; i < STORE_READERS; i++) {
         if (!connection_open(&s->readers[i], path, false, message, size))
@@ -70,7 +71,7 @@ static bool open_readers(store *s, const char *path, char *message, size_t size)
 }
 
 /* Continues the ids where the file's newest one stands. */
-static bool read_newest_id(store *s, char *message, size_t size)
+static bool read_newest_id(sqlite_store *s, char *message, size_t size)
 {
     statement st = statement_begin(&s->writer, QUERY_NEWEST_ID);
     unsigned long long ms = 0;
@@ -86,21 +87,18 @@ static bool read_newest_id(store *s, char *message, size_t size)
     return false;
 }
 
-static bool open_uploads(store *s, const char *path, char *message, size_t size)
+static bool open_uploads(sqlite_store *s, const char *path, char *message, size_t size)
 {
-    if (asprintf(&s->uploads_folder, "%s-uploads", path) < 0) {
-        s->uploads_folder = NULL;
-        snprintf(message, size, "no memory");
-        return false;
-    }
-    if (store_open_uploads(s))
-        return true;
-    snprintf(message, size, "cannot read the uploads: %s", s->writer.message);
-    return false;
+    char *folder = NULL;
+    if (asprintf(&folder, "%s-uploads", path) < 0)
+        folder = NULL;
+    bool ok = store_uploads_begin(&s->base, folder ? blobs_in_folder(folder) : NULL, message, size);
+    free(folder);
+    return ok;
 }
 
 /* An absolute path: SQLite would take "file:..." for a URI. */
-static bool open_connections(store *s, const char *path, char *message, size_t size)
+static bool open_connections(sqlite_store *s, const char *path, char *message, size_t size)
 {
     char *absolute = realpath(path, NULL);
     bool ok = absolute && open_writer(s, absolute, message, size) && read_newest_id(s, message, size) &&
@@ -114,7 +112,7 @@ static bool open_connections(store *s, const char *path, char *message, size_t s
     return ok;
 }
 
-store_status store_check_place(const store *s, connection *c)
+store_status sqlite_check_place(const sqlite_store *s, connection *c)
 {
     struct stat ours, there;
     if (fstat(s->file, &ours) == 0 && stat(s->path, &there) == 0 && ours.st_dev == there.st_dev &&
@@ -125,60 +123,40 @@ store_status store_check_place(const store *s, connection *c)
     return STORE_ERROR;
 }
 
-store *store_open(const char *path, char *message, size_t size)
+store *sqlite_open(const char *path, char *message, size_t size)
 {
-    char why[300] = "";
-    store *s = calloc(1, sizeof *s);
+    sqlite_store *s = calloc(1, sizeof *s);
     if (!s) {
-        snprintf(message, size, "%s: no memory", path);
+        snprintf(message, size, "no memory");
         return NULL;
     }
+    s->base.engine = &STORE_SQLITE;
+    pthread_mutex_init(&s->base.message_lock, NULL);
     pthread_mutex_init(&s->writer_lock, NULL);
     pthread_mutex_init(&s->queue_lock, NULL);
     pthread_mutex_init(&s->readers_lock, NULL);
-    pthread_mutex_init(&s->message_lock, NULL);
-    pthread_mutex_init(&s->upload_lock, NULL);
     pthread_cond_init(&s->reader_free, NULL);
     pthread_mutex_init(&s->sync_lock, NULL);
     pthread_cond_init(&s->sync_asked, NULL);
     pthread_cond_init(&s->sync_ended, NULL);
     s->queue_end = &s->queue;
-    s->file = lock_file(path, why, sizeof why);
-    if (s->file < 0 || !open_connections(s, path, why, sizeof why)) {
-        snprintf(message, size, "%s: %s", path, why);
-        store_close(s);
-        return NULL;
+    s->file = lock_file(path, message, size);
+    bool ok = s->file >= 0 && open_connections(s, path, message, size);
+    if (ok && !sqlite_sync_begin(s)) {
+        snprintf(message, size, "cannot start a thread");
+        ok = false;
     }
-    if (!store_sync_begin(s)) {
-        snprintf(message, size, "%s: cannot start a thread", path);
-        store_close(s);
-        return NULL;
-    }
-    return s;
+    if (ok)
+        return &s->base;
+    sqlite_close(&s->base);
+    return NULL;
 }
 
-void store_observe(store *s, metrics *m)
+void sqlite_close(store *base)
 {
-    s->metrics = m;
-}
-
-void store_listen(store *s, void (*changed)(void *ctx, const char *id), void *ctx)
-{
-    s->changed = changed;
-    s->changed_ctx = ctx;
-}
-
-void store_tell(const store *s, const char *id)
-{
-    if (s->changed)
-        s->changed(s->changed_ctx, id);
-}
-
-void store_close(store *s)
-{
-    if (!s)
-        return;
-    store_sync_end(s);
+    sqlite_store *s = sqlite_of(base);
+    sqlite_sync_end(s);
+    store_uploads_end(base);
     for (int i = 0; i < STORE_READERS; i++)
         connection_close(&s->readers[i]);
     connection_close(&s->writer); /* the last one: checkpoints and removes the journal */
@@ -188,33 +166,55 @@ void store_close(store *s)
     pthread_cond_destroy(&s->sync_asked);
     pthread_mutex_destroy(&s->sync_lock);
     pthread_cond_destroy(&s->reader_free);
-    free(s->path);
-    free(s->uploads_folder);
-    pthread_mutex_destroy(&s->upload_lock);
-    pthread_mutex_destroy(&s->message_lock);
     pthread_mutex_destroy(&s->readers_lock);
     pthread_mutex_destroy(&s->queue_lock);
     pthread_mutex_destroy(&s->writer_lock);
+    pthread_mutex_destroy(&s->base.message_lock);
+    free(s->path);
     free(s);
 }
 
-/* ---- the last failure's cause */
+const store_engine STORE_SQLITE = {
+    .scheme = "",
+    .open = sqlite_open,
+    .close = sqlite_close,
+    .submit = sqlite_submit,
+    .find_repeat = sqlite_find_repeat,
+    .claim = sqlite_claim,
+    .renew = sqlite_renew,
+    .finish = sqlite_finish,
+    .release = sqlite_release,
+    .recover = sqlite_recover,
+    .expire = sqlite_expire,
+    .retain = sqlite_retain,
+    .dismiss = sqlite_dismiss,
+    .get = sqlite_get,
+    .list = sqlite_list,
+    .get_body = sqlite_get_body,
+    .get_cases = sqlite_get_cases,
+    .get_vector = sqlite_get_vector,
+    .count_vectors = sqlite_count_vectors,
+    .get_history = sqlite_get_history,
+    .counts = sqlite_counts,
+    .webhook_next = sqlite_webhook_next,
+    .webhooks_open = sqlite_webhooks_open,
+    .webhook_postpone = sqlite_webhook_postpone,
+    .webhook_attempted = sqlite_webhook_attempted,
+    .upload_get = sqlite_upload_get,
+    .upload_add = sqlite_upload_add,
+    .upload_forget = sqlite_upload_forget,
+    .upload_idle = sqlite_upload_idle,
+    .upload_total = sqlite_upload_total,
+    .try_write = sqlite_try_write,
+    .free_bytes = sqlite_free_bytes,
+    .check = sqlite_check,
+    .check_file = sqlite_check_file,
+    .backup_file = sqlite_backup_file,
+};
 
-void store_keep_message(store *s, const connection *c)
-{
-    pthread_mutex_lock(&s->message_lock);
-    snprintf(s->message, sizeof s->message, "%s", c->message);
-    pthread_mutex_unlock(&s->message_lock);
-}
+/* ---- readers */
 
-void store_message(store *s, char *buffer, size_t size)
-{
-    pthread_mutex_lock(&s->message_lock);
-    snprintf(buffer, size, "%s", s->message);
-    pthread_mutex_unlock(&s->message_lock);
-}
-
-connection *store_take_reader(store *s)
+connection *sqlite_take_reader(sqlite_store *s)
 {
     pthread_mutex_lock(&s->readers_lock);
     while (s->n_readers_free == 0)
@@ -224,10 +224,10 @@ connection *store_take_reader(store *s)
     return c;
 }
 
-store_status store_give_reader(store *s, connection *c, store_status status)
+store_status sqlite_give_reader(sqlite_store *s, connection *c, store_status status)
 {
     if (status == STORE_ERROR || status == STORE_DAMAGED)
-        store_keep_message(s, c);
+        store_set_message(&s->base, c->message);
     pthread_mutex_lock(&s->readers_lock);
     s->readers_free[s->n_readers_free++] = c;
     pthread_cond_signal(&s->reader_free);
@@ -235,8 +235,9 @@ store_status store_give_reader(store *s, connection *c, store_status status)
     return status;
 }
 
-store_status store_limit_bytes(store *s, int64_t bytes)
+store_status sqlite_limit_bytes(store *base, int64_t bytes)
 {
+    sqlite_store *s = sqlite_of(base);
     char sql[96];
     sqlite3_stmt *stmt = NULL;
     pthread_mutex_lock(&s->writer_lock);
@@ -251,49 +252,18 @@ store_status store_limit_bytes(store *s, int64_t bytes)
     int rc = sqlite3_exec(c->db, sql, NULL, NULL, NULL);
     snprintf(c->message, sizeof c->message, "%s", sqlite3_errmsg(c->db));
     if (rc != SQLITE_OK)
-        store_keep_message(s, c);
+        store_set_message(&s->base, c->message);
     pthread_mutex_unlock(&s->writer_lock);
     return rc == SQLITE_OK ? STORE_OK : STORE_ERROR;
 }
 
-int64_t store_free_bytes(store *s)
+int64_t sqlite_free_bytes(store *base)
 {
+    sqlite_store *s = sqlite_of(base);
     struct statvfs disk;
     /* The name is the connection's for as long as it lives: no lock. */
     const char *path = sqlite3_db_filename(s->writer.db, "main");
     if (!path || !*path || statvfs(path, &disk) != 0)
         return -1;
     return (int64_t)disk.f_bavail * (int64_t)disk.f_frsize;
-}
-
-/* ---- ids and time */
-
-double store_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-double store_now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_REALTIME, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-void store_next_id(store *s, char id[33])
-{
-    uint64_t random = 0, ms = (uint64_t)(store_now() * 1e3) & 0xffffffffffffu;
-    if (ms > s->last_ms) {
-        s->last_ms = ms;
-        s->sequence = 0;
-    } else if (++s->sequence > 0xffff) {
-        s->last_ms++;
-        s->sequence = 0;
-    }
-    /* Time and counter alone make the id unique in this file; the random part keeps ids from being guessed. */
-    if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
-        random = ms * 0x9e3779b97f4a7c15u;
-    snprintf(id, 33, "%012llx%04x%016llx", (unsigned long long)s->last_ms, s->sequence, (unsigned long long)random);
 }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-char *store_copy_text(statement *st, int at, bool *ok)
+char *sqlite_copy_text(statement *st, int at, bool *ok)
 {
     if (sqlite3_column_type(st->stmt, at) == SQLITE_NULL)
         return NULL;
@@ -16,7 +16,7 @@ char *store_copy_text(statement *st, int at, bool *ok)
     return copy;
 }
 
-store_status store_read_job(statement *st, job *out)
+store_status sqlite_read_job(statement *st, job *out)
 {
     sqlite3_stmt *row = st->stmt;
     job_clear(out);
@@ -30,9 +30,9 @@ store_status store_read_job(statement *st, job *out)
     out->created = sqlite3_column_double(row, 4);
     out->started = sqlite3_column_double(row, 5);
     out->finished = out->status == JOB_RUNNING ? 0.0 : sqlite3_column_double(row, 6);
-    out->tags = store_copy_text(st, 7, &ok);
-    out->summary = store_copy_text(st, 8, &ok);
-    out->error = store_copy_text(st, 9, &ok);
+    out->tags = sqlite_copy_text(st, 7, &ok);
+    out->summary = sqlite_copy_text(st, 8, &ok);
+    out->error = sqlite_copy_text(st, 9, &ok);
     out->priority = sqlite3_column_int(row, 11);
     const char *refines = (const char *)sqlite3_column_text(row, 10);
     if (refines && strlen(refines) < sizeof out->refines)
@@ -92,54 +92,22 @@ static store_status read_list(connection *c, const store_query *q, int limit, jo
     if (q->tag)
         bind_text(&st, 4, q->tag);
     while (status == STORE_OK && *count <= (size_t)limit && statement_row(&st)) {
-        status = store_read_job(&st, &jobs[*count]);
+        status = sqlite_read_job(&st, &jobs[*count]);
         *count += status == STORE_OK;
     }
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
 }
 
-store_status store_list(store *s, const store_query *query, job **jobs, size_t *count, bool *more)
+store_status sqlite_list(store *base, const store_query *query, job *jobs, size_t *count)
 {
-    int limit = query->limit < 1 ? 1 : query->limit > 1000 ? 1000 : query->limit;
-    *jobs = NULL;
-    *count = 0;
-    *more = false;
-    job *found = calloc((size_t)limit + 1, sizeof *found);
-    size_t n = 0;
-    connection *c = store_take_reader(s);
-    store_status status = STORE_ERROR;
-    if (found)
-        status = read_list(c, query, limit, found, &n);
-    else
-        strcpy(c->message, "no memory for a list of jobs");
-    store_give_reader(s, c, status);
-    if (status == STORE_OK)
-        status = store_settle_jobs(s, found, n);
-    if (status != STORE_OK) {
-        while (n > 0)
-            job_clear(&found[--n]);
-        free(found);
-        return status;
-    }
-    *more = n > (size_t)limit;
-    if (*more)
-        job_clear(&found[--n]);
-    *jobs = found;
-    *count = n;
-    return STORE_OK;
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
+    store_status status = sqlite_give_reader(s, c, read_list(c, query, query->limit, jobs, count));
+    return status == STORE_OK ? sqlite_settle_jobs(s, jobs, *count) : status;
 }
 
 /* ---- the cases of a job */
-
-void store_cases_free(store_case *cases, size_t count)
-{
-    for (size_t i = 0; i < count; i++) {
-        free(cases[i].name);
-        free(cases[i].summary);
-    }
-    free(cases);
-}
 
 static store_status read_case(statement *st, store_case *out)
 {
@@ -149,8 +117,8 @@ static store_status read_case(statement *st, store_case *out)
         return STORE_DAMAGED;
     }
     *out = (store_case){.number = sqlite3_column_int64(st->stmt, 0)};
-    out->name = store_copy_text(st, 1, &ok);
-    out->summary = store_copy_text(st, 2, &ok);
+    out->name = sqlite_copy_text(st, 1, &ok);
+    out->summary = sqlite_copy_text(st, 2, &ok);
     if (ok)
         return STORE_OK;
     strcpy(st->c->message, "no memory for the cases of a job");
@@ -176,11 +144,10 @@ static store_status read_cases(statement *st, store_case **cases, size_t *count)
     return status;
 }
 
-store_status store_get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count)
+store_status sqlite_get_cases(store *base, const char *id, const char *name, store_case **cases, size_t *count)
 {
-    *cases = NULL;
-    *count = 0;
-    connection *c = store_take_reader(s);
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_ANSWERS);
     bind_text(&st, 1, id);
     bind_text(&st, 2, name);
@@ -190,23 +157,18 @@ store_status store_get_cases(store *s, const char *id, const char *name, store_c
         status = ended;
     if (status == STORE_DAMAGED)
         snprintf(c->message, sizeof c->message, "a summary of job %.32s is not what was written", id);
-    if (status != STORE_OK) {
-        store_cases_free(*cases, *count);
-        *cases = NULL;
-        *count = 0;
-    }
-    return store_give_reader(s, c, status);
+    return sqlite_give_reader(s, c, status);
 }
 
-store_status store_counts(store *s, int64_t counts[5])
+store_status sqlite_counts(store *base, int64_t counts[5])
 {
-    memset(counts, 0, 5 * sizeof counts[0]);
-    connection *c = store_take_reader(s);
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_COUNTS);
     while (statement_row(&st)) {
         int status = sqlite3_column_int(st.stmt, 0);
         if (status >= 0 && status < 5)
             counts[status] = sqlite3_column_int64(st.stmt, 1);
     }
-    return store_give_reader(s, c, statement_end(&st));
+    return sqlite_give_reader(s, c, statement_end(&st));
 }

@@ -128,7 +128,7 @@ static store_status insert_case(connection *c, const char *id, int64_t number, c
     return status == STORE_OK ? insert_answer(c, id, number, answer, part) : status;
 }
 
-store_status store_insert_results(connection *c, const char *id, const store_outcome *outcome)
+store_status sqlite_insert_results(connection *c, const char *id, const store_outcome *outcome)
 {
     unsigned char *part = malloc(PART_DOUBLES * 8);
     if (!part)
@@ -173,40 +173,30 @@ static store_status read_vector(statement *st, const char *id, double **out, int
     return have == *total ? STORE_OK : damaged(st->c, id);
 }
 
-store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data, int64_t *count)
+store_status sqlite_get_vector(store *base, const char *id, int64_t number, const char *name, double **x,
+                               int64_t *count)
 {
-    double *x = NULL;
-    int64_t total = 0;
-    *data = NULL;
-    *count = 0;
-    connection *c = store_take_reader(s);
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_VECTOR);
     bind_text(&st, 1, id);
     bind_text(&st, 2, name);
     bind_integer(&st, 3, number);
-    store_status status = read_vector(&st, id, &x, &total);
+    store_status status = read_vector(&st, id, x, count);
     store_status ended = statement_end(&st);
-    if (ended != STORE_OK)
-        status = ended;
-    if (status == STORE_OK) {
-        *data = x;
-        *count = total;
-        x = NULL;
-    }
-    free(x);
-    return store_give_reader(s, c, status);
+    return sqlite_give_reader(s, c, ended == STORE_OK ? status : ended);
 }
 
-store_status store_count_vectors(store *s, const char *id, const char *name, int64_t *total)
+store_status sqlite_count_vectors(store *base, const char *id, const char *name, int64_t *total)
 {
-    *total = 0;
-    connection *c = store_take_reader(s);
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_COUNT_VECTORS);
     bind_text(&st, 1, id);
     bind_text(&st, 2, name);
     if (statement_row(&st))
         *total = sqlite3_column_int64(st.stmt, 0);
-    return store_give_reader(s, c, statement_end(&st));
+    return sqlite_give_reader(s, c, statement_end(&st));
 }
 
 typedef struct {
@@ -248,13 +238,12 @@ static void drop_seen(rows_buffer *rows, int64_t after)
     memmove(rows->x, rows->x + skip, (size_t)rows->count * 8);
 }
 
-store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
-                               int64_t *columns)
+store_status sqlite_get_history(store *base, const char *id, int64_t number, int64_t after, double **rows,
+                                int64_t *count, int64_t *columns)
 {
+    sqlite_store *s = sqlite_of(base);
     rows_buffer found = {NULL, 0, 0};
-    *rows = NULL;
-    *count = *columns = 0;
-    connection *c = store_take_reader(s);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_HISTORY);
     bind_text(&st, 1, id);
     bind_real(&st, 2, (double)after);
@@ -265,11 +254,9 @@ store_status store_get_history(store *s, const char *id, int64_t number, int64_t
         status = ended;
     if (status == STORE_OK) {
         drop_seen(&found, after);
-        *rows = found.x;
         *count = found.count / found.columns;
         *columns = found.columns;
-        found.x = NULL;
     }
-    free(found.x);
-    return store_give_reader(s, c, status);
+    *rows = found.x;
+    return sqlite_give_reader(s, c, status);
 }

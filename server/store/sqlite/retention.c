@@ -30,7 +30,7 @@ static void keep_id(expire_args *a, const char *id)
     snprintf(a->ids[a->n_ids++], sizeof *a->ids, "%s", id);
 }
 
-static store_status expire(store *s, connection *c, void *args)
+static store_status expire(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     expire_args *a = args;
@@ -47,23 +47,24 @@ static store_status expire(store *s, connection *c, void *args)
 }
 
 /* Looks before it writes: most of the time there is nothing. */
-static bool any_expired(store *s)
+static bool any_expired(sqlite_store *s)
 {
-    connection *c = store_take_reader(s);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_ANY_EXPIRED);
     bind_real(&st, 1, store_now());
     bool any = statement_row(&st);
-    store_give_reader(s, c, statement_end(&st));
+    sqlite_give_reader(s, c, statement_end(&st));
     return any;
 }
 
-store_status store_expire(store *s, const char *error_json, int64_t *count)
+store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
 {
+    sqlite_store *s = sqlite_of(base);
     expire_args a = {.error_json = error_json};
-    store_status status = any_expired(s) ? store_write(s, expire, &a) : STORE_OK;
+    store_status status = any_expired(s) ? sqlite_write(s, expire, &a) : STORE_OK;
     *count = status == STORE_OK ? a.count : 0;
     for (size_t i = 0; status == STORE_OK && i < a.n_ids; i++)
-        store_tell(s, a.ids[i]);
+        store_tell(base, a.ids[i]);
     free(a.ids);
     return status;
 }
@@ -113,7 +114,7 @@ static store_status choose(connection *c, retain_args *a)
     return statement_end(&st);
 }
 
-static store_status delete_chosen(store *s, connection *c, void *args)
+static store_status delete_chosen(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     retain_args *a = args;
@@ -128,21 +129,19 @@ static store_status delete_chosen(store *s, connection *c, void *args)
     return status;
 }
 
-store_status store_retain(store *s, const store_retention *limits, int64_t *count)
+store_status sqlite_retain(store *base, const store_retention *limits, int64_t *count)
 {
+    sqlite_store *s = sqlite_of(base);
     retain_args a = {.limits = limits};
-    *count = 0;
-    if (limits->keep_s <= 0 && limits->keep_jobs <= 0 && limits->keep_bytes <= 0)
-        return STORE_OK;
-    connection *c = store_take_reader(s);
+    connection *c = sqlite_take_reader(s);
     store_status status = count_ended(c, &a);
     if (status == STORE_OK)
         status = choose(c, &a);
-    store_give_reader(s, c, status);
+    sqlite_give_reader(s, c, status);
     if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */
-        status = store_write(s, delete_chosen, &a);
+        status = sqlite_write(s, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;
     for (int i = 0; status == STORE_OK && i < a.n_ids; i++)
-        store_tell(s, a.ids[i]);
+        store_tell(base, a.ids[i]);
     return status;
 }

@@ -12,12 +12,12 @@
 #include <string.h>
 
 /* The writer's log. It is open as long as the writer; xSync touches nothing of it but its descriptor. */
-static int sync_log(const store *s)
+static int sync_log(const sqlite_store *s)
 {
     return s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY);
 }
 
-static bool find_log(store *s)
+static bool find_log(sqlite_store *s)
 {
     return sqlite3_file_control(s->writer.db, "main", SQLITE_FCNTL_JOURNAL_POINTER, &s->log) == SQLITE_OK && s->log &&
            s->log->pMethods;
@@ -25,7 +25,7 @@ static bool find_log(store *s)
 
 /* After a failed sync the kernel may take the log's pages for clean, and a second sync would succeed without them. A
  * checkpoint writes them once more, elsewhere, and syncs that. */
-static bool save_by_checkpoint(store *s)
+static bool save_by_checkpoint(sqlite_store *s)
 {
     pthread_mutex_lock(&s->writer_lock);
     int rc = sqlite3_wal_checkpoint_v2(s->writer.db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
@@ -33,14 +33,14 @@ static bool save_by_checkpoint(store *s)
         snprintf(s->writer.message, sizeof s->writer.message, "the log could not be synced, nor moved: %s",
                  sqlite3_errmsg(s->writer.db));
     if (rc != SQLITE_OK)
-        store_keep_message(s, &s->writer);
+        store_set_message(&s->base, s->writer.message);
     pthread_mutex_unlock(&s->writer_lock);
     return rc == SQLITE_OK;
 }
 
 static void *sync_loop(void *argument)
 {
-    store *s = argument;
+    sqlite_store *s = argument;
     bool suspect = false;
     pthread_mutex_lock(&s->sync_lock);
     while (!s->sync_stop) {
@@ -54,7 +54,7 @@ static void *sync_loop(void *argument)
         suspect = suspect || sync_log(s) != SQLITE_OK;
         bool ok = !suspect || save_by_checkpoint(s);
         suspect = !ok; /* until a checkpoint succeeds a sync's word counts for nothing */
-        metrics_seconds(s->metrics, METRIC_COMMIT, store_clock() - begun);
+        metrics_seconds(s->base.settings.metrics, METRIC_COMMIT, store_clock() - begun);
         pthread_mutex_lock(&s->sync_lock);
         if (ok) {
             s->synced = upto;
@@ -69,13 +69,13 @@ static void *sync_loop(void *argument)
     return NULL;
 }
 
-bool store_sync_begin(store *s)
+bool sqlite_sync_begin(sqlite_store *s)
 {
     s->sync_started = find_log(s) && pthread_create(&s->syncer, NULL, sync_loop, s) == 0;
     return s->sync_started;
 }
 
-void store_sync_end(store *s)
+void sqlite_sync_end(sqlite_store *s)
 {
     if (!s->sync_started)
         return;
@@ -86,14 +86,14 @@ void store_sync_end(store *s)
     pthread_join(s->syncer, NULL);
 }
 
-void store_begin_commit(store *s)
+void sqlite_begin_commit(sqlite_store *s)
 {
     pthread_mutex_lock(&s->sync_lock);
     s->begun++;
     pthread_mutex_unlock(&s->sync_lock);
 }
 
-uint64_t store_note_commit(store *s)
+uint64_t sqlite_note_commit(sqlite_store *s)
 {
     pthread_mutex_lock(&s->sync_lock);
     uint64_t number = s->committed = s->begun;
@@ -104,7 +104,7 @@ uint64_t store_note_commit(store *s)
 }
 
 /* Under sync_lock. */
-static void want(store *s, uint64_t number)
+static void want(sqlite_store *s, uint64_t number)
 {
     if (number <= s->wanted)
         return;
@@ -112,14 +112,14 @@ static void want(store *s, uint64_t number)
     pthread_cond_signal(&s->sync_asked);
 }
 
-void store_want_sync(store *s, uint64_t number)
+void sqlite_want_sync(sqlite_store *s, uint64_t number)
 {
     pthread_mutex_lock(&s->sync_lock);
     want(s, number);
     pthread_mutex_unlock(&s->sync_lock);
 }
 
-store_status store_await_sync(store *s, uint64_t number)
+store_status sqlite_await_sync(sqlite_store *s, uint64_t number)
 {
     pthread_mutex_lock(&s->sync_lock);
     uint64_t failures = s->failures;
@@ -132,11 +132,11 @@ store_status store_await_sync(store *s, uint64_t number)
     return ok ? STORE_OK : STORE_ERROR;
 }
 
-store_status store_settle(store *s)
+store_status sqlite_settle(sqlite_store *s)
 {
     pthread_mutex_lock(&s->sync_lock);
     uint64_t number = s->begun; /* readers see a commit a moment before its COMMIT returns */
     bool settled = s->synced >= number;
     pthread_mutex_unlock(&s->sync_lock);
-    return settled ? STORE_OK : store_await_sync(s, number);
+    return settled ? STORE_OK : sqlite_await_sync(s, number);
 }

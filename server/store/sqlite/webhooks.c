@@ -1,32 +1,32 @@
-#include "store/webhooks.h"
 #include "store/sqlite/internal.h"
 
 #include <stdio.h>
 
-store_status store_webhook_next(store *s, webhook_due *out)
+store_status sqlite_webhook_next(store *base, webhook_due *out)
 {
+    sqlite_store *s = sqlite_of(base);
     bool ok = true;
     store_status status = STORE_NOT_FOUND;
-    *out = (webhook_due){.url = NULL};
-    connection *c = store_take_reader(s);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_WEBHOOK_NEXT);
     bind_real(&st, 1, store_now());
     if (statement_row(&st)) {
         snprintf(out->job, sizeof out->job, "%s", (const char *)sqlite3_column_text(st.stmt, 0));
-        out->url = store_copy_text(&st, 1, &ok);
+        out->url = sqlite_copy_text(&st, 1, &ok);
         out->attempts = sqlite3_column_int(st.stmt, 2);
         status = ok ? STORE_OK : STORE_ERROR;
     }
     store_status ended = statement_end(&st);
-    return store_give_reader(s, c, ended == STORE_OK ? status : ended);
+    return sqlite_give_reader(s, c, ended == STORE_OK ? status : ended);
 }
 
-store_status store_webhooks_open(store *s, bool *any)
+store_status sqlite_webhooks_open(store *base, bool *any)
 {
-    connection *c = store_take_reader(s);
+    sqlite_store *s = sqlite_of(base);
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_WEBHOOKS_OPEN);
     *any = statement_row(&st);
-    return store_give_reader(s, c, statement_end(&st));
+    return sqlite_give_reader(s, c, statement_end(&st));
 }
 
 typedef struct {
@@ -35,7 +35,7 @@ typedef struct {
     double next;
 } attempted_args;
 
-static store_status attempted(store *s, connection *c, void *args)
+static store_status attempted(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     const attempted_args *a = args;
@@ -46,7 +46,7 @@ static store_status attempted(store *s, connection *c, void *args)
     return statement_run(&st);
 }
 
-static store_status postpone(store *s, connection *c, void *args)
+static store_status postpone(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     const attempted_args *a = args;
@@ -56,14 +56,16 @@ static store_status postpone(store *s, connection *c, void *args)
     return statement_run(&st);
 }
 
-store_status store_webhook_postpone(store *s, const char *url, double delay_s)
+store_status sqlite_webhook_postpone(store *base, const char *url, double delay_s)
 {
+    sqlite_store *s = sqlite_of(base);
     attempted_args a = {.job = url, .next = store_now() + delay_s};
-    return store_write(s, postpone, &a);
+    return sqlite_write(s, postpone, &a);
 }
 
-store_status store_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s)
+store_status sqlite_webhook_attempted(store *base, const char *id, webhook_end end, double delay_s)
 {
+    sqlite_store *s = sqlite_of(base);
     attempted_args a = {id, end, store_now() + delay_s};
-    return store_write(s, attempted, &a);
+    return sqlite_write(s, attempted, &a);
 }

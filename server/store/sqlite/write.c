@@ -37,15 +37,15 @@ static void roll_back(connection *c)
     memcpy(c->message, cause, sizeof cause);
 }
 
-static store_status commit(store *s, uint64_t *number)
+static store_status commit(sqlite_store *s, uint64_t *number)
 {
-    store_begin_commit(s);
+    sqlite_begin_commit(s);
     store_status status = run_query(&s->writer, QUERY_COMMIT);
-    *number = store_note_commit(s);
+    *number = sqlite_note_commit(s);
     return status;
 }
 
-static store_status attempt(store *s, store_change change, void *args, uint64_t *number)
+static store_status attempt(sqlite_store *s, store_change change, void *args, uint64_t *number)
 {
     connection *c = &s->writer;
     store_status status = run_query(c, QUERY_BEGIN);
@@ -64,7 +64,7 @@ static bool is_failure(store_status status)
     return status == STORE_ERROR || status == STORE_FULL || status == STORE_LOCKED;
 }
 
-static void run_alone(store *s, pending *p)
+static void run_alone(sqlite_store *s, pending *p)
 {
     p->status = attempt(s, p->change, p->args, &p->number);
     if (p->status == STORE_FULL) {
@@ -72,11 +72,11 @@ static void run_alone(store *s, pending *p)
         p->status = attempt(s, p->change, p->args, &p->number);
     }
     if (is_failure(p->status))
-        store_keep_message(s, &s->writer);
+        store_set_message(&s->base, s->writer.message);
 }
 
 /* One of several; false where the whole transaction can't go on. */
-static bool run_in_savepoint(store *s, pending *p)
+static bool run_in_savepoint(sqlite_store *s, pending *p)
 {
     connection *c = &s->writer;
     if (run_query(c, QUERY_SAVEPOINT) != STORE_OK)
@@ -90,7 +90,7 @@ static bool run_in_savepoint(store *s, pending *p)
 }
 
 /* False with nothing changed: each must then be tried alone, so that the failure is told to whom it belongs. */
-static bool run_together(store *s, pending *list)
+static bool run_together(sqlite_store *s, pending *list)
 {
     connection *c = &s->writer;
     bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
@@ -104,7 +104,7 @@ static bool run_together(store *s, pending *list)
     return good;
 }
 
-static void run_batch(store *s, pending *list)
+static void run_batch(sqlite_store *s, pending *list)
 {
     int count = 0;
     bool locked = false; /* that was waited for once (busy_timeout): not again for each */
@@ -120,13 +120,13 @@ static void run_batch(store *s, pending *list)
     pthread_mutex_unlock(&s->writer_lock);
     for (pending *p = list; p; p = p->next)
         count += p->status == STORE_OK;
-    metrics_add(s->metrics, METRIC_CHANGES, count);
+    metrics_add(s->base.settings.metrics, METRIC_CHANGES, count);
 }
 
 /* ------------------------------------------------------------------- queue */
 
 /* The first ones of the queue, which begins with the caller's own. Under queue_lock. */
-static pending *take_batch(store *s)
+static pending *take_batch(sqlite_store *s)
 {
     pending *first = s->queue, *last = first;
     for (int n = 1; n < BATCH_MOST && last->next; n++)
@@ -139,7 +139,7 @@ static pending *take_batch(store *s)
 }
 
 /* Under queue_lock, which it gives up meanwhile. */
-static void lead(store *s)
+static void lead(sqlite_store *s)
 {
     pending *list = take_batch(s), *next;
     s->leading = true;
@@ -156,7 +156,7 @@ static void lead(store *s)
         pthread_cond_signal(&s->queue->turn);
 }
 
-static void wait_turn(store *s, pending *me)
+static void wait_turn(sqlite_store *s, pending *me)
 {
     pthread_mutex_lock(&s->queue_lock);
     *s->queue_end = me;
@@ -170,7 +170,7 @@ static void wait_turn(store *s, pending *me)
     pthread_mutex_unlock(&s->queue_lock);
 }
 
-store_status store_write_as(store *s, write_durability durability, store_change change, void *args)
+store_status sqlite_write_as(sqlite_store *s, write_durability durability, store_change change, void *args)
 {
     pending me = {.change = change, .args = args};
     pthread_cond_init(&me.turn, NULL);
@@ -179,27 +179,28 @@ store_status store_write_as(store *s, write_durability durability, store_change 
     if (me.status != STORE_OK || durability == WRITE_LAZY)
         return me.status;
     if (durability == WRITE_DURABLE)
-        return store_await_sync(s, me.number);
-    store_want_sync(s, me.number);
+        return sqlite_await_sync(s, me.number);
+    sqlite_want_sync(s, me.number);
     return STORE_OK;
 }
 
-store_status store_write(store *s, store_change change, void *args)
+store_status sqlite_write(sqlite_store *s, store_change change, void *args)
 {
-    return store_write_as(s, WRITE_DURABLE, change, args);
+    return sqlite_write_as(s, WRITE_DURABLE, change, args);
 }
 
 /* There and back: a row that is given the value that it has is not written (SQLite, btreeOverwriteContent). */
-static store_status write_nothing(store *s, connection *c, void *args)
+static store_status write_nothing(sqlite_store *s, connection *c, void *args)
 {
     (void)args;
-    store_status status = store_check_place(s, c);
+    store_status status = sqlite_check_place(s, c);
     if (status == STORE_OK)
         status = run_query(c, QUERY_COUNT_ONE_MORE);
     return status == STORE_OK ? run_query(c, QUERY_COUNT_ONE_LESS) : status;
 }
 
-store_status store_try_write(store *s)
+store_status sqlite_try_write(store *base)
 {
-    return store_write(s, write_nothing, NULL);
+    sqlite_store *s = sqlite_of(base);
+    return sqlite_write(s, write_nothing, NULL);
 }

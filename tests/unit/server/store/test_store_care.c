@@ -1,5 +1,4 @@
 /* Looking after a database: counts, checks, backups, and a file of format 2. */
-#include "store/maintenance.h"
 #include "store_place.h"
 
 #include <sys/stat.h>

@@ -1,7 +1,6 @@
 /* The store on a disk that fails: power loss, full disk and errors at every write, damaged files. SOAK=N in the
  * environment runs N times as many. */
 #include "faulty_vfs.h"
-#include "store/maintenance.h"
 #include "store_place.h"
 
 #include <stdatomic.h>

@@ -1,9 +1,7 @@
 /* Uploads, expiry, retention and webhooks in the store: what the API tests can't reach or would wait for. */
 #include "store/sqlite/backup_uploads.h"
-#include "store/maintenance.h"
 #include "store_place.h"
 #include "store/uploads.h"
-#include "store/webhooks.h"
 
 #include <dirent.h>
 #include <sys/stat.h>
@@ -222,7 +220,7 @@ TEST(limits_of_one_and_of_all)
     char data[100] = {0};
     if (!place_begin(&p))
         return;
-    store_limit_uploads(p.s, &(upload_limits){.one = 50, .all = 100, .keep_s = 0});
+    store_configure(p.s, &(store_settings){.uploads = {.one = 50, .all = 100, .keep_s = 0}});
     CHECK_INT(send(p.s, data, 51, 7, false, &info, &known), UPLOAD_TOO_LARGE);
     CHECK_INT(send(p.s, data, 50, 7, false, &info, &known), UPLOAD_OK);
     CHECK_INT(send(p.s, data, 40, 7, false, &info, &known), UPLOAD_OK);
@@ -230,7 +228,7 @@ TEST(limits_of_one_and_of_all)
     CHECK_INT(send(p.s, data, 10, 7, false, &info, &known), UPLOAD_OK);
     CHECK_INT(files_in(&p), 3);
     place_reopen(&p); /* counts what is there; limits are not kept */
-    store_limit_uploads(p.s, &(upload_limits){.one = 50, .all = 100});
+    store_configure(p.s, &(store_settings){.uploads = {.one = 50, .all = 100}});
     CHECK_INT(send(p.s, data, 1, 7, false, &info, &known), UPLOAD_NO_ROOM);
     end_place(&p);
 }
@@ -257,7 +255,7 @@ TEST(an_upload_in_use_stays)
     request.n_uploads = 1;
     CHECK_INT(store_submit(p.s, &request, &j, &repeated), STORE_OK);
     CHECK_INT(store_upload_delete(p.s, ABC), STORE_CONFLICT);
-    store_limit_uploads(p.s, &(upload_limits){.keep_s = 1e-6});
+    store_configure(p.s, &(store_settings){.uploads = {.keep_s = 1e-6}});
     CHECK_INT(store_collect_uploads(p.s, &count), STORE_OK);
     CHECK(count == 0 && files_in(&p) == 1);
     CHECK_INT(store_dismiss(p.s, j.id, &was), STORE_OK);
@@ -453,7 +451,7 @@ TEST(a_full_queue)
     bool repeated;
     if (!place_begin(&p))
         return;
-    store_limit_queue(p.s, 2);
+    store_configure(p.s, &(store_settings){.max_queue = 2});
     submit_with(p.s, (store_request){.priority = 0}, id);
     submit_with(p.s, (store_request){.idempotency_key = "k"}, id);
     store_request request = {.body = "{}", .body_len = 2};

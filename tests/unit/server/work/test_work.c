@@ -1,5 +1,6 @@
 /* Workers with real problems: how a job ends, cancelling, stopping, taking up what was left. */
 #include "codec/codec.h"
+#include "store/sqlite/sqlite.h"
 #include "store_place.h"
 #include "work/work.h"
 
@@ -407,7 +408,7 @@ TEST(a_result_that_cannot_be_stored_is_reported_and_run_again)
     if (!service_begin(&v))
         return;
     submit(&v, SCENE, id);
-    CHECK_INT(store_limit_bytes(v.place.s, 1), STORE_OK); /* the file may not grow: the result has no room */
+    CHECK_INT(sqlite_limit_bytes(v.place.s, 1), STORE_OK); /* the file may not grow: the result has no room */
     if (!service_start(&v, &TWO_WORKERS))
         return;
     for (int i = 0; i < 1000 && count_in_log(&v, "store_failed") == 0; i++)
@@ -416,7 +417,7 @@ TEST(a_result_that_cannot_be_stored_is_reported_and_run_again)
     CHECK_INT(count_in_log(&v, "result_lost"), 1);
     CHECK_INT(status_of(v.place.s, id), JOB_RUNNING);
     work_free(v.w);
-    CHECK_INT(store_limit_bytes(v.place.s, 0), STORE_OK);
+    CHECK_INT(sqlite_limit_bytes(v.place.s, 0), STORE_OK);
     if (!service_start(&v, &TWO_WORKERS))
         return;
     CHECK(work_wait(v.w, id, 20.0));
@@ -442,7 +443,7 @@ TEST(a_result_without_room_is_given_up)
     submit(&v, body, padding); /* leaves pages that are free, for what is small */
     CHECK(store_dismiss(v.place.s, padding, &was) == STORE_OK && store_dismiss(v.place.s, padding, &was) == STORE_OK);
     submit(&v, LARGE, id);
-    CHECK_INT(store_limit_bytes(v.place.s, 1), STORE_OK);
+    CHECK_INT(sqlite_limit_bytes(v.place.s, 1), STORE_OK);
     options.room_wait_s = 0.1;
     if (!service_start(&v, &options))
         return;
@@ -453,7 +454,7 @@ TEST(a_result_without_room_is_given_up)
     CHECK(!j.summary);
     job_clear(&j);
     CHECK_INT(count_in_log(&v, "result_given_up"), 1);
-    CHECK_INT(store_limit_bytes(v.place.s, 0), STORE_OK);
+    CHECK_INT(sqlite_limit_bytes(v.place.s, 0), STORE_OK);
     submit(&v, SMALL, id);
     work_wake(v.w);
     CHECK(work_wait(v.w, id, 20.0));

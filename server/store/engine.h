@@ -1,0 +1,80 @@
+/* engine.h: an engine of the store, for who writes one. store.h and uploads.h have the contract of each operation;
+ * docs/architecture/store.md says what holds for all of them and shows how to add one.
+ *
+ *   - Each operation is one transaction, all of it or nothing, and may be called from any thread.
+ *   - STORE_OK means: durable, but for claim and renew, which recover makes good for. What may still be lost is not
+ *     read either: get, list and find_repeat return an end or a job only once it is durable.
+ *   - Pointers to outputs are never NULL; they are zeroed before the call, and freed after it where it failed.
+ *   - Before STORE_FULL, STORE_LOCKED, STORE_DAMAGED and STORE_ERROR: store_set_message with the cause.
+ *   - Who changed a job without owning it is told by store_tell after the commit, without a lock held. */
+#ifndef SERVER_STORE_ENGINE_H
+#define SERVER_STORE_ENGINE_H
+
+#include "store/store.h"
+#include "store/uploads.h"
+
+#include <pthread.h>
+
+typedef struct {
+    const char *scheme; /* how its addresses begin: "postgresql://"; "": it takes all others, as names of files */
+    /* A store with nothing but `engine` set; NULL: message. The caller then sets up the rest of struct store. */
+    store *(*open)(const char *address, char *message, size_t size);
+    void (*close)(store *s);
+    store_status (*submit)(store *s, const store_request *request, job *out, bool *repeated);
+    store_status (*find_repeat)(store *s, const store_request *request, job *out);
+    store_status (*claim)(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
+    store_status (*renew)(store *s, const char *id, const char *owner, double lease_s, int progress);
+    store_status (*finish)(store *s, const char *id, const char *owner, const store_outcome *outcome);
+    store_status (*release)(store *s, const char *id, const char *owner);
+    store_status (*recover)(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
+    store_status (*expire)(store *s, const char *error_json, int64_t *count);
+    store_status (*retain)(store *s, const store_retention *limits, int64_t *count); /* at least one limit */
+    store_status (*dismiss)(store *s, const char *id, job_status *was);
+    store_status (*get)(store *s, const char *id, job *out);
+    store_status (*list)(store *s, const store_query *query, job *jobs, size_t *count); /* limit + 1 of them at most */
+    store_status (*get_body)(store *s, const char *id, char **body, size_t *len);
+    store_status (*get_cases)(store *s, const char *id, const char *name, store_case **cases, size_t *count);
+    store_status (*get_vector)(store *s, const char *id, int64_t number, const char *name, double **x, int64_t *count);
+    store_status (*count_vectors)(store *s, const char *id, const char *name, int64_t *total);
+    store_status (*get_history)(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
+                                int64_t *columns);
+    store_status (*counts)(store *s, int64_t counts[5]);
+    store_status (*webhook_next)(store *s, webhook_due *out);
+    store_status (*webhooks_open)(store *s, bool *any);
+    store_status (*webhook_postpone)(store *s, const char *url, double delay_s);
+    store_status (*webhook_attempted)(store *s, const char *id, webhook_end end, double delay_s);
+    /* The rows of uploads. */
+    store_status (*upload_get)(store *s, const char *id, upload_info *out);
+    store_status (*upload_add)(store *s, const char *id, int64_t bytes, upload_info *out, bool *known);
+    store_status (*upload_forget)(store *s, const char *id); /* STORE_CONFLICT while a job refers to it */
+    store_status (*upload_idle)(store *s, double before, upload_info *out); /* no job's, longest unused, since before */
+    store_status (*upload_total)(store *s, int64_t *bytes);
+    store_status (*try_write)(store *s);
+    int64_t (*free_bytes)(store *s);
+    store_status (*check)(store *s, store_findings *out);
+    /* Of an address whose store may be open elsewhere. */
+    bool (*check_file)(const char *address, store_findings *out, char *message, size_t size);
+    bool (*backup_file)(const char *address, const char *to, int64_t *bytes, char *message, size_t size);
+} store_engine;
+
+/* What every store begins with; an engine's own struct has it as its first member. */
+struct store {
+    const store_engine *engine;
+    store_settings settings;
+    store_listener *changed; /* may be NULL */
+    void *changed_ctx;
+    store_uploads *uploads;
+    pthread_mutex_t message_lock; /* message; taken last */
+    char message[256];
+};
+
+void store_set_message(store *s, const char *cause);
+void store_tell(const store *s, const char *id);
+double store_now(void);   /* Unix seconds */
+double store_clock(void); /* seconds, CLOCK_MONOTONIC */
+
+/* The next id of a job: 12 hex digits of milliseconds, 4 of a counter within them, 16 random. Under the engine's lock.
+ * last_ms and sequence are those of the newest id, so that ids ascend when the clock does not. */
+void store_next_id(uint64_t *last_ms, unsigned *sequence, char id[33]);
+
+#endif

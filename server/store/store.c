@@ -1,0 +1,345 @@
+/* store.c: what is the same whatever engine keeps the jobs; every operation goes to the engine of the store. */
+#include "store/engine.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <time.h>
+
+/* ---- jobs */
+
+static const char *const STATUS_NAMES[] = {"accepted", "running", "successful", "failed", "dismissed"};
+#define STATUS_COUNT (sizeof STATUS_NAMES / sizeof STATUS_NAMES[0])
+
+const char *job_status_name(job_status status)
+{
+    return (size_t)status < STATUS_COUNT ? STATUS_NAMES[status] : "unknown";
+}
+
+bool job_status_parse(job_status *out, const char *name)
+{
+    for (size_t i = 0; i < STATUS_COUNT; i++)
+        if (strcmp(name, STATUS_NAMES[i]) == 0) {
+            *out = (job_status)i;
+            return true;
+        }
+    return false;
+}
+
+void job_clear(job *j)
+{
+    if (!j)
+        return;
+    free(j->tags);
+    free(j->summary);
+    free(j->error);
+    memset(j, 0, sizeof *j);
+}
+
+void store_cases_free(store_case *cases, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        free(cases[i].name);
+        free(cases[i].summary);
+    }
+    free(cases);
+}
+
+/* ---- the store itself */
+
+void store_configure(store *s, const store_settings *settings)
+{
+    s->settings = *settings;
+}
+
+void store_close(store *s)
+{
+    if (s)
+        s->engine->close(s);
+}
+
+void store_listen(store *s, store_listener *changed, void *ctx)
+{
+    s->changed = changed;
+    s->changed_ctx = ctx;
+}
+
+void store_tell(const store *s, const char *id)
+{
+    if (s->changed)
+        s->changed(s->changed_ctx, id);
+}
+
+void store_set_message(store *s, const char *cause)
+{
+    pthread_mutex_lock(&s->message_lock);
+    snprintf(s->message, sizeof s->message, "%s", cause);
+    pthread_mutex_unlock(&s->message_lock);
+}
+
+void store_message(store *s, char *buffer, size_t size)
+{
+    pthread_mutex_lock(&s->message_lock);
+    snprintf(buffer, size, "%s", s->message);
+    pthread_mutex_unlock(&s->message_lock);
+}
+
+/* ---- time and ids */
+
+static double read_clock(clockid_t clock)
+{
+    struct timespec t;
+    clock_gettime(clock, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+double store_clock(void)
+{
+    return read_clock(CLOCK_MONOTONIC);
+}
+
+double store_now(void)
+{
+    return read_clock(CLOCK_REALTIME);
+}
+
+void store_next_id(uint64_t *last_ms, unsigned *sequence, char id[33])
+{
+    uint64_t random = 0, ms = (uint64_t)(store_now() * 1e3) & 0xffffffffffffu;
+    if (ms > *last_ms) {
+        *last_ms = ms;
+        *sequence = 0;
+    } else if (++*sequence > 0xffff) {
+        (*last_ms)++;
+        *sequence = 0;
+    }
+    /* Time and counter alone make the id unique in its store; the random part keeps ids from being guessed. */
+    if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
+        random = ms * 0x9e3779b97f4a7c15u;
+    snprintf(id, 33, "%012llx%04x%016llx", (unsigned long long)*last_ms, *sequence, (unsigned long long)random);
+}
+
+/* ---- the life of a job */
+
+/* `out` and *repeated as a submission leaves them. */
+static store_status publish_job(store_status status, job *out)
+{
+    if (status != STORE_OK)
+        job_clear(out);
+    return status;
+}
+
+store_status store_submit(store *s, const store_request *request, job *out, bool *repeated)
+{
+    *out = (job){.progress = 0};
+    *repeated = false;
+    store_status status = publish_job(s->engine->submit(s, request, out, repeated), out);
+    *repeated = *repeated && status == STORE_OK;
+    return status;
+}
+
+store_status store_find_repeat(store *s, const store_request *request, job *out)
+{
+    *out = (job){.progress = 0};
+    return publish_job(s->engine->find_repeat(s, request, out), out);
+}
+
+store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len)
+{
+    *out = (job){.progress = 0};
+    *body = NULL;
+    *body_len = 0;
+    store_status status = publish_job(s->engine->claim(s, owner, lease_s, out, body, body_len), out);
+    if (status == STORE_OK)
+        return STORE_OK;
+    free(*body);
+    *body = NULL;
+    *body_len = 0;
+    return status;
+}
+
+store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress)
+{
+    return s->engine->renew(s, id, owner, lease_s, progress < 0 ? 0 : progress > 100 ? 100 : progress);
+}
+
+store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome)
+{
+    if (outcome->status == JOB_SUCCESSFUL || outcome->status == JOB_FAILED || outcome->status == JOB_DISMISSED)
+        return s->engine->finish(s, id, owner, outcome);
+    store_set_message(s, "a job cannot be finished with a status that is not an end");
+    return STORE_ERROR;
+}
+
+store_status store_release(store *s, const char *id, const char *owner)
+{
+    return s->engine->release(s, id, owner);
+}
+
+store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)
+{
+    int64_t counts[2] = {0, 0};
+    store_status status = s->engine->recover(s, max_attempts, error_json, &counts[0], &counts[1]);
+    if (requeued)
+        *requeued = status == STORE_OK ? counts[0] : 0;
+    if (failed)
+        *failed = status == STORE_OK ? counts[1] : 0;
+    return status;
+}
+
+store_status store_expire(store *s, const char *error_json, int64_t *count)
+{
+    *count = 0;
+    return s->engine->expire(s, error_json, count);
+}
+
+store_status store_retain(store *s, const store_retention *limits, int64_t *count)
+{
+    *count = 0;
+    if (limits->keep_s <= 0 && limits->keep_jobs <= 0 && limits->keep_bytes <= 0)
+        return STORE_OK;
+    return s->engine->retain(s, limits, count);
+}
+
+store_status store_dismiss(store *s, const char *id, job_status *was)
+{
+    *was = JOB_ACCEPTED;
+    return s->engine->dismiss(s, id, was);
+}
+
+/* ---- reading */
+
+store_status store_get(store *s, const char *id, job *out)
+{
+    *out = (job){.progress = 0};
+    return publish_job(s->engine->get(s, id, out), out);
+}
+
+store_status store_list(store *s, const store_query *query, job **jobs, size_t *count, bool *more)
+{
+    store_query q = *query;
+    q.limit = q.limit < 1 ? 1 : q.limit > 1000 ? 1000 : q.limit;
+    size_t n = 0, room = (size_t)q.limit + 1; /* one more says whether there are others */
+    *jobs = NULL;
+    *count = 0;
+    *more = false;
+    job *found = calloc(room, sizeof *found);
+    if (!found) {
+        store_set_message(s, "no memory for a list of jobs");
+        return STORE_ERROR;
+    }
+    store_status status = s->engine->list(s, &q, found, &n);
+    *more = status == STORE_OK && n == room;
+    *count = status != STORE_OK ? 0 : *more ? room - 1 : n;
+    for (size_t i = *count; i < n; i++)
+        job_clear(&found[i]);
+    if (status == STORE_OK)
+        *jobs = found;
+    else
+        free(found);
+    return status;
+}
+
+store_status store_get_body(store *s, const char *id, char **body, size_t *len)
+{
+    *body = NULL;
+    *len = 0;
+    return s->engine->get_body(s, id, body, len);
+}
+
+store_status store_get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count)
+{
+    *cases = NULL;
+    *count = 0;
+    store_status status = s->engine->get_cases(s, id, name, cases, count);
+    if (status == STORE_OK)
+        return STORE_OK;
+    store_cases_free(*cases, *count);
+    *cases = NULL;
+    *count = 0;
+    return status;
+}
+
+/* What was read in part is not shown. */
+static store_status publish_doubles(store_status status, double **x, int64_t *count)
+{
+    if (status != STORE_OK) {
+        free(*x);
+        *x = NULL;
+        *count = 0;
+    }
+    return status;
+}
+
+store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data, int64_t *count)
+{
+    *data = NULL;
+    *count = 0;
+    return publish_doubles(s->engine->get_vector(s, id, number, name, data, count), data, count);
+}
+
+store_status store_count_vectors(store *s, const char *id, const char *name, int64_t *total)
+{
+    *total = 0;
+    return s->engine->count_vectors(s, id, name, total);
+}
+
+store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
+                               int64_t *columns)
+{
+    *rows = NULL;
+    *count = *columns = 0;
+    store_status status =
+        publish_doubles(s->engine->get_history(s, id, number, after, rows, count, columns), rows, count);
+    *columns = status == STORE_OK ? *columns : 0;
+    return status;
+}
+
+store_status store_counts(store *s, int64_t counts[5])
+{
+    memset(counts, 0, 5 * sizeof counts[0]);
+    return s->engine->counts(s, counts);
+}
+
+/* ---- webhooks */
+
+store_status store_webhook_next(store *s, webhook_due *out)
+{
+    *out = (webhook_due){.url = NULL};
+    return s->engine->webhook_next(s, out);
+}
+
+store_status store_webhooks_open(store *s, bool *any)
+{
+    *any = false;
+    return s->engine->webhooks_open(s, any);
+}
+
+store_status store_webhook_postpone(store *s, const char *url, double delay_s)
+{
+    return s->engine->webhook_postpone(s, url, delay_s);
+}
+
+store_status store_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s)
+{
+    return s->engine->webhook_attempted(s, id, end, delay_s);
+}
+
+/* ---- care */
+
+store_status store_try_write(store *s)
+{
+    return s->engine->try_write(s);
+}
+
+int64_t store_free_bytes(store *s)
+{
+    return s->engine->free_bytes(s);
+}
+
+store_status store_check(store *s, store_findings *out)
+{
+    *out = (store_findings){.findings = NULL};
+    return s->engine->check(s, out);
+}
