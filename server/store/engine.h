@@ -4,7 +4,8 @@
  *   - Each operation is one transaction, all of it or nothing, and may be called from any thread.
  *   - STORE_OK means: durable, but for claim and renew, which recover makes good for. What may still be lost is not
  *     read either: get, list and find_repeat return an end or a job only once it is durable.
- *   - Pointers to outputs are never NULL; they are zeroed before the call, and freed after it where it failed.
+ *   - Pointers to outputs are never NULL; they are zeroed before the call, and freed after it where it failed. A claim
+ *     gets a lease with its owner, and sets the token.
  *   - Before STORE_FULL, STORE_LOCKED, STORE_DAMAGED and STORE_ERROR: store_set_message with the cause.
  *   - Who changed a job without owning it is told by store_tell after the commit, without a lock held. */
 #ifndef SERVER_STORE_ENGINE_H
@@ -17,15 +18,14 @@
 
 typedef struct {
     const char *scheme; /* how its addresses begin: "postgresql://"; "": it takes all others, as names of files */
-    /* A store with nothing but `engine` set; NULL: message. The caller then sets up the rest of struct store. */
     store *(*open)(const char *address, char *message, size_t size);
     void (*close)(store *s);
     store_status (*submit)(store *s, const store_request *request, job *out, bool *repeated);
     store_status (*find_repeat)(store *s, const store_request *request, job *out);
-    store_status (*claim)(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
-    store_status (*renew)(store *s, const char *id, const char *owner, double lease_s, int progress);
-    store_status (*finish)(store *s, const char *id, const char *owner, const store_outcome *outcome);
-    store_status (*release)(store *s, const char *id, const char *owner);
+    store_status (*claim)(store *s, store_lease *lease, double lease_s, job *out, char **body, size_t *len);
+    store_status (*renew)(store *s, const store_lease *lease, double lease_s, int progress);
+    store_status (*finish)(store *s, const store_lease *lease, const store_outcome *outcome);
+    store_status (*release)(store *s, const store_lease *lease);
     store_status (*recover)(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
     store_status (*expire)(store *s, const char *error_json, int64_t *count);
     store_status (*retain)(store *s, const store_retention *limits, int64_t *count); /* at least one limit */
@@ -68,6 +68,8 @@ struct store {
     char message[256];
 };
 
+void store_base_begin(store *s, const store_engine *engine);
+void store_base_end(store *s);
 void store_set_message(store *s, const char *cause);
 void store_tell(const store *s, const char *id);
 double store_now(void);   /* Unix seconds */

@@ -1,4 +1,5 @@
 /* store.c: what is the same whatever engine keeps the jobs; every operation goes to the engine of the store. */
+#include "store/blobs.h"
 #include "store/engine.h"
 
 #include <stdio.h>
@@ -51,6 +52,18 @@ void store_cases_free(store_case *cases, size_t count)
 void store_configure(store *s, const store_settings *settings)
 {
     s->settings = *settings;
+}
+
+void store_base_begin(store *s, const store_engine *engine)
+{
+    *s = (store){.engine = engine};
+    pthread_mutex_init(&s->message_lock, NULL);
+}
+
+void store_base_end(store *s)
+{
+    store_uploads_end(s);
+    pthread_mutex_destroy(&s->message_lock);
 }
 
 void store_close(store *s)
@@ -145,12 +158,16 @@ store_status store_find_repeat(store *s, const store_request *request, job *out)
     return publish_job(s->engine->find_repeat(s, request, out), out);
 }
 
-store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len)
+store_status store_claim(store *s, const char *owner, double lease_s, store_lease *lease, job *out, char **body,
+                         size_t *body_len)
 {
+    *lease = (store_lease){.token = 0};
+    snprintf(lease->owner, sizeof lease->owner, "%s", owner);
     *out = (job){.progress = 0};
     *body = NULL;
     *body_len = 0;
-    store_status status = publish_job(s->engine->claim(s, owner, lease_s, out, body, body_len), out);
+    store_status status = publish_job(s->engine->claim(s, lease, lease_s, out, body, body_len), out);
+    memcpy(lease->job, out->id, sizeof lease->job);
     if (status == STORE_OK)
         return STORE_OK;
     free(*body);
@@ -159,22 +176,22 @@ store_status store_claim(store *s, const char *owner, double lease_s, job *out, 
     return status;
 }
 
-store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress)
+store_status store_renew(store *s, const store_lease *lease, double lease_s, int progress)
 {
-    return s->engine->renew(s, id, owner, lease_s, progress < 0 ? 0 : progress > 100 ? 100 : progress);
+    return s->engine->renew(s, lease, lease_s, progress < 0 ? 0 : progress > 100 ? 100 : progress);
 }
 
-store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome)
+store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome)
 {
     if (outcome->status == JOB_SUCCESSFUL || outcome->status == JOB_FAILED || outcome->status == JOB_DISMISSED)
-        return s->engine->finish(s, id, owner, outcome);
+        return s->engine->finish(s, lease, outcome);
     store_set_message(s, "a job cannot be finished with a status that is not an end");
     return STORE_ERROR;
 }
 
-store_status store_release(store *s, const char *id, const char *owner)
+store_status store_release(store *s, const store_lease *lease)
 {
-    return s->engine->release(s, id, owner);
+    return s->engine->release(s, lease);
 }
 
 store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)

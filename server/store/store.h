@@ -98,12 +98,22 @@ store_status store_submit(store *s, const store_request *request, job *out, bool
  * STORE_CONFLICT for another body; STORE_NOT_FOUND: the key is new. */
 store_status store_find_repeat(store *s, const store_request *request, job *out);
 
-/* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, owner and lease
- * set; *body is the request as submitted, freed by the caller, or NULL where it is not what was written any more:
- * the job can only be failed. STORE_NOT_FOUND when nothing waits. */
-store_status store_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
-/* Extends the lease of a running job; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
-store_status store_renew(store *s, const char *id, const char *owner, double lease_s, int progress);
+/* What a claim gives its owner, and what the owner shows with every change that only it may make. */
+typedef struct {
+    char job[33], owner[128];
+    uint64_t token; /* fencing token: no other claim of this job by this owner has it */
+} store_lease;
+
+/* ---- claim: of the accepted jobs with the highest priority the oldest becomes running, attempts + 1, for lease_s
+ * seconds. *body is the request as submitted, freed by the caller, or NULL where it is not what was written any more:
+ * the job can only be failed. STORE_NOT_FOUND when nothing waits.
+ * A lease that has run out is still good until the job is somebody else's: by a claim of another owner where the engine
+ * has several processes, by recover where it has one. From then on everything that is done with it is STORE_CONFLICT
+ * and changes nothing. */
+store_status store_claim(store *s, const char *owner, double lease_s, store_lease *lease, job *out, char **body,
+                         size_t *body_len);
+/* Extends the lease to lease_s from now; progress 0..100. STORE_CONFLICT when the job is no longer ours. */
+store_status store_renew(store *s, const store_lease *lease, double lease_s, int progress);
 
 /* A named vector of doubles in a result: "reactions", "gaps", "displacements", "nodes", "contact_nodes", ...
  * On disk: little-endian IEEE 754 binary64, version in the row. */
@@ -132,15 +142,15 @@ typedef struct {
     size_t n_cases;
 } store_outcome;
 
-/* ---- finish: status, summaries, results and histories in one transaction. Only the owner of the running job may;
+/* ---- finish: status, summaries, results and histories in one transaction. Only with the lease of the running job;
  * otherwise STORE_CONFLICT and nothing is written: each job gets one result. */
-store_status store_finish(store *s, const char *id, const char *owner, const store_outcome *outcome);
+store_status store_finish(store *s, const store_lease *lease, const store_outcome *outcome);
 
 /* ---- requeue. store_release: one running job of ours goes back to accepted (shutdown), the attempt is not counted.
  * store_recover, once at start before any claim: jobs left running by owners that are gone become accepted again, or
  * failed with the given error JSON when attempts >= max_attempts. Counts may be NULL. Both: a job that was told to end
  * becomes dismissed instead. */
-store_status store_release(store *s, const char *id, const char *owner);
+store_status store_release(store *s, const store_lease *lease);
 store_status store_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 
 /* ---- expire: jobs that have waited longer than they may fail with the given error JSON; *count is how many. They are

@@ -15,8 +15,9 @@ typedef struct {
     pthread_t thread;
     char owner[128]; /* who it is to the store: host, process, a random number, worker */
 
-    pthread_mutex_t lock; /* id, live */
+    pthread_mutex_t lock; /* id, lease, live */
     char id[33];          /* the job that runs now, "" when none */
+    store_lease lease;    /* of that job; only this thread changes it */
     live live;
 
     atomic_bool cancel; /* somebody wants this job to end with its best answer */

@@ -297,7 +297,7 @@ static store_status try_to_store(const run *r, bool for_ever)
     work *w = r->me->w;
     double begun = work_clock();
     for (int attempt = 0;; attempt++) {
-        store_status status = store_finish(w->store, r->job->id, r->me->owner, &r->outcome);
+        store_status status = store_finish(w->store, &r->me->lease, &r->outcome);
         if (is_settled(status))
             return status;
         if (attempt < FINISH_ATTEMPTS)
@@ -388,7 +388,7 @@ static void store_end(run *r, run_end end)
 {
     work *w = r->me->w;
     const uz_summary *first = r->results && r->results[0] ? &r->results[0]->summary : NULL;
-    if (end == END_RELEASE && store_release(w->store, r->job->id, r->me->owner) != STORE_OK)
+    if (end == END_RELEASE && store_release(w->store, &r->me->lease) != STORE_OK)
         log_store_failure(r, LOG_ERROR, "release_failed");
     if (end != END_FINISH) {
         metrics_add(w->options.metrics, METRIC_REQUEUED, end == END_RELEASE);

@@ -15,23 +15,26 @@
 
 /* ---- workers */
 
-static void publish(worker *me, const char *id)
+/* lease: of the job that runs from now on; of none when it is all zero. */
+static void publish(worker *me, const store_lease *lease)
 {
     pthread_mutex_lock(&me->lock);
     live_reset(&me->live);
-    strcpy(me->id, id);
+    me->lease = *lease;
+    strcpy(me->id, lease->job);
     pthread_mutex_unlock(&me->lock);
 }
 
 static store_status claim(worker *me, job *claimed, char **body, size_t *body_len)
 {
     work *w = me->w;
+    store_lease lease;
     pthread_mutex_lock(&w->claim_lock);
-    store_status status = store_claim(w->store, me->owner, w->options.lease_s, claimed, body, body_len);
+    store_status status = store_claim(w->store, me->owner, w->options.lease_s, &lease, claimed, body, body_len);
     if (status == STORE_OK) {
         atomic_store(&me->cancel, false);
         atomic_store(&me->lost, false);
-        publish(me, claimed->id);
+        publish(me, &lease);
     }
     pthread_mutex_unlock(&w->claim_lock);
     if (status == STORE_OK)
@@ -89,7 +92,7 @@ static void *work_loop(void *arg)
             char id[33];
             strcpy(id, claimed.id);
             work_run(me, &claimed, body, body_len);
-            publish(me, "");
+            publish(me, &(store_lease){.token = 0});
             feed_changed(w->feed, id); /* ended, or put back */
             continue;
         }
@@ -109,18 +112,17 @@ static void *work_loop(void *arg)
 
 static void renew(worker *me)
 {
-    char id[33];
     pthread_mutex_lock(&me->lock);
-    strcpy(id, me->id);
+    const store_lease lease = me->lease;
     int progress = live_progress(&me->live);
     pthread_mutex_unlock(&me->lock);
-    if (!id[0])
+    if (!lease.job[0])
         return;
-    store_status status = store_renew(me->w->store, id, me->owner, me->w->options.lease_s, progress);
+    store_status status = store_renew(me->w->store, &lease, me->w->options.lease_s, progress);
     if (status != STORE_CONFLICT && status != STORE_NOT_FOUND)
         return; /* a store that fails now may work before the lease ends */
     pthread_mutex_lock(&me->lock);
-    if (strcmp(me->id, id) == 0) /* else it ended meanwhile */
+    if (me->lease.token == lease.token && strcmp(me->id, lease.job) == 0) /* else it ended meanwhile */
         atomic_store(&me->lost, true);
     pthread_mutex_unlock(&me->lock);
 }

@@ -62,16 +62,51 @@ static inline store_status submit_text(store *s, const char *body, const char *t
     return status;
 }
 
+/* The leases that this thread was given last, so that tests can name a claim by its job and owner. */
+static _Thread_local store_lease leases_held[64] __attribute__((unused));
+static _Thread_local unsigned leases_given __attribute__((unused));
+
 static inline store_status claim_id(store *s, const char *owner, char id[33])
 {
     job j = {0};
     char *body;
     size_t len;
-    store_status status = store_claim(s, owner, 30.0, &j, &body, &len);
+    store_status status = store_claim(s, owner, 30.0, &leases_held[leases_given % 64], &j, &body, &len);
+    leases_given += status == STORE_OK;
     strcpy(id, j.id);
     job_clear(&j);
     free(body);
     return status;
+}
+
+/* The last one of this owner for this job; one that nobody was given where there is none. */
+static inline store_lease lease_of(const char *id, const char *owner)
+{
+    store_lease made = {.token = 0};
+    for (unsigned n = leases_given; n > 0 && leases_given - n < 64; n--)
+        if (strcmp(leases_held[(n - 1) % 64].job, id) == 0 && strcmp(leases_held[(n - 1) % 64].owner, owner) == 0)
+            return leases_held[(n - 1) % 64];
+    snprintf(made.job, sizeof made.job, "%s", id);
+    snprintf(made.owner, sizeof made.owner, "%s", owner);
+    return made;
+}
+
+static inline store_status finish_as(store *s, const char *id, const char *owner, const store_outcome *outcome)
+{
+    const store_lease lease = lease_of(id, owner);
+    return store_finish(s, &lease, outcome);
+}
+
+static inline store_status renew_as(store *s, const char *id, const char *owner, double lease_s, int progress)
+{
+    const store_lease lease = lease_of(id, owner);
+    return store_renew(s, &lease, lease_s, progress);
+}
+
+static inline store_status release_as(store *s, const char *id, const char *owner)
+{
+    const store_lease lease = lease_of(id, owner);
+    return store_release(s, &lease);
 }
 
 static inline job_status status_of(store *s, const char *id)

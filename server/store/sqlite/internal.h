@@ -14,10 +14,11 @@ typedef struct pending pending;
 
 typedef struct {
     store base;
-    pthread_mutex_t writer_lock; /* writer, last_ms, sequence */
+    pthread_mutex_t writer_lock; /* writer, last_ms, sequence, claims */
     connection writer;           /* the only one that writes and checkpoints */
     uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
     unsigned sequence;
+    uint64_t claims; /* made since the file was opened: the token of the last one */
 
     pthread_mutex_t queue_lock; /* everything down to leading; write.c */
     pending *queue, **queue_end;
@@ -107,10 +108,10 @@ store *sqlite_open(const char *address, char *message, size_t size);
 void sqlite_close(store *s);
 store_status sqlite_submit(store *s, const store_request *request, job *out, bool *repeated);
 store_status sqlite_find_repeat(store *s, const store_request *request, job *out);
-store_status sqlite_claim(store *s, const char *owner, double lease_s, job *out, char **body, size_t *body_len);
-store_status sqlite_renew(store *s, const char *id, const char *owner, double lease_s, int progress);
-store_status sqlite_finish(store *s, const char *id, const char *owner, const store_outcome *outcome);
-store_status sqlite_release(store *s, const char *id, const char *owner);
+store_status sqlite_claim(store *s, store_lease *lease, double lease_s, job *out, char **body, size_t *len);
+store_status sqlite_renew(store *s, const store_lease *lease, double lease_s, int progress);
+store_status sqlite_finish(store *s, const store_lease *lease, const store_outcome *outcome);
+store_status sqlite_release(store *s, const store_lease *lease);
 store_status sqlite_recover(store *s, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed);
 store_status sqlite_expire(store *s, const char *error_json, int64_t *count);
 store_status sqlite_retain(store *s, const store_retention *limits, int64_t *count);

@@ -221,8 +221,20 @@ store_status sqlite_get_body(store *base, const char *id, char **body, size_t *l
 
 /* ---- claim */
 
+/* An owner as the column has it: with the token, since the table has no column for that. */
 typedef struct {
-    const char *owner;
+    char text[160];
+} holder;
+
+static holder holder_of(const store_lease *lease)
+{
+    holder h;
+    snprintf(h.text, sizeof h.text, "%s#%llu", lease->owner, (unsigned long long)lease->token);
+    return h;
+}
+
+typedef struct {
+    store_lease *lease;
     double lease_s;
     job *out;
     char *body;
@@ -231,15 +243,16 @@ typedef struct {
 
 static store_status claim(sqlite_store *s, connection *c, void *args)
 {
-    (void)s;
     claim_args *a = args;
+    a->lease->token = ++s->claims;
+    const holder owner = holder_of(a->lease);
     job_clear(a->out);
     free(a->body);
     a->body = NULL;
     store_status status = STORE_NOT_FOUND;
     statement st = statement_begin(c, QUERY_CLAIM);
     bind_real(&st, 1, store_now());
-    bind_text(&st, 2, a->owner);
+    bind_text(&st, 2, owner.text);
     bind_real(&st, 3, a->lease_s);
     if (statement_row(&st))
         status = sqlite_read_job(&st, a->out);
@@ -254,19 +267,20 @@ static store_status claim(sqlite_store *s, connection *c, void *args)
     return status == STORE_NOT_FOUND ? STORE_ERROR : status; /* a job without its request is a damaged file */
 }
 
-store_status sqlite_claim(store *base, const char *owner, double lease_s, job *out, char **body, size_t *body_len)
+store_status sqlite_claim(store *base, store_lease *lease, double lease_s, job *out, char **body, size_t *len)
 {
-    claim_args a = {owner, lease_s, out, NULL, 0};
+    claim_args a = {lease, lease_s, out, NULL, 0};
     store_status status = sqlite_write_as(sqlite_of(base), WRITE_LAZY, claim, &a);
     *body = a.body;
-    *body_len = a.body_len;
+    *len = a.body_len;
     return status;
 }
 
 /* ---- while it runs and when it ends */
 
 typedef struct {
-    const char *id, *owner;
+    const char *id;
+    holder owner;
     double lease_s;
     int progress;
     const store_outcome *outcome;
@@ -278,16 +292,16 @@ static store_status renew(sqlite_store *s, connection *c, void *args)
     const owner_args *a = args;
     statement st = statement_begin(c, QUERY_RENEW);
     bind_text(&st, 1, a->id);
-    bind_text(&st, 2, a->owner);
+    bind_text(&st, 2, a->owner.text);
     bind_real(&st, 3, store_now() + a->lease_s);
     bind_integer(&st, 4, a->progress);
     return run_update(&st, a->id);
 }
 
-store_status sqlite_renew(store *base, const char *id, const char *owner, double lease_s, int progress)
+store_status sqlite_renew(store *base, const store_lease *lease, double lease_s, int progress)
 {
     sqlite_store *s = sqlite_of(base);
-    owner_args a = {id, owner, lease_s, progress, NULL};
+    owner_args a = {lease->job, holder_of(lease), lease_s, progress, NULL};
     return sqlite_write_as(s, WRITE_LAZY, renew, &a);
 }
 
@@ -297,7 +311,7 @@ static store_status finish(sqlite_store *s, connection *c, void *args)
     const owner_args *a = args;
     statement st = statement_begin(c, QUERY_FINISH);
     bind_text(&st, 1, a->id);
-    bind_text(&st, 2, a->owner);
+    bind_text(&st, 2, a->owner.text);
     bind_integer(&st, 3, a->outcome->status);
     bind_real(&st, 4, store_now());
     bind_text(&st, 5, a->outcome->whole.summary);
@@ -312,10 +326,10 @@ static store_status finish(sqlite_store *s, connection *c, void *args)
     return statement_run(&st);
 }
 
-store_status sqlite_finish(store *base, const char *id, const char *owner, const store_outcome *outcome)
+store_status sqlite_finish(store *base, const store_lease *lease, const store_outcome *outcome)
 {
     sqlite_store *s = sqlite_of(base);
-    owner_args a = {id, owner, 0.0, 0, outcome};
+    owner_args a = {lease->job, holder_of(lease), 0.0, 0, outcome};
     return sqlite_write_as(s, WRITE_SOON, finish, &a);
 }
 
@@ -336,19 +350,19 @@ static store_status release(sqlite_store *s, connection *c, void *args)
     (void)s;
     const owner_args *a = args;
     int64_t ended;
-    store_status status = end_dismissed(c, a->id, a->owner, &ended);
+    store_status status = end_dismissed(c, a->id, a->owner.text, &ended);
     if (status != STORE_OK || ended > 0)
         return status;
     statement st = statement_begin(c, QUERY_RELEASE);
     bind_text(&st, 1, a->id);
-    bind_text(&st, 2, a->owner);
+    bind_text(&st, 2, a->owner.text);
     return run_update(&st, a->id);
 }
 
-store_status sqlite_release(store *base, const char *id, const char *owner)
+store_status sqlite_release(store *base, const store_lease *lease)
 {
     sqlite_store *s = sqlite_of(base);
-    owner_args a = {id, owner, 0.0, 0, NULL};
+    owner_args a = {lease->job, holder_of(lease), 0.0, 0, NULL};
     return sqlite_write_as(s, WRITE_SOON, release, &a);
 }
 

@@ -130,8 +130,7 @@ store *sqlite_open(const char *path, char *message, size_t size)
         snprintf(message, size, "no memory");
         return NULL;
     }
-    s->base.engine = &STORE_SQLITE;
-    pthread_mutex_init(&s->base.message_lock, NULL);
+    store_base_begin(&s->base, &STORE_SQLITE);
     pthread_mutex_init(&s->writer_lock, NULL);
     pthread_mutex_init(&s->queue_lock, NULL);
     pthread_mutex_init(&s->readers_lock, NULL);
@@ -156,7 +155,6 @@ void sqlite_close(store *base)
 {
     sqlite_store *s = sqlite_of(base);
     sqlite_sync_end(s);
-    store_uploads_end(base);
     for (int i = 0; i < STORE_READERS; i++)
         connection_close(&s->readers[i]);
     connection_close(&s->writer); /* the last one: checkpoints and removes the journal */
@@ -169,7 +167,7 @@ void sqlite_close(store *base)
     pthread_mutex_destroy(&s->readers_lock);
     pthread_mutex_destroy(&s->queue_lock);
     pthread_mutex_destroy(&s->writer_lock);
-    pthread_mutex_destroy(&s->base.message_lock);
+    store_base_end(base);
     free(s->path);
     free(s);
 }

@@ -17,6 +17,7 @@ TEST(submit_claim_finish)
     place p;
     job j = {0};
     bool repeated = true;
+    store_lease lease;
     char *body = NULL;
     size_t len = 0;
     if (!place_begin(&p))
@@ -28,12 +29,14 @@ TEST(submit_claim_finish)
     CHECK(j.started == 0 && j.finished == 0 && !j.summary && !j.error);
     CHECK_STR(j.tags, "[\"demo\"]");
     job_clear(&j);
-    CHECK_INT(store_claim(p.s, "me", 30.0, &j, &body, &len), STORE_OK);
+    CHECK_INT(store_claim(p.s, "me", 30.0, &lease, &j, &body, &len), STORE_OK);
+    CHECK_STR(lease.job, j.id);
+    CHECK_STR(lease.owner, "me");
     CHECK(j.status == JOB_RUNNING && j.attempts == 1 && j.started >= j.created);
     CHECK(len == 8 && body && strcmp(body, "{\"a\": 1}") == 0);
     free(body);
-    CHECK_INT(store_renew(p.s, j.id, "me", 30.0, 42), STORE_OK);
-    CHECK_INT(store_finish(p.s, j.id, "me", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(store_renew(p.s, &lease, 30.0, 42), STORE_OK);
+    CHECK_INT(store_finish(p.s, &lease, &PLAIN_SUCCESS), STORE_OK);
     char id[33];
     strcpy(id, j.id);
     job_clear(&j);
@@ -41,8 +44,8 @@ TEST(submit_claim_finish)
     CHECK(j.status == JOB_SUCCESSFUL && j.progress == 100 && j.finished >= j.started && !j.error);
     CHECK_STR(j.summary, PLAIN_SUCCESS.whole.summary);
     job_clear(&j);
-    CHECK_INT(store_claim(p.s, "me", 30.0, &j, &body, &len), STORE_NOT_FOUND);
-    CHECK(!body && len == 0 && !j.tags);
+    CHECK_INT(store_claim(p.s, "me", 30.0, &lease, &j, &body, &len), STORE_NOT_FOUND);
+    CHECK(!lease.job[0] && !body && len == 0 && !j.tags);
     place_end(&p);
 }
 
@@ -53,28 +56,61 @@ TEST(only_the_owner_of_a_running_job_may_change_it)
     if (!place_begin(&p))
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
-    CHECK_INT(store_finish(p.s, id, "a", &PLAIN_SUCCESS), STORE_CONFLICT); /* not running yet */
+    CHECK_INT(finish_as(p.s, id, "a", &PLAIN_SUCCESS), STORE_CONFLICT); /* not running yet */
     CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
     CHECK_STR(other, id);
-    CHECK_INT(store_renew(p.s, id, "b", 30, 1), STORE_CONFLICT);
-    CHECK_INT(store_release(p.s, id, "b"), STORE_CONFLICT);
-    CHECK_INT(store_finish(p.s, id, "b", &PLAIN_SUCCESS), STORE_CONFLICT);
+    CHECK_INT(renew_as(p.s, id, "b", 30, 1), STORE_CONFLICT);
+    CHECK_INT(release_as(p.s, id, "b"), STORE_CONFLICT);
+    CHECK_INT(finish_as(p.s, id, "b", &PLAIN_SUCCESS), STORE_CONFLICT);
     CHECK_INT(status_of(p.s, id), JOB_RUNNING);
     store_outcome no_end = {.status = JOB_RUNNING};
-    CHECK_INT(store_finish(p.s, id, "a", &no_end), STORE_ERROR);
+    CHECK_INT(finish_as(p.s, id, "a", &no_end), STORE_ERROR);
     double x = 1.0;
     store_vector v = {"reactions", 1, &x};
     store_outcome late = {.status = JOB_FAILED, .error = "{}", .whole.vectors = &v, .whole.n_vectors = 1};
-    CHECK_INT(store_finish(p.s, id, "a", &PLAIN_SUCCESS), STORE_OK);
-    CHECK_INT(store_finish(p.s, id, "a", &late), STORE_CONFLICT); /* one result for each job */
+    CHECK_INT(finish_as(p.s, id, "a", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(finish_as(p.s, id, "a", &late), STORE_CONFLICT); /* one result for each job */
     double *data;
     int64_t count;
     CHECK_INT(store_get_vector(p.s, id, 0, "reactions", &data, &count), STORE_NOT_FOUND);
     CHECK_INT(status_of(p.s, id), JOB_SUCCESSFUL);
     const char *nobody = "ffffffffffffffffffffffffffffffff";
-    CHECK_INT(store_finish(p.s, nobody, "a", &PLAIN_SUCCESS), STORE_NOT_FOUND);
-    CHECK_INT(store_renew(p.s, nobody, "a", 1, 1), STORE_NOT_FOUND);
-    CHECK_INT(store_release(p.s, nobody, "a"), STORE_NOT_FOUND);
+    CHECK_INT(finish_as(p.s, nobody, "a", &PLAIN_SUCCESS), STORE_NOT_FOUND);
+    CHECK_INT(renew_as(p.s, nobody, "a", 1, 1), STORE_NOT_FOUND);
+    CHECK_INT(release_as(p.s, nobody, "a"), STORE_NOT_FOUND);
+    place_end(&p);
+}
+
+/* The same owner claims the job a second time: what it does with the first lease comes too late. */
+TEST(an_earlier_lease_is_fenced_off)
+{
+    place p;
+    char id[33];
+    store_lease first, second;
+    job j = {0};
+    char *body = NULL;
+    size_t len = 0;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(store_claim(p.s, "a", 0.0, &first, &j, &body, &len), STORE_OK);
+    job_clear(&j);
+    free(body);
+    CHECK_INT(store_renew(p.s, &first, 0.0, 10), STORE_OK); /* it has run out, but nobody else has the job */
+    CHECK_INT(store_release(p.s, &first), STORE_OK);
+    CHECK_INT(store_renew(p.s, &first, 30.0, 20), STORE_CONFLICT);
+    CHECK_INT(store_claim(p.s, "a", 30.0, &second, &j, &body, &len), STORE_OK);
+    job_clear(&j);
+    free(body);
+    CHECK_STR(second.job, first.job);
+    CHECK(second.token != first.token);
+    CHECK_INT(store_renew(p.s, &first, 30.0, 30), STORE_CONFLICT);
+    CHECK_INT(store_finish(p.s, &first, &PLAIN_SUCCESS), STORE_CONFLICT);
+    CHECK_INT(store_release(p.s, &first), STORE_CONFLICT);
+    CHECK_INT(store_get(p.s, id, &j), STORE_OK);
+    CHECK(j.status == JOB_RUNNING && j.progress == 0);
+    job_clear(&j);
+    CHECK_INT(store_finish(p.s, &second, &PLAIN_SUCCESS), STORE_OK);
     place_end(&p);
 }
 
@@ -87,7 +123,7 @@ TEST(release_does_not_count_the_attempt)
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
     CHECK_INT(claim_id(p.s, "a", again), STORE_OK);
-    CHECK_INT(store_release(p.s, id, "a"), STORE_OK);
+    CHECK_INT(release_as(p.s, id, "a"), STORE_OK);
     CHECK_INT(store_get(p.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_ACCEPTED && j.attempts == 0 && j.started == 0 && j.progress == 0);
     job_clear(&j);
@@ -227,7 +263,7 @@ TEST(vectors_come_back_bit_for_bit)
     if (place_begin(&p)) {
         CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
         CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
-        CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+        CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
         CHECK(place_reopen(&p));
         check_vector(p.s, id, "displacements", x, large);
         check_vector(p.s, id, "odd", odd, 7);
@@ -270,7 +306,7 @@ TEST(history_after_an_iteration)
     if (place_begin(&p)) {
         CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
         CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
-        CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+        CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
         check_history(p.s, id, -1, n);
         check_history(p.s, id, 0, n - 1);
         check_history(p.s, id, 10921, n - 10922); /* the end of a part */
@@ -298,7 +334,7 @@ TEST(a_damaged_vector_is_an_error)
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
     CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
-    CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+    CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
     for (size_t i = 0; i < sizeof damage / sizeof damage[0]; i++) {
         sqlite3 *db = NULL;
         store_close(p.s);
@@ -330,7 +366,7 @@ TEST(deleting_a_job_deletes_everything_of_it)
         return;
     CHECK_INT(submit_text(p.s, "{}", "[\"t\", \"u\"]", "key", id), STORE_OK);
     CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
-    CHECK_INT(store_finish(p.s, id, "a", &outcome), STORE_OK);
+    CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
     CHECK_INT(was, JOB_SUCCESSFUL);
     CHECK_INT(store_get(p.s, id, &j), STORE_NOT_FOUND);
@@ -365,7 +401,7 @@ TEST(dismiss_by_state)
     CHECK_INT(store_get(p.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_RUNNING && j.finished == 0); /* it ends when its run does */
     job_clear(&j);
-    CHECK_INT(store_release(p.s, id, "a"), STORE_OK);
+    CHECK_INT(release_as(p.s, id, "a"), STORE_OK);
     CHECK_INT(status_of(p.s, id), JOB_DISMISSED); /* nobody runs it again */
     CHECK_INT(claim_id(p.s, "a", other), STORE_NOT_FOUND);
     place_end(&p);

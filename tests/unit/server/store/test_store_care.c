@@ -31,10 +31,10 @@ TEST(counts_follow_every_change)
         CHECK_INT(submit_text(p.s, "{}", "[\"a\"]", NULL, ids[i]), STORE_OK);
     check_counts(p.s, 5, 0, 0, 0, 0);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
-    CHECK_INT(store_finish(p.s, claimed, "me", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(finish_as(p.s, claimed, "me", &PLAIN_SUCCESS), STORE_OK);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
     check_counts(p.s, 3, 1, 1, 0, 0);
-    CHECK_INT(store_release(p.s, claimed, "me"), STORE_OK);
+    CHECK_INT(release_as(p.s, claimed, "me"), STORE_OK);
     CHECK_INT(store_dismiss(p.s, ids[4], &was), STORE_OK);
     check_counts(p.s, 3, 0, 1, 0, 1);
     CHECK_INT(store_dismiss(p.s, ids[0], &was), STORE_OK); /* ended: deleted */
@@ -71,7 +71,7 @@ static store_status finish_with_answer(store *s, const char *id)
                                        .history = ANSWER,
                                        .history_rows = 1,
                                        .history_columns = 3}};
-    return store_finish(s, id, "me", &outcome);
+    return finish_as(s, id, "me", &outcome);
 }
 
 static void check_answer_of(store *s, const char *id)
@@ -198,7 +198,8 @@ TEST(what_is_not_what_was_written_is_not_shown)
         CHECK_INT(store_get_body(p.s, other, &body, &len), request ? STORE_DAMAGED : STORE_OK);
         CHECK(!body == request);
         free(body);
-        CHECK_INT(store_claim(p.s, "me", 30.0, &j, &body, &len), STORE_OK); /* to be failed */
+        CHECK_INT(store_claim(p.s, "me", 30.0, &(store_lease){.token = 0}, &j, &body, &len),
+                  STORE_OK); /* to be failed */
         CHECK_STR(j.id, other);
         CHECK(!body == request);
         free(body);

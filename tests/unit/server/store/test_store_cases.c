@@ -28,7 +28,7 @@ static void finish_cases(place *p, char id[33], size_t n)
                              .n_cases = n};
     CHECK_INT(submit_text(p->s, "{}", "[]", NULL, id), STORE_OK);
     CHECK_INT(claim_id(p->s, "me", other), STORE_OK);
-    CHECK_INT(store_finish(p->s, id, "me", &outcome), STORE_OK);
+    CHECK_INT(finish_as(p->s, id, "me", &outcome), STORE_OK);
 }
 
 TEST(each_case_has_its_own_answer)
@@ -115,11 +115,11 @@ TEST(a_finish_that_fails_in_a_case_leaves_nothing)
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
     CHECK_INT(claim_id(p.s, "me", other), STORE_OK);
-    CHECK_INT(store_finish(p.s, id, "me", &outcome), STORE_ERROR);
+    CHECK_INT(finish_as(p.s, id, "me", &outcome), STORE_ERROR);
     CHECK_INT(status_of(p.s, id), JOB_RUNNING);
     CHECK_INT(rows_in(p.path, "answer"), 0);
     CHECK_INT(rows_in(p.path, "vector"), 0);
-    CHECK_INT(store_finish(p.s, id, "me", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(finish_as(p.s, id, "me", &PLAIN_SUCCESS), STORE_OK);
     place_end(&p);
 }
 
@@ -247,7 +247,7 @@ TEST(a_file_of_format_1_is_taken_over)
     job_clear(&j);
     CHECK_INT(claim_id(p.s, "me", id), STORE_OK);
     CHECK_STR(id, "00000000000000000000000000000002");
-    CHECK_INT(store_finish(p.s, id, "me", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(finish_as(p.s, id, "me", &PLAIN_SUCCESS), STORE_OK);
     finish_cases(&p, id, 2);
     if (place_reopen(&p)) /* now of the present format */
         check_old_job(&p);

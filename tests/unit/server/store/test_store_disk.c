@@ -37,7 +37,7 @@ TEST(large_bodies)
                                &j, &repeated),
                   STORE_CONFLICT);
         body[size - 1] = 'x';
-        CHECK_INT(store_claim(p.s, "a", 1, &j, &back, &len), STORE_OK);
+        CHECK_INT(store_claim(p.s, "a", 1, &(store_lease){.token = 0}, &j, &back, &len), STORE_OK);
         CHECK(len == size && memcmp(back, body, size) == 0 && back[len] == '\0');
         job_clear(&j);
         free(back);
@@ -100,7 +100,7 @@ TEST(recover_ends_a_job_that_was_dismissed_while_it_ran)
     CHECK_INT(store_dismiss(p.s, ids[0], &was), STORE_OK);
     CHECK_INT(was, JOB_RUNNING);
     CHECK_INT(store_dismiss(p.s, ids[1], &was), STORE_OK);
-    CHECK_INT(store_finish(p.s, ids[1], "a", &(store_outcome){.status = JOB_SUCCESSFUL}), STORE_OK); /* was sooner */
+    CHECK_INT(finish_as(p.s, ids[1], "a", &(store_outcome){.status = JOB_SUCCESSFUL}), STORE_OK); /* was sooner */
     if (!place_reopen(&p))
         return;
     CHECK_INT(store_recover(p.s, 1, "{}", &requeued, &failed), STORE_OK); /* before attempts count */
@@ -247,11 +247,11 @@ TEST(a_full_database_is_reported_and_changes_nothing)
     store_vector v = {"reactions", 131072, x};
     store_outcome outcome = {
         .status = JOB_SUCCESSFUL, .whole.summary = "{}", .whole.vectors = &v, .whole.n_vectors = 1};
-    CHECK_INT(store_finish(p.s, running, "a", &outcome), STORE_FULL);
+    CHECK_INT(finish_as(p.s, running, "a", &outcome), STORE_FULL);
     CHECK_INT(status_of(p.s, running), JOB_RUNNING);
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
-    CHECK_INT(store_finish(p.s, running, "a", &outcome), STORE_OK);
+    CHECK_INT(finish_as(p.s, running, "a", &outcome), STORE_OK);
     CHECK_INT(sqlite_limit_bytes(p.s, 0), STORE_OK);
     CHECK_INT(store_submit(p.s, &(store_request){.body = body, .body_len = sizeof body, .tags = "[]"}, &j, &repeated),
               STORE_OK);
@@ -405,8 +405,8 @@ static void *race(void *arg)
         job j = {0};
         r->problems += store_get(r->s, r->ids[r->count], &j) != STORE_OK || j.status != JOB_RUNNING;
         job_clear(&j);
-        r->problems += store_renew(r->s, r->ids[r->count], r->owner, 30, 50) != STORE_OK;
-        r->problems += store_finish(r->s, r->ids[r->count], r->owner, &PLAIN_SUCCESS) != STORE_OK;
+        r->problems += renew_as(r->s, r->ids[r->count], r->owner, 30, 50) != STORE_OK;
+        r->problems += finish_as(r->s, r->ids[r->count], r->owner, &PLAIN_SUCCESS) != STORE_OK;
         r->count++;
     }
 }

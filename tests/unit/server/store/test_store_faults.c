@@ -132,7 +132,7 @@ static store_status step_run(store *s, told *t)
     store_status status = claim_id(s, "me", id);
     if (status != STORE_OK)
         return status == STORE_NOT_FOUND ? STORE_OK : status;
-    status = store_finish(s, id, "me", &outcome);
+    status = finish_as(s, id, "me", &outcome);
     if (status == STORE_OK)
         status = t->count % 2 ? store_get(s, id, &j) : find_in_list(s, id, &j);
     int i = find_told(t, id);

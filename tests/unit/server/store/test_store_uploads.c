@@ -341,7 +341,7 @@ TEST(a_job_that_ran_once_has_no_queue_limit)
         return;
     submit_with(p.s, (store_request){.queue_limit_s = 1000}, id);
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
-    CHECK_INT(store_release(p.s, claimed, "me"), STORE_OK);
+    CHECK_INT(release_as(p.s, claimed, "me"), STORE_OK);
     submit_with(p.s, (store_request){.queue_limit_s = 1000}, other);
     change_file(p.path, "UPDATE job SET queue_until = 1 WHERE queue_until > 0"); /* long after */
     CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
@@ -378,7 +378,7 @@ static void end_jobs(store *s, int n, const char *webhook)
     for (int i = 0; i < n; i++) {
         submit_with(s, (store_request){.webhook = webhook}, id);
         CHECK_INT(claim_id(s, "me", id), STORE_OK);
-        CHECK_INT(store_finish(s, id, "me", &PLAIN_SUCCESS), STORE_OK);
+        CHECK_INT(finish_as(s, id, "me", &PLAIN_SUCCESS), STORE_OK);
     }
 }
 
