@@ -209,10 +209,8 @@ bool jobs_store(api *context, http_request *rq, const store_request *request, jo
     if (status != STORE_OK)
         return false;
     memcpy(rq->job_id, out->id, sizeof rq->job_id);
-    if (!repeated) {
+    if (!repeated)
         metrics_add(context->metrics, METRIC_SUBMITTED, 1);
-        work_wake(context->work);
-    }
     return true;
 }
 

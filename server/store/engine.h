@@ -71,7 +71,7 @@ struct store {
 void store_base_begin(store *s, const store_engine *engine);
 void store_base_end(store *s);
 void store_set_message(store *s, const char *cause);
-void store_tell(const store *s, const char *id);
+void store_tell(const store *s, const char *id, bool waits);
 double store_now(void);   /* Unix seconds */
 double store_clock(void); /* seconds, CLOCK_MONOTONIC */
 

@@ -78,10 +78,10 @@ void store_listen(store *s, store_listener *changed, void *ctx)
     s->changed_ctx = ctx;
 }
 
-void store_tell(const store *s, const char *id)
+void store_tell(const store *s, const char *id, bool waits)
 {
     if (s->changed)
-        s->changed(s->changed_ctx, id);
+        s->changed(s->changed_ctx, id, waits);
 }
 
 void store_set_message(store *s, const char *cause)

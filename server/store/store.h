@@ -69,10 +69,13 @@ void store_message(store *s, char *buffer, size_t size);
 /* What a program without privileges may still write to the store's disk; -1: not known. */
 int64_t store_free_bytes(store *s);
 
-/* From now on changed(ctx, id) is called after every change of a job that anybody but its owner makes (submitted,
- * dismissed, expired, deleted) was committed, without a lock; what owners do (claim, finish, release) they tell
- * themselves. NULL: nobody is told. Before other threads use the store, and after they did. */
-typedef void store_listener(void *ctx, const char *id);
+/* ---- notification: who waits learns of changes. From now on changed(ctx, id, waits) is called after every change of a
+ * job was committed that anybody but its owner made (submitted, dismissed, expired, deleted), without a lock, by the
+ * thread that made it or by one of the engine's. What owners do (claim, finish, release) they tell themselves; an
+ * engine of several processes tells what owners in the others do. waits: the job now waits to be claimed. id NULL:
+ * changes may have been missed, everybody is to look again. NULL: nobody is told. Before other threads use the store,
+ * and after they did. */
+typedef void store_listener(void *ctx, const char *id, bool waits);
 void store_listen(store *s, store_listener *changed, void *ctx);
 
 /* What is submitted. */

@@ -44,12 +44,13 @@ struct work {
     pthread_cond_t wake;  /* submitted or stopping */
     pthread_cond_t idle;  /* alive became 0, the drain was shortened, or stopped */
     pthread_cond_t tick;  /* finished */
-    uint64_t submitted;   /* times work_wake was called: a worker that saw no job waits for another number */
-    int alive;            /* worker threads that have not ended */
-    bool stopping;        /* no more claims */
-    bool finished;        /* the keeper shall stop */
-    bool stopped;         /* every thread was joined */
-    double drain_until;   /* work_clock() */
+    uint64_t
+        submitted; /* times that the store told of a job that waits: a worker that saw none waits for another number */
+    int alive;     /* worker threads that have not ended */
+    bool stopping; /* no more claims */
+    bool finished; /* the keeper shall stop */
+    bool stopped;  /* every thread was joined */
+    double drain_until; /* work_clock() */
 
     atomic_bool interrupt; /* the time to drain is over */
     int n_started;         /* workers to join; set before any other thread may call */

@@ -244,9 +244,23 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     return w;
 }
 
-static void tell_change(void *ctx, const char *id)
+/* What the store tells (store_listener): a job that waits is for one of the workers. */
+static void tell_change(void *ctx, const char *id, bool waits)
 {
-    feed_changed(ctx, id);
+    work *w = ctx;
+    if (id)
+        feed_changed(w->feed, id);
+    else
+        feed_wake_all(w->feed);
+    if (!waits && id)
+        return;
+    pthread_mutex_lock(&w->lock);
+    w->submitted++;
+    if (id)
+        pthread_cond_signal(&w->wake);
+    else
+        pthread_cond_broadcast(&w->wake);
+    pthread_mutex_unlock(&w->lock);
 }
 
 work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size)
@@ -262,7 +276,7 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         work_free(w);
         return NULL;
     }
-    store_listen(s, tell_change, w->feed);
+    store_listen(s, tell_change, w);
     if (!start_threads(w)) {
         snprintf(message, size, "cannot start %d worker threads", w->options.workers);
         work_free(w);
@@ -347,14 +361,6 @@ void work_free(work *w)
 }
 
 /* ---- what the rest of the server asks */
-
-void work_wake(work *w)
-{
-    pthread_mutex_lock(&w->lock);
-    w->submitted++;
-    pthread_cond_signal(&w->wake);
-    pthread_mutex_unlock(&w->lock);
-}
 
 /* The worker that runs the job, with its lock held; NULL: none. */
 static worker *find_worker(work *w, const char *id)

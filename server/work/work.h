@@ -46,9 +46,6 @@ typedef struct {
 /* Recovers jobs left by a dead process, then starts the threads. NULL on failure with the reason in message. */
 work *work_start(store *s, const work_options *options, server_log *log, char *message, size_t size);
 
-/* Tells the workers that a job was submitted. */
-void work_wake(work *w);
-
 /* Asks a running job to stop; false if no worker here runs it. The job ends as dismissed with its best answer so far,
  * unless it ends of itself first. */
 bool work_cancel(work *w, const char *id);

@@ -164,7 +164,7 @@ store_status sqlite_submit(store *base, const store_request *request, job *out, 
     store_status status = sqlite_write(sqlite_of(base), submit, &a);
     *repeated = a.repeated;
     if (status == STORE_OK && !a.repeated)
-        store_tell(base, out->id);
+        store_tell(base, out->id, true);
     return status;
 }
 
@@ -439,7 +439,7 @@ store_status sqlite_dismiss(store *base, const char *id, job_status *was)
     store_status status = sqlite_write(s, dismiss, &a);
     *was = a.was;
     if (status == STORE_OK && a.was != JOB_RUNNING)
-        store_tell(base, id);
+        store_tell(base, id, false);
     return status;
 }
 

@@ -64,7 +64,7 @@ store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
     store_status status = any_expired(s) ? sqlite_write(s, expire, &a) : STORE_OK;
     *count = status == STORE_OK ? a.count : 0;
     for (size_t i = 0; status == STORE_OK && i < a.n_ids; i++)
-        store_tell(base, a.ids[i]);
+        store_tell(base, a.ids[i], false);
     free(a.ids);
     return status;
 }
@@ -142,6 +142,6 @@ store_status sqlite_retain(store *base, const store_retention *limits, int64_t *
         status = sqlite_write(s, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;
     for (int i = 0; status == STORE_OK && i < a.n_ids; i++)
-        store_tell(base, a.ids[i]);
+        store_tell(base, a.ids[i], false);
     return status;
 }

@@ -90,8 +90,6 @@ static int count_in_log(service *v, const char *event)
 static void submit(service *v, const char *body, char id[33])
 {
     CHECK_INT(submit_text(v->place.s, body, "[]", NULL, id), STORE_OK);
-    if (v->w)
-        work_wake(v->w);
 }
 
 static void check_part(const char *text, const char *part)
@@ -456,7 +454,25 @@ TEST(a_result_without_room_is_given_up)
     CHECK_INT(count_in_log(&v, "result_given_up"), 1);
     CHECK_INT(sqlite_limit_bytes(v.place.s, 0), STORE_OK);
     submit(&v, SMALL, id);
-    work_wake(v.w);
+    CHECK(work_wait(v.w, id, 20.0));
+    CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
+    service_end(&v);
+}
+
+/* As with a store that other processes use too, and whose connection was lost for a while. */
+TEST(what_may_have_been_missed_is_looked_for)
+{
+    service v;
+    char id[33];
+    if (!service_begin(&v) || !service_start(&v, &TWO_WORKERS))
+        return;
+    for (int i = 0; i < 20; i++) /* both workers have looked and wait by now */
+        short_sleep();
+    store_listener *told = v.place.s->changed;
+    v.place.s->changed = NULL;
+    submit(&v, SMALL, id);
+    v.place.s->changed = told;
+    store_tell(v.place.s, NULL, false);
     CHECK(work_wait(v.w, id, 20.0));
     CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
     service_end(&v);
