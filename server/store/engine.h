@@ -4,14 +4,12 @@
  *   - Each operation is one transaction, all of it or nothing, and may be called from any thread.
  *   - STORE_OK means: durable, but for claim and renew, which recover makes good for. What may still be lost is not
  *     read either: get, list and find_repeat return an end or a job only once it is durable.
- *   - Pointers to outputs are never NULL; they are zeroed before the call, and freed after it where it failed. A claim
- *     gets a lease with its owner, and sets the token.
+ *   - Outputs are never NULL, zeroed before the call, and freed after one that failed. claim sets the lease's token.
  *   - Before STORE_FULL, STORE_LOCKED, STORE_DAMAGED and STORE_ERROR: store_set_message with the cause.
- *   - Who changed a job without owning it is told by store_tell after the commit, without a lock held. */
+ *   - store_tell after the commit of every change that the job's owner did not make, without a lock held. */
 #ifndef SERVER_STORE_ENGINE_H
 #define SERVER_STORE_ENGINE_H
 
-#include "store/store.h"
 #include "store/uploads.h"
 
 #include <pthread.h>

@@ -1,11 +1,14 @@
-/* store_place.h: for tests, a store in a temporary folder of its own, and the file behind it. */
+/* store_place.h: for tests, a store in a temporary folder of its own.
+ *
+ * STORE_TEST(name) { ... } is a TEST that runs once for every engine of the store (engines/engines.h): what it shows is
+ * the contract that they all keep. Its places have the engine that it runs for; those of a plain TEST have the engine
+ * of files. An engine whose stores are no files of a folder gets its addresses in place_address. */
 #ifndef TESTS_STORE_PLACE_H
 #define TESTS_STORE_PLACE_H
 
 #include "harness.h"
 #include "store/engines/engines.h"
 
-#include <sqlite3.h>
 #include <unistd.h>
 
 /* ---- a store in a folder of its own */
@@ -15,10 +18,38 @@ typedef struct {
     store *s;
 } place;
 
+static const store_engine *place_engine; /* NULL: the engine of files */
+
+/* Of a store of the engine that lies at p->path, or has nothing to do with it. */
+static inline void place_address(const place *p, char out[160])
+{
+    snprintf(out, 160, "%s%s", place_engine ? place_engine->scheme : "", p->path);
+}
+
+static inline void run_on_each_engine(void (*run)(void))
+{
+    for (size_t i = 0; STORE_ENGINES[i]; i++) {
+        place_engine = STORE_ENGINES[i];
+        if (place_engine->scheme[0])
+            printf("# with %s\n", place_engine->scheme);
+        run();
+    }
+    place_engine = NULL;
+}
+
+#define STORE_TEST(id)                                                                                                 \
+    static void on_engine_##id(void);                                                                                  \
+    TEST(id)                                                                                                           \
+    {                                                                                                                  \
+        run_on_each_engine(on_engine_##id);                                                                            \
+    }                                                                                                                  \
+    static void on_engine_##id(void)
+
 static inline bool place_open(place *p)
 {
-    char message[400] = "";
-    p->s = store_open(p->path, message, sizeof message);
+    char message[400] = "", address[160];
+    place_address(p, address);
+    p->s = store_open(address, message, sizeof message);
     CHECK_MSG(p->s, "%s", message);
     return p->s != NULL;
 }
@@ -121,28 +152,46 @@ static inline job_status status_of(store *s, const char *id)
 static const store_outcome PLAIN_SUCCESS
     __attribute__((unused)) = {.status = JOB_SUCCESSFUL, .whole.summary = "{\"outcome\": \"converged\"}"};
 
-static inline int64_t rows_in(const char *path, const char *table)
+/* Finishes a new job with n cases named "c0", "c1", ...: reactions {i, i + 1}, a history of one row. */
+static inline void finish_cases(place *p, char id[33], size_t n)
 {
-    char sql[256];
-    sqlite3 *db = NULL;
-    sqlite3_stmt *stmt = NULL;
-    int64_t count = -1;
-    snprintf(sql, sizeof sql, "SELECT count(*) FROM %s", table);
-    if (sqlite3_open_v2(path, &db, SQLITE_OPEN_READONLY, NULL) == SQLITE_OK &&
-        sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW)
-        count = sqlite3_column_int64(stmt, 0);
-    sqlite3_finalize(stmt);
-    sqlite3_close(db);
-    return count;
+    char other[33], names[4][24];
+    double r[4][2], rows[4][12], nodes[3] = {7, 8, 9};
+    store_vector reactions[4], shared = {"nodes", 3, nodes};
+    store_answer cases[4];
+    CHECK(n <= 4);
+    for (size_t i = 0; i < n; i++) {
+        snprintf(names[i], sizeof names[i], "c%zu", i);
+        r[i][0] = (double)i;
+        r[i][1] = (double)i + 1;
+        for (int j = 0; j < 12; j++)
+            rows[i][j] = 100.0 * (double)i + j;
+        reactions[i] = (store_vector){"reactions", 2, r[i]};
+        cases[i] = (store_answer){names[i], "{\"outcome\": \"converged\"}", &reactions[i], 1, rows[i], 1, 12};
+    }
+    store_outcome outcome = {.status = JOB_SUCCESSFUL,
+                             .whole = {.summary = "{\"all\": true}", .vectors = &shared, .n_vectors = 1},
+                             .cases = cases,
+                             .n_cases = n};
+    CHECK_INT(submit_text(p->s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(claim_id(p->s, "me", other), STORE_OK);
+    CHECK_INT(finish_as(p->s, id, "me", &outcome), STORE_OK);
 }
 
-static inline void change_file(const char *path, const char *sql)
+static inline void check_counts(store *s, int64_t accepted, int64_t running, int64_t successful, int64_t failed,
+                                int64_t dismissed)
 {
-    sqlite3 *db = NULL;
-    CHECK_INT(sqlite3_open(path, &db), SQLITE_OK);
-    sqlite3_busy_timeout(db, 10000); /* a worker may be writing */
-    CHECK_INT(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
-    sqlite3_close(db);
+    const int64_t want[5] = {accepted, running, successful, failed, dismissed};
+    int64_t have[5];
+    store_findings found;
+    CHECK_INT(store_counts(s, have), STORE_OK);
+    for (int i = 0; i < 5; i++)
+        CHECK_MSG(have[i] == want[i], "%s: %lld, want %lld", job_status_name((job_status)i), (long long)have[i],
+                  (long long)want[i]);
+    CHECK_INT(store_check(s, &found), STORE_OK);
+    CHECK_STR(found.findings, "");
+    CHECK_INT(found.jobs, accepted + running + successful + failed + dismissed);
+    free(found.findings);
 }
 
 #endif

@@ -12,7 +12,7 @@ TEST(status_names)
     CHECK(!job_status_parse(&status, "done") && status == JOB_SUCCESSFUL);
 }
 
-TEST(submit_claim_finish)
+STORE_TEST(submit_claim_finish)
 {
     place p;
     job j = {0};
@@ -49,7 +49,7 @@ TEST(submit_claim_finish)
     place_end(&p);
 }
 
-TEST(only_the_owner_of_a_running_job_may_change_it)
+STORE_TEST(only_the_owner_of_a_running_job_may_change_it)
 {
     place p;
     char id[33], other[33];
@@ -82,7 +82,7 @@ TEST(only_the_owner_of_a_running_job_may_change_it)
 }
 
 /* The same owner claims the job a second time: what it does with the first lease comes too late. */
-TEST(an_earlier_lease_is_fenced_off)
+STORE_TEST(an_earlier_lease_is_fenced_off)
 {
     place p;
     char id[33];
@@ -114,7 +114,7 @@ TEST(an_earlier_lease_is_fenced_off)
     place_end(&p);
 }
 
-TEST(release_does_not_count_the_attempt)
+STORE_TEST(release_does_not_count_the_attempt)
 {
     place p;
     char id[33], again[33];
@@ -132,7 +132,7 @@ TEST(release_does_not_count_the_attempt)
     place_end(&p);
 }
 
-TEST(ids_sort_by_creation_and_go_on_after_a_restart)
+STORE_TEST(ids_sort_by_creation_and_go_on_after_a_restart)
 {
     place p;
     char last[33] = "", id[33];
@@ -154,36 +154,9 @@ TEST(ids_sort_by_creation_and_go_on_after_a_restart)
     place_end(&p);
 }
 
-TEST(ids_ascend_when_the_clock_went_back)
-{
-    place p;
-    char id[33];
-    const char *future = "ffffffff0000fffe0000000000000000"; /* as if written far ahead of this clock */
-    sqlite3 *db = NULL;
-    if (!place_begin(&p))
-        return;
-    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
-    store_close(p.s);
-    CHECK_INT(sqlite3_open(p.path, &db), SQLITE_OK);
-    char sql[160];
-    snprintf(sql, sizeof sql, "DELETE FROM request; UPDATE job SET id = '%s'", future);
-    CHECK_INT(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
-    sqlite3_close(db);
-    if (!place_open(&p))
-        return;
-    char last[33];
-    strcpy(last, future);
-    for (int i = 0; i < 4; i++) { /* the counter runs over */
-        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
-        CHECK_MSG(strcmp(id, last) > 0, "%s after %s", id, last);
-        strcpy(last, id);
-    }
-    place_end(&p);
-}
-
 /* ---- idempotency */
 
-TEST(idempotency_key)
+STORE_TEST(idempotency_key)
 {
     place p;
     job first = {0}, second = {0};
@@ -251,7 +224,7 @@ static void check_vector(store *s, const char *id, const char *name, const doubl
     free(data);
 }
 
-TEST(vectors_come_back_bit_for_bit)
+STORE_TEST(vectors_come_back_bit_for_bit)
 {
     place p;
     char id[33], other[33];
@@ -291,7 +264,7 @@ static void check_history(store *s, const char *id, int64_t after, int64_t want_
     free(rows);
 }
 
-TEST(history_after_an_iteration)
+STORE_TEST(history_after_an_iteration)
 {
     place p;
     char id[33], other[33];
@@ -319,67 +292,9 @@ TEST(history_after_an_iteration)
     free(rows);
 }
 
-TEST(a_damaged_vector_is_an_error)
-{
-    place p;
-    char id[33], other[33], message[256];
-    double x[4] = {1, 2, 3, 4}, *data;
-    int64_t count;
-    store_vector v = {"gaps", 4, x};
-    store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole.vectors = &v, .whole.n_vectors = 1};
-    const char *const damage[] = {"UPDATE vector SET data = x'00'", "UPDATE vector SET data = zeroblob(24)",
-                                  "UPDATE vector SET data = zeroblob(40)", "UPDATE vector SET version = 2",
-                                  "UPDATE vector SET count = -1"};
-    if (!place_begin(&p))
-        return;
-    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
-    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
-    CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
-    for (size_t i = 0; i < sizeof damage / sizeof damage[0]; i++) {
-        sqlite3 *db = NULL;
-        store_close(p.s);
-        CHECK_INT(sqlite3_open(p.path, &db), SQLITE_OK);
-        CHECK_INT(sqlite3_exec(db, damage[i], NULL, NULL, NULL), SQLITE_OK);
-        sqlite3_close(db);
-        if (!place_open(&p))
-            return;
-        CHECK_INT(store_get_vector(p.s, id, 0, "gaps", &data, &count), STORE_DAMAGED);
-        CHECK(!data && count == 0);
-        store_message(p.s, message, sizeof message);
-        CHECK(strstr(message, "damaged") && strstr(message, id));
-    }
-    place_end(&p);
-}
-
 /* ---- dismiss */
 
-TEST(deleting_a_job_deletes_everything_of_it)
-{
-    place p;
-    char id[33], other[33];
-    double x[12] = {0};
-    store_vector v = {"gaps", 12, x};
-    store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole = {NULL, "{}", &v, 1, x, 1, 12}};
-    job_status was;
-    job j = {0};
-    if (!place_begin(&p))
-        return;
-    CHECK_INT(submit_text(p.s, "{}", "[\"t\", \"u\"]", "key", id), STORE_OK);
-    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
-    CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
-    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
-    CHECK_INT(was, JOB_SUCCESSFUL);
-    CHECK_INT(store_get(p.s, id, &j), STORE_NOT_FOUND);
-    CHECK_INT(store_dismiss(p.s, id, &was), STORE_NOT_FOUND);
-    store_close(p.s);
-    p.s = NULL;
-    const char *const tables[] = {"job", "request", "tag", "vector", "history"};
-    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
-        CHECK_MSG(rows_in(p.path, tables[i]) == 0, "%s has rows left", tables[i]);
-    place_end(&p);
-}
-
-TEST(dismiss_by_state)
+STORE_TEST(dismiss_by_state)
 {
     place p;
     char id[33], other[33];
@@ -422,7 +337,7 @@ static size_t list_ids(store *s, store_query q, char ids[][33], bool *more)
     return count;
 }
 
-TEST(list_with_cursor_status_and_tag)
+STORE_TEST(list_with_cursor_status_and_tag)
 {
     place p;
     char id[10][33], got[10][33], claimed[33];
@@ -456,19 +371,5 @@ TEST(list_with_cursor_status_and_tag)
     int64_t counts[5];
     CHECK_INT(store_counts(p.s, counts), STORE_OK);
     CHECK(counts[JOB_ACCEPTED] == 9 && counts[JOB_RUNNING] == 1 && counts[JOB_SUCCESSFUL] == 0);
-    place_end(&p);
-}
-
-TEST(bad_tags_are_an_error_and_leave_nothing)
-{
-    place p;
-    char id[33];
-    int64_t counts[5];
-    if (!place_begin(&p))
-        return;
-    CHECK_INT(submit_text(p.s, "{}", "[\"open", NULL, id), STORE_ERROR);
-    CHECK_INT(store_counts(p.s, counts), STORE_OK);
-    CHECK_INT(counts[JOB_ACCEPTED], 0);
-    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
     place_end(&p);
 }

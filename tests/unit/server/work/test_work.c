@@ -1,5 +1,6 @@
 /* Workers with real problems: how a job ends, cancelling, stopping, taking up what was left. */
 #include "codec/codec.h"
+#include "sqlite_file.h"
 #include "store/sqlite/sqlite.h"
 #include "store_place.h"
 #include "work/work.h"

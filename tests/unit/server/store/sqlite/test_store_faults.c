@@ -1,6 +1,7 @@
 /* The store on a disk that fails: power loss, full disk and errors at every write, damaged files. SOAK=N in the
  * environment runs N times as many. */
 #include "faulty_vfs.h"
+#include "sqlite_file.h"
 #include "store_place.h"
 
 #include <stdatomic.h>

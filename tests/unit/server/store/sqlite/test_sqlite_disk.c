@@ -1,52 +1,12 @@
-/* The store and its file: crashes, restarts, foreign files, a second daemon, a full disk, many threads. */
+/* The database file and its disk: kills, foreign files, a second daemon, a full disk, other programs. */
+#include "sqlite_file.h"
 #include "store/sqlite/sqlite.h"
 #include "store_place.h"
 
-#include <pthread.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-
-/* ---- sizes */
-
-TEST(large_bodies)
-{
-    place p;
-    size_t size = 64u << 20, len;
-    char *body = malloc(size), *back = NULL;
-    job j = {0};
-    bool repeated = false;
-    if (place_begin(&p)) {
-        memset(body, 'x', size);
-        body[size / 2] = '\0'; /* a body is bytes, not a text */
-        CHECK_INT(store_submit(p.s,
-                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
-                               &j, &repeated),
-                  STORE_OK);
-        job_clear(&j);
-        CHECK_INT(store_submit(p.s,
-                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
-                               &j, &repeated),
-                  STORE_OK);
-        CHECK(repeated);
-        job_clear(&j);
-        body[size - 1] = 'y';
-        CHECK_INT(store_submit(p.s,
-                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
-                               &j, &repeated),
-                  STORE_CONFLICT);
-        body[size - 1] = 'x';
-        CHECK_INT(store_claim(p.s, "a", 1, &(store_lease){.token = 0}, &j, &back, &len), STORE_OK);
-        CHECK(len == size && memcmp(back, body, size) == 0 && back[len] == '\0');
-        job_clear(&j);
-        free(back);
-        place_end(&p);
-    }
-    free(body);
-}
-
-/* ---- crashes and restarts */
 
 TEST(a_submitted_job_survives_a_kill)
 {
@@ -81,60 +41,6 @@ TEST(a_submitted_job_survives_a_kill)
     CHECK_INT(store_recover(p.s, 3, "{}", &requeued, &failed), STORE_OK);
     CHECK(requeued == 1 && failed == 0);
     CHECK_INT(status_of(p.s, claimed), JOB_ACCEPTED);
-    place_end(&p);
-}
-
-TEST(recover_ends_a_job_that_was_dismissed_while_it_ran)
-{
-    place p;
-    char ids[3][33], claimed[33];
-    int64_t requeued, failed;
-    job_status was;
-    job j = {0};
-    if (!place_begin(&p))
-        return;
-    for (int i = 0; i < 3; i++) {
-        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, ids[i]), STORE_OK);
-        CHECK_INT(claim_id(p.s, "a", claimed), STORE_OK);
-    }
-    CHECK_INT(store_dismiss(p.s, ids[0], &was), STORE_OK);
-    CHECK_INT(was, JOB_RUNNING);
-    CHECK_INT(store_dismiss(p.s, ids[1], &was), STORE_OK);
-    CHECK_INT(finish_as(p.s, ids[1], "a", &(store_outcome){.status = JOB_SUCCESSFUL}), STORE_OK); /* was sooner */
-    if (!place_reopen(&p))
-        return;
-    CHECK_INT(store_recover(p.s, 1, "{}", &requeued, &failed), STORE_OK); /* before attempts count */
-    CHECK(requeued == 0 && failed == 1);
-    CHECK_INT(store_get(p.s, ids[0], &j), STORE_OK);
-    CHECK(j.status == JOB_DISMISSED && j.finished > 0 && !j.error);
-    job_clear(&j);
-    CHECK_INT(status_of(p.s, ids[1]), JOB_SUCCESSFUL);
-    CHECK_INT(status_of(p.s, ids[2]), JOB_FAILED);
-    place_end(&p);
-}
-
-TEST(recover_fails_a_job_that_used_up_its_attempts)
-{
-    place p;
-    char id[33], again[33];
-    int64_t requeued, failed;
-    job j = {0};
-    if (!place_begin(&p))
-        return;
-    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
-    for (int attempt = 1; attempt <= 3; attempt++) {
-        CHECK_INT(claim_id(p.s, "a", again), STORE_OK);
-        if (!place_reopen(&p))
-            return;
-        CHECK_INT(store_recover(p.s, 3, "{\"code\": \"gave_up\"}", &requeued, &failed), STORE_OK);
-        CHECK_INT(requeued, attempt < 3);
-        CHECK_INT(failed, attempt == 3);
-    }
-    CHECK_INT(store_get(p.s, id, &j), STORE_OK);
-    CHECK(j.status == JOB_FAILED && j.attempts == 3 && j.finished > 0);
-    CHECK_STR(j.error ? j.error : "", "{\"code\": \"gave_up\"}");
-    job_clear(&j);
-    CHECK_INT(store_recover(p.s, 3, "{}", NULL, NULL), STORE_OK);
     place_end(&p);
 }
 
@@ -380,107 +286,4 @@ TEST(journal_is_wal_and_is_cut)
         place_end(&p);
     }
     free(body);
-}
-
-/* ---- threads */
-
-#define RACE_JOBS 200
-
-typedef struct {
-    store *s;
-    const char *owner;
-    char ids[RACE_JOBS][33];
-    int count, problems;
-} racer;
-
-static void *race(void *arg)
-{
-    racer *r = arg;
-    for (;;) {
-        store_status status = claim_id(r->s, r->owner, r->ids[r->count]);
-        if (status != STORE_OK) {
-            r->problems += status != STORE_NOT_FOUND;
-            return NULL;
-        }
-        job j = {0};
-        r->problems += store_get(r->s, r->ids[r->count], &j) != STORE_OK || j.status != JOB_RUNNING;
-        job_clear(&j);
-        r->problems += renew_as(r->s, r->ids[r->count], r->owner, 30, 50) != STORE_OK;
-        r->problems += finish_as(r->s, r->ids[r->count], r->owner, &PLAIN_SUCCESS) != STORE_OK;
-        r->count++;
-    }
-}
-
-static int compare_ids(const void *a, const void *b)
-{
-    return strcmp(a, b);
-}
-
-TEST(each_job_is_claimed_once)
-{
-    static const char *const OWNERS[] = {"a", "b", "c", "d"};
-    static racer racers[4];
-    static char all[RACE_JOBS][33];
-    pthread_t threads[4];
-    place p;
-    int total = 0;
-    if (!place_begin(&p))
-        return;
-    for (int i = 0; i < RACE_JOBS; i++)
-        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, all[i]), STORE_OK);
-    for (int i = 0; i < 4; i++) {
-        racers[i] = (racer){.s = p.s, .owner = OWNERS[i]};
-        CHECK_INT(pthread_create(&threads[i], NULL, race, &racers[i]), 0);
-    }
-    for (int i = 0; i < 4; i++) {
-        pthread_join(threads[i], NULL);
-        CHECK_INT(racers[i].problems, 0);
-        for (int k = 0; k < racers[i].count && total < RACE_JOBS; k++)
-            strcpy(all[total++], racers[i].ids[k]);
-    }
-    CHECK_INT(total, RACE_JOBS);
-    qsort(all, RACE_JOBS, sizeof all[0], compare_ids);
-    for (int i = 1; i < RACE_JOBS; i++)
-        CHECK(strcmp(all[i - 1], all[i]) != 0);
-    int64_t counts[5];
-    CHECK_INT(store_counts(p.s, counts), STORE_OK);
-    CHECK_INT(counts[JOB_SUCCESSFUL], RACE_JOBS);
-    place_end(&p);
-}
-
-typedef struct {
-    store *s;
-    int problems;
-} repeater;
-
-static void *repeat_key(void *arg)
-{
-    repeater *r = arg;
-    char key[16], id[33];
-    for (int i = 0; i < 25; i++) {
-        snprintf(key, sizeof key, "key-%d", i);
-        r->problems += submit_text(r->s, "{}", "[]", key, id) != STORE_OK;
-    }
-    return NULL;
-}
-
-TEST(concurrent_repeats_make_one_job_each)
-{
-    place p;
-    pthread_t threads[6];
-    repeater repeaters[6];
-    int64_t counts[5];
-    if (!place_begin(&p))
-        return;
-    for (int i = 0; i < 6; i++) {
-        repeaters[i] = (repeater){p.s, 0};
-        CHECK_INT(pthread_create(&threads[i], NULL, repeat_key, &repeaters[i]), 0);
-    }
-    for (int i = 0; i < 6; i++) {
-        pthread_join(threads[i], NULL);
-        CHECK_INT(repeaters[i].problems, 0);
-    }
-    CHECK_INT(store_counts(p.s, counts), STORE_OK);
-    CHECK_INT(counts[JOB_ACCEPTED], 25);
-    place_end(&p);
 }

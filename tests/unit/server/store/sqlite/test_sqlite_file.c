@@ -1,51 +1,242 @@
-/* Looking after a database: counts, checks, backups, and a file of format 2. */
+/* The database file: its rows, checks, backups, damages, and files of earlier formats. */
+#include "sqlite_file.h"
 #include "store_place.h"
 
 #include <sys/stat.h>
 
-static void check_counts(store *s, int64_t accepted, int64_t running, int64_t successful, int64_t failed,
-                         int64_t dismissed)
-{
-    const int64_t want[5] = {accepted, running, successful, failed, dismissed};
-    int64_t have[5];
-    store_findings found;
-    CHECK_INT(store_counts(s, have), STORE_OK);
-    for (int i = 0; i < 5; i++)
-        CHECK_MSG(have[i] == want[i], "%s: %lld, want %lld", job_status_name((job_status)i), (long long)have[i],
-                  (long long)want[i]);
-    CHECK_INT(store_check(s, &found), STORE_OK);
-    CHECK_STR(found.findings, "");
-    CHECK_INT(found.jobs, accepted + running + successful + failed + dismissed);
-    free(found.findings);
-}
-
-TEST(counts_follow_every_change)
+TEST(ids_ascend_when_the_clock_went_back)
 {
     place p;
-    char ids[5][33], claimed[33];
-    job_status was;
+    char id[33];
+    const char *future = "ffffffff0000fffe0000000000000000"; /* as if written far ahead of this clock */
+    sqlite3 *db = NULL;
     if (!place_begin(&p))
         return;
-    check_counts(p.s, 0, 0, 0, 0, 0);
-    for (int i = 0; i < 5; i++)
-        CHECK_INT(submit_text(p.s, "{}", "[\"a\"]", NULL, ids[i]), STORE_OK);
-    check_counts(p.s, 5, 0, 0, 0, 0);
-    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
-    CHECK_INT(finish_as(p.s, claimed, "me", &PLAIN_SUCCESS), STORE_OK);
-    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
-    check_counts(p.s, 3, 1, 1, 0, 0);
-    CHECK_INT(release_as(p.s, claimed, "me"), STORE_OK);
-    CHECK_INT(store_dismiss(p.s, ids[4], &was), STORE_OK);
-    check_counts(p.s, 3, 0, 1, 0, 1);
-    CHECK_INT(store_dismiss(p.s, ids[0], &was), STORE_OK); /* ended: deleted */
-    check_counts(p.s, 3, 0, 0, 0, 1);
-    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
-    if (place_reopen(&p)) {
-        CHECK_INT(store_recover(p.s, 1, "{}", NULL, NULL), STORE_OK);
-        check_counts(p.s, 2, 0, 0, 1, 1);
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    store_close(p.s);
+    CHECK_INT(sqlite3_open(p.path, &db), SQLITE_OK);
+    char sql[160];
+    snprintf(sql, sizeof sql, "DELETE FROM request; UPDATE job SET id = '%s'", future);
+    CHECK_INT(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+    sqlite3_close(db);
+    if (!place_open(&p))
+        return;
+    char last[33];
+    strcpy(last, future);
+    for (int i = 0; i < 4; i++) { /* the counter runs over */
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+        CHECK_MSG(strcmp(id, last) > 0, "%s after %s", id, last);
+        strcpy(last, id);
     }
     place_end(&p);
 }
+
+TEST(a_damaged_vector_is_an_error)
+{
+    place p;
+    char id[33], other[33], message[256];
+    double x[4] = {1, 2, 3, 4}, *data;
+    int64_t count;
+    store_vector v = {"gaps", 4, x};
+    store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole.vectors = &v, .whole.n_vectors = 1};
+    const char *const damage[] = {"UPDATE vector SET data = x'00'", "UPDATE vector SET data = zeroblob(24)",
+                                  "UPDATE vector SET data = zeroblob(40)", "UPDATE vector SET version = 2",
+                                  "UPDATE vector SET count = -1"};
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+    CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
+    for (size_t i = 0; i < sizeof damage / sizeof damage[0]; i++) {
+        sqlite3 *db = NULL;
+        store_close(p.s);
+        CHECK_INT(sqlite3_open(p.path, &db), SQLITE_OK);
+        CHECK_INT(sqlite3_exec(db, damage[i], NULL, NULL, NULL), SQLITE_OK);
+        sqlite3_close(db);
+        if (!place_open(&p))
+            return;
+        CHECK_INT(store_get_vector(p.s, id, 0, "gaps", &data, &count), STORE_DAMAGED);
+        CHECK(!data && count == 0);
+        store_message(p.s, message, sizeof message);
+        CHECK(strstr(message, "damaged") && strstr(message, id));
+    }
+    place_end(&p);
+}
+
+TEST(deleting_a_job_deletes_everything_of_it)
+{
+    place p;
+    char id[33], other[33];
+    double x[12] = {0};
+    store_vector v = {"gaps", 12, x};
+    store_outcome outcome = {.status = JOB_SUCCESSFUL, .whole = {NULL, "{}", &v, 1, x, 1, 12}};
+    job_status was;
+    job j = {0};
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[\"t\", \"u\"]", "key", id), STORE_OK);
+    CHECK_INT(claim_id(p.s, "a", other), STORE_OK);
+    CHECK_INT(finish_as(p.s, id, "a", &outcome), STORE_OK);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
+    CHECK_INT(was, JOB_SUCCESSFUL);
+    CHECK_INT(store_get(p.s, id, &j), STORE_NOT_FOUND);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_NOT_FOUND);
+    store_close(p.s);
+    p.s = NULL;
+    const char *const tables[] = {"job", "request", "tag", "vector", "history", "answer", "webhook", "upload_use"};
+    for (size_t i = 0; i < sizeof tables / sizeof tables[0]; i++)
+        CHECK_MSG(rows_in(p.path, tables[i]) == 0, "%s has rows left", tables[i]);
+    place_end(&p);
+}
+
+TEST(bad_tags_are_an_error_and_leave_nothing)
+{
+    place p;
+    char id[33];
+    int64_t counts[5];
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[\"open", NULL, id), STORE_ERROR);
+    CHECK_INT(store_counts(p.s, counts), STORE_OK);
+    CHECK_INT(counts[JOB_ACCEPTED], 0);
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    place_end(&p);
+}
+
+TEST(deleting_a_job_deletes_its_cases)
+{
+    static const char *const TABLES[] = {"job", "request", "answer", "vector", "history"};
+    place p;
+    char id[33];
+    job_status was;
+    if (!place_begin(&p))
+        return;
+    finish_cases(&p, id, 2);
+    CHECK_INT(rows_in(p.path, "answer"), 2);
+    CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
+    for (size_t i = 0; i < sizeof TABLES / sizeof TABLES[0]; i++)
+        CHECK_INT(rows_in(p.path, TABLES[i]), 0);
+    place_end(&p);
+}
+
+/* ---- format 1, as it was written before there were load cases */
+
+static const char *const FORMAT_1 =
+    "CREATE TABLE job(id TEXT PRIMARY KEY NOT NULL,"
+    " status INTEGER NOT NULL CHECK(status BETWEEN 0 AND 4),"
+    " progress INTEGER NOT NULL DEFAULT 0 CHECK(progress BETWEEN 0 AND 100),"
+    " attempts INTEGER NOT NULL DEFAULT 0,"
+    " created REAL NOT NULL, started REAL NOT NULL DEFAULT 0, finished REAL NOT NULL DEFAULT 0,"
+    " owner TEXT, lease REAL NOT NULL DEFAULT 0,"
+    " tags TEXT NOT NULL, summary TEXT, error TEXT, idempotency_key TEXT UNIQUE) STRICT;"
+    "CREATE INDEX job_by_status ON job(status, id);"
+    "CREATE TABLE request(job TEXT PRIMARY KEY NOT NULL REFERENCES job(id) ON DELETE CASCADE, body BLOB NOT NULL)"
+    " STRICT;"
+    "CREATE TABLE tag(tag TEXT NOT NULL, job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
+    " PRIMARY KEY(tag, job)) STRICT, WITHOUT ROWID;"
+    "CREATE INDEX tag_by_job ON tag(job);"
+    "CREATE TABLE vector(job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
+    " name TEXT NOT NULL, part INTEGER NOT NULL, version INTEGER NOT NULL,"
+    " count INTEGER NOT NULL, data BLOB NOT NULL, PRIMARY KEY(job, name, part)) STRICT;"
+    "CREATE TABLE history(job TEXT NOT NULL REFERENCES job(id) ON DELETE CASCADE,"
+    " part INTEGER NOT NULL, version INTEGER NOT NULL,"
+    " columns INTEGER NOT NULL, last REAL NOT NULL, data BLOB NOT NULL, PRIMARY KEY(job, part)) STRICT;"
+    "PRAGMA application_id = 1970954615; PRAGMA user_version = 1;";
+
+/* An ended job with two parts of a vector (0, 2 and 1, -1 as binary64) and a history of one row of three columns; one
+ * that waits. */
+static const char *const FORMAT_1_ROWS =
+    "INSERT INTO job(id, status, progress, attempts, created, started, finished, tags, summary, idempotency_key)"
+    " VALUES('00000000000000000000000000000001', 2, 100, 1, 10.5, 11.5, 12.5, '[\"old\"]', '{\"a\": 1}', 'key');"
+    "INSERT INTO request VALUES('00000000000000000000000000000001', CAST('{\"b\": 2}' AS BLOB));"
+    "INSERT INTO tag VALUES('old', '00000000000000000000000000000001');"
+    "INSERT INTO vector VALUES('00000000000000000000000000000001', 'gaps', 0, 1, 4,"
+    " x'00000000000000000000000000000040');"
+    "INSERT INTO vector VALUES('00000000000000000000000000000001', 'gaps', 1, 1, 4,"
+    " x'000000000000F03F000000000000F0BF');"
+    "INSERT INTO history VALUES('00000000000000000000000000000001', 0, 1, 3, 0.0,"
+    " x'0000000000000000000000000000F03F0000000000000040');"
+    "INSERT INTO job(id, status, created, tags) VALUES('00000000000000000000000000000002', 0, 13.5, '[]');"
+    "INSERT INTO request VALUES('00000000000000000000000000000002', CAST('{\"c\": 3}' AS BLOB));";
+
+/* The place with a file of format 1 instead of a new one; the store is closed. */
+static bool begin_old(place *p, const char *rows)
+{
+    if (!place_begin(p))
+        return false;
+    store_close(p->s);
+    p->s = NULL;
+    unlink(p->path);
+    change_file(p->path, FORMAT_1);
+    change_file(p->path, rows);
+    return true;
+}
+
+static void check_old_job(place *p)
+{
+    static const char ID[] = "00000000000000000000000000000001";
+    job j = {0};
+    double *x = NULL;
+    int64_t n = 0, columns = 0;
+    CHECK_INT(store_get(p->s, ID, &j), STORE_OK);
+    CHECK(j.status == JOB_SUCCESSFUL && j.created == 10.5 && j.finished == 12.5 && !j.refines[0]);
+    CHECK_STR(j.summary, "{\"a\": 1}");
+    CHECK_STR(j.tags, "[\"old\"]");
+    job_clear(&j);
+    CHECK_INT(store_get_vector(p->s, ID, 0, "gaps", &x, &n), STORE_OK);
+    CHECK(n == 4 && x[0] == 0 && x[1] == 2 && x[2] == 1 && x[3] == -1);
+    free(x);
+    CHECK_INT(store_get_history(p->s, ID, 0, -1, &x, &n, &columns), STORE_OK);
+    CHECK(n == 1 && columns == 3 && x[0] == 0 && x[1] == 1 && x[2] == 2);
+    free(x);
+}
+
+TEST(a_file_of_format_1_is_taken_over)
+{
+    place p;
+    char id[33];
+    job j = {0};
+    bool repeated = false;
+    if (!begin_old(&p, FORMAT_1_ROWS) || !place_open(&p))
+        return;
+    check_old_job(&p);
+    CHECK_INT(rows_in(p.path, "job WHERE bytes = 64 AND status = 2"), 1); /* 8 of the body, 4 + 3 numbers */
+    CHECK_INT(rows_in(p.path, "tally WHERE (status = 0 OR status = 2) AND jobs = 1"), 2);
+    CHECK_INT(rows_in(p.path, "upload"), 0);
+    CHECK_INT(rows_in(p.path, "webhook"), 0);
+    store_request again = {.body = "{\"b\": 2}", .body_len = 8, .idempotency_key = "key"};
+    CHECK_INT(store_submit(p.s, &again, &j, &repeated), STORE_OK);
+    CHECK(repeated);
+    CHECK_STR(j.id, "00000000000000000000000000000001");
+    job_clear(&j);
+    CHECK_INT(claim_id(p.s, "me", id), STORE_OK);
+    CHECK_STR(id, "00000000000000000000000000000002");
+    CHECK_INT(finish_as(p.s, id, "me", &PLAIN_SUCCESS), STORE_OK);
+    finish_cases(&p, id, 2);
+    if (place_reopen(&p)) /* now of the present format */
+        check_old_job(&p);
+    place_end(&p);
+}
+
+/* A step that fails (here: a row that the new tables refuse) leaves the file as it was, for the old program. */
+TEST(a_file_that_cannot_be_taken_over_stays_as_it_was)
+{
+    place p;
+    char message[400] = "";
+    if (!begin_old(&p, FORMAT_1_ROWS))
+        return;
+    change_file(p.path, "CREATE TABLE answer(mine TEXT)");
+    p.s = store_open(p.path, message, sizeof message);
+    CHECK(!p.s && strstr(message, "present format"));
+    CHECK_INT(rows_in(p.path, "vector"), 2);
+    CHECK_INT(rows_in(p.path, "vector_1"), -1);
+    change_file(p.path, "DROP TABLE answer");
+    if (place_open(&p))
+        check_old_job(&p);
+    place_end(&p);
+}
+
+/* ---- formats 2 to 4 */
 
 /* What a format added is taken away again: what is left is the format before it, as it was written then. */
 static const char *const TO_FORMAT[] = {

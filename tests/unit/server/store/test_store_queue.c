@@ -1,0 +1,385 @@
+/* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads. */
+#include "store_place.h"
+
+#include <pthread.h>
+#include <time.h>
+
+static void sleep_s(double seconds)
+{
+    struct timespec t = {.tv_sec = (time_t)seconds};
+    t.tv_nsec = (long)(1e9 * (seconds - (double)t.tv_sec));
+    nanosleep(&t, NULL);
+}
+
+static void submit_with(store *s, store_request request, char id[33])
+{
+    job j = {0};
+    bool repeated;
+    request.body = "{}";
+    request.body_len = 2;
+    CHECK_INT(store_submit(s, &request, &j, &repeated), STORE_OK);
+    strcpy(id, j.id);
+    job_clear(&j);
+}
+
+STORE_TEST(counts_follow_every_change)
+{
+    place p;
+    char ids[5][33], claimed[33];
+    job_status was;
+    if (!place_begin(&p))
+        return;
+    check_counts(p.s, 0, 0, 0, 0, 0);
+    for (int i = 0; i < 5; i++)
+        CHECK_INT(submit_text(p.s, "{}", "[\"a\"]", NULL, ids[i]), STORE_OK);
+    check_counts(p.s, 5, 0, 0, 0, 0);
+    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+    CHECK_INT(finish_as(p.s, claimed, "me", &PLAIN_SUCCESS), STORE_OK);
+    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+    check_counts(p.s, 3, 1, 1, 0, 0);
+    CHECK_INT(release_as(p.s, claimed, "me"), STORE_OK);
+    CHECK_INT(store_dismiss(p.s, ids[4], &was), STORE_OK);
+    check_counts(p.s, 3, 0, 1, 0, 1);
+    CHECK_INT(store_dismiss(p.s, ids[0], &was), STORE_OK); /* ended: deleted */
+    check_counts(p.s, 3, 0, 0, 0, 1);
+    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+    if (place_reopen(&p)) {
+        CHECK_INT(store_recover(p.s, 1, "{}", NULL, NULL), STORE_OK);
+        check_counts(p.s, 2, 0, 0, 1, 1);
+    }
+    place_end(&p);
+}
+
+STORE_TEST(priorities_go_before_age)
+{
+    static const int PRIORITIES[] = {0, 10, -10, 10, 3};
+    static const int ORDER[] = {1, 3, 4, 0, 2};
+    place p;
+    char id[5][33], claimed[33];
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 5; i++)
+        submit_with(p.s, (store_request){.priority = PRIORITIES[i]}, id[i]);
+    for (int i = 0; i < 5; i++) {
+        CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+        CHECK_STR(claimed, id[ORDER[i]]);
+    }
+    place_end(&p);
+}
+
+STORE_TEST(a_full_queue)
+{
+    place p;
+    char id[33], claimed[33];
+    job j = {0};
+    bool repeated;
+    if (!place_begin(&p))
+        return;
+    store_configure(p.s, &(store_settings){.max_queue = 2});
+    submit_with(p.s, (store_request){.priority = 0}, id);
+    submit_with(p.s, (store_request){.idempotency_key = "k"}, id);
+    store_request request = {.body = "{}", .body_len = 2};
+    CHECK_INT(store_submit(p.s, &request, &j, &repeated), STORE_BUSY);
+    request.idempotency_key = "k";
+    CHECK_INT(store_submit(p.s, &request, &j, &repeated), STORE_OK);
+    CHECK(repeated);
+    job_clear(&j);
+    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+    submit_with(p.s, (store_request){.priority = 0}, id);
+    place_end(&p);
+}
+
+/* ---- recovery */
+
+STORE_TEST(recover_ends_a_job_that_was_dismissed_while_it_ran)
+{
+    place p;
+    char ids[3][33], claimed[33];
+    int64_t requeued, failed;
+    job_status was;
+    job j = {0};
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 3; i++) {
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, ids[i]), STORE_OK);
+        CHECK_INT(claim_id(p.s, "a", claimed), STORE_OK);
+    }
+    CHECK_INT(store_dismiss(p.s, ids[0], &was), STORE_OK);
+    CHECK_INT(was, JOB_RUNNING);
+    CHECK_INT(store_dismiss(p.s, ids[1], &was), STORE_OK);
+    CHECK_INT(finish_as(p.s, ids[1], "a", &(store_outcome){.status = JOB_SUCCESSFUL}), STORE_OK); /* was sooner */
+    if (!place_reopen(&p))
+        return;
+    CHECK_INT(store_recover(p.s, 1, "{}", &requeued, &failed), STORE_OK); /* before attempts count */
+    CHECK(requeued == 0 && failed == 1);
+    CHECK_INT(store_get(p.s, ids[0], &j), STORE_OK);
+    CHECK(j.status == JOB_DISMISSED && j.finished > 0 && !j.error);
+    job_clear(&j);
+    CHECK_INT(status_of(p.s, ids[1]), JOB_SUCCESSFUL);
+    CHECK_INT(status_of(p.s, ids[2]), JOB_FAILED);
+    place_end(&p);
+}
+
+STORE_TEST(recover_fails_a_job_that_used_up_its_attempts)
+{
+    place p;
+    char id[33], again[33];
+    int64_t requeued, failed;
+    job j = {0};
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    for (int attempt = 1; attempt <= 3; attempt++) {
+        CHECK_INT(claim_id(p.s, "a", again), STORE_OK);
+        if (!place_reopen(&p))
+            return;
+        CHECK_INT(store_recover(p.s, 3, "{\"code\": \"gave_up\"}", &requeued, &failed), STORE_OK);
+        CHECK_INT(requeued, attempt < 3);
+        CHECK_INT(failed, attempt == 3);
+    }
+    CHECK_INT(store_get(p.s, id, &j), STORE_OK);
+    CHECK(j.status == JOB_FAILED && j.attempts == 3 && j.finished > 0);
+    CHECK_STR(j.error ? j.error : "", "{\"code\": \"gave_up\"}");
+    job_clear(&j);
+    CHECK_INT(store_recover(p.s, 3, "{}", NULL, NULL), STORE_OK);
+    place_end(&p);
+}
+
+/* ---- expiry and retention */
+
+STORE_TEST(a_job_that_ran_once_has_no_queue_limit)
+{
+    place p;
+    char id[33], claimed[33], other[33];
+    int64_t count;
+    if (!place_begin(&p))
+        return;
+    submit_with(p.s, (store_request){.queue_limit_s = 0.2}, id);
+    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+    CHECK_INT(release_as(p.s, claimed, "me"), STORE_OK);
+    submit_with(p.s, (store_request){.queue_limit_s = 0.2}, other);
+    sleep_s(0.25);
+    CHECK_INT(claim_id(p.s, "me", claimed), STORE_OK);
+    CHECK_STR(claimed, id);
+    CHECK_INT(claim_id(p.s, "me", claimed), STORE_NOT_FOUND); /* too late, though nobody has said so yet */
+    CHECK_INT(store_expire(p.s, "{\"code\": \"late\"}", &count), STORE_OK);
+    CHECK_INT(count, 1);
+    CHECK_INT(status_of(p.s, other), JOB_FAILED);
+    CHECK_INT(store_expire(p.s, "{}", &count), STORE_OK);
+    CHECK_INT(count, 0);
+    place_end(&p);
+}
+
+static void end_jobs(store *s, int n, const char *webhook)
+{
+    char id[33];
+    for (int i = 0; i < n; i++) {
+        submit_with(s, (store_request){.webhook = webhook}, id);
+        CHECK_INT(claim_id(s, "me", id), STORE_OK);
+        CHECK_INT(finish_as(s, id, "me", &PLAIN_SUCCESS), STORE_OK);
+    }
+}
+
+STORE_TEST(retention_goes_in_small_steps)
+{
+    place p;
+    int64_t count, total = 0;
+    int rounds = 0;
+    if (!place_begin(&p))
+        return;
+    end_jobs(p.s, 50, NULL);
+    do {
+        CHECK_INT(store_retain(p.s, &(store_retention){.keep_jobs = 5}, &count), STORE_OK);
+        CHECK(count <= 20);
+        total += count;
+        rounds++;
+    } while (count > 0 && rounds < 10);
+    CHECK_INT(total, 45);
+    CHECK_INT(rounds, 4);
+    CHECK_INT(store_retain(p.s, &(store_retention){.keep_bytes = 6}, &count), STORE_OK); /* a body has 2 */
+    CHECK_INT(count, 2);
+    CHECK_INT(store_retain(p.s, &(store_retention){.keep_s = 1000}, &count), STORE_OK);
+    CHECK_INT(count, 0);
+    CHECK_INT(store_retain(p.s, &(store_retention){.keep_s = 1e-9}, &count), STORE_OK);
+    CHECK_INT(count, 3);
+    place_end(&p);
+}
+
+STORE_TEST(a_job_stays_until_somebody_was_told)
+{
+    place p;
+    webhook_due due;
+    int64_t count;
+    bool any = true;
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND);
+    end_jobs(p.s, 1, "http://x/");
+    CHECK_INT(store_retain(p.s, &(store_retention){.keep_s = 1e-9}, &count), STORE_OK);
+    CHECK_INT(count, 0);
+    place_reopen(&p);
+    CHECK_INT(store_webhook_next(p.s, &due), STORE_OK);
+    CHECK_STR(due.url, "http://x/");
+    CHECK_INT(due.attempts, 0);
+    free(due.url);
+    CHECK_INT(store_webhook_attempted(p.s, due.job, WEBHOOK_AGAIN, 0.5), STORE_OK);
+    CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND); /* not yet */
+    sleep_s(0.6);
+    CHECK_INT(store_webhook_next(p.s, &due), STORE_OK);
+    CHECK_INT(due.attempts, 1);
+    CHECK_INT(store_webhook_postpone(p.s, "http://y/", 1000), STORE_OK);
+    webhook_due same;
+    CHECK_INT(store_webhook_next(p.s, &same), STORE_OK);
+    free(same.url);
+    CHECK_INT(store_webhook_postpone(p.s, due.url, 1000), STORE_OK);
+    CHECK_INT(store_webhook_next(p.s, &same), STORE_NOT_FOUND);
+    free(due.url);
+    CHECK_INT(store_webhook_attempted(p.s, due.job, WEBHOOK_TOLD, 0), STORE_OK);
+    CHECK_INT(store_webhook_next(p.s, &due), STORE_NOT_FOUND);
+    CHECK_INT(store_retain(p.s, &(store_retention){.keep_s = 1e-9}, &count), STORE_OK);
+    CHECK_INT(count, 1);
+    CHECK_INT(store_webhooks_open(p.s, &any), STORE_OK);
+    CHECK(!any);
+    place_end(&p);
+}
+
+/* ---- sizes */
+
+STORE_TEST(large_bodies)
+{
+    place p;
+    size_t size = 64u << 20, len;
+    char *body = malloc(size), *back = NULL;
+    job j = {0};
+    bool repeated = false;
+    if (place_begin(&p)) {
+        memset(body, 'x', size);
+        body[size / 2] = '\0'; /* a body is bytes, not a text */
+        CHECK_INT(store_submit(p.s,
+                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
+                               &j, &repeated),
+                  STORE_OK);
+        job_clear(&j);
+        CHECK_INT(store_submit(p.s,
+                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
+                               &j, &repeated),
+                  STORE_OK);
+        CHECK(repeated);
+        job_clear(&j);
+        body[size - 1] = 'y';
+        CHECK_INT(store_submit(p.s,
+                               &(store_request){.body = body, .body_len = size, .tags = "[]", .idempotency_key = "k"},
+                               &j, &repeated),
+                  STORE_CONFLICT);
+        body[size - 1] = 'x';
+        CHECK_INT(store_claim(p.s, "a", 1, &(store_lease){.token = 0}, &j, &back, &len), STORE_OK);
+        CHECK(len == size && memcmp(back, body, size) == 0 && back[len] == '\0');
+        job_clear(&j);
+        free(back);
+        place_end(&p);
+    }
+    free(body);
+}
+
+/* ---- threads */
+
+#define RACE_JOBS 200
+
+typedef struct {
+    store *s;
+    const char *owner;
+    char ids[RACE_JOBS][33];
+    int count, problems;
+} racer;
+
+static void *race(void *arg)
+{
+    racer *r = arg;
+    for (;;) {
+        store_status status = claim_id(r->s, r->owner, r->ids[r->count]);
+        if (status != STORE_OK) {
+            r->problems += status != STORE_NOT_FOUND;
+            return NULL;
+        }
+        job j = {0};
+        r->problems += store_get(r->s, r->ids[r->count], &j) != STORE_OK || j.status != JOB_RUNNING;
+        job_clear(&j);
+        r->problems += renew_as(r->s, r->ids[r->count], r->owner, 30, 50) != STORE_OK;
+        r->problems += finish_as(r->s, r->ids[r->count], r->owner, &PLAIN_SUCCESS) != STORE_OK;
+        r->count++;
+    }
+}
+
+static int compare_ids(const void *a, const void *b)
+{
+    return strcmp(a, b);
+}
+
+STORE_TEST(each_job_is_claimed_once)
+{
+    static const char *const OWNERS[] = {"a", "b", "c", "d"};
+    static racer racers[4];
+    static char all[RACE_JOBS][33];
+    pthread_t threads[4];
+    place p;
+    int total = 0;
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < RACE_JOBS; i++)
+        CHECK_INT(submit_text(p.s, "{}", "[]", NULL, all[i]), STORE_OK);
+    for (int i = 0; i < 4; i++) {
+        racers[i] = (racer){.s = p.s, .owner = OWNERS[i]};
+        CHECK_INT(pthread_create(&threads[i], NULL, race, &racers[i]), 0);
+    }
+    for (int i = 0; i < 4; i++) {
+        pthread_join(threads[i], NULL);
+        CHECK_INT(racers[i].problems, 0);
+        for (int k = 0; k < racers[i].count && total < RACE_JOBS; k++)
+            strcpy(all[total++], racers[i].ids[k]);
+    }
+    CHECK_INT(total, RACE_JOBS);
+    qsort(all, RACE_JOBS, sizeof all[0], compare_ids);
+    for (int i = 1; i < RACE_JOBS; i++)
+        CHECK(strcmp(all[i - 1], all[i]) != 0);
+    int64_t counts[5];
+    CHECK_INT(store_counts(p.s, counts), STORE_OK);
+    CHECK_INT(counts[JOB_SUCCESSFUL], RACE_JOBS);
+    place_end(&p);
+}
+
+typedef struct {
+    store *s;
+    int problems;
+} repeater;
+
+static void *repeat_key(void *arg)
+{
+    repeater *r = arg;
+    char key[16], id[33];
+    for (int i = 0; i < 25; i++) {
+        snprintf(key, sizeof key, "key-%d", i);
+        r->problems += submit_text(r->s, "{}", "[]", key, id) != STORE_OK;
+    }
+    return NULL;
+}
+
+STORE_TEST(concurrent_repeats_make_one_job_each)
+{
+    place p;
+    pthread_t threads[6];
+    repeater repeaters[6];
+    int64_t counts[5];
+    if (!place_begin(&p))
+        return;
+    for (int i = 0; i < 6; i++) {
+        repeaters[i] = (repeater){p.s, 0};
+        CHECK_INT(pthread_create(&threads[i], NULL, repeat_key, &repeaters[i]), 0);
+    }
+    for (int i = 0; i < 6; i++) {
+        pthread_join(threads[i], NULL);
+        CHECK_INT(repeaters[i].problems, 0);
+    }
+    CHECK_INT(store_counts(p.s, counts), STORE_OK);
+    CHECK_INT(counts[JOB_ACCEPTED], 25);
+    place_end(&p);
+}
