@@ -10,18 +10,13 @@
 
 #define ROUND_S 0.5
 
-static char *waited_too_long(void)
-{
-    problem_details problem = {.status = 503, .code = "queue_time_limit", .title = "The job waited too long"};
-    snprintf(problem.detail, sizeof problem.detail,
-             "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority.");
-    return codec_encode_problem(&problem);
-}
-
 static void expire(work *w)
 {
     int64_t count = 0;
-    char *error = waited_too_long();
+    problem_details problem = {.status = 503, .code = "queue_time_limit", .title = "The job waited too long"};
+    snprintf(problem.detail, sizeof problem.detail,
+             "It had not begun when its queue_limit_s was over. Submit it again, with more time or a larger priority.");
+    char *error = codec_encode_problem(&problem);
     if (error && store_expire(w->store, error, &count) == STORE_OK && count > 0) {
         log_write(w->log, LOG_INFO, "queue_time_limit", (log_field[]){LOG_I("jobs", count), {0}});
         metrics_job(w->options.metrics, job_status_name(JOB_FAILED), NULL, count);
@@ -29,29 +24,14 @@ static void expire(work *w)
     free(error);
 }
 
-static bool goes_on(work *w)
-{
-    pthread_mutex_lock(&w->lock);
-    bool more = !w->stopping;
-    pthread_mutex_unlock(&w->lock);
-    return more;
-}
-
 static void retain(work *w)
 {
     int64_t total = 0, count = 1;
-    while (count > 0 && goes_on(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
+    while (count > 0 && !work_is_stopping(w) && store_retain(w->store, &w->options.retention, &count) == STORE_OK)
         total += count;
     metrics_add(w->options.metrics, METRIC_DELETED, total);
     if (total > 0)
         log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
-}
-
-static void tidy(work *w)
-{
-    expire(w);
-    retain(w);
-    store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
 }
 
 void *housekeeping_loop(void *arg)
@@ -64,7 +44,9 @@ void *housekeeping_loop(void *arg)
         if (pthread_cond_timedwait(&w->tick, &w->lock, &deadline) != ETIMEDOUT)
             continue;
         pthread_mutex_unlock(&w->lock);
-        tidy(w);
+        expire(w);
+        retain(w);
+        store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */
         pthread_mutex_lock(&w->lock);
     }
     pthread_mutex_unlock(&w->lock);

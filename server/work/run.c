@@ -44,22 +44,16 @@ static bool is_cancelled(void *ctx)
 /* Progress is told so often; what ends a job is told at once. */
 #define TELL_S 0.25
 
-/* By a clock that costs nothing: there may be a million iterations a second. */
-static bool is_time_to_tell(worker *me)
+/* To all who follow this job; to those who follow all jobs only where the percentage is another one. By a clock that
+ * costs nothing: there may be a million iterations a second. */
+static void tell_progress(worker *me)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC_COARSE, &t);
     double now = (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-    bool is_time = now - me->told_at >= TELL_S;
-    me->told_at = is_time ? now : me->told_at;
-    return is_time;
-}
-
-/* To all who follow this job; to those who follow all jobs only where the percentage is another one. */
-static void tell_progress(worker *me)
-{
-    if (!is_time_to_tell(me))
+    if (now - me->told_at < TELL_S)
         return;
+    me->told_at = now;
     pthread_mutex_lock(&me->lock);
     int progress = live_progress(&me->live);
     pthread_mutex_unlock(&me->lock);
@@ -116,13 +110,6 @@ static void fail_from_problem(run *r, const problem_details *problem)
     set_failed(r, codec_encode_problem(problem));
 }
 
-static void fail_from_error(run *r, const uz_error *err)
-{
-    problem_details problem = {0};
-    codec_problem_from_error(&problem, err, r->request.problem.kind);
-    fail_from_problem(r, &problem);
-}
-
 static void log_store_failure(const run *r, log_level level, const char *event)
 {
     char cause[256];
@@ -159,56 +146,13 @@ static bool any_dismissed(const run *r)
     return false;
 }
 
-/* The live view points into the problem. */
-static void clear_request(run *r)
-{
-    pthread_mutex_lock(&r->me->lock);
-    live_forget_problem(&r->me->live);
-    pthread_mutex_unlock(&r->me->lock);
-    codec_request_clear(&r->request);
-}
-
-/* A store that fails now may work when the result is kept: the run begins at zero, and says so. */
-static void load_starts(run *r)
-{
-    store_status status = starts_load(&r->starts, r->me->w->store, &r->request);
-    if (status != STORE_OK)
-        log_store_failure(r, LOG_WARN, "start_not_read");
-}
-
-/* ---- the result as the store keeps it */
-
-static void take_results(run *r)
-{
-    r->outcome.status = any_dismissed(r) ? JOB_DISMISSED : JOB_SUCCESSFUL;
-    if (!answers_build(&r->answers, &r->outcome, r->results, &r->request, &r->starts, r->queue_s, r->parse_s))
-        set_failed(r, NULL);
-}
-
 /* ---- solve */
-
-/* The solver was stopped before it ended of itself: by whom decides what becomes of the job. */
-static run_end why_stopped(const run *r)
-{
-    if (atomic_load(&r->me->lost))
-        return END_DROP;
-    return atomic_load(&r->me->cancel) ? END_FINISH : END_RELEASE;
-}
 
 /* What the library can't know: who may do something about it, and how. */
 static void add_remedy(uz_error *err, const char *remedy)
 {
     size_t used = strlen(err->message);
     snprintf(err->message + used, sizeof err->message - used, "%s", remedy);
-}
-
-/* A free body may have an answer, and one that this service itself found. */
-static void explain_unverified(uz_error *err, const uz_problem *problem)
-{
-    bool touches = problem->kind == UZ_PROBLEM_SCENE ? problem->scene.n_contacts > 0 : problem->qp.N.rows > 0;
-    if (touches && (err->status == UZ_ERR_FREE_BODY || err->status == UZ_ERR_NOT_SPD))
-        add_remedy(err, ". An answer is verified only where the supports alone hold the body; one that the obstacle "
-                        "holds can be solved here: its summary has a certificate");
 }
 
 static uz_status verify(run *r, const uz_hooks *hooks, uz_error *err)
@@ -224,21 +168,24 @@ static uz_status verify(run *r, const uz_hooks *hooks, uz_error *err)
         strcpy(err->where, "/answer/displacements");
     else if (strcmp(err->where, "r") == 0)
         strcpy(err->where, "/answer/reactions");
-    explain_unverified(err, &r->request.problem);
+    /* A free body may have an answer, and one that this service itself found. */
+    const uz_problem *problem = &r->request.problem;
+    bool touches = problem->kind == UZ_PROBLEM_SCENE ? problem->scene.n_contacts > 0 : problem->qp.N.rows > 0;
+    if (touches && (err->status == UZ_ERR_FREE_BODY || err->status == UZ_ERR_NOT_SPD))
+        add_remedy(err, ". An answer is verified only where the supports alone hold the body; one that the obstacle "
+                        "holds can be solved here: its summary has a certificate");
     return status;
 }
 
-static uz_status solve_or_verify(run *r, uz_error *err)
+static uz_status solve_cases(run *r, const uz_hooks *hooks, uz_error *err)
 {
     const uz_problem *problem = &r->request.problem;
-    uz_hooks hooks = {
-        .ctx = r->me, .cancelled = is_cancelled, .progress = note_progress, .begins = note_case, .grid = note_grid};
-    if (r->request.answer.u)
-        return verify(r, &hooks, err);
-    load_starts(r);
+    /* A store that fails now may work when the result is kept: the run begins at zero, and says so. */
+    if (starts_load(&r->starts, r->me->w->store, &r->request) != STORE_OK)
+        log_store_failure(r, LOG_WARN, "start_not_read");
     r->n = problem->n_cases > 0 ? problem->n_cases : 1;
     uz_status status = uz_solve_cases(&r->results, problem, &r->request.settings,
-                                      (const uz_state *const *)r->starts.states, r->me->w->cache, &hooks, err);
+                                      (const uz_state *const *)r->starts.states, r->me->w->cache, hooks, err);
     if (strstr(err->where, "start")) /* the library's name for what the request calls warm_start */
         strcpy(err->where, "/solver/warm_start");
     return status;
@@ -246,52 +193,46 @@ static uz_status solve_or_verify(run *r, uz_error *err)
 
 static run_end solve(run *r)
 {
+    worker *me = r->me;
     uz_error err = {0};
-    double most = r->me->w->options.max_solve_s;
+    const uz_hooks hooks = {
+        .ctx = me, .cancelled = is_cancelled, .progress = note_progress, .begins = note_case, .grid = note_grid};
+    double most = me->w->options.max_solve_s;
     if (most > 0.0 && r->request.settings.time_limit_s > most)
         r->request.settings.time_limit_s = most;
-    r->request.settings.memory_limit = r->me->w->options.solve_bytes;
-    uz_status status = solve_or_verify(r, &err);
+    r->request.settings.memory_limit = me->w->options.solve_bytes;
+    uz_status status = r->request.answer.u ? verify(r, &hooks, &err) : solve_cases(r, &hooks, &err);
     if (status == UZ_ERR_LIMIT)
         add_remedy(&err, " (the limit is the daemon's option --memory)");
     bool was_stopped = status == UZ_ERR_CANCELLED || (status == UZ_OK && any_dismissed(r));
-    run_end end = was_stopped ? why_stopped(r) : END_FINISH;
-    if (end != END_FINISH)
-        return end;
-    if (status == UZ_OK)
-        take_results(r);
-    else if (status == UZ_ERR_CANCELLED)
+    /* By whom decides what becomes of the job. */
+    if (was_stopped && atomic_load(&me->lost))
+        return END_DROP;
+    if (was_stopped && !atomic_load(&me->cancel))
+        return END_RELEASE;
+    if (status == UZ_OK) {
+        r->outcome.status = any_dismissed(r) ? JOB_DISMISSED : JOB_SUCCESSFUL;
+        if (!answers_build(&r->answers, &r->outcome, r->results, &r->request, &r->starts, r->queue_s, r->parse_s))
+            set_failed(r, NULL);
+    } else if (status == UZ_ERR_CANCELLED) {
         r->outcome = (store_outcome){.status = JOB_DISMISSED};
-    else
-        fail_from_error(r, &err);
+    } else {
+        problem_details problem = {0};
+        codec_problem_from_error(&problem, &err, r->request.problem.kind);
+        fail_from_problem(r, &problem);
+    }
     return END_FINISH;
 }
 
 /* ---- store */
-
-/* Waits longer each time, 0.05 s to 3.2 s, but not at all once the service must end. */
-static void wait_before_retry(const run *r, int attempt)
-{
-    double seconds = 0.05 * (double)(1 << (2 * (attempt < 3 ? attempt : 3)));
-    for (double waited = 0.0; waited < seconds && !atomic_load(&r->me->w->interrupt); waited += 0.05)
-        nanosleep(&(struct timespec){.tv_nsec = 50000000}, NULL);
-}
 
 static bool is_settled(store_status status)
 {
     return status == STORE_OK || status == STORE_CONFLICT || status == STORE_NOT_FOUND;
 }
 
-/* Room may come back, and so may a file that another program holds: that is worth a while, unless nobody wants the
- * result any more. */
-static bool is_hopeful(const run *r, store_status status, double spent, int attempts)
-{
-    bool may_pass = status == STORE_FULL || status == STORE_LOCKED;
-    return attempts < FINISH_ATTEMPTS ||
-           (may_pass && spent < r->me->w->options.room_wait_s && !atomic_load(&r->me->cancel));
-}
-
-/* Tries to store the outcome for as long as there is hope, or until the service must end. */
+/* Tries to store the outcome for as long as there is hope, or until the service must end. Room may come back, and so
+ * may a file that another program holds: that is worth a while, unless nobody wants the result any more. */
 static store_status try_to_store(const run *r, bool for_ever)
 {
     work *w = r->me->w;
@@ -302,9 +243,14 @@ static store_status try_to_store(const run *r, bool for_ever)
             return status;
         if (attempt < FINISH_ATTEMPTS)
             log_store_failure(r, LOG_WARN, "store_failed");
-        if (atomic_load(&w->interrupt) || !(for_ever || is_hopeful(r, status, work_clock() - begun, attempt + 1)))
+        bool may_pass = (status == STORE_FULL || status == STORE_LOCKED) && !atomic_load(&r->me->cancel) &&
+                        work_clock() - begun < w->options.room_wait_s;
+        if (atomic_load(&w->interrupt) || !(for_ever || may_pass || attempt + 1 < FINISH_ATTEMPTS))
             return status;
-        wait_before_retry(r, attempt);
+        /* Longer each time, 0.05 s to 3.2 s, but not at all once the service must end. */
+        double seconds = 0.05 * (double)(1 << (2 * (attempt < 3 ? attempt : 3)));
+        for (double waited = 0.0; waited < seconds && !atomic_load(&w->interrupt); waited += 0.05)
+            nanosleep(&(struct timespec){.tv_nsec = 50000000}, NULL);
     }
 }
 
@@ -353,10 +299,14 @@ static int64_t count_iterations(const run *r)
 }
 
 /* Phases and cache: of the first case, which paid for the body; iterating and certifying of all. */
-static void count_results(const run *r)
+static void count_job(const run *r, const char *outcome)
 {
     metrics *m = r->me->w->options.metrics;
     double iterate = 0.0, certify = 0.0;
+    metrics_job(m, job_status_name(r->outcome.status), outcome, 1);
+    metrics_seconds(m, METRIC_QUEUE, r->queue_s);
+    metrics_seconds(m, METRIC_PARSE, r->parse_s);
+    metrics_seconds(m, METRIC_TOTAL, work_clock() - r->began + r->queue_s);
     if (!r->results || !r->results[0])
         return;
     const uz_summary *first = &r->results[0]->summary;
@@ -372,16 +322,6 @@ static void count_results(const run *r)
     metrics_seconds(m, METRIC_CONDENSE, first->timings.condense);
     metrics_seconds(m, METRIC_ITERATE, iterate);
     metrics_seconds(m, METRIC_CERTIFY, certify);
-}
-
-static void count_job(const run *r, const char *outcome)
-{
-    metrics *m = r->me->w->options.metrics;
-    metrics_job(m, job_status_name(r->outcome.status), outcome, 1);
-    metrics_seconds(m, METRIC_QUEUE, r->queue_s);
-    metrics_seconds(m, METRIC_PARSE, r->parse_s);
-    metrics_seconds(m, METRIC_TOTAL, work_clock() - r->began + r->queue_s);
-    count_results(r);
 }
 
 static void store_end(run *r, run_end end)
@@ -425,7 +365,10 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
     if (decode_body(&r, body, body_len))
         end = solve(&r);
     store_end(&r, end);
-    clear_request(&r);
+    pthread_mutex_lock(&me->lock);
+    live_forget_problem(&me->live); /* the live view points into the problem */
+    pthread_mutex_unlock(&me->lock);
+    codec_request_clear(&r.request);
     uz_results_free(r.results, r.n);
     starts_clear(&r.starts);
     answers_clear(&r.answers);

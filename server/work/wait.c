@@ -48,7 +48,7 @@ static bool has_ended(work *w, const char *id)
     return ended;
 }
 
-static bool is_stopping(work *w)
+bool work_is_stopping(work *w)
 {
     pthread_mutex_lock(&w->lock);
     bool stopping = w->stopping;
@@ -56,18 +56,14 @@ static bool is_stopping(work *w)
     return stopping;
 }
 
-static bool has_left(int fd)
-{
-    struct pollfd p = {.fd = fd, .events = POLLRDHUP};
-    return poll(&p, 1, 0) > 0;
-}
-
 bool work_wait_for(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more)
 {
+    struct pollfd client = {.fd = fd, .events = POLLRDHUP}; /* poll passes over a negative one */
     double until = work_clock() + seconds, left = seconds;
     listener *l = feed_listen(w->feed, id); /* before the first look, so that no end is missed */
     bool ended = has_ended(w, id);
-    while (l && !ended && left > 0.0 && !is_stopping(w) && !has_left(fd) && !(no_more && atomic_load(no_more))) {
+    while (l && !ended && left > 0.0 && !work_is_stopping(w) && poll(&client, 1, 0) <= 0 &&
+           !(no_more && atomic_load(no_more))) {
         feed_wait(l, fd, left < LOOK_AGAIN_S ? left : LOOK_AGAIN_S);
         ended = has_ended(w, id);
         left = until - work_clock();

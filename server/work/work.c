@@ -42,8 +42,8 @@ static store_status claim(worker *me, job *claimed, char **body, size_t *body_le
     return status;
 }
 
-/* Waits until something was submitted since `seen`; false: stop. After a failure of the store it tries again anyway. */
-static bool wait_for_work(work *w, uint64_t seen, bool store_failed)
+/* Waits until something was submitted since `seen`; after a failure of the store it tries again anyway. */
+static void wait_for_work(work *w, uint64_t seen, bool store_failed)
 {
     struct timespec deadline;
     work_deadline(&deadline, CLAIM_RETRY_S);
@@ -54,25 +54,7 @@ static bool wait_for_work(work *w, uint64_t seen, bool store_failed)
         else if (pthread_cond_timedwait(&w->wake, &w->lock, &deadline) == ETIMEDOUT)
             break;
     }
-    bool go_on = !w->stopping;
     pthread_mutex_unlock(&w->lock);
-    return go_on;
-}
-
-static uint64_t count_submitted(work *w, bool *stopping)
-{
-    pthread_mutex_lock(&w->lock);
-    uint64_t seen = w->submitted;
-    *stopping = w->stopping;
-    pthread_mutex_unlock(&w->lock);
-    return seen;
-}
-
-static void log_failed_claim(work *w)
-{
-    char cause[256];
-    store_message(w->store, cause, sizeof cause);
-    log_write(w->log, LOG_ERROR, "claim_failed", (log_field[]){LOG_S("cause", cause), {0}});
 }
 
 static void *work_loop(void *arg)
@@ -80,11 +62,14 @@ static void *work_loop(void *arg)
     worker *me = arg;
     work *w = me->w;
     uz_thread_init();
-    for (bool go_on = true, stopping; go_on;) {
+    for (;;) {
         job claimed;
-        char *body;
+        char *body, cause[256];
         size_t body_len;
-        uint64_t seen = count_submitted(w, &stopping);
+        pthread_mutex_lock(&w->lock);
+        uint64_t seen = w->submitted;
+        bool stopping = w->stopping;
+        pthread_mutex_unlock(&w->lock);
         if (stopping)
             break;
         store_status status = claim(me, &claimed, &body, &body_len);
@@ -96,9 +81,11 @@ static void *work_loop(void *arg)
             feed_changed(w->feed, id); /* ended, or put back */
             continue;
         }
-        if (status != STORE_NOT_FOUND)
-            log_failed_claim(w);
-        go_on = wait_for_work(w, seen, status != STORE_NOT_FOUND);
+        if (status != STORE_NOT_FOUND) {
+            store_message(w->store, cause, sizeof cause);
+            log_write(w->log, LOG_ERROR, "claim_failed", (log_field[]){LOG_S("cause", cause), {0}});
+        }
+        wait_for_work(w, seen, status != STORE_NOT_FOUND);
     }
     pthread_mutex_lock(&w->lock);
     if (--w->alive == 0)
@@ -147,20 +134,15 @@ static void *keep_loop(void *arg)
 
 /* ---- starting */
 
-static char *too_many_attempts(void)
-{
-    problem_details problem = {.status = 500, .code = "attempts_exhausted", .title = "Every attempt was cut short"};
-    snprintf(problem.detail, sizeof problem.detail,
-             "The service ended while this job ran, as often as is allowed. Most likely the job needs more memory than "
-             "there is; make it smaller or submit it again.");
-    return codec_encode_problem(&problem);
-}
-
 static bool recover(work *w, char *message, size_t size)
 {
     int64_t requeued, failed;
     char cause[256];
-    char *error = too_many_attempts();
+    problem_details problem = {.status = 500, .code = "attempts_exhausted", .title = "Every attempt was cut short"};
+    snprintf(problem.detail, sizeof problem.detail,
+             "The service ended while this job ran, as often as is allowed. Most likely the job needs more memory than "
+             "there is; make it smaller or submit it again.");
+    char *error = codec_encode_problem(&problem);
     store_status status =
         error ? store_recover(w->store, w->options.max_attempts, error, &requeued, &failed) : STORE_ERROR;
     free(error);
@@ -176,32 +158,15 @@ static bool recover(work *w, char *message, size_t size)
     return true;
 }
 
-static void name_owners(work *w)
-{
-    char host[65] = "";
-    unsigned random = 0;
-    gethostname(host, sizeof host - 1);
-    if (getrandom(&random, sizeof random, 0) < 0)
-        random = (unsigned)time(NULL);
-    for (int i = 0; i < w->options.workers; i++)
-        snprintf(w->workers[i].owner, sizeof w->workers[i].owner, "%s:%ld:%08x:%d", host, (long)getpid(), random, i);
-}
-
 /* Signals are for the thread that waits for them; those that a fault raises in its own thread stay open. */
-static void block_signals(sigset_t *before)
-{
-    static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};
-    sigset_t set;
-    sigfillset(&set);
-    for (size_t i = 0; i < sizeof FAULTS / sizeof FAULTS[0]; i++)
-        sigdelset(&set, FAULTS[i]);
-    pthread_sigmask(SIG_SETMASK, &set, before);
-}
-
 static bool start_threads(work *w)
 {
-    sigset_t before;
-    block_signals(&before);
+    static const int FAULTS[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP};
+    sigset_t blocked, before;
+    sigfillset(&blocked);
+    for (size_t i = 0; i < sizeof FAULTS / sizeof FAULTS[0]; i++)
+        sigdelset(&blocked, FAULTS[i]);
+    pthread_sigmask(SIG_SETMASK, &blocked, &before);
     bool ok = pthread_create(&w->keeper, NULL, keep_loop, w) == 0;
     w->keeper_started = ok;
     ok = ok && pthread_create(&w->housekeeper, NULL, housekeeping_loop, w) == 0;
@@ -219,9 +184,14 @@ static bool start_threads(work *w)
 
 static work *make_work(store *s, const work_options *options, server_log *log)
 {
+    char host[65] = "";
+    unsigned random = 0;
     work *w = calloc(1, sizeof *w);
     if (!w)
         return NULL;
+    gethostname(host, sizeof host - 1);
+    if (getrandom(&random, sizeof random, 0) < 0)
+        random = (unsigned)time(NULL);
     w->store = s;
     w->log = log;
     w->options = *options;
@@ -239,6 +209,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     w->workers = calloc((size_t)w->options.workers, sizeof *w->workers);
     for (int i = 0; w->workers && i < w->options.workers; i++) {
         w->workers[i].w = w;
+        snprintf(w->workers[i].owner, sizeof w->workers[i].owner, "%s:%ld:%08x:%d", host, (long)getpid(), random, i);
         pthread_mutex_init(&w->workers[i].lock, NULL);
     }
     return w;
@@ -271,7 +242,6 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
         work_free(w);
         return NULL;
     }
-    name_owners(w);
     if (!recover(w, message, size)) {
         work_free(w);
         return NULL;
@@ -287,32 +257,9 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
 
 /* ---- stopping */
 
-/* Waits until every worker has ended or the time to drain is over; another call may bring that time nearer. */
-static void drain(work *w)
-{
-    struct timespec deadline;
-    while (w->alive > 0 && work_clock() < w->drain_until) {
-        work_deadline(&deadline, w->drain_until - work_clock());
-        pthread_cond_timedwait(&w->idle, &w->lock, &deadline);
-    }
-}
-
-static void join_threads(work *w)
-{
-    for (int i = 0; i < w->n_started; i++)
-        pthread_join(w->workers[i].thread, NULL);
-    pthread_mutex_lock(&w->lock);
-    w->finished = true; /* only now: leases are kept until the last job has ended */
-    pthread_cond_broadcast(&w->tick);
-    pthread_mutex_unlock(&w->lock);
-    if (w->keeper_started)
-        pthread_join(w->keeper, NULL);
-    if (w->housekeeper_started)
-        pthread_join(w->housekeeper, NULL);
-}
-
 void work_stop(work *w, double drain_s)
 {
+    struct timespec deadline;
     double until = work_clock() + (drain_s > 0.0 ? drain_s : 0.0);
     pthread_mutex_lock(&w->lock);
     bool first = !w->stopping;
@@ -323,15 +270,26 @@ void work_stop(work *w, double drain_s)
     pthread_mutex_unlock(&w->lock);
     feed_wake_all(w->feed);
     pthread_mutex_lock(&w->lock);
-    if (first)
-        drain(w);
+    while (first && w->alive > 0 && work_clock() < w->drain_until) { /* another call may bring that time nearer */
+        work_deadline(&deadline, w->drain_until - work_clock());
+        pthread_cond_timedwait(&w->idle, &w->lock, &deadline);
+    }
     while (!first && !w->stopped)
         pthread_cond_wait(&w->idle, &w->lock);
     pthread_mutex_unlock(&w->lock);
     if (!first)
         return;
     atomic_store(&w->interrupt, true);
-    join_threads(w);
+    for (int i = 0; i < w->n_started; i++)
+        pthread_join(w->workers[i].thread, NULL);
+    pthread_mutex_lock(&w->lock);
+    w->finished = true; /* only now: leases are kept until the last job has ended */
+    pthread_cond_broadcast(&w->tick);
+    pthread_mutex_unlock(&w->lock);
+    if (w->keeper_started)
+        pthread_join(w->keeper, NULL);
+    if (w->housekeeper_started)
+        pthread_join(w->housekeeper, NULL);
     pthread_mutex_lock(&w->lock);
     w->stopped = true;
     pthread_cond_broadcast(&w->idle);
@@ -403,14 +361,6 @@ bool work_live(work *w, const char *id, int64_t after, int *progress, double **r
     return ok;
 }
 
-static bool has_case(const uz_problem *problem, const char *name)
-{
-    for (int64_t i = 0; problem && i < problem->n_cases; i++)
-        if (strcmp(problem->cases[i].name, name) == 0)
-            return true;
-    return false;
-}
-
 bool work_live_history(work *w, const char *id, const char *case_name, int64_t after, work_history *out)
 {
     bool ok = true;
@@ -421,7 +371,9 @@ bool work_live_history(work *w, const char *id, const char *case_name, int64_t a
     const live *l = &found->live;
     if (l->problem && l->current < l->problem->n_cases)
         snprintf(out->case_name, sizeof out->case_name, "%s", l->problem->cases[l->current].name);
-    out->is_case = case_name && (!l->problem || has_case(l->problem, case_name)); /* NULL: not read yet */
+    out->is_case = case_name && !l->problem; /* not read yet */
+    for (int64_t i = 0; case_name && l->problem && i < l->problem->n_cases; i++)
+        out->is_case = out->is_case || strcmp(l->problem->cases[i].name, case_name) == 0;
     if (!case_name || strcmp(case_name, out->case_name) == 0)
         ok = live_rows(l, after, &out->rows, &out->count);
     pthread_mutex_unlock(&found->lock);
