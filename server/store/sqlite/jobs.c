@@ -6,11 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool has_ended(job_status status)
-{
-    return status == JOB_SUCCESSFUL || status == JOB_FAILED || status == JOB_DISMISSED;
-}
-
 store_status sqlite_why_unchanged(connection *c, const char *id)
 {
     statement st = statement_begin(c, QUERY_JOB);
@@ -101,14 +96,6 @@ static store_status use_uploads(connection *c, const store_request *r, const cha
     return status;
 }
 
-static store_status insert_webhook(connection *c, const char *id, const char *url)
-{
-    statement st = statement_begin(c, QUERY_INSERT_WEBHOOK);
-    bind_text(&st, 1, id);
-    bind_text(&st, 2, url);
-    return statement_run(&st);
-}
-
 static store_status read_by_id(connection *c, const char *id, job *out)
 {
     store_status status = STORE_NOT_FOUND;
@@ -118,18 +105,6 @@ static store_status read_by_id(connection *c, const char *id, job *out)
         status = sqlite_read_job(&st, out);
     store_status ended = statement_end(&st);
     return ended == STORE_OK ? status : ended;
-}
-
-static store_status check_queue(sqlite_store *s, connection *c)
-{
-    int64_t waiting = 0;
-    if (s->base.settings.max_queue <= 0)
-        return STORE_OK;
-    statement st = statement_begin(c, QUERY_WAITING);
-    if (statement_row(&st))
-        waiting = sqlite3_column_int64(st.stmt, 0);
-    store_status status = statement_end(&st);
-    return status == STORE_OK && waiting >= s->base.settings.max_queue ? STORE_BUSY : status;
 }
 
 static store_status submit(sqlite_store *s, connection *c, void *args)
@@ -145,16 +120,27 @@ static store_status submit(sqlite_store *s, connection *c, void *args)
             return status;
     }
     store_status status = sqlite_check_place(s, c);
-    if (status == STORE_OK)
-        status = check_queue(s, c);
+    if (status == STORE_OK && s->base.settings.max_queue > 0) {
+        int64_t waiting = 0;
+        statement st = statement_begin(c, QUERY_WAITING);
+        if (statement_row(&st))
+            waiting = sqlite3_column_int64(st.stmt, 0);
+        status = statement_end(&st);
+        if (status == STORE_OK && waiting >= s->base.settings.max_queue)
+            status = STORE_BUSY;
+    }
     if (status != STORE_OK)
         return status;
     store_next_id(&s->last_ms, &s->sequence, id);
     status = insert_job(c, a->request, id);
     if (status == STORE_OK)
         status = use_uploads(c, a->request, id);
-    if (status == STORE_OK && a->request->webhook)
-        status = insert_webhook(c, id, a->request->webhook);
+    if (status == STORE_OK && a->request->webhook) {
+        statement st = statement_begin(c, QUERY_INSERT_WEBHOOK);
+        bind_text(&st, 1, id);
+        bind_text(&st, 2, a->request->webhook);
+        status = statement_run(&st);
+    }
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 
@@ -452,7 +438,8 @@ store_status sqlite_settle_jobs(sqlite_store *s, const job *jobs, size_t count)
 {
     bool fresh = false;
     for (size_t i = 0; i < count; i++)
-        fresh = fresh || (has_ended(jobs[i].status) && fabs(store_now() - jobs[i].finished) < UNSETTLED_S);
+        fresh = fresh || (jobs[i].status != JOB_ACCEPTED && jobs[i].status != JOB_RUNNING &&
+                          fabs(store_now() - jobs[i].finished) < UNSETTLED_S);
     return fresh ? sqlite_settle(s) : STORE_OK;
 }
 

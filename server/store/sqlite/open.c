@@ -52,24 +52,6 @@ static bool set_wal(sqlite3 *db, char *message, size_t size)
     return ok;
 }
 
-static bool open_writer(sqlite_store *s, const char *path, char *message, size_t size)
-{
-    int version;
-    return connection_open(&s->writer, path, true, message, size) &&
-           file_format_check(s->writer.db, &version, message, size) && set_wal(s->writer.db, message, size) &&
-           file_format_upgrade(s->writer.db, version, message, size);
-}
-
-static bool open_readers(sqlite_store *s, const char *path, char *message, size_t size)
-{
-    for (int i = 0; i < STORE_READERS; i++) {
-        if (!connection_open(&s->readers[i], path, false, message, size))
-            return false;
-        s->readers_free[s->n_readers_free++] = &s->readers[i];
-    }
-    return true;
-}
-
 /* Continues the ids where the file's newest one stands. */
 static bool read_newest_id(sqlite_store *s, char *message, size_t size)
 {
@@ -87,28 +69,29 @@ static bool read_newest_id(sqlite_store *s, char *message, size_t size)
     return false;
 }
 
-static bool open_uploads(sqlite_store *s, const char *path, char *message, size_t size)
-{
-    char *folder = NULL;
-    if (asprintf(&folder, "%s-uploads", path) < 0)
-        folder = NULL;
-    bool ok = store_uploads_begin(&s->base, folder ? blobs_in_folder(folder) : NULL, message, size);
-    free(folder);
-    return ok;
-}
-
-/* An absolute path: SQLite would take "file:..." for a URI. */
 static bool open_connections(sqlite_store *s, const char *path, char *message, size_t size)
 {
-    char *absolute = realpath(path, NULL);
-    bool ok = absolute && open_writer(s, absolute, message, size) && read_newest_id(s, message, size) &&
-              open_readers(s, absolute, message, size) && open_uploads(s, absolute, message, size);
-    if (!absolute)
+    int version;
+    char *folder = NULL;
+    s->path = realpath(path, NULL); /* absolute: SQLite would take "file:..." for a URI */
+    if (!s->path) {
         snprintf(message, size, "cannot resolve the path: %s", strerror(errno));
-    if (ok)
-        s->path = absolute;
-    else
-        free(absolute);
+        return false;
+    }
+    bool ok = connection_open(&s->writer, s->path, true, message, size) &&
+              file_format_check(s->writer.db, &version, message, size) && set_wal(s->writer.db, message, size) &&
+              file_format_upgrade(s->writer.db, version, message, size) && read_newest_id(s, message, size);
+    for (int i = 0; ok && i < STORE_READERS; i++) {
+        ok = connection_open(&s->readers[i], s->path, false, message, size);
+        s->readers_free[s->n_readers_free] = &s->readers[i];
+        s->n_readers_free += ok;
+    }
+    if (!ok)
+        return false;
+    if (asprintf(&folder, "%s-uploads", s->path) < 0)
+        folder = NULL;
+    ok = store_uploads_begin(&s->base, folder ? blobs_in_folder(folder) : NULL, message, size);
+    free(folder);
     return ok;
 }
 

@@ -49,49 +49,30 @@ store_status sqlite_read_job(statement *st, job *out)
     return STORE_ERROR;
 }
 
-static query_id list_query(const store_query *q)
-{
-    if (q->ascending && q->tag)
-        return q->by_status ? QUERY_OLDEST_TAG_STATUS : QUERY_OLDEST_TAG;
-    if (q->ascending)
-        return q->by_status ? QUERY_OLDEST_STATUS : QUERY_OLDEST;
-    if (q->tag)
-        return q->by_status ? QUERY_LIST_TAG_STATUS : QUERY_LIST_TAG;
-    return q->by_status ? QUERY_LIST_STATUS : QUERY_LIST;
-}
-
-/* Ids begin with the milliseconds of their creation, taken a moment before `created` and never going back. */
-static void least_id(char out[16], double since)
-{
-    double ms = (since - 1.0) * 1e3;
-    unsigned long long whole = ms > 0.0 ? (unsigned long long)fmin(ms, 281474976710655.0) : 0;
-    snprintf(out, 16, "%012llx", whole);
-}
-
-static void bind_filters(statement *st, const store_query *q, char least[16])
-{
-    bind_real(st, 5, q->since);
-    bind_real(st, 6, q->until > 0.0 ? q->until : 1e18);
-    for (int i = 0; i < STORE_MORE_TAGS; i++)
-        bind_text(st, 7 + i, q->more[i]);
-    least_id(least, q->since);
-    bind_text(st, 10, least);
-}
-
 /* Reads up to limit + 1 rows: one more says whether there are older ones. */
-static store_status read_list(connection *c, const store_query *q, int limit, job *jobs, size_t *count)
+static store_status read_list(connection *c, const store_query *q, job *jobs, size_t *count)
 {
+    static const query_id QUERIES[2][2][2] = {
+        {{QUERY_LIST, QUERY_LIST_STATUS}, {QUERY_LIST_TAG, QUERY_LIST_TAG_STATUS}},
+        {{QUERY_OLDEST, QUERY_OLDEST_STATUS}, {QUERY_OLDEST_TAG, QUERY_OLDEST_TAG_STATUS}}};
     store_status status = STORE_OK;
-    statement st = statement_begin(c, list_query(q));
-    char least[16];
+    statement st = statement_begin(c, QUERIES[q->ascending][q->tag != NULL][q->by_status]);
     bind_text(&st, 1, q->before ? q->before : q->ascending ? "" : "~"); /* after every hex digit */
-    bind_filters(&st, q, least);
-    bind_integer(&st, 2, limit + 1);
+    bind_integer(&st, 2, q->limit + 1);
     if (q->by_status)
         bind_integer(&st, 3, q->status);
     if (q->tag)
         bind_text(&st, 4, q->tag);
-    while (status == STORE_OK && *count <= (size_t)limit && statement_row(&st)) {
+    bind_real(&st, 5, q->since);
+    bind_real(&st, 6, q->until > 0.0 ? q->until : 1e18);
+    for (int i = 0; i < STORE_MORE_TAGS; i++)
+        bind_text(&st, 7 + i, q->more[i]);
+    /* Ids begin with the milliseconds of their creation, taken a moment before `created` and never going back. */
+    char least[16];
+    double ms = (q->since - 1.0) * 1e3;
+    snprintf(least, sizeof least, "%012llx", ms > 0.0 ? (unsigned long long)fmin(ms, 281474976710655.0) : 0ULL);
+    bind_text(&st, 10, least);
+    while (status == STORE_OK && *count <= (size_t)q->limit && statement_row(&st)) {
         status = sqlite_read_job(&st, &jobs[*count]);
         *count += status == STORE_OK;
     }
@@ -103,45 +84,40 @@ store_status sqlite_list(store *base, const store_query *query, job *jobs, size_
 {
     sqlite_store *s = sqlite_of(base);
     connection *c = sqlite_take_reader(s);
-    store_status status = sqlite_give_reader(s, c, read_list(c, query, query->limit, jobs, count));
+    store_status status = sqlite_give_reader(s, c, read_list(c, query, jobs, count));
     return status == STORE_OK ? sqlite_settle_jobs(s, jobs, *count) : status;
 }
 
 /* ---- the cases of a job */
 
-static store_status read_case(statement *st, store_case *out)
+/* *count grows with each case that is there to be freed. */
+static store_status read_cases(statement *st, const char *id, store_case **cases, size_t *count)
 {
-    bool ok = true;
-    if (!sqlite3_column_int(st->stmt, 3)) {
-        *out = (store_case){.name = NULL};
-        return STORE_DAMAGED;
-    }
-    *out = (store_case){.number = sqlite3_column_int64(st->stmt, 0)};
-    out->name = sqlite_copy_text(st, 1, &ok);
-    out->summary = sqlite_copy_text(st, 2, &ok);
-    if (ok)
-        return STORE_OK;
-    strcpy(st->c->message, "no memory for the cases of a job");
-    return STORE_ERROR;
-}
-
-static store_status read_cases(statement *st, store_case **cases, size_t *count)
-{
-    store_status status = STORE_OK;
     size_t capacity = 0;
-    while (status == STORE_OK && statement_row(st)) {
+    while (statement_row(st)) {
+        if (!sqlite3_column_int(st->stmt, 3)) {
+            snprintf(st->c->message, sizeof st->c->message, "a summary of job %.32s is not what was written", id);
+            return STORE_DAMAGED;
+        }
+        bool ok = true;
         if (*count == capacity) {
             capacity = capacity ? 2 * capacity : 16;
             store_case *grown = realloc(*cases, capacity * sizeof *grown);
-            if (!grown) {
-                strcpy(st->c->message, "no memory for the cases of a job");
-                return STORE_ERROR;
-            }
-            *cases = grown;
+            *cases = grown ? grown : *cases;
+            ok = grown != NULL;
         }
-        status = read_case(st, &(*cases)[(*count)++]);
+        if (ok) {
+            store_case *one = &(*cases)[(*count)++];
+            *one = (store_case){.number = sqlite3_column_int64(st->stmt, 0)};
+            one->name = sqlite_copy_text(st, 1, &ok);
+            one->summary = sqlite_copy_text(st, 2, &ok);
+        }
+        if (!ok) {
+            strcpy(st->c->message, "no memory for the cases of a job");
+            return STORE_ERROR;
+        }
     }
-    return status;
+    return STORE_OK;
 }
 
 store_status sqlite_get_cases(store *base, const char *id, const char *name, store_case **cases, size_t *count)
@@ -151,13 +127,9 @@ store_status sqlite_get_cases(store *base, const char *id, const char *name, sto
     statement st = statement_begin(c, QUERY_ANSWERS);
     bind_text(&st, 1, id);
     bind_text(&st, 2, name);
-    store_status status = read_cases(&st, cases, count);
+    store_status status = read_cases(&st, id, cases, count);
     store_status ended = statement_end(&st);
-    if (ended != STORE_OK)
-        status = ended;
-    if (status == STORE_DAMAGED)
-        snprintf(c->message, sizeof c->message, "a summary of job %.32s is not what was written", id);
-    return sqlite_give_reader(s, c, status);
+    return sqlite_give_reader(s, c, ended == STORE_OK ? status : ended);
 }
 
 store_status sqlite_counts(store *base, int64_t counts[5])

@@ -67,65 +67,48 @@ static store_status insert_vector(connection *c, const char *id, int64_t number,
     return status;
 }
 
-/* Where rows of a history go. */
-typedef struct {
-    const char *id;
-    int64_t number, part, columns;
-} rows_place;
-
-static store_status insert_rows(connection *c, const rows_place *at, const double *rows, int64_t count,
-                                unsigned char *part)
-{
-    int64_t columns = at->columns;
-    encode(part, rows, count * columns);
-    statement st = statement_begin(c, QUERY_INSERT_HISTORY);
-    bind_text(&st, 1, at->id);
-    bind_integer(&st, 2, at->part);
-    bind_integer(&st, 3, FILE_FORMAT_VECTOR_VERSION);
-    bind_integer(&st, 4, columns);
-    bind_real(&st, 5, count > 0 ? rows[(count - 1) * columns] : -1.0);
-    bind_blob(&st, 6, part, (size_t)(count * columns) * 8);
-    bind_integer(&st, 7, at->number);
-    return statement_run(&st);
-}
-
 /* A history without rows is one empty part. */
 static store_status insert_history(connection *c, const char *id, int64_t number, const store_answer *answer,
                                    unsigned char *part)
 {
-    rows_place place = {id, number, 0, answer->history_columns};
+    const int64_t columns = answer->history_columns;
     store_status status = STORE_OK;
-    if (!answer->history || place.columns <= 0 || place.columns > PART_DOUBLES)
+    if (!answer->history || columns <= 0 || columns > PART_DOUBLES)
         return STORE_OK;
-    int64_t rows_in_part = PART_DOUBLES / place.columns;
-    for (int64_t at = 0; status == STORE_OK && (at < answer->history_rows || place.part == 0); place.part++) {
-        int64_t left = answer->history_rows - at;
-        int64_t count = left < rows_in_part ? left : rows_in_part;
-        status = insert_rows(c, &place, answer->history + at * place.columns, count, part);
-        at += rows_in_part;
+    const int64_t most = PART_DOUBLES / columns; /* rows in a part */
+    for (int64_t at = 0, n = 0; status == STORE_OK && (at < answer->history_rows || n == 0); at += most, n++) {
+        const int64_t left = answer->history_rows - at, count = left < most ? left : most;
+        const double *rows = answer->history + at * columns;
+        encode(part, rows, count * columns);
+        statement st = statement_begin(c, QUERY_INSERT_HISTORY);
+        bind_text(&st, 1, id);
+        bind_integer(&st, 2, n);
+        bind_integer(&st, 3, FILE_FORMAT_VECTOR_VERSION);
+        bind_integer(&st, 4, columns);
+        bind_real(&st, 5, count > 0 ? rows[(count - 1) * columns] : -1.0);
+        bind_blob(&st, 6, part, (size_t)(count * columns) * 8);
+        bind_integer(&st, 7, number);
+        status = statement_run(&st);
     }
     return status;
 }
 
+/* number 0: of the job itself, whose summary stands in its own row. */
 static store_status insert_answer(connection *c, const char *id, int64_t number, const store_answer *answer,
                                   unsigned char *part)
 {
     store_status status = STORE_OK;
+    if (number > 0) {
+        statement st = statement_begin(c, QUERY_INSERT_ANSWER);
+        bind_text(&st, 1, id);
+        bind_integer(&st, 2, number);
+        bind_text(&st, 3, answer->name);
+        bind_text(&st, 4, answer->summary);
+        status = statement_run(&st);
+    }
     for (size_t i = 0; i < answer->n_vectors && status == STORE_OK; i++)
         status = insert_vector(c, id, number, &answer->vectors[i], part);
     return status == STORE_OK ? insert_history(c, id, number, answer, part) : status;
-}
-
-static store_status insert_case(connection *c, const char *id, int64_t number, const store_answer *answer,
-                                unsigned char *part)
-{
-    statement st = statement_begin(c, QUERY_INSERT_ANSWER);
-    bind_text(&st, 1, id);
-    bind_integer(&st, 2, number);
-    bind_text(&st, 3, answer->name);
-    bind_text(&st, 4, answer->summary);
-    store_status status = statement_run(&st);
-    return status == STORE_OK ? insert_answer(c, id, number, answer, part) : status;
 }
 
 store_status sqlite_insert_results(connection *c, const char *id, const store_outcome *outcome)
@@ -135,7 +118,7 @@ store_status sqlite_insert_results(connection *c, const char *id, const store_ou
         return no_memory(c);
     store_status status = insert_answer(c, id, 0, &outcome->whole, part);
     for (size_t i = 0; i < outcome->n_cases && status == STORE_OK; i++)
-        status = insert_case(c, id, (int64_t)i + 1, &outcome->cases[i], part);
+        status = insert_answer(c, id, (int64_t)i + 1, &outcome->cases[i], part);
     free(part);
     return status;
 }
@@ -199,64 +182,43 @@ store_status sqlite_count_vectors(store *base, const char *id, const char *name,
     return sqlite_give_reader(s, c, statement_end(&st));
 }
 
-typedef struct {
-    double *x;     /* rows, one after another */
-    int64_t count; /* doubles in x */
-    int64_t columns;
-} rows_buffer;
-
-static store_status read_part(statement *st, const char *id, rows_buffer *rows)
+/* The rows of all parts whose iteration is > after; those ascend. */
+static store_status read_history(statement *st, const char *id, int64_t after, double **rows, int64_t *count,
+                                 int64_t *columns)
 {
-    rows->columns = sqlite3_column_int64(st->stmt, 1);
-    if (!sqlite3_column_int(st->stmt, 3) || sqlite3_column_int64(st->stmt, 0) != FILE_FORMAT_VECTOR_VERSION ||
-        rows->columns <= 0)
-        return damaged(st->c, id);
-    int64_t total = rows->count + sqlite3_column_bytes(st->stmt, 2) / 8;
-    double *grown = realloc(rows->x, total > 0 ? (size_t)total * 8 : 1);
-    if (!grown)
-        return no_memory(st->c);
-    rows->x = grown;
-    return append_blob(st, 2, rows->x, &rows->count, total) && rows->count % rows->columns == 0 ? STORE_OK
-                                                                                                : damaged(st->c, id);
-}
-
-static store_status read_history(statement *st, const char *id, rows_buffer *rows)
-{
-    store_status status = STORE_NOT_FOUND;
-    while ((status == STORE_OK || status == STORE_NOT_FOUND) && statement_row(st))
-        status = read_part(st, id, rows);
-    return status;
-}
-
-/* Drops the rows whose iteration is not after `after`; iterations ascend. */
-static void drop_seen(rows_buffer *rows, int64_t after)
-{
-    int64_t skip = 0;
-    while (skip < rows->count && !(rows->x[skip] > (double)after))
-        skip += rows->columns;
-    rows->count -= skip;
-    memmove(rows->x, rows->x + skip, (size_t)rows->count * 8);
+    int64_t have = 0, skip = 0; /* doubles */
+    while (statement_row(st)) {
+        *columns = sqlite3_column_int64(st->stmt, 1);
+        if (!sqlite3_column_int(st->stmt, 3) || sqlite3_column_int64(st->stmt, 0) != FILE_FORMAT_VECTOR_VERSION ||
+            *columns <= 0)
+            return damaged(st->c, id);
+        int64_t total = have + sqlite3_column_bytes(st->stmt, 2) / 8;
+        double *grown = realloc(*rows, total > 0 ? (size_t)total * 8 : 1);
+        if (!grown)
+            return no_memory(st->c);
+        *rows = grown;
+        if (!append_blob(st, 2, grown, &have, total) || have % *columns != 0)
+            return damaged(st->c, id);
+    }
+    if (!*rows)
+        return STORE_NOT_FOUND;
+    while (skip < have && !((*rows)[skip] > (double)after))
+        skip += *columns;
+    memmove(*rows, *rows + skip, (size_t)(have - skip) * 8);
+    *count = (have - skip) / *columns;
+    return STORE_OK;
 }
 
 store_status sqlite_get_history(store *base, const char *id, int64_t number, int64_t after, double **rows,
                                 int64_t *count, int64_t *columns)
 {
     sqlite_store *s = sqlite_of(base);
-    rows_buffer found = {NULL, 0, 0};
     connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERY_HISTORY);
     bind_text(&st, 1, id);
     bind_real(&st, 2, (double)after);
     bind_integer(&st, 3, number);
-    store_status status = read_history(&st, id, &found);
+    store_status status = read_history(&st, id, after, rows, count, columns);
     store_status ended = statement_end(&st);
-    if (ended != STORE_OK)
-        status = ended;
-    if (status == STORE_OK) {
-        drop_seen(&found, after);
-        *count = found.count / found.columns;
-        *columns = found.columns;
-    }
-    *rows = found.x;
-    return sqlite_give_reader(s, c, status);
+    return sqlite_give_reader(s, c, ended == STORE_OK ? status : ended);
 }

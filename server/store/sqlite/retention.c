@@ -46,22 +46,17 @@ static store_status expire(sqlite_store *s, connection *c, void *args)
     return statement_end(&st);
 }
 
-/* Looks before it writes: most of the time there is nothing. */
-static bool any_expired(sqlite_store *s)
-{
-    connection *c = sqlite_take_reader(s);
-    statement st = statement_begin(c, QUERY_ANY_EXPIRED);
-    bind_real(&st, 1, store_now());
-    bool any = statement_row(&st);
-    sqlite_give_reader(s, c, statement_end(&st));
-    return any;
-}
-
 store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
 {
     sqlite_store *s = sqlite_of(base);
     expire_args a = {.error_json = error_json};
-    store_status status = any_expired(s) ? sqlite_write(s, expire, &a) : STORE_OK;
+    connection *c = sqlite_take_reader(s);
+    statement st =
+        statement_begin(c, QUERY_ANY_EXPIRED); /* looks before it writes: most of the time there is nothing */
+    bind_real(&st, 1, store_now());
+    bool any = statement_row(&st);
+    sqlite_give_reader(s, c, statement_end(&st));
+    store_status status = any ? sqlite_write(s, expire, &a) : STORE_OK;
     *count = status == STORE_OK ? a.count : 0;
     for (size_t i = 0; status == STORE_OK && i < a.n_ids; i++)
         store_tell(base, a.ids[i], false);
@@ -79,33 +74,26 @@ typedef struct {
     int64_t count;
 } retain_args;
 
-static store_status count_ended(connection *c, retain_args *a)
+/* The oldest jobs that must go. */
+static store_status choose(connection *c, retain_args *a)
 {
+    const store_retention *limits = a->limits;
+    double now = store_now();
+    int64_t chosen_bytes = 0;
     statement st = statement_begin(c, QUERY_ENDED);
     if (statement_row(&st)) {
         a->jobs = sqlite3_column_int64(st.stmt, 0);
         a->bytes = sqlite3_column_int64(st.stmt, 1);
     }
-    return statement_end(&st);
-}
-
-static bool too_much(const retain_args *a, double finished, double now)
-{
-    const store_retention *limits = a->limits;
-    return (limits->keep_s > 0 && finished < now - limits->keep_s) ||
-           (limits->keep_jobs > 0 && a->jobs > limits->keep_jobs) ||
-           (limits->keep_bytes > 0 && a->bytes > limits->keep_bytes);
-}
-
-/* The oldest jobs that must go. */
-static store_status choose(connection *c, retain_args *a)
-{
-    double now = store_now();
-    int64_t chosen_bytes = 0;
-    statement st = statement_begin(c, QUERY_OLD_JOBS);
+    store_status status = statement_end(&st);
+    if (status != STORE_OK)
+        return status;
+    st = statement_begin(c, QUERY_OLD_JOBS);
     bind_integer(&st, 1, MOST_AT_ONCE);
     while (a->n_ids < MOST_AT_ONCE && chosen_bytes < BYTES_AT_ONCE && statement_row(&st) &&
-           too_much(a, sqlite3_column_double(st.stmt, 1), now)) {
+           ((limits->keep_s > 0 && sqlite3_column_double(st.stmt, 1) < now - limits->keep_s) ||
+            (limits->keep_jobs > 0 && a->jobs > limits->keep_jobs) ||
+            (limits->keep_bytes > 0 && a->bytes > limits->keep_bytes))) {
         snprintf(a->ids[a->n_ids++], sizeof a->ids[0], "%s", (const char *)sqlite3_column_text(st.stmt, 0));
         a->jobs--;
         a->bytes -= sqlite3_column_int64(st.stmt, 2);
@@ -134,10 +122,7 @@ store_status sqlite_retain(store *base, const store_retention *limits, int64_t *
     sqlite_store *s = sqlite_of(base);
     retain_args a = {.limits = limits};
     connection *c = sqlite_take_reader(s);
-    store_status status = count_ended(c, &a);
-    if (status == STORE_OK)
-        status = choose(c, &a);
-    sqlite_give_reader(s, c, status);
+    store_status status = sqlite_give_reader(s, c, choose(c, &a));
     if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */
         status = sqlite_write(s, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;

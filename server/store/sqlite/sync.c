@@ -11,18 +11,6 @@
 
 #include <string.h>
 
-/* The writer's log. It is open as long as the writer; xSync touches nothing of it but its descriptor. */
-static int sync_log(const sqlite_store *s)
-{
-    return s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY);
-}
-
-static bool find_log(sqlite_store *s)
-{
-    return sqlite3_file_control(s->writer.db, "main", SQLITE_FCNTL_JOURNAL_POINTER, &s->log) == SQLITE_OK && s->log &&
-           s->log->pMethods;
-}
-
 /* After a failed sync the kernel may take the log's pages for clean, and a second sync would succeed without them. A
  * checkpoint writes them once more, elsewhere, and syncs that. */
 static bool save_by_checkpoint(sqlite_store *s)
@@ -51,7 +39,8 @@ static void *sync_loop(void *argument)
         uint64_t upto = s->committed;
         pthread_mutex_unlock(&s->sync_lock);
         double begun = store_clock();
-        suspect = suspect || sync_log(s) != SQLITE_OK;
+        /* xSync touches nothing of the log, which is open as long as the writer, but its descriptor. */
+        suspect = suspect || s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY) != SQLITE_OK;
         bool ok = !suspect || save_by_checkpoint(s);
         suspect = !ok; /* until a checkpoint succeeds a sync's word counts for nothing */
         metrics_seconds(s->base.settings.metrics, METRIC_COMMIT, store_clock() - begun);
@@ -71,7 +60,8 @@ static void *sync_loop(void *argument)
 
 bool sqlite_sync_begin(sqlite_store *s)
 {
-    s->sync_started = find_log(s) && pthread_create(&s->syncer, NULL, sync_loop, s) == 0;
+    s->sync_started = sqlite3_file_control(s->writer.db, "main", SQLITE_FCNTL_JOURNAL_POINTER, &s->log) == SQLITE_OK &&
+                      s->log && s->log->pMethods && pthread_create(&s->syncer, NULL, sync_loop, s) == 0;
     return s->sync_started;
 }
 

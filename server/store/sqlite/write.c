@@ -64,6 +64,7 @@ static bool is_failure(store_status status)
     return status == STORE_ERROR || status == STORE_FULL || status == STORE_LOCKED;
 }
 
+/* The change by itself; on a full disk once more when the journal is moved into the database. */
 static void run_alone(sqlite_store *s, pending *p)
 {
     p->status = attempt(s, p->change, p->args, &p->number);
@@ -75,28 +76,21 @@ static void run_alone(sqlite_store *s, pending *p)
         store_set_message(&s->base, s->writer.message);
 }
 
-/* One of several; false where the whole transaction can't go on. */
-static bool run_in_savepoint(sqlite_store *s, pending *p)
-{
-    connection *c = &s->writer;
-    if (run_query(c, QUERY_SAVEPOINT) != STORE_OK)
-        return false;
-    p->status = p->change(s, c, p->args);
-    if (is_failure(p->status) || sqlite3_get_autocommit(c->db))
-        return false;
-    if (p->status != STORE_OK && run_query(c, QUERY_ROLLBACK_TO) != STORE_OK)
-        return false;
-    return run_query(c, QUERY_RELEASE_SAVEPOINT) == STORE_OK;
-}
-
 /* False with nothing changed: each must then be tried alone, so that the failure is told to whom it belongs. */
 static bool run_together(sqlite_store *s, pending *list)
 {
     connection *c = &s->writer;
-    bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
-    for (pending *p = list; p && good; p = p->next)
-        good = run_in_savepoint(s, p);
     uint64_t number = 0;
+    bool good = run_query(c, QUERY_BEGIN) == STORE_OK;
+    for (pending *p = list; p && good; p = p->next) {
+        good = run_query(c, QUERY_SAVEPOINT) == STORE_OK;
+        if (!good)
+            break;
+        p->status = p->change(s, c, p->args);
+        good = !is_failure(p->status) && !sqlite3_get_autocommit(c->db) && /* else the whole transaction can't go on */
+               (p->status == STORE_OK || run_query(c, QUERY_ROLLBACK_TO) == STORE_OK) &&
+               run_query(c, QUERY_RELEASE_SAVEPOINT) == STORE_OK;
+    }
     good = good && commit(s, &number) == STORE_OK;
     roll_back(c);
     for (pending *p = list; p && good; p = p->next)
@@ -125,23 +119,17 @@ static void run_batch(sqlite_store *s, pending *list)
 
 /* ------------------------------------------------------------------- queue */
 
-/* The first ones of the queue, which begins with the caller's own. Under queue_lock. */
-static pending *take_batch(sqlite_store *s)
+/* Under queue_lock, which it gives up meanwhile: carries out the first ones of the queue, which begins with the
+ * caller's own. */
+static void lead(sqlite_store *s)
 {
-    pending *first = s->queue, *last = first;
+    pending *list = s->queue, *last = list, *next;
     for (int n = 1; n < BATCH_MOST && last->next; n++)
         last = last->next;
     s->queue = last->next;
     if (!s->queue)
         s->queue_end = &s->queue;
     last->next = NULL;
-    return first;
-}
-
-/* Under queue_lock, which it gives up meanwhile. */
-static void lead(sqlite_store *s)
-{
-    pending *list = take_batch(s), *next;
     s->leading = true;
     pthread_mutex_unlock(&s->queue_lock);
     run_batch(s, list);
@@ -156,25 +144,20 @@ static void lead(sqlite_store *s)
         pthread_cond_signal(&s->queue->turn);
 }
 
-static void wait_turn(sqlite_store *s, pending *me)
-{
-    pthread_mutex_lock(&s->queue_lock);
-    *s->queue_end = me;
-    s->queue_end = &me->next;
-    while (!me->done) {
-        if (!s->leading && s->queue == me)
-            lead(s);
-        else
-            pthread_cond_wait(&me->turn, &s->queue_lock);
-    }
-    pthread_mutex_unlock(&s->queue_lock);
-}
-
 store_status sqlite_write_as(sqlite_store *s, write_durability durability, store_change change, void *args)
 {
     pending me = {.change = change, .args = args};
     pthread_cond_init(&me.turn, NULL);
-    wait_turn(s, &me);
+    pthread_mutex_lock(&s->queue_lock);
+    *s->queue_end = &me;
+    s->queue_end = &me.next;
+    while (!me.done) {
+        if (!s->leading && s->queue == &me)
+            lead(s);
+        else
+            pthread_cond_wait(&me.turn, &s->queue_lock);
+    }
+    pthread_mutex_unlock(&s->queue_lock);
     pthread_cond_destroy(&me.turn);
     if (me.status != STORE_OK || durability == WRITE_LAZY)
         return me.status;
