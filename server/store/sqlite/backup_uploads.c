@@ -26,21 +26,21 @@ static int open_folder(const char *db, bool make)
     return open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
-static bool copy_bytes(int in, int out)
+/* As a link, or where the file system has none as a copy. False: errno. */
+static bool put_file(const folders *f, const char *id)
 {
     char piece[65536];
-    ssize_t n;
-    while ((n = read(in, piece, sizeof piece)) != 0)
-        if ((n < 0 && errno != EINTR) || (n > 0 && !blob_write_all(out, piece, (size_t)n)))
-            return false;
-    return fsync(out) == 0;
-}
-
-static bool copy_file(const folders *f, const char *id)
-{
+    ssize_t n = -1;
+    if (linkat(f->from, id, f->to, id, 0) == 0 || errno == EEXIST)
+        return true;
+    if (errno == ENOENT)
+        return false;
     int in = openat(f->from, id, O_RDONLY | O_CLOEXEC);
     int out = in < 0 ? -1 : openat(f->to, id, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-    bool ok = out >= 0 && copy_bytes(in, out);
+    bool ok = out >= 0;
+    while (ok && (n = read(in, piece, sizeof piece)) != 0)
+        ok = n > 0 ? blob_write_all(out, piece, (size_t)n) : errno == EINTR;
+    ok = ok && fsync(out) == 0;
     int cause = errno;
     if (in >= 0)
         close(in);
@@ -48,13 +48,6 @@ static bool copy_file(const folders *f, const char *id)
         close(out);
     errno = cause;
     return ok;
-}
-
-static bool put_file(const folders *f, const char *id)
-{
-    if (linkat(f->from, id, f->to, id, 0) == 0 || errno == EEXIST)
-        return true;
-    return errno != ENOENT && copy_file(f, id);
 }
 
 /* Takes the row of an upload out of the copy, as it went from the original a moment later. False: a job of the copy
@@ -72,7 +65,7 @@ static bool forget(sqlite3 *copy, const char *id)
     return done;
 }
 
-static bool has_row(sqlite3 *db, const char *id)
+bool backup_has_upload(sqlite3 *db, const char *id)
 {
     sqlite3_stmt *stmt = NULL;
     bool found = sqlite3_prepare_v2(db, "SELECT 1 FROM upload WHERE id = ?1", -1, &stmt, NULL) == SQLITE_OK &&
@@ -88,7 +81,7 @@ static bool put_or_forget(sqlite3 *db, sqlite3 *original, const folders *f, cons
     if (put_file(f, id))
         return true;
     int cause = errno;
-    if (cause == ENOENT && (db == original || (!has_row(original, id) && forget(db, id))))
+    if (cause == ENOENT && (db == original || (!backup_has_upload(original, id) && forget(db, id))))
         return true;
     errno = cause;
     return false;

@@ -14,6 +14,8 @@
  * First for the original, with db == original, whose uploads may go at any moment; then, once the pages are copied, for
  * the copy: a row whose upload went from the original meanwhile goes too, unless a job of the copy refers to it. */
 bool backup_uploads(sqlite3 *db, sqlite3 *original, const char *from, const char *to, char *message, size_t size);
+/* True if the upload has a row in db at this moment. */
+bool backup_has_upload(sqlite3 *db, const char *id);
 /* Takes the folder beside `to` away again. */
 void backup_uploads_undo(const char *to);
 

@@ -1,3 +1,4 @@
+/* maintenance.c: checks and copies of a database file, also while a daemon uses it. */
 #include "store/sqlite/backup_uploads.h"
 #include "store/sqlite/checksum.h"
 #include "store/sqlite/file_format.h"
@@ -16,14 +17,14 @@
 /* ------------------------------------------------------------------- check */
 
 /* Appends what each row of `sql` says; returns SQLite's result. */
-static int collect(sqlite3 *db, const char *sql, const char *format, FILE *out)
+static int collect(sqlite3 *db, const char *sql, const char *finding, FILE *out)
 {
     sqlite3_stmt *stmt = NULL;
     int rc = sqlite3_prepare_v2(db, sql, -1, &stmt, NULL);
     while (rc == SQLITE_OK && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
         const char *text = (const char *)sqlite3_column_text(stmt, 0);
         if (text && strcmp(text, "ok") != 0)
-            fprintf(out, format, text);
+            fprintf(out, finding, text);
         rc = SQLITE_OK;
     }
     sqlite3_finalize(stmt);
@@ -40,33 +41,6 @@ static int64_t read_integer(sqlite3 *db, const char *sql)
     return value;
 }
 
-/* What is not what was written. Each row is read whole. */
-static int check_sums(sqlite3 *db, FILE *text)
-{
-    static const char *const SQL[] = {
-        "SELECT 'summary of job ' || id FROM job WHERE summary IS NOT NULL AND NOT " SUM_IS("summary_sum", SUM_JOB),
-        "SELECT 'request of job ' || job FROM request WHERE NOT " SUM_IS("sum", SUM_REQUEST),
-        "SELECT 'summary of case ' || number || ' of job ' || job FROM answer WHERE NOT " SUM_IS("sum", SUM_ANSWER),
-        "SELECT name || ' of job ' || job FROM vector WHERE NOT " SUM_IS("sum", SUM_VECTOR),
-        "SELECT 'history of job ' || job FROM history WHERE NOT " SUM_IS("sum", SUM_HISTORY)};
-    int rc = SQLITE_OK;
-    if (read_integer(db, "PRAGMA user_version") < 5)
-        return SQLITE_OK;
-    for (size_t i = 0; i < sizeof SQL / sizeof SQL[0] && rc == SQLITE_OK; i++)
-        rc = collect(db, SQL[i], "the %s is not what was written\n", text);
-    return rc;
-}
-
-/* True if the upload has a row at this moment. */
-static bool has_upload(sqlite3 *db, const char *id)
-{
-    sqlite3_stmt *stmt = NULL;
-    bool found = sqlite3_prepare_v2(db, "SELECT 1 FROM upload WHERE id = ?1", -1, &stmt, NULL) == SQLITE_OK &&
-                 sqlite3_bind_text(stmt, 1, id, -1, SQLITE_STATIC) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW;
-    sqlite3_finalize(stmt);
-    return found;
-}
-
 /* The file of one upload. One that a daemon deletes meanwhile is none to complain about. */
 static void check_upload(sqlite3 *db, const char *folder, const char *id, FILE *text)
 {
@@ -80,7 +54,7 @@ static void check_upload(sqlite3 *db, const char *folder, const char *id, FILE *
         close(fd);
     if (status == STORE_DAMAGED)
         fprintf(text, "the file of upload %s is not what was sent\n", id);
-    else if (status != STORE_OK && has_upload(db, id))
+    else if (status != STORE_OK && backup_has_upload(db, id))
         fprintf(text, "the file of upload %s cannot be read: %s\n", id, strerror(cause));
 }
 
@@ -91,8 +65,6 @@ static int check_uploads(sqlite3 *db, const char *file, FILE *text)
     enum { PAGE = 100 };
     char ids[PAGE][UPLOAD_ID_LEN + 1], last[UPLOAD_ID_LEN + 1] = "";
     int rc = SQLITE_OK;
-    if (read_integer(db, "PRAGMA user_version") < 3)
-        return SQLITE_OK;
     snprintf(folder, sizeof folder, "%s-uploads", file);
     for (int n = PAGE; n == PAGE && rc == SQLITE_OK;) {
         sqlite3_stmt *stmt = NULL;
@@ -112,6 +84,29 @@ static int check_uploads(sqlite3 *db, const char *file, FILE *text)
     return rc;
 }
 
+/* Queries whose rows are findings, and the format that they need. What has a checksum is read whole. */
+static const struct {
+    int version;
+    const char *sql, *finding;
+} CHECKS[] = {
+    {0, "PRAGMA integrity_check(20)", "%s\n"},
+    {0, "PRAGMA foreign_key_check", "a row of %s refers to what is not there\n"},
+    {0, "SELECT id FROM job WHERE NOT EXISTS (SELECT 1 FROM request WHERE request.job = job.id) LIMIT 20",
+     "job %s has no request\n"},
+    {4, "SELECT status FROM tally WHERE jobs <> (SELECT count(*) FROM job WHERE job.status = tally.status)",
+     "the tally of jobs with status %s is wrong\n"},
+    {5, "SELECT id FROM job WHERE summary IS NOT NULL AND NOT " SUM_IS("summary_sum", SUM_JOB),
+     "the summary of job %s is not what was written\n"},
+    {5, "SELECT job FROM request WHERE NOT " SUM_IS("sum", SUM_REQUEST),
+     "the request of job %s is not what was written\n"},
+    {5, "SELECT number || ' of job ' || job FROM answer WHERE NOT " SUM_IS("sum", SUM_ANSWER),
+     "the summary of case %s is not what was written\n"},
+    {5, "SELECT name || ' of job ' || job FROM vector WHERE NOT " SUM_IS("sum", SUM_VECTOR),
+     "the %s is not what was written\n"},
+    {5, "SELECT job FROM history WHERE NOT " SUM_IS("sum", SUM_HISTORY),
+     "the history of job %s is not what was written\n"},
+};
+
 /* A damaged page may end a check early: that is a finding, not a failure of the check. file: the name of the
  * database. */
 static bool check(sqlite3 *db, const char *file, store_findings *out)
@@ -122,20 +117,12 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
     FILE *text = open_memstream(&out->findings, &len);
     if (!text)
         return false;
-    int rc = collect(db, "PRAGMA integrity_check(20)", "%s\n", text);
-    if (rc == SQLITE_OK)
-        rc = collect(db, "PRAGMA foreign_key_check", "a row of %s refers to what is not there\n", text);
-    if (rc == SQLITE_OK)
-        rc = collect(db,
-                     "SELECT id FROM job WHERE NOT EXISTS (SELECT 1 FROM request WHERE request.job = job.id) LIMIT 20",
-                     "job %s has no request\n", text);
-    if (rc == SQLITE_OK && read_integer(db, "PRAGMA user_version") >= 4)
-        rc = collect(
-            db, "SELECT status FROM tally WHERE jobs <> (SELECT count(*) FROM job WHERE job.status = tally.status)",
-            "the tally of jobs with status %s is wrong\n", text);
-    if (rc == SQLITE_OK)
-        rc = check_sums(db, text);
-    if (rc == SQLITE_OK)
+    int rc = SQLITE_OK;
+    const int64_t version = read_integer(db, "PRAGMA user_version");
+    for (size_t i = 0; i < sizeof CHECKS / sizeof CHECKS[0] && rc == SQLITE_OK; i++)
+        if (version >= CHECKS[i].version)
+            rc = collect(db, CHECKS[i].sql, CHECKS[i].finding, text);
+    if (rc == SQLITE_OK && version >= 3)
         rc = check_uploads(db, file, text);
     if (rc != SQLITE_OK)
         fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
