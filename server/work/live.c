@@ -57,15 +57,6 @@ void live_forget_problem(live *l)
     l->problem = NULL;
 }
 
-static void thin_out(live *l)
-{
-    int64_t kept = 0;
-    for (int64_t i = 0; i < l->count; i += 2)
-        memmove(l->rows[kept++], l->rows[i], sizeof l->rows[i]);
-    l->count = kept;
-    l->stride *= 2;
-}
-
 /* ||u||_K is near sqrt(2 |psi|): equal where every gap that closes was 0. */
 static double measure(const live *l, const uz_history_row *row)
 {
@@ -85,8 +76,12 @@ void live_add(live *l, const uz_history_row *row)
         l->rows = malloc(LIVE_ROWS * sizeof l->rows[0]);
     if (!l->rows || row->iteration % l->stride != 0) /* without room only the latest row is shown */
         return;
-    if (l->count == LIVE_ROWS)
-        thin_out(l);
+    if (l->count == LIVE_ROWS) { /* every other row goes */
+        l->count = 0;
+        l->stride *= 2;
+        for (int64_t i = 0; i < LIVE_ROWS; i += 2)
+            memmove(l->rows[l->count++], l->rows[i], sizeof l->rows[i]);
+    }
     codec_history_row(l->rows[l->count++], row);
 }
 

@@ -57,34 +57,7 @@ static store_status load_trade(uz_trade *out, store *s, const char *id, int64_t 
     return status == STORE_NOT_FOUND || status == STORE_DAMAGED ? STORE_OK : status;
 }
 
-/* The number of the case that the request names; 0: the job has no cases. */
-static store_status find_number(store *s, const codec_start *start, int64_t *number)
-{
-    store_case *found = NULL;
-    size_t count = 0;
-    *number = 0;
-    if (!start->case_name[0])
-        return STORE_OK;
-    store_status status = store_get_cases(s, start->job, start->case_name, &found, &count);
-    if (status == STORE_OK && count > 0)
-        *number = found[0].number;
-    store_cases_free(found, count);
-    return status;
-}
-
 /* ---- all of them */
-
-static bool make_room(starts *out, int64_t n)
-{
-    out->n = n;
-    out->states = calloc((size_t)n, sizeof *out->states);
-    out->histories = calloc((size_t)n, sizeof *out->histories);
-    out->rows = calloc((size_t)n, sizeof *out->rows);
-    out->trades = calloc((size_t)n, sizeof *out->trades);
-    for (int64_t i = 0; out->trades && i < n; i++)
-        uz_trade_clear(&out->trades[i]);
-    return out->states && out->histories && out->rows && out->trades;
-}
 
 static store_status load_continued(starts *out, store *s, const codec_request *request)
 {
@@ -104,11 +77,18 @@ static store_status load_continued(starts *out, store *s, const codec_request *r
 static store_status load_warm(starts *out, store *s, const codec_start *start)
 {
     uz_state *first = NULL;
-    int64_t number = 0;
+    store_case *found = NULL;
+    size_t count = 0;
+    int64_t number = 0; /* of the case that the request names; 0: the job has none */
     store_status status = STORE_OK;
     if (start->reactions)
         first = state_from_reactions(start->reactions, start->n_reactions);
-    else if ((status = find_number(s, start, &number)) == STORE_OK)
+    else if (start->case_name[0])
+        status = store_get_cases(s, start->job, start->case_name, &found, &count);
+    if (count > 0)
+        number = found[0].number;
+    store_cases_free(found, count);
+    if (!start->reactions && status == STORE_OK)
         status = load_state(&first, s, start->job, number, false);
     for (int64_t i = 0; first && i < out->n; i++)
         out->states[i] = i == 0 ? first : state_from_reactions(first->r, first->m);
@@ -121,7 +101,14 @@ store_status starts_load(starts *out, store *s, const codec_request *request)
     *out = (starts){.n = 0};
     if (!start->job[0] && !start->reactions)
         return STORE_OK;
-    if (!make_room(out, request->problem.n_cases > 0 ? request->problem.n_cases : 1)) {
+    out->n = request->problem.n_cases > 0 ? request->problem.n_cases : 1;
+    out->states = calloc((size_t)out->n, sizeof *out->states);
+    out->histories = calloc((size_t)out->n, sizeof *out->histories);
+    out->rows = calloc((size_t)out->n, sizeof *out->rows);
+    out->trades = calloc((size_t)out->n, sizeof *out->trades);
+    for (int64_t i = 0; out->trades && i < out->n; i++)
+        uz_trade_clear(&out->trades[i]);
+    if (!out->states || !out->histories || !out->rows || !out->trades) {
         starts_clear(out);
         return STORE_OK; /* without the memory for it the run begins at zero */
     }

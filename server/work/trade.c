@@ -15,12 +15,6 @@ static int reached(const uz_trade *trade)
     return n;
 }
 
-static bool is_same(const uz_trade_step *a, const uz_trade_step *b)
-{
-    return !(a->seconds < b->seconds || a->seconds > b->seconds) && a->iterations == b->iterations &&
-           a->applications == b->applications && a->by_certificate == b->by_certificate;
-}
-
 int64_t trade_pack(double out[TRADE_NUMBERS], const uz_trade *trade)
 {
     const int n = reached(trade);
@@ -29,8 +23,9 @@ int64_t trade_pack(double out[TRADE_NUMBERS], const uz_trade *trade)
     memcpy(out, head, sizeof head);
     for (int k = 0; k < n; k++) {
         const uz_trade_step *s = &trade->step[k];
-        if (k > 0 && is_same(s, s - 1))
-            continue;
+        if (k > 0 && !(s->seconds < s[-1].seconds || s->seconds > s[-1].seconds) && s->iterations == s[-1].iterations &&
+            s->applications == s[-1].applications && s->by_certificate == s[-1].by_certificate)
+            continue; /* the same moment */
         const double numbers[TRADE_COLUMNS] = {k, s->seconds, (double)s->iterations, (double)s->applications,
                                                s->by_certificate};
         memcpy(row, numbers, sizeof numbers);
@@ -45,36 +40,27 @@ static bool is_count(double x, double most)
     return x >= 0.0 && x <= most && !(x < floor(x) || x > floor(x));
 }
 
-/* From this step on, until another row says otherwise. */
-static bool take_row(uz_trade *out, const double *row, int least, int n)
-{
-    static const double MOST = 9007199254740992.0; /* 2^53 */
-    if (!is_count(row[0], n - 1) || (int)row[0] < least || !(row[1] >= 0.0) || !is_count(row[2], MOST) ||
-        !is_count(row[3], MOST))
-        return false;
-    for (int k = (int)row[0]; k < n; k++)
-        out->step[k] = (uz_trade_step){.seconds = row[1],
-                                       .iterations = (int64_t)row[2],
-                                       .applications = (int64_t)row[3],
-                                       .by_certificate = row[4] > 0.0};
-    return true;
-}
-
-static bool is_head(const double *x, int64_t count)
-{
-    return count >= TRADE_HEAD && count <= TRADE_NUMBERS && (count - TRADE_HEAD) % TRADE_COLUMNS == 0 &&
-           is_count(x[0] - VERSION, 0.0) && x[1] >= 0.0 && x[2] >= 0.0 && is_count(x[3], UZ_TRADE_STEPS);
-}
-
 bool trade_unpack(uz_trade *out, const double *x, int64_t count)
 {
+    static const double MOST = 9007199254740992.0; /* 2^53 */
     uz_trade_clear(out);
-    if (!is_head(x, count))
+    if (!(count >= TRADE_HEAD && count <= TRADE_NUMBERS && (count - TRADE_HEAD) % TRADE_COLUMNS == 0 &&
+          is_count(x[0] - VERSION, 0.0) && x[1] >= 0.0 && x[2] >= 0.0 && is_count(x[3], UZ_TRADE_STEPS)))
         return false;
+    const int n = (int)x[3];
     bool good = true;
-    for (int64_t at = TRADE_HEAD; good && at < count; at += TRADE_COLUMNS)
-        good = take_row(out, x + at, at == TRADE_HEAD ? 0 : (int)x[at - TRADE_COLUMNS] + 1, (int)x[3]);
-    good = good && reached(out) == (int)x[3];
+    int least = 0; /* the first step of the next row */
+    for (const double *row = x + TRADE_HEAD; good && row < x + count; row += TRADE_COLUMNS) {
+        good = is_count(row[0], n - 1) && (int)row[0] >= least && row[1] >= 0.0 && is_count(row[2], MOST) &&
+               is_count(row[3], MOST);
+        for (int k = good ? (int)row[0] : n; k < n; k++) /* until another row says otherwise */
+            out->step[k] = (uz_trade_step){.seconds = row[1],
+                                           .iterations = (int64_t)row[2],
+                                           .applications = (int64_t)row[3],
+                                           .by_certificate = row[4] > 0.0};
+        least = good ? (int)row[0] + 1 : n;
+    }
+    good = good && reached(out) == n;
     if (!good)
         uz_trade_clear(out);
     out->iterated_s = good ? x[1] : 0.0;

@@ -142,26 +142,6 @@ static struct curl_slist *make_headers(const webhooks *all, const webhook_due *d
     return list;
 }
 
-static void set_options(CURL *curl, webhooks *all, const char *url, const char *body, size_t len,
-                        struct curl_slist *headers)
-{
-    curl_easy_setopt(curl, CURLOPT_URL, url);
-    curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
-    curl_easy_setopt(curl, CURLOPT_FOLLOWLOCATION, 0L); /* it would leave the list of what may be called */
-    curl_easy_setopt(curl, CURLOPT_PROXY, "");
-    curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
-    curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, CONNECT_S);
-    curl_easy_setopt(curl, CURLOPT_TIMEOUT, WHOLE_S);
-    curl_easy_setopt(curl, CURLOPT_USERAGENT, "uzawad");
-    curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers);
-    curl_easy_setopt(curl, CURLOPT_POSTFIELDS, body);
-    curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)len);
-    curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, drop);
-    curl_easy_setopt(curl, CURLOPT_XFERINFOFUNCTION, go_on);
-    curl_easy_setopt(curl, CURLOPT_XFERINFODATA, all);
-    curl_easy_setopt(curl, CURLOPT_NOPROGRESS, 0L);
-}
-
 /* The HTTP status, 0: there was no answer, and why in cause. */
 static long post(webhooks *all, const webhook_due *due, const char *body, char *cause, size_t size)
 {
@@ -171,7 +151,21 @@ static long post(webhooks *all, const webhook_due *due, const char *body, char *
     struct curl_slist *headers = curl ? make_headers(all, due, body, len) : NULL;
     snprintf(cause, size, "no memory");
     if (headers) {
-        set_options(curl, all, due->url, body, len, headers);
+        curl_easy_setopt(curl, CURLOPT_URL, due->url);
+        curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
+        curl_easy_setopt(curl, CURLOPT_FOLLOWLOCATION, 0L); /* it would leave the list of what may be called */
+        curl_easy_setopt(curl, CURLOPT_PROXY, "");
+        curl_easy_setopt(curl, CURLOPT_NOSIGNAL, 1L);
+        curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT, CONNECT_S);
+        curl_easy_setopt(curl, CURLOPT_TIMEOUT, WHOLE_S);
+        curl_easy_setopt(curl, CURLOPT_USERAGENT, "uzawad");
+        curl_easy_setopt(curl, CURLOPT_HTTPHEADER, headers);
+        curl_easy_setopt(curl, CURLOPT_POSTFIELDS, body);
+        curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)len);
+        curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, drop);
+        curl_easy_setopt(curl, CURLOPT_XFERINFOFUNCTION, go_on);
+        curl_easy_setopt(curl, CURLOPT_XFERINFODATA, all);
+        curl_easy_setopt(curl, CURLOPT_NOPROGRESS, 0L);
         CURLcode rc = curl_easy_perform(curl);
         snprintf(cause, size, "%s", curl_easy_strerror(rc));
         if (rc == CURLE_OK)
@@ -190,21 +184,10 @@ static double wait_after(const webhooks *all, int attempts)
     return fmin(LONGEST_WAIT_S, first * ldexp(1.0, attempts < 30 ? attempts : 30));
 }
 
-static void log_attempt(const webhooks *all, const webhook_due *due, webhook_end end, long status, const char *cause)
-{
-    static const char *const NAMES[] = {"", "webhook_failed", "webhook_told", "webhook_given_up"};
-    log_field fields[] = {LOG_S("job", due->job),
-                          LOG_S("url", due->url),
-                          LOG_I("attempt", due->attempts + 1),
-                          LOG_I("status", status),
-                          LOG_S("cause", status ? NULL : cause),
-                          {0}};
-    log_write(all->log, end == WEBHOOK_TOLD ? LOG_INFO : LOG_WARN, NAMES[end], fields);
-}
-
 /* Tells of one job and notes how it went. */
 static void tell(webhooks *all, const webhook_due *due)
 {
+    static const char *const EVENTS[] = {"", "webhook_failed", "webhook_told", "webhook_given_up"}; /* by webhook_end */
     char cause[256] = "";
     const char *why = NULL;
     job j = {0};
@@ -225,7 +208,13 @@ static void tell(webhooks *all, const webhook_due *due)
         end = WEBHOOK_GIVEN_UP;
     if (status == 0 && atomic_load(&all->stop))
         return; /* cut off: it stays due */
-    log_attempt(all, due, end, status, cause);
+    log_write(all->log, end == WEBHOOK_TOLD ? LOG_INFO : LOG_WARN, EVENTS[end],
+              (log_field[]){LOG_S("job", due->job),
+                            LOG_S("url", due->url),
+                            LOG_I("attempt", due->attempts + 1),
+                            LOG_I("status", status),
+                            LOG_S("cause", status ? NULL : cause),
+                            {0}});
     metrics_add(all->options.metrics, end == WEBHOOK_TOLD ? METRIC_WEBHOOK_TOLD : METRIC_WEBHOOK_FAILED, 1);
     if (status == 0 && end == WEBHOOK_AGAIN) /* each attempt takes seconds that others wait for */
         store_webhook_postpone(all->store, due->url, wait_after(all, 0));
