@@ -66,6 +66,6 @@ check function_length long_functions
 check shell shell_syntax
 check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'
 check sqlite_only_in_its_engine only_in 'sqlite3' '^server/store/sqlite/'
-check microhttpd_only_in_http only_in 'microhttpd' '^server/http/'
+check microhttpd_only_in_transport only_in 'microhttpd' '^server/http/transport/'
 check jansson_only_in_codec only_in 'jansson' '^(server/codec|client)/'
 exit $status

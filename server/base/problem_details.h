@@ -14,4 +14,9 @@ typedef struct {
     int64_t line;      /* line of the Matrix Market text or of the JSON text, 0 if none */
 } problem_details;
 
+/* Fills *out with a formatted sentence as its detail; what is no printable ASCII in it becomes '?'. Returns false, so
+ * that a failing check ends in `return http_problem(...)`. */
+_Bool http_problem(problem_details *out, int status, const char *code, const char *title, const char *format, ...)
+    __attribute__((format(printf, 5, 6)));
+
 #endif

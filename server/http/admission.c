@@ -1,6 +1,6 @@
 /* admission.c: what is refused before a body is read, cheapest check first. */
-#include "http/conn.h"
-#include "http/problem.h"
+#include "http/transport/conn.h"
+#include "base/problem_details.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -7,7 +7,7 @@
  * comes again with it (Last-Event-ID) goes on from there. */
 #include "http/all_events.h"
 #include "http/jobs.h"
-#include "http/stream.h"
+#include "http/transport/stream.h"
 
 #include <inttypes.h>
 #include <stdio.h>

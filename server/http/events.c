@@ -5,7 +5,7 @@
  * present one, and an event's id names the state, so that one who saw it already (Last-Event-ID) does not get it
  * twice. */
 #include "http/jobs.h"
-#include "http/stream.h"
+#include "http/transport/stream.h"
 
 #include <math.h>
 #include <stdio.h>

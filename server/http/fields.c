@@ -1,6 +1,6 @@
 #include "http/fields.h"
 
-#include "http/problem.h"
+#include "base/problem_details.h"
 
 #include <errno.h>
 #include <semaphore.h>

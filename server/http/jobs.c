@@ -1,7 +1,7 @@
 /* jobs.c: /v1/jobs and /v1/jobs/{id}. */
 #include "codec/codec.h"
 #include "http/jobs.h"
-#include "http/problem.h"
+#include "base/problem_details.h"
 #include "http/request.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* list.c: GET /v1/jobs. */
 #include "http/jobs.h"
-#include "http/problem.h"
+#include "base/problem_details.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* place.c: the job, or the one of its load cases, that a reply is about. */
 #include "http/jobs.h"
-#include "http/problem.h"
+#include "base/problem_details.h"
 #include "http/results.h"
 
 #include <stdio.h>

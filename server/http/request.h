@@ -4,9 +4,9 @@
 
 #include "codec/codec.h"
 #include "http/auth.h"
-#include "http/framing.h"
-#include "http/reply.h"
-#include "http/target.h"
+#include "http/transport/framing.h"
+#include "http/transport/reply.h"
+#include "http/transport/target.h"
 #include "base/log.h"
 #include "base/metrics.h"
 #include "store/store.h"

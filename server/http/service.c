@@ -1,9 +1,9 @@
 /* service.c: routes about the service itself: what is cached, whether it lives, what is valid. */
 #include "codec/codec.h"
 #include "codec/embedded.h"
-#include "http/conn.h"
-#include "http/deadlines.h"
-#include "http/presence.h"
+#include "http/transport/conn.h"
+#include "http/transport/deadlines.h"
+#include "http/transport/presence.h"
 #include "http/request.h"
 #include "options/options.h"
 

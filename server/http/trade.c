@@ -1,6 +1,6 @@
 /* trade.c: what accuracy took: /v1/jobs/{id}/work-precision. */
 #include "http/jobs.h"
-#include "http/problem.h"
+#include "base/problem_details.h"
 #include "http/results.h"
 #include "work/trade.h"
 

@@ -1,6 +1,6 @@
 /* uploads.c: /v1/uploads: texts that are sent once and used in many requests. A body goes to disk as it comes. */
 #include "codec/codec.h"
-#include "http/problem.h"
+#include "base/problem_details.h"
 #include "http/request.h"
 #include "http/uploads.h"
 

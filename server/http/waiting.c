@@ -1,7 +1,7 @@
 #include "http/waiting.h"
-#include "http/deadlines.h"
+#include "http/transport/deadlines.h"
 #include "http/jobs.h"
-#include "http/negotiate.h"
+#include "http/transport/negotiate.h"
 
 #include <math.h>
 #include <stdlib.h>

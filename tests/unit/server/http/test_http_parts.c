@@ -1,6 +1,6 @@
 /* The parts of server/http and the command line that need no socket. */
 #include "harness.h"
-#include "http/deadlines.h"
+#include "http/transport/deadlines.h"
 #include "http/request.h"
 #include "options/options.h"
 

@@ -1,6 +1,6 @@
-#include "http/stream.h"
-#include "http/deadlines.h"
-#include "http/problem.h"
+#include "http/transport/stream.h"
+#include "http/transport/deadlines.h"
+#include "base/problem_details.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,10 +2,10 @@
 #ifndef SERVER_HTTP_CONN_H
 #define SERVER_HTTP_CONN_H
 
-#include "http/deadlines.h"
-#include "http/held.h"
+#include "http/transport/deadlines.h"
+#include "http/transport/held.h"
 #include "http/http.h"
-#include "http/presence.h"
+#include "http/transport/presence.h"
 #include "http/rate.h"
 #include "http/request.h"
 

@@ -1,5 +1,5 @@
-#include "http/held.h"
-#include "http/deadlines.h"
+#include "http/transport/held.h"
+#include "http/transport/deadlines.h"
 
 #include <errno.h>
 #include <fcntl.h>

@@ -1,6 +1,6 @@
-#include "http/reply.h"
+#include "http/transport/reply.h"
 #include "codec/codec.h"
-#include "http/problem.h"
+#include "base/problem_details.h"
 
 #include <microhttpd.h>
 #include <stdarg.h>

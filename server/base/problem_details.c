@@ -1,4 +1,4 @@
-#include "http/problem.h"
+#include "base/problem_details.h"
 
 #include <stdarg.h>
 #include <stdio.h>

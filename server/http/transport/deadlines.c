@@ -1,4 +1,4 @@
-#include "http/deadlines.h"
+#include "http/transport/deadlines.h"
 
 #include <math.h>
 #include <pthread.h>

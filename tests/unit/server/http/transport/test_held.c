@@ -1,8 +1,8 @@
 /* Connections that wait without a thread, with sources and clients of our own. */
 #include "harness.h"
-#include "http/deadlines.h"
-#include "http/held.h"
-#include "http/presence.h"
+#include "http/transport/deadlines.h"
+#include "http/transport/held.h"
+#include "http/transport/presence.h"
 
 #include <netinet/in.h>
 #include <poll.h>

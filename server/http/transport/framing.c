@@ -1,6 +1,6 @@
-#include "http/framing.h"
-#include "http/problem.h"
-#include "http/target.h"
+#include "http/transport/framing.h"
+#include "base/problem_details.h"
+#include "http/transport/target.h"
 
 #include <string.h>
 

@@ -5,7 +5,7 @@
  * (on_completed). All of this happens in the connection's own thread; a reply that then only waits leaves both
  * (held.h). */
 #include "http/all_events.h"
-#include "http/conn.h"
+#include "http/transport/conn.h"
 #include "http/fields.h"
 
 #include <errno.h>

@@ -1,5 +1,5 @@
-#include "http/target.h"
-#include "http/problem.h"
+#include "http/transport/target.h"
+#include "base/problem_details.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 /* negotiate.c: what becomes of a whole reply by what the client has and takes: 304, a range of bytes, gzip. */
-#include "http/negotiate.h"
-#include "http/problem.h"
+#include "http/transport/negotiate.h"
+#include "base/problem_details.h"
 
 #include <gnutls/crypto.h>
 #include <stdio.h>

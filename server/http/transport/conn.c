@@ -1,6 +1,6 @@
-#include "http/conn.h"
-#include "http/negotiate.h"
-#include "http/problem.h"
+#include "http/transport/conn.h"
+#include "http/transport/negotiate.h"
+#include "base/problem_details.h"
 #include "http/uploads.h"
 
 #include <math.h>

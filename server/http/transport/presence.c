@@ -1,4 +1,4 @@
-#include "http/presence.h"
+#include "http/transport/presence.h"
 #include "http/rate.h"
 
 #include <pthread.h>

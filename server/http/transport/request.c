@@ -1,5 +1,5 @@
 #include "http/request.h"
-#include "http/problem.h"
+#include "base/problem_details.h"
 
 #include <errno.h>
 #include <poll.h>
