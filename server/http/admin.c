@@ -1,6 +1,6 @@
 /* admin.c: what only an administrator asks for. */
 #include "codec/codec.h"
-#include "http/request.h"
+#include "http/api.h"
 
 #include <stdlib.h>
 

@@ -1,23 +1,10 @@
 /* admission.c: what is refused before a body is read, cheapest check first. */
-#include "http/transport/conn.h"
-#include "base/problem_details.h"
+
+#include "http/api.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
-
-void cors_find(http_server *server, http_request *rq)
-{
-    const api *context = &server->context;
-    const header_field *origin = header_find(&rq->headers, "Origin", NULL);
-    rq->reply.cors = context->n_cors > 0;
-    for (size_t i = 0; origin && i < context->n_cors && !rq->reply.cors_origin; i++) {
-        const char *one = context->cors[i];
-        if (strcmp(one, "*") == 0 ||
-            (strlen(one) == origin->value_len && memcmp(one, origin->value, origin->value_len) == 0))
-            rq->reply.cors_origin = one;
-    }
-}
 
 /* A page of another site must not submit or delete through its visitor's browser, unless its origin is one that may
  * use the service. Programs send no such header. */
@@ -42,7 +29,7 @@ static size_t name_len(const char *text, size_t len)
 
 /* True for a name that nobody can lead here from elsewhere: an address, a name without a dot, localhost and what is
  * below it (RFC 6761, section 6.3), the hosts of --cors. */
-static bool is_own_name(const http_server *server, const char *host, size_t len)
+static bool is_own_name(const api *context, const char *host, size_t len)
 {
     static const char LOCAL[] = ".localhost";
     const size_t n = name_len(host, len), local = sizeof LOCAL - 1;
@@ -50,8 +37,8 @@ static bool is_own_name(const http_server *server, const char *host, size_t len)
         return true;
     if (n > local && token_equal(host + n - local, local, LOCAL))
         return true;
-    for (size_t i = 0; i < server->context.n_cors; i++) {
-        const char *one = server->context.cors[i], *name = strstr(one, "//");
+    for (size_t i = 0; i < context->options.n_cors; i++) {
+        const char *one = context->options.cors[i], *name = strstr(one, "//");
         const size_t size = name ? name_len(name + 2, strlen(name + 2)) : 0;
         if (strcmp(one, "*") == 0 || (size == n && strncasecmp(name + 2, host, n) == 0))
             return true;
@@ -73,11 +60,11 @@ static bool is_browser(const http_request *rq)
 /* Without tokens it is the loopback address that lets nobody in. A page gets behind it where its own host name is made
  * to point here (DNS rebinding): for its visitor's browser this service is then the page's own server. The name that
  * it asks for tells. */
-static bool check_name(const conn *c, problem_details *problem)
+static bool check_name(const api *context, const http_request *rq, problem_details *problem)
 {
-    const header_field *host = header_find(&c->request->headers, "Host", NULL);
-    if (c->server->auth || !host || is_own_name(c->server, host->value, host->value_len) || !is_browser(c->request) ||
-        http_is_public(c->fd))
+    const header_field *host = header_find(&rq->headers, "Host", NULL);
+    if (context->auth || !host || is_own_name(context, host->value, host->value_len) || !is_browser(rq) ||
+        http_is_public(rq->fd))
         return true;
     return http_problem(problem, 421, "unknown_host", "This service does not go by that name",
                         "a browser asks for \"%.*s\" on an address that is for this machine only: use "
@@ -86,17 +73,17 @@ static bool check_name(const conn *c, problem_details *problem)
                         (int)(host->value_len < 100 ? host->value_len : 100), host->value);
 }
 
-static bool check_body(const http_server *server, const http_request *rq, problem_details *problem)
+static bool check_body(const api *context, const http_request *rq, problem_details *problem)
 {
     bool takes_body = strcmp(rq->route->method, "POST") == 0;
-    if (!takes_body && (rq->framing.chunked || rq->framing.length > 0))
+    if (!takes_body && (rq->chunked || rq->length > 0))
         return http_problem(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
                             rq->route->method, rq->route->pattern);
-    size_t limit = rq->route->streamed ? server->options.max_upload : server->options.max_body;
-    if (rq->framing.length > limit)
+    size_t limit = rq->route->streamed ? context->options.max_upload : context->options.max_body;
+    if (rq->length > limit)
         return http_problem(problem, 413, "body_too_large", "The request body is too large",
-                            "the body has %llu bytes, the limit of this server is %zu",
-                            (unsigned long long)rq->framing.length, limit);
+                            "the body has %llu bytes, the limit of this server is %zu", (unsigned long long)rq->length,
+                            limit);
     return true;
 }
 
@@ -125,9 +112,9 @@ static bool check_type(const http_request *rq, problem_details *problem)
     return true;
 }
 
-static bool check_draining(http_server *server, http_request *rq, problem_details *problem)
+static bool check_draining(const api *context, http_request *rq, problem_details *problem)
 {
-    if (!atomic_load(&server->context.draining) || strcmp(rq->route->method, "POST") != 0)
+    if (!api_draining(context) || strcmp(rq->route->method, "POST") != 0)
         return true;
     rq->reply.retry_after_s = 5;
     return http_problem(problem, 503, "draining", "The server is shutting down",
@@ -153,37 +140,37 @@ static const char *bearer(const http_request *rq, size_t *len)
 }
 
 /* A known token counts by its name, everybody else by address: guesses too. */
-static bool check_rate(conn *c, problem_details *problem)
+static bool check_rate(api *context, http_request *rq, problem_details *problem)
 {
-    http_request *rq = c->request;
-    double now = deadlines_now(), wait = 0.0;
-    if (!c->server->rate || (rq->route && strcmp(rq->route->pattern, "/healthz") == 0))
+    double now = http_now(), wait = 0.0;
+    if (!context->rate || (rq->route && strcmp(rq->route->pattern, "/healthz") == 0))
         return true;
     if (rq->token[0])
-        wait = rate_take(c->server->rate, rq->token, strlen(rq->token), now);
-    else if (c->address_len > 0)
-        wait = rate_take(c->server->rate, c->address, c->address_len, now);
+        wait = rate_take(context->rate, rq->token, strlen(rq->token), now);
+    else if (rq->address_len > 0)
+        wait = rate_take(context->rate, rq->address, rq->address_len, now);
     if (wait == 0.0)
         return true;
-    metrics_add(c->server->context.metrics, METRIC_RATE_LIMITED, 1);
+    metrics_add(context->metrics, METRIC_RATE_LIMITED, 1);
     rq->reply.retry_after_s = 1 + (int)wait;
     return http_problem(problem, 429, "too_many_requests", "Too many requests",
                         "one client may send %d requests per second (the daemon's option --max-client-rate)",
-                        c->server->options.max_client_rate);
+                        context->options.max_client_rate);
 }
 
-static bool refuse_token(conn *c, auth_scope have, auth_scope need, bool given, problem_details *problem)
+static bool refuse_token(api *context, http_request *rq, auth_scope have, auth_scope need, bool given,
+                         problem_details *problem)
 {
-    http_reply *reply = &c->request->reply;
+    http_reply *reply = &rq->reply;
     char *field = reply->authenticate;
     size_t size = sizeof reply->authenticate;
-    metrics_add(c->server->context.metrics, METRIC_UNAUTHORIZED, 1);
+    metrics_add(context->metrics, METRIC_UNAUTHORIZED, 1);
     if (have != SCOPE_NONE) {
         snprintf(field, size, "Bearer realm=\"uzawad\", error=\"insufficient_scope\", scope=\"%s\"",
                  auth_scope_name(need));
         return http_problem(problem, 403, "insufficient_scope", "This token does not allow that",
-                            "the token \"%s\" has the scope %s, and this needs %s", c->request->token,
-                            auth_scope_name(have), auth_scope_name(need));
+                            "the token \"%s\" has the scope %s, and this needs %s", rq->token, auth_scope_name(have),
+                            auth_scope_name(need));
     }
     snprintf(field, size, "Bearer realm=\"uzawad\"%s", given ? ", error=\"invalid_token\"" : "");
     return http_problem(problem, 401, "unauthorized", "A token is needed", "%s",
@@ -192,30 +179,27 @@ static bool refuse_token(conn *c, auth_scope have, auth_scope need, bool given, 
 }
 
 /* Before anything about the request is told, even whether its path exists. */
-static bool check_client(conn *c, bool has_route, problem_details *problem)
+static bool check_client(api *context, http_request *rq, bool has_route, problem_details *problem)
 {
-    http_request *rq = c->request;
     auth_scope need = has_route ? route_scope(rq->route) : SCOPE_READ, have = SCOPE_NONE;
     size_t len = 0;
-    const char *secret = c->server->auth ? bearer(rq, &len) : NULL;
+    const char *secret = context->auth ? bearer(rq, &len) : NULL;
     if (secret)
-        have = auth_check(c->server->auth, secret, len, rq->token);
-    if (!check_rate(c, problem))
+        have = auth_check(context->auth, secret, len, rq->token);
+    if (!check_rate(context, rq, problem))
         return false;
-    if (!c->server->auth || have >= need)
+    if (!context->auth || have >= need)
         return true;
     rq->reply.allow[0] = '\0';
-    return refuse_token(c, have, need, secret != NULL, problem);
+    return refuse_token(context, rq, have, need, secret != NULL, problem);
 }
 
-bool admit(conn *c)
+bool admission_check(api *context, http_request *rq)
 {
-    http_server *server = c->server;
-    http_request *rq = c->request;
     problem_details *problem = &rq->refused;
     bool found = target_parse(&rq->target, rq->raw_target, problem) &&
                  route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem);
-    return check_name(c, problem) && check_client(c, found, problem) && found && check_site(rq, problem) &&
-           check_body(server, rq, problem) && route_check_parameters(rq, problem) && check_type(rq, problem) &&
-           check_draining(server, rq, problem);
+    return check_name(context, rq, problem) && check_client(context, rq, found, problem) && found &&
+           check_site(rq, problem) && check_body(context, rq, problem) && route_check_parameters(rq, problem) &&
+           check_type(rq, problem) && check_draining(context, rq, problem);
 }

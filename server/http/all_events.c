@@ -5,9 +5,7 @@
  * where changes were missed. As in events.c these are states, not steps: of several changes of one job in quick
  * succession only the last is told. An event's id is the number of its change in this run of the daemon; a stream that
  * comes again with it (Last-Event-ID) goes on from there. */
-#include "http/all_events.h"
 #include "http/jobs.h"
-#include "http/transport/stream.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -31,19 +29,20 @@ struct told_changes {
 
 typedef struct {
     event_stream base;
+    api *context;
     uint64_t seen; /* the number up to which all is told */
     bool reset;    /* that it must be told first */
 } all_stream;
 
-told_changes *told_changes_new(void)
+struct told_changes *told_changes_new(void)
 {
-    told_changes *t = calloc(1, sizeof *t);
+    struct told_changes *t = calloc(1, sizeof *t);
     if (t)
         pthread_mutex_init(&t->lock, NULL);
     return t;
 }
 
-void told_changes_free(told_changes *t)
+void told_changes_free(struct told_changes *t)
 {
     if (!t)
         return;
@@ -89,13 +88,13 @@ static const told_text *text_of(api *context, const feed_change *change)
 static bool say(all_stream *s, const char *event, uint64_t number, const char *data)
 {
     char id[64];
-    snprintf(id, sizeof id, "%s.%" PRIu64, s->base.context->run, number);
+    snprintf(id, sizeof id, "%s.%" PRIu64, s->context->run, number);
     return stream_say(&s->base, event, id, data);
 }
 
 static bool say_reset(all_stream *s)
 {
-    s->seen = feed_last(work_feed(s->base.context->work));
+    s->seen = feed_last(work_feed(s->context->work));
     s->reset = false;
     return say(s, "reset", s->seen, "{}");
 }
@@ -103,7 +102,7 @@ static bool say_reset(all_stream *s)
 static bool look(event_stream *base)
 {
     all_stream *s = (all_stream *)base;
-    api *context = base->context;
+    api *context = s->context;
     feed_change changes[AT_ONCE];
     size_t count;
     uint64_t seen;
@@ -139,8 +138,9 @@ void events_get_all(api *context, http_request *rq, http_reply *reply)
     all_stream *s = calloc(1, sizeof *s);
     if (s) {
         s->base.look = look;
+        s->context = context;
         s->base.every_s = EVERY_S;
         s->reset = !read_seen(context, rq, &s->seen);
     }
-    stream_reply(context, rq, s ? &s->base : NULL, NULL, reply);
+    stream_reply(rq, s ? &s->base : NULL, NULL, reply);
 }

@@ -1,7 +1,6 @@
 /* convergence.c: how jobs converged, as a picture: /v1/jobs/{id}/convergence.svg. */
 #include "http/history.h"
 #include "http/jobs.h"
-#include "base/problem_details.h"
 
 #include <math.h>
 #include <stdio.h>

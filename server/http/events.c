@@ -5,7 +5,6 @@
  * present one, and an event's id names the state, so that one who saw it already (Last-Event-ID) does not get it
  * twice. */
 #include "http/jobs.h"
-#include "http/transport/stream.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -14,6 +13,7 @@
 
 typedef struct {
     event_stream base;
+    api *context;
     char id[33], last[64]; /* last: the state that the client has seen */
     job_status status;
     bool any;         /* a status was sent */
@@ -55,7 +55,7 @@ static void look_at_run(const job_stream *s, job *j, double **rows, const double
     *rows = NULL;
     *row = NULL;
     if (j->status != JOB_RUNNING ||
-        !work_live(s->base.context->work, j->id, (int64_t)fmax(s->iteration, -1.0), &progress, rows, &count))
+        !work_live(s->context->work, j->id, (int64_t)fmax(s->iteration, -1.0), &progress, rows, &count))
         return;
     j->progress = progress;
     if (count > 0)
@@ -69,7 +69,7 @@ static bool look(event_stream *base)
     double *rows;
     const double *row;
     char state[64];
-    bool ok = store_get(base->context->store, s->id, &j) == STORE_OK; /* deleted meanwhile: nothing more to tell */
+    bool ok = store_get(s->context->store, s->id, &j) == STORE_OK; /* deleted meanwhile: nothing more to tell */
     if (!ok)
         return false;
     look_at_run(s, &j, &rows, &row);
@@ -105,9 +105,10 @@ void events_get(api *context, http_request *rq, http_reply *reply)
     job_stream *s = calloc(1, sizeof *s);
     if (s) {
         s->base.look = look;
+        s->context = context;
         s->iteration = -1;
         memcpy(s->id, rq->job_id, sizeof s->id);
         memcpy(s->last, last, sizeof s->last);
     }
-    stream_reply(context, rq, s ? &s->base : NULL, rq->job_id, reply);
+    stream_reply(rq, s ? &s->base : NULL, rq->job_id, reply);
 }

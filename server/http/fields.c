@@ -1,7 +1,5 @@
 #include "http/fields.h"
 
-#include "base/problem_details.h"
-
 #include <errno.h>
 #include <semaphore.h>
 #include <stdio.h>
@@ -53,7 +51,7 @@ static bool wait_a_little(field_slots *slots)
 static bool is_over(void *ctx)
 {
     const field_reader *reader = ctx;
-    return atomic_load(&reader->context->draining) || request_client_gone(reader->rq);
+    return api_draining(reader->context) || request_client_gone(reader->rq);
 }
 
 static bool take_slot(field_reader *reader, http_reply *reply)

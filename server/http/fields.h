@@ -3,7 +3,7 @@
 #define SERVER_HTTP_FIELDS_H
 
 #include "codec/codec.h"
-#include "http/request.h"
+#include "http/api.h"
 
 /* How many replies may be computed at a time; others wait for their turn, each in its connection's thread. */
 typedef struct field_slots field_slots;

@@ -1,7 +1,6 @@
 /* files.c: an answer as a file for other programs and for people: /v1/jobs/{id}/result.vtu, deformed.svg, surface. */
 #include "codec/codec.h"
 #include "http/jobs.h"
-#include "base/problem_details.h"
 #include "http/results.h"
 
 #include <string.h>

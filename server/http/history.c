@@ -1,7 +1,6 @@
 /* history.c: how a run went: /v1/jobs/{id}/history and /history.csv, also while it goes on. */
 #include "http/history.h"
 #include "http/jobs.h"
-#include "base/problem_details.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #ifndef SERVER_HTTP_HISTORY_H
 #define SERVER_HTTP_HISTORY_H
 
-#include "http/request.h"
+#include "http/api.h"
 
 /* The rows of one case, or of a job without cases; the caller frees `rows`. */
 typedef struct {

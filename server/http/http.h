@@ -1,16 +1,15 @@
-/* http.h: the daemon's HTTP side, start to stop. The only folder that knows libmicrohttpd.
+/* http.h: the daemon's HTTP side, start to stop: transport/ has the connections, and here are the routes.
  *
- * bytes -> framing (framing.h) -> target (target.h) -> route table (routes.c: all handlers, each in the file of its
- * subject) -> negotiation (negotiate.h) -> reply (reply.h). One thread per connection, so a handler may block, and none
- * for one that only waits (held.h); deadlines.h ends connections that are too slow. Handlers own nothing beyond their
- * request: the store and the workers own the jobs. */
+ * admission.c refuses what can be refused without the body; routes.c has the table of all handlers, each in the file of
+ * its subject. Handlers own nothing beyond their request: the store and the workers own the jobs. */
 #ifndef SERVER_HTTP_H
 #define SERVER_HTTP_H
 
 #include "codec/codec.h"
-#include "http/auth.h"
 #include "base/log.h"
 #include "base/metrics.h"
+#include "http/auth.h"
+#include "http/transport/transport.h"
 #include "store/store.h"
 #include "work/webhook.h"
 #include "work/work.h"
@@ -29,14 +28,6 @@ typedef struct {
     auth *auth;       /* NULL: everybody may all */
 } http_parts;
 
-/* Certificate chain and key as PEM texts. */
-typedef struct {
-    char *cert, *key;
-} http_tls;
-/* Reads and checks both files; false with the reason in message. The caller clears *out. */
-bool http_tls_read(http_tls *out, const char *cert_path, const char *key_path, char *message, size_t size);
-void http_tls_clear(http_tls *tls); /* {NULL, NULL} is fine */
-
 typedef struct {
     size_t max_body;           /* bytes of one request's body */
     size_t max_upload;         /* bytes of one upload, as it is sent and after decompression */
@@ -53,12 +44,6 @@ typedef struct {
     const codec_limit *limits;       /* n_limits, for GET /v1/limits; they must outlive the server */
     size_t n_limits;
 } http_options;
-
-/* Opens a listening socket on "HOST:PORT" or "[IPv6]:PORT"; port 0 takes a free one. url becomes "SCHEME://HOST:PORT"
- * with the real port. -1 on failure with the reason in message. */
-int http_listen(const char *host_port, const char *scheme, char *url, size_t url_size, char *message, size_t size);
-/* True if others than this machine can reach the socket. */
-bool http_is_public(int listen_fd);
 
 /* Serves on listen_fd, which it owns from then on, also on failure. NULL on failure with the reason in message. */
 http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message,

@@ -1,8 +1,7 @@
 /* jobs.c: /v1/jobs and /v1/jobs/{id}. */
 #include "codec/codec.h"
 #include "http/jobs.h"
-#include "base/problem_details.h"
-#include "http/request.h"
+#include "http/api.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -78,7 +77,7 @@ bool jobs_ended(const job *j)
 
 static void note_preference(const api *context, const http_request *rq, double seconds, http_reply *reply)
 {
-    if (request_wait(rq, -1, context->max_wait_s) >= 0)
+    if (request_wait(rq, -1, context->options.max_wait_s) >= 0)
         snprintf(reply->preference_applied, sizeof reply->preference_applied, "wait=%.0f", seconds);
 }
 
@@ -95,10 +94,10 @@ static bool load_again(api *context, job *j, http_reply *reply)
 
 bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply)
 {
-    double seconds = request_wait(rq, otherwise, context->max_wait_s);
+    double seconds = request_wait(rq, otherwise, context->options.max_wait_s);
     if (seconds <= 0 || jobs_ended(j))
         return true;
-    work_wait_for(context->work, j->id, seconds, rq->fd, &context->draining);
+    work_wait_for(context->work, j->id, seconds, rq->fd, transport_draining(context->server));
     note_preference(context, rq, seconds, reply);
     return load_again(context, j, reply);
 }
@@ -106,16 +105,16 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
 /* So long a wait keeps its thread: a connection that has given it up ends with the reply (held.h). */
 static const double SHORT_WAIT_S = 1.0;
 
-void jobs_wait_then(api *context, http_request *rq, job *j, waiting_then then, http_reply *reply)
+void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http_reply *reply)
 {
-    double seconds = request_wait(rq, 0, context->max_wait_s), rest = fmax(seconds - SHORT_WAIT_S, 0.0);
+    double seconds = request_wait(rq, 0, context->options.max_wait_s), rest = fmax(seconds - SHORT_WAIT_S, 0.0);
     if (seconds <= 0 || jobs_ended(j)) {
         then(context, j, reply);
         return;
     }
     note_preference(context, rq, seconds, reply);
-    if (work_wait_for(context->work, j->id, seconds - rest, rq->fd, &context->draining) || rest == 0.0 ||
-        !waiting_begin(context, rq, j->id, rest, then)) {
+    if (work_wait_for(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server)) ||
+        rest == 0.0 || !jobs_delay(context, rq, j->id, rest, then)) {
         if (load_again(context, j, reply))
             then(context, j, reply);
     }
@@ -260,7 +259,7 @@ typedef struct {
 static bool is_unwanted(void *ctx)
 {
     const asker *a = ctx;
-    return atomic_load(&a->context->draining) || request_client_gone(a->rq);
+    return api_draining(a->context) || request_client_gone(a->rq);
 }
 
 /* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */

@@ -3,9 +3,10 @@
 #define SERVER_HTTP_JOBS_H
 
 #include "codec/codec.h"
-#include "http/request.h"
-#include "http/waiting.h"
+#include "http/api.h"
 
+/* Reads the job named in the path; false with a 404 or 500 in reply. */
+bool jobs_load(api *context, http_request *rq, job *out, http_reply *reply);
 bool jobs_ended(const job *j);
 /* A running job's progress lives in the worker; the store has the one of the last lease. */
 void jobs_freshen(api *context, job *j);
@@ -17,9 +18,15 @@ void jobs_check_still_there(api *context, const job *j, http_reply *reply);
 /* Waits as the request prefers, `otherwise` seconds where it does not say, and reads the job again; *j is replaced.
  * False with a failure in reply. */
 bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_reply *reply);
-/* Waits as the request prefers and answers by `then`; a longer wait goes on after the handler's return (waiting.h), so
- * that then must not need what the handler has. */
-void jobs_wait_then(api *context, http_request *rq, job *j, waiting_then then, http_reply *reply);
+/* Answers with the job as it is then. */
+typedef void (*jobs_then)(api *context, job *j, http_reply *reply);
+/* Waits as the request prefers and answers by `then`; a longer wait goes on after the handler's return (transport.h),
+ * so that then must not need what the handler has. */
+void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http_reply *reply);
+
+/* Puts a source into rq->reply that answers by `then` when the job has ended, or after so many seconds; its failures
+ * are answered too. False: no memory. */
+bool jobs_delay(api *context, http_request *rq, const char *id, double seconds, jobs_then then);
 
 /* NULL in *key: none was given; freed by the caller. False with a 400. */
 bool jobs_read_key(const http_request *rq, char **key, problem_details *problem);

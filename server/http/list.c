@@ -1,6 +1,5 @@
 /* list.c: GET /v1/jobs. */
 #include "http/jobs.h"
-#include "base/problem_details.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,7 +2,7 @@
  * itself. Its policy allows nothing but its own files and this service, and no code or style within the document
  * (W3C Content Security Policy 3). */
 #include "http/page.h"
-#include "http/request.h"
+#include "http/api.h"
 
 #include <string.h>
 

@@ -1,6 +1,5 @@
 /* place.c: the job, or the one of its load cases, that a reply is about. */
 #include "http/jobs.h"
-#include "base/problem_details.h"
 #include "http/results.h"
 
 #include <stdio.h>

@@ -1,7 +1,6 @@
 #include "http/rate.h"
 
 #include <math.h>
-#include <netinet/in.h>
 #include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -81,23 +80,4 @@ double rate_take(rate *r, const void *key, size_t len, double now)
         b->left -= 1.0;
     pthread_mutex_unlock(&r->lock);
     return wait;
-}
-
-size_t rate_address(const struct sockaddr *address, unsigned char out[16])
-{
-    if (!address)
-        return 0;
-    if (address->sa_family == AF_INET) {
-        memcpy(out, &((const struct sockaddr_in *)(const void *)address)->sin_addr, 4);
-        return 4;
-    }
-    if (address->sa_family != AF_INET6)
-        return 0;
-    const struct in6_addr *six = &((const struct sockaddr_in6 *)(const void *)address)->sin6_addr;
-    if (IN6_IS_ADDR_V4MAPPED(six)) {
-        memcpy(out, &six->s6_addr[12], 4);
-        return 4;
-    }
-    memcpy(out, six->s6_addr, 8);
-    return 8;
 }

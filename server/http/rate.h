@@ -4,7 +4,6 @@
 #define SERVER_HTTP_RATE_H
 
 #include <stddef.h>
-#include <sys/socket.h>
 
 typedef struct rate rate;
 /* `per_s` requests per second and twice as many at once. NULL: no memory. */
@@ -13,9 +12,5 @@ void rate_free(rate *r); /* NULL is fine */
 
 /* One request of the client key[0..len) at time `now`, seconds: 0 if it may go on, else seconds until one may. */
 double rate_take(rate *r, const void *key, size_t len, double now);
-
-/* The part of an address that names a client: IPv4, or the first 64 bits of IPv6, of which a client often has all
- * (RFC 6177). Returns its length, at most 16; 0: unknown. */
-size_t rate_address(const struct sockaddr *address, unsigned char out[16]);
 
 #endif

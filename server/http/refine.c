@@ -1,6 +1,5 @@
 /* refine.c: POST /v1/jobs/{id}/refine: a job that goes on where another one stopped. */
 #include "http/jobs.h"
-#include "base/problem_details.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -2,9 +2,7 @@
 #include "codec/codec.h"
 #include "http/fields.h"
 #include "http/jobs.h"
-#include "http/transport/negotiate.h"
-#include "base/problem_details.h"
-#include "http/request.h"
+#include "http/api.h"
 #include "http/results.h"
 #include "options/options.h"
 

@@ -3,7 +3,7 @@
 #define SERVER_HTTP_RESULTS_H
 
 #include "http/fields.h"
-#include "http/request.h"
+#include "http/api.h"
 
 /* What the store has, and what is computed from it. */
 #define STORED ((unsigned)(UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_DISPLACEMENTS | UZ_FIELD_PRESSURE))

@@ -1,8 +1,7 @@
 /* routes.c: the route table. 404, 405 with Allow and unknown query keys all follow from it; HEAD is served by GET.
  * A new route is a row here, a handler declared in request.h and defined in the file of its subject, and a path in
  * schemas/openapi.json; tests/api/test_schemas.py compares the two. */
-#include "base/problem_details.h"
-#include "http/request.h"
+#include "http/api.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,10 +1,7 @@
 /* service.c: routes about the service itself: what is cached, whether it lives, what is valid. */
 #include "codec/codec.h"
 #include "codec/embedded.h"
-#include "http/transport/conn.h"
-#include "http/transport/deadlines.h"
-#include "http/transport/presence.h"
-#include "http/request.h"
+#include "http/api.h"
 #include "options/options.h"
 
 #include <math.h>
@@ -34,7 +31,7 @@ enum { N_FIXED = sizeof FIXED / sizeof FIXED[0] };
 
 void service_limits(api *context, http_request *rq, http_reply *reply)
 {
-    size_t n = context->n_limits;
+    size_t n = context->options.n_limits;
     codec_limit *all = malloc((n + N_FIXED) * sizeof *all);
     (void)rq;
     if (!all) {
@@ -42,7 +39,7 @@ void service_limits(api *context, http_request *rq, http_reply *reply)
         return;
     }
     if (n > 0)
-        memcpy(all, context->limits, n * sizeof *all);
+        memcpy(all, context->options.limits, n * sizeof *all);
     memcpy(all + n, FIXED, sizeof FIXED);
     reply->tag_by_body = true;
     reply_json(reply, 200, codec_encode_limits(all, n + N_FIXED));
@@ -68,11 +65,12 @@ static void count_cache(api *context, metrics_now *now)
 
 void service_metrics(api *context, http_request *rq, http_reply *reply)
 {
+    const transport_counts counts = transport_count(context->server);
     metrics_now now = {.workers = work_workers(context->work),
                        .workers_busy = work_busy(context->work),
-                       .connections = (unsigned)presences_count(context->presences),
-                       .streams = atomic_load(&context->streams),
-                       .body_bytes = atomic_load(&context->body_bytes),
+                       .connections = counts.connections,
+                       .streams = counts.streams,
+                       .body_bytes = counts.body_bytes,
                        .store_free_bytes = store_free_bytes(context->store),
                        .version = UZAWAD_VERSION};
     size_t len = 0;
@@ -142,9 +140,9 @@ static const double READY_FOR_S = 1.0; /* so often at most it is tried, however 
 static void try_ready(api *context, char why[64])
 {
     pthread_mutex_lock(&context->ready_lock);
-    if (deadlines_now() >= context->ready_until) {
+    if (http_now() >= context->ready_until) {
         snprintf(context->ready_why, sizeof context->ready_why, "%s", why_not_ready(context));
-        context->ready_until = deadlines_now() + READY_FOR_S;
+        context->ready_until = http_now() + READY_FOR_S;
     }
     memcpy(why, context->ready_why, sizeof context->ready_why);
     pthread_mutex_unlock(&context->ready_lock);
@@ -156,7 +154,7 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
     char why[64] = "";
     (void)rq;
     reply->retry_after_s = 5;
-    if (atomic_load(&context->draining)) {
+    if (api_draining(context)) {
         reply_refuse(reply, 503, "draining", "The server is shutting down", "no new work is taken");
         return;
     }

@@ -1,7 +1,6 @@
 /* start_check.c: "warm_start": {"job": ...} against the store, before the request becomes a job. The other job may
  * still be deleted before this one runs; the run then begins at zero. */
 #include "http/jobs.h"
-#include "base/problem_details.h"
 
 #include <math.h>
 #include <stdio.h>

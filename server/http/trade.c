@@ -1,6 +1,5 @@
 /* trade.c: what accuracy took: /v1/jobs/{id}/work-precision. */
 #include "http/jobs.h"
-#include "base/problem_details.h"
 #include "http/results.h"
 #include "work/trade.h"
 

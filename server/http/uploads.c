@@ -1,8 +1,6 @@
 /* uploads.c: /v1/uploads: texts that are sent once and used in many requests. A body goes to disk as it comes. */
 #include "codec/codec.h"
-#include "base/problem_details.h"
-#include "http/request.h"
-#include "http/uploads.h"
+#include "http/api.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +15,7 @@ static bool refuse(api *context, http_request *rq, upload_status status, problem
     case UPLOAD_TOO_LARGE:
         return http_problem(problem, 413, "upload_too_large", "The upload is too large",
                             "an upload has at most %lld bytes here, counted after decompression",
-                            (long long)context->max_upload);
+                            (long long)context->options.max_upload);
     case UPLOAD_NO_ROOM:
         return http_problem(problem, 507, "uploads_full", "There is no room for more uploads",
                             "uploads that no job uses make room after a while: delete some, or the jobs that use them");

@@ -1,6 +1,5 @@
 /* verify.c: POST /v1/verify: a job like any other, whose result is the answer to the call where it comes in time. */
 #include "http/jobs.h"
-#include "base/problem_details.h"
 
 #include <stdlib.h>
 

@@ -1,4 +1,5 @@
 #include "http/transport/deadlines.h"
+#include "http/transport/transport.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -25,7 +26,7 @@ struct deadlines {
     char *last_words;
 };
 
-double deadlines_now(void)
+double http_now(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -69,7 +70,7 @@ static void *watch(void *argument)
     deadlines *all = argument;
     pthread_mutex_lock(&all->mutex);
     while (!all->stop) {
-        all->wake_at = sweep(all, deadlines_now());
+        all->wake_at = sweep(all, http_now());
         wait_until(all, all->wake_at);
     }
     pthread_mutex_unlock(&all->mutex);

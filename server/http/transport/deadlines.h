@@ -19,9 +19,6 @@ deadlines *deadlines_new(const char *last_words);
 /* Stops the thread; every deadline must have been removed. */
 void deadlines_free(deadlines *all);
 
-/* Seconds on the clock that deadlines are given in (CLOCK_MONOTONIC). */
-double deadlines_now(void);
-
 /* Watches fd until `at`. NULL: no memory. */
 deadline *deadlines_add(deadlines *all, int fd, double at);
 /* INFINITY: not watched. speak: say the last words when it expires. */

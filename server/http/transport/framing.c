@@ -1,6 +1,4 @@
 #include "http/transport/framing.h"
-#include "base/problem_details.h"
-#include "http/transport/target.h"
 
 #include <string.h>
 

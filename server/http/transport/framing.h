@@ -6,27 +6,7 @@
 #ifndef SERVER_HTTP_FRAMING_H
 #define SERVER_HTTP_FRAMING_H
 
-#include "base/problem_details.h"
-
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#define HEADERS_MAX 128
-
-/* Header fields as received, in order; they live in the connection's buffer until the request completes. */
-typedef struct {
-    const char *name, *value;
-    size_t name_len, value_len;
-} header_field;
-typedef struct {
-    header_field fields[HEADERS_MAX];
-    size_t count;
-    bool overflow; /* there were more than HEADERS_MAX */
-} header_list;
-
-/* The first field of that name, NULL if there is none; *count (may be NULL) is how many there are. */
-const header_field *header_find(const header_list *headers, const char *name, size_t *count);
+#include "http/transport/transport.h"
 
 typedef struct {
     bool chunked;

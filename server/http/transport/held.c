@@ -1,11 +1,11 @@
 #include "http/transport/held.h"
-#include "http/transport/deadlines.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +29,7 @@ typedef struct held {
     int fd;
     char *out; /* what the socket has not taken yet, from `at` to len */
     size_t at, len;
-    double due; /* on deadlines_now's clock: when it must be served, whatever happens */
+    double due; /* on http_now's clock: when it must be served, whatever happens */
     uint32_t watched;
     bool chunked, last, ending, over, is_ready;
     /* last: nothing follows `out`; ending: all was sent, the client closes */
@@ -123,10 +123,10 @@ static bool flush(const holder *h, held *one)
 {
     ssize_t n = one->out ? send(one->fd, one->out + one->at, one->len - one->at, MSG_NOSIGNAL | MSG_DONTWAIT) : 0;
     if (n < 0)
-        return (errno == EAGAIN || errno == EINTR) && deadlines_now() < one->due;
+        return (errno == EAGAIN || errno == EINTR) && http_now() < one->due;
     one->at += (size_t)n;
     if (n > 0)
-        one->due = deadlines_now() + h->patience_s;
+        one->due = http_now() + h->patience_s;
     if (one->at == one->len) {
         free(one->out);
         one->out = NULL;
@@ -166,7 +166,7 @@ static bool say(holder *h, held *one, bool *more)
 static void begin_end(held *one)
 {
     one->ending = true;
-    one->due = deadlines_now() + LINGER_S;
+    one->due = http_now() + LINGER_S;
     shutdown(one->fd, SHUT_WR);
 }
 
@@ -178,7 +178,7 @@ static bool linger(holder *h, const held *one)
     for (int i = 0; n > 0 && i < PIECES; i++)
         n = recv(one->fd, h->buffer, PIECE, MSG_DONTWAIT);
     bool open = n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
-    return open && deadlines_now() < one->due;
+    return open && http_now() < one->due;
 }
 
 /* Does what can be done now. False: it is over. */
@@ -187,7 +187,7 @@ static bool serve(holder *h, held *one)
     bool more = true;
     if (one->ending)
         return linger(h, one);
-    bool waits = !one->out && !one->last && deadlines_now() < one->due;
+    bool waits = !one->out && !one->last && http_now() < one->due;
     for (int i = 0; !waits && more && !one->last && i < PIECES; i++) {
         if (!flush(h, one))
             return false;
@@ -196,7 +196,7 @@ static bool serve(holder *h, held *one)
         if (!say(h, one, &more))
             return false;
         if (one->out)
-            one->due = deadlines_now() + h->patience_s;
+            one->due = http_now() + h->patience_s;
     }
     if (!flush(h, one))
         return false;
@@ -260,7 +260,7 @@ static void attend_ready(holder *h)
 
 static void attend_due(holder *h)
 {
-    double now = deadlines_now();
+    double now = http_now();
     if (now < h->soonest)
         return;
     h->soonest = INFINITY;
@@ -297,7 +297,7 @@ static bool receive(holder *h)
 
 static int wait_ms(const holder *h)
 {
-    double left = h->soonest - deadlines_now();
+    double left = h->soonest - http_now();
     return left <= 0.0 ? 0 : (int)fmin(ceil(left * 1e3), 1e6);
 }
 
@@ -403,7 +403,7 @@ bool holder_take(holder *h, int fd, http_request *rq, char *head, bool chunked, 
     source->hold(source->ctx);
     one->out = head;
     one->len = head ? strlen(head) : 0;
-    one->due = head ? deadlines_now() + h->patience_s : 0.0;
+    one->due = head ? http_now() + h->patience_s : 0.0;
     pthread_mutex_lock(&h->lock);
     one->next = h->arriving;
     h->arriving = one;

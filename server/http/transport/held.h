@@ -1,6 +1,6 @@
 /* held.h: connections that wait without a thread: event streams and long polls.
  *
- * libmicrohttpd runs each connection in a thread of its own (daemon.c), and a thread that sleeps keeps 150 kB. A reply
+ * libmicrohttpd runs each connection in a thread of its own (server.c), and a thread that sleeps keeps 150 kB. A reply
  * of which nothing is left but to wait therefore takes its socket along: the socket gets another descriptor, an
  * unconnected one takes the old number (dup2 is atomic), libmicrohttpd closes that and ends its thread, and one thread
  * here watches all sockets that were taken (epoll). It writes what their sources have to say, sees clients leave, and
@@ -11,11 +11,11 @@
  * The other way, MHD_suspend_connection, was tried with a handler that blocks for 1 ms, 64 clients and 2,000 streams on
  * 2 processors: 45 kB each (its buffers stay), and 23,000 requests per second by event threads and a pool of handlers
  * against 34,000 by a thread per connection. It also takes away the only way to tell which connection a refusal of
- * libmicrohttpd's own is about: conn_refuse. */
+ * libmicrohttpd's own is about: connection_refuse. */
 #ifndef SERVER_HTTP_HELD_H
 #define SERVER_HTTP_HELD_H
 
-#include "http/request.h"
+#include "http/transport/transport.h"
 
 typedef struct holder holder;
 

@@ -1,5 +1,5 @@
 /* listen.c: from "HOST:PORT" to a listening socket. */
-#include "http/http.h"
+#include "http/transport/transport.h"
 
 #include <errno.h>
 #include <netdb.h>

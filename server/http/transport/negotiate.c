@@ -1,6 +1,5 @@
 /* negotiate.c: what becomes of a whole reply by what the client has and takes: 304, a range of bytes, gzip. */
-#include "http/transport/negotiate.h"
-#include "base/problem_details.h"
+#include "http/transport/message.h"
 
 #include <gnutls/crypto.h>
 #include <stdio.h>

@@ -1,9 +1,10 @@
 #include "http/transport/presence.h"
-#include "http/rate.h"
 
+#include <netinet/in.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 
 struct presence {
     presences *all;
@@ -17,6 +18,27 @@ struct presences {
     presence *first;
     size_t count;
 };
+
+/* The part of an address that names a client: IPv4, or the first 64 bits of IPv6, of which a client often has all
+ * (RFC 6177). Returns its length, at most 16; 0: unknown. */
+static size_t name_client(const struct sockaddr *address, unsigned char out[16])
+{
+    if (!address)
+        return 0;
+    if (address->sa_family == AF_INET) {
+        memcpy(out, &((const struct sockaddr_in *)(const void *)address)->sin_addr, 4);
+        return 4;
+    }
+    if (address->sa_family != AF_INET6)
+        return 0;
+    const struct in6_addr *six = &((const struct sockaddr_in6 *)(const void *)address)->sin6_addr;
+    if (IN6_IS_ADDR_V4MAPPED(six)) {
+        memcpy(out, &six->s6_addr[12], 4);
+        return 4;
+    }
+    memcpy(out, six->s6_addr, 8);
+    return 8;
+}
 
 presences *presences_new(void)
 {
@@ -40,7 +62,7 @@ presence *presence_begin(presences *all, const struct sockaddr *from)
     if (!p)
         return NULL;
     p->all = all;
-    p->len = rate_address(from, p->address);
+    p->len = name_client(from, p->address);
     pthread_mutex_lock(&all->lock);
     p->next = all->first;
     if (p->next)
@@ -68,6 +90,12 @@ void presence_end(presence *p)
     free(p);
 }
 
+size_t presence_address(const presence *p, unsigned char out[16])
+{
+    memcpy(out, p->address, p->len);
+    return p->len;
+}
+
 size_t presences_count(presences *all)
 {
     pthread_mutex_lock(&all->lock);
@@ -79,7 +107,7 @@ size_t presences_count(presences *all)
 size_t presences_from(presences *all, const struct sockaddr *from)
 {
     unsigned char address[16];
-    size_t len = rate_address(from, address), count = 0;
+    size_t len = name_client(from, address), count = 0;
     pthread_mutex_lock(&all->lock);
     for (const presence *p = len > 0 ? all->first : NULL; p; p = p->next)
         count += p->len == len && memcmp(p->address, address, len) == 0;

@@ -1,6 +1,6 @@
-#include "http/transport/reply.h"
+/* reply.c: what a handler answers, and the only functions that send it. */
+#include "http/transport/message.h"
 #include "codec/codec.h"
-#include "base/problem_details.h"
 
 #include <microhttpd.h>
 #include <stdarg.h>

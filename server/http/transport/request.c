@@ -1,5 +1,5 @@
-#include "http/request.h"
-#include "base/problem_details.h"
+/* request.c: what a request's header fields and query say. */
+#include "http/transport/message.h"
 
 #include <errno.h>
 #include <poll.h>

@@ -1,6 +1,6 @@
-#include "http/transport/stream.h"
-#include "http/transport/deadlines.h"
-#include "base/problem_details.h"
+/* stream.c: replies of Server-Sent Events. */
+#include "http/transport/connection.h"
+#include "http/transport/message.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@ static void stream_free(void *ctx)
 {
     event_stream *s = ctx;
     feed_unlisten(s->listener);
-    atomic_fetch_sub(&s->context->streams, 1);
+    atomic_fetch_sub(&s->rq->server->streams, 1);
     free(s->text);
     free(s);
 }
@@ -39,7 +39,7 @@ bool stream_say(event_stream *s, const char *event, const char *id, const char *
         return false;
     s->text = grown;
     s->len += (size_t)snprintf(s->text + s->len, more, FORM, event, id, data);
-    s->told = s->spoke = deadlines_now();
+    s->told = s->spoke = http_now();
     return true;
 }
 
@@ -63,7 +63,7 @@ static ptrdiff_t heartbeat(event_stream *s, char *out, size_t size)
     static const char COMMENT[] = ":\n\n";
     if (size < sizeof COMMENT)
         return REPLY_STREAM_ENDS;
-    s->spoke = deadlines_now();
+    s->spoke = http_now();
     memcpy(out, COMMENT, sizeof COMMENT - 1);
     return sizeof COMMENT - 1;
 }
@@ -71,10 +71,10 @@ static ptrdiff_t heartbeat(event_stream *s, char *out, size_t size)
 /* Until there may be something to tell; what comes in quick succession is told together. */
 static void sleep_until_told(event_stream *s)
 {
-    double due = s->spoke + HEARTBEAT_S - deadlines_now(), pause = s->told + s->every_s - deadlines_now();
+    double due = s->spoke + HEARTBEAT_S - http_now(), pause = s->told + s->every_s - http_now();
     if (feed_wait(s->listener, s->rq->fd, fmax(due, 0.001)))
-        for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->context->draining);
-             pause = s->told + s->every_s - deadlines_now())
+        for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->rq->server->draining);
+             pause = s->told + s->every_s - http_now())
             feed_wait(s->listener, s->rq->fd, pause);
 }
 
@@ -85,13 +85,13 @@ static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
     for (;;) {
         if (s->text)
             return take(s, out, size);
-        if (s->ended || atomic_load(&s->context->draining))
+        if (s->ended || atomic_load(&s->rq->server->draining))
             return REPLY_STREAM_ENDS;
         if (request_client_gone(s->rq) || !s->look(s))
             return REPLY_STREAM_BREAKS;
         if (s->text)
             continue;
-        if (deadlines_now() - s->spoke >= HEARTBEAT_S)
+        if (http_now() - s->spoke >= HEARTBEAT_S)
             return heartbeat(s, out, size);
         if (s->held)
             return 0;
@@ -109,38 +109,32 @@ static double stream_due(void *ctx, bool told)
     const event_stream *s = ctx;
     if (!told)
         return s->spoke + HEARTBEAT_S;
-    return atomic_load(&s->context->draining) ? 0.0 : s->told + s->every_s;
+    return atomic_load(&s->rq->server->draining) ? 0.0 : s->told + s->every_s;
 }
 
 /* ---- the reply */
 
-static bool take_place(api *context, http_reply *reply)
+void stream_reply(http_request *rq, event_stream *s, const char *id, http_reply *reply)
 {
-    if (atomic_fetch_add(&context->streams, 1) < context->max_streams)
-        return true;
-    atomic_fetch_sub(&context->streams, 1);
-    reply->retry_after_s = 5;
-    reply_refuse(reply, 503, "too_many_streams", "Too many event streams at once",
-                 "at most %u may be open (the daemon's option --max-streams): close some, or ask for the job with "
-                 "\"Prefer: wait=N\"",
-                 context->max_streams);
-    return false;
-}
-
-void stream_reply(api *context, http_request *rq, event_stream *s, const char *id, http_reply *reply)
-{
+    transport *server = rq->server;
+    unsigned most = server->options.max_streams;
     if (!s) {
         reply_no_memory(reply);
         return;
     }
-    if (!take_place(context, reply)) {
+    if (atomic_fetch_add(&server->streams, 1) >= most) {
+        atomic_fetch_sub(&server->streams, 1);
         free(s);
+        reply->retry_after_s = 5;
+        reply_refuse(reply, 503, "too_many_streams", "Too many event streams at once",
+                     "at most %u may be open (the daemon's option --max-streams): close some, or ask for the job with "
+                     "\"Prefer: wait=N\"",
+                     most);
         return;
     }
-    s->context = context;
     s->rq = rq;
-    s->spoke = deadlines_now();
-    s->listener = feed_listen(work_feed(context->work), id);
+    s->spoke = http_now();
+    s->listener = feed_listen(server->options.feed, id);
     if (s->listener) {
         reply_stream(reply, 200, "text/event-stream",
                      (reply_source){stream_read, stream_free, s, s->listener, stream_hold, stream_due, false, NULL});

@@ -1,5 +1,4 @@
-#include "http/transport/target.h"
-#include "base/problem_details.h"
+#include "http/transport/transport.h"
 
 #include <stdlib.h>
 #include <string.h>

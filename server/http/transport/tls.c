@@ -1,6 +1,6 @@
 /* tls.c: the certificate and the key, checked before libmicrohttpd takes them: it would only say that it can't start.
  */
-#include "http/http.h"
+#include "http/transport/transport.h"
 
 #include <errno.h>
 #include <gnutls/gnutls.h>

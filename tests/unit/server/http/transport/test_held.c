@@ -52,7 +52,7 @@ static void hold_speaker(void *ctx)
 static double speak_due(void *ctx, bool told)
 {
     const speaker *s = ctx;
-    return told ? 0.0 : deadlines_now() + s->every_s;
+    return told ? 0.0 : http_now() + s->every_s;
 }
 
 static void speaker_end(void *ctx)
@@ -104,7 +104,7 @@ static size_t read_all(int fd, char *out, size_t size)
 
 static void wait_for(atomic_int *number, int value)
 {
-    for (double end = deadlines_now() + 20; atomic_load(number) != value && deadlines_now() < end;)
+    for (double end = http_now() + 20; atomic_load(number) != value && http_now() < end;)
         poll(NULL, 0, 5);
 }
 

@@ -1,12 +1,11 @@
-/* daemon.c: libmicrohttpd's callbacks and the life of a connection.
+/* server.c: libmicrohttpd's callbacks and the life of a connection.
  *
  * A connection has at most one request at a time. The request is made when its first line has come (on_target), looked
  * at when its header block has come (begin), fed with its body (take_body), answered (answer) and ended
  * (on_completed). All of this happens in the connection's own thread; a reply that then only waits leaves both
  * (held.h). */
-#include "http/all_events.h"
-#include "http/transport/conn.h"
-#include "http/fields.h"
+#include "http/transport/connection.h"
+#include "http/transport/message.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -17,7 +16,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static conn *connection_of(struct MHD_Connection *mhd)
+static connection *connection_of(struct MHD_Connection *mhd)
 {
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_SOCKET_CONTEXT);
     return info ? info->socket_context : NULL;
@@ -26,13 +25,13 @@ static conn *connection_of(struct MHD_Connection *mhd)
 static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_context,
                           enum MHD_ConnectionNotificationCode code)
 {
-    http_server *server = ctx;
+    transport *server = ctx;
     if (code == MHD_CONNECTION_NOTIFY_STARTED) {
         const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CONNECTION_FD);
         const union MHD_ConnectionInfo *from = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
-        *socket_context = info ? conn_new(server, info->connect_fd, from ? from->client_addr : NULL) : NULL;
+        *socket_context = info ? connection_new(server, info->connect_fd, from ? from->client_addr : NULL) : NULL;
     } else {
-        conn_free(*socket_context);
+        connection_free(*socket_context);
         *socket_context = NULL;
     }
 }
@@ -40,22 +39,22 @@ static void on_connection(void *ctx, struct MHD_Connection *mhd, void **socket_c
 /* libmicrohttpd's own limits know only the connections that it still has. */
 static enum MHD_Result on_accept(void *ctx, const struct sockaddr *address, socklen_t len)
 {
-    http_server *server = ctx;
-    const http_options *options = &server->options;
+    transport *server = ctx;
+    const transport_options *options = &server->options;
     (void)len;
-    bool room = presences_count(server->context.presences) < options->max_connections &&
+    bool room = presences_count(server->presences) < options->max_connections &&
                 (options->max_client_connections == 0 ||
-                 presences_from(server->context.presences, address) < options->max_client_connections);
+                 presences_from(server->presences, address) < options->max_client_connections);
     return room ? MHD_YES : MHD_NO;
 }
 
 /* The first line has come; `raw` is still as received. What is returned becomes *request_context below. */
 static void *on_target(void *ctx, const char *raw, struct MHD_Connection *mhd)
 {
-    http_server *server = ctx;
-    conn *c = connection_of(mhd);
+    transport *server = ctx;
+    connection *c = connection_of(mhd);
     if (c)
-        conn_begin_request(c, raw);
+        connection_begin_request(c, raw);
     pthread_setspecific(server->current, c);
     return NULL;
 }
@@ -66,17 +65,17 @@ static enum MHD_Result on_request(void *ctx, struct MHD_Connection *mhd, const c
     (void)ctx;
     (void)url;
     (void)request_context;
-    conn *c = connection_of(mhd);
+    connection *c = connection_of(mhd);
     if (!c || !c->request)
-        return MHD_NO; /* no memory for it: libmicrohttpd closes the conn */
+        return MHD_NO; /* no memory for it: libmicrohttpd closes the connection */
     bool ok;
     if (!c->request->begun) {
-        ok = conn_headers(c, mhd, method, version);
+        ok = connection_headers(c, mhd, method, version);
     } else if (*size > 0) {
-        ok = conn_body(c, data, *size);
+        ok = connection_body(c, data, *size);
         *size = 0;
     } else {
-        ok = conn_answer(c, mhd);
+        ok = connection_answer(c, mhd);
     }
     return ok ? MHD_YES : MHD_NO;
 }
@@ -86,10 +85,10 @@ static void on_completed(void *ctx, struct MHD_Connection *mhd, void **request_c
 {
     (void)ctx;
     (void)request_context;
-    conn *c = connection_of(mhd);
+    connection *c = connection_of(mhd);
     const union MHD_ConnectionInfo *info = MHD_get_connection_info(mhd, MHD_CONNECTION_INFO_HTTP_STATUS);
     if (c)
-        conn_end_request(c, info ? info->http_status : 0, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
+        connection_end_request(c, info ? info->http_status : 0, code == MHD_REQUEST_TERMINATED_COMPLETED_OK);
 }
 
 /* libmicrohttpd's messages, from the thread they are about. What it refuses by itself (a header block without end, a
@@ -97,15 +96,15 @@ static void on_completed(void *ctx, struct MHD_Connection *mhd, void **request_c
  * that answer, so ours is sent first and the connection is closed for writing. */
 __attribute__((format(printf, 2, 0))) static void on_message(void *ctx, const char *format, va_list args)
 {
-    http_server *server = ctx;
+    transport *server = ctx;
     char text[512];
     vsnprintf(text, sizeof text, format, args);
     text[strcspn(text, "\n")] = '\0';
-    log_write(server->context.log, LOG_DEBUG, "http_message", (log_field[]){LOG_S("message", text), {0}});
-    conn *c = pthread_getspecific(server->current);
+    log_write(server->options.log, LOG_DEBUG, "http_message", (log_field[]){LOG_S("message", text), {0}});
+    connection *c = pthread_getspecific(server->current);
     const char *code = strstr(text, "HTTP response code is ");
     if (c && code)
-        conn_refuse(c, atoi(code + strlen("HTTP response code is ")));
+        connection_refuse(c, atoi(code + strlen("HTTP response code is ")));
 }
 
 /* What a client reads whose request was not complete in time. */
@@ -120,7 +119,7 @@ static char *make_last_words(double deadline_s)
     return text;
 }
 
-static struct MHD_Daemon *start_daemon(http_server *server, int listen_fd, const http_options *options)
+static struct MHD_Daemon *start_daemon(transport *server, int listen_fd, const transport_options *options)
 {
     /* The watch over deadlines is exact; this one only backs it up, and must not end a long poll. */
     unsigned idle_s = (unsigned)(options->max_wait_s + 2 * options->request_deadline_s + 60);
@@ -146,92 +145,77 @@ static struct MHD_Daemon *start_daemon(http_server *server, int listen_fd, const
                             MHD_OPTION_ARRAY, items, MHD_OPTION_END);
 }
 
-static void free_server(http_server *server)
-{
-    if (!server)
-        return;
-    rate_free(server->rate);
-    free(server);
-}
-
-http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message, size_t size)
+bool transport_start(transport **out, int listen_fd, const transport_handlers *handlers,
+                     const transport_options *options, char *message, size_t size)
 {
     char *words = make_last_words(options->request_deadline_s);
-    http_server *server = calloc(1, sizeof *server);
+    transport *server = calloc(1, sizeof *server);
     bool has_key = false;
     if (!server || !words)
         goto fail;
-    server->context.store = parts->store;
-    server->context.work = parts->work;
-    server->context.log = parts->log;
-    pthread_mutex_init(&server->context.predict_lock, NULL);
-    server->context.webhooks = parts->webhooks;
-    server->context.metrics = parts->metrics;
-    server->context.max_wait_s = options->max_wait_s;
-    server->context.cors = options->cors;
-    server->context.n_cors = options->n_cors;
-    server->context.max_streams = options->max_streams;
-    atomic_init(&server->context.streams, 0);
-    server->context.max_upload = (int64_t)options->max_upload;
-    server->context.limits = options->limits;
-    server->context.n_limits = options->n_limits;
-    atomic_init(&server->context.draining, false);
+    server->handlers = *handlers;
     server->options = *options;
-    server->auth = parts->auth;
     server->tls = options->tls != NULL;
-    if (options->max_client_rate > 0 && !(server->rate = rate_new(options->max_client_rate)))
-        goto fail;
-    server->body_budget = BODY_BUDGET(options->max_body);
-    atomic_init(&server->context.body_bytes, 0);
-    pthread_mutex_init(&server->context.ready_lock, NULL);
     atomic_init(&server->id, 0);
-    atomic_init(&server->conns, 0);
+    atomic_init(&server->connections, 0);
     atomic_init(&server->refusing, 0);
+    atomic_init(&server->streams, 0);
+    atomic_init(&server->body_bytes, 0);
+    atomic_init(&server->draining, false);
     atomic_init(&server->stopping, false);
     uint64_t random = 0;
     if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
-        random = (uint64_t)(deadlines_now() * 1e9);
+        random = (uint64_t)(http_now() * 1e9);
     snprintf(server->id_prefix, sizeof server->id_prefix, "%016llx", (unsigned long long)random);
-    memcpy(server->context.run, server->id_prefix, sizeof server->context.run);
     /* The tiling of a header block is how 0.9.x parses; later versions refuse by themselves what it finds. */
     server->check_layout = strncmp(MHD_get_version(), "0.9.", 4) == 0;
     if (pthread_key_create(&server->current, NULL) != 0)
         goto fail;
     has_key = true;
-    server->context.fields = field_slots_new(work_workers(parts->work));
-    server->context.told = told_changes_new();
     server->deadlines = deadlines_new(words);
-    server->context.presences = presences_new();
-    if (!server->deadlines || !server->context.fields || !server->context.told || !server->context.presences)
+    server->presences = presences_new();
+    if (!server->deadlines || !server->presences)
         goto fail;
-    if (!server->tls && !(server->holder = holder_new(options->request_deadline_s, conn_end_held, server)))
+    if (!server->tls && !(server->holder = holder_new(options->request_deadline_s, connection_end_held, server)))
         goto fail;
+    *out = server;
     server->daemon = start_daemon(server, listen_fd, options);
     if (!server->daemon)
         goto fail;
     free(words);
-    return server;
+    return true;
 fail:
+    *out = NULL;
     snprintf(message, size, "cannot start the HTTP server: %s", errno ? strerror(errno) : "out of memory");
     if (server) {
         holder_free(server->holder);
-        presences_free(server->context.presences);
+        presences_free(server->presences);
         deadlines_free(server->deadlines);
-        field_slots_free(server->context.fields);
-        told_changes_free(server->context.told);
     }
     if (has_key)
         pthread_key_delete(server->current);
-    free_server(server);
+    free(server);
     free(words);
     close(listen_fd);
-    return NULL;
+    return false;
 }
 
-void http_drain(http_server *server)
+void transport_drain(transport *server)
 {
-    atomic_store(&server->context.draining, true);
-    feed_wake_all(work_feed(server->context.work)); /* those who wait there see it */
+    atomic_store(&server->draining, true);
+    feed_wake_all(server->options.feed); /* those who wait there see it */
+}
+
+const atomic_bool *transport_draining(const transport *server)
+{
+    return &server->draining;
+}
+
+transport_counts transport_count(transport *server)
+{
+    return (transport_counts){.connections = (unsigned)presences_count(server->presences),
+                              .streams = atomic_load(&server->streams),
+                              .body_bytes = atomic_load(&server->body_bytes)};
 }
 
 static const double REPLY_S = 0.5, REFUSE_S = 5.0;
@@ -239,22 +223,22 @@ static const double REPLY_S = 0.5, REFUSE_S = 5.0;
 /* Nothing more is heard, and what is being said gets a moment. libmicrohttpd 0.9.75 must not be stopped while it
  * refuses a request by itself: MHD_queue_response then takes no reply but says that it did, and the reply that is not
  * there is read (transmit_error_response_len). */
-static void let_end(http_server *server)
+static void let_end(transport *server)
 {
-    double begun = deadlines_now(), spent = 0.0;
+    double begun = http_now(), spent = 0.0;
     deadlines_hear_no_more(server->deadlines);
-    while (atomic_load(&server->conns) > 0 &&
+    while (atomic_load(&server->connections) > 0 &&
            (spent < REPLY_S || (atomic_load(&server->refusing) > 0 && spent < REFUSE_S))) {
         nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
-        spent = deadlines_now() - begun;
+        spent = http_now() - begun;
     }
 }
 
-void http_stop(http_server *server)
+void transport_stop(transport *server)
 {
     if (!server)
         return;
-    http_drain(server); /* event streams end */
+    transport_drain(server); /* event streams end */
     atomic_store(&server->stopping, true);
     MHD_socket listening = MHD_quiesce_daemon(server->daemon);
     let_end(server);
@@ -262,12 +246,8 @@ void http_stop(http_server *server)
     if (listening != MHD_INVALID_SOCKET)
         close(listening);
     holder_free(server->holder); /* nobody adds to it any more */
-    presences_free(server->context.presences);
+    presences_free(server->presences);
     deadlines_free(server->deadlines);
-    field_slots_free(server->context.fields);
-    told_changes_free(server->context.told);
     pthread_key_delete(server->current);
-    pthread_mutex_destroy(&server->context.predict_lock);
-    pthread_mutex_destroy(&server->context.ready_lock);
-    free_server(server);
+    free(server);
 }

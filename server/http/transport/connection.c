@@ -1,7 +1,5 @@
-#include "http/transport/conn.h"
-#include "http/transport/negotiate.h"
-#include "base/problem_details.h"
-#include "http/uploads.h"
+#include "http/transport/connection.h"
+#include "http/transport/message.h"
 
 #include <math.h>
 #include <poll.h>
@@ -14,54 +12,53 @@
 static const double LINGER_S = 2.0;
 #define LOOK_MS 50 /* so soon it sees that the service ends */
 
-conn *conn_new(http_server *server, int fd, const struct sockaddr *address)
+connection *connection_new(transport *server, int fd, const struct sockaddr *address)
 {
-    conn *c = calloc(1, sizeof *c);
+    connection *c = calloc(1, sizeof *c);
     if (!c)
         return NULL;
     c->server = server;
     c->fd = fd;
-    c->address_len = rate_address(address, c->address);
-    c->place = presence_begin(server->context.presences, address);
-    c->deadline = deadlines_add(server->deadlines, fd, deadlines_now() + server->options.request_deadline_s);
+    c->place = presence_begin(server->presences, address);
+    c->deadline = deadlines_add(server->deadlines, fd, http_now() + server->options.request_deadline_s);
     if (!c->deadline || !c->place) {
         deadline_remove(c->deadline);
         presence_end(c->place);
         free(c);
         return NULL;
     }
-    atomic_fetch_add(&server->conns, 1);
+    atomic_fetch_add(&server->connections, 1);
     return c;
 }
 
-static void drop_body(http_server *server, http_request *rq)
+static void drop_body(transport *server, http_request *rq)
 {
-    atomic_fetch_sub(&server->context.body_bytes, rq->body_capacity);
+    atomic_fetch_sub(&server->body_bytes, rq->body_capacity);
     free(rq->body);
     rq->body = NULL;
     rq->body_capacity = 0;
 }
 
-static void request_free(http_server *server, http_request *rq)
+static void request_free(transport *server, http_request *rq)
 {
     if (!rq)
         return;
     drop_body(server, rq);
     reply_clear(&rq->reply);
-    store_upload_abort(rq->upload);
+    server->handlers.drop(server->handlers.ctx, rq);
     target_clear(&rq->target);
     free(rq->kept_fields);
     free(rq->raw_target);
     free(rq);
 }
 
-static void clear_request(conn *c)
+static void clear_request(connection *c)
 {
     request_free(c->server, c->request);
     c->request = NULL;
 }
 
-void conn_free(conn *c)
+void connection_free(connection *c)
 {
     if (!c)
         return;
@@ -69,11 +66,11 @@ void conn_free(conn *c)
     clear_request(c);
     presence_end(c->place);
     atomic_fetch_sub(&c->server->refusing, c->refusing);
-    atomic_fetch_sub(&c->server->conns, 1);
+    atomic_fetch_sub(&c->server->connections, 1);
     free(c);
 }
 
-void conn_begin_request(conn *c, const char *raw_target)
+void connection_begin_request(connection *c, const char *raw_target)
 {
     clear_request(c);
     http_request *rq = calloc(1, sizeof *rq);
@@ -84,8 +81,10 @@ void conn_begin_request(conn *c, const char *raw_target)
         free(rq);
         return;
     }
+    rq->server = c->server;
     rq->fd = c->fd;
-    rq->started = deadlines_now();
+    rq->address_len = presence_address(c->place, rq->address);
+    rq->started = http_now();
     c->request = rq;
     c->layout = (framing_layout){.target = raw_target, .target_len = strlen(raw_target)};
     deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, !c->server->tls);
@@ -95,12 +94,12 @@ void conn_begin_request(conn *c, const char *raw_target)
 
 /* Reads and drops what the client still sends, until it closes: closing a socket with unread bytes resets the
  * connection, and the reset can overtake the reply. */
-static void linger(const conn *c)
+static void linger(const connection *c)
 {
     char dropped[16384];
-    double end = deadlines_now() + LINGER_S;
+    double end = http_now() + LINGER_S;
     shutdown(c->fd, SHUT_WR);
-    while (deadlines_now() < end && !atomic_load(&c->server->stopping)) {
+    while (http_now() < end && !atomic_load(&c->server->stopping)) {
         struct pollfd p = {.fd = c->fd, .events = POLLIN};
         int ready = poll(&p, 1, LOOK_MS);
         if (ready < 0 || (ready > 0 && recv(c->fd, dropped, sizeof dropped, MSG_DONTWAIT) <= 0))
@@ -108,17 +107,17 @@ static void linger(const conn *c)
     }
 }
 
-static bool send_reply(conn *c, struct MHD_Connection *mhd)
+static bool send_reply(connection *c, struct MHD_Connection *mhd)
 {
     http_reply *reply = &c->request->reply;
     request_note_reply(c->request);
     double allowed = c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE;
-    deadline_set(c->deadline, reply->source.read ? INFINITY : deadlines_now() + allowed, false);
+    deadline_set(c->deadline, reply->source.read ? INFINITY : http_now() + allowed, false);
     return reply_send(mhd, reply);
 }
 
 /* Where libmicrohttpd takes no reply: writes it and closes the connection's sending side. */
-static void send_directly(conn *c, const problem_details *problem)
+static void send_directly(connection *c, const problem_details *problem)
 {
     http_reply *reply = &c->request->reply, plain = {.cors = reply->cors, .cors_origin = reply->cors_origin};
     size_t len;
@@ -141,7 +140,7 @@ static bool refuse_header(problem_details *problem, int status)
                         "request line and header fields together may have %d bytes", HEADER_BYTES);
 }
 
-void conn_refuse(conn *c, int status)
+void connection_refuse(connection *c, int status)
 {
     http_request *rq = c->request;
     problem_details problem;
@@ -155,7 +154,7 @@ void conn_refuse(conn *c, int status)
                      "a chunk of it says that it is larger than any body may be");
     else if (status == 413 || status == 414 || status == 431)
         refuse_header(&problem, status);
-    else if (status >= 500 && rq->framing.chunked)
+    else if (status >= 500 && rq->chunked)
         http_problem(&problem, 400, "bad_request_framing", "The request is malformed or ambiguous",
                      "the line before a chunk is too long");
     else if (status >= 500)
@@ -187,7 +186,7 @@ static size_t header_size(struct MHD_Connection *mhd)
     return info ? info->header_size : 0;
 }
 
-static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
+static bool layout_is_sound(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
     if (!c->server->check_layout)
         return true;
@@ -198,7 +197,7 @@ static bool layout_is_sound(conn *c, struct MHD_Connection *mhd, const char *met
 }
 
 /* The client's X-Request-Id where it is a word that a log can hold, else one of our own. */
-static void name_request(http_server *server, http_request *rq)
+static void name_request(transport *server, http_request *rq)
 {
     static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.:/+=@";
     const header_field *field = header_find(&rq->headers, "X-Request-Id", NULL);
@@ -212,14 +211,32 @@ static void name_request(http_server *server, http_request *rq)
     snprintf(rq->id, sizeof rq->id, "%s%08llx", server->id_prefix, number);
 }
 
+/* Sets what the reply says to pages of other origins. */
+static void find_origin(const transport *server, http_request *rq)
+{
+    const transport_options *options = &server->options;
+    const header_field *origin = header_find(&rq->headers, "Origin", NULL);
+    rq->reply.cors = options->n_cors > 0;
+    for (size_t i = 0; origin && i < options->n_cors && !rq->reply.cors_origin; i++) {
+        const char *one = options->cors[i];
+        if (strcmp(one, "*") == 0 ||
+            (strlen(one) == origin->value_len && memcmp(one, origin->value, origin->value_len) == 0))
+            rq->reply.cors_origin = one;
+    }
+}
+
 /* False with rq->refused: the bytes can't be trusted, so nothing after them on this connection can. */
-static bool read_framing(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
+static bool read_framing(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
     http_request *rq = c->request;
     snprintf(rq->method, sizeof rq->method, "%s", method);
     MHD_get_connection_values_n(mhd, MHD_HEADER_KIND, collect_header, &rq->headers);
     name_request(c->server, rq);
-    if (!framing_read(&rq->framing, version, &rq->headers, &rq->refused))
+    framing read;
+    bool framed = framing_read(&read, version, &rq->headers, &rq->refused);
+    rq->chunked = read.chunked;
+    rq->length = read.length;
+    if (!framed)
         return false;
     if (!layout_is_sound(c, mhd, method, version))
         return http_problem(&rq->refused, 400, "bad_request_framing", "The request is malformed or ambiguous",
@@ -229,16 +246,16 @@ static bool read_framing(conn *c, struct MHD_Connection *mhd, const char *method
 
 static bool has_body(const http_request *rq)
 {
-    return rq->framing.chunked || rq->framing.length > 0;
+    return rq->chunked || rq->length > 0;
 }
 
-bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const char *version)
+bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
     http_request *rq = c->request;
     rq->begun = true;
     rq->can_be_held = c->server->holder && strcmp(version, "HTTP/1.1") == 0 && strcmp(method, "HEAD") != 0;
     bool framed = read_framing(c, mhd, method, version);
-    cors_find(c->server, rq);
+    find_origin(c->server, rq);
     if (header_size(mhd) > HEADER_BYTES) {
         framed = refuse_header(&rq->refused, 431);
         if (!c->server->tls) { /* libmicrohttpd may have no room for a reply */
@@ -246,14 +263,14 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
             return false;
         }
     }
-    if (framed && admit(c) && (!rq->route->streamed || uploads_begin(&c->server->context, rq))) {
+    if (framed && c->server->handlers.admit(c->server->handlers.ctx, rq)) {
         deadline_set(c->deadline,
-                     rq->started + c->server->options.request_deadline_s + (double)rq->framing.length / SLOWEST_RATE,
+                     rq->started + c->server->options.request_deadline_s + (double)rq->length / SLOWEST_RATE,
                      !c->server->tls);
         return true;
     }
     if (framed && !has_body(rq))
-        return true; /* answered in conn_answer, so that the connection can stay open */
+        return true; /* answered in connection_answer, so that the connection can stay open */
     rq->unread_body = true;
     rq->reply.close = true;
     reply_problem(&rq->reply, &rq->refused);
@@ -263,7 +280,7 @@ bool conn_headers(conn *c, struct MHD_Connection *mhd, const char *method, const
 /* -------------------------------------------------------------------- body */
 
 /* Room for `more` bytes and a NUL, within the server's budget for all bodies. */
-static bool reserve(conn *c, size_t more)
+static bool reserve(connection *c, size_t more)
 {
     http_request *rq = c->request;
     size_t need = rq->body_len + more + 1;
@@ -271,14 +288,14 @@ static bool reserve(conn *c, size_t more)
         return true;
     size_t capacity = need < 4096 ? 4096 : need + need / 2;
     size_t added = capacity - rq->body_capacity;
-    if (atomic_fetch_add(&c->server->context.body_bytes, added) + added > c->server->body_budget) {
-        atomic_fetch_sub(&c->server->context.body_bytes, added);
+    if (atomic_fetch_add(&c->server->body_bytes, added) + added > c->server->options.body_budget) {
+        atomic_fetch_sub(&c->server->body_bytes, added);
         rq->reply.retry_after_s = 5;
         return http_problem(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
     }
     char *grown = realloc(rq->body, capacity);
     if (!grown) {
-        atomic_fetch_sub(&c->server->context.body_bytes, added);
+        atomic_fetch_sub(&c->server->body_bytes, added);
         return http_problem(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
     }
     rq->body = grown;
@@ -286,7 +303,7 @@ static bool reserve(conn *c, size_t more)
     return true;
 }
 
-static bool keep(conn *c, const char *data, size_t size)
+static bool keep(connection *c, const char *data, size_t size)
 {
     http_request *rq = c->request;
     if (!reserve(c, size))
@@ -297,30 +314,28 @@ static bool keep(conn *c, const char *data, size_t size)
     return true;
 }
 
-static bool pass_on(conn *c, const char *data, size_t size)
+bool connection_body(connection *c, const char *data, size_t size)
 {
     http_request *rq = c->request;
-    rq->body_len += size;
-    return uploads_take(&c->server->context, rq, data, size);
-}
-
-bool conn_body(conn *c, const char *data, size_t size)
-{
-    http_request *rq = c->request;
-    bool streamed = rq->route->streamed;
-    size_t limit = streamed ? c->server->options.max_upload : c->server->options.max_body;
-    if (size > limit - rq->body_len)
+    const transport_handlers *handlers = &c->server->handlers;
+    bool taken = false;
+    if (size > rq->body_limit - rq->body_len) {
         http_problem(&rq->refused, 413, "body_too_large", "The request body is too large",
-                     "the body has more than %zu bytes, the limit of this server", limit);
-    else if (streamed ? pass_on(c, data, size) : keep(c, data, size)) {
-        if (rq->framing.chunked) /* the length is not known before: the allowance grows with what has come */
+                     "the body has more than %zu bytes, the limit of this server", rq->body_limit);
+    } else if (rq->streamed) {
+        rq->body_len += size;
+        taken = handlers->take(handlers->ctx, rq, data, size);
+    } else {
+        taken = keep(c, data, size);
+    }
+    if (taken) {
+        if (rq->chunked) /* the length is not known before: the allowance grows with what has come */
             deadline_set(c->deadline,
                          rq->started + c->server->options.request_deadline_s + (double)rq->body_len / SLOWEST_RATE,
                          !c->server->tls);
         return true;
     }
-    store_upload_abort(rq->upload);
-    rq->upload = NULL;
+    handlers->drop(handlers->ctx, rq);
     send_directly(c, &rq->refused);
     return false;
 }
@@ -328,7 +343,7 @@ bool conn_body(conn *c, const char *data, size_t size)
 /* ------------------------------------------------------------------ answer */
 
 /* Lets the reply go on without libmicrohttpd, whose connection then ends. False: nothing has happened. */
-static bool hold(conn *c)
+static bool hold(connection *c)
 {
     http_request *rq = c->request;
     reply_source source = rq->reply.source;
@@ -363,7 +378,7 @@ static void answer_here(http_reply *reply)
     source.free(source.ctx);
 }
 
-bool conn_answer(conn *c, struct MHD_Connection *mhd)
+bool connection_answer(connection *c, struct MHD_Connection *mhd)
 {
     http_request *rq = c->request;
     deadline_set(c->deadline, INFINITY, false); /* the client has done its part */
@@ -371,7 +386,7 @@ bool conn_answer(conn *c, struct MHD_Connection *mhd)
     if (rq->refused.status)
         reply_problem(&rq->reply, &rq->refused);
     else
-        rq->route->handler(&c->server->context, rq, &rq->reply);
+        c->server->handlers.answer(c->server->handlers.ctx, rq);
     if (rq->reply.source.read)
         drop_body(c->server, rq); /* what takes long is not beside it */
     if (rq->reply.source.read && hold(c))
@@ -382,47 +397,15 @@ bool conn_answer(conn *c, struct MHD_Connection *mhd)
     return send_reply(c, mhd);
 }
 
-static void log_request(const http_server *server, const http_request *rq, bool completed, bool expired)
+void connection_end_held(void *ctx, http_request *rq, bool completed)
 {
-    char path[256];
-    if (!server->options.access_log && rq->status < 500)
-        return;
-    snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
-    for (char *at = path; *at; at++)
-        if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
-            *at = '?';
-    log_field fields[] = {LOG_S("method", rq->method),
-                          LOG_S("path", path),
-                          LOG_S("request", rq->id),
-                          LOG_I("status", rq->status),
-                          LOG_I("bytes", rq->reply_len),
-                          LOG_N("seconds", deadlines_now() - rq->started),
-                          LOG_S("job", rq->job_id),
-                          LOG_S("token", rq->token),
-                          LOG_S("end", completed ? "complete"
-                                       : expired ? "deadline"
-                                                 : "aborted"),
-                          {0}};
-    log_write(server->context.log, LOG_INFO, "request", fields);
-}
-
-static void account(const http_server *server, const http_request *rq, bool completed, bool expired)
-{
-    const route *found = rq->route;
-    log_request(server, rq, completed, expired);
-    metrics_request(server->context.metrics, found ? found->method : NULL, found ? found->pattern : NULL, rq->status,
-                    deadlines_now() - rq->started);
-}
-
-void conn_end_held(void *ctx, http_request *rq, bool completed)
-{
-    http_server *server = ctx;
-    account(server, rq, completed, false);
+    transport *server = ctx;
+    server->handlers.account(server->handlers.ctx, rq, completed, false);
     presence_end(rq->place);
     request_free(server, rq);
 }
 
-void conn_end_request(conn *c, unsigned status, bool completed)
+void connection_end_request(connection *c, unsigned status, bool completed)
 {
     if (!c->request)
         return;
@@ -430,7 +413,7 @@ void conn_end_request(conn *c, unsigned status, bool completed)
         c->request->status = (int)status;
     if (c->request->unread_body && completed)
         linger(c);
-    account(c->server, c->request, completed, deadline_expired(c->deadline));
+    c->server->handlers.account(c->server->handlers.ctx, c->request, completed, deadline_expired(c->deadline));
     clear_request(c);
-    deadline_set(c->deadline, deadlines_now() + c->server->options.request_deadline_s, false);
+    deadline_set(c->deadline, http_now() + c->server->options.request_deadline_s, false);
 }

@@ -1,0 +1,103 @@
+/* api.h: what every route has: the service's parts, the route table and the handlers. */
+#ifndef SERVER_HTTP_API_H
+#define SERVER_HTTP_API_H
+
+#include "codec/codec.h"
+#include "http/auth.h"
+#include "http/http.h"
+#include "http/rate.h"
+#include "http/transport/transport.h"
+#include "store/store.h"
+#include "store/uploads.h"
+#include "work/webhook.h"
+#include "work/work.h"
+
+#include <pthread.h>
+
+/* What handlers may use, the same for all requests. */
+typedef struct {
+    store *store;
+    work *work;
+    server_log *log;
+    metrics *metrics;
+    const webhooks *webhooks; /* NULL: there are none */
+    auth *auth;               /* NULL: everybody may all */
+    rate *rate;               /* NULL: no limit */
+    http_options options;
+    transport *server;
+    struct field_slots *fields;   /* turns of replies that are computed: fields.h */
+    struct told_changes *told;    /* texts of the latest changes of jobs: all_events.c */
+    char run[17];                 /* a random name of this run of the daemon */
+    pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
+    pthread_mutex_t ready_lock;   /* the next two */
+    double ready_until;           /* on http_now's clock: until then ready_why is what /readyz says */
+    char ready_why[64];           /* "": ready */
+} api;
+
+/* The daemon is about to end: nothing is waited for. */
+bool api_draining(const api *context);
+
+/* ---- before a body is read (admission.c, uploads.c): false with rq->refused */
+bool admission_check(api *context, http_request *rq);
+bool uploads_begin(api *context, http_request *rq);
+/* A piece of the body. */
+bool uploads_take(api *context, http_request *rq, const char *data, size_t size);
+
+/* ---- what streams over all jobs share: the texts of the latest changes, each encoded once for all of them */
+struct told_changes *told_changes_new(void);    /* NULL: no memory */
+void told_changes_free(struct told_changes *t); /* NULL is fine */
+
+/* ---- the route table (routes.c) */
+typedef void (*route_handler)(api *context, http_request *rq, http_reply *reply);
+typedef struct route {
+    const char *method, *pattern;
+    const char *const *parameters; /* known query keys, NULL-terminated */
+    route_handler handler;
+    bool streamed; /* the body is bytes of any type that go to disk as they come */
+} route;
+
+/* What a token must allow for this route. Whoever adds a route need not think of it: what changes something is for
+ * `submit`, what only reads for `read`, /v1/admin/ for `admin`. */
+auth_scope route_scope(const route *r);
+
+/* Sets rq->route and rq->name; otherwise 404, or 405 with what is allowed in allow. With rq->reply.cors, OPTIONS is
+ * answered on every path that there is. */
+bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem);
+/* 400 for a query key that the route does not know. */
+bool route_check_parameters(const http_request *rq, problem_details *problem);
+
+/* ---- handlers */
+void jobs_submit(api *context, http_request *rq, http_reply *reply);
+void jobs_list(api *context, http_request *rq, http_reply *reply);
+void jobs_get(api *context, http_request *rq, http_reply *reply);
+void jobs_delete(api *context, http_request *rq, http_reply *reply);
+void jobs_refine(api *context, http_request *rq, http_reply *reply);
+void verify_submit(api *context, http_request *rq, http_reply *reply);
+void results_get(api *context, http_request *rq, http_reply *reply);
+void results_get_vtu(api *context, http_request *rq, http_reply *reply);
+void results_get_surface(api *context, http_request *rq, http_reply *reply);
+void results_get_picture(api *context, http_request *rq, http_reply *reply);
+void uploads_create(api *context, http_request *rq, http_reply *reply);
+void uploads_get(api *context, http_request *rq, http_reply *reply);
+void uploads_delete(api *context, http_request *rq, http_reply *reply);
+void events_get(api *context, http_request *rq, http_reply *reply);
+void events_get_all(api *context, http_request *rq, http_reply *reply);
+void history_get(api *context, http_request *rq, http_reply *reply);
+void trade_get(api *context, http_request *rq, http_reply *reply);
+void convergence_get(api *context, http_request *rq, http_reply *reply);
+void history_get_csv(api *context, http_request *rq, http_reply *reply);
+void service_limits(api *context, http_request *rq, http_reply *reply);
+void service_factors(api *context, http_request *rq, http_reply *reply);
+void admin_check(api *context, http_request *rq, http_reply *reply);
+void service_metrics(api *context, http_request *rq, http_reply *reply);
+void service_health(api *context, http_request *rq, http_reply *reply);
+void service_ready(api *context, http_request *rq, http_reply *reply);
+void service_openapi(api *context, http_request *rq, http_reply *reply);
+void service_schema(api *context, http_request *rq, http_reply *reply);
+void page_index(api *context, http_request *rq, http_reply *reply);
+void page_part(api *context, http_request *rq, http_reply *reply);
+
+/* Fills a reply for a store call that failed, and logs a STORE_ERROR. */
+void reply_store_failure(api *context, store_status status, http_reply *reply);
+
+#endif

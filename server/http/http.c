@@ -1,0 +1,160 @@
+/* http.c: the routes put behind the transport: start to stop. */
+#include "http/http.h"
+#include "http/api.h"
+#include "http/fields.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+#include <unistd.h>
+
+struct http_server {
+    api context;
+};
+
+/* ---- what the transport asks for */
+
+static bool on_admit(void *ctx, http_request *rq)
+{
+    api *context = ctx;
+    if (!admission_check(context, rq))
+        return false;
+    rq->streamed = rq->route->streamed;
+    rq->body_limit = rq->streamed ? context->options.max_upload : context->options.max_body;
+    return !rq->streamed || uploads_begin(context, rq);
+}
+
+static bool on_take(void *ctx, http_request *rq, const char *data, size_t size)
+{
+    return uploads_take(ctx, rq, data, size);
+}
+
+static void on_answer(void *ctx, http_request *rq)
+{
+    rq->route->handler(ctx, rq, &rq->reply);
+}
+
+static void on_drop(void *ctx, http_request *rq)
+{
+    (void)ctx;
+    store_upload_abort(rq->upload);
+    rq->upload = NULL;
+}
+
+static void log_request(const api *context, const http_request *rq, const char *end)
+{
+    char path[256];
+    snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
+    for (char *at = path; *at; at++)
+        if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
+            *at = '?';
+    log_field fields[] = {LOG_S("method", rq->method),
+                          LOG_S("path", path),
+                          LOG_S("request", rq->id),
+                          LOG_I("status", rq->status),
+                          LOG_I("bytes", rq->reply_len),
+                          LOG_N("seconds", http_now() - rq->started),
+                          LOG_S("job", rq->job_id),
+                          LOG_S("token", rq->token),
+                          LOG_S("end", end),
+                          {0}};
+    log_write(context->log, LOG_INFO, "request", fields);
+}
+
+static void on_account(void *ctx, const http_request *rq, bool completed, bool expired)
+{
+    const api *context = ctx;
+    const route *found = rq->route;
+    if (context->options.access_log || rq->status >= 500)
+        log_request(context, rq, completed ? "complete" : expired ? "deadline" : "aborted");
+    metrics_request(context->metrics, found ? found->method : NULL, found ? found->pattern : NULL, rq->status,
+                    http_now() - rq->started);
+}
+
+/* ---- start to stop */
+
+static void free_server(http_server *server)
+{
+    field_slots_free(server->context.fields);
+    told_changes_free(server->context.told);
+    rate_free(server->context.rate);
+    pthread_mutex_destroy(&server->context.predict_lock);
+    pthread_mutex_destroy(&server->context.ready_lock);
+    free(server);
+}
+
+http_server *http_start(int listen_fd, const http_parts *parts, const http_options *options, char *message, size_t size)
+{
+    http_server *server = calloc(1, sizeof *server);
+    uint64_t random = 0;
+    if (!server) {
+        snprintf(message, size, "cannot start the HTTP server: out of memory");
+        close(listen_fd);
+        return NULL;
+    }
+    api *context = &server->context;
+    context->store = parts->store;
+    context->work = parts->work;
+    context->webhooks = parts->webhooks;
+    context->log = parts->log;
+    context->metrics = parts->metrics;
+    context->auth = parts->auth;
+    context->options = *options;
+    pthread_mutex_init(&context->predict_lock, NULL);
+    pthread_mutex_init(&context->ready_lock, NULL);
+    if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
+        random = (uint64_t)(http_now() * 1e9);
+    snprintf(context->run, sizeof context->run, "%016llx", (unsigned long long)random);
+    if (options->max_client_rate > 0)
+        context->rate = rate_new(options->max_client_rate);
+    context->fields = field_slots_new(work_workers(parts->work));
+    context->told = told_changes_new();
+    if (!context->fields || !context->told || (options->max_client_rate > 0 && !context->rate)) {
+        snprintf(message, size, "cannot start the HTTP server: out of memory");
+        close(listen_fd);
+        free_server(server);
+        return NULL;
+    }
+    const transport_handlers handlers = {.ctx = context,
+                                         .admit = on_admit,
+                                         .take = on_take,
+                                         .answer = on_answer,
+                                         .account = on_account,
+                                         .drop = on_drop};
+    const transport_options of_transport = {.log = parts->log,
+                                            .feed = work_feed(parts->work),
+                                            .body_budget =
+                                                options->max_body < SIZE_MAX / 8 ? 8 * options->max_body : SIZE_MAX,
+                                            .max_connections = options->max_connections,
+                                            .max_client_connections = options->max_client_connections,
+                                            .max_streams = options->max_streams,
+                                            .request_deadline_s = options->request_deadline_s,
+                                            .max_wait_s = options->max_wait_s,
+                                            .cors = options->cors,
+                                            .n_cors = options->n_cors,
+                                            .tls = options->tls};
+    if (!transport_start(&context->server, listen_fd, &handlers, &of_transport, message, size)) {
+        free_server(server);
+        return NULL;
+    }
+    return server;
+}
+
+bool api_draining(const api *context)
+{
+    return atomic_load(transport_draining(context->server));
+}
+
+void http_drain(http_server *server)
+{
+    transport_drain(server->context.server);
+}
+
+void http_stop(http_server *server)
+{
+    if (!server)
+        return;
+    transport_stop(server->context.server);
+    free_server(server);
+}

@@ -1,0 +1,66 @@
+/* connection.h: private to this folder: the server object and one connection's state. */
+#ifndef SERVER_HTTP_CONNECTION_H
+#define SERVER_HTTP_CONNECTION_H
+
+#include "http/transport/deadlines.h"
+#include "http/transport/framing.h"
+#include "http/transport/held.h"
+#include "http/transport/presence.h"
+#include "http/transport/transport.h"
+
+#include <microhttpd.h>
+#include <pthread.h>
+
+/* Bytes of each connection's buffer, in which libmicrohttpd keeps the header block, 64 bytes for each of its fields and
+ * the head of the reply, and the piece in which a body arrives. */
+#define CONNECTION_MEMORY (64 * 1024)
+/* Slowest transfer that is waited for, bytes per second: the allowance that a body's length adds to a deadline. */
+#define SLOWEST_RATE 100e3
+
+struct transport {
+    transport_handlers handlers;
+    transport_options options;
+    struct MHD_Daemon *daemon;
+    deadlines *deadlines;
+    holder *holder; /* NULL: every connection keeps its thread */
+    presences *presences;
+    bool tls;              /* nothing can be written past libmicrohttpd */
+    pthread_key_t current; /* the connection that this thread serves, once it has a request */
+    bool check_layout;
+    char id_prefix[17];       /* of the request ids made here; random */
+    atomic_uint_fast64_t id;  /* the last one's number */
+    atomic_uint connections;  /* of libmicrohttpd's */
+    atomic_uint refusing;     /* those of them that it refuses by itself: transport_stop */
+    atomic_uint streams;      /* open */
+    atomic_size_t body_bytes; /* of all bodies in memory */
+    atomic_bool draining, stopping;
+};
+
+typedef struct {
+    transport *server;
+    deadline *deadline;
+    http_request *request; /* NULL between requests, and when it is held without this connection */
+    presence *place;
+    int fd;
+    bool refusing;
+    framing_layout layout;
+} connection;
+
+/* NULL: no memory; the connection's requests are then refused. */
+connection *connection_new(transport *server, int fd, const struct sockaddr *address);
+void connection_free(connection *c);
+
+void connection_begin_request(connection *c, const char *raw_target);
+/* The next three return false when the connection must be closed without a (further) reply. */
+bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *method, const char *version);
+bool connection_body(connection *c, const char *data, size_t size);
+bool connection_answer(connection *c, struct MHD_Connection *mhd);
+/* Answers a request that libmicrohttpd is about to refuse with this status. */
+void connection_refuse(connection *c, int status);
+/* status: of the reply that libmicrohttpd made by itself, 0 if there was none. */
+void connection_end_request(connection *c, unsigned status, bool completed);
+
+/* A request that was held, with its connection, is over: of the holder. ctx is the server. */
+void connection_end_held(void *ctx, http_request *rq, bool completed);
+
+#endif
