@@ -131,7 +131,8 @@ $(BUILD)/libparts.a: $(PARTS_OBJ)
 $(BUILD)/uzawad: $(SERVER_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SERVER_LIBS)
 
-$(BUILD)/uzawa: $(CLIENT_OBJ)
+# Of the library it takes what both programs share (solver/text) and nothing that needs a library of the solver's.
+$(BUILD)/uzawa: $(CLIENT_OBJ) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(CLIENT_LIBS)
 
 $(BUILD)/obj/%.o: %.c

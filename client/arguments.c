@@ -1,5 +1,5 @@
 #include "arguments.h"
-#include "closest.h"
+#include "text/edit_distance.h"
 
 #include <errno.h>
 #include <math.h>
@@ -126,20 +126,23 @@ static bool set_flag(parser *p, const client_option *rule, const char *value)
 static bool fail_unknown_option(parser *p, const char *word)
 {
     const client_option *rule;
-    client_closest near = {.word = word, .len = strcspn(word, "=")};
-    for (size_t i = 0; (rule = client_option_at(i)); i++)
+    const char *names[128];
+    size_t count = 0;
+    for (size_t i = 0; (rule = client_option_at(i)) && count < sizeof names / sizeof *names; i++)
         if (!p->have_command || rule->commands & CLIENT_IN(p->options->command))
-            client_closest_try(&near, rule->name);
-    return near.best ? fail(p, "unknown option %s; did you mean %s?", word, near.best)
+            names[count++] = rule->name;
+    const int near = uz_closest(word, strcspn(word, "="), names, count);
+    return near >= 0 ? fail(p, "unknown option %s; did you mean %s?", word, names[near])
                      : fail(p, "unknown option %s", word);
 }
 
 static bool fail_unknown_command(parser *p, const char *word)
 {
-    client_closest near = {.word = word, .len = strlen(word)};
+    const char *names[CLIENT_COMMANDS];
     for (int i = 0; i < CLIENT_COMMANDS; i++)
-        client_closest_try(&near, client_command_name((client_command)i));
-    return near.best ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", word, near.best)
+        names[i] = client_command_name((client_command)i);
+    const int near = uz_closest(word, strlen(word), names, CLIENT_COMMANDS);
+    return near >= 0 ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", word, names[near])
                      : fail(p, "unknown command \"%s\"", word);
 }
 

@@ -100,9 +100,6 @@ bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len
  * "/problem/K". */
 void codec_problem_from_error(problem_details *out, const uz_error *err, uz_problem_kind kind);
 
-/* The candidate that was probably meant, -1: none is close. */
-int codec_closest(const char *text, const char *const *candidates, size_t count);
-
 /* What is stored of this job is not what was written. */
 void codec_problem_damaged(problem_details *out, const char *id);
 

@@ -12,11 +12,6 @@ static void copy_member(char *out, size_t size, const json_t *object, const char
     snprintf(out, size, "%s", text ? text : "");
 }
 
-int codec_closest(const char *name, const char *const *candidates, size_t count)
-{
-    return problem_closest(name, strlen(name), candidates, count);
-}
-
 bool codec_decode_problem(problem_details *out, const char *json)
 {
     memset(out, 0, sizeof *out);

@@ -1,6 +1,5 @@
 #include "codec/problem.h"
 
-#include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -99,57 +98,4 @@ void problem_quote(char *out, size_t size, const char *text, size_t len)
         i += step;
     }
     snprintf(out + used, size - used, "%s\"", i < len ? "..." : "");
-}
-
-enum { CLOSEST_LEN = 40 };
-
-static int least(int a, int b)
-{
-    return a < b ? a : b;
-}
-
-static bool same_letter(char a, char b)
-{
-    return tolower((unsigned char)a) == tolower((unsigned char)b);
-}
-
-/* Optimal string alignment distance, with three rows of the table kept. */
-static int distance(const char *a, size_t n, const char *b, size_t m)
-{
-    int rows[3][CLOSEST_LEN + 1] = {{0}};
-    int *before = rows[0], *above = rows[1], *row = rows[2];
-    for (size_t j = 0; j <= m; j++)
-        above[j] = (int)j;
-    for (size_t i = 1; i <= n; i++) {
-        row[0] = (int)i;
-        for (size_t j = 1; j <= m; j++) {
-            row[j] = above[j - 1] + !same_letter(a[i - 1], b[j - 1]);
-            row[j] = least(row[j], least(above[j], row[j - 1]) + 1);
-            if (i > 1 && j > 1 && same_letter(a[i - 1], b[j - 2]) && same_letter(a[i - 2], b[j - 1]))
-                row[j] = least(row[j], before[j - 2] + 1);
-        }
-        int *oldest = before;
-        before = above;
-        above = row;
-        row = oldest;
-    }
-    return above[m];
-}
-
-int problem_closest(const char *text, size_t len, const char *const *candidates, size_t count)
-{
-    int best = -1, best_distance = CLOSEST_LEN;
-    if (len > CLOSEST_LEN)
-        return -1;
-    for (size_t i = 0; i < count; i++) {
-        size_t n = candidates[i] ? strlen(candidates[i]) : CLOSEST_LEN + 1;
-        if (n > CLOSEST_LEN)
-            continue;
-        int d = distance(text, len, candidates[i], n);
-        if (d < best_distance) {
-            best = (int)i;
-            best_distance = d;
-        }
-    }
-    return best_distance <= 1 + (int)len / 4 && best_distance < (int)len ? best : -1;
 }

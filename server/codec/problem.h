@@ -20,8 +20,4 @@ const char *problem_title(const char *code);
  * with "..." after a whole character. */
 void problem_quote(char *out, size_t size, const char *text, size_t len);
 
-/* The candidate closest to text in edits (insert, delete, replace, swap neighbours; case counts for nothing), or -1
- * when none is close enough to be meant. candidates[i] may be NULL: passed over. */
-int problem_closest(const char *text, size_t len, const char *const *candidates, size_t count);
-
 #endif

@@ -1,5 +1,6 @@
 #include "codec/quantity.h"
 #include "codec/problem.h"
+#include "text/edit_distance.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -131,9 +132,9 @@ static void collect(name_list *out, schema_at at, const char *name)
 static const char *closest(const name_list *names, const char *name, size_t len)
 {
     const char *dot = memrchr(name, '.', len), *last = dot ? dot + 1 : name;
-    int found = problem_closest(name, len, names->whole, names->count);
+    int found = uz_closest(name, len, names->whole, names->count);
     if (found < 0)
-        found = problem_closest(last, len - (size_t)(last - name), names->last, names->count);
+        found = uz_closest(last, len - (size_t)(last - name), names->last, names->count);
     return found < 0 ? NULL : names->whole[found];
 }
 

@@ -1,6 +1,7 @@
 /* What a refused value is told. */
 #include "codec/schema_visit.h"
 #include "codec/problem.h"
+#include "text/edit_distance.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -107,7 +108,7 @@ bool visit_wrong_type(const visit *v, unsigned allowed)
 /* Appends `Did you mean "x"?` if one of the names is close. */
 void visit_suggest(const visit *v, const char *text, size_t len, const char *const *names, size_t count)
 {
-    int closest = text && v->problem ? problem_closest(text, len, names, count) : -1;
+    int closest = text && v->problem ? uz_closest(text, len, names, count) : -1;
     if (closest >= 0)
         problem_add(v->problem, " Did you mean \"%s\"?", names[closest]);
 }

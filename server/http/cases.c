@@ -1,5 +1,6 @@
 /* cases.c: names of load cases in what a client is told. */
 #include "http/jobs.h"
+#include "text/edit_distance.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -36,7 +37,7 @@ void cases_suggest(problem_details *problem, const char *name, const store_case 
     const char **names = malloc((count + 1) * sizeof *names);
     for (size_t i = 0; names && i < count; i++)
         names[i] = cases[i].name;
-    int closest = names ? codec_closest(name, names, count) : -1;
+    int closest = names ? uz_closest(name, strlen(name), names, count) : -1;
     if (closest >= 0)
         append(problem, " Did you mean \"", names[closest], "\"?");
     free(names);

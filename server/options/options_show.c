@@ -1,6 +1,6 @@
 /* options_show.c: the table of options for people: usage, effective values, a sample file. */
-#include "codec/codec.h"
 #include "options/options.h"
+#include "text/edit_distance.h"
 
 #include <string.h>
 
@@ -11,14 +11,9 @@ const char *options_closest(const char *name, size_t len)
     const option_row *rows;
     const char *names[OPTIONS_MAX];
     size_t n = options_table(&rows);
-    char text[64];
-    if (len >= sizeof text)
-        return NULL;
-    memcpy(text, name, len);
-    text[len] = '\0';
     for (size_t i = 0; i < n; i++)
         names[i] = rows[i].name;
-    int at = codec_closest(text, names, n);
+    int at = uz_closest(name, len, names, n);
     return at < 0 ? NULL : names[at];
 }
 
