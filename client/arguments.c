@@ -1,18 +1,14 @@
 #include "arguments.h"
 #include "text/edit_distance.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* A walk over argv, and what was seen of it. */
 typedef struct {
     client_options *options;
-    char *const *argv;
-    int argc, next;
-    bool have_command, apply; /* apply: the second walk, where the command is known */
+    bool have_command;
     char *message;
     size_t size;
 } parser;
@@ -26,114 +22,14 @@ __attribute__((format(printf, 2, 3))) static bool fail(parser *p, const char *fo
     return false;
 }
 
-/* The row of "--name", "--name=value", "-n" for the command, or any row of that name, or NULL; *value is what follows
- * '=' or NULL. */
-static const client_option *find_rule(const char *word, client_command command, const char **value)
-{
-    *value = NULL;
-    const client_option *rule, *other = NULL;
-    size_t len = strcspn(word, "=");
-    for (size_t i = 0; (rule = client_option_at(i)); i++) {
-        bool is_short = word[1] != '-' && word[1] != '\0' && word[1] == rule->letter && word[2] == '\0';
-        bool is_long = strlen(rule->name) == len && strncmp(word, rule->name, len) == 0;
-        if (is_long && word[len] == '=')
-            *value = word + len + 1;
-        if ((is_short || is_long) && rule->commands & CLIENT_IN(command))
-            return rule;
-        if (is_short || is_long)
-            other = rule;
-    }
-    return other;
-}
-
-static bool set_seconds(parser *p, const client_option *rule, const char *value)
-{
-    char *end;
-    double seconds = strtod(value, &end);
-    if (end == value || *end || !isfinite(seconds) || seconds < 0)
-        return fail(p, "%s wants a number%s, 0 or more, not \"%s\"", rule->name,
-                    *rule->value == 'S' ? " of seconds" : "", value);
-    *(double *)(void *)((char *)p->options + rule->offset) = seconds;
-    return true;
-}
-
-static bool set_count(parser *p, const client_option *rule, const char *value)
-{
-    char *end;
-    errno = 0;
-    long count = strtol(value, &end, 10);
-    if (end == value || *end || errno || count < rule->least || count > rule->most)
-        return fail(p, "%s wants a whole number from %ld to %ld, not \"%s\"", rule->name, rule->least, rule->most,
-                    value);
-    *(long *)(void *)((char *)p->options + rule->offset) = count;
-    return true;
-}
-
-static bool set_word(parser *p, const client_option *rule, const char *value)
-{
-    client_words *words = (client_words *)(void *)((char *)p->options + rule->offset);
-    if (!*value)
-        return fail(p, "%s wants a %s", rule->name, rule->value);
-    if (words->count == rule->most)
-        return fail(p, "%s may be given at most %ld times", rule->name, rule->most);
-    words->item[words->count++] = value;
-    return true;
-}
-
-/* Is `word` one of the words between blanks? */
-static bool is_choice(const char *choices, const char *word)
-{
-    size_t len = strlen(word);
-    for (const char *at = choices; *at; at += strspn(at, " ")) {
-        size_t n = strcspn(at, " ");
-        if (n == len && memcmp(at, word, n) == 0)
-            return true;
-        at += n;
-    }
-    return false;
-}
-
-static bool set_value(parser *p, const client_option *rule, const char *value)
-{
-    switch (rule->kind) {
-    case CLIENT_SECONDS:
-        return set_seconds(p, rule, value);
-    case CLIENT_COUNT:
-        return set_count(p, rule, value);
-    case CLIENT_LIST_OF:
-        return set_word(p, rule, value);
-    case CLIENT_CHOICE:
-        if (!is_choice(rule->choices, value))
-            return fail(p, "%s is one of: %s; not \"%s\"", rule->name, rule->choices, value);
-        break;
-    case CLIENT_TEXT:
-    case CLIENT_FLAG:
-        break;
-    }
-    if (!*value)
-        return fail(p, "%s wants a value that is not empty", rule->name);
-    *(const char **)(void *)((char *)p->options + rule->offset) = value;
-    return true;
-}
-
-static bool set_flag(parser *p, const client_option *rule, const char *value)
-{
-    *(bool *)(void *)((char *)p->options + rule->offset) = true;
-    return value ? fail(p, "%s takes no value", rule->name) : true;
-}
-
 /* Of the options of the command that was named, or of all before there is one. */
 static bool fail_unknown_option(parser *p, const char *word)
 {
-    const client_option *rule;
-    const char *names[128];
-    size_t count = 0;
-    for (size_t i = 0; (rule = client_option_at(i)) && count < sizeof names / sizeof *names; i++)
-        if (!p->have_command || rule->commands & CLIENT_IN(p->options->command))
-            names[count++] = rule->name;
-    const int near = uz_closest(word, strcspn(word, "="), names, count);
-    return near >= 0 ? fail(p, "unknown option %s; did you mean %s?", word, names[near])
-                     : fail(p, "unknown option %s", word);
+    const char *name = word + strspn(word, "-");
+    const char *near =
+        uz_option_closest(client_option_table(), p->have_command ? CLIENT_IN(p->options->command) : CLIENT_EVERYWHERE,
+                          name, strcspn(name, "="));
+    return fail(p, near ? "unknown option %s; did you mean --%s?" : "unknown option %s", word, near);
 }
 
 static bool fail_unknown_command(parser *p, const char *word)
@@ -146,55 +42,52 @@ static bool fail_unknown_command(parser *p, const char *word)
                      : fail(p, "unknown command \"%s\"", word);
 }
 
-static bool take_option(parser *p, const char *word)
+static bool take_option(parser *p, const uz_option *row, const char *value)
 {
-    const char *value;
-    const client_option *rule = find_rule(word, p->options->command, &value);
-    if (!rule)
-        return fail_unknown_option(p, word);
-    if (rule->kind != CLIENT_FLAG && !value) {
-        if (p->next == p->argc)
-            return fail(p, "%s wants a value", rule->name);
-        value = p->argv[p->next++];
-    }
-    if (!p->apply)
+    char wants[200];
+    if (!(row->places & CLIENT_IN(p->options->command)))
+        return fail(p, "%s does not take --%s", client_command_name(p->options->command), row->name);
+    if (uz_option_set(p->options, row, value))
         return true;
-    if (!(rule->commands & CLIENT_IN(p->options->command)))
-        return fail(p, "%s does not take %s", client_command_name(p->options->command), rule->name);
-    return rule->kind == CLIENT_FLAG ? set_flag(p, rule, value) : set_value(p, rule, value);
+    if (row->kind == UZ_OPTION_FLAG)
+        return fail(p, "--%s takes no value", row->name);
+    uz_option_wants(wants, sizeof wants, row);
+    return fail(p, "--%s wants %s, not \"%s\"", row->name, wants, value);
 }
 
-static bool take_operand(parser *p, const char *word)
+/* One walk finds the command, the next one (apply) takes the options as that command understands them. */
+static bool take_words(parser *p, int argc, char *const *argv, bool apply)
 {
-    if (!p->have_command) {
-        p->have_command = client_command_find(&p->options->command, word);
-        return p->have_command || fail_unknown_command(p, word);
-    }
-    if (!p->apply)
-        return true;
-    if (p->options->operand)
-        return fail(p, "%s: one operand too many: \"%s\"", client_command_name(p->options->command), word);
-    p->options->operand = word;
-    return true;
-}
-
-/* One walk finds the command, the next one takes the options as that command understands them. */
-static bool take_words(parser *p)
-{
-    bool options_end = false, command_seen = false;
-    p->next = 1;
-    while (p->next < p->argc) {
-        const char *word = p->argv[p->next++];
-        bool option = !options_end && word[0] == '-' && word[1];
-        if (option && strcmp(word, "--") == 0) {
-            options_end = true;
-        } else if (!option && p->apply && !command_seen) {
-            command_seen = true; /* the command itself */
-        } else if (option ? !take_option(p, word) : !take_operand(p, word)) {
-            return false;
+    uz_option_walk walk = {.table = client_option_table(), .argc = argc, .argv = argv};
+    bool command_seen = false;
+    for (;;) {
+        walk.places = CLIENT_IN(p->options->command);
+        switch (uz_option_next(&walk)) {
+        case UZ_WALK_END:
+            return true;
+        case UZ_WALK_UNKNOWN:
+            return fail_unknown_option(p, walk.word);
+        case UZ_WALK_LACKS:
+            return fail(p, "--%s wants a value", walk.row->name);
+        case UZ_WALK_OPTION:
+            if (apply && !take_option(p, walk.row, walk.value))
+                return false;
+            break;
+        case UZ_WALK_OPERAND:
+            if (!p->have_command) {
+                p->have_command = client_command_find(&p->options->command, walk.word);
+                if (!p->have_command)
+                    return fail_unknown_command(p, walk.word);
+            } else if (apply && command_seen) {
+                if (p->options->operand)
+                    return fail(p, "%s: one operand too many: \"%s\"", client_command_name(p->options->command),
+                                walk.word);
+                p->options->operand = walk.word;
+            }
+            command_seen = true;
+            break;
         }
     }
-    return true;
 }
 
 static bool has_matrices(const client_options *o)
@@ -271,9 +164,9 @@ static bool check_plot(parser *p)
     if (convergence && o->width >= 0)
         return fail(p, "--width wants --deformed or --trade");
     if (o->deformed && o->width >= 0 && o->width < 200)
-        return fail(p, "--width wants a whole number from 200 to 4000 with --deformed, not \"%ld\"", o->width);
+        return fail(p, "--width wants an integer from 200 to 4000 with --deformed, not \"%d\"", o->width);
     if (o->trade && o->width > 400)
-        return fail(p, "--width wants a whole number from 40 to 400 with --trade, not \"%ld\"", o->width);
+        return fail(p, "--width wants an integer from 40 to 400 with --trade, not \"%d\"", o->width);
     if (!convergence && (o->axis || o->with.count))
         return fail(p, "--x and --with are of the convergence");
     if (o->ascii && !o->trade)
@@ -315,11 +208,8 @@ bool client_arguments_parse(client_options *out, int argc, char *const *argv, co
                             .limit = 20,
                             .width = -1,
                             .height = -1};
-    parser p = {.options = out, .argv = argv, .argc = argc, .message = message, .size = size};
-    if (!take_words(&p))
-        return false;
-    p.apply = true;
-    if (!take_words(&p))
+    parser p = {.options = out, .message = message, .size = size};
+    if (!take_words(&p, argc, argv, false) || !take_words(&p, argc, argv, true))
         return false;
     if (out->help || out->version)
         return true;

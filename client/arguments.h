@@ -8,13 +8,7 @@
 #include <stddef.h>
 
 #define CLIENT_MAX_TAGS  16 /* as many as the service keeps for a job */
-#define CLIENT_MAX_WORDS 64
-
-/* What an option that may be repeated was given. */
-typedef struct {
-    const char *item[CLIENT_MAX_WORDS];
-    int count;
-} client_words;
+#define CLIENT_MAX_WORDS UZ_OPTION_MOST_WORDS
 
 /* Strings point into argv or the environment. */
 typedef struct {
@@ -23,14 +17,14 @@ typedef struct {
     const char *server;  /* URL, never NULL */
     double timeout_s;    /* INFINITY: none */
     double retry_s;      /* how long to try to reach the server; < 0: chosen by the command */
-    client_words tags, set, vary, fields, with;
+    uz_words tags, set, vary, fields, with;
     const char *K, *N, *h, *p, *mesh; /* files; NULL: not given */
     const char *key, *format, *output, *status, *colour, *factor, *axis;
-    const char *case_name, *accuracy;          /* accuracy: a number or a level, as written */
-    double time_limit_s;                       /* NAN: not given */
-    const char *junit, *baseline;              /* a file; a job */
-    double tolerance;                          /* of the baseline; -1: not given */
-    long limit, width, height, max_iterations; /* -1: not given */
+    const char *case_name, *accuracy;         /* accuracy: a number or a level, as written */
+    double time_limit_s;                      /* NAN: not given */
+    const char *junit, *baseline;             /* a file; a job */
+    double tolerance;                         /* of the baseline; -1: not given */
+    int limit, width, height, max_iterations; /* -1: not given */
     bool wait, quiet, json, progress, csv, plot, ascii, deformed, trade, help, version;
 } client_options;
 

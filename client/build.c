@@ -123,7 +123,7 @@ static client_exit set_one(client_session *s, json_t *request, const char *word)
 
 client_exit client_build_values(client_session *s, json_t *request)
 {
-    const client_words *set = &s->options->set;
+    const uz_words *set = &s->options->set;
     client_exit code = CLIENT_OK;
     for (int i = 0; code == CLIENT_OK && i < set->count; i++)
         code = set_one(s, request, set->item[i]);
@@ -133,7 +133,7 @@ client_exit client_build_values(client_session *s, json_t *request)
 /* ------------------------------------------------------------------ bodies */
 
 static client_exit add_body(client_session *s, client_bodies *out, const client_buffer *text, const char *label,
-                            const client_words *tags)
+                            const uz_words *tags)
 {
     client_job_body *body = &out->item[out->count];
     snprintf(body->label, sizeof body->label, "%s", label);
@@ -146,7 +146,7 @@ static client_exit add_body(client_session *s, client_bodies *out, const client_
 static client_exit add_request(client_session *s, client_bodies *out, const json_t *request, const char *label,
                                const char *common)
 {
-    client_words tags = s->options->tags;
+    uz_words tags = s->options->tags;
     char *text = json_dumps(request, JSON_COMPACT);
     if (!text)
         return client_complain(s, CLIENT_LOCAL, "no memory");

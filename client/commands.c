@@ -84,115 +84,117 @@ static const client_page PAGES[CLIENT_COMMANDS] = {
 #define STAYING     (MAKING | IN(VERIFY) | IN(WAIT))
 #define FILES       (IN(RESULT) | IN(PICTURE) | IN(HISTORY) | IN(PLOT)) /* commands whose output may go to a file */
 
-#define FIELD(name) offsetof(client_options, name)
-static const client_option OPTIONS[] = {
-    {"--K", 0, CLIENT_TEXT, FIELD(K), IN(SUBMIT), 0, 0, "FILE", NULL, "the stiffness matrix, in Matrix Market form"},
-    {"--N", 0, CLIENT_TEXT, FIELD(N), IN(SUBMIT), 0, 0, "FILE", NULL, "the contact normals, a row for each contact"},
-    {"--h", 0, CLIENT_TEXT, FIELD(h), IN(SUBMIT), 0, 0, "FILE", NULL, "the initial gaps"},
-    {"--p", 0, CLIENT_TEXT, FIELD(p), IN(SUBMIT), 0, 0, "FILE", NULL, "the load"},
-    {"--mesh", 0, CLIENT_TEXT, FIELD(mesh), IN(SUBMIT), 0, 0, "FILE", NULL,
-     "a Gmsh file (2.2 or 4.1) in place of the scene's mesh"},
-    {"--set", 0, CLIENT_LIST_OF, FIELD(set), IN(SUBMIT), 0, CLIENT_MAX_WORDS, "PATH=VALUE", NULL,
-     "put VALUE, as JSON or else as a string, at PATH of the request; may be repeated"},
-    {"--vary", 0, CLIENT_LIST_OF, FIELD(vary), IN(SUBMIT), 0, 8, "PATH=VALUES", NULL,
-     "solve for each of VALUES at PATH: FIRST:LAST:COUNT in equal steps, or a list A,B,C; may be repeated"},
-    {"--accuracy", 'a', CLIENT_TEXT, FIELD(accuracy), IN(REFINE), 0, 0, "A", "quick balanced precise exact",
-     "a relative error such as 1e-8, or quick, balanced, precise, exact"},
-    {"--max-iterations", 0, CLIENT_COUNT, FIELD(max_iterations), IN(REFINE), 0, 1000000000, "N", NULL,
-     "counted from the start of the first run"},
-    {"--time-limit", 0, CLIENT_SECONDS, FIELD(time_limit_s), IN(REFINE), 0, 0, "S", NULL, "of the new run, in seconds"},
-    {"--wait", 'w', CLIENT_FLAG, FIELD(wait), MAKING, 0, 0, NULL, NULL,
-     "wait until the job has ended and print the summary"},
-    {"--timeout", 't', CLIENT_SECONDS, FIELD(timeout_s), MAKING, 0, 0, "S", NULL,
-     "with --wait: stop waiting after S seconds"},
-    {"--timeout", 't', CLIENT_SECONDS, FIELD(timeout_s), STAYING, 0, 0, "S", NULL, "stop waiting after S seconds"},
-    {"--tag", 0, CLIENT_LIST_OF, FIELD(tags), IN(SUBMIT), 0, CLIENT_MAX_TAGS, "WORD", NULL,
-     "label the job; may be repeated"},
-    {"--key", 'k', CLIENT_TEXT, FIELD(key), IN(SUBMIT), 0, 0, "KEY", NULL,
-     "idempotency key (default: random); the same key and request give the same job"},
-    {"--key", 'k', CLIENT_TEXT, FIELD(key), STAYING & ~IN(WAIT), 0, 0, "KEY", NULL,
-     "idempotency key (default: random)"},
-    {"--format", 'f', CLIENT_CHOICE, FIELD(format), IN(RESULT), 0, 0, "F", "json csv vtu",
-     "json (default), csv: a table, or vtu: scenes only"},
-    {"--format", 'f', CLIENT_CHOICE, FIELD(format), IN(HELP), 0, 0, "F", "text man bash json",
-     "text (default); of all commands together: man, a manual page, bash, a completion, or json"},
-    {"--fields", 0, CLIENT_LIST_OF, FIELD(fields), IN(RESULT), 0, CLIENT_MAX_WORDS, "A,B",
-     "summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain "
-     "stress_gauss",
-     "such as displacements, reactions, gaps, pressure, stress, von_mises (default: reactions,gaps; of vtu: "
-     "everything useful)"},
-    {"--field", 0, CLIENT_LIST_OF, FIELD(fields), IN(RESULT), 0, CLIENT_MAX_WORDS, "NAME",
-     "summary nodes reactions gaps pressure displacements contact_status stress principal von_mises strain "
-     "stress_gauss",
-     "one of them; may be repeated"},
-    {"--junit", 0, CLIENT_TEXT, FIELD(junit), STAYING, 0, 0, "FILE", NULL,
-     "write a JUnit report: whether the job converged, each assertion, each comparison"},
-    {"--baseline", 0, CLIENT_TEXT, FIELD(baseline), STAYING, 0, 0, "ID", NULL,
-     "compare with another job: energy, reactions, pressure, displacements and what touches"},
-    {"--tolerance", 0, CLIENT_SECONDS, FIELD(tolerance), STAYING, 0, 0, "T", NULL,
-     "what the comparison lets pass, relative (default 1e-3)"},
-    {"--deformed", 0, CLIENT_FLAG, FIELD(deformed), IN(PLOT), 0, 0, NULL, NULL, "draw the deformed body of a scene"},
-    {"--trade", 0, CLIENT_FLAG, FIELD(trade), IN(PLOT), 0, 0, NULL, NULL,
-     "print what each certified digit took, as a table and a drawing"},
-    {"--x", 0, CLIENT_CHOICE, FIELD(axis), IN(PLOT), 0, 0, "AXIS", "iterations seconds",
-     "of the convergence: over iterations (default) or seconds"},
-    {"--with", 0, CLIENT_LIST_OF, FIELD(with), IN(PLOT), 0, 8, "ID", NULL,
-     "draw another job's convergence beside it; may be repeated"},
-    {"--colour", 0, CLIENT_TEXT, FIELD(colour), IN(PICTURE), 0, 0, "C", "von_mises displacements",
-     "von_mises (default) or displacements"},
-    {"--factor", 0, CLIENT_TEXT, FIELD(factor), IN(PICTURE), 0, 0, "X", NULL,
-     "displacements are drawn X times as large (default: so that they show)"},
-    {"--width", 0, CLIENT_COUNT, FIELD(width), IN(PICTURE), 200, 4000, "N", NULL,
-     "of the picture, in pixels (default 900)"},
-    {"--colour", 0, CLIENT_TEXT, FIELD(colour), IN(PLOT), 0, 0, "C", "von_mises displacements",
-     "with --deformed: von_mises (default) or displacements"},
-    {"--factor", 0, CLIENT_TEXT, FIELD(factor), IN(PLOT), 0, 0, "X", NULL,
-     "with --deformed: displacements are drawn X times as large"},
-    {"--width", 0, CLIENT_COUNT, FIELD(width), IN(PLOT), 40, 4000, "N", NULL,
-     "with --deformed: of the picture, in pixels; with --trade: of the drawing, in characters"},
-    {"--csv", 0, CLIENT_FLAG, FIELD(csv), IN(HISTORY), 0, 0, NULL, NULL, "as CSV instead of JSON"},
-    {"--plot", 0, CLIENT_FLAG, FIELD(plot), IN(HISTORY), 0, 0, NULL, NULL,
-     "draw it: log10 of the error bound and of the residual"},
-    {"--width", 0, CLIENT_COUNT, FIELD(width), IN(HISTORY), 24, 400, "N", NULL,
-     "of the drawing, in characters (default 72, less on a narrow terminal)"},
-    {"--height", 0, CLIENT_COUNT, FIELD(height), IN(HISTORY), 8, 200, "N", NULL,
-     "of the drawing, in lines (default 20)"},
-    {"--ascii", 0, CLIENT_FLAG, FIELD(ascii), IN(HISTORY) | IN(PLOT), 0, 0, NULL, NULL,
-     "draw in plain ASCII (default where the locale is not UTF-8)"},
-    {"--case", 'c', CLIENT_TEXT, FIELD(case_name), IN(RESULT), 0, 0, "NAME", NULL, "of this load case alone"},
-    {"--case", 'c', CLIENT_TEXT, FIELD(case_name), FILES, 0, 0, "NAME", NULL,
-     "of this load case; needed where the job has some"},
-    {"--output", 'o', CLIENT_TEXT, FIELD(output), FILES, 0, 0, "FILE", NULL, "write to FILE, whole or not at all"},
-    {"--status", 0, CLIENT_TEXT, FIELD(status), IN(LIST), 0, 0, "S", "accepted running successful failed dismissed",
-     "accepted, running, successful, failed or dismissed"},
-    {"--tag", 0, CLIENT_LIST_OF, FIELD(tags), IN(LIST), 0, CLIENT_MAX_TAGS, "WORD", NULL, "only jobs with this tag"},
-    {"--limit", 'n', CLIENT_COUNT, FIELD(limit), IN(LIST), 1, 1000000, "N", NULL, "at most N jobs (default 20)"},
-    {"--progress", 0, CLIENT_FLAG, FIELD(progress), STAYING, 0, 0, NULL, NULL,
-     "show progress on stderr even where it is no terminal"},
-    {"--quiet", 'q', CLIENT_FLAG, FIELD(quiet), MAKING, 0, 0, NULL, NULL, "print the id and nothing else"},
-    {"--quiet", 'q', CLIENT_FLAG, FIELD(quiet), IN(LIST), 0, 0, NULL, NULL, "print the ids and nothing else"},
-    {"--quiet", 'q', CLIENT_FLAG, FIELD(quiet), IN(DOCTOR), 0, 0, NULL, NULL, "print only what is wrong"},
-    {"--quiet", 'q', CLIENT_FLAG, FIELD(quiet), IN(VERIFY) | IN(WAIT) | IN(CANCEL) | IN(DELETE), 0, 0, NULL, NULL,
-     "print nothing; the exit status tells"},
-    {"--json", 'j', CLIENT_FLAG, FIELD(json), IN(SUBMIT) | IN(REFINE) | IN(VERIFY) | IN(WAIT) | IN(STATUS), 0, 0, NULL,
-     NULL, "print the job as JSON, and what is wrong too"},
-    {"--json", 'j', CLIENT_FLAG, FIELD(json), IN(PICTURE), 0, 0, NULL, NULL,
-     "with --output: print what was written as JSON"},
-    {"--json", 'j', CLIENT_FLAG, FIELD(json), IN(PLOT), 0, 0, NULL, NULL,
-     "with --output: print what was written as JSON; with --trade: print the numbers"},
-    {"--json", 'j', CLIENT_FLAG, FIELD(json), CLIENT_EVERYWHERE, 0, 0, NULL, NULL,
-     "print JSON, and what is wrong as JSON too"},
-    {"--server", 's', CLIENT_TEXT, FIELD(server), ASKING, 0, 0, "URL", NULL,
-     "the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the token; $UZAWA_CA "
-     "is a file of certificates to trust"},
-    {"--timeout", 't', CLIENT_SECONDS, FIELD(timeout_s), ASKING, 0, 0, "S", NULL,
-     "give up after S seconds; for wait and --wait: stop waiting"},
-    {"--retry", 0, CLIENT_SECONDS, FIELD(retry_s), ASKING, 0, 0, "S", NULL,
-     "keep trying to reach the server for S seconds (default 3; 30 while waiting)"},
-    {"--help", 'h', CLIENT_FLAG, FIELD(help), CLIENT_EVERYWHERE, 0, 0, NULL, NULL, "explain the command"},
-    {"--version", 'V', CLIENT_FLAG, FIELD(version), CLIENT_EVERYWHERE, 0, 0, NULL, NULL, "print the version"},
+#define OPTION(NAME, LETTER, KIND, MEMBER, COMMANDS, ...)                                                              \
+    {                                                                                                                  \
+        .name = NAME, .letter = LETTER, .kind = UZ_OPTION_##KIND, .offset = offsetof(client_options, MEMBER),          \
+        .places = COMMANDS, __VA_ARGS__                                                                                \
+    }
+static const uz_option OPTIONS[] = {
+    OPTION("K", 0, WORD, K, IN(SUBMIT), .value = "FILE", .about = "the stiffness matrix, in Matrix Market form"),
+    OPTION("N", 0, WORD, N, IN(SUBMIT), .value = "FILE", .about = "the contact normals, a row for each contact"),
+    OPTION("h", 0, WORD, h, IN(SUBMIT), .value = "FILE", .about = "the initial gaps"),
+    OPTION("p", 0, WORD, p, IN(SUBMIT), .value = "FILE", .about = "the load"),
+    OPTION("mesh", 0, WORD, mesh, IN(SUBMIT), .value = "FILE",
+           .about = "a Gmsh file (2.2 or 4.1) in place of the scene's mesh"),
+    OPTION("set", 0, WORDS, set, IN(SUBMIT), .most = CLIENT_MAX_WORDS, .value = "PATH=VALUE",
+           .about = "put VALUE, as JSON or else as a string, at PATH of the request; may be repeated"),
+    OPTION("vary", 0, WORDS, vary, IN(SUBMIT), .most = 8, .value = "PATH=VALUES",
+           .about =
+               "solve for each of VALUES at PATH: FIRST:LAST:COUNT in equal steps, or a list A,B,C; may be repeated"),
+    OPTION("accuracy", 'a', WORD, accuracy, IN(REFINE), .value = "A", .choices = "quick balanced precise exact",
+           .about = "a relative error such as 1e-8, or quick, balanced, precise, exact"),
+    OPTION("max-iterations", 0, INTEGER, max_iterations, IN(REFINE), .most = 1000000000, .value = "N",
+           .about = "counted from the start of the first run"),
+    OPTION("time-limit", 0, NUMBER, time_limit_s, IN(REFINE), .value = "S", .unit = "seconds",
+           .about = "of the new run, in seconds"),
+    OPTION("wait", 'w', FLAG, wait, MAKING, .about = "wait until the job has ended and print the summary"),
+    OPTION("timeout", 't', NUMBER, timeout_s, MAKING, .value = "S", .unit = "seconds",
+           .about = "with --wait: stop waiting after S seconds"),
+    OPTION("timeout", 't', NUMBER, timeout_s, STAYING, .value = "S", .unit = "seconds",
+           .about = "stop waiting after S seconds"),
+    OPTION("tag", 0, WORDS, tags, IN(SUBMIT), .most = CLIENT_MAX_TAGS, .value = "WORD",
+           .about = "label the job; may be repeated"),
+    OPTION("key", 'k', WORD, key, IN(SUBMIT), .value = "KEY",
+           .about = "idempotency key (default: random); the same key and request give the same job"),
+    OPTION("key", 'k', WORD, key, STAYING & ~IN(WAIT), .value = "KEY", .about = "idempotency key (default: random)"),
+    OPTION("format", 'f', CHOICE, format, IN(RESULT), .value = "F", .choices = "json csv vtu",
+           .about = "json (default), csv: a table, or vtu: scenes only"),
+    OPTION("format", 'f', CHOICE, format, IN(HELP), .value = "F", .choices = "text man bash json",
+           .about = "text (default); of all commands together: man, a manual page, bash, a completion, or json"),
+    OPTION("fields", 0, WORDS, fields, IN(RESULT), .most = CLIENT_MAX_WORDS, .value = "A,B",
+           .choices = "summary nodes reactions gaps pressure displacements contact_status stress principal von_mises "
+                      "strain stress_gauss",
+           .about = "such as displacements, reactions, gaps, pressure, stress, von_mises (default: reactions,gaps; of "
+                    "vtu: everything useful)"),
+    OPTION("field", 0, WORDS, fields, IN(RESULT), .most = CLIENT_MAX_WORDS, .value = "NAME",
+           .choices = "summary nodes reactions gaps pressure displacements contact_status stress principal von_mises "
+                      "strain stress_gauss",
+           .about = "one of them; may be repeated"),
+    OPTION("junit", 0, WORD, junit, STAYING, .value = "FILE",
+           .about = "write a JUnit report: whether the job converged, each assertion, each comparison"),
+    OPTION("baseline", 0, WORD, baseline, STAYING, .value = "ID",
+           .about = "compare with another job: energy, reactions, pressure, displacements and what touches"),
+    OPTION("tolerance", 0, NUMBER, tolerance, STAYING, .value = "T",
+           .about = "what the comparison lets pass, relative (default 1e-3)"),
+    OPTION("deformed", 0, FLAG, deformed, IN(PLOT), .about = "draw the deformed body of a scene"),
+    OPTION("trade", 0, FLAG, trade, IN(PLOT),
+           .about = "print what each certified digit took, as a table and a drawing"),
+    OPTION("x", 0, CHOICE, axis, IN(PLOT), .value = "AXIS", .choices = "iterations seconds",
+           .about = "of the convergence: over iterations (default) or seconds"),
+    OPTION("with", 0, WORDS, with, IN(PLOT), .most = 8, .value = "ID",
+           .about = "draw another job's convergence beside it; may be repeated"),
+    OPTION("colour", 0, WORD, colour, IN(PICTURE), .value = "C", .choices = "von_mises displacements",
+           .about = "von_mises (default) or displacements"),
+    OPTION("factor", 0, WORD, factor, IN(PICTURE), .value = "X",
+           .about = "displacements are drawn X times as large (default: so that they show)"),
+    OPTION("width", 0, INTEGER, width, IN(PICTURE), .least = 200, .most = 4000, .value = "N",
+           .about = "of the picture, in pixels (default 900)"),
+    OPTION("colour", 0, WORD, colour, IN(PLOT), .value = "C", .choices = "von_mises displacements",
+           .about = "with --deformed: von_mises (default) or displacements"),
+    OPTION("factor", 0, WORD, factor, IN(PLOT), .value = "X",
+           .about = "with --deformed: displacements are drawn X times as large"),
+    OPTION("width", 0, INTEGER, width, IN(PLOT), .least = 40, .most = 4000, .value = "N",
+           .about = "with --deformed: of the picture, in pixels; with --trade: of the drawing, in characters"),
+    OPTION("csv", 0, FLAG, csv, IN(HISTORY), .about = "as CSV instead of JSON"),
+    OPTION("plot", 0, FLAG, plot, IN(HISTORY), .about = "draw it: log10 of the error bound and of the residual"),
+    OPTION("width", 0, INTEGER, width, IN(HISTORY), .least = 24, .most = 400, .value = "N",
+           .about = "of the drawing, in characters (default 72, less on a narrow terminal)"),
+    OPTION("height", 0, INTEGER, height, IN(HISTORY), .least = 8, .most = 200, .value = "N",
+           .about = "of the drawing, in lines (default 20)"),
+    OPTION("ascii", 0, FLAG, ascii, IN(HISTORY) | IN(PLOT),
+           .about = "draw in plain ASCII (default where the locale is not UTF-8)"),
+    OPTION("case", 'c', WORD, case_name, IN(RESULT), .value = "NAME", .about = "of this load case alone"),
+    OPTION("case", 'c', WORD, case_name, FILES, .value = "NAME",
+           .about = "of this load case; needed where the job has some"),
+    OPTION("output", 'o', WORD, output, FILES, .value = "FILE", .about = "write to FILE, whole or not at all"),
+    OPTION("status", 0, WORD, status, IN(LIST), .value = "S", .choices = "accepted running successful failed dismissed",
+           .about = "accepted, running, successful, failed or dismissed"),
+    OPTION("tag", 0, WORDS, tags, IN(LIST), .most = CLIENT_MAX_TAGS, .value = "WORD",
+           .about = "only jobs with this tag"),
+    OPTION("limit", 'n', INTEGER, limit, IN(LIST), .least = 1, .most = 1000000, .value = "N",
+           .about = "at most N jobs (default 20)"),
+    OPTION("progress", 0, FLAG, progress, STAYING, .about = "show progress on stderr even where it is no terminal"),
+    OPTION("quiet", 'q', FLAG, quiet, MAKING, .about = "print the id and nothing else"),
+    OPTION("quiet", 'q', FLAG, quiet, IN(LIST), .about = "print the ids and nothing else"),
+    OPTION("quiet", 'q', FLAG, quiet, IN(DOCTOR), .about = "print only what is wrong"),
+    OPTION("quiet", 'q', FLAG, quiet, IN(VERIFY) | IN(WAIT) | IN(CANCEL) | IN(DELETE),
+           .about = "print nothing; the exit status tells"),
+    OPTION("json", 'j', FLAG, json, IN(SUBMIT) | IN(REFINE) | IN(VERIFY) | IN(WAIT) | IN(STATUS),
+           .about = "print the job as JSON, and what is wrong too"),
+    OPTION("json", 'j', FLAG, json, IN(PICTURE), .about = "with --output: print what was written as JSON"),
+    OPTION("json", 'j', FLAG, json, IN(PLOT),
+           .about = "with --output: print what was written as JSON; with --trade: print the numbers"),
+    OPTION("json", 'j', FLAG, json, CLIENT_EVERYWHERE, .about = "print JSON, and what is wrong as JSON too"),
+    OPTION("server", 's', WORD, server, ASKING, .value = "URL",
+           .about = "the service (default: $UZAWA_SERVER, else http://127.0.0.1:8080); $UZAWA_TOKEN is sent as the "
+                    "token; $UZAWA_CA is a file of certificates to trust"),
+    OPTION("timeout", 't', NUMBER, timeout_s, ASKING, .value = "S", .unit = "seconds",
+           .about = "give up after S seconds; for wait and --wait: stop waiting"),
+    OPTION("retry", 0, NUMBER, retry_s, ASKING, .value = "S", .unit = "seconds",
+           .about = "keep trying to reach the server for S seconds (default 3; 30 while waiting)"),
+    OPTION("help", 'h', FLAG, help, CLIENT_EVERYWHERE, .about = "explain the command"),
+    OPTION("version", 'V', FLAG, version, CLIENT_EVERYWHERE, .about = "print the version"),
 };
-static const size_t N_OPTIONS = sizeof OPTIONS / sizeof *OPTIONS;
 
 static const client_exit_line EXITS[] = {
     {0, "done; wait, verify and --wait: ended and certified as asked"},
@@ -216,14 +218,24 @@ const client_page *client_page_of(client_command command)
     return &PAGES[command];
 }
 
-const client_option *client_option_at(size_t i)
+uz_option_table client_option_table(void)
 {
-    return i < N_OPTIONS ? &OPTIONS[i] : NULL;
+    return (uz_option_table){OPTIONS, sizeof OPTIONS / sizeof *OPTIONS};
 }
 
-bool client_option_is_general(const client_option *option)
+bool client_option_is_own(const uz_option *option, client_command command)
 {
-    return option->commands == ASKING || (option->commands == CLIENT_EVERYWHERE && option->letter != 'j');
+    if (!(option->places & CLIENT_IN(command)))
+        return false;
+    for (const uz_option *before = OPTIONS; before != option; before++)
+        if (strcmp(before->name, option->name) == 0 && before->places & CLIENT_IN(command))
+            return false;
+    return true;
+}
+
+bool client_option_is_general(const uz_option *option)
+{
+    return option->places == ASKING || (option->places == CLIENT_EVERYWHERE && option->letter != 'j');
 }
 
 const client_exit_line *client_exit_line_at(size_t i)

@@ -3,6 +3,8 @@
 #ifndef CLIENT_COMMANDS_H
 #define CLIENT_COMMANDS_H
 
+#include "text/options.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -41,33 +43,14 @@ typedef struct {
     const char *exits;   /* how it ends, beyond what is true of all commands; NULL: nothing */
 } client_page;
 
-typedef enum {
-    CLIENT_FLAG,
-    CLIENT_TEXT,
-    CLIENT_CHOICE, /* one of `choices` */
-    CLIENT_SECONDS,
-    CLIENT_COUNT,
-    CLIENT_LIST_OF /* text, may be repeated `most` times */
-} client_option_kind;
-
-/* A name may have several rows where it means something else to other commands; the first one for the command counts.
- */
-typedef struct {
-    const char *name;
-    char letter; /* 0: no short form */
-    client_option_kind kind;
-    size_t offset;       /* of the field in client_options */
-    unsigned commands;   /* where it may be used */
-    long least, most;    /* COUNT and LIST_OF */
-    const char *value;   /* what the value is called; NULL: a flag */
-    const char *choices; /* words between blanks, for CLIENT_CHOICE and for completion; NULL: any */
-    const char *about;   /* as in client_page.details, one paragraph */
-} client_option;
-
 const client_page *client_page_of(client_command command);
-const client_option *client_option_at(size_t i); /* NULL past the end */
+/* A row's places are the commands that it belongs to. A name may have several rows where it means something else to
+ * other commands; the first one for the command counts. */
+uz_option_table client_option_table(void);
+/* The first row of its name for the command. */
+bool client_option_is_own(const uz_option *option, client_command command);
 /* True of the options that every command that talks to the server has. */
-bool client_option_is_general(const client_option *option);
+bool client_option_is_general(const uz_option *option);
 
 const char *client_command_name(client_command command);
 bool client_command_find(client_command *out, const char *name);

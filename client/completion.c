@@ -9,34 +9,26 @@ static void print_commands(FILE *to)
         fprintf(to, "%s%s", i ? " " : "", client_command_name((client_command)i));
 }
 
-static bool named_before(size_t at, unsigned commands)
-{
-    for (size_t i = 0; i < at; i++)
-        if (strcmp(client_option_at(i)->name, client_option_at(at)->name) == 0 &&
-            client_option_at(i)->commands & commands)
-            return true;
-    return false;
-}
-
 /* "    submit) options='--K --N ...' ;;" */
 static void print_options(FILE *to, client_command command)
 {
-    const client_option *o;
+    const uz_option_table all = client_option_table();
     fprintf(to, "    %s) options='", client_command_name(command));
-    for (size_t i = 0; (o = client_option_at(i)); i++)
-        if (o->commands & CLIENT_IN(command) && !named_before(i, CLIENT_IN(command)))
-            fprintf(to, "%s ", o->name);
+    for (size_t i = 0; i < all.count; i++)
+        if (client_option_is_own(&all.rows[i], command))
+            fprintf(to, "--%s ", all.rows[i].name);
     fputs("' ;;\n", to);
 }
 
 /* Patterns of `case $command$previous`: what may follow an option. */
 static void print_values(FILE *to, client_command command)
 {
-    const client_option *o;
-    for (size_t i = 0; (o = client_option_at(i)); i++) {
-        if (!(o->commands & CLIENT_IN(command)) || !o->value || named_before(i, CLIENT_IN(command)))
+    const uz_option_table all = client_option_table();
+    for (size_t i = 0; i < all.count; i++) {
+        const uz_option *o = &all.rows[i];
+        if (!o->value || !client_option_is_own(o, command))
             continue;
-        fprintf(to, "    %s%s", client_command_name(command), o->name);
+        fprintf(to, "    %s--%s", client_command_name(command), o->name);
         if (o->letter)
             fprintf(to, "|%s-%c", client_command_name(command), o->letter);
         if (o->choices)

@@ -25,7 +25,7 @@ static bool locale_is_utf8(void)
 static int drawing_width(const client_session *s)
 {
     if (s->options->width >= 0)
-        return (int)s->options->width;
+        return s->options->width;
     int columns = s->options->output ? PLOT_WIDTH : client_columns(s->out, PLOT_WIDTH);
     return columns < PLOT_LEAST ? PLOT_LEAST : columns < PLOT_WIDTH ? columns : PLOT_WIDTH;
 }
@@ -36,7 +36,7 @@ client_exit client_draw_history(client_session *s, const char *csv)
     size_t len = 0;
     client_series series;
     const client_options *o = s->options;
-    client_plot_style style = {.width = drawing_width(s), .height = o->height < 0 ? PLOT_HEIGHT : (int)o->height};
+    client_plot_style style = {.width = drawing_width(s), .height = o->height < 0 ? PLOT_HEIGHT : o->height};
     style.ascii = o->ascii || !locale_is_utf8();
     style.colour = !o->output && isatty(fileno(s->out)) == 1 && !getenv("NO_COLOR");
     if (!client_series_read(&series, csv, message, sizeof message))

@@ -189,7 +189,7 @@ static client_exit fetch_and_deliver(client_session *s, char *path)
 }
 
 /* "a,b" of the words, "" of none. The caller frees; NULL: no memory, said. */
-static char *joined(client_session *s, const client_words *words)
+static char *joined(client_session *s, const uz_words *words)
 {
     client_buffer text = {0};
     bool ok = client_buffer_append(&text, "", 0);
@@ -225,7 +225,7 @@ client_exit client_picture(client_session *s)
 {
     char width[24];
     const client_options *o = s->options;
-    snprintf(width, sizeof width, "%ld", o->width);
+    snprintf(width, sizeof width, "%d", o->width);
     const client_query query[] = {{"colour", o->colour},
                                   {"factor", o->factor},
                                   {"width", o->width < 0 ? NULL : width},

@@ -85,32 +85,25 @@ static const char *print_paragraph(FILE *to, const char *text)
     return text[len] ? text + len + 1 : text + len;
 }
 
-static void print_option(FILE *to, const client_option *o)
+static void print_option(FILE *to, const uz_option *o)
 {
     fputs(".It ", to);
     if (o->letter)
         fprintf(to, "Fl %c , ", o->letter);
-    fprintf(to, "Fl \\-%s", o->name + 2);
+    fprintf(to, "Fl \\-%s", o->name);
     if (o->value)
         fprintf(to, " Ar %s", o->value);
     fputc('\n', to);
     print_paragraph(to, o->about);
 }
 
-static bool is_first_for(const client_option *o, client_command command)
-{
-    for (size_t i = 0; client_option_at(i) != o; i++)
-        if (strcmp(client_option_at(i)->name, o->name) == 0 && client_option_at(i)->commands & CLIENT_IN(command))
-            return false;
-    return o->commands & CLIENT_IN(command);
-}
-
 static void print_options(FILE *to, client_command command, bool general)
 {
-    const client_option *o;
+    const uz_option_table all = client_option_table();
     bool open = false;
-    for (size_t i = 0; (o = client_option_at(i)); i++) {
-        if (client_option_is_general(o) != general || (!general && !is_first_for(o, command)))
+    for (size_t i = 0; i < all.count; i++) {
+        const uz_option *o = &all.rows[i];
+        if (client_option_is_general(o) != general || (!general && !client_option_is_own(o, command)))
             continue;
         fputs(open ? "" : ".Bl -tag -width Ds\n", to);
         open = true;
@@ -207,11 +200,13 @@ void client_manual_print(FILE *to)
 static json_t *options_json(client_command command)
 {
     json_t *options = json_array();
-    const client_option *o;
-    for (size_t i = 0; options && (o = client_option_at(i)); i++)
-        if (is_first_for(o, command))
-            json_array_append_new(options,
-                                  json_pack("{s:s, s:s?, s:s}", "name", o->name, "value", o->value, "about", o->about));
+    const uz_option_table all = client_option_table();
+    for (size_t i = 0; options && i < all.count; i++) {
+        const uz_option *o = &all.rows[i];
+        if (client_option_is_own(o, command))
+            json_array_append_new(
+                options, json_pack("{s:s+, s:s?, s:s}", "name", "--", o->name, "value", o->value, "about", o->about));
+    }
     return options;
 }
 

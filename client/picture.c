@@ -113,7 +113,7 @@ static char *picture_path(client_session *s)
     char width[24];
     client_query query[16] = {{"case", o->case_name}};
     int n = 1;
-    snprintf(width, sizeof width, "%ld", o->width);
+    snprintf(width, sizeof width, "%d", o->width);
     if (o->deformed) {
         query[n++] = (client_query){"colour", o->colour};
         query[n++] = (client_query){"factor", o->factor};

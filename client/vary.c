@@ -262,7 +262,7 @@ static client_exit add_job(client_session *s, json_t *requests, json_t *labels, 
 client_exit client_build_variants(client_session *s, json_t **requests, json_t **labels, const json_t *request)
 {
     varied all[MOST_VARIED] = {0};
-    const client_words *words = &s->options->vary;
+    const uz_words *words = &s->options->vary;
     client_exit code = CLIENT_OK;
     *requests = json_array();
     *labels = json_array();

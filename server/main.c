@@ -435,7 +435,7 @@ int main(int argc, char **argv)
     }
     service s = {0};
     own_signals(argv, &s.signals);
-    s.log = log_open(stderr, options.level);
+    s.log = log_open(stderr, (log_level)options.level);
     s.metrics = metrics_new();
     if (!s.log || !s.metrics) {
         fprintf(stderr, "uzawad: no memory\n");

@@ -2,12 +2,13 @@
  * file.
  *
  * An option "max-body" is --max-body VALUE, UZAWAD_MAX_BODY=VALUE, or a line "max-body = VALUE" in the file that
- * --config or UZAWAD_CONFIG names. Of several the flag counts, then the environment, then the file, then the default;
- * but every value that is given must be valid, wherever it stands. */
+ * --config or UZAWAD_CONFIG names. Precedence: flag, environment, file, default; but every value that is given must be
+ * valid, wherever it stands. */
 #ifndef SERVER_OPTIONS_H
 #define SERVER_OPTIONS_H
 
 #include "base/log.h"
+#include "text/options.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -15,7 +16,10 @@
 
 #define UZAWAD_VERSION "0.1.0"
 
-enum { OPTION_PATH = 1024, OPTIONS_MAX = 64, OPTION_WORDS = 32 };
+enum { OPTION_PATH = UZ_OPTION_ROOM, OPTIONS_MAX = 64, OPTION_WORDS = 32 };
+
+/* Places of the rows: settings stand in files and the environment too, requests on the command line only. */
+enum { OPTION_SETTING = 1, OPTION_REQUEST = 2 };
 
 typedef enum { FROM_DEFAULT, FROM_FILE, FROM_ENVIRONMENT, FROM_FLAG } option_source;
 
@@ -48,7 +52,7 @@ typedef struct {
     char cors[OPTION_PATH];
     /* end, log */
     double drain_s;
-    log_level level;
+    int level; /* log_level */
     bool access_log;
 
     option_source source[OPTIONS_MAX]; /* in the order of the table */
@@ -95,39 +99,13 @@ typedef struct {
 /* The options that are limits; at most `most`. Returns how many. */
 size_t options_limits(const server_options *o, option_limit *out, size_t most);
 
-/* ---- the table (options_table.c), for options.c, options_show.c and options_file.c */
-typedef enum {
-    OPTION_TEXT,
-    OPTION_FILE,
-    OPTION_INTEGER,
-    OPTION_BYTES,
-    OPTION_COUNT,
-    OPTION_SECONDS, /* or days: the unit says it */
-    OPTION_LEVEL,
-    OPTION_SWITCH,
-    OPTION_ORIGINS, /* this and the next: words; a flag may be given several times, elsewhere spaces separate them */
-    OPTION_HOSTS
-} option_kind;
-typedef struct {
-    const char *name;
-    option_kind kind;
-    size_t offset; /* of the value in server_options */
-    double least, most;
-    const char *normal; /* the default as text; NULL: computed, `otherwise` says how */
-    const char *otherwise;
-    const char *unit; /* of a limit; NULL: the option is none */
-    bool zero_is_off;
-    const char *meaning; /* one sentence; lines are broken where it is printed */
-} option_row;
-bool options_is_list(const option_row *row);
-size_t options_table(const option_row **rows);
-/* The row of that name; NULL: none. */
-const option_row *options_find(const char *name, size_t len);
+/* ---- for the files of this folder */
+
+#define OPTION_LEVELS "debug info warn error" /* in the order of log_level */
+uz_option_table options_table(void);
 /* Gives a value to an option; false with what it takes instead in message. */
-bool options_set(server_options *o, const option_row *row, const char *text, char *message, size_t size);
+bool options_set(server_options *o, const uz_option *row, const char *text, char *message, size_t size);
 /* options_file.c: reads the file into *o; false with "FILE:LINE: what is wrong; what to do" in message. */
 bool options_read_file(server_options *o, const char *path, char *message, size_t size);
-/* The name that was probably meant; NULL: none is close. */
-const char *options_closest(const char *name, size_t len);
 
 #endif

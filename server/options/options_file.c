@@ -63,7 +63,7 @@ static bool read_value(char *text)
 static bool refuse_name(const line_place *at, const char *name)
 {
     char what[256];
-    const char *meant = options_closest(name, strlen(name));
+    const char *meant = uz_option_closest(options_table(), OPTION_SETTING, name, strlen(name));
     if (meant)
         snprintf(what, sizeof what, "there is no option \"%.60s\": did you mean \"%s\"?", name, meant);
     else
@@ -73,9 +73,8 @@ static bool refuse_name(const line_place *at, const char *name)
 
 static bool take_line(server_options *o, char *text, const line_place *at)
 {
-    const option_row *rows;
+    const uz_option_table table = options_table();
     char why[256];
-    options_table(&rows);
     text = trim(text);
     if (!text[0] || text[0] == '#')
         return true;
@@ -84,12 +83,12 @@ static bool take_line(server_options *o, char *text, const line_place *at)
         return refuse(at, "a line must be \"name = value\", or begin with '#'");
     *equals = '\0';
     char *name = trim(text), *value = trim(equals + 1);
-    const option_row *row = options_find(name, strlen(name));
+    const uz_option *row = uz_option_find(table, OPTION_SETTING, name, strlen(name));
     if (!row)
         return refuse_name(at, name);
     if (strcmp(name, "config") == 0)
         return refuse(at, "a file can't name another one: take this line out");
-    int *line = &o->line[row - rows];
+    int *line = &o->line[row - table.rows];
     if (*line) {
         snprintf(why, sizeof why, "%s stands in line %d already: keep one of them", name, *line);
         return refuse(at, why);
@@ -98,7 +97,7 @@ static bool take_line(server_options *o, char *text, const line_place *at)
         return refuse(at, "the quotes of this value are not closed, or something follows them");
     if (!options_set(o, row, value, why, sizeof why))
         return refuse(at, why);
-    o->source[row - rows] = FROM_FILE;
+    o->source[row - table.rows] = FROM_FILE;
     *line = at->number;
     return true;
 }

@@ -174,25 +174,24 @@ TEST(arguments_refused)
 }
 
 /* An operand where one is needed, a value where one is wanted: what is left to be refused is the option itself. */
-static bool takes(client_command command, const client_option *option)
+static bool takes(client_command command, const uz_option *option)
 {
     client_options o;
     char message[256] = "", line[200];
     const client_page *page = client_page_of(command);
-    const char *value = option->kind == CLIENT_FLAG ? "" : option->kind == CLIENT_CHOICE ? " json" : " 60";
-    snprintf(line, sizeof line, "%s %s %s%s", page->name, page->operands & CLIENT_OPERAND_NEEDED ? "x" : "",
+    const char *value = option->kind == UZ_OPTION_FLAG ? "" : option->kind == UZ_OPTION_CHOICE ? " json" : " 60";
+    snprintf(line, sizeof line, "%s %s --%s%s", page->name, page->operands & CLIENT_OPERAND_NEEDED ? "x" : "",
              option->name, value);
     return parse(&o, line, NULL, message) || !strstr(message, "does not take");
 }
 
 TEST(arguments_are_refused_by_commands_that_do_not_have_them)
 {
-    const client_option *option, *other;
-    for (size_t i = 0; (option = client_option_at(i)); i++)
+    const uz_option_table all = client_option_table();
+    for (size_t i = 0; i < all.count; i++)
         for (int c = 0; c < CLIENT_COMMANDS; c++) {
-            bool has = false;
-            for (size_t k = 0; (other = client_option_at(k)); k++)
-                has = has || (strcmp(other->name, option->name) == 0 && other->commands & CLIENT_IN(c));
+            const uz_option *option = &all.rows[i];
+            bool has = uz_option_find(all, CLIENT_IN(c), option->name, strlen(option->name)) != NULL;
             CHECK_MSG(takes((client_command)c, option) == has, "%s %s", client_command_name((client_command)c),
                       option->name);
         }
