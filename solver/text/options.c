@@ -134,6 +134,22 @@ bool uz_option_set(void *values, const uz_option *row, const char *text)
     return true;
 }
 
+/* "a, b or c" */
+static void write_choices(char *out, size_t size, const char *words)
+{
+    size_t used = 0;
+    while (*words) {
+        const size_t len = strcspn(words, " ");
+        const char *rest = words + len + strspn(words + len, " ");
+        used += (size_t)snprintf(out + used, size - used, "%.*s%s", (int)len, words,
+                                 !*rest              ? ""
+                                 : strchr(rest, ' ') ? ", "
+                                                     : " or ");
+        used = used < size ? used : size - 1;
+        words = rest;
+    }
+}
+
 void uz_option_wants(char *out, size_t size, const uz_option *row)
 {
     switch (row->kind) {
@@ -168,7 +184,7 @@ void uz_option_wants(char *out, size_t size, const uz_option *row)
         return;
     case UZ_OPTION_LEVEL:
     case UZ_OPTION_CHOICE:
-        snprintf(out, size, "one of: %s", row->choices);
+        write_choices(out, size, row->choices);
         return;
     case UZ_OPTION_WORD:
         snprintf(out, size, "a value that is not empty");
