@@ -39,7 +39,7 @@ LDFLAGS_ALL   = $(SAN) -pthread $(LDFLAGS)
 
 SOLVER_SRC := $(sort $(wildcard solver/*/*.c))
 SERVER_SRC := $(sort $(wildcard server/*.c server/*/*.c server/*/*/*.c))
-CLIENT_SRC := $(sort $(wildcard client/*.c))
+CLIENT_SRC := $(sort $(wildcard client/*.c client/*/*.c))
 UNIT_SRC   := $(sort $(wildcard tests/unit/*/test_*.c tests/unit/*/*/test_*.c tests/unit/*/*/*/test_*.c))
 FUZZ_SRC   := $(sort $(wildcard tests/fuzz/fuzz_*.c))
 BENCH_SRC  := $(sort $(wildcard tests/bench/*.c))
@@ -53,7 +53,7 @@ PRELOAD_SRC := $(sort $(wildcard tests/preload/*.c))
 SCHEMAS    := $(sort $(wildcard schemas/*.json))
 C_FILES    := $(SOLVER_SRC) $(SERVER_SRC) $(CLIENT_SRC) $(UNIT_SRC) $(FUZZ_SRC) $(BENCH_SRC) $(EXTREMES_SRC) $(THEORY_SRC) $(FIGURES_SRC) $(SOAK_SRC) $(GUARD_SRC) $(PRELOAD_SRC) $(PEERS_SRC) \
               $(wildcard tests/support/*.c)
-H_FILES    := $(wildcard solver/*/*.h server/*.h server/*/*.h server/*/*/*.h client/*.h tests/*/*.h)
+H_FILES    := $(wildcard solver/*/*.h server/*.h server/*/*.h server/*/*/*.h client/*.h client/*/*.h tests/*/*.h)
 
 PAGE_SRC   := $(sort $(wildcard client/page/*.* client/examples/gallery/*.json)) tests/data/paper_body.json
 

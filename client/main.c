@@ -1,5 +1,6 @@
 /* uzawa: the command line client of the contact solver service. It speaks HTTP and nothing else. */
-#include "session.h"
+#include "commands/run.h"
+#include "request/build.h"
 
 #include <stdlib.h>
 #include <string.h>

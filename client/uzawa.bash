@@ -1,4 +1,4 @@
-# Completion of uzawa for bash. Made from client/commands.c by make man.
+# Completion of uzawa for bash. Made from client/arguments/commands.c by make man.
 
 # The newest jobs, if the service answers at once.
 _uzawa_ids() {

@@ -52,7 +52,7 @@ def test_manual_is_well_formed(_):
 
 @options(None)
 def test_help_and_manual_name_every_exit_code(_):
-    codes = [int(code) for code in re.findall(r"= (\d+)", (ROOT / "client/exit_codes.h").read_text())]
+    codes = [int(code) for code in re.findall(r"= (\d+)", (ROOT / "client/local/exit_codes.h").read_text())]
     overview = text_of("help")
     for code in codes:
         check(re.search(rf"^ +{code}  ", overview, re.M), "no exit status", code, "in", overview)

@@ -1,10 +1,10 @@
 /* The client's parts that need no server: command line, tags, files, URLs. */
 #include "harness.h"
 
-#include "arguments.h"
-#include "files.h"
-#include "http.h"
-#include "tags.h"
+#include "arguments/arguments.h"
+#include "local/files.h"
+#include "service/http.h"
+#include "request/tags.h"
 
 #include <sys/stat.h>
 #include <unistd.h>
@@ -129,7 +129,7 @@ TEST(arguments_refused)
         {"picture x --fields a", "does not take --fields"},
         {"upload", "FILE"},
         {"upload x --tag a", "does not take --tag"},
-        {"result x --format xml", "json csv vtu"},
+        {"result x --format xml", "json, csv or vtu"},
         {"submit a --progress", "--progress wants --wait"},
         {"submit a --wait --quiet --json", "contradict"},
         {"wait a --quiet --progress", "contradict"},
@@ -150,7 +150,7 @@ TEST(arguments_refused)
         {"plot x --deformed --with y", "of the convergence"},
         {"plot x --ascii", "wants --trade"},
         {"plot x --trade -o f", "no --output"},
-        {"plot x --x frogs", "iterations seconds"},
+        {"plot x --x frogs", "iterations or seconds"},
         {"help submit --format man", "all commands together"},
         {"submit --K a", "--K and --p"},
         {"submit --K a --p b --N c", "both or neither"},

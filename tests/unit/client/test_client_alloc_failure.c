@@ -3,7 +3,7 @@
 #include "failing_heap.h"
 #include "harness.h"
 
-#include "build.h"
+#include "request/build.h"
 
 #include <unistd.h>
 

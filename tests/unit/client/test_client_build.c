@@ -1,9 +1,9 @@
 /* The requests that the client makes: paths, values that vary, and what is left of the time. */
 #include "harness.h"
 
-#include "build.h"
-#include "paths.h"
-#include "progress.h"
+#include "request/build.h"
+#include "request/paths.h"
+#include "show/progress.h"
 
 #include <jansson.h>
 #include <unistd.h>

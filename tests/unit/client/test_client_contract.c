@@ -1,8 +1,8 @@
 /* Checks, JUnit reports and comparisons with a baseline. */
-#include "baseline.h"
+#include "commands/baseline.h"
 #include "harness.h"
-#include "junit.h"
-#include "report.h"
+#include "show/junit.h"
+#include "show/report.h"
 
 #include <stdlib.h>
 #include <unistd.h>

@@ -1,10 +1,10 @@
 /* What the client draws and says: CSV, drawing, the summary in words, exit codes. */
 #include "harness.h"
 
-#include "files.h"
-#include "plot.h"
-#include "report.h"
-#include "series.h"
+#include "local/files.h"
+#include "show/plot.h"
+#include "show/report.h"
+#include "show/series.h"
 
 /* ------------------------------------------------------------ CSV, drawing */
 

@@ -3,8 +3,8 @@
 #include "failing_heap.h"
 #include "harness.h"
 
-#include "baseline.h"
-#include "junit.h"
+#include "commands/baseline.h"
+#include "show/junit.h"
 
 #define ANSWER                                                                                                         \
     "{\"summary\": {\"outcome\": \"converged\", \"energy\": {\"primal\": -1}, \"contact\": {\"reaction_sum\": -2}, "   \

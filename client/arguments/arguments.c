@@ -1,0 +1,219 @@
+#include "arguments/arguments.h"
+#include "text/edit_distance.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    client_options *options;
+    bool have_command;
+    char *message;
+    size_t size;
+} parser;
+
+__attribute__((format(printf, 2, 3))) static bool fail(parser *p, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    vsnprintf(p->message, p->size, format, args);
+    va_end(args);
+    return false;
+}
+
+/* Of the options of the command that was named, or of all before there is one. */
+static bool fail_unknown_option(parser *p, const char *word)
+{
+    const char *name = word + strspn(word, "-");
+    const char *near =
+        uz_option_closest(client_option_table(), p->have_command ? CLIENT_IN(p->options->command) : CLIENT_EVERYWHERE,
+                          name, strcspn(name, "="));
+    return fail(p, near ? "unknown option %s; did you mean --%s?" : "unknown option %s", word, near);
+}
+
+static bool fail_unknown_command(parser *p, const char *word)
+{
+    const char *names[CLIENT_COMMANDS];
+    for (int i = 0; i < CLIENT_COMMANDS; i++)
+        names[i] = client_command_name((client_command)i);
+    const int near = uz_closest(word, strlen(word), names, CLIENT_COMMANDS);
+    return near >= 0 ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", word, names[near])
+                     : fail(p, "unknown command \"%s\"", word);
+}
+
+static bool take_option(parser *p, const uz_option *row, const char *value)
+{
+    char wants[200];
+    if (!(row->places & CLIENT_IN(p->options->command)))
+        return fail(p, "%s does not take --%s", client_command_name(p->options->command), row->name);
+    if (uz_option_set(p->options, row, value))
+        return true;
+    if (row->kind == UZ_OPTION_FLAG)
+        return fail(p, "--%s takes no value", row->name);
+    uz_option_wants(wants, sizeof wants, row);
+    return fail(p, "--%s wants %s, not \"%s\"", row->name, wants, value);
+}
+
+/* One walk finds the command, the next one (apply) takes the options as that command understands them. */
+static bool take_words(parser *p, int argc, char *const *argv, bool apply)
+{
+    uz_option_walk walk = {.table = client_option_table(), .argc = argc, .argv = argv};
+    bool command_seen = false;
+    for (;;) {
+        walk.places = CLIENT_IN(p->options->command);
+        switch (uz_option_next(&walk)) {
+        case UZ_WALK_END:
+            return true;
+        case UZ_WALK_UNKNOWN:
+            return fail_unknown_option(p, walk.word);
+        case UZ_WALK_LACKS:
+            return fail(p, "--%s wants a value", walk.row->name);
+        case UZ_WALK_OPTION:
+            if (apply && !take_option(p, walk.row, walk.value))
+                return false;
+            break;
+        case UZ_WALK_OPERAND:
+            if (!p->have_command) {
+                p->have_command = client_command_find(&p->options->command, walk.word);
+                if (!p->have_command)
+                    return fail_unknown_command(p, walk.word);
+            } else if (apply && command_seen) {
+                if (p->options->operand)
+                    return fail(p, "%s: one operand too many: \"%s\"", client_command_name(p->options->command),
+                                walk.word);
+                p->options->operand = walk.word;
+            }
+            command_seen = true;
+            break;
+        }
+    }
+}
+
+static bool has_matrices(const client_options *o)
+{
+    return o->K || o->N || o->h || o->p;
+}
+
+/* What each command needs to be complete. */
+static bool check_operand(parser *p)
+{
+    const client_options *o = p->options;
+    const client_page *page = client_page_of(o->command);
+    if (o->operand && !page->operand)
+        return fail(p, "%s takes no operand, but got \"%s\"", page->name, o->operand);
+    if (o->operand && !*o->operand)
+        return fail(p, "%s: %s is empty", page->name, page->operand);
+    if (!o->operand && page->operands & CLIENT_OPERAND_NEEDED)
+        return fail(p, "%s wants %s %s", page->name, *page->operand == 'I' ? "an" : "a", page->operand);
+    if (!o->operand && o->command == CLIENT_SUBMIT && !has_matrices(o))
+        return o->mesh ? fail(p, "--mesh wants a FILE with the scene whose mesh it replaces")
+                       : fail(p, "submit wants a FILE, or --K and --p");
+    if (!o->operand && o->command == CLIENT_SUBMIT && (!o->K || !o->p || !o->N != !o->h))
+        return fail(p, "without a FILE submit wants --K and --p, and --N and --h both or neither");
+    return true;
+}
+
+/* At most one of the files is standard input. */
+static bool check_standard_input(parser *p)
+{
+    const client_options *o = p->options;
+    const char *files[] = {o->operand, o->K, o->N, o->h, o->p, o->mesh};
+    int count = 0;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++)
+        count += files[i] && strcmp(files[i], "-") == 0;
+    return count < 2 || fail(p, "only one file can be \"-\", standard input");
+}
+
+static bool check_submit(parser *p)
+{
+    const client_options *o = p->options;
+    if (o->mesh && has_matrices(o))
+        return fail(p, "--mesh is of a scene, --K, --N, --h and --p of a problem in matrices: choose one");
+    return check_standard_input(p);
+}
+
+/* Options that change nothing without another. */
+static bool check_idle(parser *p)
+{
+    const client_options *o = p->options;
+    const bool stays = o->wait || o->command == CLIENT_WAIT || o->command == CLIENT_VERIFY;
+    if (o->progress && !stays)
+        return fail(p, "--progress wants --wait");
+    if ((o->junit || o->baseline) && !stays)
+        return fail(p, "%s wants --wait", o->junit ? "--junit" : "--baseline");
+    if (o->tolerance >= 0 && !o->baseline)
+        return fail(p, "--tolerance wants --baseline");
+    if (o->progress && o->quiet)
+        return fail(p, "--progress and --quiet contradict each other");
+    if (o->quiet && o->json)
+        return fail(p, "--quiet and --json contradict each other");
+    if (o->command == CLIENT_HISTORY && !o->plot && (o->width >= 0 || o->height >= 0 || o->ascii))
+        return fail(p, "--width, --height and --ascii want --plot");
+    return true;
+}
+
+static bool check_plot(parser *p)
+{
+    const client_options *o = p->options;
+    const bool convergence = !o->deformed && !o->trade;
+    if (o->deformed && o->trade)
+        return fail(p, "--deformed and --trade are alternatives: choose one");
+    if (!o->deformed && (o->colour || o->factor))
+        return fail(p, "--colour and --factor want --deformed");
+    if (convergence && o->width >= 0)
+        return fail(p, "--width wants --deformed or --trade");
+    if (o->deformed && o->width >= 0 && o->width < 200)
+        return fail(p, "--width wants an integer from 200 to 4000 with --deformed, not \"%d\"", o->width);
+    if (o->trade && o->width > 400)
+        return fail(p, "--width wants an integer from 40 to 400 with --trade, not \"%d\"", o->width);
+    if (!convergence && (o->axis || o->with.count))
+        return fail(p, "--x and --with are of the convergence");
+    if (o->ascii && !o->trade)
+        return fail(p, "--ascii wants --trade");
+    if (o->output && o->trade)
+        return fail(p, "--trade is printed and takes no --output");
+    return true;
+}
+
+static bool check_combination(parser *p)
+{
+    const client_options *o = p->options;
+    const bool drawing = o->command == CLIENT_PICTURE || (o->command == CLIENT_PLOT && !o->trade);
+    if (o->csv + o->plot + o->json > 1)
+        return fail(p, "--csv, --plot and --json are alternatives: choose one");
+    if (o->json && o->format && strcmp(o->format, "json") != 0)
+        return fail(p, "--json and --format %s contradict each other", o->format);
+    if (o->json && drawing && (!o->output || strcmp(o->output, "-") == 0))
+        return fail(p, "--json wants --output FILE, since the picture goes to standard output otherwise");
+    if (o->command == CLIENT_HELP && o->format && strcmp(o->format, "text") != 0 && o->operand)
+        return fail(p, "help --format %s is of all commands together", o->format);
+    if (o->command == CLIENT_REFINE && !o->accuracy)
+        return fail(p, "refine wants --accuracy: a relative error such as 1e-8, or quick, balanced, precise, exact");
+    if (o->command == CLIENT_LIST && o->tags.count > 1)
+        return fail(p, "list filters by one --tag");
+    return check_idle(p) && check_submit(p) && (o->command != CLIENT_PLOT || check_plot(p));
+}
+
+bool client_arguments_parse(client_options *out, int argc, char *const *argv, const char *env_server, char *message,
+                            size_t size)
+{
+    *out = (client_options){.command = CLIENT_HELP,
+                            .server = env_server && *env_server ? env_server : "http://127.0.0.1:8080",
+                            .timeout_s = INFINITY,
+                            .retry_s = -1,
+                            .time_limit_s = NAN,
+                            .tolerance = -1,
+                            .max_iterations = -1,
+                            .limit = 20,
+                            .width = -1,
+                            .height = -1};
+    parser p = {.options = out, .message = message, .size = size};
+    if (!take_words(&p, argc, argv, false) || !take_words(&p, argc, argv, true))
+        return false;
+    if (out->help || out->version)
+        return true;
+    if (!p.have_command)
+        return fail(&p, "no command given");
+    return check_operand(&p) && check_combination(&p);
+}

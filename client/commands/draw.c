@@ -1,0 +1,120 @@
+/* draw.c: drawings with characters: a convergence history, and what each digit took. */
+#include "commands/fetch.h"
+#include "show/plot.h"
+#include "show/progress.h"
+#include "show/report.h"
+
+#include <langinfo.h>
+#include <locale.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define PLOT_WIDTH  72
+#define PLOT_LEAST  24
+#define PLOT_HEIGHT 20
+
+static bool locale_is_utf8(void)
+{
+    setlocale(LC_CTYPE, "");
+    return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
+}
+
+/* As asked for, else as wide as the terminal allows. */
+static int drawing_width(const client_session *s)
+{
+    if (s->options->width >= 0)
+        return s->options->width;
+    int columns = s->options->output ? PLOT_WIDTH : client_columns(s->out, PLOT_WIDTH);
+    return columns < PLOT_LEAST ? PLOT_LEAST : columns < PLOT_WIDTH ? columns : PLOT_WIDTH;
+}
+
+client_exit client_draw_history(client_session *s, const char *csv)
+{
+    char message[512], *text = NULL;
+    size_t len = 0;
+    client_series series;
+    const client_options *o = s->options;
+    client_plot_style style = {.width = drawing_width(s), .height = o->height < 0 ? PLOT_HEIGHT : o->height};
+    style.ascii = o->ascii || !locale_is_utf8();
+    style.colour = !o->output && isatty(fileno(s->out)) == 1 && !getenv("NO_COLOR");
+    if (!client_series_read(&series, csv, message, sizeof message))
+        return client_complain(s, CLIENT_SERVER_ERROR, message);
+    FILE *drawing = open_memstream(&text, &len);
+    bool drawn = drawing && client_plot_print(drawing, &series, &style);
+    bool ok = drawing && fclose(drawing) == 0;
+    client_exit code = CLIENT_OK;
+    if (!ok)
+        code = client_complain(s, CLIENT_LOCAL, "no memory");
+    else if (!drawn)
+        client_complain(s, CLIENT_OK, "the history has no iteration to draw");
+    else
+        code = client_deliver(s, text, len);
+    free(text);
+    client_series_clear(&series);
+    return code;
+}
+
+/* ------------------------------------------------------- what digits took */
+
+/* The least and the largest time that is there, as powers of ten. */
+static bool time_range(const json_t *decades, double *low, double *high)
+{
+    *low = INFINITY;
+    *high = -INFINITY;
+    for (size_t i = 0; i < json_array_size(decades); i++) {
+        double seconds = client_json_number(json_array_get(decades, i), "seconds");
+        if (!(seconds > 0))
+            continue;
+        *low = fmin(*low, log10(seconds));
+        *high = fmax(*high, log10(seconds));
+    }
+    *low -= 0.1; /* so that the shortest has a bar as well */
+    return *high > -INFINITY;
+}
+
+/* A bar whose length is the logarithm of the time. */
+static void print_bar(FILE *to, double seconds, double low, double high, int cells, bool ascii)
+{
+    int full = (int)lround((log10(seconds) - low) / (high - low) * cells);
+    for (int i = 0; i < full; i++)
+        fputs(ascii ? "#" : "\u2588", to);
+}
+
+static void print_decade(FILE *to, const json_t *decade, double low, double high, int cells, bool ascii)
+{
+    char time[16] = "never", steps[24] = "";
+    double seconds = client_json_number(decade, "seconds"), iterations = client_json_number(decade, "iterations");
+    if (seconds >= 0)
+        client_format_seconds(time, sizeof time, seconds);
+    if (isfinite(iterations))
+        snprintf(steps, sizeof steps, "%.0f", iterations);
+    fprintf(to, "%5.0e  %9s  %7s", client_json_number(decade, "relative_error"), time, steps);
+    if (seconds > 0 && cells > 0) {
+        fputs("  ", to);
+        print_bar(to, seconds, low, high, cells, ascii);
+    }
+    fputc('\n', to);
+}
+
+void client_draw_trade(client_session *s, const json_t *trade)
+{
+    const json_t *decades = json_object_get(trade, "decades");
+    const char *advice = client_json_text(trade, "suggestion.text");
+    const bool ascii = s->options->ascii || !locale_is_utf8();
+    double low, high;
+    int cells = drawing_width(s) - 27;
+    bool any = time_range(decades, &low, &high);
+    fprintf(s->out, "%5s  %9s  %7s%s\n", "error", "certified", "steps",
+            any && cells >= 17 ? "  time, logarithmic" : "");
+    for (size_t i = 0; i < json_array_size(decades); i++)
+        print_decade(s->out, json_array_get(decades, i), low, high, cells > 0 ? cells : 0, ascii);
+    double mesh = client_json_number(trade, "mesh_error");
+    if (isfinite(mesh))
+        fprintf(s->out, "the mesh itself is off by about %.2g\n", mesh);
+    if (*advice) {
+        client_print_safe(s->out, advice);
+        fputc('\n', s->out);
+    }
+}

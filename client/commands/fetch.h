@@ -1,0 +1,26 @@
+/* fetch.h: what the commands share that fetch something of a job. */
+#ifndef CLIENT_FETCH_H
+#define CLIENT_FETCH_H
+
+#include "commands/run.h"
+
+typedef struct {
+    const char *name, *value; /* value NULL: left out */
+} client_query;
+
+/* Appends "&name=value", escaped; nothing where value is NULL. False: no memory. */
+bool client_append_query(client_buffer *path, const char *name, const char *value);
+/* "/v1/jobs/ID/result?a=1&b=2"; a part without a name ends the list. The caller frees. NULL: no memory, said. */
+char *client_path_with_query(client_session *s, const char *suffix, const client_query *part);
+
+/* To --output or standard output, whole or not at all; with --json it says what was written. */
+client_exit client_deliver(client_session *s, const char *text, size_t len);
+
+/* The fields ("a,b") of the job's answer as CSV. */
+client_exit client_table(client_session *s, const char *fields);
+/* A history in CSV as a drawing; it goes where the data would. */
+client_exit client_draw_history(client_session *s, const char *csv);
+/* What each digit took (work-precision.json), as a table with bars. */
+void client_draw_trade(client_session *s, const json_t *trade);
+
+#endif

@@ -1,0 +1,182 @@
+/* plot: pictures from the service, as SVG or, by way of rsvg-convert, as PNG. */
+#include "commands/fetch.h"
+#include "show/report.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static bool ends_in(const char *text, const char *end)
+{
+    size_t len = strlen(text), n = strlen(end);
+    return len > n && strcmp(text + len - n, end) == 0;
+}
+
+/* ------------------------------------------------------------------- PNG */
+
+/* rsvg-convert between two pipes. Returns its pid, -1: no process. */
+static pid_t start_converter(int *to, int *from)
+{
+    int in[2], out[2];
+    if (pipe(in) != 0)
+        return -1;
+    if (pipe(out) != 0) {
+        close(in[0]);
+        close(in[1]);
+        return -1;
+    }
+    pid_t pid = fork();
+    if (pid == 0) {
+        dup2(in[0], STDIN_FILENO);
+        dup2(out[1], STDOUT_FILENO);
+        close(in[1]);
+        close(out[0]);
+        execlp("rsvg-convert", "rsvg-convert", "--format=png", "--zoom=2", (char *)NULL);
+        _exit(127);
+    }
+    close(in[0]);
+    close(out[1]);
+    *to = in[1];
+    *from = out[0];
+    return pid;
+}
+
+/* Writes what the pipe takes; *to becomes -1 when all is written or nobody reads. */
+static void feed(int *to, const client_buffer *svg, size_t *at)
+{
+    ssize_t n = write(*to, svg->data + *at, svg->len - *at < 4096 ? svg->len - *at : 4096);
+    if (n > 0)
+        *at += (size_t)n;
+    if ((n < 0 && errno != EINTR) || *at == svg->len) {
+        close(*to);
+        *to = -1;
+    }
+}
+
+/* False: the end, or no memory. */
+static bool drink(int from, client_buffer *png)
+{
+    char block[1 << 14];
+    ssize_t n = read(from, block, sizeof block);
+    return n > 0 ? client_buffer_append(png, block, (size_t)n) : n < 0 && errno == EINTR;
+}
+
+/* Feeds and drinks at once, so that neither side waits for the other for ever. */
+static void exchange(int to, int from, const client_buffer *svg, client_buffer *png)
+{
+    size_t at = 0;
+    for (bool more = true; more;) {
+        struct pollfd ready[2] = {{.fd = from, .events = POLLIN}, {.fd = to, .events = POLLOUT}};
+        if (poll(ready, 2, -1) < 0 && errno != EINTR)
+            break;
+        if (to >= 0 && ready[1].revents)
+            feed(&to, svg, &at);
+        if (ready[0].revents)
+            more = drink(from, png);
+    }
+    if (to >= 0)
+        close(to);
+    close(from);
+}
+
+static client_exit convert(client_session *s, const client_buffer *svg, client_buffer *png)
+{
+    int to, from, status = 0;
+    struct sigaction ignore = {.sa_handler = SIG_IGN}, before;
+    if (!svg->len)
+        return client_complain(s, CLIENT_SERVER_ERROR, "the reply is empty");
+    sigaction(SIGPIPE, &ignore, &before);
+    pid_t pid = start_converter(&to, &from);
+    if (pid >= 0)
+        exchange(to, from, svg, png);
+    sigaction(SIGPIPE, &before, NULL);
+    while (pid >= 0 && waitpid(pid, &status, 0) < 0 && errno == EINTR)
+        continue;
+    if (pid >= 0 && WIFEXITED(status) && WEXITSTATUS(status) == 0 && png->len)
+        return CLIENT_OK;
+    if (pid >= 0 && WIFEXITED(status) && WEXITSTATUS(status) == 127)
+        return client_complain(
+            s, CLIENT_LOCAL,
+            "a PNG wants the program rsvg-convert (Debian: librsvg2-bin); a FILE that ends in .svg needs nothing");
+    return client_complain(s, CLIENT_LOCAL, "rsvg-convert could not make a PNG of the picture");
+}
+
+/* ------------------------------------------------------------ the command */
+
+static char *picture_path(client_session *s)
+{
+    const client_options *o = s->options;
+    char width[24];
+    client_query query[16] = {{"case", o->case_name}};
+    int n = 1;
+    snprintf(width, sizeof width, "%d", o->width);
+    if (o->deformed) {
+        query[n++] = (client_query){"colour", o->colour};
+        query[n++] = (client_query){"factor", o->factor};
+        query[n++] = (client_query){"width", o->width < 0 ? NULL : width};
+        return client_path_with_query(s, "/deformed.svg", query);
+    }
+    client_buffer with = {0};
+    bool ok = client_buffer_append(&with, "", 0);
+    for (int i = 0; ok && i < o->with.count; i++)
+        ok = client_buffer_append(&with, ",", i > 0) &&
+             client_buffer_append(&with, o->with.item[i], strlen(o->with.item[i]));
+    query[n++] = (client_query){"x", o->axis};
+    query[n++] = (client_query){"with", ok && with.len ? with.data : NULL};
+    char *path = ok ? client_path_with_query(s, "/convergence.svg", query) : NULL;
+    if (!ok)
+        client_complain(s, CLIENT_LOCAL, "no memory");
+    free(with.data);
+    return path;
+}
+
+static client_exit fetch_picture(client_session *s)
+{
+    client_reply reply;
+    client_buffer png = {0};
+    const char *output = s->options->output;
+    char *path = picture_path(s);
+    if (!path)
+        return CLIENT_LOCAL;
+    client_request request = client_request_new(s, "GET", path);
+    client_exit code = client_ask(s, &reply, &request);
+    const bool as_png = output && ends_in(output, ".png");
+    if (code == CLIENT_OK && as_png)
+        code = convert(s, &reply.body, &png);
+    const client_buffer *picture = as_png ? &png : &reply.body;
+    if (code == CLIENT_OK)
+        code = client_deliver(s, picture->data, picture->len);
+    free(png.data);
+    client_reply_clear(&reply);
+    free(path);
+    return code;
+}
+
+static client_exit fetch_trade(client_session *s)
+{
+    json_t *trade = NULL;
+    const client_query query[] = {{"case", s->options->case_name}, {NULL, NULL}};
+    char *path = client_path_with_query(s, "/work-precision", query);
+    if (!path)
+        return CLIENT_LOCAL;
+    client_request request = client_request_new(s, "GET", path);
+    client_exit code = client_ask_json(s, &trade, &request);
+    if (code == CLIENT_OK && !json_is_array(json_object_get(trade, "decades")))
+        code = client_complain(s, CLIENT_SERVER_ERROR, "the reply has no decades; is this the right server?");
+    else if (code == CLIENT_OK && s->options->json)
+        code = client_print_json(s, trade);
+    else if (code == CLIENT_OK)
+        client_draw_trade(s, trade);
+    json_decref(trade);
+    free(path);
+    return code;
+}
+
+client_exit client_plot(client_session *s)
+{
+    return s->options->trade ? fetch_trade(s) : fetch_picture(s);
+}

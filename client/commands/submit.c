@@ -1,0 +1,265 @@
+/* submit, refine and verify: the commands that make jobs. */
+#include "request/build.h"
+#include "commands/follow.h"
+#include "show/report.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/random.h>
+
+#define KEY_BYTES 16
+#define KEY_ROOM  (2 * KEY_BYTES + 1)
+
+/* Random, so that a repeated request is recognised as the same one and no other. */
+static bool make_key(char key[KEY_ROOM])
+{
+    unsigned char bytes[KEY_BYTES];
+    if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
+        return false;
+    for (size_t i = 0; i < sizeof bytes; i++)
+        snprintf(key + 2 * i, 3, "%02x", bytes[i]);
+    return true;
+}
+
+/* One key for all that the command makes: whoever repeats it with that key finds what is there already. */
+static bool have_key(client_session *s)
+{
+    return s->options->key || *s->key || make_key(s->key);
+}
+
+/* A certificate is wanted at once. */
+static bool stays(const client_session *s)
+{
+    return s->options->wait || s->options->command == CLIENT_VERIFY;
+}
+
+static void tell_of_the_key(client_session *s, const char *key)
+{
+    char message[300];
+    snprintf(message, sizeof message,
+             "interrupted before the service answered; the same command with --key %.200s finds the job", key);
+    client_complain(s, CLIENT_INTERRUPTED, message);
+}
+
+/* One of several jobs, from 0; -1: the only one, which may be waited for at once. */
+static client_exit post_body(client_session *s, const char *path, const client_buffer *body, client_watch *watch,
+                             int number, json_t **job)
+{
+    char prefer[40], *header = NULL, *key = NULL;
+    client_request request = client_request_new(s, "POST", path);
+    *job = NULL;
+    if (!have_key(s))
+        return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
+    const char *given = s->options->key ? s->options->key : s->key;
+    bool ok = (number < 0 ? asprintf(&key, "%s", given) : asprintf(&key, "%s-%d", given, number)) >= 0;
+    if (!ok || asprintf(&header, "Idempotency-Key: %s", key) < 0) {
+        if (ok)
+            free(key);
+        return client_complain(s, CLIENT_LOCAL, "no memory");
+    }
+    request.headers[0] = header;
+    request.body = body->data ? body->data : "";
+    request.body_len = body->len;
+    if (stays(s) && number < 0)
+        client_hold(&request, prefer, sizeof prefer, client_hold_seconds(s, watch->progress));
+    client_exit code = client_ask_json(s, job, &request);
+    if (code == CLIENT_INTERRUPTED)
+        tell_of_the_key(s, given);
+    free(header);
+    free(key);
+    return code;
+}
+
+static void print_id(client_session *s, const char *id)
+{
+    client_print_safe(s->out, id);
+    fputc('\n', s->out);
+    fflush(s->out); /* whoever reads it may want to use it while we wait */
+}
+
+/* Of a job, or of the result that verify answers with. "" where the reply has none, which is told. */
+static client_exit job_id(client_session *s, char id[128], const json_t *job)
+{
+    const char *of_result = client_json_text(job, "job");
+    snprintf(id, 128, "%s", *of_result ? of_result : client_json_text(job, "id"));
+    return *id ? CLIENT_OK
+               : client_complain(s, CLIENT_SERVER_ERROR, "the reply names no job; is this the right server?");
+}
+
+/* --------------------------------------------------------------- one job */
+
+static client_exit stay(client_session *s, json_t **job, client_watch *watch)
+{
+    char id[128];
+    client_exit code = job_id(s, id, *job);
+    if (code != CLIENT_OK)
+        return code;
+    if (!stays(s) && s->options->json)
+        return client_print_json(s, *job);
+    if (!stays(s) || (s->options->quiet && s->options->command != CLIENT_VERIFY))
+        print_id(s, id);
+    if (!stays(s))
+        return CLIENT_OK;
+    if (*client_json_text(*job, "job")) { /* verify answered with a result, which is no job */
+        json_decref(*job);
+        *job = NULL;
+    } else {
+        client_progress_show(watch->progress, *job);
+    }
+    return client_follow(s, id, job, watch);
+}
+
+static client_exit post_and_stay(client_session *s, const char *path, const client_buffer *body)
+{
+    json_t *job = NULL;
+    client_watch watch;
+    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
+    progress.shown = progress.shown && stays(s);
+    client_watch_begin(&watch, s->http, &progress);
+    client_exit code = post_body(s, path, body, &watch, -1, &job);
+    if (code == CLIENT_OK)
+        code = stay(s, &job, &watch);
+    client_watch_end(&watch, s->http);
+    if (stays(s))
+        code = client_report_end(s, job, code);
+    json_decref(job);
+    return code;
+}
+
+/* -------------------------------------------------------------- several */
+
+static client_exit post_all(client_session *s, const client_bodies *bodies, client_watch *watch, json_t *jobs)
+{
+    client_exit code = CLIENT_OK;
+    for (size_t i = 0; code == CLIENT_OK && i < bodies->count; i++) {
+        char id[128];
+        json_t *job;
+        code = post_body(s, "/v1/jobs", &bodies->item[i].body, watch, (int)i, &job);
+        if (code == CLIENT_OK)
+            code = job_id(s, id, job);
+        if (code == CLIENT_OK && !s->options->json && (!stays(s) || s->options->quiet))
+            print_id(s, id);
+        if (code == CLIENT_OK && json_array_append(jobs, job) != 0)
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        json_decref(job);
+    }
+    return code;
+}
+
+static void print_job_line(client_session *s, const json_t *job, const char *label)
+{
+    double error = client_json_number(job, "summary.certificate.relative_error");
+    char text[32];
+    client_print_safe(s->out, client_json_text(job, "id"));
+    fputs("  ", s->out);
+    const char *outcome = client_json_text(job, "summary.outcome");
+    fprintf(s->out, "%-15s  ", *outcome ? outcome : client_json_text(job, "status"));
+    if (isfinite(error))
+        fprintf(s->out, "%-9s  ", client_format_bound(text, error));
+    else
+        fprintf(s->out, "%-9s  ", "unknown");
+    client_print_safe(s->out, label);
+    fputc('\n', s->out);
+}
+
+/* Each job to its end. The first exit code that is not 0 counts, but an interrupt or a timeout ends it all. */
+static client_exit follow_all(client_session *s, const client_bodies *bodies, client_watch *watch, json_t *jobs)
+{
+    client_exit worst = CLIENT_OK;
+    if (!s->options->json && !s->options->quiet)
+        fprintf(s->out, "%-32s  %-15s  %-9s  %s\n", "id", "outcome", "error", "values");
+    for (size_t i = 0; i < json_array_size(jobs); i++) {
+        json_t *job = json_incref(json_array_get(jobs, i));
+        client_exit code = client_follow(s, client_json_text(job, "id"), &job, watch);
+        json_array_set(jobs, i, job);
+        bool ended = code == CLIENT_OK;
+        if (ended)
+            code = client_job_exit(job);
+        if (ended && !s->options->json && !s->options->quiet)
+            print_job_line(s, job, bodies->item[i].label);
+        code = client_contract(s, job, bodies->item[i].label, code);
+        json_decref(job);
+        worst = worst == CLIENT_OK ? code : worst;
+        if (!ended)
+            return code;
+    }
+    return worst;
+}
+
+static client_exit post_several(client_session *s, const client_bodies *bodies)
+{
+    client_watch watch;
+    client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
+    json_t *jobs = json_array();
+    progress.shown = progress.shown && stays(s);
+    client_watch_begin(&watch, s->http, &progress);
+    client_exit code = post_all(s, bodies, &watch, jobs);
+    if (code == CLIENT_OK && stays(s))
+        code = follow_all(s, bodies, &watch, jobs);
+    client_watch_end(&watch, s->http);
+    if (s->options->json && json_array_size(jobs) && client_print_json(s, jobs) != CLIENT_OK)
+        code = CLIENT_LOCAL;
+    json_decref(jobs);
+    return code;
+}
+
+/* ------------------------------------------------------------ the commands */
+
+client_exit client_submit(client_session *s)
+{
+    client_bodies bodies;
+    if (!have_key(s))
+        return client_complain(s, CLIENT_LOCAL, "no random numbers for an idempotency key");
+    client_exit code = client_build(s, &bodies);
+    if (code == CLIENT_OK && bodies.count == 1)
+        code = post_and_stay(s, "/v1/jobs", &bodies.item[0].body);
+    else if (code == CLIENT_OK)
+        code = post_several(s, &bodies);
+    client_bodies_clear(&bodies);
+    return code;
+}
+
+client_exit client_verify(client_session *s)
+{
+    char message[512];
+    client_buffer file;
+    if (!client_file_read(&file, s->options->operand, message, sizeof message))
+        return client_complain(s, CLIENT_LOCAL, message);
+    client_exit code = post_and_stay(s, "/v1/verify", &file);
+    free(file.data);
+    return code;
+}
+
+/* {"accuracy": {"relative_error": 1e-8}} or {"accuracy": "exact"}, and the limits that were given. NULL: no memory. */
+static char *refine_body(const client_options *o)
+{
+    char *end;
+    double error = strtod(o->accuracy, &end);
+    bool number = *end == '\0' && isfinite(error);
+    json_t *body = number ? json_pack("{s:{s:f}}", "accuracy", "relative_error", error)
+                          : json_pack("{s:s}", "accuracy", o->accuracy);
+    bool ok = body != NULL;
+    if (ok && o->max_iterations >= 0)
+        ok = json_object_set_new(body, "max_iterations", json_integer(o->max_iterations)) == 0;
+    if (ok && isfinite(o->time_limit_s))
+        ok = json_object_set_new(body, "time_limit_s", json_real(o->time_limit_s)) == 0;
+    char *text = ok ? json_dumps(body, JSON_COMPACT) : NULL;
+    json_decref(body);
+    return text;
+}
+
+client_exit client_refine(client_session *s)
+{
+    char *path = client_job_path(s, s->options->operand, "/refine"), *text = refine_body(s->options);
+    client_exit code = CLIENT_LOCAL;
+    if (path && text) {
+        client_buffer body = {.data = text, .len = strlen(text)};
+        code = post_and_stay(s, path, &body);
+    } else if (path) {
+        client_complain(s, code, "no memory, or the accuracy is not UTF-8");
+    }
+    free(text);
+    free(path);
+    return code;
+}

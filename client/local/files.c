@@ -1,0 +1,150 @@
+#include "local/files.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+bool client_buffer_append(client_buffer *buffer, const void *bytes, size_t count)
+{
+    if (count >= SIZE_MAX - buffer->len)
+        return false;
+    size_t needed = buffer->len + count + 1;
+    if (needed > buffer->capacity) {
+        size_t capacity = buffer->capacity ? buffer->capacity : 4096;
+        while (capacity < needed)
+            capacity = capacity > SIZE_MAX / 2 ? needed : capacity * 2;
+        char *grown = realloc(buffer->data, capacity);
+        if (!grown)
+            return false;
+        buffer->data = grown;
+        buffer->capacity = capacity;
+    }
+    if (count)
+        memcpy(buffer->data + buffer->len, bytes, count);
+    buffer->len += count;
+    buffer->data[buffer->len] = '\0';
+    return true;
+}
+
+static bool complain(char *message, size_t size, const char *doing, const char *path)
+{
+    snprintf(message, size, "cannot %s %s: %s", doing, path, strerror(errno));
+    return false;
+}
+
+static bool read_all(client_buffer *out, int fd)
+{
+    char block[1 << 16];
+    ssize_t got;
+    while ((got = read(fd, block, sizeof block)) != 0) {
+        if (got < 0 && errno == EINTR)
+            continue;
+        if (got < 0)
+            return false;
+        if (!client_buffer_append(out, block, (size_t)got)) {
+            errno = ENOMEM;
+            return false;
+        }
+    }
+    return client_buffer_append(out, "", 0);
+}
+
+bool client_file_read(client_buffer *out, const char *path, char *message, size_t size)
+{
+    client_buffer read_in = {0};
+    bool standard = strcmp(path, "-") == 0;
+    *out = (client_buffer){0};
+    int fd = standard ? STDIN_FILENO : open(path, O_RDONLY | O_CLOEXEC);
+    bool ok = fd >= 0 && read_all(&read_in, fd);
+    if (ok)
+        *out = read_in;
+    else {
+        complain(message, size, "read", standard ? "standard input" : path);
+        free(read_in.data);
+    }
+    if (fd >= 0 && !standard)
+        close(fd);
+    return ok;
+}
+
+static bool write_all(int fd, const char *bytes, size_t count)
+{
+    while (count > 0) {
+        ssize_t done = write(fd, bytes, count);
+        if (done < 0 && errno == EINTR)
+            continue;
+        if (done < 0)
+            return false;
+        bytes += done;
+        count -= (size_t)done;
+    }
+    return true;
+}
+
+static bool write_directly(const char *path, const char *bytes, size_t count)
+{
+    int fd = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC);
+    bool ok = fd >= 0 && write_all(fd, bytes, count);
+    if (fd >= 0 && close(fd) != 0)
+        ok = false;
+    return ok;
+}
+
+static bool write_beside(const char *path, const char *bytes, size_t count)
+{
+    bool ok = false;
+    int fd = -1, why = 0;
+    char *beside = NULL;
+    if (asprintf(&beside, "%s.part-%ld", path, (long)getpid()) < 0) {
+        errno = ENOMEM;
+        return false;
+    }
+    fd = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0) {
+        ok = write_all(fd, bytes, count) && fsync(fd) == 0;
+        ok = close(fd) == 0 && ok && rename(beside, path) == 0;
+        why = errno;
+        if (!ok)
+            unlink(beside);
+        errno = why;
+    }
+    free(beside);
+    return ok;
+}
+
+static bool write_standard_output(const char *bytes, size_t count)
+{
+    return fwrite(bytes, 1, count, stdout) == count && fflush(stdout) == 0;
+}
+
+bool client_file_write(const char *path, const char *bytes, size_t count, char *message, size_t size)
+{
+    struct stat st;
+    if (strcmp(path, "-") == 0)
+        return write_standard_output(bytes, count) || complain(message, size, "write to", "standard output");
+    bool plain = lstat(path, &st) != 0 || S_ISREG(st.st_mode);
+    bool ok = plain ? write_beside(path, bytes, count) : write_directly(path, bytes, count);
+    return ok || complain(message, size, "write", path);
+}
+
+/* Length of the control character at `text`: C0 and DEL are one byte, C1 (U+0080..U+009F) two in UTF-8; else 0. */
+static size_t control_length(const char *text)
+{
+    unsigned char first = (unsigned char)text[0], second = first ? (unsigned char)text[1] : 0;
+    if (first < 0x20 || first == 0x7f)
+        return 1;
+    return first == 0xc2 && second >= 0x80 && second <= 0x9f ? 2 : 0;
+}
+
+void client_print_safe(FILE *to, const char *text)
+{
+    while (*text) {
+        size_t skip = control_length(text);
+        fputc(skip ? '?' : *text, to);
+        text += skip ? skip : 1;
+    }
+}

@@ -1,0 +1,43 @@
+/* build.h: the requests that the command line of submit stands for. */
+#ifndef CLIENT_BUILD_H
+#define CLIENT_BUILD_H
+
+#include "session/session.h"
+
+typedef struct {
+    client_buffer body;
+    char label[160]; /* the values that this one has, "70e3"; "" where nothing varies over jobs */
+} client_job_body;
+
+typedef struct {
+    client_job_body *item;
+    size_t count;
+} client_bodies;
+
+/* From FILE, --K and the like, --mesh, --set, --vary and --tag; large files are uploaded on the way. A FILE that
+ * nothing is put into goes as it is, byte for byte but for tags. CLIENT_USAGE: a path or value is wrong; CLIENT_LOCAL:
+ * a file is, or no memory; else what the upload ended with. Told on s->err. The caller clears *out. */
+client_exit client_build(client_session *s, client_bodies *out);
+void client_bodies_clear(client_bodies *bodies);
+
+/* ---- the parts */
+
+/* Puts the files and the values of --set into the request. */
+client_exit client_build_files(client_session *s, json_t *request);
+client_exit client_build_values(client_session *s, json_t *request);
+
+/* A request for each combination of what varies over jobs, with cases for what varies over cases. *requests: array,
+ * new. *labels: array of strings beside it, new. */
+client_exit client_build_variants(client_session *s, json_t **requests, json_t **labels, const json_t *request);
+
+/* The values of --vary as an array, new; NULL: message says what is wrong, "" where there is no
+ * memory. */
+json_t *client_vary_values(const char *text, char *message, size_t size);
+
+/* The command upload. */
+client_exit client_upload(client_session *s);
+
+/* The id of a file's bytes on the service, which is sent them unless it has them. `name` tells whether it is packed. */
+client_exit client_upload_once(client_session *s, char id[65], const char *name, const client_buffer *file);
+
+#endif

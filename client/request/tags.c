@@ -1,0 +1,132 @@
+#include "request/tags.h"
+
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Where in the text the tags go: bytes [from, to) are replaced. */
+typedef struct {
+    size_t from, to;
+    bool has_tags, empty_object;
+} tags_place;
+
+static size_t skip_space(const client_buffer *text, size_t at)
+{
+    while (at < text->len && memchr(" \t\r\n", text->data[at], 4))
+        at++;
+    return at;
+}
+
+/* Index after the string that begins at `at`, or text->len. */
+static size_t skip_string(const client_buffer *text, size_t at)
+{
+    for (at++; at < text->len && text->data[at] != '"'; at++)
+        if (text->data[at] == '\\')
+            at++;
+    return at < text->len ? at + 1 : text->len;
+}
+
+/* Index after the value that begins at `at`: of the ',' or bracket that ends it in the enclosing object. */
+static size_t skip_value(const client_buffer *text, size_t at)
+{
+    size_t depth = 0;
+    while (at < text->len) {
+        char c = text->data[at];
+        if (c == '"') {
+            at = skip_string(text, at);
+            continue;
+        }
+        if (depth == 0 && (c == ',' || c == '}' || c == ']'))
+            break;
+        depth += c == '{' || c == '[';
+        depth -= c == '}' || c == ']';
+        at++;
+    }
+    return at;
+}
+
+/* False: the text is no object as far as can be seen. */
+static bool find_place(tags_place *place, const client_buffer *text)
+{
+    static const char KEY[] = "\"tags\"";
+    size_t at = skip_space(text, 0);
+    if (at >= text->len || text->data[at] != '{')
+        return false;
+    *place = (tags_place){.from = at + 1, .to = at + 1};
+    at = skip_space(text, at + 1);
+    place->empty_object = at < text->len && text->data[at] == '}';
+    while (at < text->len && text->data[at] == '"') {
+        bool is_tags = text->len - at >= sizeof KEY - 1 && memcmp(text->data + at, KEY, sizeof KEY - 1) == 0;
+        at = skip_space(text, skip_string(text, at));
+        if (at >= text->len || text->data[at] != ':')
+            return false;
+        size_t from = skip_space(text, at + 1);
+        at = skip_value(text, from);
+        if (is_tags) {
+            *place = (tags_place){.from = from, .to = at, .has_tags = true};
+            return true;
+        }
+        if (at < text->len && text->data[at] == ',')
+            at = skip_space(text, at + 1);
+    }
+    return at < text->len && text->data[at] == '}';
+}
+
+static bool has_string(const json_t *array, const char *text)
+{
+    for (size_t i = 0; i < json_array_size(array); i++) {
+        const char *item = json_string_value(json_array_get(array, i));
+        if (item && strcmp(item, text) == 0)
+            return true;
+    }
+    return false;
+}
+
+/* The new array's text on one line, or NULL; the caller frees. *ok false: no memory. */
+static char *merged_tags(const client_buffer *body, const tags_place *place, const char *const *tags, int n_tags,
+                         bool *ok)
+{
+    json_t *array =
+        place->has_tags ? json_loadb(body->data + place->from, place->to - place->from, 0, NULL) : json_array();
+    char *text = NULL;
+    if (json_is_array(array)) {
+        for (int i = 0; *ok && i < n_tags; i++)
+            if (!has_string(array, tags[i]))
+                *ok = json_array_append_new(array, json_string(tags[i])) == 0;
+        text = *ok ? json_dumps(array, JSON_COMPACT) : NULL;
+        *ok = text != NULL;
+    }
+    json_decref(array);
+    return text;
+}
+
+static bool append_new_tags(client_buffer *out, const client_buffer *body, const tags_place *place, const char *text)
+{
+    bool ok = client_buffer_append(out, body->data, place->from);
+    if (!place->has_tags)
+        ok = ok && client_buffer_append(out, "\"tags\":", 7);
+    ok = ok && client_buffer_append(out, text, strlen(text));
+    /* An array that was written over several lines keeps its line breaks. */
+    for (size_t i = place->from; ok && i < place->to; i++)
+        if (body->data[i] == '\n')
+            ok = client_buffer_append(out, "\n", 1);
+    if (!place->has_tags && !place->empty_object)
+        ok = ok && client_buffer_append(out, ",", 1);
+    return ok && client_buffer_append(out, body->data + place->to, body->len - place->to);
+}
+
+bool client_tags_add(client_buffer *out, const client_buffer *body, const char *const *tags, int n_tags)
+{
+    tags_place place;
+    bool ok = true;
+    char *text = n_tags > 0 && find_place(&place, body) ? merged_tags(body, &place, tags, n_tags, &ok) : NULL;
+    *out = (client_buffer){0};
+    if (ok)
+        ok = text ? append_new_tags(out, body, &place, text) : client_buffer_append(out, body->data, body->len);
+    if (!ok) {
+        free(out->data);
+        *out = (client_buffer){0};
+    }
+    free(text);
+    return ok;
+}

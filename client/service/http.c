@@ -1,0 +1,425 @@
+#include "service/http.h"
+
+#include <curl/curl.h>
+#include <math.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <time.h>
+
+#define CONNECT_LIMIT_MS 10000L
+#define TICK_MS          250
+
+struct client_http {
+    CURL *curl;
+    CURLM *multi; /* so that a request can be left when something else happens */
+    const client_http_watch *watch;
+    char *base; /* server URL without a trailing '/' */
+    const char *token, *ca_file;
+    char curl_says[CURL_ERROR_SIZE];
+};
+
+double client_clock(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+bool client_http_append_escaped(client_buffer *to, const char *text)
+{
+    static const char HEX[] = "0123456789ABCDEF";
+    static const char PLAIN[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~";
+    bool ok = true;
+    for (; ok && *text; text++) {
+        unsigned char byte = (unsigned char)*text;
+        char escaped[3] = {'%', HEX[byte >> 4], HEX[byte & 15]};
+        ok = strchr(PLAIN, byte) ? client_buffer_append(to, text, 1) : client_buffer_append(to, escaped, 3);
+    }
+    return ok;
+}
+
+void client_reply_clear(client_reply *reply)
+{
+    free(reply->body.data);
+    *reply = (client_reply){0};
+}
+
+static bool is_loopback(const char *host)
+{
+    return strcasecmp(host, "localhost") == 0 || strncmp(host, "127.", 4) == 0 || strcmp(host, "[::1]") == 0;
+}
+
+/* Checks the URL and tells whether a proxy from the environment must be left out: nobody means one for this machine. */
+static bool inspect_url(const char *server, bool *direct, char *message, size_t size)
+{
+    char *scheme = NULL, *host = NULL;
+    CURLU *url = curl_url();
+    bool ok = url && curl_url_set(url, CURLUPART_URL, server, 0) == CURLUE_OK &&
+              curl_url_get(url, CURLUPART_SCHEME, &scheme, 0) == CURLUE_OK &&
+              curl_url_get(url, CURLUPART_HOST, &host, 0) == CURLUE_OK &&
+              (strcmp(scheme, "http") == 0 || strcmp(scheme, "https") == 0) && !strpbrk(server, "?#");
+    if (ok)
+        *direct = is_loopback(host);
+    else
+        snprintf(message, size, "the server must be a URL like http://host:8080, not \"%s\"", server);
+    curl_free(scheme);
+    curl_free(host);
+    curl_url_cleanup(url);
+    return ok;
+}
+
+client_http *client_http_open(const char *server, char *message, size_t size)
+{
+    bool direct = false;
+    if (!inspect_url(server, &direct, message, size))
+        return NULL;
+    client_http *http = calloc(1, sizeof *http);
+    if (http && curl_global_init(CURL_GLOBAL_DEFAULT) != CURLE_OK) {
+        free(http);
+        http = NULL;
+    }
+    if (!http) {
+        snprintf(message, size, "no memory");
+        return NULL;
+    }
+    http->curl = curl_easy_init();
+    http->multi = curl_multi_init();
+    http->base = strdup(server);
+    if (!http->curl || !http->multi || !http->base) {
+        client_http_close(http);
+        snprintf(message, size, "no memory");
+        return NULL;
+    }
+    size_t len = strlen(http->base);
+    while (len > 0 && http->base[len - 1] == '/')
+        http->base[--len] = '\0';
+    if (direct)
+        curl_easy_setopt(http->curl, CURLOPT_PROXY, "");
+    return http;
+}
+
+void client_http_close(client_http *http)
+{
+    if (!http)
+        return;
+    curl_easy_cleanup(http->curl);
+    curl_multi_cleanup(http->multi);
+    free(http->base);
+    free(http);
+    curl_global_cleanup();
+}
+
+/* Where a reply goes. header_whole: the empty line after its header has come. Without it a connection that breaks off
+ * before Content-Length looks to curl like a reply that ends with the connection. */
+typedef struct {
+    client_http *http;
+    client_reply *reply;
+    const client_request *request;
+    bool enough, header_whole;
+} body_sink;
+
+static size_t take_body(char *bytes, size_t size, size_t count, void *ctx)
+{
+    body_sink *sink = ctx;
+    long status = 0;
+    curl_easy_getinfo(sink->http->curl, CURLINFO_RESPONSE_CODE, &status);
+    if (!sink->request->take || status < 200 || status >= 300)
+        return client_buffer_append(&sink->reply->body, bytes, size * count) ? size * count : 0;
+    sink->enough = !sink->request->take(sink->request->take_ctx, bytes, size * count);
+    return sink->enough ? 0 : size * count;
+}
+
+/* The value of a header line of that name, cut to `size`, in value; false: it is another header. */
+static bool header_value(char *value, size_t size, const char *line, size_t len, const char *name)
+{
+    size_t name_len = strlen(name);
+    if (len <= name_len || strncasecmp(line, name, name_len) != 0)
+        return false;
+    snprintf(value, size, "%.*s", (int)(len - name_len), line + name_len);
+    value[strcspn(value, "\r\n")] = '\0';
+    return true;
+}
+
+/* Seconds from now, for both forms of Retry-After (RFC 9110, 10.2.3): a number or a date. */
+static double retry_after(const char *value)
+{
+    char *end;
+    double seconds = strtod(value, &end);
+    if (end == value) {
+        time_t then = curl_getdate(value, NULL);
+        seconds = then < 0 ? 0 : difftime(then, time(NULL));
+    }
+    return seconds > 0 && isfinite(seconds) ? seconds : 0;
+}
+
+static size_t take_header(char *bytes, size_t size, size_t count, void *ctx)
+{
+    body_sink *sink = ctx;
+    client_reply *reply = sink->reply;
+    char value[64];
+    if (size * count > 0 && (bytes[0] == '\r' || bytes[0] == '\n'))
+        sink->header_whole = true;
+    else if (header_value(value, sizeof value, bytes, size * count, "HTTP/")) /* after a 1xx another one begins */
+        sink->header_whole = false;
+    else if (header_value(value, sizeof value, bytes, size * count, "Retry-After:"))
+        reply->retry_after_s = retry_after(value);
+    else if (header_value(value, sizeof value, bytes, size * count, "Date:"))
+        reply->date = curl_getdate(value, NULL);
+    return size * count;
+}
+
+/* NULL: no memory. "Expect:" keeps curl from holding back a large body for a second. */
+static struct curl_slist *header_list(const client_request *request)
+{
+    struct curl_slist *list = curl_slist_append(NULL, "Expect:");
+    bool ok = list != NULL;
+    const char *of_body = request->body_type ? request->body_type : "Content-Type: application/json";
+    const char *type = request->body ? of_body : NULL;
+    for (int i = -1; ok && i < CLIENT_HTTP_MAX_HEADERS; i++) {
+        const char *header = i < 0 ? type : request->headers[i];
+        struct curl_slist *longer = header ? curl_slist_append(list, header) : list;
+        ok = longer != NULL;
+        list = ok ? longer : list;
+    }
+    if (!ok) {
+        curl_slist_free_all(list);
+        list = NULL;
+    }
+    return list;
+}
+
+void client_http_trust(client_http *http, const char *token, const char *ca_file)
+{
+    http->token = token && *token ? token : NULL;
+    http->ca_file = ca_file && *ca_file ? ca_file : NULL;
+}
+
+static void set_limits(CURL *curl, const client_request *request)
+{
+    double left_ms = (request->deadline - client_clock()) * 1000;
+    long limit_ms = left_ms >= 1e9 ? 0 : left_ms < 1 ? 1 : (long)ceil(left_ms); /* 0: none */
+    curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT_MS, CONNECT_LIMIT_MS);
+    curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS, limit_ms);
+    curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
+    curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, (long)ceil(request->silence_s));
+}
+
+void client_http_set_watch(client_http *http, const client_http_watch *watch)
+{
+    http->watch = watch;
+}
+
+static void set_request(client_http *http, body_sink *sink, const client_request *request)
+{
+    CURL *curl = http->curl;
+    curl_easy_setopt(curl, CURLOPT_HTTPGET, 1L);
+    if (request->body) {
+        curl_easy_setopt(curl, CURLOPT_POST, 1L);
+        curl_easy_setopt(curl, CURLOPT_POSTFIELDS, request->body);
+        curl_easy_setopt(curl, CURLOPT_POSTFIELDSIZE_LARGE, (curl_off_t)request->body_len);
+    }
+    curl_easy_setopt(curl, CURLOPT_CUSTOMREQUEST, request->method);
+    /* On a connection that was used before, curl itself sends a request again when the reply is lost. */
+    curl_easy_setopt(curl, CURLOPT_FRESH_CONNECT, strcmp(request->method, "DELETE") == 0 ? 1L : 0L);
+    curl_easy_setopt(curl, CURLOPT_PROTOCOLS_STR, "http,https");
+    if (http->token) {
+        curl_easy_setopt(curl, CURLOPT_HTTPAUTH, (long)CURLAUTH_BEARER);
+        curl_easy_setopt(curl, CURLOPT_XOAUTH2_BEARER, http->token);
+    }
+    if (http->ca_file)
+        curl_easy_setopt(curl, CURLOPT_CAINFO, http->ca_file);
+    curl_easy_setopt(curl, CURLOPT_PATH_AS_IS, 1L); /* a job called ".." is the server's to refuse */
+    curl_easy_setopt(curl, CURLOPT_USERAGENT, "uzawa");
+    curl_easy_setopt(curl, CURLOPT_ACCEPT_ENCODING, "");
+    curl_easy_setopt(curl, CURLOPT_ERRORBUFFER, http->curl_says);
+    curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, take_body);
+    curl_easy_setopt(curl, CURLOPT_WRITEDATA, sink);
+    curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, take_header);
+    curl_easy_setopt(curl, CURLOPT_HEADERDATA, sink);
+    curl_easy_setopt(curl, CURLOPT_CERTINFO, request->certificate ? 1L : 0L);
+    set_limits(curl, request);
+}
+
+/* False: the watch wants to give up. *seconds of pause, or until something of the request happens if busy. */
+static bool look_around(client_http *http, int ms)
+{
+    const client_http_watch *watch = http->watch;
+    struct curl_waitfd extra = {.fd = watch ? watch->fd : -1, .events = CURL_WAIT_POLLIN};
+    bool has_fd = watch && watch->fd >= 0;
+    curl_multi_poll(http->multi, has_fd ? &extra : NULL, has_fd ? 1 : 0, ms, NULL);
+    struct pollfd ready = {.fd = extra.fd, .events = POLLIN};
+    if (has_fd && poll(&ready, 1, 0) > 0 && watch->woken(watch->ctx))
+        return false;
+    if (watch && watch->tick)
+        watch->tick(watch->ctx);
+    return true;
+}
+
+/* What curl_easy_perform does, but for the watch: CURLE_ABORTED_BY_CALLBACK. */
+static CURLcode perform(client_http *http)
+{
+    int running = 1, left = 0;
+    CURLcode code = CURLE_ABORTED_BY_CALLBACK;
+    if (curl_multi_add_handle(http->multi, http->curl) != CURLM_OK)
+        return CURLE_OUT_OF_MEMORY;
+    bool ok = curl_multi_perform(http->multi, &running) == CURLM_OK;
+    while (ok && running && look_around(http, TICK_MS))
+        ok = curl_multi_perform(http->multi, &running) == CURLM_OK;
+    CURLMsg *message = curl_multi_info_read(http->multi, &left);
+    if (!ok)
+        code = CURLE_OUT_OF_MEMORY;
+    else if (!running && message && message->msg == CURLMSG_DONE)
+        code = message->data.result;
+    curl_multi_remove_handle(http->multi, http->curl);
+    return code;
+}
+
+/* "2026-11-26 16:58:04 GMT" of GnuTLS, or what curl_getdate knows; -1: neither. */
+static time_t certificate_date(const char *text)
+{
+    struct tm parts = {0};
+    return strptime(text, "%Y-%m-%d %H:%M:%S", &parts) ? timegm(&parts) : curl_getdate(text, NULL);
+}
+
+/* The server's own certificate is the first of the chain. */
+static void note_certificate(client_http *http, client_reply *reply)
+{
+    struct curl_certinfo *chain = NULL;
+    char value[128];
+    if (curl_easy_getinfo(http->curl, CURLINFO_CERTINFO, &chain) != CURLE_OK || !chain || chain->num_of_certs < 1)
+        return;
+    for (struct curl_slist *line = chain->certinfo[0]; line; line = line->next) {
+        size_t len = strlen(line->data);
+        if (header_value(value, sizeof value, line->data, len, "Expire date:"))
+            reply->cert_until = certificate_date(value);
+        else if (header_value(value, sizeof value, line->data, len, "Subject:"))
+            snprintf(reply->cert_subject, sizeof reply->cert_subject, "%s", value);
+    }
+}
+
+static CURLcode send_once(client_http *http, client_reply *reply, const client_request *request)
+{
+    char *url = NULL, *address = NULL;
+    CURLcode code = CURLE_OUT_OF_MEMORY;
+    struct curl_slist *headers = header_list(request);
+    body_sink sink = {.http = http, .reply = reply, .request = request};
+    int attempts = reply->attempts + 1;
+    client_reply_clear(reply);
+    reply->attempts = attempts;
+    reply->date = -1;
+    http->curl_says[0] = '\0';
+    if (headers && asprintf(&url, "%s%s", http->base, request->path) >= 0) {
+        set_request(http, &sink, request);
+        curl_easy_setopt(http->curl, CURLOPT_URL, url);
+        curl_easy_setopt(http->curl, CURLOPT_HTTPHEADER, headers);
+        code = perform(http);
+        if (code == CURLE_OK && !sink.header_whole)
+            code = CURLE_PARTIAL_FILE;
+        code = sink.enough ? CURLE_OK : code;
+        curl_easy_getinfo(http->curl, CURLINFO_RESPONSE_CODE, &reply->status);
+        if (curl_easy_getinfo(http->curl, CURLINFO_PRIMARY_IP, &address) == CURLE_OK && address)
+            snprintf(reply->address, sizeof reply->address, "%s", address);
+        if (request->certificate)
+            note_certificate(http, reply);
+        free(url);
+    }
+    curl_slist_free_all(headers);
+    return code;
+}
+
+/* Nothing of the request can have reached the server. */
+static bool never_arrived(CURLcode code)
+{
+    return code == CURLE_COULDNT_CONNECT || code == CURLE_COULDNT_RESOLVE_HOST || code == CURLE_COULDNT_RESOLVE_PROXY;
+}
+
+/* A local cause, or one that another attempt will meet again. */
+static bool hopeless(CURLcode code)
+{
+    return code == CURLE_ABORTED_BY_CALLBACK || code == CURLE_OUT_OF_MEMORY || code == CURLE_WRITE_ERROR ||
+           code == CURLE_UNSUPPORTED_PROTOCOL || code == CURLE_URL_MALFORMAT ||
+           code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CONNECT_ERROR;
+}
+
+static bool is_passing(long status)
+{
+    return status == 429 || status == 502 || status == 503 || status == 504;
+}
+
+static bool worth_another(CURLcode code, const client_reply *reply, const client_request *request)
+{
+    if (code == CURLE_OK)
+        return request->repeatable && is_passing(reply->status);
+    return never_arrived(code) || (request->repeatable && !hopeless(code));
+}
+
+/* 0.1 s, doubling up to 2 s, up to a quarter shorter by chance so that many clients don't return at once. */
+static double pause_before(int attempt, const client_reply *reply)
+{
+    double pause = attempt < 5 ? 0.1 * (double)(1 << attempt) : 2;
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    pause *= 1 - 0.25 * (double)(now.tv_nsec % 1000) / 1000;
+    return fmax(pause, reply->retry_after_s);
+}
+
+static client_http_cause cause_of(CURLcode code)
+{
+    switch (code) {
+    case CURLE_COULDNT_RESOLVE_HOST:
+    case CURLE_COULDNT_RESOLVE_PROXY:
+        return CLIENT_CAUSE_NAME;
+    case CURLE_COULDNT_CONNECT:
+        return CLIENT_CAUSE_CONNECTION;
+    case CURLE_PEER_FAILED_VERIFICATION:
+    case CURLE_SSL_CACERT_BADFILE:
+        return CLIENT_CAUSE_CERTIFICATE;
+    case CURLE_SSL_CONNECT_ERROR:
+        return CLIENT_CAUSE_TLS;
+    case CURLE_OPERATION_TIMEDOUT:
+        return CLIENT_CAUSE_SILENCE;
+    default:
+        return CLIENT_CAUSE_OTHER;
+    }
+}
+
+static client_http_end end_of(client_http *http, client_reply *reply, CURLcode code, const client_request *request)
+{
+    if (code == CURLE_OK)
+        return CLIENT_HTTP_ANSWERED;
+    const char *why = http->curl_says[0] ? http->curl_says : curl_easy_strerror(code);
+    snprintf(reply->message, sizeof reply->message, "no answer from %.60s: %.220s", http->base, why);
+    reply->cause = cause_of(code);
+    if (code == CURLE_ABORTED_BY_CALLBACK)
+        return CLIENT_HTTP_INTERRUPTED;
+    if (code == CURLE_OUT_OF_MEMORY || code == CURLE_WRITE_ERROR)
+        return CLIENT_HTTP_MEMORY;
+    return client_clock() >= request->deadline ? CLIENT_HTTP_DEADLINE : CLIENT_HTTP_UNREACHABLE;
+}
+
+bool client_http_pause(client_http *http, double seconds)
+{
+    double end = client_clock() + seconds, left;
+    while ((left = end - client_clock()) > 0)
+        if (!look_around(http, (int)fmin(ceil(left * 1000), TICK_MS)))
+            return false;
+    return true;
+}
+
+client_http_end client_http_send(client_http *http, client_reply *reply, const client_request *request)
+{
+    double start = client_clock();
+    *reply = (client_reply){0};
+    for (int attempt = 0;; attempt++) {
+        CURLcode code = send_once(http, reply, request);
+        double pause = pause_before(attempt, reply), then = client_clock() + pause;
+        bool again =
+            worth_another(code, reply, request) && then <= start + request->patience_s && then < request->deadline;
+        if (!again)
+            return end_of(http, reply, code, request);
+        if (!client_http_pause(http, pause))
+            return end_of(http, reply, CURLE_ABORTED_BY_CALLBACK, request);
+    }
+}

@@ -1,0 +1,195 @@
+#include "show/junit.h"
+#include "local/files.h"
+#include "show/report.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- suites */
+
+static void clear_suite(client_suite *suite)
+{
+    free(suite->name);
+    free(suite->id);
+    free(suite->created);
+    free(suite->outcome);
+    client_checks_clear(&suite->checks);
+}
+
+bool client_suites_add(client_suites *to, const char *name, const json_t *job, client_checks *checks)
+{
+    const char *outcome = client_json_text(job, "summary.outcome"), *id = client_json_text(job, "id");
+    client_suite suite = {.name = strdup(name),
+                          .id = strdup(id),
+                          .created = strdup(client_json_text(job, "created")),
+                          .outcome = strdup(*outcome ? outcome : client_json_text(job, "status")),
+                          .seconds = client_json_number(job, "summary.timings_s.total")};
+    client_suite *grown = realloc(to->item, (to->count + 1) * sizeof *grown);
+    if (grown)
+        to->item = grown;
+    if (!grown || !suite.name || !suite.id || !suite.created || !suite.outcome || checks->failed) {
+        clear_suite(&suite);
+        return false;
+    }
+    suite.checks = *checks;
+    *checks = (client_checks){.item = NULL};
+    to->item[to->count++] = suite;
+    return true;
+}
+
+void client_suites_clear(client_suites *suites)
+{
+    for (size_t i = 0; i < suites->count; i++)
+        clear_suite(&suites->item[i]);
+    free(suites->item);
+    *suites = (client_suites){.item = NULL};
+}
+
+/* ---- XML */
+
+/* Three bytes of UTF-8 that no XML 1.0 text may have: U+FFFE and U+FFFF. */
+static bool is_no_character(const char *at)
+{
+    return (unsigned char)at[0] == 0xef && (unsigned char)at[1] == 0xbf && (unsigned char)at[2] >= 0xbe;
+}
+
+/* Text between tags or in an attribute: what XML gives a meaning is escaped, what it forbids becomes '?'. */
+static void put_text(FILE *to, const char *text)
+{
+    for (const char *at = text; *at; at++) {
+        const char *entity = strchr("<>&\"'\n\t", *at) ? at : NULL;
+        if (entity)
+            fprintf(to, "&#%d;", *at);
+        else if ((unsigned char)*at < 0x20)
+            fputc('?', to);
+        else if (is_no_character(at)) {
+            fputc('?', to);
+            at += 2;
+        } else
+            fputc(*at, to);
+    }
+}
+
+static void put_attribute(FILE *to, const char *name, const char *value)
+{
+    fprintf(to, " %s=\"", name);
+    put_text(to, value);
+    fputc('"', to);
+}
+
+/* Seconds, with a point whatever the locale: the client never sets LC_NUMERIC. */
+static void put_seconds(FILE *to, double seconds)
+{
+    fprintf(to, " time=\"%.6f\"", isfinite(seconds) ? seconds : 0.0);
+}
+
+static const char *tag_of(client_verdict verdict)
+{
+    return verdict == CLIENT_PASS ? NULL : verdict == CLIENT_NO_ANSWER ? "error" : "failure";
+}
+
+/* The class is the suite, and the load case behind a dot. The first one has the time of all. */
+static void put_check(FILE *to, const client_suite *suite, size_t i)
+{
+    static const char *const TYPES[] = {"", "uncertain", "fail", "no_answer"};
+    const client_checks *checks = &suite->checks;
+    const client_check *check = &checks->item[i];
+    const char *tag = tag_of(check->verdict);
+    fputs("    <testcase classname=\"", to);
+    put_text(to, suite->name);
+    fputs(*check->group ? "." : "", to);
+    put_text(to, check->group);
+    fputs(checks->compared > 0 && i >= checks->compared ? "\" name=\"baseline: " : "\" name=\"", to);
+    put_text(to, check->name);
+    fputc('"', to);
+    put_seconds(to, i == 0 ? suite->seconds : 0.0);
+    if (tag) {
+        fprintf(to, ">\n      <%s", tag);
+        put_attribute(to, "type", TYPES[check->verdict]);
+        put_attribute(to, "message", check->text);
+        fputs("/>\n    </testcase>\n", to);
+    } else {
+        fputs(">\n      <system-out>", to);
+        put_text(to, check->text);
+        fputs("</system-out>\n    </testcase>\n", to);
+    }
+}
+
+static size_t count_tag(const client_checks *checks, const char *tag)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < checks->count; i++) {
+        const char *own = tag_of(checks->item[i].verdict);
+        count += own && strcmp(own, tag) == 0;
+    }
+    return count;
+}
+
+static void put_property(FILE *to, const char *name, const char *value)
+{
+    fprintf(to, "      <property name=\"%s\"", name);
+    put_attribute(to, "value", value);
+    fputs("/>\n", to);
+}
+
+static void put_counts(FILE *to, size_t tests, size_t failures, size_t errors, double seconds)
+{
+    fprintf(to, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" skipped=\"0\"", tests, failures, errors);
+    put_seconds(to, seconds);
+}
+
+/* The common shape has whole seconds without a zone. */
+static void put_suite(FILE *to, const client_suite *suite)
+{
+    char created[20];
+    const client_checks *checks = &suite->checks;
+    snprintf(created, sizeof created, "%.19s", suite->created);
+    fputs("  <testsuite", to);
+    put_attribute(to, "name", suite->name);
+    put_counts(to, checks->count, count_tag(checks, "failure"), count_tag(checks, "error"), suite->seconds);
+    put_attribute(to, "timestamp", created);
+    fputs(">\n    <properties>\n", to);
+    put_property(to, "job", suite->id);
+    put_property(to, "outcome", suite->outcome);
+    fputs("    </properties>\n", to);
+    for (size_t i = 0; i < checks->count; i++)
+        put_check(to, suite, i);
+    fputs("  </testsuite>\n", to);
+}
+
+static void put_report(FILE *to, const client_suites *suites)
+{
+    size_t tests = 0, failures = 0, errors = 0;
+    double seconds = 0.0;
+    for (size_t i = 0; i < suites->count; i++) {
+        const client_suite *suite = &suites->item[i];
+        tests += suite->checks.count;
+        failures += count_tag(&suite->checks, "failure");
+        errors += count_tag(&suite->checks, "error");
+        seconds += isfinite(suite->seconds) ? suite->seconds : 0.0;
+    }
+    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"uzawa\"", to);
+    put_counts(to, tests, failures, errors, seconds);
+    fputs(">\n", to);
+    for (size_t i = 0; i < suites->count; i++)
+        put_suite(to, &suites->item[i]);
+    fputs("</testsuites>\n", to);
+}
+
+bool client_junit_write(const client_suites *suites, const char *path, char *message, size_t size)
+{
+    char *text = NULL;
+    size_t len = 0;
+    FILE *report = open_memstream(&text, &len);
+    if (report)
+        put_report(report, suites);
+    bool ok = report && fflush(report) == 0 && !ferror(report);
+    ok = report && fclose(report) == 0 && ok;
+    if (!ok)
+        snprintf(message, size, "no memory for the report");
+    else
+        ok = client_file_write(path, text, len, message, size);
+    free(text);
+    return ok;
+}

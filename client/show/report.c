@@ -1,0 +1,164 @@
+#include "show/report.h"
+#include "local/files.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+const json_t *client_json_at(const json_t *object, const char *path)
+{
+    while (object) {
+        size_t len = strcspn(path, ".");
+        char key[64];
+        if (len >= sizeof key)
+            return NULL;
+        memcpy(key, path, len);
+        key[len] = '\0';
+        object = json_object_get(object, key);
+        if (!path[len])
+            break;
+        path += len + 1;
+    }
+    return object;
+}
+
+double client_json_number(const json_t *object, const char *path)
+{
+    const json_t *value = client_json_at(object, path);
+    return json_is_number(value) ? json_number_value(value) : NAN;
+}
+
+const char *client_json_text(const json_t *object, const char *path)
+{
+    const char *text = json_string_value(client_json_at(object, path));
+    return text ? text : "";
+}
+
+bool client_job_ended(const json_t *job)
+{
+    const char *status = client_json_text(job, "status");
+    return strcmp(status, "successful") == 0 || strcmp(status, "failed") == 0 || strcmp(status, "dismissed") == 0;
+}
+
+/* Surely, whatever a finer answer would be. */
+static bool fails_assertion(const json_t *summary)
+{
+    const json_t *line;
+    size_t i;
+    json_array_foreach(json_object_get(summary, "assertions"), i, line)
+    {
+        if (strcmp(client_json_text(line, "result"), "fail") == 0)
+            return true;
+    }
+    return false;
+}
+
+client_exit client_job_exit(const json_t *job)
+{
+    const char *status = client_json_text(job, "status"), *outcome = client_json_text(job, "summary.outcome");
+    if (strcmp(outcome, "infeasible") == 0)
+        return CLIENT_INFEASIBLE;
+    if (strcmp(status, "dismissed") == 0 || strcmp(outcome, "dismissed") == 0)
+        return CLIENT_DISMISSED;
+    if (strcmp(status, "failed") == 0)
+        return CLIENT_JOB_FAILED;
+    if (fails_assertion(json_object_get(job, "summary")))
+        return CLIENT_ASSERTION_FAILED;
+    if (strcmp(outcome, "converged") != 0 && strcmp(outcome, "verified") != 0)
+        return CLIENT_NOT_CONVERGED;
+    return json_is_false(client_json_at(job, "summary.assertions_passed")) ? CLIENT_ASSERTION_FAILED : CLIENT_OK;
+}
+
+const char *client_format_seconds(char *buffer, size_t size, double seconds)
+{
+    if (seconds >= 1)
+        snprintf(buffer, size, "%.3g s", seconds);
+    else if (seconds >= 1e-3)
+        snprintf(buffer, size, "%.3g ms", seconds * 1e3);
+    else
+        snprintf(buffer, size, "%.3g us", seconds * 1e6);
+    return buffer;
+}
+
+const char *client_format_bound(char buffer[32], double bound)
+{
+    snprintf(buffer, 32, "%.1e", bound);
+    double shown = strtod(buffer, NULL);
+    if (bound > 0 && isfinite(bound) && shown < bound)
+        shown += pow(10, floor(log10(shown)) - 1);
+    snprintf(buffer, 32, "%.2g", shown);
+    return buffer;
+}
+
+static void print_tags(FILE *to, const json_t *job)
+{
+    const json_t *tags = json_object_get(job, "tags");
+    if (json_array_size(tags) == 0)
+        return;
+    fputs("tags       ", to);
+    for (size_t i = 0; i < json_array_size(tags); i++) {
+        const json_t *tag = json_array_get(tags, i);
+        fputs(" ", to);
+        client_print_safe(to, json_is_string(tag) ? json_string_value(tag) : "?");
+    }
+    fputc('\n', to);
+}
+
+static void print_time(FILE *to, const json_t *job, const char *name)
+{
+    const char *text = client_json_text(job, name);
+    if (!*text)
+        return;
+    fprintf(to, "%-12s", name);
+    client_print_safe(to, text);
+    fputc('\n', to);
+}
+
+void client_print_job(FILE *to, const json_t *job)
+{
+    double progress = client_json_number(job, "progress");
+    fputs("job         ", to);
+    client_print_safe(to, client_json_text(job, "id"));
+    fputs("\nstatus      ", to);
+    client_print_safe(to, client_json_text(job, "status"));
+    if (!client_job_ended(job) && isfinite(progress))
+        fprintf(to, ", %.0f %%", progress);
+    fputc('\n', to);
+    print_tags(to, job);
+    print_time(to, job, "created");
+    print_time(to, job, "started");
+    print_time(to, job, "finished");
+}
+
+static const char *without_reply(long http_status)
+{
+    if (http_status >= 500)
+        return "the server failed";
+    return http_status >= 400 ? "the server refused the request" : "this is no reply of a contact solver service";
+}
+
+void client_print_problem(FILE *to, long http_status, const json_t *problem)
+{
+    const char *code = client_json_text(problem, "code"), *pointer = client_json_text(problem, "pointer");
+    const char *detail = client_json_text(problem, "detail"), *title = client_json_text(problem, "title");
+    double line = client_json_number(problem, "line");
+    fputs("uzawa: ", to);
+    client_print_safe(to, *detail ? detail : *title ? title : without_reply(http_status));
+    fputc('\n', to);
+    if (strcmp(code, "case_needed") == 0)
+        fputs("  here: --case NAME\n", to);
+    if (*pointer || line > 0) {
+        fputs("  at ", to);
+        client_print_safe(to, pointer);
+        if (line > 0)
+            fprintf(to, "%sline %.0f", *pointer ? ", " : "", line);
+        fputc('\n', to);
+    }
+    if (http_status > 0)
+        fprintf(to, "  HTTP status %ld%s", http_status, *code ? ", code " : "");
+    else if (*code)
+        fputs("  code ", to);
+    client_print_safe(to, code);
+    if (http_status > 0 || *code)
+        fputc('\n', to);
+}
