@@ -1,4 +1,5 @@
 #include "show/plot.h"
+#include "text/axis.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -40,32 +41,28 @@ static int down(const canvas *c, double decade)
     return (int)lround(fmin(fmax(part, 0), 1) * (points_down(c) - 1));
 }
 
-static bool drawable(double value)
-{
-    return isfinite(value) && value > 0;
-}
-
 /* The iterations and decades that the drawing must hold. False: there is nothing to draw. */
 static bool find_range(canvas *c, const client_series *s)
 {
-    double low = INFINITY, high = -INFINITY, last = 0;
+    uz_range values = uz_range_none();
+    double last = 0;
     for (size_t i = 0; i < s->count; i++) {
         double at = s->column[CLIENT_ITERATION][i];
         for (int k = CLIENT_ERROR_BOUND; k <= CLIENT_RESIDUAL; k++) {
             double value = s->column[k][i];
-            if (!drawable(value) || !isfinite(at) || at < 0)
+            if (!uz_axis_has(value, true) || !isfinite(at) || at < 0)
                 continue;
-            low = fmin(low, log10(value));
-            high = fmax(high, log10(value));
+            uz_range_take(&values, value, true);
             last = fmax(last, at);
         }
     }
-    c->high = ceil(high);
-    c->low = fmax(floor(low), c->high - MOST_DECADES);
-    if (c->high - c->low < 1)
-        c->low = c->high - 1;
+    if (values.low > values.high)
+        return false;
+    const uz_range decades = uz_range_decades(values);
+    c->high = decades.high;
+    c->low = fmax(decades.low, c->high - MOST_DECADES);
     c->last = fmax(last, 1);
-    return high > -INFINITY;
+    return true;
 }
 
 /* A dotted line is two points on, two off along its path, so that the two lines differ without colour too. */
@@ -94,7 +91,7 @@ static void draw_series(canvas *c, const client_series *s, client_column column,
     bool have_previous = false;
     for (size_t i = 0; i < s->count; i++) {
         double at = s->column[CLIENT_ITERATION][i], value = s->column[column][i];
-        if (!drawable(value) || !(at >= 0 && at <= c->last)) {
+        if (!uz_axis_has(value, true) || !(at >= 0 && at <= c->last)) {
             have_previous = false;
             continue;
         }
@@ -168,9 +165,7 @@ static void print_margin(FILE *to, const canvas *c, int row)
 /* Iterations between labels: 1, 2 or 5 times a power of ten, about one label for 14 cells. */
 static double iteration_step(const canvas *c)
 {
-    double wanted = c->last * 14 / c->cols, power = pow(10, floor(log10(fmax(wanted, 1))));
-    double ratio = wanted / power;
-    return power * (ratio <= 1 ? 1 : ratio <= 2 ? 2 : ratio <= 5 ? 5 : 10);
+    return uz_round_step(fmax(c->last * 14 / c->cols, 1));
 }
 
 static bool restart_in_cell(const canvas *c, const client_series *s, int col)

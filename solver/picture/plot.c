@@ -2,40 +2,12 @@
 
 #include <math.h>
 
-uz_range uz_range_none(void)
-{
-    return (uz_range){INFINITY, -INFINITY};
-}
-
-static bool has_place(double x, bool log)
-{
-    return isfinite(x) && (!log || x > 0.0);
-}
-
-void uz_range_take(uz_range *range, double x, bool log)
-{
-    if (!has_place(x, log))
-        return;
-    range->low = fmin(range->low, x);
-    range->high = fmax(range->high, x);
-}
-
-/* The smallest of 1, 2, 5 times a power of ten that is at least x > 0. */
-static double round_step(double x)
-{
-    const double power = pow(10.0, floor(log10(x)));
-    for (int k = 0; k < 3; k++)
-        if (x <= (k == 0 ? 1.0 : k == 1 ? 2.0 : 5.0) * power * (1.0 + 1e-9))
-            return (k == 0 ? 1.0 : k == 1 ? 2.0 : 5.0) * power;
-    return 10.0 * power;
-}
-
 /* Room for a number on either axis. */
 enum { ROOM_X = 90, ROOM_Y = 26 };
 
 static double step_of(uz_range range, double length, double room, bool log)
 {
-    const double step = round_step((range.high - range.low) / fmax(1.0, floor(length / room)));
+    const double step = uz_round_step((range.high - range.low) / fmax(1.0, floor(length / room)));
     return log ? fmax(1.0, ceil(step)) : step;
 }
 
@@ -48,9 +20,7 @@ uz_panel uz_panel_make(double left, double top, double width, double height, uz_
     if (!(y.low <= y.high))
         y = (uz_range){log ? 0.1 : 0.0, 1.0};
     if (log) { /* exponents from here on */
-        y = (uz_range){floor(log10(y.low)), ceil(log10(y.high))};
-        if (!(y.high > y.low))
-            y.high = y.low + 1.0;
+        y = uz_range_decades(y);
     } else {
         y = (uz_range){0.0, fmax(1.0, y.high)};
         const double step = fmax(1.0, step_of(y, height, ROOM_Y, false));
@@ -72,7 +42,7 @@ static double up(const uz_panel *panel, double y)
 
 bool uz_panel_place(double *px, double *py, const uz_panel *panel, double x, double y)
 {
-    if (!isfinite(x) || !has_place(y, panel->log))
+    if (!isfinite(x) || !uz_axis_has(y, panel->log))
         return false;
     *px = across(panel, x);
     *py = up(panel, panel->log ? log10(y) : y);

@@ -2,6 +2,7 @@
 #ifndef UZ_PICTURE_PLOT_H
 #define UZ_PICTURE_PLOT_H
 
+#include "text/axis.h"
 #include "text/buffer.h"
 
 /* count numbers, `stride` doubles from one to the next. */
@@ -13,14 +14,6 @@ static inline double uz_column_at(uz_column c, int64_t i)
 {
     return c.at[i * c.stride];
 }
-
-/* A range of numbers, empty (low > high) at first; what is not finite stays out, and what is not positive where it is
- * for a logarithm. */
-typedef struct {
-    double low, high;
-} uz_range;
-uz_range uz_range_none(void);
-void uz_range_take(uz_range *range, double x, bool log);
 
 /* Where numbers go: x to left..left + width, y to top + height..top. */
 typedef struct {

@@ -16,7 +16,7 @@ from service import ROOT, check, options
 sys.path.insert(0, str(ROOT / "tests/peers"))
 import peers  # noqa: E402
 import stats  # noqa: E402
-import svg  # noqa: E402
+import draw  # noqa: E402  of tests/figures, whose path peers adds
 from worker import Ended, Worker  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv[1])
@@ -124,12 +124,15 @@ def test_limits_of_a_process(_):
 
 @options(None)
 def test_charts_are_svg(_):
-    chart = svg.Chart("a < b & c", svg.Axis("ratio", log=True), svg.Axis("share", low=0.0, high=1.0))
-    chart.line("x", [(1, 0.1), (0, 0.2), (100, 1.0)], step=True, markers=True)
-    root = xml.etree.ElementTree.fromstring(chart.text())
-    circles = [e for e in root.iter() if e.tag.endswith("circle")]
-    check(len(circles) == 2, "a point at 0 of a logarithmic axis is left out", len(circles))
-    check([float(c.get("cx")) for c in circles] == [70.0, 560.0], chart.text())
+    text = draw.profiles({"1e-06": {"a < b & c": [(1, 0.1), (100, 1.0)]}})
+    root = xml.etree.ElementTree.fromstring(text)
+    curves = [e.get("d") for e in root.iter() if e.tag.endswith("path") and e.get("stroke") == draw.PROFILE_COLOURS[0]]
+    check(len(curves) == 1, text)
+    corners = [[float(x) for x in place.split()] for place in curves[0][1:].split("L")]
+    (left, bottom), (right, top) = corners[0], corners[-1]
+    check(right - left == 260 and bottom - top == 260, "from the lower left corner to the upper right one", corners)
+    check(corners[1] == [left, bottom - 26] and corners[2] == [right, bottom - 26], "in steps", corners)
+    check(draw.Log(1, 100).at(0) == 0 and draw.Log(1, 100).at(10) == 0.5)
 
 
 @options(None)

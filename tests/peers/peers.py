@@ -29,11 +29,11 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-sys.path.append(str(ROOT / "tests/figures"))  # behind this folder, whose svg is another
+sys.path.append(str(ROOT / "tests/figures"))
 
-import stamp  # noqa: E402  the path is set above
+import draw  # noqa: E402  the path is set above
+import stamp  # noqa: E402
 import stats  # noqa: E402
-import svg  # noqa: E402
 from worker import Ended, Worker  # noqa: E402
 
 TOLERANCES = [1e-3, 1e-6, 1e-9]
@@ -354,13 +354,7 @@ def profiles(rows):
 
 def draw_profiles(all_profiles, folder):
     for tolerance, profile in all_profiles.items():
-        chart = svg.Chart(f"Share of the problems solved and certified to {tolerance}",
-                          svg.Axis("time over that of the fastest", log=True, low=1.0),
-                          svg.Axis("share of the problems", low=0.0, high=1.0))
-        longest = max((points[-1][0] for points in profile.values()), default=10.0)
-        for solver, points in sorted(profile.items(), key=lambda item: -item[1][-1][1]):
-            chart.line(solver, [*points, (longest, points[-1][1])], step=True)
-        chart.write(folder / f"peers-profile-{tolerance}.svg")
+        (folder / f"peers-profile-{tolerance}.svg").write_text(draw.profiles({tolerance: profile}))
 
 
 def print_tables(report):
