@@ -224,24 +224,20 @@ static void sweep(uz_bounded *box, const uz_csc *K, bool backwards)
     }
 }
 
-/* From the better of where the last sweeps ended and the last exact displacement cut to the bounds: the energy only
- * falls, so the points converge to the solution whatever the exact steps do. */
-static void choose_start(uz_bounded *box, const uz_csc *K, const double *exact)
-{
-    double *cut = box->size;
-    for (int64_t j = 0; j < K->cols; j++)
-        cut[j] = clip(exact[j], box->bottom[j], box->top[j]);
-    if (energy(box, K, cut) < box->point_energy || isinf(box->point_energy))
-        memcpy(box->point, cut, (size_t)K->cols * sizeof *cut);
-}
-
 bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
 {
     const uz_sparse_load *x = (const uz_sparse_load *)load;
     uz_bounded *box = x->box;
     if (!box || box->contradictory)
         return false;
-    choose_start(box, load->K, box->has_exact ? box->u : x->base);
+    /* From the better of where the last sweeps ended and the last exact displacement cut to the bounds: the energy only
+     * falls, so the points converge to the solution whatever the exact steps do. */
+    const double *exact = box->has_exact ? box->u : x->base;
+    double *cut = box->size;
+    for (int64_t j = 0; j < load->K->cols; j++)
+        cut[j] = clip(exact[j], box->bottom[j], box->top[j]);
+    if (energy(box, load->K, cut) < box->point_energy || isinf(box->point_energy))
+        memcpy(box->point, cut, (size_t)load->K->cols * sizeof *cut);
     for (int k = 0; k < SWEEPS; k++)
         sweep(box, load->K, k % 2 == 1);
     box->point_energy = energy(box, load->K, box->point);

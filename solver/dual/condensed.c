@@ -314,38 +314,31 @@ static bool column(uz_dual_load *load, double *out, int64_t i)
     return true;
 }
 
-/* room (d) = L^-1 P N'(r + w) by the paths, w the kept correction or nothing. */
-static uz_status spread_along_reach(double *room, const uz_condensed_load *x, const double *r, bool corrected,
-                                    uz_error *err)
-{
-    const uz_condensed *dense = x->dense;
-    double *force = x->apply_room; /* n_b */
-    memset(force, 0, (size_t)dense->n_b * sizeof *force);
-    uz_csc_gaxpy_t(force, &dense->N_b, 1.0, r);
-    if (corrected)
-        uz_csc_gaxpy_t(force, &dense->N_b, 1.0, x->load.kept);
-    memset(room, 0, (size_t)dense->dual.d * sizeof *room);
-    for (int64_t k = 0; k < dense->n_b; k++)
-        room[dense->position[k]] = force[k];
-    return uz_reach_forward(dense->reach, x->ws, room, err);
-}
-
 static uz_status add_reactions(uz_dual_load *load, double *y, int64_t stride, double *room, const double *r,
                                bool corrected, uz_error *err)
 {
     const uz_condensed_load *x = (const uz_condensed_load *)load;
     const uz_condensed *dense = x->dense;
-    double *z = x->work;
-    if (dense->reach) {
-        uz_status status = spread_along_reach(room, x, r, corrected, err);
-        for (int64_t k = 0; k < load->dual->d; k++)
-            y[k * stride] += room[k];
-        return status;
+    if (!dense->reach) {
+        double *z = x->work;
+        uz_condensed_response(z, dense, r);
+        for (int64_t k = 0; k < dense->n_b; k++)
+            y[dense->position[k] * stride] += z[k] + (corrected ? load->kept[k] : 0.0);
+        return UZ_OK;
     }
-    uz_condensed_response(z, dense, r);
+    /* room = L^-1 P N'(r + w) by the paths, w the kept correction or nothing. */
+    double *force = x->apply_room;
+    memset(force, 0, (size_t)dense->n_b * sizeof *force);
+    uz_csc_gaxpy_t(force, &dense->N_b, 1.0, r);
+    if (corrected)
+        uz_csc_gaxpy_t(force, &dense->N_b, 1.0, load->kept);
+    memset(room, 0, (size_t)load->dual->d * sizeof *room);
     for (int64_t k = 0; k < dense->n_b; k++)
-        y[dense->position[k] * stride] += z[k] + (corrected ? load->kept[k] : 0.0);
-    return UZ_OK;
+        room[dense->position[k]] = force[k];
+    uz_status status = uz_reach_forward(dense->reach, x->ws, room, err);
+    for (int64_t k = 0; k < load->dual->d; k++)
+        y[k * stride] += room[k];
+    return status;
 }
 
 static uz_status recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
@@ -385,16 +378,11 @@ static bool suits(const uz_dual_shape *shape)
 /* Steps of the active set. */
 #define STEPS 6.0
 
-static double cube(double x)
-{
-    return x * x * x;
-}
-
 static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_factor_info *factor,
                      const uz_cost_rates *rates)
 {
     double n_b = (double)size->n_b, m = (double)size->m, entries = (double)factor->nnz;
-    double dense = cube(fmax(n_b, m)), step = cube(m) / 3.0;
+    double order = fmax(n_b, m), dense = order * order * order, step = m * m * m / 3.0;
     cost->flops += dense + STEPS * step + 2.0 * SOLVES * entries;
     cost->setup_s += dense * rates->flop_s;
     cost->case_s += STEPS * step * rates->flop_s + SOLVES * UZ_COST_SOLVE_PASSES * entries * rates->entry_s;

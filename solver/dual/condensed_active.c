@@ -141,16 +141,6 @@ static bool solve_by_operator(const uz_condensed_load *x, double *r, double *g, 
     return true;
 }
 
-/* v at the rows = -(block)^-1 v there. */
-static void solve_block(double *v, double *room, const double *chol, const int64_t *rows, int64_t count)
-{
-    for (int64_t k = 0; k < count; k++)
-        room[k] = v[rows[k]];
-    uz_potrs_lower(count, chol, room);
-    for (int64_t k = 0; k < count; k++)
-        v[rows[k]] = -room[k];
-}
-
 /* With T = D^-1 and v = g0 - g: r = T v, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
  * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
  * through the factor: T is badly conditioned, its answer is not yet that of the body. false: it had to stop. */
@@ -170,7 +160,11 @@ static bool solve_by_inverse(const uz_condensed_load *x, double *r, double *g, c
             v[rows[k]] = change[rows[k]];
         if (uz_stop_is_due(&x->load.stop))
             return false;
-        solve_block(v, change, chol, rows, count);
+        for (int64_t k = 0; k < count; k++) /* v at the rows = -(block)^-1 v there */
+            change[k] = v[rows[k]];
+        uz_potrs_lower(count, chol, change);
+        for (int64_t k = 0; k < count; k++)
+            v[rows[k]] = -change[k];
         if (uz_stop_is_due(&x->load.stop))
             return false;
         uz_symv_lower(m, x->D_inverse, v, change);
@@ -292,15 +286,6 @@ static bool solve_rows(double *w, double *Dw, double *D_AA, const uz_condensed_l
     return ok;
 }
 
-/* |D| |w| row by row is at most sqrt(D_ii) times this sum: what rounding leaves of D w is in proportion. */
-static double rounding_sum(const double *D, const double *w, int64_t m)
-{
-    double sum = 0.0;
-    for (int64_t j = 0; j < m; j++)
-        sum += sqrt(D[j + j * m]) * fabs(w[j]);
-    return sum;
-}
-
 /* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
  * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
 static bool correct_rows(const uz_condensed_load *x, double *w, double *target, const double *g, const bool *close)
@@ -316,7 +301,11 @@ static bool correct_rows(const uz_condensed_load *x, double *w, double *target, 
     for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_stop_is_due(&x->load.stop);
          round++) {
         ok = solve_rows(w, target, D_AA, x, g, rows, list_rows(rows, in, true, m));
-        double noise = 8.0 * DBL_EPSILON * rounding_sum(D, w, m);
+        /* |D| |w| row by row is at most sqrt(D_ii) times this sum: what rounding leaves of D w is in proportion. */
+        double sum = 0.0;
+        for (int64_t j = 0; j < m; j++)
+            sum += sqrt(D[j + j * m]) * fabs(w[j]);
+        double noise = 8.0 * DBL_EPSILON * sum;
         feasible = ok;
         for (int64_t i = 0; i < m; i++) {
             bool wrong = g[i] - target[i] < -CORRECTION_TOLERANCE * scale - sqrt(D[i + i * m]) * noise;

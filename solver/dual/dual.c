@@ -12,28 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static uz_dual_lazy *lazy_new(void)
-{
-    uz_dual_lazy *lazy = uz_alloc_zero(1, sizeof *lazy);
-    if (lazy) {
-        pthread_mutex_init(&lazy->making, NULL);
-        pthread_mutex_init(&lazy->known, NULL);
-        lazy->lambda_max = NAN;
-    }
-    return lazy;
-}
-
-/* 2^-k with 2^k nearest to the norm of the row (in the ratio's sense); 1 for a row of zeros. */
-static double nearest_scale(double norm)
-{
-    int exponent;
-    if (!(norm > 0.0))
-        return 1.0;
-    if (frexp(norm, &exponent) < M_SQRT1_2)
-        exponent--;
-    return ldexp(1.0, -exponent);
-}
-
+/* By 2^-k with 2^k nearest to the norm of the row (in the ratio's sense), 1 for a row of zeros. */
 static uz_status scale_rows(uz_dual *dual, uz_error *err)
 {
     uz_csc *N = &dual->N;
@@ -42,8 +21,11 @@ static uz_status scale_rows(uz_dual *dual, uz_error *err)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)N->rows);
     for (int64_t k = 0; k < N->ptr[N->cols]; k++)
         dual->row_scale[N->idx[k]] = hypot(dual->row_scale[N->idx[k]], N->val[k]);
-    for (int64_t i = 0; i < N->rows; i++)
-        dual->row_scale[i] = nearest_scale(dual->row_scale[i]);
+    for (int64_t i = 0; i < N->rows; i++) {
+        int exponent;
+        double share = frexp(dual->row_scale[i], &exponent);
+        dual->row_scale[i] = share > 0.0 ? ldexp(1.0, share < M_SQRT1_2 ? 1 - exponent : -exponent) : 1.0;
+    }
     for (int64_t k = 0; k < N->ptr[N->cols]; k++)
         N->val[k] *= dual->row_scale[N->idx[k]];
     return UZ_OK;
@@ -66,10 +48,15 @@ uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_h
     dual->touched = &dual->N;
     dual->factor = source->factor;
     dual->krylov = source->krylov;
-    dual->lazy = lazy_new();
+    dual->lazy = uz_alloc_zero(1, sizeof *dual->lazy);
     uz_status status = UZ_OK;
-    if (!dual->lazy)
+    if (dual->lazy) {
+        pthread_mutex_init(&dual->lazy->making, NULL);
+        pthread_mutex_init(&dual->lazy->known, NULL);
+        dual->lazy->lambda_max = NAN;
+    } else {
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
+    }
     if (status == UZ_OK)
         status = uz_csc_copy(&dual->N, N, err);
     if (status == UZ_OK)

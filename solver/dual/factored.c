@@ -46,14 +46,6 @@ static void unload(uz_dual_load *load)
     uz_sparse_unload(&x->sparse);
 }
 
-static bool all_zero(const double *x, int64_t n)
-{
-    for (int64_t i = 0; i < n; i++)
-        if (x[i] != 0.0)
-            return false;
-    return true;
-}
-
 static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
     factored_load *x = (factored_load *)load;
@@ -61,7 +53,10 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     double *response = x->sparse.response;
     memset(response, 0, (size_t)dual->d * sizeof *response);
     memset(Dr, 0, (size_t)dual->m * sizeof *Dr);
-    if (all_zero(r, dual->m))
+    int64_t first = 0;
+    while (first < dual->m && r[first] == 0.0)
+        first++;
+    if (first == dual->m) /* r = 0 */
         return UZ_OK;
     uz_csc_gaxpy_t(response, &dual->N, 1.0, r);
     uz_status status = solve(x, response, err);

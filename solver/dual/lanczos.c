@@ -17,28 +17,6 @@ typedef struct {
     double *d, *e, *vectors; /* its eigenproblem, steps x steps */
 } lanczos;
 
-static bool allocate(lanczos *z, int64_t m, int64_t steps)
-{
-    memset(z, 0, sizeof *z);
-    z->basis = uz_alloc(m * (steps + 1), sizeof(double));
-    z->alpha = uz_alloc(steps, sizeof(double));
-    z->beta = uz_alloc(steps + 1, sizeof(double));
-    z->d = uz_alloc(steps, sizeof(double));
-    z->e = uz_alloc(steps + 1, sizeof(double));
-    z->vectors = uz_alloc(steps * steps, sizeof(double));
-    return z->basis && z->alpha && z->beta && z->d && z->e && z->vectors;
-}
-
-static void release(lanczos *z)
-{
-    free(z->basis);
-    free(z->alpha);
-    free(z->beta);
-    free(z->d);
-    free(z->e);
-    free(z->vectors);
-}
-
 /* A fixed pseudo-random start: no direction of a structured problem is orthogonal to it, and runs repeat. */
 static void start_vector(double *v, int64_t m)
 {
@@ -50,14 +28,6 @@ static void start_vector(double *v, int64_t m)
     double norm = uz_norm(m, v);
     for (int64_t i = 0; i < m; i++)
         v[i] /= norm;
-}
-
-/* Two passes of Gram-Schmidt against all earlier vectors ("twice is enough", Parlett 1980). */
-static void orthogonalise(const double *basis, int64_t m, int64_t k, double *w)
-{
-    for (int pass = 0; pass < 2; pass++)
-        for (int64_t j = 0; j <= k; j++)
-            uz_axpy(m, -uz_dot(m, basis + j * m, w), basis + j * m, w);
 }
 
 /* Largest Ritz value of the first k + 1 steps and its residual norm beta |s_last|. */
@@ -84,7 +54,10 @@ static uz_status iterate(lanczos *z, double *lambda, int64_t m, int64_t steps, u
         if (status != UZ_OK)
             return status;
         z->alpha[k] = uz_dot(m, v, w);
-        orthogonalise(z->basis, m, k, w);
+        /* Two passes of Gram-Schmidt against all earlier vectors ("twice is enough", Parlett 1980). */
+        for (int pass = 0; pass < 2; pass++)
+            for (int64_t j = 0; j <= k; j++)
+                uz_axpy(m, -uz_dot(m, z->basis + j * m, w), z->basis + j * m, w);
         z->beta[k] = uz_norm(m, w);
         bool last = k + 1 == steps || z->beta[k] <= 1e-14 * fabs(z->alpha[0]);
         if (last || k % CHECK_EVERY == CHECK_EVERY - 1) {
@@ -102,14 +75,24 @@ static uz_status iterate(lanczos *z, double *lambda, int64_t m, int64_t steps, u
 
 uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, double tolerance, uz_error *err)
 {
-    lanczos z;
     int64_t steps = m < MAX_STEPS ? m : MAX_STEPS;
-    *lambda = 0.0;
+    lanczos z = {.basis = uz_alloc(m * (steps + 1), sizeof(double)),
+                 .alpha = uz_alloc(steps, sizeof(double)),
+                 .beta = uz_alloc(steps + 1, sizeof(double)),
+                 .d = uz_alloc(steps, sizeof(double)),
+                 .e = uz_alloc(steps + 1, sizeof(double)),
+                 .vectors = uz_alloc(steps * steps, sizeof(double))};
     uz_status status = UZ_OK;
-    if (!allocate(&z, m, steps))
+    *lambda = 0.0;
+    if (!z.basis || !z.alpha || !z.beta || !z.d || !z.e || !z.vectors)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld Lanczos vectors", (long long)steps);
     else if (m > 0)
         status = iterate(&z, lambda, m, steps, apply, ctx, tolerance, err);
-    release(&z);
+    free(z.basis);
+    free(z.alpha);
+    free(z.beta);
+    free(z.d);
+    free(z.e);
+    free(z.vectors);
     return status;
 }

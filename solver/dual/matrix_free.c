@@ -179,18 +179,6 @@ static uz_status inverse_norm(uz_dual_load *load, double *value, double *e, uz_e
 /* Of the aim: below this a solve is as good as exact. */
 #define ACTIVE_FLOOR 0.02
 
-/* right = p - K u of the dofs that are held, and no others. */
-static void load_free(free_load *x)
-{
-    const uz_dual_load *load = &x->sparse.load;
-    const uz_bounded *box = x->sparse.box;
-    double *held = x->cg.p;
-    for (int64_t j = 0; j < load->K->cols; j++)
-        held[j] = box->fixed[j] ? box->u[j] : 0.0;
-    memcpy(x->right, x->p, (size_t)load->K->cols * sizeof *x->right);
-    uz_csc_symv(x->right, load->K, -1.0, held);
-}
-
 /* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears. */
 static uz_status measure_slack(free_load *x, uz_error *err)
 {
@@ -207,57 +195,45 @@ static uz_status measure_slack(free_load *x, uz_error *err)
     return status;
 }
 
-static double energy_norm(const uz_bounded *box, int64_t d)
-{
-    double square = 0.0;
-    for (int64_t j = 0; j < d; j++)
-        square += box->u[j] * (box->force[j] + box->p[j]);
-    return uz_root(square);
-}
-
-static bool looks_wrong(const double *r, const double *g, const bool *active, int64_t m)
-{
-    for (int64_t i = 0; i < m; i++)
-        if (active[i] ? r[i] > 0.0 : g[i] < 0.0)
-            return true;
-    return false;
-}
-
-/* u, r, g and active at this tolerance of the energy norm. */
-static uz_status solve_to(free_load *x, uz_cg *cg, double tolerance, double *g, bool *active, bool *met, uz_error *err)
+/* u, r, g and active at this tolerance of the energy norm. *go_on: it was reached, and the guess still looks right. */
+static uz_status solve_to(free_load *x, uz_cg *cg, double tolerance, double *g, bool *active, bool *go_on,
+                          uz_error *err)
 {
     const uz_dual_load *load = &x->sparse.load;
+    const int64_t d = load->dual->d, m = load->dual->m;
     uz_bounded *box = x->sparse.box;
-    const uz_dual *dual = load->dual;
-    double root = root_of_lambda(load), most = uz_root(-2.0 * load->psi0), norm;
+    double root = root_of_lambda(load), most = uz_root(-2.0 * load->psi0), square = 0.0;
     uz_bounded_balance(box, load->K);
-    norm = fmin(energy_norm(box, dual->d), most > 0.0 ? most : INFINITY);
+    for (int64_t j = 0; j < d; j++)
+        square += box->u[j] * (box->force[j] + box->p[j]);
+    double norm = fmin(uz_root(square), most > 0.0 ? most : INFINITY);
     uz_cg_stop stop = stop_at(x, 0.0, tolerance * norm * root);
     uz_cg_info info;
     uz_status status = uz_cg_solve(&info, box->u, cg, load->K, x->right, &stop, err);
+    *go_on = status == UZ_OK && info.met;
     if (status != UZ_OK)
         return status;
-    *met = info.met;
     uz_bounded_balance(box, load->K);
     uz_bounded_react(&x->sparse, g, active);
+    for (int64_t i = 0; *go_on && i < m; i++)
+        *go_on = !(active[i] ? box->r[i] > 0.0 : g[i] < 0.0);
     return UZ_OK;
 }
 
 static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, bool *active, uz_error *err)
 {
+    const uz_dual_load *load = &x->sparse.load;
     const uz_bounded *box = x->sparse.box;
-    const int64_t m = x->sparse.load.dual->m;
-    double least = ACTIVE_FLOOR * x->aim, tolerance = fmax(least, x->coarse);
-    bool met = true;
-    uz_status status = UZ_OK;
-    load_free(x);
-    do {
-        status = solve_to(x, cg, tolerance, g, active, &met, err);
-        if (status != UZ_OK || !met || tolerance <= least || looks_wrong(box->r, g, active, m))
-            break;
-        tolerance = least;
-    } while (true);
-    memcpy(r, box->r, (size_t)m * sizeof *r);
+    double least = ACTIVE_FLOOR * x->aim, tolerance = fmax(least, x->coarse), *held = x->cg.p;
+    bool go_on = true;
+    for (int64_t j = 0; j < load->K->cols; j++)
+        held[j] = box->fixed[j] ? box->u[j] : 0.0;
+    memcpy(x->right, x->p, (size_t)load->K->cols * sizeof *x->right);
+    uz_csc_symv(x->right, load->K, -1.0, held); /* p - K u of the dofs that are held, and no others */
+    uz_status status = solve_to(x, cg, tolerance, g, active, &go_on, err);
+    if (go_on && tolerance > least)
+        status = solve_to(x, cg, least, g, active, &go_on, err);
+    memcpy(r, box->r, (size_t)load->dual->m * sizeof *r);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
     return status == UZ_OK ? measure_slack(x, err) : status;
 }

@@ -103,15 +103,6 @@ static double column_dot(const uz_csc *Nt, int64_t i, const double *x)
     return sum;
 }
 
-/* n_i'W n_i */
-static double row_weight(const uz_csc *Nt, int64_t i, const double *weight)
-{
-    double sum = 0.0;
-    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
-        sum += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
-    return sum;
-}
-
 /* One pass; returns the largest move relative to the largest target. */
 static double sweep(double *c, const uz_csc *Nt, const double *weight, const double *g, const bool *close,
                     bool only_lift)
@@ -120,7 +111,9 @@ static double sweep(double *c, const uz_csc *Nt, const double *weight, const dou
     for (int64_t i = 0; i < Nt->cols; i++) {
         bool closing = close[i] && !only_lift;
         double miss = g[i] - column_dot(Nt, i, c);
-        double weighted = row_weight(Nt, i, weight);
+        double weighted = 0.0; /* n_i'W n_i */
+        for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
+            weighted += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
         if (weighted <= 0.0 || (!closing && miss >= 0.0))
             continue;
         for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
@@ -171,24 +164,18 @@ uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, con
     return UZ_OK;
 }
 
-/* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */
-static bool recover_guess(const uz_bounded *box, double *u, const double *r, int64_t d, int64_t m)
-{
-    if (!box || !box->has_exact)
-        return false;
-    for (int64_t i = 0; i < m; i++)
-        if (r[i] != box->r[i])
-            return false;
-    memcpy(u, box->u, (size_t)d * sizeof *u);
-    return true;
-}
-
 uz_status uz_sparse_recover(uz_dual_load *load, double *u, const double *r, bool corrected, uz_error *err)
 {
     uz_sparse_load *x = (uz_sparse_load *)load;
     int64_t d = load->dual->d;
     uz_status status = UZ_OK;
-    if (!recover_guess(x->box, u, r, d, load->dual->m)) {
+    /* The displacement of the last guess if r is its answer: no error of K^-1 on the whole body is in it. */
+    bool guessed = x->box && x->box->has_exact;
+    for (int64_t i = 0; guessed && i < load->dual->m; i++)
+        guessed = r[i] == x->box->r[i];
+    if (guessed) {
+        memcpy(u, x->box->u, (size_t)d * sizeof *u);
+    } else {
         status = load->dual->form->apply(load, x->work, r, err);
         for (int64_t j = 0; j < d; j++)
             u[j] = x->base[j] + x->response[j];
