@@ -281,24 +281,20 @@ void uz_condensed_response(double *z, const uz_condensed *dense, const double *w
 }
 
 /* Without D two triangular solves do: slower each, but there is nothing to form. */
-void uz_condensed_multiply(const uz_condensed_load *x, double *Dr, const double *r)
+uz_status uz_condensed_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
 {
+    const uz_condensed_load *x = (const uz_condensed_load *)load;
     const uz_condensed *dense = x->dense;
     int64_t m = dense->dual.m;
+    (void)err;
     if (x->D) {
         uz_symv_lower(m, x->D, r, Dr);
-        return;
+        return UZ_OK;
     }
     uz_condensed_response(x->apply_room, dense, r);
     uz_trsv_lower_t(dense->n_b, dense->L_bb, x->apply_room);
     memset(Dr, 0, (size_t)m * sizeof *Dr);
     uz_csc_gaxpy(Dr, &dense->N_b, 1.0, x->apply_room);
-}
-
-static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err)
-{
-    (void)err;
-    uz_condensed_multiply((const uz_condensed_load *)load, Dr, r);
     return UZ_OK;
 }
 
@@ -406,7 +402,7 @@ const uz_dual_form uz_dual_condensed = {
     .load = load_whole,
     .unload = unload,
     .prepare = uz_condensed_prepare,
-    .apply = apply,
+    .apply = uz_condensed_apply,
     .column = column,
     .correct = uz_condensed_correct,
     .recover = recover,

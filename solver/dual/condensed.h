@@ -43,10 +43,9 @@ typedef struct {
 
 /* z (n_b) = L_bb^-1 N_b'w; contact last. */
 void uz_condensed_response(double *z, const uz_condensed *dense, const double *w);
-/* Dr = D r, by D where this load has it. */
-void uz_condensed_multiply(const uz_condensed_load *x, double *Dr, const double *r);
 
-/* Operations. */
+/* Operations; applying never fails. */
+uz_status uz_condensed_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
 uz_status uz_condensed_prepare(uz_dual_load *load, uz_error *err);
 uz_status uz_condensed_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active,

@@ -117,7 +117,7 @@ static bool gather_lower(double *D_AA, const double *D, const int64_t *rows, int
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
 /* r_A from D_AA r_A = g0_A. false: it had to stop. */
-static bool solve_by_operator(const uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
+static bool solve_by_operator(uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
                               int64_t count)
 {
     int64_t m = x->load.dual->m;
@@ -144,7 +144,7 @@ static bool solve_by_operator(const uz_condensed_load *x, double *r, double *g, 
 /* With T = D^-1 and v = g0 - g: r = T v, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
  * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
  * through the factor: T is badly conditioned, its answer is not yet that of the body. false: it had to stop. */
-static bool solve_by_inverse(const uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
+static bool solve_by_inverse(uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
                              int64_t count)
 {
     int64_t m = x->load.dual->m;
@@ -174,7 +174,7 @@ static bool solve_by_inverse(const uz_condensed_load *x, double *r, double *g, c
             r[i] += change[i];
         if (uz_stop_is_due(&x->load.stop))
             return false;
-        uz_condensed_multiply(x, change, r);
+        (void)uz_condensed_apply(&x->load, change, r, NULL);
         for (int64_t i = 0; i < m; i++)
             g[i] = x->load.g0[i] - change[i];
         if (uz_stop_is_due(&x->load.stop))
@@ -260,7 +260,7 @@ enum { REFINEMENTS = 2 };
 /* w (m) with D w = target on the listed rows as far as they are independent, zero elsewhere; refined, as D_AA is the
  * inverse of a stiffness and as badly conditioned. Dw (m) is D w, also where it had to stop before w was right. D_AA is
  * room for count^2. */
-static bool solve_rows(double *w, double *Dw, double *D_AA, const uz_condensed_load *x, const double *target,
+static bool solve_rows(double *w, double *Dw, double *D_AA, uz_condensed_load *x, const double *target,
                        const int64_t *rows, int64_t count)
 {
     int64_t m = x->load.dual->m, *pivot = uz_alloc(count, sizeof *pivot);
@@ -278,7 +278,7 @@ static bool solve_rows(double *w, double *Dw, double *D_AA, const uz_condensed_l
             uz_potrs_leading(rank, count, D_AA, part);
             for (int64_t k = 0; k < rank; k++)
                 w[rows[pivot[k]]] += part[k];
-            uz_condensed_multiply(x, Dw, w);
+            (void)uz_condensed_apply(&x->load, Dw, w, NULL);
         }
     }
     free(pivot);
@@ -288,7 +288,7 @@ static bool solve_rows(double *w, double *Dw, double *D_AA, const uz_condensed_l
 
 /* Where D is singular: closes the rows to close and the penetrating ones as equations, then also those that penetrate
  * because of it, until none does. target (m) becomes what was reached, N c; the correction is K^-1 N'w. */
-static bool correct_rows(const uz_condensed_load *x, double *w, double *target, const double *g, const bool *close)
+static bool correct_rows(uz_condensed_load *x, double *w, double *target, const double *g, const bool *close)
 {
     int64_t m = x->load.dual->m, *rows = uz_alloc(m, sizeof *rows);
     const double *D = x->D;
