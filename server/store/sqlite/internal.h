@@ -18,7 +18,7 @@ typedef struct {
     connection writer;           /* the only one that writes and checkpoints */
     uint64_t last_ms;            /* time and counter in the newest id, so that ids ascend when the clock does not */
     unsigned sequence;
-    uint64_t claims; /* made since the file was opened: the token of the last one */
+    uint64_t claims; /* the token of the last one; begins at the time of opening, past those of earlier processes */
 
     pthread_mutex_t queue_lock; /* everything down to leading; write.c */
     pending *queue, **queue_end;

@@ -122,6 +122,7 @@ store *sqlite_open(const char *path, char *message, size_t size)
     pthread_cond_init(&s->sync_asked, NULL);
     pthread_cond_init(&s->sync_ended, NULL);
     s->queue_end = &s->queue;
+    s->claims = (uint64_t)(store_now() * 1e6);
     s->file = lock_file(path, message, size);
     bool ok = s->file >= 0 && open_connections(s, path, message, size);
     if (ok && !sqlite_sync_begin(s)) {

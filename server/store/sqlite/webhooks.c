@@ -1,3 +1,4 @@
+/* webhooks.c: whom to tell of the end of which job (store.h). */
 #include "store/sqlite/internal.h"
 
 #include <stdio.h>

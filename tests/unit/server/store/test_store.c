@@ -114,6 +114,34 @@ STORE_TEST(an_earlier_lease_is_fenced_off)
     place_end(&p);
 }
 
+/* The process that had the lease is gone, and its successor goes by the same name. */
+STORE_TEST(a_lease_ends_with_its_process)
+{
+    place p;
+    char id[33];
+    store_lease leases[2];
+    if (!place_begin(&p))
+        return;
+    CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
+    for (int i = 0; i < 2; i++) {
+        job j = {0};
+        char *body = NULL;
+        size_t len = 0;
+        CHECK_INT(store_claim(p.s, "a", 30.0, &leases[i], &j, &body, &len), STORE_OK);
+        CHECK_STR(leases[i].job, id);
+        job_clear(&j);
+        free(body);
+        if (i == 0 && !place_reopen(&p))
+            return;
+        if (i == 0)
+            CHECK_INT(store_recover(p.s, 3, "{}", NULL, NULL), STORE_OK);
+    }
+    CHECK_INT(store_renew(p.s, &leases[0], 30.0, 50), STORE_CONFLICT);
+    CHECK_INT(store_finish(p.s, &leases[0], &PLAIN_SUCCESS), STORE_CONFLICT);
+    CHECK_INT(store_finish(p.s, &leases[1], &PLAIN_SUCCESS), STORE_OK);
+    place_end(&p);
+}
+
 STORE_TEST(release_does_not_count_the_attempt)
 {
     place p;
