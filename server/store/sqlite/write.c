@@ -144,20 +144,25 @@ static void lead(sqlite_store *s)
         pthread_cond_signal(&s->queue->turn);
 }
 
+static void wait_turn(sqlite_store *s, pending *me)
+{
+    pthread_mutex_lock(&s->queue_lock);
+    *s->queue_end = me;
+    s->queue_end = &me->next;
+    while (!me->done) {
+        if (!s->leading && s->queue == me)
+            lead(s);
+        else
+            pthread_cond_wait(&me->turn, &s->queue_lock);
+    }
+    pthread_mutex_unlock(&s->queue_lock);
+}
+
 store_status sqlite_write_as(sqlite_store *s, write_durability durability, store_change change, void *args)
 {
     pending me = {.change = change, .args = args};
     pthread_cond_init(&me.turn, NULL);
-    pthread_mutex_lock(&s->queue_lock);
-    *s->queue_end = &me;
-    s->queue_end = &me.next;
-    while (!me.done) {
-        if (!s->leading && s->queue == &me)
-            lead(s);
-        else
-            pthread_cond_wait(&me.turn, &s->queue_lock);
-    }
-    pthread_mutex_unlock(&s->queue_lock);
+    wait_turn(s, &me);
     pthread_cond_destroy(&me.turn);
     if (me.status != STORE_OK || durability == WRITE_LAZY)
         return me.status;

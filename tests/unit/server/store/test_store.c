@@ -1,4 +1,5 @@
 /* What the store keeps and who may change it: jobs, claims, idempotency keys, results, lists. */
+#include "store/engine.h"
 #include "store_place.h"
 
 /* ---- submit, claim, finish */

@@ -1,4 +1,5 @@
 /* What the store keeps of load cases and of jobs that refine others. */
+#include "store/engine.h"
 #include "store_place.h"
 
 /* ---- cases */

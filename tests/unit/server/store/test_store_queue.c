@@ -1,4 +1,5 @@
 /* The queue of the store and those who work on it: order, recovery, expiry, retention, webhooks, many threads. */
+#include "store/engine.h"
 #include "store_place.h"
 
 #include <pthread.h>

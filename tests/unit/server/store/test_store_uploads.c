@@ -1,4 +1,5 @@
 /* Uploads in the store: what the API tests can't reach or would wait for. */
+#include "store/engine.h"
 #include "upload_place.h"
 
 #include <zlib.h>

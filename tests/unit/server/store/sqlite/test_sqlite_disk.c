@@ -1,6 +1,7 @@
 /* The database file and its disk: kills, foreign files, a second daemon, a full disk, other programs. */
 #include "sqlite_file.h"
 #include "store/sqlite/sqlite.h"
+#include "store/engine.h"
 #include "store_place.h"
 
 #include <signal.h>

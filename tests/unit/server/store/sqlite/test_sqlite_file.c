@@ -1,5 +1,6 @@
 /* The database file: its rows, checks, backups, damages, and files of earlier formats. */
 #include "sqlite_file.h"
+#include "store/engine.h"
 #include "store_place.h"
 
 #include <sys/stat.h>

@@ -2,6 +2,7 @@
  * environment runs N times as many. */
 #include "faulty_vfs.h"
 #include "sqlite_file.h"
+#include "store/engine.h"
 #include "store_place.h"
 
 #include <stdatomic.h>
