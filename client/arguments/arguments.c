@@ -32,16 +32,6 @@ static bool fail_unknown_option(parser *p, const char *word)
     return fail(p, near ? "unknown option %s; did you mean --%s?" : "unknown option %s", word, near);
 }
 
-static bool fail_unknown_command(parser *p, const char *word)
-{
-    const char *names[CLIENT_COMMANDS];
-    for (int i = 0; i < CLIENT_COMMANDS; i++)
-        names[i] = client_command_name((client_command)i);
-    const int near = uz_closest(word, strlen(word), names, CLIENT_COMMANDS);
-    return near >= 0 ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", word, names[near])
-                     : fail(p, "unknown command \"%s\"", word);
-}
-
 static bool take_option(parser *p, const uz_option *row, const char *value)
 {
     char wants[200];
@@ -76,8 +66,14 @@ static bool take_words(parser *p, int argc, char *const *argv, bool apply)
         case UZ_WALK_OPERAND:
             if (!p->have_command) {
                 p->have_command = client_command_find(&p->options->command, walk.word);
-                if (!p->have_command)
-                    return fail_unknown_command(p, walk.word);
+                if (!p->have_command) {
+                    const char *names[CLIENT_COMMANDS];
+                    for (int i = 0; i < CLIENT_COMMANDS; i++)
+                        names[i] = client_command_name((client_command)i);
+                    const int near = uz_closest(walk.word, strlen(walk.word), names, CLIENT_COMMANDS);
+                    return near >= 0 ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", walk.word, names[near])
+                                     : fail(p, "unknown command \"%s\"", walk.word);
+                }
             } else if (apply && command_seen) {
                 if (p->options->operand)
                     return fail(p, "%s: one operand too many: \"%s\"", client_command_name(p->options->command),

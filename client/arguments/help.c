@@ -28,26 +28,22 @@ static void print_options(FILE *to, client_command command, bool general)
     }
 }
 
-static void print_overview(FILE *to)
-{
-    const client_exit_line *line;
-    fputs("usage: uzawa [--server URL] [--timeout S] COMMAND ...\n"
-          "Solves frictionless contact problems by a contact solver service.\n\nCommands:\n",
-          to);
-    for (int i = 0; i < CLIENT_COMMANDS; i++)
-        fprintf(to, "  %-9s %s\n", client_page_of((client_command)i)->name, client_page_of((client_command)i)->about);
-    print_options(to, CLIENT_COMMANDS, true);
-    fputs("\nExit status:\n", to);
-    for (size_t i = 0; (line = client_exit_line_at(i)); i++) {
-        fprintf(to, " %3d  ", line->code);
-        print_paragraph(to, line->about, 6, 6);
-    }
-}
-
 void client_help_print(FILE *to, client_command command)
 {
     if (command >= CLIENT_COMMANDS) {
-        print_overview(to);
+        const client_exit_line *line;
+        fputs("usage: uzawa [--server URL] [--timeout S] COMMAND ...\n"
+              "Solves frictionless contact problems by a contact solver service.\n\nCommands:\n",
+              to);
+        for (int i = 0; i < CLIENT_COMMANDS; i++)
+            fprintf(to, "  %-9s %s\n", client_page_of((client_command)i)->name,
+                    client_page_of((client_command)i)->about);
+        print_options(to, CLIENT_COMMANDS, true);
+        fputs("\nExit status:\n", to);
+        for (size_t i = 0; (line = client_exit_line_at(i)); i++) {
+            fprintf(to, " %3d  ", line->code);
+            print_paragraph(to, line->about, 6, 6);
+        }
         return;
     }
     const client_page *p = client_page_of(command);

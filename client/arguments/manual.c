@@ -84,18 +84,6 @@ static const char *print_paragraph(FILE *to, const char *text)
     return text[len] ? text + len + 1 : text + len;
 }
 
-static void print_option(FILE *to, const uz_option *o)
-{
-    fputs(".It ", to);
-    if (o->letter)
-        fprintf(to, "Fl %c , ", o->letter);
-    fprintf(to, "Fl \\-%s", o->name);
-    if (o->value)
-        fprintf(to, " Ar %s", o->value);
-    fputc('\n', to);
-    print_paragraph(to, o->about);
-}
-
 static void print_options(FILE *to, client_command command, bool general)
 {
     const uz_option_table all = client_option_table();
@@ -106,7 +94,14 @@ static void print_options(FILE *to, client_command command, bool general)
             continue;
         fputs(open ? "" : ".Bl -tag -width Ds\n", to);
         open = true;
-        print_option(to, o);
+        fputs(".It ", to);
+        if (o->letter)
+            fprintf(to, "Fl %c , ", o->letter);
+        fprintf(to, "Fl \\-%s", o->name);
+        if (o->value)
+            fprintf(to, " Ar %s", o->value);
+        fputc('\n', to);
+        print_paragraph(to, o->about);
     }
     fputs(open ? ".El\n" : "", to);
 }

@@ -74,14 +74,6 @@ static bool time_range(const json_t *decades, double *low, double *high)
     return *high > -INFINITY;
 }
 
-/* A bar whose length is the logarithm of the time. */
-static void print_bar(FILE *to, double seconds, double low, double high, int cells, bool ascii)
-{
-    int full = (int)lround((log10(seconds) - low) / (high - low) * cells);
-    for (int i = 0; i < full; i++)
-        fputs(ascii ? "#" : "\u2588", to);
-}
-
 static void print_decade(FILE *to, const json_t *decade, double low, double high, int cells, bool ascii)
 {
     char time[16] = "never", steps[24] = "";
@@ -93,7 +85,10 @@ static void print_decade(FILE *to, const json_t *decade, double low, double high
     fprintf(to, "%5.0e  %9s  %7s", client_json_number(decade, "relative_error"), time, steps);
     if (seconds > 0 && cells > 0) {
         fputs("  ", to);
-        print_bar(to, seconds, low, high, cells, ascii);
+        /* A bar whose length is the logarithm of the time. */
+        int full = (int)lround((log10(seconds) - low) / (high - low) * cells);
+        for (int i = 0; i < full; i++)
+            fputs(ascii ? "#" : "\u2588", to);
     }
     fputc('\n', to);
 }

@@ -65,24 +65,6 @@ static bool drink(int from, client_buffer *png)
     return n > 0 ? client_buffer_append(png, block, (size_t)n) : n < 0 && errno == EINTR;
 }
 
-/* Feeds and drinks at once, so that neither side waits for the other for ever. */
-static void exchange(int to, int from, const client_buffer *svg, client_buffer *png)
-{
-    size_t at = 0;
-    for (bool more = true; more;) {
-        struct pollfd ready[2] = {{.fd = from, .events = POLLIN}, {.fd = to, .events = POLLOUT}};
-        if (poll(ready, 2, -1) < 0 && errno != EINTR)
-            break;
-        if (to >= 0 && ready[1].revents)
-            feed(&to, svg, &at);
-        if (ready[0].revents)
-            more = drink(from, png);
-    }
-    if (to >= 0)
-        close(to);
-    close(from);
-}
-
 static client_exit convert(client_session *s, const client_buffer *svg, client_buffer *png)
 {
     int to, from, status = 0;
@@ -91,8 +73,22 @@ static client_exit convert(client_session *s, const client_buffer *svg, client_b
         return client_complain(s, CLIENT_SERVER_ERROR, "the reply is empty");
     sigaction(SIGPIPE, &ignore, &before);
     pid_t pid = start_converter(&to, &from);
-    if (pid >= 0)
-        exchange(to, from, svg, png);
+    if (pid >= 0) {
+        /* Feeds and drinks at once, so that neither side waits for the other for ever. */
+        size_t at = 0;
+        for (bool more = true; more;) {
+            struct pollfd ready[2] = {{.fd = from, .events = POLLIN}, {.fd = to, .events = POLLOUT}};
+            if (poll(ready, 2, -1) < 0 && errno != EINTR)
+                break;
+            if (to >= 0 && ready[1].revents)
+                feed(&to, svg, &at);
+            if (ready[0].revents)
+                more = drink(from, png);
+        }
+        if (to >= 0)
+            close(to);
+        close(from);
+    }
     sigaction(SIGPIPE, &before, NULL);
     while (pid >= 0 && waitpid(pid, &status, 0) < 0 && errno == EINTR)
         continue;

@@ -164,35 +164,6 @@ static void print_quoted(FILE *to, const char *text)
     fputs("\",", to);
 }
 
-static void print_row(const table *t, const json_t *answer, const char *name, size_t row)
-{
-    const json_t *gauss = json_object_get(answer, "stress_gauss"), *at = json_array_get(t->nodes, row);
-    if (t->cases)
-        print_quoted(t->to, name);
-    if (t->place == AT_POINTS) {
-        const json_t *points = json_object_get(gauss, "points");
-        fprintf(t->to, "%.0f", json_number_value(json_array_get(json_object_get(gauss, "elements"), row)));
-        print_entry(t->to, json_array_get(points, row), width_of(points));
-        const json_t *stress = json_object_get(gauss, "stress");
-        print_entry(t->to, json_array_get(stress, row), width_of(stress));
-        fputc('\n', t->to);
-        return;
-    }
-    fprintf(t->to, "%zu", row);
-    if (t->place == AT_CONTACTS && json_array_size(t->nodes)) {
-        const json_t *node = json_array_get(t->contact_nodes, row);
-        print_value(t->to, node);
-        at = json_array_get(t->nodes, (size_t)json_integer_value(node));
-    }
-    if (json_array_size(t->nodes))
-        print_entry(t->to, at, width_of(t->nodes));
-    for (int i = 0; i < t->count; i++) {
-        const json_t *values = json_object_get(answer, t->name[i]);
-        print_entry(t->to, json_array_get(values, row), width_of(values));
-    }
-    fputc('\n', t->to);
-}
-
 static size_t count_rows(const table *t, const json_t *answer)
 {
     if (t->place == AT_POINTS)
@@ -202,21 +173,33 @@ static size_t count_rows(const table *t, const json_t *answer)
 
 static void print_answer(const table *t, const json_t *answer, const char *name)
 {
-    for (size_t row = 0, rows = count_rows(t, answer); row < rows; row++)
-        print_row(t, answer, name, row);
-}
-
-static void print_table(table *t, const json_t *result)
-{
-    const json_t *cases = json_object_get(result, "cases");
-    t->nodes = json_object_get(result, "nodes");
-    t->contact_nodes = json_object_get(result, "contact_nodes");
-    t->cases = json_is_array(cases);
-    print_header(t, t->cases ? json_array_get(cases, 0) : result);
-    for (size_t i = 0; i < json_array_size(cases); i++)
-        print_answer(t, json_array_get(cases, i), client_json_text(json_array_get(cases, i), "name"));
-    if (!t->cases)
-        print_answer(t, result, "");
+    for (size_t row = 0, rows = count_rows(t, answer); row < rows; row++) {
+        const json_t *gauss = json_object_get(answer, "stress_gauss"), *at = json_array_get(t->nodes, row);
+        if (t->cases)
+            print_quoted(t->to, name);
+        if (t->place == AT_POINTS) {
+            const json_t *points = json_object_get(gauss, "points");
+            fprintf(t->to, "%.0f", json_number_value(json_array_get(json_object_get(gauss, "elements"), row)));
+            print_entry(t->to, json_array_get(points, row), width_of(points));
+            const json_t *stress = json_object_get(gauss, "stress");
+            print_entry(t->to, json_array_get(stress, row), width_of(stress));
+            fputc('\n', t->to);
+            return;
+        }
+        fprintf(t->to, "%zu", row);
+        if (t->place == AT_CONTACTS && json_array_size(t->nodes)) {
+            const json_t *node = json_array_get(t->contact_nodes, row);
+            print_value(t->to, node);
+            at = json_array_get(t->nodes, (size_t)json_integer_value(node));
+        }
+        if (json_array_size(t->nodes))
+            print_entry(t->to, at, width_of(t->nodes));
+        for (int i = 0; i < t->count; i++) {
+            const json_t *values = json_object_get(answer, t->name[i]);
+            print_entry(t->to, json_array_get(values, row), width_of(values));
+        }
+        fputc('\n', t->to);
+    }
 }
 
 /* ------------------------------------------------------------- the command */
@@ -249,7 +232,15 @@ client_exit client_table(client_session *s, const char *fields)
         code = fetch_result(s, &result, &t);
     t.to = code == CLIENT_OK ? open_memstream(&text, &len) : NULL;
     if (t.to) {
-        print_table(&t, result);
+        const json_t *cases = json_object_get(result, "cases");
+        t.nodes = json_object_get(result, "nodes");
+        t.contact_nodes = json_object_get(result, "contact_nodes");
+        t.cases = json_is_array(cases);
+        print_header(&t, t.cases ? json_array_get(cases, 0) : result);
+        for (size_t i = 0; i < json_array_size(cases); i++)
+            print_answer(&t, json_array_get(cases, i), client_json_text(json_array_get(cases, i), "name"));
+        if (!t.cases)
+            print_answer(&t, result, "");
         bool whole = !ferror(t.to);
         if (fclose(t.to) == 0 && whole)
             code = client_deliver(s, text, len);

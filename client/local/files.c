@@ -116,16 +116,12 @@ static bool write_beside(const char *path, const char *bytes, size_t count)
     return ok;
 }
 
-static bool write_standard_output(const char *bytes, size_t count)
-{
-    return fwrite(bytes, 1, count, stdout) == count && fflush(stdout) == 0;
-}
-
 bool client_file_write(const char *path, const char *bytes, size_t count, char *message, size_t size)
 {
     struct stat st;
     if (strcmp(path, "-") == 0)
-        return write_standard_output(bytes, count) || complain(message, size, "write to", "standard output");
+        return (fwrite(bytes, 1, count, stdout) == count && fflush(stdout) == 0) ||
+               complain(message, size, "write to", "standard output");
     bool plain = lstat(path, &st) != 0 || S_ISREG(st.st_mode);
     bool ok = plain ? write_beside(path, bytes, count) : write_directly(path, bytes, count);
     return ok || complain(message, size, "write", path);

@@ -15,11 +15,6 @@ void client_bodies_clear(client_bodies *bodies)
     *bodies = (client_bodies){0};
 }
 
-static bool edits(const client_options *o)
-{
-    return o->K || o->N || o->h || o->p || o->mesh || o->set.count || o->vary.count;
-}
-
 /* ------------------------------------------------------------------ files */
 
 static bool ends_in_gz(const char *path)
@@ -227,7 +222,7 @@ client_exit client_build(client_session *s, client_bodies *out)
     *out = (client_bodies){0};
     if (o->operand && !client_file_read(&file, o->operand, message, sizeof message))
         return client_complain(s, CLIENT_LOCAL, message);
-    if (edits(o)) {
+    if (o->K || o->N || o->h || o->p || o->mesh || o->set.count || o->vary.count) {
         code = build_edited(s, out, &file);
     } else {
         out->item = calloc(1, sizeof *out->item);

@@ -158,20 +158,6 @@ static size_t combinations(const varied *all, int count, bool in_case)
     return n;
 }
 
-static void append_name(char *name, size_t size, const json_t *value)
-{
-    size_t len = strlen(name);
-    char number[40], *dumped = NULL;
-    const char *text = json_string_value(value);
-    if (json_is_real(value)) {
-        snprintf(number, sizeof number, "%.15g", json_real_value(value));
-        text = number;
-    } else if (!text)
-        text = dumped = json_dumps(value, JSON_COMPACT | JSON_ENCODE_ANY | JSON_REAL_PRECISION(15));
-    snprintf(name + len, size - len, "%s%s", len ? "," : "", text ? text : "?");
-    free(dumped);
-}
-
 /* Puts the k-th combination into the request and its values into name; the last one varies fastest. */
 static bool put_combination(const varied *all, int count, bool in_case, size_t k, json_t *request, char *name,
                             size_t size)
@@ -186,7 +172,16 @@ static bool put_combination(const varied *all, int count, bool in_case, size_t k
         left /= json_array_size(all[i].values);
         json_t *value = json_array_get(all[i].values, k / left);
         k %= left;
-        append_name(name, size, value);
+        size_t len = strlen(name);
+        char number[40], *dumped = NULL;
+        const char *text = json_string_value(value);
+        if (json_is_real(value)) {
+            snprintf(number, sizeof number, "%.15g", json_real_value(value));
+            text = number;
+        } else if (!text)
+            text = dumped = json_dumps(value, JSON_COMPACT | JSON_ENCODE_ANY | JSON_REAL_PRECISION(15));
+        snprintf(name + len, size - len, "%s%s", len ? "," : "", text ? text : "?");
+        free(dumped);
         ok = client_path_set(&all[i].path, request, json_deep_copy(value), why, sizeof why);
     }
     return ok;

@@ -196,16 +196,6 @@ void client_http_trust(client_http *http, const char *token, const char *ca_file
     http->ca_file = ca_file && *ca_file ? ca_file : NULL;
 }
 
-static void set_limits(CURL *curl, const client_request *request)
-{
-    double left_ms = (request->deadline - client_clock()) * 1000;
-    long limit_ms = left_ms >= 1e9 ? 0 : left_ms < 1 ? 1 : (long)ceil(left_ms); /* 0: none */
-    curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT_MS, CONNECT_LIMIT_MS);
-    curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS, limit_ms);
-    curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
-    curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, (long)ceil(request->silence_s));
-}
-
 void client_http_set_watch(client_http *http, const client_http_watch *watch)
 {
     http->watch = watch;
@@ -239,7 +229,12 @@ static void set_request(client_http *http, body_sink *sink, const client_request
     curl_easy_setopt(curl, CURLOPT_HEADERFUNCTION, take_header);
     curl_easy_setopt(curl, CURLOPT_HEADERDATA, sink);
     curl_easy_setopt(curl, CURLOPT_CERTINFO, request->certificate ? 1L : 0L);
-    set_limits(curl, request);
+    double left_ms = (request->deadline - client_clock()) * 1000;
+    long limit_ms = left_ms >= 1e9 ? 0 : left_ms < 1 ? 1 : (long)ceil(left_ms); /* 0: none */
+    curl_easy_setopt(curl, CURLOPT_CONNECTTIMEOUT_MS, CONNECT_LIMIT_MS);
+    curl_easy_setopt(curl, CURLOPT_TIMEOUT_MS, limit_ms);
+    curl_easy_setopt(curl, CURLOPT_LOW_SPEED_LIMIT, 1L);
+    curl_easy_setopt(curl, CURLOPT_LOW_SPEED_TIME, (long)ceil(request->silence_s));
 }
 
 /* False: the watch wants to give up. *seconds of pause, or until something of the request happens if busy. */
@@ -343,15 +338,11 @@ static bool hopeless(CURLcode code)
            code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CONNECT_ERROR;
 }
 
-static bool is_passing(long status)
-{
-    return status == 429 || status == 502 || status == 503 || status == 504;
-}
-
 static bool worth_another(CURLcode code, const client_reply *reply, const client_request *request)
 {
     if (code == CURLE_OK)
-        return request->repeatable && is_passing(reply->status);
+        return request->repeatable &&
+               (reply->status == 429 || reply->status == 502 || reply->status == 503 || reply->status == 504);
     return never_arrived(code) || (request->repeatable && !hopeless(code));
 }
 

@@ -96,25 +96,21 @@ static client_verdict verdict_of(const json_t *line)
                                               : CLIENT_FAIL;
 }
 
-/* " at least 1 at most 3"; " near 5". */
-static void add_limits(char *out, size_t size, const json_t *line)
-{
-    static const char *const LIMITS[][2] = {{"min", "at least"}, {"max", "at most"}, {"near", "near"}};
-    for (size_t i = 0; i < sizeof LIMITS / sizeof LIMITS[0]; i++) {
-        double value = client_json_number(line, LIMITS[i][0]);
-        size_t used = strlen(out);
-        if (isfinite(value))
-            snprintf(out + used, size - used, " %s %.9g", LIMITS[i][1], value);
-    }
-}
-
 /* The user's own name, or what is asserted. */
 static void name_line(char *out, size_t size, const json_t *line)
 {
     const char *name = client_json_text(line, "name");
     snprintf(out, size, "%s", *name ? name : client_json_text(line, "quantity"));
-    if (!*name)
-        add_limits(out, size, line);
+    if (!*name) {
+        /* " at least 1 at most 3"; " near 5". */
+        static const char *const LIMITS[][2] = {{"min", "at least"}, {"max", "at most"}, {"near", "near"}};
+        for (size_t i = 0; i < sizeof LIMITS / sizeof LIMITS[0]; i++) {
+            double value = client_json_number(line, LIMITS[i][0]);
+            size_t used = strlen(out);
+            if (isfinite(value))
+                snprintf(out + used, size - used, " %s %.9g", LIMITS[i][1], value);
+        }
+    }
 }
 
 static void find_text(char *out, size_t size, const json_t *line)

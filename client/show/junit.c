@@ -158,32 +158,28 @@ static void put_suite(FILE *to, const client_suite *suite)
     fputs("  </testsuite>\n", to);
 }
 
-static void put_report(FILE *to, const client_suites *suites)
-{
-    size_t tests = 0, failures = 0, errors = 0;
-    double seconds = 0.0;
-    for (size_t i = 0; i < suites->count; i++) {
-        const client_suite *suite = &suites->item[i];
-        tests += suite->checks.count;
-        failures += count_tag(&suite->checks, "failure");
-        errors += count_tag(&suite->checks, "error");
-        seconds += isfinite(suite->seconds) ? suite->seconds : 0.0;
-    }
-    fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"uzawa\"", to);
-    put_counts(to, tests, failures, errors, seconds);
-    fputs(">\n", to);
-    for (size_t i = 0; i < suites->count; i++)
-        put_suite(to, &suites->item[i]);
-    fputs("</testsuites>\n", to);
-}
-
 bool client_junit_write(const client_suites *suites, const char *path, char *message, size_t size)
 {
     char *text = NULL;
     size_t len = 0;
     FILE *report = open_memstream(&text, &len);
-    if (report)
-        put_report(report, suites);
+    if (report) {
+        size_t tests = 0, failures = 0, errors = 0;
+        double seconds = 0.0;
+        for (size_t i = 0; i < suites->count; i++) {
+            const client_suite *suite = &suites->item[i];
+            tests += suite->checks.count;
+            failures += count_tag(&suite->checks, "failure");
+            errors += count_tag(&suite->checks, "error");
+            seconds += isfinite(suite->seconds) ? suite->seconds : 0.0;
+        }
+        fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"uzawa\"", report);
+        put_counts(report, tests, failures, errors, seconds);
+        fputs(">\n", report);
+        for (size_t i = 0; i < suites->count; i++)
+            put_suite(report, &suites->item[i]);
+        fputs("</testsuites>\n", report);
+    }
     bool ok = report && fflush(report) == 0 && !ferror(report);
     ok = report && fclose(report) == 0 && ok;
     if (!ok)

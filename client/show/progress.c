@@ -124,23 +124,6 @@ static void put_left(part *to, int rank, double seconds)
 
 enum { PARTS = 7 };
 
-static void fill_parts(part parts[PARTS], const client_progress *p)
-{
-    double now = client_clock();
-    memset(parts, 0, PARTS * sizeof *parts);
-    put(&parts[0], 1, "%.10s %3.0f %%", p->status, isfinite(p->percent) ? p->percent : 0);
-    put(&parts[1], 6, "%.1f s", now - p->start);
-    put(&parts[2], 5, "%s", phase_of(p));
-    if (isfinite(p->iteration))
-        put(&parts[3], 4, "iteration %.0f", p->iteration);
-    if (isfinite(p->relative))
-        put(&parts[4], 2, "error ~%.1e", p->relative);
-    if (isfinite(p->bound))
-        put(&parts[5], 7, "bound %.2e", p->bound);
-    if (strcmp(p->status, "running") == 0)
-        put_left(&parts[6], 3, client_progress_left(p, now));
-}
-
 /* The parts of rank 1..most with two blanks between them. Returns the length. */
 static int join(char out[ROOM], const part parts[PARTS], int most)
 {
@@ -156,7 +139,19 @@ static int join(char out[ROOM], const part parts[PARTS], int most)
 static int compose(char out[ROOM], const client_progress *p, int room)
 {
     part parts[PARTS];
-    fill_parts(parts, p);
+    double now = client_clock();
+    memset(parts, 0, PARTS * sizeof *parts);
+    put(&parts[0], 1, "%.10s %3.0f %%", p->status, isfinite(p->percent) ? p->percent : 0);
+    put(&parts[1], 6, "%.1f s", now - p->start);
+    put(&parts[2], 5, "%s", phase_of(p));
+    if (isfinite(p->iteration))
+        put(&parts[3], 4, "iteration %.0f", p->iteration);
+    if (isfinite(p->relative))
+        put(&parts[4], 2, "error ~%.1e", p->relative);
+    if (isfinite(p->bound))
+        put(&parts[5], 7, "bound %.2e", p->bound);
+    if (strcmp(p->status, "running") == 0)
+        put_left(&parts[6], 3, client_progress_left(p, now));
     int most = PARTS, len;
     while ((len = join(out, parts, most)) > room && most > 1)
         most--;

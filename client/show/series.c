@@ -14,14 +14,9 @@ void client_series_clear(client_series *series)
     *series = (client_series){0};
 }
 
-static size_t line_length(const char *line)
-{
-    return strcspn(line, "\r\n");
-}
-
 static const char *next_line(const char *line)
 {
-    line += line_length(line);
+    line += strcspn(line, "\r\n");
     return line + strspn(line, "\r\n");
 }
 

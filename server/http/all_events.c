@@ -92,13 +92,6 @@ static bool say(all_stream *s, const char *event, uint64_t number, const char *d
     return stream_say(&s->base, event, id, data);
 }
 
-static bool say_reset(all_stream *s)
-{
-    s->seen = feed_last(work_feed(s->context->work));
-    s->reset = false;
-    return say(s, "reset", s->seen, "{}");
-}
-
 static bool look(event_stream *base)
 {
     all_stream *s = (all_stream *)base;
@@ -106,8 +99,11 @@ static bool look(event_stream *base)
     feed_change changes[AT_ONCE];
     size_t count;
     uint64_t seen;
-    if (s->reset || !feed_since(work_feed(context->work), s->seen, changes, AT_ONCE, &count, &seen))
-        return say_reset(s);
+    if (s->reset || !feed_since(work_feed(context->work), s->seen, changes, AT_ONCE, &count, &seen)) {
+        s->seen = feed_last(work_feed(s->context->work));
+        s->reset = false;
+        return say(s, "reset", s->seen, "{}");
+    }
     bool ok = true;
     pthread_mutex_lock(&context->told->lock);
     for (size_t i = 0; ok && i < count; i++) {

@@ -28,13 +28,6 @@ typedef struct {
     int n;
 } curve_list;
 
-static void clear(curve_list *list)
-{
-    for (int k = 0; k < list->n; k++)
-        free(list->rows[k].rows);
-    list->n = 0;
-}
-
 /* The end of an id tells jobs of one minute apart; the beginning is the time. */
 static curve_name name_curve(const job *j, const char *case_name)
 {
@@ -151,17 +144,6 @@ static bool read_plot(const http_request *rq, uz_plot *out, problem_details *pro
     return true;
 }
 
-static void draw(const curve_list *list, const uz_plot *how, http_reply *reply)
-{
-    char *svg = NULL;
-    size_t len = 0;
-    uz_error err = {0};
-    if (uz_picture_convergence(&svg, &len, list->curves, list->n, how, &err) == UZ_OK)
-        reply_text(reply, 200, "image/svg+xml", svg, len);
-    else
-        reply_no_memory(reply); /* arguments were checked */
-}
-
 void convergence_get(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem;
@@ -178,9 +160,17 @@ void convergence_get(api *context, http_request *rq, http_reply *reply)
         add_others(&list, context, target_value(&rq->target, "with"), reply)) {
         snprintf(title, sizeof title, "Convergence of job %s", j.id);
         how.title = title;
-        draw(&list, &how, reply);
+        char *svg = NULL;
+        size_t len = 0;
+        uz_error err = {0};
+        if (uz_picture_convergence(&svg, &len, list.curves, list.n, &how, &err) == UZ_OK)
+            reply_text(reply, 200, "image/svg+xml", svg, len);
+        else
+            reply_no_memory(reply); /* arguments were checked */
     }
-    clear(&list);
+    for (int k = 0; k < list.n; k++)
+        free(list.rows[k].rows);
+    list.n = 0;
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }

@@ -158,13 +158,6 @@ static store_status read_answer(stored_answer *out, const field_reader *reader, 
     return status;
 }
 
-static void free_answer(stored_answer *answer)
-{
-    free(answer->u);
-    free(answer->r);
-    free(answer->g);
-}
-
 static void reply_failure(const field_reader *reader, uz_status status, const uz_error *err, http_reply *reply)
 {
     problem_details problem;
@@ -204,7 +197,9 @@ static bool compute(void *out, computation run, const field_reader *reader, int6
     } else {
         reply_store_failure(reader->context, found, reply);
     }
-    free_answer(&answer);
+    free(answer.u);
+    free(answer.r);
+    free(answer.g);
     return done;
 }
 

@@ -16,39 +16,30 @@ typedef struct {
     uz_picture how; /* picture; its title is the name of the case for all */
 } file_wanted;
 
-static void write_file(api *context, const http_request *rq, const job *j, int64_t number, const file_wanted *wanted,
-                       http_reply *reply)
-{
-    field_reader reader;
-    char *text = NULL;
-    size_t len = 0;
-    if (fields_open(&reader, context, rq, j, reply)) {
-        if (wanted->kind == FILE_PICTURE && fields_picture(&text, &len, &reader, number, &wanted->how, reply))
-            reply_text(reply, 200, "image/svg+xml", text, len);
-        else if (wanted->kind == FILE_VTU && fields_vtu(&text, &len, &reader, number, wanted->which, reply))
-            reply_text(reply, 200, "application/xml", text, len);
-        else if (wanted->kind == FILE_SURFACE &&
-                 fields_surface(&text, &len, &reader, number, wanted->which, wanted->how.title, reply))
-            reply_text(reply, 200, "model/gltf-binary", text, len);
-    }
-    fields_close(&reader);
-}
-
-static void reply_case(api *context, const http_request *rq, const job *j, file_wanted *wanted, http_reply *reply)
-{
-    results_place at;
-    if (results_one(&at, context, rq, j, "a file", reply)) {
-        wanted->how.title = at.name;
-        write_file(context, rq, j, at.number, wanted, reply);
-    }
-    results_place_clear(&at);
-}
-
 static void find_and_reply(api *context, http_request *rq, file_wanted *wanted, http_reply *reply)
 {
     job j = {0};
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply))
-        reply_case(context, rq, &j, wanted, reply);
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply)) {
+        results_place at;
+        if (results_one(&at, context, rq, &j, "a file", reply)) {
+            wanted->how.title = at.name;
+            field_reader reader;
+            char *text = NULL;
+            size_t len = 0;
+            if (fields_open(&reader, context, rq, &j, reply)) {
+                if (wanted->kind == FILE_PICTURE &&
+                    fields_picture(&text, &len, &reader, at.number, &wanted->how, reply))
+                    reply_text(reply, 200, "image/svg+xml", text, len);
+                else if (wanted->kind == FILE_VTU && fields_vtu(&text, &len, &reader, at.number, wanted->which, reply))
+                    reply_text(reply, 200, "application/xml", text, len);
+                else if (wanted->kind == FILE_SURFACE &&
+                         fields_surface(&text, &len, &reader, at.number, wanted->which, wanted->how.title, reply))
+                    reply_text(reply, 200, "model/gltf-binary", text, len);
+            }
+            fields_close(&reader);
+        }
+        results_place_clear(&at);
+    }
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }

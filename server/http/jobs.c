@@ -229,7 +229,7 @@ void jobs_acknowledge(api *context, job *j, http_reply *reply)
     reply_job(context, jobs_ended(j) ? 200 : 202, j, reply);
 }
 
-static void submit(api *context, http_request *rq, const store_request *request, http_reply *reply)
+void jobs_store_and_wait(api *context, http_request *rq, const store_request *request, http_reply *reply)
 {
     job j = {0};
     if (jobs_store(context, rq, request, &j, reply))
@@ -311,7 +311,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     } else {
         codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
         store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
-        submit(context, rq, &stored, reply);
+        jobs_store_and_wait(context, rq, &stored, reply);
     }
 done:
     codec_request_clear(&request);

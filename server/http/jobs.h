@@ -40,6 +40,9 @@ bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
 /* Stores a request and tells the workers. False with a failure in reply; the caller clears *out. */
 bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply);
 
+/* Stores a request, waits as it prefers and answers with the job. */
+void jobs_store_and_wait(api *context, http_request *rq, const store_request *request, http_reply *reply);
+
 /* True with *out if the request came before with this key (NULL: none) and this body. Then it is answered as it was,
  * also where it would be refused now: what it names may be gone since, or a limit lower. The caller clears *out. */
 bool jobs_find_repeat(api *context, http_request *rq, const char *key, job *out);

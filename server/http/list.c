@@ -12,11 +12,6 @@ static bool refuse(problem_details *problem, const char *text)
     return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed", "%s", text);
 }
 
-static bool is_id(const char *text)
-{
-    return strlen(text) == 32 && strspn(text, "0123456789abcdef") == 32;
-}
-
 /* ---- times */
 
 /* Seconds east of Greenwich for "Z", "+hh:mm" or "-hh:mm"; a '+' that was not escaped arrives as a space. */
@@ -104,7 +99,7 @@ static bool read_query(const http_request *rq, store_query *query, problem_detai
     query->ascending = order && strcmp(order, "asc") == 0;
     if (status && !job_status_parse(&query->status, status))
         return refuse(problem, "status must be accepted, running, successful, failed or dismissed");
-    if (query->before && !is_id(query->before))
+    if (query->before && !(strlen(query->before) == 32 && strspn(query->before, "0123456789abcdef") == 32))
         return refuse(problem, "cursor must be the \"next\" of an earlier page");
     if (order && !query->ascending && strcmp(order, "desc") != 0)
         return refuse(problem, "order must be desc (newest first) or asc");

@@ -54,14 +54,6 @@ static void make_request(api *context, const http_request *rq, const job *old, c
     *body = NULL;
 }
 
-static void submit(api *context, http_request *rq, const store_request *request, http_reply *reply)
-{
-    job j = {0};
-    if (jobs_store(context, rq, request, &j, reply))
-        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
-    job_clear(&j);
-}
-
 /* A run on a grid that nobody gave can't go on: another accuracy asks for another grid. */
 static bool chose_cells(api *context, const job *j)
 {
@@ -72,36 +64,6 @@ static bool chose_cells(api *context, const job *j)
     return status == STORE_OK;
 }
 
-static void refine(api *context, http_request *rq, const job *old, const char *key, http_reply *reply)
-{
-    char *old_body = NULL, *body = NULL;
-    codec_request made = {0};
-    size_t old_len = 0, len = 0;
-    store_status status = store_get_body(context->store, old->id, &old_body, &old_len);
-    if (status != STORE_OK) {
-        reply_store_failure(context, status, reply);
-    } else if (codec_is_verify(old_body, old_len)) {
-        reply_refuse(reply, 409, "not_solved_here", "The job solved nothing",
-                     "it certified an answer that was given to it, and there is no run to continue");
-    } else if (chose_cells(context, old)) {
-        reply_refuse(
-            reply, 409, "mesh_is_chosen", "The job chose its mesh",
-            "the cells of its box were chosen for its accuracy: send the problem again with another accuracy, or "
-            "with the cells of this job's summary");
-    } else {
-        make_request(context, rq, old, old_body, old_len, &body, &len, &made, reply);
-        free(old_body); /* as large as the new one: not kept while the client waits */
-        old_body = NULL;
-        store_request request = jobs_request(&made, body, len, key);
-        request.refines = old->id;
-        if (body)
-            submit(context, rq, &request, reply);
-    }
-    free(old_body);
-    free(body);
-    codec_request_clear(&made);
-}
-
 void jobs_refine(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem = {0};
@@ -109,8 +71,34 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
     char *key = NULL;
     if (!jobs_read_key(rq, &key, &problem))
         reply_problem(reply, &problem);
-    else if (jobs_load(context, rq, &old, reply) && results_exist(&old, reply) && has_reactions(context, &old, reply))
-        refine(context, rq, &old, key, reply);
+    else if (jobs_load(context, rq, &old, reply) && results_exist(&old, reply) && has_reactions(context, &old, reply)) {
+        char *old_body = NULL, *body = NULL;
+        codec_request made = {0};
+        size_t old_len = 0, len = 0;
+        store_status status = store_get_body(context->store, old.id, &old_body, &old_len);
+        if (status != STORE_OK) {
+            reply_store_failure(context, status, reply);
+        } else if (codec_is_verify(old_body, old_len)) {
+            reply_refuse(reply, 409, "not_solved_here", "The job solved nothing",
+                         "it certified an answer that was given to it, and there is no run to continue");
+        } else if (chose_cells(context, &old)) {
+            reply_refuse(
+                reply, 409, "mesh_is_chosen", "The job chose its mesh",
+                "the cells of its box were chosen for its accuracy: send the problem again with another accuracy, or "
+                "with the cells of this job's summary");
+        } else {
+            make_request(context, rq, &old, old_body, old_len, &body, &len, &made, reply);
+            free(old_body); /* as large as the new one: not kept while the client waits */
+            old_body = NULL;
+            store_request request = jobs_request(&made, body, len, key);
+            request.refines = old.id;
+            if (body)
+                jobs_store_and_wait(context, rq, &request, reply);
+        }
+        free(old_body);
+        free(body);
+        codec_request_clear(&made);
+    }
     job_clear(&old);
     free(key);
 }

@@ -333,29 +333,25 @@ static bool add_cases(many *of, http_reply *reply)
     return true;
 }
 
-static void encode_cases(many *of, http_reply *reply)
-{
-    const place whole = {.j = of->j, .summary = of->j->summary};
-    size_t len = 0;
-    of->all = codec_results_begin(of->j->id, of->j->summary);
-    if (!of->all) {
-        reply_no_memory(reply);
-    } else if (!add_cases(of, reply)) {
-        codec_results_drop(of->all);
-    } else {
-        codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL, of->fields);
-        char *text = codec_results_end(of->all, &rest, &len);
-        reply_text(reply, 200, "application/json", text, len);
-    }
-}
-
 static void reply_cases(many *of, const http_request *rq, http_reply *reply)
 {
     store_status status = fetch_shared(of->context, of->j, of->fields, &of->shared);
     if (status != STORE_OK)
         reply_store_failure(of->context, status, reply);
-    else if (!(of->fields->which & COMPUTED) || fields_open(&of->reader, of->context, rq, of->j, reply))
-        encode_cases(of, reply);
+    else if (!(of->fields->which & COMPUTED) || fields_open(&of->reader, of->context, rq, of->j, reply)) {
+        const place whole = {.j = of->j, .summary = of->j->summary};
+        size_t len = 0;
+        of->all = codec_results_begin(of->j->id, of->j->summary);
+        if (!of->all) {
+            reply_no_memory(reply);
+        } else if (!add_cases(of, reply)) {
+            codec_results_drop(of->all);
+        } else {
+            codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL, of->fields);
+            char *text = codec_results_end(of->all, &rest, &len);
+            reply_text(reply, 200, "application/json", text, len);
+        }
+    }
     if (of->fields->which & COMPUTED)
         fields_close(&of->reader);
     vectors_free(&of->shared);
@@ -385,6 +381,35 @@ bool results_cases(api *context, const http_request *rq, const job *j, store_cas
     *cases = NULL;
     *count = 0;
     return false;
+}
+
+bool results_one(results_place *out, api *context, const http_request *rq, const job *j, const char *what,
+                 http_reply *reply)
+{
+    *out = (results_place){.summary = j->summary};
+    if (!results_cases(context, rq, j, &out->cases, &out->count, reply))
+        return false;
+    if (out->count == 0)
+        return true;
+    if (!target_value(&rq->target, "case")) {
+        char title[96];
+        problem_details problem;
+        snprintf(title, sizeof title, "Each load case has %s of its own", what);
+        http_problem(&problem, 400, "case_needed", title, "say which one with ?case=NAME.");
+        cases_list(&problem, out->cases, out->count);
+        reply_problem(reply, &problem);
+        return false;
+    }
+    out->number = out->cases[0].number;
+    out->name = out->cases[0].name;
+    out->summary = out->cases[0].summary;
+    return true;
+}
+
+void results_place_clear(results_place *at)
+{
+    store_cases_free(at->cases, at->count);
+    *at = (results_place){.number = 0};
 }
 
 static void reply_result(api *context, const http_request *rq, const job *j, const field_list *fields,

@@ -137,17 +137,6 @@ static const char *why_not_ready(api *context)
 
 static const double READY_FOR_S = 1.0; /* so often at most it is tried, however many ask */
 
-static void try_ready(api *context, char why[64])
-{
-    pthread_mutex_lock(&context->ready_lock);
-    if (http_now() >= context->ready_until) {
-        snprintf(context->ready_why, sizeof context->ready_why, "%s", why_not_ready(context));
-        context->ready_until = http_now() + READY_FOR_S;
-    }
-    memcpy(why, context->ready_why, sizeof context->ready_why);
-    pthread_mutex_unlock(&context->ready_lock);
-}
-
 void service_ready(api *context, http_request *rq, http_reply *reply)
 {
     int64_t counts[5] = {0};
@@ -158,7 +147,13 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
         reply_refuse(reply, 503, "draining", "The server is shutting down", "no new work is taken");
         return;
     }
-    try_ready(context, why);
+    pthread_mutex_lock(&context->ready_lock);
+    if (http_now() >= context->ready_until) {
+        snprintf(context->ready_why, sizeof context->ready_why, "%s", why_not_ready(context));
+        context->ready_until = http_now() + READY_FOR_S;
+    }
+    memcpy(why, context->ready_why, sizeof context->ready_why);
+    pthread_mutex_unlock(&context->ready_lock);
     if (!why[0] && store_counts(context->store, counts) != STORE_OK)
         snprintf(why, sizeof why, "store_unavailable");
     if (strcmp(why, "solver_unavailable") == 0) {
@@ -204,4 +199,22 @@ void service_schema(api *context, http_request *rq, http_reply *reply)
 {
     (void)context;
     reply_embedded(rq->name, "application/schema+json", reply);
+}
+
+/* ---- for administrators */
+
+/* POST, because it costs as much as reading the whole file. */
+void admin_check(api *context, http_request *rq, http_reply *reply)
+{
+    store_findings found;
+    (void)rq;
+    store_status status = store_check(context->store, &found);
+    if (status != STORE_OK) {
+        reply_store_failure(context, status, reply);
+        return;
+    }
+    if (found.findings[0])
+        log_write(context->log, LOG_ERROR, "database_damaged", (log_field[]){LOG_S("findings", found.findings), {0}});
+    reply_json(reply, 200, codec_encode_findings(found.findings, found.jobs, found.seconds));
+    free(found.findings);
 }

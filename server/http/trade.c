@@ -35,28 +35,25 @@ static bool find_mesh_error(codec_trade *of, api *context, const http_request *r
     return done;
 }
 
-static void reply_record(api *context, const http_request *rq, const job *j, http_reply *reply)
-{
-    results_place at;
-    codec_trade of = {.job_id = j->id};
-    size_t len = 0;
-    if (results_one(&at, context, rq, j, "a record", reply) && read_record(&of.trade, context, j, at.number, reply)) {
-        of.case_name = at.name;
-        if (!codec_read_trade(&of, at.summary))
-            reply_no_memory(reply);
-        else if (find_mesh_error(&of, context, rq, j, at.number, reply)) {
-            char *text = codec_encode_trade(&of, &len);
-            reply_text(reply, 200, "application/json", text, len);
-        }
-    }
-    results_place_clear(&at);
-}
-
 void trade_get(api *context, http_request *rq, http_reply *reply)
 {
     job j = {0};
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply))
-        reply_record(context, rq, &j, reply);
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply)) {
+        results_place at;
+        codec_trade of = {.job_id = j.id};
+        size_t len = 0;
+        if (results_one(&at, context, rq, &j, "a record", reply) &&
+            read_record(&of.trade, context, &j, at.number, reply)) {
+            of.case_name = at.name;
+            if (!codec_read_trade(&of, at.summary))
+                reply_no_memory(reply);
+            else if (find_mesh_error(&of, context, rq, &j, at.number, reply)) {
+                char *text = codec_encode_trade(&of, &len);
+                reply_text(reply, 200, "application/json", text, len);
+            }
+        }
+        results_place_clear(&at);
+    }
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }

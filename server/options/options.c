@@ -23,17 +23,6 @@ bool options_set(server_options *o, const uz_option *row, const char *text, char
     return false;
 }
 
-static void set_defaults(server_options *o)
-{
-    const uz_option_table table = options_table();
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    memset(o, 0, sizeof *o);
-    for (size_t i = 0; i < table.count; i++)
-        if (table.rows[i].normal && table.rows[i].normal[0])
-            uz_option_set(o, &table.rows[i], table.rows[i].normal);
-    o->workers = cores < 1 ? 1 : cores > 1024 ? 1024 : (int)cores;
-}
-
 void options_split(option_words *out, const char *list)
 {
     out->n = 0;
@@ -187,7 +176,13 @@ static bool check_together(const server_options *o, char *message, size_t size)
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size)
 {
     flags f = {.verdict = OPTIONS_RUN};
-    set_defaults(out);
+    const uz_option_table table = options_table();
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    memset(out, 0, sizeof *out);
+    for (size_t i = 0; i < table.count; i++)
+        if (table.rows[i].normal && table.rows[i].normal[0])
+            uz_option_set(out, &table.rows[i], table.rows[i].normal);
+    out->workers = cores < 1 ? 1 : cores > 1024 ? 1024 : (int)cores;
     options_verdict verdict = read_flags(&f, argc, argv, message, size);
     if (verdict == OPTIONS_WRONG || verdict == OPTIONS_HELP || verdict == OPTIONS_VERSION)
         return verdict;

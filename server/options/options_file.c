@@ -60,17 +60,6 @@ static bool read_value(char *text)
     return true;
 }
 
-static bool refuse_name(const line_place *at, const char *name)
-{
-    char what[256];
-    const char *meant = uz_option_closest(options_table(), OPTION_SETTING, name, strlen(name));
-    if (meant)
-        snprintf(what, sizeof what, "there is no option \"%.60s\": did you mean \"%s\"?", name, meant);
-    else
-        snprintf(what, sizeof what, "there is no option \"%.60s\": uzawad --help lists them", name);
-    return refuse(at, what);
-}
-
 static bool take_line(server_options *o, char *text, const line_place *at)
 {
     const uz_option_table table = options_table();
@@ -84,8 +73,15 @@ static bool take_line(server_options *o, char *text, const line_place *at)
     *equals = '\0';
     char *name = trim(text), *value = trim(equals + 1);
     const uz_option *row = uz_option_find(table, OPTION_SETTING, name, strlen(name));
-    if (!row)
-        return refuse_name(at, name);
+    if (!row) {
+        char what[256];
+        const char *meant = uz_option_closest(options_table(), OPTION_SETTING, name, strlen(name));
+        if (meant)
+            snprintf(what, sizeof what, "there is no option \"%.60s\": did you mean \"%s\"?", name, meant);
+        else
+            snprintf(what, sizeof what, "there is no option \"%.60s\": uzawad --help lists them", name);
+        return refuse(at, what);
+    }
     if (strcmp(name, "config") == 0)
         return refuse(at, "a file can't name another one: take this line out");
     int *line = &o->line[row - table.rows];

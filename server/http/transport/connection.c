@@ -244,11 +244,6 @@ static bool read_framing(connection *c, struct MHD_Connection *mhd, const char *
     return true;
 }
 
-static bool has_body(const http_request *rq)
-{
-    return rq->chunked || rq->length > 0;
-}
-
 bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
     http_request *rq = c->request;
@@ -269,7 +264,7 @@ bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *m
                      !c->server->tls);
         return true;
     }
-    if (framed && !has_body(rq))
+    if (framed && !(rq->chunked || rq->length > 0))
         return true; /* answered in connection_answer, so that the connection can stay open */
     rq->unread_body = true;
     rq->reply.close = true;

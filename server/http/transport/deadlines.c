@@ -33,22 +33,18 @@ double http_now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static void cut(const deadlines *all, deadline *d)
-{
-    d->expired = true;
-    d->at = INFINITY;
-    if (d->speak)
-        (void)send(d->fd, all->last_words, strlen(all->last_words), MSG_DONTWAIT | MSG_NOSIGNAL);
-    shutdown(d->fd, SHUT_RDWR);
-}
-
 /* Cuts what is overdue and returns the earliest deadline left. */
 static double sweep(const deadlines *all, double now)
 {
     double earliest = INFINITY;
     for (deadline *d = all->first; d; d = d->next) {
-        if (d->at <= now)
-            cut(all, d);
+        if (d->at <= now) {
+            d->expired = true;
+            d->at = INFINITY;
+            if (d->speak)
+                (void)send(d->fd, all->last_words, strlen(all->last_words), MSG_DONTWAIT | MSG_NOSIGNAL);
+            shutdown(d->fd, SHUT_RDWR);
+        }
         earliest = fmin(earliest, d->at);
     }
     return earliest;

@@ -35,24 +35,19 @@ static double delayed_due(void *ctx, bool told)
     return told ? 0.0 : fmin(d->until, http_now() + LOOK_AGAIN_S);
 }
 
-static void make_message(delayed_reply *d)
-{
-    http_request *rq = d->rq;
-    d->make(d, &rq->reply);
-    negotiate(rq, &rq->reply);
-    request_note_reply(rq);
-    rq->reply.close = true;
-    d->message = reply_message(&rq->reply, &d->len);
-    reply_clear(&rq->reply);
-}
-
 static ptrdiff_t delayed_read(void *ctx, char *out, size_t size)
 {
     delayed_reply *d = ctx;
     if (!d->message) {
         if (!is_over(d))
             return 0;
-        make_message(d);
+        http_request *rq = d->rq;
+        d->make(d, &rq->reply);
+        negotiate(rq, &rq->reply);
+        request_note_reply(rq);
+        rq->reply.close = true;
+        d->message = reply_message(&rq->reply, &d->len);
+        reply_clear(&rq->reply);
     }
     if (!d->message)
         return REPLY_STREAM_BREAKS;

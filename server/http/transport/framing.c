@@ -110,16 +110,6 @@ static bool read_coding(framing *out, const header_field *field, const char *ver
     return true;
 }
 
-static bool check_expect(const header_list *headers, problem_details *problem)
-{
-    size_t count;
-    const header_field *field = header_find(headers, "Expect", &count);
-    if (count > 1 || (field && !token_equal(field->value, field->value_len, "100-continue")))
-        return http_problem(problem, 417, "expectation_failed", "The expectation is not met",
-                            "the only expectation is \"100-continue\"");
-    return true;
-}
-
 /* White space behind a value is none of it (RFC 9110, section 5.5); libmicrohttpd leaves it there. Not before the
  * fields that say how long the body is have been read: libmicrohttpd takes those with it for something else. */
 static void trim_values(header_list *headers)
@@ -149,7 +139,12 @@ bool framing_read(framing *out, const char *version, header_list *headers, probl
     if ((length && !read_length(out, length, problem)) || (coding && !read_coding(out, coding, version, problem)))
         return false;
     trim_values(headers);
-    return check_expect(headers, problem);
+    size_t count;
+    const header_field *field = header_find(headers, "Expect", &count);
+    if (count > 1 || (field && !token_equal(field->value, field->value_len, "100-continue")))
+        return http_problem(problem, 417, "expectation_failed", "The expectation is not met",
+                            "the only expectation is \"100-continue\"");
+    return true;
 }
 
 /* The end of the line that ends at `at`: CR LF became two NULs. */

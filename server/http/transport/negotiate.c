@@ -64,14 +64,9 @@ static bool field_has_tag(const header_field *field, const char *tag)
     return false;
 }
 
-static bool is_read(const http_request *rq)
-{
-    return strcmp(rq->method, "GET") == 0 || strcmp(rq->method, "HEAD") == 0;
-}
-
 bool reply_unchanged(const http_request *rq, http_reply *reply)
 {
-    if (!reply->tag[0] || !is_read(rq))
+    if (!reply->tag[0] || !(strcmp(rq->method, "GET") == 0 || strcmp(rq->method, "HEAD") == 0))
         return false;
     for (size_t i = 0; i < rq->headers.count; i++) {
         const header_field *field = &rq->headers.fields[i];
@@ -128,18 +123,6 @@ static bool same_representation(const http_request *rq, const http_reply *reply)
                       memcmp(field->value + 1, reply->tag, len) == 0);
 }
 
-static void take_range(http_reply *reply, int64_t from, int64_t to)
-{
-    snprintf(reply->content_range, sizeof reply->content_range, "bytes %lld-%lld/%zu", (long long)from, (long long)to,
-             reply->len);
-    reply->status = 206;
-    reply->len = (size_t)(to - from + 1);
-    if (reply->has_file)
-        reply->offset = (size_t)from;
-    else if (reply->body)
-        memmove(reply->body, reply->body + from, reply->len);
-}
-
 /* True if the reply is a part, or says that there is no such part. */
 static bool apply_range(const http_request *rq, http_reply *reply)
 {
@@ -151,7 +134,14 @@ static bool apply_range(const http_request *rq, http_reply *reply)
     size_t size = reply->len;
     range_kind kind = read_range(field, (int64_t)size, &from, &to);
     if (kind == RANGE_GOOD) {
-        take_range(reply, from, to);
+        snprintf(reply->content_range, sizeof reply->content_range, "bytes %lld-%lld/%zu", (long long)from,
+                 (long long)to, reply->len);
+        reply->status = 206;
+        reply->len = (size_t)(to - from + 1);
+        if (reply->has_file)
+            reply->offset = (size_t)from;
+        else if (reply->body)
+            memmove(reply->body, reply->body + from, reply->len);
     } else if (kind == RANGE_BEYOND) {
         reply_refuse(reply, 416, "range_not_satisfiable", "There is no such range", "the representation has %zu bytes",
                      size);

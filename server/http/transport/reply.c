@@ -282,17 +282,6 @@ done:
     return sent;
 }
 
-/* What libmicrohttpd adds to the replies that it sends (RFC 9110, section 6.6.1). */
-static void put_date(FILE *out)
-{
-    static const char DAYS[] = "SunMonTueWedThuFriSat", MONTHS[] = "JanFebMarAprMayJunJulAugSepOctNovDec";
-    struct tm t;
-    time_t now = time(NULL);
-    if (gmtime_r(&now, &t))
-        fprintf(out, "Date: %.3s, %02d %.3s %04d %02d:%02d:%02d GMT\r\n", DAYS + 3 * t.tm_wday, t.tm_mday,
-                MONTHS + 3 * t.tm_mon, t.tm_year + 1900, t.tm_hour, t.tm_min, t.tm_sec);
-}
-
 static char *write_message(const http_reply *reply, bool chunked, size_t *len)
 {
     field fields[MAX_FIELDS];
@@ -303,7 +292,13 @@ static char *write_message(const http_reply *reply, bool chunked, size_t *len)
         return NULL;
     size_t n = list_fields(fields, reply, &texts);
     fprintf(out, "HTTP/1.1 %d %s\r\n", reply->status, MHD_get_reason_phrase_for((unsigned)reply->status));
-    put_date(out);
+    /* What libmicrohttpd adds to the replies that it sends (RFC 9110, section 6.6.1). */
+    static const char DAYS[] = "SunMonTueWedThuFriSat", MONTHS[] = "JanFebMarAprMayJunJulAugSepOctNovDec";
+    struct tm t;
+    time_t now = time(NULL);
+    if (gmtime_r(&now, &t))
+        fprintf(out, "Date: %.3s, %02d %.3s %04d %02d:%02d:%02d GMT\r\n", DAYS + 3 * t.tm_wday, t.tm_mday,
+                MONTHS + 3 * t.tm_mon, t.tm_year + 1900, t.tm_hour, t.tm_min, t.tm_sec);
     for (size_t i = 0; i < n; i++)
         fprintf(out, "%s: %s\r\n", fields[i].name, fields[i].value);
     if (chunked)

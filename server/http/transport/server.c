@@ -220,20 +220,6 @@ transport_counts transport_count(transport *server)
 
 static const double REPLY_S = 0.5, REFUSE_S = 5.0;
 
-/* Nothing more is heard, and what is being said gets a moment. libmicrohttpd 0.9.75 must not be stopped while it
- * refuses a request by itself: MHD_queue_response then takes no reply but says that it did, and the reply that is not
- * there is read (transmit_error_response_len). */
-static void let_end(transport *server)
-{
-    double begun = http_now(), spent = 0.0;
-    deadlines_hear_no_more(server->deadlines);
-    while (atomic_load(&server->connections) > 0 &&
-           (spent < REPLY_S || (atomic_load(&server->refusing) > 0 && spent < REFUSE_S))) {
-        nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
-        spent = http_now() - begun;
-    }
-}
-
 void transport_stop(transport *server)
 {
     if (!server)
@@ -241,7 +227,16 @@ void transport_stop(transport *server)
     transport_drain(server); /* event streams end */
     atomic_store(&server->stopping, true);
     MHD_socket listening = MHD_quiesce_daemon(server->daemon);
-    let_end(server);
+    /* Nothing more is heard, and what is being said gets a moment. libmicrohttpd 0.9.75 must not be stopped while it
+     * refuses a request by itself: MHD_queue_response then takes no reply but says that it did, and the reply that is
+     * not there is read (transmit_error_response_len). */
+    double begun = http_now(), spent = 0.0;
+    deadlines_hear_no_more(server->deadlines);
+    while (atomic_load(&server->connections) > 0 &&
+           (spent < REPLY_S || (atomic_load(&server->refusing) > 0 && spent < REFUSE_S))) {
+        nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
+        spent = http_now() - begun;
+    }
     MHD_stop_daemon(server->daemon);
     if (listening != MHD_INVALID_SOCKET)
         close(listening);

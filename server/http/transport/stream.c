@@ -45,57 +45,44 @@ bool stream_say(event_stream *s, const char *event, const char *id, const char *
 
 /* ---- the reply's reader */
 
-static ptrdiff_t take(event_stream *s, char *out, size_t size)
-{
-    size_t n = s->len - s->at < size ? s->len - s->at : size;
-    memcpy(out, s->text + s->at, n);
-    s->at += n;
-    if (s->at == s->len) {
-        free(s->text);
-        s->text = NULL;
-        s->len = s->at = 0;
-    }
-    return (ptrdiff_t)n;
-}
-
-static ptrdiff_t heartbeat(event_stream *s, char *out, size_t size)
-{
-    static const char COMMENT[] = ":\n\n";
-    if (size < sizeof COMMENT)
-        return REPLY_STREAM_ENDS;
-    s->spoke = http_now();
-    memcpy(out, COMMENT, sizeof COMMENT - 1);
-    return sizeof COMMENT - 1;
-}
-
-/* Until there may be something to tell; what comes in quick succession is told together. */
-static void sleep_until_told(event_stream *s)
-{
-    double due = s->spoke + HEARTBEAT_S - http_now(), pause = s->told + s->every_s - http_now();
-    if (feed_wait(s->listener, s->rq->fd, fmax(due, 0.001)))
-        for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->rq->server->draining);
-             pause = s->told + s->every_s - http_now())
-            feed_wait(s->listener, s->rq->fd, pause);
-}
-
 /* Blocks until there is something to send; does not where the stream is held. */
 static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
 {
     event_stream *s = ctx;
     for (;;) {
-        if (s->text)
-            return take(s, out, size);
+        if (s->text) {
+            size_t n = s->len - s->at < size ? s->len - s->at : size;
+            memcpy(out, s->text + s->at, n);
+            s->at += n;
+            if (s->at == s->len) {
+                free(s->text);
+                s->text = NULL;
+                s->len = s->at = 0;
+            }
+            return (ptrdiff_t)n;
+        }
         if (s->ended || atomic_load(&s->rq->server->draining))
             return REPLY_STREAM_ENDS;
         if (request_client_gone(s->rq) || !s->look(s))
             return REPLY_STREAM_BREAKS;
         if (s->text)
             continue;
-        if (http_now() - s->spoke >= HEARTBEAT_S)
-            return heartbeat(s, out, size);
+        if (http_now() - s->spoke >= HEARTBEAT_S) {
+            static const char COMMENT[] = ":\n\n";
+            if (size < sizeof COMMENT)
+                return REPLY_STREAM_ENDS;
+            s->spoke = http_now();
+            memcpy(out, COMMENT, sizeof COMMENT - 1);
+            return sizeof COMMENT - 1;
+        }
         if (s->held)
             return 0;
-        sleep_until_told(s);
+        /* Until there may be something to tell; what comes in quick succession is told together. */
+        double due = s->spoke + HEARTBEAT_S - http_now(), pause = s->told + s->every_s - http_now();
+        if (feed_wait(s->listener, s->rq->fd, fmax(due, 0.001)))
+            for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->rq->server->draining);
+                 pause = s->told + s->every_s - http_now())
+                feed_wait(s->listener, s->rq->fd, pause);
     }
 }
 
