@@ -109,31 +109,25 @@ void fields_close(field_reader *reader)
 
 /* ---------------------------------------------------------------- computing */
 
-/* The cells that were chosen for a box go into it. */
-static store_status take_cells(uz_box *box, const field_reader *reader)
+/* The scene with the loads of the case, and the cells that were chosen for a box; borrowed. */
+static store_status read_scene(uz_scene *out, const field_reader *reader, int64_t number)
 {
+    const uz_problem *problem = &reader->request.problem;
     double *cells = NULL;
     int64_t count = 0;
-    if (!box->automatic)
+    *out = problem->scene;
+    if (number > 0 && number <= problem->n_cases && problem->cases[number - 1].loads) {
+        out->loads = problem->cases[number - 1].loads;
+        out->n_loads = problem->cases[number - 1].n_loads;
+    }
+    if (!out->box.automatic)
         return STORE_OK;
     store_status status = store_get_vector(reader->context->store, reader->j->id, 0, "cells", &cells, &count);
     for (int i = 0; status == STORE_OK && i < 3 && i < count; i++)
-        box->cells[i] = (int64_t)cells[i];
-    box->automatic = status != STORE_OK;
+        out->box.cells[i] = (int64_t)cells[i];
+    out->box.automatic = status != STORE_OK;
     free(cells);
     return status;
-}
-
-/* The scene with the loads of the case; borrowed. */
-static uz_scene scene_of_case(const field_reader *reader, int64_t number)
-{
-    const uz_problem *problem = &reader->request.problem;
-    uz_scene scene = problem->scene;
-    if (number > 0 && number <= problem->n_cases && problem->cases[number - 1].loads) {
-        scene.loads = problem->cases[number - 1].loads;
-        scene.n_loads = problem->cases[number - 1].n_loads;
-    }
-    return scene;
 }
 
 typedef struct {
@@ -174,131 +168,64 @@ static void reply_failure(const field_reader *reader, uz_status status, const uz
     }
 }
 
-/* Either of the two that follow, on what the store has. */
-typedef uz_status (*computation)(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                                 const uz_hooks *hooks, uz_error *err);
-
-static bool compute(void *out, computation run, const field_reader *reader, int64_t number, unsigned which,
-                    http_reply *reply)
+static uz_status write_surface(field_output *out, const uz_scene *scene, const uz_field_source *answer,
+                               const field_reader *reader, const uz_hooks *hooks, uz_error *err)
 {
-    const uz_hooks hooks = {.ctx = (void *)reader, .cancelled = is_over};
-    uz_scene scene = scene_of_case(reader, number);
-    stored_answer answer;
-    uz_error err = {0};
-    bool done = false;
-    store_status found = read_answer(&answer, reader, number);
-    if (found == STORE_OK)
-        found = take_cells(&scene.box, reader);
-    if (found == STORE_OK) {
-        uz_status status = run(out, &scene, &answer.source, which, &hooks, &err);
-        done = status == UZ_OK;
-        if (!done)
-            reply_failure(reader, status, &err, reply);
-    } else {
-        reply_store_failure(reader->context, found, reply);
-    }
-    free(answer.u);
-    free(answer.r);
-    free(answer.g);
-    return done;
-}
-
-static uz_status run_fields(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                            const uz_hooks *hooks, uz_error *err)
-{
-    return uz_fields_compute(out, scene, answer, which, hooks, err);
-}
-
-bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply)
-{
-    *out = (uz_fields){.dim = 0};
-    return compute(out, run_fields, reader, number, which, reply);
-}
-
-typedef struct {
-    char *text;
-    size_t len;
-} file_text;
-
-static uz_status run_vtu(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                         const uz_hooks *hooks, uz_error *err)
-{
-    file_text *file = out;
-    return uz_vtu_write(&file->text, &file->len, scene, answer, which, hooks, err);
-}
-
-bool fields_vtu(char **text, size_t *len, const field_reader *reader, int64_t number, unsigned which, http_reply *reply)
-{
-    file_text file = {NULL, 0};
-    const bool done = compute(&file, run_vtu, reader, number, which, reply);
-    *text = file.text;
-    *len = file.len;
-    return done;
-}
-
-typedef struct {
-    file_text file;
-    const uz_picture *how;
-} drawing;
-
-static uz_status run_picture(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                             const uz_hooks *hooks, uz_error *err)
-{
-    drawing *d = out;
-    (void)which;
-    return uz_picture_deformed(&d->file.text, &d->file.len, scene, answer, d->how, hooks, err);
-}
-
-bool fields_picture(char **text, size_t *len, const field_reader *reader, int64_t number, const uz_picture *how,
-                    http_reply *reply)
-{
-    drawing d = {.how = how};
-    const bool done = compute(&d, run_picture, reader, number, 0, reply);
-    *text = d.file.text;
-    *len = d.file.len;
-    return done;
-}
-
-typedef struct {
-    file_text file;
-    const char *job_id, *case_name;
-} surface_file;
-
-static uz_status run_surface(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                             const uz_hooks *hooks, uz_error *err)
-{
-    surface_file *s = out;
     uz_surface surface;
-    uz_status status = uz_surface_compute(&surface, scene, answer, which, FIELDS_MOST_SURFACE, hooks, err);
+    uz_status status = uz_surface_compute(&surface, scene, answer, out->which, FIELDS_MOST_SURFACE, hooks, err);
     if (status == UZ_OK) {
-        const codec_surface what = {&surface, scene, s->job_id, s->case_name};
-        s->file.text = codec_encode_surface(&what, &s->file.len);
-        status = s->file.text ? UZ_OK : UZ_ERR_MEMORY;
+        const codec_surface what = {&surface, scene, reader->j->id, out->case_name};
+        out->text = codec_encode_surface(&what, &out->len);
+        status = out->text ? UZ_OK : UZ_ERR_MEMORY;
     }
     uz_surface_clear(&surface);
     return status;
 }
 
-bool fields_surface(char **file, size_t *len, const field_reader *reader, int64_t number, unsigned which,
-                    const char *case_name, http_reply *reply)
+static uz_status write_output(field_output *out, const uz_scene *scene, const uz_field_source *answer,
+                              const field_reader *reader, uz_error *err)
 {
-    surface_file s = {.job_id = reader->j->id, .case_name = case_name};
-    const bool done = compute(&s, run_surface, reader, number, which, reply);
-    *file = s.file.text;
-    *len = s.file.len;
-    return done;
+    const uz_hooks hooks = {.ctx = (void *)reader, .cancelled = is_over};
+    switch (out->kind) {
+    case OUTPUT_FIELDS:
+        return uz_fields_compute(out->fields, scene, answer, out->which, &hooks, err);
+    case OUTPUT_MESH_ERROR:
+        return uz_mesh_error(&out->mesh_error, scene, answer, &hooks, err);
+    case OUTPUT_VTU:
+        return uz_vtu_write(&out->text, &out->len, scene, answer, out->which, &hooks, err);
+    case OUTPUT_PICTURE:
+        return uz_picture_deformed(&out->text, &out->len, scene, answer, &out->how, &hooks, err);
+    case OUTPUT_SURFACE:
+        return write_surface(out, scene, answer, reader, &hooks, err);
+    }
+    return UZ_ERR_ARGUMENT;
 }
 
-static uz_status run_mesh_error(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
-                                const uz_hooks *hooks, uz_error *err)
+bool fields_make(field_output *out, const field_reader *reader, int64_t number, http_reply *reply)
 {
-    (void)which;
-    return uz_mesh_error(out, scene, answer, hooks, err);
+    uz_scene scene;
+    stored_answer answer;
+    uz_error err = {0};
+    uz_status status = UZ_ERR_ARGUMENT;
+    store_status found = read_answer(&answer, reader, number);
+    if (found == STORE_OK)
+        found = read_scene(&scene, reader, number);
+    if (found == STORE_OK)
+        status = write_output(out, &scene, &answer.source, reader, &err);
+    free(answer.u);
+    free(answer.r);
+    free(answer.g);
+    if (found != STORE_OK)
+        reply_store_failure(reader->context, found, reply);
+    else if (status != UZ_OK)
+        reply_failure(reader, status, &err, reply);
+    return found == STORE_OK && status == UZ_OK;
 }
 
-bool fields_mesh_error(double *error, const field_reader *reader, int64_t number, http_reply *reply)
+bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply)
 {
-    return compute(error, run_mesh_error, reader, number, 0, reply);
+    *out = (uz_fields){.dim = 0};
+    return fields_make(&(field_output){.kind = OUTPUT_FIELDS, .which = which, .fields = out}, reader, number, reply);
 }
 
 /* -------------------------------------------------------------------- names */

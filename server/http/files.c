@@ -9,37 +9,19 @@ static const unsigned IN_VTU = (STORED | COMPUTED | UZ_FIELD_MATERIALS) & ~(unsi
 static const unsigned VTU_BY_DEFAULT = UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_VON_MISES |
                                        UZ_FIELD_PRESSURE | UZ_FIELD_GAPS | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_MATERIALS;
 
-/* What is asked for. */
-typedef struct {
-    enum { FILE_VTU, FILE_PICTURE, FILE_SURFACE } kind;
-    unsigned which; /* vtu, surface: uz_field bits */
-    uz_picture how; /* picture; its title is the name of the case for all */
-} file_wanted;
-
-static void find_and_reply(api *context, http_request *rq, file_wanted *wanted, http_reply *reply)
+static void find_and_reply(api *context, http_request *rq, field_output *wanted, const char *type, http_reply *reply)
 {
     job j = {0};
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply)) {
-        results_place at;
-        if (results_one(&at, context, rq, &j, "a file", reply)) {
-            wanted->how.title = at.name;
-            field_reader reader;
-            char *text = NULL;
-            size_t len = 0;
-            if (fields_open(&reader, context, rq, &j, reply)) {
-                if (wanted->kind == FILE_PICTURE &&
-                    fields_picture(&text, &len, &reader, at.number, &wanted->how, reply))
-                    reply_text(reply, 200, "image/svg+xml", text, len);
-                else if (wanted->kind == FILE_VTU && fields_vtu(&text, &len, &reader, at.number, wanted->which, reply))
-                    reply_text(reply, 200, "application/xml", text, len);
-                else if (wanted->kind == FILE_SURFACE &&
-                         fields_surface(&text, &len, &reader, at.number, wanted->which, wanted->how.title, reply))
-                    reply_text(reply, 200, "model/gltf-binary", text, len);
-            }
-            fields_close(&reader);
-        }
-        results_place_clear(&at);
+    results_place at = {.number = 0};
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
+        results_one(&at, context, rq, &j, "a file", reply)) {
+        field_reader reader;
+        wanted->how.title = wanted->case_name = at.name;
+        if (fields_open(&reader, context, rq, &j, reply) && fields_make(wanted, &reader, at.number, reply))
+            reply_text(reply, 200, type, wanted->text, wanted->len);
+        fields_close(&reader);
     }
+    results_place_clear(&at);
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }
@@ -51,7 +33,8 @@ void results_get_vtu(api *context, http_request *rq, http_reply *reply)
     if (!results_fields(rq, &fields, VTU_BY_DEFAULT, IN_VTU, &problem))
         reply_problem(reply, &problem);
     else
-        find_and_reply(context, rq, &(file_wanted){.which = fields.which}, reply);
+        find_and_reply(context, rq, &(field_output){.kind = OUTPUT_VTU, .which = fields.which}, "application/xml",
+                       reply);
 }
 
 static const unsigned IN_SURFACE = UZ_FIELD_DISPLACEMENTS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE;
@@ -63,7 +46,8 @@ void results_get_surface(api *context, http_request *rq, http_reply *reply)
     if (!results_fields(rq, &fields, IN_SURFACE, IN_SURFACE, &problem))
         reply_problem(reply, &problem);
     else
-        find_and_reply(context, rq, &(file_wanted){.kind = FILE_SURFACE, .which = fields.which}, reply);
+        find_and_reply(context, rq, &(field_output){.kind = OUTPUT_SURFACE, .which = fields.which}, "model/gltf-binary",
+                       reply);
 }
 
 /* The colour: "displacements" or "von_mises". */
@@ -95,12 +79,12 @@ void results_get_picture(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem;
     int64_t width = 900;
-    file_wanted wanted = {.kind = FILE_PICTURE};
+    field_output wanted = {.kind = OUTPUT_PICTURE};
     if (!read_colour(rq, &wanted.how.colour, &problem) || !read_factor(rq, &wanted.how.factor, &problem) ||
         !request_integer(rq, "width", 200, 4000, &width, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
     wanted.how.width = (int)width;
-    find_and_reply(context, rq, &wanted, reply);
+    find_and_reply(context, rq, &wanted, "image/svg+xml", reply);
 }

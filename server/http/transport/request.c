@@ -2,6 +2,7 @@
 #include "http/transport/message.h"
 
 #include <errno.h>
+#include <math.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,30 +58,48 @@ static long preference_wait(const char *at, const char *end)
     return seconds;
 }
 
-static long field_wait(const header_field *field)
+/* A walk over the members of the lists (RFC 9110, section 5.6.1) in all header fields of one name. */
+typedef struct {
+    const header_list *headers;
+    const char *field;
+    size_t next;           /* field to look at */
+    const char *rest, *to; /* of the present one */
+    const char *at, *end;  /* the member */
+} member_walk;
+
+static bool next_member(member_walk *w)
 {
-    const char *at = field->value, *end = at + field->value_len;
-    while (at < end) {
-        const char *next = member_end(at, end, ',');
-        long seconds = preference_wait(skip_space(at, next), next);
-        if (seconds >= 0)
-            return seconds;
-        at = next + (next < end);
+    while (w->rest == w->to) {
+        if (w->next == w->headers->count)
+            return false;
+        const header_field *field = &w->headers->fields[w->next++];
+        if (!token_equal(field->name, field->name_len, w->field))
+            continue;
+        w->rest = field->value;
+        w->to = field->value + field->value_len;
     }
-    return -1;
+    w->end = member_end(w->rest, w->to, ',');
+    w->at = skip_space(w->rest, w->end);
+    w->rest = w->end + (w->end < w->to);
+    return true;
+}
+
+/* The member without its parameters is this token. */
+static bool member_is(const member_walk *w, const char *token)
+{
+    const char *end = trim_end(w->at, member_end(w->at, w->end, ';'));
+    return token_equal(w->at, (size_t)(end - w->at), token);
 }
 
 double request_wait(const http_request *rq, double otherwise, double max_wait_s)
 {
-    for (size_t i = 0; i < rq->headers.count; i++) {
-        const header_field *field = &rq->headers.fields[i];
-        if (!token_equal(field->name, field->name_len, "Prefer"))
-            continue;
-        long seconds = field_wait(field);
+    member_walk w = {.headers = &rq->headers, .field = "Prefer"};
+    while (next_member(&w)) {
+        long seconds = preference_wait(w.at, w.end);
         if (seconds >= 0)
-            return (double)seconds < max_wait_s ? (double)seconds : max_wait_s;
+            return fmin((double)seconds, max_wait_s);
     }
-    return otherwise < max_wait_s ? otherwise : max_wait_s;
+    return fmin(otherwise, max_wait_s);
 }
 
 /* True for ";q=0", ";q=0.000" among a media range's parameters. */
@@ -94,56 +113,24 @@ static bool quality_is_zero(const char *at, const char *end)
     return false;
 }
 
-static bool field_accepts(const header_field *field, const char *type)
-{
-    const char *at = field->value, *end = at + field->value_len;
-    while (at < end) {
-        const char *next = member_end(at, end, ',');
-        const char *name = skip_space(at, next);
-        const char *name_end = trim_end(name, member_end(name, next, ';'));
-        if (token_equal(name, (size_t)(name_end - name), type) && !quality_is_zero(name, next))
-            return true;
-        at = next + (next < end);
-    }
-    return false;
-}
-
 bool request_accepts(const http_request *rq, const char *type)
 {
-    for (size_t i = 0; i < rq->headers.count; i++) {
-        const header_field *field = &rq->headers.fields[i];
-        if (token_equal(field->name, field->name_len, "Accept") && field_accepts(field, type))
+    member_walk w = {.headers = &rq->headers, .field = "Accept"};
+    while (next_member(&w))
+        if (member_is(&w, type) && !quality_is_zero(w.at, w.end))
             return true;
-    }
     return false;
-}
-
-/* -1: the field does not name the coding, else whether it takes it. */
-static int field_takes(const header_field *field, const char *coding)
-{
-    const char *at = field->value, *end = at + field->value_len;
-    while (at < end) {
-        const char *next = member_end(at, end, ',');
-        const char *name = skip_space(at, next);
-        const char *name_end = trim_end(name, member_end(name, next, ';'));
-        if (token_equal(name, (size_t)(name_end - name), coding))
-            return !quality_is_zero(name, next);
-        at = next + (next < end);
-    }
-    return -1;
 }
 
 bool request_takes_gzip(const http_request *rq)
 {
     static const char *const NAMES[] = {"gzip", "x-gzip", "*"}; /* the star is for those that are not named */
-    for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; k++)
-        for (size_t i = 0; i < rq->headers.count; i++) {
-            const header_field *field = &rq->headers.fields[i];
-            bool named = token_equal(field->name, field->name_len, "Accept-Encoding");
-            int takes = named ? field_takes(field, NAMES[k]) : -1;
-            if (takes >= 0)
-                return takes;
-        }
+    for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; k++) {
+        member_walk w = {.headers = &rq->headers, .field = "Accept-Encoding"};
+        while (next_member(&w))
+            if (member_is(&w, NAMES[k]))
+                return !quality_is_zero(w.at, w.end);
+    }
     return false;
 }
 
