@@ -9,10 +9,9 @@
         .name = NAME, .kind = UZ_OPTION_##KIND, .offset = offsetof(server_options, MEMBER), .places = OPTION_SETTING,  \
         __VA_ARGS__                                                                                                    \
     }
-#define REQUEST(NAME, KIND, VERDICT, VALUE, ABOUT)                                                                     \
+#define REQUEST(NAME, KIND, ...)                                                                                       \
     {                                                                                                                  \
-        .name = NAME, .kind = UZ_OPTION_##KIND, .places = OPTION_REQUEST, .least = VERDICT, .value = VALUE,            \
-        .about = ABOUT                                                                                                 \
+        .name = NAME, .kind = UZ_OPTION_##KIND, .places = OPTION_REQUEST, __VA_ARGS__                                  \
     }
 
 /* "https://host[:port]" as a browser sends it, or "*". */
@@ -121,16 +120,17 @@ static const uz_option ROWS[] = {
     SETTING("access-log", SWITCH, access_log, .value = "yes|no", .normal = "yes",
             .about = "log a line for each request"),
     /* What is asked for instead of a run; `least` says what. */
-    REQUEST("check-config", FLAG, OPTIONS_CHECK, NULL,
-            "print the values in effect and where they come from, look at the files and the address that they name, "
-            "and end"),
-    REQUEST("example-config", FLAG, OPTIONS_EXAMPLE, NULL, "print a configuration file with every option, and end"),
-    REQUEST("check-db", FLAG, OPTIONS_CHECK_DB, NULL,
-            "look whether the file of --db is whole, also while a daemon uses it, and end"),
-    REQUEST("backup", WORD, OPTIONS_BACKUP, "FILE",
-            "copy the database to a new FILE, also while a daemon uses it, and end"),
-    REQUEST("version", FLAG, OPTIONS_VERSION, NULL, NULL),
-    REQUEST("help", FLAG, OPTIONS_HELP, NULL, NULL),
+    REQUEST("check-config", FLAG, .least = OPTIONS_CHECK,
+            .about = "print the values in effect and where they come from, look at the files and the address that they "
+                     "name, and end"),
+    REQUEST("example-config", FLAG, .least = OPTIONS_EXAMPLE,
+            .about = "print a configuration file with every option, and end"),
+    REQUEST("check-db", FLAG, .least = OPTIONS_CHECK_DB,
+            .about = "look whether the file of --db is whole, also while a daemon uses it, and end"),
+    REQUEST("backup", WORD, .least = OPTIONS_BACKUP, .value = "FILE",
+            .about = "copy the database to a new FILE, also while a daemon uses it, and end"),
+    REQUEST("version", FLAG, .least = OPTIONS_VERSION),
+    REQUEST("help", FLAG, .least = OPTIONS_HELP),
 };
 #define N_ROWS (sizeof ROWS / sizeof ROWS[0])
 _Static_assert(N_ROWS <= OPTIONS_MAX, "server_options has room for the sources");

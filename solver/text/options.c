@@ -199,10 +199,10 @@ void uz_option_wants(char *out, size_t size, const uz_option *row)
 
 const uz_option *uz_option_find(uz_option_table table, unsigned places, const char *name, size_t len)
 {
-    for (size_t i = 0; i < table.count; i++)
-        if (table.rows[i].places & places && strlen(table.rows[i].name) == len &&
-            memcmp(table.rows[i].name, name, len) == 0)
-            return &table.rows[i];
+    const uz_option *row = table.rows;
+    for (size_t i = 0; i < table.count; i++, row++)
+        if (row->places & places && strlen(row->name) == len && memcmp(row->name, name, len) == 0)
+            return row;
     return NULL;
 }
 
