@@ -2,6 +2,8 @@
  * exact the answer then is, against a solution of some 30 digits. */
 #include "figures/figures.h"
 
+#include "harness.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
