@@ -57,7 +57,7 @@ ROTATION, STRAIN = constant(0.1, r"MOST_ROTATION = ([\d.]+)"), constant(0.05, r"
 
 
 def reference(row):
-    """A row of the table of the paper's plate: its numbers are those that a test compares with."""
+    """A row of the table of the paper's body: its numbers are those that a test compares with."""
     return lambda program: all(number in (program.root / "tests/api/test_reference.py").read_text() for number in row)
 
 
@@ -76,7 +76,7 @@ PHRASES = {
     "Computing 56, 1996": None, "Contact Mechanics, 1985": None,
     # rules of the program
     "from Poisson's ratio 0.4 on, except in plane stress": constant(0.4, r"#define NEARLY_INCOMPRESSIBLE ([\d.]+)"),
-    "the default there, is 5 %": constant(5e-2, r"UZ_BALANCED_TOTAL_ERROR ([\de.-]+)"), "the paper's plate 5 % takes": None, "cells, and 2 % takes": None,  # asked for
+    "the default there, is 5 %": constant(5e-2, r"UZ_BALANCED_TOTAL_ERROR ([\de.-]+)"), "the paper's body 5 % takes": None, "cells, and 2 % takes": None,  # asked for
     "start near an obstacle (2 % of the body's extent": constant(0.02, r"UZ_CANDIDATES_REACH ([\d.]+)"),
     "(0.1 rad), `large_strain` (0.05),": lambda program: ROTATION(program) and STRAIN(program),
     "normal turns by 0.1 rad on the way": constant(0.1, r"MOST_TURN = ([\d.]+)"),

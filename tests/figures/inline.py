@@ -84,7 +84,7 @@ def of_soak(name, text):
 
 
 def mesh_error(problem):
-    """Of the plate at a size."""
+    """Of a problem."""
     def value(data):
         row = next((row for row in (data.get("figures") or {"precision": []})["precision"] if row["name"] == problem), None)
         return row and tables.percent(row["mesh_error"])
@@ -97,7 +97,7 @@ def gradient_digits(data):
 
 
 def over_peers(key):
-    """The fastest other solver over ours on the paper's plate, from the least to the largest ratio."""
+    """The fastest other solver over ours on the paper's body, from the least to the largest ratio."""
     def value(data):
         found = [row[key] for row in (data.get("peers") or {}).get("body", []) if row[key] is not None]
         return f"{sig(min(found))} to {sig(max(found))} times" if found else None

@@ -127,8 +127,7 @@ Times are medians of several runs in one thread after a warm-up, of the processo
 them in the CSV files with minima and maxima. "load" is that of the minute before (older data: of the measurement itself too), "processors of others" how many other programs
 kept busy meanwhile; where that is above {stamp.QUIET_OTHERS}, or unknown with a load above {stamp.QUIET_LOAD:.0f}, the numbers count as measured beside other work, and say so.
 
-*Cold* is a solve with nothing in the cache, *cached* one whose factor is there; d is the number of unknowns, m of contact rows. The paper's body is the plate of [the
-paper](theory.md#the-paper)."""
+*Cold* is a solve with nothing in the cache, *cached* one whose factor is there; d is the number of unknowns, m of contact rows. The paper's body is the plate of [the paper](theory.md#the-paper)."""
 
 RESIDUAL = """The paper's body and stopping rule, with the step 1/λ_max(N K⁻¹ N'). The residual is the paper's: of r with the displacement of that iteration, which in the
 accelerated methods belongs to the extrapolated ρ: e1 = N'(ρ − r) is most of it, and vanishes for an iteration where a restart sets ρ = r."""
