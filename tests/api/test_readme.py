@@ -207,6 +207,33 @@ def test_every_error_code_is_explained(_):
 
 
 @options(None)
+def test_references_are_complete(s):
+    """What programs and operators look up: routes with their parameters, outcomes, warnings, fields, options."""
+    def enums(node, key):
+        """What may stand at a key, wherever a schema has it."""
+        if isinstance(node, dict):
+            found = node.get("properties", {}).get(key, {}).get("enum", [])
+            return set(found).union(*(enums(value, key) for value in node.values()))
+        return set().union(*(enums(value, key) for value in node)) if isinstance(node, list) else set()
+
+    text, summary = (ROOT / "docs/http.md").read_text(), json.loads((service.SCHEMAS / "summary.json").read_text())
+    paths = json.loads((service.SCHEMAS / "openapi.json").read_text())["paths"]
+    routes = [f"{method.upper()} {path}" for path, methods in paths.items() for method in methods if method in ("get", "post", "delete")]
+    words = routes + [one["name"] for methods in paths.values() for method in methods.values() if isinstance(method, dict)
+                      for one in method.get("parameters", [])
+                      if one.get("in") == "query" and one["name"] != "validate"]
+    words += enums(summary, "outcome") | enums(summary, "code")
+    check(len(words) > 60 and "mesh_limit" in words and "locking" in words, words)
+    missing = [word for word in words if f"`{word}`" not in text]
+    check(not missing, "docs/http.md says nothing about", missing)
+    told = subprocess.run([f"{s.build}/uzawad", "--help"], capture_output=True, text=True, timeout=20).stdout
+    flags = set(re.findall(r"--[a-z-]+[a-z]", told))
+    check(len(flags) > 40, flags)
+    missing = [flag for flag in sorted(flags) if f"`{flag}`" not in (ROOT / "docs/operations.md").read_text()]
+    check(not missing, "docs/operations.md says nothing about", missing)
+
+
+@options(None)
 def test_demo(_):
     """What `make demo` runs, of whose answer the README has the lines."""
     done = subprocess.run(["tests/demo.sh", str(pathlib.Path(sys.argv[1]).resolve())], cwd=ROOT, capture_output=True,
