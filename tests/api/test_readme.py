@@ -27,7 +27,7 @@ MOST_LINES, WIDTH = 150, 120
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 # Pages of the plug points, which come with the changes that they describe.
 TO_COME = {f"docs/architecture/{name}.md" for name in ("element-type", "mesh-reader", "dual-form", "contact-law", "method", "contact-discretization",
-                                                       "obstacle", "http", "output", "run")}
+                                                       "obstacle", "output", "run")}
 
 
 def blocks(text):
