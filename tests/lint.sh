@@ -67,5 +67,5 @@ check shell shell_syntax
 check cholmod_only_in_factor only_in 'cholmod' '^solver/factor/'
 check sqlite_only_in_its_engine only_in 'sqlite3' '^server/store/sqlite/'
 check microhttpd_only_in_transport only_in 'microhttpd' '^server/http/transport/'
-check jansson_only_in_codec only_in 'jansson' '^(server/codec|client)/'
+check jansson_only_in_client only_in 'jansson' '^client/'
 exit $status

@@ -1,8 +1,7 @@
-/* codec.h: JSON in, JSON out. The only folder that knows jansson.
+/* codec.h: JSON in, JSON out.
  *
- * In: bytes -> json_scan (strict grammar, duplicate keys, NUL bytes; lifts big number arrays and long strings out of
- * the text so that they never become jansson values) -> jansson (the small rest) -> schema check (schemas/request.json)
- * -> decode into the solver's plain structs.
+ * In: bytes -> json_scan (strict grammar, duplicate keys, NUL bytes; a tree with arrays of numbers as values) -> schema
+ * check (schemas/request.json) -> decode into the solver's plain structs.
  * Out: a growing text; every function returns malloc'ed NUL-terminated text or NULL when there is no memory. */
 #ifndef SERVER_CODEC_H
 #define SERVER_CODEC_H
@@ -15,7 +14,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Once, before threads start: seeds jansson's hash and parses the embedded schemas. False: message says why. */
+/* Once, before threads start: parses the embedded schemas. False: message says why. */
 bool codec_init(char *message, size_t size);
 void codec_end(void);
 

@@ -1,7 +1,6 @@
-#include "codec/codec.h"
+/* decode.c: a request: the text, its schema, its parts, and what only the whole of it tells. */
 #include "codec/decode.h"
 #include "codec/problem.h"
-#include "codec/schema.h"
 #include "codec/text.h"
 
 #include <stdio.h>
@@ -18,7 +17,6 @@ static const codec_limits NO_LIMITS = {JSON_MAX_DEPTH, INT64_MAX, INT64_MAX, INT
 bool codec_init(char *message, size_t size)
 {
     codec_end();
-    json_object_seed(0);
     limits = NO_LIMITS;
     loaded = schemas_load(message, size);
     return loaded != NULL;
@@ -43,11 +41,6 @@ int json_depth_limit(void)
 const schemas *decode_schemas(void)
 {
     return loaded;
-}
-
-bool decode_check(const json_doc *doc, const char *schema, problem_details *problem)
-{
-    return schemas_check(loaded, schema, doc, problem);
 }
 
 static int http_status(uz_status status)
@@ -112,56 +105,23 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
     out->line = err->line;
 }
 
-/* Tags are compared as C strings by the store, and shown in terminals. */
-static bool check_tags(const json_t *tags, problem_details *problem)
+/* The array as text. Tags are compared as C strings by the store, and shown in terminals. */
+static bool decode_tags(char **out, decoding *d, const json_value *tags)
 {
-    size_t i;
-    json_t *tag;
-    json_array_foreach(tags, i, tag)
-    {
-        const char *word = json_string_value(tag);
-        json_path list = {NULL, "tags", 4, 0}, path = {&list, NULL, 0, i};
-        for (size_t k = 0; k < json_string_length(tag); k++)
-            if ((unsigned char)word[k] < 0x20 || word[k] == 0x7f) {
-                problem_set(problem, 422, "not_allowed", &path, "/tags/%zu has a control character; tags are words.",
-                            i);
-                return false;
+    text t = {0};
+    text_open(&t, '[');
+    for (size_t i = 0; i < json_size(tags); i++) {
+        const json_value *tag = &tags->items[i];
+        for (size_t k = 0; k < tag->count; k++)
+            if ((unsigned char)tag->text[k] < 0x20 || tag->text[k] == 0x7f) {
+                free(t.data);
+                return decode_refuse(d, "not_allowed", tag, "has a control character; tags are words.");
             }
+        text_string(&t, tag->text);
     }
-    return true;
-}
-
-static bool decode_tags(char **out, const json_t *tags, problem_details *problem)
-{
-    if (!check_tags(tags, problem))
-        return false;
-    text none = {0};
-    if (!tags)
-        text_put(&none, "[]");
-    *out = tags ? json_dumps(tags, JSON_COMPACT) : text_finish(&none, NULL);
-    if (!*out)
-        problem_set(problem, 503, "out_of_memory", NULL, "There is not enough memory for this request now.");
-    return *out != NULL;
-}
-
-/* object NULL: nobody is told. */
-static bool decode_webhook(char **out, const json_t *object, problem_details *problem)
-{
-    const char *url = json_string_value(json_object_get(object, "url"));
-    if (!url)
-        return true;
-    *out = strdup(url);
-    return *out || decode_no_memory(problem);
-}
-
-static bool decode_problem(uz_problem *out, json_doc *doc, size_t body_len, problem_details *problem)
-{
-    const json_t *object = json_object_get(doc->root, "problem");
-    const char *kind = json_string_value(json_object_get(object, "kind"));
-    bool scene = strcmp(kind, "scene") == 0;
-    out->kind = scene ? UZ_PROBLEM_SCENE : UZ_PROBLEM_MATRICES;
-    return scene ? decode_scene(&out->scene, doc, object, body_len, problem)
-                 : decode_matrices(&out->qp, doc, object, body_len, problem);
+    text_close(&t, ']');
+    *out = text_finish(&t, NULL);
+    return *out || problem_no_memory(d->problem);
 }
 
 /* ---- sizes that only the whole request tells */
@@ -199,13 +159,13 @@ static bool check_columns(const codec_request *request, problem_details *problem
 {
     bool scene = request->problem.kind == UZ_PROBLEM_SCENE;
     int columns = request->answer.columns, dim = uz_scene_dim(&request->problem.scene);
-    json_path answer = {NULL, "answer", 6, 0}, path = {&answer, "displacements", 13, 0};
     if (columns == 0 || (scene && columns == dim))
         return true;
-    problem_set(problem, 422, "size_mismatch", &path, "/answer/displacements has points of %d numbers; %s.", columns,
+    problem_set(problem, 422, "size_mismatch", NULL, "/answer/displacements has points of %d numbers; %s.", columns,
                 !scene     ? "a problem in matrices has single numbers"
                 : dim == 2 ? "this scene has 2 directions"
                            : "this scene has 3 directions");
+    snprintf(problem->pointer, sizeof problem->pointer, "/answer/displacements");
     return false;
 }
 
@@ -255,33 +215,26 @@ static bool check_sizes(const codec_request *request, problem_details *problem)
            check_count("/answer/reactions", answer->n_r, m, "contact rows", problem);
 }
 
-static const char *schema_of(codec_kind kind, const json_doc *doc)
-{
-    bool verify = kind == CODEC_VERIFY || (kind == CODEC_STORED && json_object_get(doc->root, "answer"));
-    return verify ? "verify.json" : "request.json";
-}
-
 /* A box whose cells are to be chosen has no mesh yet that a vector could belong to, and no other rule than the error
  * that they could be chosen by. */
-static bool decode_automatic(codec_request *out, const json_t *solver, bool verify, problem_details *problem)
+static bool decode_automatic(codec_request *out, decoding *d, const json_value *root)
 {
-    json_path top = {NULL, "problem", 7, 0}, mesh = {&top, "mesh", 4, 0}, box = {&mesh, "box", 3, 0};
-    json_path cells = {&box, "cells", 5, 0}, root = {NULL, "solver", 6, 0};
-    json_path stopping = {&root, "stopping", 8, 0}, start = {&root, "warm_start", 10, 0};
+    const json_value *solver = json_get(root, "solver"), *start = json_get(solver, "warm_start");
+    const json_value *box = json_get(json_get(json_get(root, "problem"), "mesh"), "box");
     const uz_problem *p = &out->problem;
     if (p->kind != UZ_PROBLEM_SCENE || !p->scene.box.automatic)
         return true;
-    if (!json_object_get(solver, "accuracy"))
+    if (!json_get(solver, "accuracy"))
         out->settings.balanced = true;
-    if (verify)
-        problem_set(problem, 422, "not_allowed", &cells,
+    if (json_get(root, "answer"))
+        problem_set(d->problem, 422, "not_allowed", json_get(box, "cells"),
                     "An answer belongs to a mesh: give the numbers of its cells in place of \"auto\".");
     else if (out->settings.stopping == UZ_STOP_PAPER)
-        problem_set(problem, 422, "not_allowed", &stopping,
+        problem_set(d->problem, 422, "not_allowed", json_get(solver, "stopping"),
                     "The paper's rule bounds no error that the cells of the box could be chosen by.");
-    else if (json_object_get(solver, "warm_start"))
+    else if (start)
         problem_set(
-            problem, 422, "not_allowed", &start,
+            d->problem, 422, "not_allowed", start,
             "Reactions belong to a mesh, and the cells of the box are still to be chosen: each grid starts from "
             "the one before it.");
     else
@@ -289,36 +242,43 @@ static bool decode_automatic(codec_request *out, const json_t *solver, bool veri
     return false;
 }
 
-/* The parts of a checked document, each where the next may need it. */
-static bool decode_parts(codec_request *out, json_doc *doc, size_t len, problem_details *problem)
+/* The parts of a checked tree, each where the next may need it. */
+static bool decode_parts(codec_request *out, decoding *d, const json_value *root)
 {
-    const json_t *solver = json_object_get(doc->root, "solver"), *answer = json_object_get(doc->root, "answer");
+    const json_value *solver = json_get(root, "solver"), *answer = json_get(root, "answer");
+    const json_value *problem = json_get(root, "problem");
+    const char *webhook = json_text_of(json_get(root, "webhook"), "url");
     decode_settings(&out->settings, solver);
-    out->priority = (int)json_real_value(json_object_get(doc->root, "priority")); /* 0 where there is none */
-    out->queue_limit_s = json_real_value(json_object_get(doc->root, "queue_limit_s"));
-    return decode_webhook(&out->webhook, json_object_get(doc->root, "webhook"), problem) &&
-           decode_tags(&out->tags, json_object_get(doc->root, "tags"), problem) &&
-           decode_problem(&out->problem, doc, len, problem) && decode_automatic(out, solver, answer != NULL, problem) &&
-           decode_cases(&out->problem, doc, json_object_get(doc->root, "cases"), len, problem) &&
-           decode_start(&out->start, doc, json_object_get(solver, "warm_start"), len, problem) &&
-           decode_assertions(out, json_object_get(doc->root, "assert"), problem) &&
-           (!answer || decode_answer(&out->answer, doc, answer, len, problem));
+    out->priority = (int)decode_number(root, "priority", 0);
+    out->queue_limit_s = decode_number(root, "queue_limit_s", 0);
+    out->webhook = webhook ? strdup(webhook) : NULL;
+    if (webhook && !out->webhook)
+        return problem_no_memory(d->problem);
+    if (!decode_tags(&out->tags, d, json_get(root, "tags")))
+        return false;
+    out->problem.kind = json_text_is(json_get(problem, "kind"), "scene") ? UZ_PROBLEM_SCENE : UZ_PROBLEM_MATRICES;
+    const bool good = out->problem.kind == UZ_PROBLEM_SCENE ? decode_scene(&out->problem.scene, d, problem)
+                                                            : decode_matrices(&out->problem.qp, d, problem);
+    return good && decode_automatic(out, d, root) && decode_cases(&out->problem, d, json_get(root, "cases")) &&
+           decode_start(&out->start, d, json_get(solver, "warm_start")) &&
+           decode_assertions(out, d, json_get(root, "assert")) && (!answer || decode_answer(&out->answer, d, answer));
 }
 
 bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
                        problem_details *problem)
 {
-    json_doc doc;
+    json_tree tree;
     codec_request request = {.tags = NULL};
+    decoding d = {.store = uploads, .bound = decode_memory_bound(len), .problem = problem};
     *out = request;
-    if (!json_scan(&doc, body, len, problem))
+    if (!json_scan(&tree, body, len, problem))
         return false;
-    doc.store = uploads;
-    bool good = decode_check(&doc, schema_of(kind, &doc), problem) && decode_parts(&request, &doc, len, problem);
-    request.uploads = doc.uploads;
-    request.n_uploads = doc.n_uploads;
-    doc.uploads = NULL;
-    json_doc_clear(&doc);
+    const bool verify = kind == CODEC_VERIFY || (kind == CODEC_STORED && json_get(tree.root, "answer"));
+    bool good = schemas_check(loaded, verify ? "verify.json" : "request.json", tree.root, problem) &&
+                decode_parts(&request, &d, tree.root);
+    request.uploads = d.uploads;
+    request.n_uploads = d.n_uploads;
+    json_clear(&tree);
     good = good && (kind == CODEC_STORED || check_limits(&request, problem)) && check_sizes(&request, problem);
     if (good)
         *out = request;

@@ -3,190 +3,120 @@
 #include "codec/problem.h"
 #include "codec/room.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* One contact on its way. */
+/* One contact on its way; shape: the obstacle's. */
 typedef struct {
     uz_contact *to;
-    json_doc *doc;
+    decoding *d;
+    const json_value *shape;
     int dim;
-    size_t bound;
-    const json_path *at; /* of the obstacle's shape */
-    problem_details *problem;
-} obstacle_reading;
+} obstacle;
 
-static const char *pointer_of(char pointer[128], const obstacle_reading *r, const char *key)
+static bool read_plane(const obstacle *o)
 {
-    json_path at = {r->at, key, strlen(key), 0};
-    json_path_write(pointer, 128, &at);
-    return pointer;
+    o->to->kind = UZ_OBSTACLE_PLANE;
+    return decode_components(o->to->point, o->d, o->shape, "point", 0, o->dim) &&
+           decode_direction(o->to->normal, o->d, o->shape, "normal", o->dim, "it must point out of the obstacle");
 }
 
-static bool read_plane(const obstacle_reading *r, const json_t *shape)
+static bool read_round(const obstacle *o)
 {
-    r->to->kind = UZ_OBSTACLE_PLANE;
-    return decode_components(r->to->point, shape, "point", 0, r->dim, r->at, r->problem) &&
-           decode_direction(r->to->normal, shape, "normal", r->dim, r->at, "it must point out of the obstacle",
-                            r->problem);
+    o->to->kind = UZ_OBSTACLE_ROUND;
+    o->to->radius = decode_number(o->shape, "radius", 0);
+    o->to->inside = json_truth(json_get(o->shape, "inside"));
+    return decode_components(o->to->point, o->d, o->shape, "center", 0, o->dim);
 }
 
-static void read_radius(const obstacle_reading *r, const json_t *shape)
+static bool read_cylinder(const obstacle *o)
 {
-    r->to->radius = json_real_value(json_object_get(shape, "radius"));
-    r->to->inside = json_is_true(json_object_get(shape, "inside"));
+    o->to->kind = UZ_OBSTACLE_CYLINDER;
+    o->to->radius = decode_number(o->shape, "radius", 0);
+    o->to->inside = json_truth(json_get(o->shape, "inside"));
+    return decode_components(o->to->point, o->d, o->shape, "point", 0, o->dim) &&
+           decode_direction(o->to->normal, o->d, o->shape, "axis", o->dim, "it must be the direction of the axis");
 }
 
-static bool read_round(const obstacle_reading *r, const json_t *shape)
+static bool read_polyline(const obstacle *o)
 {
-    r->to->kind = UZ_OBSTACLE_ROUND;
-    read_radius(r, shape);
-    return decode_components(r->to->point, shape, "center", 0, r->dim, r->at, r->problem);
-}
-
-static bool read_cylinder(const obstacle_reading *r, const json_t *shape)
-{
-    r->to->kind = UZ_OBSTACLE_CYLINDER;
-    read_radius(r, shape);
-    return decode_components(r->to->point, shape, "point", 0, r->dim, r->at, r->problem) &&
-           decode_direction(r->to->normal, shape, "axis", r->dim, r->at, "it must be the direction of the axis",
-                            r->problem);
-}
-
-static bool refuse_rows(const obstacle_reading *r, const char *key, const char *what)
-{
-    char pointer[128];
-    problem_set(r->problem, 422, "size_mismatch", NULL, "%s %s.", pointer_of(pointer, r, key), what);
-    snprintf(r->problem->pointer, sizeof r->problem->pointer, "%s", pointer);
-    return false;
-}
-
-static bool read_polyline(const obstacle_reading *r, const json_t *shape)
-{
-    char pointer[128];
+    const json_value *value = json_get(o->shape, "points");
     double *points = NULL;
     int64_t n = 0;
     int columns = 0;
-    uz_contact *to = r->to;
+    uz_contact *to = o->to;
     to->kind = UZ_OBSTACLE_POLYLINE;
-    if (!decode_points(&points, &n, &columns, r->doc, json_object_get(shape, "points"), r->bound,
-                       pointer_of(pointer, r, "points"), r->problem)) {
-        free(points);
-        return false;
+    bool good = decode_points(&points, &n, &columns, o->d, value);
+    if (good && columns != 2)
+        good = decode_refuse(o->d, "size_mismatch", value, "must have points of 2 numbers.");
+    if (good) {
+        to->x = room_for((size_t)n, sizeof *to->x);
+        to->y = room_for((size_t)n, sizeof *to->y);
+        good = (to->x && to->y) || problem_no_memory(o->d->problem);
     }
-    to->x = room_for((size_t)n, sizeof *to->x);
-    to->y = room_for((size_t)n, sizeof *to->y);
-    const bool good = columns == 2 && to->x && to->y;
     to->n_x = good ? n / 2 : 0;
     for (int64_t i = 0; i < to->n_x; i++) {
         to->x[i] = points[2 * i];
         to->y[i] = points[2 * i + 1];
     }
     free(points);
-    if (columns != 2)
-        return refuse_rows(r, "points", "must have points of 2 numbers");
-    return good || decode_no_memory(r->problem);
+    return good;
 }
 
-/* Heights in rows that are too long to be a table: each is an array of its own. */
-static bool read_height_rows(const obstacle_reading *r, const json_t *rows)
+/* z over x, or over x and y: then as many rows as y, of as many numbers as x. */
+static bool read_height(const obstacle *o)
 {
-    char pointer[128];
-    uz_contact *to = r->to;
-    size_t i;
-    json_t *row;
-    to->z = room_for((size_t)to->n_y, (size_t)to->n_x * sizeof *to->z);
-    if (!to->z)
-        return decode_no_memory(r->problem);
-    json_array_foreach(rows, i, row)
-    {
-        double *values = NULL;
-        int64_t n = 0;
-        bool good = decode_vector(&values, &n, r->doc, row, r->bound, pointer_of(pointer, r, "z"), r->problem);
-        if (good && n == to->n_x)
-            memcpy(to->z + (int64_t)i * n, values, (size_t)n * sizeof *values);
-        free(values);
-        if (!good)
-            return false;
-        if (n != to->n_x)
-            return refuse_rows(r, "z", "must have rows of as many heights as there are x");
-    }
-    return true;
-}
-
-/* z over x and y: as many rows as y, of as many numbers as x. */
-static bool read_heights(const obstacle_reading *r, const json_t *z)
-{
-    uz_contact *to = r->to;
-    json_lifted *lifted = json_doc_lifted(r->doc, z);
-    const int64_t rows = lifted ? lifted->count : (int64_t)json_array_size(z);
-    if ((lifted && lifted->columns == 0) || (!lifted && json_is_real(json_array_get(z, 0))))
-        return refuse_rows(r, "z", "must have rows of heights, one for each y");
-    if (rows != to->n_y)
-        return refuse_rows(r, "z", "must have as many rows as there are y");
-    if (!lifted)
-        return read_height_rows(r, z);
-    if (lifted->columns != to->n_x)
-        return refuse_rows(r, "z", "must have rows of as many heights as there are x");
-    to->z = lifted->numbers;
-    lifted->numbers = NULL;
-    return true;
-}
-
-static bool read_height(const obstacle_reading *r, const json_t *shape)
-{
-    char pointer[128];
-    uz_contact *to = r->to;
+    const json_value *z = json_get(o->shape, "z"), *y = json_get(o->shape, "y");
+    const char *wrong = NULL;
+    uz_contact *to = o->to;
     int64_t n = 0;
     int columns = 0;
-    const json_t *z = json_object_get(shape, "z"), *y = json_object_get(shape, "y");
     to->kind = UZ_OBSTACLE_HEIGHT;
-    if (!decode_vector(&to->x, &to->n_x, r->doc, json_object_get(shape, "x"), r->bound, pointer_of(pointer, r, "x"),
-                       r->problem))
+    if (!decode_vector(&to->x, &to->n_x, o->d, json_get(o->shape, "x")))
         return false;
-    if (y)
-        return decode_vector(&to->y, &to->n_y, r->doc, y, r->bound, pointer_of(pointer, r, "y"), r->problem) &&
-               read_heights(r, z);
-    if (!decode_points(&to->z, &n, &columns, r->doc, z, r->bound, pointer_of(pointer, r, "z"), r->problem))
+    if (!y) {
+        if (!decode_points(&to->z, &n, &columns, o->d, z))
+            return false;
+        if (columns != 0 || n != to->n_x)
+            wrong = "must have one height for each x.";
+        return !wrong || decode_refuse(o->d, "size_mismatch", z, "%s", wrong);
+    }
+    if (!decode_vector(&to->y, &to->n_y, o->d, y))
         return false;
-    return (columns == 0 && n == to->n_x) || refuse_rows(r, "z", "must have one height for each x");
+    json_value room;
+    if (json_item(z, 0, &room)->kind == JSON_IS_NUMBER)
+        wrong = "must have rows of heights, one for each y.";
+    else if ((int64_t)z->count != to->n_y)
+        wrong = "must have as many rows as there are y.";
+    else if (z->kind != JSON_IS_NUMBERS ||
+             z->columns != to->n_x) /* in an array of anything the rows are not of one size */
+        wrong = "must have rows of as many heights as there are x.";
+    if (wrong)
+        return decode_refuse(o->d, "size_mismatch", z, "%s", wrong);
+    to->z = json_take_numbers(z);
+    return to->z || problem_no_memory(o->d->problem);
 }
 
 static const struct {
     const char *key;
-    bool (*read)(const obstacle_reading *r, const json_t *shape);
+    bool (*read)(const obstacle *o);
 } SHAPES[] = {{"plane", read_plane},       {"circle", read_round},      {"sphere", read_round},
               {"cylinder", read_cylinder}, {"polyline", read_polyline}, {"height", read_height}};
 
-static bool decode_contact(const obstacle_reading *r, const json_t *item, const json_path *item_at)
+bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
 {
-    const json_t *obstacle = json_object_get(item, "obstacle");
-    json_path at = {item_at, "obstacle", 8, 0};
-    decode_name(r->to->on, sizeof r->to->on, item, "on", "");
-    decode_name(r->to->with, sizeof r->to->with, item, "with", "");
-    r->to->kind = UZ_OBSTACLE_BODY;
-    for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {
-        const json_t *shape = json_object_get(obstacle, SHAPES[k].key);
-        json_path shape_at = {&at, SHAPES[k].key, strlen(SHAPES[k].key), 0};
-        obstacle_reading here = *r;
-        here.at = &shape_at;
-        if (shape)
-            return SHAPES[k].read(&here, shape);
-    }
-    return true;
-}
-
-bool decode_contacts(uz_scene *out, json_doc *doc, const json_t *list, size_t body_len, problem_details *problem)
-{
-    json_path top = {NULL, "problem", 7, 0}, here = {&top, "contacts", 8, 0};
-    obstacle_reading r = {NULL, doc, uz_scene_dim(out), decode_memory_bound(body_len), NULL, problem};
-    out->contacts = decode_room(list, sizeof *out->contacts, &out->n_contacts, problem);
+    out->contacts = decode_room(d, list, sizeof *out->contacts, &out->n_contacts);
     for (int64_t i = 0; i < out->n_contacts; i++) {
-        json_path at = {&here, NULL, 0, (size_t)i};
-        r.to = &out->contacts[i];
-        if (!decode_contact(&r, json_array_get(list, (size_t)i), &at))
-            return false;
+        const json_value *item = &list->items[i], *given = json_get(item, "obstacle");
+        uz_contact *to = &out->contacts[i];
+        decode_name(to->on, sizeof to->on, item, "on", "");
+        decode_name(to->with, sizeof to->with, item, "with", "");
+        to->kind = UZ_OBSTACLE_BODY;
+        for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {
+            const obstacle o = {to, d, json_get(given, SHAPES[k].key), uz_scene_dim(out)};
+            if (o.shape && !SHAPES[k].read(&o))
+                return false;
+        }
     }
     return out->contacts != NULL;
 }

@@ -1,5 +1,6 @@
-/* Replies about jobs and about the service. */
+/* encode.c: replies about jobs and about the service. */
 #include "codec/codec.h"
+#include "codec/json.h"
 #include "codec/text.h"
 
 #include <math.h>
@@ -66,11 +67,11 @@ static void put_link(text *t, const char *rel, const char *id, const char *tail)
     text_close(t, '}');
 }
 
-/* By the member that only their summary has (encode_summary.c); inside a string its quotes would be escaped. Each case
- * has a history of its own, under its name. */
+/* Each case has a history of its own, under its name. */
 static bool has_cases(const job *j)
 {
-    return j->summary && strstr(j->summary, "\"cases\":{\"count\":");
+    size_t len;
+    return j->summary && json_member_text(j->summary, strlen(j->summary), "cases", &len);
 }
 
 /* A job that was dismissed while it ran may have left its best answer so far. */

@@ -2,12 +2,8 @@
 #include "codec/encode_trade.h"
 
 #include "codec/codec.h"
-#include "codec/json_doc.h"
 
-#include <jansson.h>
 #include <math.h>
-#include <stdio.h>
-#include <string.h>
 
 enum { DECADES = 10 };
 
@@ -96,58 +92,6 @@ static void put_levels(text *t, const uz_trade *trade, double mesh_error)
     put_level(t, "precise", 1e-8, trade);
     put_level(t, "exact", 1e-12, trade);
     text_close(t, ']');
-}
-
-/* A number of the summary, NaN where there is none. */
-static double number_at(const json_t *object, const char *key)
-{
-    const json_t *value = json_object_get(object, key);
-    return json_is_number(value) ? json_number_value(value) : NAN;
-}
-
-static bool word_is(const json_t *object, const char *key, const char *word)
-{
-    const char *value = json_string_value(json_object_get(object, key));
-    return value && strcmp(value, word) == 0;
-}
-
-bool codec_read_trade(codec_trade *out, const char *summary)
-{
-    json_doc doc;
-    problem_details problem;
-    if (!json_scan(&doc, summary, strlen(summary), &problem))
-        return false;
-    const json_t *root = doc.root;
-    const json_t *suggestion = json_object_get(root, "suggestion"), *certificate = json_object_get(root, "certificate");
-    out->mesh_error = number_at(json_is_object(suggestion) ? suggestion : root,
-                                json_is_object(suggestion) ? "mesh_error" : "discretization_error");
-    out->solver_error = number_at(certificate, "relative_error");
-    out->requested_error = number_at(root, "requested_error");
-    out->certify_s = number_at(json_object_get(root, "timings_s"), "certify");
-    out->is_scene = word_is(json_object_get(root, "problem"), "kind", "scene");
-    out->has_answer = !word_is(root, "outcome", "infeasible");
-    /* what may be told that it could have asked for less: a run from the beginning that asked for an error of its own
-     */
-    out->may_save = out->is_scene && word_is(root, "outcome", "converged") && word_is(root, "started_from", "zero") &&
-                    !word_is(root, "method", "linear") && !json_object_get(root, "mesh");
-    json_doc_clear(&doc);
-    return true;
-}
-
-static void copy_word(char *out, size_t size, const json_t *object, const char *key)
-{
-    const char *value = json_string_value(json_object_get(object, key));
-    snprintf(out, size, "%s", value ? value : "");
-}
-
-void codec_read_method(char *method, char *op, size_t size, const char *summary)
-{
-    json_doc doc; /* left empty where there is no memory */
-    problem_details problem;
-    json_scan(&doc, summary, strlen(summary), &problem);
-    copy_word(method, size, doc.root, "method");
-    copy_word(op, size, doc.root, "operator");
-    json_doc_clear(&doc);
 }
 
 char *codec_encode_trade(const codec_trade *of, size_t *len)

@@ -1,38 +1,61 @@
-/* The judge of what is JSON: recursive descent over the raw bytes, at most JSON_MAX_DEPTH deep.
+/* json_scan.c: the judge of what is JSON: recursive descent over the raw bytes, at most JSON_MAX_DEPTH deep.
  *
- * A function that returns NULL or false has stopped the scan and said why. A refusal of well-formed JSON (a key twice,
- * a number beyond double precision) only records the first problem and goes on, so that a text which is no JSON at all
- * is always answered with 400. */
-#include "codec/json_doc.h"
+ * A function that returns false has stopped the scan and said why. A refusal of well-formed JSON (a key twice, a number
+ * beyond double precision) only records the first problem and goes on, so that a text which is no JSON at all is always
+ * answered with 400. */
+#include "codec/json.h"
 #include "codec/problem.h"
 #include "codec/room.h"
 #include "uzawa.h"
 
 #include <math.h>
+#include <search.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
     const char *text;
     size_t len, at;
-    json_doc *doc;
+    json_tree *tree;
     problem_details *problem;
     size_t values;
     int depth;
+    json_value *stack; /* what stands in arrays and objects that are still open */
+    size_t used, capacity;
 } scanner;
 
-static json_t *scan_value(scanner *s, const json_path *path);
+static bool scan_value(scanner *s, json_value *out);
+static bool stop_syntax(scanner *s, size_t at, const char *why);
+static int peek(scanner *s);
+
+bool json_scan(json_tree *tree, const char *body, size_t len, problem_details *problem)
+{
+    scanner s = {.text = body, .len = len, .tree = tree, .problem = problem};
+    *tree = (json_tree){NULL, NULL};
+    *problem = (problem_details){0};
+    json_value *root = json_room(tree, sizeof *root);
+    if (!root) {
+        problem_no_memory(problem);
+        return false;
+    }
+    *root = (json_value){.parent = NULL};
+    if (len >= 3 && memcmp(body, "\xef\xbb\xbf", 3) == 0)
+        stop_syntax(&s, 0, "the text begins with a byte order mark; remove it");
+    else if (peek(&s) < 0)
+        stop_syntax(&s, s.at, "the body is empty; a JSON object was expected");
+    else if (scan_value(&s, root) && peek(&s) >= 0)
+        stop_syntax(&s, s.at, "something follows the end of the JSON text");
+    free(s.stack);
+    tree->root = root;
+    if (problem->status == 0)
+        return true;
+    json_clear(tree);
+    return false;
+}
 
 /* ------------------------------------------------------------- failures */
 
-static void *stop_memory(scanner *s)
-{
-    problem_set(s->problem, 503, "out_of_memory", NULL, "There is not enough memory for this request now.");
-    return NULL;
-}
-
-static void *stop_syntax(scanner *s, size_t at, const char *why)
+static bool stop_syntax(scanner *s, size_t at, const char *why)
 {
     char found[24] = "the end";
     size_t line = 1, start = 0;
@@ -48,48 +71,54 @@ static void *stop_syntax(scanner *s, size_t at, const char *why)
     problem_set(s->problem, 400, "json_syntax", NULL, "Line %zu, column %zu (byte %zu, found %s): %s.", line,
                 at - start + 1, at, found, why);
     s->problem->line = (int64_t)line;
-    return NULL;
+    return false;
 }
 
-static void *stop_limit(scanner *s, int status, const char *code, const json_path *path, const char *what, int limit)
+static bool stop_expected(scanner *s)
 {
-    problem_set(s->problem, status, code, path, "More than %d %s (byte %zu).", limit, what, s->at);
-    return NULL;
+    return stop_syntax(s, s->at, "a value was expected (an object, array, string, number, true, false or null)");
 }
 
-/* Records a refusal; the scan goes on and a later syntax error replaces it. */
-static void refuse_number(scanner *s, const json_path *path, size_t start, size_t end)
+/* One more value, at this place. */
+static bool count_value(scanner *s, const json_value *at)
 {
-    if (s->problem->status)
-        return;
-    problem_set(s->problem, 422, "number_out_of_range", path,
-                "The number %.*s%s is larger than double precision holds (about 1.8e308).",
-                (int)(end - start > 40 ? 40 : end - start), s->text + start, end - start > 40 ? "..." : "");
+    if (++s->values <= JSON_MAX_VALUES)
+        return true;
+    problem_set(s->problem, 413, "too_many_values", at, "More than %d %s (byte %zu).", JSON_MAX_VALUES,
+                "values besides long number arrays; write vectors as one flat array", s->at);
+    return false;
 }
 
-static void refuse_key(scanner *s, const json_path *path)
+static bool check_depth(scanner *s, const json_value *at)
 {
-    char shown[64];
-    if (s->problem->status)
-        return;
-    problem_quote(shown, sizeof shown, path->key, path->key_len);
-    problem_set(s->problem, 422, "duplicate_key", path, "The key %s stands twice in the same object.", shown);
+    if (s->depth < json_depth_limit())
+        return true;
+    problem_set(s->problem, 400, "json_depth", at, "More than %d %s (byte %zu).", json_depth_limit(),
+                "levels of arrays and objects", s->at);
+    return false;
 }
 
 /* -------------------------------------------------------------- tokens */
 
-static void skip_space(scanner *s)
+/* The next byte after white space, -1 at the end. */
+static int peek(scanner *s)
 {
     while (s->at < s->len &&
            (s->text[s->at] == ' ' || s->text[s->at] == '\n' || s->text[s->at] == '\t' || s->text[s->at] == '\r'))
         s->at++;
+    return s->at < s->len ? (unsigned char)s->text[s->at] : -1;
 }
 
-/* The next byte after white space, -1 at the end. */
-static int peek(scanner *s)
+/* After an item: true if another follows, false at the closing bracket or after a failure. */
+static bool next_item(scanner *s, char close, bool *failed)
 {
-    skip_space(s);
-    return s->at < s->len ? (unsigned char)s->text[s->at] : -1;
+    int c = peek(s);
+    if (c == ',' || c == close) {
+        s->at++;
+        return c == ',';
+    }
+    *failed = true;
+    return stop_syntax(s, s->at, close == ']' ? "a comma or ']' was expected" : "a comma or '}' was expected");
 }
 
 static bool is_digit(const scanner *s, size_t at)
@@ -129,334 +158,343 @@ static size_t number_end(const scanner *s, size_t *bad)
     return end;
 }
 
-static bool scan_number(scanner *s, const json_path *path, double *value)
+static bool scan_number(scanner *s, const json_value *at, double *value)
 {
     size_t bad, start = s->at, end = number_end(s, &bad);
     if (end == 0)
-        return stop_syntax(s, bad, "a number is malformed") != NULL;
+        return stop_syntax(s, bad, "a number is malformed");
     if (uz_parse_double(value, s->text + start, end - start) != end - start)
-        return stop_syntax(s, start, "a number is malformed") != NULL;
+        return stop_syntax(s, start, "a number is malformed");
     if (!isfinite(*value)) {
-        refuse_number(s, path, start, end);
         *value = 0;
+        if (s->problem->status == 0) /* recorded; the scan goes on and a later syntax error replaces it */
+            problem_set(s->problem, 422, "number_out_of_range", at,
+                        "The number %.*s%s is larger than double precision holds (about 1.8e308).",
+                        (int)(end - start > 40 ? 40 : end - start), s->text + start, end - start > 40 ? "..." : "");
     }
     s->at = end;
     return true;
 }
 
-static json_t *made(scanner *s, json_t *value)
+static bool scan_word(scanner *s, json_value *out, const char *word, json_kind kind, bool truth)
 {
-    return value ? value : stop_memory(s);
-}
-
-static json_t *scan_word(scanner *s, const char *word, json_t *value)
-{
-    size_t n = strlen(word);
+    const size_t n = strlen(word);
     if (s->len - s->at < n || memcmp(s->text + s->at, word, n) != 0)
-        return stop_syntax(s, s->at, "a value was expected (an object, array, string, number, true, false or null)");
+        return stop_expected(s);
     s->at += n;
-    return value;
+    out->kind = kind;
+    if (kind == JSON_IS_BOOLEAN)
+        out->truth = truth;
+    return true;
 }
 
-/* -------------------------------------------------------------- lifting */
-
-/* Registers a lifted value, which the document owns from here on even when this fails. */
-static json_t *lift(scanner *s, json_lifted item)
+/* The string at s->at: the bytes, short ones copied and long ones as they stand; a key is always copied. */
+static const char *scan_string(scanner *s, bool key, size_t *bytes)
 {
-    json_doc *doc = s->doc;
-    if (doc->n_lifted == doc->capacity) {
-        size_t capacity = doc->capacity ? 2 * doc->capacity : 8;
-        json_lifted *grown = room_grow(doc->lifted, capacity, sizeof *grown);
-        if (!grown) {
-            free(item.numbers);
-            free(item.text);
-            return stop_memory(s);
-        }
-        doc->lifted = grown;
-        doc->capacity = capacity;
+    const size_t start = s->at + 1;
+    size_t end;
+    const char *why = json_text_check(s->text, s->len, s->at, &end, bytes);
+    if (why) {
+        stop_syntax(s, end, why);
+        return NULL;
     }
-    doc->lifted[doc->n_lifted++] = item;
-    return made(s, json_integer((json_int_t)doc->n_lifted - 1));
-}
-
-/* How many items the array at s->at has if it looks like a flat array of numbers, else 0. The grammar is checked
- * later, item by item; this only decides which way to go and how much room to make. */
-static int64_t count_numbers(const scanner *s)
-{
-    int64_t count = 1;
-    for (size_t i = s->at + 1; i < s->len; i++) {
-        char c = s->text[i];
-        if (c == ']')
-            return count;
-        if (c == ',')
-            count++;
-        else if (!((c >= '0' && c <= '9') || c == '-' || c == '+' || c == '.' || c == 'e' || c == 'E' || c == ' ' ||
-                   c == '\n' || c == '\t' || c == '\r'))
-            return 0;
+    s->at = end + 1;
+    if (*bytes > JSON_SHORT_TEXT && !key)
+        return s->text + start;
+    char *copy = json_room(s->tree, *bytes + 1);
+    if (!copy) {
+        problem_no_memory(s->problem);
+        return NULL;
     }
-    return 0;
+    if (*bytes == end - start)
+        memcpy(copy, s->text + start, *bytes);
+    else
+        json_text_decode(copy, s->text + start, *bytes);
+    copy[*bytes] = '\0';
+    return copy;
 }
 
-/* Counts rows and columns of the array at s->at if it looks like a table of numbers: rows of the same number of
- * numbers each. rows 0: it does not. As above, this only decides which way to go. */
-static void count_table(const scanner *s, int64_t *rows, int64_t *columns)
+/* ------------------------------------------------------ blocks of numbers */
+
+enum { OTHER, DIGIT, SIGN, SPACE, COMMA, OPEN, CLOSE };
+static const unsigned char CLASS[256] = {
+    ['0'] = DIGIT,  ['1'] = DIGIT, ['2'] = DIGIT, ['3'] = DIGIT, ['4'] = DIGIT,  ['5'] = DIGIT,
+    ['6'] = DIGIT,  ['7'] = DIGIT, ['8'] = DIGIT, ['9'] = DIGIT, ['.'] = SIGN,   ['-'] = SIGN,
+    ['+'] = SIGN,   ['e'] = SIGN,  ['E'] = SIGN,  [' '] = SPACE, ['\n'] = SPACE, ['\t'] = SPACE,
+    ['\r'] = SPACE, [','] = COMMA, ['['] = OPEN,  [']'] = CLOSE};
+
+/* Does the array at s->at look like numbers, or like rows of the same number of numbers each (*columns > 0)? The
+ * grammar is checked later, item by item; this only decides which way to go and how much room to make. */
+static bool looks_like_numbers(const scanner *s, size_t *count, size_t *columns)
 {
-    int64_t in_row = 0, first = 0, found = 0;
-    bool inside = false, digits = false; /* digits: the row is not empty */
-    *rows = *columns = 0;
+    size_t commas = 0, in_row = 0, rows = 0, width = 0;
+    bool inside = false, flat = false, digits = false; /* digits: there are some, in this row */
     for (size_t i = s->at + 1; i < s->len; i++) {
-        char c = s->text[i];
-        if (inside ? c == '[' : c == ']')
+        switch (CLASS[(unsigned char)s->text[i]]) {
+        case DIGIT:
+            digits = true;
+            while (i + 1 < s->len && CLASS[(unsigned char)s->text[i + 1]] == DIGIT)
+                i++; /* fall through */
+        case SIGN:
+            if (!inside && rows > 0)
+                return false;
+            flat = flat || !inside;
             break;
-        if (c == '[') {
+        case SPACE:
+            break;
+        case COMMA:
+            commas += !inside;
+            in_row += inside;
+            break;
+        case OPEN:
+            if (inside || flat)
+                return false;
             inside = true;
             digits = false;
             in_row = 1;
-        } else if (c == ']') {
+            break;
+        case CLOSE:
+            *count = rows ? rows : commas + 1;
+            *columns = width;
+            if (!inside)
+                return rows || digits || commas >= JSON_SHORT_ARRAY;
             inside = false;
-            first = found++ ? first : in_row;
-            if (in_row != first || in_row > JSON_LIFT_NUMBERS || !digits)
-                return;
-        } else if (inside && c == ',') {
-            in_row++;
-        } else if (c != ',' && !strchr(inside ? "0123456789-+.eE \n\t\r" : " \n\t\r", c)) {
-            return;
+            width = rows++ ? width : in_row;
+            if (in_row != width || !digits || width > INT32_MAX)
+                return false;
+            break;
+        default:
+            return false;
         }
-        digits = digits || (c >= '0' && c <= '9');
     }
-    *rows = inside ? 0 : found;
-    *columns = first;
+    *count = rows; /* not closed: it is told as a long table's mistake */
+    *columns = width;
+    return !inside && rows > JSON_SHORT_ARRAY && width <= JSON_SHORT_ARRAY;
 }
 
-/* After an item: true if another follows, false at the closing bracket or after a failure. */
-static bool next_item(scanner *s, char close, bool *failed)
-{
-    int c = peek(s);
-    if (c == ',' || c == close) {
-        s->at++;
-        return c == ',';
-    }
-    *failed = true;
-    stop_syntax(s, s->at, close == ']' ? "a comma or ']' was expected" : "a comma or '}' was expected");
-    return false;
-}
-
-/* The numbers of the array at s->at, which count_numbers has counted; false when the scan stops. */
-static bool scan_numbers(scanner *s, const json_path *path, double *numbers)
+/* The numbers from the bracket at s->at on. one: they count as one value together. */
+static bool scan_row(scanner *s, const json_value *row, double *numbers, bool one)
 {
     bool failed = false;
     s->at++;
     for (size_t i = 0;; i++) {
-        json_path here = {path, NULL, 0, i};
-        int c = peek(s);
-        if (c != '-' && !is_digit(s, s->at)) {
-            failed = true;
-            stop_syntax(s, s->at, "a number was expected");
-        } else {
-            failed = !scan_number(s, &here, &numbers[i]);
-        }
-        if (failed || !next_item(s, ']', &failed))
+        const json_value here = {.parent = row, .place = i};
+        const int c = peek(s);
+        if (!one && !count_value(s, &here))
+            return false;
+        if (c != '-' && !is_digit(s, s->at))
+            return one ? stop_syntax(s, s->at, "a number was expected") : stop_expected(s);
+        if (!scan_number(s, &here, &numbers[i]))
+            return false;
+        if (!next_item(s, ']', &failed))
             return !failed;
     }
 }
 
-static json_t *lift_numbers(scanner *s, const json_path *path, int64_t count)
-{
-    double *numbers = room_for((size_t)count, sizeof *numbers);
-    if (!numbers)
-        return stop_memory(s);
-    if (scan_numbers(s, path, numbers))
-        return lift(s, (json_lifted){.numbers = numbers, .count = count});
-    free(numbers);
-    return NULL;
-}
-
-static json_t *lift_table(scanner *s, const json_path *path, int64_t rows, int64_t columns)
+static bool scan_table(scanner *s, json_value *out, double *numbers, size_t columns, bool one)
 {
     bool failed = false;
-    double *numbers = room_for((size_t)rows, (size_t)columns * sizeof *numbers);
-    if (!numbers)
-        return stop_memory(s);
     s->at++;
-    for (int64_t i = 0;; i++) {
-        json_path here = {path, NULL, 0, (size_t)i};
-        failed = peek(s) != '[';
-        if (failed)
-            stop_syntax(s, s->at, "a row of numbers was expected");
-        else
-            failed = !scan_numbers(s, &here, numbers + i * columns);
-        if (failed || !next_item(s, ']', &failed))
-            break;
+    for (size_t i = 0;; i++) {
+        const json_value row = {.parent = out, .place = i};
+        const int c = peek(s);
+        if (!one && !count_value(s, &row))
+            return false;
+        if (c != '[')
+            return one ? stop_syntax(s, s->at, "a row of numbers was expected") : stop_expected(s);
+        if (!one && !check_depth(s, &row))
+            return false;
+        if (!scan_row(s, &row, numbers + i * columns, one || columns > JSON_SHORT_ARRAY))
+            return false;
+        if (!next_item(s, ']', &failed))
+            return !failed;
     }
-    if (!failed)
-        return lift(s, (json_lifted){.numbers = numbers, .count = rows, .columns = columns});
-    free(numbers);
-    return NULL;
 }
 
-/* -------------------------------------------------------------- values */
-
-/* The decoded string at s->at, NUL-terminated, owned by the caller. */
-static char *scan_bytes(scanner *s, size_t *len)
+static bool scan_numbers(scanner *s, json_value *out, size_t count, size_t columns)
 {
-    size_t start = s->at + 1, end;
-    bool plain;
-    const char *why = json_text_check(s->text, s->len, s->at, &end, &plain);
-    if (why)
-        return stop_syntax(s, end, why);
-    char *text = room_for(end - start + 1, 1);
-    if (!text)
-        return stop_memory(s);
-    *len = end - start;
-    if (plain)
-        memcpy(text, s->text + start, *len);
-    else
-        *len = json_text_decode(text, s->text + start, *len);
-    text[*len] = '\0';
-    s->at = end + 1;
-    return text;
+    const bool one = count > JSON_SHORT_ARRAY && columns <= JSON_SHORT_ARRAY;
+    const size_t row = (columns ? columns : 1) * sizeof(double);
+    const bool is_long = count * row > JSON_SHORT_ARRAY * sizeof(double);
+    double *numbers = is_long ? room_for(count, row) : json_room(s->tree, count * row);
+    if (!numbers)
+        return problem_no_memory(s->problem);
+    if (columns ? scan_table(s, out, numbers, columns, one) : scan_row(s, out, numbers, one)) {
+        out->kind = JSON_IS_NUMBERS;
+        out->numbers = numbers;
+        out->count = count;
+        out->columns = (uint32_t)columns;
+        out->is_long = is_long;
+        return true;
+    }
+    if (is_long)
+        free(numbers);
+    return false;
 }
 
-static json_t *scan_string(scanner *s)
-{
-    size_t len;
-    char *text = scan_bytes(s, &len);
-    if (!text)
-        return NULL;
-    if (len > JSON_LIFT_TEXT_LEN)
-        return lift(s, (json_lifted){.is_text = true, .text = text, .len = len});
-    json_t *value = json_stringn_nocheck(text, len);
-    free(text);
-    return made(s, value);
-}
+/* ------------------------------------------------------ arrays and objects */
 
-static json_t *scan_array(scanner *s, const json_path *path)
+static bool push(scanner *s, json_value *value)
 {
-    int64_t count = count_numbers(s);
-    if (count > JSON_LIFT_NUMBERS)
-        return lift_numbers(s, path, count);
-    int64_t rows, columns;
-    count_table(s, &rows, &columns);
-    if (rows > JSON_LIFT_NUMBERS)
-        return lift_table(s, path, rows, columns);
-    bool failed = false;
-    json_t *array = made(s, json_array());
-    s->at++;
-    bool more = array && peek(s) != ']';
-    s->at += array && !more;
-    for (size_t i = 0; more; i++) {
-        json_path here = {path, NULL, 0, i};
-        json_t *item = scan_value(s, &here);
-        failed = !item;
-        if (item && json_array_append_new(array, item) != 0) {
-            failed = true;
-            stop_memory(s);
+    if (s->used == s->capacity) {
+        const size_t capacity = s->capacity ? 2 * s->capacity : 64;
+        json_value *grown = room_grow(s->stack, capacity, sizeof *grown);
+        if (!grown) {
+            json_free_numbers(value);
+            return problem_no_memory(s->problem);
         }
-        more = !failed && next_item(s, ']', &failed);
+        s->stack = grown;
+        s->capacity = capacity;
     }
-    if (!failed)
-        return array;
-    json_decref(array);
-    return NULL;
+    s->stack[s->used++] = *value;
+    return true;
 }
 
-/* One "key": value into the object; false when the scan stops. */
-static bool scan_member(scanner *s, json_t *object, const json_path *path)
+static int compare_keys(const void *a, const void *b)
 {
-    json_path here = {path, "", 0, 0};
-    json_t *value = NULL;
-    bool done = false;
-    if (peek(s) != '"')
-        return stop_syntax(s, s->at, "a key in double quotes was expected") != NULL;
-    char *key = scan_bytes(s, &here.key_len);
-    if (!key)
-        return false;
-    here.key = key;
-    if (peek(s) != ':') {
-        stop_syntax(s, s->at, "a colon was expected after the key");
-        goto end;
-    }
-    s->at++;
-    if (json_object_getn(object, key, here.key_len))
-        refuse_key(s, &here);
-    value = scan_value(s, &here);
-    if (!value)
-        goto end;
-    done = json_object_setn_new_nocheck(object, key, here.key_len, value) == 0;
-    if (!done)
-        stop_memory(s);
-end:
-    free(key);
-    return done;
+    const json_value *x = a, *y = b;
+    const size_t n = x->place < y->place ? x->place : y->place;
+    const int order = memcmp(x->key, y->key, n);
+    return order ? order : (x->place > y->place) - (x->place < y->place);
 }
 
-static json_t *scan_object(scanner *s, const json_path *path)
+/* Is the key of `member` among those from `base` on? A few are compared one by one; more are kept in *keys, a red-black
+ * tree, which no choice of keys makes slow. */
+static bool key_stands_twice(scanner *s, size_t base, const json_value *member, void **keys, bool *failed)
+{
+    enum { FEW = 16 };
+    const size_t n = s->used - base;
+    if (n < FEW) {
+        for (size_t i = base; i < s->used; i++)
+            if (compare_keys(&s->stack[i], member) == 0)
+                return true;
+        return false;
+    }
+    for (size_t i = n == FEW ? 0 : n; i <= n; i++) {
+        json_value *entry = json_room(s->tree, sizeof *entry);
+        void *found = NULL;
+        if (entry) {
+            *entry = i < n ? s->stack[base + i] : *member;
+            found = tsearch(entry, keys, compare_keys);
+        }
+        if (!found) {
+            *failed = !problem_no_memory(s->problem);
+            return false;
+        }
+        if (i == n)
+            return *(json_value **)found != entry;
+    }
+    return false;
+}
+
+/* The key of a member and the colon. */
+static bool scan_key(scanner *s, size_t base, json_value *member, void **keys)
 {
     bool failed = false;
-    json_t *object = made(s, json_object());
+    char shown[64];
+    if (peek(s) != '"')
+        return stop_syntax(s, s->at, "a key in double quotes was expected");
+    member->key = scan_string(s, true, &member->place);
+    if (!member->key)
+        return false;
+    if (peek(s) != ':')
+        return stop_syntax(s, s->at, "a colon was expected after the key");
     s->at++;
-    bool more = object && peek(s) != '}';
-    s->at += object && !more;
-    while (more) {
-        failed = !scan_member(s, object, path);
-        more = !failed && next_item(s, '}', &failed);
+    if (key_stands_twice(s, base, member, keys, &failed) && s->problem->status == 0) {
+        problem_quote(shown, sizeof shown, member->key, member->place);
+        problem_set(s->problem, 422, "duplicate_key", member, "The key %s stands twice in the same object.", shown);
     }
-    if (!failed)
-        return object;
-    json_decref(object);
-    return NULL;
+    return !failed;
 }
 
-static json_t *scan_container(scanner *s, const json_path *path, bool object)
+/* Where a value stands at last, what is in it learns where that is. */
+static void adopt(json_value *value)
 {
-    if (s->depth == json_depth_limit())
-        return stop_limit(s, 400, "json_depth", path, "levels of arrays and objects", json_depth_limit());
+    if (value->kind == JSON_IS_ARRAY || value->kind == JSON_IS_OBJECT)
+        for (size_t i = 0; i < value->count; i++)
+            value->items[i].parent = value;
+}
+
+/* Moves what was pushed since `base` into the tree. */
+static bool close_container(scanner *s, json_value *out, size_t base, json_kind kind)
+{
+    const size_t count = s->used - base;
+    json_value *items = json_room(s->tree, count * sizeof *items);
+    if (!items)
+        return problem_no_memory(s->problem);
+    if (count > 0)
+        memcpy(items, s->stack + base, count * sizeof *items);
+    for (size_t i = 0; i < count; i++)
+        adopt(&items[i]);
+    s->used = base;
+    out->kind = kind;
+    out->items = items;
+    out->count = count;
+    return true;
+}
+
+static void keep_key(void *key)
+{
+    (void)key;
+}
+
+/* An array or object, whose opening bracket stands at s->at. */
+static bool scan_container(scanner *s, json_value *out, bool object)
+{
+    const size_t base = s->used;
+    const char close = object ? '}' : ']';
+    size_t count, columns;
+    bool failed = false;
+    void *keys = NULL;
+    if (!check_depth(s, out))
+        return false;
     s->depth++;
-    json_t *value = object ? scan_object(s, path) : scan_array(s, path);
+    if (!object && looks_like_numbers(s, &count, &columns)) {
+        failed = !scan_numbers(s, out, count, columns);
+        s->depth--;
+        return !failed;
+    }
+    s->at++;
+    bool more = peek(s) != close;
+    s->at += !more;
+    while (more) {
+        json_value item = {.parent = out, .place = s->used - base};
+        failed = (object && !scan_key(s, base, &item, &keys)) || !scan_value(s, &item) || !push(s, &item);
+        more = !failed && next_item(s, close, &failed);
+    }
+    failed = failed || !close_container(s, out, base, object ? JSON_IS_OBJECT : JSON_IS_ARRAY);
+    while (s->used > base)
+        json_free_numbers(&s->stack[--s->used]);
+    tdestroy(keys, keep_key);
     s->depth--;
-    return value;
+    return !failed;
 }
 
-static json_t *scan_value(scanner *s, const json_path *path)
+/* out: where it stands is filled in. */
+static bool scan_value(scanner *s, json_value *out)
 {
-    double number;
-    int c = peek(s);
-    if (++s->values > JSON_MAX_VALUES)
-        return stop_limit(s, 413, "too_many_values", path,
-                          "values besides long number arrays; write vectors as one flat array", JSON_MAX_VALUES);
+    const int c = peek(s);
+    if (!count_value(s, out))
+        return false;
     switch (c) {
     case '{':
-        return scan_container(s, path, true);
     case '[':
-        return scan_container(s, path, false);
+        return scan_container(s, out, c == '{');
     case '"':
-        return scan_string(s);
+        out->text = scan_string(s, false, &out->count);
+        out->kind = out->text ? JSON_IS_STRING : JSON_IS_NULL;
+        out->is_long = out->count > JSON_SHORT_TEXT;
+        return out->text != NULL;
     case 't':
-        return scan_word(s, "true", json_true());
+        return scan_word(s, out, "true", JSON_IS_BOOLEAN, true);
     case 'f':
-        return scan_word(s, "false", json_false());
-    case '-':
-        break;
+        return scan_word(s, out, "false", JSON_IS_BOOLEAN, false);
+    case 'n':
+        return scan_word(s, out, "null", JSON_IS_NULL, false);
     default:
-        if (c < '0' || c > '9')
-            return scan_word(s, "null", json_null());
+        if (c != '-' && (c < '0' || c > '9'))
+            return stop_expected(s);
+        out->kind = JSON_IS_NUMBER;
+        return scan_number(s, out, &out->number);
     }
-    return scan_number(s, path, &number) ? made(s, json_real(number)) : NULL;
-}
-
-bool json_scan(json_doc *doc, const char *body, size_t len, problem_details *problem)
-{
-    scanner s = {.text = body, .len = len, .doc = doc, .problem = problem};
-    *doc = (json_doc){0};
-    *problem = (problem_details){0};
-    if (len >= 3 && memcmp(body, "\xef\xbb\xbf", 3) == 0)
-        stop_syntax(&s, 0, "the text begins with a byte order mark; remove it");
-    else if (peek(&s) < 0)
-        stop_syntax(&s, s.at, "the body is empty; a JSON object was expected");
-    else if ((doc->root = scan_value(&s, NULL)) && peek(&s) >= 0)
-        stop_syntax(&s, s.at, "something follows the end of the JSON text");
-    if (problem->status == 0)
-        return true;
-    json_doc_clear(doc);
-    return false;
 }

@@ -1,4 +1,5 @@
-#include "codec/json_doc.h"
+/* json_text.c: strings of a JSON text: UTF-8 and escapes (RFC 8259, section 7). */
+#include "codec/json.h"
 
 #include <string.h>
 
@@ -53,38 +54,61 @@ static int hex4(const char *text, size_t len)
     return value;
 }
 
-/* Length of the escape at text[0] == '\\'; 0: malformed, and *why says how. */
-static size_t escape_length(const char *text, size_t len, const char **why)
+/* The escape at text[0] == '\\': its length, and the character that it stands for; 0: malformed, and *why says how. */
+static inline size_t read_escape(const char *text, size_t len, unsigned *code, const char **why)
 {
+    static const char NAMES[] = "\"\\/bfrt", MEANS[] = "\"\\/\b\f\r\t";
+    if (len > 1 && text[1] == 'n') { /* most of them are: a file has lines */
+        *code = '\n';
+        return 2;
+    }
     *why = "an escape must be one of \\\" \\\\ \\/ \\b \\f \\n \\r \\t \\uXXXX";
     if (len < 2)
         return 0;
-    if (text[1] != '\0' && strchr("\"\\/bfnrt", text[1]))
-        return 2;
-    int high = text[1] == 'u' ? hex4(text + 2, len - 2) : -1;
+    for (size_t i = 0; i < sizeof NAMES - 1; i++)
+        if (text[1] == NAMES[i]) {
+            *code = (unsigned char)MEANS[i];
+            return 2;
+        }
+    const int high = text[1] == 'u' ? hex4(text + 2, len - 2) : -1;
     if (high < 0)
         return 0;
+    *code = (unsigned)high;
     if (high < 0xd800 || high > 0xdfff)
         return 6;
     *why = "half of a surrogate pair stands alone";
-    int low = len >= 12 && text[6] == '\\' && text[7] == 'u' ? hex4(text + 8, len - 8) : -1;
-    return high < 0xdc00 && low >= 0xdc00 && low <= 0xdfff ? 12 : 0;
+    const int low = len >= 12 && text[6] == '\\' && text[7] == 'u' ? hex4(text + 8, len - 8) : -1;
+    if (high >= 0xdc00 || low < 0xdc00 || low > 0xdfff)
+        return 0;
+    *code = 0x10000 + ((unsigned)(high - 0xd800) << 10) + (unsigned)(low - 0xdc00);
+    return 12;
 }
 
-const char *json_text_check(const char *text, size_t len, size_t at, size_t *end, bool *plain)
+static size_t utf8_bytes(unsigned code)
+{
+    return code < 0x80 ? 1 : code < 0x800 ? 2 : code < 0x10000 ? 3 : 4;
+}
+
+const char *json_text_check(const char *text, size_t len, size_t at, size_t *end, size_t *bytes)
 {
     const char *why = NULL;
-    *plain = true;
-    for (at++; at < len && text[at] != '"';) {
-        unsigned char c = (unsigned char)text[at];
+    const size_t start = ++at;
+    size_t saved = 0; /* by undoing the escapes */
+    while (at < len && text[at] != '"') {
+        const unsigned char c = (unsigned char)text[at];
         size_t step = 1;
+        unsigned code = 0;
+        if (c >= 0x20 && c < 0x80 && c != '\\') {
+            at++;
+            continue;
+        }
         if (c < 0x20) {
             why = "a control character stands in a string; write it as an escape (a line break is \\n)";
             step = 0;
         } else if (c == '\\') {
-            *plain = false;
-            step = escape_length(text + at, len - at, &why);
-        } else if (c >= 0x80) {
+            step = read_escape(text + at, len - at, &code, &why);
+            saved += step - utf8_bytes(code); /* of no use where step is 0 */
+        } else {
             step = json_utf8_length(text + at, len - at);
             why = "the text is not UTF-8";
         }
@@ -95,61 +119,55 @@ const char *json_text_check(const char *text, size_t len, size_t at, size_t *end
         at += step;
     }
     *end = at;
+    *bytes = at - start - saved;
     return at < len ? NULL : "a string has no closing quote";
 }
 
-static size_t put_utf8(char *out, unsigned code)
+static inline size_t put_utf8(char *out, unsigned code)
 {
     if (code < 0x80) {
         out[0] = (char)code;
         return 1;
     }
-    if (code < 0x800) {
-        out[0] = (char)(0xc0 | code >> 6);
-        out[1] = (char)(0x80 | (code & 0x3f));
-        return 2;
-    }
-    if (code < 0x10000) {
-        out[0] = (char)(0xe0 | code >> 12);
-        out[1] = (char)(0x80 | (code >> 6 & 0x3f));
-        out[2] = (char)(0x80 | (code & 0x3f));
-        return 3;
-    }
-    out[0] = (char)(0xf0 | code >> 18);
-    out[1] = (char)(0x80 | (code >> 12 & 0x3f));
-    out[2] = (char)(0x80 | (code >> 6 & 0x3f));
-    out[3] = (char)(0x80 | (code & 0x3f));
-    return 4;
+    static const unsigned char FIRST[] = {0, 0, 0xc0, 0xe0, 0xf0};
+    const size_t bytes = utf8_bytes(code);
+    for (size_t i = bytes - 1; i > 0; i--, code >>= 6)
+        out[i] = (char)(0x80 | (code & 0x3f));
+    out[0] = (char)(FIRST[bytes] | code);
+    return bytes;
 }
 
-/* Decodes the checked escape at from[0]; returns its length and adds what it stands for to out. */
-static size_t decode_escape(char *out, size_t *used, const char *from)
-{
-    static const char NAMES[] = "bfnrt", MEANS[] = "\b\f\n\r\t";
-    const char *name = strchr(NAMES, from[1]);
-    if (from[1] != 'u') {
-        out[(*used)++] = name ? MEANS[name - NAMES] : from[1];
-        return 2;
-    }
-    unsigned code = (unsigned)hex4(from + 2, 4);
-    bool pair = code >= 0xd800 && code <= 0xdbff;
-    if (pair)
-        code = 0x10000 + ((code - 0xd800) << 10) + ((unsigned)hex4(from + 8, 4) - 0xdc00);
-    *used += put_utf8(out + *used, code);
-    return pair ? 12 : 6;
-}
-
-size_t json_text_decode(char *out, const char *from, size_t len)
+size_t json_text_decode(char *out, const char *from, size_t bytes)
 {
     size_t used = 0;
-    for (size_t i = 0; i < len;) {
-        const char *escape = memchr(from + i, '\\', len - i);
-        size_t run = escape ? (size_t)(escape - from) - i : len - i;
-        memcpy(out + used, from + i, run);
+    while (used < bytes) {
+        const char *escape = memchr(from, '\\', bytes - used);
+        const size_t run = escape ? (size_t)(escape - from) : bytes - used;
+        memcpy(out + used, from, run);
         used += run;
-        i += run;
-        if (escape)
-            i += decode_escape(out, &used, from + i);
+        from += run;
+        if (escape) {
+            unsigned code = 0;
+            const char *why;
+            from += read_escape(from, 12, &code, &why); /* was checked: what is behind a shorter one is not looked at */
+            used += put_utf8(out + used, code);
+        }
     }
     return used;
+}
+
+size_t json_text_characters(const json_value *string)
+{
+    size_t count = 0;
+    if (!string->is_long) {
+        for (size_t i = 0; i < string->count; i++)
+            count += ((unsigned char)string->text[i] & 0xc0) != 0x80;
+        return count;
+    }
+    for (const char *at = string->text; *at != '"'; count++) {
+        unsigned code;
+        const char *why;
+        at += *at == '\\' ? read_escape(at, 12, &code, &why) : json_utf8_length(at, 4);
+    }
+    return count;
 }

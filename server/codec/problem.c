@@ -1,3 +1,4 @@
+/* problem.c: what a refusal says. */
 #include "codec/problem.h"
 
 #include <stdarg.h>
@@ -56,17 +57,23 @@ static void mend_utf8(char *out)
         out[start] = '\0';
 }
 
-void problem_set(problem_details *out, int status, const char *code, const json_path *path, const char *format, ...)
+void problem_set(problem_details *out, int status, const char *code, const json_value *at, const char *format, ...)
 {
     va_list args;
     *out = (problem_details){.status = status};
     snprintf(out->code, sizeof out->code, "%s", code);
     snprintf(out->title, sizeof out->title, "%s", problem_title(code));
-    json_path_write(out->pointer, sizeof out->pointer, path);
+    json_pointer(out->pointer, sizeof out->pointer, at);
     va_start(args, format);
     vsnprintf(out->detail, sizeof out->detail, format, args);
     va_end(args);
     mend_utf8(out->detail);
+}
+
+bool problem_no_memory(problem_details *out)
+{
+    problem_set(out, 503, "out_of_memory", NULL, "There is not enough memory for this request now.");
+    return false;
 }
 
 void problem_add(problem_details *out, const char *format, ...)

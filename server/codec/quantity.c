@@ -1,3 +1,4 @@
+/* quantity.c: names of numbers, against the schema of summaries and in a summary. */
 #include "codec/quantity.h"
 #include "codec/problem.h"
 #include "text/edit_distance.h"
@@ -52,39 +53,31 @@ static bool is_verdict(const char *key)
     return strncmp(key, "assertions", 10) == 0;
 }
 
-static bool has_code(schema_at items, step s)
+static const json_value *property(schema_at at, step s)
 {
-    const json_t *code = json_object_get(json_object_get(items.node, "properties"), "code"), *word;
-    size_t i;
-    json_array_foreach(json_object_get(code, "enum"), i, word)
-    {
-        if (step_is(s, json_string_value(word)))
-            return true;
-    }
-    return false;
+    return json_get_n(json_get(at.node, "properties"), s.at, step_length(s));
 }
 
 /* The schema one step further; node NULL: there is none. A code leads to the warning's value. */
 static schema_at schema_step(schema_at at, step s)
 {
     if (!(schema_types(at) & SCHEMA_ARRAY))
-        return schema_resolve(
-            schema_child(at, json_object_getn(json_object_get(at.node, "properties"), s.at, step_length(s))));
-    schema_at items = schema_resolve(schema_child(at, json_object_get(at.node, "items")));
-    if (step_index(s) < 0)
-        items.node = has_code(items, s) ? json_object_get(json_object_get(items.node, "properties"), "value") : NULL;
-    return schema_resolve(items);
+        return schema_resolve(schema_child(at, property(at, s)));
+    schema_at items = schema_resolve(schema_child(at, json_get(at.node, "items")));
+    if (step_index(s) >= 0)
+        return items;
+    const json_value *properties = json_get(items.node, "properties");
+    const json_value *codes = json_get(json_get(properties, "code"), "enum"), *value = NULL;
+    for (size_t i = 0; i < json_size(codes); i++)
+        if (step_is(s, codes->items[i].text))
+            value = json_get(properties, "value");
+    return schema_resolve(schema_child(items, value));
 }
 
 static bool is_number(schema_at at)
 {
     unsigned types = schema_types(at);
     return types != SCHEMA_ANY && (types & (SCHEMA_FRACTION | SCHEMA_INTEGER));
-}
-
-static schema_at summary_schema(const schemas *all)
-{
-    return (schema_at){all->files, "summary.json", json_object_get(all->files, "summary.json")};
 }
 
 /* ---- what may have been meant */
@@ -110,9 +103,8 @@ static void collect_below(name_list *out, schema_at at, const char *name, const 
 /* Arrays by their first item. */
 static void collect(name_list *out, schema_at at, const char *name)
 {
-    const char *key;
-    json_t *child;
-    bool array = schema_types(at) != SCHEMA_ANY && (schema_types(at) & SCHEMA_ARRAY);
+    const json_value *properties = json_get(at.node, "properties");
+    const bool array = schema_types(at) != SCHEMA_ANY && (schema_types(at) & SCHEMA_ARRAY);
     if ((is_number(at) || array) && out->count < MOST_NAMES) {
         memcpy(out->name[out->count], name, strlen(name) + 1);
         out->whole[out->count] = out->name[out->count];
@@ -121,11 +113,9 @@ static void collect(name_list *out, schema_at at, const char *name)
         out->count++;
     }
     if (array)
-        collect_below(out, schema_resolve(schema_child(at, json_object_get(at.node, "items"))), name, "0");
-    json_object_foreach((json_t *)json_object_get(at.node, "properties"), key, child)
-    {
-        collect_below(out, schema_resolve(schema_child(at, child)), name, key);
-    }
+        collect_below(out, schema_resolve(schema_child(at, json_get(at.node, "items"))), name, "0");
+    for (size_t i = 0; i < json_size(properties); i++)
+        collect_below(out, schema_resolve(schema_child(at, &properties->items[i])), name, properties->items[i].key);
 }
 
 /* The whole name with the fewest edits, else the one that ends as this one does. */
@@ -144,7 +134,7 @@ static void suggest(const schemas *all, const char *name, size_t len, problem_de
     name_list *names = calloc(1, sizeof *names);
     if (!names)
         return;
-    collect(names, summary_schema(all), "");
+    collect(names, schema_root(all, "summary.json"), "");
     const char *meant = closest(names, name, len);
     if (meant)
         problem_add(problem, " Did you mean \"%s\"?", meant);
@@ -154,23 +144,24 @@ static void suggest(const schemas *all, const char *name, size_t len, problem_de
 /* The first few numbers of an object. */
 static void list_members(schema_at at, const char *name, size_t len, problem_details *problem)
 {
-    const char *key, *before = ": ";
-    json_t *child;
-    json_object_foreach((json_t *)json_object_get(at.node, "properties"), key, child)
-    {
-        if (!is_number(schema_resolve(schema_child(at, child))))
+    const json_value *properties = json_get(at.node, "properties");
+    const char *before = ": ";
+    for (size_t i = 0; i < json_size(properties); i++) {
+        if (!is_number(schema_resolve(schema_child(at, &properties->items[i]))))
             continue;
-        problem_add(problem, "%s%.*s.%s", before, (int)len, name, key);
+        problem_add(problem, "%s%.*s.%s", before, (int)len, name, properties->items[i].key);
         before = ", ";
     }
     problem_add(problem, ".");
 }
 
-bool quantity_check(const schemas *all, const char *name, size_t len, const json_path *path, problem_details *problem)
+bool quantity_check(const schemas *all, const json_value *quantity, problem_details *problem)
 {
     char shown[80];
+    const char *name = quantity->text;
+    const size_t len = quantity->count;
     const char *end = name + len;
-    schema_at at = summary_schema(all);
+    schema_at at = schema_root(all, "summary.json");
     bool own = len >= 10 && is_verdict(name);
     for (step s = first_step(name, end); at.node && !own; s = first_step(s.end + 1, end)) {
         at = schema_step(at, s);
@@ -180,7 +171,8 @@ bool quantity_check(const schemas *all, const char *name, size_t len, const json
     if (at.node && !own && (is_number(at) || (schema_types(at) != SCHEMA_ANY && (schema_types(at) & SCHEMA_ARRAY))))
         return true;
     problem_quote(shown, sizeof shown, name, len);
-    problem_set(problem, 422, "not_allowed", path, "%s is no number of a job's summary (/schemas/summary.json)", shown);
+    problem_set(problem, 422, "not_allowed", quantity, "%s is no number of a job's summary (/schemas/summary.json)",
+                shown);
     if (at.node && !own && (schema_types(at) & SCHEMA_OBJECT) && schema_types(at) != SCHEMA_ANY) {
         problem_add(problem, ", but holds some");
         list_members(at, name, len, problem);
@@ -193,41 +185,35 @@ bool quantity_check(const schemas *all, const char *name, size_t len, const json
 
 /* ---- numbers of a summary */
 
-/* The value that the warning of this code has; 0 where there is none. */
-static double warning_value(const json_t *warnings, step s)
+static bool read_end(double *value, const json_value *node)
 {
-    const json_t *item;
-    size_t i;
-    json_array_foreach(warnings, i, item)
-    {
-        const char *code = json_string_value(json_object_get(item, "code"));
-        if (code && step_is(s, code))
-            return json_is_number(json_object_get(item, "value")) ? json_number_value(json_object_get(item, "value"))
-                                                                  : (double)NAN;
-    }
-    return 0.0;
+    *value = json_is_list(node) ? (double)node->count : json_number(node, (double)NAN);
+    return json_is_list(node) || node->kind == JSON_IS_NUMBER || node->kind == JSON_IS_NULL;
 }
 
-static bool read_end(double *value, const json_t *node)
-{
-    *value = json_is_array(node) ? (double)json_array_size(node) : json_is_number(node) ? json_number_value(node) : NAN;
-    return json_is_array(node) || json_is_number(node) || json_is_null(node);
-}
-
-bool quantity_read(double *value, const json_t *summary, const char *name)
+bool quantity_read(double *value, const json_value *summary, const char *name)
 {
     const char *end = name + strlen(name);
-    const json_t *node = summary;
-    *value = NAN;
+    const json_value *node = summary;
+    json_value rooms[2]; /* a number of a row of a table */
+    *value = (double)NAN;
     for (step s = first_step(name, end);; s = first_step(s.end + 1, end)) {
-        if (json_is_null(node)) /* max_pressure_at.node where nothing presses */
+        if (json_is(node, JSON_IS_NULL)) /* max_pressure_at.node where nothing presses */
             return true;
-        if (json_is_array(node) && step_index(s) < 0) {
-            *value = warning_value(node, s);
+        if (json_is_list(node) &&
+            step_index(s) < 0) { /* the value of the warning of this code; 0 where there is none */
+            *value = 0.0;
+            for (size_t i = 0; node->kind == JSON_IS_ARRAY && i < node->count; i++) {
+                const char *code = json_text_of(&node->items[i], "code");
+                if (code && step_is(s, code)) {
+                    *value = json_number(json_get(&node->items[i], "value"), (double)NAN);
+                    return true;
+                }
+            }
             return true;
         }
-        node = json_is_array(node) ? json_array_get(node, (size_t)step_index(s))
-                                   : json_object_getn(node, s.at, step_length(s));
+        node = json_is_list(node) ? json_item(node, (size_t)step_index(s), &rooms[node == &rooms[0]])
+                                  : json_get_n(node, s.at, step_length(s));
         if (!node || s.end == end)
             return node && read_end(value, node);
     }

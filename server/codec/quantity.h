@@ -6,17 +6,16 @@
 #ifndef SERVER_CODEC_QUANTITY_H
 #define SERVER_CODEC_QUANTITY_H
 
-#include "codec/json_doc.h"
 #include "codec/schema.h"
 
 enum { QUANTITY_NAME = 128 }; /* bytes of a name and its NUL */
 
-/* True if the schema of summaries has such a number. False: *problem names what was probably meant; `path` is the place
- * of the name in the request. */
-bool quantity_check(const schemas *all, const char *name, size_t len, const json_path *path, problem_details *problem);
+/* True if the schema of summaries has a number of this name, a string of the request. False: *problem names what was
+ * probably meant. */
+bool quantity_check(const schemas *all, const json_value *name, problem_details *problem);
 
-/* The number in a summary that json_scan read. False: the summary has no such entry. True: *value, NaN where the
- * entry is null, so not known. */
-bool quantity_read(double *value, const json_t *summary, const char *name);
+/* The number in a summary. False: the summary has no such entry. True: *value, NaN where the entry is null, so not
+ * known. */
+bool quantity_read(double *value, const json_value *summary, const char *name);
 
 #endif

@@ -10,30 +10,36 @@
 #ifndef SERVER_CODEC_SCHEMA_H
 #define SERVER_CODEC_SCHEMA_H
 
-#include "codec/json_doc.h"
+#include "codec/embedded.h"
+#include "codec/json.h"
 
 /* Source: JSON Schema: A Media Type for Describing JSON Documents, draft 2020-12. */
 typedef struct {
-    json_t *files; /* name -> parsed file; only read after loading */
+    const char *name;
+    json_tree tree;
+} schema_file;
+typedef struct {
+    schema_file *files; /* count; only read after loading */
+    size_t count;
 } schemas;
 
-/* Parses and checks every embedded file but openapi.json, which is not a schema and is only parsed. NULL: message. */
+/* Parses and checks every embedded file but openapi.json, which is no schema. NULL: message. */
 schemas *schemas_load(char *message, size_t size);
-/* The same for files (name -> parsed text), which it owns from here on even when it fails. */
-schemas *schemas_adopt(json_t *files, char *message, size_t size);
+/* The same for these files; their names and texts must outlive what is made of them. */
+schemas *schemas_parse(const embedded_file *files, size_t count, char *message, size_t size);
 void schemas_free(schemas *all);
 
-/* Checks doc->root against the file `name`. False: *problem is the first violation, 422 with code unknown_key,
+/* Checks a value against the file `name`. False: *problem is the first violation, 422 with code unknown_key,
  * missing_key, wrong_type, out_of_range, not_allowed, and a pointer. May be called from many threads. */
-bool schemas_check(const schemas *all, const char *name, const json_doc *doc, problem_details *problem);
+bool schemas_check(const schemas *all, const char *name, const json_value *value, problem_details *problem);
 
-/* ---- shared by schema.c (loading) and schema_check.c (checking) */
+/* ---- shared by schema.c (loading), schema_check.c (checking) and quantity.c */
 
 /* A schema and the file that its references start from. */
 typedef struct {
-    const json_t *files; /* name -> parsed file */
-    const char *file;
-    const json_t *node;
+    const schemas *all;
+    const schema_file *file;
+    const json_value *node;
 } schema_at;
 
 /* Types as a set of bits; SCHEMA_INTEGER is the whole numbers, so "number" is both bits. */
@@ -54,12 +60,13 @@ typedef enum { SHAPE_NONE, SHAPE_SCHEMA, SHAPE_LIST, SHAPE_MAP, SHAPE_REF } sche
 /* False if the keyword is not one of ours. */
 bool schema_keyword(const char *name, schema_shape *shape);
 
-schema_at schema_child(schema_at at, const json_t *node);
+schema_at schema_root(const schemas *all, const char *name); /* node NULL: there is no such file */
+schema_at schema_child(schema_at at, const json_value *node);
 /* Follows $ref until there is none; node NULL if it leads nowhere. */
 schema_at schema_resolve(schema_at at);
 /* The types that the resolved schema's "type" allows; SCHEMA_ANY without one; 0 if it is malformed. */
 unsigned schema_types(schema_at at);
 /* The required property that has a "const" in the resolved schema, and that const; NULL if none. */
-const char *schema_discriminator(schema_at at, const json_t **value);
+const char *schema_discriminator(schema_at at, const json_value **value);
 
 #endif

@@ -1,325 +1,392 @@
-/* Checking: one rule per keyword, in the order of the table, until the first violation. */
+/* schema_check.c: checking: one rule per keyword, in the order of the table, until the first violation. */
 #include "codec/problem.h"
-#include "codec/schema_numbers.h"
-#include "codec/schema_visit.h"
+#include "codec/schema.h"
+#include "text/edit_distance.h"
 
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { MAX_NAMES = 64 }; /* candidates looked at for "did you mean" */
 
+/* A value against a schema. */
+typedef struct {
+    problem_details *problem; /* NULL: only the verdict is wanted */
+    schema_at at;
+    const json_value *value;
+} visit;
+
+/* A keyword; the rule is NULL for an annotation, or one that another rule uses. Numbers that a keyword bounds: the
+ * measure of the value, NaN where it has none. */
+typedef struct keyword {
+    const char *name;
+    schema_shape shape;
+    bool (*rule)(const visit *v, const json_value *argument, const struct keyword *k);
+    double (*measure)(const json_value *value);
+    enum { AT_LEAST, AT_MOST, ABOVE, BELOW } sense;
+    const char *says; /* bound, measure */
+} keyword;
+
 static bool check(const visit *v);
+static schema_at below(const visit *v, const json_value *schema);
 
-/* ------------------------------------------------- any value, scalars */
+/* ------------------------------------------------------------- refusals */
 
-static bool rule_type(const visit *v, const json_t *argument)
+static unsigned type_of(const json_value *value)
 {
-    unsigned allowed = schema_types(v->at);
-    (void)argument;
-    return (visit_type(v) & allowed) != 0 || visit_wrong_type(v, allowed);
+    static const unsigned TYPES[] = {
+        [JSON_IS_NULL] = SCHEMA_NULL,     [JSON_IS_BOOLEAN] = SCHEMA_BOOLEAN, [JSON_IS_NUMBER] = SCHEMA_FRACTION,
+        [JSON_IS_STRING] = SCHEMA_STRING, [JSON_IS_ARRAY] = SCHEMA_ARRAY,     [JSON_IS_NUMBERS] = SCHEMA_ARRAY,
+        [JSON_IS_OBJECT] = SCHEMA_OBJECT};
+    /* a whole number however it is written */
+    return value->kind == JSON_IS_NUMBER && value->number == floor(value->number) ? SCHEMA_INTEGER : TYPES[value->kind];
 }
 
-static bool same_scalar(const visit *v, const json_t *wanted)
+/* Fills the problem with "PLACE message"; returns false, so that a rule ends in `return refuse(...)`. */
+__attribute__((format(printf, 3, 4))) static bool refuse(const visit *v, const char *code, const char *format, ...)
 {
-    size_t len;
-    const char *text = visit_string(v, &len);
-    if (json_is_string(wanted))
-        return visit_type(v) == SCHEMA_STRING && len == json_string_length(wanted) &&
-               memcmp(text, json_string_value(wanted), len) == 0;
-    if (json_is_number(wanted))
-        return json_is_real(v->value) && json_real_value(v->value) == json_number_value(wanted);
-    return json_typeof(v->value) == json_typeof(wanted);
-}
-
-static bool rule_enum(const visit *v, const json_t *argument)
-{
-    const char *names[MAX_NAMES];
-    char got[64];
-    size_t i, len, count = 0;
-    json_t *item;
-    json_array_foreach(argument, i, item)
-    {
-        if (same_scalar(v, item))
-            return true;
-        if (json_is_string(item) && count < MAX_NAMES)
-            names[count++] = json_string_value(item);
-    }
-    const char *text = visit_string(v, &len);
-    visit_describe(got, sizeof got, v);
-    visit_refuse(v, "not_allowed", "is %s; it must be %s", got, count > 1 ? "one of " : "");
-    visit_list(v, names, count);
-    if (v->problem)
-        problem_add(v->problem, ".");
-    visit_suggest(v, text, len, names, count);
+    char text[400];
+    va_list args;
+    if (!v->problem)
+        return false;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    problem_set(v->problem, 422, code, v->value, "%s", "");
+    problem_add(v->problem, "%s %s", v->problem->pointer[0] ? v->problem->pointer : "The request", text);
     return false;
 }
 
-static bool rule_const(const visit *v, const json_t *argument)
+/* "a string or an array" for a set of types. */
+static void name_types(char *out, size_t size, unsigned types)
+{
+    static const struct {
+        unsigned bits;
+        const char *name;
+    } NAMES[] = {{SCHEMA_INTEGER | SCHEMA_FRACTION, "a number"},
+                 {SCHEMA_INTEGER, "a whole number"},
+                 {SCHEMA_STRING, "a string"},
+                 {SCHEMA_ARRAY, "an array"},
+                 {SCHEMA_OBJECT, "an object"},
+                 {SCHEMA_BOOLEAN, "true or false"},
+                 {SCHEMA_NULL, "null"},
+                 {SCHEMA_FRACTION, "a number"}};
+    size_t used = 0;
+    out[0] = '\0';
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0] && used < size; i++) {
+        if ((types & NAMES[i].bits) != NAMES[i].bits)
+            continue;
+        used += (size_t)snprintf(out + used, size - used, "%s%s", used ? " or " : "", NAMES[i].name);
+        types &= ~NAMES[i].bits;
+    }
+}
+
+/* The value for a person: a string, shortened, or a number as it is, else its type. */
+static void describe(char *out, size_t size, const json_value *value)
+{
+    enum { SHOWN = 48 };
+    char beginning[SHOWN + 4];
+    const size_t len = value->count < SHOWN ? value->count : SHOWN;
+    if (value->kind == JSON_IS_STRING && value->is_long)
+        problem_quote(out, size < SHOWN ? size : SHOWN, beginning, json_text_decode(beginning, value->text, len));
+    else if (value->kind == JSON_IS_STRING)
+        problem_quote(out, size < SHOWN ? size : SHOWN, value->text, value->count);
+    else if (value->kind == JSON_IS_NUMBER)
+        snprintf(out, size, "%.15g", value->number);
+    else
+        name_types(out, size, type_of(value));
+}
+
+static bool refuse_type(const visit *v, unsigned allowed)
+{
+    char want[128], got[64];
+    name_types(want, sizeof want, allowed);
+    name_types(got, sizeof got, type_of(v->value));
+    if (type_of(v->value) == SCHEMA_FRACTION && (allowed & SCHEMA_INTEGER))
+        describe(got, sizeof got, v->value);
+    return refuse(v, "wrong_type", "must be %s, not %s.", want, got);
+}
+
+/* Appends the names, quoted, between two texts. */
+static void add_names(const visit *v, const char *before, const char *const *names, size_t count, const char *after)
+{
+    if (!v->problem)
+        return;
+    problem_add(v->problem, "%s", before);
+    for (size_t i = 0; i < count; i++)
+        problem_add(v->problem, "%s\"%s\"", i ? ", " : "", names[i]);
+    problem_add(v->problem, "%s", after);
+}
+
+/* Appends `Did you mean "x"?` if one of the names is close. */
+static void suggest(const visit *v, const char *text, size_t len, const char *const *names, size_t count)
+{
+    const int closest = text && v->problem ? uz_closest(text, len, names, count) : -1;
+    if (closest >= 0)
+        problem_add(v->problem, " Did you mean \"%s\"?", names[closest]);
+}
+
+/* ------------------------------------------------------------- any value */
+
+static bool rule_type(const visit *v, const json_value *argument, const keyword *k)
+{
+    const unsigned allowed = schema_types(v->at);
+    (void)argument;
+    (void)k;
+    return (type_of(v->value) & allowed) != 0 || refuse_type(v, allowed);
+}
+
+/* Is it one of the scalars of a schema? */
+static bool same_scalar(const json_value *value, const json_value *wanted)
+{
+    return json_is_list(wanted) || json_is(wanted, JSON_IS_OBJECT) ? value->kind == wanted->kind
+                                                                   : json_same(value, wanted);
+}
+
+static bool rule_enum(const visit *v, const json_value *argument, const keyword *k)
+{
+    const char *names[MAX_NAMES];
+    char got[64];
+    size_t count = 0;
+    json_value room;
+    (void)k;
+    for (size_t i = 0; i < json_size(argument); i++) {
+        const json_value *item = json_item(argument, i, &room);
+        if (same_scalar(v->value, item))
+            return true;
+        if (json_text(item) && count < MAX_NAMES)
+            names[count++] = json_text(item);
+    }
+    describe(got, sizeof got, v->value);
+    refuse(v, "not_allowed", "is %s; it must be %s", got, count > 1 ? "one of " : "");
+    add_names(v, "", names, count, ".");
+    suggest(v, json_text(v->value), v->value->count, names, count);
+    return false;
+}
+
+static bool rule_const(const visit *v, const json_value *argument, const keyword *k)
 {
     char got[64];
-    if (same_scalar(v, argument))
+    (void)k;
+    if (same_scalar(v->value, argument))
         return true;
-    visit_describe(got, sizeof got, v);
-    if (json_is_string(argument))
-        return visit_refuse(v, "not_allowed", "is %s; it must be \"%s\".", got, json_string_value(argument));
-    return visit_refuse(v, "not_allowed", "is %s; it must be %.15g.", got, json_number_value(argument));
+    describe(got, sizeof got, v->value);
+    if (json_text(argument))
+        return refuse(v, "not_allowed", "is %s; it must be \"%s\".", got, json_text(argument));
+    return refuse(v, "not_allowed", "is %s; it must be %.15g.", got, json_number(argument, 0));
 }
 
-static bool rule_minimum(const visit *v, const json_t *argument)
+static double measure_number(const json_value *value)
 {
-    double x = json_real_value(v->value), least = json_number_value(argument);
-    return !json_is_real(v->value) || x >= least ||
-           visit_refuse(v, "out_of_range", "must be at least %.15g, not %.15g.", least, x);
+    return json_number(value, (double)NAN);
 }
 
-static bool rule_maximum(const visit *v, const json_t *argument)
+/* Characters, not bytes. */
+static double measure_text(const json_value *value)
 {
-    double x = json_real_value(v->value), most = json_number_value(argument);
-    return !json_is_real(v->value) || x <= most ||
-           visit_refuse(v, "out_of_range", "must be at most %.15g, not %.15g.", most, x);
+    return value->kind == JSON_IS_STRING ? (double)json_text_characters(value) : (double)NAN;
 }
 
-static bool rule_exclusive_minimum(const visit *v, const json_t *argument)
+static double measure_array(const json_value *value)
 {
-    double x = json_real_value(v->value), least = json_number_value(argument);
-    return !json_is_real(v->value) || x > least ||
-           visit_refuse(v, "out_of_range", "must be greater than %.15g, not %.15g.", least, x);
+    return json_is_list(value) ? (double)value->count : (double)NAN;
 }
 
-static bool rule_exclusive_maximum(const visit *v, const json_t *argument)
+static bool rule_bound(const visit *v, const json_value *argument, const keyword *k)
 {
-    double x = json_real_value(v->value), most = json_number_value(argument);
-    return !json_is_real(v->value) || x < most ||
-           visit_refuse(v, "out_of_range", "must be less than %.15g, not %.15g.", most, x);
-}
-
-/* Characters, not bytes. -1: no string. */
-static double text_length(const visit *v)
-{
-    size_t len, count = 0;
-    const char *text = visit_string(v, &len);
-    if (visit_type(v) != SCHEMA_STRING)
-        return -1;
-    for (size_t i = 0; i < len; i++)
-        count += ((unsigned char)text[i] & 0xc0) != 0x80;
-    return (double)count;
-}
-
-static bool rule_min_length(const visit *v, const json_t *argument)
-{
-    double n = text_length(v), least = json_number_value(argument);
-    return n < 0 || n >= least ||
-           visit_refuse(v, "out_of_range", "must have at least %.15g characters, not %.15g.", least, n);
-}
-
-static bool rule_max_length(const visit *v, const json_t *argument)
-{
-    double n = text_length(v), most = json_number_value(argument);
-    return n <= most || visit_refuse(v, "out_of_range", "must have at most %.15g characters, not %.15g.", most, n);
+    const double x = k->measure(v->value), bound = json_number(argument, 0);
+    const bool misses[] = {[AT_LEAST] = x<bound, [AT_MOST] = x> bound, [ABOVE] = x <= bound, [BELOW] = x >= bound};
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wformat-nonliteral"
+    return !misses[k->sense] || refuse(v, "out_of_range", k->says, bound, x); /* of the table below */
+#pragma GCC diagnostic pop
 }
 
 /* -------------------------------------------------------------- arrays */
 
-/* Items of an array, lifted or not; -1: no array. */
-static double array_length(const visit *v)
-{
-    const json_lifted *lifted = json_doc_lifted(v->doc, v->value);
-    if (visit_type(v) != SCHEMA_ARRAY)
-        return -1;
-    return lifted ? (double)lifted->count : (double)json_array_size(v->value);
-}
+/* What a schema asks of a number, where it asks for nothing but a type and a range. */
+typedef struct {
+    bool plain; /* false: more is asked, or nothing that a number could meet */
+    bool whole;
+    double least, above, most, below; /* x >= least, x > above, x <= most, x < below */
+} number_range;
 
-static bool rule_min_items(const visit *v, const json_t *argument)
+/* Is every keyword one of these, or says it nothing about values? */
+static bool only_keywords(const json_value *node, const char *const *known, size_t count)
 {
-    double n = array_length(v), least = json_number_value(argument);
-    return n < 0 || n >= least ||
-           visit_refuse(v, "out_of_range", "must have at least %.15g items, not %.15g.", least, n);
-}
-
-static bool rule_max_items(const visit *v, const json_t *argument)
-{
-    double n = array_length(v), most = json_number_value(argument);
-    return n <= most || visit_refuse(v, "out_of_range", "must have at most %.15g items, not %.15g.", most, n);
-}
-
-/* Each row is put into one small array and checked as if it stood there. */
-static bool check_table_rows(const visit *v, const json_lifted *table, schema_at items)
-{
-    const schema_numbers numbers = schema_row_numbers(items);
-    json_t *row = json_array();
-    bool good = row != NULL;
-    for (int64_t j = 0; good && j < table->columns; j++)
-        good = json_array_append_new(row, json_real(0)) == 0;
-    if (!good)
-        visit_no_memory(v);
-    for (int64_t i = 0; good && i < table->count; i++) {
-        json_path path = {v->path, NULL, 0, (size_t)i};
-        /* the rows are of one size: what holds for the first one holds for others whose numbers are in range */
-        if (i > 0 && schema_numbers_fit(numbers, table->numbers + i * table->columns, table->columns))
-            continue;
-        for (int64_t j = 0; j < table->columns; j++)
-            json_real_set(json_array_get(row, (size_t)j), table->numbers[i * table->columns + j]);
-        good = check(&(visit){v->doc, v->problem, items, row, &path});
-    }
-    json_decref(row);
-    return good;
-}
-
-static bool check_lifted_items(const visit *v, const json_lifted *lifted, schema_at items)
-{
-    bool good = true;
-    if (lifted->columns > 0)
-        return check_table_rows(v, lifted, items);
-    const schema_numbers numbers = schema_plain_numbers(items);
-    json_t *number = json_real(0);
-    if (!number)
-        return visit_no_memory(v);
-    for (int64_t i = 0; good && i < lifted->count; i++) {
-        json_path path = {v->path, NULL, 0, (size_t)i};
-        if (schema_numbers_fit(numbers, lifted->numbers + i, 1))
-            continue;
-        json_real_set(number, lifted->numbers[i]);
-        good = check(&(visit){v->doc, v->problem, items, number, &path});
-    }
-    json_decref(number);
-    return good;
-}
-
-static bool rule_items(const visit *v, const json_t *argument)
-{
-    const json_lifted *lifted = json_doc_lifted(v->doc, v->value);
-    size_t i;
-    json_t *item;
-    if (visit_type(v) != SCHEMA_ARRAY)
-        return true;
-    if (lifted)
-        return check_lifted_items(v, lifted, schema_child(v->at, argument));
-    json_array_foreach(v->value, i, item)
-    {
-        json_path path = {v->path, NULL, 0, i};
-        if (!check(&(visit){v->doc, v->problem, schema_child(v->at, argument), item, &path}))
+    static const char *const SILENT[] = {"title", "description", "default", "examples", "$comment"};
+    for (size_t k = 0; k < json_size(node); k++) {
+        bool found = false;
+        for (size_t i = 0; i < sizeof SILENT / sizeof SILENT[0]; i++)
+            found = found || strcmp(node->items[k].key, SILENT[i]) == 0;
+        for (size_t i = 0; i < count; i++)
+            found = found || strcmp(node->items[k].key, known[i]) == 0;
+        if (!found)
             return false;
     }
     return true;
 }
 
-/* Quadratic: loading demands a maxItems beside it. Not for lifted arrays, which are longer than that maxItems. */
-static bool rule_unique_items(const visit *v, const json_t *argument)
+static number_range range_of(schema_at at)
 {
+    static const char *const KNOWN[] = {"type", "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"};
+    at = schema_resolve(at);
+    const unsigned types = schema_types(at);
+    number_range out = {json_truth(at.node), false, -INFINITY, -INFINITY, INFINITY, INFINITY};
+    if (!json_is(at.node, JSON_IS_OBJECT) || !only_keywords(at.node, KNOWN, sizeof KNOWN / sizeof KNOWN[0]))
+        return out;
+    out.plain = (types & SCHEMA_INTEGER) != 0;
+    out.whole = !(types & SCHEMA_FRACTION);
+    out.least = json_number(json_get(at.node, "minimum"), -INFINITY);
+    out.above = json_number(json_get(at.node, "exclusiveMinimum"), -INFINITY);
+    out.most = json_number(json_get(at.node, "maximum"), INFINITY);
+    out.below = json_number(json_get(at.node, "exclusiveMaximum"), INFINITY);
+    return out;
+}
+
+/* The same of the numbers in a row of a table, where the schema asks nothing of the row but its length and its items.
+ */
+static number_range row_range(schema_at row)
+{
+    static const char *const KNOWN[] = {"type", "minItems", "maxItems", "items"};
+    row = schema_resolve(row);
+    const json_value *items = json_get(row.node, "items");
+    number_range out = {true, false, -INFINITY, -INFINITY, INFINITY, INFINITY};
+    if (json_truth(row.node))
+        return out;
+    out.plain = json_is(row.node, JSON_IS_OBJECT) && only_keywords(row.node, KNOWN, sizeof KNOWN / sizeof KNOWN[0]);
+    return out.plain && items ? range_of(schema_child(row, items)) : out;
+}
+
+static bool in_range(const number_range *r, const double *x, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!(x[i] >= r->least && x[i] > r->above && x[i] <= r->most && x[i] < r->below) ||
+            (r->whole && x[i] != floor(x[i])))
+            return false;
+    return r->plain;
+}
+
+/* A million numbers need no visit for each of them. */
+static bool rule_items(const visit *v, const json_value *argument, const keyword *k)
+{
+    const json_value *list = v->value;
+    const schema_at items = below(v, argument);
+    const size_t columns = list->columns ? list->columns : 1;
+    const bool table = list->columns > 0, numbers = list->kind == JSON_IS_NUMBERS;
+    const number_range range = table ? row_range(items) : numbers ? range_of(items) : (number_range){.plain = false};
+    json_value room;
+    (void)k;
+    for (size_t i = 0; json_is_list(list) && i < list->count; i++) {
+        /* rows are of one size: what holds for the first one holds for others whose numbers are in range */
+        if (numbers && !(table && i == 0) && in_range(&range, list->numbers + i * columns, columns))
+            continue;
+        if (!check(&(visit){v->problem, items, json_item(list, i, &room)}))
+            return false;
+    }
+    return true;
+}
+
+/* Quadratic: loading demands a maxItems beside it. */
+static bool rule_unique_items(const visit *v, const json_value *argument, const keyword *k)
+{
+    json_value room, other;
     (void)argument;
-    for (size_t i = 0; i < json_array_size(v->value); i++)
+    (void)k;
+    for (size_t i = 0; json_is_list(v->value) && i < v->value->count; i++)
         for (size_t j = 0; j < i; j++) {
-            json_path path = {v->path, NULL, 0, i};
-            if (json_equal(json_array_get(v->value, i), json_array_get(v->value, j)))
-                return visit_refuse(&(visit){v->doc, v->problem, v->at, v->value, &path}, "not_allowed",
-                                    "repeats item %zu; each may stand only once.", j);
+            const json_value *item = json_item(v->value, i, &room);
+            if (json_same(item, json_item(v->value, j, &other)))
+                return refuse(&(visit){v->problem, v->at, item}, "not_allowed",
+                              "repeats item %zu; each may stand only once.", j);
         }
     return true;
 }
 
 /* ------------------------------------------------------------- objects */
 
-static bool unknown_key(const visit *v, const char *key, size_t len)
+static bool refuse_key(const visit *v, const json_value *member)
 {
-    const char *names[MAX_NAMES], *name;
+    const json_value *properties = json_get(v->at.node, "properties");
+    const char *names[MAX_NAMES];
     char shown[64];
     size_t count = 0;
-    json_t *value;
-    json_path path = {v->path, key, len, 0};
-    visit here = {v->doc, v->problem, v->at, v->value, &path};
-    json_object_foreach(json_object_get(v->at.node, "properties"), name, value)
-    {
-        if (count < MAX_NAMES)
-            names[count++] = name;
-    }
-    problem_quote(shown, sizeof shown, key, len);
-    visit_refuse(&here, "unknown_key", "is not known: there is no key %s here.", shown);
-    visit_suggest(&here, key, len, names, count);
-    if (v->problem && count > 0) {
-        problem_add(v->problem, " Known: ");
-        visit_list(v, names, count);
-        problem_add(v->problem, ".");
-    }
+    for (; count < json_size(properties) && count < MAX_NAMES; count++)
+        names[count] = properties->items[count].key;
+    problem_quote(shown, sizeof shown, member->key, member->place);
+    refuse(&(visit){v->problem, v->at, member}, "unknown_key", "is not known: there is no key %s here.", shown);
+    suggest(v, member->key, member->place, names, count);
+    if (count > 0)
+        add_names(v, " Known: ", names, count, ".");
     return false;
 }
 
-static bool rule_additional_properties(const visit *v, const json_t *argument)
+static bool rule_additional_properties(const visit *v, const json_value *argument, const keyword *k)
 {
-    const json_t *properties = json_object_get(v->at.node, "properties");
-    void *entry = json_is_object(v->value) ? json_object_iter((json_t *)v->value) : NULL;
-    for (; entry; entry = json_object_iter_next((json_t *)v->value, entry)) {
-        const char *key = json_object_iter_key(entry);
-        size_t len = json_object_iter_key_len(entry);
-        json_path path = {v->path, key, len, 0};
-        if (json_object_getn(properties, key, len))
+    const json_value *properties = json_get(v->at.node, "properties");
+    (void)k;
+    for (size_t i = 0; json_is(v->value, JSON_IS_OBJECT) && i < v->value->count; i++) {
+        const json_value *member = &v->value->items[i];
+        if (json_get_n(properties, member->key, member->place))
             continue;
-        if (json_is_false(argument))
-            return unknown_key(v, key, len);
-        if (!check(&(visit){v->doc, v->problem, schema_child(v->at, argument), json_object_iter_value(entry), &path}))
+        if (json_is(argument, JSON_IS_BOOLEAN) && !argument->truth)
+            return refuse_key(v, member);
+        if (!check(&(visit){v->problem, below(v, argument), member}))
             return false;
     }
     return true;
 }
 
-static bool rule_required(const visit *v, const json_t *argument)
+static bool rule_required(const visit *v, const json_value *argument, const keyword *k)
 {
-    for (size_t i = 0; json_is_object(v->value) && i < json_array_size(argument); i++) {
-        const char *key = json_string_value(json_array_get(argument, i));
-        if (!json_object_get(v->value, key))
-            return visit_refuse(v, "missing_key", "has no \"%s\", which is required.", key);
+    (void)k;
+    for (size_t i = 0; json_is(v->value, JSON_IS_OBJECT) && i < json_size(argument); i++)
+        if (!json_get(v->value, argument->items[i].text))
+            return refuse(v, "missing_key", "has no \"%s\", which is required.", argument->items[i].text);
+    return true;
+}
+
+static bool rule_dependent_required(const visit *v, const json_value *argument, const keyword *k)
+{
+    (void)k;
+    for (size_t i = 0; i < json_size(argument); i++) {
+        const json_value *needed = &argument->items[i];
+        for (size_t j = 0; json_get(v->value, needed->key) && j < json_size(needed); j++)
+            if (!json_get(v->value, needed->items[j].text))
+                return refuse(v, "missing_key", "has \"%s\" but no \"%s\", which goes with it.", needed->key,
+                              needed->items[j].text);
     }
     return true;
 }
 
-static bool rule_dependent_required(const visit *v, const json_t *argument)
+static bool rule_min_properties(const visit *v, const json_value *argument, const keyword *k)
 {
-    const char *key;
-    json_t *needed, *other;
-    size_t i;
-    json_object_foreach((json_t *)argument, key, needed)
-    {
-        json_array_foreach(needed, i, other)
-        {
-            const char *name = json_string_value(other);
-            if (json_object_get(v->value, key) && !json_object_get(v->value, name))
-                return visit_refuse(v, "missing_key", "has \"%s\" but no \"%s\", which goes with it.", key, name);
-        }
-    }
-    return true;
-}
-
-static bool rule_min_properties(const visit *v, const json_t *argument)
-{
-    const json_t *known = json_object_get(v->at.node, "properties");
-    double n = (double)json_object_size(v->value), least = json_number_value(argument);
-    const char *key;
-    json_t *value;
-    if (!json_is_object(v->value) || n >= least)
+    const json_value *known = json_get(v->at.node, "properties");
+    const double least = json_number(argument, 0);
+    (void)k;
+    if (!json_is(v->value, JSON_IS_OBJECT) || (double)v->value->count >= least)
         return true;
-    visit_refuse(v, "missing_key", "must have at least %.15g of the keys", least);
-    json_object_foreach((json_t *)known, key, value)
-    {
-        if (v->problem)
-            problem_add(v->problem, " \"%s\"", key);
-    }
+    refuse(v, "missing_key", "must have at least %.15g of the keys", least);
+    for (size_t i = 0; v->problem && i < json_size(known); i++)
+        problem_add(v->problem, " \"%s\"", known->items[i].key);
     return false;
 }
 
-static bool rule_max_properties(const visit *v, const json_t *argument)
+static bool rule_max_properties(const visit *v, const json_value *argument, const keyword *k)
 {
-    double n = (double)json_object_size(v->value), most = json_number_value(argument);
-    return !json_is_object(v->value) || n <= most ||
-           visit_refuse(v, "not_allowed", "has %.15g keys, but at most %.15g of them go together.", n, most);
+    const double n = (double)json_size(v->value), most = json_number(argument, 0);
+    (void)k;
+    return !json_is(v->value, JSON_IS_OBJECT) || n <= most ||
+           refuse(v, "not_allowed", "has %.15g keys, but at most %.15g of them go together.", n, most);
 }
 
-static bool rule_properties(const visit *v, const json_t *argument)
+static bool rule_properties(const visit *v, const json_value *argument, const keyword *k)
 {
-    const char *key;
-    json_t *schema;
-    json_object_foreach((json_t *)argument, key, schema)
-    {
-        json_t *value = json_object_get(v->value, key);
-        json_path path = {v->path, key, strlen(key), 0};
-        if (value && !check(&(visit){v->doc, v->problem, schema_child(v->at, schema), value, &path}))
+    (void)k;
+    for (size_t i = 0; i < json_size(argument); i++) {
+        const json_value *schema = &argument->items[i], *value = json_get_n(v->value, schema->key, schema->place);
+        if (value && !check(&(visit){v->problem, below(v, schema), value}))
             return false;
     }
     return true;
@@ -327,84 +394,79 @@ static bool rule_properties(const visit *v, const json_t *argument)
 
 /* -------------------------------------------------------- combinations */
 
-static bool rule_ref(const visit *v, const json_t *argument)
+static schema_at below(const visit *v, const json_value *schema)
 {
-    visit there = *v;
+    return schema_child(v->at, schema);
+}
+
+static bool rule_ref(const visit *v, const json_value *argument, const keyword *k)
+{
     (void)argument;
-    there.at = schema_resolve(v->at);
-    return check(&there);
+    (void)k;
+    return check(&(visit){v->problem, schema_resolve(v->at), v->value});
 }
 
 /* Among branches that are all objects, the one whose const the value names. */
-static bool choose_by_key(const visit *v, const json_t *branches)
+static bool choose_by_key(const visit *v, const json_value *branches)
 {
-    const char *names[MAX_NAMES], *key = NULL;
-    size_t i, len, count = 0;
-    json_t *branch;
-    const json_t *wanted = NULL;
-    visit here = *v;
-    json_path path = {v->path, NULL, 0, 0};
-    json_array_foreach(branches, i, branch)
-    {
-        schema_at at = schema_resolve(schema_child(v->at, branch));
-        const char *name = schema_discriminator(at, &wanted);
-        if (!name)
+    const char *names[MAX_NAMES];
+    size_t count = 0;
+    json_value room;
+    const json_value *wanted = NULL, *named = NULL;
+    for (size_t i = 0; i < branches->count; i++) {
+        const schema_at at = schema_resolve(below(v, json_item(branches, i, &room)));
+        const char *key = schema_discriminator(at, &wanted);
+        if (!key)
             continue;
-        key = name;
-        here.value = json_object_get(v->value, key);
-        if (!here.value)
-            return visit_refuse(v, "missing_key", "has no \"%s\", which is required.", key);
-        if (same_scalar(&here, wanted))
-            return check(&(visit){v->doc, v->problem, at, v->value, v->path});
-        if (json_is_string(wanted) && count < MAX_NAMES)
-            names[count++] = json_string_value(wanted);
+        named = json_get(v->value, key);
+        if (!named)
+            return refuse(v, "missing_key", "has no \"%s\", which is required.", key);
+        if (same_scalar(named, wanted))
+            return check(&(visit){v->problem, at, v->value});
+        if (json_text(wanted) && count < MAX_NAMES)
+            names[count++] = json_text(wanted);
     }
-    if (!key)
+    if (!named)
         return false;
-    path.key = key;
-    path.key_len = strlen(key);
-    here.path = &path;
-    if (visit_type(&here) != SCHEMA_STRING)
-        return visit_wrong_type(&here, SCHEMA_STRING);
-    visit_refuse(&here, "not_allowed", "must be one of ");
-    visit_list(v, names, count);
-    if (v->problem)
-        problem_add(v->problem, ".");
-    const char *text = visit_string(&here, &len);
-    visit_suggest(&here, text, len, names, count);
+    const visit here = {v->problem, v->at, named};
+    if (named->kind != JSON_IS_STRING)
+        return refuse_type(&here, SCHEMA_STRING);
+    refuse(&here, "not_allowed", "must be one of ");
+    add_names(v, "", names, count, ".");
+    suggest(v, json_text(named), named->count, names, count);
     return false;
 }
 
-static bool rule_choice(const visit *v, const json_t *argument)
+static bool rule_choice(const visit *v, const json_value *argument, const keyword *k)
 {
     schema_at chosen = v->at;
-    size_t i, fitting = 0;
+    size_t fitting = 0;
     unsigned all = 0;
-    json_t *branch;
-    json_array_foreach(argument, i, branch)
-    {
-        schema_at at = schema_resolve(schema_child(v->at, branch));
-        unsigned types = schema_types(at);
+    json_value room;
+    (void)k;
+    for (size_t i = 0; i < json_size(argument); i++) {
+        const schema_at at = schema_resolve(below(v, json_item(argument, i, &room)));
+        const unsigned types = schema_types(at);
         all |= types;
-        if (types & visit_type(v)) {
+        if (types & type_of(v->value)) {
             chosen = at;
             fitting++;
         }
     }
     if (fitting == 0)
-        return visit_wrong_type(v, all);
-    return fitting == 1 ? check(&(visit){v->doc, v->problem, chosen, v->value, v->path}) : choose_by_key(v, argument);
+        return refuse_type(v, all);
+    return fitting == 1 ? check(&(visit){v->problem, chosen, v->value}) : choose_by_key(v, argument);
 }
 
 /* "then" and "else" say in their description why they ask for more; it is added to what they refuse. */
-static bool rule_if(const visit *v, const json_t *argument)
+static bool rule_if(const visit *v, const json_value *argument, const keyword *k)
 {
-    visit condition = {v->doc, NULL, schema_child(v->at, argument), v->value, v->path};
-    const json_t *branch = json_object_get(v->at.node, check(&condition) ? "then" : "else");
-    visit there = {v->doc, v->problem, schema_child(v->at, branch), v->value, v->path};
-    if (!branch || check(&there))
+    const bool holds = check(&(visit){NULL, below(v, argument), v->value});
+    const json_value *branch = json_get(v->at.node, holds ? "then" : "else");
+    (void)k;
+    if (!branch || check(&(visit){v->problem, below(v, branch), v->value}))
         return true;
-    const char *why = json_string_value(json_object_get(branch, "description"));
+    const char *why = json_text_of(branch, "description");
     if (why && v->problem)
         problem_add(v->problem, " %s", why);
     return false;
@@ -412,47 +474,43 @@ static bool rule_if(const visit *v, const json_t *argument)
 
 /* ------------------------------------------------------------ keywords */
 
-/* In the order of checking: what names the culprit best comes first. No rule: an annotation, or used by another. */
-static const struct {
-    const char *name;
-    schema_shape shape;
-    bool (*rule)(const visit *v, const json_t *argument);
-} KEYWORDS[] = {
-    {"$ref", SHAPE_REF, rule_ref},
-    {"type", SHAPE_NONE, rule_type},
-    {"const", SHAPE_NONE, rule_const},
-    {"enum", SHAPE_NONE, rule_enum},
-    {"minimum", SHAPE_NONE, rule_minimum},
-    {"maximum", SHAPE_NONE, rule_maximum},
-    {"exclusiveMinimum", SHAPE_NONE, rule_exclusive_minimum},
-    {"exclusiveMaximum", SHAPE_NONE, rule_exclusive_maximum},
-    {"minLength", SHAPE_NONE, rule_min_length},
-    {"maxLength", SHAPE_NONE, rule_max_length},
-    {"minItems", SHAPE_NONE, rule_min_items},
-    {"maxItems", SHAPE_NONE, rule_max_items},
-    {"items", SHAPE_SCHEMA, rule_items},
-    {"uniqueItems", SHAPE_NONE, rule_unique_items},
-    {"additionalProperties", SHAPE_SCHEMA, rule_additional_properties},
-    {"required", SHAPE_NONE, rule_required},
-    {"dependentRequired", SHAPE_NONE, rule_dependent_required},
-    {"minProperties", SHAPE_NONE, rule_min_properties},
-    {"maxProperties", SHAPE_NONE, rule_max_properties},
-    {"properties", SHAPE_MAP, rule_properties},
-    {"oneOf", SHAPE_LIST, rule_choice},
-    {"anyOf", SHAPE_LIST, rule_choice},
-    {"if", SHAPE_SCHEMA, rule_if},
-    {"then", SHAPE_SCHEMA, NULL},
-    {"else", SHAPE_SCHEMA, NULL},
-    {"$defs", SHAPE_MAP, NULL},
-    {"$schema", SHAPE_NONE, NULL},
-    {"$id", SHAPE_NONE, NULL},
-    {"$comment", SHAPE_NONE, NULL},
-    {"title", SHAPE_NONE, NULL},
-    {"description", SHAPE_NONE, NULL},
-    {"default", SHAPE_NONE, NULL},
-    {"examples", SHAPE_NONE, NULL},
-    {"format", SHAPE_NONE, NULL},
-    {"contentMediaType", SHAPE_NONE, NULL},
+/* In the order of checking: what names the culprit best comes first. */
+static const keyword KEYWORDS[] = {
+    {"$ref", SHAPE_REF, rule_ref, NULL, 0, NULL},
+    {"type", SHAPE_NONE, rule_type, NULL, 0, NULL},
+    {"const", SHAPE_NONE, rule_const, NULL, 0, NULL},
+    {"enum", SHAPE_NONE, rule_enum, NULL, 0, NULL},
+    {"minimum", SHAPE_NONE, rule_bound, measure_number, AT_LEAST, "must be at least %.15g, not %.15g."},
+    {"maximum", SHAPE_NONE, rule_bound, measure_number, AT_MOST, "must be at most %.15g, not %.15g."},
+    {"exclusiveMinimum", SHAPE_NONE, rule_bound, measure_number, ABOVE, "must be greater than %.15g, not %.15g."},
+    {"exclusiveMaximum", SHAPE_NONE, rule_bound, measure_number, BELOW, "must be less than %.15g, not %.15g."},
+    {"minLength", SHAPE_NONE, rule_bound, measure_text, AT_LEAST, "must have at least %.15g characters, not %.15g."},
+    {"maxLength", SHAPE_NONE, rule_bound, measure_text, AT_MOST, "must have at most %.15g characters, not %.15g."},
+    {"minItems", SHAPE_NONE, rule_bound, measure_array, AT_LEAST, "must have at least %.15g items, not %.15g."},
+    {"maxItems", SHAPE_NONE, rule_bound, measure_array, AT_MOST, "must have at most %.15g items, not %.15g."},
+    {"items", SHAPE_SCHEMA, rule_items, NULL, 0, NULL},
+    {"uniqueItems", SHAPE_NONE, rule_unique_items, NULL, 0, NULL},
+    {"additionalProperties", SHAPE_SCHEMA, rule_additional_properties, NULL, 0, NULL},
+    {"required", SHAPE_NONE, rule_required, NULL, 0, NULL},
+    {"dependentRequired", SHAPE_NONE, rule_dependent_required, NULL, 0, NULL},
+    {"minProperties", SHAPE_NONE, rule_min_properties, NULL, 0, NULL},
+    {"maxProperties", SHAPE_NONE, rule_max_properties, NULL, 0, NULL},
+    {"properties", SHAPE_MAP, rule_properties, NULL, 0, NULL},
+    {"oneOf", SHAPE_LIST, rule_choice, NULL, 0, NULL},
+    {"anyOf", SHAPE_LIST, rule_choice, NULL, 0, NULL},
+    {"if", SHAPE_SCHEMA, rule_if, NULL, 0, NULL},
+    {"then", SHAPE_SCHEMA, NULL, NULL, 0, NULL},
+    {"else", SHAPE_SCHEMA, NULL, NULL, 0, NULL},
+    {"$defs", SHAPE_MAP, NULL, NULL, 0, NULL},
+    {"$schema", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"$id", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"$comment", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"title", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"description", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"default", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"examples", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"format", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"contentMediaType", SHAPE_NONE, NULL, NULL, 0, NULL},
 };
 enum { KEYWORD_COUNT = sizeof KEYWORDS / sizeof KEYWORDS[0] };
 
@@ -468,23 +526,22 @@ bool schema_keyword(const char *name, schema_shape *shape)
 
 static bool check(const visit *v)
 {
-    if (json_is_boolean(v->at.node))
-        return json_is_true(v->at.node) || visit_refuse(v, "not_allowed", "is not allowed here.");
+    if (json_is(v->at.node, JSON_IS_BOOLEAN))
+        return v->at.node->truth || refuse(v, "not_allowed", "is not allowed here.");
     for (size_t i = 0; i < KEYWORD_COUNT; i++) {
-        const json_t *argument = json_object_get(v->at.node, KEYWORDS[i].name);
-        if (argument && KEYWORDS[i].rule && !KEYWORDS[i].rule(v, argument))
+        const json_value *argument = KEYWORDS[i].rule ? json_get(v->at.node, KEYWORDS[i].name) : NULL;
+        if (argument && !KEYWORDS[i].rule(v, argument, &KEYWORDS[i]))
             return false;
     }
     return true;
 }
 
-bool schemas_check(const schemas *all, const char *name, const json_doc *doc, problem_details *problem)
+bool schemas_check(const schemas *all, const char *name, const json_value *value, problem_details *problem)
 {
-    const json_t *file = json_object_get(all->files, name);
-    visit v = {doc, problem, {all->files, name, file}, doc->root, NULL};
+    const schema_at root = schema_root(all, name);
     *problem = (problem_details){0};
-    if (file)
-        return check(&v);
+    if (root.node)
+        return check(&(visit){problem, root, value});
     problem_set(problem, 500, "internal", NULL, "There is no schema %s.", name);
     return false;
 }

@@ -1,5 +1,5 @@
 #include "codec/text.h"
-#include "codec/json_doc.h"
+#include "codec/json.h"
 #include "uzawa.h"
 
 #include <inttypes.h>

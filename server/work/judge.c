@@ -46,7 +46,7 @@ static double margin_of(range limits, double value)
 
 /* ---- how far a number may be from that of the exact answer */
 
-static double number_at(const json_t *summary, const char *name)
+static double number_at(const json_value *summary, const char *name)
 {
     double value = NAN;
     return quantity_read(&value, summary, name) ? value : (double)NAN;
@@ -69,7 +69,7 @@ static bool is_estimate(const char *quantity)
 /* The minimum of the energy is between the dual and the primal value. The strain energy W is half the square of a
  * seminorm of the strain without its thermal part, and by the triangle inequality sqrt(2 W) differs from the exact one
  * by at most the energy norm of the displacement's error. */
-static bound exact_bound(const json_t *summary, const char *quantity, double value)
+static bound exact_bound(const json_value *summary, const char *quantity, double value)
 {
     const double gap = number_at(summary, "certificate.gap"), e = number_at(summary, "certificate.absolute_error");
     if (!is_estimate(quantity))
@@ -119,9 +119,9 @@ static void say_between(codec_finding *out, range exact)
 }
 
 /* A finding without a reason passes. */
-static void judge_value(codec_finding *out, const codec_assertion *a, const json_t *summary)
+static void judge_value(codec_finding *out, const codec_assertion *a, const json_value *summary)
 {
-    const char *outcome = json_string_value(json_object_get(summary, "outcome"));
+    const char *outcome = json_text_of(summary, "outcome");
     const bool met = outcome && (strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0);
     const range limits = limits_of(a);
     const bound known = exact_bound(summary, a->quantity, out->value);
@@ -146,16 +146,16 @@ static void judge_value(codec_finding *out, const codec_assertion *a, const json
 }
 
 /* Outcomes that no case had are not in a summary. */
-static bool read_value(double *value, const json_t *summary, const char *quantity)
+static bool read_value(double *value, const json_value *summary, const char *quantity)
 {
     if (quantity_read(value, summary, quantity))
         return true;
-    const bool none = strncmp(quantity, "cases.", 6) == 0 && json_object_get(summary, "cases");
+    const bool none = strncmp(quantity, "cases.", 6) == 0 && json_get(summary, "cases");
     *value = none ? 0.0 : (double)NAN;
     return none;
 }
 
-static codec_finding judge_one(const codec_assertion *a, const json_t *summary)
+static codec_finding judge_one(const codec_assertion *a, const json_value *summary)
 {
     codec_finding out = {.verdict = CODEC_FAIL, .value = NAN, .error = NAN, .margin = -INFINITY};
     if (read_value(&out.value, summary, a->quantity))
@@ -254,21 +254,21 @@ static bool end_list(text *t, bool passed, char **summary)
 }
 
 /* The summary as values; false: no memory. */
-static bool read_summary(json_doc *doc, const char *summary)
+static bool read_summary(json_tree *tree, const char *summary)
 {
     problem_details problem;
-    return json_scan(doc, summary, strlen(summary), &problem);
+    return json_scan(tree, summary, strlen(summary), &problem);
 }
 
 /* whole: the summary is of all cases together. */
 static bool judge_list(char **summary, const codec_request *request, const char *name, bool whole, codec_finding *all)
 {
-    json_doc doc;
+    json_tree tree;
     text t = {0};
     bool passed = true;
     if (request->n_assertions == 0)
         return true;
-    if (!read_summary(&doc, *summary))
+    if (!read_summary(&tree, *summary))
         return false;
     begin_list(&t, *summary);
     for (int64_t i = 0; i < request->n_assertions; i++) {
@@ -276,13 +276,13 @@ static bool judge_list(char **summary, const codec_request *request, const char 
         const bool gathered = whole && !is_of_the_whole(a);
         if (!whole && !concerns(a, name))
             continue;
-        const codec_finding found = gathered ? all[i] : judge_one(a, doc.root);
+        const codec_finding found = gathered ? all[i] : judge_one(a, tree.root);
         passed = passed && found.verdict == CODEC_PASS;
         put_finding(&t, a, &found, gathered);
         if (name)
             gather(&all[i], &found, name);
     }
-    json_doc_clear(&doc);
+    json_clear(&tree);
     return end_list(&t, passed, summary);
 }
 

@@ -1,6 +1,7 @@
 /* The scanner against an independent parser: what one takes as JSON, so does the other. */
-#include "codec/json_doc.h"
+#include "codec/json.h"
 
+#include <jansson.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,14 +29,14 @@ static bool jansson_takes(const char *text, size_t size)
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
-    json_doc doc;
+    json_tree doc;
     problem_details problem;
     const char *text = (const char *)data;
     bool good = json_scan(&doc, text, size, &problem);
     bool no_json = strcmp(problem.code, "json_syntax") == 0;
     expect(good == (problem.status == 0), "a verdict without a status");
     expect(good || (problem.code[0] && problem.detail[0] && !doc.root), "a refusal that says nothing");
-    json_doc_clear(&doc);
+    json_clear(&doc);
     if (memchr(text, '\0', size))
         expect(no_json || strcmp(problem.code, "json_depth") == 0, "a NUL byte was taken");
     else if (good && !memmem(text, size, "\\u0000", 6))

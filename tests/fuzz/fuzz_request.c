@@ -1,6 +1,6 @@
 /* The whole way of a request body. Whatever comes, the answer is a request or a problem that can be sent. */
 #include "codec/codec.h"
-#include "codec/json_doc.h"
+#include "codec/json.h"
 
 #include <stdint.h>
 #include <stdio.h>
@@ -24,13 +24,13 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 /* The problem document is JSON, whatever bytes of the request it quotes. */
 static void check_problem(const problem_details *problem)
 {
-    json_doc doc;
+    json_tree doc;
     problem_details again;
     char *text = codec_encode_problem(problem);
     if (!text || problem->status < 400 || !problem->code[0] || !problem->detail[0] ||
         !json_scan(&doc, text, strlen(text), &again))
         abort();
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(text);
 }
 

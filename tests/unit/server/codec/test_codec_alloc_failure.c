@@ -1,11 +1,10 @@
-/* Every allocation of the codec, and of jansson under it, fails once. What comes out then is a whole answer or a clear
+/* Every allocation of the codec fails once. What comes out then is a whole answer or a clear
  * refusal, and not one block is left behind. Linked with malloc, calloc, realloc and free wrapped. */
 #include "codec/codec.h"
 #include "codec/decode.h"
 #include "harness.h"
 #include "sanitized.h"
 
-#include <jansson.h>
 #include <math.h>
 #include <stdint.h>
 
@@ -62,7 +61,6 @@ static void exhaust(bool (*attempt)(const char *), const char *argument)
     enum { MOST = 20000 };
     long n = 0;
     bool done = false;
-    json_set_alloc_funcs(malloc, free);
     for (; n < MOST && !done; n = next_allocation(n)) {
         int64_t before = blocks;
         countdown = n;
@@ -112,19 +110,21 @@ static bool try_scene(const char *path)
 {
     uz_scene scene = {0};
     problem_details problem = {0};
-    json_doc doc = {0};
+    json_tree tree = {NULL, NULL};
+    decoding d = {.bound = 1 << 30, .problem = &problem};
     size_t len;
     int64_t planned = countdown;
     countdown = -1;
     char *body = test_read_file(path, &len);
     countdown = planned;
-    const bool good = json_scan(&doc, body, len, &problem) && decode_check(&doc, "request.json", &problem) &&
-                      decode_scene(&scene, &doc, json_object_get(doc.root, "problem"), len, &problem);
+    const bool good = json_scan(&tree, body, len, &problem) &&
+                      schemas_check(decode_schemas(), "request.json", tree.root, &problem) &&
+                      decode_scene(&scene, &d, json_get(tree.root, "problem"));
     planned = countdown;
     countdown = -1;
     CHECK_MSG(good || (problem.status == 503 && strcmp(problem.code, "out_of_memory") == 0), "%s: %d %s %s", path,
               problem.status, problem.code, problem.detail);
-    json_doc_clear(&doc);
+    json_clear(&tree);
     uz_scene_clear(&scene);
     free(body);
     countdown = planned;
@@ -236,7 +236,6 @@ TEST(loading)
 TEST(decoding)
 {
     char message[256];
-    json_set_alloc_funcs(malloc, free);
     CHECK(codec_init(message, sizeof message));
     exhaust(try_decode, "tests/data/paper_body.json");
     exhaust(try_decode, "tests/data/small_matrices.json");
@@ -257,6 +256,5 @@ TEST(encoding)
     exhaust(try_encode, NULL);
     exhaust(try_judge, "{\"outcome\":\"converged\",\"contact\":{\"active\":2}}");
     exhaust(try_surface, "a case");
-    json_set_alloc_funcs(malloc, free);
     exhaust(try_trade, "{\"method\": \"auto\", \"certificate\": {\"relative_error\": 1e-9}, \"suggestion\": {}}");
 }

@@ -14,14 +14,15 @@ static bool ready(void)
 /* A request as the codec takes it, without asking whether the scene can be assembled. */
 static bool decode(uz_scene *out, const char *body, problem_details *problem)
 {
-    json_doc doc;
+    json_tree doc;
+    decoding d = {.bound = decode_memory_bound(strlen(body)), .problem = problem};
     *problem = (problem_details){0};
     *out = (uz_scene){0};
     if (!ready() || !json_scan(&doc, body, strlen(body), problem))
         return false;
-    const bool good = decode_check(&doc, "request.json", problem) &&
-                      decode_scene(out, &doc, json_object_get(doc.root, "problem"), strlen(body), problem);
-    json_doc_clear(&doc);
+    const bool good = schemas_check(decode_schemas(), "request.json", doc.root, problem) &&
+                      decode_scene(out, &d, json_get(doc.root, "problem"));
+    json_clear(&doc);
     return good;
 }
 

@@ -4,37 +4,42 @@
 #include "harness.h"
 
 /* Reads a reply back through the strict scanner and checks it against its schema. The caller clears *doc. */
-static void read_reply(json_doc *doc, char *reply, const char *schema)
+static void read_reply(json_tree *doc, char *reply, const char *schema)
 {
     char message[256] = "";
     problem_details problem = {0};
     schemas *all = schemas_load(message, sizeof message);
     CHECK_MSG(all, "%s", message);
     CHECK(reply != NULL);
-    *doc = (json_doc){0};
+    *doc = (json_tree){0};
     if (reply && json_scan(doc, reply, strlen(reply), &problem) && all)
-        schemas_check(all, schema, doc, &problem);
+        schemas_check(all, schema, doc->root, &problem);
     CHECK_MSG(problem.status == 0, "%s: %s %s in %s", schema, problem.pointer, problem.detail, reply);
     schemas_free(all);
 }
 
 /* The number at "a/b/c" of a document, NaN for null. */
-static double number_at(const json_doc *doc, const char *place)
+static double number_at(const json_tree *doc, const char *place)
 {
-    const json_t *value = doc->root;
+    const json_value *value = doc->root;
     for (const char *at = place; value && *at;) {
         size_t n = strcspn(at, "/");
-        value = json_object_getn(value, at, n);
+        value = json_get_n(value, at, n);
         at += n + (at[n] == '/');
     }
     CHECK_MSG(value, "no %s", place);
-    return json_is_null(value) ? (double)NAN : json_real_value(value);
+    return json_number(value, (double)NAN);
 }
 
-static const char *text_at(const json_doc *doc, const char *key)
+static const char *text_at(const json_tree *doc, const char *key)
 {
-    const char *found = json_string_value(json_object_get(doc->root, key));
+    const char *found = json_text(json_get(doc->root, key));
     return found ? found : "";
+}
+
+static bool is_false(const json_value *value)
+{
+    return json_is(value, JSON_IS_BOOLEAN) && !value->truth;
 }
 
 /* xorshift64*: Vigna 2016. */
@@ -97,21 +102,21 @@ TEST(strings_are_escaped)
 
 TEST(problem)
 {
-    json_doc doc;
+    json_tree doc;
     problem_details problem = {.status = 422, .code = "unknown_key", .title = "T", .detail = "say \"x\"", .line = 3};
     char *reply = codec_encode_problem(&problem);
     read_reply(&doc, reply, "problem-details.json");
     CHECK_STR(text_at(&doc, "type"), "/schemas/problem-details.json#unknown_key");
     CHECK_STR(text_at(&doc, "detail"), "say \"x\"");
-    CHECK(json_object_get(doc.root, "pointer") != NULL); /* the whole request */
+    CHECK(json_get(doc.root, "pointer") != NULL); /* the whole request */
     CHECK(number_at(&doc, "line") == 3 && number_at(&doc, "status") == 422);
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
     problem = (problem_details){.status = 404, .code = "not_found"};
     reply = codec_encode_problem(&problem);
     read_reply(&doc, reply, "problem-details.json");
-    CHECK(!json_object_get(doc.root, "pointer") && !json_object_get(doc.root, "line"));
-    json_doc_clear(&doc);
+    CHECK(!json_get(doc.root, "pointer") && !json_get(doc.root, "line"));
+    json_clear(&doc);
     free(reply);
 }
 
@@ -194,7 +199,7 @@ TEST(summary_of_a_scene)
                    {"requested_error", 1e-6},
                    {"alpha", 1060.75},
                    {"lambda_max", 9.427e-4}};
-    json_doc doc;
+    json_tree doc;
     uz_summary s = paper_summary();
     char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
     read_reply(&doc, reply, "summary.json");
@@ -204,55 +209,55 @@ TEST(summary_of_a_scene)
     CHECK_STR(text_at(&doc, "outcome"), "converged");
     CHECK_STR(text_at(&doc, "method"), "accelerated_restart");
     CHECK_STR(text_at(&doc, "operator"), "condensed");
-    CHECK_INT(json_array_size(json_object_get(json_object_get(doc.root, "contact"), "force")), 2);
-    CHECK(json_is_true(json_object_get(json_object_get(doc.root, "factor"), "cached")));
-    const json_t *reused = json_object_get(json_object_get(doc.root, "factor"), "reused");
-    CHECK(json_is_false(json_object_get(reused, "assembly")) && json_is_true(json_object_get(reused, "ordering")));
-    CHECK(json_is_true(json_object_get(reused, "factor")) && json_is_false(json_object_get(reused, "operator")));
-    json_doc_clear(&doc);
+    CHECK_INT(json_size(json_get(json_get(doc.root, "contact"), "force")), 2);
+    CHECK(json_truth(json_get(json_get(doc.root, "factor"), "cached")));
+    const json_value *reused = json_get(json_get(doc.root, "factor"), "reused");
+    CHECK(is_false(json_get(reused, "assembly")) && json_truth(json_get(reused, "ordering")));
+    CHECK(json_truth(json_get(reused, "factor")) && is_false(json_get(reused, "operator")));
+    json_clear(&doc);
     free(reply);
 }
 
 TEST(summary_of_a_body_held_by_contact)
 {
-    json_doc doc;
+    json_tree doc;
     uz_summary s = paper_summary();
     char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
     read_reply(&doc, reply, "summary.json");
-    CHECK(!json_object_get(doc.root, "semicoercive"));
-    json_doc_clear(&doc);
+    CHECK(!json_get(doc.root, "semicoercive"));
+    json_clear(&doc);
     free(reply);
     s.semicoercive = (uz_semicoercive){.free_modes = 2, .held = 9, .held_by = {3, 5, 6, 7, 8, 9, 10, 12}, .rounds = 4};
     reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
     read_reply(&doc, reply, "summary.json");
     CHECK(number_at(&doc, "semicoercive/free_modes") == 2 && number_at(&doc, "semicoercive/held") == 9);
     CHECK(number_at(&doc, "semicoercive/rounds") == 4);
-    json_t *rows = json_object_get(json_object_get(doc.root, "semicoercive"), "held_by_rows");
-    CHECK(json_array_size(rows) == 8 && json_number_value(json_array_get(rows, 7)) == 12);
-    json_doc_clear(&doc);
+    const json_value *rows = json_get(json_get(doc.root, "semicoercive"), "held_by_rows");
+    CHECK(json_size(rows) == 8 && rows->numbers[7] == 12);
+    json_clear(&doc);
     free(reply);
 }
 
 TEST(summary_of_matrices)
 {
-    json_doc doc;
+    json_tree doc;
     uz_summary s = paper_summary();
     s.outcome = UZ_PRECISION_LIMIT;
     snprintf(s.message, sizeof s.message, "reached 1e-9");
     char *reply = codec_encode_summary(&s, UZ_PROBLEM_MATRICES);
     read_reply(&doc, reply, "summary.json");
-    const json_t *contact = json_object_get(doc.root, "contact");
-    CHECK(!json_object_get(contact, "force") && !json_object_get(contact, "max_pressure"));
+    const json_value *contact = json_get(doc.root, "contact");
+    CHECK(!json_get(contact, "force") && !json_get(contact, "max_pressure"));
     CHECK_STR(text_at(&doc, "outcome"), "precision_limit");
     CHECK_STR(text_at(&doc, "message"), "reached 1e-9");
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
 }
 
 /* A summary with a suggestion, and the record beside it. */
 static void check_suggestion(double share, const char *told)
 {
-    json_doc doc;
+    json_tree doc;
     uz_summary s = paper_summary();
     s.suggestion = (uz_suggestion){.any = true,
                                    .relative_error = 2.2e-3,
@@ -264,13 +269,13 @@ static void check_suggestion(double share, const char *told)
                                    .iterations = 48};
     char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE), want[160];
     read_reply(&doc, reply, "summary.json");
-    const json_t *suggestion = json_object_get(doc.root, "suggestion");
+    const json_value *suggestion = json_get(doc.root, "suggestion");
     snprintf(want, sizeof want, "mesh error 2.2 %%, solver error 0.0008 %%: balanced would have taken %s of the time",
              told);
-    CHECK_STR(json_string_value(json_object_get(suggestion, "text")), want);
-    CHECK_STR(json_string_value(json_object_get(suggestion, "level")), "balanced");
-    CHECK_INT(json_number_value(json_object_get(suggestion, "iterations")), 48);
-    json_doc_clear(&doc);
+    CHECK_STR(json_text(json_get(suggestion, "text")), want);
+    CHECK_STR(json_text(json_get(suggestion, "level")), "balanced");
+    CHECK_INT(json_number(json_get(suggestion, "iterations"), 0), 48);
+    json_clear(&doc);
     free(reply);
 }
 
@@ -287,16 +292,16 @@ TEST(a_suggestion_says_at_most)
 
 TEST(what_accuracy_took_fits_the_schema)
 {
-    json_doc doc;
+    json_tree doc;
     codec_trade of = {.job_id = "0190f3a5c1d87d0b9e4f2a6b8c1d3e5f"};
     uz_trade_clear(&of.trade);
     CHECK(!codec_read_trade(&of, "{") && codec_read_trade(&of, "{}"));
     CHECK(isnan(of.mesh_error) && isnan(of.solver_error) && !of.may_save);
     char *reply = codec_encode_trade(&of, NULL);
     read_reply(&doc, reply, "work-precision.json");
-    CHECK(json_is_null(json_object_get(doc.root, "mesh_error")) &&
-          json_is_null(json_object_get(doc.root, "suggestion")));
-    json_doc_clear(&doc);
+    CHECK(json_is(json_get(doc.root, "mesh_error"), JSON_IS_NULL) &&
+          json_is(json_get(doc.root, "suggestion"), JSON_IS_NULL));
+    json_clear(&doc);
     free(reply);
     for (int k = 0; k < 30; k++)
         of.trade.step[k] = (uz_trade_step){.seconds = 0.01 * k, .iterations = 10 * k, .by_certificate = k > 27};
@@ -309,25 +314,25 @@ TEST(what_accuracy_took_fits_the_schema)
              "0.01}, \"requested_error\": 1e-7, \"discretization_error\": 0.02}"));
     reply = codec_encode_trade(&of, NULL);
     read_reply(&doc, reply, "work-precision.json");
-    const json_t *decades = json_object_get(doc.root, "decades"), *second = json_array_get(decades, 1),
-                 *eighth = json_array_get(decades, 7), *suggestion = json_object_get(doc.root, "suggestion");
-    CHECK_INT(json_number_value(json_object_get(second, "iterations")), 70);
-    CHECK_STR(json_string_value(json_object_get(second, "by")), "iteration");
-    CHECK(json_is_null(json_object_get(eighth, "seconds")) && json_is_null(json_object_get(eighth, "by")));
-    CHECK_INT(json_number_value(json_object_get(suggestion, "iterations")), 100); /* 2e-3 is met at 10^-2.75 */
-    json_doc_clear(&doc);
+    const json_value *decades = json_get(doc.root, "decades"), *second = &decades->items[1],
+                     *eighth = &decades->items[7], *suggestion = json_get(doc.root, "suggestion");
+    CHECK_INT(json_number(json_get(second, "iterations"), 0), 70);
+    CHECK_STR(json_text(json_get(second, "by")), "iteration");
+    CHECK(json_is(json_get(eighth, "seconds"), JSON_IS_NULL) && json_is(json_get(eighth, "by"), JSON_IS_NULL));
+    CHECK_INT(json_number(json_get(suggestion, "iterations"), 0), 100); /* 2e-3 is met at 10^-2.75 */
+    json_clear(&doc);
     free(reply);
 }
 
 TEST(every_outcome_fits_the_schema)
 {
     for (int i = UZ_CONVERGED; i <= UZ_DISMISSED; i++) {
-        json_doc doc;
+        json_tree doc;
         uz_summary s = paper_summary();
         s.outcome = (uz_outcome)i;
         char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
         read_reply(&doc, reply, "summary.json");
-        json_doc_clear(&doc);
+        json_clear(&doc);
         free(reply);
     }
 }
@@ -335,7 +340,7 @@ TEST(every_outcome_fits_the_schema)
 TEST(jobs)
 {
     uz_summary s = paper_summary();
-    json_doc doc;
+    json_tree doc;
     job list[2] = {{.id = "0193aa", .status = JOB_SUCCESSFUL, .progress = 100, .attempts = 1, .created = 1769860800.25},
                    {.id = "0193ab", .status = JOB_FAILED, .created = 1769860799.9996}};
     list[0].started = list[0].finished = 1769860801;
@@ -348,25 +353,25 @@ TEST(jobs)
     CHECK_STR(text_at(&doc, "id"), "0193aa");
     CHECK_STR(text_at(&doc, "status"), "successful");
     CHECK_STR(text_at(&doc, "created"), "2026-01-31T12:00:00.250Z");
-    CHECK_INT(json_array_size(json_object_get(doc.root, "links")), 4);
-    json_doc_clear(&doc);
+    CHECK_INT(json_size(json_get(doc.root, "links")), 4);
+    json_clear(&doc);
     free(reply);
     reply = codec_encode_job(&list[1]);
     read_reply(&doc, reply, "job.json");
     CHECK_STR(text_at(&doc, "created"), "2026-01-31T12:00:00.000Z"); /* rounding carries into the second */
-    CHECK(json_is_null(json_object_get(doc.root, "started")) && json_is_null(json_object_get(doc.root, "summary")));
-    CHECK_INT(json_array_size(json_object_get(doc.root, "links")), 1);
-    json_doc_clear(&doc);
+    CHECK(json_is(json_get(doc.root, "started"), JSON_IS_NULL) && json_is(json_get(doc.root, "summary"), JSON_IS_NULL));
+    CHECK_INT(json_size(json_get(doc.root, "links")), 1);
+    json_clear(&doc);
     free(reply);
     reply = codec_encode_jobs(list, 2, true);
     read_reply(&doc, reply, "jobs.json");
     CHECK_STR(text_at(&doc, "next"), "0193ab");
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
     reply = codec_encode_jobs(NULL, 0, false);
     read_reply(&doc, reply, "jobs.json");
-    CHECK(json_is_null(json_object_get(doc.root, "next")));
-    json_doc_clear(&doc);
+    CHECK(json_is(json_get(doc.root, "next"), JSON_IS_NULL));
+    json_clear(&doc);
     free(reply);
     free(list[0].summary);
     free(list[1].error);
@@ -374,24 +379,24 @@ TEST(jobs)
 
 TEST(service)
 {
-    json_doc doc;
+    json_tree doc;
     uz_cache_entry entries[2] = {{.digest = "ab", .d = 660, .m = 30, .nnz = 7, .hits = 3, .bytes = 100},
                                  {.digest = "cd", .bytes = 23}};
     char *reply = codec_encode_factors(entries, 2, 1 << 30);
     read_reply(&doc, reply, "factors.json");
     CHECK(number_at(&doc, "bytes") == 123 && number_at(&doc, "max_bytes") == 1 << 30);
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
     reply = codec_encode_health("ok", (int64_t[5]){1, 2, 3, 4, 5}, 2);
     read_reply(&doc, reply, "health.json");
     CHECK(number_at(&doc, "jobs/accepted") == 1 && number_at(&doc, "jobs/dismissed") == 5);
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
 }
 
 TEST(result)
 {
-    json_doc doc;
+    json_tree doc;
     size_t len;
     uz_summary s = paper_summary();
     char *summary = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
@@ -412,7 +417,7 @@ TEST(result)
     CHECK(strstr(reply, "\"reactions\":[-0.1,0],\"gaps\":[0,null],\"displacements\":[[1,2],[3,0.5]],\"nodes\":[[1,2],"
                         "[3,0.5]],\"contact_nodes\":[0,1]}"));
     read_reply(&doc, reply, "result.json");
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
     result.dim = 0;
     result.reactions = NULL;
@@ -421,14 +426,14 @@ TEST(result)
     CHECK(strstr(reply, "\"displacements\":[1,2,3,0.5]") && !strstr(reply, "reactions\"") &&
           !strstr(reply, "nodes\":[["));
     read_reply(&doc, reply, "result.json");
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
     free(summary);
 }
 
 TEST(history)
 {
-    json_doc doc;
+    json_tree doc;
     size_t len;
     double rows[2 * CODEC_HISTORY_COLUMNS];
     uz_history_row row = {.iteration = 7,
@@ -446,7 +451,7 @@ TEST(history)
     CHECK_INT(len, strlen(reply));
     CHECK(strstr(reply, "\"rows\":[[7,0.5,-1,1,2,3,4,5,6,null,8,1],[7,0.5,-1,1,2,3,4,5,6,0.25,8,1]]"));
     read_reply(&doc, reply, "history.json");
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
     reply = codec_encode_history_csv(rows, 2, &len);
     CHECK_STR(reply, "iteration,seconds,dual_objective,residual_total,e1,e2,e3,e4,step_norm,error_bound,contacts,"
@@ -454,6 +459,6 @@ TEST(history)
     free(reply);
     reply = codec_encode_history(NULL, rows, 0, &len);
     read_reply(&doc, reply, "history.json");
-    json_doc_clear(&doc);
+    json_clear(&doc);
     free(reply);
 }

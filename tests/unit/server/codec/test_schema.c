@@ -1,6 +1,8 @@
 #include "codec/schema.h"
 #include "harness.h"
 
+#include <jansson.h>
+
 /* tests/data/requests.json: {"name", "valid", "body", and for a refusal "code", "pointer", "says"}. The same list is
  * put to another implementation of JSON Schema by tests/api/test_schemas.py. */
 static json_t *read_requests(void)
@@ -19,12 +21,12 @@ static const char *text_of(const json_t *object, const char *key)
 
 static void check_request(const schemas *all, const json_t *item)
 {
-    json_doc doc;
+    json_tree tree;
     problem_details problem;
     const char *name = text_of(item, "name");
     char *body = json_dumps(json_object_get(item, "body"), JSON_ENCODE_ANY);
-    CHECK_MSG(json_scan(&doc, body, strlen(body), &problem), "%s: no JSON: %s", name, problem.detail);
-    bool good = schemas_check(all, "request.json", &doc, &problem);
+    CHECK_MSG(json_scan(&tree, body, strlen(body), &problem), "%s: no JSON: %s", name, problem.detail);
+    bool good = schemas_check(all, "request.json", tree.root, &problem);
     CHECK_MSG(good == json_is_true(json_object_get(item, "valid")), "%s: %s %s", name, good ? "taken" : "refused",
               problem.detail);
     if (!good) {
@@ -35,7 +37,7 @@ static void check_request(const schemas *all, const json_t *item)
                   problem.detail);
         CHECK_MSG(strstr(problem.detail, text_of(item, "says")), "%s: detail %s", name, problem.detail);
     }
-    json_doc_clear(&doc);
+    json_clear(&tree);
     free(body);
 }
 
@@ -52,12 +54,16 @@ TEST(requests)
     json_decref(list);
 }
 
+static schemas *parse(const char *schema, char message[256])
+{
+    const embedded_file file = {"s.json", schema, strlen(schema)};
+    return schemas_parse(&file, 1, message, 256);
+}
+
 /* Loads one file with the given text; true if it is taken. */
 static bool takes(const char *schema, char message[256])
 {
-    json_t *files = json_object();
-    json_object_set_new(files, "s.json", json_loads(schema, JSON_DECODE_ANY, NULL));
-    schemas *all = schemas_adopt(files, message, 256);
+    schemas *all = parse(schema, message);
     schemas_free(all);
     return all != NULL;
 }
@@ -89,19 +95,17 @@ TEST(what_is_not_checked_is_refused_at_loading)
 static bool fits(const char *schema, const char *body, problem_details *problem)
 {
     char message[256];
-    json_doc doc;
-    json_t *files = json_object();
-    json_object_set_new(files, "s.json", json_loads(schema, 0, NULL));
-    schemas *all = schemas_adopt(files, message, sizeof message);
+    json_tree tree;
+    schemas *all = parse(schema, message);
     CHECK_MSG(all, "%s: %s", schema, message);
-    CHECK(json_scan(&doc, body, strlen(body), problem));
-    bool good = all && schemas_check(all, "s.json", &doc, problem);
-    json_doc_clear(&doc);
+    CHECK(json_scan(&tree, body, strlen(body), problem));
+    bool good = all && schemas_check(all, "s.json", tree.root, problem);
+    json_clear(&tree);
     schemas_free(all);
     return good;
 }
 
-TEST(lifted_values)
+TEST(long_values)
 {
     problem_details problem;
     char numbers[1024] = "[1", text[6000] = "\"";
@@ -136,7 +140,7 @@ TEST(lengths_count_characters)
     CHECK(fits("{\"minLength\": 3}", "\"a\\u0000b\"", &problem));
 }
 
-TEST(lifted_tables)
+TEST(long_tables)
 {
     problem_details problem;
     char rows[2048] = "[[1,2]";

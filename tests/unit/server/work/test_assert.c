@@ -119,7 +119,7 @@ TEST(quantities_are_read)
                 {"a.c", false, NAN},
                 {"warnings.locking", true, 0.49},
                 {"warnings.large_strain", true, 0}};
-    json_doc doc;
+    json_tree doc;
     problem_details problem;
     CHECK(json_scan(&doc, SUMMARY, strlen(SUMMARY), &problem));
     for (size_t i = 0; i < sizeof LIST / sizeof LIST[0]; i++) {
@@ -127,7 +127,7 @@ TEST(quantities_are_read)
         CHECK_MSG(quantity_read(&value, doc.root, LIST[i].name) == LIST[i].there, "%s", LIST[i].name);
         CHECK_MSG(value == LIST[i].value || (isnan(value) && isnan(LIST[i].value)), "%s: %g", LIST[i].name, value);
     }
-    json_doc_clear(&doc);
+    json_clear(&doc);
 }
 
 /* ---- verdicts */

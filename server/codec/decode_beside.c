@@ -1,0 +1,138 @@
+/* decode_beside.c: what a request says beside its problem: load cases, settings, a start, an answer to verify. */
+#include "codec/decode.h"
+#include "codec/problem.h"
+#include "codec/room.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- cases */
+
+static int compare_names(const void *a, const void *b)
+{
+    const uz_load_case *const *x = a, *const *y = b;
+    int order = strcmp((*x)->name, (*y)->name);
+    return order ? order : (*x > *y) - (*x < *y);
+}
+
+/* The first case whose name an earlier one has is refused. */
+static bool check_names(const uz_problem *p, decoding *d, const json_value *list)
+{
+    char shown[80];
+    int64_t found = p->n_cases, earlier = 0;
+    const uz_load_case **sorted = room_for((size_t)p->n_cases, sizeof *sorted);
+    if (!sorted)
+        return problem_no_memory(d->problem);
+    for (int64_t i = 0; i < p->n_cases; i++)
+        sorted[i] = &p->cases[i];
+    qsort(sorted, (size_t)p->n_cases, sizeof *sorted, compare_names);
+    for (int64_t i = 1; i < p->n_cases; i++)
+        if (strcmp(sorted[i - 1]->name, sorted[i]->name) == 0 && sorted[i] - p->cases < found) {
+            found = sorted[i] - p->cases;
+            earlier = sorted[i - 1] - p->cases;
+        }
+    free(sorted);
+    if (found == p->n_cases)
+        return true;
+    problem_quote(shown, sizeof shown, p->cases[found].name, strlen(p->cases[found].name));
+    return decode_refuse(d, "not_allowed", json_get(&list->items[found], "name"),
+                         "is %s, which is the name of case %lld already.", shown, (long long)earlier);
+}
+
+/* The vector `key` of a case in matrices, `wanted` numbers; absent: NULL. */
+static bool take_vector(double **out, decoding *d, const json_value *item, const char *key, int64_t wanted,
+                        const char *matrix)
+{
+    const json_value *value = json_get(item, key);
+    int64_t n = 0;
+    if (!value)
+        return true;
+    return decode_vector(out, &n, d, value) &&
+           (n == wanted ||
+            decode_refuse(d, "size_mismatch", value, "has %lld numbers; it must have %lld, one for each row of %s.",
+                          (long long)n, (long long)wanted, matrix));
+}
+
+bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
+{
+    if (json_size(list) == 0)
+        return true;
+    problem->cases = decode_room(d, list, sizeof *problem->cases, &problem->n_cases);
+    for (int64_t i = 0; i < problem->n_cases; i++) {
+        const json_value *item = &list->items[i];
+        uz_load_case *out = &problem->cases[i];
+        if (!decode_label(out->name, d, json_get(item, "name"), "A name of a case"))
+            return false;
+        const bool good =
+            problem->kind == UZ_PROBLEM_SCENE
+                ? decode_loads(&out->loads, &out->n_loads, d, json_get(item, "loads"), uz_scene_dim(&problem->scene))
+                : take_vector(&out->p, d, item, "p", problem->qp.K.rows, "K") &&
+                      take_vector(&out->h, d, item, "h", problem->qp.N.rows, "N");
+        if (!good)
+            return false;
+    }
+    return problem->cases && check_names(problem, d, list);
+}
+
+/* ---- settings */
+
+static const struct {
+    const char *name;
+    double relative_error; /* 0: rounding level */
+    bool balanced;
+} LEVELS[] = {{"quick", 1e-2, false}, {"balanced", 1e-2, true}, {"precise", 1e-8, false}, {"exact", 0, false}};
+
+static void set_level(uz_settings *out, const char *name)
+{
+    for (size_t i = 0; i < sizeof LEVELS / sizeof LEVELS[0]; i++)
+        if (strcmp(LEVELS[i].name, name) == 0) {
+            out->relative_error = LEVELS[i].relative_error;
+            out->balanced = LEVELS[i].balanced;
+        }
+}
+
+static const char *text_or(const json_value *object, const char *key, const char *otherwise)
+{
+    const char *text = json_text_of(object, key);
+    return text ? text : otherwise;
+}
+
+/* The schema's enums and the library's names are the same words (a test compares them), so parsing cannot fail. */
+void decode_settings(uz_settings *out, const json_value *object)
+{
+    uz_settings s = uz_settings_default();
+    const json_value *accuracy = json_get(object, "accuracy");
+    uz_method_parse(&s.method, text_or(object, "method", "auto"));
+    uz_operator_parse(&s.op, text_or(object, "operator", "auto"));
+    uz_ordering_parse(&s.ordering, text_or(object, "ordering", "auto"));
+    uz_stopping_parse(&s.stopping, text_or(object, "stopping", "certified"));
+    set_level(&s, s.stopping == UZ_STOP_PAPER ? "quick" : "precise");
+    if (json_is(accuracy, JSON_IS_OBJECT))
+        s.relative_error = decode_number(accuracy, "relative_error", s.relative_error);
+    else if (accuracy)
+        set_level(&s, accuracy->text);
+    s.epsilon = decode_number(object, "epsilon", 1e-6);
+    s.alpha = decode_number(object, "alpha", s.alpha);
+    s.max_iterations = (int64_t)decode_number(object, "max_iterations", (double)s.max_iterations);
+    s.time_limit_s = decode_number(object, "time_limit_s", s.time_limit_s);
+    s.semidefinite = json_truth(json_get(object, "semidefinite"));
+    *out = s;
+}
+
+/* ---- start and answer */
+
+bool decode_start(codec_start *out, decoding *d, const json_value *object)
+{
+    const json_value *of = json_get(object, "case"), *reactions = json_get(object, "reactions");
+    snprintf(out->job, sizeof out->job, "%s", text_or(object, "job", ""));
+    out->continued = json_truth(json_get(object, "continue"));
+    return (!of || decode_label(out->case_name, d, of, "A name of a case")) &&
+           (!reactions || decode_vector(&out->reactions, &out->n_reactions, d, reactions));
+}
+
+bool decode_answer(codec_answer *out, decoding *d, const json_value *object)
+{
+    return decode_points(&out->u, &out->n_u, &out->columns, d, json_get(object, "displacements")) &&
+           decode_vector(&out->r, &out->n_r, d, json_get(object, "reactions"));
+}

@@ -1,0 +1,70 @@
+/* stored.c: what this service wrote itself, read back: summaries and errors of jobs. */
+#include "codec/codec.h"
+#include "codec/json.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* False: no memory. */
+static bool read_own(json_tree *tree, const char *json)
+{
+    problem_details problem;
+    return json_scan(tree, json, strlen(json), &problem);
+}
+
+static void copy_member(char *out, size_t size, const json_value *object, const char *key)
+{
+    const char *text = json_text_of(object, key);
+    snprintf(out, size, "%s", text ? text : "");
+}
+
+bool codec_decode_problem(problem_details *out, const char *json)
+{
+    json_tree tree;
+    memset(out, 0, sizeof *out);
+    if (!read_own(&tree, json))
+        return false;
+    const json_value *object = tree.root;
+    const bool good = json_is(object, JSON_IS_OBJECT);
+    out->status = (int)json_number(json_get(object, "status"), 0);
+    out->line = (int64_t)json_number(json_get(object, "line"), 0);
+    copy_member(out->code, sizeof out->code, object, "code");
+    copy_member(out->title, sizeof out->title, object, "title");
+    copy_member(out->detail, sizeof out->detail, object, "detail");
+    copy_member(out->pointer, sizeof out->pointer, object, "pointer");
+    json_clear(&tree);
+    return good;
+}
+
+bool codec_read_trade(codec_trade *out, const char *summary)
+{
+    json_tree tree;
+    if (!read_own(&tree, summary))
+        return false;
+    const json_value *root = tree.root, *suggestion = json_get(root, "suggestion");
+    const json_value *mesh_error = json_is(suggestion, JSON_IS_OBJECT) ? json_get(suggestion, "mesh_error")
+                                                                       : json_get(root, "discretization_error");
+    out->mesh_error = json_number(mesh_error, (double)NAN);
+    out->solver_error = json_number(json_get(json_get(root, "certificate"), "relative_error"), (double)NAN);
+    out->requested_error = json_number(json_get(root, "requested_error"), (double)NAN);
+    out->certify_s = json_number(json_get(json_get(root, "timings_s"), "certify"), (double)NAN);
+    out->is_scene = json_text_is(json_get(json_get(root, "problem"), "kind"), "scene");
+    out->has_answer = !json_text_is(json_get(root, "outcome"), "infeasible");
+    /* what may be told that it could have asked for less: a run from the beginning that asked for an error of its own
+     */
+    out->may_save = out->is_scene && json_text_is(json_get(root, "outcome"), "converged") &&
+                    json_text_is(json_get(root, "started_from"), "zero") &&
+                    !json_text_is(json_get(root, "method"), "linear") && !json_get(root, "mesh");
+    json_clear(&tree);
+    return true;
+}
+
+void codec_read_method(char *method, char *op, size_t size, const char *summary)
+{
+    json_tree tree; /* left empty where there is no memory */
+    read_own(&tree, summary);
+    copy_member(method, size, tree.root, "method");
+    copy_member(op, size, tree.root, "operator");
+    json_clear(&tree);
+}
