@@ -112,6 +112,15 @@ char *codec_encode_jobs(const job *jobs, size_t count,
                         bool more); /* {"jobs": [...], "next": cursor or null, "links": ...} */
 char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind);
 
+/* A summary of this service, read back from its text, which must outlive it. NULL: no memory. */
+typedef struct codec_summary codec_summary;
+codec_summary *codec_summary_read(const char *json);
+void codec_summary_free(codec_summary *summary); /* NULL is fine */
+/* The number of this name (codec/quantity.h). False: there is no such entry. True: *value, NaN where it is not known.
+ */
+bool codec_summary_number(double *value, const codec_summary *summary, const char *name);
+const char *codec_summary_outcome(const codec_summary *summary); /* "": it has none */
+
 /* How many cases of a job ended in each way. */
 #define CODEC_OUTCOMES (UZ_MESH_LIMIT + 1)
 typedef struct {
@@ -134,13 +143,15 @@ typedef struct {
     double value, error, margin; /* NaN: not known; margin: of the value to the nearer limit, negative beyond it */
     char reason[160], case_name[64];
 } codec_finding;
-/* Adds to a summary of this service (malloc'ed, replaced) what became of the request's assertions, as `assertions` and
- * `assertions_passed`; without assertions it stays as it is. name: of the case that the summary is of, NULL: the job
- * has none. all: n_assertions findings that begin zeroed, which gather those of every case; NULL where there are none.
- * False: no memory. */
-bool codec_judge(char **summary, const codec_request *request, const char *name, codec_finding *all);
-/* The same for the summary of a job with cases, once all of them were judged. */
-bool codec_judge_whole(char **summary, const codec_request *request, codec_finding *all);
+/* An assertion and what became of it; of_cases: all of them, of which the finding is the worst. */
+typedef struct {
+    const codec_assertion *of;
+    codec_finding found;
+    bool of_cases;
+} codec_judged;
+/* Adds `assertions` and `assertions_passed` to a summary of this service (malloc'ed, replaced). False: no memory, and
+ * it stays as it is. */
+bool codec_add_findings(char **summary, const codec_judged *list, int64_t n);
 
 char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t max_bytes);
 /* The reply to a request that is only checked; NULL: nothing is predicted. */

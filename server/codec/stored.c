@@ -1,9 +1,11 @@
 /* stored.c: what this service wrote itself, read back: summaries and errors of jobs. */
 #include "codec/codec.h"
 #include "codec/json.h"
+#include "codec/quantity.h"
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* False: no memory. */
@@ -35,6 +37,37 @@ bool codec_decode_problem(problem_details *out, const char *json)
     copy_member(out->pointer, sizeof out->pointer, object, "pointer");
     json_clear(&tree);
     return good;
+}
+
+struct codec_summary {
+    json_tree tree;
+};
+
+codec_summary *codec_summary_read(const char *json)
+{
+    codec_summary *summary = calloc(1, sizeof *summary);
+    if (summary && read_own(&summary->tree, json))
+        return summary;
+    free(summary);
+    return NULL;
+}
+
+void codec_summary_free(codec_summary *summary)
+{
+    if (summary)
+        json_clear(&summary->tree);
+    free(summary);
+}
+
+bool codec_summary_number(double *value, const codec_summary *summary, const char *name)
+{
+    return quantity_read(value, summary->tree.root, name);
+}
+
+const char *codec_summary_outcome(const codec_summary *summary)
+{
+    const char *outcome = json_text_of(summary->tree.root, "outcome");
+    return outcome ? outcome : "";
 }
 
 bool codec_read_trade(codec_trade *out, const char *summary)

@@ -1,4 +1,5 @@
 #include "work/answers.h"
+#include "work/judge.h"
 #include "work/overall.h"
 #include "work/state.h"
 
@@ -120,7 +121,7 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     add_vectors(parts, result, is_scene);
     const char *name = request->problem.n_cases > 0 ? request->problem.cases[i].name : NULL;
     add_trade(parts, result, has_earlier ? &from->trades[i] : NULL);
-    return parts->summary && codec_judge(&parts->summary, request, name, a->findings) &&
+    return parts->summary && judge_summary(&parts->summary, request, name, a->findings) &&
            add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
                        has_earlier ? from->rows[i] : 0);
 }
@@ -161,7 +162,7 @@ static bool build_whole(answers *a, uz_result *const *results, const codec_reque
     add_waiting(&overall.timings, queue_s, parse_s);
     codec_run run = {.started_from = started_from(results, a->n), .cases = &counts};
     a->shared.summary = codec_encode_run(&overall, request->problem.kind, &run);
-    return a->shared.summary && codec_judge_whole(&a->shared.summary, request, a->findings) &&
+    return a->shared.summary && judge_whole(&a->shared.summary, request, a->findings) &&
            add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE);
 }
 

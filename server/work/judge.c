@@ -4,9 +4,7 @@
  * certificate bounds how far a number is from that of the exact answer, the whole range must meet the limits to pass,
  * and miss them to fail. The other numbers are taken as they are, and `error` says that no bound is known. An answer
  * that is not what was asked for passes nothing. */
-#include "codec/codec.h"
-#include "codec/quantity.h"
-#include "codec/text.h"
+#include "work/judge.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -46,10 +44,10 @@ static double margin_of(range limits, double value)
 
 /* ---- how far a number may be from that of the exact answer */
 
-static double number_at(const json_value *summary, const char *name)
+static double number_at(const codec_summary *summary, const char *name)
 {
     double value = NAN;
-    return quantity_read(&value, summary, name) ? value : (double)NAN;
+    return codec_summary_number(&value, summary, name) ? value : (double)NAN;
 }
 
 /* Numbers of the answer, which a finer one would have otherwise; the others are what they are. */
@@ -69,7 +67,7 @@ static bool is_estimate(const char *quantity)
 /* The minimum of the energy is between the dual and the primal value. The strain energy W is half the square of a
  * seminorm of the strain without its thermal part, and by the triangle inequality sqrt(2 W) differs from the exact one
  * by at most the energy norm of the displacement's error. */
-static bound exact_bound(const json_value *summary, const char *quantity, double value)
+static bound exact_bound(const codec_summary *summary, const char *quantity, double value)
 {
     const double gap = number_at(summary, "certificate.gap"), e = number_at(summary, "certificate.absolute_error");
     if (!is_estimate(quantity))
@@ -87,19 +85,21 @@ static bound exact_bound(const json_value *summary, const char *quantity, double
 
 /* ---- the verdict */
 
+enum { DIGITS = 32 };
+
 /* The digits that read back, whatever the locale. */
-static const char *shown(char out[TEXT_DOUBLE], double x)
+static const char *shown(char out[DIGITS], double x)
 {
     if (isfinite(x))
-        text_shortest(out, x);
+        out[uz_format_double(out, x)] = '\0';
     else
-        snprintf(out, TEXT_DOUBLE, "unbounded");
+        snprintf(out, DIGITS, "unbounded");
     return out;
 }
 
 static void say_missed(codec_finding *out, const codec_assertion *a, range limits)
 {
-    char value[TEXT_DOUBLE], limit[TEXT_DOUBLE], near[TEXT_DOUBLE];
+    char value[DIGITS], limit[DIGITS], near[DIGITS];
     shown(value, out->value);
     if (!isnan(a->near))
         snprintf(out->reason, sizeof out->reason, "%s is not within %s of %s", value, shown(limit, tolerance_of(a)),
@@ -112,17 +112,17 @@ static void say_missed(codec_finding *out, const codec_assertion *a, range limit
 
 static void say_between(codec_finding *out, range exact)
 {
-    char lo[TEXT_DOUBLE], hi[TEXT_DOUBLE];
+    char lo[DIGITS], hi[DIGITS];
     snprintf(out->reason, sizeof out->reason,
              "the exact value is between %s and %s, so that it may or may not meet the limit", shown(lo, exact.lo),
              shown(hi, exact.hi));
 }
 
 /* A finding without a reason passes. */
-static void judge_value(codec_finding *out, const codec_assertion *a, const json_value *summary)
+static void judge_value(codec_finding *out, const codec_assertion *a, const codec_summary *summary)
 {
-    const char *outcome = json_text_of(summary, "outcome");
-    const bool met = outcome && (strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0);
+    const char *outcome = codec_summary_outcome(summary);
+    const bool met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0;
     const range limits = limits_of(a);
     const bound known = exact_bound(summary, a->quantity, out->value);
     const bool bounded = !isnan(known.error) && !isnan(out->value);
@@ -145,66 +145,22 @@ static void judge_value(codec_finding *out, const codec_assertion *a, const json
     }
 }
 
-/* Outcomes that no case had are not in a summary. */
-static bool read_value(double *value, const json_value *summary, const char *quantity)
-{
-    if (quantity_read(value, summary, quantity))
-        return true;
-    const bool none = strncmp(quantity, "cases.", 6) == 0 && json_get(summary, "cases");
-    *value = none ? 0.0 : (double)NAN;
-    return none;
-}
-
-static codec_finding judge_one(const codec_assertion *a, const json_value *summary)
+static codec_finding judge_one(const codec_assertion *a, const codec_summary *summary)
 {
     codec_finding out = {.verdict = CODEC_FAIL, .value = NAN, .error = NAN, .margin = -INFINITY};
-    if (read_value(&out.value, summary, a->quantity))
+    bool there = codec_summary_number(&out.value, summary, a->quantity);
+    if (!there && strncmp(a->quantity, "cases.", 6) == 0 && !isnan(number_at(summary, "cases.count"))) {
+        out.value = 0.0; /* outcomes that no case had are not in a summary */
+        there = true;
+    }
+    if (there)
         judge_value(&out, a, summary);
     else
         snprintf(out.reason, sizeof out.reason, "the summary of this job has no such number");
     return out;
 }
 
-/* ---- what is told */
-
-static void put_given(text *t, const char *key, double value)
-{
-    if (!isnan(value))
-        text_member_number(t, key, value);
-}
-
-static void put_word(text *t, const char *key, const char *value)
-{
-    if (value[0])
-        text_member_string(t, key, value);
-}
-
-static const char *const WORDS[CODEC_VERDICTS] = {"pass", "uncertain", "fail"};
-
-static void put_finding(text *t, const codec_assertion *a, const codec_finding *f, bool of_cases)
-{
-    text_open(t, '{');
-    put_word(t, "name", a->name);
-    put_word(t, "quantity", a->quantity);
-    put_word(t, "case", f->case_name);
-    put_given(t, "min", a->least);
-    put_given(t, "max", a->most);
-    put_given(t, "near", a->near);
-    put_given(t, "absolute", a->absolute);
-    put_given(t, "relative", a->relative);
-    text_member_number(t, "value", f->value);
-    text_member_number(t, "error", f->error);
-    put_word(t, "result", WORDS[f->verdict]);
-    put_word(t, "reason", f->reason);
-    if (of_cases) {
-        text_key(t, "cases");
-        text_open(t, '{');
-        for (int i = 0; i < CODEC_VERDICTS; i++)
-            text_member_integer(t, WORDS[i], f->counts[i]);
-        text_close(t, '}');
-    }
-    text_close(t, '}');
-}
+/* ---- of many cases */
 
 /* The worst of several cases; of equally good ones that which is nearest to its limit. */
 static void gather(codec_finding *sum, const codec_finding *one, const char *name)
@@ -232,66 +188,39 @@ static bool concerns(const codec_assertion *a, const char *name)
     return !name || (a->case_name[0] ? strcmp(a->case_name, name) == 0 : !is_of_the_whole(a));
 }
 
-/* Opens the summary's text again. */
-static void begin_list(text *t, const char *summary)
-{
-    text_bytes(t, summary, strlen(summary) - 1);
-    text_key(t, "assertions");
-    text_open(t, '[');
-}
-
-static bool end_list(text *t, bool passed, char **summary)
-{
-    text_close(t, ']');
-    text_member_bool(t, "assertions_passed", passed);
-    text_close(t, '}');
-    char *longer = text_finish(t, NULL);
-    if (longer) {
-        free(*summary);
-        *summary = longer;
-    }
-    return longer != NULL;
-}
-
-/* The summary as values; false: no memory. */
-static bool read_summary(json_tree *tree, const char *summary)
-{
-    problem_details problem;
-    return json_scan(tree, summary, strlen(summary), &problem);
-}
-
 /* whole: the summary is of all cases together. */
 static bool judge_list(char **summary, const codec_request *request, const char *name, bool whole, codec_finding *all)
 {
-    json_tree tree;
-    text t = {0};
-    bool passed = true;
-    if (request->n_assertions == 0)
+    const int64_t n = request->n_assertions;
+    int64_t told = 0;
+    bool good = false;
+    if (n == 0)
         return true;
-    if (!read_summary(&tree, *summary))
-        return false;
-    begin_list(&t, *summary);
-    for (int64_t i = 0; i < request->n_assertions; i++) {
+    codec_judged *list = calloc((size_t)n, sizeof *list);
+    codec_summary *read = codec_summary_read(*summary);
+    for (int64_t i = 0; list && read && i < n; i++) {
         const codec_assertion *a = &request->assertions[i];
         const bool gathered = whole && !is_of_the_whole(a);
         if (!whole && !concerns(a, name))
             continue;
-        const codec_finding found = gathered ? all[i] : judge_one(a, tree.root);
-        passed = passed && found.verdict == CODEC_PASS;
-        put_finding(&t, a, &found, gathered);
+        codec_judged *one = &list[told++];
+        *one = (codec_judged){a, gathered ? all[i] : judge_one(a, read), gathered};
         if (name)
-            gather(&all[i], &found, name);
+            gather(&all[i], &one->found, name);
     }
-    json_clear(&tree);
-    return end_list(&t, passed, summary);
+    if (list && read)
+        good = codec_add_findings(summary, list, told);
+    codec_summary_free(read);
+    free(list);
+    return good;
 }
 
-bool codec_judge(char **summary, const codec_request *request, const char *name, codec_finding *all)
+bool judge_summary(char **summary, const codec_request *request, const char *name, codec_finding *all)
 {
     return judge_list(summary, request, name, false, all);
 }
 
-bool codec_judge_whole(char **summary, const codec_request *request, codec_finding *all)
+bool judge_whole(char **summary, const codec_request *request, codec_finding *all)
 {
     return judge_list(summary, request, NULL, true, all);
 }
