@@ -168,41 +168,10 @@ static void reply_failure(const field_reader *reader, uz_status status, const uz
     }
 }
 
-static uz_status write_surface(field_output *out, const uz_scene *scene, const uz_field_source *answer,
-                               const field_reader *reader, const uz_hooks *hooks, uz_error *err)
-{
-    uz_surface surface;
-    uz_status status = uz_surface_compute(&surface, scene, answer, out->which, FIELDS_MOST_SURFACE, hooks, err);
-    if (status == UZ_OK) {
-        const codec_surface what = {&surface, scene, reader->j->id, out->case_name};
-        out->text = codec_encode_surface(&what, &out->len);
-        status = out->text ? UZ_OK : UZ_ERR_MEMORY;
-    }
-    uz_surface_clear(&surface);
-    return status;
-}
-
-static uz_status write_output(field_output *out, const uz_scene *scene, const uz_field_source *answer,
-                              const field_reader *reader, uz_error *err)
+bool fields_compute(void *out, field_computation run, const field_reader *reader, int64_t number, unsigned which,
+                    http_reply *reply)
 {
     const uz_hooks hooks = {.ctx = (void *)reader, .cancelled = is_over};
-    switch (out->kind) {
-    case OUTPUT_FIELDS:
-        return uz_fields_compute(out->fields, scene, answer, out->which, &hooks, err);
-    case OUTPUT_MESH_ERROR:
-        return uz_mesh_error(&out->mesh_error, scene, answer, &hooks, err);
-    case OUTPUT_VTU:
-        return uz_vtu_write(&out->text, &out->len, scene, answer, out->which, &hooks, err);
-    case OUTPUT_PICTURE:
-        return uz_picture_deformed(&out->text, &out->len, scene, answer, &out->how, &hooks, err);
-    case OUTPUT_SURFACE:
-        return write_surface(out, scene, answer, reader, &hooks, err);
-    }
-    return UZ_ERR_ARGUMENT;
-}
-
-bool fields_make(field_output *out, const field_reader *reader, int64_t number, http_reply *reply)
-{
     uz_scene scene;
     stored_answer answer;
     uz_error err = {0};
@@ -211,7 +180,7 @@ bool fields_make(field_output *out, const field_reader *reader, int64_t number, 
     if (found == STORE_OK)
         found = read_scene(&scene, reader, number);
     if (found == STORE_OK)
-        status = write_output(out, &scene, &answer.source, reader, &err);
+        status = run(out, &scene, &answer.source, which, &hooks, &err);
     free(answer.u);
     free(answer.r);
     free(answer.g);
@@ -222,10 +191,28 @@ bool fields_make(field_output *out, const field_reader *reader, int64_t number, 
     return found == STORE_OK && status == UZ_OK;
 }
 
+static uz_status run_fields(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                            const uz_hooks *hooks, uz_error *err)
+{
+    return uz_fields_compute(out, scene, answer, which, hooks, err);
+}
+
 bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply)
 {
     *out = (uz_fields){.dim = 0};
-    return fields_make(&(field_output){.kind = OUTPUT_FIELDS, .which = which, .fields = out}, reader, number, reply);
+    return fields_compute(out, run_fields, reader, number, which, reply);
+}
+
+static uz_status run_mesh_error(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                                const uz_hooks *hooks, uz_error *err)
+{
+    (void)which;
+    return uz_mesh_error(out, scene, answer, hooks, err);
+}
+
+bool fields_mesh_error(double *error, const field_reader *reader, int64_t number, http_reply *reply)
+{
+    return fields_compute(error, run_mesh_error, reader, number, 0, reply);
 }
 
 /* -------------------------------------------------------------------- names */

@@ -24,29 +24,15 @@ typedef struct {
 bool fields_open(field_reader *reader, api *context, const http_request *rq, const job *j, http_reply *reply);
 void fields_close(field_reader *reader);
 
-/* What is made of the answer to a case. */
-#define FIELDS_MOST_SURFACE ((size_t)256000000) /* openapi.json says so */
-typedef struct {
-    enum {
-        OUTPUT_FIELDS,
-        OUTPUT_MESH_ERROR,
-        OUTPUT_VTU,
-        OUTPUT_PICTURE,
-        OUTPUT_SURFACE /* a glTF file of what a viewer draws; 413 where it is larger than FIELDS_MOST_SURFACE */
-    } kind;
-    unsigned which;        /* FIELDS, VTU, SURFACE: uz_field bits */
-    uz_picture how;        /* PICTURE */
-    const char *case_name; /* SURFACE; NULL: none */
-    /* What it becomes: one of these three. */
-    uz_fields *fields;
-    double mesh_error;
-    char *text; /* len bytes, malloc'ed */
-    size_t len;
-} field_output;
-
-/* Case number 0: the job has none. False with a reply. */
-bool fields_make(field_output *out, const field_reader *reader, int64_t number, http_reply *reply);
+/* A computation of the library on the case's scene and its stored answer; it ends where nobody waits for it any more.
+ * Case number 0: the job has none. False with a reply. */
+typedef uz_status (*field_computation)(void *out, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                                       const uz_hooks *hooks, uz_error *err);
+bool fields_compute(void *out, field_computation run, const field_reader *reader, int64_t number, unsigned which,
+                    http_reply *reply);
+/* `which`: uz_field bits. */
 bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply);
+bool fields_mesh_error(double *error, const field_reader *reader, int64_t number, http_reply *reply);
 
 /* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits). False with a 400
  * that has the list. */

@@ -1,4 +1,4 @@
-/* history.c: how a run went: /v1/jobs/{id}/history and /history.csv, also while it goes on. */
+/* history.c: the rows of a history: of an ended job from the store, of one that runs from its worker. */
 #include "http/history.h"
 #include "http/jobs.h"
 
@@ -72,44 +72,4 @@ bool history_rows(api *context, const job *j, const char *name, int64_t after, f
     out->count = live.count;
     snprintf(out->case_name, sizeof out->case_name, "%s", name ? name : live.case_name);
     return !name || live.is_case || refuse_case(reply, 404, name, NULL, 0);
-}
-
-static void encode(const found_rows *found, bool csv, http_reply *reply)
-{
-    size_t len = 0;
-    const char *name = found->case_name[0] ? found->case_name : NULL;
-    char *text = csv ? codec_encode_history_csv(found->rows, found->count, &len)
-                     : codec_encode_history(name, found->rows, found->count, &len);
-    reply_text(reply, 200, csv ? "text/csv; charset=utf-8; header=present" : "application/json", text, len);
-}
-
-static void reply_history(api *context, http_request *rq, bool csv, http_reply *reply)
-{
-    int64_t after = -1;
-    found_rows found = {.rows = NULL};
-    problem_details problem;
-    job j = {0};
-    if (!request_integer(rq, "after", -1, INT64_MAX, &after, &problem)) {
-        reply_problem(reply, &problem);
-        return;
-    }
-    reply->tag_by_body = true;
-    if (jobs_load(context, rq, &j, reply) &&
-        history_rows(context, &j, target_value(&rq->target, "case"), after, &found, reply))
-        encode(&found, csv, reply);
-    reply->takes_ranges = reply->status == 200 && jobs_ended(&j); /* while it runs every reply is another one */
-    jobs_check_still_there(context, &j, reply);
-    free(found.rows);
-    job_clear(&j);
-}
-
-void history_get(api *context, http_request *rq, http_reply *reply)
-{
-    reply->varies_by_type = true;
-    reply_history(context, rq, request_accepts(rq, "text/csv"), reply);
-}
-
-void history_get_csv(api *context, http_request *rq, http_reply *reply)
-{
-    reply_history(context, rq, true, reply);
 }

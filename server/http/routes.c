@@ -1,7 +1,9 @@
 /* routes.c: the route table. 404, 405 with Allow and unknown query keys all follow from it; HEAD is served by GET.
- * A new route is a row here, a handler declared in request.h and defined in the file of its subject, and a path in
- * schemas/openapi.json; tests/api/test_schemas.py compares the two. */
+ * What can be had of a job has its rows in outputs.c. Another route is a row here, a handler declared in api.h and
+ * defined in the file of its subject, and a path in schemas/openapi.json; tests/api/test_schemas.py compares the two.
+ */
 #include "http/api.h"
+#include "http/output.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -9,12 +11,6 @@
 static const char *const NONE[] = {NULL};
 static const char *const SUBMIT[] = {"validate", NULL};
 static const char *const LIST[] = {"status", "limit", "cursor", "tag", "since", "until", "order", NULL};
-static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
-static const char *const FILE_OF[] = {"fields", "case", NULL};
-static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL};
-static const char *const HISTORY[] = {"after", "case", NULL};
-static const char *const OF_CASE[] = {"case", NULL};
-static const char *const CURVES[] = {"case", "x", "with", "theme", "width", NULL};
 
 static const route ROUTES[] = {
     {"POST", "/v1/jobs", SUBMIT, jobs_submit, false},
@@ -22,16 +18,8 @@ static const route ROUTES[] = {
     {"GET", "/v1/jobs/{id}", NONE, jobs_get, false},
     {"DELETE", "/v1/jobs/{id}", NONE, jobs_delete, false},
     {"POST", "/v1/jobs/{id}/refine", NONE, jobs_refine, false},
-    {"GET", "/v1/jobs/{id}/result", RESULT, results_get, false},
-    {"GET", "/v1/jobs/{id}/result.vtu", FILE_OF, results_get_vtu, false},
-    {"GET", "/v1/jobs/{id}/surface", FILE_OF, results_get_surface, false},
-    {"GET", "/v1/jobs/{id}/deformed.svg", PICTURE, results_get_picture, false},
     {"GET", "/v1/jobs/{id}/events", NONE, events_get, false},
     {"GET", "/v1/events", NONE, events_get_all, false},
-    {"GET", "/v1/jobs/{id}/history", HISTORY, history_get, false},
-    {"GET", "/v1/jobs/{id}/history.csv", HISTORY, history_get_csv, false},
-    {"GET", "/v1/jobs/{id}/work-precision", OF_CASE, trade_get, false},
-    {"GET", "/v1/jobs/{id}/convergence.svg", CURVES, convergence_get, false},
     {"POST", "/v1/verify", NONE, verify_submit, false},
     {"POST", "/v1/uploads", NONE, uploads_create, true},
     {"GET", "/v1/uploads/{digest}", NONE, uploads_get, false},
@@ -47,7 +35,14 @@ static const route ROUTES[] = {
     {"GET", "/openapi.json", NONE, service_openapi, false},
     {"GET", "/schemas/{name}", NONE, service_schema, false},
 };
-static const size_t N_ROUTES = sizeof ROUTES / sizeof ROUTES[0];
+
+/* These, and those of the outputs; NULL past the end. */
+static const route *route_at(size_t i)
+{
+    const size_t own = sizeof ROUTES / sizeof ROUTES[0];
+    const output *row = i < own ? NULL : output_at(i - own);
+    return i < own ? &ROUTES[i] : row ? &row->route : NULL;
+}
 
 /* {id}: 32 hexadecimal digits in lower case. {digest}: 64 of them. {name}: a file name. */
 static bool placeholder_matches(const char *kind, const char *text, size_t len)
@@ -111,8 +106,8 @@ auth_scope route_scope(const route *r)
 static bool refuse_path(const http_request *rq, problem_details *problem)
 {
     char name[sizeof rq->name];
-    for (size_t i = 0; i < N_ROUTES; i++) {
-        const char *pattern = ROUTES[i].pattern;
+    for (size_t i = 0; route_at(i); i++) {
+        const char *pattern = route_at(i)->pattern;
         const bool of_job = strstr(pattern, "{id}"), of_upload = strstr(pattern, "{digest}");
         if ((of_job || of_upload) && path_matches(pattern, rq->target.path, true, name, sizeof name))
             return http_problem(problem, 404, "not_found", "Not found",
@@ -127,15 +122,16 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
 {
     const char *method = strcmp(rq->method, "HEAD") == 0 ? "GET" : rq->method;
     allow[0] = '\0';
-    for (size_t i = 0; i < N_ROUTES; i++) {
-        if (!path_matches(ROUTES[i].pattern, rq->target.path, false, rq->name, sizeof rq->name))
+    for (size_t i = 0; route_at(i); i++) {
+        const route *r = route_at(i);
+        if (!path_matches(r->pattern, rq->target.path, false, rq->name, sizeof rq->name))
             continue;
-        if (strcmp(ROUTES[i].method, method) == 0) {
-            rq->route = &ROUTES[i];
+        if (strcmp(r->method, method) == 0) {
+            rq->route = r;
             allow[0] = '\0';
             return true;
         }
-        allow_also(allow, size, ROUTES[i].method);
+        allow_also(allow, size, r->method);
     }
     if (allow[0] && rq->reply.cors && strcmp(method, "OPTIONS") == 0) {
         allow_also(allow, size, method);

@@ -29,9 +29,8 @@ static bool find_mesh_error(codec_trade *of, api *context, const http_request *r
     field_reader reader;
     if (!of->is_scene || !of->has_answer || isfinite(of->mesh_error))
         return true;
-    field_output out = {.kind = OUTPUT_MESH_ERROR};
-    bool done = fields_open(&reader, context, rq, j, reply) && fields_make(&out, &reader, number, reply);
-    of->mesh_error = done ? out.mesh_error : of->mesh_error;
+    const bool done =
+        fields_open(&reader, context, rq, j, reply) && fields_mesh_error(&of->mesh_error, &reader, number, reply);
     fields_close(&reader);
     return done;
 }

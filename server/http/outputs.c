@@ -1,0 +1,139 @@
+/* outputs.c: the table of what can be had of a job, and how a row is answered. */
+#include "codec/codec.h"
+#include "http/history.h"
+#include "http/jobs.h"
+#include "http/output.h"
+#include "http/results.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#define IN_VTU ((STORED | COMPUTED | (unsigned)UZ_FIELD_MATERIALS) & ~(unsigned)UZ_FIELD_STRESS_GAUSS)
+#define VTU_BY_DEFAULT                                                                                                 \
+    ((unsigned)(UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE | UZ_FIELD_GAPS |    \
+                UZ_FIELD_CONTACT_STATUS | UZ_FIELD_MATERIALS))
+#define IN_SURFACE ((unsigned)(UZ_FIELD_DISPLACEMENTS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE))
+
+static const char *const RESULT[] = {"fields", "case", "from", "count", NULL};
+static const char *const FILE_OF[] = {"fields", "case", NULL};
+static const char *const PICTURE[] = {"colour", "factor", "width", "case", NULL};
+static const char *const HISTORY[] = {"after", "case", NULL};
+static const char *const OF_CASE[] = {"case", NULL};
+static const char *const CURVES[] = {"case", "x", "with", "theme", "width", NULL};
+
+#define OUTPUT(suffix, parameters, handler)                                                                            \
+    {                                                                                                                  \
+        "GET", "/v1/jobs/{id}/" suffix, parameters, handler, false                                                     \
+    }
+
+static const output OUTPUTS[] = {
+    {OUTPUT("result", RESULT, results_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
+    {OUTPUT("result.vtu", FILE_OF, output_get), "application/xml", OUTPUT_OF_ANSWER, output_vtu, VTU_BY_DEFAULT, IN_VTU,
+     NULL, false},
+    {OUTPUT("surface", FILE_OF, output_get), "model/gltf-binary", OUTPUT_OF_ANSWER, output_surface, IN_SURFACE,
+     IN_SURFACE, NULL, false},
+    {OUTPUT("deformed.svg", PICTURE, output_get), "image/svg+xml", OUTPUT_OF_ANSWER, output_picture, 0, 0,
+     output_picture_read, false},
+    {OUTPUT("history", HISTORY, output_get), "application/json", OUTPUT_OF_HISTORY, output_history, 0, 0, NULL, true},
+    {OUTPUT("history.csv", HISTORY, output_get), "text/csv; charset=utf-8; header=present", OUTPUT_OF_HISTORY,
+     output_history_csv, 0, 0, NULL, false},
+    {OUTPUT("work-precision", OF_CASE, trade_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
+    {OUTPUT("convergence.svg", CURVES, convergence_get), "image/svg+xml", OUTPUT_OWN, NULL, 0, 0, NULL, false},
+};
+
+const output *output_at(size_t i)
+{
+    return i < sizeof OUTPUTS / sizeof OUTPUTS[0] ? &OUTPUTS[i] : NULL;
+}
+
+/* ---- of a case of a scene */
+
+/* A file on its way through fields_compute. */
+typedef struct {
+    const output *row;
+    output_source of;
+    char *file;
+    size_t len;
+} writing;
+
+static uz_status write_answer(void *ctx, const uz_scene *scene, const uz_field_source *answer, unsigned which,
+                              const uz_hooks *hooks, uz_error *err)
+{
+    writing *w = ctx;
+    (void)which;
+    w->of.scene = scene;
+    w->of.answer = answer;
+    return w->row->write(&w->file, &w->len, &w->of, hooks, err);
+}
+
+static void reply_answer(api *context, http_request *rq, writing *w, http_reply *reply)
+{
+    job j = {0};
+    results_place at = {.cases = NULL};
+    field_reader reader;
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
+        results_one(&at, context, rq, &j, "a file", reply)) {
+        w->of.job_id = j.id;
+        w->of.case_name = at.name;
+        if (fields_open(&reader, context, rq, &j, reply) &&
+            fields_compute(w, write_answer, &reader, at.number, w->of.options->fields, reply))
+            reply_text(reply, 200, w->row->type, w->file, w->len);
+        fields_close(&reader);
+    }
+    results_place_clear(&at);
+    jobs_check_still_there(context, &j, reply);
+    job_clear(&j);
+}
+
+/* ---- of a history */
+
+static void reply_history(api *context, http_request *rq, writing *w, http_reply *reply)
+{
+    int64_t after = -1;
+    found_rows found = {.rows = NULL};
+    uz_error err = {0};
+    problem_details problem;
+    job j = {0};
+    if (!request_integer(rq, "after", -1, INT64_MAX, &after, &problem)) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    reply->tag_by_body = true;
+    if (jobs_load(context, rq, &j, reply) &&
+        history_rows(context, &j, target_value(&rq->target, "case"), after, &found, reply)) {
+        w->of.case_name = found.case_name[0] ? found.case_name : NULL;
+        w->of.rows = found.rows;
+        w->of.n_rows = found.count;
+        w->row->write(&w->file, &w->len, &w->of, NULL, &err); /* fails for want of memory, which reply_text says */
+        reply_text(reply, 200, w->row->type, w->file, w->len);
+    }
+    reply->takes_ranges = reply->status == 200 && jobs_ended(&j); /* while it runs every reply is another one */
+    jobs_check_still_there(context, &j, reply);
+    free(found.rows);
+    job_clear(&j);
+}
+
+void output_get(api *context, http_request *rq, http_reply *reply)
+{
+    const output *row = (const output *)(const void *)rq->route;
+    output_options options = {.fields = 0};
+    field_list fields = {.which = 0};
+    problem_details problem;
+    if (row->negotiated) {
+        char type[64] = ""; /* without its parameters */
+        strncat(type, row[1].type, strcspn(row[1].type, ";"));
+        reply->varies_by_type = true;
+        row += request_accepts(rq, type);
+    }
+    if ((row->allowed && !results_fields(rq, &fields, row->by_default, row->allowed, &problem)) ||
+        (row->read && !row->read(&options, rq, &problem))) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    options.fields = fields.which;
+    writing w = {.row = row, .of = {.options = &options}};
+    if (row->kind == OUTPUT_OF_HISTORY)
+        reply_history(context, rq, &w, reply);
+    else
+        reply_answer(context, rq, &w, reply);
+}
