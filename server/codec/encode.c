@@ -77,8 +77,7 @@ static bool has_cases(const job *j)
 /* A job that was dismissed while it ran may have left its best answer so far. */
 static void put_links(text *t, const job *j)
 {
-    text_key(t, "links");
-    text_open(t, '[');
+    text_member_open(t, "links", '[');
     put_link(t, "self", j->id, "");
     bool has_answer = !j->damaged && (j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary));
     if (has_answer)
@@ -94,13 +93,6 @@ static void put_links(text *t, const job *j)
     text_close(t, ']');
 }
 
-static void put_damaged(text *t, const job *j)
-{
-    problem_details problem;
-    codec_problem_damaged(&problem, j->id);
-    put_problem(t, &problem);
-}
-
 static void put_job(text *t, const job *j)
 {
     text_open(t, '{');
@@ -112,15 +104,16 @@ static void put_job(text *t, const job *j)
     put_time(t, "finished", j->finished);
     text_member_integer(t, "attempts", j->attempts);
     text_member_integer(t, "priority", j->priority);
-    text_key(t, "tags");
-    text_raw(t, j->tags ? j->tags : "[]");
-    text_key(t, "summary");
-    text_raw(t, j->summary);
+    text_member_raw(t, "tags", j->tags ? j->tags : "[]");
+    text_member_raw(t, "summary", j->summary);
     text_key(t, "error");
-    if (j->damaged)
-        put_damaged(t, j);
-    else
+    if (j->damaged) {
+        problem_details problem;
+        codec_problem_damaged(&problem, j->id);
+        put_problem(t, &problem);
+    } else {
         text_raw(t, j->error);
+    }
     put_links(t, j);
     text_close(t, '}');
 }
@@ -136,14 +129,12 @@ char *codec_encode_jobs(const job *jobs, size_t count, bool more)
 {
     text t = {0};
     text_open(&t, '{');
-    text_key(&t, "jobs");
-    text_open(&t, '[');
+    text_member_open(&t, "jobs", '[');
     for (size_t i = 0; i < count; i++)
         put_job(&t, &jobs[i]);
     text_close(&t, ']');
     text_member_string(&t, "next", more && count > 0 ? jobs[count - 1].id : NULL);
-    text_key(&t, "links");
-    text_open(&t, '[');
+    text_member_open(&t, "links", '[');
     put_link(&t, "self", "", "");
     text_close(&t, ']');
     text_close(&t, '}');
@@ -157,8 +148,7 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
     text t = {0};
     size_t bytes = 0;
     text_open(&t, '{');
-    text_key(&t, "factors");
-    text_open(&t, '[');
+    text_member_open(&t, "factors", '[');
     for (size_t i = 0; i < count; i++) {
         const uz_cache_entry *e = &entries[i];
         bytes += e->bytes;
@@ -222,8 +212,7 @@ char *codec_encode_upload(const upload_info *info)
     put_time(&t, "created", info->created);
     put_time(&t, "used", info->used);
     text_member_integer(&t, "used_by", info->jobs);
-    text_key(&t, "links");
-    text_open(&t, '[');
+    text_member_open(&t, "links", '[');
     text_open(&t, '{');
     text_member_string(&t, "rel", "self");
     text_key(&t, "href");
@@ -240,8 +229,7 @@ char *codec_encode_findings(const char *findings, int64_t jobs, double seconds)
     char line[512];
     text_open(&t, '{');
     text_member_bool(&t, "whole", findings[0] == '\0');
-    text_key(&t, "findings");
-    text_open(&t, '[');
+    text_member_open(&t, "findings", '[');
     for (const char *at = findings; *at;) {
         size_t len = strcspn(at, "\n");
         snprintf(line, sizeof line, "%.*s", (int)len, at);
@@ -259,8 +247,7 @@ char *codec_encode_limits(const codec_limit *limits, size_t count)
 {
     text t = {0};
     text_open(&t, '{');
-    text_key(&t, "limits");
-    text_open(&t, '{');
+    text_member_open(&t, "limits", '{');
     for (size_t i = 0; i < count; i++) {
         text_key(&t, limits[i].name);
         text_open(&t, '{');
@@ -280,8 +267,7 @@ char *codec_encode_health(const char *status, const int64_t counts[5], int worke
     text_open(&t, '{');
     text_member_string(&t, "status", status);
     text_member_integer(&t, "workers", workers);
-    text_key(&t, "jobs");
-    text_open(&t, '{');
+    text_member_open(&t, "jobs", '{');
     for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
         text_member_integer(&t, job_status_name((job_status)i), counts[i]);
     text_close(&t, '}');

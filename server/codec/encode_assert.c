@@ -34,8 +34,7 @@ static void put_finding(text *t, const codec_judged *judged)
     put_word(t, "result", WORDS[f->verdict]);
     put_word(t, "reason", f->reason);
     if (judged->of_cases) {
-        text_key(t, "cases");
-        text_open(t, '{');
+        text_member_open(t, "cases", '{');
         for (int i = 0; i < CODEC_VERDICTS; i++)
             text_member_integer(t, WORDS[i], f->counts[i]);
         text_close(t, '}');
@@ -48,8 +47,7 @@ bool codec_add_findings(char **summary, const codec_judged *list, int64_t n)
     text t = {0};
     bool passed = true;
     text_bytes(&t, *summary, strlen(*summary) - 1); /* but the closing brace */
-    text_key(&t, "assertions");
-    text_open(&t, '[');
+    text_member_open(&t, "assertions", '[');
     for (int64_t i = 0; i < n; i++) {
         passed = passed && list[i].found.verdict == CODEC_PASS;
         put_finding(&t, &list[i]);

@@ -21,46 +21,28 @@ static void put_vector(text *t, const char *key, const double *x, int64_t n, int
     text_close(t, ']');
 }
 
-static void put_summary(text *t, const char *summary)
-{
-    text_key(t, "summary");
-    text_raw(t, summary);
-}
-
-/* Names of the components, then the fields that have them. */
-static void put_components(text *t, const uz_fields *f)
-{
-    const char *const *names = uz_field_components(f->dim);
-    if (!f->stress && !f->strain && !f->gauss_stress)
-        return;
-    text_key(t, "components");
-    text_open(t, '[');
-    for (int c = 0; c < f->components; c++)
-        text_string(t, names[c]);
-    text_close(t, ']');
-}
-
-static void put_gauss(text *t, const uz_fields *f)
-{
-    if (!f->gauss_stress)
-        return;
-    text_key(t, "stress_gauss");
-    text_open(t, '{');
-    put_vector(t, "elements", f->gauss_element, f->n_points, 0);
-    put_vector(t, "points", f->gauss_point, f->n_points * f->dim, f->dim);
-    put_vector(t, "stress", f->gauss_stress, f->n_points * f->components, f->components);
-    text_close(t, '}');
-}
-
+/* What was computed; first the names of the components that stresses and strains have. */
 static void put_computed(text *t, const uz_fields *f)
 {
-    put_components(t, f);
+    const char *const *names = uz_field_components(f->dim);
+    if (f->stress || f->strain || f->gauss_stress) {
+        text_member_open(t, "components", '[');
+        for (int c = 0; c < f->components; c++)
+            text_string(t, names[c]);
+        text_close(t, ']');
+    }
     put_vector(t, "contact_status", f->contact_status, f->m, 0);
     put_vector(t, "stress", f->stress, f->n_nodes * f->components, f->components);
     put_vector(t, "principal", f->principal, f->n_nodes * 3, 3);
     put_vector(t, "von_mises", f->von_mises, f->n_nodes, 0);
     put_vector(t, "strain", f->strain, f->n_nodes * f->components, f->components);
-    put_gauss(t, f);
+    if (f->gauss_stress) {
+        text_member_open(t, "stress_gauss", '{');
+        put_vector(t, "elements", f->gauss_element, f->n_points, 0);
+        put_vector(t, "points", f->gauss_point, f->n_points * f->dim, f->dim);
+        put_vector(t, "stress", f->gauss_stress, f->n_points * f->components, f->components);
+        text_close(t, '}');
+    }
 }
 
 /* What each case has of its own. */
@@ -90,7 +72,7 @@ char *codec_encode_result(const codec_result *result, size_t *len)
     text_member_string(&t, "job", result->job_id);
     if (result->case_name)
         text_member_string(&t, "case", result->case_name);
-    put_summary(&t, result->summary);
+    text_member_raw(&t, "summary", result->summary);
     put_fields(&t, result);
     put_places(&t, result);
     text_close(&t, '}');
@@ -110,9 +92,8 @@ codec_results *codec_results_begin(const char *job_id, const char *summary)
         return NULL;
     text_open(&all->t, '{');
     text_member_string(&all->t, "job", job_id);
-    put_summary(&all->t, summary);
-    text_key(&all->t, "cases");
-    text_open(&all->t, '[');
+    text_member_raw(&all->t, "summary", summary);
+    text_member_open(&all->t, "cases", '[');
     return all;
 }
 
@@ -120,7 +101,7 @@ void codec_results_add(codec_results *all, const codec_result *one)
 {
     text_open(&all->t, '{');
     text_member_string(&all->t, "name", one->case_name);
-    put_summary(&all->t, one->summary);
+    text_member_raw(&all->t, "summary", one->summary);
     put_fields(&all->t, one);
     text_close(&all->t, '}');
 }
@@ -171,13 +152,11 @@ char *codec_encode_history(const char *case_name, const double *rows, int64_t co
     text_open(&t, '{');
     if (case_name)
         text_member_string(&t, "case", case_name);
-    text_key(&t, "columns");
-    text_open(&t, '[');
+    text_member_open(&t, "columns", '[');
     for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++)
         text_string(&t, CODEC_HISTORY_NAMES[i]);
     text_close(&t, ']');
-    text_key(&t, "rows");
-    text_open(&t, '[');
+    text_member_open(&t, "rows", '[');
     for (int64_t i = 0; i < count && !t.failed; i++)
         text_numbers(&t, rows + i * CODEC_HISTORY_COLUMNS, CODEC_HISTORY_COLUMNS);
     text_close(&t, ']');

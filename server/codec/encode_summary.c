@@ -20,22 +20,9 @@ static void put_named(text *t, const named *list, size_t count)
 
 static void put_object(text *t, const char *key, const named *list, size_t count)
 {
-    text_key(t, key);
-    text_open(t, '{');
+    text_member_open(t, key, '{');
     put_named(t, list, count);
     text_close(t, '}');
-}
-
-static void put_count(text *t, const char *key, int64_t value)
-{
-    text_key(t, key);
-    text_integer(t, value);
-}
-
-static void put_word(text *t, const char *key, const char *value)
-{
-    text_key(t, key);
-    text_string(t, value);
 }
 
 static void put_residual(text *t, const char *key, const uz_residual *e)
@@ -43,37 +30,19 @@ static void put_residual(text *t, const char *key, const uz_residual *e)
     put_object(t, key, (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
 }
 
-static void put_peak(text *t, const uz_evaluation *e, int dim)
-{
-    put_named(t, (named[]){{"area", e->contact_area}}, 1);
-    text_key(t, "max_pressure_at");
-    if (e->peak_node < 0) {
-        text_raw(t, NULL);
-        return;
-    }
-    text_open(t, '{');
-    put_count(t, "node", e->peak_node);
-    text_key(t, "x");
-    text_numbers(t, e->peak_at, dim);
-    text_close(t, '}');
-}
-
 static void put_resultant(text *t, const uz_resultant *r, int dim)
 {
     text_open(t, '{');
     if (r->on[0])
-        put_word(t, "on", r->on);
-    text_key(t, "force");
-    text_numbers(t, r->force, dim);
-    text_key(t, "moment");
-    text_numbers(t, dim == 2 ? r->moment + 2 : r->moment, dim == 2 ? 1 : 3);
+        text_member_string(t, "on", r->on);
+    text_member_numbers(t, "force", r->force, dim);
+    text_member_numbers(t, "moment", dim == 2 ? r->moment + 2 : r->moment, dim == 2 ? 1 : 3);
     text_close(t, '}');
 }
 
 static void put_resultants(text *t, const char *key, const uz_resultant *list, int64_t count, int dim)
 {
-    text_key(t, key);
-    text_open(t, '[');
+    text_member_open(t, key, '[');
     for (int64_t i = 0; i < count; i++)
         put_resultant(t, &list[i], dim);
     text_close(t, ']');
@@ -82,21 +51,19 @@ static void put_resultants(text *t, const char *key, const uz_resultant *list, i
 /* Scenes: what acts on the body, and what makes the answer doubtful. */
 static void put_evaluation(text *t, const uz_evaluation *e, int dim)
 {
-    text_key(t, "resultants");
-    text_open(t, '{');
+    text_member_open(t, "resultants", '{');
     put_resultants(t, "contacts", e->contacts, e->n_contacts, dim);
     put_resultants(t, "supports", e->supports, e->n_supports, dim);
     text_key(t, "loads");
     put_resultant(t, &e->loads, dim);
-    put_named(t, (named[]){{"imbalance", e->imbalance}}, 1);
+    text_member_number(t, "imbalance", e->imbalance);
     text_close(t, '}');
-    text_key(t, "warnings");
-    text_open(t, '[');
+    text_member_open(t, "warnings", '[');
     for (int i = 0; i < e->n_warnings; i++) {
         text_open(t, '{');
-        put_word(t, "code", e->warnings[i].code);
-        put_word(t, "message", e->warnings[i].message);
-        put_named(t, (named[]){{"value", e->warnings[i].value}}, 1);
+        text_member_string(t, "code", e->warnings[i].code);
+        text_member_string(t, "message", e->warnings[i].message);
+        text_member_number(t, "value", e->warnings[i].value);
         text_close(t, '}');
     }
     text_close(t, ']');
@@ -104,20 +71,27 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
 
 static void put_contact(text *t, const uz_summary *s, bool scene)
 {
-    text_key(t, "contact");
-    text_open(t, '{');
-    put_count(t, "candidates", s->m);
-    put_count(t, "kept", s->kept);
-    put_count(t, "added", s->added);
-    put_count(t, "rounds", s->rounds);
-    put_count(t, "active", s->active);
+    const uz_evaluation *e = s->evaluation;
+    text_member_open(t, "contact", '{');
+    text_member_integer(t, "candidates", s->m);
+    text_member_integer(t, "kept", s->kept);
+    text_member_integer(t, "added", s->added);
+    text_member_integer(t, "rounds", s->rounds);
+    text_member_integer(t, "active", s->active);
     put_named(t, (named[]){{"reaction_sum", s->reaction_sum}, {"max_penetration", s->max_penetration}}, 2);
     if (scene) {
-        text_key(t, "force");
-        text_numbers(t, s->force, s->dim);
-        put_named(t, (named[]){{"max_pressure", s->max_pressure}}, 1);
-        if (s->evaluation)
-            put_peak(t, s->evaluation, s->dim);
+        text_member_numbers(t, "force", s->force, s->dim);
+        text_member_number(t, "max_pressure", s->max_pressure);
+        if (e)
+            text_member_number(t, "area", e->contact_area);
+        if (e && e->peak_node < 0) {
+            text_member_raw(t, "max_pressure_at", NULL);
+        } else if (e) {
+            text_member_open(t, "max_pressure_at", '{');
+            text_member_integer(t, "node", e->peak_node);
+            text_member_numbers(t, "x", e->peak_at, s->dim);
+            text_close(t, '}');
+        }
     }
     text_close(t, '}');
 }
@@ -132,8 +106,7 @@ static void put_energy(text *t, const uz_certificate *c, const uz_evaluation *e)
 
 static void put_certificate(text *t, const uz_certificate *c)
 {
-    text_key(t, "certificate");
-    text_open(t, '{');
+    text_member_open(t, "certificate", '{');
     put_named(
         t, (named[]){{"relative_error", c->relative_error}, {"absolute_error", c->absolute_error}, {"gap", c->gap}}, 3);
     put_residual(t, "residual", &c->residual);
@@ -141,34 +114,20 @@ static void put_certificate(text *t, const uz_certificate *c)
     text_close(t, '}');
 }
 
-static void put_flag(text *t, const char *key, bool value)
-{
-    text_key(t, key);
-    text_bool(t, value);
-}
-
-static void put_reused(text *t, const uz_reuse *reused)
-{
-    text_key(t, "reused");
-    text_open(t, '{');
-    put_flag(t, "assembly", reused->assembly);
-    put_flag(t, "ordering", reused->ordering);
-    put_flag(t, "factor", reused->factor);
-    put_flag(t, "operator", reused->op);
-    text_close(t, '}');
-}
-
 static void put_factor(text *t, const uz_summary *s)
 {
-    text_key(t, "factor");
-    text_open(t, '{');
-    put_flag(t, "cached", s->factor_cached);
-    put_reused(t, &s->reused);
-    put_word(t, "ordering", uz_ordering_name(s->ordering));
-    text_key(t, "contact_last");
-    text_bool(t, s->contact_last);
-    put_count(t, "nnz", s->factor_nnz);
-    put_count(t, "bytes", (int64_t)s->factor_bytes);
+    text_member_open(t, "factor", '{');
+    text_member_bool(t, "cached", s->factor_cached);
+    text_member_open(t, "reused", '{');
+    text_member_bool(t, "assembly", s->reused.assembly);
+    text_member_bool(t, "ordering", s->reused.ordering);
+    text_member_bool(t, "factor", s->reused.factor);
+    text_member_bool(t, "operator", s->reused.op);
+    text_close(t, '}');
+    text_member_string(t, "ordering", uz_ordering_name(s->ordering));
+    text_member_bool(t, "contact_last", s->contact_last);
+    text_member_integer(t, "nnz", s->factor_nnz);
+    text_member_integer(t, "bytes", (int64_t)s->factor_bytes);
     put_named(t, (named[]){{"flops", s->factor_flops}, {"rcond", s->rcond}}, 2);
     text_close(t, '}');
 }
@@ -177,13 +136,11 @@ static void put_factor(text *t, const uz_summary *s)
 static void put_semicoercive(text *t, const uz_semicoercive *s)
 {
     const int64_t most = (int64_t)(sizeof s->held_by / sizeof s->held_by[0]);
-    text_key(t, "semicoercive");
-    text_open(t, '{');
-    put_count(t, "free_modes", s->free_modes);
-    put_count(t, "rounds", s->rounds);
-    put_count(t, "held", s->held);
-    text_key(t, "held_by_rows");
-    text_open(t, '[');
+    text_member_open(t, "semicoercive", '{');
+    text_member_integer(t, "free_modes", s->free_modes);
+    text_member_integer(t, "rounds", s->rounds);
+    text_member_integer(t, "held", s->held);
+    text_member_open(t, "held_by_rows", '[');
     for (int64_t i = 0; i < s->held && i < most; i++)
         text_integer(t, s->held_by[i]);
     text_close(t, ']');
@@ -200,40 +157,26 @@ static void put_timings(text *t, const uz_timings *s)
 
 static void put_cost(text *t, const uz_cost *c)
 {
-    text_key(t, "cost");
-    text_open(t, '{');
+    text_member_open(t, "cost", '{');
     put_object(t, "predicted", (named[]){{"seconds", c->seconds}, {"bytes", c->bytes}, {"flops", c->flops}}, 3);
     put_object(t, "actual", (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}}, 2);
-    text_key(t, "considered");
-    text_open(t, '[');
+    text_member_open(t, "considered", '[');
     for (int k = 0; k < c->n_considered; k++) {
         const uz_cost_option *form = &c->considered[k];
         text_open(t, '{');
-        put_word(t, "operator", uz_operator_name(form->op));
+        text_member_string(t, "operator", uz_operator_name(form->op));
         put_named(t, (named[]){{"seconds", form->seconds}, {"bytes", form->bytes}}, 2);
-        text_key(t, "fits");
-        text_bool(t, form->fits);
+        text_member_bool(t, "fits", form->fits);
         text_close(t, '}');
     }
     text_close(t, ']');
     text_close(t, '}');
 }
 
-static void put_problem(text *t, const uz_summary *s, bool scene)
-{
-    text_key(t, "problem");
-    text_open(t, '{');
-    put_word(t, "kind", scene ? "scene" : "matrices");
-    put_count(t, "d", s->d);
-    put_count(t, "m", s->m);
-    text_close(t, '}');
-}
-
 /* cells: as many as the box has directions. */
 static void put_cells(text *t, const int64_t *cells, int dim)
 {
-    text_key(t, "cells");
-    text_open(t, '[');
+    text_member_open(t, "cells", '[');
     for (int axis = 0; axis < dim; axis++)
         text_integer(t, cells[axis]);
     text_close(t, ']');
@@ -242,17 +185,15 @@ static void put_cells(text *t, const int64_t *cells, int dim)
 /* A box whose cells were chosen: the grids that were tried for it. */
 static void put_ladder(text *t, const uz_ladder *ladder)
 {
-    text_key(t, "mesh");
-    text_open(t, '{');
+    text_member_open(t, "mesh", '{');
     put_cells(t, ladder->cells, ladder->dim);
-    text_key(t, "ladder");
-    text_open(t, '[');
+    text_member_open(t, "ladder", '[');
     for (int i = 0; i < ladder->count; i++) {
         const uz_rung *rung = &ladder->rung[i];
         text_open(t, '{');
         put_cells(t, rung->cells, ladder->dim);
-        put_count(t, "d", rung->d);
-        put_count(t, "iterations", rung->iterations);
+        text_member_integer(t, "d", rung->d);
+        text_member_integer(t, "iterations", rung->iterations);
         put_named(t,
                   (named[]){{"discretization_error", rung->discretization_error},
                             {"certified_error", rung->certified_error},
@@ -266,13 +207,12 @@ static void put_ladder(text *t, const uz_ladder *ladder)
 
 static void put_cases(text *t, const codec_cases *cases)
 {
-    text_key(t, "cases");
-    text_open(t, '{');
-    put_count(t, "count", cases->count);
-    put_word(t, "worst", cases->worst);
+    text_member_open(t, "cases", '{');
+    text_member_integer(t, "count", cases->count);
+    text_member_string(t, "worst", cases->worst);
     for (int i = 0; i < CODEC_OUTCOMES; i++)
         if (cases->outcomes[i] > 0 || i == UZ_CONVERGED)
-            put_count(t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
+            text_member_integer(t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
     text_close(t, '}');
 }
 
@@ -286,18 +226,22 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     text t = {0};
     bool scene = kind == UZ_PROBLEM_SCENE;
     text_open(&t, '{');
-    put_word(&t, "outcome", uz_outcome_name(summary->outcome));
-    put_word(&t, "message", summary->message);
-    put_word(&t, "method", uz_method_name(summary->method));
-    put_word(&t, "operator", uz_operator_name(summary->op));
-    put_count(&t, "iterations", summary->iterations);
-    put_count(&t, "restarts", summary->restarts);
-    put_count(&t, "refinements", summary->refinements);
+    text_member_string(&t, "outcome", uz_outcome_name(summary->outcome));
+    text_member_string(&t, "message", summary->message);
+    text_member_string(&t, "method", uz_method_name(summary->method));
+    text_member_string(&t, "operator", uz_operator_name(summary->op));
+    text_member_integer(&t, "iterations", summary->iterations);
+    text_member_integer(&t, "restarts", summary->restarts);
+    text_member_integer(&t, "refinements", summary->refinements);
     if (run->started_from)
-        put_word(&t, "started_from", run->started_from);
+        text_member_string(&t, "started_from", run->started_from);
     if (run->cases)
         put_cases(&t, run->cases);
-    put_problem(&t, summary, scene);
+    text_member_open(&t, "problem", '{');
+    text_member_string(&t, "kind", scene ? "scene" : "matrices");
+    text_member_integer(&t, "d", summary->d);
+    text_member_integer(&t, "m", summary->m);
+    text_close(&t, '}');
     put_contact(&t, summary, scene);
     put_energy(&t, &summary->certificate, summary->evaluation);
     put_certificate(&t, &summary->certificate);
@@ -314,11 +258,11 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
         put_suggestion(&t, &summary->suggestion);
     }
     if (summary->ladder) {
-        put_named(&t, (named[]){{"total_error", summary->total_error}}, 1);
+        text_member_number(&t, "total_error", summary->total_error);
         put_ladder(&t, summary->ladder);
     }
     if (summary->outcome == UZ_INFEASIBLE)
-        put_named(&t, (named[]){{"infeasible_radius", summary->infeasible_radius}}, 1);
+        text_member_number(&t, "infeasible_radius", summary->infeasible_radius);
     if (summary->semicoercive.free_modes > 0)
         put_semicoercive(&t, &summary->semicoercive);
     put_factor(&t, summary);

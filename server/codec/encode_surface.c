@@ -62,25 +62,18 @@ static int add_indices(surface_writer *w, const unsigned *data, int64_t count)
 
 /* -------------------------------------------------------------------- JSON */
 
-static void put_vector(text *t, const char *key, const double *x, int64_t n)
-{
-    text_key(t, key);
-    text_numbers(t, x, n);
-}
-
 static void put_floats(text *t, const char *key, const float *x, size_t n)
 {
     double wide[3];
     for (size_t i = 0; i < n && i < 3; i++)
         wide[i] = (double)x[i];
-    put_vector(t, key, wide, (int64_t)n);
+    text_member_numbers(t, key, wide, (int64_t)n);
 }
 
 static void put_accessors(surface_writer *w)
 {
     text *t = &w->json;
-    text_key(t, "accessors");
-    text_open(t, '[');
+    text_member_open(t, "accessors", '[');
     for (int i = 0; i < w->n_arrays; i++) {
         const array *a = &w->arrays[i];
         text_open(t, '{');
@@ -100,8 +93,7 @@ static void put_accessors(surface_writer *w)
 static void put_views(surface_writer *w)
 {
     text *t = &w->json;
-    text_key(t, "bufferViews");
-    text_open(t, '[');
+    text_member_open(t, "bufferViews", '[');
     for (int i = 0; i < w->n_arrays; i++) {
         const array *a = &w->arrays[i];
         text_open(t, '{');
@@ -113,8 +105,7 @@ static void put_views(surface_writer *w)
         text_close(t, '}');
     }
     text_close(t, ']');
-    text_key(t, "buffers");
-    text_open(t, '[');
+    text_member_open(t, "buffers", '[');
     text_open(t, '{');
     text_member_integer(t, "byteLength", (int64_t)w->bytes);
     text_close(t, '}');
@@ -137,8 +128,7 @@ static void put_primitive(text *t, int mode, int indices, const vertices *v, boo
     if (indices == NONE)
         return;
     text_open(t, '{');
-    text_key(t, "attributes");
-    text_open(t, '{');
+    text_member_open(t, "attributes", '{');
     text_member_integer(t, "POSITION", v->position);
     put_accessor(t, "_NODE", coloured ? v->node : NONE);
     put_accessor(t, "_VON_MISES", coloured ? v->von_mises : NONE);
@@ -146,8 +136,7 @@ static void put_primitive(text *t, int mode, int indices, const vertices *v, boo
     text_member_integer(t, "indices", indices);
     text_member_integer(t, "mode", mode);
     if (moves) {
-        text_key(t, "targets");
-        text_open(t, '[');
+        text_member_open(t, "targets", '[');
         text_open(t, '{');
         text_member_integer(t, "POSITION", v->displacement);
         text_close(t, '}');
@@ -161,8 +150,8 @@ static void put_node(text *t, const char *name, int mesh, const uz_surface *s)
     text_open(t, '{');
     text_member_string(t, "name", name);
     text_member_integer(t, "mesh", mesh);
-    put_vector(t, "translation", s->origin, 3);
-    put_vector(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
+    text_member_numbers(t, "translation", s->origin, 3);
+    text_member_numbers(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
     text_close(t, '}');
 }
 
@@ -171,8 +160,7 @@ static void put_nodes(text *t, const uz_surface *s, bool outline)
     text_member_integer(t, "scene", 0);
     text_key(t, "scenes");
     text_put(t, outline ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
-    text_key(t, "nodes");
-    text_open(t, '[');
+    text_member_open(t, "nodes", '[');
     put_node(t, "body", 0, s);
     if (outline)
         put_node(t, "undeformed outline", 1, s);
@@ -187,21 +175,18 @@ static void put_meshes(surface_writer *w, const vertices *v, int row_vertex)
     const int lines = add_indices(w, s->line, 2 * s->n_lines);
     const int outline = add_indices(w, s->outline, 2 * s->n_outline);
     put_nodes(t, s, outline != NONE);
-    text_key(t, "meshes");
-    text_open(t, '[');
+    text_member_open(t, "meshes", '[');
     text_open(t, '{');
-    text_key(t, "primitives");
-    text_open(t, '[');
+    text_member_open(t, "primitives", '[');
     put_primitive(t, TRIANGLES, triangles, v, true, true);
     put_primitive(t, LINES, lines, v, false, true);
     put_primitive(t, POINTS, row_vertex, v, false, true);
     text_close(t, ']');
-    put_vector(t, "weights", &s->factor, 1);
+    text_member_numbers(t, "weights", &s->factor, 1);
     text_close(t, '}');
     if (outline != NONE) {
         text_open(t, '{');
-        text_key(t, "primitives");
-        text_open(t, '[');
+        text_member_open(t, "primitives", '[');
         put_primitive(t, LINES, outline, v, false, false);
         text_close(t, ']');
         text_close(t, '}');
@@ -215,8 +200,7 @@ static void put_drawn(text *t, const char *key, const uz_drawn *drawn, int acces
 {
     if (!drawn->x)
         return;
-    text_key(t, key);
-    text_open(t, '{');
+    text_member_open(t, key, '{');
     put_accessor(t, "accessor", accessor);
     text_member_number(t, "unit", drawn->unit);
     text_member_number(t, "low", drawn->low);
@@ -229,8 +213,7 @@ static void put_contact(surface_writer *w, int row_vertex)
     const uz_surface *s = w->in->surface;
     const int64_t n = s->n_rows;
     text *t = &w->json;
-    text_key(t, "contact");
-    text_open(t, '{');
+    text_member_open(t, "contact", '{');
     text_member_integer(t, "rows", n);
     put_accessor(t, "vertex", row_vertex);
     put_accessor(t, "contact", add_array(w, UNSIGNED, 0, s->row_contact, n, 1));
@@ -247,9 +230,9 @@ static void put_round(text *t, const uz_contact *c, int dim)
 {
     text_key(t, c->kind == UZ_OBSTACLE_CYLINDER ? "cylinder" : dim == 2 ? "circle" : "sphere");
     text_open(t, '{');
-    put_vector(t, c->kind == UZ_OBSTACLE_CYLINDER ? "point" : "center", c->point, dim);
+    text_member_numbers(t, c->kind == UZ_OBSTACLE_CYLINDER ? "point" : "center", c->point, dim);
     if (c->kind == UZ_OBSTACLE_CYLINDER)
-        put_vector(t, "axis", c->normal, dim);
+        text_member_numbers(t, "axis", c->normal, dim);
     text_member_number(t, "radius", c->radius);
     text_member_bool(t, "inside", c->inside);
     text_close(t, '}');
@@ -257,10 +240,8 @@ static void put_round(text *t, const uz_contact *c, int dim)
 
 static void put_polyline(text *t, const uz_contact *c)
 {
-    text_key(t, "polyline");
-    text_open(t, '{');
-    text_key(t, "points");
-    text_open(t, '[');
+    text_member_open(t, "polyline", '{');
+    text_member_open(t, "points", '[');
     for (int64_t i = 0; i < c->n_x; i++)
         text_numbers(t, (const double[]){c->x[i], c->y[i]}, 2);
     text_close(t, ']');
@@ -269,18 +250,16 @@ static void put_polyline(text *t, const uz_contact *c)
 
 static void put_height(text *t, const uz_contact *c)
 {
-    text_key(t, "height");
-    text_open(t, '{');
-    put_vector(t, "x", c->x, c->n_x);
+    text_member_open(t, "height", '{');
+    text_member_numbers(t, "x", c->x, c->n_x);
     if (c->n_y > 0) {
-        put_vector(t, "y", c->y, c->n_y);
-        text_key(t, "z");
-        text_open(t, '[');
+        text_member_numbers(t, "y", c->y, c->n_y);
+        text_member_open(t, "z", '[');
         for (int64_t j = 0; j < c->n_y; j++)
             text_numbers(t, c->z + j * c->n_x, c->n_x);
         text_close(t, ']');
     } else {
-        put_vector(t, "z", c->z, c->n_x);
+        text_member_numbers(t, "z", c->z, c->n_x);
     }
     text_close(t, '}');
 }
@@ -295,13 +274,11 @@ static void put_obstacle(text *t, const uz_contact *c, int dim)
         text_close(t, '}');
         return;
     }
-    text_key(t, "obstacle");
-    text_open(t, '{');
+    text_member_open(t, "obstacle", '{');
     if (c->kind == UZ_OBSTACLE_PLANE) {
-        text_key(t, "plane");
-        text_open(t, '{');
-        put_vector(t, "point", c->point, dim);
-        put_vector(t, "normal", c->normal, dim);
+        text_member_open(t, "plane", '{');
+        text_member_numbers(t, "point", c->point, dim);
+        text_member_numbers(t, "normal", c->normal, dim);
         text_close(t, '}');
     } else if (c->kind == UZ_OBSTACLE_POLYLINE) {
         put_polyline(t, c);
@@ -319,15 +296,14 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     const uz_surface *s = w->in->surface;
     const uz_scene *scene = w->in->scene;
     text *t = &w->json;
-    text_key(t, "extras");
-    text_open(t, '{');
+    text_member_open(t, "extras", '{');
     text_member_string(t, "job", w->in->job_id);
     text_member_string(t, "case", w->in->case_name);
     text_member_integer(t, "dim", s->dim);
     text_member_bool(t, "axisymmetric", scene->model == UZ_AXISYMMETRIC);
     text_member_integer(t, "nodes", s->n_nodes);
     text_member_integer(t, "elements", s->n_elements);
-    put_vector(t, "origin", s->origin, 3);
+    text_member_numbers(t, "origin", s->origin, 3);
     text_member_number(t, "unit", s->unit);
     text_member_number(t, "factor", s->factor);
     text_member_number(t, "largest_displacement", s->largest);
@@ -335,8 +311,7 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     text_member_integer(t, "displacement", v->displacement);
     put_drawn(t, "von_mises", &s->von_mises, v->von_mises);
     put_contact(w, row_vertex);
-    text_key(t, "contacts");
-    text_open(t, '[');
+    text_member_open(t, "contacts", '[');
     for (int64_t k = 0; k < scene->n_contacts; k++)
         put_obstacle(t, &scene->contacts[k], s->dim);
     text_close(t, ']');

@@ -60,8 +60,7 @@ static void put_step(text *t, double seconds, const uz_trade_step *step)
 static void put_decades(text *t, const uz_trade *trade)
 {
     static const double DECADE[DECADES] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
-    text_key(t, "decades");
-    text_open(t, '[');
+    text_member_open(t, "decades", '[');
     for (int k = 0; k < DECADES; k++) {
         const uz_trade_step *step = uz_trade_reach(trade, DECADE[k]);
         text_open(t, '{');
@@ -85,8 +84,7 @@ static void put_level(text *t, const char *name, double relative_error, const uz
 /* `balanced` is known where the mesh's error is. */
 static void put_levels(text *t, const uz_trade *trade, double mesh_error)
 {
-    text_key(t, "levels");
-    text_open(t, '[');
+    text_member_open(t, "levels", '[');
     put_level(t, "quick", 1e-2, trade);
     put_level(t, "balanced", mesh_error > 0.0 ? fmin(1.0, 0.1 * mesh_error) : NAN, trade);
     put_level(t, "precise", 1e-8, trade);

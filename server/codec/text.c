@@ -82,41 +82,27 @@ void text_key(text *t, const char *key)
     text_bytes(t, "\":", 2);
 }
 
-static void put_escaped(text *t, unsigned char c)
-{
-    static const char NAMED[] = "\b\f\n\r\t\"\\", NAMES[] = "bfnrt\"\\";
-    const char *named = c ? strchr(NAMED, c) : NULL;
-    if (named)
-        text_bytes(t, (char[2]){'\\', NAMES[named - NAMED]}, 2);
-    else
-        text_format(t, "\\u%04x", c);
-}
-
-static bool needs_escape(unsigned char c)
-{
-    return c < 0x20 || c == '"' || c == '\\' || c == 0x7f;
-}
-
 void text_string(text *t, const char *string)
 {
-    size_t len = string ? strlen(string) : 0;
+    static const char NAMED[] = "\b\f\n\r\t\"\\", NAMES[] = "bfnrt\"\\";
+    const size_t len = string ? strlen(string) : 0;
     comma(t);
-    if (!string) {
-        text_put(t, "null");
-        return;
-    }
-    text_bytes(t, "\"", 1);
+    text_put(t, string ? "\"" : "null");
     for (size_t i = 0; i < len;) {
-        size_t step = json_utf8_length(string + i, len - i);
+        const size_t step = json_utf8_length(string + i, len - i);
+        const unsigned char c = (unsigned char)string[i];
+        const char *named = strchr(NAMED, c);
         if (step == 0)
             text_put(t, "\xef\xbf\xbd");
-        else if (needs_escape((unsigned char)string[i]))
-            put_escaped(t, (unsigned char)string[i]);
+        else if (named)
+            text_bytes(t, (char[2]){'\\', NAMES[named - NAMED]}, 2);
+        else if (c < 0x20 || c == 0x7f)
+            text_format(t, "\\u%04x", c);
         else
             text_bytes(t, string + i, step);
         i += step ? step : 1;
     }
-    text_bytes(t, "\"", 1);
+    text_put(t, string ? "\"" : "");
 }
 
 void text_integer(text *t, int64_t value)
@@ -159,6 +145,24 @@ void text_member_bool(text *t, const char *key, bool value)
 {
     text_key(t, key);
     text_bool(t, value);
+}
+
+void text_member_open(text *t, const char *key, char bracket)
+{
+    text_key(t, key);
+    text_open(t, bracket);
+}
+
+void text_member_raw(text *t, const char *key, const char *json)
+{
+    text_key(t, key);
+    text_raw(t, json);
+}
+
+void text_member_numbers(text *t, const char *key, const double *x, int64_t n)
+{
+    text_key(t, key);
+    text_numbers(t, x, n);
 }
 
 size_t text_shortest(char out[TEXT_DOUBLE], double x)

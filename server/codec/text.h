@@ -33,6 +33,9 @@ void text_member_string(text *t, const char *key, const char *string);
 void text_member_integer(text *t, const char *key, int64_t value);
 void text_member_number(text *t, const char *key, double value);
 void text_member_bool(text *t, const char *key, bool value);
+void text_member_open(text *t, const char *key, char bracket);
+void text_member_raw(text *t, const char *key, const char *json);
+void text_member_numbers(text *t, const char *key, const double *x, int64_t n);
 
 /* The NUL-terminated text, owned by the caller; NULL if memory ran out. *len (may be NULL) without the NUL. */
 char *text_finish(text *t, size_t *len);
