@@ -43,65 +43,33 @@ const schemas *decode_schemas(void)
     return loaded;
 }
 
-static int http_status(uz_status status)
-{
-    return status == UZ_ERR_MEMORY ? 503 : status == UZ_ERR_INTERNAL || status == UZ_ERR_ARGUMENT ? 500 : 422;
-}
-
-/* Members of a request beside its problem. */
-static bool points_beside(const char *where)
-{
-    static const char *const MEMBERS[] = {"/cases", "/solver", "/answer"};
-    for (size_t i = 0; i < sizeof MEMBERS / sizeof MEMBERS[0]; i++) {
-        size_t len = strlen(MEMBERS[i]);
-        if (strncmp(where, MEMBERS[i], len) == 0 && (where[len] == '/' || where[len] == '\0'))
-            return true;
-    }
-    return false;
-}
-
-/* A load case of a request has loads, p and h; an error about anything else of it is one of the body that all cases
- * share. Returns `where` without the case. */
-static const char *leave_case(const char *where)
-{
-    static const char CASES[] = "/cases/";
-    if (strncmp(where, CASES, sizeof CASES - 1) != 0)
-        return where;
-    const char *rest = where + sizeof CASES - 1;
-    rest += strspn(rest, "0123456789");
-    bool own = *rest == '\0' || strncmp(rest, "/loads", 6) == 0 || strcmp(rest, "/p") == 0 || strcmp(rest, "/h") == 0;
-    return own ? where : rest;
-}
-
-/* The library names the matrices that it makes of a scene, and no request of a scene has them. Too large they are
- * because of the mesh. */
-static const char *leave_matrix(const char *where, uz_status status)
-{
-    static const char *const NAMES[] = {"K", "N", "p", "h"};
-    const char *name = where + (where[0] == '/');
-    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
-        if (strcmp(name, NAMES[i]) == 0)
-            return status == UZ_ERR_LIMIT ? "/mesh" : "";
-    return where;
-}
-
-/* The library reads two formats of text and has one status for both. */
-static const char *code_of(const uz_error *err)
-{
-    const bool gmsh = strcmp(err->where, "/mesh/gmsh") == 0;
-    if (gmsh && err->status == UZ_ERR_FORMAT)
-        return "gmsh_syntax";
-    return gmsh && err->status == UZ_ERR_UNSUPPORTED ? "gmsh_unsupported" : uz_status_name(err->status);
-}
-
 void codec_problem_from_error(problem_details *out, const uz_error *err, uz_problem_kind kind)
 {
-    const char *where = leave_case(err->where);
-    if (kind == UZ_PROBLEM_SCENE)
-        where = leave_matrix(where, err->status);
-    problem_set(out, http_status(err->status), code_of(err), NULL, "%s", err->message);
-    snprintf(out->pointer, sizeof out->pointer, "%s%s%s", points_beside(where) ? "" : "/problem",
-             where[0] && where[0] != '/' ? "/" : "", where);
+    static const char *const MATRICES[] = {"K", "N", "p", "h"}, *const BESIDE[] = {"/cases", "/solver", "/answer"};
+    const uz_status status = err->status;
+    const char *where = err->where, *code = uz_status_name(status), *within = "/problem";
+    if (strcmp(where, "/mesh/gmsh") == 0) /* the library reads two formats of text and has one status for both */
+        code = status == UZ_ERR_FORMAT ? "gmsh_syntax" : status == UZ_ERR_UNSUPPORTED ? "gmsh_unsupported" : code;
+    if (strncmp(where, "/cases/", 7) == 0) {
+        /* A load case has loads, p and h; an error about anything else of it is one of the body that all cases share.
+         */
+        const char *rest = where + 7 + strspn(where + 7, "0123456789");
+        if (*rest && strncmp(rest, "/loads", 6) != 0 && strcmp(rest, "/p") != 0 && strcmp(rest, "/h") != 0)
+            where = rest;
+    }
+    /* The library names the matrices that it makes of a scene, and no request of a scene has them. Too large they are
+     * because of the mesh. */
+    for (size_t i = 0; kind == UZ_PROBLEM_SCENE && i < sizeof MATRICES / sizeof MATRICES[0]; i++)
+        if (strcmp(where + (where[0] == '/'), MATRICES[i]) == 0)
+            where = status == UZ_ERR_LIMIT ? "/mesh" : "";
+    for (size_t i = 0; i < sizeof BESIDE / sizeof BESIDE[0]; i++) {
+        const size_t len = strlen(BESIDE[i]);
+        if (strncmp(where, BESIDE[i], len) == 0 && (where[len] == '/' || where[len] == '\0'))
+            within = "";
+    }
+    const int http = status == UZ_ERR_MEMORY ? 503 : status == UZ_ERR_INTERNAL || status == UZ_ERR_ARGUMENT ? 500 : 422;
+    problem_set(out, http, code, NULL, "%s", err->message);
+    snprintf(out->pointer, sizeof out->pointer, "%s%s%s", within, where[0] && where[0] != '/' ? "/" : "", where);
     out->line = err->line;
 }
 
@@ -144,75 +112,70 @@ bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u,
     return true;
 }
 
-static bool check_count(const char *pointer, int64_t have, int64_t want, const char *what, problem_details *problem)
-{
-    if (have == want)
-        return true;
-    problem_set(problem, 422, "size_mismatch", NULL, "%s has %lld numbers, but the problem has %lld %s.", pointer,
-                (long long)have, (long long)want, what);
-    snprintf(problem->pointer, sizeof problem->pointer, "%s", pointer);
-    return false;
-}
-
-/* A point of another size than the scene's would pass as numbers of other nodes. */
-static bool check_columns(const codec_request *request, problem_details *problem)
-{
-    bool scene = request->problem.kind == UZ_PROBLEM_SCENE;
-    int columns = request->answer.columns, dim = uz_scene_dim(&request->problem.scene);
-    if (columns == 0 || (scene && columns == dim))
-        return true;
-    problem_set(problem, 422, "size_mismatch", NULL, "/answer/displacements has points of %d numbers; %s.", columns,
-                !scene     ? "a problem in matrices has single numbers"
-                : dim == 2 ? "this scene has 2 directions"
-                           : "this scene has 3 directions");
-    snprintf(problem->pointer, sizeof problem->pointer, "/answer/displacements");
-    return false;
-}
-
-static bool check_limit(int64_t have, int64_t most, const char *what, const char *option, problem_details *problem)
-{
-    if (have <= most)
-        return true;
-    problem_set(problem, 413, "problem_too_large", NULL,
-                "The problem has %lld %s; this service takes at most %lld (the daemon's option --%s).", (long long)have,
-                what, (long long)most, option);
-    return false;
-}
-
-/* Without making the mesh, which is what a limit shall spare. */
-static int64_t scene_dofs(const uz_scene *scene)
-{
-    double dofs = scene->box.dim;
-    for (int i = 0; i < scene->box.dim; i++)
-        dofs *= (double)scene->box.cells[i] + 1.0;
-    return dofs < 9e18 ? (int64_t)dofs : INT64_MAX;
-}
-
 static bool check_limits(const codec_request *request, problem_details *problem)
 {
     const uz_qp *qp = &request->problem.qp;
-    if (request->problem.kind == UZ_PROBLEM_SCENE)
-        return check_limit(scene_dofs(&request->problem.scene), limits.dofs, "degrees of freedom", "max-dofs", problem);
-    return check_limit(qp->K.rows, limits.dofs, "degrees of freedom", "max-dofs", problem) &&
-           check_limit(qp->N.rows, limits.rows, "contact rows", "max-rows", problem) &&
-           check_limit(qp->K.ptr[qp->K.cols], limits.nonzeros, "entries of K", "max-nonzeros", problem) &&
-           check_limit(qp->N.ptr[qp->N.cols], limits.nonzeros, "entries of N", "max-nonzeros", problem);
+    const uz_box *box = &request->problem.scene.box;
+    const bool scene = request->problem.kind == UZ_PROBLEM_SCENE;
+    double dofs = box->dim; /* without making the mesh, which is what a limit shall spare */
+    for (int i = 0; scene && i < box->dim; i++)
+        dofs *= (double)box->cells[i] + 1.0;
+    const struct {
+        int64_t have, most;
+        const char *what, *option;
+    } LIST[] = {{!scene        ? qp->K.rows
+                 : dofs < 9e18 ? (int64_t)dofs
+                               : INT64_MAX,
+                 limits.dofs, "degrees of freedom", "max-dofs"},
+                {scene ? 0 : qp->N.rows, limits.rows, "contact rows", "max-rows"},
+                {scene ? 0 : qp->K.ptr[qp->K.cols], limits.nonzeros, "entries of K", "max-nonzeros"},
+                {scene ? 0 : qp->N.ptr[qp->N.cols], limits.nonzeros, "entries of N", "max-nonzeros"}};
+    for (size_t i = 0; i < sizeof LIST / sizeof LIST[0]; i++)
+        if (LIST[i].have > LIST[i].most) {
+            problem_set(problem, 413, "problem_too_large", NULL,
+                        "The problem has %lld %s; this service takes at most %lld (the daemon's option --%s).",
+                        (long long)LIST[i].have, LIST[i].what, (long long)LIST[i].most, LIST[i].option);
+            return false;
+        }
+    return true;
 }
 
+/* Vectors that came with the request, as long as the problem wants them. */
 static bool check_sizes(const codec_request *request, problem_details *problem)
 {
     const codec_answer *answer = &request->answer;
     const codec_start *start = &request->start;
+    const bool scene = request->problem.kind == UZ_PROBLEM_SCENE;
+    const int dim = uz_scene_dim(&request->problem.scene);
     int64_t m, n_u;
     if (!answer->u && !start->reactions)
         return true;
     if (!codec_request_sizes(request, &m, &n_u, problem))
         return false;
-    if (start->reactions)
-        return check_count("/solver/warm_start/reactions", start->n_reactions, m, "contact rows", problem);
-    return check_columns(request, problem) &&
-           check_count("/answer/displacements", answer->n_u, n_u, "displacements", problem) &&
-           check_count("/answer/reactions", answer->n_r, m, "contact rows", problem);
+    /* a point of another size than the scene's would pass as numbers of other nodes */
+    if (!start->reactions && answer->columns != 0 && !(scene && answer->columns == dim)) {
+        problem_set(problem, 422, "size_mismatch", NULL, "/answer/displacements has points of %d numbers; %s.",
+                    answer->columns,
+                    !scene     ? "a problem in matrices has single numbers"
+                    : dim == 2 ? "this scene has 2 directions"
+                               : "this scene has 3 directions");
+        snprintf(problem->pointer, sizeof problem->pointer, "/answer/displacements");
+        return false;
+    }
+    const struct {
+        const char *pointer, *what;
+        int64_t have, want;
+    } LIST[] = {{"/solver/warm_start/reactions", "contact rows", start->reactions ? start->n_reactions : m, m},
+                {"/answer/displacements", "displacements", start->reactions ? n_u : answer->n_u, n_u},
+                {"/answer/reactions", "contact rows", start->reactions ? m : answer->n_r, m}};
+    for (size_t i = 0; i < sizeof LIST / sizeof LIST[0]; i++)
+        if (LIST[i].have != LIST[i].want) {
+            problem_set(problem, 422, "size_mismatch", NULL, "%s has %lld numbers, but the problem has %lld %s.",
+                        LIST[i].pointer, (long long)LIST[i].have, (long long)LIST[i].want, LIST[i].what);
+            snprintf(problem->pointer, sizeof problem->pointer, "%s", LIST[i].pointer);
+            return false;
+        }
+    return true;
 }
 
 /* A box whose cells are to be chosen has no mesh yet that a vector could belong to, and no other rule than the error

@@ -96,14 +96,6 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
     text_close(t, '}');
 }
 
-/* The primal one bounds the minimum from above only where a feasible displacement was found, so with a finite gap. */
-static void put_energy(text *t, const uz_certificate *c, const uz_evaluation *e)
-{
-    double primal = isfinite(c->gap) ? c->energy_primal : INFINITY;
-    const named list[] = {{"primal", primal}, {"dual", c->energy_dual}, {"strain", e ? e->strain_energy : NAN}};
-    put_object(t, "energy", list, e ? 3 : 2);
-}
-
 static void put_certificate(text *t, const uz_certificate *c)
 {
     text_member_open(t, "certificate", '{');
@@ -145,14 +137,6 @@ static void put_semicoercive(text *t, const uz_semicoercive *s)
         text_integer(t, s->held_by[i]);
     text_close(t, ']');
     text_close(t, '}');
-}
-
-static void put_timings(text *t, const uz_timings *s)
-{
-    const named list[] = {{"queue", s->queue},     {"parse", s->parse},     {"assemble", s->assemble},
-                          {"order", s->order},     {"factor", s->factor},   {"condense", s->condense},
-                          {"iterate", s->iterate}, {"certify", s->certify}, {"total", s->total}};
-    put_object(t, "timings_s", list, sizeof list / sizeof list[0]);
 }
 
 static void put_cost(text *t, const uz_cost *c)
@@ -224,7 +208,17 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind)
 char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run)
 {
     text t = {0};
-    bool scene = kind == UZ_PROBLEM_SCENE;
+    const bool scene = kind == UZ_PROBLEM_SCENE;
+    const uz_certificate *c = &summary->certificate;
+    const uz_timings *s = &summary->timings;
+    /* the primal one bounds the minimum from above only where a feasible displacement was found, so with a finite gap
+     */
+    const named energy[] = {{"primal", isfinite(c->gap) ? c->energy_primal : (double)INFINITY},
+                            {"dual", c->energy_dual},
+                            {"strain", summary->evaluation ? summary->evaluation->strain_energy : (double)NAN}};
+    const named timings[] = {{"queue", s->queue},     {"parse", s->parse},     {"assemble", s->assemble},
+                             {"order", s->order},     {"factor", s->factor},   {"condense", s->condense},
+                             {"iterate", s->iterate}, {"certify", s->certify}, {"total", s->total}};
     text_open(&t, '{');
     text_member_string(&t, "outcome", uz_outcome_name(summary->outcome));
     text_member_string(&t, "message", summary->message);
@@ -243,8 +237,8 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     text_member_integer(&t, "m", summary->m);
     text_close(&t, '}');
     put_contact(&t, summary, scene);
-    put_energy(&t, &summary->certificate, summary->evaluation);
-    put_certificate(&t, &summary->certificate);
+    put_object(&t, "energy", energy, summary->evaluation ? 3 : 2);
+    put_certificate(&t, c);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);
     put_named(&t,
@@ -267,7 +261,7 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
         put_semicoercive(&t, &summary->semicoercive);
     put_factor(&t, summary);
     put_cost(&t, &summary->cost);
-    put_timings(&t, &summary->timings);
+    put_object(&t, "timings_s", timings, sizeof timings / sizeof timings[0]);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }

@@ -62,15 +62,8 @@ static int add_indices(surface_writer *w, const unsigned *data, int64_t count)
 
 /* -------------------------------------------------------------------- JSON */
 
-static void put_floats(text *t, const char *key, const float *x, size_t n)
-{
-    double wide[3];
-    for (size_t i = 0; i < n && i < 3; i++)
-        wide[i] = (double)x[i];
-    text_member_numbers(t, key, wide, (int64_t)n);
-}
-
-static void put_accessors(surface_writer *w)
+/* The arrays: an accessor and a view of the one buffer for each of them. */
+static void put_arrays(surface_writer *w)
 {
     text *t = &w->json;
     text_member_open(t, "accessors", '[');
@@ -81,18 +74,13 @@ static void put_accessors(surface_writer *w)
         text_member_integer(t, "componentType", a->type);
         text_member_integer(t, "count", (int64_t)a->count);
         text_member_string(t, "type", a->components == 3 ? "VEC3" : "SCALAR");
-        if (a->low) {
-            put_floats(t, "min", a->low, a->components);
-            put_floats(t, "max", a->high, a->components);
+        if (a->low) { /* of vectors */
+            text_member_numbers(t, "min", (const double[]){a->low[0], a->low[1], a->low[2]}, 3);
+            text_member_numbers(t, "max", (const double[]){a->high[0], a->high[1], a->high[2]}, 3);
         }
         text_close(t, '}');
     }
     text_close(t, ']');
-}
-
-static void put_views(surface_writer *w)
-{
-    text *t = &w->json;
     text_member_open(t, "bufferViews", '[');
     for (int i = 0; i < w->n_arrays; i++) {
         const array *a = &w->arrays[i];
@@ -145,28 +133,6 @@ static void put_primitive(text *t, int mode, int indices, const vertices *v, boo
     text_close(t, '}');
 }
 
-static void put_node(text *t, const char *name, int mesh, const uz_surface *s)
-{
-    text_open(t, '{');
-    text_member_string(t, "name", name);
-    text_member_integer(t, "mesh", mesh);
-    text_member_numbers(t, "translation", s->origin, 3);
-    text_member_numbers(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
-    text_close(t, '}');
-}
-
-static void put_nodes(text *t, const uz_surface *s, bool outline)
-{
-    text_member_integer(t, "scene", 0);
-    text_key(t, "scenes");
-    text_put(t, outline ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
-    text_member_open(t, "nodes", '[');
-    put_node(t, "body", 0, s);
-    if (outline)
-        put_node(t, "undeformed outline", 1, s);
-    text_close(t, ']');
-}
-
 static void put_meshes(surface_writer *w, const vertices *v, int row_vertex)
 {
     const uz_surface *s = w->in->surface;
@@ -174,7 +140,20 @@ static void put_meshes(surface_writer *w, const vertices *v, int row_vertex)
     const int triangles = add_indices(w, s->triangle, 3 * s->n_triangles);
     const int lines = add_indices(w, s->line, 2 * s->n_lines);
     const int outline = add_indices(w, s->outline, 2 * s->n_outline);
-    put_nodes(t, s, outline != NONE);
+    const int n_meshes = outline == NONE ? 1 : 2;
+    text_member_integer(t, "scene", 0);
+    text_key(t, "scenes");
+    text_put(t, n_meshes == 2 ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
+    text_member_open(t, "nodes", '[');
+    for (int mesh = 0; mesh < n_meshes; mesh++) {
+        text_open(t, '{');
+        text_member_string(t, "name", mesh == 0 ? "body" : "undeformed outline");
+        text_member_integer(t, "mesh", mesh);
+        text_member_numbers(t, "translation", s->origin, 3);
+        text_member_numbers(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
     text_member_open(t, "meshes", '[');
     text_open(t, '{');
     text_member_open(t, "primitives", '[');
@@ -184,7 +163,7 @@ static void put_meshes(surface_writer *w, const vertices *v, int row_vertex)
     text_close(t, ']');
     text_member_numbers(t, "weights", &s->factor, 1);
     text_close(t, '}');
-    if (outline != NONE) {
+    if (n_meshes == 2) {
         text_open(t, '{');
         text_member_open(t, "primitives", '[');
         put_primitive(t, LINES, outline, v, false, false);
@@ -238,16 +217,6 @@ static void put_round(text *t, const uz_contact *c, int dim)
     text_close(t, '}');
 }
 
-static void put_polyline(text *t, const uz_contact *c)
-{
-    text_member_open(t, "polyline", '{');
-    text_member_open(t, "points", '[');
-    for (int64_t i = 0; i < c->n_x; i++)
-        text_numbers(t, (const double[]){c->x[i], c->y[i]}, 2);
-    text_close(t, ']');
-    text_close(t, '}');
-}
-
 static void put_height(text *t, const uz_contact *c)
 {
     text_member_open(t, "height", '{');
@@ -281,7 +250,12 @@ static void put_obstacle(text *t, const uz_contact *c, int dim)
         text_member_numbers(t, "normal", c->normal, dim);
         text_close(t, '}');
     } else if (c->kind == UZ_OBSTACLE_POLYLINE) {
-        put_polyline(t, c);
+        text_member_open(t, "polyline", '{');
+        text_member_open(t, "points", '[');
+        for (int64_t i = 0; i < c->n_x; i++)
+            text_numbers(t, (const double[]){c->x[i], c->y[i]}, 2);
+        text_close(t, ']');
+        text_close(t, '}');
     } else if (c->kind == UZ_OBSTACLE_HEIGHT) {
         put_height(t, c);
     } else {
@@ -341,8 +315,7 @@ static void put_json(surface_writer *w)
     text_put(t, "{\"version\":\"2.0\",\"generator\":\"uzawad\"}");
     put_meshes(w, &v, row_vertex);
     put_extras(w, &v, row_vertex);
-    put_accessors(w);
-    put_views(w);
+    put_arrays(w);
     text_close(t, '}');
     while (w->json.len % 4 != 0 && !w->json.failed)
         text_put(t, " ");

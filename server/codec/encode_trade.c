@@ -16,15 +16,6 @@ static void put_count(text *t, const char *key, const int64_t *value)
         text_raw(t, NULL);
 }
 
-/* "1/8" where it is at most that, else "70 %". */
-static void put_share(text *t, double share)
-{
-    if (share <= 0.5)
-        text_format(t, "1/%.0f", floor(1.0 / share * (1.0 + 1e-12)));
-    else
-        text_format(t, "%.0f %%", ceil(100.0 * share));
-}
-
 void put_suggestion(text *t, const uz_suggestion *s)
 {
     if (!s->any) {
@@ -36,7 +27,10 @@ void put_suggestion(text *t, const uz_suggestion *s)
     text_key(t, "text");
     text_format(t, "\"mesh error %.2g %%, solver error %.2g %%: balanced would have taken ", 100.0 * s->mesh_error,
                 100.0 * s->solver_error);
-    put_share(t, s->share);
+    if (s->share <= 0.5) /* "1/8" where it is at most that, else "70 %" */
+        text_format(t, "1/%.0f", floor(1.0 / s->share * (1.0 + 1e-12)));
+    else
+        text_format(t, "%.0f %%", ceil(100.0 * s->share));
     text_put(t, " of the time\"");
     text_member_number(t, "relative_error", s->relative_error);
     text_member_number(t, "mesh_error", s->mesh_error);
@@ -57,20 +51,6 @@ static void put_step(text *t, double seconds, const uz_trade_step *step)
     text_member_string(t, "by", !step ? NULL : step->by_certificate ? "certificate" : "iteration");
 }
 
-static void put_decades(text *t, const uz_trade *trade)
-{
-    static const double DECADE[DECADES] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
-    text_member_open(t, "decades", '[');
-    for (int k = 0; k < DECADES; k++) {
-        const uz_trade_step *step = uz_trade_reach(trade, DECADE[k]);
-        text_open(t, '{');
-        text_member_number(t, "relative_error", DECADE[k]);
-        put_step(t, step ? step->seconds : NAN, step);
-        text_close(t, '}');
-    }
-    text_close(t, ']');
-}
-
 static void put_level(text *t, const char *name, double relative_error, const uz_trade *trade)
 {
     const uz_trade_step *step = isfinite(relative_error) ? uz_trade_reach(trade, relative_error) : NULL;
@@ -81,30 +61,33 @@ static void put_level(text *t, const char *name, double relative_error, const uz
     text_close(t, '}');
 }
 
-/* `balanced` is known where the mesh's error is. */
-static void put_levels(text *t, const uz_trade *trade, double mesh_error)
-{
-    text_member_open(t, "levels", '[');
-    put_level(t, "quick", 1e-2, trade);
-    put_level(t, "balanced", mesh_error > 0.0 ? fmin(1.0, 0.1 * mesh_error) : NAN, trade);
-    put_level(t, "precise", 1e-8, trade);
-    put_level(t, "exact", 1e-12, trade);
-    text_close(t, ']');
-}
-
 char *codec_encode_trade(const codec_trade *of, size_t *len)
 {
     text t = {0};
     const uz_trade *trade = &of->trade;
     uz_suggestion suggestion = {0};
+    static const double DECADE[DECADES] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
     if (of->may_save && of->requested_error < (1.0 - 1e-9) * 0.1 * of->mesh_error)
         suggestion = uz_trade_suggest(trade, of->mesh_error, of->solver_error, of->certify_s);
     text_open(&t, '{');
     text_member_string(&t, "job", of->job_id);
     if (of->case_name)
         text_member_string(&t, "case", of->case_name);
-    put_decades(&t, trade);
-    put_levels(&t, trade, of->mesh_error);
+    text_member_open(&t, "decades", '[');
+    for (int k = 0; k < DECADES; k++) {
+        const uz_trade_step *step = uz_trade_reach(trade, DECADE[k]);
+        text_open(&t, '{');
+        text_member_number(&t, "relative_error", DECADE[k]);
+        put_step(&t, step ? step->seconds : (double)NAN, step);
+        text_close(&t, '}');
+    }
+    text_close(&t, ']');
+    text_member_open(&t, "levels", '[');
+    put_level(&t, "quick", 1e-2, trade);
+    put_level(&t, "balanced", of->mesh_error > 0.0 ? fmin(1.0, 0.1 * of->mesh_error) : (double)NAN, trade);
+    put_level(&t, "precise", 1e-8, trade);
+    put_level(&t, "exact", 1e-12, trade);
+    text_close(&t, ']');
     text_member_number(&t, "iterated_s", trade->iterated_s);
     text_member_number(&t, "total_s", trade->total_s);
     text_member_number(&t, "solver_error", of->solver_error);

@@ -53,16 +53,11 @@ static bool is_verdict(const char *key)
     return strncmp(key, "assertions", 10) == 0;
 }
 
-static const json_value *property(schema_at at, step s)
-{
-    return json_get_n(json_get(at.node, "properties"), s.at, step_length(s));
-}
-
 /* The schema one step further; node NULL: there is none. A code leads to the warning's value. */
 static schema_at schema_step(schema_at at, step s)
 {
     if (!(schema_types(at) & SCHEMA_ARRAY))
-        return schema_resolve(schema_child(at, property(at, s)));
+        return schema_resolve(schema_child(at, json_get_n(json_get(at.node, "properties"), s.at, step_length(s))));
     schema_at items = schema_resolve(schema_child(at, json_get(at.node, "items")));
     if (step_index(s) >= 0)
         return items;
@@ -118,16 +113,6 @@ static void collect(name_list *out, schema_at at, const char *name)
         collect_below(out, schema_resolve(schema_child(at, &properties->items[i])), name, properties->items[i].key);
 }
 
-/* The whole name with the fewest edits, else the one that ends as this one does. */
-static const char *closest(const name_list *names, const char *name, size_t len)
-{
-    const char *dot = memrchr(name, '.', len), *last = dot ? dot + 1 : name;
-    int found = uz_closest(name, len, names->whole, names->count);
-    if (found < 0)
-        found = uz_closest(last, len - (size_t)(last - name), names->last, names->count);
-    return found < 0 ? NULL : names->whole[found];
-}
-
 /* Without memory for the names the refusal has no suggestion. */
 static void suggest(const schemas *all, const char *name, size_t len, problem_details *problem)
 {
@@ -135,9 +120,13 @@ static void suggest(const schemas *all, const char *name, size_t len, problem_de
     if (!names)
         return;
     collect(names, schema_root(all, "summary.json"), "");
-    const char *meant = closest(names, name, len);
-    if (meant)
-        problem_add(problem, " Did you mean \"%s\"?", meant);
+    /* the whole name with the fewest edits, else the one that ends as this one does */
+    const char *dot = memrchr(name, '.', len), *last = dot ? dot + 1 : name;
+    int found = uz_closest(name, len, names->whole, names->count);
+    if (found < 0)
+        found = uz_closest(last, len - (size_t)(last - name), names->last, names->count);
+    if (found >= 0)
+        problem_add(problem, " Did you mean \"%s\"?", names->whole[found]);
     free(names);
 }
 
@@ -185,12 +174,6 @@ bool quantity_check(const schemas *all, const json_value *quantity, problem_deta
 
 /* ---- numbers of a summary */
 
-static bool read_end(double *value, const json_value *node)
-{
-    *value = json_is_list(node) ? (double)node->count : json_number(node, (double)NAN);
-    return json_is_list(node) || node->kind == JSON_IS_NUMBER || node->kind == JSON_IS_NULL;
-}
-
 bool quantity_read(double *value, const json_value *summary, const char *name)
 {
     const char *end = name + strlen(name);
@@ -214,7 +197,11 @@ bool quantity_read(double *value, const json_value *summary, const char *name)
         }
         node = json_is_list(node) ? json_item(node, (size_t)step_index(s), &rooms[node == &rooms[0]])
                                   : json_get_n(node, s.at, step_length(s));
-        if (!node || s.end == end)
-            return node && read_end(value, node);
+        if (!node)
+            return false;
+        if (s.end == end) {
+            *value = json_is_list(node) ? (double)node->count : json_number(node, (double)NAN);
+            return json_is_list(node) || node->kind == JSON_IS_NUMBER || node->kind == JSON_IS_NULL;
+        }
     }
 }
