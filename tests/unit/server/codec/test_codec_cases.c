@@ -103,7 +103,7 @@ TEST(cases_have_the_sizes_of_the_problem)
     CHECK_INT(problem.line, 4);
 }
 
-/* A load of a case is lifted out of the text, as the problem's own is. */
+/* A load of a case is a block of numbers, as the problem's own is. */
 TEST(long_loads_of_cases)
 {
     enum { D = 1000 };
