@@ -266,7 +266,7 @@ static struct MHD_Response *make_response(http_reply *reply)
 bool reply_send(struct MHD_Connection *connection, http_reply *reply)
 {
     field fields[MAX_FIELDS];
-    field_texts texts;
+    field_texts texts = {.number = ""};
     bool sent = false;
     size_t n = list_fields(fields, reply, &texts);
     struct MHD_Response *response = make_response(reply);
@@ -285,7 +285,7 @@ done:
 static char *write_message(const http_reply *reply, bool chunked, size_t *len)
 {
     field fields[MAX_FIELDS];
-    field_texts texts;
+    field_texts texts = {.number = ""};
     char *text = NULL;
     FILE *out = open_memstream(&text, len);
     if (!out)
