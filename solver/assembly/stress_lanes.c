@@ -210,7 +210,7 @@ INLINE void add_linear_fit(double *rows, const uz_stress_group *g, const int64_t
 
 INLINE void add(double *rows, const uz_stress_group *g, const int64_t *const place[LANES], int n, int direct, int dim)
 {
-    if (uz_element_is_quadratic(g->rule.kind))
+    if (g->rule.quadratic)
         add_linear_fit(rows, g, place, n, direct, dim);
     else
         add_mean(rows, g, place, n, direct);

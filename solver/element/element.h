@@ -1,34 +1,21 @@
 /* element.h: one finite element: shape functions, stiffness, strain, loads, and one of its sides.
  *
  * Pure functions on one element: nothing here allocates, prints or knows a mesh. Every element is isoparametric with
- * its nodes in VTK order (scene/mesh.h); displacements, forces and coordinates of an element are by node: x0 y0 [z0] x1
- * y1 ..., dim = 2 or 3 per node.
+ * its nodes in VTK order (element_type.h, also for local points); displacements, forces and coordinates of an element
+ * are by node: x0 y0 [z0] x1 y1 ..., dim = 2 or 3 per node.
  *
  * Strain and stress, shear strains doubled (gamma = 2 epsilon):
  *   plane stress, plane strain   3: xx yy xy
  *   axisymmetric                 4: rr zz hoop rz   (x is the radius, y the axis; integrals are over the whole ring)
  *   solid                        6: xx yy zz xy yz zx
  *
- * Reference coordinates ("local points"): tri and tet the unit simplex with node 0 at the origin and node 1, 2, 3 at
- * the unit point of axis 0, 1, 2; quad and hex [-1, 1]^dim. A local point is an array of 3; what dim does not need is
- * not read.
- *
  * Sources: Zienkiewicz and Taylor, "The Finite Element Method", vol. 1 (isoparametric elements, axisymmetric strain);
  * Hughes, "The Finite Element Method", ch. 3 and 4.5; those of the formulations stand beside them. */
 #ifndef UZ_ELEMENT_ELEMENT_H
 #define UZ_ELEMENT_ELEMENT_H
 
+#include "element/element_type.h"
 #include "uzawa.h"
-
-enum {
-    UZ_ELEMENT_NODES = 10,   /* most nodes of an element */
-    UZ_ELEMENT_DOFS = 30,    /* most displacements */
-    UZ_ELEMENT_STRESSES = 6, /* most components of stress */
-    UZ_ELEMENT_GAUSS = 9,    /* most integration points */
-    UZ_ELEMENT_INTERNAL = 9, /* most internal parameters (incompatible modes) */
-    UZ_SIDE_NODES = 6,       /* most nodes of a side */
-    UZ_SIDE_GAUSS = 7        /* most integration points of a side */
-};
 
 /* ---------------------------------------------------------------- material */
 
@@ -66,8 +53,7 @@ const double (*uz_element_local_nodes(uz_element_kind kind))[3];
 void uz_element_shape(double *N, uz_element_kind kind, const double point[3]);
 
 /* Gauss rule of the stiffness: how many points, and the g-th of them with its weight (the reference volume is their
- * sum). The fewest that leave no deformation without stiffness; a ring of tri3 needs three where a plane one needs one.
- * tri3 1 (ring: 3), tri6 3, quad4 2 x 2, quad8 3 x 3, tet4 1, tet10 4, hex8 2 x 2 x 2. */
+ * sum). */
 int uz_element_gauss_count(uz_element_kind kind, uz_model model);
 double uz_element_gauss(double point[3], uz_element_kind kind, uz_model model, int g);
 
@@ -82,9 +68,9 @@ typedef struct {
     const double *xyz; /* nodes x dim, the true coordinates: differences to the first node are taken here */
 } uz_element;
 
-/* What this element does for `asked`. AUTO: mean dilatation for quad4 and hex8 from Poisson's ratio 0.4 on, plane
- * stress excepted, where nothing locks; else standard. BBAR is STANDARD for other kinds and in plane stress,
- * INCOMPATIBLE is STANDARD for other kinds and for rings (axisymmetric). */
+/* What this element does for `asked`. AUTO: mean dilatation, of types that have it, from Poisson's ratio 0.4 on,
+ * plane stress excepted, where nothing locks; else standard. BBAR is STANDARD for types without it and in plane stress,
+ * INCOMPATIBLE is STANDARD for types without them and for rings (axisymmetric). */
 uz_formulation uz_resolve_formulation(uz_formulation asked, uz_element_kind kind, uz_model model, double poisson);
 
 /* What is wrong with an element's shape. */
@@ -145,7 +131,7 @@ void uz_element_strain_operator(double *B, const uz_element *element, const doub
 
 /* -------------------------------------------------------------------- sides */
 
-/* A side: an edge of 2 or 3 nodes (dim 2), a face of 3, 4 or 6 (dim 3). Nodes as uz_element_side gives them: seen from
+/* A side: an edge of 2 or 3 nodes (dim 2), a face of 3, 4, 6 or 8 (dim 3). Nodes as in uz_element_side: seen from
  * outside a face runs counter-clockwise, an edge has the element on its left; the normal points out of the element.
  * Local points: edges s in [-1, 1]; triangles the unit simplex; quadrilaterals [-1, 1]^2. */
 typedef struct {
@@ -156,9 +142,10 @@ typedef struct {
 } uz_side;
 
 void uz_side_shape(double *N, const uz_side *side, const double point[2]);
-/* Reference coordinates of the nodes: [node][2]. */
-const double (*uz_side_local_nodes(const uz_side *side))[2];
-/* Gauss rule that integrates the mass matrix of an undistorted side exactly: edges 2 or 3 points, faces 3, 4 or 7. */
+/* Reference coordinates of the nodes: [node][3], of which one or two are used. */
+const double (*uz_side_local_nodes(const uz_side *side))[3];
+/* Gauss rule that integrates the mass matrix of an undistorted side exactly: edges 2 or 3 points, faces 3, 4, 7
+ * or 9. */
 int uz_side_gauss_count(const uz_side *side);
 double uz_side_gauss(double point[2], const uz_side *side, int g);
 

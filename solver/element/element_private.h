@@ -4,9 +4,6 @@
 
 #include "element/element.h"
 
-/* Derivatives of the shape functions by the reference coordinates: local[node][axis]. */
-void uz_local_gradients(double local[UZ_ELEMENT_NODES][3], uz_element_kind kind, const double point[3]);
-
 /* J[axis][x]: derivatives of position by the reference coordinates, from those of the shape functions. */
 void uz_jacobian(double J[3][3], const uz_element *element, double local[UZ_ELEMENT_NODES][3]);
 /* inverse[x][axis] of J, of size dim; returns the determinant of J. */

@@ -2,8 +2,6 @@
  * shape is one that can be integrated. */
 #include "element/element_private.h"
 
-#include "element/element_kind.h"
-
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -12,6 +10,32 @@
 
 /* The sine of the least angle, in the sense of Hadamard's inequality, that is more than rounding. */
 #define FLAT (64 * DBL_EPSILON)
+
+const double (*uz_element_local_nodes(uz_element_kind kind))[3]
+{
+    return uz_element_type_of(kind)->local;
+}
+
+void uz_element_shape(double *N, uz_element_kind kind, const double point[3])
+{
+    uz_element_type_of(kind)->shape(N, point);
+}
+
+static const uz_gauss_rule *rule_of(uz_element_kind kind, uz_model model)
+{
+    const uz_element_type *type = uz_element_type_of(kind);
+    return model == UZ_AXISYMMETRIC && type->ring.count > 0 ? &type->ring : &type->rule;
+}
+
+int uz_element_gauss_count(uz_element_kind kind, uz_model model)
+{
+    return rule_of(kind, model)->count;
+}
+
+double uz_element_gauss(double point[3], uz_element_kind kind, uz_model model, int g)
+{
+    return rule_of(kind, model)->point(point, g);
+}
 
 /* Positions are taken from the first node, so that an element far from the origin keeps its digits. Inlined for each
  * dim, whose loops the compiler then unrolls. */
@@ -66,7 +90,7 @@ double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *
 {
     double local[UZ_ELEMENT_NODES][3], J[3][3], inverse[3][3];
     const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    uz_local_gradients(local, element->kind, point);
+    uz_element_type_of(element->kind)->gradients(local, point);
     uz_jacobian(J, element, local);
     const double det = uz_invert_jacobian(inverse, J, dim);
     for (int a = 0; a < nodes; a++)
@@ -156,7 +180,7 @@ double uz_centre_jacobian(double inverse[3][3], const uz_element *element)
 {
     static const double CENTRE[3] = {0, 0, 0};
     double local[UZ_ELEMENT_NODES][3], J[3][3];
-    uz_local_gradients(local, element->kind, CENTRE);
+    uz_element_type_of(element->kind)->gradients(local, CENTRE);
     uz_jacobian(J, element, local);
     return uz_invert_jacobian(inverse, J, uz_element_dim(element->kind));
 }
@@ -228,7 +252,7 @@ static uz_shape_fault check_point(const uz_element *element, const double point[
 {
     double local[UZ_ELEMENT_NODES][3], J[3][3], lengths = 1;
     const int dim = uz_element_dim(element->kind);
-    uz_local_gradients(local, element->kind, point);
+    uz_element_type_of(element->kind)->gradients(local, point);
     uz_jacobian(J, element, local);
     for (int i = 0; i < dim; i++)
         lengths *= sqrt(J[i][0] * J[i][0] + J[i][1] * J[i][1] + (dim == 3 ? J[i][2] * J[i][2] : 0));
@@ -246,13 +270,14 @@ static uz_shape_fault worse(uz_shape_fault a, uz_shape_fault b)
 static uz_shape_fault check_jacobian(const uz_element *element)
 {
     const uz_element_kind kind = element->kind;
-    const int nodes = uz_element_node_count(kind), count = uz_element_gauss_count(kind, element->model);
-    uz_shape_fault fault = check_point(element, uz_element_local_nodes(kind)[0]);
-    if (kind == UZ_TRI3 || kind == UZ_TET4) /* the Jacobian is constant */
+    const uz_element_type *type = uz_element_type_of(kind);
+    const int count = uz_element_gauss_count(kind, element->model);
+    uz_shape_fault fault = check_point(element, type->local[0]);
+    if (type->jacobian == UZ_JACOBIAN_CONSTANT)
         return fault;
-    for (int a = 1; a < nodes; a++)
-        fault = worse(fault, check_point(element, uz_element_local_nodes(kind)[a]));
-    for (int g = 0; g < count && kind != UZ_QUAD4; g++) { /* that of quad4 is linear: least at a corner */
+    for (int a = 1; a < type->nodes; a++)
+        fault = worse(fault, check_point(element, type->local[a]));
+    for (int g = 0; g < count && type->jacobian != UZ_JACOBIAN_LINEAR; g++) { /* a linear one is least at a corner */
         double point[3];
         uz_element_gauss(point, kind, element->model, g);
         fault = worse(fault, check_point(element, point));
@@ -282,17 +307,11 @@ static bool has_negative_radius(const uz_element *element)
     return false;
 }
 
-/* The element of the corners alone. */
-static uz_element_kind linear_kind(uz_element_kind kind)
-{
-    return kind == UZ_TRI6 ? UZ_TRI3 : kind == UZ_QUAD8 ? UZ_QUAD4 : kind == UZ_TET10 ? UZ_TET4 : kind;
-}
-
 uz_shape_fault uz_element_check(const uz_element *element)
 {
     uz_shape_fault fault = check_jacobian(element);
     uz_element corners = *element;
-    corners.kind = linear_kind(element->kind);
+    corners.kind = uz_element_type_of(element->kind)->linear;
     if (fault != UZ_SHAPE_GOOD)
         return corners.kind != element->kind && check_jacobian(&corners) == UZ_SHAPE_GOOD ? UZ_SHAPE_MIDDLES : fault;
     if (element->model == UZ_AXISYMMETRIC && has_negative_radius(element))

@@ -1,8 +1,6 @@
 /* motion.c: the strain of a deformed element, as its stiffness takes it. */
 #include "element/element_private.h"
 
-#include "element/element_kind.h"
-
 #include <string.h>
 
 void uz_element_move(uz_element_motion *motion, const uz_element *element, const double *u)

@@ -1,12 +1,11 @@
 /* side.c: integrals over one side of an element. */
 #include "element/element.h"
+#include "element/reference.h"
 
 #include <math.h>
 #include <string.h>
 
-#define PI     3.14159265358979323846
-#define GAUSS2 0.57735026918962576451 /* 1 / sqrt(3) */
-#define GAUSS3 0.77459666924148337704 /* sqrt(3 / 5) */
+#define PI 3.14159265358979323846
 
 /* The triangle's rule of degree 5, seven points (Radon 1948): the centre with weight 9/40 and two rings of three at
  * (6 -+ sqrt(15)) / 21 with (155 -+ sqrt(15)) / 1200, weights of a triangle of area 1. */
@@ -15,19 +14,25 @@
 #define WEIGHT_A 0.12593918054482715260
 #define WEIGHT_B 0.13239415278850618074
 
-static const double EDGE_NODES[3][2] = {{-1}, {1}, {0}};
-static const double QUAD_NODES[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
-static const double TRI_NODES[6][2] = {{0, 0}, {1, 0}, {0, 1}, {0.5, 0}, {0.5, 0.5}, {0, 0.5}};
-
-const double (*uz_side_local_nodes(const uz_side *side))[2]
+/* A face is, in its own plane, the element of as many nodes. */
+static const uz_element_type *face_type(const uz_side *side)
 {
-    return side->dim == 2 ? EDGE_NODES : side->nodes == 4 ? QUAD_NODES : TRI_NODES;
+    return uz_element_type_of(side->nodes == 3   ? UZ_TRI3
+                              : side->nodes == 4 ? UZ_QUAD4
+                              : side->nodes == 6 ? UZ_TRI6
+                                                 : UZ_QUAD8);
+}
+
+const double (*uz_side_local_nodes(const uz_side *side))[3]
+{
+    static const double EDGE[3][3] = {{-1}, {1}, {0}};
+    return side->dim == 2 ? EDGE : face_type(side)->local;
 }
 
 /* ---------------------------------------------------------- shape functions */
 
 /* Values, and derivatives by the one reference coordinate. */
-static void edge_shape(double *N, double slope[][2], int nodes, double s)
+static void edge_shape(double *N, double slope[][3], int nodes, double s)
 {
     N[0] = nodes == 2 ? 0.5 * (1 - s) : -0.5 * s * (1 - s);
     N[1] = nodes == 2 ? 0.5 * (1 + s) : 0.5 * s * (1 + s);
@@ -39,46 +44,20 @@ static void edge_shape(double *N, double slope[][2], int nodes, double s)
     }
 }
 
-static void quad_shape(double *N, double slope[][2], double s, double t)
+static void shape(double *N, double slope[][3], const uz_side *side, const double point[2])
 {
-    for (int a = 0; a < 4; a++) {
-        const double p = QUAD_NODES[a][0], q = QUAD_NODES[a][1];
-        N[a] = 0.25 * (1 + p * s) * (1 + q * t);
-        slope[a][0] = 0.25 * p * (1 + q * t);
-        slope[a][1] = 0.25 * q * (1 + p * s);
-    }
-}
-
-static void triangle_shape(double *N, double slope[][2], int nodes, double s, double t)
-{
-    static const double along[3][2] = {{-1, -1}, {1, 0}, {0, 1}};
-    const double L[3] = {1 - s - t, s, t};
-    for (int a = 0; a < 3; a++) {
-        N[a] = nodes == 3 ? L[a] : L[a] * (2 * L[a] - 1);
-        for (int i = 0; i < 2; i++)
-            slope[a][i] = (nodes == 3 ? 1 : 4 * L[a] - 1) * along[a][i];
-    }
-    for (int a = 0; a < 3 && nodes == 6; a++) {
-        const int b = (a + 1) % 3;
-        N[3 + a] = 4 * L[a] * L[b];
-        for (int i = 0; i < 2; i++)
-            slope[3 + a][i] = 4 * (along[a][i] * L[b] + L[a] * along[b][i]);
-    }
-}
-
-static void shape(double *N, double slope[][2], const uz_side *side, const double point[2])
-{
-    if (side->dim == 2)
+    if (side->dim == 2) {
         edge_shape(N, slope, side->nodes, point[0]);
-    else if (side->nodes == 4)
-        quad_shape(N, slope, point[0], point[1]);
-    else
-        triangle_shape(N, slope, side->nodes, point[0], point[1]);
+    } else {
+        const uz_element_type *type = face_type(side);
+        type->shape(N, point);
+        type->gradients(slope, point);
+    }
 }
 
 void uz_side_shape(double *N, const uz_side *side, const double point[2])
 {
-    double slope[UZ_SIDE_NODES][2];
+    double slope[UZ_SIDE_NODES][3];
     shape(N, slope, side, point);
 }
 
@@ -86,12 +65,14 @@ void uz_side_shape(double *N, const uz_side *side, const double point[2])
 
 int uz_side_gauss_count(const uz_side *side)
 {
-    return side->dim == 2 || side->nodes < 6 ? (side->nodes == 2 ? 2 : side->nodes == 4 ? 4 : 3) : 7;
+    if (side->dim == 2)
+        return side->nodes;
+    return side->nodes == 3 ? 3 : side->nodes == 6 ? 7 : face_type(side)->rule.count;
 }
 
 static double edge_gauss(double point[2], int nodes, int g)
 {
-    point[0] = nodes == 2 ? (g == 0 ? -GAUSS2 : GAUSS2) : (g - 1) * GAUSS3;
+    point[0] = nodes == 2 ? (g == 0 ? -UZ_GAUSS2 : UZ_GAUSS2) : (g - 1) * UZ_GAUSS3;
     point[1] = 0;
     return nodes == 2 ? 1 : g == 1 ? 8. / 9 : 5. / 9;
 }
@@ -110,17 +91,18 @@ double uz_side_gauss(double point[2], const uz_side *side, int g)
 {
     if (side->dim == 2)
         return edge_gauss(point, side->nodes, g);
-    if (side->nodes != 4)
+    if (side->nodes % 3 == 0)
         return triangle_gauss(point, side->nodes, g);
-    for (int i = 0; i < 2; i++)
-        point[i] = GAUSS2 * QUAD_NODES[g][i];
-    return 1;
+    double place[3];
+    const double weight = face_type(side)->rule.point(place, g);
+    memcpy(point, place, 2 * sizeof *point);
+    return weight;
 }
 
 /* ------------------------------------------------------------------- areas */
 
 /* Tangents along the reference coordinates, from differences to the first node. */
-static void tangents(double T[2][3], const uz_side *side, double slope[][2])
+static void tangents(double T[2][3], const uz_side *side, double slope[][3])
 {
     memset(T, 0, 6 * sizeof T[0][0]);
     for (int a = 1; a < side->nodes; a++)
@@ -145,7 +127,7 @@ static double depth(const uz_side *side, const double *N)
 /* The values of the shape functions come along. */
 static void area_vector(double *area, double *N, const uz_side *side, const double point[2])
 {
-    double slope[UZ_SIDE_NODES][2], T[2][3];
+    double slope[UZ_SIDE_NODES][3], T[2][3];
     shape(N, slope, side, point);
     tangents(T, side, slope);
     const double *s = T[0], *t = T[1], times = depth(side, N);

@@ -17,12 +17,11 @@
  * Incompatible modes are further shape functions without nodes (element_private.h), condensed at once. */
 #include "element/element_private.h"
 
-#include "element/element_kind.h"
-
 #include <math.h>
 #include <string.h>
 
-enum { MOST = 33 /* hex8: 24 displacements and 9 internal parameters */ };
+/* The internal parameters come with hex8 at most. */
+enum { MOST = UZ_ELEMENT_DOFS > 33 ? UZ_ELEMENT_DOFS : 33 };
 
 /* Where mean dilatation begins to pay. On Cook's membrane in plane strain (8 x 8 cells) the energy that plain quad4
  * lacks is 7.6 % for Poisson's ratio 0 and 8.4 % for 0.3, but 11.6 % for 0.4, 17 % for 0.45 and 65 % for 0.499; with
@@ -32,17 +31,15 @@ enum { MOST = 33 /* hex8: 24 displacements and 9 internal parameters */ };
 
 uz_formulation uz_resolve_formulation(uz_formulation asked, uz_element_kind kind, uz_model model, double poisson)
 {
-    const bool has_choice = kind == UZ_QUAD4 || kind == UZ_HEX8;
-    if (!has_choice)
-        return UZ_FORMULATION_STANDARD;
+    const uz_element_type *type = uz_element_type_of(kind);
+    const bool bbar = type->bbar && model != UZ_PLANE_STRESS;
     switch (asked) {
     case UZ_FORMULATION_AUTO:
-        return model != UZ_PLANE_STRESS && poisson >= NEARLY_INCOMPRESSIBLE ? UZ_FORMULATION_BBAR
-                                                                            : UZ_FORMULATION_STANDARD;
+        return bbar && poisson >= NEARLY_INCOMPRESSIBLE ? UZ_FORMULATION_BBAR : UZ_FORMULATION_STANDARD;
     case UZ_FORMULATION_BBAR:
-        return model != UZ_PLANE_STRESS ? UZ_FORMULATION_BBAR : UZ_FORMULATION_STANDARD;
+        return bbar ? UZ_FORMULATION_BBAR : UZ_FORMULATION_STANDARD;
     case UZ_FORMULATION_INCOMPATIBLE:
-        return model != UZ_AXISYMMETRIC ? UZ_FORMULATION_INCOMPATIBLE : UZ_FORMULATION_STANDARD;
+        return type->incompatible && model != UZ_AXISYMMETRIC ? UZ_FORMULATION_INCOMPATIBLE : UZ_FORMULATION_STANDARD;
     case UZ_FORMULATION_STANDARD:
     case UZ_FORMULATIONS:
         break;

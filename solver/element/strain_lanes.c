@@ -2,7 +2,6 @@
 
 #include "core/cpu.h"
 #include "element/element_private.h"
-#include "element/element_kind.h"
 
 #include <string.h>
 
@@ -18,7 +17,7 @@ typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), align
 static void set_point(uz_strain_rule *rule, int g)
 {
     uz_element_shape(rule->N[g], rule->kind, rule->point[g]);
-    uz_local_gradients(rule->slope[g], rule->kind, rule->point[g]);
+    uz_element_type_of(rule->kind)->gradients(rule->slope[g], rule->point[g]);
 }
 
 void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, const double point[][3], int count)
@@ -29,6 +28,7 @@ void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model mode
     rule->formulation = UZ_FORMULATION_STANDARD;
     rule->dim = uz_element_dim(kind);
     rule->nodes = uz_element_node_count(kind);
+    rule->quadratic = rule->nodes > uz_element_type_of(kind)->corners;
     rule->points = count;
     rule->stresses = uz_stress_count(model);
     rule->direct = rule->stresses == 3 ? 2 : 3;
@@ -44,7 +44,7 @@ void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model mo
     uz_strain_rule_at(rule, kind, model, NULL, 0);
     rule->formulation = formulation;
     rule->points = uz_element_gauss_count(kind, model);
-    uz_local_gradients(rule->centre, kind, ORIGIN);
+    uz_element_type_of(kind)->gradients(rule->centre, ORIGIN);
     for (int g = 0; g < rule->points; g++) {
         rule->weight[g] = uz_element_gauss(rule->point[g], kind, model, g);
         set_point(rule, g);

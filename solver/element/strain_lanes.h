@@ -17,6 +17,7 @@ typedef struct {
     uz_element_kind kind;
     uz_model model;
     uz_formulation formulation; /* as uz_resolve_formulation gave it */
+    bool quadratic;             /* has it middles of edges? */
     int dim, nodes, points, stresses;
     int direct; /* of the stresses, which come first: those that are no shear */
     double point[UZ_ELEMENT_GAUSS][3], weight[UZ_ELEMENT_GAUSS];

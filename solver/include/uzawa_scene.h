@@ -22,16 +22,12 @@ typedef enum {
     UZ_FORMULATIONS              /* how many */
 } uz_formulation;
 
-/* Nodes of each in VTK order. A new kind of element is a row in each of: element/element_kind.c (name, nodes, sides),
- * element/shape.c (shape functions, Gauss rules), element/geometry.c (its linear kind), io/vtu.c (VTK's number),
- * io/gmsh_elements.c (Gmsh's number), scene/box_elements.c (cells of a box), post/recover.c and patches.c (where
- * its stress is best), and "elements" and "box" of schemas/request.json. tests/unit/solver/element say what it must
- * satisfy. */
+/* Nodes of each in VTK order. Everything else about a type of element is in its descriptor (element/element_type.h). */
 typedef enum { UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8, UZ_TET4, UZ_HEX8, UZ_TET10, UZ_ELEMENT_KINDS } uz_element_kind;
 const char *uz_element_name(uz_element_kind kind); /* "quad4"; never NULL */
 bool uz_element_parse(uz_element_kind *out, const char *name);
 int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */
-int uz_element_node_count(uz_element_kind kind); /* 3 to 10 */
+int uz_element_node_count(uz_element_kind kind); /* 3 to 20 */
 
 /* A rectangle or a cuboid in cells along the axes. Its sides are the groups left and right (x), bottom and top (y),
  * back and front (z, 3D only). */

@@ -174,15 +174,11 @@ static void number_elements(int64_t *new_element, uz_given_mesh *out, const gmsh
     }
 }
 
-/* Gmsh's order of nodes is VTK's but for the last two of the quadratic tetrahedron. */
-static void copy_element(int64_t *to, const gmsh_file *file, int64_t e)
+static void copy_element(int64_t *to, const int64_t *from, uz_element_kind kind)
 {
-    const int64_t count = file->first[e + 1] - file->first[e];
-    memcpy(to, file->node + file->first[e], (size_t)count * sizeof *to);
-    if (gmsh_type_of(file->type[e]).kind == UZ_TET10) {
-        to[8] = file->node[file->first[e] + 9];
-        to[9] = file->node[file->first[e] + 8];
-    }
+    const uz_element_type *type = uz_element_type_of(kind);
+    for (int i = 0; i < type->nodes; i++)
+        to[i] = from[type->gmsh_node ? type->gmsh_node[i] : i];
 }
 
 static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const int64_t *new_element, int64_t places)
@@ -197,9 +193,10 @@ static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const 
     for (int64_t e = 0, done = 0; e < file->n_elements; e++) {
         if (new_element[e] < done)
             continue; /* no element of the body, or repeated */
-        copy_element(out->node + at, file, e);
+        const uz_element_kind kind = (uz_element_kind)gmsh_kind_of(file->type[e]);
+        copy_element(out->node + at, file->node + file->first[e], kind);
         at += file->first[e + 1] - file->first[e];
-        out->kind[done++] = (unsigned char)gmsh_type_of(file->type[e]).kind;
+        out->kind[done++] = (unsigned char)kind;
         out->first[done] = at;
     }
     return UZ_OK;

@@ -4,6 +4,7 @@
 #ifndef UZ_SCENE_GMSH_H
 #define UZ_SCENE_GMSH_H
 
+#include "element/element_type.h"
 #include "uzawa.h"
 
 /* ---- the text (gmsh_text.c) */
@@ -105,12 +106,14 @@ int64_t gmsh_find_node(const gmsh_file *file, int64_t tag);
 
 /* ---- elements of Gmsh */
 
-/* What is known of a type: nodes 0: unknown. kind -1: it cannot be an element of a body. */
+/* What is known of a type; nodes 0: unknown. */
 typedef struct {
-    int dim, nodes, kind;
-    const char *name, *remedy; /* remedy: of types that are not read */
+    int dim, nodes;
+    const char *name, *remedy; /* remedy: what to do where no element is of this type */
 } gmsh_type;
 gmsh_type gmsh_type_of(int64_t type);
+/* The element of that type; -1: none. */
+int gmsh_kind_of(int64_t type);
 
 /* ---- the mesh of what was read (gmsh_groups.c: its groups) */
 uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file);

@@ -13,43 +13,51 @@
 
 /* Indexed by Gmsh's numbers of its types. */
 static const gmsh_type TYPES[] = {
-    [1] = {1, 2, -1, "2-node line", NULL},
-    [2] = {2, 3, UZ_TRI3, "3-node triangle", NULL},
-    [3] = {2, 4, UZ_QUAD4, "4-node quadrilateral", NULL},
-    [4] = {3, 4, UZ_TET4, "4-node tetrahedron", NULL},
-    [5] = {3, 8, UZ_HEX8, "8-node hexahedron", NULL},
-    [6] = {3, 6, -1, "6-node prism", NO_WEDGES},
-    [7] = {3, 5, -1, "5-node pyramid", NO_WEDGES},
-    [8] = {1, 3, -1, "3-node line", NULL},
-    [9] = {2, 6, UZ_TRI6, "6-node triangle", NULL},
-    [10] = {2, 9, -1, "9-node quadrilateral", SERENDIPITY},
-    [11] = {3, 10, UZ_TET10, "10-node tetrahedron", NULL},
-    [12] = {3, 27, -1, "27-node hexahedron", LINEAR},
-    [13] = {3, 18, -1, "18-node prism", NO_WEDGES},
-    [14] = {3, 14, -1, "14-node pyramid", NO_WEDGES},
-    [15] = {0, 1, -1, "point", NULL},
-    [16] = {2, 8, UZ_QUAD8, "8-node quadrilateral", NULL},
-    [17] = {3, 20, -1, "20-node hexahedron", LINEAR},
-    [18] = {3, 15, -1, "15-node prism", NO_WEDGES},
-    [19] = {3, 13, -1, "13-node pyramid", NO_WEDGES},
-    [20] = {2, 9, -1, "9-node triangle", LOWER},
-    [21] = {2, 10, -1, "10-node triangle", LOWER},
-    [22] = {2, 12, -1, "12-node triangle", LOWER},
-    [23] = {2, 15, -1, "15-node triangle", LOWER},
-    [24] = {2, 15, -1, "15-node triangle", LOWER},
-    [25] = {2, 21, -1, "21-node triangle", LOWER},
-    [26] = {1, 4, -1, "4-node line", LOWER},
-    [27] = {1, 5, -1, "5-node line", LOWER},
-    [28] = {1, 6, -1, "6-node line", LOWER},
-    [29] = {3, 20, -1, "20-node tetrahedron", LOWER},
-    [30] = {3, 35, -1, "35-node tetrahedron", LOWER},
-    [31] = {3, 56, -1, "56-node tetrahedron", LOWER},
+    [1] = {1, 2, "2-node line", NULL},
+    [2] = {2, 3, "3-node triangle", NULL},
+    [3] = {2, 4, "4-node quadrilateral", NULL},
+    [4] = {3, 4, "4-node tetrahedron", NULL},
+    [5] = {3, 8, "8-node hexahedron", NULL},
+    [6] = {3, 6, "6-node prism", NO_WEDGES},
+    [7] = {3, 5, "5-node pyramid", NO_WEDGES},
+    [8] = {1, 3, "3-node line", NULL},
+    [9] = {2, 6, "6-node triangle", NULL},
+    [10] = {2, 9, "9-node quadrilateral", SERENDIPITY},
+    [11] = {3, 10, "10-node tetrahedron", NULL},
+    [12] = {3, 27, "27-node hexahedron", LINEAR},
+    [13] = {3, 18, "18-node prism", NO_WEDGES},
+    [14] = {3, 14, "14-node pyramid", NO_WEDGES},
+    [15] = {0, 1, "point", NULL},
+    [16] = {2, 8, "8-node quadrilateral", NULL},
+    [17] = {3, 20, "20-node hexahedron", LINEAR},
+    [18] = {3, 15, "15-node prism", NO_WEDGES},
+    [19] = {3, 13, "13-node pyramid", NO_WEDGES},
+    [20] = {2, 9, "9-node triangle", LOWER},
+    [21] = {2, 10, "10-node triangle", LOWER},
+    [22] = {2, 12, "12-node triangle", LOWER},
+    [23] = {2, 15, "15-node triangle", LOWER},
+    [24] = {2, 15, "15-node triangle", LOWER},
+    [25] = {2, 21, "21-node triangle", LOWER},
+    [26] = {1, 4, "4-node line", LOWER},
+    [27] = {1, 5, "5-node line", LOWER},
+    [28] = {1, 6, "6-node line", LOWER},
+    [29] = {3, 20, "20-node tetrahedron", LOWER},
+    [30] = {3, 35, "35-node tetrahedron", LOWER},
+    [31] = {3, 56, "56-node tetrahedron", LOWER},
 };
 
 gmsh_type gmsh_type_of(int64_t type)
 {
     const int64_t count = sizeof TYPES / sizeof TYPES[0];
-    return type > 0 && type < count ? TYPES[type] : (gmsh_type){0, 0, -1, NULL, NULL};
+    return type > 0 && type < count ? TYPES[type] : (gmsh_type){0, 0, NULL, NULL};
+}
+
+int gmsh_kind_of(int64_t type)
+{
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
+        if (uz_element_types[k]->gmsh == type)
+            return k;
+    return -1;
 }
 
 static uz_status check_type(const gmsh_file *file, int64_t number)
@@ -60,7 +68,7 @@ static uz_status check_type(const gmsh_file *file, int64_t number)
                          "elements of Gmsh's type %lld are not read; use triangles, quadrilaterals, tetrahedra or "
                          "hexahedra of order 1 or 2",
                          (long long)number);
-    if (type.remedy)
+    if (type.remedy && gmsh_kind_of(number) < 0)
         return gmsh_fail(&file->text, UZ_ERR_UNSUPPORTED, "a %s (Gmsh's type %lld) is not read; %s", type.name,
                          (long long)number, type.remedy);
     return UZ_OK;

@@ -95,16 +95,13 @@ static void put_points(uz_buffer *vtu, const uz_mesh *mesh)
 /* Node order of all kinds is VTK's own. */
 static void put_cells(uz_buffer *vtu, const uz_mesh *mesh)
 {
-    static const unsigned char TYPE[UZ_ELEMENT_KINDS] = {
-        [UZ_TRI3] = 5, [UZ_QUAD4] = 9, [UZ_TRI6] = 22, [UZ_QUAD8] = 23, [UZ_TET4] = 10, [UZ_HEX8] = 12, [UZ_TET10] = 24,
-    };
     unsigned char *type = uz_alloc(mesh->n_elements, sizeof *type);
     if (!type) {
         vtu->failed = true;
         return;
     }
     for (int64_t e = 0; e < mesh->n_elements; e++)
-        type[e] = TYPE[mesh->kind[e]];
+        type[e] = (unsigned char)uz_element_type_of((uz_element_kind)mesh->kind[e])->vtk;
     uz_vtu_open(vtu, "Cells");
     uz_vtu_array(vtu, "connectivity", UZ_VTU_INT64, mesh->node, mesh->first[mesh->n_elements], 1, NULL);
     uz_vtu_array(vtu, "offsets", UZ_VTU_INT64, mesh->first + 1, mesh->n_elements, 1, NULL);

@@ -44,7 +44,7 @@ static uz_status cover_plane(uz_skin *skin, const uz_mesh *mesh, uz_error *err)
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
-        add_cell(skin, node, uz_element_corner_count((uz_element_kind)mesh->kind[e]), count);
+        add_cell(skin, node, uz_element_type_of((uz_element_kind)mesh->kind[e])->corners, count);
     }
     return UZ_OK;
 }
@@ -70,7 +70,10 @@ static uz_status cover_solid(uz_skin *skin, const uz_mesh *mesh, const uz_hooks 
         if (!is_outer(&sides, i))
             continue;
         const int count = uz_mesh_face(node, mesh, sides.item[i]);
-        add_cell(skin, node, uz_face_corner_count((uz_element_kind)mesh->kind[sides.item[i].element]), count);
+        add_cell(
+            skin, node,
+            uz_element_type_of((uz_element_kind)mesh->kind[sides.item[i].element])->side[sides.item[i].side].corners,
+            count);
     }
     uz_corner_table_clear(&sides);
     return status;

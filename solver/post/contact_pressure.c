@@ -25,9 +25,9 @@ typedef struct {
     bool *has_row;
 } pressure_work;
 
-static bool is_quadratic(const uz_side *side)
+static int corners_of(const uz_side *side)
 {
-    return side->dim == 2 ? side->nodes == 3 : side->nodes == 6;
+    return side->dim == 2 ? 2 : side->nodes % 4 == 0 ? 4 : 3;
 }
 
 static bool need_ends(pressure_work *w, int64_t n_nodes)
@@ -41,7 +41,7 @@ static bool need_ends(pressure_work *w, int64_t n_nodes)
 static void add_side(pressure_work *w, const uz_side *side, const int64_t *node)
 {
     double weight[UZ_FACE_NODES];
-    const int corners = is_quadratic(side) ? side->dim : side->nodes;
+    const int corners = corners_of(side);
     uz_side_weights(weight, side);
     for (int a = 0; a < corners; a++)
         w->area[node[a]] += weight[a];
@@ -61,7 +61,7 @@ static bool add_sides(pressure_work *w, const uz_body_model *model, const uz_gro
     int64_t node[UZ_FACE_NODES];
     for (int64_t f = 0; f < group->n_faces; f++) {
         uz_body_side(&side, xyz, node, model, group->face[f]);
-        if (is_quadratic(&side) && !need_ends(w, model->mesh.n_nodes))
+        if (side.nodes > corners_of(&side) && !need_ends(w, model->mesh.n_nodes))
             return false;
         add_side(w, &side, node);
     }

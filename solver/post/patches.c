@@ -40,17 +40,10 @@ static bool is_plain(const uz_field_body *body, int64_t e)
 {
     const uz_body_model *model = body->model;
     const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
-    if (kind == UZ_TRI3 || kind == UZ_TET4)
-        return true;
-    return (kind == UZ_QUAD4 || kind == UZ_HEX8) &&
+    const uz_element_type *type = uz_element_type_of(kind);
+    return type->nodes == type->corners &&
            uz_resolve_formulation(model->formulation, kind, model->kind, uz_element_material(model, e)->poisson) !=
                UZ_FORMULATION_INCOMPATIBLE;
-}
-
-static const double *middle_of(uz_element_kind kind)
-{
-    static const double TRI[3] = {1.0 / 3, 1.0 / 3}, TET[3] = {0.25, 0.25, 0.25}, BOX[3] = {0};
-    return kind == UZ_TRI3 ? TRI : kind == UZ_TET4 ? TET : BOX;
 }
 
 static void take_sample(sample *to, uz_field_points *middle, int64_t e, double volume)
@@ -283,7 +276,7 @@ static uz_status take_samples(patches *p, uz_field_points *middle, const double 
             continue;
         if (!known[kind]) {
             middle[kind].count = 1;
-            memcpy(middle[kind].point[0], middle_of(kind), sizeof middle[kind].point[0]);
+            memcpy(middle[kind].point[0], uz_element_type_of(kind)->centre, sizeof middle[kind].point[0]);
             uz_field_points_init(&middle[kind], p->body, u, e);
             known[kind] = true;
         }

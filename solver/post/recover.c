@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { POINTS = 8, BETWEEN_QUESTIONS = 1024 };
+enum { POINTS = UZ_ELEMENT_SAMPLES, BETWEEN_QUESTIONS = 1024 };
 
 /* The points of a kind, and what each of them gives to each node. */
 typedef struct {
@@ -25,76 +25,6 @@ typedef struct {
     bool known;
     double volume; /* of each element where all are alike */
 } recovery;
-
-static bool is_simplex(uz_element_kind kind)
-{
-    return kind == UZ_TRI3 || kind == UZ_TRI6 || kind == UZ_TET4 || kind == UZ_TET10;
-}
-
-static bool is_linear_simplex(uz_element_kind kind)
-{
-    return kind == UZ_TRI3 || kind == UZ_TET4;
-}
-
-/* One point in the middle: strain is constant. */
-static void plan_constant(recovery *plan, uz_element_kind kind)
-{
-    const int dim = uz_element_dim(kind);
-    plan->points = 1;
-    for (int c = 0; c < dim; c++)
-        plan->point[0][c] = 1.0 / (dim + 1);
-    for (int a = 0; a < uz_element_node_count(kind); a++)
-        plan->share[a][0] = 1;
-}
-
-/* dim + 1 points, each at barycentric coordinates (high, low, low[, low]): what is linear in them. */
-static void plan_simplex(recovery *plan, uz_element_kind kind)
-{
-    const int dim = uz_element_dim(kind), points = dim + 1;
-    const double low = dim == 2 ? 1.0 / 6 : (5 - sqrt(5)) / 20, high = 1 - dim * low;
-    const double(*node)[3] = uz_element_local_nodes(kind);
-    plan->points = points;
-    for (int k = 0; k < points; k++)
-        for (int c = 0; c < dim; c++)
-            plan->point[k][c] = k == c + 1 ? high : low;
-    for (int a = 0; a < uz_element_node_count(kind); a++) {
-        double rest = 1;
-        for (int c = 0; c < dim; c++) {
-            rest -= node[a][c];
-            plan->share[a][c + 1] = (node[a][c] - low) / (high - low);
-        }
-        plan->share[a][0] = (rest - low) / (high - low);
-    }
-}
-
-/* 2^dim Gauss points at +-1/sqrt(3): what is linear along each axis. */
-static void plan_box(recovery *plan, uz_element_kind kind)
-{
-    const int dim = uz_element_dim(kind);
-    const double(*node)[3] = uz_element_local_nodes(kind);
-    plan->points = 1 << dim;
-    for (int k = 0; k < plan->points; k++)
-        for (int c = 0; c < dim; c++)
-            plan->point[k][c] = (k >> c & 1 ? 1 : -1) / sqrt(3);
-    for (int a = 0; a < uz_element_node_count(kind); a++)
-        for (int k = 0; k < plan->points; k++) {
-            double share = 1;
-            for (int c = 0; c < dim; c++)
-                share *= 0.5 * (1 + 3 * plan->point[k][c] * node[a][c]);
-            plan->share[a][k] = share;
-        }
-}
-
-static void make_plan(recovery *plan, uz_element_kind kind)
-{
-    memset(plan, 0, sizeof *plan);
-    if (is_linear_simplex(kind))
-        plan_constant(plan, kind);
-    else if (is_simplex(kind))
-        plan_simplex(plan, kind);
-    else
-        plan_box(plan, kind);
-}
 
 /* Sums at the nodes, but for those that are done. */
 typedef struct {
@@ -127,7 +57,9 @@ static bool all_done(const unsigned char *done, const uz_mesh *mesh, int64_t ele
 
 static void begin_plan(recovery *plan, const uz_field_body *body, const double *u, int64_t element)
 {
-    make_plan(plan, (uz_element_kind)body->model->mesh.kind[element]);
+    const uz_element_kind kind = (uz_element_kind)body->model->mesh.kind[element];
+    memset(plan, 0, sizeof *plan);
+    plan->points = uz_element_type_of(kind)->recover(plan->point, plan->share, kind);
     plan->states.count = plan->points;
     memcpy(plan->states.point, plan->point, sizeof plan->point);
     uz_field_points_init(&plan->states, body, u, element);

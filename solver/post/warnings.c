@@ -116,8 +116,7 @@ static void look_at_elements(const doubts *d)
         uz_field_element at;
         uz_field_state state;
         const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
-        const bool box = kind == UZ_QUAD4 || kind == UZ_QUAD8 || kind == UZ_HEX8;
-        const double middle = box ? 0 : 1.0 / (mesh->dim + 1), point[3] = {middle, middle, middle};
+        const double *point = uz_element_type_of(uz_element_type_of(kind)->linear)->centre;
         uz_field_element_at(&at, &body, d->u, e);
         uz_field_state_at(&state, &at, point);
         uz_principal(principal, state.strain, body.components);
@@ -233,7 +232,8 @@ static void outward_normal(double n[3], double middle[3], const uz_mesh *mesh, u
 {
     int64_t node[UZ_FACE_NODES];
     double side[2][3] = {{0}};
-    const int dim = mesh->dim, corners = uz_face_corner_count((uz_element_kind)mesh->kind[face.element]);
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[face.element]);
+    const int dim = mesh->dim, corners = type->side[face.side].corners;
     uz_mesh_face(node, mesh, face);
     memset(middle, 0, 3 * sizeof *middle);
     for (int a = 0; a < corners; a++)
@@ -325,9 +325,8 @@ static bool may_lock(const uz_body_model *model, int64_t e)
     const double poisson = uz_element_material(model, e)->poisson;
     if (model->kind == UZ_PLANE_STRESS || poisson < LOCKS)
         return false;
-    if (kind == UZ_TRI3 || kind == UZ_TET4)
-        return true;
-    return (kind == UZ_QUAD4 || kind == UZ_HEX8) &&
+    const uz_element_type *type = uz_element_type_of(kind);
+    return type->nodes == type->corners &&
            uz_resolve_formulation(model->formulation, kind, model->kind, poisson) == UZ_FORMULATION_STANDARD;
 }
 

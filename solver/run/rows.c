@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "element/element_type.h"
 #include "scene/mesh.h"
 
 #include <math.h>
@@ -22,7 +23,8 @@ static double box_nodes(const uz_box *box, const char *on)
     double nodes = 1;
     int across = -1;
     const bool known = uz_element_parse(&kind, box->element);
-    const bool middles = !known || uz_element_is_quadratic(kind);
+    const uz_element_type *type = uz_element_type_of(kind);
+    const bool middles = !known || type->nodes > type->corners;
     for (int k = 0; k < 6; k++)
         if (strcmp(on, sides[k]) == 0)
             across = k / 2;

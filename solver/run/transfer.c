@@ -7,14 +7,13 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Weights below this are rounding: quad8 has no node in the middle of its cells, and none is needed on its sides. */
+/* Weights below this are rounding. */
 #define NO_WEIGHT 1e-9
 
 /* The lattice of the coarse grid with a pressure at each of its nodes. */
 typedef struct {
     const uz_box *box;
-    uz_element_kind kind;
-    int order;
+    uz_box_lattice lattice;
     double *line[3];
     double *pressure; /* n_nodes; of the contact that is transferred */
 } field;
@@ -29,12 +28,11 @@ static void clear(field *f)
 static uz_status make(field *f, const uz_box *box, int64_t n_nodes, uz_error *err)
 {
     f->box = box;
-    f->kind = uz_box_element(box);
-    f->order = uz_box_order(f->kind);
+    f->lattice = uz_box_lattice_of(box);
     f->pressure = uz_alloc_zero(n_nodes, sizeof *f->pressure);
     bool room = f->pressure != NULL;
     for (int axis = 0; axis < box->dim; axis++)
-        room = (f->line[axis] = uz_box_lines(box, axis, f->order)) && room;
+        room = (f->line[axis] = uz_box_lines(box, axis, f->lattice.order)) && room;
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to start from the coarser grid");
 }
 
@@ -42,7 +40,7 @@ static uz_status make(field *f, const uz_box *box, int64_t n_nodes, uz_error *er
 static int64_t locate(double *share, const field *f, int axis, double x)
 {
     const double *line = f->line[axis];
-    int64_t low = 0, high = f->order * f->box->cells[axis];
+    int64_t low = 0, high = f->lattice.order * f->box->cells[axis];
     while (high - low > 1) {
         const int64_t middle = low + (high - low) / 2;
         if (line[middle] <= x)
@@ -70,9 +68,9 @@ static double pressure_at(const field *f, const double *x)
             at[axis] = low[axis] + up;
             weight *= up ? share[axis] : 1.0 - share[axis];
         }
-        const bool missing = f->kind == UZ_QUAD8 && at[0] % 2 && at[1] % 2;
-        if (weight > NO_WEIGHT && !missing)
-            sum += weight * f->pressure[uz_box_node(f->box, f->kind, at)];
+        const int64_t node = weight > NO_WEIGHT ? uz_box_node(&f->lattice, at) : -1;
+        if (node >= 0)
+            sum += weight * f->pressure[node];
     }
     return sum;
 }

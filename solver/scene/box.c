@@ -16,17 +16,45 @@ static uz_status fail_at(uz_error *err, uz_status status, const char *key, int i
     return uz_fail(err, status, where, "%s", message);
 }
 
+enum { NAMES = 128 };
+
+static bool comes_before(const uz_element_type *a, const uz_element_type *b)
+{
+    return a->name[0] != b->name[0] ? a->name[0] < b->name[0] : a->nodes < b->nodes;
+}
+
+/* "hex8, tet4 or tet10": by family, each from few nodes to many. */
+static void list_elements(char names[NAMES], int dim)
+{
+    const uz_element_type *last = NULL;
+    size_t used = 0;
+    for (bool more = true; more;) {
+        const uz_element_type *next = NULL;
+        more = false;
+        for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
+            const uz_element_type *type = uz_element_types[k];
+            if (type->dim != dim || (last && !comes_before(last, type)))
+                continue;
+            more = next != NULL;
+            next = !next || comes_before(type, next) ? type : next;
+        }
+        used += (size_t)snprintf(names + used, NAMES - used, "%s%s", !last ? "" : more ? ", " : " or ", next->name);
+        last = next;
+    }
+}
+
 static uz_status check_kind(const uz_box *box, uz_error *err)
 {
-    char name[sizeof box->element + 1] = "";
+    char name[sizeof box->element + 1] = "", names[NAMES];
     uz_element_kind kind;
     if (box->dim != 2 && box->dim != 3)
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/size", "a box of %d dimensions; only 2 and 3 are built", box->dim);
     memcpy(name, box->element, sizeof box->element);
-    if (!uz_element_parse(&kind, name) || uz_element_dim(kind) != box->dim)
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/element", "no element \"%.15s\" in a box of %d dimensions; use %s",
-                       name, box->dim, box->dim == 2 ? "quad4, quad8, tri3 or tri6" : "hex8, tet4 or tet10");
-    return UZ_OK;
+    if (uz_element_parse(&kind, name) && uz_element_dim(kind) == box->dim)
+        return UZ_OK;
+    list_elements(names, box->dim);
+    return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/element", "no element \"%.15s\" in a box of %d dimensions; use %s",
+                   name, box->dim, names);
 }
 
 static uz_status check_lengths(const uz_box *box, uz_error *err)
@@ -47,26 +75,15 @@ static uz_status check_lengths(const uz_box *box, uz_error *err)
     return UZ_OK;
 }
 
-/* Nodes of a lattice of two points a cell that quad8 has not: the centres of its cells. */
-static int64_t missing_nodes(const uz_box *box, uz_element_kind kind)
-{
-    return kind == UZ_QUAD8 ? box->cells[0] * box->cells[1] : 0;
-}
-
 static uz_status check_cells(const uz_box *box, uz_error *err)
 {
-    const uz_element_kind kind = uz_box_element(box);
-    const int order = uz_box_order(kind);
-    int64_t dofs = box->dim;
     for (int i = 0; i < box->dim; i++) {
         if (box->cells[i] < 1)
             return fail_at(err, UZ_ERR_SCENE, "cells", i, "a box needs at least one cell in each direction");
         if (box->cells[i] >= UZ_SCENE_MAX_DOFS)
             return fail_at(err, UZ_ERR_SCENE, "cells", i, "too many cells");
-        if (__builtin_mul_overflow(dofs, order * box->cells[i] + 1, &dofs))
-            dofs = INT64_MAX / (2 * UZ_SCENE_MAX_DOFS);
     }
-    if (dofs - box->dim * missing_nodes(box, kind) > UZ_SCENE_MAX_DOFS)
+    if (box->dim * uz_box_node_count(box) > UZ_SCENE_MAX_DOFS)
         return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
                        "the box would have more than %d unknowns; use fewer cells", UZ_SCENE_MAX_DOFS);
     return UZ_OK;
@@ -112,7 +129,7 @@ static uz_status check_spacing(const uz_box *box, uz_error *err)
     return UZ_OK;
 }
 
-/* ---- nodes: points of a lattice of `order` steps a cell, x fastest */
+/* ---- nodes: points of a lattice, see uz_box_lattice */
 
 uz_element_kind uz_box_element(const uz_box *box)
 {
@@ -123,20 +140,52 @@ uz_element_kind uz_box_element(const uz_box *box)
     return kind;
 }
 
-int uz_box_order(uz_element_kind kind)
+uz_box_lattice uz_box_lattice_of(const uz_box *box)
 {
-    return uz_element_is_quadratic(kind) ? 2 : 1;
+    const uz_element_type *type = uz_element_type_of(uz_box_element(box));
+    int64_t place[UZ_ELEMENT_PARTS][UZ_ELEMENT_NODES][3];
+    uz_box_lattice out = {.order = type->nodes > type->corners ? 2 : 1};
+    const int parts = uz_box_places(place, uz_box_element(box));
+    for (int p = 0; p < parts && out.order == 2; p++)
+        for (int a = 0; a < type->nodes; a++)
+            out.node[place[p][a][2] % 2][place[p][a][1] % 2][place[p][a][0] % 2] = true;
+    out.whole = true;
+    for (int i = 0; i < 1 << box->dim && out.order == 2; i++)
+        out.whole = out.whole && out.node[i >> 2][i >> 1 & 1][i & 1];
+    for (int z = 0; z < 2; z++) {
+        for (int y = 0; y < 2; y++)
+            out.row[z][y] = out.whole
+                                ? out.order * box->cells[0] + 1
+                                : (out.node[z][y][0] ? box->cells[0] + 1 : 0) + (out.node[z][y][1] ? box->cells[0] : 0);
+        out.plane[z] = out.whole ? (out.order * box->cells[1] + 1) * out.row[z][0]
+                                 : (box->cells[1] + 1) * out.row[z][0] + box->cells[1] * out.row[z][1];
+    }
+    return out;
 }
 
-int64_t uz_box_node(const uz_box *box, uz_element_kind kind, const int64_t at[3])
+int64_t uz_box_node(const uz_box_lattice *lattice, const int64_t at[3])
 {
-    const int order = uz_box_order(kind);
-    const int64_t row = order * box->cells[0] + 1;
-    if (kind == UZ_QUAD8) {
-        const int64_t pair = row + box->cells[0] + 1; /* a row of corners and middles, and one of middles above it */
-        return at[1] % 2 ? at[1] / 2 * pair + row + at[0] / 2 : at[1] / 2 * pair + at[0];
+    if (lattice->whole)
+        return at[2] * lattice->plane[0] + at[1] * lattice->row[0][0] + at[0];
+    const int x = (int)(at[0] % 2), y = (int)(at[1] % 2), z = (int)(at[2] % 2);
+    if (!lattice->node[z][y][x])
+        return -1;
+    return (at[2] + 1) / 2 * lattice->plane[0] + at[2] / 2 * lattice->plane[1] + (at[1] + 1) / 2 * lattice->row[z][0] +
+           at[1] / 2 * lattice->row[z][1] + (lattice->node[z][y][!x] ? at[0] : at[0] / 2);
+}
+
+double uz_box_node_count(const uz_box *box)
+{
+    const uz_box_lattice lattice = uz_box_lattice_of(box);
+    double count = 0;
+    for (int i = 0; i < 1 << box->dim; i++) {
+        double nodes = 1;
+        for (int axis = 0; axis < box->dim; axis++)
+            nodes *= (i >> axis & 1) ? (double)box->cells[axis] : (double)box->cells[axis] + 1;
+        if (i == 0 || (lattice.order == 2 && (lattice.whole || lattice.node[i >> 2][i >> 1 & 1][i & 1])))
+            count += nodes;
     }
-    return (at[2] * (order * box->cells[1] + 1) + at[1]) * row + at[0];
+    return count;
 }
 
 /* A point of the lattice along one axis: a grid line, or the middle between two. */
@@ -159,15 +208,15 @@ double *uz_box_lines(const uz_box *box, int axis, int order)
     return line;
 }
 
-static void place_nodes(uz_mesh *mesh, const uz_box *box, uz_element_kind kind, double *const line[3])
+static void place_nodes(uz_mesh *mesh, const uz_box *box, const uz_box_lattice *lattice, double *const line[3])
 {
-    const int order = uz_box_order(kind);
-    const int64_t end[3] = {order * box->cells[0], order * box->cells[1], box->dim == 3 ? order * box->cells[2] : 0};
+    const int64_t end[3] = {lattice->order * box->cells[0], lattice->order * box->cells[1],
+                            box->dim == 3 ? lattice->order * box->cells[2] : 0};
     double *xyz = mesh->xyz;
     for (int64_t k = 0; k <= end[2]; k++)
         for (int64_t j = 0; j <= end[1]; j++)
             for (int64_t i = 0; i <= end[0]; i++) {
-                if (kind == UZ_QUAD8 && i % 2 && j % 2)
+                if (!lattice->whole && !lattice->node[k % 2][j % 2][i % 2])
                     continue;
                 *xyz++ = line[0][i];
                 *xyz++ = line[1][j];
@@ -176,14 +225,15 @@ static void place_nodes(uz_mesh *mesh, const uz_box *box, uz_element_kind kind, 
             }
 }
 
-static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_element_kind kind, uz_error *err)
+static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_error *err)
 {
+    const uz_box_lattice lattice = uz_box_lattice_of(box);
     double *line[3];
     for (int axis = 0; axis < 3; axis++)
-        line[axis] = uz_box_lines(box, axis, uz_box_order(kind));
+        line[axis] = uz_box_lines(box, axis, lattice.order);
     const bool room = line[0] && line[1] && line[2];
     if (room)
-        place_nodes(mesh, box, kind, line);
+        place_nodes(mesh, box, &lattice, line);
     for (int axis = 0; axis < 3; axis++)
         free(line[axis]);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grid lines of a box");
@@ -191,37 +241,36 @@ static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_element_kind ki
 
 /* ---- the whole */
 
-static void measure(uz_mesh *mesh, const uz_box *box, uz_element_kind kind)
+static void measure(uz_mesh *mesh, const uz_box *box)
 {
-    int64_t cells = 1, nodes = 1;
+    const uz_element_type *type = uz_element_type_of(uz_box_element(box));
+    int64_t cells = 1;
     mesh->dim = box->dim;
-    mesh->uniform = kind == UZ_QUAD4 || kind == UZ_HEX8;
+    mesh->uniform = type->nodes == type->corners && type->parts == 1;
     for (int axis = 0; axis < box->dim; axis++) {
         cells *= box->cells[axis];
-        nodes *= uz_box_order(kind) * box->cells[axis] + 1;
         mesh->cell[axis] = box->size[axis] / (double)box->cells[axis];
         mesh->extent = axis == 0 ? box->size[0] : hypot(mesh->extent, box->size[axis]);
         mesh->uniform = mesh->uniform && !is_graded(box, axis);
     }
-    mesh->n_nodes = nodes - missing_nodes(box, kind);
-    mesh->n_elements = cells * uz_box_parts(kind);
+    mesh->n_nodes = (int64_t)uz_box_node_count(box);
+    mesh->n_elements = cells * uz_element_type_of(type->linear)->parts;
 }
 
 static uz_status fill(uz_mesh *mesh, const uz_box *box, uz_error *err)
 {
-    const uz_element_kind kind = uz_box_element(box);
-    measure(mesh, box, kind);
+    measure(mesh, box);
     mesh->xyz = uz_alloc(mesh->n_nodes * box->dim, sizeof *mesh->xyz);
     mesh->kind = uz_alloc(mesh->n_elements, sizeof *mesh->kind);
     mesh->first = uz_alloc(mesh->n_elements + 1, sizeof *mesh->first);
-    mesh->node = uz_alloc(mesh->n_elements * uz_element_node_count(kind), sizeof *mesh->node);
+    mesh->node = uz_alloc(mesh->n_elements * uz_element_node_count(uz_box_element(box)), sizeof *mesh->node);
     if (!mesh->xyz || !mesh->kind || !mesh->first || !mesh->node)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a mesh of %lld nodes", (long long)mesh->n_nodes);
-    uz_status status = fill_nodes(mesh, box, kind, err);
+    uz_status status = fill_nodes(mesh, box, err);
     if (status != UZ_OK)
         return status;
-    uz_box_fill_elements(mesh, box, kind);
-    return uz_box_fill_groups(mesh, box, kind, err);
+    uz_box_fill_elements(mesh, box);
+    return uz_box_fill_groups(mesh, box, err);
 }
 
 uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err)

@@ -113,9 +113,11 @@ static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, u
                        "incompatible_modes");
     if (formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD)
         return UZ_OK;
-    for (int64_t e = 0; e < mesh->n_elements; e++)
-        if (mesh->kind[e] == UZ_QUAD4 || mesh->kind[e] == UZ_HEX8)
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        if (type->bbar || type->incompatible)
             return UZ_OK;
+    }
     return uz_fail(err, UZ_ERR_SCENE, "/formulation",
                    "the formulations bbar and incompatible_modes are those of quad4 and hex8, and the mesh has none; "
                    "use auto");

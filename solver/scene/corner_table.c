@@ -26,12 +26,10 @@ static void sort_nodes(int64_t *node, int count)
 /* The corners of a side or of a whole element, ascending, -1 beyond them. */
 static void sorted_corners(int64_t corner[UZ_MOST_CORNERS], const uz_mesh *mesh, uz_face item)
 {
-    const uz_element_kind kind = (uz_element_kind)mesh->kind[item.element];
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[item.element]);
     const int64_t *node = mesh->node + mesh->first[item.element];
-    const int *local = NULL;
-    const int count = item.side < 0 ? uz_element_corner_count(kind) : uz_face_corner_count(kind);
-    if (item.side >= 0)
-        uz_element_side(&local, kind, item.side);
+    const int *local = item.side < 0 ? NULL : type->side[item.side].node;
+    const int count = item.side < 0 ? type->corners : type->side[item.side].corners;
     for (int i = 0; i < UZ_MOST_CORNERS; i++)
         corner[i] = i >= count ? -1 : local ? node[local[i]] : node[i];
     sort_nodes(corner, count);
@@ -61,7 +59,7 @@ static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, 
 {
     int64_t corner[UZ_MOST_CORNERS];
     for (int64_t e = 0; e < mesh->n_elements; e++) {
-        const int last = sides ? uz_element_side_count((uz_element_kind)mesh->kind[e]) - 1 : -1;
+        const int last = sides ? uz_element_type_of((uz_element_kind)mesh->kind[e])->sides - 1 : -1;
         for (int s = sides ? 0 : -1; s <= last; s++) {
             sorted_corners(corner, mesh, (uz_face){e, s});
             if (place)

@@ -7,7 +7,7 @@
 
 #include "scene/mesh.h"
 
-enum { UZ_MOST_CORNERS = 8 };
+enum { UZ_MOST_CORNERS = UZ_ELEMENT_CORNERS };
 
 typedef struct {
     int64_t *start;      /* n_nodes + 1: the bucket of node i is item[start[i]..start[i + 1]) */

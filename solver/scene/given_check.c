@@ -98,30 +98,15 @@ static uz_status check_kind(const uz_given_mesh *given, int64_t e, uz_error *err
  * of the edge, 4 middle - 3 corner - other end, the derivative of the quadratic through the three. A volume is
  * positive where the tangents, in the order below, are right-handed. */
 
-/* Corners next to each corner. */
-static const int TET_NEXT[4][3] = {{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}};
-static const int HEX_NEXT[8][3] = {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7},
-                                   {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}};
-/* The middle node between two corners of a tetrahedron. */
-static const int TET_MIDDLE[4][4] = {{-1, 4, 6, 7}, {4, -1, 5, 8}, {6, 5, -1, 9}, {7, 8, 9, -1}};
-
-static int next_corner(uz_element_kind kind, int corner, int k)
-{
-    const int corners = uz_element_corner_count(kind);
-    if (uz_element_dim(kind) == 2)
-        return (corner + (k == 0 ? 1 : corners - 1)) % corners;
-    return corners == 4 ? TET_NEXT[corner][k] : HEX_NEXT[corner][k];
-}
-
 /* The node in the middle of the edge between two corners; -1: none. */
-static int middle_node(uz_element_kind kind, int a, int b)
+static int middle_node(const uz_element_type *type, int a, int b)
 {
-    const int corners = uz_element_corner_count(kind);
-    if (uz_element_node_count(kind) == corners)
-        return -1;
-    if (uz_element_dim(kind) == 3)
-        return TET_MIDDLE[a][b];
-    return corners + ((a + 1) % corners == b ? a : b);
+    for (int m = type->corners; m < type->nodes; m++) {
+        const int *end = type->edge[m - type->corners];
+        if ((end[0] == a && end[1] == b) || (end[0] == b && end[1] == a))
+            return m;
+    }
+    return -1;
 }
 
 static double length_of(const double *v, int dim)
@@ -133,7 +118,7 @@ static double length_of(const double *v, int dim)
 static double tangent(double out[3], const uz_given_mesh *given, int64_t e, int a, int b)
 {
     const int64_t *node = given->node + given->first[e];
-    const int dim = given->dim, m = middle_node((uz_element_kind)given->kind[e], a, b);
+    const int dim = given->dim, m = middle_node(uz_element_type_of((uz_element_kind)given->kind[e]), a, b);
     const double *from = given->xyz + node[a] * dim, *to = given->xyz + node[b] * dim;
     const double *mid = m < 0 ? NULL : given->xyz + node[m] * dim;
     double chord[3] = {0, 0, 0};
@@ -155,10 +140,11 @@ static double determinant(double t[3][3], int dim)
 /* 1, -1, or 0 where the volume at the corner is none but for rounding: small against that of its edges. */
 static int corner_sign(const uz_given_mesh *given, int64_t e, int corner)
 {
-    const uz_element_kind kind = (uz_element_kind)given->kind[e];
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)given->kind[e]);
+    const int *next = uz_element_type_of(type->linear)->next[corner];
     double t[3][3] = {{0}};
     for (int k = 0; k < given->dim; k++) {
-        const double length = tangent(t[k], given, e, corner, next_corner(kind, corner, k));
+        const double length = tangent(t[k], given, e, corner, next[k]);
         if (!(length > 0) || !isfinite(length))
             return 0;
         for (int c = 0; c < given->dim; c++)
@@ -170,12 +156,8 @@ static int corner_sign(const uz_given_mesh *given, int64_t e, int corner)
 
 static uz_status refuse_inverted(const uz_given_mesh *given, int64_t e, uz_error *err)
 {
-    const char *remedy = "its nodes must run counterclockwise: give them in the opposite order";
-    if (uz_element_node_count((uz_element_kind)given->kind[e]) == 8 && given->dim == 3)
-        remedy = "its first four nodes must run counterclockwise seen from the side of the other four: swap the fours";
-    else if (given->dim == 3)
-        remedy = "its first three nodes must run counterclockwise seen from the fourth: swap two corners, and the "
-                 "middles of edges with them";
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)given->kind[e]);
+    const char *remedy = uz_element_type_of(type->linear)->mirrored;
     if (given->from_file)
         remedy = given->dim == 2 ? "its nodes run clockwise: turn the surface over (ReverseMesh Surface in Gmsh)"
                                  : "its nodes are those of its mirror image: orient the volume anew in Gmsh";
@@ -184,7 +166,7 @@ static uz_status refuse_inverted(const uz_given_mesh *given, int64_t e, uz_error
 
 static uz_status check_shape(const uz_given_mesh *given, int64_t e, uz_error *err)
 {
-    const int corners = uz_element_corner_count((uz_element_kind)given->kind[e]);
+    const int corners = uz_element_type_of((uz_element_kind)given->kind[e])->corners;
     int negative = 0, worst = -1;
     char what[96];
     for (int i = 0; i < corners; i++) {

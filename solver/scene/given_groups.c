@@ -108,7 +108,7 @@ static int corners_among(int64_t nodes, int dim)
 {
     if (dim == 2)
         return nodes == 2 || nodes == 3 ? 2 : 0;
-    return nodes == 3 || nodes == 6 ? 3 : nodes == 4 ? 4 : 0;
+    return nodes == 3 || nodes == 6 ? 3 : nodes == 4 || nodes == 8 ? 4 : 0;
 }
 
 /* Are the middles that came with a face those of the element's side? */
@@ -135,7 +135,7 @@ static uz_status match_face(uz_face *out, bool *inner, const group_work *work, c
     if (corners == 0)
         return refuse_face(work, group, i,
                            work->mesh->dim == 2 ? "has not 2 nodes, nor 3 with the one in its middle"
-                                                : "has not 3 or 4 corners, nor 3 with the middles of its edges");
+                                                : "has not 3 or 4 corners, alone or with the middles of its edges");
     for (int k = 0; k < count; k++) {
         const int64_t given = group->face_node[group->face_first[i] + k];
         if (given < 0 || given >= work->given->n_nodes)

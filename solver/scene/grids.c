@@ -54,7 +54,7 @@ static double first_length(const uz_grids *grids)
 
 uz_grids uz_grids_of_box(const uz_box *box, double most_dofs)
 {
-    uz_grids grids = {.box = *box, .order = uz_box_order(uz_box_element(box)), .most_dofs = UZ_SCENE_MAX_DOFS};
+    uz_grids grids = {.box = *box, .order = uz_box_lattice_of(box).order, .most_dofs = UZ_SCENE_MAX_DOFS};
     if (most_dofs > 0.0)
         grids.most_dofs = fmin(most_dofs, grids.most_dofs);
     grids.box.automatic = false;
@@ -81,14 +81,7 @@ uz_box uz_grid(const uz_grids *grids, int64_t n)
 double uz_grid_dofs(const uz_grids *grids, int64_t n)
 {
     const uz_box box = uz_grid(grids, n);
-    double nodes = 1.0, cells = 1.0;
-    for (int axis = 0; axis < box.dim; axis++) {
-        nodes *= (double)(grids->order * box.cells[axis]) + 1.0;
-        cells *= (double)box.cells[axis];
-    }
-    if (uz_box_element(&box) == UZ_QUAD8)
-        nodes -= cells;
-    return nodes * box.dim;
+    return uz_box_node_count(&box) * box.dim;
 }
 
 /* ---- the next one */

@@ -70,10 +70,9 @@ const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count)
 
 int uz_mesh_face(int64_t node[UZ_FACE_NODES], const uz_mesh *mesh, uz_face face)
 {
-    const int *local;
     const int64_t *of = mesh->node + mesh->first[face.element];
-    const int count = uz_element_side(&local, (uz_element_kind)mesh->kind[face.element], face.side);
-    for (int i = 0; i < count; i++)
-        node[i] = of[local[i]];
-    return count;
+    const uz_element_side *side = &uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side];
+    for (int i = 0; i < side->nodes; i++)
+        node[i] = of[side->node[i]];
+    return side->nodes;
 }

@@ -2,7 +2,7 @@
 #ifndef UZ_SCENE_MESH_H
 #define UZ_SCENE_MESH_H
 
-#include "element/element_kind.h"
+#include "element/element_type.h"
 #include "uzawa.h"
 
 /* Most unknowns that a scene may have: beyond it no factor fits in the memory of one machine. */
@@ -10,7 +10,7 @@
 
 typedef enum { UZ_GROUP_NODES, UZ_GROUP_FACES, UZ_GROUP_ELEMENTS } uz_group_kind;
 
-/* A side of an element (an edge in 2D), numbered as uz_element_side gives its nodes: the element is on the left of an
+/* A side of an element (an edge in 2D), numbered as in its uz_element_type: the element is on the left of an
  * edge, and the normal of a face by the right-hand rule points out of it. */
 typedef struct {
     int64_t element;
@@ -46,7 +46,7 @@ typedef struct {
 } uz_mesh;
 
 /* Nodes x fastest, row by row from the bottom, with the middles of edges in their places; elements by cells likewise.
- * A cell is one quad4, quad8 or hex8, two tri3 or tri6, six tet4 or tet10. Groups: left and right (x), bottom and top
+ * A cell is one quadrilateral or hexahedron, two triangles, six tetrahedra. Groups: left and right (x), bottom and top
  * (y), in 3D back (lowest z) and front (highest z); all. `uniform` where all cells are equal and of one element.
  * Errors: UZ_ERR_SCENE or _NOT_FINITE at "/mesh/box/...". */
 uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err);
@@ -69,7 +69,7 @@ void uz_mesh_clear(uz_mesh *mesh);
 const int64_t *uz_mesh_element(const uz_mesh *mesh, int64_t element, int *count);
 /* The nodes of a face in its order, corners first, then middles of its edges: at most UZ_FACE_NODES. Returns how many.
  */
-enum { UZ_FACE_NODES = 8 };
+enum { UZ_FACE_NODES = UZ_SIDE_NODES };
 int uz_mesh_face(int64_t node[UZ_FACE_NODES], const uz_mesh *mesh, uz_face face);
 
 /* The group of that name, or NULL with UZ_ERR_SCENE at `where`, listing the names that there are. */

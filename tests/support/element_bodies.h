@@ -71,7 +71,7 @@ static inline void scatter(small_body *b, const uz_side *side, const int *node, 
 static inline void press(void *ctx, const uz_side *side, const int *node)
 {
     small_body *b = ctx;
-    double f[18] = {0}, pressure[6];
+    double f[3 * UZ_SIDE_NODES] = {0}, pressure[UZ_SIDE_NODES];
     for (int a = 0; a < side->nodes; a++)
         pressure[a] = b->value;
     uz_side_add_pressure(f, side, pressure);
@@ -82,7 +82,7 @@ static inline void press(void *ctx, const uz_side *side, const int *node)
 static inline void lift(void *ctx, const uz_side *side, const int *node)
 {
     small_body *b = ctx;
-    double f[18] = {0};
+    double f[3 * UZ_SIDE_NODES] = {0};
     uz_side_add_traction(f, side, (const double[3]){0, b->value, 0});
     scatter(b, side, node, f);
 }
@@ -91,7 +91,7 @@ static inline void lift(void *ctx, const uz_side *side, const int *node)
 static inline void bend(void *ctx, const uz_side *side, const int *node)
 {
     small_body *b = ctx;
-    double f[18] = {0}, t[18] = {0};
+    double f[3 * UZ_SIDE_NODES] = {0}, t[3 * UZ_SIDE_NODES] = {0};
     for (int a = 0; a < side->nodes; a++)
         t[a * side->dim] = b->value * (side->xyz[a * side->dim + 1] - 0.5);
     uz_side_add_nodal_traction(f, side, t);

@@ -45,40 +45,23 @@ static inline double shake(uint64_t *seed)
 /* Local corners of the edge of each node behind the corners. */
 static inline const int (*edges_of(uz_element_kind kind))[2]
 {
-    static const int TRI[3][2] = {{0, 1}, {1, 2}, {2, 0}}, QUAD[4][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}};
-    static const int TET[6][2] = {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}};
-    return kind == UZ_TRI6 ? TRI : kind == UZ_QUAD8 ? QUAD : kind == UZ_TET10 ? TET : NULL;
+    return uz_element_type_of(kind)->edge;
 }
 
 static inline int corner_count(uz_element_kind kind)
 {
-    static const int COUNT[UZ_ELEMENT_KINDS] = {3, 4, 3, 4, 4, 8, 4};
-    return COUNT[kind];
+    return uz_element_type_of(kind)->corners;
 }
 
-/* The corners of the elements that fill a cell, as bits 0, 1, 2 for x, y, z. Tetrahedra: one for each order of the
- * axes, all round the diagonal (Kuhn). Returns how many elements. */
-static inline int cell_corners(int corner[6][8], uz_element_kind kind)
+/* The corners of the elements that fill a cell, as bits 0, 1, 2 for x, y, z. Returns how many elements. */
+static inline int cell_corners(int corner[UZ_ELEMENT_PARTS][UZ_ELEMENT_CORNERS], uz_element_kind kind)
 {
-    static const int QUAD[8] = {0, 1, 3, 2, 4, 5, 7, 6};
-    static const int TRI[2][3] = {{0, 1, 3}, {0, 3, 2}};
-    static const int ORDER[6][2] = {{1, 2}, {2, 4}, {4, 1}, {2, 1}, {4, 2}, {1, 4}};
-    const int corners = corner_count(kind);
-    if (corners == 8 || kind == UZ_QUAD4 || kind == UZ_QUAD8) {
-        memcpy(corner[0], QUAD, sizeof QUAD);
-        return 1;
-    }
-    if (corners == 3) {
-        memcpy(corner[0], TRI[0], sizeof TRI[0]);
-        memcpy(corner[1], TRI[1], sizeof TRI[1]);
-        return 2;
-    }
-    for (int t = 0; t < 6; t++) {
-        const int a = ORDER[t][0], b = ORDER[t][0] | ORDER[t][1], even = t < 3;
-        const int tet[4] = {0, even ? a : b, even ? b : a, 7};
-        memcpy(corner[t], tet, sizeof tet);
-    }
-    return 6;
+    static const int BITS[UZ_ELEMENT_CORNERS] = {0, 1, 3, 2, 4, 5, 7, 6};
+    const uz_element_type *linear = uz_element_type_of(uz_element_type_of(kind)->linear);
+    for (int t = 0; t < linear->parts; t++)
+        for (int a = 0; a < linear->corners; a++)
+            corner[t][a] = BITS[linear->part[t][a]];
+    return linear->parts;
 }
 
 /* Numbers a lattice point on its first use. */
@@ -117,7 +100,8 @@ static inline small_mesh small_grid(uz_element element, int n_x, int n_y, int n_
     small_mesh mesh = {.element = element, .dim = uz_element_dim(element.kind)};
     const int n[3] = {n_x, n_y, mesh.dim == 3 ? n_z : 1}, layers = mesh.dim == 3 ? n_z : 1;
     const size_t lattice = (size_t)((2 * n[0] + 1) * (2 * n[1] + 1) * (2 * n[2] + 1));
-    int corner[6][8], *number = zeros(lattice, sizeof *number), cells = n[0] * n[1] * layers;
+    int corner[UZ_ELEMENT_PARTS][UZ_ELEMENT_CORNERS], *number = zeros(lattice, sizeof *number),
+                                                      cells = n[0] * n[1] * layers;
     const int in_cell = cell_corners(corner, element.kind);
     mesh.per = uz_element_node_count(element.kind);
     mesh.xyz = zeros(lattice * 3, sizeof *mesh.xyz);
@@ -188,12 +172,12 @@ static inline void each_side(const small_mesh *mesh, const bool *marked, void *c
                              void (*load)(void *ctx, const uz_side *side, const int *node))
 {
     for (int e = 0; e < mesh->n_elements; e++)
-        for (int s = 0; s < uz_element_side_count(mesh->element.kind); s++) {
+        for (int s = 0; s < uz_element_type_of(mesh->element.kind)->sides; s++) {
             double xs[3 * UZ_SIDE_NODES];
-            const int *local;
+            const uz_element_side *at = &uz_element_type_of(mesh->element.kind)->side[s];
+            const int *local = at->node;
             int node[UZ_SIDE_NODES], on = 0;
-            const uz_side side = {mesh->dim, uz_element_side(&local, mesh->element.kind, s), mesh->element.model,
-                                  mesh->element.thickness, xs};
+            const uz_side side = {mesh->dim, at->nodes, mesh->element.model, mesh->element.thickness, xs};
             for (int a = 0; a < side.nodes; a++) {
                 node[a] = mesh->node[e * mesh->per + local[a]];
                 on += marked[node[a]];

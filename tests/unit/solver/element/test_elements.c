@@ -17,6 +17,12 @@ TEST(shape_functions_are_one_at_their_node_and_sum_to_one)
             for (int b = 0; b < nodes; b++)
                 CHECK(N[b] == (a == b));
         }
+        for (int m = uz_element_type_of(k)->corners; m < nodes; m++)
+            for (int c = 0; c < uz_element_dim(k); c++) {
+                const int *end = uz_element_type_of(k)->edge[m - uz_element_type_of(k)->corners];
+                CHECK(uz_element_local_nodes(k)[m][c] ==
+                      0.5 * (uz_element_local_nodes(k)[end[0]][c] + uz_element_local_nodes(k)[end[1]][c]));
+            }
         uz_element_shape(N, k, (const double[3]){0.3, 0.21, 0.4});
         for (int a = 0; a < nodes; a++)
             sum += N[a];
@@ -65,7 +71,8 @@ static double monomial(uz_element_kind kind, int p, int q, int r)
 
 TEST(gauss_rules_have_their_degree)
 {
-    static const int DEGREE[UZ_ELEMENT_KINDS] = {1, 3, 2, 5, 1, 3, 2};
+    static const int DEGREE[UZ_ELEMENT_KINDS] = {
+        [UZ_TRI3] = 1, [UZ_QUAD4] = 3, [UZ_TRI6] = 2, [UZ_QUAD8] = 5, [UZ_TET4] = 1, [UZ_HEX8] = 3, [UZ_TET10] = 2};
     for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
         for (int ring = 0; ring < 2; ring++) {
             const uz_element_kind k = (uz_element_kind)kind;
@@ -262,8 +269,8 @@ TEST(quadratic_elements_have_quadratic_fields)
         const double point[3] = {0.3, 0.2, 0.1};
         const int dim = uz_element_dim(element.kind), nodes = uz_element_node_count(element.kind);
         uz_element_motion motion;
-        if (nodes == corner_count(element.kind) || element.kind == UZ_QUAD8)
-            continue; /* quad8 has it on parallelograms only */
+        if (nodes == corner_count(element.kind) || corner_count(element.kind) > dim + 1)
+            continue; /* but for simplices only on parallelograms */
         element = bent(xe, element, 1);
         for (int a = 0; a < nodes; a++) {
             u[a * dim] = xe[a * dim] * xe[a * dim];

@@ -7,10 +7,11 @@ static const double TAU = 6.283185307179586;
 
 static uz_side side_of(double *xs, const uz_element *element, int number)
 {
-    const int *local, dim = uz_element_dim(element->kind);
-    const uz_side side = {dim, uz_element_side(&local, element->kind, number), element->model, element->thickness, xs};
+    const int dim = uz_element_dim(element->kind);
+    const uz_element_side *at = &uz_element_type_of(element->kind)->side[number];
+    const uz_side side = {dim, at->nodes, element->model, element->thickness, xs};
     for (int a = 0; a < side.nodes; a++)
-        memcpy(xs + a * dim, element->xyz + local[a] * dim, (size_t)dim * sizeof *xs);
+        memcpy(xs + a * dim, element->xyz + at->node[a] * dim, (size_t)dim * sizeof *xs);
     return side;
 }
 
@@ -143,8 +144,8 @@ TEST(pressure_all_round_is_the_volume)
         double xe[UZ_ELEMENT_DOFS], work = 0, sum[3] = {0}, area = 0;
         element = bent(xe, element, 1);
         const int dim = uz_element_dim(element.kind);
-        for (int s = 0; s < uz_element_side_count(element.kind); s++) {
-            double xs[18], f[18] = {0}, pressure[6];
+        for (int s = 0; s < uz_element_type_of(element.kind)->sides; s++) {
+            double xs[3 * UZ_SIDE_NODES], f[3 * UZ_SIDE_NODES] = {0}, pressure[UZ_SIDE_NODES];
             const uz_side side = side_of(xs, &element, s);
             for (int a = 0; a < side.nodes; a++)
                 pressure[a] = 4;
@@ -167,9 +168,11 @@ TEST(side_integrals_agree)
 {
     uz_element element;
     for (int i = 0; each_element(&element, i, 0.3); i++) {
-        double xe[UZ_ELEMENT_DOFS], xs[18], w[6], M[36], t[3] = {3, -1, 2}, all[18], f[18] = {0}, again[18] = {0};
+        enum { MOST = 3 * UZ_SIDE_NODES };
+        double xe[UZ_ELEMENT_DOFS], xs[MOST], w[UZ_SIDE_NODES], M[UZ_SIDE_NODES * UZ_SIDE_NODES], t[3] = {3, -1, 2};
+        double all[MOST], f[MOST] = {0}, again[MOST] = {0};
         element = bent(xe, element, 1);
-        const uz_side side = side_of(xs, &element, uz_element_side_count(element.kind) - 1);
+        const uz_side side = side_of(xs, &element, uz_element_type_of(element.kind)->sides - 1);
         const int dim = side.dim, n = side.nodes;
         double area = 0;
         uz_side_weights(w, &side);
@@ -237,12 +240,11 @@ TEST(sides_are_their_elements_sides)
 {
     uz_element element;
     for (int i = 0; each_element(&element, i, 0.3); i++)
-        for (int s = 0; s < uz_element_side_count(element.kind); s++) {
-            double xe[UZ_ELEMENT_DOFS], xs[18], N[6], Ne[UZ_ELEMENT_NODES], at[3] = {0};
-            const int *local;
+        for (int s = 0; s < uz_element_type_of(element.kind)->sides; s++) {
+            double xe[UZ_ELEMENT_DOFS], xs[3 * UZ_SIDE_NODES], N[UZ_SIDE_NODES], Ne[UZ_ELEMENT_NODES], at[3] = {0};
+            const int *local = uz_element_type_of(element.kind)->side[s].node;
             element = bent(xe, element, 1);
             const uz_side side = side_of(xs, &element, s);
-            uz_element_side(&local, element.kind, s);
             uz_side_shape(N, &side, (const double[2]){0.3, 0.2});
             for (int a = 0; a < side.nodes; a++)
                 for (int c = 0; c < 3; c++)

@@ -46,7 +46,7 @@ static double volume_of(const uz_mesh *mesh, int64_t e)
     static const int AROUND[6][2] = {{1, 2}, {2, 3}, {3, 7}, {7, 4}, {4, 5}, {5, 1}};
     int count;
     const int64_t *node = uz_mesh_element(mesh, e, &count);
-    const int corners = uz_element_corner_count((uz_element_kind)mesh->kind[e]);
+    const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->corners;
     double sum = 0;
     if (corners == 3)
         return simplex(mesh, node, 1, 2, 0);
@@ -83,7 +83,7 @@ static void check_conforming(const uz_mesh *mesh)
         for (int64_t f = 0; f < mesh->groups[g].n_faces; f++) {
             int64_t node[UZ_FACE_NODES], corner[UZ_MOST_CORNERS];
             const uz_face face = mesh->groups[g].face[f];
-            const int corners = uz_face_corner_count((uz_element_kind)mesh->kind[face.element]);
+            const int corners = uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side].corners;
             uz_mesh_face(node, mesh, face);
             memcpy(corner, node, (size_t)corners * sizeof *corner);
             const int64_t place = uz_corner_table_find(&sides, mesh, corner, corners);
@@ -115,10 +115,10 @@ static void check_side(const uz_mesh *mesh, const char *name, int axis, double e
 static void check_middles(const uz_mesh *mesh)
 {
     for (int64_t e = 0; e < mesh->n_elements; e++)
-        for (int s = 0; s < uz_element_side_count((uz_element_kind)mesh->kind[e]); s++) {
+        for (int s = 0; s < uz_element_type_of((uz_element_kind)mesh->kind[e])->sides; s++) {
             int64_t node[UZ_FACE_NODES];
             const int count = uz_mesh_face(node, mesh, (uz_face){e, s});
-            const int corners = uz_face_corner_count((uz_element_kind)mesh->kind[e]);
+            const int corners = uz_element_type_of((uz_element_kind)mesh->kind[e])->side[s].corners;
             for (int m = corners; m < count; m++)
                 for (int c = 0; c < mesh->dim; c++) {
                     const double a = mesh->xyz[node[m - corners] * mesh->dim + c];

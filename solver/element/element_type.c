@@ -1,0 +1,37 @@
+/* element_type.c: the table of element types. */
+#include "element/element_type.h"
+
+#include <string.h>
+
+extern const uz_element_type uz_type_tri3, uz_type_quad4, uz_type_tri6, uz_type_quad8, uz_type_tet4, uz_type_hex8,
+    uz_type_tet10;
+
+const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
+    [UZ_TRI3] = &uz_type_tri3, [UZ_QUAD4] = &uz_type_quad4, [UZ_TRI6] = &uz_type_tri6,   [UZ_QUAD8] = &uz_type_quad8,
+    [UZ_TET4] = &uz_type_tet4, [UZ_HEX8] = &uz_type_hex8,   [UZ_TET10] = &uz_type_tet10,
+};
+
+const char *uz_element_name(uz_element_kind kind)
+{
+    return kind < UZ_ELEMENT_KINDS ? uz_element_types[kind]->name : "unknown";
+}
+
+bool uz_element_parse(uz_element_kind *out, const char *name)
+{
+    for (int i = 0; i < UZ_ELEMENT_KINDS; i++)
+        if (strcmp(uz_element_types[i]->name, name) == 0) {
+            *out = (uz_element_kind)i;
+            return true;
+        }
+    return false;
+}
+
+int uz_element_dim(uz_element_kind kind)
+{
+    return uz_element_types[kind]->dim;
+}
+
+int uz_element_node_count(uz_element_kind kind)
+{
+    return uz_element_types[kind]->nodes;
+}
