@@ -56,8 +56,10 @@ typedef struct {
     uz_contact_sites *sites; /* n_sites: one per contact of the scene */
     int64_t n_sites;
     int64_t n_pair_rows; /* contact rows against another part of the body */
-    int64_t n_modes;     /* motions that only obstacles hold; 0: the supports hold the body */
-    double *modes;       /* d x n_modes: displacements of the free dofs, one motion after the other */
+    int64_t *row_ends; /* m x 2: of a row whose node is a middle of eight-node faces, the rows of the ends of its edge,
+                        * else -1; NULL: there are no such rows. See contact_rows.c */
+    int64_t n_modes;   /* motions that only obstacles hold; 0: the supports hold the body */
+    double *modes;     /* d x n_modes: displacements of the free dofs, one motion after the other */
 } uz_body_model;
 
 /* Element e as solver/element takes it; xyz is room for its coordinates. */
@@ -93,6 +95,9 @@ uz_status uz_check_pressed(const uz_body_model *model, const double *p, uz_error
 
 /* Bytes that determine the body and nothing else: scenes with equal keys have the same model. Freed by the caller. */
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err);
+
+/* f (m): what each row's node gets of the reactions r (m): r itself but around eight-node faces. */
+void uz_row_forces(double *f, const uz_body_model *model, const double *r);
 
 /* nodal (n_nodes x dim) from the free dofs u (d) and the prescribed values (n_fixed; NULL: all zero). */
 void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u, const double *prescribed);

@@ -1,4 +1,11 @@
-/* contact_rows.c: the rows of N, and what each of them is in the mesh. */
+/* contact_rows.c: the rows of N, and what each of them is in the mesh.
+ *
+ * A row is the gap of one node, g_i >= 0, and its reaction a force on that node, but on faces of eight nodes. There a
+ * uniform pressure pulls at the corners (-1/12 of the face, while each middle has 1/3), and reactions of one sign could
+ * not carry it. So the row of a middle between a and b is (g_i - s (g_a + g_b)) / (1 - 2 s), s = UZ_MIDDLE_SHARE: g as
+ * the sum of transformed shape functions whose integrals are positive (see uz_side_positive_weights). What is linear
+ * along the edge keeps its value, so that resultants and contact_pressure.c read a reaction as a force at its node. A
+ * middle of which an end has no row keeps the row of its own gap. */
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
@@ -109,7 +116,7 @@ static void spread_area(double *area, const uz_body_model *model, const uz_group
         int64_t node[UZ_FACE_NODES];
         double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
         uz_body_side(&side, xyz, node, model, group->face[e]);
-        uz_side_weights(w, &side);
+        uz_side_positive_weights(w, &side);
         const double whole = uz_side_area(&side);
         for (int a = 0; a < side.nodes; a++)
             area[node[a]] += fabs(w[a]) > 1e-12 * whole ? w[a] : 0;
@@ -182,6 +189,115 @@ static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries)
            work->row && work->col && work->val && work->area;
 }
 
+/* ---- middles of eight-node faces */
+
+static bool has_eight_nodes(const uz_mesh *mesh, uz_face face)
+{
+    return uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side].nodes == 8;
+}
+
+/* Rows [first, end) are those of a contact's group. row_of: n_nodes. */
+static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_of, int64_t first, int64_t end)
+{
+    for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++)
+        row_of[uz_group_node_at(group, i)] = -1;
+    for (int64_t row = first; row < end; row++)
+        row_of[model->info.contact_node[row]] = row;
+    for (int64_t f = 0; f < group->n_faces; f++) {
+        int64_t node[UZ_FACE_NODES];
+        if (!has_eight_nodes(&model->mesh, group->face[f]))
+            continue;
+        uz_mesh_face(node, &model->mesh, group->face[f]);
+        for (int j = 0; j < 4; j++) {
+            const int64_t row = row_of[node[4 + j]], a = row_of[node[j]], b = row_of[node[(j + 1) % 4]];
+            if (row >= 0 && a >= 0 && b >= 0) {
+                model->row_ends[2 * row] = a;
+                model->row_ends[2 * row + 1] = b;
+            }
+        }
+    }
+}
+
+static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    bool any = false;
+    for (int64_t k = 0; k < scene->n_contacts; k++) {
+        const uz_group *group = contact_group(&model->mesh, &scene->contacts[k], err);
+        for (int64_t f = 0; f < group->n_faces && !any; f++)
+            any = has_eight_nodes(&model->mesh, group->face[f]);
+    }
+    if (!any)
+        return UZ_OK;
+    int64_t *row_of = uz_alloc(model->mesh.n_nodes, sizeof *row_of), row = 0;
+    model->row_ends = uz_alloc(2 * model->m, sizeof *model->row_ends);
+    if (row_of && model->row_ends) {
+        memset(model->row_ends, 0xff, (size_t)(2 * model->m) * sizeof *model->row_ends);
+        for (int64_t k = 0; k < scene->n_contacts; k++) {
+            const int64_t first = row;
+            while (row < model->m && model->info.contact_of[row] == k)
+                row++;
+            list_ends(model, contact_group(&model->mesh, &scene->contacts[k], err), row_of, first, row);
+        }
+    }
+    const bool room = row_of && model->row_ends;
+    free(row_of);
+    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
+}
+
+/* Room for so many entries. */
+static bool grow_work(row_work *work, int64_t entries)
+{
+    int64_t *row = uz_realloc(work->row, entries, sizeof *row);
+    work->row = row ? row : work->row;
+    int64_t *col = uz_realloc(work->col, entries, sizeof *col);
+    work->col = col ? col : work->col;
+    double *val = uz_realloc(work->val, entries, sizeof *val);
+    work->val = val ? val : work->val;
+    return row && col && val;
+}
+
+/* Adds the shares of their ends to the rows of middles. Entries come row by row. */
+static bool blend_entries(row_work *work, const uz_body_model *model)
+{
+    const double scale = 1 / (1 - 2 * UZ_MIDDLE_SHARE);
+    int64_t *start = uz_alloc_zero(model->m + 1, sizeof *start), most = work->count;
+    if (!start)
+        return false;
+    for (int64_t q = 0; q < work->count; q++)
+        start[work->row[q] + 1] = q + 1;
+    for (int64_t i = 0; i < model->m; i++) {
+        start[i + 1] = start[i + 1] > start[i] ? start[i + 1] : start[i];
+        for (int64_t q = start[i]; q < start[i + 1] && model->row_ends[2 * i] >= 0; q++)
+            work->val[q] *= scale;
+    }
+    for (int64_t i = 0; i < 2 * model->m; i++)
+        if (model->row_ends[i] >= 0)
+            most += start[model->row_ends[i] + 1] - start[model->row_ends[i]];
+    const bool room = grow_work(work, most);
+    for (int64_t i = 0; i < model->m && room; i++)
+        for (int k = 0; k < 2 && model->row_ends[2 * i] >= 0; k++) {
+            const int64_t end = model->row_ends[2 * i + k];
+            for (int64_t q = start[end]; q < start[end + 1]; q++) {
+                work->row[work->count] = i;
+                work->col[work->count] = work->col[q];
+                work->val[work->count++] = -UZ_MIDDLE_SHARE * scale * work->val[q];
+            }
+        }
+    free(start);
+    return room;
+}
+
+void uz_row_forces(double *f, const uz_body_model *model, const double *r)
+{
+    memcpy(f, r, (size_t)model->m * sizeof *f);
+    for (int64_t i = 0; i < model->m && model->row_ends; i++)
+        if (model->row_ends[2 * i] >= 0) {
+            f[i] = r[i] / (1 - 2 * UZ_MIDDLE_SHARE);
+            f[model->row_ends[2 * i]] -= UZ_MIDDLE_SHARE * f[i];
+            f[model->row_ends[2 * i + 1]] -= UZ_MIDDLE_SHARE * f[i];
+        }
+}
+
 static void free_work(row_work *work)
 {
     free(work->row);
@@ -203,7 +319,11 @@ uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_
     }
     for (int64_t k = 0; k < scene->n_contacts; k++)
         add_contact(model, &work, &row, scene, contact_group(&model->mesh, &scene->contacts[k], err), k);
-    status = uz_csc_from_triplets(&model->N, model->m, model->d, work.count, work.row, work.col, work.val, err);
+    status = find_ends(model, scene, err);
+    if (status == UZ_OK && model->row_ends && !blend_entries(&work, model))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
+    if (status == UZ_OK)
+        status = uz_csc_from_triplets(&model->N, model->m, model->d, work.count, work.row, work.col, work.val, err);
 done:
     free_work(&work);
     return status;
@@ -308,5 +428,9 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
         status = contact_gaps(h, &row, prescribed, model, scene, k, err);
     if (status == UZ_OK && row != model->m)
         return other_body(err);
+    for (int64_t i = 0; status == UZ_OK && i < model->m && model->row_ends; i++)
+        if (model->row_ends[2 * i] >= 0)
+            h[i] = (h[i] - UZ_MIDDLE_SHARE * (h[model->row_ends[2 * i]] + h[model->row_ends[2 * i + 1]])) /
+                   (1 - 2 * UZ_MIDDLE_SHARE);
     return status;
 }

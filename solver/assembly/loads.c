@@ -65,7 +65,7 @@ static uz_status load_sum(const loading *x, const uz_group *group, const char *w
     double *share = uz_alloc_zero(x->model->mesh.n_nodes, sizeof *share);
     if (!share)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a force on %lld nodes", (long long)group->n_nodes);
-    uz_status status = uz_spread_over_group(share, x->model, group, where, err);
+    uz_status status = uz_spread_over_group(share, x->model, group, false, where, err);
     for (int64_t a = 0; a < x->model->mesh.n_nodes && status == UZ_OK; a++)
         for (int c = 0; c < dim; c++)
             x->f[a * dim + c] += share[a] * x->load->v[c];

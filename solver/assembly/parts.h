@@ -25,8 +25,8 @@ uz_status uz_prescribed_values(double *value, const uz_body_model *model, const 
 /* mesh -> spring. */
 uz_status uz_spread_springs(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* share (n_nodes) += what each node of the group has of a total of 1: by area of faces, else equally. */
-uz_status uz_spread_over_group(double *share, const uz_body_model *model, const uz_group *group, const char *where,
-                               uz_error *err);
+uz_status uz_spread_over_group(double *share, const uz_body_model *model, const uz_group *group, bool positive,
+                               const char *where, uz_error *err);
 
 /* mesh, dof: does every connected part stay in place under its supports alone? UZ_ERR_FREE_BODY names the rigid-body
  * modes that are left. */

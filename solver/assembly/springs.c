@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-uz_status uz_spread_over_group(double *share, const uz_body_model *model, const uz_group *group, const char *where,
-                               uz_error *err)
+uz_status uz_spread_over_group(double *share, const uz_body_model *model, const uz_group *group, bool positive,
+                               const char *where, uz_error *err)
 {
     const int64_t count = uz_group_node_count(&model->mesh, group);
     double total = 0, w[UZ_FACE_NODES];
@@ -25,7 +25,7 @@ uz_status uz_spread_over_group(double *share, const uz_body_model *model, const 
             double xyz[3 * UZ_FACE_NODES];
             int64_t node[UZ_FACE_NODES];
             uz_body_side(&side, xyz, node, model, group->face[i]);
-            uz_side_weights(w, &side);
+            (positive ? uz_side_positive_weights : uz_side_weights)(w, &side);
             for (int a = 0; a < side.nodes; a++) {
                 if (pass == 0)
                     total += w[a];
@@ -45,7 +45,7 @@ static uz_status add_springs(uz_body_model *model, double *share, const uz_suppo
     if (!group)
         return UZ_ERR_SCENE;
     memset(share, 0, (size_t)model->mesh.n_nodes * sizeof *share);
-    uz_status status = uz_spread_over_group(share, model, group, "/supports", err);
+    uz_status status = uz_spread_over_group(share, model, group, true, "/supports", err);
     for (int64_t a = 0; a < model->mesh.n_nodes && status == UZ_OK; a++)
         for (int c = 0; c < dim; c++)
             if (support->spring[c] > 0) /* the corners of a tri6 face have less than nothing by rounding */

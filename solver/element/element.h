@@ -157,6 +157,13 @@ double uz_side_area(const uz_side *side);
 /* w[node] = integral of its shape function over the area: the weights of a constant traction. They sum to the area. At
  * the corners of a straight tri6 face they are 0. */
 void uz_side_weights(double *w, const uz_side *side);
+/* Weights that are positive and sum to the area: those above, but that on a face of eight nodes, whose corners have
+ * -1/12 of it, each middle gives UZ_MIDDLE_SHARE of its own to each end of its edge: corners have 1/20, middles 1/5.
+ * They are the integrals of the shape functions transformed as in A. Popp, B. Wohlmuth, M. Gee, W. Wall, "Dual
+ * quadratic mortar finite element methods for 3D finite deformation contact", SIAM J. Sci. Comput. 34 (2012) B421-B446.
+ */
+#define UZ_MIDDLE_SHARE 0.2
+void uz_side_positive_weights(double *w, const uz_side *side);
 /* M, nodes x nodes: integral N N' over the area. */
 void uz_side_mass(double *M, const uz_side *side);
 

@@ -187,6 +187,17 @@ void uz_side_weights(double *w, const uz_side *side)
     }
 }
 
+void uz_side_positive_weights(double *w, const uz_side *side)
+{
+    uz_side_weights(w, side);
+    for (int j = 0; j < 4 && side->nodes == 8; j++) {
+        const double share = UZ_MIDDLE_SHARE * w[4 + j];
+        w[j] += share;
+        w[(j + 1) % 4] += share;
+        w[4 + j] -= 2 * share;
+    }
+}
+
 void uz_side_mass(double *M, const uz_side *side)
 {
     const int n = side->nodes;

@@ -130,17 +130,58 @@ static void triangle_shape(double *w, double *da, double *db, int count, double 
     }
 }
 
+/* The quadrilateral of eight nodes, corners first. */
+static void serendipity_shape(double w[8], double da[8], double db[8], const double at[2])
+{
+    double gradient[UZ_FACE_NODES][3];
+    const uz_element_type *type = uz_element_type_of(UZ_QUAD8);
+    const double point[3] = {at[0], at[1], 0};
+    type->shape(w, point);
+    type->gradients(gradient, point);
+    for (int i = 0; i < 8; i++) {
+        da[i] = gradient[i][0];
+        db[i] = gradient[i][1];
+    }
+}
+
 static void shape(double *w, double *da, double *db, int count, const double at[2])
 {
-    if (count == 4)
+    if (count == 8)
+        serendipity_shape(w, da, db, at);
+    else if (count == 4)
         quad_shape(w, da, db, at[0], at[1]);
     else
         triangle_shape(w, da, db, count, at[0], at[1]);
 }
 
-/* Second derivatives of the position: the same everywhere on a face. */
-static void second_derivatives(double aa[3], double ab[3], double bb[3], const surface *f)
+/* Of the position on a face of eight nodes, where p, q are a node's own coordinates: those of (1 + p a) (1 + q b)
+ * (p a + q b - 1) / 4 at corners and of (1 - a^2) (1 + q b) / 2 or (1 - b^2) (1 + p a) / 2 between them. */
+static void serendipity_second(double aa[3], double ab[3], double bb[3], const surface *f, const double at[2])
 {
+    const double(*local)[3] = uz_element_type_of(UZ_QUAD8)->local;
+    memset(aa, 0, 3 * sizeof *aa);
+    memset(ab, 0, 3 * sizeof *ab);
+    memset(bb, 0, 3 * sizeof *bb);
+    for (int i = 0; i < 8; i++) {
+        const double p = local[i][0], q = local[i][1], a = at[0], b = at[1];
+        const double along_a = p == 0 ? -(1 + q * b) : q == 0 ? 0 : 0.5 * (1 + q * b);
+        const double along_b = q == 0 ? -(1 + p * a) : p == 0 ? 0 : 0.5 * (1 + p * a);
+        const double mixed = p == 0 ? -a * q : q == 0 ? -b * p : 0.25 * p * q * (1 + 2 * p * a + 2 * q * b);
+        for (int c = 0; c < 3; c++) {
+            aa[c] += along_a * f->x[i][c];
+            ab[c] += mixed * f->x[i][c];
+            bb[c] += along_b * f->x[i][c];
+        }
+    }
+}
+
+/* Second derivatives of the position: the same everywhere on a face of at most six nodes. */
+static void second_derivatives(double aa[3], double ab[3], double bb[3], const surface *f, const double at[2])
+{
+    if (f->count == 8) {
+        serendipity_second(aa, ab, bb, f, at);
+        return;
+    }
     for (int c = 0; c < 3; c++) {
         const double x[6] = {f->x[0][c], f->x[1][c], f->x[2][c], f->x[3][c], f->x[4][c], f->x[5][c]};
         aa[c] = f->count == 6 ? 4 * (x[0] + x[1] - 2 * x[3]) : 0;
@@ -171,7 +212,7 @@ static double distance_at(const surface *f, const double at[2])
 /* How far outside the face's own coordinates; < 0 within. */
 static double outside(int count, const double at[2])
 {
-    if (count == 4)
+    if (count % 4 == 0)
         return fmax(fabs(at[0]), fabs(at[1])) - 1;
     return fmax(fmax(-at[0], -at[1]), at[0] + at[1] - 1);
 }
@@ -184,7 +225,7 @@ static void newton_step(double step[2], const surface *f, const double at[2])
     combine(x, f, w);
     combine(ta, f, da);
     combine(tb, f, db);
-    second_derivatives(aa, ab, bb, f);
+    second_derivatives(aa, ab, bb, f, at);
     const double ga = dot(x, ta), gb = dot(x, tb);
     double haa = dot(ta, ta) + dot(x, aa), hab = dot(ta, tb) + dot(x, ab), hbb = dot(tb, tb) + dot(x, bb);
     if (!(haa > 0 && haa * hbb - hab * hab > 1e-6 * haa * hbb)) {
@@ -236,7 +277,7 @@ static void best_start(double at[2], const surface *f)
     for (int i = 0; i < starts; i++) {
         const int column = i % 3, line = i / 3;
         const double grid[2] = {0.7 * (column - 1), 0.7 * (line - 1)};
-        const double *start = f->count == 4 ? grid : TRIANGLE[i];
+        const double *start = f->count % 4 == 0 ? grid : TRIANGLE[i];
         const double d = distance_at(f, start);
         if (d < best) {
             best = d;
@@ -249,7 +290,7 @@ static void best_start(double at[2], const surface *f)
 
 int uz_face_corners(int dim, int count)
 {
-    return dim == 2 ? 2 : count == 4 ? 4 : 3;
+    return dim == 2 ? 2 : count % 4 == 0 ? 4 : 3;
 }
 
 static void set_normal(uz_foot *out, const double normal[3])
@@ -294,7 +335,7 @@ static double closest_on_border(uz_foot *out, const surface *f, double x[3])
     double best = INFINITY;
     for (int edge = 0; edge < corners; edge++) {
         const int next = (edge + 1) % corners;
-        const curve k = curve_of(f->x[edge], f->x[next], f->count == 6 ? f->x[3 + edge] : NULL, 3);
+        const curve k = curve_of(f->x[edge], f->x[next], f->count > corners ? f->x[corners + edge] : NULL, 3);
         double s = closest_on_curve(&k);
         s = s >= 1 - SNAP ? 1 : s <= -1 + SNAP ? -1 : s;
         const double distance = curve_distance(&k, s);

@@ -21,9 +21,9 @@ typedef struct {
 int uz_face_corners(int dim, int count);
 
 /* The point of the face closest to the origin. xyz: count x dim, nodes as uz_mesh_face gives them: edges of 2 or 3 in
- * 2D; triangles of 3 or 6, quadrilaterals of 4 in 3D. Curved faces are searched by Newton's method from the best of a
- * few samples: the closest point of faces that bend by less than a quarter turn. A foot within rounding of the face's
- * border is on it. */
+ * 2D; triangles of 3 or 6, quadrilaterals of 4 or 8 in 3D. Curved faces are searched by Newton's method from the best
+ * of a few samples: the closest point of faces that bend by less than a quarter turn. A foot within rounding of the
+ * face's border is on it. */
 void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz);
 
 #endif

@@ -58,6 +58,7 @@ static int closest_on(uz_foot *foot, const master *m, int64_t face, const double
 
 /* A face lies within the box of its Bezier points: its corners, and for each middle twice it less the mean of its
  * edge's ends (Farin, "Curves and Surfaces for CAGD", convex hull property). A bilinear face within that of its
+ * corners; one of eight nodes, as a biquadratic, has one more point: the sum of its middles less 3/4 that of its
  * corners. */
 static void box_of(double *box, const double *xyz, int dim, int count)
 {
@@ -71,6 +72,13 @@ static void box_of(double *box, const double *xyz, int dim, int count)
             const double v = i < corners ? x[i * dim] : 2 * x[i * dim] - 0.5 * (x[a * dim] + x[b * dim]);
             box[c] = fmin(box[c], v);
             box[dim + c] = fmax(box[dim + c], v);
+        }
+        double inner = 0;
+        for (int i = 0; i < count && count == 8; i++)
+            inner += (i < corners ? -0.75 : 1) * xyz[i * dim + c];
+        if (count == 8) {
+            box[c] = fmin(box[c], inner);
+            box[dim + c] = fmax(box[dim + c], inner);
         }
     }
 }

@@ -118,7 +118,7 @@ static uz_status add_springs(balance *b, double *share, int64_t s, uz_error *err
     const uz_support *support = &b->scene->supports[s];
     const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
     memset(share, 0, (size_t)mesh->n_nodes * sizeof *share);
-    uz_status status = group ? uz_spread_over_group(share, b->model, group, "/supports", err) : UZ_ERR_SCENE;
+    uz_status status = group ? uz_spread_over_group(share, b->model, group, true, "/supports", err) : UZ_ERR_SCENE;
     for (int64_t a = 0; a < mesh->n_nodes && status == UZ_OK; a++) {
         double f[DIM] = {0};
         for (int c = 0; c < b->dim; c++)
@@ -378,9 +378,17 @@ uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, cons
                             const double *r, uz_error *err)
 {
     balance b = {.model = model, .scene = scene, .u = u, .r = r, .out = out, .dim = model->mesh.dim};
+    double *force = model->row_ends ? uz_alloc(model->m, sizeof *force) : NULL;
     uz_status status = make_room(&b, err);
+    if (status == UZ_OK && model->row_ends && !force)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld contact rows", (long long)model->m);
+    if (status == UZ_OK && force) {
+        uz_row_forces(force, model, r);
+        b.r = force;
+    }
     if (status == UZ_OK)
         status = add_everything(&b, err);
+    free(force);
     free(b.load);
     free(b.contact);
     free(b.inner);
