@@ -3,13 +3,26 @@
 
 #include <string.h>
 
-extern const uz_element_type uz_type_tri3, uz_type_quad4, uz_type_tri6, uz_type_quad8, uz_type_tet4, uz_type_hex8,
-    uz_type_tet10;
+/* One row each; the order is that of uz_element_kind. */
+extern const uz_element_type uz_type_tri3;
+extern const uz_element_type uz_type_quad4;
+extern const uz_element_type uz_type_tri6;
+extern const uz_element_type uz_type_quad8;
+extern const uz_element_type uz_type_tet4;
+extern const uz_element_type uz_type_hex8;
+extern const uz_element_type uz_type_tet10;
 
+/* clang-format off */
 const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
-    [UZ_TRI3] = &uz_type_tri3, [UZ_QUAD4] = &uz_type_quad4, [UZ_TRI6] = &uz_type_tri6,   [UZ_QUAD8] = &uz_type_quad8,
-    [UZ_TET4] = &uz_type_tet4, [UZ_HEX8] = &uz_type_hex8,   [UZ_TET10] = &uz_type_tet10,
+    [UZ_TRI3] = &uz_type_tri3,
+    [UZ_QUAD4] = &uz_type_quad4,
+    [UZ_TRI6] = &uz_type_tri6,
+    [UZ_QUAD8] = &uz_type_quad8,
+    [UZ_TET4] = &uz_type_tet4,
+    [UZ_HEX8] = &uz_type_hex8,
+    [UZ_TET10] = &uz_type_tet10,
 };
+/* clang-format on */
 
 const char *uz_element_name(uz_element_kind kind)
 {
