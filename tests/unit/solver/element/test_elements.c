@@ -87,7 +87,8 @@ TEST(gauss_rules_have_their_degree)
                             const double weight = uz_element_gauss(at, k, model, g);
                             sum += weight * pow(at[0], p) * pow(at[1], q) * pow(at[2], r);
                         }
-                        CHECK(fabs(sum - monomial(k, p, q, r)) < 1e-15);
+                        CHECK(fabs(sum - monomial(k, p, q, r)) <
+                              (uz_element_gauss_count(k, model) > 9 ? 4e-15 : 1e-15));
                     }
         }
 }

@@ -304,3 +304,56 @@ TEST(partitioned_files)
     CHECK_INT(find_given(&mesh, "physical_9")->n_elements, 1);
     uz_given_mesh_clear(&mesh);
 }
+
+/* ---------------------------------------------------------------- orders of nodes */
+
+/* Elements as Gmsh's manual draws them ("Node ordering"): corners in its order, and the edges of the nodes behind. */
+static const struct {
+    int type;
+    uz_element_kind kind;
+    int corners, edges;
+    double corner[8][3];
+    int edge[12][2];
+} DRAWN[] = {
+    {4, UZ_TET4, 4, 0, {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0}}},
+    {11,
+     UZ_TET10,
+     4,
+     6,
+     {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+     {{0, 1}, {1, 2}, {2, 0}, {3, 0}, {2, 3}, {1, 3}}},
+    {5, UZ_HEX8, 8, 0, {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}, {{0}}},
+};
+
+TEST(nodes_come_in_the_order_of_vtk)
+{
+    for (size_t k = 0; k < sizeof DRAWN / sizeof DRAWN[0]; k++) {
+        char text[4096];
+        const int nodes = DRAWN[k].corners + DRAWN[k].edges;
+        int len = snprintf(text, sizeof text, "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n%d\n", nodes);
+        for (int a = 0; a < nodes; a++) {
+            double x[3];
+            const int *edge = DRAWN[k].edge[a < DRAWN[k].corners ? 0 : a - DRAWN[k].corners];
+            for (int c = 0; c < 3; c++)
+                x[c] = a < DRAWN[k].corners ? DRAWN[k].corner[a][c]
+                                            : 0.5 * (DRAWN[k].corner[edge[0]][c] + DRAWN[k].corner[edge[1]][c]);
+            len += snprintf(text + len, sizeof text - (size_t)len, "%d %g %g %g\n", a + 1, x[0], x[1], x[2]);
+        }
+        len += snprintf(text + len, sizeof text - (size_t)len, "$EndNodes\n$Elements\n1\n1 %d 0", DRAWN[k].type);
+        for (int a = 0; a < nodes; a++)
+            len += snprintf(text + len, sizeof text - (size_t)len, " %d", a + 1);
+        len += snprintf(text + len, sizeof text - (size_t)len, "\n$EndElements\n");
+        uz_given_mesh given;
+        uz_error err = {0};
+        CHECK_MSG(uz_gmsh_read(&given, text, (size_t)len, 0, &err) == UZ_OK, "%s", err.message);
+        CHECK_INT(given.kind ? given.kind[0] : -1, DRAWN[k].kind);
+        check_usable(&given, "boundary", uz_element_type_of(DRAWN[k].kind)->sides); /* and is not inverted */
+        for (int m = DRAWN[k].corners; m < nodes && given.node; m++) {
+            const int *end = uz_element_type_of(DRAWN[k].kind)->edge[m - DRAWN[k].corners];
+            for (int c = 0; c < 3; c++)
+                CHECK(given.xyz[3 * given.node[m] + c] ==
+                      0.5 * (given.xyz[3 * given.node[end[0]] + c] + given.xyz[3 * given.node[end[1]] + c]));
+        }
+        uz_given_mesh_clear(&given);
+    }
+}

@@ -2,8 +2,12 @@
 #include "theory.h"
 #include "core/random.h"
 
-static const char *const ELEMENTS[] = {"tri3", "quad4", "tri6", "quad8", "tet4", "hex8", "tet10"};
-enum { N_ELEMENTS = 7, FIRST_SOLID = 4 };
+enum { N_ELEMENTS = UZ_ELEMENT_KINDS };
+
+static bool is_solid(int element)
+{
+    return uz_element_dim((uz_element_kind)element) == 3;
+}
 
 static void clear(uz_scene *scene, uz_result *result)
 {
@@ -67,13 +71,14 @@ static void check_pressed(uz_model model, const char *element)
 TEST(a_uniform_pressure_is_found_on_every_side)
 {
     for (int i = 0; i < N_ELEMENTS; i++) {
-        if (i >= FIRST_SOLID) {
-            check_pressed(UZ_SOLID, ELEMENTS[i]);
+        const char *name = uz_element_name((uz_element_kind)i);
+        if (is_solid(i)) {
+            check_pressed(UZ_SOLID, name);
             continue;
         }
-        check_pressed(UZ_PLANE_STRESS, ELEMENTS[i]);
-        check_pressed(UZ_PLANE_STRAIN, ELEMENTS[i]);
-        check_pressed(UZ_AXISYMMETRIC, ELEMENTS[i]);
+        check_pressed(UZ_PLANE_STRESS, name);
+        check_pressed(UZ_PLANE_STRAIN, name);
+        check_pressed(UZ_AXISYMMETRIC, name);
     }
 }
 
@@ -85,9 +90,10 @@ static double between(uint64_t *random, double low, double high)
 /* Loads of all kinds, supports of all kinds, an oblique obstacle. */
 static uz_scene mixed(uint64_t *random, int element)
 {
-    const bool solid = element >= FIRST_SOLID;
+    const bool solid = is_solid(element);
+    const char *name = uz_element_name((uz_element_kind)element);
     const double size[3] = {3, 2, 1.5};
-    uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRAIN, ELEMENTS[element], size, (int64_t[3]){3, 2, 2});
+    uz_scene s = body_scene(solid ? UZ_SOLID : UZ_PLANE_STRAIN, name, size, (int64_t[3]){3, 2, 2});
     for (int c = 0; c < 3; c++)
         s.box.origin[c] = between(random, -50, 50);
     s.materials[0].young = 2e3;

@@ -27,7 +27,7 @@ static double *linear_motion(const uz_mesh *mesh, const double *G)
 /* nodes of the reference element, moved a little and scaled by `size`. */
 static void shake(double *xyz, uz_element_kind kind, uz_model model, double size)
 {
-    static const double SHIFT[10][3] = {
+    static const double SHIFT[UZ_ELEMENT_NODES][3] = {
         {0.03, -0.05, 0.02}, {-0.06, 0.04, 0.05}, {0.07, 0.02, -0.03}, {0.01, 0.06, 0.04}, {-0.02, 0.03, 0.05},
         {0.05, -0.04, 0.01}, {0.02, 0.05, -0.06}, {-0.03, 0.01, 0.02}, {0.02, 0.02, 0.01}, {0.01, -0.02, 0.03}};
     const int dim = uz_element_dim(kind), nodes = uz_element_node_count(kind);
@@ -156,13 +156,14 @@ TEST(a_ring_has_its_hoop_stress)
 /* Quadratic elements find a stress that is linear, at every node. */
 TEST(linear_stress_is_exact_in_quadratic_elements)
 {
-    static const uz_element_kind KINDS[] = {UZ_TRI6, UZ_QUAD8, UZ_TET10};
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < UZ_ELEMENT_KINDS; i++) {
         loose_body b;
-        const uz_model model = KINDS[i] == UZ_TET10 ? UZ_SOLID : UZ_PLANE_STRAIN;
-        loose_init(&b, KINDS[i], model, 2);
+        const uz_element_kind kind = (uz_element_kind)i;
+        if (uz_element_type_of(kind)->nodes == uz_element_type_of(kind)->corners)
+            continue;
+        loose_init(&b, kind, uz_element_dim(kind) == 3 ? UZ_SOLID : UZ_PLANE_STRAIN, 2);
         const int dim = b.model.mesh.dim, nodes = (int)b.model.mesh.n_nodes, k = b.body.components;
-        const double(*local)[3] = uz_element_local_nodes(KINDS[i]);
+        const double(*local)[3] = uz_element_local_nodes(kind);
         double *u = zeros(nodes * dim), *got = zeros(nodes * k), stress[6];
         for (int a = 0; a < nodes; a++) { /* straight sides: the reference element itself */
             for (int c = 0; c < dim; c++)
@@ -175,8 +176,8 @@ TEST(linear_stress_is_exact_in_quadratic_elements)
             hooke(stress, (double[6]){1e-3 * local[a][1], 0, 0, 0.5 * (1e-3 * local[a][0] - 1e-3 * local[a][0])}, 200e3,
                   0.3);
             for (int c = 0; c < k; c++)
-                CHECK_MSG(fabs(got[a * k + c] - stress[c]) <= 1e-10, "%s node %d: %d %g %g", uz_element_name(KINDS[i]),
-                          a, c, got[a * k + c], stress[c]);
+                CHECK_MSG(fabs(got[a * k + c] - stress[c]) <= 1e-10, "%s node %d: %d %g %g", uz_element_name(kind), a,
+                          c, got[a * k + c], stress[c]);
         }
         free(u);
         free(got);

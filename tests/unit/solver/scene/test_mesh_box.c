@@ -236,5 +236,5 @@ TEST(boxes_that_are_too_large_are_refused)
     check_refused("quad8", 2, 19999999, "/mesh/box/cells");
     check_refused("hex8", 2, 3, "/mesh/box/element");
     check_refused("tri3", 3, 3, "/mesh/box/element");
-    check_refused("hex20", 3, 3, "/mesh/box/element");
+    check_refused("hex27", 3, 3, "/mesh/box/element");
 }
