@@ -11,6 +11,7 @@ extern const uz_element_type uz_type_quad8;
 extern const uz_element_type uz_type_tet4;
 extern const uz_element_type uz_type_hex8;
 extern const uz_element_type uz_type_tet10;
+extern const uz_element_type uz_type_hex20;
 
 /* clang-format off */
 const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
@@ -21,6 +22,7 @@ const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
     [UZ_TET4] = &uz_type_tet4,
     [UZ_HEX8] = &uz_type_hex8,
     [UZ_TET10] = &uz_type_tet10,
+    [UZ_HEX20] = &uz_type_hex20,
 };
 /* clang-format on */
 

@@ -10,6 +10,7 @@ static const body_kind KINDS[] = {
     {UZ_PLANE_STRESS, "tri3"},  {UZ_PLANE_STRESS, "quad4"}, {UZ_PLANE_STRESS, "tri6"},  {UZ_PLANE_STRESS, "quad8"},
     {UZ_PLANE_STRAIN, "tri3"},  {UZ_PLANE_STRAIN, "quad8"}, {UZ_AXISYMMETRIC, "quad4"}, {UZ_AXISYMMETRIC, "tri6"},
     {UZ_AXISYMMETRIC, "quad8"}, {UZ_SOLID, "tet4"},         {UZ_SOLID, "hex8"},         {UZ_SOLID, "tet10"},
+    {UZ_SOLID, "hex20"},
 };
 enum { N_KINDS = sizeof KINDS / sizeof KINDS[0] };
 
@@ -292,9 +293,12 @@ TEST(internal_forces_balance)
         double *inner = body_room(x->n_nodes * dim, sizeof *inner), *outer = body_room(x->n_nodes * dim, sizeof *outer);
         CHECK(uz_internal_forces(inner, &model, x->u, NULL) == UZ_OK);
         CHECK(uz_nodal_loads(outer, &model, &s, NULL) == UZ_OK);
+        double *force = body_room(x->m, sizeof *force);
+        uz_row_forces(force, &model, x->r);
         for (int64_t i = 0; i < x->m; i++)
             for (int c = 0; c < dim; c++)
-                outer[x->mesh.contact_node[i] * dim + c] -= x->r[i] * x->mesh.contact_normal[i * dim + c];
+                outer[x->mesh.contact_node[i] * dim + c] -= force[i] * x->mesh.contact_normal[i * dim + c];
+        free(force);
         const double most = body_most(outer, x->n_nodes * dim);
         for (int64_t i = 0; i < x->n_nodes * dim; i++)
             if (model.dof[i] >= 0)

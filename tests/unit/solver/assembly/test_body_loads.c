@@ -223,8 +223,8 @@ TEST(springs_at_inclined_supports)
 /* A column hung at its top, or pressed by its own weight: exact at the nodes of a column of linear elements. */
 TEST(gravity_column_of_two_materials)
 {
-    static const char *const elements[] = {"quad4", "tri6", "quad8", "hex8", "tet10"};
-    for (int k = 0; k < 5; k++) {
+    static const char *const elements[] = {"quad4", "tri6", "quad8", "hex8", "tet10", "hex20"};
+    for (int k = 0; k < 6; k++) {
         const uz_model model = k < 3 ? UZ_PLANE_STRESS : UZ_SOLID;
         uz_scene s = body_scene(model, elements[k], (double[3]){1, 8, 1}, (int64_t[3]){1, 8, 1});
         const double E = 1000, rho[2] = {0.5, 2}, g = 10;

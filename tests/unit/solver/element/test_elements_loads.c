@@ -235,6 +235,25 @@ TEST(sides_have_their_textbook_weights)
     CHECK_REL(vector[1], -TAU * 2, 1e-14); /* the ring is above: outward is down */
 }
 
+/* A square of eight nodes: weights of a constant traction -A/12 at corners and A/3 between (Zienkiewicz and Taylor,
+ * vol. 1), the first row of the mass A/180 (6, 2, 3, 2, -6, -8, -8, -6), and weights that are positive. */
+TEST(face_of_eight_nodes_has_known_weights)
+{
+    const double square[24] = {0, 0, 1, 2, 0, 1, 2, 2, 1, 0, 2, 1, 1, 0, 1, 2, 1, 1, 1, 2, 1, 0, 1, 1}; /* area 4 */
+    const double row[8] = {6, 2, 3, 2, -6, -8, -8, -6};
+    const uz_side side = {3, 8, UZ_SOLID, 0, square};
+    double w[8], M[64];
+    uz_side_weights(w, &side);
+    uz_side_mass(M, &side);
+    for (int a = 0; a < 8; a++) {
+        CHECK_REL(w[a], a < 4 ? -4. / 12 : 4. / 3, 1e-14);
+        CHECK_REL(M[a], 4. / 180 * row[a], 1e-13);
+    }
+    uz_side_positive_weights(w, &side);
+    for (int a = 0; a < 8; a++)
+        CHECK_REL(w[a], a < 4 ? 4. / 20 : 4. / 5, 1e-14);
+}
+
 /* The shape functions of a side are those of its element there. */
 TEST(sides_are_their_elements_sides)
 {

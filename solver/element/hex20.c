@@ -1,0 +1,78 @@
+/* hex20.c: the hexahedron of 20 nodes of the serendipity family.
+ *
+ * Shape functions: Zienkiewicz and Taylor, "The Finite Element Method", vol. 1, section on serendipity elements. Its
+ * stiffness is integrated by 3 x 3 x 3 points: 2 x 2 x 2 leave six motions beside the rigid ones without stiffness
+ * (CalculiX has that rule as C3D20R). */
+#include "element/reference.h"
+
+static const double LOCAL[20][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, 1},
+                                    {1, -1, 1},   {1, 1, 1},   {-1, 1, 1}, {0, -1, -1}, {1, 0, -1},
+                                    {0, 1, -1},   {-1, 0, -1}, {0, -1, 1}, {1, 0, 1},   {0, 1, 1},
+                                    {-1, 0, 1},   {-1, -1, 0}, {1, -1, 0}, {1, 1, 0},   {-1, 1, 0}};
+static const int EDGE[12][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6},
+                                {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
+static const int GMSH[20] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15};
+
+/* Corners: product of (1 + p_i x_i) / 8 times (sum of p_i x_i - 2); middles: (1 - x_k^2) / 4 times that of the other
+ * two axes, k being the one along which p_k = 0. */
+static void shape(double *N, const double point[3])
+{
+    for (int a = 0; a < 20; a++) {
+        double product = a < 8 ? 0.125 : 0.25, sum = -2;
+        for (int i = 0; i < 3; i++) {
+            const double p = LOCAL[a][i], x = point[i];
+            product *= p == 0 ? (1 - x) * (1 + x) : 1 + p * x;
+            sum += p * x;
+        }
+        N[a] = a < 8 ? product * sum : product;
+    }
+}
+
+static void gradients(double (*local)[3], const double point[3])
+{
+    for (int a = 0; a < 20; a++) {
+        double factor[3], sum = -2;
+        for (int i = 0; i < 3; i++) {
+            const double p = LOCAL[a][i], x = point[i];
+            factor[i] = p == 0 ? (1 - x) * (1 + x) : 1 + p * x;
+            sum += p * x;
+        }
+        for (int i = 0; i < 3; i++) {
+            const double p = LOCAL[a][i], others = factor[(i + 1) % 3] * factor[(i + 2) % 3];
+            if (a < 8)
+                local[a][i] = 0.125 * p * others * (sum + factor[i]);
+            else
+                local[a][i] = 0.25 * others * (p == 0 ? -2 * point[i] : p);
+        }
+    }
+}
+
+static double gauss(double point[3], int g)
+{
+    return uz_gauss_line3(&point[0], g % 3) * uz_gauss_line3(&point[1], g / 3 % 3) * uz_gauss_line3(&point[2], g / 9);
+}
+
+const uz_element_type uz_type_hex20 = {
+    .name = "hex20",
+    .dim = 3,
+    .nodes = 20,
+    .corners = 8,
+    .sides = 6,
+    .side = {{8, 4, {0, 4, 7, 3, 16, 15, 19, 11}},
+             {8, 4, {1, 2, 6, 5, 9, 18, 13, 17}},
+             {8, 4, {0, 1, 5, 4, 8, 17, 12, 16}},
+             {8, 4, {3, 7, 6, 2, 19, 14, 18, 10}},
+             {8, 4, {0, 3, 2, 1, 11, 10, 9, 8}},
+             {8, 4, {4, 5, 6, 7, 12, 13, 14, 15}}},
+    .edge = EDGE,
+    .linear = UZ_HEX8,
+    .local = LOCAL,
+    .shape = shape,
+    .gradients = gradients,
+    .rule = {27, gauss},
+    .recover = uz_recover_box,
+    .vtk = 25,
+    .gmsh = 17,
+    .gmsh_node = GMSH,
+    .abaqus = {NULL, NULL, NULL, "C3D20"},
+};
