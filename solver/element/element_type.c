@@ -12,6 +12,7 @@ extern const uz_element_type uz_type_tet4;
 extern const uz_element_type uz_type_hex8;
 extern const uz_element_type uz_type_tet10;
 extern const uz_element_type uz_type_hex20;
+extern const uz_element_type uz_type_wedge6;
 
 /* clang-format off */
 const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
@@ -23,6 +24,7 @@ const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
     [UZ_HEX8] = &uz_type_hex8,
     [UZ_TET10] = &uz_type_tet10,
     [UZ_HEX20] = &uz_type_hex20,
+    [UZ_WEDGE6] = &uz_type_wedge6,
 };
 /* clang-format on */
 

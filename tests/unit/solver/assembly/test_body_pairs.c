@@ -123,6 +123,7 @@ TEST(two_blocks_pressed_are_one)
     check_pressed(UZ_SOLID, "hex8");
     check_pressed(UZ_SOLID, "tet4");
     check_pressed(UZ_SOLID, "hex20");
+    check_pressed(UZ_SOLID, "wedge6");
     check_pressed(UZ_PLANE_STRESS, "quad8");
 }
 

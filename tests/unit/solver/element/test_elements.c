@@ -62,17 +62,19 @@ static double monomial(uz_element_kind kind, int p, int q, int r)
     const int dim = uz_element_dim(kind);
     if (corner_count(kind) == dim + 1) /* p! q! r! / (p + q + r + dim)! */
         return tgamma(p + 1) * tgamma(q + 1) * tgamma(r + 1) / tgamma(p + q + r + dim + 1);
-    double product = 1;
+    const bool wedge = corner_count(kind) == 6; /* a triangle times a line */
+    double product = wedge ? tgamma(p + 1) * tgamma(q + 1) / tgamma(p + q + 3) : 1;
     const int power[3] = {p, q, r};
-    for (int c = 0; c < dim; c++)
+    for (int c = wedge ? 2 : 0; c < dim; c++)
         product *= power[c] % 2 ? 0 : 2.0 / (power[c] + 1);
     return product;
 }
 
 TEST(gauss_rules_have_their_degree)
 {
-    static const int DEGREE[UZ_ELEMENT_KINDS] = {[UZ_TRI3] = 1, [UZ_QUAD4] = 3, [UZ_TRI6] = 2,  [UZ_QUAD8] = 5,
-                                                 [UZ_TET4] = 1, [UZ_HEX8] = 3,  [UZ_TET10] = 2, [UZ_HEX20] = 5};
+    static const int DEGREE[UZ_ELEMENT_KINDS] = {
+        [UZ_TRI3] = 1, [UZ_QUAD4] = 3, [UZ_TRI6] = 2,  [UZ_QUAD8] = 5, [UZ_TET4] = 1,
+        [UZ_HEX8] = 3, [UZ_TET10] = 2, [UZ_HEX20] = 5, [UZ_WEDGE6] = 2};
     for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
         for (int ring = 0; ring < 2; ring++) {
             const uz_element_kind k = (uz_element_kind)kind;

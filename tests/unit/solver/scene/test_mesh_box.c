@@ -54,6 +54,8 @@ static double volume_of(const uz_mesh *mesh, int64_t e)
         return simplex(mesh, node, 1, 2, 0) + simplex(mesh, node, 2, 3, 0);
     if (corners == 4)
         return simplex(mesh, node, 1, 2, 3);
+    if (corners == 6) /* from node 0 to the triangle and to the rectangle that it is not on */
+        return simplex(mesh, node, 3, 5, 4) + simplex(mesh, node, 2, 1, 4) + simplex(mesh, node, 2, 4, 5);
     for (int k = 0; k < 6; k++)
         sum += simplex(mesh, node, AROUND[k][0], AROUND[k][1], 6);
     return sum;
@@ -164,6 +166,7 @@ TEST(boxes_of_every_element)
         check_box("quad8", 2, 7 * 5 - 6, 6, g);
         check_box("tri6", 2, 35, 12, g);
         check_box("hex8", 3, 60, 24, g);
+        check_box("wedge6", 3, 60, 48, g);
         check_box("hex20", 3, 60 + 3 * 3 * 5 + 4 * 2 * 5 + 4 * 3 * 4, 24, g);
         check_box("tet4", 3, 60, 144, g);
         check_box("tet10", 3, 7 * 5 * 9, 144, g);
