@@ -13,6 +13,7 @@ extern const uz_element_type uz_type_hex8;
 extern const uz_element_type uz_type_tet10;
 extern const uz_element_type uz_type_hex20;
 extern const uz_element_type uz_type_wedge6;
+extern const uz_element_type uz_type_wedge15;
 
 /* clang-format off */
 const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
@@ -25,6 +26,7 @@ const uz_element_type *const uz_element_types[UZ_ELEMENT_KINDS] = {
     [UZ_TET10] = &uz_type_tet10,
     [UZ_HEX20] = &uz_type_hex20,
     [UZ_WEDGE6] = &uz_type_wedge6,
+    [UZ_WEDGE15] = &uz_type_wedge15,
 };
 /* clang-format on */
 

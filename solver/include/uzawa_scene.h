@@ -23,7 +23,19 @@ typedef enum {
 } uz_formulation;
 
 /* Nodes of each in VTK order. Everything else about a type of element is in its descriptor (element/element_type.h). */
-typedef enum { UZ_TRI3, UZ_QUAD4, UZ_TRI6, UZ_QUAD8, UZ_TET4, UZ_HEX8, UZ_TET10, UZ_HEX20, UZ_WEDGE6, UZ_ELEMENT_KINDS } uz_element_kind;
+typedef enum {
+    UZ_TRI3,
+    UZ_QUAD4,
+    UZ_TRI6,
+    UZ_QUAD8,
+    UZ_TET4,
+    UZ_HEX8,
+    UZ_TET10,
+    UZ_HEX20,
+    UZ_WEDGE6,
+    UZ_WEDGE15,
+    UZ_ELEMENT_KINDS
+} uz_element_kind;
 const char *uz_element_name(uz_element_kind kind); /* "quad4"; never NULL */
 bool uz_element_parse(uz_element_kind *out, const char *name);
 int uz_element_dim(uz_element_kind kind);        /* 2 or 3 */

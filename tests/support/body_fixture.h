@@ -185,16 +185,16 @@ static inline void body_give_mesh(uz_scene *scene, body_map map)
 /* Puts the nodes between two corners of quadratic elements in their middles, where a map has bent the edges. */
 static inline void body_straighten(uz_scene *scene)
 {
-    static const int edge[6][2] = {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}};
     uz_given_mesh *g = &scene->given;
     for (int64_t e = 0; e < g->n_elements; e++) {
         const uz_element_kind kind = (uz_element_kind)g->kind[e];
         const int64_t *node = g->node + g->first[e];
-        const int corners = kind == UZ_TRI6 ? 3 : kind == UZ_QUAD8 || kind == UZ_TET10 ? 4 : 0;
-        const int middles = corners > 0 ? uz_element_node_count(kind) - corners : 0;
+        const uz_element_type *type = uz_element_type_of(kind);
+        const int corners = type->corners;
+        const int middles = type->nodes - corners;
         for (int i = 0; i < middles * g->dim; i++) {
             const int k = i / g->dim, c = i % g->dim;
-            const int from = kind == UZ_QUAD8 ? k : edge[k][0], to = kind == UZ_QUAD8 ? (k + 1) % 4 : edge[k][1];
+            const int from = type->edge[k][0], to = type->edge[k][1];
             g->xyz[node[corners + k] * g->dim + c] =
                 0.5 * (g->xyz[node[from] * g->dim + c] + g->xyz[node[to] * g->dim + c]);
         }

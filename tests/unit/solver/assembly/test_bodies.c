@@ -10,7 +10,7 @@ static const body_kind KINDS[] = {
     {UZ_PLANE_STRESS, "tri3"},  {UZ_PLANE_STRESS, "quad4"}, {UZ_PLANE_STRESS, "tri6"},  {UZ_PLANE_STRESS, "quad8"},
     {UZ_PLANE_STRAIN, "tri3"},  {UZ_PLANE_STRAIN, "quad8"}, {UZ_AXISYMMETRIC, "quad4"}, {UZ_AXISYMMETRIC, "tri6"},
     {UZ_AXISYMMETRIC, "quad8"}, {UZ_SOLID, "tet4"},         {UZ_SOLID, "hex8"},         {UZ_SOLID, "tet10"},
-    {UZ_SOLID, "hex20"},        {UZ_SOLID, "wedge6"},
+    {UZ_SOLID, "hex20"},        {UZ_SOLID, "wedge6"},       {UZ_SOLID, "wedge15"},
 };
 enum { N_KINDS = sizeof KINDS / sizeof KINDS[0] };
 

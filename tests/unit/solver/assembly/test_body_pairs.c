@@ -124,6 +124,7 @@ TEST(two_blocks_pressed_are_one)
     check_pressed(UZ_SOLID, "tet4");
     check_pressed(UZ_SOLID, "hex20");
     check_pressed(UZ_SOLID, "wedge6");
+    check_pressed(UZ_SOLID, "wedge15");
     check_pressed(UZ_PLANE_STRESS, "quad8");
 }
 
@@ -159,7 +160,8 @@ TEST(blocks_of_other_meshes)
         int64_t cells, cells_above;
     } kinds[] = {{UZ_PLANE_STRESS, "quad4", "tri6", 3, 5}, {UZ_PLANE_STRAIN, "quad8", "quad4", 4, 7},
                  {UZ_SOLID, "hex8", "tet4", 2, 3},         {UZ_SOLID, "tet10", "hex8", 2, 4},
-                 {UZ_SOLID, "hex20", "tet10", 2, 3},       {UZ_SOLID, "hex8", "hex20", 3, 2}};
+                 {UZ_SOLID, "hex20", "tet10", 2, 3},       {UZ_SOLID, "hex8", "hex20", 3, 2},
+                 {UZ_SOLID, "wedge15", "wedge6", 2, 3}};
     for (int k = 0; k < 4; k++) {
         uz_scene s = stack(kinds[k].model, kinds[k].below, kinds[k].above, kinds[k].cells, kinds[k].cells_above);
         hold_sides(&s, 'a');

@@ -73,8 +73,8 @@ static double monomial(uz_element_kind kind, int p, int q, int r)
 TEST(gauss_rules_have_their_degree)
 {
     static const int DEGREE[UZ_ELEMENT_KINDS] = {
-        [UZ_TRI3] = 1, [UZ_QUAD4] = 3, [UZ_TRI6] = 2,  [UZ_QUAD8] = 5, [UZ_TET4] = 1,
-        [UZ_HEX8] = 3, [UZ_TET10] = 2, [UZ_HEX20] = 5, [UZ_WEDGE6] = 2};
+        [UZ_TRI3] = 1, [UZ_QUAD4] = 3, [UZ_TRI6] = 2,  [UZ_QUAD8] = 5,  [UZ_TET4] = 1,
+        [UZ_HEX8] = 3, [UZ_TET10] = 2, [UZ_HEX20] = 5, [UZ_WEDGE6] = 2, [UZ_WEDGE15] = 2};
     for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
         for (int ring = 0; ring < 2; ring++) {
             const uz_element_kind k = (uz_element_kind)kind;

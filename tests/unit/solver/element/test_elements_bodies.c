@@ -34,6 +34,7 @@ TEST(quadratic_elements_follow_the_tube)
     CHECK_REL(tube(UZ_TRI6, UZ_PLANE_STRAIN, s, 0.3), 1.0, 1e-3);
     CHECK_REL(tube(UZ_TET10, UZ_SOLID, s, 0.3), 1.0, 2e-3);
     CHECK_REL(tube(UZ_HEX20, UZ_SOLID, s, 0.3), 1.0, 1e-4);
+    CHECK_REL(tube(UZ_WEDGE15, UZ_SOLID, s, 0.3), 1.0, 1e-3);
     CHECK_REL(tube(UZ_QUAD8, UZ_AXISYMMETRIC, s, 0.3), 1.0, 1e-4);
     CHECK_REL(tube(UZ_TRI6, UZ_AXISYMMETRIC, s, 0.3), 1.0, 1e-3);
     CHECK_REL(tube(UZ_TRI3, UZ_AXISYMMETRIC, s, 0.3), 1.0, 2e-2);
@@ -78,6 +79,7 @@ TEST(one_layer_bends_with_incompatible_modes)
     CHECK_REL(beam(UZ_TRI6, UZ_FORMULATION_STANDARD, true), 1.0, 1e-10);
     CHECK_REL(beam(UZ_TET10, UZ_FORMULATION_STANDARD, true), 1.0, 1e-10);
     CHECK_REL(beam(UZ_HEX20, UZ_FORMULATION_STANDARD, true), 1.0, 1e-10);
+    CHECK_REL(beam(UZ_WEDGE15, UZ_FORMULATION_STANDARD, true), 1.0, 1e-10);
     CHECK_REL(beam(UZ_HEX20, UZ_FORMULATION_STANDARD, false), 1.0, 2e-2);
     CHECK(beam(UZ_QUAD4, UZ_FORMULATION_STANDARD, true) < 0.8);
     CHECK(beam(UZ_HEX8, UZ_FORMULATION_STANDARD, true) < 0.8);

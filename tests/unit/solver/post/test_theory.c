@@ -30,6 +30,7 @@ TEST(hertz_point_in_space)
     theory_table t = {.count = 0};
     theory_hertz(&t, UZ_SOLID, "hex8", 4, 1.7);
     theory_hertz(&t, UZ_SOLID, "hex20", 3, 1.8);
+    theory_hertz(&t, UZ_SOLID, "wedge15", 3, 1.8);
     check_all(&t, 0.15);
 }
 

@@ -167,6 +167,7 @@ TEST(boxes_of_every_element)
         check_box("tri6", 2, 35, 12, g);
         check_box("hex8", 3, 60, 24, g);
         check_box("wedge6", 3, 60, 48, g);
+        check_box("wedge15", 3, 7 * 5 * 5 + 60 / 5 * 4, 48, g);
         check_box("hex20", 3, 60 + 3 * 3 * 5 + 4 * 2 * 5 + 4 * 3 * 4, 24, g);
         check_box("tet4", 3, 60, 144, g);
         check_box("tet10", 3, 7 * 5 * 9, 144, g);

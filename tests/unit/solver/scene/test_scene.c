@@ -58,7 +58,7 @@ TEST(box_is_checked)
     REFUSED((s.box.size[0] = 1.7e308, s.box.origin[0] = 1.7e308), UZ_ERR_NOT_FINITE, "/mesh/box/size/0", "largest");
     REFUSED(s.box.origin[1] = 1e18, UZ_ERR_SCENE, "/mesh/box/origin/1", "told apart");
     REFUSED(memcpy(s.box.element, "hex8", 5), UZ_ERR_SCENE, "/mesh/box/element", "quad4");
-    REFUSED(s.box.dim = 3, UZ_ERR_SCENE, "/mesh/box/element", "hex8, hex20, tet4, tet10 or wedge6");
+    REFUSED(s.box.dim = 3, UZ_ERR_SCENE, "/mesh/box/element", "hex8, hex20, tet4, tet10, wedge6 or wedge15");
     REFUSED(s.box.dim = 4, UZ_ERR_SCENE, "/mesh/box/size", "dimensions");
     REFUSED(s.box.grading[1] = -1, UZ_ERR_SCENE, "/mesh/box/grading/1", "positive");
     REFUSED(s.box.grading[0] = (double)INFINITY, UZ_ERR_NOT_FINITE, "/mesh/box/grading/0", "finite");
