@@ -167,7 +167,7 @@ static bool read_gmsh(uz_given_mesh *to, decoding *d, const json_value *gmsh)
     decode_source file;
     if (!decode_source_open(&file, d, gmsh))
         return false;
-    const bool good = uz_gmsh_read(to, file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
+    const bool good = uz_mesh_read(to, "gmsh", file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
     decode_source_close(&file);
     snprintf(err.where, sizeof err.where, "/mesh/gmsh");
     return good || decode_refuse_text(d, gmsh, &err, UZ_PROBLEM_SCENE);

@@ -82,6 +82,10 @@ void uz_given_mesh_clear(uz_given_mesh *mesh);
  * _NOT_FINITE, _LIMIT with the line (of a binary file the message says the byte), _MEMORY.
  * Source: Gmsh reference manual, section "Gmsh file formats". */
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
+/* The same of a file in any format that there is a reader for (io/mesh_reader.h): "gmsh"; NULL: by what it looks like.
+ * UZ_ERR_UNSUPPORTED: there is none. */
+uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
+                       uz_error *err);
 
 typedef struct {
     char on[64];

@@ -1,5 +1,6 @@
 /* gmsh.c: a whole Gmsh file, and the mesh that it is. */
 #include "io/gmsh.h"
+#include "io/mesh_reader.h"
 
 #include "core/alloc.h"
 #include "core/error.h"
@@ -233,6 +234,17 @@ uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file)
         status = gmsh_make_groups(out, file, dim, new_element);
     free(new_element);
     return status;
+}
+
+bool uz_gmsh_recognises(const char *text, size_t len)
+{
+    static const char *const FIRST[] = {"$MeshFormat", "$Comments", "$NOD" /* version 1, which is refused */};
+    for (; len > 0 && strchr(" \t\r\n", *text) && *text; len--)
+        text++;
+    for (size_t i = 0; i < sizeof FIRST / sizeof FIRST[0]; i++)
+        if (len >= strlen(FIRST[i]) && memcmp(text, FIRST[i], strlen(FIRST[i])) == 0)
+            return true;
+    return false;
 }
 
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err)

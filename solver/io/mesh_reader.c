@@ -1,0 +1,30 @@
+#include "io/mesh_reader.h"
+
+#include "core/error.h"
+
+#include <string.h>
+
+static const uz_mesh_reader READERS[] = {
+    {"gmsh", uz_gmsh_recognises, uz_gmsh_read},
+};
+
+const uz_mesh_reader *uz_mesh_reader_find(const char *format, const char *text, size_t len)
+{
+    for (size_t i = 0; i < sizeof READERS / sizeof READERS[0]; i++)
+        if (format ? strcmp(READERS[i].name, format) == 0 : READERS[i].recognises(text, len))
+            return &READERS[i];
+    return NULL;
+}
+
+uz_status uz_mesh_read(uz_given_mesh *out, const char *format, const char *text, size_t len, size_t max_bytes,
+                       uz_error *err)
+{
+    const uz_mesh_reader *reader = uz_mesh_reader_find(format, text, len);
+    uz_error_reset(err);
+    memset(out, 0, sizeof *out);
+    if (reader)
+        return reader->read(out, text, len, max_bytes, err);
+    if (format)
+        return uz_fail(err, UZ_ERR_UNSUPPORTED, "", "meshes of the format \"%.32s\" are not read", format);
+    return uz_fail(err, UZ_ERR_UNSUPPORTED, "", "the file looks like no mesh format that is read");
+}

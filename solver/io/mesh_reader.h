@@ -1,0 +1,27 @@
+/* mesh_reader.h: the file formats that a mesh is read from, one row each of the table in mesh_reader.c. To add one:
+ * docs/architecture/mesh-reader.md. */
+#ifndef UZ_IO_MESH_READER_H
+#define UZ_IO_MESH_READER_H
+
+#include "uzawa.h"
+
+typedef struct {
+    const char *name; /* as uz_mesh_read is asked for it: "gmsh" */
+    /* Does a file that begins like this have the format? Looks at no more than it needs, and never fails. */
+    bool (*recognises)(const char *text, size_t len);
+    /* Reads a whole file.
+     * out        the mesh, for uz_given_mesh_clear; empty on failure. Elements have VTK's order of nodes (a descriptor
+     *            of element/element_type.h has that of the format), nodes and elements are numbered from 0 in the order
+     * of the file, named parts are groups, and from_file is set. text, len  the bytes; they may be anything, and counts
+     * in them are not to be trusted max_bytes  bounds what the mesh may take; 0: no bound Errors: UZ_ERR_FORMAT,
+     * _UNSUPPORTED, _NOT_FINITE, _LIMIT with the line, _MEMORY. */
+    uz_status (*read)(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
+} uz_mesh_reader;
+
+/* The reader of that name; NULL: by what the file looks like. NULL if there is none. */
+const uz_mesh_reader *uz_mesh_reader_find(const char *format, const char *text, size_t len);
+
+/* Rows of the table. */
+bool uz_gmsh_recognises(const char *text, size_t len);
+
+#endif
