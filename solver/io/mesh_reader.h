@@ -9,12 +9,11 @@ typedef struct {
     const char *name; /* as uz_mesh_read is asked for it: "gmsh" */
     /* Does a file that begins like this have the format? Looks at no more than it needs, and never fails. */
     bool (*recognises)(const char *text, size_t len);
-    /* Reads a whole file.
-     * out        the mesh, for uz_given_mesh_clear; empty on failure. Elements have VTK's order of nodes (a descriptor
-     *            of element/element_type.h has that of the format), nodes and elements are numbered from 0 in the order
-     * of the file, named parts are groups, and from_file is set. text, len  the bytes; they may be anything, and counts
-     * in them are not to be trusted max_bytes  bounds what the mesh may take; 0: no bound Errors: UZ_ERR_FORMAT,
-     * _UNSUPPORTED, _NOT_FINITE, _LIMIT with the line, _MEMORY. */
+    /* Reads a whole file. `text` may be anything, and counts in it are not to be trusted; max_bytes bounds what the
+     * mesh may take (0: no bound). *out is for uz_given_mesh_clear, and empty on failure: elements have VTK's order of
+     * nodes (the descriptors of element/element_type.h have that of the format), nodes and elements are numbered from 0
+     * in the order of the file, named parts are groups, and from_file is set. Errors: UZ_ERR_FORMAT, _UNSUPPORTED,
+     * _NOT_FINITE and _LIMIT with the line, _MEMORY. */
     uz_status (*read)(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err);
 } uz_mesh_reader;
 
