@@ -164,10 +164,11 @@ size_t json_text_characters(const json_value *string)
             count += ((unsigned char)string->text[i] & 0xc0) != 0x80;
         return count;
     }
-    for (const char *at = string->text; *at != '"'; count++) {
+    for (const char *at = string->text; *at != '"';) {
         unsigned code;
         const char *why;
-        at += *at == '\\' ? read_escape(at, 12, &code, &why) : json_utf8_length(at, 4);
+        count += ((unsigned char)*at & 0xc0) != 0x80;
+        at += *at == '\\' ? read_escape(at, 12, &code, &why) : 1;
     }
     return count;
 }
