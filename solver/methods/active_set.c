@@ -26,7 +26,8 @@ enum { PATIENCE = 3, MAX_STEPS = 400, EXTRA_STEPS = 12, FEW_ROWS = 1024 };
 typedef enum { GUESS, EXCHANGE, N_MOVES } move;
 
 typedef struct {
-    bool *active; /* m: the current guess */
+    bool *active;  /* m: the current guess */
+    bool *refuted; /* m: rows whose part of it is wrong */
     uz_active_end solved;
     double *r; /* m: its solution, signs unchecked */
     double *g; /* m: its gaps */
@@ -40,45 +41,38 @@ static bool allocate(pivoting *p, int64_t m)
 {
     memset(p, 0, sizeof *p);
     p->active = uz_alloc_zero(m, sizeof(bool));
+    p->refuted = uz_alloc_zero(m, sizeof(bool));
     p->r = uz_alloc_zero(m, sizeof(double));
     p->g = uz_alloc_zero(m, sizeof(double));
     p->fewest = m + 1;
     p->patience = PATIENCE;
     p->rate[EXCHANGE] = FAIR_RATE;
-    return p->active && p->r && p->g;
+    return p->active && p->refuted && p->r && p->g;
 }
 
 static void release(pivoting *p)
 {
     free(p->active);
+    free(p->refuted);
     free(p->r);
     free(p->g);
 }
 
 /* From the start: the operator's own guess, where it has one. Else the rows that a projected gradient step would leave
- * in contact. */
+ * in contact; of those without a reaction all that penetrate, as there may be no step size yet. */
 static void guess(pivoting *p, const uz_iterate *it, uz_dual_load *load)
 {
+    const uz_law *law = it->law;
     const double *g0 = load->g0;
     if (it->iteration == 0 && !it->warm && uz_dual_load_guess_active(load, p->active))
         return;
-    for (int64_t i = 0; i < it->m; i++) {
-        double gap = g0[i] - it->Dr[i];
-        p->active[i] = it->r[i] < 0.0 ? it->r[i] + it->alpha * gap < 0.0 : gap < 0.0;
-    }
-}
-
-static bool is_wrong(const pivoting *p, int64_t i)
-{
-    return p->active[i] ? p->r[i] > 0.0 : p->g[i] < 0.0;
-}
-
-static int64_t count_wrong(pivoting *p, int64_t m)
-{
-    int64_t wrong = 0;
-    for (int64_t i = 0; i < m; i++)
-        wrong += is_wrong(p, i);
-    return wrong;
+    for (int64_t i = 0; i < it->m; i++)
+        p->g[i] = g0[i] - it->Dr[i];
+    law->kind->active(law, p->active, it->r, it->m);
+    law->kind->predict(law, it->close, it->r, p->g, it->alpha, it->m);
+    law->kind->penetration(law, p->r, p->g, it->m);
+    for (int64_t i = 0; i < it->m; i++)
+        p->active[i] = p->active[i] ? it->close[i] : p->r[i] > 0.0;
 }
 
 /* How far the last move brought the number of wrong rows down. */
@@ -103,7 +97,7 @@ static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
         return;
     }
     for (int64_t i = m - 1; i >= 0; i--) {
-        if (!is_wrong(p, i))
+        if (!p->refuted[i])
             continue;
         p->active[i] = !p->active[i];
         if (!all)
@@ -111,17 +105,17 @@ static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
     }
 }
 
-/* The guess's answer as an iterate: r <= 0, D r, and the bound on it. */
+/* The guess's answer as an iterate: r, projected, D r, and the bound on it. */
 static uz_status take(uz_iterate *it, const pivoting *p, uz_dual_load *load, uz_error *err)
 {
     const double *g0 = load->g0;
-    bool cut = false;
+    bool admissible = it->law->kind->admissible(it->law, p->r, it->m);
     for (int64_t i = 0; i < it->m; i++) {
-        cut = cut || p->r[i] > 0.0;
-        it->r[i] = fmin(0.0, p->r[i]);
+        it->r[i] = p->r[i];
         it->Dr[i] = g0[i] - p->g[i];
     }
-    uz_status status = cut ? uz_dual_load_apply(load, it->Dr, it->r, err) : UZ_OK;
+    it->law->kind->project(it->law, it->r, it->m);
+    uz_status status = admissible ? UZ_OK : uz_dual_load_apply(load, it->Dr, it->r, err);
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     it->tau = 1.0;
@@ -155,7 +149,7 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
     uz_stop stop = {options->hooks, options->deadline};
     uz_exchange_end exchanged;
     int64_t n = options->max_iterations - it->iteration;
-    uz_status status = uz_exchange_run(&exchanged, &n, p->r, p->g, it->ray, p->active, NULL, load, &stop, err);
+    uz_status status = uz_exchange_run(&exchanged, &n, p->r, p->g, it->ray, p->active, NULL, it->law, load, &stop, err);
     if (status != UZ_OK)
         return status;
     *end = ends[exchanged];
@@ -176,7 +170,7 @@ static uz_status step(pivoting *p, bool *over, uz_end *end, uz_iterate *it, uz_d
     *over = p->solved != UZ_ACTIVE_SOLVED;
     if (status != UZ_OK || *over)
         return status; /* too little time is found by whoever goes on */
-    p->wrong = count_wrong(p, it->m);
+    p->wrong = it->law->kind->refute(it->law, p->refuted, p->active, p->r, p->g, it->m);
     status = take(it, p, load, err);
     if (status == UZ_OK)
         status = uz_iterate_record(it, load, options, history, 0.0, false, err);

@@ -32,15 +32,19 @@ static void make_gaps(uz_iterate *it, const uz_dual_load *load)
 
 /* Is there more to be had from rows that should come into contact than from those that press? Of the latter only what
  * a plain step would leave them counts (the reduced free gradient). */
-static bool out_of_proportion(const uz_iterate *it)
+static bool out_of_proportion(uz_iterate *it)
 {
+    const double *penetration = it->r_next;
+    const bool *presses = it->close;
     double asked = 0.0, left = 0.0;
+    it->law->kind->active(it->law, it->close, it->r, it->m);
+    it->law->kind->penetration(it->law, it->r_next, it->gamma, it->m);
     for (int64_t i = 0; i < it->m; i++) {
         double g = it->gamma[i];
-        if (it->r[i] < 0.0)
+        if (presses[i])
             left += g * fmin(g, -it->r[i] / it->alpha);
-        else if (g < 0.0)
-            asked += g * g;
+        else
+            asked += penetration[i] * penetration[i];
     }
     return !(left > 0.0) || asked > left;
 }
@@ -49,8 +53,10 @@ static bool out_of_proportion(const uz_iterate *it)
 static double make_direction(uz_iterate *it)
 {
     double curvature = 0.0, cross = 0.0, rise = 0.0, gradient = 0.0, *d = it->r_next;
+    const bool *presses = it->close;
+    it->law->kind->active(it->law, it->close, it->r, it->m);
     for (int64_t i = 0; i < it->m; i++) {
-        if (it->r[i] < 0.0) {
+        if (presses[i]) {
             curvature += (it->r[i] - it->rho[i]) * (it->Dr[i] - it->Drho[i]);
             cross += it->gamma[i] * (it->Dr[i] - it->Drho[i]);
             gradient += it->gamma[i] * it->gamma[i];
@@ -58,29 +64,30 @@ static double make_direction(uz_iterate *it)
     }
     double beta = curvature > 0.0 ? -cross / curvature : 0.0;
     for (int64_t i = 0; i < it->m; i++) {
-        d[i] = it->r[i] < 0.0 ? it->gamma[i] + beta * (it->r[i] - it->rho[i]) : 0.0;
+        d[i] = presses[i] ? it->gamma[i] + beta * (it->r[i] - it->rho[i]) : 0.0;
         rise += it->gamma[i] * d[i];
     }
     if (rise > RISE * gradient)
         return rise;
     for (int64_t i = 0; i < it->m; i++)
-        d[i] = it->r[i] < 0.0 ? it->gamma[i] : 0.0;
+        d[i] = presses[i] ? it->gamma[i] : 0.0;
     return gradient;
 }
 
-/* The length that maximizes psi along d; *bound: that at which the first row stops to press. Along what is flat the
- * step goes beyond the bound, unless what curvature there is says less; without a bound it goes as far as a plain one:
- * rise / curvature would be the quotient of two roundings. */
+/* The length that maximizes psi along d; gamma: how far each row can go, *bound: that at which the first row stops to
+ * press. Along what is flat the step goes beyond the bound, unless what curvature there is says less; without a bound
+ * it goes as far as a plain one: rise / curvature would be the quotient of two roundings. */
 static double best_length(double *bound, uz_iterate *it, double rise)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
-    double curvature = 0.0, square = 0.0;
+    double curvature = 0.0, square = 0.0, *reach = it->gamma;
+    it->law->kind->reach(it->law, reach, it->r, d, it->m);
     *bound = INFINITY;
     for (int64_t i = 0; i < it->m; i++) {
         curvature += d[i] * Dd[i];
         square += d[i] * d[i];
-        if (d[i] > 0.0)
-            *bound = fmin(*bound, -it->r[i] / d[i]);
+        if (reach[i] < *bound)
+            *bound = reach[i];
     }
     it->along_ray = isinf(*bound) && it->alpha * curvature <= RAY * square;
     if (it->along_ray)
@@ -118,12 +125,13 @@ static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *loa
     *restart = length > bound;
     for (int64_t i = 0; i < it->m; i++) {
         double r = it->r[i], Dr = it->Dr[i];
-        bool stops = *restart && d[i] > 0.0 && -r / d[i] <= bound;
-        it->r[i] = stops ? 0.0 : fmin(0.0, r + taken * d[i]);
+        bool stops = *restart && it->gamma[i] <= bound;
+        it->r[i] = stops ? 0.0 : r + taken * d[i];
         it->Dr[i] = Dr + taken * Dd[i];
         it->rho[i] = *restart ? r + length * d[i] : r;
         it->Drho[i] = *restart ? Dr + length * Dd[i] : Dr;
     }
+    it->law->kind->project(it->law, it->r, it->m);
     it->tau = *restart ? 1.0 : 2.0;
     return UZ_OK;
 }
@@ -143,7 +151,8 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
 {
     bool plain = memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
     for (int64_t i = 0; i < it->m; i++)
-        it->r_next[i] = fmin(0.0, it->rho[i] + (plain ? it->alpha * it->gamma[i] : 0.0));
+        it->r_next[i] = it->rho[i] + (plain ? it->alpha * it->gamma[i] : 0.0);
+    it->law->kind->project(it->law, it->r_next, it->m);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     if (status != UZ_OK)
         return status;
@@ -160,14 +169,8 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
 
 static double remaining(uz_iterate *it, const uz_dual_load *load)
 {
-    const double *scale = load->dual->row_scale;
-    double square = 0.0;
     make_gaps(it, load);
-    for (int64_t i = 0; i < it->m; i++) {
-        double step = scale[i] * (it->r[i] - fmin(0.0, it->r[i] + it->alpha * it->gamma[i]));
-        square += step * step;
-    }
-    return sqrt(square);
+    return it->law->kind->residual(it->law, it->r, it->gamma, it->alpha, load->dual->row_scale, it->m);
 }
 
 uz_status uz_conjugate_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)

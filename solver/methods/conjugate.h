@@ -1,11 +1,11 @@
 /* conjugate.h: projected conjugate gradients on the dual, one application of D per iteration.
  *
- * On the rows that press, r < 0, psi is maximized by conjugate gradients: the factor of the last direction and the
+ * On the rows that press psi is maximized by conjugate gradients: the factor of the last direction and the
  * length of the step are the best ones, where Algorithm 2 has a fixed step and a momentum that grows with k. Where the
  * bounds come in the way, that point is the extrapolated rho from which a projected step is made, as in Algorithm 2:
  *
- *     tau = 1, rho = r   a plain step: r+ = min(0, r + alpha g)
- *     tau = 1 otherwise  the step ended at a bound: r+ = min(0, rho), unless psi(r) is better: then rho = r
+ *     tau = 1, rho = r   a plain step: r+ = P(r + alpha g)
+ *     tau = 1 otherwise  the step ended at a bound: r+ = P(rho), unless psi(r) is better: then rho = r
  *     tau = 2            a conjugate step; r - rho is the last one's direction, 0: there is none
  *
  * psi never decreases, but by rounding. Rows come into contact by plain steps, when what they ask for is more than what
@@ -20,7 +20,7 @@
 
 #include "methods/iterate.h"
 
-/* *step_norm: ||r - min(0, r + alpha g)|| at the new r, in the caller's forces: the paper's ||rho - r|| where rho is r.
+/* *step_norm: ||r - P(r + alpha g)|| at the new r, in the caller's forces: the paper's ||rho - r|| where rho is r.
  * *restart: a direction was given up, or a step was not taken. */
 uz_status uz_conjugate_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err);
 

@@ -17,6 +17,7 @@
 enum { FIRST_ROOM = 16, PASSES = 2, CIRCLES = 20 };
 
 typedef struct {
+    const uz_law *law;
     uz_dual_load *load;
     int64_t m, count, room;
     int64_t *rows;     /* room: the rows in contact, in the order of L */
@@ -24,6 +25,7 @@ typedef struct {
     double *L;         /* room x room, the leading count x count block: D_AA = L L' */
     double *l, *w;     /* room: L^-1 D_Aq and D_AA^-1 D_Aq for the row q that is pressed */
     double *s, *g;     /* m, the caller's: the reactions are base + s, so that s has digits of its own */
+    double *depth;     /* m: how far the rows penetrate */
     double *size;      /* m: what the rounding of g_i is in proportion to */
     double *open;      /* m: g for s = 0 */
     double *base;      /* m: 0 for rows not in contact */
@@ -75,12 +77,13 @@ static uz_status grow(exchange *x, uz_error *err)
 static uz_status allocate(exchange *x, int64_t m, uz_error *err)
 {
     x->m = m;
+    x->depth = uz_alloc(m, sizeof *x->depth);
     x->size = uz_alloc(m, sizeof *x->size);
     x->incoming = uz_alloc(m, sizeof *x->incoming);
     x->open = uz_alloc(m, sizeof *x->open);
     x->base = uz_alloc_zero(m, sizeof *x->base);
     x->barred = uz_alloc_zero(m, sizeof *x->barred);
-    if (x->size && x->open && x->base && x->incoming && x->barred)
+    if (x->depth && x->size && x->open && x->base && x->incoming && x->barred)
         return grow(x, err);
     return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory to exchange %lld rows", (long long)m);
 }
@@ -94,6 +97,7 @@ static void release(exchange *x)
     free(x->L);
     free(x->l);
     free(x->w);
+    free(x->depth);
     free(x->size);
     free(x->open);
     free(x->base);
@@ -190,6 +194,19 @@ static double reaction(const exchange *x, int64_t k)
     return x->base[x->rows[k]] + x->s[x->rows[k]];
 }
 
+static bool is_admissible(const exchange *x, double reaction_of_row)
+{
+    return x->law->kind->admissible(x->law, &reaction_of_row, 1);
+}
+
+/* How far row q penetrates. */
+static double penetration(const exchange *x, int64_t q)
+{
+    double depth;
+    x->law->kind->penetration(x->law, &depth, &x->g[q], 1);
+    return depth;
+}
+
 /* g = open - D s, and its size. */
 static void measure(exchange *x)
 {
@@ -228,7 +245,7 @@ static void settle(exchange *x)
         for (int pass = 0; pass < PASSES && !uz_stop_is_due(x->stop); pass++)
             close_gaps(x);
         for (int64_t k = x->count - 1; k >= 0 && !uz_stop_is_due(x->stop); k--)
-            if (reaction(x, k) > 0.0) {
+            if (!is_admissible(x, reaction(x, k))) {
                 let_go(x, k);
                 pulls = true;
             }
@@ -262,8 +279,9 @@ static uz_status begin(exchange *x, const bool *active, uz_error *err)
 static int64_t choose(const exchange *x)
 {
     int64_t q = -1;
+    x->law->kind->penetration(x->law, x->depth, x->g, x->m);
     for (int64_t i = 0; i < x->m; i++)
-        if (!x->barred[i] && x->g[i] < -NOISE * x->size[i] && (q < 0 || x->g[i] < x->g[q]))
+        if (!x->barred[i] && x->depth[i] > NOISE * x->size[i] && (q < 0 || x->depth[i] > x->depth[q]))
             q = i;
     return q;
 }
@@ -279,7 +297,9 @@ static int64_t first_to_go(const exchange *x, bool dependent, double *step)
     for (int64_t k = 0; dependent && k < x->count; k++)
         least = fmax(least, PULL_NOISE * fabs(x->w[k]));
     for (int64_t k = 0; k < x->count; k++) {
-        double reach = x->w[k] > least ? fmax(0.0, -reaction(x, k)) / x->w[k] : INFINITY;
+        double reach = INFINITY, r = reaction(x, k);
+        if (x->w[k] > least)
+            x->law->kind->reach(x->law, &reach, &r, &x->w[k], 1);
         if (reach < *step || (first < 0 && isfinite(reach) && reach <= *step)) {
             *step = reach;
             first = k;
@@ -305,8 +325,9 @@ static uz_status look_at_ray(bool *proven, double *ray, exchange *x, int64_t q, 
     memset(ray, 0, (size_t)x->m * sizeof *ray);
     ray[q] = -1.0;
     for (int64_t k = 0; k < x->count; k++)
-        ray[x->rows[k]] = fmin(0.0, x->w[k]);
-    uz_status status = uz_ray_project(ray, N, err);
+        ray[x->rows[k]] = x->w[k];
+    x->law->kind->project(x->law, ray, x->m);
+    uz_status status = uz_ray_project(ray, &x->load->dual->N, err);
     double length = status == UZ_OK ? uz_gap_length(N, h, x->load->g0, x->size) : 0.0, radius;
     *proven = status == UZ_OK && uz_ray_proves(&radius, ray, N, h, length);
     return status;
@@ -319,7 +340,7 @@ static uz_status admit(exchange *x, int64_t q, bool *proven, double *ray, uz_err
     while (status == UZ_OK && !uz_stop_is_due(x->stop)) {
         yield_to(x, q);
         bool dependent = depends(x, q);
-        double step = dependent ? INFINITY : fmax(0.0, -x->g[q]) / x->compliance;
+        double step = dependent ? INFINITY : penetration(x, q) / x->compliance;
         int64_t gone = first_to_go(x, dependent, &step);
         if (gone < 0 && !dependent) {
             advance(x, q, step);
@@ -358,10 +379,10 @@ static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *e
 }
 
 uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, double *g, double *ray, bool *active,
-                          const double *base, uz_dual_load *load, const uz_stop *stop, uz_error *err)
+                          const double *base, const uz_law *law, uz_dual_load *load, const uz_stop *stop, uz_error *err)
 {
     int64_t m = load->dual->N.rows;
-    exchange x = {.load = load, .s = s, .g = g, .stop = stop, .most = *steps};
+    exchange x = {.law = law, .load = load, .s = s, .g = g, .stop = stop, .most = *steps};
     *end = UZ_EXCHANGE_STOPPED;
     uz_status status = allocate(&x, m, err);
     if (status == UZ_OK) {

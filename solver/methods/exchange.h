@@ -4,9 +4,10 @@
 
 #include "core/hooks.h"
 #include "dual/dual.h"
+#include "law/law.h"
 
 typedef enum {
-    UZ_EXCHANGE_SOLVED,  /* r <= 0 <= g and r g = 0, but for rounding */
+    UZ_EXCHANGE_SOLVED,  /* the law holds, but for rounding */
     UZ_EXCHANGE_RAY,     /* `ray` seems to prove that the rows contradict */
     UZ_EXCHANGE_BLURRED, /* solved but for rows that contradict others by no more than rounding, or nearly so */
     UZ_EXCHANGE_STOPPED  /* it had to stop, or rounding made the steps go round in circles */
@@ -20,12 +21,13 @@ typedef enum {
  * are finitely many.
  *
  * active (m): in, rows to begin with, of which an independent part that only presses is taken; out, the rows in
- * contact. base (m, <= 0; NULL: zero): reactions that are already in the load, whose g0 is the gap that they leave: a
- * correction is solved with the digits of its own size. s (m): out; the reactions are base + s. g (m): out.
- * steps: in, the most; out, how often a row joined or was let go. ray (m): UZ_EXCHANGE_RAY. Has a cancellation
- * point between steps of O(m |A|). A row that joins costs one uz_dual_load_column; memory is m |A| + |A|^2 doubles for
- * |A| rows in contact. Overwrites what the last apply left. */
+ * contact. base (m, allowed; NULL: zero): reactions that are already in the load, whose g0 is the gap that they leave:
+ * a correction is solved with the digits of its own size. law: one_sided. s (m): out; the reactions are base + s.
+ * g (m): out. steps: in, the most; out, how often a row joined or was let go. ray (m): UZ_EXCHANGE_RAY. Has a
+ * cancellation point between steps of O(m |A|). A row that joins costs one uz_dual_load_column; memory is
+ * m |A| + |A|^2 doubles for |A| rows in contact. Overwrites what the last apply left. */
 uz_status uz_exchange_run(uz_exchange_end *end, int64_t *steps, double *s, double *g, double *ray, bool *active,
-                          const double *base, uz_dual_load *load, const uz_stop *stop, uz_error *err);
+                          const double *base, const uz_law *law, uz_dual_load *load, const uz_stop *stop,
+                          uz_error *err);
 
 #endif

@@ -19,14 +19,17 @@ void uz_iterate_swap(double **a, double **b)
     *b = t;
 }
 
-/* r(k+1) = min(0, rho + alpha gamma). Returns ||rho - r(k+1)||, in the caller's forces. */
+/* r(k+1) = P(rho + alpha gamma). Returns ||rho - r(k+1)||, in the caller's forces. */
 static double project(uz_iterate *it, const uz_dual_load *load)
 {
     const double *g0 = load->g0, *scale = load->dual->row_scale;
     double square = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
         it->gamma[i] = g0[i] - it->Drho[i];
-        it->r_next[i] = fmin(0.0, it->rho[i] + it->alpha * it->gamma[i]);
+        it->r_next[i] = it->rho[i] + it->alpha * it->gamma[i];
+    }
+    it->law->kind->project(it->law, it->r_next, it->m);
+    for (int64_t i = 0; i < it->m; i++) {
         double step = scale[i] * (it->rho[i] - it->r_next[i]);
         square += step * step;
     }

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err)
+uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, int64_t m, double alpha, uz_error *err)
 {
     memset(it, 0, sizeof *it);
     double **vectors[] = {&it->r,     &it->Dr,     &it->r_next, &it->Dr_next, &it->rho,     &it->Drho,
@@ -26,6 +26,7 @@ uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err
         uz_iterate_clear(it);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the iterates of %lld contacts", (long long)m);
     }
+    it->law = law;
     it->m = m;
     it->alpha = alpha;
     it->tau = 1.0;
@@ -52,10 +53,9 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_
 {
     const double *g0 = load->g0;
     double bound, psi, norm2;
-    for (int64_t i = 0; i < it->m; i++) {
+    for (int64_t i = 0; i < it->m; i++)
         it->gamma[i] = g0[i] - it->Dr[i];
-        it->close[i] = it->r[i] + it->alpha * it->gamma[i] < 0.0;
-    }
+    it->law->kind->predict(it->law, it->close, it->r, it->gamma, it->alpha, it->m);
     uz_status status = uz_dual_load_correct(load, &bound, it->best_bound, it->r, it->gamma, it->close, err);
     if (status != UZ_OK || !(bound < it->best_bound))
         return status;
@@ -104,13 +104,16 @@ static uz_residual residual(uz_iterate *it, uz_dual_load *load)
 {
     const double *g0 = load->g0, *scale = load->dual->row_scale;
     uz_residual e = {0};
-    double e2 = 0.0, e4 = 0.0, *difference = it->r_next;
+    double e2 = 0.0, e4 = 0.0, *difference = it->r_next, *penetration = it->gamma;
     for (int64_t i = 0; i < it->m; i++) {
-        double gap = g0[i] - it->Drho[i], complementarity = gap * it->r[i], penetration = fmin(gap, 0.0) / scale[i];
+        double gap = g0[i] - it->Drho[i], complementarity = gap * it->r[i];
         difference[i] = it->rho[i] - it->r[i];
-        e2 += penetration * penetration;
+        penetration[i] = gap;
         e4 += complementarity * complementarity;
     }
+    it->law->kind->penetration(it->law, penetration, penetration, it->m);
+    for (int64_t i = 0; i < it->m; i++)
+        e2 += (penetration[i] / scale[i]) * (penetration[i] / scale[i]);
     e.e1 = force_norm(load->dual, difference);
     e.e2 = sqrt(e2);
     e.e4 = sqrt(e4);
@@ -124,8 +127,7 @@ static uz_history_row describe(uz_iterate *it, uz_dual_load *load, double step_n
     double norm2;
     uz_dual_load_energies(load, &row.dual_objective, &norm2, it->r, it->Dr);
     row.residual = residual(it, load);
-    for (int64_t i = 0; i < it->m; i++)
-        row.contacts += it->r[i] < 0.0;
+    row.contacts = it->law->kind->active(it->law, NULL, it->r, it->m);
     row.error_bound = it->best_bound;
     row.seconds = uz_seconds() - it->started;
     return row;

@@ -11,7 +11,8 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_
 /* Row 0: applies D to the start and bounds it. */
 uz_status uz_iterate_begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                            uz_error *err);
-/* Appends the iterate's row to the history and tells the progress hook. Overwrites r_next. */
+/* Appends the iterate's row to the history and tells the progress hook. Overwrites r_next and
+ * gamma. */
 uz_status uz_iterate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                             double step_norm, bool restart, uz_error *err);
 /* Goes back to the best answer's r, or to 0 where there is none: guesses that failed may have left r anywhere. D r is

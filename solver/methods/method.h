@@ -1,8 +1,10 @@
-/* method.h: the iterations on the dual problem maximize psi(r), r <= 0. They see the body through dual/dual.h only. */
+/* method.h: the iterations on the dual problem maximize psi(r) over the r that the contact law allows (law/law.h). They
+ * see the body through dual/dual.h only. */
 #ifndef UZ_METHOD_H
 #define UZ_METHOD_H
 
 #include "dual/dual.h"
+#include "law/law.h"
 #include "uzawa.h"
 
 /* Why a method returned. */
@@ -30,9 +32,10 @@ typedef struct {
 
 /* The iterate, kept between calls so that a run can be continued. Vectors of m. */
 typedef struct {
+    const uz_law *law;
     int64_t m, iteration, restarts, next_check;
     double alpha, tau;
-    double *r, *Dr; /* r(k) <= 0 and D r(k) */
+    double *r, *Dr; /* r(k), which the law allows, and D r(k) */
     double *r_next, *Dr_next;
     double *rho, *Drho;   /* extrapolated point; of `conjugate` see conjugate.h */
     double *gamma;        /* gap at rho, or at r while a bound is computed */
@@ -58,8 +61,8 @@ typedef struct {
     uz_best before;             /* what was best before the last answer of a run that ended was bounded out of turn */
 } uz_iterate;
 
-/* alpha 0: chosen when the first gradient step needs it. */
-uz_status uz_iterate_init(uz_iterate *it, int64_t m, double alpha, uz_error *err);
+/* law: borrowed. alpha 0: chosen when the first gradient step needs it. */
+uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, int64_t m, double alpha, uz_error *err);
 void uz_iterate_clear(uz_iterate *it);
 
 /* Takes over where a run stood, or the reactions of a warm start, before the first call of uz_method_run. What the

@@ -145,10 +145,11 @@ static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const u
 /* Nothing but the reactions. */
 static void take_reactions(uz_iterate *it, const uz_state *s, const double *scale, double alpha)
 {
-    for (int64_t i = 0; i < it->m; i++) {
-        it->r[i] = fmin(0.0, s->r[i] / scale[i]);
-        it->warm = it->warm || it->r[i] < 0.0;
-    }
+    for (int64_t i = 0; i < it->m; i++)
+        it->r[i] = s->r[i] / scale[i];
+    it->law->kind->project(it->law, it->r, it->m);
+    if (it->law->kind->active(it->law, NULL, it->r, it->m) > 0)
+        it->warm = true;
     memset(it->anchor, 0, (size_t)it->m * sizeof *it->anchor);
     memset(it->best_r, 0, (size_t)it->m * sizeof *it->best_r);
     it->alpha = alpha;

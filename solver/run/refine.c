@@ -76,8 +76,8 @@ static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
     for (int64_t i = 0; i < run->m; i++) {
         x->f[i] = uz_gap_of_row(&x->Nt, i, run->h, answer->u, NULL);
         x->r[i] = answer->r[i] / scale[i];
-        x->active[i] = answer->r[i] < 0.0;
     }
+    run->it.law->kind->active(run->it.law, x->active, answer->r, run->m);
     return status;
 }
 
@@ -96,7 +96,8 @@ static uz_status exchange_rows(refinement *x, uz_dual_load *correction, uz_error
     uz_stop stop = {x->run->hooks, x->run->deadline};
     uz_exchange_end ended;
     int64_t steps = INT64_MAX;
-    uz_status status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, correction, &stop, err);
+    uz_status status =
+        uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, x->run->it.law, correction, &stop, err);
     x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_BLURRED;
     return status;
 }
@@ -138,7 +139,8 @@ static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
     for (int64_t j = 0; j < run->d; j++)
         latest->u[j] += x->c[j];
     for (int64_t i = 0; i < run->m; i++)
-        latest->r[i] = fmin(0.0, scale[i] * (x->r[i] + x->s[i]));
+        latest->r[i] = scale[i] * (x->r[i] + x->s[i]);
+    run->it.law->kind->project(run->it.law, latest->r, run->m);
     return uz_run_certify_answer(run, latest, err);
 }
 

@@ -1,0 +1,107 @@
+/* frictionless.c: contact without friction: obstacles push and never pull, r <= 0, and nothing penetrates, g >= 0. One
+ * row per contact. */
+#include "law/laws.h"
+
+#include <math.h>
+
+static void project(const uz_law *law, double *r, int64_t n)
+{
+    (void)law;
+    for (int64_t i = 0; i < n; i++)
+        r[i] = fmin(0.0, r[i]);
+}
+
+static bool admissible(const uz_law *law, const double *r, int64_t n)
+{
+    (void)law;
+    for (int64_t i = 0; i < n; i++)
+        if (r[i] > 0.0)
+            return false;
+    return true;
+}
+
+static double residual(const uz_law *law, const double *r, const double *g, double step, const double *scale, int64_t n)
+{
+    double square = 0.0;
+    (void)law;
+    for (int64_t i = 0; i < n; i++) {
+        const double change = r[i] - fmin(0.0, r[i] + step * g[i]), scaled = scale ? scale[i] * change : change;
+        square += scaled * scaled;
+    }
+    return sqrt(square);
+}
+
+/* The largest g's over s <= 0 is 0 for g >= 0, and there is none for any other g. */
+static double gap_bound(const uz_law *law, const double *r, const double *g, int64_t n)
+{
+    double sum = 0.0;
+    (void)law;
+    for (int64_t i = 0; i < n; i++) {
+        if (g[i] < 0.0)
+            return INFINITY;
+        sum -= r[i] * g[i];
+    }
+    return sum;
+}
+
+static void penetration(const uz_law *law, double *out, const double *g, int64_t n)
+{
+    (void)law;
+    for (int64_t i = 0; i < n; i++)
+        out[i] = g[i] < 0.0 ? -g[i] : 0.0;
+}
+
+static int64_t active(const uz_law *law, bool *in, const double *r, int64_t n)
+{
+    int64_t count = 0;
+    (void)law;
+    for (int64_t i = 0; i < n; i++) {
+        const bool presses = r[i] < 0.0;
+        count += presses;
+        if (in)
+            in[i] = presses;
+    }
+    return count;
+}
+
+static void predict(const uz_law *law, bool *in, const double *r, const double *g, double step, int64_t n)
+{
+    (void)law;
+    for (int64_t i = 0; i < n; i++)
+        in[i] = r[i] + step * g[i] < 0.0;
+}
+
+static int64_t refute(const uz_law *law, bool *wrong, const bool *guess, const double *r, const double *g, int64_t n)
+{
+    int64_t count = 0;
+    (void)law;
+    for (int64_t i = 0; i < n; i++) {
+        const bool refuted = guess[i] ? r[i] > 0.0 : g[i] < 0.0;
+        count += refuted;
+        if (wrong)
+            wrong[i] = refuted;
+    }
+    return count;
+}
+
+static void reach(const uz_law *law, double *out, const double *r, const double *d, int64_t n)
+{
+    (void)law;
+    for (int64_t i = 0; i < n; i++)
+        out[i] = d[i] > 0.0 ? (r[i] < 0.0 ? -r[i] : 0.0) / d[i] : INFINITY;
+}
+
+const uz_law_kind uz_frictionless = {
+    .name = "frictionless",
+    .rows = 1,
+    .one_sided = true,
+    .project = project,
+    .admissible = admissible,
+    .residual = residual,
+    .gap_bound = gap_bound,
+    .penetration = penetration,
+    .active = active,
+    .predict = predict,
+    .refute = refute,
+    .reach = reach,
+};
