@@ -1,5 +1,7 @@
 #include "certificate/bound.h"
 
+#include "certificate/one_sided.h"
+
 #include <float.h>
 #include <math.h>
 
@@ -69,17 +71,10 @@ double uz_bound_largest(const double *x, int64_t n)
 /* Paper, section 4. */
 static void residuals(uz_residual *a, const uz_bound_terms *t, const double *r, const double *g, int64_t m)
 {
-    double e2 = 0.0, e4 = 0.0;
-    for (int64_t i = 0; i < m; i++) {
-        if (g[i] < 0.0)
-            e2 = hypot(e2, g[i]);
-        if (g[i] * r[i] != 0.0)
-            e4 = hypot(e4, g[i] * r[i]);
-    }
     a->e1 = t->e1;
-    a->e2 = e2;
+    a->e2 = uz_penetration_norm(g, m);
     a->e3 = t->positive_part;
-    a->e4 = e4;
+    a->e4 = uz_complementarity_norm(r, g, m);
     a->total = hypot(hypot(a->e1, a->e2), hypot(a->e3, a->e4));
 }
 

@@ -2,6 +2,7 @@
 
 #include "certificate/bound.h"
 #include "certificate/feasible.h"
+#include "certificate/one_sided.h"
 #include "certificate/residual.h"
 #include "certificate/twofold.h"
 #include "core/alloc.h"
@@ -240,21 +241,9 @@ static uz_status measure(certifier *c, uz_certificate *out, const double *r, dou
         sharpen_energies(c, &terms, r, g);
     if (feasible)
         status = distance(c, &terms.square, err);
-    for (int64_t i = 0; i < c->m; i++)
-        terms.complementarity -= r[i] * fabs(uz_feasible_gap(&c->feasible, i));
+    terms.complementarity = uz_feasible_complementarity(&c->feasible, r);
     uz_bound_conclude(out, &terms, feasible, r, g, c->in->h, c->m);
     return status;
-}
-
-double uz_certify_cut(double *r, int64_t m)
-{
-    double positive_part = 0.0;
-    for (int64_t i = 0; i < m; i++) {
-        if (r[i] > 0.0)
-            positive_part = hypot(positive_part, r[i]);
-        r[i] = fmin(r[i], 0.0);
-    }
-    return positive_part;
 }
 
 uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,
@@ -264,7 +253,7 @@ uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u,
     memset(out, 0, sizeof *out);
     uz_status status = prepare(&c, input, u, err);
     if (status == UZ_OK)
-        status = measure(&c, out, r, g, uz_certify_cut(r, c.m), err);
+        status = measure(&c, out, r, g, uz_cut_reactions(r, c.m), err);
     release(&c);
     return status;
 }

@@ -42,9 +42,7 @@ typedef struct {
 uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,
                      uz_error *err);
 
-/* Parts of it, for answers in lanes. weight (d): W = diag(K)^-1. uz_certify_cut: cuts r (m) at 0 and returns the norm
- * of what it cut. */
+/* A part of it, for answers in lanes. weight (d): W = diag(K)^-1. */
 void uz_certify_weights(double *weight, const uz_csc *K);
-double uz_certify_cut(double *r, int64_t m);
 
 #endif

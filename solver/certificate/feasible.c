@@ -1,6 +1,7 @@
 /* feasible.c: a displacement without penetration, near a given one. */
 #include "certificate/feasible.h"
 
+#include "certificate/one_sided.h"
 #include "certificate/residual.h"
 #include "certificate/row_relax.h"
 #include "core/alloc.h"
@@ -71,10 +72,18 @@ double uz_feasible_gap(const uz_feasible *c, int64_t i)
     return uz_gap_of_row(c->Nt, i, c->h, c->u, c->correction);
 }
 
+double uz_feasible_complementarity(const uz_feasible *c, const double *r)
+{
+    double sum = 0.0;
+    for (int64_t i = 0; i < c->m; i++)
+        sum -= r[i] * fabs(uz_feasible_gap(c, i));
+    return sum;
+}
+
 /* Closing a gap of g costs about g^2 / compliance in the bound, leaving it open costs -2 r g. */
 static bool worth_closing(const uz_feasible *c, const double *r, int64_t i, double gap)
 {
-    return r[i] < 0.0 && gap <= -2.0 * r[i] * uz_row_compliance(c->Nt, i, c->weight);
+    return uz_row_presses(r[i]) && gap <= -2.0 * r[i] * uz_row_compliance(c->Nt, i, c->weight);
 }
 
 /* What the rounding of a gap is relative to: the terms that it is the difference of. Row by row: a wide gap, or a row
@@ -106,9 +115,9 @@ static double choose_rows(const uz_feasible *c, const double *r, bool closing)
     for (int64_t i = 0; i < c->m; i++) {
         double gap = uz_feasible_gap(c, i);
         bool close = closing && worth_closing(c, r, i, fabs(gap));
-        c->move.in[i] = close || gap < 0.0;
+        c->move.in[i] = close || uz_row_penetrates(gap);
         c->move.target[i] = c->move.in[i] ? gap - gap_rounding(c, i) : 0.0;
-        worst = isnan(gap) ? INFINITY : gap < 0.0 ? fmax(worst, -gap / c->size[i]) : worst;
+        worst = isnan(gap) ? INFINITY : uz_row_penetrates(gap) ? fmax(worst, -gap / c->size[i]) : worst;
     }
     return worst;
 }

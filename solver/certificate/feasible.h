@@ -24,10 +24,12 @@ uz_status uz_touched_dofs(uz_csc *Nt, int64_t **dof, const uz_csc *N, uz_error *
 bool uz_feasible_init(uz_feasible *f, const uz_csc *Nt, const double *weight);
 void uz_feasible_clear(uz_feasible *f);
 
-/* Fills the correction: it lifts the negative gaps of u and closes those of the rows where r (m, <= 0) makes that worth
+/* Fills the correction: it lifts the negative gaps of u and closes those of the rows where r (m) makes that worth
  * while. true: no gap of u + c is negative by more than the rounding of twofold arithmetic. */
 bool uz_make_feasible(uz_feasible *f, const double *r);
 /* g_i(u + c) */
 double uz_feasible_gap(const uz_feasible *f, int64_t i);
+/* -r'g(u + c), what the pair adds to the duality gap. A gap below 0 by rounding counts as one above. */
+double uz_feasible_complementarity(const uz_feasible *f, const double *r);
 
 #endif

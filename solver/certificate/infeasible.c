@@ -1,5 +1,6 @@
 #include "certificate/infeasible.h"
 
+#include "certificate/one_sided.h"
 #include "certificate/twofold.h"
 
 #include <float.h>
@@ -15,9 +16,9 @@ static double measure_ray(bool *rounded, const double *y, const uz_csc *N, const
     twofold work = {0};
     double size = 0.0, residual = 0.0;
     *rounded = true;
+    if (!uz_is_ray_direction(y, N->rows))
+        return 0.0;
     for (int64_t i = 0; i < N->rows; i++) {
-        if (!(y[i] <= 0.0))
-            return 0.0;
         twofold_add_product(&work.hi, &work.lo, h[i], y[i], 0);
         size += fabs(h[i] * y[i]);
     }

@@ -3,6 +3,7 @@
 #include "certificate/bound.h"
 #include "certificate/certificate.h"
 #include "certificate/feasible.h"
+#include "certificate/one_sided.h"
 #include "certificate/residual.h"
 #include "certificate/twofold.h"
 #include "core/alloc.h"
@@ -311,9 +312,7 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[b * WIDTH + lane] = f->correction[b];
     couple(c, lane);
-    *complementarity = 0.0;
-    for (int64_t i = 0; i < f->m; i++)
-        *complementarity -= a->r[i] * fabs(uz_feasible_gap(f, i));
+    *complementarity = uz_feasible_complementarity(f, a->r);
     return feasible;
 }
 
@@ -355,7 +354,7 @@ void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, 
     uz_bound_terms terms[WIDTH] = {{0}};
     bool feasible[WIDTH] = {false};
     for (int l = 0; l < count; l++) {
-        terms[l].positive_part = uz_certify_cut(answers[l].r, c->feasible.m);
+        terms[l].positive_part = uz_cut_reactions(answers[l].r, c->feasible.m);
         answers[l].certified = false;
         feasible[l] = prepare_lane(c, l, &answers[l], U, &terms[l].complementarity);
     }

@@ -1,5 +1,6 @@
 #include "certificate/row_relax.h"
 
+#include "certificate/one_sided.h"
 #include "certificate/residual.h"
 #include "certificate/row_move.h"
 
@@ -26,9 +27,9 @@ static double sweep(uz_row_relax *x, bool closing)
     for (int64_t i = 0; i < x->Nt->cols; i++) {
         double compliance = uz_row_compliance(x->Nt, i, x->weight), rounding = gap_rounding(x, i),
                gap = uz_gap_of_row(x->Nt, i, x->h, x->u, x->c);
-        if (!(compliance > 0.0) || (gap >= 0.0 && !closing))
+        if (!(compliance > 0.0) || (uz_row_is_open(gap) && !closing))
             continue;
-        double change = (gap < 0.0 ? rounding - gap : -gap) / compliance;
+        double change = (uz_row_penetrates(gap) ? rounding - gap : -gap) / compliance;
         if (closing)
             change = fmax(change, x->r[i] - x->push[i]);
         x->push[i] += change;

@@ -1,5 +1,6 @@
 #include "semicoercive/contact_proof.h"
 
+#include "certificate/one_sided.h"
 #include "certificate/residual.h"
 #include "certificate/row_move.h"
 #include "core/alloc.h"
@@ -65,7 +66,7 @@ static bool is_own_dof(const prover *x, int64_t j, int64_t i, double value)
     const uz_csc *N = x->claim->of->N;
     for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++) {
         const int64_t k = N->idx[q];
-        bool away = N->val[q] * value <= 0.0 && !(x->claim->r[k] < 0.0);
+        bool away = N->val[q] * value <= 0.0 && !uz_row_presses(x->claim->r[k]);
         if (k != i && !away && !is_harmless(x, k, i))
             return false;
     }
@@ -178,7 +179,7 @@ static double miss_of(const prover *x, int64_t k, int64_t i)
         return isnan(image) ? INFINITY : fabs(image - 1.0);
     if (isnan(image))
         return INFINITY;
-    bool away = image <= 0.0 && !(x->claim->r[k] < 0.0);
+    bool away = image <= 0.0 && !uz_row_presses(x->claim->r[k]);
     return away || is_harmless(x, k, i) ? 0.0 : fabs(image);
 }
 
