@@ -310,6 +310,7 @@ uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_
 {
     row_work work;
     int64_t row = 0, entries;
+    model->law = &uz_law_frictionless;
     uz_status status = count_rows(&entries, model, scene, err);
     if (status != UZ_OK)
         return status;

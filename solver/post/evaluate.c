@@ -40,7 +40,7 @@ static uz_status make_evaluation(uz_evaluation **out, const uz_scene *scene, uz_
 }
 
 /* Force, area and peak of the contact: the obstacle pushes along its normal by -r. */
-static void evaluate_contact(uz_result *result, uz_evaluation *e)
+static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_law *law)
 {
     uz_summary *summary = &result->summary;
     const uz_mesh_info *mesh = &result->mesh;
@@ -50,7 +50,7 @@ static void evaluate_contact(uz_result *result, uz_evaluation *e)
         const int64_t node = mesh->contact_node[i];
         for (int axis = 0; axis < mesh->dim; axis++)
             summary->force[axis] -= result->r[i] * mesh->contact_normal[i * mesh->dim + axis];
-        if (result->r[i] < 0.0)
+        if (law->kind->active(law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];
         if (!(result->pressure[i] > summary->max_pressure))
             continue;
@@ -73,7 +73,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
     if (status != UZ_OK)
         return status;
-    evaluate_contact(result, result->evaluation);
+    evaluate_contact(result, result->evaluation, model->law);
     status = uz_find_doubts(result->evaluation, model, scene, result->u, result->r, err);
     if (status != UZ_OK)
         return status;

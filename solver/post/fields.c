@@ -82,8 +82,9 @@ static uz_status contact_fields(uz_fields *out, const uz_field_body *body, const
         status = make_room(&out->contact_status, which & UZ_FIELD_CONTACT_STATUS, out->m, 1, err);
     if (status == UZ_OK && out->pressure)
         status = uz_contact_pressure(out->pressure, body->model, body->scene, r, err);
+    const uz_law *law = body->model->law;
     for (int64_t i = 0; status == UZ_OK && out->contact_status && i < out->m; i++)
-        out->contact_status[i] = r[i] < 0;
+        out->contact_status[i] = (double)law->kind->active(law, NULL, &r[i], 1);
     return status;
 }
 

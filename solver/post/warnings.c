@@ -205,6 +205,7 @@ typedef struct {
 static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obstacle, int64_t k, int64_t *row)
 {
     const uz_mesh_info *info = &d->model->info;
+    const uz_law *law = d->model->law;
     const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
     const uz_group *group = uz_mesh_group(&d->model->mesh, d->scene->contacts[k].on, "", NULL);
     const int64_t count = group ? uz_group_node_count(&d->model->mesh, group) : 0;
@@ -213,9 +214,10 @@ static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obs
         if (info->contact_node[*row] != uz_group_node_at(group, i))
             continue;
         const double face = sites && sites->first ? size_of_face(&d->model->mesh, sites->face[i]) : 0;
-        if (d->r[*row] < 0 && obstacle)
+        const bool active = law->kind->active(law, NULL, &d->r[*row], 1) > 0;
+        if (active && obstacle)
             most->turn = fmax(most->turn, turn_of(d, obstacle, *row));
-        if (d->r[*row] < 0 && face > 0) {
+        if (active && face > 0) {
             relative_motion(v, d, *row, sites, i);
             most->part = fmax(most->part, length(v) / face);
         }
