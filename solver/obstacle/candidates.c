@@ -32,19 +32,26 @@ void uz_candidates_clear(uz_candidates *candidates)
 }
 
 /* The deepest penetration of the rows left out, 0 if there is none, INFINITY where a gap is no number. */
-static double deepest(const uz_candidates *c, const double *g, const double *size, double rounding)
+static double deepest(const uz_candidates *c, const uz_law *law, const double *g, const double *size, double rounding)
 {
-    double depth = 0;
-    for (int64_t i = 0; i < c->m; i++)
-        if (!c->in[i] && !(g[i] >= -rounding * size[i]))
-            depth = isnan(g[i]) ? INFINITY : fmax(depth, -g[i]);
+    double depth = 0, own;
+    for (int64_t i = 0; i < c->m; i++) {
+        if (c->in[i])
+            continue;
+        law->kind->penetration(law, &own, &g[i], 1);
+        if (isnan(g[i]))
+            depth = INFINITY;
+        else if (!(own <= rounding * size[i]))
+            depth = fmax(depth, own);
+    }
     return depth;
 }
 
-int64_t uz_candidates_extend(uz_candidates *candidates, const double *g, const double *size, double rounding)
+int64_t uz_candidates_extend(uz_candidates *candidates, const uz_law *law, const double *g, const double *size,
+                             double rounding)
 {
     uz_candidates *c = candidates;
-    const double depth = deepest(c, g, size, rounding);
+    const double depth = deepest(c, law, g, size, rounding);
     const int64_t before = c->count;
     for (int64_t i = 0; i < c->m && depth > 0; i++)
         if (!c->in[i] && !(g[i] > depth)) {

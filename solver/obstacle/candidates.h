@@ -25,6 +25,7 @@
 #ifndef UZ_OBSTACLE_CANDIDATES_H
 #define UZ_OBSTACLE_CANDIDATES_H
 
+#include "law/law.h"
 #include "uzawa.h"
 
 /* The part of a body's extent by which its points are first expected to come closer to an obstacle. What
@@ -46,7 +47,8 @@ void uz_candidates_clear(uz_candidates *candidates);
  * times size_i, size_i >= the terms that g_i is the difference of; a gap that is no number counts as negative. With
  * them come the rows whose gap is not wider than the deepest penetration: they would be next. Returns how many rows
  * were added: 0 ends the loop. */
-int64_t uz_candidates_extend(uz_candidates *candidates, const double *g, const double *size, double rounding);
+int64_t uz_candidates_extend(uz_candidates *candidates, const uz_law *law, const double *g, const double *size,
+                             double rounding);
 
 /* N (m x d) without the rows left out: count x d. */
 uz_status uz_candidates_reduce(uz_csc *out, const uz_csc *N, const uz_candidates *candidates, uz_error *err);

@@ -81,6 +81,11 @@ const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem)
     return body->is_scene ? &body->model.K : &problem->qp.K;
 }
 
+const uz_law *uz_body_law(const uz_body *body)
+{
+    return body->is_scene ? body->model.law : &uz_law_frictionless;
+}
+
 const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
 {
     return body->rows.in ? &body->N_in : uz_body_all_rows(body, problem);

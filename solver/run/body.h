@@ -59,5 +59,7 @@ double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace
 const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem);
 const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem);
 const uz_csc *uz_body_all_rows(const uz_body *body, const uz_problem *problem);
+/* The law of its contacts. */
+const uz_law *uz_body_law(const uz_body *body);
 
 #endif

@@ -373,7 +373,7 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
 {
     uz_status status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
-        status = uz_iterate_init(&run->it, &uz_law_frictionless, run->m, run->settings->alpha, err);
+        status = uz_iterate_init(&run->it, uz_body_law(run->body), run->m, run->settings->alpha, err);
     run->it.decades = run->moved ? NULL : &run->decades; /* bounds of iterations are relative to another norm */
     uz_decades_resume(&run->decades, uz_run_time(run));
     if (status == UZ_OK && run->start)

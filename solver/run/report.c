@@ -149,8 +149,9 @@ static void report_contact(uz_run *run)
 {
     uz_result *result = run->result;
     uz_summary *summary = &result->summary;
+    const uz_law *law = uz_body_law(run->body);
+    summary->active += law->kind->active(law, NULL, result->r, run->m);
     for (int64_t i = 0; i < run->m; i++) {
-        summary->active += result->r[i] < 0.0;
         summary->reaction_sum += result->r[i];
         summary->max_penetration = fmax(summary->max_penetration, -result->g[i]);
     }

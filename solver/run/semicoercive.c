@@ -200,6 +200,7 @@ static bool is_over(const uz_semi *s)
 /* One step of the proximal point method. *settled: the rows that press are those of the round before. */
 static uz_status make_round(uz_semi *s, bool *settled, uz_error *err)
 {
+    const uz_law *law = s->is_scene ? s->model.law : &uz_law_frictionless;
     uz_settings settings = settings_of(s, false, ROUND_ERROR);
     uz_hooks quiet = {0};
     if (s->hooks) {
@@ -212,7 +213,7 @@ static uz_status make_round(uz_semi *s, bool *settled, uz_error *err)
         return status;
     *settled = s->rounds++ > 0;
     for (int64_t i = 0; i < s->m; i++) {
-        bool active = s->last->r[i] < 0.0;
+        bool active = law->kind->active(law, NULL, &s->last->r[i], 1) > 0;
         *settled = *settled && active == s->active[i];
         s->active[i] = active;
         s->target[i] = s->of.h[i] - s->last->g[i];

@@ -73,7 +73,7 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
         status = uz_candidates_add(&wants, rows, err);
     if (status == UZ_OK) {
         add_sizes(size, uz_body_all_rows(run->body, run->problem), run->h_all, run->answer.u);
-        int64_t added = uz_candidates_extend(&wants, run->answer.g, size, ROUNDING);
+        int64_t added = uz_candidates_extend(&wants, run->it.law, run->answer.g, size, ROUNDING);
         if (added == 0 && suspect)
             take_nearest(&wants, run->answer.g);
     }

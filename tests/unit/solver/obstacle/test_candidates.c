@@ -76,7 +76,7 @@ static course trial_and_check(const uz_problem *full, double reach, const uz_res
         uz_candidates_scatter(r, got->r, &in);
         uz_problem_clear(&part);
         c.rows = in.count;
-    } while (++c.rounds < 50 && uz_candidates_extend(&in, g, size, 1e-12) > 0);
+    } while (++c.rounds < 50 && uz_candidates_extend(&in, &uz_law_frictionless, g, size, 1e-12) > 0);
     CHECK_INT(uz_verify(&verified, full, got->u, r, &settings, NULL, NULL, &err), UZ_OK);
     CHECK_INT(verified->summary.outcome, UZ_VERIFIED);
     CHECK(verified->summary.certificate.relative_error <= settings.relative_error);
@@ -160,10 +160,11 @@ TEST(extension_takes_what_is_violated_and_what_is_next)
     uz_candidates c;
     uz_error err = {0};
     CHECK_INT(uz_candidates_first(&c, h, 6, 1, &err), UZ_OK);
-    CHECK_INT(uz_candidates_extend(&c, fine, size, 1e-12), 0); /* rows that are in are the solver's business */
-    CHECK_INT(uz_candidates_extend(&c, g, size, 1e-12), 3);
+    CHECK_INT(uz_candidates_extend(&c, &uz_law_frictionless, fine, size, 1e-12),
+              0); /* rows that are in are the solver's business */
+    CHECK_INT(uz_candidates_extend(&c, &uz_law_frictionless, g, size, 1e-12), 3);
     CHECK(c.in[1] && !c.in[2] && c.in[3] && !c.in[4] && c.in[5]);
-    CHECK_INT(uz_candidates_extend(&c, lost, size, 1e-12), 2);
+    CHECK_INT(uz_candidates_extend(&c, &uz_law_frictionless, lost, size, 1e-12), 2);
     CHECK_INT(c.count, 6);
     uz_candidates_clear(&c);
 }
