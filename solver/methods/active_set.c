@@ -11,6 +11,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "methods/exchange.h"
+#include "methods/kinds.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -215,8 +216,8 @@ static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_dual_load *l
     return UZ_OK;
 }
 
-uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                            uz_history *history, uz_error *err)
+static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
+                     uz_history *history, uz_error *err)
 {
     pivoting p;
     uz_status status = it->begun ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
@@ -229,3 +230,6 @@ uz_status uz_active_set_run(uz_end *end, uz_iterate *it, uz_dual_load *load, con
     release(&p);
     return status;
 }
+
+const uz_method_kind uz_method_active_set = {
+    .method = UZ_METHOD_ACTIVE_SET, .name = "active_set", .one_sided = true, .run = run};

@@ -1,23 +1,11 @@
 /* gradient.c: projected gradient steps on the dual: Kanno's Algorithm 1 (uzawa) and Algorithm 2 (accelerated, with and
- * without restart), with the corrections of the design: tau from 1 + 4 tau^2, rho from r(k+1). `conjugate` has other
- * steps (conjugate.h) in the same loop.
+ * without restart), with the corrections of the design: tau from 1 + 4 tau^2, rho from r(k+1).
  *
  * D is applied once per iteration, to r(k+1); D rho follows from D r(k+1) and D r(k), rho being their combination. */
-#include "methods/conjugate.h"
+#include "methods/iterate.h"
+#include "methods/kinds.h"
 
-#include "certificate/infeasible.h"
-#include "dual/ray.h"
-
-#include <float.h>
 #include <math.h>
-#include <string.h>
-
-void uz_iterate_swap(double **a, double **b)
-{
-    double *t = *a;
-    *a = *b;
-    *b = t;
-}
 
 /* r(k+1) = P(rho + alpha gamma). Returns ||rho - r(k+1)||, in the caller's forces. */
 static double project(uz_iterate *it, const uz_dual_load *load)
@@ -36,34 +24,14 @@ static double project(uz_iterate *it, const uz_dual_load *load)
     return sqrt(square);
 }
 
-/* s'Ds <= s's / alpha for s = r(k+1) - rho? */
-bool uz_iterate_shorten(uz_iterate *it)
-{
-    double curvature = 0.0, square = 0.0, size = 0.0;
-    for (int64_t i = 0; i < it->m; i++) {
-        double s = it->r_next[i] - it->rho[i];
-        curvature += s * (it->Dr_next[i] - it->Drho[i]);
-        square += s * s;
-        size += it->r_next[i] * it->r_next[i];
-    }
-    bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
-    if (noise || !(it->alpha * curvature > square * (1.0 + 1e-6))) /* nor where it is NaN: no step size follows */
-        return false;
-    it->alpha = 0.9 * square / curvature;
-    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
-    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
-    it->tau = 1.0;
-    return true;
-}
-
 /* rho(k+1) and tau; true if the momentum was dropped (O'Donoghue and Candes 2015). */
-static bool extrapolate(uz_iterate *it, uz_method method)
+static bool extrapolate(uz_iterate *it, bool momentum, bool restarts)
 {
     double tau = 0.5 * (1.0 + sqrt(1.0 + 4.0 * it->tau * it->tau)), omega = (it->tau - 1.0) / tau, ascent = 0.0;
     for (int64_t i = 0; i < it->m; i++)
         ascent += it->gamma[i] * (it->r_next[i] - it->r[i]);
-    bool restart = method == UZ_METHOD_ACCELERATED_RESTART && ascent < 0.0;
-    if (method == UZ_METHOD_UZAWA || restart)
+    bool restart = restarts && ascent < 0.0;
+    if (!momentum || restart)
         omega = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
         it->rho[i] = it->r_next[i] + omega * (it->r_next[i] - it->r[i]);
@@ -76,46 +44,10 @@ static bool extrapolate(uz_iterate *it, uz_method method)
     return restart;
 }
 
-/* Bounds cost about one iteration; a check at every sixteenth of the way adds 6 % and overshoots by 6 %. */
-static void plan_next_check(uz_iterate *it)
+/* A projected gradient step from rho, then the next rho. */
+static uz_status step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, bool momentum,
+                      bool restarts, uz_error *err)
 {
-    it->next_check = it->iteration + (it->iteration < 16 ? 1 : it->iteration / 16);
-}
-
-/* step_norm is in the units of the problem's own rows, r in those of the scaled ones. */
-static bool stalled(const uz_iterate *it, const uz_dual_load *load, double step_norm)
-{
-    const double *scale = load->dual->row_scale;
-    double size = 0.0;
-    for (int64_t i = 0; i < it->m; i++)
-        size += scale[i] * it->r[i] * (scale[i] * it->r[i]);
-    int64_t patience = it->best_iteration / 2 + 4000;
-    return step_norm <= 4.0 * DBL_EPSILON * sqrt(size) ||
-           (isfinite(it->best_bound) && it->iteration - it->best_iteration > patience);
-}
-
-static bool should_end(uz_end *end, const uz_iterate *it, const uz_dual_load *load, const uz_method_options *options,
-                       double step_norm)
-{
-    bool started = it->iteration > 0, paper = options->stopping == UZ_STOP_PAPER;
-    if (paper && started && step_norm <= options->epsilon)
-        *end = UZ_END_PAPER;
-    else if (!paper && it->best_relative <= options->target)
-        *end = UZ_END_TARGET;
-    else if (uz_should_stop(end, it, options))
-        return true;
-    else if (!paper && started && stalled(it, load, step_norm))
-        *end = UZ_END_STALLED;
-    else
-        return false;
-    return true;
-}
-
-static uz_status step(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, double *step_norm,
-                      bool *restart, uz_error *err)
-{
-    if (options->method == UZ_METHOD_CONJUGATE)
-        return uz_conjugate_step(it, load, step_norm, restart, err);
     *step_norm = project(it, load);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     it->iteration++;
@@ -127,189 +59,31 @@ static uz_status step(uz_iterate *it, uz_dual_load *load, const uz_method_option
         *step_norm = NAN; /* no step was taken */
         return uz_dual_load_apply(load, it->Dr, it->r, err);
     }
-    *restart = extrapolate(it, options->method);
+    *restart = extrapolate(it, momentum, restarts);
     return UZ_OK;
 }
 
-static uz_status try_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
+static uz_status plain_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
 {
-    uz_status status = uz_ray_project(it->ray, &load->dual->N, err);
-    if (status != UZ_OK)
-        return status;
-    double length = uz_gap_length(&load->dual->N, load->h, load->g0, it->gamma);
-    double radius;
-    *found = uz_ray_proves(&radius, it->ray, &load->dual->N, load->h, length);
-    return UZ_OK;
+    return step(it, load, step_norm, restart, false, false, err);
 }
 
-/* Contradicting rows leave no feasible displacement, so nothing is ever bounded, and the reactions grow along a ray.
- * Looked for at powers of two, from the growth since the last one. */
-static uz_status look_for_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
+static uz_status accelerated_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
 {
-    bool power_of_two = (it->iteration & (it->iteration - 1)) == 0;
-    if (isfinite(it->best_bound) || it->iteration < 8 || !power_of_two)
-        return UZ_OK;
-    for (int64_t i = 0; i < it->m; i++)
-        it->ray[i] = it->r[i] - it->anchor[i];
-    memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
-    return try_ray(found, it, load, err);
+    return step(it, load, step_norm, restart, true, false, err);
 }
 
-/* And at once where a conjugate step went along one: so far that what is bounded afterwards is rounding. */
-static uz_status look_along(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
+static uz_status restarted_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
 {
-    bool wanted = it->along_ray && isinf(it->best_bound);
-    it->along_ray = false;
-    return wanted ? try_ray(found, it, load, err) : UZ_OK;
+    return step(it, load, step_norm, restart, true, true, err);
 }
 
-/* The bound of a run's last answer is out of turn: a run that goes on from there as if it had not ended must not know
- * it. */
-static void set_aside(uz_iterate *it)
-{
-    uz_best *before = &it->before;
-    before->kept = true;
-    before->bound = it->best_bound;
-    before->relative = it->best_relative;
-    before->iteration = it->best_iteration;
-    before->made_by = it->made_by;
-    memcpy(before->r, it->best_r, (size_t)it->m * sizeof *it->r);
-}
+static const uz_steps plain = {.step = plain_step}, accelerated = {.step = accelerated_step},
+                      restarted = {.step = restarted_step};
 
-/* `conjugate` carries D r along: the bound is with the one that an apply gives, the run goes on with its own. */
-static uz_status bound_last(uz_iterate *it, uz_dual_load *load, uz_method method, uz_error *err)
-{
-    if (method != UZ_METHOD_CONJUGATE)
-        return uz_iterate_bound(it, load, method, err);
-    if (isfinite(it->best_bound) && it->best_iteration == it->iteration)
-        return UZ_OK; /* it is the best, and has its bound */
-    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
-    uz_iterate_swap(&it->Dr, &it->Dr_next);
-    if (status == UZ_OK)
-        status = uz_iterate_bound(it, load, method, err);
-    uz_iterate_swap(&it->Dr, &it->Dr_next);
-    return status;
-}
-
-/* The answer of the paper's rule is its last r, good or bad; otherwise the last r may still be the best. */
-static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
-                        uz_error *err)
-{
-    set_aside(it);
-    if (options->stopping == UZ_STOP_PAPER)
-        it->best_bound = INFINITY;
-    uz_status status = bound_last(it, load, options->method, err);
-    if (isinf(it->best_bound)) /* nothing could be bounded: the last r is as good as any */
-        memcpy(it->best_r, it->r, (size_t)it->m * sizeof *it->r);
-    if (history->count > 0) /* none in a run that continued another and ended at once */
-        history->rows[history->count - 1].error_bound = it->best_bound;
-    return status;
-}
-
-/* alpha = 1 / lambda_max(D) where the user gave none. A run that is told to stop before lambda_max is known has no
- * alpha: who goes on with it chooses. */
-static uz_status prepare(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_error *err)
-{
-    const uz_stop stop = {options->hooks, options->deadline};
-    double lambda = 0.0;
-    uz_status status = uz_dual_load_prepare(load, it->alpha > 0.0 ? NULL : &lambda, err);
-    if (it->alpha <= 0.0 && (lambda > 0.0 || !uz_stop_is_due(&stop)))
-        it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
-    return status;
-}
-
-/* r may have been changed by another engine, and preparing overwrites what the last apply left. */
-static uz_status resume(uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    uz_status status = uz_dual_load_apply(load, it->Dr, it->r, err);
-    if (it->tau == 1.0) {
-        memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
-        memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
-    }
-    return status;
-}
-
-/* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the
- * correction that it had in the run that found it. Its numbers stay those of the state. */
-static uz_status correct_again(uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    double bound = it->best_bound, relative = it->best_relative;
-    int64_t iteration = it->best_iteration;
-    bool wanted = it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET;
-    it->resumed = false;
-    if (!wanted)
-        return UZ_OK;
-    uz_status status = uz_iterate_bound_best(it, load, err);
-    it->best_bound = bound;
-    it->best_relative = relative;
-    it->best_iteration = iteration;
-    return status;
-}
-
-/* A start with reactions may be the solution: it is bounded before anything is prepared. */
-static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
-                       uz_error *err)
-{
-    uz_status status = UZ_OK;
-    if (!it->begun && it->warm) {
-        status = uz_iterate_begin(it, load, options, history, err);
-        if (status == UZ_OK && options->stopping == UZ_STOP_CERTIFIED && it->best_relative <= options->target)
-            return UZ_OK;
-    }
-    if (status == UZ_OK)
-        status = prepare(it, load, options, err);
-    if (status == UZ_OK && !it->begun)
-        return uz_iterate_begin(it, load, options, history, err);
-    if (status == UZ_OK)
-        status = correct_again(it, load, err);
-    if (status == UZ_OK && !it->fresh)
-        status = resume(it, load, err);
-    if (status == UZ_OK && it->warm && it->iteration == 0) /* with the step size it may be bounded better */
-        status = uz_iterate_bound(it, load, options->method, err);
-    return status;
-}
-
-/* The bound, where it is due. */
-static uz_status check(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_error *err)
-{
-    bool due = options->stopping == UZ_STOP_CERTIFIED && it->iteration >= it->next_check;
-    uz_status status = UZ_OK;
-    if (options->method == UZ_METHOD_CONJUGATE)
-        status = uz_conjugate_settle(it, load, due, err);
-    if (status != UZ_OK || !due)
-        return status;
-    status = uz_iterate_bound(it, load, options->method, err);
-    plan_next_check(it);
-    return status;
-}
-
-static uz_status record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
-                        bool restart, uz_error *err)
-{
-    if (options->method == UZ_METHOD_CONJUGATE)
-        return uz_conjugate_record(it, load, options, history, restart, err);
-    return uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
-}
-
-uz_status uz_gradient_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                          uz_history *history, uz_error *err)
-{
-    bool restart = false, ray = false;
-    uz_status status = begin(it, load, options, history, err);
-    it->before.kept = false;
-    while (status == UZ_OK && !ray && !should_end(end, it, load, options, it->step_norm)) {
-        it->fresh = false;
-        status = step(it, load, options, &it->step_norm, &restart, err);
-        if (status == UZ_OK)
-            status = look_along(&ray, it, load, err);
-        if (status == UZ_OK)
-            status = check(it, load, options, err);
-        if (status == UZ_OK && !ray)
-            status = look_for_ray(&ray, it, load, err);
-        if (status == UZ_OK)
-            status = record(it, load, options, history, restart, err);
-    }
-    if (ray)
-        *end = UZ_END_RAY;
-    return status == UZ_OK ? finish(it, load, options, history, err) : status;
-}
+const uz_method_kind uz_method_uzawa = {
+    .method = UZ_METHOD_UZAWA, .name = "uzawa", .run = uz_steps_run, .steps = &plain};
+const uz_method_kind uz_method_accelerated = {
+    .method = UZ_METHOD_ACCELERATED, .name = "accelerated", .run = uz_steps_run, .steps = &accelerated};
+const uz_method_kind uz_method_accelerated_restart = {
+    .method = UZ_METHOD_ACCELERATED_RESTART, .name = "accelerated_restart", .run = uz_steps_run, .steps = &restarted};

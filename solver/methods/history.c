@@ -1,4 +1,4 @@
-#include "methods/method.h"
+#include "methods/iterate.h"
 
 #include "core/alloc.h"
 #include "core/error.h"

@@ -181,3 +181,30 @@ bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *
         return false;
     return true;
 }
+
+void uz_iterate_swap(double **a, double **b)
+{
+    double *t = *a;
+    *a = *b;
+    *b = t;
+}
+
+/* s'Ds <= s's / alpha for s = r(k+1) - rho? */
+bool uz_iterate_shorten(uz_iterate *it)
+{
+    double curvature = 0.0, square = 0.0, size = 0.0;
+    for (int64_t i = 0; i < it->m; i++) {
+        double s = it->r_next[i] - it->rho[i];
+        curvature += s * (it->Dr_next[i] - it->Drho[i]);
+        square += s * s;
+        size += it->r_next[i] * it->r_next[i];
+    }
+    bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
+    if (noise || !(it->alpha * curvature > square * (1.0 + 1e-6))) /* nor where it is NaN: no step size follows */
+        return false;
+    it->alpha = 0.9 * square / curvature;
+    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+    it->tau = 1.0;
+    return true;
+}

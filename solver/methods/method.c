@@ -1,82 +1,55 @@
-/* method.c: which engine runs. */
+/* method.c: the table of methods. */
 #include "methods/iterate.h"
+#include "methods/kinds.h"
 
-/* The active set comes first: on the reference problems it ends in 1 to 10 steps from no contact at all, where
- * conjugate steps need 30 to 100, and in the scaled and bounded forms without ever forming D. Where it fails
- * (dependent rows in the guess, a form that can't) conjugate steps take over, and hand it a better guess once. Where D
- * is applied by inner iterations accelerated steps do: with rows that depend on each other a direction's curvature is
- * less than what the inner iterations leave, and conjugate steps go astray. */
-enum { WARM_UP = 32 };
+#include "core/error.h"
 
-/* The active set came to nothing: the iterations go on. */
-static bool gave_up(uz_end end)
+#include <string.h>
+
+static const uz_method_kind *const kinds[] = {
+    &uz_method_auto,       &uz_method_uzawa,     &uz_method_accelerated, &uz_method_accelerated_restart,
+    &uz_method_active_set, &uz_method_conjugate,
+};
+
+const uz_method_kind *uz_method_kind_at(int i)
 {
-    return end == UZ_END_STALLED || end == UZ_END_UNSOLVED;
+    return i >= 0 && (size_t)i < sizeof kinds / sizeof kinds[0] ? kinds[i] : NULL;
 }
 
-/* Where auto stands: kept in the iterate, so that a run can go on from there. */
-enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING };
-
-static uz_status run_phase(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                           uz_history *history, uz_error *err)
+const uz_method_kind *uz_method_kind_of(uz_method method)
 {
-    uz_method_options phase = *options;
-    phase.method = load->dual->can->exact ? UZ_METHOD_CONJUGATE : UZ_METHOD_ACCELERATED_RESTART;
-    if (it->phase == FIRST_GUESS || it->phase == SECOND_GUESS)
-        return uz_active_set_run(end, it, load, &phase, history, err);
-    if (it->phase == WARMING_UP && it->phase_end < options->max_iterations)
-        phase.max_iterations = it->phase_end;
-    return uz_gradient_run(end, it, load, &phase, history, err);
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (kinds[i]->method == method)
+            return kinds[i];
+    return NULL;
 }
 
-/* Is the phase over, but not the run? */
-static bool phase_over(uz_end end, const uz_iterate *it, const uz_method_options *options)
+const char *uz_method_name(uz_method method)
 {
-    if (it->phase == WARMING_UP)
-        return end == UZ_END_ITERATIONS && it->iteration < options->max_iterations;
-    return it->phase != ITERATING && gave_up(end);
+    const uz_method_kind *kind = uz_method_kind_of(method);
+    if (kind)
+        return kind->name;
+    return method == UZ_METHOD_GIVEN ? "given" : method == UZ_METHOD_LINEAR ? "linear" : "unknown";
 }
 
-static void warm_up(uz_iterate *it)
+bool uz_method_parse(uz_method *out, const char *name)
 {
-    it->phase = WARMING_UP;
-    it->phase_end = it->iteration + WARM_UP;
-}
-
-/* Guesses that came to nothing leave r at the best that was found. */
-static void next_phase(uz_iterate *it)
-{
-    if (it->phase == FIRST_GUESS)
-        warm_up(it);
-    else
-        it->phase++;
-    if (it->phase != SECOND_GUESS)
-        uz_iterate_go_back(it);
-}
-
-static uz_status run_auto(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                          uz_history *history, uz_error *err)
-{
-    uz_method_options engine = *options;
-    engine.method = UZ_METHOD_ACCELERATED_RESTART;
-    if (options->stopping != UZ_STOP_CERTIFIED)
-        return uz_gradient_run(end, it, load, &engine, history, err);
-    if (options->again)
-        warm_up(it);
-    uz_status status = run_phase(end, it, load, options, history, err);
-    while (status == UZ_OK && phase_over(*end, it, options)) {
-        next_phase(it);
-        status = run_phase(end, it, load, options, history, err);
-    }
-    return status;
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++)
+        if (strcmp(kinds[i]->name, name) == 0) {
+            *out = kinds[i]->method;
+            return true;
+        }
+    return false;
 }
 
 uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                         uz_history *history, uz_error *err)
 {
-    if (options->method == UZ_METHOD_AUTO)
-        return run_auto(end, it, load, options, history, err);
-    if (options->method == UZ_METHOD_ACTIVE_SET)
-        return uz_active_set_run(end, it, load, options, history, err);
-    return uz_gradient_run(end, it, load, options, history, err);
+    const uz_method_kind *kind = uz_method_kind_of(options->method);
+    if (!kind)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "there is no such method");
+    if (kind->one_sided && !it->law->kind->one_sided)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the method %s can't with the contact law %s", kind->name,
+                       it->law->kind->name);
+    return kind->run(end, it, load, options, history, err);
 }

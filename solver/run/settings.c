@@ -4,16 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-static const char *const METHODS[] = {
-    [UZ_METHOD_AUTO] = "auto",
-    [UZ_METHOD_UZAWA] = "uzawa",
-    [UZ_METHOD_ACCELERATED] = "accelerated",
-    [UZ_METHOD_ACCELERATED_RESTART] = "accelerated_restart",
-    [UZ_METHOD_ACTIVE_SET] = "active_set",
-    [UZ_METHOD_CONJUGATE] = "conjugate",
-    [UZ_METHOD_GIVEN] = "given",
-    [UZ_METHOD_LINEAR] = "linear",
-};
 static const char *const OPERATORS[] = {
     [UZ_OPERATOR_AUTO] = "auto",
     [UZ_OPERATOR_CONDENSED] = "condensed",
@@ -54,11 +44,6 @@ static int find_name(const char *const *table, size_t count, const char *name)
     return -1;
 }
 
-const char *uz_method_name(uz_method value)
-{
-    return name_at(METHODS, COUNT(METHODS), (unsigned)value);
-}
-
 const char *uz_operator_name(uz_operator value)
 {
     return name_at(OPERATORS, COUNT(OPERATORS), (unsigned)value);
@@ -77,14 +62,6 @@ const char *uz_stopping_name(uz_stopping value)
 const char *uz_outcome_name(uz_outcome value)
 {
     return name_at(OUTCOMES, COUNT(OUTCOMES), (unsigned)value);
-}
-
-bool uz_method_parse(uz_method *out, const char *name)
-{
-    int found = find_name(METHODS, UZ_METHOD_GIVEN, name); /* what follows are results, nobody can ask for them */
-    if (found >= 0)
-        *out = (uz_method)found;
-    return found >= 0;
 }
 
 bool uz_operator_parse(uz_operator *out, const char *name)

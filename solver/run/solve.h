@@ -6,7 +6,7 @@
 #include "run/body.h"
 #include "certificate/certificate.h"
 #include "methods/decades.h"
-#include "methods/method.h"
+#include "methods/iterate.h"
 #include "uzawa.h"
 
 /* What may become the result. */
