@@ -6,6 +6,7 @@
  * the sum of transformed shape functions whose integrals are positive (see uz_side_positive_weights). What is linear
  * along the edge keeps its value, so that resultants and contact_pressure.c read a reaction as a force at its node. A
  * middle of which an end has no row keeps the row of its own gap. */
+#include "assembly/discretization.h"
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
@@ -29,70 +30,37 @@ bool uz_is_contact_row(const uz_body_model *model, int64_t node, const double no
     return false;
 }
 
-bool uz_contact_normal(double normal[3], const uz_body_model *model, const uz_scene *scene, int64_t k, int64_t i)
+/* Does the row move any free dof? */
+static bool moves_something(const uz_body_model *model, const uz_contact_row *row)
 {
-    const int dim = model->mesh.dim;
-    const uz_contact_sites *sites = model->sites ? &model->sites[k] : NULL;
-    if (!sites || sites->n == 0)
-        return uz_unit_normal(normal, scene->contacts[k].normal, dim);
-    normal[2] = 0;
-    memcpy(normal, sites->normal + i * dim, (size_t)dim * sizeof *normal);
-    return isfinite(sites->gap[i]);
-}
-
-/* A node of a contact's group on its obstacle. */
-typedef struct {
-    int64_t contact, place; /* the place-th of its group */
-    int64_t node;
-    double normal[3];
-    int masters; /* nodes of the face that it meets: 0 on an obstacle */
-    const int64_t *master;
-    const double *weight;
-} site;
-
-/* Does the site move any free dof? *exists: does the node have a place on the obstacle at all? */
-static bool find_site(site *s, bool *exists, const uz_body_model *model, const uz_scene *scene, const uz_group *group,
-                      int64_t contact, int64_t place)
-{
-    *s = (site){.contact = contact, .place = place, .node = uz_group_node_at(group, place)};
-    const uz_contact_sites *sites = model->sites ? &model->sites[contact] : NULL;
-    *exists = uz_contact_normal(s->normal, model, scene, contact, place);
-    if (!*exists)
-        return false;
-    if (sites && sites->first) {
-        s->masters = (int)(sites->first[place + 1] - sites->first[place]);
-        s->master = sites->node + sites->first[place];
-        s->weight = sites->weight + sites->first[place];
-    }
-    bool moves = uz_is_contact_row(model, s->node, s->normal);
-    for (int j = 0; j < s->masters && !moves; j++)
-        moves = uz_is_contact_row(model, s->master[j], s->normal);
-    return moves;
-}
-
-/* The group that can touch. The scene was checked. */
-static const uz_group *contact_group(const uz_mesh *mesh, const uz_contact *contact, uz_error *err)
-{
-    return uz_mesh_group(mesh, contact->on, "/contacts", err);
+    for (int j = 0; j < row->slaves; j++)
+        if (uz_is_contact_row(model, row->slave[j], row->normal))
+            return true;
+    for (int j = 0; j < row->masters; j++)
+        if (uz_is_contact_row(model, row->master[j], row->normal))
+            return true;
+    return false;
 }
 
 /* How many rows, and at most how many entries. */
-static uz_status count_rows(int64_t *entries, uz_body_model *model, const uz_scene *scene, uz_error *err)
+static uz_status count_rows(int64_t *entries, int64_t *most_places, uz_body_model *model, const uz_scene *scene,
+                            uz_error *err)
 {
-    const int dim = model->mesh.dim;
-    bool exists;
-    site s;
-    *entries = model->m = model->n_pair_rows = 0;
+    uz_contact_input in;
+    uz_contact_row row;
+    *entries = *most_places = model->m = model->n_pair_rows = 0;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
-        const uz_group *group = contact_group(&model->mesh, &scene->contacts[k], err);
-        if (!group)
-            return UZ_ERR_SCENE;
-        for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++) {
-            if (!find_site(&s, &exists, model, scene, group, k, i))
+        const uz_status status = uz_contact_input_of(&in, model, scene, k, err);
+        if (status != UZ_OK)
+            return status;
+        const int64_t places = uz_discretization_of(in.contact)->places(&in);
+        *most_places = places > *most_places ? places : *most_places;
+        for (int64_t i = 0; i < places; i++) {
+            if (!uz_contact_row_at(&row, &in, i) || !moves_something(model, &row))
                 continue;
             model->m++;
-            model->n_pair_rows += s.masters > 0;
-            *entries += dim * (1 + s.masters);
+            model->n_pair_rows += row.masters > 0;
+            *entries += (int64_t)model->mesh.dim * (row.slaves + row.masters);
         }
         if (model->m > UZ_SCENE_MAX_DOFS)
             return uz_fail(err, UZ_ERR_SCENE, "/contacts", "more than %d contact candidates; use fewer contacts",
@@ -101,27 +69,11 @@ static uz_status count_rows(int64_t *entries, uz_body_model *model, const uz_sce
     return UZ_OK;
 }
 
-/* N as triplets, and one double per node for tributary areas: zero between contacts. */
+/* N as triplets, the areas of one contact's places, and one double per node: zero between contacts. */
 typedef struct {
     int64_t count, *row, *col;
-    double *val, *area;
+    double *val, *area, *room;
 } row_work;
-
-/* What a consistent constant pressure gives each node of a face: nothing to the corners of a flat tri6 face, where it
- * must not be what rounding leaves, as reactions are divided by it. */
-static void spread_area(double *area, const uz_body_model *model, const uz_group *group)
-{
-    for (int64_t e = 0; e < group->n_faces; e++) {
-        uz_side side;
-        int64_t node[UZ_FACE_NODES];
-        double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
-        uz_body_side(&side, xyz, node, model, group->face[e]);
-        uz_side_positive_weights(w, &side);
-        const double whole = uz_side_area(&side);
-        for (int a = 0; a < side.nodes; a++)
-            area[node[a]] += fabs(w[a]) > 1e-12 * whole ? w[a] : 0;
-    }
-}
 
 /* `factor` times the normal on the free dofs of a node. */
 static void add_entries(row_work *work, const uz_body_model *model, int64_t row, int64_t node, const double normal[3],
@@ -139,39 +91,41 @@ static void add_entries(row_work *work, const uz_body_model *model, int64_t row,
     }
 }
 
-static void add_row(uz_body_model *model, row_work *work, int64_t row, const site *s)
+static void add_row(uz_body_model *model, row_work *work, int64_t row, int64_t contact, int64_t place,
+                    const uz_contact_row *r)
 {
     const int dim = model->mesh.dim;
     uz_mesh_info *info = &model->info;
-    info->contact_node[row] = s->node;
-    info->contact_area[row] = work->area[s->node];
-    info->contact_of[row] = s->contact;
-    info->contact_face[2 * row] = info->contact_face[2 * row + 1] = -1;
-    if (s->masters > 0) {
-        info->contact_face[2 * row] = model->sites[s->contact].face[s->place].element;
-        info->contact_face[2 * row + 1] = model->sites[s->contact].face[s->place].side;
-    }
-    memcpy(info->contact_normal + row * dim, s->normal, (size_t)dim * sizeof *s->normal);
-    add_entries(work, model, row, s->node, s->normal, -1);
-    for (int j = 0; j < s->masters; j++)
-        add_entries(work, model, row, s->master[j], s->normal, s->weight[j]);
+    info->contact_node[row] = r->node;
+    info->contact_area[row] = work->area[place];
+    info->contact_of[row] = contact;
+    info->contact_face[2 * row] = r->masters > 0 ? r->face.element : -1;
+    info->contact_face[2 * row + 1] = r->masters > 0 ? r->face.side : -1;
+    memcpy(info->contact_normal + row * dim, r->normal, (size_t)dim * sizeof *r->normal);
+    for (int j = 0; j < r->slaves; j++)
+        add_entries(work, model, row, r->slave[j], r->normal, -r->slave_share[j]);
+    for (int j = 0; j < r->masters; j++)
+        add_entries(work, model, row, r->master[j], r->normal, r->master_share[j]);
 }
 
-static void add_contact(uz_body_model *model, row_work *work, int64_t *row, const uz_scene *scene,
-                        const uz_group *group, int64_t k)
+static uz_status add_contact(uz_body_model *model, row_work *work, int64_t *row, const uz_scene *scene, int64_t k,
+                             uz_error *err)
 {
-    const int64_t count = uz_group_node_count(&model->mesh, group);
-    bool exists;
-    site s;
-    spread_area(work->area, model, group);
-    for (int64_t i = 0; i < count; i++)
-        if (find_site(&s, &exists, model, scene, group, k, i))
-            add_row(model, work, (*row)++, &s);
-    for (int64_t i = 0; i < count; i++)
-        work->area[uz_group_node_at(group, i)] = 0;
+    uz_contact_input in;
+    uz_contact_row r;
+    const uz_status status = uz_contact_input_of(&in, model, scene, k, err);
+    if (status != UZ_OK)
+        return status;
+    const uz_contact_discretization *discretization = uz_discretization_of(in.contact);
+    in.room = work->room;
+    discretization->areas(work->area, &in);
+    for (int64_t i = 0; i < discretization->places(&in); i++)
+        if (uz_contact_row_at(&r, &in, i) && moves_something(model, &r))
+            add_row(model, work, (*row)++, k, i, &r);
+    return UZ_OK;
 }
 
-static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries)
+static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries, int64_t most_places)
 {
     const int dim = model->mesh.dim;
     uz_mesh_info *info = &model->info;
@@ -184,12 +138,19 @@ static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries)
     work->row = uz_alloc(entries, sizeof *work->row);
     work->col = uz_alloc(entries, sizeof *work->col);
     work->val = uz_alloc(entries, sizeof *work->val);
-    work->area = uz_alloc_zero(model->mesh.n_nodes, sizeof *work->area);
+    work->area = uz_alloc(most_places, sizeof *work->area);
+    work->room = uz_alloc_zero(model->mesh.n_nodes, sizeof *work->room);
     return info->contact_node && info->contact_area && info->contact_normal && info->contact_of && info->contact_face &&
-           work->row && work->col && work->val && work->area;
+           work->row && work->col && work->val && work->area && work->room;
 }
 
 /* ---- middles of eight-node faces */
+
+/* The group that can touch. The scene was checked. */
+static const uz_group *group_that_touches(const uz_body_model *model, const uz_scene *scene, int64_t k, uz_error *err)
+{
+    return uz_mesh_group(&model->mesh, scene->contacts[k].on, "/contacts", err);
+}
 
 static bool has_eight_nodes(const uz_mesh *mesh, uz_face face)
 {
@@ -222,7 +183,7 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
 {
     bool any = false;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
-        const uz_group *group = contact_group(&model->mesh, &scene->contacts[k], err);
+        const uz_group *group = group_that_touches(model, scene, k, err);
         for (int64_t f = 0; f < group->n_faces && !any; f++)
             any = has_eight_nodes(&model->mesh, group->face[f]);
     }
@@ -236,7 +197,7 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
             const int64_t first = row;
             while (row < model->m && model->info.contact_of[row] == k)
                 row++;
-            list_ends(model, contact_group(&model->mesh, &scene->contacts[k], err), row_of, first, row);
+            list_ends(model, group_that_touches(model, scene, k, err), row_of, first, row);
         }
     }
     const bool room = row_of && model->row_ends;
@@ -304,23 +265,25 @@ static void free_work(row_work *work)
     free(work->col);
     free(work->val);
     free(work->area);
+    free(work->room);
 }
 
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     row_work work;
-    int64_t row = 0, entries;
+    int64_t row = 0, entries, most_places;
     model->law = &uz_law_frictionless;
-    uz_status status = count_rows(&entries, model, scene, err);
+    uz_status status = count_rows(&entries, &most_places, model, scene, err);
     if (status != UZ_OK)
         return status;
-    if (!alloc_rows(model, &work, entries)) {
+    if (!alloc_rows(model, &work, entries, most_places)) {
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
         goto done;
     }
-    for (int64_t k = 0; k < scene->n_contacts; k++)
-        add_contact(model, &work, &row, scene, contact_group(&model->mesh, &scene->contacts[k], err), k);
-    status = find_ends(model, scene, err);
+    for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++)
+        status = add_contact(model, &work, &row, scene, k, err);
+    if (status == UZ_OK)
+        status = find_ends(model, scene, err);
     if (status == UZ_OK && model->row_ends && !blend_entries(&work, model))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
     if (status == UZ_OK)
@@ -343,40 +306,44 @@ static void prescribed_at(double u[3], const uz_body_model *model, int64_t node,
     uz_from_frame(u, model, node);
 }
 
-/* The gap of a site with the prescribed displacements and zero for the free ones: (x + u - point) . n of a plane. The
- * sum is also given in absolute values: the size against which a rounding error is small. */
-static double gap_at(double *scale, const uz_body_model *model, const uz_contact *contact, const site *s,
-                     const double *prescribed)
+/* The gap of a row with the prescribed displacements and zero for the free ones. The sum is also given in absolute
+ * values: the size against which a rounding error is small. */
+static double gap_at(double *scale, const uz_body_model *model, const uz_contact_row *row, const double *prescribed)
 {
     const int dim = model->mesh.dim;
-    const uz_contact_sites *sites = model->sites ? &model->sites[s->contact] : NULL;
-    const bool plane = !sites || sites->n == 0;
-    double gap = plane ? 0 : sites->gap[s->place], u[3];
-    prescribed_at(u, model, s->node, prescribed);
+    double gap = row->gap, u[3], along[3];
     *scale = 0;
-    for (int c = 0; c < dim; c++) {
-        const double x = model->mesh.xyz[s->node * dim + c], from = plane ? contact->point[c] : 0;
-        gap += ((plane ? x - from : 0) + u[c]) * s->normal[c];
-        *scale += (fabs(x) + fabs(from) + fabs(u[c])) * fabs(s->normal[c]);
-    }
-    for (int j = 0; j < s->masters; j++) {
-        prescribed_at(u, model, s->master[j], prescribed);
+    memcpy(along, row->offset, sizeof along);
+    for (int j = 0; j < row->slaves; j++) {
+        const double *x = model->mesh.xyz + row->slave[j] * dim;
+        prescribed_at(u, model, row->slave[j], prescribed);
         for (int c = 0; c < dim; c++) {
-            gap -= s->weight[j] * u[c] * s->normal[c];
-            *scale += fabs(s->weight[j] * u[c] * s->normal[c]);
+            const double from = j == 0 ? fabs(row->from[c]) : 0, share = row->slave_share[j];
+            along[c] += share * u[c];
+            *scale += (fabs(x[c]) + from + fabs(share * u[c])) * fabs(row->normal[c]);
+        }
+    }
+    for (int c = 0; c < dim; c++)
+        gap += along[c] * row->normal[c];
+    for (int j = 0; j < row->masters; j++) {
+        prescribed_at(u, model, row->master[j], prescribed);
+        for (int c = 0; c < dim; c++) {
+            gap -= row->master_share[j] * u[c] * row->normal[c];
+            *scale += fabs(row->master_share[j] * u[c] * row->normal[c]);
         }
     }
     return gap;
 }
 
 /* A node without a row cannot give way: it must be outside, up to what is surely rounding or of no consequence. */
-static uz_status check_held(const uz_body_model *model, const site *s, double gap, double scale, uz_error *err)
+static uz_status check_held(const uz_body_model *model, const uz_contact_row *row, int64_t contact, double gap,
+                            double scale, uz_error *err)
 {
     char where[96], at[96];
-    const double *x = model->mesh.xyz + s->node * model->mesh.dim;
+    const double *x = model->mesh.xyz + row->node * model->mesh.dim;
     if (gap >= -1e-9 * model->mesh.extent - 1e-13 * scale)
         return UZ_OK;
-    snprintf(where, sizeof where, "/contacts/%lld", (long long)s->contact);
+    snprintf(where, sizeof where, "/contacts/%lld", (long long)contact);
     if (model->mesh.dim == 2)
         snprintf(at, sizeof at, "(%g, %g)", x[0], x[1]);
     else
@@ -384,7 +351,7 @@ static uz_status check_held(const uz_body_model *model, const site *s, double ga
     return uz_fail(err, UZ_ERR_SCENE, where,
                    "node %lld at %s is held by a support %g inside the obstacle and cannot give way; "
                    "move the obstacle, or let the node move along its normal",
-                   (long long)s->node, at, -gap);
+                   (long long)row->node, at, -gap);
 }
 
 static uz_status other_body(uz_error *err)
@@ -392,28 +359,28 @@ static uz_status other_body(uz_error *err)
     return uz_fail(err, UZ_ERR_ARGUMENT, "/contacts", "the scene's contacts are not those of this body");
 }
 
-static uz_status contact_gaps(double *h, int64_t *row, const double *prescribed, const uz_body_model *model,
+static uz_status contact_gaps(double *h, int64_t *next, const double *prescribed, const uz_body_model *model,
                               const uz_scene *scene, int64_t k, uz_error *err)
 {
-    const uz_group *group = contact_group(&model->mesh, &scene->contacts[k], err);
-    const int64_t count = group ? uz_group_node_count(&model->mesh, group) : 0;
-    uz_status status = group ? UZ_OK : UZ_ERR_SCENE;
-    if (model->sites && model->sites[k].n > 0 && model->sites[k].n != count)
+    uz_contact_input in;
+    uz_status status = uz_contact_input_of(&in, model, scene, k, err);
+    if (status != UZ_OK)
+        return status;
+    const int64_t places = uz_discretization_of(in.contact)->places(&in);
+    if (model->sites[k].n > 0 && model->sites[k].n != places)
         return other_body(err);
-    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
-        bool exists;
+    for (int64_t i = 0; i < places && status == UZ_OK; i++) {
         double scale;
-        site s;
-        const bool moves = find_site(&s, &exists, model, scene, group, k, i);
-        const double gap = exists ? gap_at(&scale, model, &scene->contacts[k], &s, prescribed) : 0;
-        if (!exists)
+        uz_contact_row row;
+        if (!uz_contact_row_at(&row, &in, i))
             continue;
-        if (!moves)
-            status = check_held(model, &s, gap, scale, err);
-        else if (*row == model->m)
+        const double gap = gap_at(&scale, model, &row, prescribed);
+        if (!moves_something(model, &row))
+            status = check_held(model, &row, k, gap, scale, err);
+        else if (*next == model->m)
             return other_body(err);
         else
-            h[(*row)++] = gap;
+            h[(*next)++] = gap;
     }
     return status;
 }
@@ -423,7 +390,7 @@ uz_status uz_initial_gaps(double *h, const double *prescribed, const uz_body_mod
 {
     int64_t row = 0;
     uz_status status = UZ_OK;
-    if (model->n_sites > 0 && model->n_sites != scene->n_contacts)
+    if (model->n_sites != scene->n_contacts)
         return other_body(err);
     for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++)
         status = contact_gaps(h, &row, prescribed, model, scene, k, err);

@@ -8,6 +8,7 @@
  * Matrix Computations, 5.1) has n as its k-th row up to the sign, and for others the unit vectors of supported
  * directions, where w is zero, and tangents near the remaining axes. A node that is turned again has H times its frame.
  */
+#include "assembly/discretization.h"
 #include "assembly/parts.h"
 
 #include "core/alloc.h"
@@ -205,14 +206,15 @@ static uz_status count_candidates(int64_t *most, const uz_body_model *model, con
     for (int64_t k = 0; k < scene->n_contacts; k++) {
         double normal[3];
         int axes = 0;
-        const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "/contacts", err);
-        if (!group)
-            return UZ_ERR_SCENE;
+        uz_contact_input in;
+        const uz_status status = uz_contact_input_of(&in, model, scene, k, err);
+        if (status != UZ_OK)
+            return status;
         uz_unit_normal(normal, scene->contacts[k].normal, dim);
         for (int c = 0; c < dim; c++)
             axes += normal[c] != 0;
-        oblique = oblique || axes > 1 || scene->contacts[k].kind != UZ_OBSTACLE_PLANE;
-        *most += uz_group_node_count(&model->mesh, group);
+        oblique = oblique || axes > 1 || model->sites[k].n > 0;
+        *most += uz_discretization_of(in.contact)->places(&in);
     }
     *most = oblique ? *most : 0;
     return UZ_OK;
@@ -229,11 +231,12 @@ uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the directions of %lld nodes", (long long)most);
     status = uz_reserve_frames(model, most, err);
     for (int64_t k = 0; status == UZ_OK && k < scene->n_contacts; k++) {
-        const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "/contacts", err);
-        for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++) {
-            double normal[3];
-            if (uz_contact_normal(normal, model, scene, k, i))
-                choose_frame(model, chosen, uz_group_node_at(group, i), normal);
+        uz_contact_input in;
+        status = uz_contact_input_of(&in, model, scene, k, err);
+        for (int64_t i = 0; status == UZ_OK && i < uz_discretization_of(in.contact)->places(&in); i++) {
+            uz_contact_row row;
+            if (uz_contact_row_at(&row, &in, i))
+                choose_frame(model, chosen, row.node, row.normal);
         }
     }
     free(chosen);

@@ -53,15 +53,8 @@ void uz_free_shares(double share[3], const uz_body_model *model, int64_t node, c
 bool uz_is_turned_element(const uz_body_model *model, int64_t element);
 void uz_turn_element(double *ke, const uz_body_model *model, int64_t element);
 
-/* mesh -> sites: where the nodes stand to obstacles that are no planes. */
+/* mesh -> sites, by each contact's discretization (discretization.h). */
 uz_status uz_find_sites(uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* The normal of the i-th site; a component that is zero but for rounding becomes zero, as those of planes do. */
-void uz_put_normal(uz_contact_sites *sites, int64_t i, const double normal[3], int dim);
-/* The sites (n, gap, normal are there) of a group on the faces of another part of the body. */
-uz_status uz_find_pairs(uz_contact_sites *sites, const uz_body_model *model, const uz_group *group,
-                        const uz_contact *contact, int64_t k, uz_error *err);
-/* Unit normal (dim) of contact k at the i-th node of its group; false: the node has no place on the obstacle. */
-bool uz_contact_normal(double normal[3], const uz_body_model *model, const uz_scene *scene, int64_t k, int64_t i);
 /* mesh, dof, frames, sites -> N, m, n_pair_rows, info.contact_*. */
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Does `node` get a row from an obstacle with this unit normal? Only where some free dof of it has a share in the

@@ -238,9 +238,10 @@ TEST(recovering_and_restricting_are_inverse)
 static uz_body_model brick(int64_t element[8], int64_t dof[24], const int *held)
 {
     static int64_t first[2] = {0, 8};
+    static double xyz[24] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
     static uz_group all = {.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
     uz_body_model model = {0};
-    model.mesh = (uz_mesh){.dim = 3, .n_nodes = 8, .n_elements = 1, .first = first, .node = element};
+    model.mesh = (uz_mesh){.dim = 3, .n_nodes = 8, .n_elements = 1, .xyz = xyz, .first = first, .node = element};
     model.mesh.groups = &all;
     model.mesh.n_groups = 1;
     model.dof = dof;
@@ -319,6 +320,7 @@ TEST(frames_in_space)
         uz_contact contact = {.on = "all", .normal = {n[0], n[1], n[2]}};
         uz_scene scene = {.contacts = &contact, .n_contacts = 1};
         uz_body_model model = brick(element, dof, held);
+        CHECK(uz_find_sites(&model, &scene, NULL) == UZ_OK); /* a plane has none but their list */
         CHECK(uz_choose_frames(&model, &scene, NULL) == UZ_OK);
         for (int64_t a = 0; a < 8; a++) {
             int axes = 0;
@@ -330,6 +332,7 @@ TEST(frames_in_space)
                 CHECK(!uz_node_frame(&model, a));
         }
         check_turned_element(&model);
+        free(model.sites);
         free(model.frame_of);
         free(model.info.turned_node);
         free(model.info.frame);

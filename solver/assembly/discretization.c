@@ -1,0 +1,99 @@
+/* discretization.c: which discretization a contact has, and what those have in common whose rows stand at nodes. */
+#include "assembly/discretization.h"
+
+#include "assembly/parts.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+const uz_contact_discretization *uz_discretization_of(const uz_contact *contact)
+{
+    return contact->kind == UZ_OBSTACLE_BODY ? &uz_node_to_face : &uz_node_to_obstacle;
+}
+
+uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, const uz_scene *scene, int64_t index,
+                              uz_error *err)
+{
+    const uz_contact *contact = &scene->contacts[index];
+    char where[96];
+    *in = (uz_contact_input){.model = model, .contact = contact, .index = index};
+    in->on = uz_mesh_group(&model->mesh, contact->on, "/contacts", err);
+    if (!in->on)
+        return UZ_ERR_SCENE;
+    if (contact->kind != UZ_OBSTACLE_BODY)
+        return UZ_OK;
+    snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
+    in->with = uz_mesh_group(&model->mesh, contact->with, where, err);
+    return in->with ? UZ_OK : UZ_ERR_SCENE;
+}
+
+bool uz_contact_row_at(uz_contact_row *row, const uz_contact_input *in, int64_t place)
+{
+    return uz_discretization_of(in->contact)->row(row, in, &in->model->sites[in->index], place);
+}
+
+uz_status uz_find_sites(uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    model->sites = uz_alloc_zero(scene->n_contacts, sizeof *model->sites);
+    if (!model->sites)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contacts", (long long)scene->n_contacts);
+    model->n_sites = scene->n_contacts;
+    for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++) {
+        uz_contact_input in;
+        status = uz_contact_input_of(&in, model, scene, k, err);
+        if (status == UZ_OK)
+            status = uz_discretization_of(in.contact)->find(&model->sites[k], &in, err);
+    }
+    return status;
+}
+
+uz_status uz_sites_of_nodes(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
+{
+    const int64_t count = uz_places_of_nodes(in);
+    sites->gap = uz_alloc(count, sizeof *sites->gap);
+    sites->normal = uz_alloc_zero(count * in->model->mesh.dim, sizeof *sites->normal);
+    if (!sites->gap || !sites->normal)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the gaps of %lld nodes", (long long)count);
+    sites->n = count;
+    for (int64_t i = 0; i < count; i++)
+        sites->gap[i] = INFINITY;
+    return UZ_OK;
+}
+
+void uz_put_normal(uz_contact_sites *sites, int64_t i, const double normal[3], int dim)
+{
+    double unit[3];
+    if (uz_unit_normal(unit, normal, dim))
+        memcpy(sites->normal + i * dim, unit, (size_t)dim * sizeof *unit);
+}
+
+int64_t uz_places_of_nodes(const uz_contact_input *in)
+{
+    return uz_group_node_count(&in->model->mesh, in->on);
+}
+
+/* What a consistent constant pressure gives each node of a face: nothing to the corners of a flat tri6 face, where it
+ * must not be what rounding leaves, as reactions are divided by it. */
+void uz_areas_of_nodes(double *area, const uz_contact_input *in)
+{
+    const int64_t count = uz_places_of_nodes(in);
+    for (int64_t e = 0; e < in->on->n_faces; e++) {
+        uz_side side;
+        int64_t node[UZ_FACE_NODES];
+        double xyz[3 * UZ_FACE_NODES], w[UZ_FACE_NODES];
+        uz_body_side(&side, xyz, node, in->model, in->on->face[e]);
+        uz_side_positive_weights(w, &side);
+        const double whole = uz_side_area(&side);
+        for (int a = 0; a < side.nodes; a++)
+            in->room[node[a]] += fabs(w[a]) > 1e-12 * whole ? w[a] : 0;
+    }
+    for (int64_t i = 0; i < count; i++)
+        area[i] = in->room[uz_group_node_at(in->on, i)];
+    for (int64_t i = 0; i < count; i++)
+        in->room[uz_group_node_at(in->on, i)] = 0;
+}
