@@ -7,6 +7,7 @@
 #include "text/buffer.h"
 #include "core/digest.h"
 #include "core/error.h"
+#include "obstacle/shape.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -162,15 +163,6 @@ static void put_supports(uz_buffer *key, const uz_scene *scene, int dim)
     put_inclined_and_springs(key, scene, dim);
 }
 
-/* How long the lists of points of an obstacle are: x, y, z. */
-static void point_counts(int64_t n[3], const uz_contact *contact)
-{
-    const bool height = contact->kind == UZ_OBSTACLE_HEIGHT;
-    n[0] = contact->n_x;
-    n[1] = height ? contact->n_y : contact->n_x;
-    n[2] = contact->n_x * (contact->n_y > 0 ? contact->n_y : 1);
-}
-
 /* Of a plane only the normal: where it is, is the load's matter. Of others the normals of the rows depend on all. */
 static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
 {
@@ -179,14 +171,16 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
     for (int64_t i = 0; i < scene->n_contacts; i++) {
         const uz_contact *contact = &scene->contacts[i];
         double normal[3];
-        int64_t n[3];
+        int64_t n[3] = {0};
+        const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
         uz_unit_normal(normal, contact->normal, dim);
         put_name(key, contact->on, sizeof contact->on);
         put_doubles(key, normal, 3);
         put_int(key, contact->kind);
         if (contact->kind == UZ_OBSTACLE_PLANE)
             continue;
-        point_counts(n, contact);
+        if (shape && shape->lists)
+            shape->lists(n, contact);
         put_doubles(key, contact->point, 3);
         put_double(key, contact->radius);
         put_int(key, contact->inside);

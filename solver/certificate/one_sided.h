@@ -2,7 +2,8 @@
  *
  * This is the certificate's own statement, on purpose beside law/frictionless.c: a certificate that asked the methods'
  * law whether their answer obeys it would certify a mistake in that law. What a new law needs here is its own proof:
- * which reactions are cut, what a gap violates, what the pair adds to the duality gap, and how a feasible v is found. */
+ * which reactions are cut, what a gap violates, what the pair adds to the duality gap, and how a feasible v is found.
+ */
 #ifndef UZ_ONE_SIDED_H
 #define UZ_ONE_SIDED_H
 

@@ -124,9 +124,7 @@ typedef struct {
     double v[3], value;
 } uz_load;
 
-/* A new obstacle is a gap and a normal in obstacle/ (obstacle.h, check.c), bytes in assembly/body_key.c, a reader in
- * server/codec/decode_contacts.c, a shape in schemas/request.json; and, to be seen, in picture/overlay.c (plane) or
- * picture/patches.c (solid), server/codec/encode_surface.c and client/page/body_obstacles.js. */
+/* A new obstacle: docs/architecture/obstacle.md. */
 typedef enum {
     UZ_OBSTACLE_PLANE,    /* half space: point, normal (out of the obstacle) */
     UZ_OBSTACLE_ROUND,    /* circle (2D) or sphere (3D): point is the centre, radius, inside */

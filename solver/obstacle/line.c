@@ -1,7 +1,7 @@
 /* line.c: the gap to a polyline, the obstacle on its right. */
 #include "core/alloc.h"
 #include "core/error.h"
-#include "obstacle/shapes.h"
+#include "obstacle/pieces.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* table.c: the gap to a table of heights, bilinear in each cell of its grid. */
 #include "core/alloc.h"
 #include "core/error.h"
-#include "obstacle/shapes.h"
+#include "obstacle/pieces.h"
 
 #include <float.h>
 #include <math.h>

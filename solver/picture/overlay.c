@@ -1,6 +1,8 @@
 /* overlay.c: what stands around the body: its outline before, obstacles, contact forces, the legend. */
 #include "picture/scenery.h"
 
+#include "obstacle/shape.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -65,31 +67,25 @@ static void border_line(border *b, const uz_scenery *scenery, const double point
                                        .y = p.y + (along + side * reach / 2) * dy});
 }
 
-static void border_circle(border *b, const uz_scenery *scenery, const uz_contact *contact)
+/* The obstacle's outline, going on well beyond the picture at its ends. */
+static void border_outline(border *b, const uz_scenery *scenery, const uz_contact *contact)
 {
-    enum { STEPS = 720 };
-    for (int i = 0; i <= STEPS; i++) {
-        /* Clockwise the disc is on the right; for a hole the other way. */
-        const double angle = (contact->inside ? 2 : -2) * 3.14159265358979 * i / STEPS;
-        const double x[2] = {contact->point[0] + contact->radius * cos(angle),
-                             contact->point[1] + contact->radius * sin(angle)};
-        border_to(b, uz_scenery_point(scenery, x));
-    }
-}
-
-/* Points given by two arrays, going on straight (a polyline) or flat (a table) beyond their ends. */
-static void border_points(border *b, const uz_scenery *scenery, const double *x, const double *y, int64_t n, bool flat)
-{
+    const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
     const double far = 10 * scenery->extent;
+    double at[2], way[2];
+    const int64_t n = shape->outline(at, way, contact, 0);
+    if (n == 1) {
+        border_line(b, scenery, at, way);
+        return;
+    }
     for (int64_t i = -1; i <= n; i++) {
-        const int64_t k = i < 0 ? 0 : i < n ? i : n - 1, near = i < 0 ? 1 : n - 2;
-        double at[2] = {x[k], y[k]};
-        if (k != i) {
-            double way[2] = {x[k] - x[near], flat ? 0 : y[k] - y[near]};
-            const double length = hypot(way[0], way[1]);
-            at[0] += far * way[0] / length;
-            at[1] += far * way[1] / length;
-        }
+        const int64_t k = i < 0 ? 0 : i < n ? i : n - 1;
+        shape->outline(at, way, contact, k);
+        const double length = hypot(way[0], way[1]);
+        if (k != i && !(length > 0))
+            continue;
+        for (int c = 0; k != i && c < 2; c++)
+            at[c] += far * way[c] / length;
         border_to(b, uz_scenery_point(scenery, at));
     }
 }
@@ -98,14 +94,7 @@ static void put_obstacle(uz_buffer *svg, const uz_scenery *scenery, const uz_con
 {
     border b = {.svg = svg};
     uz_buffer_print(svg, "<path class=\"obstacle\" d=\"");
-    if (contact->kind == UZ_OBSTACLE_PLANE)
-        border_line(&b, scenery, contact->point, (const double[2]){contact->normal[1], -contact->normal[0]});
-    else if (contact->kind == UZ_OBSTACLE_ROUND)
-        border_circle(&b, scenery, contact);
-    else if (contact->kind == UZ_OBSTACLE_POLYLINE)
-        border_points(&b, scenery, contact->x, contact->y, contact->n_x, false);
-    else if (contact->kind == UZ_OBSTACLE_HEIGHT)
-        border_points(&b, scenery, contact->x, contact->z, contact->n_x, true);
+    border_outline(&b, scenery, contact);
     uz_buffer_print(svg, "\"/><path class=\"ticks\" d=\"");
     uz_buffer_put(svg, b.ticks.data, b.ticks.len);
     svg->failed = svg->failed || b.ticks.failed;
@@ -116,7 +105,7 @@ static void put_obstacle(uz_buffer *svg, const uz_scenery *scenery, const uz_con
 void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
 {
     for (int64_t k = 0; scenery->model->mesh.dim == 2 && k < scenery->scene->n_contacts; k++)
-        if (scenery->scene->contacts[k].kind != UZ_OBSTACLE_BODY)
+        if (uz_obstacle_shape_of(scenery->scene->contacts[k].kind))
             put_obstacle(svg, scenery, &scenery->scene->contacts[k]);
 }
 

@@ -1,7 +1,7 @@
-/* shapes.h: the obstacles that are made of many pieces. Their coordinates are the caller's times a power of two that
+/* pieces.h: the obstacles that are made of many pieces. Their coordinates are the caller's times a power of two that
  * brings them near 1, so that squares neither overflow nor vanish. */
-#ifndef UZ_OBSTACLE_SHAPES_H
-#define UZ_OBSTACLE_SHAPES_H
+#ifndef UZ_OBSTACLE_PIECES_H
+#define UZ_OBSTACLE_PIECES_H
 
 #include "obstacle/box_tree.h"
 #include "obstacle/obstacle.h"

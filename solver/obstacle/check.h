@@ -1,0 +1,27 @@
+/* check.h: parts of the checks of shapes. Each refuses with a pointer into the scene. */
+#ifndef UZ_OBSTACLE_CHECK_H
+#define UZ_OBSTACLE_CHECK_H
+
+#include "obstacle/shape.h"
+
+#include <float.h>
+
+/* Coordinates that differ by less than this part of their size have no direction between them. */
+#define UZ_TOLD_APART (64 * DBL_EPSILON)
+
+enum { UZ_OBSTACLE_POINTER = 96 };
+
+/* "/contacts/0/obstacle/circle/radius"; i >= 0: "/contacts/0/obstacle/polyline/points/7". Returns where. */
+const char *uz_obstacle_pointer(char where[UZ_OBSTACLE_POINTER], const uz_obstacle_subject *s, const char *key,
+                                int64_t i);
+uz_status uz_obstacle_not_finite(const uz_obstacle_subject *s, const char *key, int64_t i);
+uz_status uz_obstacle_check_finite(const uz_obstacle_subject *s, const char *key, const double *v, int64_t n);
+/* The contact's normal; remedy: what is said of one without a direction. */
+uz_status uz_obstacle_check_direction(const uz_obstacle_subject *s, const char *key, const char *remedy);
+uz_status uz_obstacle_check_radius(const uz_obstacle_subject *s);
+/* Are there `least` numbers in each list, and the lists themselves? */
+uz_status uz_obstacle_check_lists(const uz_obstacle_subject *s, int64_t least, const char *key, const char *what);
+/* The largest magnitude of n numbers (v NULL: none) and `most`. */
+double uz_obstacle_largest(double most, const double *v, int64_t n);
+
+#endif

@@ -1,0 +1,108 @@
+/* polyline.c: an obstacle on the right of a line. */
+#include "obstacle/check.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "obstacle/pieces.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static uz_status check(const uz_obstacle_subject *s)
+{
+    char where[UZ_OBSTACLE_POINTER];
+    const uz_contact *c = s->contact;
+    const uz_status status = uz_obstacle_check_lists(s, 2, "points", "a polyline needs two points at least");
+    if (status != UZ_OK)
+        return status;
+    for (int64_t i = 0; i < c->n_x; i++) {
+        if (!isfinite(c->x[i]) || !isfinite(c->y[i]))
+            return uz_obstacle_not_finite(s, "points", i);
+        if (i == 0)
+            continue;
+        const double size = fmax(fmax(fabs(c->x[i]), fabs(c->x[i - 1])), fmax(fabs(c->y[i]), fabs(c->y[i - 1])));
+        if (hypot(c->x[i] - c->x[i - 1], c->y[i] - c->y[i - 1]) <= UZ_TOLD_APART * size)
+            return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "points", i),
+                           "point %lld repeats the one before it, (%g, %g); leave it out", (long long)i, c->x[i],
+                           c->y[i]);
+    }
+    if (c->n_x == 3 && c->x[0] == c->x[2] && c->y[0] == c->y[2])
+        return uz_fail(s->err, UZ_ERR_SCENE, uz_obstacle_pointer(where, s, "points", 2),
+                       "a closed line needs three different points at least");
+    return UZ_OK;
+}
+
+static double largest(const uz_contact *contact, int dim)
+{
+    (void)dim;
+    return uz_obstacle_largest(uz_obstacle_largest(0, contact->x, contact->n_x), contact->y, contact->n_x);
+}
+
+static uz_status refuse_crossing(const uz_obstacle *o, const int64_t pair[2], uz_error *err)
+{
+    const uz_line *line = o->own;
+    char where[96], of[2][64];
+    for (int k = 0; k < 2; k++)
+        if (pair[k] == 0 || pair[k] == line->n)
+            snprintf(of[k], sizeof of[k], "the half line beyond point %lld",
+                     (long long)(pair[k] == 0 ? 0 : line->n - 1));
+        else
+            snprintf(of[k], sizeof of[k], "the segment from point %lld", (long long)pair[k] - 1);
+    snprintf(where, sizeof where, "/contacts/%lld/obstacle/polyline/points", (long long)o->index);
+    return uz_fail(
+        err, UZ_ERR_SCENE, where,
+        "the line meets itself: %s and %s; it must have the obstacle on its right everywhere. Move its points, "
+        "or end it where it began to close it",
+        of[0], of[1]);
+}
+
+static uz_status init(uz_obstacle *o, const uz_contact *c, uz_error *err)
+{
+    int64_t pair[2];
+    uz_line *line = o->own = uz_alloc_zero(1, sizeof *line);
+    if (!line)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an obstacle");
+    const uz_status status = uz_line_init(line, c->n_x, c->x, c->y, NULL, o->scale, err);
+    return status == UZ_OK && uz_line_crosses(pair, line) ? refuse_crossing(o, pair, err) : status;
+}
+
+static void clear(uz_obstacle *o)
+{
+    if (o->own)
+        uz_line_clear(o->own);
+    free(o->own);
+}
+
+static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_error *err)
+{
+    (void)err;
+    uz_line_gap(out, o->own, x);
+    return UZ_OK;
+}
+
+static void lists(int64_t n[3], const uz_contact *contact)
+{
+    n[0] = n[1] = n[2] = contact->n_x;
+}
+
+/* Beyond its ends the line goes on straight. */
+static int64_t outline(double x[2], double way[2], const uz_contact *contact, int64_t i)
+{
+    const int64_t n = contact->n_x, near = i == 0 ? 1 : n - 2;
+    x[0] = contact->x[i];
+    x[1] = contact->y[i];
+    way[0] = contact->x[i] - contact->x[near];
+    way[1] = contact->y[i] - contact->y[near];
+    return n;
+}
+
+const uz_obstacle_shape uz_shape_polyline = {
+    .name = {"polyline", "polyline"},
+    .refused = {NULL, "a polyline is an obstacle of plane models; use height for a solid"},
+    .check = check,
+    .largest = largest,
+    .init = init,
+    .clear = clear,
+    .gap = gap,
+    .lists = lists,
+    .outline = outline};
