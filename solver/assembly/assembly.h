@@ -56,7 +56,7 @@ typedef struct {
     double *spring;          /* n_nodes x dim: stiffness of the ground along the axes; NULL: no springs */
     uz_contact_sites *sites; /* n_sites: one per contact of the scene */
     int64_t n_sites;
-    const uz_law *law;       /* of the contacts */
+    const uz_law *law;   /* of the contacts */
     int64_t n_pair_rows; /* contact rows against another part of the body */
     int64_t *row_ends; /* m x 2: of a row whose node is a middle of eight-node faces, the rows of the ends of its edge,
                         * else -1; NULL: there are no such rows. See contact_rows.c */
