@@ -4,11 +4,17 @@
 
 #include <math.h>
 
+/* -0 stays -0; NaN becomes 0. */
+static inline double cut(double r)
+{
+    return r <= 0.0 ? r : 0.0;
+}
+
 static void project(const uz_law *law, double *r, int64_t n)
 {
     (void)law;
     for (int64_t i = 0; i < n; i++)
-        r[i] = fmin(0.0, r[i]);
+        r[i] = cut(r[i]);
 }
 
 static bool admissible(const uz_law *law, const double *r, int64_t n)
@@ -25,7 +31,7 @@ static double residual(const uz_law *law, const double *r, const double *g, doub
     double square = 0.0;
     (void)law;
     for (int64_t i = 0; i < n; i++) {
-        const double change = r[i] - fmin(0.0, r[i] + step * g[i]), scaled = scale ? scale[i] * change : change;
+        const double change = r[i] - cut(r[i] + step * g[i]), scaled = scale ? scale[i] * change : change;
         square += scaled * scaled;
     }
     return sqrt(square);
