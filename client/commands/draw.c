@@ -96,7 +96,6 @@ static void print_decade(FILE *to, const json_t *decade, double low, double high
 void client_draw_trade(client_session *s, const json_t *trade)
 {
     const json_t *decades = json_object_get(trade, "decades");
-    const char *advice = client_json_text(trade, "suggestion.text");
     const bool ascii = s->options->ascii || !locale_is_utf8();
     double low, high;
     int cells = drawing_width(s) - 27;
@@ -108,8 +107,4 @@ void client_draw_trade(client_session *s, const json_t *trade)
     double mesh = client_json_number(trade, "mesh_error");
     if (isfinite(mesh))
         fprintf(s->out, "the mesh itself is off by about %.2g\n", mesh);
-    if (*advice) {
-        client_print_safe(s->out, advice);
-        fputc('\n', s->out);
-    }
 }

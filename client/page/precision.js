@@ -12,8 +12,7 @@ export async function show_precision(element, api, id, case_name, signal) {
   if (!decades.length) return null;
   const place = h("div");
   show(element, h("h2", null, "Time against certified error"), place,
-    h("p", { class: "muted" }, `Certified to ${number(decades[decades.length - 1].relative_error)} after ${seconds(decades[decades.length - 1].seconds)}.`),
-    got.suggestion ? h("p", { class: "suggestion" }, h("strong", null, "Cheaper: "), got.suggestion.text) : null);
+    h("p", { class: "muted" }, `Certified to ${number(decades[decades.length - 1].relative_error)} after ${seconds(decades[decades.length - 1].seconds)}.`));
   const chart = new Chart(place, 240);
   const points = decades.map((one) => [one.seconds, one.relative_error]).sort((a, b) => a[0] - b[0]);
   const series = [{ name: "first certified", colour: 1, dots: true, points }];

@@ -61,11 +61,6 @@ function assertions_of(summary) {
       h("td", null, limits_of(one), one.reason ? h("div", { class: "muted" }, one.reason) : null)))));
 }
 
-function suggestion_of(summary) {
-  const text = summary.suggestion?.text;
-  return text ? h("p", { class: "suggestion" }, h("strong", null, "Cheaper: "), text) : null;
-}
-
 /** The card of a summary. */
 export function verdict_card(summary) {
   const outcome = outcome_words(summary), mesh = mesh_words(summary);
@@ -74,7 +69,7 @@ export function verdict_card(summary) {
     h("p", { class: "certificate", id: "certificate" }, certificate_words(summary)),
     mesh ? h("p", null, mesh) : null,
     h("p", { class: "muted" }, outcome.text, summary.message ? ` ${summary.message}` : ""),
-    hint_of(summary), suggestion_of(summary), warnings_of(summary), assertions_of(summary),
+    hint_of(summary), warnings_of(summary), assertions_of(summary),
     h("dl", { class: "facts" }, facts_of(summary).map(([name, value]) => h("div", null, h("dt", null, name), h("dd", null, value)))));
 }
 

@@ -213,8 +213,8 @@ char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len);
 typedef struct {
     const char *job_id, *case_name; /* case_name NULL: none */
     uz_trade trade;
-    double mesh_error, solver_error, requested_error, certify_s;
-    bool is_scene, has_answer, may_save;
+    double mesh_error, solver_error;
+    bool is_scene, has_answer;
 } codec_trade;
 /* Fills the members after trade from the JSON text of a summary; false: no memory. */
 bool codec_read_trade(codec_trade *out, const char *summary);

@@ -1,5 +1,4 @@
 #include "codec/codec.h"
-#include "codec/encode_trade.h"
 #include "codec/text.h"
 
 #include <math.h>
@@ -247,10 +246,6 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
                         {"alpha", summary->alpha},
                         {"lambda_max", summary->lambda_max}},
               4);
-    if (summary->suggestion.any) {
-        text_key(&t, "suggestion");
-        put_suggestion(&t, &summary->suggestion);
-    }
     if (summary->ladder) {
         text_member_number(&t, "total_error", summary->total_error);
         put_ladder(&t, summary->ladder);

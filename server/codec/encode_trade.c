@@ -1,7 +1,6 @@
-/* encode_trade.c: what accuracy took: /v1/jobs/{id}/work-precision, and the suggestion in a summary. */
-#include "codec/encode_trade.h"
-
+/* encode_trade.c: what accuracy took: /v1/jobs/{id}/work-precision. */
 #include "codec/codec.h"
+#include "codec/text.h"
 
 #include <math.h>
 
@@ -14,32 +13,6 @@ static void put_count(text *t, const char *key, const int64_t *value)
         text_integer(t, *value);
     else
         text_raw(t, NULL);
-}
-
-void put_suggestion(text *t, const uz_suggestion *s)
-{
-    if (!s->any) {
-        text_raw(t, NULL);
-        return;
-    }
-    text_open(t, '{');
-    text_member_string(t, "level", "balanced");
-    text_key(t, "text");
-    text_format(t, "\"mesh error %.2g %%, solver error %.2g %%: balanced would have taken ", 100.0 * s->mesh_error,
-                100.0 * s->solver_error);
-    if (s->share <= 0.5) /* "1/8" where it is at most that, else "70 %" */
-        text_format(t, "1/%.0f", floor(1.0 / s->share * (1.0 + 1e-12)));
-    else
-        text_format(t, "%.0f %%", ceil(100.0 * s->share));
-    text_put(t, " of the time\"");
-    text_member_number(t, "relative_error", s->relative_error);
-    text_member_number(t, "mesh_error", s->mesh_error);
-    text_member_number(t, "solver_error", s->solver_error);
-    text_member_number(t, "seconds", s->seconds);
-    text_member_number(t, "total_s", s->total_s);
-    text_member_number(t, "share", s->share);
-    put_count(t, "iterations", &s->iterations);
-    text_close(t, '}');
 }
 
 /* seconds: when the bound was established, or what the whole solve would have taken. step NULL: it never was. */
@@ -65,10 +38,7 @@ char *codec_encode_trade(const codec_trade *of, size_t *len)
 {
     text t = {0};
     const uz_trade *trade = &of->trade;
-    uz_suggestion suggestion = {0};
     static const double DECADE[DECADES] = {1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10};
-    if (of->may_save && of->requested_error < (1.0 - 1e-9) * 0.1 * of->mesh_error)
-        suggestion = uz_trade_suggest(trade, of->mesh_error, of->solver_error, of->certify_s);
     text_open(&t, '{');
     text_member_string(&t, "job", of->job_id);
     if (of->case_name)
@@ -92,8 +62,6 @@ char *codec_encode_trade(const codec_trade *of, size_t *len)
     text_member_number(&t, "total_s", trade->total_s);
     text_member_number(&t, "solver_error", of->solver_error);
     text_member_number(&t, "mesh_error", of->mesh_error);
-    text_key(&t, "suggestion");
-    put_suggestion(&t, &suggestion);
     text_close(&t, '}');
     return text_finish(&t, len);
 }

@@ -75,20 +75,11 @@ bool codec_read_trade(codec_trade *out, const char *summary)
     json_tree tree;
     if (!read_own(&tree, summary))
         return false;
-    const json_value *root = tree.root, *suggestion = json_get(root, "suggestion");
-    const json_value *mesh_error = json_is(suggestion, JSON_IS_OBJECT) ? json_get(suggestion, "mesh_error")
-                                                                       : json_get(root, "discretization_error");
-    out->mesh_error = json_number(mesh_error, (double)NAN);
+    const json_value *root = tree.root;
+    out->mesh_error = json_number(json_get(root, "discretization_error"), (double)NAN);
     out->solver_error = json_number(json_get(json_get(root, "certificate"), "relative_error"), (double)NAN);
-    out->requested_error = json_number(json_get(root, "requested_error"), (double)NAN);
-    out->certify_s = json_number(json_get(json_get(root, "timings_s"), "certify"), (double)NAN);
     out->is_scene = json_text_is(json_get(json_get(root, "problem"), "kind"), "scene");
     out->has_answer = !json_text_is(json_get(root, "outcome"), "infeasible");
-    /* what may be told that it could have asked for less: a run from the beginning that asked for an error of its own
-     */
-    out->may_save = out->is_scene && json_text_is(json_get(root, "outcome"), "converged") &&
-                    json_text_is(json_get(root, "started_from"), "zero") &&
-                    !json_text_is(json_get(root, "method"), "linear") && !json_get(root, "mesh");
     json_clear(&tree);
     return true;
 }

@@ -110,6 +110,5 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
         out->refinements += results[i]->summary.refinements;
     }
     take_factor(out, &results[0]->summary);
-    out->suggestion.any = false; /* each case has its own */
     set_message(out, counts);
 }

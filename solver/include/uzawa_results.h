@@ -182,7 +182,6 @@ typedef struct {
     char message[256];               /* one sentence on the outcome where it is not `converged`; "" otherwise */
     const uz_evaluation *evaluation; /* scenes with an answer: the result's own; else NULL */
     const uz_ladder *ladder;         /* cells chosen here: the result's own; else NULL */
-    uz_suggestion suggestion;        /* scenes */
 } uz_summary;
 
 /* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.

@@ -30,18 +30,6 @@ const uz_trade_step *uz_trade_reach(const uz_trade *trade, double relative_error
 /* Seconds of the whole solve if it had ended there: what follows the iterations is spent all the same. */
 double uz_trade_cost(const uz_trade *trade, const uz_trade_step *step);
 
-/* `balanced` would have served: the mesh loses more than ten times what it leaves of the error. */
-typedef struct {
-    bool any;
-    double relative_error;           /* that `balanced` asks for */
-    double mesh_error, solver_error; /* estimated; certified */
-    double seconds, total_s, share;  /* of the solve with it, at most; of this one; the former over the latter */
-    int64_t iterations;
-} uz_suggestion;
-/* mesh_error: estimated relative error of the mesh, NaN where not known; extra_s: what `balanced` does beside. Nothing
- * is suggested where it would save less than a fifth of the time. */
-uz_suggestion uz_trade_suggest(const uz_trade *trade, double mesh_error, double solver_error, double extra_s);
-
 #ifdef __cplusplus
 }
 #endif

@@ -394,7 +394,6 @@ static uz_status publish(climb *c, uz_error *err)
         result->summary.ladder = result->ladder;
         add_timings(&result->summary.timings, &c->spent[i]);
         uz_trade_shift(&result->trade, c->spent[i].total);
-        result->summary.suggestion.any = false; /* the cells follow from what was asked for */
         conclude(c, &result->summary);
     }
     return UZ_OK;

@@ -329,8 +329,6 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
     uz_explain_outcome(run->result, run->end);
     report_cost(run);
     report_trade(run);
-    if (status == UZ_OK)
-        uz_run_suggest(run);
     summary->timings.total = uz_run_time(run);
     return status;
 }

@@ -193,7 +193,6 @@ static void report_trade(uz_result *result)
     uz_decades_certify(&decades, result->summary.certificate.relative_error, result->summary.iterations, 0);
     result->trade = decades.trade;
     result->trade.total_s = decades.trade.iterated_s;
-    result->summary.suggestion.any = false;
 }
 
 /* A sum of loads that is no more than their rounding. */

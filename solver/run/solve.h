@@ -87,8 +87,6 @@ uz_status uz_run_publish(uz_run *run, uz_error *err);
 uz_scene uz_run_scene(const uz_run *run);
 /* Seconds of the run until now. In a block the others' time is not this case's. */
 double uz_run_time(const uz_run *run);
-/* Whether `balanced` would have served (suggest.c), in the summary; the trade of the result is complete. */
-void uz_run_suggest(uz_run *run);
 void uz_run_end(uz_run *run);
 
 /* The problem's matrices and load cases, as far as they can be checked before anything is computed. */

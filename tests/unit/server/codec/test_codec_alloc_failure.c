@@ -257,5 +257,5 @@ TEST(encoding)
     exhaust(try_encode, NULL);
     exhaust(try_judge, "{\"outcome\":\"converged\",\"contact\":{\"active\":2}}");
     exhaust(try_surface, "a case");
-    exhaust(try_trade, "{\"method\": \"auto\", \"certificate\": {\"relative_error\": 1e-9}, \"suggestion\": {}}");
+    exhaust(try_trade, "{\"method\": \"auto\", \"certificate\": {\"relative_error\": 1e-9}}");
 }

@@ -254,53 +254,16 @@ TEST(summary_of_matrices)
     free(reply);
 }
 
-/* A summary with a suggestion, and the record beside it. */
-static void check_suggestion(double share, const char *told)
-{
-    json_tree doc;
-    uz_summary s = paper_summary();
-    s.suggestion = (uz_suggestion){.any = true,
-                                   .relative_error = 2.2e-3,
-                                   .mesh_error = 0.022,
-                                   .solver_error = 8e-6,
-                                   .seconds = share,
-                                   .total_s = 1.0,
-                                   .share = share,
-                                   .iterations = 48};
-    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE), want[160];
-    read_reply(&doc, reply, "summary.json");
-    const json_value *suggestion = json_get(doc.root, "suggestion");
-    snprintf(want, sizeof want, "mesh error 2.2 %%, solver error 0.0008 %%: balanced would have taken %s of the time",
-             told);
-    CHECK_STR(json_text(json_get(suggestion, "text")), want);
-    CHECK_STR(json_text(json_get(suggestion, "level")), "balanced");
-    CHECK_INT(json_number(json_get(suggestion, "iterations"), 0), 48);
-    json_clear(&doc);
-    free(reply);
-}
-
-TEST(a_suggestion_says_at_most)
-{
-    check_suggestion(0.125, "1/8");
-    check_suggestion(0.13, "1/7");
-    check_suggestion(0.5, "1/2");
-    check_suggestion(0.501, "51 %");
-    check_suggestion(0.8, "80 %");
-    check_suggestion(1.0 / 3.0, "1/3");
-    check_suggestion(1e-3, "1/1000");
-}
-
 TEST(what_accuracy_took_fits_the_schema)
 {
     json_tree doc;
     codec_trade of = {.job_id = "0190f3a5c1d87d0b9e4f2a6b8c1d3e5f"};
     uz_trade_clear(&of.trade);
     CHECK(!codec_read_trade(&of, "{") && codec_read_trade(&of, "{}"));
-    CHECK(isnan(of.mesh_error) && isnan(of.solver_error) && !of.may_save);
+    CHECK(isnan(of.mesh_error) && isnan(of.solver_error));
     char *reply = codec_encode_trade(&of, NULL);
     read_reply(&doc, reply, "work-precision.json");
-    CHECK(json_is(json_get(doc.root, "mesh_error"), JSON_IS_NULL) &&
-          json_is(json_get(doc.root, "suggestion"), JSON_IS_NULL));
+    CHECK(json_is(json_get(doc.root, "mesh_error"), JSON_IS_NULL));
     json_clear(&doc);
     free(reply);
     for (int k = 0; k < 30; k++)
@@ -315,11 +278,11 @@ TEST(what_accuracy_took_fits_the_schema)
     reply = codec_encode_trade(&of, NULL);
     read_reply(&doc, reply, "work-precision.json");
     const json_value *decades = json_get(doc.root, "decades"), *second = &decades->items[1],
-                     *eighth = &decades->items[7], *suggestion = json_get(doc.root, "suggestion");
+                     *eighth = &decades->items[7], *levels = json_get(doc.root, "levels");
     CHECK_INT(json_number(json_get(second, "iterations"), 0), 70);
     CHECK_STR(json_text(json_get(second, "by")), "iteration");
     CHECK(json_is(json_get(eighth, "seconds"), JSON_IS_NULL) && json_is(json_get(eighth, "by"), JSON_IS_NULL));
-    CHECK_INT(json_number(json_get(suggestion, "iterations"), 0), 100); /* 2e-3 is met at 10^-2.75 */
+    CHECK_INT(json_number(json_get(&levels->items[1], "iterations"), 0), 100); /* 2e-3 is met at 10^-2.75 */
     json_clear(&doc);
     free(reply);
 }

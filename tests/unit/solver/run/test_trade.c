@@ -155,7 +155,6 @@ TEST(linear_bodies_reach_everything_at_once)
     CHECK_INT(result->summary.method, UZ_METHOD_LINEAR);
     check_record(result);
     CHECK(is_reached(&result->trade.step[39]) && result->trade.step[39].iterations <= 1);
-    CHECK(!result->summary.suggestion.any);
     uz_result_free(result);
     uz_problem_clear(&problem);
 }
@@ -340,53 +339,6 @@ TEST(a_continued_run_keeps_what_was_reached)
     CHECK(later.step[20].seconds == before.step[20].seconds + earlier.total_s);
     CHECK(later.step[20].applications == before.step[20].applications + earlier.step[19].applications);
     CHECK(!is_reached(&later.step[40]));
-}
-
-/* ---- suggestions */
-
-TEST(what_would_have_saved_enough_is_suggested)
-{
-    uz_trade trade;
-    uz_trade_clear(&trade);
-    for (int k = 0; k < 32; k++)
-        trade.step[k] = (uz_trade_step){.seconds = 0.1 * (k + 1), .iterations = 10 * (k + 1)};
-    trade.iterated_s = 3.2;
-    trade.total_s = 4.0;
-    /* a tenth of 2.2 % is met at 10^-2.75, step 10: 1.1 s, and 0.8 s that follow the iterations */
-    uz_suggestion s = uz_trade_suggest(&trade, 0.022, 8e-9, 0.1);
-    CHECK(s.any && s.iterations == 110 && s.mesh_error == 0.022 && s.solver_error == 8e-9 && s.total_s == 4.0);
-    CHECK_REL(s.seconds, 2.0, 1e-12);
-    CHECK_REL(s.share, 0.5, 1e-12);
-    CHECK_REL(s.relative_error, 0.0022, 1e-12);
-    CHECK(!uz_trade_suggest(&trade, 0.022, 8e-9, 1.4).any); /* 3.3 of 4 s */
-    CHECK(uz_trade_suggest(&trade, 0.022, 8e-9, 1.2).any);
-    CHECK(!uz_trade_suggest(&trade, NAN, 8e-9, 0.0).any && !uz_trade_suggest(&trade, 0.0, 8e-9, 0.0).any);
-    CHECK(!uz_trade_suggest(&trade, 1e-8, 8e-9, 0.0).any); /* the answer is no better than a tenth of that */
-    CHECK(!uz_trade_suggest(&trade, 1e-9, 8e-11, 0.0).any);
-    for (int k = 10; k < 32; k++)
-        trade.step[k].by_certificate = true; /* nothing is known before the answer */
-    CHECK(!uz_trade_suggest(&trade, 0.022, 8e-9, 0.0).any);
-}
-
-/* A slow way to many digits on a coarse mesh: `balanced` takes as many iterations as the suggestion says, or fewer. */
-TEST(a_coarse_mesh_with_many_digits_is_told_so)
-{
-    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(30, 10)};
-    uz_settings settings = with_method(UZ_METHOD_UZAWA, UZ_OPERATOR_MATRIX_FREE, 1e-4);
-    uz_result *result = solve(&problem, &settings);
-    const uz_suggestion s = result->summary.suggestion;
-    CHECK(s.any && s.share <= 0.8 && s.iterations < result->summary.iterations);
-    CHECK(s.mesh_error > 0.015 && s.mesh_error < 0.03 && s.solver_error == result->summary.certificate.relative_error);
-    uz_result_free(result);
-    settings.balanced = true;
-    result = solve(&problem, &settings);
-    CHECK_INT(result->summary.outcome, UZ_CONVERGED);
-    CHECK_REL(result->summary.discretization_error, s.mesh_error, 0.1);
-    CHECK_MSG(result->summary.iterations <= s.iterations, "%lld of %lld", (long long)result->summary.iterations,
-              (long long)s.iterations);
-    CHECK(!result->summary.suggestion.any);
-    uz_result_free(result);
-    uz_problem_clear(&problem);
 }
 
 TEST(the_mesh_error_is_found_from_the_answer_again)
