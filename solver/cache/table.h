@@ -1,5 +1,5 @@
 /* table.h: reference-counted objects by kind and digest, bounded in bytes, the least recently used first out, with one
- * creator per object while others wait for it. What the objects are is their owners' business: bodies (cache.h),
+ * creator per object while others wait for it. What the objects are is their owners' business: bodies (setup_cache.h),
  * factors and analyses (parts.h).
  *
  * An object may hold uses of others in the same table and give them back when it is destroyed: nothing is destroyed

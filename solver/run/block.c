@@ -1,4 +1,4 @@
-/* block.c: the pipeline of pipeline.c for several loads at once.
+/* block.c: the pipeline of run.c for several loads at once.
  *
  *     p -> y, g0            forward substitution of all loads, once through L
  *     r                     iterations, load by load: they live on the contact

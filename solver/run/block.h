@@ -2,7 +2,7 @@
 #ifndef UZ_BLOCK_H
 #define UZ_BLOCK_H
 
-#include "run/solve.h"
+#include "run/run.h"
 
 typedef struct uz_block uz_block; /* one thread; used for one group of cases after the other */
 

@@ -1,7 +1,7 @@
 /* cases.c: one body, one or many loads. */
-#include "run/ladder.h"
+#include "run/grid_sequence.h"
 #include "run/block.h"
-#include "run/cache.h"
+#include "run/setup_cache.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -10,7 +10,7 @@
 #include "methods/method.h"
 #include "run/rows.h"
 #include "run/semicoercive.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <math.h>
 #include <stdio.h>

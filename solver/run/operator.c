@@ -1,5 +1,5 @@
 /* operator.c: which form of the operator a body gets, and the making of it: a factor, or a multigrid in its place. */
-#include "run/body.h"
+#include "run/setup.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"

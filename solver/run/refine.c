@@ -10,7 +10,7 @@
 #include "core/alloc.h"
 #include "core/error.h"
 #include "methods/exchange.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <float.h>
 #include <math.h>

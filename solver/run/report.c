@@ -1,5 +1,5 @@
 /* report.c: what a solve leaves behind. */
-#include "run/solve.h"
+#include "run/run.h"
 
 #include "core/alloc.h"
 #include "core/clock.h"

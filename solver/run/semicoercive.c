@@ -1,6 +1,6 @@
 #include "run/semicoercive.h"
 
-#include "run/cache.h"
+#include "run/setup_cache.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/error.h"
@@ -8,7 +8,7 @@
 #include "semicoercive/contact_proof.h"
 #include "semicoercive/null_space.h"
 #include "run/semicoercive_private.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <float.h>
 #include <math.h>

@@ -7,7 +7,7 @@
 #include "post/evaluate.h"
 #include "assembly/pressed.h"
 #include "run/semicoercive_private.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,10 +1,10 @@
 /* verify.c: the certificate of an answer that somebody else made. */
-#include "run/cache.h"
+#include "run/setup_cache.h"
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
 #include "linalg/linalg.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -8,7 +8,7 @@
  * Algorithms, chapter 12, with the inner solver cut short). r_0 is renewed at every check, whose bound needs D r in
  * float64 anyway. Both ways take the checks of the product's own method (solver/methods/gradient.c). */
 #include "bench/bench.h"
-#include "run/cache.h"
+#include "run/setup_cache.h"
 #include "core/clock.h"
 #include "dual/dual.h"
 

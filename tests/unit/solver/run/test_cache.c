@@ -1,5 +1,5 @@
 /* The cache of bodies: one creator per key, a bound in bytes, and keys that tell bodies apart. */
-#include "run/cache.h"
+#include "run/setup_cache.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"

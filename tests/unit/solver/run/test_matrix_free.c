@@ -1,6 +1,6 @@
 /* Whole solves without a factor: the answers of the other forms, bounds that hold at every accuracy, and the memory
  * rule that chooses this form. */
-#include "run/cache.h"
+#include "run/setup_cache.h"
 #include "harness.h"
 #include "membrane.h"
 #include "qp_fixture.h"

@@ -1,8 +1,8 @@
-/* cache.h: bodies by digest. One creator per key while others wait for it. */
-#ifndef UZ_CACHE_H
-#define UZ_CACHE_H
+/* setup_cache.h: bodies by digest. One creator per key while others wait for it. */
+#ifndef UZ_SETUP_CACHE_H
+#define UZ_SETUP_CACHE_H
 
-#include "run/body.h"
+#include "run/setup.h"
 
 /* uz_cache_acquire for a body that is solved with these rows, and others (rows.h); NULL: none in particular. */
 uz_status uz_cache_acquire_rows(uz_body **body, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,

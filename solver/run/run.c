@@ -1,4 +1,4 @@
-/* pipeline.c: from a problem to a certified answer, read from top to bottom as the paper does.
+/* run.c: from a problem to a certified answer, read from top to bottom as the paper does.
  *
  *     scene -> K, N        assembly          (cached with the factor)
  *     K -> L, D            factor, condense  (cached)
@@ -6,7 +6,7 @@
  *     r                    iterations on D
  *     u                    one backward substitution
  *     (u, r) -> bound      certificate, from the original data */
-#include "run/body.h"
+#include "run/setup.h"
 #include "certificate/certificate.h"
 #include "certificate/infeasible.h"
 #include "core/alloc.h"
@@ -15,7 +15,7 @@
 #include "core/hooks.h"
 #include "methods/method.h"
 #include "run/rows.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <float.h>
 #include <math.h>

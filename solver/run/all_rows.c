@@ -1,4 +1,4 @@
-/* widen.c: from an answer with some of the contact rows to one with all of them.
+/* all_rows.c: from an answer with some of the contact rows to one with all of them.
  *
  * Rows that were left out have no reaction and the gap that u leaves; what is certified is the full problem, on its own
  * K, N, p and h (obstacle/candidates.h says why that bound is one). Where it misses the request although that of the
@@ -9,7 +9,7 @@
 #include "core/hooks.h"
 #include "linalg/linalg.h"
 #include "run/rows.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <float.h>
 #include <math.h>

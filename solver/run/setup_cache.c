@@ -1,5 +1,5 @@
-/* cache.c: bodies as objects of the table. */
-#include "run/cache.h"
+/* setup_cache.c: bodies as objects of the table. */
+#include "run/setup_cache.h"
 
 #include "cache/table.h"
 #include "core/alloc.h"

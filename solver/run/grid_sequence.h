@@ -1,6 +1,6 @@
-/* ladder.h: a box whose cells are chosen so that the total error is what was asked for. */
-#ifndef UZ_ADAPTIVE_LADDER_H
-#define UZ_ADAPTIVE_LADDER_H
+/* grid_sequence.h: a box whose cells are chosen so that the total error is what was asked for. */
+#ifndef UZ_GRID_SEQUENCE_H
+#define UZ_GRID_SEQUENCE_H
 
 #include "uzawa.h"
 

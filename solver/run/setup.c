@@ -1,4 +1,4 @@
-#include "run/body.h"
+#include "run/setup.h"
 
 #include "core/alloc.h"
 #include "core/clock.h"

@@ -1,4 +1,4 @@
-/* ladder.c: grid after grid until the total error is what was asked for.
+/* grid_sequence.c: grid after grid until the total error is what was asked for.
  *
  *     grid n -> solve, started from the contact pressure of the best grid so far
  *            -> estimated discretization error and certified algebraic error: the total error
@@ -6,7 +6,7 @@
  *
  * The algebraic part is asked for a tenth of the total, so that it takes half a percent of it and the estimate, which
  * needs an answer to look at, is one of the mesh alone. */
-#include "run/ladder.h"
+#include "run/grid_sequence.h"
 
 #include "scene/grids.h"
 #include "run/transfer.h"
@@ -15,7 +15,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "run/solve.h"
+#include "run/run.h"
 
 #include <math.h>
 #include <stdio.h>

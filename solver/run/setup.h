@@ -1,6 +1,6 @@
-/* body.h: what is known of a body before its load: the part of a problem that is worth caching. */
-#ifndef UZ_BODY_H
-#define UZ_BODY_H
+/* setup.h: what is known of a body before its load: the part of a problem that is worth caching. */
+#ifndef UZ_SETUP_H
+#define UZ_SETUP_H
 
 #include "assembly/assembly.h"
 #include "cache/parts.h"

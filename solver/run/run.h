@@ -1,9 +1,9 @@
-/* solve.h: the state of the solve of one load, shared by pipeline.c (what happens), report.c (what is told of it),
+/* run.h: the state of the solve of one load, shared by run.c (what happens), report.c (what is told of it),
  * cases.c (several loads on one body) and verify.c. */
-#ifndef UZ_SOLVE_H
-#define UZ_SOLVE_H
+#ifndef UZ_RUN_H
+#define UZ_RUN_H
 
-#include "run/body.h"
+#include "run/setup.h"
 #include "certificate/certificate.h"
 #include "methods/decades.h"
 #include "methods/iterate.h"
@@ -71,7 +71,7 @@ uz_status uz_run_start(uz_run *run, uz_error *err);   /* vectors, the given star
 uz_status uz_run_iterate(uz_run *run, uz_error *err); /* until the method's own estimate is met, or it ends */
 uz_status uz_run_certify(uz_run *run, uz_error *err); /* the best answer */
 uz_status uz_run_finish(uz_run *run, uz_error *err);  /* further rounds where the certificate asks for them */
-/* The answer and its certificate become those of all rows, where the body left some out (widen.c); run->wants. */
+/* The answer and its certificate become those of all rows, where the body left some out (all_rows.c); run->wants. */
 uz_status uz_run_widen(uz_run *run, uz_error *err);
 /* From here on certificates are about all rows, of which the answer has room. */
 void uz_run_take_all_rows(uz_run *run);
@@ -101,7 +101,7 @@ void uz_blank_answer(uz_result *result);
 /* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */
 void uz_explain_outcome(uz_result *result, uz_end end);
 
-/* uz_solve_cases on a mesh that is given, and on one whose cells are chosen (run/ladder.c). */
+/* uz_solve_cases on a mesh that is given, and on one whose cells are chosen (run/grid_sequence.c). */
 uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
                            const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 
