@@ -112,14 +112,9 @@ void fields_close(field_reader *reader)
 /* The scene with the loads of the case, and the cells that were chosen for a box; borrowed. */
 static store_status read_scene(uz_scene *out, const field_reader *reader, int64_t number)
 {
-    const uz_problem *problem = &reader->request.problem;
     double *cells = NULL;
     int64_t count = 0;
-    *out = problem->scene;
-    if (number > 0 && number <= problem->n_cases && problem->cases[number - 1].loads) {
-        out->loads = problem->cases[number - 1].loads;
-        out->n_loads = problem->cases[number - 1].n_loads;
-    }
+    *out = uz_scene_of_case(&reader->request.problem, number - 1);
     if (!out->box.automatic)
         return STORE_OK;
     store_status status = store_get_vector(reader->context->store, reader->j->id, 0, "cells", &cells, &count);

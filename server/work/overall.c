@@ -51,17 +51,6 @@ static bool is_worse(const uz_result *a, const uz_result *b)
     return x != y ? x > y : error_of(a) > error_of(b);
 }
 
-static void add_timings(uz_timings *sum, const uz_timings *t)
-{
-    sum->assemble += t->assemble;
-    sum->order += t->order;
-    sum->factor += t->factor;
-    sum->condense += t->condense;
-    sum->iterate += t->iterate;
-    sum->certify += t->certify;
-    sum->total += t->total;
-}
-
 /* The first case paid for the factor, or found it; its cost has the setup. */
 static void take_factor(uz_summary *out, const uz_summary *first)
 {
@@ -97,7 +86,7 @@ void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *res
         counts->outcomes[results[i]->summary.outcome]++;
         worst = is_worse(results[i], results[worst]) ? i : worst;
         bound = fmax(bound, bound_of(results[i]));
-        add_timings(&times, &results[i]->summary.timings);
+        uz_timings_add(&times, &results[i]->summary.timings);
     }
     *out = results[worst]->summary;
     counts->worst = problem->cases[worst].name;

@@ -29,6 +29,8 @@ typedef struct {
     int64_t n_cases;
 } uz_problem;
 void uz_problem_clear(uz_problem *problem);
+/* The scene with the loads of case i, from 0; its own where that has none, or is none. It borrows all it has. */
+uz_scene uz_scene_of_case(const uz_problem *problem, int64_t i);
 
 /* -------------------------------------------------------------- settings */
 

@@ -45,7 +45,8 @@ typedef struct {
 
 typedef struct {
     double queue, parse, assemble, order, factor, condense, iterate, certify, total;
-} uz_timings; /* seconds; queue and parse are the caller's */
+} uz_timings;                                              /* seconds; queue and parse are the caller's */
+void uz_timings_add(uz_timings *sum, const uz_timings *t); /* all but queue and parse */
 
 /* One row of the convergence history. Columns as in the HTTP interface. */
 typedef struct {

@@ -6,7 +6,6 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "linalg/linalg.h"
 #include "methods/method.h"
 #include "run/rows.h"
 #include "run/semicoercive.h"
@@ -36,43 +35,6 @@ typedef struct {
     uz_candidates wanted; /* rows of the next round, or in NULL */
 } batch;
 
-/* Says which case an error is about: /loads/0/on becomes /cases/3/loads/0/on. Pointers too long are cut. */
-static void name_case(uz_error *err, int64_t i)
-{
-    char prefix[32];
-    if (!err)
-        return;
-    bool pointer = err->where[0] == '/' || err->where[0] == '\0';
-    size_t length = (size_t)snprintf(prefix, sizeof prefix, "/cases/%lld%s", (long long)i, pointer ? "" : "/");
-    memmove(err->where + length, err->where, sizeof err->where - length);
-    memcpy(err->where, prefix, length);
-    err->where[sizeof err->where - 1] = '\0';
-}
-
-static uz_status check_case(const uz_load_case *load_case, const uz_problem *problem, uz_error *err)
-{
-    bool scene = problem->kind == UZ_PROBLEM_SCENE;
-    if (scene ? load_case->p || load_case->h : load_case->loads != NULL)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "%s",
-                       scene ? "a load case of a scene has loads, not p or h"
-                             : "a load case of a problem in matrices has p and h, not loads");
-    uz_status status = uz_check_finite(load_case->p, problem->qp.K.cols, "p", err);
-    return status == UZ_OK ? uz_check_finite(load_case->h, problem->qp.N.rows, "h", err) : status;
-}
-
-uz_status uz_check_problem(const uz_problem *problem, uz_error *err)
-{
-    if (problem->n_cases < 0 || (problem->n_cases > 0 && !problem->cases))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "the problem's load cases are missing");
-    uz_status status = problem->kind == UZ_PROBLEM_MATRICES ? uz_qp_check(&problem->qp, err) : UZ_OK;
-    for (int64_t i = 0; status == UZ_OK && i < problem->n_cases; i++) {
-        status = check_case(&problem->cases[i], problem, err);
-        if (status != UZ_OK)
-            name_case(err, i);
-    }
-    return status;
-}
-
 /* The first case of a round carries the cost of the body; for the others it is there. place: in the round. */
 static uz_status open_case(uz_run *run, const batch *b, int64_t place, uz_error *err)
 {
@@ -97,20 +59,12 @@ static uz_status open_case(uz_run *run, const batch *b, int64_t place, uz_error 
 static void count_rounds(const batch *b, const uz_result *before, uz_result *result)
 {
     uz_summary *summary = &result->summary;
-    uz_timings *t = &summary->timings;
     summary->rounds = b->round;
     summary->added = summary->kept - b->kept;
     if (!before)
         return;
-    const uz_timings *earlier = &before->summary.timings;
-    t->assemble += earlier->assemble;
-    t->order += earlier->order;
-    t->factor += earlier->factor;
-    t->condense += earlier->condense;
-    t->iterate += earlier->iterate;
-    t->certify += earlier->certify;
-    t->total += earlier->total;
-    uz_trade_shift(&result->trade, earlier->total);
+    uz_timings_add(&summary->timings, &before->summary.timings);
+    uz_trade_shift(&result->trade, before->summary.timings.total);
 }
 
 /* The case's rows go to those of the next round. */
@@ -133,7 +87,7 @@ static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *e
         b->results[run->index] = run->result;
         run->result = NULL;
     } else if (b->problem->n_cases > 0) {
-        name_case(err, run->index);
+        uz_error_name_case(err, run->index);
     }
     return status;
 }
@@ -169,7 +123,7 @@ static uz_status solve_block(batch *b, uz_block *block, int64_t first, int64_t c
         if (status == UZ_OK)
             status = close_case(&runs[k], b, status, err);
         else if (runs[k].index == failed && b->problem->n_cases > 0)
-            name_case(err, failed);
+            uz_error_name_case(err, failed);
         uz_run_end(&runs[k]);
     }
     return status;
@@ -345,26 +299,6 @@ uz_status uz_solve_regular(uz_result **out, const uz_problem *problem, const uz_
     return status;
 }
 
-/* One case as a problem of its own, which borrows all it has. */
-static uz_problem problem_of_case(const uz_problem *problem, int64_t i)
-{
-    uz_problem one = *problem;
-    one.cases = NULL;
-    one.n_cases = 0;
-    if (problem->n_cases == 0)
-        return one;
-    const uz_load_case *load_case = &problem->cases[i];
-    if (load_case->p)
-        one.qp.p = load_case->p;
-    if (load_case->h)
-        one.qp.h = load_case->h;
-    if (load_case->loads) {
-        one.scene.loads = load_case->loads;
-        one.scene.n_loads = load_case->n_loads;
-    }
-    return one;
-}
-
 /* Other refusals are about the body, which all cases share. */
 static bool is_about_case(const uz_error *err)
 {
@@ -395,7 +329,7 @@ static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status ref
 {
     uz_status status = refused;
     for (int64_t i = 0; i < b->n; i++) {
-        uz_problem one = problem_of_case(b->problem, i);
+        uz_problem one = uz_problem_of_case(b->problem, i);
         if (!uz_may_be_semicoercive(refused, b->results[i], &one, b->settings))
             continue;
         if (b->hooks && b->hooks->begins)
@@ -407,7 +341,7 @@ static uz_status solve_held_by_obstacle(batch *b, uz_cache *cache, uz_status ref
         if (status == UZ_OK)
             continue;
         if (b->problem->n_cases > 0 && err && is_about_case(err))
-            name_case(err, i);
+            uz_error_name_case(err, i);
         return status;
     }
     return status;
@@ -453,11 +387,4 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
         *out = results[0];
     free(results);
     return status;
-}
-
-void uz_results_free(uz_result **results, int64_t n)
-{
-    for (int64_t i = 0; results && i < n; i++)
-        uz_result_free(results[i]);
-    free(results);
 }

@@ -66,27 +66,6 @@ bool uz_cells_are_chosen(const uz_problem *problem)
     return problem->kind == UZ_PROBLEM_SCENE && problem->scene.source == UZ_MESH_BOX && problem->scene.box.automatic;
 }
 
-static uz_scene scene_of_case(const uz_problem *problem, int64_t i)
-{
-    uz_scene scene = problem->scene;
-    if (problem->n_cases > 0 && problem->cases[i].loads) {
-        scene.loads = problem->cases[i].loads;
-        scene.n_loads = problem->cases[i].n_loads;
-    }
-    return scene;
-}
-
-static void add_timings(uz_timings *sum, const uz_timings *t)
-{
-    sum->assemble += t->assemble;
-    sum->order += t->order;
-    sum->factor += t->factor;
-    sum->condense += t->condense;
-    sum->iterate += t->iterate;
-    sum->certify += t->certify;
-    sum->total += t->total;
-}
-
 /* ---- the error of a grid */
 
 /* Has the body only been pushed aside? Then no element is strained, and there is nothing to estimate. */
@@ -121,7 +100,7 @@ static uz_status estimate(rung *x, uz_rung *row, const uz_problem *problem, int6
 {
     uz_status status = UZ_OK;
     for (int64_t i = 0; status == UZ_OK && i < n_cases; i++) {
-        const uz_scene scene = scene_of_case(problem, i);
+        const uz_scene scene = uz_scene_of_case(problem, i);
         const uz_summary *s = &x->results[i]->summary;
         status = estimate_case(x->results[i], outline, &scene, err);
         row->iterations += s->iterations;
@@ -208,7 +187,7 @@ static uz_status solve_rung(rung *x, uz_rung *row, climb *c, int64_t n, uz_error
 static void drop(climb *c, rung *x)
 {
     for (int64_t i = 0; x->results && i < c->n_cases; i++)
-        add_timings(&c->spent[i], &x->results[i]->summary.timings);
+        uz_timings_add(&c->spent[i], &x->results[i]->summary.timings);
     uz_results_free(x->results, x->results ? c->n_cases : 0);
     x->results = NULL;
 }
@@ -392,7 +371,7 @@ static uz_status publish(climb *c, uz_error *err)
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grids that were tried");
         *result->ladder = c->ladder;
         result->summary.ladder = result->ladder;
-        add_timings(&result->summary.timings, &c->spent[i]);
+        uz_timings_add(&result->summary.timings, &c->spent[i]);
         uz_trade_shift(&result->trade, c->spent[i].total);
         conclude(c, &result->summary);
     }

@@ -14,33 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* An enumerator that has a name. */
-static bool is_known(const char *name)
-{
-    return strcmp(name, "unknown") != 0;
-}
-
-uz_status uz_check_settings(const uz_settings *s, uz_error *err)
-{
-    if (!(s->relative_error >= 0.0 && s->relative_error <= 1.0))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "relative_error must lie in [0, 1], it is %g", s->relative_error);
-    if (!(s->epsilon >= 0.0 && isfinite(s->epsilon)))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "epsilon must be finite and not negative, it is %g", s->epsilon);
-    if (!(s->alpha >= 0.0 && isfinite(s->alpha)))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
-    if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
-    if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
-        !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "method, operator, ordering or stopping is not one of the known ones");
-    return UZ_OK;
-}
-
-double uz_requested_error(const uz_settings *settings)
-{
-    return settings->relative_error > 0.0 ? settings->relative_error : UZ_EXACT_RELATIVE_ERROR;
-}
-
 uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                        uz_error *err)
 {
@@ -157,16 +130,6 @@ static void report_contact(uz_run *run)
     }
 }
 
-uz_scene uz_run_scene(const uz_run *run)
-{
-    uz_scene scene = run->problem->scene;
-    if (run->load_case && run->load_case->loads) {
-        scene.loads = run->load_case->loads;
-        scene.n_loads = run->load_case->n_loads;
-    }
-    return scene;
-}
-
 static uz_status report_displacements(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
@@ -183,96 +146,8 @@ static uz_status report_displacements(uz_run *run, uz_error *err)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)result->n_nodes);
     uz_recover_nodal(result->u, model, run->answer.u, run->prescribed);
-    const uz_scene scene = uz_run_scene(run);
+    const uz_scene scene = uz_scene_of_case(run->problem, run->index);
     return status == UZ_OK ? uz_evaluate(result, model, &scene, err) : status;
-}
-
-static void blank(double *x, int64_t n)
-{
-    for (int64_t i = 0; x && i < n; i++)
-        x[i] = NAN;
-}
-
-void uz_blank_answer(uz_result *result)
-{
-    uz_summary *s = &result->summary;
-    int64_t n_u = result->mesh.dim > 0 ? result->n_nodes * result->mesh.dim : result->d;
-    blank(result->u, n_u);
-    blank(result->r, result->m);
-    blank(result->g, result->m);
-    blank(result->pressure, result->m);
-    uz_evaluation_free(result->evaluation);
-    result->evaluation = NULL;
-    s->evaluation = NULL;
-    blank(s->force, 3);
-    s->reaction_sum = s->max_penetration = s->max_pressure = NAN;
-    s->active = 0;
-    memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
-}
-
-/* The rows with a share in the contradiction. */
-static void explain_infeasible(const uz_result *result, char *text, size_t size)
-{
-    int64_t named = 0, count = 0;
-    size_t at = (size_t)snprintf(text, size, "no displacement meets all contact conditions: these rows contradict:");
-    for (int64_t i = 0; i < result->m; i++) {
-        if (!(result->ray[i] < -1e-9))
-            continue;
-        count++;
-        if (named < 8 && at < size) {
-            at += (size_t)snprintf(text + at, size - at, "%s %lld", named ? "," : "", (long long)i);
-            named++;
-        }
-    }
-    if (count > named && at < size)
-        snprintf(text + at, size - at, " and %lld more", (long long)(count - named));
-}
-
-void uz_explain_outcome(uz_result *result, uz_end end)
-{
-    uz_summary *s = &result->summary;
-    const char *why = "";
-    switch (s->outcome) {
-    case UZ_INFEASIBLE:
-        explain_infeasible(result, s->message, sizeof s->message);
-        return;
-    case UZ_ITERATION_LIMIT:
-        why = "the iterations allowed were used up: raise max_iterations";
-        break;
-    case UZ_TIME_LIMIT:
-        why = "the time allowed was used up: raise time_limit_s";
-        break;
-    case UZ_PRECISION_LIMIT:
-        why = end == UZ_END_UNSOLVED
-                  ? "active_set solves on the condensed operator, with one entry in each row, or with few rows"
-              : end == UZ_END_BLURRED ? "rows contradict each other by less than rounding can tell from touching"
-                                      : "double precision holds no more digits for this method and problem";
-        break;
-    case UZ_PAPER_RULE:
-        why = "the paper's stopping rule was met; it bounds a force, not an error";
-        break;
-    case UZ_NOT_VERIFIED:
-        why = "the bound on the error of this answer is larger than asked for";
-        break;
-    case UZ_DISMISSED:
-        why = "stopped by request";
-        break;
-    default:
-        return;
-    }
-    const uz_certificate *c = &s->certificate;
-    if (isfinite(c->relative_error))
-        snprintf(s->message, sizeof s->message, "%s. Certified: relative error at most %.3g, asked for %.3g.", why,
-                 c->relative_error, s->requested_error);
-    else if (isfinite(c->absolute_error))
-        snprintf(
-            s->message, sizeof s->message,
-            "%s. Certified: error at most %.3g in the energy norm, which is too much to bound a relative error; asked "
-            "for %.3g.",
-            why, c->absolute_error, s->requested_error);
-    else
-        snprintf(s->message, sizeof s->message, "%s. Nothing could be certified; asked for a relative error of %.3g.",
-                 why, s->requested_error);
 }
 
 double uz_run_time(const uz_run *run)
@@ -374,38 +249,4 @@ void uz_run_end(uz_run *run)
     uz_candidates_clear(&run->wants);
     free(run->work);
     uz_result_free(run->result);
-}
-
-void uz_result_free(uz_result *result)
-{
-    if (!result)
-        return;
-    free(result->ray);
-    free(result->u);
-    free(result->r);
-    free(result->g);
-    free(result->pressure);
-    uz_evaluation_free(result->evaluation);
-    free(result->history.rows);
-    uz_state_free(result->state);
-    uz_mesh_info_clear(&result->mesh);
-    free(result->ladder);
-    free(result);
-}
-
-void uz_problem_clear(uz_problem *problem)
-{
-    if (!problem)
-        return;
-    if (problem->kind == UZ_PROBLEM_SCENE)
-        uz_scene_clear(&problem->scene);
-    else
-        uz_qp_clear(&problem->qp);
-    for (int64_t i = 0; problem->cases && i < problem->n_cases; i++) {
-        free(problem->cases[i].p);
-        free(problem->cases[i].h);
-        free(problem->cases[i].loads);
-    }
-    free(problem->cases);
-    memset(problem, 0, sizeof *problem);
 }

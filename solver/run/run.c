@@ -33,7 +33,7 @@ static uz_status make_load(uz_run *run, uz_error *err)
         run->h_all = run->h;
         return UZ_OK;
     }
-    uz_scene scene = uz_run_scene(run);
+    uz_scene scene = uz_scene_of_case(run->problem, run->index);
     int64_t kept = body->rows.in ? run->m : 0, n_fixed = body->model.n_fixed;
     run->owned = uz_alloc_zero(run->d + run->all + n_fixed + kept, sizeof(double));
     if (!run->owned)
@@ -215,7 +215,7 @@ void uz_run_balance_request(uz_run *run)
     if (!nodal)
         return; /* the request stays at what it was, which is stricter */
     uz_recover_nodal(nodal, &run->body->model, run->answer.u, run->prescribed);
-    const uz_scene scene = uz_run_scene(run);
+    const uz_scene scene = uz_scene_of_case(run->problem, run->index);
     summary->discretization_error = uz_estimate_mesh_error(&run->body->model, &scene, nodal);
     free(nodal);
     if (summary->discretization_error > 0.0)

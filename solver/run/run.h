@@ -7,6 +7,9 @@
 #include "certificate/certificate.h"
 #include "methods/decades.h"
 #include "methods/iterate.h"
+#include "run/problem.h"
+#include "run/results.h"
+#include "run/settings.h"
 #include "uzawa.h"
 
 /* What may become the result. */
@@ -51,7 +54,6 @@ typedef struct {
     uz_result *result;
 } uz_run;
 
-uz_status uz_check_settings(const uz_settings *settings, uz_error *err);
 /* Makes an empty result. *run is zeroed first: uz_run_end may follow a failure. */
 uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                        uz_error *err);
@@ -83,23 +85,9 @@ uz_status uz_run_refine(uz_run *run, uz_error *err);
 uz_status uz_run_report(uz_run *run, uz_error *err);
 /* The part of it that is about the answer, whoever made it: u, r and g go to the result. The outcome stands. */
 uz_status uz_run_publish(uz_run *run, uz_error *err);
-/* Scenes: that with the loads of the case; it borrows all it has. */
-uz_scene uz_run_scene(const uz_run *run);
 /* Seconds of the run until now. In a block the others' time is not this case's. */
 double uz_run_time(const uz_run *run);
 void uz_run_end(uz_run *run);
-
-/* The problem's matrices and load cases, as far as they can be checked before anything is computed. */
-uz_status uz_check_problem(const uz_problem *problem, uz_error *err);
-
-/* `exact` means rounding level: no certificate in double precision can be expected below this. */
-#define UZ_EXACT_RELATIVE_ERROR 1e-12
-/* The relative error that a certificate has to meet, before `balanced` knows better. */
-double uz_requested_error(const uz_settings *settings);
-/* There is no answer: nothing that looks like one may be left. */
-void uz_blank_answer(uz_result *result);
-/* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */
-void uz_explain_outcome(uz_result *result, uz_end end);
 
 /* uz_solve_cases on a mesh that is given, and on one whose cells are chosen (run/grid_sequence.c). */
 uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz_settings *settings,

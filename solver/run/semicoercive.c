@@ -137,16 +137,6 @@ static uz_settings settings_of(const uz_semi *s, bool exact, double relative_err
     return settings;
 }
 
-static void add_timings(uz_timings *sum, const uz_timings *before)
-{
-    sum->assemble += before->assemble;
-    sum->order += before->order;
-    sum->factor += before->factor;
-    sum->condense += before->condense;
-    sum->iterate += before->iterate;
-    sum->certify += before->certify;
-}
-
 /* Solves with the weights and targets that stand in s; the result takes the place of s->last. */
 static uz_status solve_augmented(uz_semi *s, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
@@ -159,7 +149,7 @@ static uz_status solve_augmented(uz_semi *s, const uz_settings *settings, const 
     if (status != UZ_OK)
         return status;
     if (s->last)
-        add_timings(&result->summary.timings, &s->last->summary.timings);
+        uz_timings_add(&result->summary.timings, &s->last->summary.timings);
     uz_result_free(s->last);
     s->last = result;
     return UZ_OK;

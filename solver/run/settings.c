@@ -1,5 +1,7 @@
-/* settings.c: defaults, and the names of choices and outcomes. */
-#include "uzawa.h"
+/* settings.c: defaults, the names of choices and outcomes, and what is wrong with settings. */
+#include "run/settings.h"
+
+#include "core/error.h"
 
 #include <math.h>
 #include <string.h>
@@ -97,4 +99,31 @@ uz_settings uz_settings_default(void)
         .time_limit_s = INFINITY,
     };
     return settings;
+}
+
+/* An enumerator that has a name. */
+static bool is_known(const char *name)
+{
+    return strcmp(name, "unknown") != 0;
+}
+
+uz_status uz_check_settings(const uz_settings *s, uz_error *err)
+{
+    if (!(s->relative_error >= 0.0 && s->relative_error <= 1.0))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "relative_error must lie in [0, 1], it is %g", s->relative_error);
+    if (!(s->epsilon >= 0.0 && isfinite(s->epsilon)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "epsilon must be finite and not negative, it is %g", s->epsilon);
+    if (!(s->alpha >= 0.0 && isfinite(s->alpha)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "alpha must be finite and not negative, it is %g", s->alpha);
+    if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
+    if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
+        !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "method, operator, ordering or stopping is not one of the known ones");
+    return UZ_OK;
+}
+
+double uz_requested_error(const uz_settings *settings)
+{
+    return settings->relative_error > 0.0 ? settings->relative_error : UZ_EXACT_RELATIVE_ERROR;
 }

@@ -1,0 +1,17 @@
+/* problem.h: checks on a problem, and its load cases one by one. */
+#ifndef UZ_PROBLEM_H
+#define UZ_PROBLEM_H
+
+#include "uzawa.h"
+
+/* The problem's matrices and load cases, as far as they can be checked before anything is computed. */
+uz_status uz_check_problem(const uz_problem *problem, uz_error *err);
+
+/* Load case i (from 0) as a problem of its own, which borrows all it has. Without load cases it is the problem. */
+uz_problem uz_problem_of_case(const uz_problem *problem, int64_t i);
+
+/* Says which case an error is about: /loads/0/on becomes /cases/3/loads/0/on. Pointers too long are cut. err may be
+ * NULL. */
+void uz_error_name_case(uz_error *err, int64_t i);
+
+#endif

@@ -1,0 +1,130 @@
+/* results.c: what is left of a solve: its message, sums of times, and the end of it. */
+#include "run/results.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void blank(double *x, int64_t n)
+{
+    for (int64_t i = 0; x && i < n; i++)
+        x[i] = NAN;
+}
+
+void uz_blank_answer(uz_result *result)
+{
+    uz_summary *s = &result->summary;
+    int64_t n_u = result->mesh.dim > 0 ? result->n_nodes * result->mesh.dim : result->d;
+    blank(result->u, n_u);
+    blank(result->r, result->m);
+    blank(result->g, result->m);
+    blank(result->pressure, result->m);
+    uz_evaluation_free(result->evaluation);
+    result->evaluation = NULL;
+    s->evaluation = NULL;
+    blank(s->force, 3);
+    s->reaction_sum = s->max_penetration = s->max_pressure = NAN;
+    s->active = 0;
+    memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
+}
+
+/* The rows with a share in the contradiction. */
+static void explain_infeasible(const uz_result *result, char *text, size_t size)
+{
+    int64_t named = 0, count = 0;
+    size_t at = (size_t)snprintf(text, size, "no displacement meets all contact conditions: these rows contradict:");
+    for (int64_t i = 0; i < result->m; i++) {
+        if (!(result->ray[i] < -1e-9))
+            continue;
+        count++;
+        if (named < 8 && at < size) {
+            at += (size_t)snprintf(text + at, size - at, "%s %lld", named ? "," : "", (long long)i);
+            named++;
+        }
+    }
+    if (count > named && at < size)
+        snprintf(text + at, size - at, " and %lld more", (long long)(count - named));
+}
+
+void uz_explain_outcome(uz_result *result, uz_end end)
+{
+    uz_summary *s = &result->summary;
+    const char *why = "";
+    switch (s->outcome) {
+    case UZ_INFEASIBLE:
+        explain_infeasible(result, s->message, sizeof s->message);
+        return;
+    case UZ_ITERATION_LIMIT:
+        why = "the iterations allowed were used up: raise max_iterations";
+        break;
+    case UZ_TIME_LIMIT:
+        why = "the time allowed was used up: raise time_limit_s";
+        break;
+    case UZ_PRECISION_LIMIT:
+        why = end == UZ_END_UNSOLVED
+                  ? "active_set solves on the condensed operator, with one entry in each row, or with few rows"
+              : end == UZ_END_BLURRED ? "rows contradict each other by less than rounding can tell from touching"
+                                      : "double precision holds no more digits for this method and problem";
+        break;
+    case UZ_PAPER_RULE:
+        why = "the paper's stopping rule was met; it bounds a force, not an error";
+        break;
+    case UZ_NOT_VERIFIED:
+        why = "the bound on the error of this answer is larger than asked for";
+        break;
+    case UZ_DISMISSED:
+        why = "stopped by request";
+        break;
+    default:
+        return;
+    }
+    const uz_certificate *c = &s->certificate;
+    if (isfinite(c->relative_error))
+        snprintf(s->message, sizeof s->message, "%s. Certified: relative error at most %.3g, asked for %.3g.", why,
+                 c->relative_error, s->requested_error);
+    else if (isfinite(c->absolute_error))
+        snprintf(
+            s->message, sizeof s->message,
+            "%s. Certified: error at most %.3g in the energy norm, which is too much to bound a relative error; asked "
+            "for %.3g.",
+            why, c->absolute_error, s->requested_error);
+    else
+        snprintf(s->message, sizeof s->message, "%s. Nothing could be certified; asked for a relative error of %.3g.",
+                 why, s->requested_error);
+}
+
+void uz_timings_add(uz_timings *sum, const uz_timings *t)
+{
+    sum->assemble += t->assemble;
+    sum->order += t->order;
+    sum->factor += t->factor;
+    sum->condense += t->condense;
+    sum->iterate += t->iterate;
+    sum->certify += t->certify;
+    sum->total += t->total;
+}
+
+void uz_result_free(uz_result *result)
+{
+    if (!result)
+        return;
+    free(result->ray);
+    free(result->u);
+    free(result->r);
+    free(result->g);
+    free(result->pressure);
+    uz_evaluation_free(result->evaluation);
+    free(result->history.rows);
+    uz_state_free(result->state);
+    uz_mesh_info_clear(&result->mesh);
+    free(result->ladder);
+    free(result);
+}
+
+void uz_results_free(uz_result **results, int64_t n)
+{
+    for (int64_t i = 0; results && i < n; i++)
+        uz_result_free(results[i]);
+    free(results);
+}

@@ -1,0 +1,13 @@
+/* results.h: what is left of a solve, whoever made it. */
+#ifndef UZ_RESULTS_H
+#define UZ_RESULTS_H
+
+#include "methods/method.h"
+#include "uzawa.h"
+
+/* There is no answer: nothing that looks like one may be left. */
+void uz_blank_answer(uz_result *result);
+/* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */
+void uz_explain_outcome(uz_result *result, uz_end end);
+
+#endif
