@@ -1,4 +1,4 @@
-/* parts.h: what bodies share: the factor of a K that another contact set was solved with, and the ordering and symbolic
+/* parts.h: what setups share: the factor of a K that another contact set was solved with, and the ordering and symbolic
  * analysis of a pattern whose numbers have changed. */
 #ifndef UZ_PARTS_H
 #define UZ_PARTS_H

@@ -104,7 +104,7 @@ static void destroy_all(uz_item *list)
     }
 }
 
-/* Bodies first: they hold uses of factors, which an empty table would not find. */
+/* Setups first: they hold uses of factors, which an empty table would not find. */
 void uz_cache_free(uz_cache *cache)
 {
     if (!cache)

@@ -64,7 +64,7 @@ static void take_nearest(uz_candidates *wants, const double *g)
 /* The rows of another round: those of this one, those that are penetrated, and those that would be next. */
 static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
 {
-    const uz_candidates *rows = &run->body->rows;
+    const uz_candidates *rows = &run->setup->rows;
     uz_candidates wants = {0};
     double *size = uz_alloc(rows->m, sizeof *size);
     uz_status status =
@@ -72,7 +72,7 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
     if (status == UZ_OK)
         status = uz_candidates_add(&wants, rows, err);
     if (status == UZ_OK) {
-        add_sizes(size, uz_body_all_rows(run->body, run->problem), run->h_all, run->answer.u);
+        add_sizes(size, uz_setup_all_rows(run->setup, run->problem), run->h_all, run->answer.u);
         int64_t added = uz_candidates_extend(&wants, run->it.law, run->answer.g, size, ROUNDING);
         if (added == 0 && suspect)
             take_nearest(&wants, run->answer.g);
@@ -87,7 +87,7 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
 
 uz_status uz_run_widen(uz_run *run, uz_error *err)
 {
-    const uz_candidates *rows = &run->body->rows;
+    const uz_candidates *rows = &run->setup->rows;
     uz_certificate *certificate = &run->result->summary.certificate;
     if (!rows->in)
         return UZ_OK;

@@ -32,24 +32,24 @@ struct uz_block {
 };
 
 /* Without a finite bound on K^-1 no lane can be certified; the cases are then certified one by one. */
-static uz_status make_certifier(uz_block *block, uz_body *body, const uz_problem *problem, uz_error *err)
+static uz_status make_certifier(uz_block *block, uz_setup *setup, const uz_problem *problem, uz_error *err)
 {
     uz_factor_workspace *ws = uz_factor_workspace_new();
     if (!ws)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a linear solve");
-    double bound = uz_body_inverse_bound(body, block->K, ws, NULL);
+    double bound = uz_setup_inverse_bound(setup, block->K, ws, NULL);
     uz_factor_workspace_free(ws);
-    return uz_lane_certifier_create(&block->certifier, block->K, uz_body_N(body, problem),
-                                    uz_factor_describe(body->factor).rcond, bound, err);
+    return uz_lane_certifier_create(&block->certifier, block->K, uz_setup_N(setup, problem),
+                                    uz_factor_describe(setup->factor).rcond, bound, err);
 }
 
-uz_status uz_block_create(uz_block **out, uz_body *body, const uz_problem *problem, int64_t blocks, uz_error *err)
+uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *problem, int64_t blocks, uz_error *err)
 {
     *out = NULL;
     uz_block *block = uz_alloc_zero(1, sizeof *block);
     if (!block)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
-    block->K = uz_body_K(body, problem);
+    block->K = uz_setup_K(setup, problem);
     block->d = block->K->cols;
     block->width = blocks * UZ_LANES;
     block->runs = uz_alloc_zero(block->width, sizeof *block->runs);
@@ -60,9 +60,9 @@ uz_status uz_block_create(uz_block **out, uz_body *body, const uz_problem *probl
     if (!block->runs || !block->cases || !block->r || !block->corrected)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)
-        status = uz_dual_block_create(&block->loads, body->dual, blocks, err);
+        status = uz_dual_block_create(&block->loads, setup->dual, blocks, err);
     if (status == UZ_OK)
-        status = make_certifier(block, body, problem, err);
+        status = make_certifier(block, setup, problem, err);
     if (status == UZ_OK)
         *out = block;
     else

@@ -7,7 +7,7 @@
 typedef struct uz_block uz_block; /* one thread; used for one group of cases after the other */
 
 /* blocks * UZ_LANES cases at most at a time, on a body with a condensed operator; all is borrowed. */
-uz_status uz_block_create(uz_block **out, uz_body *body, const uz_problem *problem, int64_t blocks, uz_error *err);
+uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *problem, int64_t blocks, uz_error *err);
 void uz_block_free(uz_block *block);
 
 /* The runs of a group: begun by the caller, with body and load case, and ended by the caller. */

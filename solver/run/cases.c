@@ -23,7 +23,7 @@ typedef struct {
     const uz_hooks *hooks;
     const uz_state *const *starts; /* n, or NULL */
     int64_t n;
-    uz_body *body; /* borrowed from the cache */
+    uz_setup *setup; /* borrowed from the cache */
     uz_reuse reused;
     double started, round_started;
     uz_result **results; /* n */
@@ -35,7 +35,7 @@ typedef struct {
     uz_candidates wanted; /* rows of the next round, or in NULL */
 } batch;
 
-/* The first case of a round carries the cost of the body; for the others it is there. place: in the round. */
+/* The first case of a round carries the cost of the setup; for the others it is there. place: in the round. */
 static uz_status open_case(uz_run *run, const batch *b, int64_t place, uz_error *err)
 {
     static const uz_reuse everything = {true, true, true, true};
@@ -44,13 +44,13 @@ static uz_status open_case(uz_run *run, const batch *b, int64_t place, uz_error 
     run->index = i;
     run->load_case = b->problem->n_cases > 0 ? &b->problem->cases[i] : NULL;
     run->start = b->starts ? b->starts[i] : NULL;
-    run->body = b->body;
+    run->setup = b->setup;
     run->deadline = b->started + b->settings->time_limit_s;
     if (place == 0)
         run->started = b->round_started;
     if (status != UZ_OK)
         return status;
-    uz_run_take_body(run, place > 0 ? everything : b->reused);
+    uz_run_take_setup(run, place > 0 ? everything : b->reused);
     run->serves_many = run->hit || b->n > 1;
     return UZ_OK;
 }
@@ -133,7 +133,7 @@ static uz_status solve_in_blocks(batch *b, int64_t n, uz_error *err)
 {
     uz_block *block = NULL;
     int64_t width = blocks_for(b) * UZ_LANES;
-    uz_status status = uz_block_create(&block, b->body, b->problem, blocks_for(b), err);
+    uz_status status = uz_block_create(&block, b->setup, b->problem, blocks_for(b), err);
     for (int64_t i = 0; status == UZ_OK && i < n; i += width)
         status = solve_block(b, block, i, n - i < width ? n - i : width, err);
     uz_block_free(block);
@@ -143,12 +143,12 @@ static uz_status solve_in_blocks(batch *b, int64_t n, uz_error *err)
 /* What the results take that this call returns, and while it works the vectors of a block. */
 static uz_status check_memory(const batch *b, uz_error *err)
 {
-    const uz_dual *dual = b->body->dual;
-    const uz_mesh *mesh = &b->body->model.mesh;
-    double nodal = b->body->is_scene ? (double)(mesh->n_nodes * mesh->dim) : (double)dual->d;
+    const uz_dual *dual = b->setup->dual;
+    const uz_mesh *mesh = &b->setup->model.mesh;
+    double nodal = b->setup->is_scene ? (double)(mesh->n_nodes * mesh->dim) : (double)dual->d;
     double lanes = 7.0 * (double)(blocks_for(b) * UZ_LANES) * (double)dual->d;
-    double each = (b->body->is_scene ? 2.0 : 1.0) * nodal + 8.0 * (double)dual->m;
-    double bytes = (double)b->body->bytes + 8.0 * ((double)b->n * each + lanes);
+    double each = (b->setup->is_scene ? 2.0 : 1.0) * nodal + 8.0 * (double)dual->m;
+    double bytes = (double)b->setup->bytes + 8.0 * ((double)b->n * each + lanes);
     if (b->n == 1 || b->settings->memory_limit == 0 || bytes <= (double)b->settings->memory_limit)
         return UZ_OK;
     return uz_fail(err, UZ_ERR_LIMIT, "/cases",
@@ -172,7 +172,7 @@ static uz_status check(const batch *b, uz_error *err)
 static uz_status add_starts(batch *b, uz_error *err)
 {
     uz_status status = UZ_OK;
-    const int64_t m = b->body->rows.m;
+    const int64_t m = b->setup->rows.m;
     for (int64_t i = 0; b->starts && i < b->n && status == UZ_OK; i++)
         if (b->starts[i] && uz_state_check(b->starts[i], m, NULL) == UZ_OK)
             status = uz_candidates_add_start(&b->wanted, b->starts[i], err);
@@ -182,15 +182,15 @@ static uz_status add_starts(batch *b, uz_error *err)
 static uz_status acquire(batch *b, uz_cache *cache, uz_error *err)
 {
     uz_status status =
-        uz_cache_acquire_rows(&b->body, &b->reused, cache, b->problem, &b->wanted, b->settings, b->hooks, err);
-    if (status != UZ_OK || !b->body->rows.in || b->round > 1)
+        uz_setup_acquire(&b->setup, &b->reused, cache, b->problem, &b->wanted, b->settings, b->hooks, err);
+    if (status != UZ_OK || !b->setup->rows.in || b->round > 1)
         return status;
     status = add_starts(b, err);
-    if (status != UZ_OK || uz_candidates_has(&b->body->rows, &b->wanted))
+    if (status != UZ_OK || uz_candidates_has(&b->setup->rows, &b->wanted))
         return status;
-    uz_cache_release(cache, b->body);
-    b->body = NULL;
-    return uz_cache_acquire_rows(&b->body, &b->reused, cache, b->problem, &b->wanted, b->settings, b->hooks, err);
+    uz_setup_release(cache, b->setup);
+    b->setup = NULL;
+    return uz_setup_acquire(&b->setup, &b->reused, cache, b->problem, &b->wanted, b->settings, b->hooks, err);
 }
 
 /* The cases of this round, on its rows. */
@@ -202,14 +202,14 @@ static uz_status solve_round(batch *b, uz_cache *cache, uz_error *err)
     if (status == UZ_OK)
         status = check_memory(b, err);
     if (status == UZ_OK && b->round == 1)
-        b->kept = b->body->dual->m;
-    bool in_blocks = status == UZ_OK && n > 1 && b->body->dual->can->lanes;
+        b->kept = b->setup->dual->m;
+    bool in_blocks = status == UZ_OK && n > 1 && b->setup->dual->can->lanes;
     if (in_blocks)
         status = solve_in_blocks(b, n, err);
     for (int64_t i = 0; status == UZ_OK && !in_blocks && i < n; i++)
         status = solve_one(b, i, err);
-    uz_cache_release(cache, b->body);
-    b->body = NULL;
+    uz_setup_release(cache, b->setup);
+    b->setup = NULL;
     return status;
 }
 

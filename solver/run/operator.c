@@ -1,4 +1,4 @@
-/* operator.c: which form of the operator a body gets, and the making of it: a factor, or a multigrid in its place. */
+/* operator.c: which form of the operator a setup gets, and the making of it: a factor, or a multigrid in its place. */
 #include "run/setup.h"
 #include "core/alloc.h"
 #include "core/clock.h"
@@ -45,10 +45,10 @@ static uz_status modes_of_turned(uz_modes *axes, const uz_body_model *model, uz_
 }
 
 /* The near-null space: rigid-body modes where the mesh is known. */
-static uz_status find_modes(uz_modes *modes, const uz_body *body, const uz_csc *K, uz_error *err)
+static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc *K, uz_error *err)
 {
-    const uz_body_model *model = &body->model;
-    if (!body->is_scene)
+    const uz_body_model *model = &setup->model;
+    if (!setup->is_scene)
         return uz_modes_of_matrix(modes, K, err);
     uz_status status =
         uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim, model->d, err);
@@ -67,7 +67,7 @@ static uz_status find_modes(uz_modes *modes, const uz_body *body, const uz_csc *
 
 /* What the operator is made of. */
 typedef struct {
-    uz_body *body;
+    uz_setup *setup;
     const uz_csc *K, *N;
     const int64_t *dofs; /* that N touches */
     uz_cost_size size;
@@ -82,7 +82,7 @@ typedef struct {
 /* What a multigrid may take so that the whole stays within the limit: a load with bounds has a second one. */
 static size_t levels_budget(const making *m)
 {
-    const uz_cost_plan *plan = &m->body->plan;
+    const uz_cost_plan *plan = &m->setup->plan;
     double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0;
     if (m->settings->memory_limit == 0)
         return 0;
@@ -92,29 +92,29 @@ static size_t levels_budget(const making *m)
 
 static uz_status make_dual(making *m, uz_operator op, uz_error *err)
 {
-    uz_body *body = m->body;
-    const uz_dual_source source = {op, m->N, body->factor, body->krylov};
+    uz_setup *setup = m->setup;
+    const uz_dual_source source = {op, m->N, setup->factor, setup->krylov};
     double start = uz_seconds();
-    uz_status status = uz_dual_create(&body->dual, &source, m->hooks, err);
-    body->condense_s = uz_seconds() - start;
+    uz_status status = uz_dual_create(&setup->dual, &source, m->hooks, err);
+    setup->condense_s = uz_seconds() - start;
     return status;
 }
 
 static uz_status precondition(making *m, uz_error *err)
 {
-    uz_body *body = m->body;
+    uz_setup *setup = m->setup;
     uz_modes modes;
-    uz_status status = find_modes(&modes, body, m->K, err);
+    uz_status status = find_modes(&modes, setup, m->K, err);
     if (status == UZ_OK)
-        status = uz_krylov_create(&body->krylov, m->K, &modes, levels_budget(m), m->hooks, err);
-    return status == UZ_OK ? make_dual(m, body->plan.form[body->plan.chosen].op, err) : status;
+        status = uz_krylov_create(&setup->krylov, m->K, &modes, levels_budget(m), m->hooks, err);
+    return status == UZ_OK ? make_dual(m, setup->plan.form[setup->plan.chosen].op, err) : status;
 }
 
 /* Between analysis and factorization: is this still the form to take? An error that says nothing means no. */
 static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_error *err)
 {
     making *m = ctx;
-    uz_cost_plan *plan = &m->body->plan;
+    uz_cost_plan *plan = &m->setup->plan;
     (void)err;
     uz_cost_decide(plan, &m->size, predicted, m->direct, m->asked, m->settings->memory_limit);
     return plan->chosen >= 0 && plan->form[plan->chosen].op == m->direct ? UZ_OK : UZ_ERR_LIMIT;
@@ -130,24 +130,24 @@ static bool is_one_to_one(const uz_csc *N, int64_t n_b)
 /* *taken false on success: the plan speaks for another form now, or for none. */
 static uz_status factor_and_condense(making *m, bool *taken, uz_error *err)
 {
-    uz_body *body = m->body;
+    uz_setup *setup = m->setup;
     int64_t n_dofs = uz_dual_abilities_of(m->direct)->contact_last ? m->size.n_b : 0;
     int64_t rows = is_one_to_one(m->N, n_dofs) ? 0 : m->N->rows;
-    body->plan.chosen = -1;
-    uz_status status = uz_shared_factor_get(&body->shared, m->cache, m->key, m->K, m->dofs, n_dofs, rows,
+    setup->plan.chosen = -1;
+    uz_status status = uz_shared_factor_get(&setup->shared, m->cache, m->key, m->K, m->dofs, n_dofs, rows,
                                             m->settings->ordering, accept_factor, m, m->hooks, err);
-    bool accepted = body->plan.chosen >= 0 && body->plan.form[body->plan.chosen].op == m->direct;
+    bool accepted = setup->plan.chosen >= 0 && setup->plan.form[setup->plan.chosen].op == m->direct;
     *taken = status != UZ_ERR_LIMIT || accepted;
     if (status != UZ_OK)
         return *taken ? status : UZ_OK;
-    body->factor = body->shared.factor;
+    setup->factor = setup->shared.factor;
     return make_dual(m, m->direct, err);
 }
 
 /* The plan where no factor was analysed. */
 static void plan_without_factor(making *m)
 {
-    uz_cost_decide(&m->body->plan, &m->size, NULL, m->direct, m->settings->op, m->settings->memory_limit);
+    uz_cost_decide(&m->setup->plan, &m->size, NULL, m->direct, m->settings->op, m->settings->memory_limit);
 }
 
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
@@ -157,19 +157,19 @@ static void plan_without_factor(making *m)
  * more to a factorization. */
 static bool regrets(const making *m, uz_status status)
 {
-    const uz_cost_plan *plan = &m->body->plan;
+    const uz_cost_plan *plan = &m->setup->plan;
     bool choice = m->asked == UZ_OPERATOR_AUTO && plan->count > 1 && plan->form[0].fits;
     if (status != UZ_OK)
         return choice && status == UZ_ERR_NOT_SPD;
-    return choice && uz_krylov_describe(m->body->krylov).lambda < LAMBDA_LEAST;
+    return choice && uz_krylov_describe(m->setup->krylov).lambda < LAMBDA_LEAST;
 }
 
 static void undo_precondition(making *m, uz_error *err)
 {
-    uz_dual_free(m->body->dual);
-    uz_krylov_free(m->body->krylov);
-    m->body->dual = NULL;
-    m->body->krylov = NULL;
+    uz_dual_free(m->setup->dual);
+    uz_krylov_free(m->setup->krylov);
+    m->setup->dual = NULL;
+    m->setup->krylov = NULL;
     if (err)
         uz_error_reset(err);
 }
@@ -179,7 +179,7 @@ enum { TRIES = 4 };
 /* The form that was asked for, or the one that the plan chooses once the analysis of a factor has shown its size. */
 static uz_status make_operator(making *m, uz_error *err)
 {
-    uz_body *body = m->body;
+    uz_setup *setup = m->setup;
     const uz_settings *settings = m->settings;
     bool no_factor = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor;
     m->direct = uz_dual_choose(m->N, m->size.n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
@@ -194,27 +194,27 @@ static uz_status make_operator(making *m, uz_error *err)
             status = factor_and_condense(m, &taken, err);
         if (taken || status != UZ_OK)
             return status;
-        if (body->plan.chosen < 0)
+        if (setup->plan.chosen < 0)
             break;
-        if (!uz_dual_abilities_of(body->plan.form[body->plan.chosen].op)->needs_factor) {
+        if (!uz_dual_abilities_of(setup->plan.form[setup->plan.chosen].op)->needs_factor) {
             status = precondition(m, err);
             if (!regrets(m, status))
                 return status;
             undo_precondition(m, err);
             m->asked = m->direct;
         } else {
-            m->direct = body->plan.form[body->plan.chosen].op;
+            m->direct = setup->plan.form[setup->plan.chosen].op;
         }
     }
-    return uz_cost_refuse(&body->plan, settings->op, settings->memory_limit, err);
+    return uz_cost_refuse(&setup->plan, settings->op, settings->memory_limit, err);
 }
 
-uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const uz_matrix_key *key,
-                                const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
+                                 const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
-    making m = {.body = body,
-                .K = uz_body_K(body, problem),
-                .N = uz_body_N(body, problem),
+    making m = {.setup = setup,
+                .K = uz_setup_K(setup, problem),
+                .N = uz_setup_N(setup, problem),
                 .key = key,
                 .settings = settings,
                 .cache = cache,
@@ -230,7 +230,7 @@ uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const 
                             .n_b = n_b,
                             .k_entries = m.K->ptr[m.K->cols],
                             .n_entries = m.N->ptr[m.N->cols],
-                            .modes = body->is_scene && body->model.mesh.dim == 3 ? 6 : 3,
+                            .modes = setup->is_scene && setup->model.mesh.dim == 3 ? 6 : 3,
                             .bounds = uz_cost_bounds(m.N, settings),
                             .cases = problem->n_cases};
     status = make_operator(&m, err);

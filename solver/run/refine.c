@@ -51,7 +51,7 @@ static uz_status begin(refinement *x, uz_run *run, uz_error *err)
     x->active = uz_alloc_zero(run->m, sizeof *x->active);
     if (!ok || !x->active)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld dofs", (long long)run->d);
-    return uz_csc_transpose(&x->Nt, uz_body_N(run->body, run->problem), err);
+    return uz_csc_transpose(&x->Nt, uz_setup_N(run->setup, run->problem), err);
 }
 
 static void end(refinement *x)
@@ -69,8 +69,8 @@ static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
     const uz_run *run = x->run;
     const double *scale = run->load->dual->row_scale;
     uz_status status =
-        uz_equilibrium_residual(&x->res, uz_body_K(run->body, run->problem), uz_body_N(run->body, run->problem), run->p,
-                                answer->u, x->zero, answer->r, err);
+        uz_equilibrium_residual(&x->res, uz_setup_K(run->setup, run->problem), uz_setup_N(run->setup, run->problem),
+                                run->p, answer->u, x->zero, answer->r, err);
     for (int64_t j = 0; j < run->d; j++)
         x->e[j] = -x->res.e_u[j];
     for (int64_t i = 0; i < run->m; i++) {
@@ -112,7 +112,7 @@ static uz_status correct(refinement *x, uz_error *err)
     for (int64_t i = 0; i < run->m; i++)
         x->f[i] = exchange || x->active[i] ? x->f[i] : INFINITY;
     uz_status status =
-        uz_dual_load_create(&correction, run->body->dual, uz_body_K(run->body, run->problem), x->e, x->f, err);
+        uz_dual_load_create(&correction, run->setup->dual, uz_setup_K(run->setup, run->problem), x->e, x->f, err);
     uz_stop stop = {run->hooks, run->deadline};
     if (status == UZ_OK)
         status = uz_dual_load_aim(correction, NAN, &stop, err);

@@ -35,29 +35,29 @@ uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings
 }
 
 /* What stands in the factor's place: no entries of L, but bytes and a condition. */
-static uz_factor_info describe_factor(const uz_body *body)
+static uz_factor_info describe_factor(const uz_setup *setup)
 {
-    if (body->factor)
-        return uz_factor_describe(body->factor);
-    uz_krylov_info krylov = uz_krylov_describe(body->krylov);
+    if (setup->factor)
+        return uz_factor_describe(setup->factor);
+    uz_krylov_info krylov = uz_krylov_describe(setup->krylov);
     return (uz_factor_info){
         .bytes = krylov.bytes, .rcond = krylov.rcond, .factor_s = krylov.create_s + krylov.spectrum_s};
 }
 
-void uz_run_take_body(uz_run *run, uz_reuse reused)
+void uz_run_take_setup(uz_run *run, uz_reuse reused)
 {
     uz_summary *summary = &run->result->summary;
-    uz_factor_info factor = describe_factor(run->body);
-    const uz_dual *dual = run->body->dual;
+    uz_factor_info factor = describe_factor(run->setup);
+    const uz_dual *dual = run->setup->dual;
     run->d = summary->d = run->result->d = dual->d;
     run->m = run->all = summary->kept = dual->m;
-    if (run->body->rows.in)
-        run->all = run->body->rows.m;
+    if (run->setup->rows.in)
+        run->all = run->setup->rows.m;
     summary->m = run->result->m = run->all;
     summary->rounds = 1;
     summary->op = dual->can->op;
     summary->ordering = factor.ordering;
-    uz_decades_init(&run->decades, run->body->rows.in != NULL);
+    uz_decades_init(&run->decades, run->setup->rows.in != NULL);
     run->hit = run->serves_many = summary->factor_cached = reused.op;
     summary->reused = reused;
     summary->contact_last = factor.contact_last;
@@ -67,19 +67,19 @@ void uz_run_take_body(uz_run *run, uz_reuse reused)
     summary->rcond = factor.rcond;
     if (run->hit)
         return;
-    summary->timings.assemble = run->body->assemble_s;
+    summary->timings.assemble = run->setup->assemble_s;
     summary->timings.order = reused.ordering ? 0.0 : factor.order_s;
     summary->timings.factor = reused.factor ? 0.0 : factor.factor_s;
-    summary->timings.condense = run->body->condense_s;
+    summary->timings.condense = run->setup->condense_s;
 }
 
 /* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
 #define RUN_VECTORS 10.0
 
-/* A cached body has spared the setup, of prediction and of what is measured alike. */
+/* A cached setup is spared, of prediction and of what is measured alike. */
 static void report_cost(uz_run *run)
 {
-    const uz_cost_plan *plan = &run->body->plan;
+    const uz_cost_plan *plan = &run->setup->plan;
     const uz_timings *t = &run->result->summary.timings;
     uz_cost *cost = &run->result->summary.cost;
     cost->n_considered = plan->count;
@@ -95,8 +95,8 @@ static void report_cost(uz_run *run)
     }
     cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
     cost->actual_bytes =
-        (double)run->body->bytes + (run->load ? (double)run->load->bytes : 0.0) +
-        (run->body->is_scene ? 0.0 : (double)(uz_csc_bytes(&run->problem->qp.K) + uz_csc_bytes(&run->problem->qp.N))) +
+        (double)run->setup->bytes + (run->load ? (double)run->load->bytes : 0.0) +
+        (run->setup->is_scene ? 0.0 : (double)(uz_csc_bytes(&run->problem->qp.K) + uz_csc_bytes(&run->problem->qp.N))) +
         8.0 * RUN_VECTORS * (double)run->d;
 }
 
@@ -122,7 +122,7 @@ static void report_contact(uz_run *run)
 {
     uz_result *result = run->result;
     uz_summary *summary = &result->summary;
-    const uz_law *law = uz_body_law(run->body);
+    const uz_law *law = uz_setup_law(run->setup);
     summary->active += law->kind->active(law, NULL, result->r, run->m);
     for (int64_t i = 0; i < run->m; i++) {
         summary->reaction_sum += result->r[i];
@@ -133,8 +133,8 @@ static void report_contact(uz_run *run)
 static uz_status report_displacements(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
-    const uz_body_model *model = &run->body->model;
-    if (!run->body->is_scene) {
+    const uz_body_model *model = &run->setup->model;
+    if (!run->setup->is_scene) {
         result->u = run->answer.u;
         run->answer.u = NULL;
         return UZ_OK;
@@ -162,11 +162,11 @@ double uz_run_time(const uz_run *run)
  * ||delta||_K, over supported dofs too, as theirs are told as well. The bound is on what is told. */
 static uz_status widen_by_turning(uz_run *run, uz_error *err)
 {
-    const uz_body_model *model = &run->body->model;
+    const uz_body_model *model = &run->setup->model;
     uz_summary *s = &run->result->summary;
     uz_certificate *c = &s->certificate;
     double energy;
-    if (!run->body->is_scene || model->info.n_turned == 0)
+    if (!run->setup->is_scene || model->info.n_turned == 0)
         return UZ_OK;
     uz_status status = uz_turning_energy(&energy, model, run->result->u, err);
     if (status != UZ_OK)
@@ -213,11 +213,11 @@ static uz_status report_state(uz_run *run, uz_error *err)
 {
     uz_state *part = NULL;
     uz_status status = uz_iterate_state(&part, &run->it, run->load, run->settings->method, err);
-    if (status != UZ_OK || !run->body->rows.in) {
+    if (status != UZ_OK || !run->setup->rows.in) {
         run->result->state = part;
         return status;
     }
-    status = uz_state_scatter(&run->result->state, part, &run->body->rows, err);
+    status = uz_state_scatter(&run->result->state, part, &run->setup->rows, err);
     uz_state_free(part);
     return status;
 }
@@ -232,7 +232,7 @@ uz_status uz_run_report(uz_run *run, uz_error *err)
     summary->iterations = run->it.iteration;
     summary->restarts = run->it.restarts;
     summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;
-    summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
+    summary->lambda_max = uz_dual_known_lambda_max(run->setup->dual);
     uz_status status = UZ_OK;
     if (!run->result->ray)
         status = report_state(run, err);

@@ -1,4 +1,4 @@
-/* rows.h: which contact rows a body is solved with, and the way back to all of them.
+/* rows.h: which contact rows take part in a solve, and the way back to all of them.
  *
  * m rows cost m^2 numbers and m^3 operations where D is dense, and a factorization that has them last or goes round
  * them otherwise; where whole surfaces are candidates most of them stay far from any obstacle. Scenes with many rows

@@ -25,16 +25,16 @@
 /* p and h: the case's or the problem's own, or assembled from the loads of the scene. */
 static uz_status make_load(uz_run *run, uz_error *err)
 {
-    const uz_body *body = run->body;
+    const uz_setup *setup = run->setup;
     const uz_load_case *load_case = run->load_case;
-    if (!body->is_scene) {
+    if (!setup->is_scene) {
         run->p = load_case && load_case->p ? load_case->p : run->problem->qp.p;
         run->h = load_case && load_case->h ? load_case->h : run->problem->qp.h;
         run->h_all = run->h;
         return UZ_OK;
     }
     uz_scene scene = uz_scene_of_case(run->problem, run->index);
-    int64_t kept = body->rows.in ? run->m : 0, n_fixed = body->model.n_fixed;
+    int64_t kept = setup->rows.in ? run->m : 0, n_fixed = setup->model.n_fixed;
     run->owned = uz_alloc_zero(run->d + run->all + n_fixed + kept, sizeof(double));
     if (!run->owned)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)run->d);
@@ -42,10 +42,10 @@ static uz_status make_load(uz_run *run, uz_error *err)
     run->p = run->owned;
     run->h = run->h_all = h;
     run->prescribed = h + run->all;
-    uz_status status = uz_body_model_load(run->owned, h, run->prescribed, &body->model, &scene, err);
-    run->moved = status == UZ_OK && uz_is_moved(&body->model, run->prescribed);
-    if (status == UZ_OK && body->rows.in) {
-        uz_candidates_gather(run->prescribed + n_fixed, h, &body->rows);
+    uz_status status = uz_body_model_load(run->owned, h, run->prescribed, &setup->model, &scene, err);
+    run->moved = status == UZ_OK && uz_is_moved(&setup->model, run->prescribed);
+    if (status == UZ_OK && setup->rows.in) {
+        uz_candidates_gather(run->prescribed + n_fixed, h, &setup->rows);
         run->h = run->prescribed + n_fixed;
     }
     return status;
@@ -109,7 +109,7 @@ static uz_status need_workspace(uz_run *run, uz_error *err)
 static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, uz_error *err)
 {
     uz_run *run = ctx;
-    const uz_factor *factor = run->body->factor;
+    const uz_factor *factor = run->setup->factor;
     if (!factor)
         return uz_dual_load_inverse_norm(run->load, value, e, err);
     uz_status status = need_workspace(run, err);
@@ -131,12 +131,12 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, u
 uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err)
 {
     *norm = 0.0;
-    return run->moved ? uz_whole_norm(norm, &run->body->model, u, run->prescribed, err) : UZ_OK;
+    return run->moved ? uz_whole_norm(norm, &run->setup->model, u, run->prescribed, err) : UZ_OK;
 }
 
 uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const double *u, uz_error *err)
 {
-    const uz_csc *K = uz_body_K(run->body, run->problem);
+    const uz_csc *K = uz_setup_K(run->setup, run->problem);
     const uz_stop stop = {run->hooks, run->deadline};
     double whole_norm = 0.0;
     uz_status status = need_workspace(run, err);
@@ -146,14 +146,14 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const doubl
         return status;
     *input = (uz_certify_input){
         .K = K,
-        .N = run->wide ? uz_body_all_rows(run->body, run->problem) : uz_body_N(run->body, run->problem),
+        .N = run->wide ? uz_setup_all_rows(run->setup, run->problem) : uz_setup_N(run->setup, run->problem),
         .p = run->p,
         .h = run->wide ? run->h_all : run->h,
         .inverse_norm = inverse_norm,
         .ctx = run,
         .rcond = run->result->summary.rcond,
         .inverse_bound =
-            run->serves_many && run->body->factor ? uz_body_inverse_bound(run->body, K, run->ws, &stop) : INFINITY,
+            run->serves_many && run->setup->factor ? uz_setup_inverse_bound(run->setup, K, run->ws, &stop) : INFINITY,
         .moved = run->moved,
         .whole_norm = whole_norm,
         .sharp = 0.5 * run->requested,
@@ -211,12 +211,12 @@ uz_status uz_run_certify(uz_run *run, uz_error *err)
 void uz_run_balance_request(uz_run *run)
 {
     uz_summary *summary = &run->result->summary;
-    double *nodal = uz_alloc(run->body->model.mesh.n_nodes * run->body->model.mesh.dim, sizeof *nodal);
+    double *nodal = uz_alloc(run->setup->model.mesh.n_nodes * run->setup->model.mesh.dim, sizeof *nodal);
     if (!nodal)
         return; /* the request stays at what it was, which is stricter */
-    uz_recover_nodal(nodal, &run->body->model, run->answer.u, run->prescribed);
+    uz_recover_nodal(nodal, &run->setup->model, run->answer.u, run->prescribed);
     const uz_scene scene = uz_scene_of_case(run->problem, run->index);
-    summary->discretization_error = uz_estimate_mesh_error(&run->body->model, &scene, nodal);
+    summary->discretization_error = uz_estimate_mesh_error(&run->setup->model, &scene, nodal);
     free(nodal);
     if (summary->discretization_error > 0.0)
         run->requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * summary->discretization_error));
@@ -226,7 +226,7 @@ void uz_run_balance_request(uz_run *run)
 static uz_status prove_infeasible(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
-    const uz_csc *N = uz_body_N(run->body, run->problem);
+    const uz_csc *N = uz_setup_N(run->setup, run->problem);
     const double *scale = run->load->dual->row_scale, *g0 = run->load->g0;
     for (int64_t i = 0; i < run->m; i++) {
         run->it.ray[i] *= scale[i];
@@ -293,7 +293,7 @@ static double share_of_request(const uz_run *run)
 static uz_status judge(bool *done, uz_run *run, uz_error *err)
 {
     const uz_certificate *certificate = &run->answer.certificate;
-    if (run->settings->balanced && run->body->is_scene && !run->again) {
+    if (run->settings->balanced && run->setup->is_scene && !run->again) {
         uz_run_balance_request(run);
         run->target = run->requested;
     }
@@ -358,11 +358,11 @@ static uz_outcome conclude(const uz_run *run)
 static uz_status take_start(uz_run *run, uz_error *err)
 {
     uz_state *part = NULL;
-    if (!run->body->rows.in)
+    if (!run->setup->rows.in)
         return uz_iterate_start(&run->it, run->load, run->start, err);
     uz_status status = uz_state_check(run->start, run->all, err);
     if (status == UZ_OK)
-        status = uz_state_gather(&part, run->start, &run->body->rows, err);
+        status = uz_state_gather(&part, run->start, &run->setup->rows, err);
     if (status == UZ_OK)
         status = uz_iterate_start(&run->it, run->load, part, err);
     uz_state_free(part);
@@ -373,7 +373,7 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
 {
     uz_status status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
-        status = uz_iterate_init(&run->it, uz_body_law(run->body), run->m, run->settings->alpha, err);
+        status = uz_iterate_init(&run->it, uz_setup_law(run->setup), run->m, run->settings->alpha, err);
     run->it.decades = run->moved ? NULL : &run->decades; /* bounds of iterations are relative to another norm */
     uz_decades_resume(&run->decades, uz_run_time(run));
     if (status == UZ_OK && run->start)
@@ -399,8 +399,8 @@ uz_status uz_run_solve(uz_run *run, uz_error *err)
     uz_status status = uz_run_make_load(run, err);
     double start = uz_seconds();
     if (status == UZ_OK)
-        status =
-            uz_dual_load_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
+        status = uz_dual_load_create(&run->load, run->setup->dual, uz_setup_K(run->setup, run->problem), run->p, run->h,
+                                     err);
     if (status == UZ_OK)
         status = uz_run_start(run, err);
     run->result->summary.timings.iterate += uz_seconds() - start;

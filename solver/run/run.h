@@ -29,7 +29,7 @@ typedef struct {
     const uz_state *start;         /* NULL: from r = 0 */
     bool hit;                      /* the body came from the cache */
     bool serves_many;              /* it serves more than this case: what makes certificates cheaper pays */
-    uz_body *body;                 /* borrowed */
+    uz_setup *setup;               /* borrowed */
     int64_t d, m;        /* m: rows that the body is solved with; once the run is `wide` all of the problem's */
     int64_t all;         /* rows of the problem */
     bool wide;           /* answer and certificate are about all rows */
@@ -58,7 +58,7 @@ typedef struct {
 uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
                        uz_error *err);
 /* Sizes and timings from the body. */
-void uz_run_take_body(uz_run *run, uz_reuse reused);
+void uz_run_take_setup(uz_run *run, uz_reuse reused);
 /* p, h and prescribed values of the case. */
 uz_status uz_run_make_load(uz_run *run, uz_error *err);
 /* What a certificate of u (d) starts from; needs the load. */

@@ -160,19 +160,19 @@ static uz_status solve_augmented(uz_semi *s, const uz_settings *settings, const 
 static uz_status find_null_space(uz_semi *s, uz_error *err)
 {
     uz_problem augmented;
-    uz_body *body = NULL;
+    uz_setup *setup = NULL;
     uz_reuse reused;
     uz_status status = uz_check_semidefinite(s->of.K, s->settings, s->hooks, err);
     if (status != UZ_OK)
         return status;
     status = uz_augment(&augmented, &s->of, &s->Nt, s->soft, s->target, err);
     if (status == UZ_OK)
-        status = uz_cache_acquire(&body, &reused, s->cache, &augmented, s->settings, s->hooks, err);
+        status = uz_setup_acquire(&setup, &reused, s->cache, &augmented, NULL, s->settings, s->hooks, err);
     if (status == UZ_OK)
-        status = uz_null_space(&s->null_space, &s->k, s->of.K, &augmented.qp.K, s->of.N, &s->Nt, s->soft, body->factor,
+        status = uz_null_space(&s->null_space, &s->k, s->of.K, &augmented.qp.K, s->of.N, &s->Nt, s->soft, setup->factor,
                                s->hooks, err);
     s->Z = s->null_space;
-    uz_cache_release(s->cache, body);
+    uz_setup_release(s->cache, setup);
     uz_augmented_clear(&augmented);
     if (status == UZ_OK && s->k == 0)
         status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "K is singular to working precision");
@@ -238,7 +238,7 @@ static int64_t choose_rows(uz_semi *s, const double *press, double share)
 static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
 {
     uz_problem augmented;
-    uz_body *body = NULL;
+    uz_setup *setup = NULL;
     uz_reuse reused;
     bool single = true;
     double sum = 0.0, rows = 0.0, *noise = uz_alloc_zero(s->d, sizeof *noise);
@@ -256,14 +256,14 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
         rows += single ? pow(noise[j] / s->Nt.val[q], 2) / s->weight[i] : 0.0;
     }
     if (status == UZ_OK && !single)
-        status = uz_cache_acquire(&body, &reused, s->cache, &augmented, s->settings, s->hooks, err);
-    if (body) {
+        status = uz_setup_acquire(&setup, &reused, s->cache, &augmented, NULL, s->settings, s->hooks, err);
+    if (setup) {
         for (int64_t j = 0; j < s->d; j++)
             sum += noise[j] > 0.0 ? noise[j] / augmented.qp.K.val[augmented.qp.K.ptr[j]] * noise[j] : 0.0;
-        rows = sum > 0.0 ? uz_body_inverse_bound(body, &augmented.qp.K, ws, NULL) * sum : 0.0;
+        rows = sum > 0.0 ? uz_setup_inverse_bound(setup, &augmented.qp.K, ws, NULL) * sum : 0.0;
     }
     *bound = sqrt(rows);
-    uz_cache_release(s->cache, body);
+    uz_setup_release(s->cache, setup);
     uz_augmented_clear(&augmented);
     uz_factor_workspace_free(ws);
     free(noise);
@@ -275,7 +275,7 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
 static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
 {
     uz_problem augmented;
-    uz_body *body = NULL;
+    uz_setup *setup = NULL;
     uz_reuse reused;
     uz_factor_workspace *ws = uz_factor_workspace_new();
     uz_status status = ws ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify");
@@ -283,15 +283,15 @@ static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
     if (status == UZ_OK)
         status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
     if (status == UZ_OK)
-        status = uz_cache_acquire(&body, &reused, s->cache, &augmented, s->settings, s->hooks, err);
+        status = uz_setup_acquire(&setup, &reused, s->cache, &augmented, NULL, s->settings, s->hooks, err);
     if (status == UZ_OK) {
         double most = 1.0;
         const uz_csc *K = &augmented.qp.K;
         for (int64_t j = 0; j < s->d; j++)
             most = fmax(most, 1.0 / (s->inverse[j] * K->val[K->ptr[j]]));
-        *bound = most * uz_body_inverse_bound(body, K, ws, NULL);
+        *bound = most * uz_setup_inverse_bound(setup, K, ws, NULL);
     }
-    uz_cache_release(s->cache, body);
+    uz_setup_release(s->cache, setup);
     uz_augmented_clear(&augmented);
     uz_factor_workspace_free(ws);
     return status;

@@ -52,8 +52,8 @@ static void add_rows(uz_digest *digest, const uz_problem *problem, const uz_cand
         uz_digest_add(digest, wanted->in, (size_t)wanted->m);
 }
 
-uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_candidates *wanted,
-                         const uz_settings *settings, uz_error *err)
+uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,
+                          const uz_settings *settings, uz_error *err)
 {
     memset(key, 0, sizeof *key);
     uz_digest *state = uz_digest_new();
@@ -76,34 +76,34 @@ uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_c
     return status;
 }
 
-const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem)
+const uz_csc *uz_setup_K(const uz_setup *setup, const uz_problem *problem)
 {
-    return body->is_scene ? &body->model.K : &problem->qp.K;
+    return setup->is_scene ? &setup->model.K : &problem->qp.K;
 }
 
-const uz_law *uz_body_law(const uz_body *body)
+const uz_law *uz_setup_law(const uz_setup *setup)
 {
-    return body->is_scene ? body->model.law : &uz_law_frictionless;
+    return setup->is_scene ? setup->model.law : &uz_law_frictionless;
 }
 
-const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem)
+const uz_csc *uz_setup_N(const uz_setup *setup, const uz_problem *problem)
 {
-    return body->rows.in ? &body->N_in : uz_body_all_rows(body, problem);
+    return setup->rows.in ? &setup->N_in : uz_setup_all_rows(setup, problem);
 }
 
-const uz_csc *uz_body_all_rows(const uz_body *body, const uz_problem *problem)
+const uz_csc *uz_setup_all_rows(const uz_setup *setup, const uz_problem *problem)
 {
-    if (body->no_rows.ptr)
-        return &body->no_rows;
-    return body->is_scene ? &body->model.N : &problem->qp.N;
+    if (setup->no_rows.ptr)
+        return &setup->no_rows;
+    return setup->is_scene ? &setup->model.N : &problem->qp.N;
 }
 
 /* The key of K: known for matrices; of a scene's only when there is a cache to look into. */
-static uz_status find_key(uz_matrix_key *K_key, const uz_body_key *key, const uz_body *body, uz_error *err)
+static uz_status find_key(uz_matrix_key *K_key, const uz_setup_key *key, const uz_setup *setup, uz_error *err)
 {
-    if (key && !body->is_scene)
+    if (key && !setup->is_scene)
         *K_key = key->K;
-    return key && body->is_scene ? uz_matrix_digest(K_key, &body->model.K, err) : UZ_OK;
+    return key && setup->is_scene ? uz_matrix_digest(K_key, &setup->model.K, err) : UZ_OK;
 }
 
 /* The fewest bytes that a box of this many cells can be solved with: told before the mesh is made. */
@@ -127,25 +127,25 @@ static uz_status refuse_large_box(const uz_problem *problem, const uz_settings *
 }
 
 /* Matrices without contacts may come with an N that is a zeroed struct. */
-static uz_status take_matrices(uz_body *body, const uz_problem *problem, const uz_settings *settings, uz_error *err)
+static uz_status take_matrices(uz_setup *setup, const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
     double start = uz_seconds();
     uz_status status = UZ_OK;
-    body->is_scene = problem->kind == UZ_PROBLEM_SCENE;
-    if (body->is_scene)
+    setup->is_scene = problem->kind == UZ_PROBLEM_SCENE;
+    if (setup->is_scene)
         status = refuse_large_box(problem, settings, err);
-    if (status == UZ_OK && body->is_scene)
-        status = uz_body_model_build(&body->model, &problem->scene, err);
+    if (status == UZ_OK && setup->is_scene)
+        status = uz_body_model_build(&setup->model, &problem->scene, err);
     else if (status == UZ_OK && problem->qp.N.rows == 0)
-        status = uz_csc_init(&body->no_rows, 0, problem->qp.K.cols, 0, err);
-    body->assemble_s = uz_seconds() - start;
+        status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
+    setup->assemble_s = uz_seconds() - start;
     return status;
 }
 
 /* The initial gaps of a scene's rows follow from its supports; of its loads there may be several lists. */
-static uz_status choose_by_gaps(uz_body *body, const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
+static uz_status choose_by_gaps(uz_setup *setup, const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
 {
-    const uz_body_model *model = &body->model;
+    const uz_body_model *model = &setup->model;
     uz_scene unloaded = *scene;
     unloaded.loads = NULL;
     unloaded.n_loads = 0;
@@ -155,7 +155,7 @@ static uz_status choose_by_gaps(uz_body *body, const uz_scene *scene, const uz_c
     if (p && h)
         status = uz_body_model_load(p, h, NULL, model, &unloaded, &refusal);
     if (status == UZ_OK)
-        status = uz_choose_rows(&body->rows, h, model->m, &model->info, scene, wanted, err);
+        status = uz_choose_rows(&setup->rows, h, model->m, &model->info, scene, wanted, err);
     else if (status == UZ_ERR_MEMORY)
         status = uz_fail(err, status, "", "no memory for the gaps of %lld contacts", (long long)model->m);
     else
@@ -165,80 +165,81 @@ static uz_status choose_by_gaps(uz_body *body, const uz_scene *scene, const uz_c
     return status;
 }
 
-static uz_status choose_rows(uz_body *body, const uz_problem *problem, const uz_candidates *wanted, uz_error *err)
+static uz_status choose_rows(uz_setup *setup, const uz_problem *problem, const uz_candidates *wanted, uz_error *err)
 {
-    if (!body->is_scene || !uz_may_omit_rows(problem))
+    if (!setup->is_scene || !uz_may_omit_rows(problem))
         return UZ_OK;
-    uz_status status = choose_by_gaps(body, &problem->scene, wanted, err);
-    if (status == UZ_OK && body->rows.in)
-        status = uz_candidates_reduce(&body->N_in, &body->model.N, &body->rows, err);
+    uz_status status = choose_by_gaps(setup, &problem->scene, wanted, err);
+    if (status == UZ_OK && setup->rows.in)
+        status = uz_candidates_reduce(&setup->N_in, &setup->model.N, &setup->rows, err);
     return status;
 }
 
-static void describe(uz_body *body)
+static void describe(uz_setup *setup)
 {
-    size_t form = body->krylov ? uz_krylov_describe(body->krylov).bytes : uz_factor_describe(body->factor).bytes;
-    body->bytes = sizeof *body + (body->shared.item ? 0 : form) + body->dual->bytes;
-    if (body->is_scene)
-        body->bytes += uz_body_model_bytes(&body->model);
-    if (body->rows.in)
-        body->bytes += (size_t)body->rows.m + uz_csc_bytes(&body->N_in);
-    body->reused.ordering = body->shared.analysis_reused;
-    body->reused.factor = body->shared.factor_reused;
+    size_t form = setup->krylov ? uz_krylov_describe(setup->krylov).bytes : uz_factor_describe(setup->factor).bytes;
+    setup->bytes = sizeof *setup + (setup->shared.item ? 0 : form) + setup->dual->bytes;
+    if (setup->is_scene)
+        setup->bytes += uz_body_model_bytes(&setup->model);
+    if (setup->rows.in)
+        setup->bytes += (size_t)setup->rows.m + uz_csc_bytes(&setup->N_in);
+    setup->reused.ordering = setup->shared.analysis_reused;
+    setup->reused.factor = setup->shared.factor_reused;
 }
 
-uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_candidates *wanted, const uz_body_key *key,
-                         const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,
+                          const uz_setup_key *key, const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks,
+                          uz_error *err)
 {
     uz_matrix_key K_key;
     *out = NULL;
-    uz_body *body = uz_alloc_zero(1, sizeof *body);
-    if (!body)
+    uz_setup *setup = uz_alloc_zero(1, sizeof *setup);
+    if (!setup)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
-    pthread_mutex_init(&body->mutex, NULL);
-    body->inverse_bound = NAN;
-    uz_status status = take_matrices(body, problem, settings, err);
+    pthread_mutex_init(&setup->mutex, NULL);
+    setup->inverse_bound = NAN;
+    uz_status status = take_matrices(setup, problem, settings, err);
     if (status == UZ_OK)
-        status = choose_rows(body, problem, wanted, err);
+        status = choose_rows(setup, problem, wanted, err);
     if (status == UZ_OK)
-        status = find_key(&K_key, key, body, err);
+        status = find_key(&K_key, key, setup, err);
     if (status == UZ_OK)
-        status = uz_body_make_operator(body, problem, &K_key, settings, cache, hooks, err);
+        status = uz_setup_make_operator(setup, problem, &K_key, settings, cache, hooks, err);
     if (status == UZ_OK) {
-        describe(body);
-        *out = body;
+        describe(setup);
+        *out = setup;
     } else {
-        uz_body_free(body);
+        uz_setup_free(setup);
     }
     return status;
 }
 
-double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)
+double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)
 {
     uz_error ignored = {0};
     double bound;
-    if (!uz_lock_while(&body->mutex, stop))
+    if (!uz_lock_while(&setup->mutex, stop))
         return INFINITY;
-    if (isnan(body->inverse_bound) &&
-        uz_factor_inverse_norm(&bound, body->factor, ws, K, stop, &ignored) != UZ_ERR_CANCELLED)
-        body->inverse_bound = bound;
-    bound = isnan(body->inverse_bound) ? INFINITY : body->inverse_bound;
-    pthread_mutex_unlock(&body->mutex);
+    if (isnan(setup->inverse_bound) &&
+        uz_factor_inverse_norm(&bound, setup->factor, ws, K, stop, &ignored) != UZ_ERR_CANCELLED)
+        setup->inverse_bound = bound;
+    bound = isnan(setup->inverse_bound) ? INFINITY : setup->inverse_bound;
+    pthread_mutex_unlock(&setup->mutex);
     return bound;
 }
 
-void uz_body_free(uz_body *body)
+void uz_setup_free(uz_setup *setup)
 {
-    if (!body)
+    if (!setup)
         return;
-    pthread_mutex_destroy(&body->mutex);
-    uz_dual_free(body->dual);
-    uz_shared_factor_release(&body->shared);
-    uz_krylov_free(body->krylov);
-    if (body->is_scene)
-        uz_body_model_clear(&body->model);
-    uz_csc_clear(&body->no_rows);
-    uz_csc_clear(&body->N_in);
-    uz_candidates_clear(&body->rows);
-    free(body);
+    pthread_mutex_destroy(&setup->mutex);
+    uz_dual_free(setup->dual);
+    uz_shared_factor_release(&setup->shared);
+    uz_krylov_free(setup->krylov);
+    if (setup->is_scene)
+        uz_body_model_clear(&setup->model);
+    uz_csc_clear(&setup->no_rows);
+    uz_csc_clear(&setup->N_in);
+    uz_candidates_clear(&setup->rows);
+    free(setup);
 }

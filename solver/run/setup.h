@@ -1,4 +1,5 @@
-/* setup.h: what is known of a body before its load: the part of a problem that is worth caching. */
+/* setup.h: what is made of a problem before its loads, and kept in the cache: matrices, the contact
+ * rows to solve with, a factor or a multigrid, and the dual operator. */
 #ifndef UZ_SETUP_H
 #define UZ_SETUP_H
 
@@ -30,36 +31,37 @@ typedef struct {
     uz_reuse reused;   /* when it was made */
     size_t bytes;      /* its own, without a factor that the cache counts */
     uz_item *item;     /* its place in the cache, or NULL */
-} uz_body;
+} uz_setup;
 
-/* SHA-256, hex: of everything the body is built from, the asked operator, ordering and memory limit included, and of
+/* SHA-256, hex: of everything a setup is made from, the asked operator, ordering and memory limit included, and of
  * what the choice of its rows follows from; of K, for matrices (a scene's K has to be assembled first). */
 typedef struct {
     char digest[65];
     uz_matrix_key K;
-} uz_body_key;
-uz_status uz_body_digest(uz_body_key *key, const uz_problem *problem, const uz_candidates *wanted,
-                         const uz_settings *settings, uz_error *err);
+} uz_setup_key;
+uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz_candidates *wanted,
+                          const uz_settings *settings, uz_error *err);
 
 /* Assembles (scenes), chooses rows (`wanted` among them; NULL: none in particular), factors and condenses; with a cache
- * the factor and its analysis are found or kept there, and key is that of uz_body_digest. */
-uz_status uz_body_create(uz_body **out, const uz_problem *problem, const uz_candidates *wanted, const uz_body_key *key,
-                         const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+ * the factor and its analysis are found or kept there, and key is that of uz_setup_digest. */
+uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,
+                          const uz_setup_key *key, const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks,
+                          uz_error *err);
 /* The part of it that follows the assembly: the form of the operator by predicted cost and memory, and what it needs.
  * key: of K; read only where there is a cache. UZ_ERR_LIMIT with the predicted bytes where no form fits. */
-uz_status uz_body_make_operator(uz_body *body, const uz_problem *problem, const uz_matrix_key *key,
-                                const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
-void uz_body_free(uz_body *body);
+uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
+                                 const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+void uz_setup_free(uz_setup *setup);
 
-/* What the certificate of a body that is used again and again saves by: uz_factor_inverse_norm, made at the first call.
+/* What the certificate of a setup that serves many loads saves by: uz_factor_inverse_norm, made at the first call.
  * INFINITY when that failed, or it had to stop (stop NULL: never) before it was known. */
-double uz_body_inverse_bound(uz_body *body, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop);
+double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop);
 
-/* The body's matrices: the model's for a scene, the problem's otherwise. N has the rows it is solved with. */
-const uz_csc *uz_body_K(const uz_body *body, const uz_problem *problem);
-const uz_csc *uz_body_N(const uz_body *body, const uz_problem *problem);
-const uz_csc *uz_body_all_rows(const uz_body *body, const uz_problem *problem);
+/* Its matrices: the model's for a scene, the problem's otherwise. N has the rows it is solved with. */
+const uz_csc *uz_setup_K(const uz_setup *setup, const uz_problem *problem);
+const uz_csc *uz_setup_N(const uz_setup *setup, const uz_problem *problem);
+const uz_csc *uz_setup_all_rows(const uz_setup *setup, const uz_problem *problem);
 /* The law of its contacts. */
-const uz_law *uz_body_law(const uz_body *body);
+const uz_law *uz_setup_law(const uz_setup *setup);
 
 #endif

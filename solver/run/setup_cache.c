@@ -1,4 +1,4 @@
-/* setup_cache.c: bodies as objects of the table. */
+/* setup_cache.c: setups as objects of the table. */
 #include "run/setup_cache.h"
 
 #include "cache/table.h"
@@ -8,62 +8,48 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void destroy_body(void *object)
+static void destroy_setup(void *object)
 {
-    uz_body_free(object);
+    uz_setup_free(object);
 }
 
-/* Makes the body of a reserved item. */
-static uz_status fill(uz_cache *cache, uz_item *item, const uz_problem *problem, const uz_candidates *wanted,
-                      const uz_body_key *key, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
-{
-    uz_body *body = NULL;
-    uz_status status = uz_body_create(&body, problem, wanted, key, settings, cache, hooks, err);
-    if (status == UZ_OK) {
-        body->item = item;
-        uz_table_publish(cache, item, body, body->bytes, destroy_body);
-    } else {
-        uz_table_abandon(cache, item);
-    }
-    return status;
-}
-
-uz_status uz_cache_acquire(uz_body **body, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
-                           const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
-{
-    return uz_cache_acquire_rows(body, reused, cache, problem, NULL, settings, hooks, err);
-}
-
-uz_status uz_cache_acquire_rows(uz_body **body, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
-                                const uz_candidates *wanted, const uz_settings *settings, const uz_hooks *hooks,
-                                uz_error *err)
+uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
+                           const uz_candidates *wanted, const uz_settings *settings, const uz_hooks *hooks,
+                           uz_error *err)
 {
     static const uz_reuse everything = {true, true, true, true}, nothing;
-    uz_body_key key;
+    uz_setup_key key;
     uz_item *item = NULL;
     bool create = true;
-    *body = NULL;
+    *setup = NULL;
     *reused = nothing;
     if (!cache)
-        return uz_body_create(body, problem, wanted, NULL, settings, NULL, hooks, err);
-    uz_status status = uz_body_digest(&key, problem, wanted, settings, err);
+        return uz_setup_create(setup, problem, wanted, NULL, settings, NULL, hooks, err);
+    uz_status status = uz_setup_digest(&key, problem, wanted, settings, err);
     if (status == UZ_OK)
-        status = uz_table_acquire(&item, &create, cache, UZ_ITEM_BODY, key.digest, hooks, err);
-    if (status == UZ_OK && create)
-        status = fill(cache, item, problem, wanted, &key, settings, hooks, err);
+        status = uz_table_acquire(&item, &create, cache, UZ_ITEM_SETUP, key.digest, hooks, err);
     if (status != UZ_OK)
         return status;
-    *body = uz_item_object(item);
-    *reused = create ? (*body)->reused : everything;
+    if (create) {
+        status = uz_setup_create(setup, problem, wanted, &key, settings, cache, hooks, err);
+        if (status != UZ_OK) {
+            uz_table_abandon(cache, item);
+            return status;
+        }
+        (*setup)->item = item;
+        uz_table_publish(cache, item, *setup, (*setup)->bytes, destroy_setup);
+    }
+    *setup = uz_item_object(item);
+    *reused = create ? (*setup)->reused : everything;
     return UZ_OK;
 }
 
-void uz_cache_release(uz_cache *cache, uz_body *body)
+void uz_setup_release(uz_cache *cache, uz_setup *setup)
 {
     if (!cache)
-        uz_body_free(body);
-    else if (body)
-        uz_table_release(cache, body->item);
+        uz_setup_free(setup);
+    else if (setup)
+        uz_table_release(cache, setup->item);
 }
 
 /* ---- what is cached, for people */
@@ -80,7 +66,7 @@ static void count_one(const void *object, const char *digest, int64_t hits, size
     ((entries *)ctx)->room++;
 }
 
-/* A factor that several bodies share counts for the first of them. */
+/* A factor that several setups share counts for the first of them. */
 static size_t factor_bytes(entries *to, const uz_factor *factor)
 {
     to->factors[to->count] = factor;
@@ -92,18 +78,18 @@ static size_t factor_bytes(entries *to, const uz_factor *factor)
 
 static void describe_one(const void *object, const char *digest, int64_t hits, size_t bytes, void *ctx)
 {
-    const uz_body *body = object;
+    const uz_setup *setup = object;
     entries *to = ctx;
     if (to->count == to->room)
         return; /* came in since they were counted */
-    const uz_dual *dual = body->dual;
+    const uz_dual *dual = setup->dual;
     uz_cache_entry *entry = &to->list[to->count];
     memcpy(entry->digest, digest, sizeof entry->digest);
     entry->d = dual->d;
     entry->m = dual->m;
-    entry->nnz = body->factor ? uz_factor_describe(body->factor).nnz : 0;
+    entry->nnz = setup->factor ? uz_factor_describe(setup->factor).nnz : 0;
     entry->hits = hits;
-    entry->bytes = bytes + factor_bytes(to, body->factor);
+    entry->bytes = bytes + factor_bytes(to, setup->factor);
     to->count++;
 }
 
@@ -113,7 +99,7 @@ uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **out, size_t *count, uz
     *out = NULL;
     *count = 0;
     uz_error_reset(err);
-    uz_table_visit(cache, UZ_ITEM_BODY, count_one, &found);
+    uz_table_visit(cache, UZ_ITEM_SETUP, count_one, &found);
     found.list = uz_alloc_zero((int64_t)found.room, sizeof *found.list);
     found.factors = uz_alloc_zero((int64_t)found.room, sizeof *found.factors);
     if (!found.list || !found.factors) {
@@ -121,7 +107,7 @@ uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **out, size_t *count, uz
         free(found.factors);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to list the cache");
     }
-    uz_table_visit(cache, UZ_ITEM_BODY, describe_one, &found);
+    uz_table_visit(cache, UZ_ITEM_SETUP, describe_one, &found);
     free(found.factors);
     *out = found.list;
     *count = found.count;

@@ -21,7 +21,7 @@ static uz_status check_given(const double *x, int64_t n, const char *name, uz_er
  * displacements that meet the supports, and no other has an energy that could be compared. */
 static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
 {
-    const uz_body_model *model = &run->body->model;
+    const uz_body_model *model = &run->setup->model;
     int dim = model->mesh.dim;
     uz_restrict_nodal(run->answer.u, model, u);
     for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
@@ -38,8 +38,8 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
 
 static uz_status take_answer(uz_run *run, const double *u, const double *r, uz_error *err)
 {
-    const uz_mesh *mesh = &run->body->model.mesh;
-    bool scene = run->body->is_scene;
+    const uz_mesh *mesh = &run->setup->model.mesh;
+    bool scene = run->setup->is_scene;
     uz_status status = check_given(u, scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
     if (status == UZ_OK)
         status = check_given(r, run->m, "r", err);
@@ -57,7 +57,7 @@ static uz_status take_answer(uz_run *run, const double *u, const double *r, uz_e
 static uz_status certify(uz_run *run, const double *r, uz_error *err)
 {
     uz_answer *answer = &run->answer;
-    if (run->settings->balanced && run->body->is_scene)
+    if (run->settings->balanced && run->setup->is_scene)
         uz_run_balance_request(run);
     uz_certify_input input;
     uz_status status = uz_run_certify_input(&input, run, answer->u, err);
@@ -80,9 +80,9 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     if (status == UZ_OK)
         status = take_answer(run, u, r, err);
     double start = uz_seconds();
-    if (status == UZ_OK && run->body->krylov) /* its certificate solves with what a load keeps */
-        status =
-            uz_dual_load_create(&run->load, run->body->dual, uz_body_K(run->body, run->problem), run->p, run->h, err);
+    if (status == UZ_OK && run->setup->krylov) /* its certificate solves with what a load keeps */
+        status = uz_dual_load_create(&run->load, run->setup->dual, uz_setup_K(run->setup, run->problem), run->p, run->h,
+                                     err);
     if (status == UZ_OK)
         status = certify(run, r, err);
     summary->timings.certify = uz_seconds() - start;
@@ -94,7 +94,7 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     summary->outcome = summary->certificate.relative_error <= run->requested ? UZ_VERIFIED : UZ_NOT_VERIFIED;
     summary->method = UZ_METHOD_GIVEN;
     summary->alpha = NAN;
-    summary->lambda_max = uz_dual_known_lambda_max(run->body->dual);
+    summary->lambda_max = uz_dual_known_lambda_max(run->setup->dual);
     return uz_run_publish(run, err);
 }
 
@@ -122,16 +122,16 @@ uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u,
         return status;
     status = uz_run_begin(&run, problem, settings, hooks, err);
     if (status == UZ_OK)
-        status = uz_cache_acquire(&run.body, &reused, cache, problem, settings, hooks, err);
+        status = uz_setup_acquire(&run.setup, &reused, cache, problem, NULL, settings, hooks, err);
     if (status == UZ_OK) {
-        uz_run_take_body(&run, reused);
+        uz_run_take_setup(&run, reused);
         status = verify(&run, u, r, err);
     }
     if (status == UZ_OK) {
         *out = run.result;
         run.result = NULL;
     }
-    uz_cache_release(cache, run.body);
+    uz_setup_release(cache, run.setup);
     uz_run_end(&run);
     return status;
 }

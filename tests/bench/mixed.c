@@ -156,16 +156,16 @@ static uz_scene strip(int m)
     return scene;
 }
 
-static bool read_operator(problem_of *p, const uz_problem *problem, uz_body *body)
+static bool read_operator(problem_of *p, const uz_problem *problem, uz_setup *setup)
 {
     uz_dual_load *load = NULL;
     uz_error err;
     double lambda = 0.0;
     uz_qp qp = {0};
-    const uz_csc *K = uz_body_K(body, problem);
+    const uz_csc *K = uz_setup_K(setup, problem);
     uz_mesh_info info = {0};
     bool good = uz_scene_to_qp(&qp, &info, &problem->scene, &err) == UZ_OK &&
-                uz_dual_load_create(&load, body->dual, K, qp.p, qp.h, &err) == UZ_OK &&
+                uz_dual_load_create(&load, setup->dual, K, qp.p, qp.h, &err) == UZ_OK &&
                 uz_dual_load_prepare(load, &lambda, &err) == UZ_OK && lambda > 0.0;
     for (int i = 0; good && i < p->m; i++)
         good = uz_dual_load_column(load, p->D + (size_t)i * (size_t)p->m, i, &err) == UZ_OK;
@@ -186,7 +186,7 @@ static bool make(problem_of *p, int m)
     uz_settings settings = uz_settings_default();
     uz_cache *cache = uz_cache_new((size_t)4 << 30);
     uz_reuse reused;
-    uz_body *body = NULL;
+    uz_setup *setup = NULL;
     uz_result *result = NULL;
     uz_error err;
     const size_t n = (size_t)m;
@@ -200,18 +200,18 @@ static bool make(problem_of *p, int m)
                       .x32 = calloc(2 * n, sizeof(float))};
     bool good = p->D && p->D32 && p->g0 && p->room && p->x32 && cache &&
                 uz_solve(&result, &problem, &settings, cache, NULL, &err) == UZ_OK && result->m == m &&
-                uz_cache_acquire(&body, &reused, cache, &problem, &settings, NULL, &err) == UZ_OK;
+                uz_setup_acquire(&setup, &reused, cache, &problem, NULL, &settings, NULL, &err) == UZ_OK;
     if (good) {
         p->exact = p->g0 + n;
         p->D_exact = p->exact + n;
         p->y32 = p->x32 + n;
         memcpy(p->exact, result->r, n * sizeof(double));
         p->norm = result->summary.certificate.energy_norm;
-        good = read_operator(p, &problem, body);
+        good = read_operator(p, &problem, setup);
     }
     if (good)
         apply(p, p->D_exact, p->exact);
-    uz_cache_release(cache, body);
+    uz_setup_release(cache, setup);
     uz_cache_free(cache);
     uz_result_free(result);
     uz_problem_clear(&problem);

@@ -19,22 +19,23 @@ static uz_problem spring_body(int64_t d, double stiffness)
     return problem;
 }
 
-static uz_body *acquire(uz_cache *cache, const uz_problem *problem, bool *hit)
+static uz_setup *acquire(uz_cache *cache, const uz_problem *problem, bool *hit)
 {
     uz_settings settings = uz_settings_default();
-    uz_body *body = NULL;
+    uz_setup *setup = NULL;
     uz_reuse reused;
     uz_error err = {0};
-    CHECK_MSG(uz_cache_acquire(&body, &reused, cache, problem, &settings, NULL, &err) == UZ_OK, "%s", err.message);
+    CHECK_MSG(uz_setup_acquire(&setup, &reused, cache, problem, NULL, &settings, NULL, &err) == UZ_OK, "%s",
+              err.message);
     *hit = reused.op;
-    return body;
+    return setup;
 }
 
 /* Makes the body known and lets go of it; whether it was known before. */
 static bool touch(uz_cache *cache, const uz_problem *problem)
 {
     bool hit = false;
-    uz_cache_release(cache, acquire(cache, problem, &hit));
+    uz_setup_release(cache, acquire(cache, problem, &hit));
     return hit;
 }
 
@@ -88,9 +89,9 @@ TEST(without_a_cache)
 {
     uz_problem problem = spring_body(10, 1);
     bool hit = true;
-    uz_body *body = acquire(NULL, &problem, &hit);
-    CHECK(body && !hit);
-    uz_cache_release(NULL, body);
+    uz_setup *setup = acquire(NULL, &problem, &hit);
+    CHECK(setup && !hit);
+    uz_setup_release(NULL, setup);
     uz_cache_free(NULL);
     uz_problem_clear(&problem);
 }
@@ -128,18 +129,18 @@ TEST(bodies_in_use_survive)
     uz_cache *cache = uz_cache_new(0);
     uz_problem a = spring_body(30, 1), b = spring_body(30, 2);
     bool hit;
-    uz_body *first = acquire(cache, &a, &hit), *again = acquire(cache, &a, &hit);
+    uz_setup *first = acquire(cache, &a, &hit), *again = acquire(cache, &a, &hit);
     CHECK(hit && first == again);
-    uz_body *other = acquire(cache, &b, &hit);
+    uz_setup *other = acquire(cache, &b, &hit);
     CHECK_INT(count_entries(cache), 2);
-    uz_cache_release(cache, again);
+    uz_setup_release(cache, again);
     CHECK_INT(count_entries(cache), 2);
     CHECK_INT(first->dual->d, 30); /* still there */
-    uz_cache_release(cache, first);
+    uz_setup_release(cache, first);
     CHECK_INT(count_entries(cache), 1);
-    uz_cache_release(cache, other);
+    uz_setup_release(cache, other);
     CHECK_INT(count_entries(cache), 0);
-    uz_cache_release(cache, NULL);
+    uz_setup_release(cache, NULL);
     uz_cache_free(cache);
     uz_problem_clear(&a);
     uz_problem_clear(&b);
@@ -152,7 +153,7 @@ typedef struct {
     pthread_barrier_t *start;
     atomic_int *created, *failed;
     const uz_hooks *hooks;
-    uz_body *body;
+    uz_setup *setup;
 } user;
 
 static void *use(void *ctx)
@@ -163,13 +164,13 @@ static void *use(void *ctx)
     uz_reuse reused = {0};
     uz_thread_init();
     pthread_barrier_wait(u->start);
-    uz_status status = uz_cache_acquire(&u->body, &reused, u->cache, u->problem, &settings, u->hooks, &err);
+    uz_status status = uz_setup_acquire(&u->setup, &reused, u->cache, u->problem, NULL, &settings, u->hooks, &err);
     atomic_fetch_add(u->created, status == UZ_OK && !reused.op);
     atomic_fetch_add(u->failed, status != UZ_OK);
     return NULL;
 }
 
-static void use_from_threads(uz_cache *cache, const uz_problem *problem, const uz_hooks *hooks, uz_body **bodies,
+static void use_from_threads(uz_cache *cache, const uz_problem *problem, const uz_hooks *hooks, uz_setup **setups,
                              int *created, int *failed)
 {
     pthread_t threads[THREADS];
@@ -183,7 +184,7 @@ static void use_from_threads(uz_cache *cache, const uz_problem *problem, const u
     }
     for (int t = 0; t < THREADS; t++) {
         pthread_join(threads[t], NULL);
-        bodies[t] = users[t].body;
+        setups[t] = users[t].setup;
     }
     pthread_barrier_destroy(&start);
     *created = made;
@@ -195,9 +196,9 @@ TEST(one_creator_for_many_threads)
     for (int round = 0; round < 10; round++) {
         uz_cache *cache = uz_cache_new(1 << 30);
         uz_problem problem = spring_body(150, round);
-        uz_body *bodies[THREADS];
+        uz_setup *setups[THREADS];
         int created, failed;
-        use_from_threads(cache, &problem, NULL, bodies, &created, &failed);
+        use_from_threads(cache, &problem, NULL, setups, &created, &failed);
         CHECK_INT(created, 1);
         CHECK_INT(failed, 0);
         uz_cache_entry *entries;
@@ -205,8 +206,8 @@ TEST(one_creator_for_many_threads)
         CHECK_INT(entries[0].hits, THREADS - 1);
         free(entries);
         for (int t = 0; t < THREADS; t++) {
-            CHECK(bodies[t] == bodies[0]);
-            uz_cache_release(cache, bodies[t]);
+            CHECK(setups[t] == setups[0]);
+            uz_setup_release(cache, setups[t]);
         }
         uz_cache_free(cache);
         uz_problem_clear(&problem);
@@ -218,9 +219,9 @@ TEST(failing_creators_let_the_next_try)
 {
     uz_cache *cache = uz_cache_new(1 << 30);
     uz_problem problem = spring_body(50, -100);
-    uz_body *bodies[THREADS];
+    uz_setup *setups[THREADS];
     int created, failed;
-    use_from_threads(cache, &problem, NULL, bodies, &created, &failed);
+    use_from_threads(cache, &problem, NULL, setups, &created, &failed);
     CHECK_INT(created, 0);
     CHECK_INT(failed, THREADS);
     CHECK_INT(count_entries(cache), 0);
@@ -241,13 +242,13 @@ TEST(cancelled_creator_leaves_the_work_to_a_waiter)
         uz_problem problem = spring_body(100, round);
         atomic_int refuse = 1;
         uz_hooks hooks = {.ctx = &refuse, .cancelled = refuse_once};
-        uz_body *bodies[THREADS];
+        uz_setup *setups[THREADS];
         int created, failed;
-        use_from_threads(cache, &problem, &hooks, bodies, &created, &failed);
+        use_from_threads(cache, &problem, &hooks, setups, &created, &failed);
         CHECK_INT(created, 1);
         CHECK_INT(failed, 1);
         for (int t = 0; t < THREADS; t++)
-            uz_cache_release(cache, bodies[t]);
+            uz_setup_release(cache, setups[t]);
         CHECK_INT(count_entries(cache), 1);
         uz_cache_free(cache);
         uz_problem_clear(&problem);
@@ -300,9 +301,9 @@ TEST(solves_from_many_threads)
 
 static void digest_of(char digest[65], const uz_problem *problem, const uz_settings *settings)
 {
-    uz_body_key key;
+    uz_setup_key key;
     uz_error err = {0};
-    CHECK(uz_body_digest(&key, problem, NULL, settings, &err) == UZ_OK);
+    CHECK(uz_setup_digest(&key, problem, NULL, settings, &err) == UZ_OK);
     memcpy(digest, key.digest, 65);
     CHECK_INT(strlen(digest), 64);
 }

@@ -101,14 +101,14 @@ static double conditioning(double tilt)
 {
     uz_problem problem = scene_problem(60, 20);
     uz_settings freely = settings_for(UZ_OPERATOR_MATRIX_FREE, UZ_METHOD_AUTO, 1e-6);
-    uz_body *body = NULL;
+    uz_setup *setup = NULL;
     uz_reuse reused;
     uz_error err = {0};
     problem.scene.contacts[0].normal[0] = tilt;
-    CHECK_MSG(uz_cache_acquire(&body, &reused, NULL, &problem, &freely, NULL, &err) == UZ_OK, "%s", err.message);
-    double lambda = uz_krylov_describe(body->krylov).lambda;
-    CHECK_INT(body->model.info.n_turned > 0, tilt != 0);
-    uz_cache_release(NULL, body);
+    CHECK_MSG(uz_setup_acquire(&setup, &reused, NULL, &problem, NULL, &freely, NULL, &err) == UZ_OK, "%s", err.message);
+    double lambda = uz_krylov_describe(setup->krylov).lambda;
+    CHECK_INT(setup->model.info.n_turned > 0, tilt != 0);
+    uz_setup_release(NULL, setup);
     uz_problem_clear(&problem);
     return lambda;
 }
