@@ -19,13 +19,8 @@
 /* Gaps left out may be negative by this part of what they are the difference of. */
 #define ROUNDING (64.0 * DBL_EPSILON)
 
-void uz_run_take_all_rows(uz_run *run)
-{
-    run->m = run->all;
-    run->wide = true;
-}
-
-static uz_status widen_vector(double **x, const uz_candidates *rows, uz_error *err)
+/* x in the order of all rows, zero on those left out. *x NULL: nothing. */
+static uz_status scatter(double **x, const uz_candidates *rows, uz_error *err)
 {
     double *all = *x ? uz_alloc(rows->m, sizeof *all) : NULL;
     if (!*x)
@@ -64,7 +59,7 @@ static void take_nearest(uz_candidates *wants, const double *g)
 /* The rows of another round: those of this one, those that are penetrated, and those that would be next. */
 static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
 {
-    const uz_candidates *rows = &run->setup->rows;
+    const uz_candidates *rows = &run->asked->setup->rows;
     uz_candidates wants = {0};
     double *size = uz_alloc(rows->m, sizeof *size);
     uz_status status =
@@ -72,8 +67,8 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
     if (status == UZ_OK)
         status = uz_candidates_add(&wants, rows, err);
     if (status == UZ_OK) {
-        add_sizes(size, uz_setup_all_rows(run->setup, run->problem), run->h_all, run->answer.u);
-        int64_t added = uz_candidates_extend(&wants, run->it.law, run->answer.g, size, ROUNDING);
+        add_sizes(size, uz_setup_all_rows(run->asked->setup, run->asked->problem), run->load.h_all, run->answer.u);
+        int64_t added = uz_candidates_extend(&wants, run->work.it.law, run->answer.g, size, ROUNDING);
         if (added == 0 && suspect)
             take_nearest(&wants, run->answer.g);
     }
@@ -85,30 +80,31 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
     return status;
 }
 
-uz_status uz_run_widen(uz_run *run, uz_error *err)
+uz_status uz_run_certify_all_rows(uz_run *run, uz_error *err)
 {
-    const uz_candidates *rows = &run->setup->rows;
+    const uz_candidates *rows = &run->asked->setup->rows;
     uz_certificate *certificate = &run->result->summary.certificate;
     if (!rows->in)
         return UZ_OK;
     double start = uz_seconds();
-    bool met = certificate->relative_error <= run->requested;
-    uz_status status = widen_vector(&run->answer.r, rows, err);
+    bool met = certificate->relative_error <= run->work.requested;
+    uz_status status = scatter(&run->answer.r, rows, err);
     if (status == UZ_OK)
-        status = widen_vector(&run->answer.g, rows, err);
+        status = scatter(&run->answer.g, rows, err);
     if (status == UZ_OK)
-        status = widen_vector(&run->result->ray, rows, err);
+        status = scatter(&run->result->ray, rows, err);
     if (status != UZ_OK)
         return status;
-    uz_run_take_all_rows(run);
+    run->answer.m = run->all;
     if (!run->result->ray)
         status = uz_run_certify_answer(run, &run->answer, err);
     if (status == UZ_OK && !run->result->ray)
         *certificate = run->answer.certificate;
-    if (status == UZ_OK && !run->result->ray && certificate->relative_error > run->requested)
+    if (status == UZ_OK && !run->result->ray && certificate->relative_error > run->work.requested)
         status = want_rows(run, met, err);
     run->result->summary.timings.certify += uz_seconds() - start;
-    uz_decades_resume(&run->decades, uz_run_time(run));
-    uz_decades_widen(&run->decades, certificate->relative_error, run->it.iteration, run->load->applications);
+    uz_decades_resume(&run->work.decades, uz_run_time(run));
+    uz_decades_widen(&run->work.decades, certificate->relative_error, run->work.it.iteration,
+                     run->work.dual->applications);
     return status;
 }

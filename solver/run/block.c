@@ -1,11 +1,11 @@
-/* block.c: the pipeline of run.c for several loads at once.
+/* block.c: the steps of run.c for several loads at once.
  *
  *     p -> y, g0            forward substitution of all loads, once through L
  *     r                     iterations, load by load: they live on the contact
  *     u                     backward substitution of all loads, once through L
  *     (u, r) -> bound       certificates of UZ_LANES loads with one pass over K
  *
- * A case whose bound misses the request goes on by itself, as a single one would. */
+ * A load whose bound misses the request goes on by itself, as a single one would. */
 #include "run/block.h"
 
 #include "certificate/lanes.h"
@@ -96,7 +96,7 @@ static void interleave(double *P, const uz_run *runs, int64_t count, int64_t d)
     for (int64_t first = 0; first < d; first += TILE) {
         int64_t last = first + TILE < d ? first + TILE : d;
         for (int64_t lane = 0; lane < UZ_LANES; lane++) {
-            const double *p = lane < count ? runs[lane].p : NULL;
+            const double *p = lane < count ? runs[lane].load.p : NULL;
             for (int64_t j = first; j < last; j++)
                 P[j * UZ_LANES + lane] = p ? p[j] : 0.0;
         }
@@ -113,27 +113,25 @@ static void separate(uz_run *runs, int64_t count, const double *U, int64_t d)
     }
 }
 
-/* How many of the runs are in the 8 lanes from `first` on. */
-static int64_t lanes_from(int64_t first, int64_t count)
-{
-    return count - first < UZ_LANES ? count - first : UZ_LANES;
-}
-
 /* Every load pays its share of what was done for all. */
 static void share_time(uz_block *block, int64_t count, double seconds, bool certify)
 {
-    for (int64_t k = 0; k < count; k++) {
+    for (int64_t k = 0; k < count && block->runs[k].result; k++) {
         uz_timings *t = &block->runs[k].result->summary.timings;
         *(certify ? &t->certify : &t->iterate) += seconds / (double)count;
     }
 }
 
-static uz_status load_all(uz_block *block, int64_t count, int64_t *failed, uz_error *err)
+/* The loads of all runs, and the forward substitution. */
+static uz_status load_all(uz_block *block, const uz_request *asked, int64_t count, int64_t *failed, uz_error *err)
 {
     uz_status status = UZ_OK;
+    memset(block->runs, 0, (size_t)count * sizeof *block->runs);
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
-        *failed = block->runs[k].index;
-        status = uz_run_make_load(&block->runs[k], err);
+        *failed = k;
+        status = uz_run_begin(&block->runs[k], &asked[k], err);
+        if (status == UZ_OK)
+            status = uz_run_load(&block->runs[k], err);
     }
     if (status != UZ_OK)
         return status;
@@ -142,21 +140,6 @@ static uz_status load_all(uz_block *block, int64_t count, int64_t *failed, uz_er
         interleave(P + first * block->d, block->runs + first, count - first, block->d);
     status = uz_dual_block_forward(block->loads, err);
     share_time(block, count, uz_seconds() - start, false);
-    return status;
-}
-
-static uz_status iterate_one(uz_block *block, int64_t k, uz_error *err)
-{
-    uz_run *run = &block->runs[k];
-    run->in_block = true;
-    uz_status status = uz_dual_block_open(&run->load, block->loads, k, block->K, run->h, err);
-    if (status == UZ_OK)
-        status = uz_run_start(run, err);
-    if (status == UZ_OK)
-        status = uz_run_iterate(run, err);
-    block->cases[k] = run->load;
-    block->r[k] = run->it.best_r;
-    block->corrected[k] = isfinite(run->it.best_bound);
     return status;
 }
 
@@ -169,16 +152,16 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
     uz_run *runs = block->runs + first;
     separate(runs, count, U, block->d);
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
-        const double *scale = runs[k].load->dual->row_scale;
+        const double *scale = runs[k].work.dual->dual->row_scale;
         double whole_norm;
         for (int64_t i = 0; i < runs[k].m; i++)
             runs[k].answer.r[i] = scale[i] * block->r[first + k][i];
         status = uz_run_whole_norm(&whole_norm, &runs[k], runs[k].answer.u, err);
         answers[k] = (uz_lane_answer){.r = runs[k].answer.r,
                                       .g = runs[k].answer.g,
-                                      .h = runs[k].h,
-                                      .sharp = 0.5 * runs[k].requested,
-                                      .moved = runs[k].moved,
+                                      .h = runs[k].load.h,
+                                      .sharp = 0.5 * runs[k].work.requested,
+                                      .moved = runs[k].load.moved,
                                       .whole_norm = whole_norm};
     }
     if (status != UZ_OK)
@@ -191,37 +174,38 @@ static uz_status certify_lanes(uz_block *block, int64_t first, int64_t count, bo
     return UZ_OK;
 }
 
-static uz_status recover_and_certify(uz_block *block, int64_t count, bool *certified, uz_error *err)
-{
-    double start = uz_seconds();
-    uz_status status = uz_dual_block_recover(block->loads, block->cases, block->r, block->corrected, count, err);
-    for (int64_t first = 0; status == UZ_OK && first < count; first += UZ_LANES)
-        status = certify_lanes(block, first, lanes_from(first, count), certified + first, err);
-    share_time(block, count, uz_seconds() - start, true);
-    return status;
-}
-
-static uz_status finish_one(uz_run *run, bool certified, uz_error *err)
-{
-    uz_status status = certified ? UZ_OK : uz_run_certify(run, err);
-    return status == UZ_OK ? uz_run_finish(run, err) : status;
-}
-
-uz_status uz_block_solve(uz_block *block, int64_t count, int64_t *failed, uz_error *err)
+uz_status uz_block_solve(uz_block *block, const uz_request *asked, int64_t count, int64_t *failed, uz_error *err)
 {
     bool *certified = uz_alloc_zero(count, sizeof *certified);
+    *failed = 0;
     if (!certified)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
-    uz_status status = load_all(block, count, failed, err);
+    uz_status status = load_all(block, asked, count, failed, err);
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
-        *failed = block->runs[k].index;
-        status = iterate_one(block, k, err);
+        uz_run *run = &block->runs[k];
+        *failed = k;
+        status = uz_dual_block_open(&run->work.dual, block->loads, k, block->K, run->load.h, err);
+        if (status == UZ_OK)
+            status = uz_run_start(run, err);
+        if (status == UZ_OK)
+            status = uz_run_iterate(run, err);
+        block->cases[k] = run->work.dual;
+        block->r[k] = run->work.it.best_r;
+        block->corrected[k] = isfinite(run->work.it.best_bound);
     }
+    double start = uz_seconds();
     if (status == UZ_OK)
-        status = recover_and_certify(block, count, certified, err);
+        status = uz_dual_block_recover(block->loads, block->cases, block->r, block->corrected, count, err);
+    for (int64_t first = 0; status == UZ_OK && first < count; first += UZ_LANES)
+        status =
+            certify_lanes(block, first, count - first < UZ_LANES ? count - first : UZ_LANES, certified + first, err);
+    share_time(block, count, uz_seconds() - start, true);
     for (int64_t k = 0; status == UZ_OK && k < count; k++) {
-        *failed = block->runs[k].index;
-        status = finish_one(&block->runs[k], certified[k], err);
+        *failed = k;
+        if (!certified[k])
+            status = uz_run_certify(&block->runs[k], err);
+        if (status == UZ_OK)
+            status = uz_run_finish(&block->runs[k], err);
     }
     free(certified);
     return status;

@@ -6,8 +6,6 @@
  *
  * The algebraic part is asked for a tenth of the total, so that it takes half a percent of it and the estimate, which
  * needs an answer to look at, is one of the mesh alone. */
-#include "run/grid_sequence.h"
-
 #include "scene/grids.h"
 #include "run/transfer.h"
 #include "assembly/assembly.h"
@@ -15,7 +13,10 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "run/run.h"
+#include "methods/decades.h"
+#include "run/problem.h"
+#include "run/settings.h"
+#include "run/solve.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -60,11 +61,6 @@ typedef struct {
     stop_kind stop;
     char reason[160];
 } climb;
-
-bool uz_cells_are_chosen(const uz_problem *problem)
-{
-    return problem->kind == UZ_PROBLEM_SCENE && problem->scene.source == UZ_MESH_BOX && problem->scene.box.automatic;
-}
 
 /* ---- the error of a grid */
 
@@ -391,8 +387,8 @@ static uz_status check(const climb *c, const uz_state *const *starts, uz_error *
     return status;
 }
 
-uz_status uz_solve_ladder(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
-                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+uz_status uz_solve_grid_sequence(uz_result ***out, const uz_problem *problem, const uz_settings *settings,
+                                 const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
     climb c = {.problem = problem,
                .settings = settings,

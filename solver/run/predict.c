@@ -4,7 +4,7 @@
 #include "dual/dual.h"
 #include "factor/factor.h"
 #include "run/rows.h"
-#include "run/run.h"
+#include "run/settings.h"
 #include "uzawa.h"
 
 #include <stdlib.h>

@@ -1,9 +1,9 @@
 /* refine.c: iterative refinement of an answer whose certificate misses the request.
  *
- * With u and r given, e = p + N'r - K u and f = h - N u in twofold precision, what is missing is the solution of the
- * contact problem of the correction: K c = e + N's with gaps f - N c >= 0 and r + s <= 0. It is solved on the factor
- * that is there, with the relative error that u itself was found with; so each pass takes as many digits again, while
- * the condition of K leaves any (Higham, Accuracy and Stability of Numerical Algorithms, chapter 12). The rows in
+ * With u and r given, e = p + N'r - K u and f = h - N u in double-double precision, what is missing is the solution of
+ * the contact problem of the correction: K c = e + N's with gaps f - N c >= 0 and r + s <= 0. It is solved on the
+ * factor that is there, with the relative error that u itself was found with; so each pass takes as many digits again,
+ * while the condition of K leaves any (Higham, Accuracy and Stability of Numerical Algorithms, chapter 12). The rows in
  * contact are chosen anew at the size of the correction: of rows that repeat each other up to rounding it is the
  * tightest that has to bear the reaction. */
 #include "certificate/residual.h"
@@ -51,7 +51,7 @@ static uz_status begin(refinement *x, uz_run *run, uz_error *err)
     x->active = uz_alloc_zero(run->m, sizeof *x->active);
     if (!ok || !x->active)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to refine %lld dofs", (long long)run->d);
-    return uz_csc_transpose(&x->Nt, uz_setup_N(run->setup, run->problem), err);
+    return uz_csc_transpose(&x->Nt, uz_setup_N(run->asked->setup, run->asked->problem), err);
 }
 
 static void end(refinement *x)
@@ -67,17 +67,17 @@ static void end(refinement *x)
 static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
 {
     const uz_run *run = x->run;
-    const double *scale = run->load->dual->row_scale;
-    uz_status status =
-        uz_equilibrium_residual(&x->res, uz_setup_K(run->setup, run->problem), uz_setup_N(run->setup, run->problem),
-                                run->p, answer->u, x->zero, answer->r, err);
+    const double *scale = run->work.dual->dual->row_scale;
+    uz_status status = uz_equilibrium_residual(&x->res, uz_setup_K(run->asked->setup, run->asked->problem),
+                                               uz_setup_N(run->asked->setup, run->asked->problem), run->load.p,
+                                               answer->u, x->zero, answer->r, err);
     for (int64_t j = 0; j < run->d; j++)
         x->e[j] = -x->res.e_u[j];
     for (int64_t i = 0; i < run->m; i++) {
-        x->f[i] = uz_gap_of_row(&x->Nt, i, run->h, answer->u, NULL);
+        x->f[i] = uz_gap_of_row(&x->Nt, i, run->load.h, answer->u, NULL);
         x->r[i] = answer->r[i] / scale[i];
     }
-    run->it.law->kind->active(run->it.law, x->active, answer->r, run->m);
+    run->work.it.law->kind->active(run->work.it.law, x->active, answer->r, run->m);
     return status;
 }
 
@@ -93,11 +93,11 @@ static uz_status keep_rows(refinement *x, uz_dual_load *correction, uz_error *er
 
 static uz_status exchange_rows(refinement *x, uz_dual_load *correction, uz_error *err)
 {
-    uz_stop stop = {x->run->hooks, x->run->deadline};
+    uz_stop stop = {x->run->asked->hooks, x->run->asked->deadline};
     uz_exchange_end ended;
     int64_t steps = INT64_MAX;
-    uz_status status =
-        uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, x->run->it.law, correction, &stop, err);
+    uz_status status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, x->run->work.it.law,
+                                       correction, &stop, err);
     x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_BLURRED;
     return status;
 }
@@ -106,14 +106,14 @@ static uz_status exchange_rows(refinement *x, uz_dual_load *correction, uz_error
 static uz_status correct(refinement *x, uz_error *err)
 {
     const uz_run *run = x->run;
-    bool small = run->load->dual->can->cheap_steps || run->m <= FEW_ROWS,
-         exchange = run->load->dual->rows_may_depend && small;
+    bool small = run->work.dual->dual->can->cheap_steps || run->m <= FEW_ROWS,
+         exchange = run->work.dual->dual->rows_may_depend && small;
     uz_dual_load *correction = NULL;
     for (int64_t i = 0; i < run->m; i++)
         x->f[i] = exchange || x->active[i] ? x->f[i] : INFINITY;
-    uz_status status =
-        uz_dual_load_create(&correction, run->setup->dual, uz_setup_K(run->setup, run->problem), x->e, x->f, err);
-    uz_stop stop = {run->hooks, run->deadline};
+    uz_status status = uz_dual_load_create(&correction, run->asked->setup->dual,
+                                           uz_setup_K(run->asked->setup, run->asked->problem), x->e, x->f, err);
+    uz_stop stop = {run->asked->hooks, run->asked->deadline};
     if (status == UZ_OK)
         status = uz_dual_load_aim(correction, NAN, &stop, err);
     if (status == UZ_OK)
@@ -129,18 +129,18 @@ static uz_status correct(refinement *x, uz_error *err)
 static uz_status refine_once(refinement *x, uz_answer *latest, uz_error *err)
 {
     uz_run *run = x->run;
-    const double *scale = run->load->dual->row_scale;
+    const double *scale = run->work.dual->dual->row_scale;
     uz_status status = measure(x, latest, err);
     if (status == UZ_OK)
         status = correct(x, err);
-    uz_stop stop = {run->hooks, run->deadline};
+    uz_stop stop = {run->asked->hooks, run->asked->deadline};
     if (status != UZ_OK || x->contradictory || uz_stop_is_due(&stop)) /* half a correction is none */
         return status;
     for (int64_t j = 0; j < run->d; j++)
         latest->u[j] += x->c[j];
     for (int64_t i = 0; i < run->m; i++)
         latest->r[i] = scale[i] * (x->r[i] + x->s[i]);
-    run->it.law->kind->project(run->it.law, latest->r, run->m);
+    run->work.it.law->kind->project(run->work.it.law, latest->r, run->m);
     return uz_run_certify_answer(run, latest, err);
 }
 
@@ -156,9 +156,9 @@ static void copy_answer(uz_answer *to, const uz_answer *from, const uz_run *run)
 static bool is_worth_it(const uz_run *run)
 {
     double error = run->answer.certificate.relative_error;
-    bool ended = run->end == UZ_END_SOLVED || run->end == UZ_END_BLURRED || run->end == UZ_END_STALLED;
-    uz_stop stop = {run->hooks, run->deadline};
-    return ended && error > run->requested && error > ROUNDED && !uz_stop_is_due(&stop);
+    bool ended = run->work.end == UZ_END_SOLVED || run->work.end == UZ_END_BLURRED || run->work.end == UZ_END_STALLED;
+    uz_stop stop = {run->asked->hooks, run->asked->deadline};
+    return ended && error > run->work.requested && error > ROUNDED && !uz_stop_is_due(&stop);
 }
 
 uz_status uz_run_refine(uz_run *run, uz_error *err)
@@ -184,8 +184,8 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
         idle = unbounded || run->answer.certificate.relative_error < LEAST_GAIN * before ? 0 : idle + 1;
     }
     if (x.contradictory && isinf(run->answer.certificate.relative_error)) {
-        memcpy(run->it.ray, x.ray, (size_t)run->m * sizeof *x.ray);
-        run->end = UZ_END_RAY; /* to be proved by the original data */
+        memcpy(run->work.it.ray, x.ray, (size_t)run->m * sizeof *x.ray);
+        run->work.end = UZ_END_RAY; /* to be proved by the original data */
     }
     uz_answer_clear(&latest);
     end(&x);

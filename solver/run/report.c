@@ -1,4 +1,4 @@
-/* report.c: what a solve leaves behind. */
+/* report.c: what is told of the solve of one load. */
 #include "run/run.h"
 
 #include "core/alloc.h"
@@ -6,6 +6,8 @@
 #include "core/error.h"
 #include "post/evaluate.h"
 #include "linalg/linalg.h"
+#include "run/problem.h"
+#include "run/results.h"
 #include "run/rows.h"
 
 #include <float.h>
@@ -13,26 +15,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-uz_status uz_run_begin(uz_run *run, const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks,
-                       uz_error *err)
-{
-    memset(run, 0, sizeof *run);
-    run->problem = problem;
-    run->settings = settings;
-    run->hooks = hooks;
-    run->started = uz_seconds();
-    run->deadline = run->started + settings->time_limit_s;
-    run->requested = uz_requested_error(settings);
-    run->target = settings->balanced ? 1e-2 : run->requested;
-    run->result = uz_alloc_zero(1, sizeof *run->result);
-    if (!run->result)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
-    run->result->summary.discretization_error = NAN;
-    run->result->summary.max_pressure = NAN;
-    uz_decades_init(&run->decades, false);
-    return UZ_OK;
-}
 
 /* What stands in the factor's place: no entries of L, but bytes and a condition. */
 static uz_factor_info describe_factor(const uz_setup *setup)
@@ -44,33 +26,33 @@ static uz_factor_info describe_factor(const uz_setup *setup)
         .bytes = krylov.bytes, .rcond = krylov.rcond, .factor_s = krylov.create_s + krylov.spectrum_s};
 }
 
-void uz_run_take_setup(uz_run *run, uz_reuse reused)
+void uz_report_setup(uz_run *run)
 {
+    const uz_setup *setup = run->asked->setup;
+    const uz_reuse reused = run->asked->reused;
     uz_summary *summary = &run->result->summary;
-    uz_factor_info factor = describe_factor(run->setup);
-    const uz_dual *dual = run->setup->dual;
-    run->d = summary->d = run->result->d = dual->d;
-    run->m = run->all = summary->kept = dual->m;
-    if (run->setup->rows.in)
-        run->all = run->setup->rows.m;
+    uz_factor_info factor = describe_factor(setup);
+    summary->discretization_error = NAN;
+    summary->max_pressure = NAN;
+    summary->d = run->result->d = run->d;
     summary->m = run->result->m = run->all;
+    summary->kept = run->m;
     summary->rounds = 1;
-    summary->op = dual->can->op;
+    summary->op = setup->dual->can->op;
     summary->ordering = factor.ordering;
-    uz_decades_init(&run->decades, run->setup->rows.in != NULL);
-    run->hit = run->serves_many = summary->factor_cached = reused.op;
+    summary->factor_cached = reused.op;
     summary->reused = reused;
     summary->contact_last = factor.contact_last;
     summary->factor_flops = factor.flops;
     summary->factor_nnz = factor.nnz;
     summary->factor_bytes = factor.bytes;
     summary->rcond = factor.rcond;
-    if (run->hit)
+    if (reused.op)
         return;
-    summary->timings.assemble = run->setup->assemble_s;
+    summary->timings.assemble = setup->assemble_s;
     summary->timings.order = reused.ordering ? 0.0 : factor.order_s;
     summary->timings.factor = reused.factor ? 0.0 : factor.factor_s;
-    summary->timings.condense = run->setup->condense_s;
+    summary->timings.condense = setup->condense_s;
 }
 
 /* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
@@ -79,13 +61,13 @@ void uz_run_take_setup(uz_run *run, uz_reuse reused)
 /* A cached setup is spared, of prediction and of what is measured alike. */
 static void report_cost(uz_run *run)
 {
-    const uz_cost_plan *plan = &run->setup->plan;
+    const uz_cost_plan *plan = &run->asked->setup->plan;
     const uz_timings *t = &run->result->summary.timings;
     uz_cost *cost = &run->result->summary.cost;
     cost->n_considered = plan->count;
     for (int k = 0; k < plan->count; k++) {
         const uz_cost_estimate *form = &plan->form[k];
-        double seconds = form->case_s + (run->hit ? 0.0 : form->setup_s);
+        double seconds = form->case_s + (run->asked->reused.op ? 0.0 : form->setup_s);
         cost->considered[k] = (uz_cost_option){form->op, seconds, form->bytes, form->fits};
         if (k != plan->chosen)
             continue;
@@ -95,36 +77,20 @@ static void report_cost(uz_run *run)
     }
     cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
     cost->actual_bytes =
-        (double)run->setup->bytes + (run->load ? (double)run->load->bytes : 0.0) +
-        (run->setup->is_scene ? 0.0 : (double)(uz_csc_bytes(&run->problem->qp.K) + uz_csc_bytes(&run->problem->qp.N))) +
+        (double)run->asked->setup->bytes + (run->work.dual ? (double)run->work.dual->bytes : 0.0) +
+        (run->asked->setup->is_scene
+             ? 0.0
+             : (double)(uz_csc_bytes(&run->asked->problem->qp.K) + uz_csc_bytes(&run->asked->problem->qp.N))) +
         8.0 * RUN_VECTORS * (double)run->d;
-}
-
-uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err)
-{
-    answer->u = uz_alloc_zero(d, sizeof(double));
-    answer->r = uz_alloc_zero(m, sizeof(double));
-    answer->g = uz_alloc_zero(m, sizeof(double));
-    if (answer->u && answer->r && answer->g)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)d);
-}
-
-void uz_answer_clear(uz_answer *answer)
-{
-    free(answer->u);
-    free(answer->r);
-    free(answer->g);
-    memset(answer, 0, sizeof *answer);
 }
 
 static void report_contact(uz_run *run)
 {
     uz_result *result = run->result;
     uz_summary *summary = &result->summary;
-    const uz_law *law = uz_setup_law(run->setup);
-    summary->active += law->kind->active(law, NULL, result->r, run->m);
-    for (int64_t i = 0; i < run->m; i++) {
+    const uz_law *law = uz_setup_law(run->asked->setup);
+    summary->active += law->kind->active(law, NULL, result->r, run->answer.m);
+    for (int64_t i = 0; i < run->answer.m; i++) {
         summary->reaction_sum += result->r[i];
         summary->max_penetration = fmax(summary->max_penetration, -result->g[i]);
     }
@@ -133,49 +99,49 @@ static void report_contact(uz_run *run)
 static uz_status report_displacements(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
-    const uz_body_model *model = &run->setup->model;
-    if (!run->setup->is_scene) {
+    const uz_body_model *model = &run->asked->setup->model;
+    if (!run->asked->setup->is_scene) {
         result->u = run->answer.u;
         run->answer.u = NULL;
         return UZ_OK;
     }
-    uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, run->m, err);
+    uz_status status = uz_mesh_info_copy(&result->mesh, &model->info, run->all, err);
     result->n_nodes = model->mesh.n_nodes;
     result->u = uz_alloc(result->n_nodes * model->mesh.dim, sizeof(double));
     if (!result->u)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the displacements of %lld nodes",
                        (long long)result->n_nodes);
-    uz_recover_nodal(result->u, model, run->answer.u, run->prescribed);
-    const uz_scene scene = uz_scene_of_case(run->problem, run->index);
+    uz_recover_nodal(result->u, model, run->answer.u, run->load.prescribed);
+    const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
     return status == UZ_OK ? uz_evaluate(result, model, &scene, err) : status;
 }
 
 double uz_run_time(const uz_run *run)
 {
     const uz_timings *t = &run->result->summary.timings;
-    if (run->in_block)
+    if (run->asked->in_block)
         return t->assemble + t->order + t->factor + t->condense + t->iterate + t->certify;
-    return uz_seconds() - run->started;
+    return uz_seconds() - run->asked->started;
 }
 
 /* Displacements are told along x, y and z: where a node's dofs are not, turning them rounds by delta, and the error by
  * ||delta||_K, over supported dofs too, as theirs are told as well. The bound is on what is told. */
-static uz_status widen_by_turning(uz_run *run, uz_error *err)
+static uz_status add_rotation_error(uz_run *run, uz_error *err)
 {
-    const uz_body_model *model = &run->setup->model;
+    const uz_body_model *model = &run->asked->setup->model;
     uz_summary *s = &run->result->summary;
     uz_certificate *c = &s->certificate;
     double energy;
-    if (!run->setup->is_scene || model->info.n_turned == 0)
+    if (!run->asked->setup->is_scene || model->info.n_turned == 0)
         return UZ_OK;
     uz_status status = uz_turning_energy(&energy, model, run->result->u, err);
     if (status != UZ_OK)
         return status;
     c->absolute_error += sqrt(energy);
     c->relative_error += c->energy_norm > 0.0 ? sqrt(energy) / c->energy_norm : 0.0;
-    if (c->relative_error > run->requested && s->outcome == UZ_CONVERGED)
+    if (c->relative_error > run->work.requested && s->outcome == UZ_CONVERGED)
         s->outcome = UZ_PRECISION_LIMIT;
-    if (c->relative_error > run->requested && s->outcome == UZ_VERIFIED)
+    if (c->relative_error > run->work.requested && s->outcome == UZ_VERIFIED)
         s->outcome = UZ_NOT_VERIFIED;
     return UZ_OK;
 }
@@ -183,25 +149,25 @@ static uz_status widen_by_turning(uz_run *run, uz_error *err)
 /* Displacements that were turned have a larger bound, and a problem without an answer has none. */
 static void report_trade(uz_run *run)
 {
-    uz_decades_drop(&run->decades, run->result->summary.certificate.relative_error);
-    run->result->trade = run->decades.trade;
+    uz_decades_drop(&run->work.decades, run->result->summary.certificate.relative_error);
+    run->result->trade = run->work.decades.trade;
     run->result->trade.total_s = uz_run_time(run);
 }
 
-uz_status uz_run_publish(uz_run *run, uz_error *err)
+uz_status uz_report_answer(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
-    summary->requested_error = run->requested;
+    summary->requested_error = run->work.requested;
     run->result->r = run->answer.r;
     run->result->g = run->answer.g;
     run->answer.r = run->answer.g = NULL;
     report_contact(run);
     uz_status status = report_displacements(run, err);
     if (status == UZ_OK)
-        status = widen_by_turning(run, err);
+        status = add_rotation_error(run, err);
     if (run->result->ray)
         uz_blank_answer(run->result);
-    uz_explain_outcome(run->result, run->end);
+    uz_explain_outcome(run->result, run->work.end);
     report_cost(run);
     report_trade(run);
     summary->timings.total = uz_run_time(run);
@@ -212,41 +178,30 @@ uz_status uz_run_publish(uz_run *run, uz_error *err)
 static uz_status report_state(uz_run *run, uz_error *err)
 {
     uz_state *part = NULL;
-    uz_status status = uz_iterate_state(&part, &run->it, run->load, run->settings->method, err);
-    if (status != UZ_OK || !run->setup->rows.in) {
+    uz_status status = uz_iterate_state(&part, &run->work.it, run->work.dual, run->asked->settings->method, err);
+    if (status != UZ_OK || !run->asked->setup->rows.in) {
         run->result->state = part;
         return status;
     }
-    status = uz_state_scatter(&run->result->state, part, &run->setup->rows, err);
+    status = uz_state_scatter(&run->result->state, part, &run->asked->setup->rows, err);
     uz_state_free(part);
     return status;
 }
 
-uz_status uz_run_report(uz_run *run, uz_error *err)
+uz_status uz_report_run(uz_run *run, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
-    summary->method = run->settings->method == UZ_METHOD_AUTO ? run->it.made_by : run->settings->method;
+    summary->method =
+        run->asked->settings->method == UZ_METHOD_AUTO ? run->work.it.made_by : run->asked->settings->method;
     if (run->all == 0)
         summary->method = UZ_METHOD_LINEAR;
-    summary->origin = run->it.origin;
-    summary->iterations = run->it.iteration;
-    summary->restarts = run->it.restarts;
-    summary->alpha = run->it.alpha > 0.0 ? run->it.alpha : NAN;
-    summary->lambda_max = uz_dual_known_lambda_max(run->setup->dual);
+    summary->origin = run->work.it.origin;
+    summary->iterations = run->work.it.iteration;
+    summary->restarts = run->work.it.restarts;
+    summary->alpha = run->work.it.alpha > 0.0 ? run->work.it.alpha : NAN;
+    summary->lambda_max = uz_dual_known_lambda_max(run->asked->setup->dual);
     uz_status status = UZ_OK;
     if (!run->result->ray)
         status = report_state(run, err);
-    return status == UZ_OK ? uz_run_publish(run, err) : status;
-}
-
-void uz_run_end(uz_run *run)
-{
-    uz_dual_load_free(run->load);
-    uz_iterate_clear(&run->it);
-    uz_factor_workspace_free(run->ws);
-    free(run->owned);
-    uz_answer_clear(&run->answer);
-    uz_candidates_clear(&run->wants);
-    free(run->work);
-    uz_result_free(run->result);
+    return status == UZ_OK ? uz_report_answer(run, err) : status;
 }

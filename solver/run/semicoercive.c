@@ -8,7 +8,8 @@
 #include "semicoercive/contact_proof.h"
 #include "semicoercive/null_space.h"
 #include "run/semicoercive_private.h"
-#include "run/run.h"
+#include "run/settings.h"
+#include "run/solve.h"
 
 #include <float.h>
 #include <math.h>
@@ -144,10 +145,12 @@ static uz_status solve_augmented(uz_semi *s, const uz_settings *settings, const 
     uz_result *result = NULL;
     uz_status status = uz_augment(&augmented, &s->of, &s->Nt, s->weight, s->target, err);
     if (status == UZ_OK)
-        status = uz_solve_regular(&result, &augmented, settings, s->cache, hooks, err);
+        status = uz_solve_rounds(&result, &augmented, settings, NULL, s->cache, hooks, err);
     uz_augmented_clear(&augmented);
-    if (status != UZ_OK)
+    if (status != UZ_OK) {
+        uz_result_free(result);
         return status;
+    }
     if (s->last)
         uz_timings_add(&result->summary.timings, &s->last->summary.timings);
     uz_result_free(s->last);

@@ -7,7 +7,8 @@
 #include "post/evaluate.h"
 #include "assembly/pressed.h"
 #include "run/semicoercive_private.h"
-#include "run/run.h"
+#include "methods/decades.h"
+#include "run/results.h"
 
 #include <math.h>
 #include <stdio.h>

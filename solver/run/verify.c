@@ -4,7 +4,9 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "linalg/linalg.h"
+#include "run/problem.h"
 #include "run/run.h"
+#include "run/settings.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,32 +23,33 @@ static uz_status check_given(const double *x, int64_t n, const char *name, uz_er
  * displacements that meet the supports, and no other has an energy that could be compared. */
 static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
 {
-    const uz_body_model *model = &run->setup->model;
+    const uz_body_model *model = &run->asked->setup->model;
     int dim = model->mesh.dim;
     uz_restrict_nodal(run->answer.u, model, u);
     for (int64_t i = 0; i < model->mesh.n_nodes * dim; i++) {
         int64_t dof = model->dof[i], node = i / dim;
         double given = uz_along_dof(model, node, (int)(i % dim), u + node * dim);
         double rounding = uz_dof_rounding(model, node, u + node * dim);
-        if (dof < 0 && !(fabs(given - run->prescribed[-1 - dof]) <= rounding))
+        if (dof < 0 && !(fabs(given - run->load.prescribed[-1 - dof]) <= rounding))
             return uz_fail(err, UZ_ERR_SCENE, "u",
                            "node %lld is supported: its displacement along %s must be %.17g, it is given as %.17g",
-                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), run->prescribed[-1 - dof], given);
+                           (long long)node, uz_dof_name(model, node, (int)(i % dim)), run->load.prescribed[-1 - dof],
+                           given);
     }
     return UZ_OK;
 }
 
 static uz_status take_answer(uz_run *run, const double *u, const double *r, uz_error *err)
 {
-    const uz_mesh *mesh = &run->setup->model.mesh;
-    bool scene = run->setup->is_scene;
+    const uz_mesh *mesh = &run->asked->setup->model.mesh;
+    bool scene = run->asked->setup->is_scene;
     uz_status status = check_given(u, scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
     if (status == UZ_OK)
-        status = check_given(r, run->m, "r", err);
+        status = check_given(r, run->all, "r", err);
     if (status != UZ_OK)
         return status;
-    if (run->m > 0)
-        memcpy(run->answer.r, r, (size_t)run->m * sizeof *r);
+    if (run->all > 0)
+        memcpy(run->answer.r, r, (size_t)run->all * sizeof *r);
     if (scene)
         return take_nodal(run, u, err);
     memcpy(run->answer.u, u, (size_t)run->d * sizeof *u);
@@ -57,45 +60,44 @@ static uz_status take_answer(uz_run *run, const double *u, const double *r, uz_e
 static uz_status certify(uz_run *run, const double *r, uz_error *err)
 {
     uz_answer *answer = &run->answer;
-    if (run->settings->balanced && run->setup->is_scene)
+    if (run->asked->settings->balanced && run->asked->setup->is_scene)
         uz_run_balance_request(run);
     uz_certify_input input;
-    uz_status status = uz_run_certify_input(&input, run, answer->u, err);
+    uz_status status = uz_run_certify_input(&input, run, answer, err);
     input.twofold_energies = true;
     if (status == UZ_OK)
         status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
     run->result->summary.certificate = answer->certificate;
-    if (run->m > 0)
-        memcpy(answer->r, r, (size_t)run->m * sizeof *r);
+    if (run->all > 0)
+        memcpy(answer->r, r, (size_t)run->all * sizeof *r);
     return status;
 }
 
 static uz_status verify(uz_run *run, const double *u, const double *r, uz_error *err)
 {
     uz_summary *summary = &run->result->summary;
-    uz_status status = uz_run_make_load(run, err);
-    uz_run_take_all_rows(run);
+    uz_status status = uz_run_load(run, err);
     if (status == UZ_OK)
-        status = uz_answer_allocate(&run->answer, run->d, run->m, err);
+        status = uz_answer_allocate(&run->answer, run->d, run->all, err);
     if (status == UZ_OK)
         status = take_answer(run, u, r, err);
     double start = uz_seconds();
-    if (status == UZ_OK && run->setup->krylov) /* its certificate solves with what a load keeps */
-        status = uz_dual_load_create(&run->load, run->setup->dual, uz_setup_K(run->setup, run->problem), run->p, run->h,
-                                     err);
+    if (status == UZ_OK && run->asked->setup->krylov) /* its certificate solves with what a load keeps */
+        status = uz_dual_load_create(&run->work.dual, run->asked->setup->dual,
+                                     uz_setup_K(run->asked->setup, run->asked->problem), run->load.p, run->load.h, err);
     if (status == UZ_OK)
         status = certify(run, r, err);
     summary->timings.certify = uz_seconds() - start;
     if (status != UZ_OK)
         return status;
-    uz_decades_resume(&run->decades, uz_run_time(run));
-    uz_decades_pause(&run->decades);
-    uz_decades_certify(&run->decades, summary->certificate.relative_error, 0, 0);
-    summary->outcome = summary->certificate.relative_error <= run->requested ? UZ_VERIFIED : UZ_NOT_VERIFIED;
+    uz_decades_resume(&run->work.decades, uz_run_time(run));
+    uz_decades_pause(&run->work.decades);
+    uz_decades_certify(&run->work.decades, summary->certificate.relative_error, 0, 0);
+    summary->outcome = summary->certificate.relative_error <= run->work.requested ? UZ_VERIFIED : UZ_NOT_VERIFIED;
     summary->method = UZ_METHOD_GIVEN;
     summary->alpha = NAN;
-    summary->lambda_max = uz_dual_known_lambda_max(run->setup->dual);
-    return uz_run_publish(run, err);
+    summary->lambda_max = uz_dual_known_lambda_max(run->asked->setup->dual);
+    return uz_report_answer(run, err);
 }
 
 static uz_status check(const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
@@ -113,25 +115,26 @@ static uz_status check(const uz_problem *problem, const uz_settings *settings, c
 uz_status uz_verify(uz_result **out, const uz_problem *problem, const double *u, const double *r,
                     const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
-    uz_run run;
-    uz_reuse reused = {0};
+    uz_run run = {.asked = NULL};
+    uz_request asked = {.problem = problem, .settings = settings, .hooks = hooks};
     *out = NULL;
     uz_error_reset(err);
     uz_status status = check(problem, settings, hooks, err);
     if (status != UZ_OK)
         return status;
-    status = uz_run_begin(&run, problem, settings, hooks, err);
+    asked.started = uz_seconds();
+    asked.deadline = asked.started + settings->time_limit_s;
+    status = uz_setup_acquire(&asked.setup, &asked.reused, cache, problem, NULL, settings, hooks, err);
+    asked.serves_many = asked.reused.op;
     if (status == UZ_OK)
-        status = uz_setup_acquire(&run.setup, &reused, cache, problem, NULL, settings, hooks, err);
-    if (status == UZ_OK) {
-        uz_run_take_setup(&run, reused);
+        status = uz_run_begin(&run, &asked, err);
+    if (status == UZ_OK)
         status = verify(&run, u, r, err);
-    }
     if (status == UZ_OK) {
         *out = run.result;
         run.result = NULL;
     }
-    uz_setup_release(cache, run.setup);
+    uz_setup_release(cache, asked.setup);
     uz_run_end(&run);
     return status;
 }

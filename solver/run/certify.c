@@ -1,0 +1,161 @@
+/* certify.c: the certificate of what a run has: its input, answers from reactions, and proofs that there is none. */
+#include "run/run.h"
+
+#include "certificate/infeasible.h"
+#include "core/alloc.h"
+#include "core/error.h"
+#include "run/problem.h"
+#include "run/settings.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+uz_status uz_run_certify_reactions(uz_run *run, uz_answer *answer, const double *r, bool with_correction, uz_error *err)
+{
+    const double *scale = run->work.dual->dual->row_scale;
+    uz_status status = uz_dual_load_recover(run->work.dual, answer->u, r, with_correction, err);
+    for (int64_t i = 0; i < answer->m; i++)
+        answer->r[i] = scale[i] * r[i];
+    return status == UZ_OK ? uz_run_certify_answer(run, answer, err) : status;
+}
+
+uz_status uz_run_certify_answer(uz_run *run, uz_answer *answer, uz_error *err)
+{
+    uz_certify_input input;
+    uz_status status = uz_run_certify_input(&input, run, answer, err);
+    if (status == UZ_OK)
+        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
+    return status;
+}
+
+/* Loads of a block may need no linear solve. */
+static uz_status need_workspace(uz_run *run, uz_error *err)
+{
+    uz_work *work = &run->work;
+    if (!work->ws)
+        work->ws = uz_factor_workspace_new();
+    if (!work->scratch)
+        work->scratch = uz_alloc(run->d, sizeof(double));
+    if (work->ws && work->scratch)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+}
+
+/* e'K^-1 e = ||L^-1 P e||^2: half a linear solve; the other half makes e K^-1 e. */
+static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, uz_error *err)
+{
+    uz_run *run = ctx;
+    const uz_factor *factor = run->asked->setup->factor;
+    if (!factor)
+        return uz_dual_load_inverse_norm(run->work.dual, value, e, err);
+    uz_status status = need_workspace(run, err);
+    if (status != UZ_OK)
+        return status;
+    double *x = run->work.scratch, sum = 0.0;
+    uz_factor_permute(factor, x, e);
+    status = uz_factor_forward(factor, run->work.ws, x, 1, err);
+    for (int64_t j = 0; j < run->d; j++)
+        sum += x[j] * x[j];
+    *value = sum;
+    if (status != UZ_OK || !solve)
+        return status;
+    status = uz_factor_backward(factor, run->work.ws, x, 1, err);
+    uz_factor_unpermute(factor, e, x);
+    return status;
+}
+
+uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err)
+{
+    *norm = 0.0;
+    return run->load.moved ? uz_whole_norm(norm, &run->asked->setup->model, u, run->load.prescribed, err) : UZ_OK;
+}
+
+uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_answer *answer, uz_error *err)
+{
+    const uz_request *asked = run->asked;
+    uz_setup *setup = asked->setup;
+    const uz_csc *K = uz_setup_K(setup, asked->problem);
+    const uz_stop stop = {asked->hooks, asked->deadline};
+    const bool all_rows = answer->m == run->all;
+    double whole_norm = 0.0;
+    uz_status status = need_workspace(run, err);
+    if (status == UZ_OK)
+        status = uz_run_whole_norm(&whole_norm, run, answer->u, err);
+    if (status != UZ_OK)
+        return status;
+    *input = (uz_certify_input){
+        .K = K,
+        .N = all_rows ? uz_setup_all_rows(setup, asked->problem) : uz_setup_N(setup, asked->problem),
+        .p = run->load.p,
+        .h = all_rows ? run->load.h_all : run->load.h,
+        .inverse_norm = inverse_norm,
+        .ctx = run,
+        .rcond = run->result->summary.rcond,
+        .inverse_bound =
+            asked->serves_many && setup->factor ? uz_setup_inverse_bound(setup, K, run->work.ws, &stop) : INFINITY,
+        .moved = run->load.moved,
+        .whole_norm = whole_norm,
+        .sharp = 0.5 * run->work.requested,
+    };
+    return UZ_OK;
+}
+
+/* A tenth of what the mesh itself loses: digits beyond that describe the mesh, not the body. */
+void uz_run_balance_request(uz_run *run)
+{
+    const uz_body_model *model = &run->asked->setup->model;
+    uz_summary *summary = &run->result->summary;
+    double *nodal = uz_alloc(model->mesh.n_nodes * model->mesh.dim, sizeof *nodal);
+    if (!nodal)
+        return; /* the request stays at what it was, which is stricter */
+    uz_recover_nodal(nodal, model, run->answer.u, run->load.prescribed);
+    const uz_scene scene = uz_scene_of_case(run->asked->problem, run->asked->index);
+    summary->discretization_error = uz_estimate_mesh_error(model, &scene, nodal);
+    free(nodal);
+    if (summary->discretization_error > 0.0)
+        run->work.requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * summary->discretization_error));
+}
+
+uz_status uz_run_prove_infeasible(uz_run *run, uz_error *err)
+{
+    uz_result *result = run->result;
+    uz_iterate *it = &run->work.it;
+    const uz_csc *N = uz_setup_N(run->asked->setup, run->asked->problem);
+    const double *scale = run->work.dual->dual->row_scale, *g0 = run->work.dual->g0;
+    for (int64_t i = 0; i < run->m; i++) {
+        it->ray[i] *= scale[i];
+        it->r_next[i] = g0[i] / scale[i];
+    }
+    double length = uz_gap_length(N, run->load.h, it->r_next, it->gamma);
+    double radius;
+    if (!uz_ray_proves(&radius, it->ray, N, run->load.h, length)) {
+        run->work.end = UZ_END_BLURRED;
+        return UZ_OK;
+    }
+    result->ray = uz_alloc(run->m, sizeof *result->ray);
+    if (!result->ray)
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for the proof of infeasibility");
+    memcpy(result->ray, it->ray, (size_t)run->m * sizeof *result->ray);
+    result->summary.infeasible_radius = radius;
+    return UZ_OK;
+}
+
+uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err)
+{
+    answer->m = m;
+    answer->u = uz_alloc_zero(d, sizeof(double));
+    answer->r = uz_alloc_zero(m, sizeof(double));
+    answer->g = uz_alloc_zero(m, sizeof(double));
+    if (answer->u && answer->r && answer->g)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)d);
+}
+
+void uz_answer_clear(uz_answer *answer)
+{
+    free(answer->u);
+    free(answer->r);
+    free(answer->g);
+    memset(answer, 0, sizeof *answer);
+}

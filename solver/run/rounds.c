@@ -1,0 +1,277 @@
+/* rounds.c: all loads of a call on one setup, in rounds of contact rows.
+ *
+ *     rows -> setup -> loads in blocks, or one by one -> rows that the next round has to have as well
+ *
+ * Where contact rows are left out, an answer may turn out to need more of them; such loads go on together on a setup
+ * with the rows that any of them wants. */
+#include "run/solve.h"
+
+#include "core/alloc.h"
+#include "core/clock.h"
+#include "core/error.h"
+#include "core/hooks.h"
+#include "run/block.h"
+#include "run/problem.h"
+#include "run/results.h"
+#include "run/rows.h"
+#include "run/run.h"
+#include "run/settings.h"
+#include "run/setup_cache.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* What all loads of a call share. */
+typedef struct {
+    const uz_problem *problem;
+    const uz_settings *settings;
+    const uz_state *const *starts; /* n, or NULL */
+    uz_cache *cache;
+    const uz_hooks *hooks;
+    int64_t n;
+    double started;
+    uz_result **results; /* n */
+    uz_setup *setup;     /* of this round; borrowed from the cache */
+    uz_reuse reused;
+    double round_started;
+    int64_t round;         /* from 1 */
+    int64_t *todo, *again; /* n: the cases of this round and of the next, in order */
+    int64_t n_todo, n_again;
+    int64_t kept;         /* rows of the first round */
+    uz_candidates wanted; /* rows of the next round, or in NULL */
+} batch;
+
+static uz_status check(const batch *b, uz_error *err);
+static uz_status reacquire_for_starts(batch *b, uz_error *err);
+static uz_status check_memory(const batch *b, uz_error *err);
+static uz_status solve_in_blocks(batch *b, uz_error *err);
+static uz_request request_of(const batch *b, int64_t place, bool in_block);
+static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err);
+static bool is_over(const batch *b);
+static void end_before_round(const batch *b);
+static void prepare_round(batch *b);
+
+uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const uz_settings *settings,
+                          const uz_state *const *starts, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
+{
+    const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
+    batch b = {problem, settings, starts, cache, hooks, n, .started = uz_seconds(), .results = results, .round = 1};
+    uz_error own = {0};
+    b.round_started = b.started;
+    uz_status status = check(&b, &own);
+    if (status == UZ_OK && !((b.todo = uz_alloc(n, sizeof *b.todo)) && (b.again = uz_alloc(n, sizeof *b.again))))
+        status = uz_fail(&own, UZ_ERR_MEMORY, "", "no memory for %lld cases", (long long)n);
+    for (; status == UZ_OK && b.n_todo < n; b.n_todo++)
+        b.todo[b.n_todo] = b.n_todo;
+    while (status == UZ_OK && b.n_todo > 0) {
+        status = uz_setup_acquire(&b.setup, &b.reused, cache, problem, &b.wanted, settings, hooks, &own);
+        if (status == UZ_OK && b.round == 1 && b.setup->rows.in)
+            status = reacquire_for_starts(&b, &own);
+        if (status == UZ_OK)
+            status = check_memory(&b, &own);
+        if (status == UZ_OK && b.round == 1)
+            b.kept = b.setup->dual->m;
+        const bool block = status == UZ_OK && b.n_todo > 1 && b.setup->dual->can->lanes;
+        if (block)
+            status = solve_in_blocks(&b, &own);
+        for (int64_t place = 0; status == UZ_OK && !block && place < b.n_todo; place++) {
+            const uz_request asked = request_of(&b, place, false);
+            uz_run run;
+            status = uz_run_begin(&run, &asked, &own);
+            if (status == UZ_OK)
+                status = uz_run_load(&run, &own);
+            if (status == UZ_OK)
+                status = uz_run_start(&run, &own);
+            if (status == UZ_OK)
+                status = uz_run_iterate(&run, &own);
+            if (status == UZ_OK)
+                status = uz_run_certify(&run, &own);
+            if (status == UZ_OK)
+                status = uz_run_finish(&run, &own);
+            status = close_case(&run, &b, status, &own);
+            uz_run_end(&run);
+        }
+        uz_setup_release(cache, b.setup);
+        b.setup = NULL;
+        if (status == UZ_OK)
+            prepare_round(&b);
+        if (b.round > 1 && (status == UZ_ERR_CANCELLED || (status == UZ_OK && b.n_todo > 0 && is_over(&b)))) {
+            end_before_round(&b);
+            status = UZ_OK;
+            break;
+        }
+    }
+    if (status != UZ_OK && err)
+        *err = own;
+    free(b.todo);
+    free(b.again);
+    uz_candidates_clear(&b.wanted);
+    return status;
+}
+
+/* Everything that can be refused before anything is computed. */
+static uz_status check(const batch *b, uz_error *err)
+{
+    uz_status status = uz_check_settings(b->settings, err);
+    if (status == UZ_OK)
+        status = uz_check_problem(b->problem, err);
+    if (status == UZ_OK && uz_cancelled(b->hooks))
+        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before it began");
+    return status;
+}
+
+/* The rows whose reactions the starts know have to be in, so that an answer is a start that takes no iterations. */
+static uz_status reacquire_for_starts(batch *b, uz_error *err)
+{
+    uz_status status = UZ_OK;
+    const int64_t m = b->setup->rows.m;
+    for (int64_t i = 0; b->starts && i < b->n && status == UZ_OK; i++)
+        if (b->starts[i] && uz_state_check(b->starts[i], m, NULL) == UZ_OK)
+            status = uz_candidates_add_start(&b->wanted, b->starts[i], err);
+    if (status != UZ_OK || uz_candidates_has(&b->setup->rows, &b->wanted))
+        return status;
+    uz_setup_release(b->cache, b->setup);
+    b->setup = NULL;
+    return uz_setup_acquire(&b->setup, &b->reused, b->cache, b->problem, &b->wanted, b->settings, b->hooks, err);
+}
+
+/* How many lanes go through the factor at a time: twice as many as one pass over K certifies, where there are so many
+ * cases. */
+static int64_t blocks_for(const batch *b)
+{
+    return b->n > UZ_LANES ? 2 : 1;
+}
+
+/* What the results take that this call returns, and while it works the vectors of a block. */
+static uz_status check_memory(const batch *b, uz_error *err)
+{
+    const uz_setup *setup = b->setup;
+    const uz_dual *dual = setup->dual;
+    const uz_mesh *mesh = &setup->model.mesh;
+    double nodal = setup->is_scene ? (double)(mesh->n_nodes * mesh->dim) : (double)dual->d;
+    double lanes = 7.0 * (double)(blocks_for(b) * UZ_LANES) * (double)dual->d;
+    double each = (setup->is_scene ? 2.0 : 1.0) * nodal + 8.0 * (double)dual->m;
+    double bytes = (double)setup->bytes + 8.0 * ((double)b->n * each + lanes);
+    if (b->n == 1 || b->settings->memory_limit == 0 || bytes <= (double)b->settings->memory_limit)
+        return UZ_OK;
+    return uz_fail(err, UZ_ERR_LIMIT, "/cases",
+                   "the body and the results of %lld load cases take %.0f bytes, %zu are allowed: send fewer cases at "
+                   "a time",
+                   (long long)b->n, bytes, b->settings->memory_limit);
+}
+
+/* The first case of a round carries the cost of the setup; for the others it is there. place: in the round. */
+static uz_request request_of(const batch *b, int64_t place, bool in_block)
+{
+    static const uz_reuse everything = {true, true, true, true};
+    const int64_t i = b->todo[place];
+    const uz_reuse reused = place > 0 ? everything : b->reused;
+    return (uz_request){
+        .problem = b->problem,
+        .settings = b->settings,
+        .hooks = b->hooks,
+        .index = i,
+        .start = b->starts ? b->starts[i] : NULL,
+        .setup = b->setup,
+        .reused = reused,
+        .serves_many = reused.op || b->n > 1,
+        .in_block = in_block,
+        .started = place == 0 ? b->round_started : uz_seconds(),
+        .deadline = b->started + b->settings->time_limit_s,
+    };
+}
+
+static uz_status solve_in_blocks(batch *b, uz_error *err)
+{
+    uz_block *block = NULL;
+    const int64_t width = blocks_for(b) * UZ_LANES;
+    uz_request *asked = uz_alloc_zero(width, sizeof *asked);
+    uz_status status = asked ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
+    if (status == UZ_OK)
+        status = uz_block_create(&block, b->setup, b->problem, blocks_for(b), err);
+    for (int64_t first = 0; status == UZ_OK && first < b->n_todo; first += width) {
+        const int64_t count = b->n_todo - first < width ? b->n_todo - first : width;
+        int64_t failed = 0;
+        for (int64_t k = 0; k < count; k++)
+            asked[k] = request_of(b, first + k, true);
+        status = uz_block_solve(block, asked, count, &failed, err);
+        uz_run *runs = uz_block_runs(block);
+        if (status != UZ_OK && b->problem->n_cases > 0)
+            uz_error_name_case(err, asked[failed].index);
+        for (int64_t k = 0; k < count; k++) {
+            if (status == UZ_OK)
+                status = close_case(&runs[k], b, status, err);
+            uz_run_end(&runs[k]);
+        }
+    }
+    uz_block_free(block);
+    free(asked);
+    return status;
+}
+
+/* What the rounds before took of the case's time counts. */
+static void count_rounds(const batch *b, const uz_result *before, uz_result *result)
+{
+    uz_summary *summary = &result->summary;
+    summary->rounds = b->round;
+    summary->added = summary->kept - b->kept;
+    if (!before)
+        return;
+    uz_timings_add(&summary->timings, &before->summary.timings);
+    uz_trade_shift(&result->trade, before->summary.timings.total);
+}
+
+/* The result goes to its place and the case's rows to those of the next round, or the error is named. */
+static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err)
+{
+    const int64_t i = run->asked->index;
+    if (status == UZ_OK && run->wants.in) {
+        b->again[b->n_again++] = i;
+        status = uz_candidates_add(&b->wanted, &run->wants, err);
+    }
+    if (status == UZ_OK) {
+        count_rounds(b, b->results[i], run->result);
+        uz_result_free(b->results[i]);
+        b->results[i] = run->result;
+        run->result = NULL;
+    } else if (b->problem->n_cases > 0) {
+        uz_error_name_case(err, i);
+    }
+    return status;
+}
+
+/* There are answers with bounds: whoever ends the solve now gets these. */
+static bool is_over(const batch *b)
+{
+    uz_stop stop = {b->hooks, b->started + b->settings->time_limit_s};
+    return uz_stop_is_due(&stop);
+}
+
+static void end_before_round(const batch *b)
+{
+    for (int64_t k = 0; k < b->n_todo; k++) {
+        uz_result *result = b->results[b->todo[k]];
+        if (result->summary.rounds == b->round)
+            continue; /* it had its turn */
+        result->summary.outcome = uz_cancelled(b->hooks) ? UZ_DISMISSED : UZ_TIME_LIMIT;
+        uz_explain_outcome(result, UZ_END_TARGET);
+    }
+}
+
+enum { MAX_ROUNDS = 8 };
+
+/* Rows are only ever added, and after some rounds all of them: the last round leaves none out. */
+static void prepare_round(batch *b)
+{
+    int64_t *done = b->todo;
+    b->todo = b->again;
+    b->n_todo = b->n_again;
+    b->again = done;
+    b->n_again = 0;
+    b->round++;
+    b->round_started = uz_seconds();
+    if (b->round < MAX_ROUNDS || b->n_todo == 0)
+        return;
+    memset(b->wanted.in, 1, (size_t)b->wanted.m);
+    b->wanted.count = b->wanted.m;
+}
