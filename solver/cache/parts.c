@@ -21,8 +21,6 @@ typedef struct {
     const int64_t *dofs;
     int64_t n_dofs, rows;
     uz_ordering ordering;
-    uz_factor_accept accept;
-    void *ctx;
     const uz_hooks *hooks;
 } wanted;
 
@@ -103,32 +101,6 @@ static void destroy_factor(void *object)
     free(kept);
 }
 
-static uz_status factorize(uz_factor **out, const uz_analysis *analysis, const wanted *w, uz_error *err)
-{
-    uz_factor_info predicted = uz_analysis_describe(analysis);
-    uz_status status = w->accept(w->ctx, &predicted, err);
-    return status == UZ_OK ? uz_factor_create(out, w->K, analysis, 0, w->hooks, err) : status;
-}
-
-static uz_status make_kept(kept_factor **out, bool *analysis_reused, uz_cache *cache, const wanted *w, uz_error *err)
-{
-    uz_item *analysis = NULL;
-    kept_factor *kept = uz_alloc_zero(1, sizeof *kept);
-    if (!kept)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache entry");
-    kept->ordering = w->ordering;
-    memcpy(kept->K, w->key->values, sizeof kept->K);
-    uz_status status = get_analysis(&analysis, analysis_reused, cache, w, err);
-    if (status == UZ_OK)
-        status = factorize(&kept->factor, uz_item_object(analysis), w, err);
-    uz_table_release(cache, analysis);
-    if (status == UZ_OK)
-        *out = kept;
-    else
-        free(kept);
-    return status;
-}
-
 static bool fits(const void *object, void *ctx)
 {
     const kept_factor *kept = object;
@@ -146,42 +118,32 @@ static bool fits_best(const void *object, void *ctx)
     return fits(object, ctx) && count <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs);
 }
 
-static uz_status get_shared(uz_shared_factor *out, uz_cache *cache, wanted *w, uz_error *err)
+/* A factor of K that is there, one that ends with the contact if possible, or a place that the caller has to fill. */
+static uz_status find_or_reserve(uz_item **item, bool *create, uz_cache *cache, wanted *w, uz_error *err)
 {
     char digest[65];
-    bool create = false;
-    kept_factor *kept = NULL;
-    out->cache = cache;
-    out->item = uz_table_search(cache, UZ_ITEM_FACTOR, fits_best, w);
-    if (!out->item)
-        out->item = uz_table_search(cache, UZ_ITEM_FACTOR, fits, w);
-    if (!out->item) {
-        uz_status status = digest_with_order(digest, w->key->values, w, err);
-        if (status == UZ_OK)
-            status = uz_table_acquire(&out->item, &create, cache, UZ_ITEM_FACTOR, digest, w->hooks, err);
-        if (status == UZ_OK && create)
-            status = make_kept(&kept, &out->analysis_reused, cache, w, err);
-        if (status != UZ_OK && create) {
-            uz_table_abandon(cache, out->item);
-            out->item = NULL;
-        }
-        if (status != UZ_OK)
-            return status;
-        if (create)
-            uz_table_publish(cache, out->item, kept, uz_factor_describe(kept->factor).bytes, destroy_factor);
+    *create = false;
+    *item = uz_table_search(cache, UZ_ITEM_FACTOR, fits_best, w);
+    if (!*item)
+        *item = uz_table_search(cache, UZ_ITEM_FACTOR, fits, w);
+    if (*item)
+        return UZ_OK;
+    uz_status status = digest_with_order(digest, w->key->values, w, err);
+    return status == UZ_OK ? uz_table_acquire(item, create, cache, UZ_ITEM_FACTOR, digest, w->hooks, err) : status;
+}
+
+/* Puts a factor into the place that was reserved for it, and owns it also on failure. */
+static uz_status keep(uz_cache *cache, uz_item *item, uz_factor *factor, const wanted *w, uz_error *err)
+{
+    kept_factor *kept = uz_alloc_zero(1, sizeof *kept);
+    if (!kept) {
+        uz_factor_free(factor);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache entry");
     }
-    kept = uz_item_object(out->item);
-    if (!create) {
-        uz_factor_info there = uz_factor_describe(kept->factor);
-        uz_status status = w->accept(w->ctx, &there, err);
-        if (status != UZ_OK) {
-            uz_table_release(cache, out->item);
-            out->item = NULL;
-            return status;
-        }
-        out->analysis_reused = out->factor_reused = true;
-    }
-    out->factor = kept->factor;
+    kept->factor = factor;
+    kept->ordering = w->ordering;
+    memcpy(kept->K, w->key->values, sizeof kept->K);
+    uz_table_publish(cache, item, kept, uz_factor_describe(factor).bytes, destroy_factor);
     return UZ_OK;
 }
 
@@ -189,17 +151,46 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
                                const int64_t *dofs, int64_t n_dofs, int64_t rows, uz_ordering ordering,
                                uz_factor_accept accept, void *ctx, const uz_hooks *hooks, uz_error *err)
 {
-    wanted w = {key, K, dofs, n_dofs, rows, ordering, accept, ctx, hooks};
-    uz_analysis *analysis = NULL;
+    wanted w = {key, K, dofs, n_dofs, rows, ordering, hooks};
+    uz_item *item = NULL, *kept_analysis = NULL;
+    uz_analysis *own_analysis = NULL;
+    uz_factor *factor = NULL;
+    bool create = true;
     memset(out, 0, sizeof *out);
-    if (cache)
-        return get_shared(out, cache, &w, err);
-    uz_status status = analyze(&analysis, &w, err);
-    if (status == UZ_OK)
-        status = factorize(&out->own, analysis, &w, err);
-    uz_analysis_free(analysis);
-    out->factor = out->own;
-    return status;
+    uz_status status = cache ? find_or_reserve(&item, &create, cache, &w, err) : UZ_OK;
+    if (status != UZ_OK)
+        return status;
+    if (create) {
+        status = cache ? get_analysis(&kept_analysis, &out->analysis_reused, cache, &w, err)
+                       : analyze(&own_analysis, &w, err);
+        const uz_analysis *analysis = kept_analysis ? uz_item_object(kept_analysis) : own_analysis;
+        if (status == UZ_OK) {
+            uz_factor_info predicted = uz_analysis_describe(analysis);
+            status = accept(ctx, &predicted, err);
+        }
+        if (status == UZ_OK)
+            status = uz_factor_create(&factor, K, analysis, 0, hooks, err);
+        uz_table_release(cache, kept_analysis);
+        uz_analysis_free(own_analysis);
+        if (status == UZ_OK && cache)
+            status = keep(cache, item, factor, &w, err);
+        if (status != UZ_OK && cache)
+            uz_table_abandon(cache, item);
+    } else {
+        factor = ((kept_factor *)uz_item_object(item))->factor;
+        uz_factor_info there = uz_factor_describe(factor);
+        status = accept(ctx, &there, err);
+        out->analysis_reused = out->factor_reused = status == UZ_OK;
+        if (status != UZ_OK)
+            uz_table_release(cache, item);
+    }
+    if (status != UZ_OK)
+        return status;
+    out->factor = factor;
+    out->own = cache ? NULL : factor;
+    out->cache = cache;
+    out->item = item;
+    return UZ_OK;
 }
 
 void uz_shared_factor_release(uz_shared_factor *shared)

@@ -138,6 +138,11 @@ bool uz_cost_bounds(const uz_csc *N, const uz_settings *settings)
     return (by_auto || settings->method == UZ_METHOD_ACTIVE_SET) && uz_dual_bounds_dofs(N);
 }
 
+bool uz_cost_is_one_to_one(const uz_csc *N, int64_t n_b)
+{
+    return N->rows == n_b && N->ptr[N->cols] == n_b;
+}
+
 /* ------------------------------------------------------------------- the choice */
 
 /* The model is trusted to this factor where it speaks against the form that measurements have chosen, and asked only

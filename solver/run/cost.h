@@ -22,6 +22,10 @@ uz_cost_rates uz_cost_measure_rates(void);
  * for, which take hundreds of solves. */
 bool uz_cost_bounds(const uz_csc *N, const uz_settings *settings);
 
+/* Whether each of n_b contact dofs has a row of its own: the trailing block of a factor with these dofs last is then
+ * all of the operator. Otherwise the contact may stand anywhere in it, whichever is cheaper. */
+bool uz_cost_is_one_to_one(const uz_csc *N, int64_t n_b);
+
 /* Bytes that ordering and symbolic analysis take beside K, at most. */
 double uz_cost_analysis_bytes(const uz_cost_size *size);
 

@@ -69,26 +69,12 @@ static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc
 typedef struct {
     uz_setup *setup;
     const uz_csc *K, *N;
-    const int64_t *dofs; /* that N touches */
     uz_cost_size size;
-    const uz_matrix_key *key; /* of K, where there is a cache */
     const uz_settings *settings;
-    uz_cache *cache;
     const uz_hooks *hooks;
     uz_operator direct; /* the form that a factor is analysed for */
     uz_operator asked;  /* the settings', until conjugate gradients have failed where a factor fits */
 } making;
-
-/* What a multigrid may take so that the whole stays within the limit: a load with bounds has a second one. */
-static size_t levels_budget(const making *m)
-{
-    const uz_cost_plan *plan = &m->setup->plan;
-    double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0;
-    if (m->settings->memory_limit == 0)
-        return 0;
-    double predicted = uz_krylov_predict_bytes(m->size.d, m->size.k_entries, m->size.modes);
-    return (size_t)(predicted + fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies);
-}
 
 static uz_status make_dual(making *m, uz_operator op, uz_error *err)
 {
@@ -100,14 +86,26 @@ static uz_status make_dual(making *m, uz_operator op, uz_error *err)
     return status;
 }
 
+/* A multigrid in the factor's place. What it may take so that the whole stays within the limit: a load with bounds has
+ * a second one. */
 static uz_status precondition(making *m, uz_error *err)
 {
     uz_setup *setup = m->setup;
+    const uz_cost_plan *plan = &setup->plan;
+    double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0, budget = 0.0;
     uz_modes modes;
+    if (m->settings->memory_limit > 0)
+        budget = uz_krylov_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
+                 fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies;
     uz_status status = find_modes(&modes, setup, m->K, err);
     if (status == UZ_OK)
-        status = uz_krylov_create(&setup->krylov, m->K, &modes, levels_budget(m), m->hooks, err);
+        status = uz_krylov_create(&setup->krylov, m->K, &modes, (size_t)budget, m->hooks, err);
     return status == UZ_OK ? make_dual(m, setup->plan.form[setup->plan.chosen].op, err) : status;
+}
+
+static bool is_chosen(const uz_cost_plan *plan, uz_operator form)
+{
+    return plan->chosen >= 0 && plan->form[plan->chosen].op == form;
 }
 
 /* Between analysis and factorization: is this still the form to take? An error that says nothing means no. */
@@ -117,37 +115,7 @@ static uz_status accept_factor(void *ctx, const uz_factor_info *predicted, uz_er
     uz_cost_plan *plan = &m->setup->plan;
     (void)err;
     uz_cost_decide(plan, &m->size, predicted, m->direct, m->asked, m->settings->memory_limit);
-    return plan->chosen >= 0 && plan->form[plan->chosen].op == m->direct ? UZ_OK : UZ_ERR_LIMIT;
-}
-
-/* Each contact dof has a row of its own: the trailing block of a factor with these dofs last is then all of the
- * operator. Otherwise the contact may stand anywhere in it, whichever is cheaper. */
-static bool is_one_to_one(const uz_csc *N, int64_t n_b)
-{
-    return N->rows == n_b && N->ptr[N->cols] == n_b;
-}
-
-/* *taken false on success: the plan speaks for another form now, or for none. */
-static uz_status factor_and_condense(making *m, bool *taken, uz_error *err)
-{
-    uz_setup *setup = m->setup;
-    int64_t n_dofs = uz_dual_abilities_of(m->direct)->contact_last ? m->size.n_b : 0;
-    int64_t rows = is_one_to_one(m->N, n_dofs) ? 0 : m->N->rows;
-    setup->plan.chosen = -1;
-    uz_status status = uz_shared_factor_get(&setup->shared, m->cache, m->key, m->K, m->dofs, n_dofs, rows,
-                                            m->settings->ordering, accept_factor, m, m->hooks, err);
-    bool accepted = setup->plan.chosen >= 0 && setup->plan.form[setup->plan.chosen].op == m->direct;
-    *taken = status != UZ_ERR_LIMIT || accepted;
-    if (status != UZ_OK)
-        return *taken ? status : UZ_OK;
-    setup->factor = setup->shared.factor;
-    return make_dual(m, m->direct, err);
-}
-
-/* The plan where no factor was analysed. */
-static void plan_without_factor(making *m)
-{
-    uz_cost_decide(&m->setup->plan, &m->size, NULL, m->direct, m->settings->op, m->settings->memory_limit);
+    return is_chosen(plan, m->direct) ? UZ_OK : UZ_ERR_LIMIT;
 }
 
 /* Below this conjugate gradients take ten times the iterations that the plan has counted on. */
@@ -177,54 +145,21 @@ static void undo_precondition(making *m, uz_error *err)
 enum { TRIES = 4 };
 
 /* The form that was asked for, or the one that the plan chooses once the analysis of a factor has shown its size. */
-static uz_status make_operator(making *m, uz_error *err)
-{
-    uz_setup *setup = m->setup;
-    const uz_settings *settings = m->settings;
-    bool no_factor = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor;
-    m->direct = uz_dual_choose(m->N, m->size.n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
-    no_factor =
-        no_factor || (settings->memory_limit > 0 && uz_cost_analysis_bytes(&m->size) > (double)settings->memory_limit);
-    for (int k = 0; k < TRIES; k++) {
-        bool taken = false;
-        uz_status status = UZ_OK;
-        if (no_factor)
-            plan_without_factor(m);
-        else
-            status = factor_and_condense(m, &taken, err);
-        if (taken || status != UZ_OK)
-            return status;
-        if (setup->plan.chosen < 0)
-            break;
-        if (!uz_dual_abilities_of(setup->plan.form[setup->plan.chosen].op)->needs_factor) {
-            status = precondition(m, err);
-            if (!regrets(m, status))
-                return status;
-            undo_precondition(m, err);
-            m->asked = m->direct;
-        } else {
-            m->direct = setup->plan.form[setup->plan.chosen].op;
-        }
-    }
-    return uz_cost_refuse(&setup->plan, settings->op, settings->memory_limit, err);
-}
-
 uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
                                  const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)
 {
+    uz_cost_plan *plan = &setup->plan;
+    const size_t limit = settings->memory_limit;
     making m = {.setup = setup,
                 .K = uz_setup_K(setup, problem),
                 .N = uz_setup_N(setup, problem),
-                .key = key,
                 .settings = settings,
-                .cache = cache,
                 .hooks = hooks,
                 .asked = settings->op};
     int64_t *dofs = NULL, n_b = 0;
     uz_status status = uz_dual_contact_dofs(&dofs, &n_b, m.N, err);
     if (status != UZ_OK)
         return status;
-    m.dofs = dofs;
     m.size = (uz_cost_size){.d = m.K->cols,
                             .m = m.N->rows,
                             .n_b = n_b,
@@ -233,7 +168,42 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
                             .modes = setup->is_scene && setup->model.mesh.dim == 3 ? 6 : 3,
                             .bounds = uz_cost_bounds(m.N, settings),
                             .cases = problem->n_cases};
-    status = make_operator(&m, err);
+    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor,
+               no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(&m.size) > (double)limit);
+    m.direct = uz_dual_choose(m.N, n_b, free_asked ? UZ_OPERATOR_AUTO : settings->op);
+    bool done = false;
+    for (int k = 0; status == UZ_OK && !done && k < TRIES; k++) {
+        plan->chosen = -1;
+        if (no_factor) {
+            uz_cost_decide(plan, &m.size, NULL, m.direct, settings->op, limit);
+        } else {
+            int64_t n_dofs = uz_dual_abilities_of(m.direct)->contact_last ? n_b : 0;
+            int64_t rows = uz_cost_is_one_to_one(m.N, n_dofs) ? 0 : m.N->rows;
+            status = uz_shared_factor_get(&setup->shared, cache, key, m.K, dofs, n_dofs, rows, settings->ordering,
+                                          accept_factor, &m, hooks, err);
+            done = status != UZ_ERR_LIMIT || is_chosen(plan, m.direct);
+            if (!done)
+                status = UZ_OK; /* the plan speaks for another form now, or for none */
+            setup->factor = setup->shared.factor;
+            if (done && status == UZ_OK)
+                status = make_dual(&m, m.direct, err);
+        }
+        if (status != UZ_OK || done || plan->chosen < 0)
+            break;
+        if (!uz_dual_abilities_of(plan->form[plan->chosen].op)->needs_factor) {
+            status = precondition(&m, err);
+            done = !regrets(&m, status);
+            if (!done) {
+                undo_precondition(&m, err);
+                status = UZ_OK;
+                m.asked = m.direct;
+            }
+        } else {
+            m.direct = plan->form[plan->chosen].op;
+        }
+    }
+    if (status == UZ_OK && !done)
+        status = uz_cost_refuse(plan, settings->op, limit, err);
     free(dofs);
     return status;
 }

@@ -9,11 +9,6 @@
 
 #include <stdlib.h>
 
-static bool is_one_to_one(const uz_csc *N, int64_t n_b)
-{
-    return N->rows == n_b && N->ptr[N->cols] == n_b;
-}
-
 static void take_plan(uz_prediction *out, const uz_cost_plan *plan, const uz_cost_size *size)
 {
     const uz_cost_estimate *e = &plan->form[plan->chosen >= 0 ? plan->chosen : 0];
@@ -30,7 +25,7 @@ static uz_status analyse(uz_prediction *out, uz_cost_plan *plan, const uz_csc *K
 {
     uz_analysis *analysis = NULL;
     int64_t last = uz_dual_abilities_of(form)->contact_last ? size->n_b : 0,
-            rows = is_one_to_one(N, last) ? 0 : N->rows;
+            rows = uz_cost_is_one_to_one(N, last) ? 0 : N->rows;
     uz_status status = uz_analysis_choose(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
     if (status != UZ_OK)
         return status;
