@@ -52,27 +52,20 @@ static cholmod_sparse *permute(const uz_csc *K, const int64_t *position, cholmod
     return S;
 }
 
-/* cholmod_factorize, told that the matrix is in the factor's order already. */
-static bool factorize_permuted(uz_factor *factor, const uz_csc *K, cholmod_common *common)
-{
-    cholmod_sparse *S = permute(K, factor->analysis->position, common);
-    if (!S)
-        return false;
-    int ordering = factor->L.ordering;
-    factor->L.ordering = CHOLMOD_NATURAL;
-    bool ok = cholmod_l_factorize(S, &factor->L, common);
-    factor->L.ordering = ordering;
-    int status = common->status;
-    cholmod_l_free_sparse(&S, common);
-    common->status = status;
-    return ok;
-}
-
-/* A TRUE from cholmod_factorize is no proof: status and minor are looked at before anything resets them. */
+/* cholmod_factorize, told that the matrix is in the factor's order already. A TRUE from it is no proof: status and
+ * minor are looked at before anything resets them. */
 static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
 {
-    bool ok = factorize_permuted(factor, K, common);
+    cholmod_sparse *S = permute(K, factor->analysis->position, common);
+    bool ok = S != NULL;
+    if (S) {
+        int ordering = factor->L.ordering;
+        factor->L.ordering = CHOLMOD_NATURAL;
+        ok = cholmod_l_factorize(S, &factor->L, common);
+        factor->L.ordering = ordering;
+    }
     int status = common->status;
+    cholmod_l_free_sparse(&S, common);
     int64_t minor = (int64_t)factor->L.minor;
     if (status == CHOLMOD_OUT_OF_MEMORY || status == CHOLMOD_TOO_LARGE)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %.3g bytes", 8.0 * (double)factor->L.xsize);
