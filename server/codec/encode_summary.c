@@ -166,21 +166,21 @@ static void put_cells(text *t, const int64_t *cells, int dim)
 }
 
 /* A box whose cells were chosen: the grids that were tried for it. */
-static void put_ladder(text *t, const uz_ladder *ladder)
+static void put_grids(text *t, const uz_grid_sequence *grids)
 {
     text_member_open(t, "mesh", '{');
-    put_cells(t, ladder->cells, ladder->dim);
+    put_cells(t, grids->cells, grids->dim);
     text_member_open(t, "ladder", '[');
-    for (int i = 0; i < ladder->count; i++) {
-        const uz_rung *rung = &ladder->rung[i];
+    for (int i = 0; i < grids->count; i++) {
+        const uz_grid_level *level = &grids->level[i];
         text_open(t, '{');
-        put_cells(t, rung->cells, ladder->dim);
-        text_member_integer(t, "d", rung->d);
-        text_member_integer(t, "iterations", rung->iterations);
+        put_cells(t, level->cells, grids->dim);
+        text_member_integer(t, "d", level->d);
+        text_member_integer(t, "iterations", level->iterations);
         put_named(t,
-                  (named[]){{"discretization_error", rung->discretization_error},
-                            {"certified_error", rung->certified_error},
-                            {"seconds", rung->seconds}},
+                  (named[]){{"discretization_error", level->discretization_error},
+                            {"certified_error", level->certified_error},
+                            {"seconds", level->seconds}},
                   3);
         text_close(t, '}');
     }
@@ -246,9 +246,9 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
                         {"alpha", summary->alpha},
                         {"lambda_max", summary->lambda_max}},
               4);
-    if (summary->ladder) {
+    if (summary->grids) {
         text_member_number(&t, "total_error", summary->total_error);
-        put_ladder(&t, summary->ladder);
+        put_grids(&t, summary->grids);
     }
     if (summary->outcome == UZ_INFEASIBLE)
         text_member_number(&t, "infeasible_radius", summary->infeasible_radius);

@@ -28,9 +28,9 @@ static bool add_places(answers *a, answer_parts *to, const uz_result *result, bo
     if (!is_scene)
         return true;
     add_vector(to, "nodes", result->mesh.xyz, result->mesh.n_nodes * result->mesh.dim);
-    for (int i = 0; result->ladder && i < 3; i++)
-        a->cells[i] = (double)result->ladder->cells[i];
-    add_vector(to, "cells", result->ladder ? a->cells : NULL, 3);
+    for (int i = 0; result->grids && i < 3; i++)
+        a->cells[i] = (double)result->grids->cells[i];
+    add_vector(to, "cells", result->grids ? a->cells : NULL, 3);
     if (!result->mesh.contact_node)
         return true;
     a->contact_nodes = calloc((size_t)result->m + 1, sizeof *a->contact_nodes);

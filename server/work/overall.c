@@ -42,7 +42,7 @@ static double bound_of(const uz_result *result)
 /* Where the cells were chosen it is the total error that was asked for. */
 static double error_of(const uz_result *result)
 {
-    return result->summary.ladder ? result->summary.total_error : bound_of(result);
+    return result->summary.grids ? result->summary.total_error : bound_of(result);
 }
 
 static bool is_worse(const uz_result *a, const uz_result *b)

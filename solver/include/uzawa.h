@@ -79,7 +79,7 @@ uz_status uz_solve(uz_result **out, const uz_problem *problem, const uz_settings
  * in err->where: "/cases/3/loads/0/on",
  * "/cases/3/p", "/cases/3/start"). The hook `begins` is called again for a case that goes on after others began.
  *
- * A box whose cells are chosen here (uz_box.automatic) is solved on a ladder of grids with cells near square, each
+ * A box whose cells are chosen here (uz_box.automatic) is solved on a sequence of grids with cells near square, each
  * started from the contact pressure of the one before. relative_error then bounds the total error
  * sqrt(discretization^2 + algebraic^2), whose first part is an estimate (uz_summary.discretization_error) and whose
  * second is certified; `balanced` stands for UZ_BALANCED_TOTAL_ERROR. The answer is that of the coarsest grid found to

@@ -137,16 +137,16 @@ typedef struct {
     double discretization_error; /* estimated */
     double certified_error;      /* bound, of what the equations of this grid leave */
     double seconds;
-} uz_rung;
+} uz_grid_level;
 
-enum { UZ_LADDER_RUNGS = 16 };
+enum { UZ_GRID_LEVELS = 16 };
 
 /* The grids in the order in which they were tried; the answer is on `cells`, which need not be the last of them. */
 typedef struct {
     int dim, count;
-    uz_rung rung[UZ_LADDER_RUNGS];
+    uz_grid_level level[UZ_GRID_LEVELS];
     int64_t cells[3];
-} uz_ladder;
+} uz_grid_sequence;
 
 typedef struct {
     uz_outcome outcome;
@@ -182,7 +182,7 @@ typedef struct {
     uz_timings timings;
     char message[256];               /* one sentence on the outcome where it is not `converged`; "" otherwise */
     const uz_evaluation *evaluation; /* scenes with an answer: the result's own; else NULL */
-    const uz_ladder *ladder;         /* cells chosen here: the result's own; else NULL */
+    const uz_grid_sequence *grids;   /* cells chosen here: the result's own; else NULL */
 } uz_summary;
 
 /* Where a run stood when it ended: enough to go on as if it had not. Rows are the caller's.
@@ -212,7 +212,7 @@ typedef struct {
     double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof; u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_evaluation *evaluation;
-    uz_ladder *ladder; /* box whose cells were chosen here */
+    uz_grid_sequence *grids; /* box whose cells were chosen here */
     uz_history history;
     uz_trade trade;
     uz_state *state; /* where the iterations stood; NULL: nothing to continue */

@@ -118,7 +118,7 @@ void uz_result_free(uz_result *result)
     free(result->history.rows);
     uz_state_free(result->state);
     uz_mesh_info_clear(&result->mesh);
-    free(result->ladder);
+    free(result->grids);
     free(result);
 }
 

@@ -88,16 +88,16 @@ static void check_coarsest(const uz_scene *scene, double requested)
     const uz_settings settings = asking(requested);
     const uz_grids grids = uz_grids_of_box(&scene->box, 0);
     uz_result *result = solve(scene, &settings);
-    const uz_ladder *ladder = result->ladder;
+    const uz_grid_sequence *sequence = result->grids;
     const uz_summary *s = &result->summary;
     int64_t n = grids.first, passes = 0;
     CHECK_INT(s->outcome, UZ_CONVERGED);
-    CHECK(s->total_error <= requested && s->ladder == ladder);
+    CHECK(s->total_error <= requested && s->grids == sequence);
     CHECK_REL(s->total_error, hypot(s->discretization_error, s->certificate.relative_error), 1e-12);
-    while (uz_grid(&grids, n).cells[X] < ladder->cells[X] && n < 1000)
+    while (uz_grid(&grids, n).cells[X] < sequence->cells[X] && n < 1000)
         n++;
-    CHECK(uz_grid(&grids, n).cells[X] == ladder->cells[X] && uz_grid(&grids, n).cells[Y] == ladder->cells[Y]);
-    CHECK_INT(result->n_nodes, (ladder->cells[X] + 1) * (ladder->cells[Y] + 1));
+    CHECK(uz_grid(&grids, n).cells[X] == sequence->cells[X] && uz_grid(&grids, n).cells[Y] == sequence->cells[Y]);
+    CHECK_INT(result->n_nodes, (sequence->cells[X] + 1) * (sequence->cells[Y] + 1));
     for (int64_t k = grids.first; k <= n && passes == 0; k++)
         if (total_at(scene, k, requested) <= requested)
             passes = k;
@@ -130,13 +130,13 @@ TEST(smooth_problems_converge_at_the_textbook_rate)
         uz_scene s = column(KINDS[k].model, KINDS[k].element);
         const uz_settings settings = asking(KINDS[k].requested);
         uz_result *result = solve(&s, &settings);
-        const uz_ladder *ladder = result->ladder;
-        const uz_rung *first = &ladder->rung[0], *last = &ladder->rung[ladder->count - 1];
+        const uz_grid_sequence *grids = result->grids;
+        const uz_grid_level *first = &grids->level[0], *last = &grids->level[grids->count - 1];
         CHECK_INT(result->summary.outcome, UZ_CONVERGED);
         const double rate = log(first->discretization_error / last->discretization_error) /
                             log((double)last->cells[X] / (double)first->cells[X]);
-        CHECK_MSG(ladder->count > 1 && fabs(rate - 1) < 0.12, "%s: order %g after %d grids", KINDS[k].element, rate,
-                  ladder->count);
+        CHECK_MSG(grids->count > 1 && fabs(rate - 1) < 0.12, "%s: order %g after %d grids", KINDS[k].element, rate,
+                  grids->count);
         uz_result_free(result);
         uz_scene_clear(&s);
     }
@@ -183,11 +183,11 @@ TEST(total_error_is_within_a_factor_of_two)
         reference.box = s.box;
         reference.box.automatic = false;
         for (int axis = 0; axis < 2; axis++)
-            reference.box.cells[axis] = TIMES * result->ladder->cells[axis];
+            reference.box.cells[axis] = TIMES * result->grids->cells[axis];
         uz_result *fine = body_solve(&reference, 1e-8);
         uz_body_model model = body_model(&reference);
         uz_box box = s.box;
-        memcpy(box.cells, result->ladder->cells, sizeof box.cells);
+        memcpy(box.cells, result->grids->cells, sizeof box.cells);
         double *e = body_room(fine->n_nodes * 2, sizeof *e);
         put_on_finer(e, result->u, &box, TIMES);
         for (int64_t i = 0; i < fine->n_nodes * 2; i++)
@@ -209,12 +209,12 @@ TEST(units_change_nothing)
     uz_scene in_mm = paper(1), in_m = paper(1e-3);
     const uz_settings settings = asking(0.015);
     uz_result *a = solve(&in_mm, &settings), *b = solve(&in_m, &settings);
-    CHECK_INT(a->ladder->count, b->ladder->count);
-    for (int i = 0; i < a->ladder->count && i < b->ladder->count; i++) {
-        CHECK_INT(a->ladder->rung[i].cells[X], b->ladder->rung[i].cells[X]);
-        CHECK_REL(b->ladder->rung[i].discretization_error, a->ladder->rung[i].discretization_error, 1e-6);
+    CHECK_INT(a->grids->count, b->grids->count);
+    for (int i = 0; i < a->grids->count && i < b->grids->count; i++) {
+        CHECK_INT(a->grids->level[i].cells[X], b->grids->level[i].cells[X]);
+        CHECK_REL(b->grids->level[i].discretization_error, a->grids->level[i].discretization_error, 1e-6);
     }
-    CHECK(memcmp(a->ladder->cells, b->ladder->cells, sizeof a->ladder->cells) == 0);
+    CHECK(memcmp(a->grids->cells, b->grids->cells, sizeof a->grids->cells) == 0);
     uz_result_free(a);
     uz_result_free(b);
     uz_scene_clear(&in_mm);
@@ -234,9 +234,9 @@ TEST(elements_gradings_and_levels)
         CHECK_INT(result->summary.outcome, UZ_CONVERGED);
         CHECK(result->summary.requested_error == UZ_BALANCED_TOTAL_ERROR);
         const double *x = result->mesh.xyz;
-        const int64_t last = (strcmp(ELEMENTS[k], "tri3") == 0 ? 1 : 2) * result->ladder->cells[X];
-        const double first_cell = x[2 * (last / result->ladder->cells[X])] - x[0];
-        CHECK(x[2 * last] - x[2 * (last - last / result->ladder->cells[X])] > 3.99 * first_cell);
+        const int64_t last = (strcmp(ELEMENTS[k], "tri3") == 0 ? 1 : 2) * result->grids->cells[X];
+        const double first_cell = x[2 * (last / result->grids->cells[X])] - x[0];
+        CHECK(x[2 * last] - x[2 * (last - last / result->grids->cells[X])] > 3.99 * first_cell);
         uz_result_free(result);
         uz_scene_clear(&s);
     }
@@ -259,12 +259,12 @@ TEST(worst_case_decides)
     double worst = 0;
     for (int i = 0; results && i < 2; i++) {
         CHECK_INT(results[i]->summary.outcome, UZ_CONVERGED);
-        CHECK(results[i]->summary.total_error <= 0.02 && results[i]->ladder);
+        CHECK(results[i]->summary.total_error <= 0.02 && results[i]->grids);
         worst = fmax(worst, results[i]->summary.discretization_error);
     }
-    for (int i = 0; results && i < results[0]->ladder->count; i++)
-        if (results[0]->ladder->rung[i].cells[X] == results[0]->ladder->cells[X])
-            CHECK_REL(results[0]->ladder->rung[i].discretization_error, worst, 1e-12);
+    for (int i = 0; results && i < results[0]->grids->count; i++)
+        if (results[0]->grids->level[i].cells[X] == results[0]->grids->cells[X])
+            CHECK_REL(results[0]->grids->level[i].discretization_error, worst, 1e-12);
     uz_results_free(results, 2);
     uz_scene_clear(&s);
 }
@@ -307,7 +307,7 @@ TEST(progress_covers_the_whole)
     watcher w = {0};
     uz_result *result = NULL;
     CHECK_INT(solve_watched(&result, &w, 0.01), UZ_OK);
-    CHECK(result && result->ladder->count == w.grids && w.grids > 2 && !w.back && w.last > 0.9);
+    CHECK(result && result->grids->count == w.grids && w.grids > 2 && !w.back && w.last > 0.9);
     uz_result_free(result);
 }
 
@@ -323,7 +323,7 @@ TEST(cancelled_ladders_give_the_best_grid)
         }
         CHECK_INT(status, UZ_OK);
         CHECK(result && result->summary.outcome == UZ_DISMISSED && strstr(result->summary.message, "by request"));
-        CHECK(result && result->ladder->count == at - 1 && isfinite(result->summary.total_error));
+        CHECK(result && result->grids->count == at - 1 && isfinite(result->summary.total_error));
         uz_result_free(result);
     }
 }
@@ -335,11 +335,11 @@ TEST(time_limit_ends_a_ladder)
     settings.time_limit_s = 0.02;
     uz_result *result = solve(&s, &settings);
     CHECK_INT(result->summary.outcome, UZ_TIME_LIMIT);
-    CHECK(result->ladder->count >= 1 && strstr(result->summary.message, "time_limit_s"));
+    CHECK(result->grids->count >= 1 && strstr(result->summary.message, "time_limit_s"));
     uz_result_free(result);
     settings.time_limit_s = 0;
     result = solve(&s, &settings);
-    CHECK(result->summary.outcome == UZ_TIME_LIMIT && result->ladder->count == 1);
+    CHECK(result->summary.outcome == UZ_TIME_LIMIT && result->grids->count == 1);
     uz_result_free(result);
     uz_scene_clear(&s);
 }
@@ -351,7 +351,7 @@ TEST(memory_limit_ends_a_ladder)
     settings.memory_limit = 3000000;
     uz_result *result = solve(&s, &settings);
     CHECK_INT(result->summary.outcome, UZ_MESH_LIMIT);
-    CHECK_MSG(result->ladder->count > 1 && strstr(result->summary.message, "bytes"), "%s", result->summary.message);
+    CHECK_MSG(result->grids->count > 1 && strstr(result->summary.message, "bytes"), "%s", result->summary.message);
     CHECK(result->summary.total_error > 3e-3 && result->summary.cost.actual_bytes <= 3e6);
     uz_result_free(result);
     uz_scene_clear(&s);
@@ -364,7 +364,7 @@ TEST(what_is_out_of_reach_is_not_climbed_to)
     uz_settings settings = asking(0);
     uz_result *result = solve(&s, &settings);
     CHECK_INT(result->summary.outcome, UZ_MESH_LIMIT);
-    CHECK(result->ladder->count <= 4 && result->d < 100000 && result->summary.message[0]);
+    CHECK(result->grids->count <= 4 && result->d < 100000 && result->summary.message[0]);
     uz_result_free(result);
     uz_scene_clear(&s);
 }
@@ -378,7 +378,7 @@ TEST(unsolved_equations_end_a_ladder)
     settings.max_iterations = 1;
     uz_result *result = solve(&s, &settings);
     CHECK_INT(result->summary.outcome, UZ_ITERATION_LIMIT);
-    CHECK(result->ladder->count == 1);
+    CHECK(result->grids->count == 1);
     uz_result_free(result);
     uz_scene_clear(&s);
 }
@@ -392,7 +392,7 @@ TEST(infeasible_boxes_end_at_once)
     const uz_settings settings = asking(0.01);
     uz_result *result = solve(&s, &settings);
     CHECK_INT(result->summary.outcome, UZ_INFEASIBLE);
-    CHECK(result->ladder->count == 1 && result->ray && strstr(result->summary.message, "contradict"));
+    CHECK(result->grids->count == 1 && result->ray && strstr(result->summary.message, "contradict"));
     uz_result_free(result);
     uz_scene_clear(&s);
 }
@@ -480,7 +480,7 @@ TEST(coarser_grids_save_iterations)
     uz_settings settings = asking(0.015);
     settings.method = UZ_METHOD_ACCELERATED_RESTART;
     uz_result *warm = solve(&s, &settings), *cold = NULL;
-    memcpy(s.box.cells, warm->ladder->cells, sizeof s.box.cells);
+    memcpy(s.box.cells, warm->grids->cells, sizeof s.box.cells);
     s.box.automatic = false;
     settings.relative_error *= 0.1;
     cold = solve(&s, &settings);
