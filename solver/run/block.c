@@ -31,20 +31,9 @@ struct uz_block {
     bool *corrected;      /* width */
 };
 
-/* Without a finite bound on K^-1 no lane can be certified; the cases are then certified one by one. */
-static uz_status make_certifier(uz_block *block, uz_setup *setup, const uz_problem *problem, uz_error *err)
-{
-    uz_factor_workspace *ws = uz_factor_workspace_new();
-    if (!ws)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a linear solve");
-    double bound = uz_setup_inverse_bound(setup, block->K, ws, NULL);
-    uz_factor_workspace_free(ws);
-    return uz_lane_certifier_create(&block->certifier, block->K, uz_setup_N(setup, problem),
-                                    uz_factor_describe(setup->factor).rcond, bound, err);
-}
-
 uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *problem, int64_t blocks, uz_error *err)
 {
+    uz_factor_workspace *ws = NULL;
     *out = NULL;
     uz_block *block = uz_alloc_zero(1, sizeof *block);
     if (!block)
@@ -61,8 +50,13 @@ uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *pro
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a block of loads");
     if (status == UZ_OK)
         status = uz_dual_block_create(&block->loads, setup->dual, blocks, err);
-    if (status == UZ_OK)
-        status = make_certifier(block, setup, problem, err);
+    if (status == UZ_OK && !(ws = uz_factor_workspace_new()))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a linear solve");
+    if (status == UZ_OK) /* without a finite bound on K^-1 no lane can be certified; the loads then are one by one */
+        status = uz_lane_certifier_create(&block->certifier, block->K, uz_setup_N(setup, problem),
+                                          uz_factor_describe(setup->factor).rcond,
+                                          uz_setup_inverse_bound(setup, block->K, ws, NULL), err);
+    uz_factor_workspace_free(ws);
     if (status == UZ_OK)
         *out = block;
     else

@@ -9,54 +9,44 @@
 
 #include <stdlib.h>
 
-static void take_plan(uz_prediction *out, const uz_cost_plan *plan, const uz_cost_size *size)
-{
-    const uz_cost_estimate *e = &plan->form[plan->chosen >= 0 ? plan->chosen : 0];
-    out->fits = plan->chosen >= 0;
-    out->op = e->op;
-    out->bytes = e->bytes;
-    out->seconds = e->setup_s + (double)(size->cases > 0 ? size->cases : 1) * e->case_s;
-}
-
-/* The analysis of a factor for this form, and the plan that follows from it. */
-static uz_status analyse(uz_prediction *out, uz_cost_plan *plan, const uz_csc *K, const uz_csc *N, const int64_t *dofs,
-                         const uz_cost_size *size, uz_operator form, const uz_settings *settings, const uz_hooks *hooks,
-                         uz_error *err)
-{
-    uz_analysis *analysis = NULL;
-    int64_t last = uz_dual_abilities_of(form)->contact_last ? size->n_b : 0,
-            rows = uz_cost_is_one_to_one(N, last) ? 0 : N->rows;
-    uz_status status = uz_analysis_choose(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
-    if (status != UZ_OK)
-        return status;
-    uz_factor_info info = uz_analysis_describe(analysis);
-    uz_analysis_free(analysis);
-    out->factor_nnz = info.nnz;
-    uz_cost_decide(plan, size, &info, form, settings->op, settings->memory_limit);
-    return UZ_OK;
-}
-
+/* The form and what it takes, of K and N; the analysis of a factor where there is to be one. */
 static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, uz_cost_size *size,
                          const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
+    const size_t limit = settings->memory_limit;
+    const bool free_asked = settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor;
     uz_cost_plan plan = {.chosen = -1};
+    uz_analysis *analysis = NULL;
     int64_t *dofs = NULL;
     uz_status status = uz_dual_contact_dofs(&dofs, &size->n_b, N, err);
     if (status != UZ_OK)
         return status;
-    bool free_only = (settings->op != UZ_OPERATOR_AUTO && !uz_dual_abilities_of(settings->op)->needs_factor) ||
-                     (settings->memory_limit > 0 && uz_cost_analysis_bytes(size) > (double)settings->memory_limit);
-    uz_operator form = uz_dual_choose(N, size->n_b, free_only ? UZ_OPERATOR_AUTO : settings->op);
-    if (free_only)
-        uz_cost_decide(&plan, size, NULL, form, settings->op, settings->memory_limit);
-    else
-        status = analyse(out, &plan, K, N, dofs, size, form, settings, hooks, err);
+    const bool no_factor = free_asked || (limit > 0 && uz_cost_analysis_bytes(size) > (double)limit);
+    const uz_operator form = uz_dual_choose(N, size->n_b, no_factor ? UZ_OPERATOR_AUTO : settings->op);
+    if (no_factor) {
+        uz_cost_decide(&plan, size, NULL, form, settings->op, limit);
+    } else {
+        int64_t last = uz_dual_abilities_of(form)->contact_last ? size->n_b : 0;
+        int64_t rows = uz_cost_is_one_to_one(N, last) ? 0 : N->rows;
+        status = uz_analysis_choose(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
+        if (status == UZ_OK) {
+            uz_factor_info info = uz_analysis_describe(analysis);
+            out->factor_nnz = info.nnz;
+            uz_cost_decide(&plan, size, &info, form, settings->op, limit);
+        }
+        uz_analysis_free(analysis);
+    }
     free(dofs);
-    if (status == UZ_OK)
-        take_plan(out, &plan, size);
-    if (status == UZ_OK && !uz_dual_abilities_of(out->op)->needs_factor)
+    if (status != UZ_OK)
+        return status;
+    const uz_cost_estimate *e = &plan.form[plan.chosen >= 0 ? plan.chosen : 0];
+    out->fits = plan.chosen >= 0;
+    out->op = e->op;
+    out->bytes = e->bytes;
+    out->seconds = e->setup_s + (double)(size->cases > 0 ? size->cases : 1) * e->case_s;
+    if (!uz_dual_abilities_of(out->op)->needs_factor)
         out->factor_nnz = 0;
-    return status;
+    return UZ_OK;
 }
 
 /* The matrices of a scene with the rows that its solve begins with. */

@@ -81,27 +81,6 @@ static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
     return status;
 }
 
-/* Rows that can't depend on each other, or are too many to exchange: those that press stay, the others are left out. */
-static uz_status keep_rows(refinement *x, uz_dual_load *correction, uz_error *err)
-{
-    uz_active_end end;
-    uz_status status = uz_dual_load_solve_active(correction, &end, x->s, x->g, x->active, err);
-    for (int64_t i = 0; i < x->run->m; i++)
-        x->s[i] = end == UZ_ACTIVE_SOLVED ? x->s[i] : 0.0;
-    return status;
-}
-
-static uz_status exchange_rows(refinement *x, uz_dual_load *correction, uz_error *err)
-{
-    uz_stop stop = {x->run->asked->hooks, x->run->asked->deadline};
-    uz_exchange_end ended;
-    int64_t steps = INT64_MAX;
-    uz_status status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, x->run->work.it.law,
-                                       correction, &stop, err);
-    x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_BLURRED;
-    return status;
-}
-
 /* c and s for e and f. */
 static uz_status correct(refinement *x, uz_error *err)
 {
@@ -116,8 +95,18 @@ static uz_status correct(refinement *x, uz_error *err)
     uz_stop stop = {run->asked->hooks, run->asked->deadline};
     if (status == UZ_OK)
         status = uz_dual_load_aim(correction, NAN, &stop, err);
-    if (status == UZ_OK)
-        status = exchange ? exchange_rows(x, correction, err) : keep_rows(x, correction, err);
+    if (status == UZ_OK && exchange) {
+        uz_exchange_end ended;
+        int64_t steps = INT64_MAX;
+        status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, x->run->work.it.law, correction,
+                                 &stop, err);
+        x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_BLURRED;
+    } else if (status == UZ_OK) { /* rows that can't depend on each other, or are too many: those that press stay */
+        uz_active_end ended;
+        status = uz_dual_load_solve_active(correction, &ended, x->s, x->g, x->active, err);
+        for (int64_t i = 0; i < run->m; i++)
+            x->s[i] = ended == UZ_ACTIVE_SOLVED ? x->s[i] : 0.0;
+    }
     if (status == UZ_OK)
         status = uz_dual_load_recover(correction, x->c, x->s, false, err);
     uz_dual_load_free(correction);

@@ -84,18 +84,6 @@ static void report_cost(uz_run *run)
         8.0 * RUN_VECTORS * (double)run->d;
 }
 
-static void report_contact(uz_run *run)
-{
-    uz_result *result = run->result;
-    uz_summary *summary = &result->summary;
-    const uz_law *law = uz_setup_law(run->asked->setup);
-    summary->active += law->kind->active(law, NULL, result->r, run->answer.m);
-    for (int64_t i = 0; i < run->answer.m; i++) {
-        summary->reaction_sum += result->r[i];
-        summary->max_penetration = fmax(summary->max_penetration, -result->g[i]);
-    }
-}
-
 static uz_status report_displacements(uz_run *run, uz_error *err)
 {
     uz_result *result = run->result;
@@ -146,62 +134,59 @@ static uz_status add_rotation_error(uz_run *run, uz_error *err)
     return UZ_OK;
 }
 
-/* Displacements that were turned have a larger bound, and a problem without an answer has none. */
-static void report_trade(uz_run *run)
-{
-    uz_decades_drop(&run->work.decades, run->result->summary.certificate.relative_error);
-    run->result->trade = run->work.decades.trade;
-    run->result->trade.total_s = uz_run_time(run);
-}
-
 uz_status uz_report_answer(uz_run *run, uz_error *err)
 {
-    uz_summary *summary = &run->result->summary;
+    uz_result *result = run->result;
+    uz_summary *summary = &result->summary;
     summary->requested_error = run->work.requested;
-    run->result->r = run->answer.r;
-    run->result->g = run->answer.g;
+    result->r = run->answer.r;
+    result->g = run->answer.g;
     run->answer.r = run->answer.g = NULL;
-    report_contact(run);
+    const uz_law *law = uz_setup_law(run->asked->setup);
+    summary->active += law->kind->active(law, NULL, result->r, run->answer.m);
+    for (int64_t i = 0; i < run->answer.m; i++) {
+        summary->reaction_sum += result->r[i];
+        summary->max_penetration = fmax(summary->max_penetration, -result->g[i]);
+    }
     uz_status status = report_displacements(run, err);
     if (status == UZ_OK)
         status = add_rotation_error(run, err);
-    if (run->result->ray)
-        uz_blank_answer(run->result);
-    uz_explain_outcome(run->result, run->work.end);
+    if (result->ray)
+        uz_blank_answer(result);
+    uz_explain_outcome(result, run->work.end);
     report_cost(run);
-    report_trade(run);
+    /* in a rotated frame displacements have a larger bound, and a problem without an answer has none */
+    uz_decades_drop(&run->work.decades, summary->certificate.relative_error);
+    result->trade = run->work.decades.trade;
+    result->trade.total_s = uz_run_time(run);
     summary->timings.total = uz_run_time(run);
-    return status;
-}
-
-/* Where the iterations stood, in all rows. */
-static uz_status report_state(uz_run *run, uz_error *err)
-{
-    uz_state *part = NULL;
-    uz_status status = uz_iterate_state(&part, &run->work.it, run->work.dual, run->asked->settings->method, err);
-    if (status != UZ_OK || !run->asked->setup->rows.in) {
-        run->result->state = part;
-        return status;
-    }
-    status = uz_state_scatter(&run->result->state, part, &run->asked->setup->rows, err);
-    uz_state_free(part);
     return status;
 }
 
 uz_status uz_report_run(uz_run *run, uz_error *err)
 {
-    uz_summary *summary = &run->result->summary;
-    summary->method =
-        run->asked->settings->method == UZ_METHOD_AUTO ? run->work.it.made_by : run->asked->settings->method;
+    const uz_request *asked = run->asked;
+    const uz_iterate *it = &run->work.it;
+    const uz_candidates *rows = &asked->setup->rows;
+    uz_result *result = run->result;
+    uz_summary *summary = &result->summary;
+    uz_state *state = NULL;
+    summary->method = asked->settings->method == UZ_METHOD_AUTO ? it->made_by : asked->settings->method;
     if (run->all == 0)
         summary->method = UZ_METHOD_LINEAR;
-    summary->origin = run->work.it.origin;
-    summary->iterations = run->work.it.iteration;
-    summary->restarts = run->work.it.restarts;
-    summary->alpha = run->work.it.alpha > 0.0 ? run->work.it.alpha : NAN;
-    summary->lambda_max = uz_dual_known_lambda_max(run->asked->setup->dual);
+    summary->origin = it->origin;
+    summary->iterations = it->iteration;
+    summary->restarts = it->restarts;
+    summary->alpha = it->alpha > 0.0 ? it->alpha : NAN;
+    summary->lambda_max = uz_dual_known_lambda_max(asked->setup->dual);
     uz_status status = UZ_OK;
-    if (!run->result->ray)
-        status = report_state(run, err);
+    if (!result->ray)
+        status = uz_iterate_state(&state, it, run->work.dual, asked->settings->method, err);
+    if (status == UZ_OK && state && rows->in) {
+        status = uz_state_scatter(&result->state, state, rows, err);
+        uz_state_free(state);
+    } else {
+        result->state = state;
+    }
     return status == UZ_OK ? uz_report_answer(run, err) : status;
 }

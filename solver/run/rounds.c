@@ -47,7 +47,6 @@ static uz_status check_memory(const batch *b, uz_error *err);
 static uz_status solve_in_blocks(batch *b, uz_error *err);
 static uz_request request_of(const batch *b, int64_t place, bool in_block);
 static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err);
-static bool is_over(const batch *b);
 static void end_before_round(const batch *b);
 static void prepare_round(batch *b);
 
@@ -56,6 +55,7 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
 {
     const int64_t n = problem->n_cases > 0 ? problem->n_cases : 1;
     batch b = {problem, settings, starts, cache, hooks, n, .started = uz_seconds(), .results = results, .round = 1};
+    const uz_stop stop = {hooks, b.started + settings->time_limit_s};
     uz_error own = {0};
     b.round_started = b.started;
     uz_status status = check(&b, &own);
@@ -95,8 +95,9 @@ uz_status uz_solve_rounds(uz_result **results, const uz_problem *problem, const 
         b.setup = NULL;
         if (status == UZ_OK)
             prepare_round(&b);
-        if (b.round > 1 && (status == UZ_ERR_CANCELLED || (status == UZ_OK && b.n_todo > 0 && is_over(&b)))) {
-            end_before_round(&b);
+        const bool next = status == UZ_OK && b.n_todo > 0;
+        if (b.round > 1 && (status == UZ_ERR_CANCELLED || (next && uz_stop_is_due(&stop)))) {
+            end_before_round(&b); /* there are answers with bounds: whoever ends the solve now gets these */
             status = UZ_OK;
             break;
         }
@@ -209,18 +210,6 @@ static uz_status solve_in_blocks(batch *b, uz_error *err)
     return status;
 }
 
-/* What the rounds before took of the case's time counts. */
-static void count_rounds(const batch *b, const uz_result *before, uz_result *result)
-{
-    uz_summary *summary = &result->summary;
-    summary->rounds = b->round;
-    summary->added = summary->kept - b->kept;
-    if (!before)
-        return;
-    uz_timings_add(&summary->timings, &before->summary.timings);
-    uz_trade_shift(&result->trade, before->summary.timings.total);
-}
-
 /* The result goes to its place and the case's rows to those of the next round, or the error is named. */
 static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *err)
 {
@@ -230,21 +219,20 @@ static uz_status close_case(uz_run *run, batch *b, uz_status status, uz_error *e
         status = uz_candidates_add(&b->wanted, &run->wants, err);
     }
     if (status == UZ_OK) {
-        count_rounds(b, b->results[i], run->result);
-        uz_result_free(b->results[i]);
-        b->results[i] = run->result;
+        uz_result *before = b->results[i], *result = run->result;
+        result->summary.rounds = b->round;
+        result->summary.added = result->summary.kept - b->kept;
+        if (before) { /* what the rounds before took of the case's time counts */
+            uz_timings_add(&result->summary.timings, &before->summary.timings);
+            uz_trade_shift(&result->trade, before->summary.timings.total);
+        }
+        uz_result_free(before);
+        b->results[i] = result;
         run->result = NULL;
     } else if (b->problem->n_cases > 0) {
         uz_error_name_case(err, i);
     }
     return status;
-}
-
-/* There are answers with bounds: whoever ends the solve now gets these. */
-static bool is_over(const batch *b)
-{
-    uz_stop stop = {b->hooks, b->started + b->settings->time_limit_s};
-    return uz_stop_is_due(&stop);
 }
 
 static void end_before_round(const batch *b)

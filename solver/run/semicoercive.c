@@ -214,12 +214,6 @@ static uz_status make_round(uz_semi *s, bool *settled, uz_error *err)
     return UZ_OK;
 }
 
-/* Energy that a row's force has in a spring of its own stiffness: comparable between rows in any scaling. */
-static double hardness(const uz_semi *s, int64_t i)
-{
-    return s->active[i] && s->provable[i] && s->stiffness[i] > 0.0 ? -s->last->r[i] / sqrt(s->stiffness[i]) : 0.0;
-}
-
 /* Weights of phase 2: the rows that press hard. Returns how many. */
 static int64_t choose_rows(uz_semi *s, const double *press, double share)
 {
@@ -334,23 +328,16 @@ static uz_status judge_exact(uz_semi *s, uz_contact_verdict *verdict, double *re
     return status;
 }
 
-/* What to ask of the augmented problem, whose norm counts the springs, and motions of the supports, too. */
-static uz_status first_request(double *request, const uz_semi *s, uz_error *err)
-{
-    double norm, augmented;
-    uz_status status = uz_semi_norms(&norm, &augmented, s, 0.0, err);
-    *request = status == UZ_OK ? fmin(1.0, fmax(1e-15, 0.5 * s->requested * (norm / fmax(augmented, DBL_MIN)))) : 1.0;
-    return status;
-}
-
 /* Phase 2 on the rows that stand in s->weight. *done: s->last is what there is to tell. UZ_ERR_NOT_SPD: these rows
  * don't hold the body. */
 static uz_status solve_exact(uz_semi *s, bool *done, uz_contact_verdict *verdict, uz_error *err)
 {
-    double request, relative = INFINITY;
-    uz_status first = first_request(&request, s, err);
+    double norm, augmented, relative = INFINITY;
+    uz_status first = uz_semi_norms(&norm, &augmented, s, 0.0, err);
     if (first != UZ_OK)
         return first;
+    /* the norm of the augmented problem counts the springs, and motions of the supports, too */
+    double request = fmin(1.0, fmax(1e-15, 0.5 * s->requested * (norm / fmax(augmented, DBL_MIN))));
     for (int attempt = 0; attempt < EXACT_TRIES; attempt++) {
         uz_settings settings = settings_of(s, true, request);
         uz_status status = solve_augmented(s, &settings, s->hooks, err);
@@ -375,8 +362,10 @@ static uz_status try_exact(uz_semi *s, bool *done, uz_error *err)
     bool held = false;
     double *press = uz_alloc_zero(s->m, sizeof *press);
     uz_status status = press ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld rows", (long long)s->m);
+    /* the energy that a row's force has in a spring of its own stiffness: comparable between rows in any scaling */
     for (int64_t i = 0; status == UZ_OK && i < s->m; i++)
-        press[i] = hardness(s, i);
+        if (s->active[i] && s->provable[i] && s->stiffness[i] > 0.0)
+            press[i] = -s->last->r[i] / sqrt(s->stiffness[i]);
     for (size_t level = 0; level < sizeof HARD / sizeof HARD[0] && status == UZ_OK && !*done; level++) {
         uz_contact_verdict verdict = UZ_CONTACT_DENIED;
         uz_error refusal = {0};
@@ -432,20 +421,6 @@ static uz_status run_rounds(uz_semi *s, uz_error *err)
     return status;
 }
 
-static uz_status run(uz_semi *s, uz_error *err)
-{
-    double start = uz_seconds();
-    uz_status status = prepare(s, err);
-    s->assemble_s = uz_seconds() - start;
-    if (status == UZ_OK && !s->is_scene)
-        status = find_null_space(s, err);
-    if (status == UZ_OK)
-        status = uz_semi_check_pressed(s, s->is_scene, err);
-    if (status == UZ_OK)
-        status = run_rounds(s, err);
-    return status == UZ_OK ? uz_semi_conclude(s, err) : status;
-}
-
 uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, const uz_settings *settings,
                                 uz_cache *cache, const uz_hooks *hooks, uz_status refused, double started,
                                 uz_error *err)
@@ -458,7 +433,17 @@ uz_status uz_solve_semicoercive(uz_result **out, const uz_problem *problem, cons
     s.discretization_error = NAN;
     s.deadline = s.started + settings->time_limit_s;
     s.requested = uz_requested_error(settings);
-    uz_status status = run(&s, &own);
+    double start = uz_seconds();
+    uz_status status = prepare(&s, &own);
+    s.assemble_s = uz_seconds() - start;
+    if (status == UZ_OK && !s.is_scene)
+        status = find_null_space(&s, &own);
+    if (status == UZ_OK)
+        status = uz_semi_check_pressed(&s, s.is_scene, &own);
+    if (status == UZ_OK)
+        status = run_rounds(&s, &own);
+    if (status == UZ_OK)
+        status = uz_semi_conclude(&s, &own);
     bool better =
         !*out || (s.last && s.last->summary.certificate.relative_error < (*out)->summary.certificate.relative_error);
     if (status == UZ_OK && better) {

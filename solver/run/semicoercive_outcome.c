@@ -1,4 +1,4 @@
-/* outcome.c: what a semicoercive solve leaves behind, or why it is refused. */
+/* semicoercive_outcome.c: what a semicoercive solve leaves behind, or why it is refused. */
 #include "certificate/bound.h"
 #include "certificate/certificate.h"
 #include "core/alloc.h"
@@ -174,28 +174,6 @@ static uz_status describe_scene(uz_semi *s, uz_error *err)
     return status == UZ_OK ? uz_evaluate(result, &s->model, &s->problem->scene, err) : status;
 }
 
-static uz_outcome outcome_of(const uz_semi *s)
-{
-    const uz_summary *summary = &s->last->summary;
-    if (s->last->ray)
-        return UZ_INFEASIBLE;
-    if (s->proved && summary->certificate.relative_error <= s->requested)
-        return UZ_CONVERGED;
-    return summary->outcome == UZ_CONVERGED ? UZ_PRECISION_LIMIT : summary->outcome;
-}
-
-/* Bounds of iterations were about regularized problems; that of the certificate alone is about this one. */
-static void report_trade(uz_result *result)
-{
-    uz_decades decades;
-    uz_decades_init(&decades, false);
-    uz_decades_resume(&decades, result->summary.timings.total);
-    uz_decades_pause(&decades);
-    uz_decades_certify(&decades, result->summary.certificate.relative_error, result->summary.iterations, 0);
-    result->trade = decades.trade;
-    result->trade.total_s = decades.trade.iterated_s;
-}
-
 /* A sum of loads that is no more than their rounding. */
 #define NO_LOAD 1e-12
 
@@ -222,7 +200,12 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     uz_status status = result->ray ? UZ_OK : certify(s, err);
     if (status != UZ_OK)
         return status;
-    summary->outcome = outcome_of(s);
+    if (result->ray)
+        summary->outcome = UZ_INFEASIBLE;
+    else if (s->proved && summary->certificate.relative_error <= s->requested)
+        summary->outcome = UZ_CONVERGED;
+    else if (summary->outcome == UZ_CONVERGED)
+        summary->outcome = UZ_PRECISION_LIMIT;
     summary->requested_error = s->requested;
     summary->discretization_error = s->discretization_error;
     name_rows(s, &summary->semicoercive);
@@ -240,6 +223,13 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
                                "the edge of its contact");
     summary->timings.assemble += s->assemble_s;
     summary->timings.total = uz_seconds() - s->started;
-    report_trade(s->last);
+    /* bounds of iterations were about regularized problems; that of the certificate alone is about this one */
+    uz_decades decades;
+    uz_decades_init(&decades, false);
+    uz_decades_resume(&decades, summary->timings.total);
+    uz_decades_pause(&decades);
+    uz_decades_certify(&decades, summary->certificate.relative_error, summary->iterations, 0);
+    result->trade = decades.trade;
+    result->trade.total_s = decades.trade.iterated_s;
     return status;
 }

@@ -1,4 +1,5 @@
-/* semi.h: the state of one semicoercive solve, shared by semicoercive.c (what happens) and outcome.c (what is told). */
+/* semicoercive_private.h: the state of one semicoercive solve, shared by semicoercive.c (what happens) and
+ * semicoercive_outcome.c (what is told). */
 #ifndef UZ_SEMI_H
 #define UZ_SEMI_H
 

@@ -98,14 +98,6 @@ const uz_csc *uz_setup_all_rows(const uz_setup *setup, const uz_problem *problem
     return setup->is_scene ? &setup->model.N : &problem->qp.N;
 }
 
-/* The key of K: known for matrices; of a scene's only when there is a cache to look into. */
-static uz_status find_key(uz_matrix_key *K_key, const uz_setup_key *key, const uz_setup *setup, uz_error *err)
-{
-    if (key && !setup->is_scene)
-        *K_key = key->K;
-    return key && setup->is_scene ? uz_matrix_digest(K_key, &setup->model.K, err) : UZ_OK;
-}
-
 /* The fewest bytes that a box of this many cells can be solved with: told before the mesh is made. */
 static uz_status refuse_large_box(const uz_problem *problem, const uz_settings *settings, uz_error *err)
 {
@@ -126,24 +118,9 @@ static uz_status refuse_large_box(const uz_problem *problem, const uz_settings *
                    nodes, least, settings->memory_limit);
 }
 
-/* Matrices without contacts may come with an N that is a zeroed struct. */
-static uz_status take_matrices(uz_setup *setup, const uz_problem *problem, const uz_settings *settings, uz_error *err)
-{
-    double start = uz_seconds();
-    uz_status status = UZ_OK;
-    setup->is_scene = problem->kind == UZ_PROBLEM_SCENE;
-    if (setup->is_scene)
-        status = refuse_large_box(problem, settings, err);
-    if (status == UZ_OK && setup->is_scene)
-        status = uz_body_model_build(&setup->model, &problem->scene, err);
-    else if (status == UZ_OK && problem->qp.N.rows == 0)
-        status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
-    setup->assemble_s = uz_seconds() - start;
-    return status;
-}
-
-/* The initial gaps of a scene's rows follow from its supports; of its loads there may be several lists. */
-static uz_status choose_by_gaps(uz_setup *setup, const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
+/* The rows to solve with. The initial gaps of a scene follow from its supports; of its loads there may be several
+ * lists. */
+static uz_status choose_rows(uz_setup *setup, const uz_scene *scene, const uz_candidates *wanted, uz_error *err)
 {
     const uz_body_model *model = &setup->model;
     uz_scene unloaded = *scene;
@@ -162,21 +139,44 @@ static uz_status choose_by_gaps(uz_setup *setup, const uz_scene *scene, const uz
         status = UZ_OK; /* the load will tell what is wrong with it */
     free(p);
     free(h);
-    return status;
-}
-
-static uz_status choose_rows(uz_setup *setup, const uz_problem *problem, const uz_candidates *wanted, uz_error *err)
-{
-    if (!setup->is_scene || !uz_may_omit_rows(problem))
-        return UZ_OK;
-    uz_status status = choose_by_gaps(setup, &problem->scene, wanted, err);
     if (status == UZ_OK && setup->rows.in)
-        status = uz_candidates_reduce(&setup->N_in, &setup->model.N, &setup->rows, err);
+        status = uz_candidates_reduce(&setup->N_in, &model->N, &setup->rows, err);
     return status;
 }
 
-static void describe(uz_setup *setup)
+uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,
+                          const uz_setup_key *key, const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks,
+                          uz_error *err)
 {
+    const double start = uz_seconds();
+    uz_matrix_key K_key;
+    uz_status status = UZ_OK;
+    *out = NULL;
+    uz_setup *setup = uz_alloc_zero(1, sizeof *setup);
+    if (!setup)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+    pthread_mutex_init(&setup->mutex, NULL);
+    setup->inverse_bound = NAN;
+    setup->is_scene = problem->kind == UZ_PROBLEM_SCENE;
+    if (setup->is_scene)
+        status = refuse_large_box(problem, settings, err);
+    if (status == UZ_OK && setup->is_scene)
+        status = uz_body_model_build(&setup->model, &problem->scene, err);
+    else if (status == UZ_OK && problem->qp.N.rows == 0) /* N may come as a zeroed struct */
+        status = uz_csc_init(&setup->no_rows, 0, problem->qp.K.cols, 0, err);
+    setup->assemble_s = uz_seconds() - start;
+    if (status == UZ_OK && setup->is_scene && uz_may_omit_rows(problem))
+        status = choose_rows(setup, &problem->scene, wanted, err);
+    if (status == UZ_OK && key && setup->is_scene)
+        status = uz_matrix_digest(&K_key, &setup->model.K, err);
+    else if (key)
+        K_key = key->K;
+    if (status == UZ_OK)
+        status = uz_setup_make_operator(setup, problem, &K_key, settings, cache, hooks, err);
+    if (status != UZ_OK) {
+        uz_setup_free(setup);
+        return status;
+    }
     size_t form = setup->krylov ? uz_krylov_describe(setup->krylov).bytes : uz_factor_describe(setup->factor).bytes;
     setup->bytes = sizeof *setup + (setup->shared.item ? 0 : form) + setup->dual->bytes;
     if (setup->is_scene)
@@ -185,33 +185,8 @@ static void describe(uz_setup *setup)
         setup->bytes += (size_t)setup->rows.m + uz_csc_bytes(&setup->N_in);
     setup->reused.ordering = setup->shared.analysis_reused;
     setup->reused.factor = setup->shared.factor_reused;
-}
-
-uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,
-                          const uz_setup_key *key, const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks,
-                          uz_error *err)
-{
-    uz_matrix_key K_key;
-    *out = NULL;
-    uz_setup *setup = uz_alloc_zero(1, sizeof *setup);
-    if (!setup)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
-    pthread_mutex_init(&setup->mutex, NULL);
-    setup->inverse_bound = NAN;
-    uz_status status = take_matrices(setup, problem, settings, err);
-    if (status == UZ_OK)
-        status = choose_rows(setup, problem, wanted, err);
-    if (status == UZ_OK)
-        status = find_key(&K_key, key, setup, err);
-    if (status == UZ_OK)
-        status = uz_setup_make_operator(setup, problem, &K_key, settings, cache, hooks, err);
-    if (status == UZ_OK) {
-        describe(setup);
-        *out = setup;
-    } else {
-        uz_setup_free(setup);
-    }
-    return status;
+    *out = setup;
+    return UZ_OK;
 }
 
 double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)

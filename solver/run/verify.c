@@ -39,57 +39,47 @@ static uz_status take_nodal(uz_run *run, const double *u, uz_error *err)
     return UZ_OK;
 }
 
-static uz_status take_answer(uz_run *run, const double *u, const double *r, uz_error *err)
-{
-    const uz_mesh *mesh = &run->asked->setup->model.mesh;
-    bool scene = run->asked->setup->is_scene;
-    uz_status status = check_given(u, scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
-    if (status == UZ_OK)
-        status = check_given(r, run->all, "r", err);
-    if (status != UZ_OK)
-        return status;
-    if (run->all > 0)
-        memcpy(run->answer.r, r, (size_t)run->all * sizeof *r);
-    if (scene)
-        return take_nodal(run, u, err);
-    memcpy(run->answer.u, u, (size_t)run->d * sizeof *u);
-    return UZ_OK;
-}
-
-/* The certificate cuts reactions at 0; the result shows what was given. */
-static uz_status certify(uz_run *run, const double *r, uz_error *err)
-{
-    uz_answer *answer = &run->answer;
-    if (run->asked->settings->balanced && run->asked->setup->is_scene)
-        uz_run_balance_request(run);
-    uz_certify_input input;
-    uz_status status = uz_run_certify_input(&input, run, answer, err);
-    input.twofold_energies = true;
-    if (status == UZ_OK)
-        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
-    run->result->summary.certificate = answer->certificate;
-    if (run->all > 0)
-        memcpy(answer->r, r, (size_t)run->all * sizeof *r);
-    return status;
-}
-
+/* Certifies u and r on the setup of the run. The certificate cuts reactions at 0; the result shows what was given. */
 static uz_status verify(uz_run *run, const double *u, const double *r, uz_error *err)
 {
+    const uz_request *asked = run->asked;
+    const uz_setup *setup = asked->setup;
+    const uz_mesh *mesh = &setup->model.mesh;
+    const size_t size_r = (size_t)run->all * sizeof *r;
     uz_summary *summary = &run->result->summary;
+    uz_answer *answer = &run->answer;
+    uz_certify_input input;
     uz_status status = uz_run_load(run, err);
     if (status == UZ_OK)
-        status = uz_answer_allocate(&run->answer, run->d, run->all, err);
+        status = uz_answer_allocate(answer, run->d, run->all, err);
     if (status == UZ_OK)
-        status = take_answer(run, u, r, err);
+        status = check_given(u, setup->is_scene ? mesh->n_nodes * mesh->dim : run->d, "u", err);
+    if (status == UZ_OK)
+        status = check_given(r, run->all, "r", err);
+    if (status == UZ_OK && setup->is_scene)
+        status = take_nodal(run, u, err);
+    else if (status == UZ_OK)
+        memcpy(answer->u, u, (size_t)run->d * sizeof *u);
+    if (status == UZ_OK && size_r > 0)
+        memcpy(answer->r, r, size_r);
     double start = uz_seconds();
-    if (status == UZ_OK && run->asked->setup->krylov) /* its certificate solves with what a load keeps */
-        status = uz_dual_load_create(&run->work.dual, run->asked->setup->dual,
-                                     uz_setup_K(run->asked->setup, run->asked->problem), run->load.p, run->load.h, err);
+    if (status == UZ_OK && setup->krylov) /* its certificate solves with what a load keeps */
+        status = uz_dual_load_create(&run->work.dual, setup->dual, uz_setup_K(setup, asked->problem), run->load.p,
+                                     run->load.h, err);
+    if (status == UZ_OK && asked->settings->balanced && setup->is_scene)
+        uz_run_balance_request(run);
     if (status == UZ_OK)
-        status = certify(run, r, err);
+        status = uz_run_certify_input(&input, run, answer, err);
+    if (status == UZ_OK) {
+        input.twofold_energies = true;
+        status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
+    }
     summary->timings.certify = uz_seconds() - start;
     if (status != UZ_OK)
         return status;
+    summary->certificate = answer->certificate;
+    if (size_r > 0)
+        memcpy(answer->r, r, size_r);
     uz_decades_resume(&run->work.decades, uz_run_time(run));
     uz_decades_pause(&run->work.decades);
     uz_decades_certify(&run->work.decades, summary->certificate.relative_error, 0, 0);
