@@ -25,7 +25,10 @@ uz_status uz_spread_over_group(double *share, const uz_body_model *model, const 
             double xyz[3 * UZ_FACE_NODES];
             int64_t node[UZ_FACE_NODES];
             uz_body_side(&side, xyz, node, model, group->face[i]);
-            (positive ? uz_side_positive_weights : uz_side_weights)(w, &side);
+            if (positive)
+                uz_side_positive_weights(w, &side);
+            else
+                uz_side_weights(w, &side);
             for (int a = 0; a < side.nodes; a++) {
                 if (pass == 0)
                     total += w[a];
