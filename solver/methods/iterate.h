@@ -40,8 +40,8 @@ struct uz_iterate {
     bool resumed;      /* another run's state, with the correction of its best answer made before D was prepared */
     int32_t phase;     /* of auto */
     int64_t phase_end;
-    struct uz_decades *decades; /* where bounds are noted; NULL: nowhere */
-    uz_best before;             /* what was best before the last answer of a run that ended was bounded out of turn */
+    struct uz_milestones *milestones; /* where bounds are noted; NULL: nowhere */
+    uz_best before; /* what was best before the last answer of a run that ended was bounded out of turn */
 };
 
 /* law: borrowed. alpha 0: chosen when the first gradient step needs it. */

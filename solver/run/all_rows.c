@@ -103,8 +103,8 @@ uz_status uz_run_certify_all_rows(uz_run *run, uz_error *err)
     if (status == UZ_OK && !run->result->ray && certificate->relative_error > run->work.requested)
         status = want_rows(run, met, err);
     run->result->summary.timings.certify += uz_seconds() - start;
-    uz_decades_resume(&run->work.decades, uz_run_time(run));
-    uz_decades_widen(&run->work.decades, certificate->relative_error, run->work.it.iteration,
-                     run->work.dual->applications);
+    uz_milestones_resume(&run->work.milestones, uz_run_time(run));
+    uz_milestones_extend(&run->work.milestones, certificate->relative_error, run->work.it.iteration,
+                         run->work.dual->applications);
     return status;
 }

@@ -13,7 +13,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "core/hooks.h"
-#include "methods/decades.h"
+#include "methods/milestones.h"
 #include "run/problem.h"
 #include "run/settings.h"
 #include "run/transfer.h"

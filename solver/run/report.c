@@ -156,8 +156,8 @@ uz_status uz_report_answer(uz_run *run, uz_error *err)
     uz_explain_outcome(result, run->work.end);
     report_cost(run);
     /* in a rotated frame displacements have a larger bound, and a problem without an answer has none */
-    uz_decades_drop(&run->work.decades, summary->certificate.relative_error);
-    result->trade = run->work.decades.trade;
+    uz_milestones_drop(&run->work.milestones, summary->certificate.relative_error);
+    result->trade = run->work.milestones.trade;
     result->trade.total_s = uz_run_time(run);
     summary->timings.total = uz_run_time(run);
     return status;

@@ -35,7 +35,7 @@ uz_status uz_run_begin(uz_run *run, const uz_request *asked, uz_error *err)
     run->all = setup->rows.in ? setup->rows.m : dual->m;
     run->work.requested = uz_requested_error(settings);
     run->work.target = settings->balanced ? 1e-2 : run->work.requested;
-    uz_decades_init(&run->work.decades, setup->rows.in != NULL);
+    uz_milestones_init(&run->work.milestones, setup->rows.in != NULL);
     run->result = uz_alloc_zero(1, sizeof *run->result);
     if (!run->result)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a result");
@@ -118,8 +118,8 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     if (status == UZ_OK)
         status = uz_iterate_init(&work->it, uz_setup_law(asked->setup), run->m, asked->settings->alpha, err);
     /* bounds of iterations are relative to another norm where supports move the body */
-    work->it.decades = run->load.moved ? NULL : &work->decades;
-    uz_decades_resume(&work->decades, uz_run_time(run));
+    work->it.milestones = run->load.moved ? NULL : &work->milestones;
+    uz_milestones_resume(&work->milestones, uz_run_time(run));
     if (status == UZ_OK && asked->start)
         status = take_start(run, err);
     if (status == UZ_OK)
@@ -143,13 +143,13 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
         .hooks = asked->hooks,
     };
     const uz_stop stop = {asked->hooks, asked->deadline};
-    uz_decades_resume(&work->decades, uz_run_time(run));
+    uz_milestones_resume(&work->milestones, uz_run_time(run));
     double start = uz_seconds();
     uz_status status = uz_dual_load_aim(work->dual, work->target, &stop, err);
     if (status == UZ_OK)
         status = uz_method_run(&work->end, &work->it, work->dual, &options, &run->result->history, err);
     run->result->summary.timings.iterate += uz_seconds() - start;
-    uz_decades_pause(&work->decades);
+    uz_milestones_pause(&work->milestones);
     return status == UZ_OK && work->end == UZ_END_RAY ? uz_run_prove_infeasible(run, err) : status;
 }
 
@@ -165,9 +165,9 @@ uz_status uz_run_certify(uz_run *run, uz_error *err)
 /* What the certificate says of the bounds so far. */
 static void note_certificate(uz_run *run)
 {
-    uz_decades_resume(&run->work.decades, uz_run_time(run));
-    uz_decades_certify(&run->work.decades, run->answer.certificate.relative_error, run->work.it.iteration,
-                       run->work.dual->applications);
+    uz_milestones_resume(&run->work.milestones, uz_run_time(run));
+    uz_milestones_certify(&run->work.milestones, run->answer.certificate.relative_error, run->work.it.iteration,
+                          run->work.dual->applications);
 }
 
 /* A method keeps the answer that it could bound best. Where rows nearly depend on each other its own bounds fail

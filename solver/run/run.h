@@ -7,7 +7,7 @@
 #define UZ_RUN_H
 
 #include "certificate/certificate.h"
-#include "methods/decades.h"
+#include "methods/milestones.h"
 #include "methods/iterate.h"
 #include "run/setup.h"
 #include "uzawa.h"
@@ -39,7 +39,7 @@ typedef struct {
 typedef struct {
     uz_dual_load *dual;
     uz_iterate it;
-    uz_decades decades;
+    uz_milestones milestones;
     uz_factor_workspace *ws; /* this and d numbers for linear solves, made when the first is needed */
     double *scratch;
     double requested; /* relative error that the certificate must meet */

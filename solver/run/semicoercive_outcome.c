@@ -7,7 +7,7 @@
 #include "post/evaluate.h"
 #include "assembly/pressed.h"
 #include "run/semicoercive_private.h"
-#include "methods/decades.h"
+#include "methods/milestones.h"
 #include "run/results.h"
 
 #include <math.h>
@@ -224,12 +224,12 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     summary->timings.assemble += s->assemble_s;
     summary->timings.total = uz_seconds() - s->started;
     /* bounds of iterations were about regularized problems; that of the certificate alone is about this one */
-    uz_decades decades;
-    uz_decades_init(&decades, false);
-    uz_decades_resume(&decades, summary->timings.total);
-    uz_decades_pause(&decades);
-    uz_decades_certify(&decades, summary->certificate.relative_error, summary->iterations, 0);
-    result->trade = decades.trade;
-    result->trade.total_s = decades.trade.iterated_s;
+    uz_milestones milestones;
+    uz_milestones_init(&milestones, false);
+    uz_milestones_resume(&milestones, summary->timings.total);
+    uz_milestones_pause(&milestones);
+    uz_milestones_certify(&milestones, summary->certificate.relative_error, summary->iterations, 0);
+    result->trade = milestones.trade;
+    result->trade.total_s = milestones.trade.iterated_s;
     return status;
 }

@@ -80,9 +80,9 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     summary->certificate = answer->certificate;
     if (size_r > 0)
         memcpy(answer->r, r, size_r);
-    uz_decades_resume(&run->work.decades, uz_run_time(run));
-    uz_decades_pause(&run->work.decades);
-    uz_decades_certify(&run->work.decades, summary->certificate.relative_error, 0, 0);
+    uz_milestones_resume(&run->work.milestones, uz_run_time(run));
+    uz_milestones_pause(&run->work.milestones);
+    uz_milestones_certify(&run->work.milestones, summary->certificate.relative_error, 0, 0);
     summary->outcome = summary->certificate.relative_error <= run->work.requested ? UZ_VERIFIED : UZ_NOT_VERIFIED;
     summary->method = UZ_METHOD_GIVEN;
     summary->alpha = NAN;

@@ -1,11 +1,11 @@
-#include "methods/decades.h"
+#include "methods/milestones.h"
 
 #include "core/clock.h"
 
 #include <math.h>
 
-/* Of a partial run (decades.h): the solution on the rows kept is within c of that on all rows, for half the square of
- * their distance is at most the gap. So with b <= KEPT t and c <= ALL t the error is at most b (1 + c) + c <= t for
+/* Of a partial run (milestones.h): the solution on the rows kept is within c of that on all rows, for half the square
+ * of their distance is at most the gap. So with b <= KEPT t and c <= ALL t the error is at most b (1 + c) + c <= t for
  * every t <= 1. */
 #define KEPT 0.85
 #define ALL  0.05
@@ -22,30 +22,30 @@ void uz_trade_clear(uz_trade *trade)
     trade->iterated_s = trade->total_s = 0.0;
 }
 
-void uz_decades_init(uz_decades *d, bool partial)
+void uz_milestones_init(uz_milestones *d, bool partial)
 {
-    *d = (uz_decades){.partial = partial, .since = uz_seconds()};
+    *d = (uz_milestones){.partial = partial, .since = uz_seconds()};
     uz_trade_clear(&d->trade);
 }
 
-void uz_decades_resume(uz_decades *d, double spent_s)
+void uz_milestones_resume(uz_milestones *d, double spent_s)
 {
     d->base = spent_s;
     d->since = uz_seconds();
 }
 
-static double seconds_now(const uz_decades *d)
+static double seconds_now(const uz_milestones *d)
 {
     return d->base + (uz_seconds() - d->since);
 }
 
-void uz_decades_pause(uz_decades *d)
+void uz_milestones_pause(uz_milestones *d)
 {
     d->trade.iterated_s = seconds_now(d);
 }
 
 /* Asked at every bound: the clock is read only where something is reached for the first time. */
-static void note(uz_decades *d, double bound, const uz_trade_step *reached)
+static void note(uz_milestones *d, double bound, const uz_trade_step *reached)
 {
     if (d->reached >= UZ_TRADE_STEPS || !(bound <= uz_trade_error(d->reached)))
         return;
@@ -55,14 +55,14 @@ static void note(uz_decades *d, double bound, const uz_trade_step *reached)
         d->trade.step[d->reached++] = step;
 }
 
-void uz_decades_note(uz_decades *d, double bound, int64_t iterations, int64_t applications)
+void uz_milestones_note(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
 {
     if (d)
         note(d, d->partial ? bound / KEPT : bound,
              &(uz_trade_step){.iterations = iterations, .applications = applications});
 }
 
-void uz_decades_drop(uz_decades *d, double bound)
+void uz_milestones_drop(uz_milestones *d, double bound)
 {
     while (d->reached > 0 && !(bound <= uz_trade_error(d->reached - 1)))
         d->trade.step[--d->reached] = (uz_trade_step){.seconds = NAN};
@@ -73,20 +73,20 @@ static uz_trade_step by_certificate(int64_t iterations, int64_t applications)
     return (uz_trade_step){.iterations = iterations, .applications = applications, .by_certificate = true};
 }
 
-void uz_decades_certify(uz_decades *d, double bound, int64_t iterations, int64_t applications)
+void uz_milestones_certify(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
 {
     uz_trade_step step = by_certificate(iterations, applications);
-    uz_decades_drop(d, bound);
+    uz_milestones_drop(d, bound);
     if (d->partial) /* about the rows kept, as the bounds of the iterations are */
-        uz_decades_note(d, bound, iterations, applications);
+        uz_milestones_note(d, bound, iterations, applications);
     else
         note(d, bound, &step);
 }
 
-void uz_decades_widen(uz_decades *d, double bound, int64_t iterations, int64_t applications)
+void uz_milestones_extend(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
 {
     uz_trade_step step = by_certificate(iterations, applications);
-    uz_decades_drop(d, bound / ALL);
+    uz_milestones_drop(d, bound / ALL);
     d->partial = false;
     note(d, bound, &step);
 }
