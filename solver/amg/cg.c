@@ -1,5 +1,5 @@
 /* cg.c: preconditioned conjugate gradients (Hestenes and Stiefel 1952). */
-#include "amg/krylov.h"
+#include "amg/amg.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"

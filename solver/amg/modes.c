@@ -1,5 +1,5 @@
 /* modes.c: which dofs belong together, and the displacements that K hardly resists. */
-#include "amg/krylov.h"
+#include "amg/amg.h"
 
 #include "core/alloc.h"
 #include "core/error.h"

@@ -3,7 +3,7 @@
 #define UZ_MULTIGRID_PRIVATE_H
 
 #include "factor/factor.h"
-#include "amg/krylov.h"
+#include "amg/amg.h"
 
 /* One level and the way to the next, coarser one. A coarse level has k = number of modes dofs for each aggregate of the
  * finer one, in a row; where an aggregate has fewer independent modes, those left over are 0 everywhere and their

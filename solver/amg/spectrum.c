@@ -11,7 +11,7 @@
  * values converge. That orthogonality is lost on the way does no harm: the coefficients are those of an exact process
  * on a matrix whose eigenvalues lie within rounding of those of this one (Greenbaum, Linear Algebra Appl. 113 (1989)).
  */
-#include "amg/krylov.h"
+#include "amg/amg.h"
 
 #include "core/alloc.h"
 #include "linalg/blas.h"
@@ -30,10 +30,10 @@ enum { STEPS_MOST = 3000, CHECK_EVERY = 4, POWERS = 8 };
 /* 0.8 times this is 1e-12. */
 #define LEAST_SHARE 1.25e-12
 
-struct uz_krylov {
+struct uz_amg {
     uz_modes modes;
     uz_multigrid *mg;
-    uz_krylov_info info;
+    uz_amg_info info;
 };
 
 typedef struct {
@@ -150,9 +150,9 @@ static uz_status estimate_inverse(double *most, uz_cg *cg, const uz_csc *K, uz_e
 /* Below this rounding of the entries of K alone makes or unmakes a digit of lambda_min(D^-1 K). */
 #define RCOND_LEAST DBL_EPSILON
 
-static uz_status bound_spectrum(uz_krylov *krylov, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks, uz_error *err)
+static uz_status bound_spectrum(uz_amg *amg, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks, uz_error *err)
 {
-    uz_krylov_info *info = &krylov->info;
+    uz_amg_info *info = &amg->info;
     coefficients *c = uz_alloc_zero(1, sizeof *c);
     double most = INFINITY;
     if (!c)
@@ -176,25 +176,25 @@ static uz_status bound_spectrum(uz_krylov *krylov, uz_cg *cg, const uz_csc *K, c
                    info->rcond, (long long)info->iterations);
 }
 
-static uz_status try_threshold(uz_krylov *krylov, const uz_csc *K, double strong, size_t memory_limit,
-                               const uz_hooks *hooks, uz_error *err)
+static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size_t memory_limit, const uz_hooks *hooks,
+                               uz_error *err)
 {
     double start = uz_seconds();
-    uz_krylov_info *info = &krylov->info;
+    uz_amg_info *info = &amg->info;
     uz_stop stop = {hooks, INFINITY};
     uz_cg cg = {0};
     size_t n = (size_t)K->cols;
-    krylov->modes.strong = strong;
-    uz_status status = uz_multigrid_create(&krylov->mg, K, &krylov->modes, NULL, memory_limit, &stop, err);
+    amg->modes.strong = strong;
+    uz_status status = uz_multigrid_create(&amg->mg, K, &amg->modes, NULL, memory_limit, &stop, err);
     info->create_s += uz_seconds() - start;
     if (status != UZ_OK)
         return status;
-    info->levels = uz_multigrid_levels(krylov->mg);
-    info->bytes = uz_multigrid_bytes(krylov->mg) + n * (4 + 4 * (size_t)krylov->modes.count);
+    info->levels = uz_multigrid_levels(amg->mg);
+    info->bytes = uz_multigrid_bytes(amg->mg) + n * (4 + 4 * (size_t)amg->modes.count);
     start = uz_seconds();
-    status = uz_cg_init(&cg, krylov->mg, NULL, K->cols, err);
+    status = uz_cg_init(&cg, amg->mg, NULL, K->cols, err);
     if (status == UZ_OK)
-        status = bound_spectrum(krylov, &cg, K, hooks, err);
+        status = bound_spectrum(amg, &cg, K, hooks, err);
     uz_cg_clear(&cg);
     info->spectrum_s += uz_seconds() - start;
     return status;
@@ -207,28 +207,28 @@ static uz_status try_threshold(uz_krylov *krylov, const uz_csc *K, double strong
 #define BAD_LAMBDA    0.02
 #define WORTH_LAMBDA  3.0
 
-static bool may_improve(const uz_krylov *krylov, uz_status status)
+static bool may_improve(const uz_amg *amg, uz_status status)
 {
     if (status != UZ_OK)
-        return status == UZ_ERR_NOT_SPD && krylov->mg && krylov->info.iterations > 0;
-    return krylov->info.levels > 1 && krylov->info.lambda < BAD_LAMBDA;
+        return status == UZ_ERR_NOT_SPD && amg->mg && amg->info.iterations > 0;
+    return amg->info.levels > 1 && amg->info.lambda < BAD_LAMBDA;
 }
 
 /* The better of two thresholds; the first one's failure stands where the second fails too. */
-static uz_status build(uz_krylov *krylov, const uz_csc *K, size_t memory_limit, const uz_hooks *hooks, uz_error *err)
+static uz_status build(uz_amg *amg, const uz_csc *K, size_t memory_limit, const uz_hooks *hooks, uz_error *err)
 {
     uz_error ignored = {0}, *into = err ? err : &ignored;
-    uz_status status = try_threshold(krylov, K, krylov->modes.strong, memory_limit, hooks, into);
-    if (!may_improve(krylov, status))
+    uz_status status = try_threshold(amg, K, amg->modes.strong, memory_limit, hooks, into);
+    if (!may_improve(amg, status))
         return status;
-    uz_krylov second = {.modes = krylov->modes, .info = krylov->info};
+    uz_amg second = {.modes = amg->modes, .info = amg->info};
     uz_error failure = {0};
     second.info.lambda = 0.0;
     uz_status other = try_threshold(&second, K, SECOND_STRONG, memory_limit, hooks, &failure);
-    bool better = other == UZ_OK && (status != UZ_OK || second.info.lambda > WORTH_LAMBDA * krylov->info.lambda);
-    uz_multigrid_free(better ? krylov->mg : second.mg);
+    bool better = other == UZ_OK && (status != UZ_OK || second.info.lambda > WORTH_LAMBDA * amg->info.lambda);
+    uz_multigrid_free(better ? amg->mg : second.mg);
     if (better) {
-        *krylov = second;
+        *amg = second;
         uz_error_reset(into);
         return UZ_OK;
     }
@@ -239,47 +239,47 @@ static uz_status build(uz_krylov *krylov, const uz_csc *K, size_t memory_limit, 
     return status;
 }
 
-uz_status uz_krylov_create(uz_krylov **out, const uz_csc *K, uz_modes *modes, size_t memory_limit,
-                           const uz_hooks *hooks, uz_error *err)
+uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
+                        uz_error *err)
 {
     *out = NULL;
-    uz_krylov *krylov = uz_alloc_zero(1, sizeof *krylov);
-    if (!krylov) {
+    uz_amg *amg = uz_alloc_zero(1, sizeof *amg);
+    if (!amg) {
         uz_modes_clear(modes);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a multigrid");
     }
-    krylov->modes = *modes;
+    amg->modes = *modes;
     memset(modes, 0, sizeof *modes);
-    uz_status status = build(krylov, K, memory_limit, hooks, err);
+    uz_status status = build(amg, K, memory_limit, hooks, err);
     if (status == UZ_OK)
-        *out = krylov;
+        *out = amg;
     else
-        uz_krylov_free(krylov);
+        uz_amg_free(amg);
     return status;
 }
 
-void uz_krylov_free(uz_krylov *krylov)
+void uz_amg_free(uz_amg *amg)
 {
-    if (!krylov)
+    if (!amg)
         return;
-    uz_modes_clear(&krylov->modes);
-    uz_multigrid_free(krylov->mg);
-    free(krylov);
+    uz_modes_clear(&amg->modes);
+    uz_multigrid_free(amg->mg);
+    free(amg);
 }
 
-uz_krylov_info uz_krylov_describe(const uz_krylov *krylov)
+uz_amg_info uz_amg_describe(const uz_amg *amg)
 {
-    return krylov->info;
+    return amg->info;
 }
 
-const uz_multigrid *uz_krylov_multigrid(const uz_krylov *krylov)
+const uz_multigrid *uz_amg_multigrid(const uz_amg *amg)
 {
-    return krylov->mg;
+    return amg->mg;
 }
 
-const uz_modes *uz_krylov_modes(const uz_krylov *krylov)
+const uz_modes *uz_amg_modes(const uz_amg *amg)
 {
-    return &krylov->modes;
+    return &amg->modes;
 }
 
 /* The residual's share of the value that is sharp enough, as a share of its root. */
@@ -299,12 +299,12 @@ static double largest_power(const double *x, int64_t n)
     return ldexp(1.0, exponent - 1);
 }
 
-uz_status uz_krylov_inverse_norm(double *value, double *e, const uz_krylov *krylov, uz_cg *cg, const uz_csc *K,
-                                 const uz_hooks *hooks, double deadline, uz_error *err)
+uz_status uz_amg_inverse_norm(double *value, double *e, const uz_amg *amg, uz_cg *cg, const uz_csc *K,
+                              const uz_hooks *hooks, double deadline, uz_error *err)
 {
     int64_t n = cg->n;
     double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0, unit = largest_power(e, n);
-    uz_cg_stop stop = {.relative = SHARP * sqrt(krylov->info.lambda),
+    uz_cg_stop stop = {.relative = SHARP * sqrt(amg->info.lambda),
                        .max_iterations = NORM_STEPS_MOST,
                        .hooks = hooks,
                        .deadline = deadline};
@@ -318,7 +318,7 @@ uz_status uz_krylov_inverse_norm(double *value, double *e, const uz_krylov *kryl
     for (int64_t j = 0; j < n; j++)
         sum += w[j] * (e[j] + cg->r[j]);
     if (status == UZ_OK) {
-        double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / krylov->info.lambda;
+        double scaled = (isnan(sum) ? INFINITY : fmax(0.0, sum)) + info.last * info.last / amg->info.lambda;
         *value = scaled * unit * unit;
         for (int64_t j = 0; j < n; j++)
             e[j] = unit * w[j];
@@ -329,7 +329,7 @@ uz_status uz_krylov_inverse_norm(double *value, double *e, const uz_krylov *kryl
 
 /* Measured on plane and solid bodies: coarse levels take less than four tenths of K, the prolongation 4 + 4 k bytes for
  * each of some four blocks a row. */
-double uz_krylov_predict_bytes(int64_t n, int64_t nnz, int modes)
+double uz_amg_predict_bytes(int64_t n, int64_t nnz, int modes)
 {
     return (double)n * (4.0 * (4.0 + 4.0 * modes) + 4.0 * modes + 20.0) + 0.4 * 16.0 * (double)nnz;
 }

@@ -8,7 +8,7 @@
 /* What a form of the operator needs, and what it can do. */
 typedef struct {
     uz_operator op;
-    bool needs_factor; /* it is made from a factor of K, else from a uz_krylov */
+    bool needs_factor; /* it is made from a factor of K, else from a uz_amg */
     bool contact_last; /* a factor whose order ends with the contact dofs serves it best */
     bool exact;        /* it solves to rounding; else within the aim, each solve the nearer the closer r is to that of
                         * the last apply, and with a bound on what is left in every answer */

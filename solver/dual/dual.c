@@ -47,7 +47,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_h
     dual->bytes = 48 * (size_t)N->ptr[N->cols];
     dual->touched = &dual->N;
     dual->factor = source->factor;
-    dual->krylov = source->krylov;
+    dual->amg = source->amg;
     dual->lazy = uz_alloc_zero(1, sizeof *dual->lazy);
     uz_status status = UZ_OK;
     if (dual->lazy) {

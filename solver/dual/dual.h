@@ -11,7 +11,7 @@
 #ifndef UZ_DUAL_H
 #define UZ_DUAL_H
 
-#include "amg/krylov.h"
+#include "amg/amg.h"
 #include "core/hooks.h"
 #include "dual/choice.h"
 #include "factor/factor.h"
@@ -35,7 +35,7 @@ typedef struct {
     double *row_scale;       /* m: the powers of two by which rows of N and h were multiplied: a gap here is scale x the
                               * caller's, a caller's reaction is scale x the one here */
     const uz_factor *factor; /* the caller's, or NULL */
-    const uz_krylov *krylov; /* the caller's, or NULL */
+    const uz_amg *amg;       /* the caller's, or NULL */
     struct uz_dual_lazy *lazy;
 } uz_dual;
 
@@ -58,7 +58,7 @@ typedef struct {
     const uz_csc *N;         /* m x d; copied */
     const uz_factor *factor; /* of K, where the form needs one: must outlive the operator. Where `can.contact_last`,
                               * any: best with the dofs of uz_dual_contact_dofs last */
-    const uz_krylov *krylov; /* of K, for the other forms; likewise */
+    const uz_amg *amg;       /* of K, for the other forms; likewise */
 } uz_dual_source;
 
 uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_hooks *hooks, uz_error *err);

@@ -1,7 +1,7 @@
 /* matrix_free.c: the dual operator by conjugate gradients: no factor of K.
  *
  * Every solve stops at a tolerance, and what it leaves is bounded: with the residual s of K u = p + N'r and lambda from
- * uz_krylov_describe, ||u - u(r)||_K^2 = s'K^-1 s <= s'M^-1 s / lambda. That slack is part of the bound on the answer,
+ * uz_amg_describe, ||u - u(r)||_K^2 = s'K^-1 s <= s'M^-1 s / lambda. That slack is part of the bound on the answer,
  * so that a tolerance decides about time and never about what is certified.
  *
  * Rule for the tolerance of D r: an error in u(r) of delta in the energy norm changes the dual gradient by N delta, and
@@ -56,7 +56,7 @@ static uz_cg_stop stop_at(const free_load *x, double relative, double absolute)
 
 static double root_of_lambda(const uz_dual_load *load)
 {
-    return sqrt(uz_krylov_describe(load->dual->krylov).lambda);
+    return sqrt(uz_amg_describe(load->dual->amg).lambda);
 }
 
 /* base = K^-1 p to the aim, from where it stands; psi0 and g0 with it. */
@@ -93,7 +93,7 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
     x->p = uz_alloc(d, sizeof *x->p);
     x->right = uz_alloc(d, sizeof *x->right);
     load->bytes += 8 * 8 * (size_t)d;
-    status = x->p && x->right ? uz_cg_init(&x->cg, uz_krylov_multigrid(load->dual->krylov), NULL, d, err)
+    status = x->p && x->right ? uz_cg_init(&x->cg, uz_amg_multigrid(load->dual->amg), NULL, d, err)
                               : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
     if (status != UZ_OK)
         return status;
@@ -167,7 +167,7 @@ static uz_status correct(uz_dual_load *load, double *bound2, const double *r, co
 static uz_status inverse_norm(uz_dual_load *load, double *value, double *e, uz_error *err)
 {
     free_load *x = (free_load *)load;
-    return uz_krylov_inverse_norm(value, e, load->dual->krylov, &x->cg, load->K, x->stop.hooks, x->stop.deadline, err);
+    return uz_amg_inverse_norm(value, e, load->dual->amg, &x->cg, load->K, x->stop.hooks, x->stop.deadline, err);
 }
 
 /* ------------------------------------------------------------- given rows as equations */
@@ -191,7 +191,7 @@ static uz_status measure_slack(free_load *x, uz_error *err)
         e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
     uz_status status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
     double square = uz_dot(load->K->cols, e, x->cg.z);
-    x->slack = uz_root(square / uz_krylov_describe(load->dual->krylov).lambda);
+    x->slack = uz_root(square / uz_amg_describe(load->dual->amg).lambda);
     return status;
 }
 
@@ -242,7 +242,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
 {
     free_load *x = (free_load *)load;
     uz_bounded *box = x->sparse.box;
-    const uz_krylov *krylov = load->dual->krylov;
+    const uz_amg *amg = load->dual->amg;
     uz_multigrid *mg = NULL;
     uz_cg cg = {0};
     if (!box)
@@ -253,7 +253,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     }
     if (x->coarse <= 0.0)
         x->coarse = FIRST_TOLERANCE;
-    uz_status status = uz_multigrid_create(&mg, load->K, uz_krylov_modes(krylov), box->fixed, 0, &x->stop, err);
+    uz_status status = uz_multigrid_create(&mg, load->K, uz_amg_modes(amg), box->fixed, 0, &x->stop, err);
     if (status == UZ_OK)
         status = uz_cg_init(&cg, mg, box->fixed, load->dual->d, err);
     if (status == UZ_OK)
@@ -288,7 +288,7 @@ static void add_cost(uz_cost_estimate *cost, const uz_cost_size *size, const uz_
     double load = SOLVE_CYCLES + (size->m == 0   ? 0.0
                                   : size->bounds ? STEPS * STEP_CYCLES
                                                  : UZ_COST_ITERATIONS * CHANGE_CYCLES);
-    double levels = uz_krylov_predict_bytes(size->d, size->k_entries, size->modes);
+    double levels = uz_amg_predict_bytes(size->d, size->k_entries, size->modes);
     cost->setup_s += setup * cycle;
     cost->case_s += load * cycle;
     cost->flops += (setup + load) * CYCLE_PASSES * 4.0 * (double)size->k_entries;

@@ -79,7 +79,7 @@ typedef struct {
 static uz_status make_dual(making *m, uz_operator op, uz_error *err)
 {
     uz_setup *setup = m->setup;
-    const uz_dual_source source = {op, m->N, setup->factor, setup->krylov};
+    const uz_dual_source source = {op, m->N, setup->factor, setup->amg};
     double start = uz_seconds();
     uz_status status = uz_dual_create(&setup->dual, &source, m->hooks, err);
     setup->condense_s = uz_seconds() - start;
@@ -95,11 +95,11 @@ static uz_status precondition(making *m, uz_error *err)
     double limit = (double)m->settings->memory_limit, copies = m->size.bounds ? 2.0 : 1.0, budget = 0.0;
     uz_modes modes;
     if (m->settings->memory_limit > 0)
-        budget = uz_krylov_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
+        budget = uz_amg_predict_bytes(m->size.d, m->size.k_entries, m->size.modes) +
                  fmax(0.0, limit - plan->form[plan->chosen].bytes) / copies;
     uz_status status = find_modes(&modes, setup, m->K, err);
     if (status == UZ_OK)
-        status = uz_krylov_create(&setup->krylov, m->K, &modes, (size_t)budget, m->hooks, err);
+        status = uz_amg_create(&setup->amg, m->K, &modes, (size_t)budget, m->hooks, err);
     return status == UZ_OK ? make_dual(m, setup->plan.form[setup->plan.chosen].op, err) : status;
 }
 
@@ -129,15 +129,15 @@ static bool regrets(const making *m, uz_status status)
     bool choice = m->asked == UZ_OPERATOR_AUTO && plan->count > 1 && plan->form[0].fits;
     if (status != UZ_OK)
         return choice && status == UZ_ERR_NOT_SPD;
-    return choice && uz_krylov_describe(m->setup->krylov).lambda < LAMBDA_LEAST;
+    return choice && uz_amg_describe(m->setup->amg).lambda < LAMBDA_LEAST;
 }
 
 static void undo_precondition(making *m, uz_error *err)
 {
     uz_dual_free(m->setup->dual);
-    uz_krylov_free(m->setup->krylov);
+    uz_amg_free(m->setup->amg);
     m->setup->dual = NULL;
-    m->setup->krylov = NULL;
+    m->setup->amg = NULL;
     if (err)
         uz_error_reset(err);
 }

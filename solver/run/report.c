@@ -21,9 +21,8 @@ static uz_factor_info describe_factor(const uz_setup *setup)
 {
     if (setup->factor)
         return uz_factor_describe(setup->factor);
-    uz_krylov_info krylov = uz_krylov_describe(setup->krylov);
-    return (uz_factor_info){
-        .bytes = krylov.bytes, .rcond = krylov.rcond, .factor_s = krylov.create_s + krylov.spectrum_s};
+    uz_amg_info amg = uz_amg_describe(setup->amg);
+    return (uz_factor_info){.bytes = amg.bytes, .rcond = amg.rcond, .factor_s = amg.create_s + amg.spectrum_s};
 }
 
 void uz_report_setup(uz_run *run)

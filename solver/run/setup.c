@@ -177,7 +177,7 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
         uz_setup_free(setup);
         return status;
     }
-    size_t form = setup->krylov ? uz_krylov_describe(setup->krylov).bytes : uz_factor_describe(setup->factor).bytes;
+    size_t form = setup->amg ? uz_amg_describe(setup->amg).bytes : uz_factor_describe(setup->factor).bytes;
     setup->bytes = sizeof *setup + (setup->shared.item ? 0 : form) + setup->dual->bytes;
     if (setup->is_scene)
         setup->bytes += uz_body_model_bytes(&setup->model);
@@ -210,7 +210,7 @@ void uz_setup_free(uz_setup *setup)
     pthread_mutex_destroy(&setup->mutex);
     uz_dual_free(setup->dual);
     uz_shared_factor_release(&setup->shared);
-    uz_krylov_free(setup->krylov);
+    uz_amg_free(setup->amg);
     if (setup->is_scene)
         uz_body_model_clear(&setup->model);
     uz_csc_clear(&setup->no_rows);

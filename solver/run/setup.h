@@ -22,7 +22,7 @@ typedef struct {
     uz_csc N_in;         /* these, where some are left out */
     uz_shared_factor shared;
     const uz_factor *factor; /* shared.factor; NULL: matrix_free */
-    uz_krylov *krylov;       /* matrix_free, else NULL */
+    uz_amg *amg;             /* matrix_free, else NULL */
     uz_dual *dual;
     pthread_mutex_t mutex; /* guards inverse_bound */
     double inverse_bound;  /* NaN until somebody asks */

@@ -63,7 +63,7 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     if (status == UZ_OK && size_r > 0)
         memcpy(answer->r, r, size_r);
     double start = uz_seconds();
-    if (status == UZ_OK && setup->krylov) /* its certificate solves with what a load keeps */
+    if (status == UZ_OK && setup->amg) /* its certificate solves with what a load keeps */
         status = uz_dual_load_create(&run->work.dual, setup->dual, uz_setup_K(setup, asked->problem), run->load.p,
                                      run->load.h, err);
     if (status == UZ_OK && asked->settings->balanced && setup->is_scene)

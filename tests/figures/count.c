@@ -4,7 +4,7 @@
  * one, and a solve with the free dofs' factor as one with the body's: both are upper bounds. */
 #include "factor/factor.h"
 #include "figures/figures.h"
-#include "amg/krylov.h"
+#include "amg/amg.h"
 
 static figure_work counted;
 

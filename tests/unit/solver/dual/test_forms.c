@@ -10,7 +10,7 @@ typedef struct {
     const uz_qp *qp;
     const uz_dual_abilities *can;
     uz_factor *factor;
-    uz_krylov *krylov;
+    uz_amg *amg;
     uz_dual *dual;
     uz_dual_load *load;
     double tolerance; /* of what it answers, relative */
@@ -30,9 +30,9 @@ static void open_subject(subject *s, const uz_qp *qp, int k)
         free(dofs);
     } else {
         CHECK_INT(uz_modes_of_matrix(&modes, &qp->K, &err), UZ_OK);
-        CHECK_INT(uz_krylov_create(&s->krylov, &qp->K, &modes, 0, NULL, &err), UZ_OK);
+        CHECK_INT(uz_amg_create(&s->amg, &qp->K, &modes, 0, NULL, &err), UZ_OK);
     }
-    uz_dual_source source = {s->can->op, &qp->N, s->factor, s->krylov};
+    uz_dual_source source = {s->can->op, &qp->N, s->factor, s->amg};
     CHECK_INT(uz_dual_create(&s->dual, &source, NULL, &err), UZ_OK);
     CHECK_INT(uz_dual_load_create(&s->load, s->dual, &qp->K, qp->p, qp->h, &err), UZ_OK);
     CHECK_INT(uz_dual_load_aim(s->load, 1e-10, NULL, &err), UZ_OK);
@@ -45,7 +45,7 @@ static void close_subject(subject *s)
     uz_dual_load_free(s->load);
     uz_dual_free(s->dual);
     uz_factor_free(s->factor);
-    uz_krylov_free(s->krylov);
+    uz_amg_free(s->amg);
 }
 
 static double dot(const double *a, const double *b, int64_t n)

@@ -1,4 +1,4 @@
-/* krylov.h: linear solves with K without a factor of it: conjugate gradients, preconditioned by multigrid of smoothed
+/* amg.h: linear solves with K without a factor of it: conjugate gradients, preconditioned by multigrid of smoothed
  * aggregates (Vanek, Mandel, Brezina, Computing 56 (1996)), and a bound on the spectrum that makes their residuals
  * bounds on their errors.
  *
@@ -9,8 +9,8 @@
  *
  * Nothing here keeps a pointer to K: it is handed to every call, so that an object may outlive the K it was made of as
  * long as the next one has the same numbers. */
-#ifndef UZ_KRYLOV_H
-#define UZ_KRYLOV_H
+#ifndef UZ_AMG_H
+#define UZ_AMG_H
 
 #include "core/hooks.h"
 #include "uzawa.h"
@@ -94,7 +94,7 @@ uz_status uz_cg_solve(uz_cg_info *info, double *x, uz_cg *cg, const uz_csc *K, c
 
 /* ---------------------------------------------------------------- the whole */
 
-typedef struct uz_krylov uz_krylov; /* immutable after creation: shared by any number of threads */
+typedef struct uz_amg uz_amg; /* immutable after creation: shared by any number of threads */
 
 typedef struct {
     int levels;
@@ -104,21 +104,21 @@ typedef struct {
     double create_s;    /* seconds of the multigrid */
     double spectrum_s;  /* and of the bounds */
     int64_t iterations; /* that the bound on the spectrum took */
-} uz_krylov_info;
+} uz_amg_info;
 
 /* Takes the content of *modes, also on failure. Errors as uz_multigrid_create; NOT_SPD also where K is singular to
  * working precision. */
-uz_status uz_krylov_create(uz_krylov **out, const uz_csc *K, uz_modes *modes, size_t memory_limit,
-                           const uz_hooks *hooks, uz_error *err);
-void uz_krylov_free(uz_krylov *krylov);
-uz_krylov_info uz_krylov_describe(const uz_krylov *krylov);
-const uz_multigrid *uz_krylov_multigrid(const uz_krylov *krylov);
-const uz_modes *uz_krylov_modes(const uz_krylov *krylov);
+uz_status uz_amg_create(uz_amg **out, const uz_csc *K, uz_modes *modes, size_t memory_limit, const uz_hooks *hooks,
+                        uz_error *err);
+void uz_amg_free(uz_amg *amg);
+uz_amg_info uz_amg_describe(const uz_amg *amg);
+const uz_multigrid *uz_amg_multigrid(const uz_amg *amg);
+const uz_modes *uz_amg_modes(const uz_amg *amg);
 
 /* *value >= e'K^-1 e, and sharp to a hundredth unless hooks or the deadline cut it short; e (n) becomes K^-1 e, about.
  * cg: of the whole multigrid. */
-uz_status uz_krylov_inverse_norm(double *value, double *e, const uz_krylov *krylov, uz_cg *cg, const uz_csc *K,
-                                 const uz_hooks *hooks, double deadline, uz_error *err);
+uz_status uz_amg_inverse_norm(double *value, double *e, const uz_amg *amg, uz_cg *cg, const uz_csc *K,
+                              const uz_hooks *hooks, double deadline, uz_error *err);
 
 /* The root of what rounding may have made negative; INFINITY of what is no number, so that overflow never looks like 0.
  */
@@ -129,7 +129,7 @@ static inline double uz_root(double square)
     return square > 0.0 ? sqrt(square) : 0.0;
 }
 
-/* Predicted bytes of a uz_krylov for a matrix of n dofs and nnz entries in its lower triangle. */
-double uz_krylov_predict_bytes(int64_t n, int64_t nnz, int modes);
+/* Predicted bytes of a uz_amg for a matrix of n dofs and nnz entries in its lower triangle. */
+double uz_amg_predict_bytes(int64_t n, int64_t nnz, int modes);
 
 #endif

@@ -2,15 +2,15 @@
 #include "brick.h"
 #include "factor/factor.h"
 #include "harness.h"
-#include "amg/krylov.h"
+#include "amg/amg.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
 
 /* A matrix, its modes, and both ways to solve with it. */
 typedef struct {
     uz_csc K;
-    uz_krylov *krylov;
-    uz_krylov_info info;
+    uz_amg *amg;
+    uz_amg_info info;
     uz_cg cg;
     uz_factor *factor;
     uz_factor_workspace *ws;
@@ -27,10 +27,10 @@ static bool open_pair(pair *p, uz_csc *K, uz_modes *modes, uz_error *err)
     memset(p, 0, sizeof *p);
     p->K = *K;
     memset(K, 0, sizeof *K);
-    if (uz_krylov_create(&p->krylov, &p->K, modes, 0, NULL, err) != UZ_OK)
+    if (uz_amg_create(&p->amg, &p->K, modes, 0, NULL, err) != UZ_OK)
         return false;
-    p->info = uz_krylov_describe(p->krylov);
-    CHECK(uz_cg_init(&p->cg, uz_krylov_multigrid(p->krylov), NULL, p->K.cols, err) == UZ_OK);
+    p->info = uz_amg_describe(p->amg);
+    CHECK(uz_cg_init(&p->cg, uz_amg_multigrid(p->amg), NULL, p->K.cols, err) == UZ_OK);
     CHECK(uz_factor_plain(&p->factor, &p->K, UZ_ORDERING_AUTO, 0, NULL, err) == UZ_OK);
     p->ws = uz_factor_workspace_new();
     return true;
@@ -39,7 +39,7 @@ static bool open_pair(pair *p, uz_csc *K, uz_modes *modes, uz_error *err)
 static void close_pair(pair *p)
 {
     uz_cg_clear(&p->cg);
-    uz_krylov_free(p->krylov);
+    uz_amg_free(p->amg);
     uz_factor_workspace_free(p->ws);
     uz_factor_free(p->factor);
     uz_csc_clear(&p->K);
@@ -156,7 +156,7 @@ static void check_norm(pair *p)
     memcpy(w, e, (size_t)n * sizeof *w);
     solve_exactly(p, w);
     double exact = dot(e, w, n);
-    CHECK(uz_krylov_inverse_norm(&value, e, p->krylov, &p->cg, &p->K, NULL, INFINITY, &err) == UZ_OK);
+    CHECK(uz_amg_inverse_norm(&value, e, p->amg, &p->cg, &p->K, NULL, INFINITY, &err) == UZ_OK);
     CHECK_MSG(value >= exact * (1.0 - 1e-12) && value <= 1.02 * exact, "%.17g for %.17g", value, exact);
     free(e);
     free(w);
@@ -286,13 +286,13 @@ TEST(modes_of_a_free_body_meet_no_resistance)
 static uz_status refusal(brick *b, bool with_mesh, uz_error *err)
 {
     uz_modes modes;
-    uz_krylov *krylov = NULL;
+    uz_amg *amg = NULL;
     uz_status status = with_mesh ? uz_modes_of_body(&modes, b->xyz, b->dof, b->n_nodes, 3, b->d, err)
                                  : uz_modes_of_matrix(&modes, &b->K, err);
     CHECK(status == UZ_OK);
-    status = uz_krylov_create(&krylov, &b->K, &modes, 0, NULL, err);
-    CHECK(krylov == NULL);
-    uz_krylov_free(krylov);
+    status = uz_amg_create(&amg, &b->K, &modes, 0, NULL, err);
+    CHECK(amg == NULL);
+    uz_amg_free(amg);
     return status;
 }
 
@@ -333,7 +333,7 @@ TEST(held_dofs)
         held[j] = j % 7 == 0 || (j > n / 2 && j < n / 2 + 40);
         x[j] = held[j] ? 5.0 : 0.0;
     }
-    CHECK(uz_multigrid_create(&mg, &p.K, uz_krylov_modes(p.krylov), held, 0, NULL, &err) == UZ_OK);
+    CHECK(uz_multigrid_create(&mg, &p.K, uz_amg_modes(p.amg), held, 0, NULL, &err) == UZ_OK);
     CHECK(uz_cg_init(&cg, mg, held, n, &err) == UZ_OK);
     uz_cg_stop stop = {.relative = 1e-10, .max_iterations = 200, .deadline = INFINITY};
     CHECK(uz_cg_solve(&info, x, &cg, &p.K, b, &stop, &err) == UZ_OK);
@@ -363,10 +363,10 @@ TEST(memory_is_bounded)
 {
     brick b = brick_make((int64_t[]){9, 9, 9}, (double[]){1, 1, 1}, 0.3, true);
     uz_modes modes;
-    uz_krylov *krylov = NULL;
+    uz_amg *amg = NULL;
     uz_error err = {0};
     CHECK(uz_modes_of_body(&modes, b.xyz, b.dof, b.n_nodes, 3, b.d, &err) == UZ_OK);
-    CHECK_INT(uz_krylov_create(&krylov, &b.K, &modes, 100000, NULL, &err), UZ_ERR_LIMIT);
-    CHECK(krylov == NULL && strstr(err.message, "100000") != NULL);
+    CHECK_INT(uz_amg_create(&amg, &b.K, &modes, 100000, NULL, &err), UZ_ERR_LIMIT);
+    CHECK(amg == NULL && strstr(err.message, "100000") != NULL);
     brick_free(&b);
 }
