@@ -139,7 +139,7 @@ $(BUILD)/obj/%.o: %.c
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS_ALL) $(if $(filter tests/%,$<),-Itests -Itests/support) -c -o $@ $<
 
-# Contraction only saves roundings there; the twofold arithmetic of certificates must never have it.
+# Contraction only saves roundings there; the double-double arithmetic of certificates must never have it.
 $(call obj,solver/factor/blocked.c solver/factor/single.c solver/element/strain_lanes.c solver/assembly/stress_lanes.c): CFLAGS += -ffp-contract=fast
 # Short loops of known length around the registers are unrolled.
 $(call obj,solver/factor/single.c solver/assembly/stiffness.c solver/assembly/stress_lanes.c $(wildcard solver/element/*.c solver/post/*.c) solver/io/vtu.c): CFLAGS += -O3

@@ -5,7 +5,7 @@
 #include <float.h>
 #include <math.h>
 
-#define TWOFOLD_ROUNDING 0x1p-98
+#define DOUBLE_DOUBLE_ROUNDING 0x1p-98
 
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 typedef int64_t bits __attribute__((vector_size(32), aligned(8), may_alias));
@@ -118,7 +118,7 @@ double uz_bound_doubt(double spread, double rcond, int64_t d)
 
 double uz_bound_noise(double spread, double sum)
 {
-    return TWOFOLD_ROUNDING * sqrt((1.0 + spread) * sum);
+    return DOUBLE_DOUBLE_ROUNDING * sqrt((1.0 + spread) * sum);
 }
 
 double uz_bound_enlarge(double square, double doubt, double noise)

@@ -22,7 +22,7 @@ typedef struct {
 void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasible, const double *r, const double *g,
                        const double *h, int64_t m);
 
-/* e'K^-1 e, enlarged by what the rounding of the factor (relative part `doubt`) and of twofold sums (see
+/* e'K^-1 e, enlarged by what the rounding of the factor (relative part `doubt`) and of double-double sums (see
  * uz_bound_noise) may hide of it. */
 double uz_bound_enlarge(double square, double doubt, double noise);
 
@@ -32,7 +32,7 @@ double uz_bound_enlarge(double square, double doubt, double noise);
  * of that, where an estimate of the condition from the factor's diagonal is short by up to 3e5. */
 double uz_bound_doubt(double spread, double rcond, int64_t d);
 
-/* What the rounding of twofold sums may hide of e, in the norm of K^-1: it matters only where rounding hit u* by
+/* What the rounding of double-double sums may hide of e, in the norm of K^-1: it matters only where rounding hit u* by
  * chance. sum: of u_j^2 K_jj + (|K u|_j + |p_j|)^2 / K_jj. */
 double uz_bound_noise(double spread, double sum);
 

@@ -4,7 +4,7 @@
 #include "certificate/feasible.h"
 #include "certificate/one_sided.h"
 #include "certificate/residual.h"
-#include "certificate/twofold.h"
+#include "certificate/double_double.h"
 #include "core/alloc.h"
 #include "core/cpu.h"
 #include "core/error.h"
@@ -202,18 +202,18 @@ static void add_up(certifier *c, uz_bound_terms *t)
     t->span = uz_bound_largest(c->Nt.val, c->Nt.ptr[c->m]) * uz_bound_largest(c->u, c->d);
 }
 
-static void add_dot(twofold *sum, double factor, const double *x, const double *y, int64_t n)
+static void add_dot(double_double *sum, double factor, const double *x, const double *y, int64_t n)
 {
     for (int64_t i = 0; i < n; i++)
-        twofold_add_product(&sum->hi, &sum->lo, factor * x[i], y[i], 0);
+        dd_add_product(&sum->hi, &sum->lo, factor * x[i], y[i], 0);
 }
 
-/* u'Ku = u'e_u + u'p + r'N u with e_u = K u - p - N'r, which is known in twofold precision, and N u = h - g. */
+/* u'Ku = u'e_u + u'p + r'N u with e_u = K u - p - N'r, which is known in double-double precision, and N u = h - g. */
 static void sharpen_energies(const certifier *c, uz_bound_terms *t, const double *r, const double *g)
 {
-    twofold load = {0.0, 0.0};
+    double_double load = {0.0, 0.0};
     add_dot(&load, 1.0, c->u, c->in->p, c->d);
-    twofold stiffness = load;
+    double_double stiffness = load;
     add_dot(&stiffness, 1.0, c->u, c->res.e_u, c->d);
     add_dot(&stiffness, 1.0, r, c->in->h, c->m);
     add_dot(&stiffness, -1.0, r, g, c->m);
@@ -237,7 +237,7 @@ static uz_status measure(certifier *c, uz_certificate *out, const double *r, dou
     if (status != UZ_OK)
         return status;
     add_up(c, &terms);
-    if (c->in->twofold_energies && isfinite(terms.stiffness) && isfinite(terms.load))
+    if (c->in->precise_energies && isfinite(terms.stiffness) && isfinite(terms.load))
         sharpen_energies(c, &terms, r, g);
     if (feasible)
         status = distance(c, &terms.square, err);

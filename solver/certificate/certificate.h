@@ -12,7 +12,7 @@
  * error, times a reaction, under the root would limit every certificate to the root of the machine precision. So v is
  * u + c with a correction c of its own, as small as rounding where u is good, that lifts every negative gap and closes
  * the gaps of the rows in contact; u itself is then at most ||c||_K further away. Residuals and gaps are computed in
- * twofold precision: their rounding is far below that of u. */
+ * double-double precision: their rounding is far below that of u. */
 #ifndef UZ_CERTIFICATE_H
 #define UZ_CERTIFICATE_H
 
@@ -30,7 +30,8 @@ typedef struct {
     double rcond;         /* of K: how far inverse_norm may be trusted */
     double inverse_bound; /* e'K^-1 e <= inverse_bound sum e_j^2 / K_jj; INFINITY: unknown. Spares inverse_norm where it
                              is sharp enough: */
-    bool twofold_energies; /* u'Ku and u'p in twofold precision too: what is shown, not what is bounded, needs it */
+    bool precise_energies; /* u'Ku and u'p in double-double precision too: what is shown, not what is bounded, needs it
+                            */
     bool moved;            /* supports move the body; relative errors are then beside */
     double whole_norm;     /* ||u||_K with the supported dofs */
     double sharp;          /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */

@@ -14,7 +14,8 @@
 
 enum { LEAST_ROUNDS = 2, CLOSING_ROUNDS = 8, MAX_ROUNDS = 40 };
 
-/* Twofold arithmetic carries about 100 bits: a violation of the constraints by 2^-80 of their size is rounding. */
+/* Double-double arithmetic carries about 100 bits: a violation of the constraints by 2^-80 of their size is rounding.
+ */
 #define NEGLIGIBLE 0x1p-80
 
 /* Corrections up to this many times as large, squared, as the moves of single rows are taken. */
@@ -123,8 +124,8 @@ static double choose_rows(const uz_feasible *c, const double *r, bool closing)
 }
 
 /* Rounds of equations from round `first` on: until CLOSING_ROUNDS gaps are closed, later penetrating rows are only
- * lifted. Each round starts from gaps in twofold precision, so what rounding left is moved by the next. True when no
- * gap of u + c is negative by more than the rounding of twofold arithmetic. */
+ * lifted. Each round starts from gaps in double-double precision, so what rounding left is moved by the next. True when
+ * no gap of u + c is negative by more than the rounding of double-double arithmetic. */
 static bool move_rows(uz_feasible *c, const double *r, int first, int last)
 {
     for (int round = first; round < last; round++) {

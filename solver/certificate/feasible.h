@@ -25,7 +25,7 @@ bool uz_feasible_init(uz_feasible *f, const uz_csc *Nt, const double *weight);
 void uz_feasible_clear(uz_feasible *f);
 
 /* Fills the correction: it lifts the negative gaps of u and closes those of the rows where r (m) makes that worth
- * while. true: no gap of u + c is negative by more than the rounding of twofold arithmetic. */
+ * while. true: no gap of u + c is negative by more than the rounding of double-double arithmetic. */
 bool uz_make_feasible(uz_feasible *f, const double *r);
 /* g_i(u + c) */
 double uz_feasible_gap(const uz_feasible *f, int64_t i);

@@ -1,7 +1,7 @@
 #include "certificate/infeasible.h"
 
 #include "certificate/one_sided.h"
-#include "certificate/twofold.h"
+#include "certificate/double_double.h"
 
 #include <float.h>
 #include <math.h>
@@ -13,20 +13,20 @@
 /* The radius, and whether N'y is no more than the rounding of y in each dof. */
 static double measure_ray(bool *rounded, const double *y, const uz_csc *N, const double *h)
 {
-    twofold work = {0};
+    double_double work = {0};
     double size = 0.0, residual = 0.0;
     *rounded = true;
     if (!uz_is_ray_direction(y, N->rows))
         return 0.0;
     for (int64_t i = 0; i < N->rows; i++) {
-        twofold_add_product(&work.hi, &work.lo, h[i], y[i], 0);
+        dd_add_product(&work.hi, &work.lo, h[i], y[i], 0);
         size += fabs(h[i] * y[i]);
     }
     for (int64_t j = 0; j < N->cols; j++) {
-        twofold sum = {0};
+        double_double sum = {0};
         double terms = 0.0;
         for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++) {
-            twofold_add_product(&sum.hi, &sum.lo, N->val[k], y[N->idx[k]], 0);
+            dd_add_product(&sum.hi, &sum.lo, N->val[k], y[N->idx[k]], 0);
             terms += fabs(N->val[k] * y[N->idx[k]]);
         }
         residual += fabs(sum.hi + sum.lo);

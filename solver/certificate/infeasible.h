@@ -9,7 +9,7 @@
 #include "uzawa.h"
 
 /* The radius (length; INFINITY for an exact ray) within which y proves that nothing is feasible; 0: it proves nothing.
- * Twofold precision, original data. N: m x d. */
+ * Double-double precision, original data. N: m x d. */
 double uz_ray_radius(const double *y, const uz_csc *N, const double *h);
 
 /* How large displacements of this problem are at all, from its gaps: max over rows of (|h_i| + |g_i|) / max_j |N_ij|.

@@ -5,7 +5,7 @@
 #include "certificate/feasible.h"
 #include "certificate/one_sided.h"
 #include "certificate/residual.h"
-#include "certificate/twofold.h"
+#include "certificate/double_double.h"
 #include "core/alloc.h"
 #include "core/cpu.h"
 #include "core/error.h"
@@ -166,7 +166,7 @@ void uz_lane_certifier_free(uz_lane_certifier *c)
     free(c);
 }
 
-/* hi + lo += a x, lane by lane: twofold_add_product of twofold.h. */
+/* hi + lo += a x, lane by lane: dd_add_product of double_double.h. */
 static inline __attribute__((always_inline)) void add_product(lanes *hi, lanes *lo, double a, const lanes *x, int fused)
 {
     const lanes product = a * *x;

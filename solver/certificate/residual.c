@@ -1,10 +1,10 @@
 /* residual.c: one pass over K, in registers of two and four lanes.
  *
  * The dofs of a node stand together, and so do those of nodes in a row of a mesh: the rows that a column meets come in
- * runs, and what is done to a run is done in lanes. Sums in lanes are twofold too, and are added up as such. */
+ * runs, and what is done to a run is done in lanes. Sums in lanes are double-double too, and are added up as such. */
 #include "certificate/residual.h"
 
-#include "certificate/twofold.h"
+#include "certificate/double_double.h"
 #include "core/alloc.h"
 #include "core/cpu.h"
 #include "core/error.h"
@@ -21,7 +21,7 @@ typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 #define LOW_HALF(x)   __builtin_shufflevector(x, x, 0, 1)
 #define HIGH_HALF(x)  __builtin_shufflevector(x, x, 2, 3)
 
-/* twofold_add_product, lane by lane. */
+/* dd_add_product, lane by lane. */
 static inline __attribute__((always_inline)) void add_product4(four *hi, four *lo, const four *a, const four *b,
                                                                int fused)
 {
@@ -47,7 +47,7 @@ static inline __attribute__((always_inline)) void add_product2(two *hi, two *lo,
     *hi = sum;
 }
 
-/* twofold_add, lane by lane. */
+/* dd_add, lane by lane. */
 static inline __attribute__((always_inline)) void add4(four *hi, four *lo, const four *x)
 {
     const four sum = *hi + *x, back = sum - *hi;
@@ -82,8 +82,8 @@ typedef struct {
 static inline __attribute__((always_inline)) void take_one(row_sums *s, const product_of *q, const double *val,
                                                            int64_t i, double x_j, int fused)
 {
-    twofold_add_product(&s->hi, &s->lo, *val, q->x[i], fused);
-    twofold_add_product(&q->hi[i], &q->lo[i], *val, x_j, fused);
+    dd_add_product(&s->hi, &s->lo, *val, q->x[i], fused);
+    dd_add_product(&q->hi[i], &q->lo[i], *val, x_j, fused);
 }
 
 static inline __attribute__((always_inline)) void take_two(row_sums *s, const product_of *q, const double *val,
@@ -115,9 +115,9 @@ static inline __attribute__((always_inline)) void add_lanes(const product_of *q,
     two hi = LOW_HALF(s->hi4), lo = (LOW_HALF(s->lo4) + HIGH_HALF(s->lo4)) + s->lo2;
     add2(&hi, &lo, &high);
     add2(&hi, &lo, &s->hi2);
-    twofold sum = {s->hi, s->lo + (lo[0] + lo[1])};
-    twofold_add(&sum, hi[0]);
-    twofold_add(&sum, hi[1]);
+    double_double sum = {s->hi, s->lo + (lo[0] + lo[1])};
+    dd_add(&sum, hi[0]);
+    dd_add(&sum, hi[1]);
     q->hi[j] = sum.hi;
     q->lo[j] = sum.lo;
 }
@@ -172,7 +172,7 @@ static inline __attribute__((always_inline)) void take_column(const product_of *
     row_sums s = {.hi = q->hi[j], .lo = q->lo[j]};
     int64_t k = A->ptr[j];
     if (k < A->ptr[j + 1] && A->idx[k] == j)
-        twofold_add_product(&s.hi, &s.lo, A->val[k++], q->x[j], fused);
+        dd_add_product(&s.hi, &s.lo, A->val[k++], q->x[j], fused);
     take_runs(&s, q, k, A->ptr[j + 1], q->x[j], fused);
     add_lanes(q, j, &s);
 }
@@ -300,12 +300,12 @@ static inline __attribute__((always_inline)) void symmetric_product(const produc
 static inline __attribute__((always_inline)) void finish_row(const uz_residuals *out, int64_t j, const double *lo,
                                                              const uz_csc *N, const double *p, const double *r)
 {
-    twofold sum = {out->Ku[j], lo[j]};
-    twofold_add(&sum, -p[j]);
+    double_double sum = {out->Ku[j], lo[j]};
+    dd_add(&sum, -p[j]);
     for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
-        twofold_add_product(&sum.hi, &sum.lo, -N->val[k], r[N->idx[k]], 0);
+        dd_add_product(&sum.hi, &sum.lo, -N->val[k], r[N->idx[k]], 0);
     out->e_u[j] = sum.hi + sum.lo;
-    twofold_add(&sum, out->Kc[j]);
+    dd_add(&sum, out->Kc[j]);
     out->e[j] = sum.hi + sum.lo;
     out->Ku[j] += lo[j];
 }
@@ -382,11 +382,11 @@ uz_status uz_equilibrium_residual(uz_residuals *out, const uz_csc *K, const uz_c
 
 double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u, const double *c)
 {
-    twofold sum = {h[i], 0.0};
+    double_double sum = {h[i], 0.0};
     for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++) {
-        twofold_add_product(&sum.hi, &sum.lo, -Nt->val[k], u[Nt->idx[k]], 0);
+        dd_add_product(&sum.hi, &sum.lo, -Nt->val[k], u[Nt->idx[k]], 0);
         if (c)
-            twofold_add_product(&sum.hi, &sum.lo, -Nt->val[k], c[Nt->idx[k]], 0);
+            dd_add_product(&sum.hi, &sum.lo, -Nt->val[k], c[Nt->idx[k]], 0);
     }
     return sum.hi + sum.lo;
 }

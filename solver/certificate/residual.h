@@ -1,4 +1,4 @@
-/* residual.h: residuals of the original data in twofold precision. */
+/* residual.h: residuals of the original data in double-double precision. */
 #ifndef UZ_RESIDUAL_H
 #define UZ_RESIDUAL_H
 
@@ -21,8 +21,8 @@ static inline double uz_dof_weight(const uz_csc *K, int64_t j)
     return diagonal ? 1.0 / K->val[first] : 1.0;
 }
 
-/* h_i - n_i'(u + c) for row i of N, given as column i of N'; c NULL: zero. One twofold sum from the original data: a
- * gap rounded before c is taken away would hide contradictions as large as its rounding. */
+/* h_i - n_i'(u + c) for row i of N, given as column i of N'; c NULL: zero. One double-double sum from the original
+ * data: a gap rounded before c is taken away would hide contradictions as large as its rounding. */
 double uz_gap_of_row(const uz_csc *Nt, int64_t i, const double *h, const double *u, const double *c);
 
 #endif

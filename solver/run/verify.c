@@ -71,7 +71,7 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
     if (status == UZ_OK)
         status = uz_run_certify_input(&input, run, answer, err);
     if (status == UZ_OK) {
-        input.twofold_energies = true;
+        input.precise_energies = true;
         status = uz_certify(&answer->certificate, answer->r, answer->g, answer->u, &input, err);
     }
     summary->timings.certify = uz_seconds() - start;

@@ -21,7 +21,7 @@ typedef struct {
     double *z, *image; /* d, m: z and N z; zero but for the dofs and rows that are listed */
     double *Kz;        /* d */
     int64_t *dof, n_dof, *row, n_row;
-    double *force; /* d: K u - p - N'r in twofold precision */
+    double *force; /* d: K u - p - N'r in double-double precision */
     uz_row_move move;
 } prover;
 

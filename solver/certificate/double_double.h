@@ -1,11 +1,11 @@
-/* twofold.h: sums of products with about twice the precision of a double, as an unevaluated pair hi + lo
+/* double_double.h: sums of products with about twice the precision of a double, as an unevaluated pair hi + lo
  * (Ogita, Rump, Oishi, "Accurate sum and dot product", SIAM J. Sci. Comput. 26 (2005): TwoSum, TwoProduct, Dot2). */
-#ifndef UZ_TWOFOLD_H
-#define UZ_TWOFOLD_H
+#ifndef UZ_DOUBLE_DOUBLE_H
+#define UZ_DOUBLE_DOUBLE_H
 
 typedef struct {
     double hi, lo;
-} twofold;
+} double_double;
 
 /* a * b = product + error exactly, barring under- and overflow: Dekker's splitting, for processors without FMA. */
 static inline double product_error_split(double a, double b, double product)
@@ -17,8 +17,7 @@ static inline double product_error_split(double a, double b, double product)
 }
 
 /* s += a * b; fused: the processor has FMA and the caller is compiled for it. */
-static inline __attribute__((always_inline)) void twofold_add_product(double *hi, double *lo, double a, double b,
-                                                                      int fused)
+static inline __attribute__((always_inline)) void dd_add_product(double *hi, double *lo, double a, double b, int fused)
 {
     double product = a * b;
     double error = fused ? __builtin_fma(a, b, -product) : product_error_split(a, b, product);
@@ -27,7 +26,7 @@ static inline __attribute__((always_inline)) void twofold_add_product(double *hi
     *hi = sum;
 }
 
-static inline void twofold_add(twofold *s, double x)
+static inline void dd_add(double_double *s, double x)
 {
     double sum = s->hi + x, back = sum - s->hi;
     s->lo += (s->hi - (sum - back)) + (x - back);
