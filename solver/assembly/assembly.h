@@ -44,7 +44,7 @@ typedef struct {
     uz_csc N;       /* m x d */
     uz_csc K_fixed; /* d x n_fixed: what supported dofs do to free ones; p loses K_fixed times the prescribed values */
     int64_t *dof;   /* n_nodes x dim: number of a free dof, or -1 - k for supported dof k */
-    int64_t *frame_of; /* n_nodes: 1 + place in info.turned_node, <= 0: along the axes. NULL: all of them are */
+    int64_t *frame_of; /* n_nodes: 1 + place in info.rotated_node, <= 0: along the axes. NULL: all of them are */
     uz_mesh mesh;
     uz_mesh_info info; /* as uz_scene_to_qp gives it; its xyz is the mesh's own array */
     uz_model kind;
@@ -123,7 +123,7 @@ uz_status uz_nodal_loads(double *f, const uz_body_model *model, const uz_scene *
  * where they are. Less the loads and the springs' -k u it is what supports and obstacles do. */
 uz_status uz_internal_forces(double *f, const uz_body_model *model, const double *nodal, uz_error *err);
 
-/* 1/2 u'K u over all dofs, springs included. carried: rigid motion may be most of u; elements are then turned back one
+/* 1/2 u'K u over all dofs, springs included. carried: rigid motion may be most of u; elements are then rotated back one
  * by one, so that its rounding is none of the energy. */
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried,
                            uz_error *err);
@@ -138,7 +138,7 @@ uz_status uz_whole_norm(double *norm, const uz_body_model *model, const double *
 /* What turning a vector at a node from its dofs to the axes may round in each component: 0 where they are the same. */
 double uz_turning_error(const uz_body_model *model, int64_t node, const double *v);
 /* A bound on delta' K delta, over all dofs, for the errors delta that turning leaves in nodal (n_nodes x dim): the sum
- * of |delta|'|ke||delta| over the elements with turned nodes, springs included. */
+ * of |delta|'|ke||delta| over the elements with rotated nodes, springs included. */
 uz_status uz_turning_energy(double *energy, const uz_body_model *model, const double *nodal, uz_error *err);
 
 /* Copies what a result shows of the mesh: not the frames, as a result speaks of x and y only. */

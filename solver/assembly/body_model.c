@@ -20,7 +20,7 @@ void uz_mesh_info_clear(uz_mesh_info *info)
     free(info->contact_normal);
     free(info->contact_of);
     free(info->contact_face);
-    free(info->turned_node);
+    free(info->rotated_node);
     free(info->frame);
     memset(info, 0, sizeof *info);
 }
@@ -73,7 +73,7 @@ size_t uz_body_model_bytes(const uz_body_model *model)
     bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
     bytes +=
         8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
-    bytes += (size_t)model->info.n_turned * 8 * (1 + dim * dim) + rows * 8 * (4 + dim + (model->row_ends ? 2 : 0));
+    bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim) + rows * 8 * (4 + dim + (model->row_ends ? 2 : 0));
     for (int64_t k = 0; k < model->n_sites; k++) {
         const uz_contact_sites *s = &model->sites[k];
         const size_t n = (size_t)s->n;

@@ -6,7 +6,7 @@
  *     g(u) = gap + n . (offset + sum_j D_j u_j - sum_k M_k u_k) >= 0,
  *
  * with one D_j = 1 for a node against a face or an obstacle; rows of a mortar method couple several. Only nodes and
- * vectors in space are spoken of here: contact_rows.c puts in which dofs are free and how they are turned, and makes N
+ * vectors in space are spoken of here: contact_rows.c puts in which dofs are free and how they are rotated, and makes N
  * and h. How to add one: docs/architecture/contact-discretization.md. */
 #ifndef UZ_DISCRETIZATION_H
 #define UZ_DISCRETIZATION_H

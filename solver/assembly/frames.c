@@ -1,7 +1,7 @@
 /* frames.c: directions of the dofs of nodes.
  *
  * A support along an inclined normal holds one displacement of a node, a rigid obstacle bounds one. Where this is not
- * an axis, the node's free dofs are turned into the normal and tangents, so that the held direction is a dof, or the
+ * an axis, the node's free dofs are rotated into the normal and tangents, so that the held direction is a dof, or the
  * row of N has one entry and the contact one dof per node. Supports turn first, one after the other; a contact turns
  * what they have left. With n the normal on the node's free directions, of unit length there, k its largest component
  * and s the sign of n_k, H = I - w w' / (1 + |n_k|),   w = n + s e_k,   H e_k = -s n (Householder; Golub and Van Loan,
@@ -75,7 +75,7 @@ static void turn_lines(double *ke, int lines, int line, int step, const double *
     }
 }
 
-bool uz_is_turned_element(const uz_body_model *model, int64_t element)
+bool uz_is_rotated_element(const uz_body_model *model, int64_t element)
 {
     int corners;
     const int64_t *corner = uz_mesh_element(&model->mesh, element, &corners);
@@ -131,9 +131,9 @@ static void turn_node(uz_body_model *model, int64_t node, const double n[3], int
     double H[9] = {0}, Q[9] = {0};
     fill_frame(H, n, k, dim);
     if (model->frame_of[node] <= 0) {
-        memcpy(info->frame + info->n_turned * dim * dim, H, (size_t)(dim * dim) * sizeof *H);
-        info->turned_node[info->n_turned] = node;
-        model->frame_of[node] = ++info->n_turned;
+        memcpy(info->frame + info->n_rotated * dim * dim, H, (size_t)(dim * dim) * sizeof *H);
+        info->rotated_node[info->n_rotated] = node;
+        model->frame_of[node] = ++info->n_rotated;
         return;
     }
     double *frame = info->frame + (model->frame_of[node] - 1) * dim * dim;
@@ -185,11 +185,11 @@ uz_status uz_reserve_frames(uz_body_model *model, int64_t more, uz_error *err)
 {
     const int dim = model->mesh.dim;
     uz_mesh_info *info = &model->info;
-    const int64_t most = info->n_turned + more < model->mesh.n_nodes ? info->n_turned + more : model->mesh.n_nodes;
+    const int64_t most = info->n_rotated + more < model->mesh.n_nodes ? info->n_rotated + more : model->mesh.n_nodes;
     if (!model->frame_of)
         model->frame_of = uz_alloc_zero(model->mesh.n_nodes, sizeof *model->frame_of);
-    int64_t *node = model->frame_of ? uz_realloc(info->turned_node, most, sizeof *node) : NULL;
-    info->turned_node = node ? node : info->turned_node;
+    int64_t *node = model->frame_of ? uz_realloc(info->rotated_node, most, sizeof *node) : NULL;
+    info->rotated_node = node ? node : info->rotated_node;
     double *frame = node ? uz_realloc(info->frame, most * dim * dim, sizeof *frame) : NULL;
     info->frame = frame ? frame : info->frame;
     if (!frame)
@@ -201,7 +201,7 @@ uz_status uz_reserve_frames(uz_body_model *model, int64_t more, uz_error *err)
 static uz_status count_candidates(int64_t *most, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const int dim = model->mesh.dim;
-    bool oblique = model->info.n_turned > 0;
+    bool oblique = model->info.n_rotated > 0;
     *most = 0;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
         double normal[3];

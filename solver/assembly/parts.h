@@ -36,21 +36,22 @@ uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err);
  * of. The caller frees *modes, NULL when there are none. */
 uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *model, uz_error *err);
 
-/* Room for `more` turned nodes. */
+/* Room for `more` rotated nodes. */
 uz_status uz_reserve_frames(uz_body_model *model, int64_t more, uz_error *err);
-/* Which dof of the node is along n? Its free dofs are turned where none is; -1: held dofs span n already. */
+/* Which dof of the node is along n? Its free dofs are rotated where none is; -1: held dofs span n already. */
 int uz_hold_direction(uz_body_model *model, int64_t node, const double n[3]);
-/* mesh, dof -> frame_of, info.turned_node, info.frame: directions of the dofs of contact nodes. */
+/* mesh, dof -> frame_of, info.rotated_node, info.frame: directions of the dofs of contact nodes. */
 uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error *err);
-/* The dim x dim matrix of a node whose dofs are turned, its rows their directions; NULL: they are along the axes. */
+/* The dim x dim matrix of a node whose dofs are rotated, its rows their directions; NULL: they are along the axes. */
 const double *uz_node_frame(const uz_body_model *model, int64_t node);
 /* A vector at a node (dim) along the directions of the node's dofs, and back in place. */
 void uz_to_frame(double out[3], const uz_body_model *model, int64_t node, const double v[3]);
 void uz_from_frame(double v[3], const uz_body_model *model, int64_t node);
-/* A unit vector along the free dofs of a node: 0 for held ones, and where a turned dof has a share by rounding only. */
+/* A unit vector along the free dofs of a node: 0 for held ones, and where a rotated dof has a share by rounding only.
+ */
 void uz_free_shares(double share[3], const uz_body_model *model, int64_t node, const double n[3]);
-/* Has the element a node with turned dofs? Its stiffness ke (full, square) then becomes T ke T'. */
-bool uz_is_turned_element(const uz_body_model *model, int64_t element);
+/* Has the element a node with rotated dofs? Its stiffness ke (full, square) then becomes T ke T'. */
+bool uz_is_rotated_element(const uz_body_model *model, int64_t element);
 void uz_turn_element(double *ke, const uz_body_model *model, int64_t element);
 
 /* mesh -> sites, by each contact's discretization (discretization.h). */

@@ -19,8 +19,8 @@ void uz_recover_nodal(double *nodal, const uz_body_model *model, const double *u
         else
             nodal[i] = prescribed ? prescribed[-1 - dof] : 0;
     }
-    for (int64_t i = 0; i < model->info.n_turned; i++)
-        uz_from_frame(nodal + model->info.turned_node[i] * dim, model, model->info.turned_node[i]);
+    for (int64_t i = 0; i < model->info.n_rotated; i++)
+        uz_from_frame(nodal + model->info.rotated_node[i] * dim, model, model->info.rotated_node[i]);
 }
 
 void uz_restrict_nodal(double *u, const uz_body_model *model, const double *nodal)
@@ -82,8 +82,8 @@ static void *duplicate(const void *from, int64_t count, size_t size)
 uz_status uz_mesh_info_copy(uz_mesh_info *out, const uz_mesh_info *info, int64_t m, uz_error *err)
 {
     *out = *info;
-    out->n_turned = 0;
-    out->turned_node = NULL;
+    out->n_rotated = 0;
+    out->rotated_node = NULL;
     out->frame = NULL;
     out->xyz = duplicate(info->xyz, info->n_nodes * info->dim, sizeof *info->xyz);
     out->contact_node = duplicate(info->contact_node, m, sizeof *info->contact_node);

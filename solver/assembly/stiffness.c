@@ -197,7 +197,7 @@ static void add_element(uz_body_model *model, const double *ke, int64_t element)
     const int64_t *node = uz_mesh_element(&model->mesh, element, &count);
     const int dim = model->mesh.dim, n = count * dim;
     addition x = {.model = model, .ke = ke, .n = n, .dim = dim};
-    if (uz_is_turned_element(model, element)) {
+    if (uz_is_rotated_element(model, element)) {
         memcpy(turned, ke, (size_t)(n * n) * sizeof *ke);
         uz_turn_element(turned, model, element);
         x.ke = turned;
@@ -299,7 +299,7 @@ static inline __attribute__((always_inline)) void take_relative(double *d, bool 
 /* The same less the rotation that fits it best, which strains nothing either: what it leaves by rounding is eps of its
  * square, while the strain beside it may be a millionth of it. Minimizes sum |d_a - w x x_a|^2, with x and d from the
  * first node. */
-static void take_unturned(double *d, const uz_mesh *mesh, const int64_t *node, int count)
+static void take_unrotated(double *d, const uz_mesh *mesh, const int64_t *node, int count)
 {
     const int dim = mesh->dim;
     double x[UZ_ELEMENT_NODES][3] = {{0}}, u[UZ_ELEMENT_NODES][3] = {{0}}, J[3][3] = {{0}}, w[3] = {0};
@@ -356,7 +356,7 @@ static double energy_any(const uz_body_model *model, const double *ke, const dou
     return product_with(ke, d, count * model->mesh.dim);
 }
 
-static double energy_unturned(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
+static double energy_unrotated(const uz_body_model *model, const double *ke, const double *nodal, int64_t e)
 {
     double d[DOFS];
     int count;
@@ -364,7 +364,7 @@ static double energy_unturned(const uz_body_model *model, const double *ke, cons
     const bool rings = model->kind == UZ_AXISYMMETRIC;
     take_relative(d, rings, nodal, node, count, model->mesh.dim);
     if (!rings)
-        take_unturned(d, &model->mesh, node, count);
+        take_unrotated(d, &model->mesh, node, count);
     return product_with(ke, d, count * model->mesh.dim);
 }
 
@@ -402,10 +402,10 @@ UZ_AVX2_FMA static double energy_quad4_wide(const uz_body_model *model, const do
 uz_status uz_strain_energy(double *energy, const uz_body_model *model, const double *nodal, bool carried, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
-    const energy_of of_any = carried ? energy_unturned : energy_any, of_quad4 = carried ? of_any
-                                                                                : uz_cpu_has_avx2_fma()
-                                                                                    ? energy_quad4_wide
-                                                                                    : energy_quad4;
+    const energy_of of_any = carried ? energy_unrotated : energy_any, of_quad4 = carried ? of_any
+                                                                                 : uz_cpu_has_avx2_fma()
+                                                                                     ? energy_quad4_wide
+                                                                                     : energy_quad4;
     stiffness_source source;
     const double *ke;
     double twice = 0;
@@ -446,7 +446,7 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
         double delta[DOFS];
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
-        if (!uz_is_turned_element(model, e))
+        if (!uz_is_rotated_element(model, e))
             continue;
         status = source_get(&ke, &source, e, err);
         for (int a = 0; a < count; a++)
@@ -455,8 +455,8 @@ uz_status uz_turning_energy(double *energy, const uz_body_model *model, const do
         if (status == UZ_OK)
             *energy += element_energy_bound(ke, delta, count * dim);
     }
-    for (int64_t t = 0; t < model->info.n_turned && model->spring; t++) {
-        const int64_t a = model->info.turned_node[t];
+    for (int64_t t = 0; t < model->info.n_rotated && model->spring; t++) {
+        const int64_t a = model->info.rotated_node[t];
         const double delta = uz_turning_error(model, a, nodal + a * dim);
         for (int c = 0; c < dim; c++)
             *energy += model->spring[a * dim + c] * delta * delta;

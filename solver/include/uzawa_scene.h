@@ -177,9 +177,9 @@ typedef struct {
     double *contact_normal; /* m x dim: unit normal of the obstacle at the contact, pointing towards the body */
     int64_t *contact_of;    /* m: which contact of the scene */
     int64_t *contact_face;  /* m x 2: element and side that the node meets of another part of the body, else -1, -1 */
-    int64_t n_turned;       /* uz_scene_to_qp only: nodes whose dofs are not along the axes */
-    int64_t *turned_node;   /* n_turned */
-    double *frame;          /* n_turned x dim x dim: row c of a node's matrix is the direction of its dof c */
+    int64_t n_rotated;      /* uz_scene_to_qp only: nodes whose dofs are not along the axes */
+    int64_t *rotated_node;  /* n_rotated */
+    double *frame;          /* n_rotated x dim x dim: row c of a node's matrix is the direction of its dof c */
 } uz_mesh_info;
 void uz_mesh_info_clear(uz_mesh_info *info);
 

@@ -144,7 +144,7 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
                                    const uz_method_options *options, uz_history *history, uz_error *err)
 {
     static const uz_end ends[] = {[UZ_EXCHANGE_SOLVED] = UZ_END_SOLVED,
-                                  [UZ_EXCHANGE_BLURRED] = UZ_END_BLURRED,
+                                  [UZ_EXCHANGE_UNDECIDED] = UZ_END_UNDECIDED,
                                   [UZ_EXCHANGE_RAY] = UZ_END_RAY,
                                   [UZ_EXCHANGE_STOPPED] = UZ_END_STALLED};
     uz_stop stop = {options->hooks, options->deadline};

@@ -32,7 +32,7 @@ typedef struct {
     double *incoming;  /* m: D_q */
     double compliance; /* of q while the rows in contact are held */
     bool *barred;      /* m: in contact, or can't be */
-    bool blurred;
+    bool undecided;
     int64_t steps, most;
     const uz_stop *stop;
 } exchange;
@@ -348,7 +348,7 @@ static uz_status admit(exchange *x, int64_t q, bool *proven, double *ray, uz_err
         }
         if (gone < 0) {
             x->s[q] = 0.0;
-            x->barred[q] = x->blurred = true;
+            x->barred[q] = x->undecided = true;
             return look_at_ray(proven, ray, x, q, err);
         }
         advance(x, q, step);
@@ -366,7 +366,7 @@ static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *e
             return UZ_OK;
         int64_t q = choose(x);
         if (q < 0) {
-            *end = x->blurred ? UZ_EXCHANGE_BLURRED : UZ_EXCHANGE_SOLVED;
+            *end = x->undecided ? UZ_EXCHANGE_UNDECIDED : UZ_EXCHANGE_SOLVED;
             return UZ_OK;
         }
         uz_status status = admit(x, q, &proven, ray, err);

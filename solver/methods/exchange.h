@@ -7,10 +7,10 @@
 #include "law/law.h"
 
 typedef enum {
-    UZ_EXCHANGE_SOLVED,  /* the law holds, but for rounding */
-    UZ_EXCHANGE_RAY,     /* `ray` seems to prove that the rows contradict */
-    UZ_EXCHANGE_BLURRED, /* solved but for rows that contradict others by no more than rounding, or nearly so */
-    UZ_EXCHANGE_STOPPED  /* it had to stop, or rounding made the steps go round in circles */
+    UZ_EXCHANGE_SOLVED,    /* the law holds, but for rounding */
+    UZ_EXCHANGE_RAY,       /* `ray` seems to prove that the rows contradict */
+    UZ_EXCHANGE_UNDECIDED, /* solved but for rows that contradict others by no more than rounding, or nearly so */
+    UZ_EXCHANGE_STOPPED    /* it had to stop, or rounding made the steps go round in circles */
 } uz_exchange_end;
 
 /* Goldfarb and Idnani's dual method (Math. Programming 27 (1983)) on psi: a penetrating row q is pressed, rows in

@@ -130,7 +130,7 @@ uz_status uz_run_prove_infeasible(uz_run *run, uz_error *err)
     double length = uz_gap_length(N, run->load.h, it->r_next, it->gamma);
     double radius;
     if (!uz_ray_proves(&radius, it->ray, N, run->load.h, length)) {
-        run->work.end = UZ_END_BLURRED;
+        run->work.end = UZ_END_UNDECIDED;
         return UZ_OK;
     }
     result->ray = uz_alloc(run->m, sizeof *result->ray);

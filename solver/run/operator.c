@@ -8,12 +8,12 @@
 #include <stdlib.h>
 
 /* Modes at a node whose dofs are along its normal and tangents. `axes` has them along the axes: it numbers all of a
- * turned node's dofs, also those that are held. */
+ * rotated node's dofs, also those that are held. */
 static void turn_modes(uz_modes *modes, const uz_modes *axes, const uz_body_model *model)
 {
     const int dim = model->mesh.dim, count = modes->count;
-    for (int64_t t = 0; t < model->info.n_turned; t++) {
-        const int64_t *dof = model->dof + model->info.turned_node[t] * dim;
+    for (int64_t t = 0; t < model->info.n_rotated; t++) {
+        const int64_t *dof = model->dof + model->info.rotated_node[t] * dim;
         const double *Q = model->info.frame + t * dim * dim;
         for (int c = 0; c < dim; c++)
             for (int k = 0; k < count && dof[c] >= 0; k++) {
@@ -26,7 +26,7 @@ static void turn_modes(uz_modes *modes, const uz_modes *axes, const uz_body_mode
 }
 
 /* Their modes along the axes. */
-static uz_status modes_of_turned(uz_modes *axes, const uz_body_model *model, uz_error *err)
+static uz_status modes_of_rotated(uz_modes *axes, const uz_body_model *model, uz_error *err)
 {
     const int dim = model->mesh.dim;
     const int64_t total = model->mesh.n_nodes * dim;
@@ -35,11 +35,11 @@ static uz_status modes_of_turned(uz_modes *axes, const uz_body_model *model, uz_
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the modes of %lld dofs", (long long)total);
     for (int64_t i = 0; i < total; i++)
         number[i] = -1;
-    for (int64_t t = 0; t < model->info.n_turned; t++)
+    for (int64_t t = 0; t < model->info.n_rotated; t++)
         for (int c = 0; c < dim; c++)
-            number[model->info.turned_node[t] * dim + c] = t * dim + c;
+            number[model->info.rotated_node[t] * dim + c] = t * dim + c;
     uz_status status =
-        uz_modes_of_body(axes, model->info.xyz, number, model->mesh.n_nodes, dim, model->info.n_turned * dim, err);
+        uz_modes_of_body(axes, model->info.xyz, number, model->mesh.n_nodes, dim, model->info.n_rotated * dim, err);
     free(number);
     return status;
 }
@@ -52,10 +52,10 @@ static uz_status find_modes(uz_modes *modes, const uz_setup *setup, const uz_csc
         return uz_modes_of_matrix(modes, K, err);
     uz_status status =
         uz_modes_of_body(modes, model->info.xyz, model->dof, model->mesh.n_nodes, model->mesh.dim, model->d, err);
-    if (status != UZ_OK || model->info.n_turned == 0)
+    if (status != UZ_OK || model->info.n_rotated == 0)
         return status;
     uz_modes axes;
-    status = modes_of_turned(&axes, model, err);
+    status = modes_of_rotated(&axes, model, err);
     if (status == UZ_OK) {
         turn_modes(modes, &axes, model);
         uz_modes_clear(&axes);

@@ -100,7 +100,7 @@ static uz_status correct(refinement *x, uz_error *err)
         int64_t steps = INT64_MAX;
         status = uz_exchange_run(&ended, &steps, x->s, x->g, x->ray, x->active, x->r, x->run->work.it.law, correction,
                                  &stop, err);
-        x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_BLURRED;
+        x->contradictory = ended == UZ_EXCHANGE_RAY || ended == UZ_EXCHANGE_UNDECIDED;
     } else if (status == UZ_OK) { /* rows that can't depend on each other, or are too many: those that press stay */
         uz_active_end ended;
         status = uz_dual_load_solve_active(correction, &ended, x->s, x->g, x->active, err);
@@ -145,7 +145,7 @@ static void copy_answer(uz_answer *to, const uz_answer *from, const uz_run *run)
 static bool is_worth_it(const uz_run *run)
 {
     double error = run->answer.certificate.relative_error;
-    bool ended = run->work.end == UZ_END_SOLVED || run->work.end == UZ_END_BLURRED || run->work.end == UZ_END_STALLED;
+    bool ended = run->work.end == UZ_END_SOLVED || run->work.end == UZ_END_UNDECIDED || run->work.end == UZ_END_STALLED;
     uz_stop stop = {run->asked->hooks, run->asked->deadline};
     return ended && error > run->work.requested && error > ROUNDED && !uz_stop_is_due(&stop);
 }

@@ -119,7 +119,7 @@ static uz_status add_rotation_error(uz_run *run, uz_error *err)
     uz_summary *s = &run->result->summary;
     uz_certificate *c = &s->certificate;
     double energy;
-    if (!run->asked->setup->is_scene || model->info.n_turned == 0)
+    if (!run->asked->setup->is_scene || model->info.n_rotated == 0)
         return UZ_OK;
     uz_status status = uz_turning_energy(&energy, model, run->result->u, err);
     if (status != UZ_OK)

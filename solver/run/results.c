@@ -64,8 +64,8 @@ void uz_explain_outcome(uz_result *result, uz_end end)
     case UZ_PRECISION_LIMIT:
         why = end == UZ_END_UNSOLVED
                   ? "active_set solves on the condensed operator, with one entry in each row, or with few rows"
-              : end == UZ_END_BLURRED ? "rows contradict each other by less than rounding can tell from touching"
-                                      : "double precision holds no more digits for this method and problem";
+              : end == UZ_END_UNDECIDED ? "rows contradict each other by less than rounding can tell from touching"
+                                        : "double precision holds no more digits for this method and problem";
         break;
     case UZ_PAPER_RULE:
         why = "the paper's stopping rule was met; it bounds a force, not an error";

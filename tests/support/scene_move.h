@@ -37,7 +37,7 @@ static inline void move_loads(uz_scene *s, const scene_move *how)
     }
 }
 
-static inline bool is_turned(const scene_move *how)
+static inline bool is_rotated(const scene_move *how)
 {
     return how->turn[0][0] != 1 || how->turn[1][1] != 1 || how->turn[2][2] != 1;
 }
@@ -54,7 +54,7 @@ static inline void move_supports(uz_scene *s, const scene_move *how)
             x->spring[c] *= how->force / how->length;
             x->u[c] *= how->length;
         }
-        if (x->kind != UZ_SUPPORT_COMPONENTS || !is_turned(how))
+        if (x->kind != UZ_SUPPORT_COMPONENTS || !is_rotated(how))
             continue;
         const uz_support old = *x;
         bool used = false;

@@ -19,11 +19,11 @@ connection *connection_new(transport *server, int fd, const struct sockaddr *add
         return NULL;
     c->server = server;
     c->fd = fd;
-    c->place = presence_begin(server->presences, address);
+    c->place = peer_begin(server->peers, address);
     c->deadline = deadlines_add(server->deadlines, fd, http_now() + server->options.request_deadline_s);
     if (!c->deadline || !c->place) {
         deadline_remove(c->deadline);
-        presence_end(c->place);
+        peer_end(c->place);
         free(c);
         return NULL;
     }
@@ -64,7 +64,7 @@ void connection_free(connection *c)
         return;
     deadline_remove(c->deadline);
     clear_request(c);
-    presence_end(c->place);
+    peer_end(c->place);
     atomic_fetch_sub(&c->server->refusing, c->refusing);
     atomic_fetch_sub(&c->server->connections, 1);
     free(c);
@@ -83,7 +83,7 @@ void connection_begin_request(connection *c, const char *raw_target)
     }
     rq->server = c->server;
     rq->fd = c->fd;
-    rq->address_len = presence_address(c->place, rq->address);
+    rq->address_len = peer_address(c->place, rq->address);
     rq->started = http_now();
     c->request = rq;
     c->layout = (framing_layout){.target = raw_target, .target_len = strlen(raw_target)};
@@ -396,7 +396,7 @@ void connection_end_held(void *ctx, http_request *rq, bool completed)
 {
     transport *server = ctx;
     server->handlers.account(server->handlers.ctx, rq, completed, false);
-    presence_end(rq->place);
+    peer_end(rq->place);
     request_free(server, rq);
 }
 

@@ -5,7 +5,7 @@
 #include "http/transport/deadlines.h"
 #include "http/transport/framing.h"
 #include "http/transport/held.h"
-#include "http/transport/presence.h"
+#include "http/transport/peer.h"
 #include "http/transport/transport.h"
 
 #include <microhttpd.h>
@@ -23,7 +23,7 @@ struct transport {
     struct MHD_Daemon *daemon;
     deadlines *deadlines;
     holder *holder; /* NULL: every connection keeps its thread */
-    presences *presences;
+    peers *peers;
     bool tls;              /* nothing can be written past libmicrohttpd */
     pthread_key_t current; /* the connection that this thread serves, once it has a request */
     bool check_layout;
@@ -40,7 +40,7 @@ typedef struct {
     transport *server;
     deadline *deadline;
     http_request *request; /* NULL between requests, and when it is held without this connection */
-    presence *place;
+    peer *place;
     int fd;
     bool refusing;
     framing_layout layout;

@@ -70,7 +70,7 @@ static void watch_socket(const holder *h, held *one)
 /* ---- the end of one */
 
 /* Events of the same round may still name it: freed after them. */
-static void bury(holder *h, held *one, bool completed)
+static void end_held(holder *h, held *one, bool completed)
 {
     if (one->previous)
         one->previous->next = one->next;
@@ -212,7 +212,7 @@ static bool serve(holder *h, held *one)
 static void attend(holder *h, held *one)
 {
     if (!one->over && !serve(h, one))
-        bury(h, one, one->ending);
+        end_held(h, one, one->ending);
 }
 
 /* ---- the thread */
@@ -241,7 +241,7 @@ static void notice(holder *h, const struct epoll_event *e)
         if (!one->out && !one->last)
             one->due = fmin(one->due, one->source.due(one->source.ctx, true));
     } else if (!one->ending && (e->events & (EPOLLRDHUP | EPOLLHUP | EPOLLERR))) {
-        bury(h, one, false);
+        end_held(h, one, false);
         return;
     }
     make_ready(h, one);
@@ -317,7 +317,7 @@ static void *hold(void *argument)
         held *one = h->first;
         one->due = 0.0;
         bool alive = one->out || one->ending || serve(h, one);
-        bury(h, one, alive && one->ending);
+        end_held(h, one, alive && one->ending);
     }
     free_buried(h);
     return NULL;

@@ -42,9 +42,9 @@ static enum MHD_Result on_accept(void *ctx, const struct sockaddr *address, sock
     transport *server = ctx;
     const transport_options *options = &server->options;
     (void)len;
-    bool room = presences_count(server->presences) < options->max_connections &&
-                (options->max_client_connections == 0 ||
-                 presences_from(server->presences, address) < options->max_client_connections);
+    bool room =
+        peers_count(server->peers) < options->max_connections &&
+        (options->max_client_connections == 0 || peers_from(server->peers, address) < options->max_client_connections);
     return room ? MHD_YES : MHD_NO;
 }
 
@@ -173,8 +173,8 @@ bool transport_start(transport **out, int listen_fd, const transport_handlers *h
         goto fail;
     has_key = true;
     server->deadlines = deadlines_new(words);
-    server->presences = presences_new();
-    if (!server->deadlines || !server->presences)
+    server->peers = peers_new();
+    if (!server->deadlines || !server->peers)
         goto fail;
     if (!server->tls && !(server->holder = holder_new(options->request_deadline_s, connection_end_held, server)))
         goto fail;
@@ -189,7 +189,7 @@ fail:
     snprintf(message, size, "cannot start the HTTP server: %s", errno ? strerror(errno) : "out of memory");
     if (server) {
         holder_free(server->holder);
-        presences_free(server->presences);
+        peers_free(server->peers);
         deadlines_free(server->deadlines);
     }
     if (has_key)
@@ -213,7 +213,7 @@ const atomic_bool *transport_draining(const transport *server)
 
 transport_counts transport_count(transport *server)
 {
-    return (transport_counts){.connections = (unsigned)presences_count(server->presences),
+    return (transport_counts){.connections = (unsigned)peers_count(server->peers),
                               .streams = atomic_load(&server->streams),
                               .body_bytes = atomic_load(&server->body_bytes)};
 }
@@ -241,7 +241,7 @@ void transport_stop(transport *server)
     if (listening != MHD_INVALID_SOCKET)
         close(listening);
     holder_free(server->holder); /* nobody adds to it any more */
-    presences_free(server->presences);
+    peers_free(server->peers);
     deadlines_free(server->deadlines);
     pthread_key_delete(server->current);
     free(server);

@@ -147,7 +147,7 @@ typedef struct http_request {
     size_t body_len;           /* as received, also of a body that is streamed */
     char id[65];               /* X-Request-Id, the client's or our own */
     int fd;                    /* to see whether the client is still there */
-    unsigned char address[16]; /* what tells its client from others (presence.h), address_len bytes; 0: unknown */
+    unsigned char address[16]; /* what tells its client from others (peer.h), address_len bytes; 0: unknown */
     size_t address_len;
     char method[16];
     double started; /* on http_now's clock */
@@ -165,11 +165,11 @@ typedef struct http_request {
     size_t reply_len;
     /* Private to this folder. */
     size_t body_capacity;
-    bool begun;             /* the header block has been looked at */
-    bool can_be_held;       /* its connection can do without libmicrohttpd (held.h) */
-    char *kept_fields;      /* what `headers` points into, where that is not the connection's buffer */
-    struct presence *place; /* its connection's, where that is held */
-    bool unread_body;       /* the reply was sent before the whole body was read */
+    bool begun;         /* the header block has been looked at */
+    bool can_be_held;   /* its connection can do without libmicrohttpd (held.h) */
+    char *kept_fields;  /* what `headers` points into, where that is not the connection's buffer */
+    struct peer *place; /* its connection's, where that is held */
+    bool unread_body;   /* the reply was sent before the whole body was read */
 } http_request;
 
 /* Seconds of `Prefer: wait=N` (RFC 7240), or `otherwise` when there is none; capped. */

@@ -27,7 +27,7 @@ static void turn_space(double x[3])
 
 /* A block between planes of symmetry, one side moved, pulled sideways and pressed on a floor: in the frame that `map`
  * makes of the axes. Where there are `components`, supports are along the axes. */
-static uz_result *turned_block(uz_model model, const char *element, body_map map, double angle, bool components)
+static uz_result *rotated_block(uz_model model, const char *element, body_map map, double angle, bool components)
 {
     const body_map turn = map;
     uz_scene s = body_scene(model, element, (double[3]){4, 2, 2}, (int64_t[3]){4, 2, 2});
@@ -56,10 +56,10 @@ static uz_result *turned_block(uz_model model, const char *element, body_map map
     return x;
 }
 
-static void check_turned(uz_model model, const char *element, body_map turn, double angle)
+static void check_rotated(uz_model model, const char *element, body_map turn, double angle)
 {
-    uz_result *straight = turned_block(model, element, turn, 0, true);
-    uz_result *turned = turned_block(model, element, turn, angle, false);
+    uz_result *straight = rotated_block(model, element, turn, 0, true);
+    uz_result *turned = rotated_block(model, element, turn, angle, false);
     const int dim = straight->summary.dim;
     const double most = body_most(straight->u, straight->n_nodes * dim);
     CHECK(straight->summary.active > 0 && straight->summary.active < straight->m);
@@ -81,11 +81,11 @@ static void check_turned(uz_model model, const char *element, body_map turn, dou
 
 TEST(a_turned_scene_has_the_turned_answer)
 {
-    check_turned(UZ_PLANE_STRESS, "quad4", turn_plane, 0.4);
-    check_turned(UZ_PLANE_STRAIN, "tri6", turn_plane, 2.5);
-    check_turned(UZ_SOLID, "hex8", turn_space, 1.1);
-    check_turned(UZ_SOLID, "tet4", turn_space, -0.7);
-    check_turned(UZ_SOLID, "tet10", turn_space, 0.3);
+    check_rotated(UZ_PLANE_STRESS, "quad4", turn_plane, 0.4);
+    check_rotated(UZ_PLANE_STRAIN, "tri6", turn_plane, 2.5);
+    check_rotated(UZ_SOLID, "hex8", turn_space, 1.1);
+    check_rotated(UZ_SOLID, "tet4", turn_space, -0.7);
+    check_rotated(UZ_SOLID, "tet10", turn_space, 0.3);
 }
 
 /* The supports of one node: two planes leave a line, three nothing, a fourth must agree. */
@@ -146,8 +146,8 @@ TEST(an_obstacle_at_inclined_supports_costs_one_dof)
     for (int64_t i = 0; i < model.m; i++) {
         const int64_t a = model.info.contact_node[i];
         CHECK_INT(row_entries(&model.N, i), 1);
-        for (int64_t t = 0; t < model.info.n_turned; t++)
-            for (int k = 0; k < 9 && model.info.turned_node[t] == a; k++) { /* its frame is orthogonal */
+        for (int64_t t = 0; t < model.info.n_rotated; t++)
+            for (int k = 0; k < 9 && model.info.rotated_node[t] == a; k++) { /* its frame is orthogonal */
                 const double *Q = model.info.frame + 9 * t;
                 double dot = 0;
                 for (int c = 0; c < 3; c++)

@@ -80,7 +80,7 @@ TEST(answers_are_those_of_dofs_along_the_axes)
     double *h = plain.qp.h;
     scene.scene.n_contacts = 0;
     CHECK(uz_scene_to_qp(&plain.qp, &info, &scene.scene, NULL) == UZ_OK);
-    CHECK_INT(info.n_turned, 0);
+    CHECK_INT(info.n_rotated, 0);
     scene.scene.n_contacts = contacts;
     free(plain.qp.h);
     uz_csc_clear(&plain.qp.N);
@@ -115,7 +115,7 @@ TEST(answers_are_those_of_dofs_along_the_axes)
 }
 
 /* K = Q K0 Q', where K0 is that of the scene without its contacts. */
-TEST(stiffness_is_turned)
+TEST(stiffness_is_rotated)
 {
     uz_scene scene = oblique_scene();
     scene.box.cells[0] = 4;
@@ -126,8 +126,8 @@ TEST(stiffness_is_turned)
     const int64_t d = model.d;
     double *K = dense_symmetric(&model.K), *K0 = dense_symmetric(&plain.K), *x = zeros(2 * model.mesh.n_nodes);
     CHECK_INT(plain.d, d);
-    CHECK_INT(model.info.n_turned, 3); /* the first of the 5 nodes is held in x, the last in y */
-    for (int64_t j = 0; j < d; j++) {  /* column j of K0 Q' by the displacement that dof j is, and of Q K0 Q' */
+    CHECK_INT(model.info.n_rotated, 3); /* the first of the 5 nodes is held in x, the last in y */
+    for (int64_t j = 0; j < d; j++) {   /* column j of K0 Q' by the displacement that dof j is, and of Q K0 Q' */
         double *e = zeros(d), *column = zeros(d);
         e[j] = 1;
         uz_recover_nodal(x, &model, e, NULL);
@@ -194,7 +194,7 @@ static void check_corner(double first_x, double first_y, double x, double y, int
     CHECK_INT(model.info.contact_node[5], 11);
     CHECK_INT(entries_of_row(&model.N, 2, &value), 1);
     CHECK_INT(entries_of_row(&model.N, 5, &value), entries);
-    CHECK_INT(model.info.n_turned, turned);
+    CHECK_INT(model.info.n_rotated, turned);
     uz_body_model_clear(&model);
     uz_scene_clear(&scene);
 }
@@ -219,7 +219,7 @@ TEST(recovering_and_restricting_are_inverse)
     uz_recover_nodal(nodal, &model, u, NULL);
     uz_restrict_nodal(back, &model, nodal);
     CHECK(largest_difference(u, back, model.d) < 4 * DBL_EPSILON);
-    const int64_t node = model.info.turned_node[3]; /* minus the row of N is the displacement along the normal */
+    const int64_t node = model.info.rotated_node[3]; /* minus the row of N is the displacement along the normal */
     CHECK_INT(model.info.contact_node[4], node);
     double *Nu = zeros(model.m);
     uz_csc_gaxpy(Nu, &model.N, 1, u);
@@ -282,7 +282,7 @@ static void check_frame(const uz_body_model *model, int64_t node, const double n
 }
 
 /* T ke T' with T put together as a matrix. */
-static void check_turned_element(const uz_body_model *model)
+static void check_rotated_element(const uz_body_model *model)
 {
     enum { N = 24 };
     static double T[N][N], ke[N][N], want[N][N], half[N][N];
@@ -305,7 +305,7 @@ static void check_turned_element(const uz_body_model *model)
         for (int j = 0; j < N; j++)
             for (int k = 0; k < N; k++)
                 want[i][j] += half[i][k] * T[j][k];
-    CHECK(uz_is_turned_element(model, 0));
+    CHECK(uz_is_rotated_element(model, 0));
     uz_turn_element(&ke[0][0], model, 0);
     CHECK(largest_difference(&ke[0][0], &want[0][0], N * N) < 1e-14);
 }
@@ -331,10 +331,10 @@ TEST(frames_in_space)
             else
                 CHECK(!uz_node_frame(&model, a));
         }
-        check_turned_element(&model);
+        check_rotated_element(&model);
         free(model.sites);
         free(model.frame_of);
-        free(model.info.turned_node);
+        free(model.info.rotated_node);
         free(model.info.frame);
     }
 }

@@ -270,8 +270,8 @@ TEST(oblique_plane_has_its_gaps)
     CHECK_REL(N[1], -1.0, 1e-15);
     CHECK_REL(N[8 + 3], -1.0, 1e-15);
     CHECK_INT(qp.N.ptr[8], 2);
-    CHECK_INT(info.n_turned, 2);
-    CHECK_INT(info.turned_node[1], 2);
+    CHECK_INT(info.n_rotated, 2);
+    CHECK_INT(info.rotated_node[1], 2);
     CHECK_REL(info.frame[4 + 2], -0.6, 1e-15);
     CHECK_REL(info.frame[4 + 3], 0.8, 1e-15);
     CHECK(fabs(info.frame[4] * -0.6 + info.frame[5] * 0.8) < 1e-15);

@@ -2,7 +2,7 @@
 #include "harness.h"
 #include "http/transport/deadlines.h"
 #include "http/transport/held.h"
-#include "http/transport/presence.h"
+#include "http/transport/peer.h"
 
 #include <netinet/in.h>
 #include <poll.h>
@@ -274,41 +274,41 @@ TEST(what_cannot_be_taken_is_left)
 
 TEST(connections_are_counted_by_address)
 {
-    presences *all = presences_new();
+    peers *all = peers_new();
     struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr = {htonl(0x7f000001)}, .sin_port = 1}, b = a;
     struct sockaddr_in6 six = {.sin6_family = AF_INET6};
     struct sockaddr unknown = {.sa_family = AF_UNIX};
     a.sin_port = 2; /* does not matter */
     b.sin_addr.s_addr = htonl(0x7f000002);
-    presence *p[5] = {
-        presence_begin(all, (struct sockaddr *)&a),
-        presence_begin(all, (struct sockaddr *)&b),
-        presence_begin(all, (struct sockaddr *)&a),
-        presence_begin(all, (struct sockaddr *)&six),
-        presence_begin(all, NULL),
+    peer *p[5] = {
+        peer_begin(all, (struct sockaddr *)&a),
+        peer_begin(all, (struct sockaddr *)&b),
+        peer_begin(all, (struct sockaddr *)&a),
+        peer_begin(all, (struct sockaddr *)&six),
+        peer_begin(all, NULL),
     };
-    CHECK(presences_count(all) == 5 && presences_from(all, (struct sockaddr *)&a) == 2);
-    CHECK(presences_from(all, (struct sockaddr *)&b) == 1 && presences_from(all, (struct sockaddr *)&six) == 1);
-    CHECK(presences_from(all, NULL) == 0 && presences_from(all, &unknown) == 0);
-    presence_end(p[2]);
-    CHECK(presences_count(all) == 4 && presences_from(all, (struct sockaddr *)&a) == 1);
-    presence_end(p[0]);
-    presence_end(p[4]);
-    CHECK(presences_from(all, (struct sockaddr *)&a) == 0 && presences_from(all, (struct sockaddr *)&b) == 1);
-    presence_end(p[1]);
-    presence_end(p[3]);
-    presence_end(NULL);
-    CHECK(presences_count(all) == 0);
+    CHECK(peers_count(all) == 5 && peers_from(all, (struct sockaddr *)&a) == 2);
+    CHECK(peers_from(all, (struct sockaddr *)&b) == 1 && peers_from(all, (struct sockaddr *)&six) == 1);
+    CHECK(peers_from(all, NULL) == 0 && peers_from(all, &unknown) == 0);
+    peer_end(p[2]);
+    CHECK(peers_count(all) == 4 && peers_from(all, (struct sockaddr *)&a) == 1);
+    peer_end(p[0]);
+    peer_end(p[4]);
+    CHECK(peers_from(all, (struct sockaddr *)&a) == 0 && peers_from(all, (struct sockaddr *)&b) == 1);
+    peer_end(p[1]);
+    peer_end(p[3]);
+    peer_end(NULL);
+    CHECK(peers_count(all) == 0);
     struct sockaddr_in6 near = six, far = six, mapped = six;
     near.sin6_addr.s6_addr[15] = 9; /* one client has all of a network of 64 bits */
     far.sin6_addr.s6_addr[7] = 1;
     memcpy(mapped.sin6_addr.s6_addr, "\0\0\0\0\0\0\0\0\0\0\xff\xff\x7f\0\0\1", 16);
-    p[0] = presence_begin(all, (struct sockaddr *)&six);
-    p[1] = presence_begin(all, (struct sockaddr *)&a);
-    CHECK(presences_from(all, (struct sockaddr *)&near) == 1 && presences_from(all, (struct sockaddr *)&far) == 0);
-    CHECK(presences_from(all, (struct sockaddr *)&mapped) == 1);
-    presence_end(p[0]);
-    presence_end(p[1]);
-    presences_free(all);
-    presences_free(NULL);
+    p[0] = peer_begin(all, (struct sockaddr *)&six);
+    p[1] = peer_begin(all, (struct sockaddr *)&a);
+    CHECK(peers_from(all, (struct sockaddr *)&near) == 1 && peers_from(all, (struct sockaddr *)&far) == 0);
+    CHECK(peers_from(all, (struct sockaddr *)&mapped) == 1);
+    peer_end(p[0]);
+    peer_end(p[1]);
+    peers_free(all);
+    peers_free(NULL);
 }

@@ -1,4 +1,4 @@
-#include "http/transport/presence.h"
+#include "http/transport/peer.h"
 
 #include <netinet/in.h>
 #include <pthread.h>
@@ -6,16 +6,16 @@
 #include <string.h>
 #include <sys/socket.h>
 
-struct presence {
-    presences *all;
-    presence *previous, *next;
+struct peer {
+    peers *all;
+    peer *previous, *next;
     unsigned char address[16];
     size_t len;
 };
 
-struct presences {
+struct peers {
     pthread_mutex_t lock;
-    presence *first;
+    peer *first;
     size_t count;
 };
 
@@ -40,15 +40,15 @@ static size_t name_client(const struct sockaddr *address, unsigned char out[16])
     return 8;
 }
 
-presences *presences_new(void)
+peers *peers_new(void)
 {
-    presences *all = calloc(1, sizeof *all);
+    peers *all = calloc(1, sizeof *all);
     if (all)
         pthread_mutex_init(&all->lock, NULL);
     return all;
 }
 
-void presences_free(presences *all)
+void peers_free(peers *all)
 {
     if (!all)
         return;
@@ -56,9 +56,9 @@ void presences_free(presences *all)
     free(all);
 }
 
-presence *presence_begin(presences *all, const struct sockaddr *from)
+peer *peer_begin(peers *all, const struct sockaddr *from)
 {
-    presence *p = calloc(1, sizeof *p);
+    peer *p = calloc(1, sizeof *p);
     if (!p)
         return NULL;
     p->all = all;
@@ -73,11 +73,11 @@ presence *presence_begin(presences *all, const struct sockaddr *from)
     return p;
 }
 
-void presence_end(presence *p)
+void peer_end(peer *p)
 {
     if (!p)
         return;
-    presences *all = p->all;
+    peers *all = p->all;
     pthread_mutex_lock(&all->lock);
     if (p->previous)
         p->previous->next = p->next;
@@ -90,13 +90,13 @@ void presence_end(presence *p)
     free(p);
 }
 
-size_t presence_address(const presence *p, unsigned char out[16])
+size_t peer_address(const peer *p, unsigned char out[16])
 {
     memcpy(out, p->address, p->len);
     return p->len;
 }
 
-size_t presences_count(presences *all)
+size_t peers_count(peers *all)
 {
     pthread_mutex_lock(&all->lock);
     size_t count = all->count;
@@ -104,12 +104,12 @@ size_t presences_count(presences *all)
     return count;
 }
 
-size_t presences_from(presences *all, const struct sockaddr *from)
+size_t peers_from(peers *all, const struct sockaddr *from)
 {
     unsigned char address[16];
     size_t len = name_client(from, address), count = 0;
     pthread_mutex_lock(&all->lock);
-    for (const presence *p = len > 0 ? all->first : NULL; p; p = p->next)
+    for (const peer *p = len > 0 ? all->first : NULL; p; p = p->next)
         count += p->len == len && memcmp(p->address, address, len) == 0;
     pthread_mutex_unlock(&all->lock);
     return count;
