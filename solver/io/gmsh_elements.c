@@ -6,10 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LINEAR      "set Mesh.ElementOrder = 1"
 #define LOWER       "set Mesh.ElementOrder = 1 or 2"
 #define SERENDIPITY "set Mesh.SecondOrderIncomplete = 1 for quadrilaterals of 8 nodes, or Mesh.ElementOrder = 1 for 4"
-#define NO_WEDGES   "mesh the body with tetrahedra or hexahedra alone"
+#define INCOMPLETE                                                                                                     \
+    "set Mesh.SecondOrderIncomplete = 1 for hexahedra of 20 nodes and wedges of 15, or Mesh.ElementOrder = 1"
+#define NO_PYRAMIDS "mesh the body with tetrahedra, hexahedra or wedges"
 
 /* Indexed by Gmsh's numbers of its types. */
 static const gmsh_type TYPES[] = {
@@ -18,20 +19,20 @@ static const gmsh_type TYPES[] = {
     [3] = {2, 4, "4-node quadrilateral", NULL},
     [4] = {3, 4, "4-node tetrahedron", NULL},
     [5] = {3, 8, "8-node hexahedron", NULL},
-    [6] = {3, 6, "6-node prism", NO_WEDGES},
-    [7] = {3, 5, "5-node pyramid", NO_WEDGES},
+    [6] = {3, 6, "6-node prism", NULL},
+    [7] = {3, 5, "5-node pyramid", NO_PYRAMIDS},
     [8] = {1, 3, "3-node line", NULL},
     [9] = {2, 6, "6-node triangle", NULL},
     [10] = {2, 9, "9-node quadrilateral", SERENDIPITY},
     [11] = {3, 10, "10-node tetrahedron", NULL},
-    [12] = {3, 27, "27-node hexahedron", LINEAR},
-    [13] = {3, 18, "18-node prism", NO_WEDGES},
-    [14] = {3, 14, "14-node pyramid", NO_WEDGES},
+    [12] = {3, 27, "27-node hexahedron", INCOMPLETE},
+    [13] = {3, 18, "18-node prism", INCOMPLETE},
+    [14] = {3, 14, "14-node pyramid", NO_PYRAMIDS},
     [15] = {0, 1, "point", NULL},
     [16] = {2, 8, "8-node quadrilateral", NULL},
-    [17] = {3, 20, "20-node hexahedron", LINEAR},
-    [18] = {3, 15, "15-node prism", NO_WEDGES},
-    [19] = {3, 13, "13-node pyramid", NO_WEDGES},
+    [17] = {3, 20, "20-node hexahedron", NULL},
+    [18] = {3, 15, "15-node prism", NULL},
+    [19] = {3, 13, "13-node pyramid", NO_PYRAMIDS},
     [20] = {2, 9, "9-node triangle", LOWER},
     [21] = {2, 10, "10-node triangle", LOWER},
     [22] = {2, 12, "12-node triangle", LOWER},
@@ -65,8 +66,8 @@ static uz_status check_type(const gmsh_file *file, int64_t number)
     const gmsh_type type = gmsh_type_of(number);
     if (type.nodes == 0)
         return gmsh_fail(&file->text, UZ_ERR_UNSUPPORTED,
-                         "elements of Gmsh's type %lld are not read; use triangles, quadrilaterals, tetrahedra or "
-                         "hexahedra of order 1 or 2",
+                         "elements of Gmsh's type %lld are not read; use triangles, quadrilaterals, tetrahedra, "
+                         "hexahedra or wedges of order 1 or 2",
                          (long long)number);
     if (type.remedy && gmsh_kind_of(number) < 0)
         return gmsh_fail(&file->text, UZ_ERR_UNSUPPORTED, "a %s (Gmsh's type %lld) is not read; %s", type.name,
