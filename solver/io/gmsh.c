@@ -77,48 +77,7 @@ static uz_status read_section(gmsh_file *file, const char *name)
     return status == UZ_OK ? gmsh_section_end(&file->text, name) : status;
 }
 
-static uz_status read_file(gmsh_file *file)
-{
-    char name[GMSH_NAME];
-    uz_status status = read_header(file);
-    while (status == UZ_OK) {
-        status = gmsh_section(&file->text, name);
-        if (status != UZ_OK || !name[0])
-            break;
-        status = read_section(file, name);
-    }
-    if (status == UZ_OK && !file->tag)
-        status = gmsh_fail(&file->text, UZ_ERR_FORMAT, "the file has no $Nodes");
-    if (status == UZ_OK && file->n_elements == 0)
-        status = gmsh_fail(&file->text, UZ_ERR_FORMAT, "the file has no elements; mesh it in Gmsh before saving it");
-    return status;
-}
-
-static void clear_file(gmsh_file *file)
-{
-    free(file->xyz);
-    free(file->tag);
-    free(file->by_tag);
-    free(file->type);
-    free(file->part_tag);
-    free(file->first);
-    free(file->node);
-    free(file->parts);
-    free(file->physical);
-    free(file->names);
-}
-
 /* ---- the body */
-
-static int highest_dim(const gmsh_file *file)
-{
-    int highest = 0;
-    for (int64_t e = 0; e < file->n_elements; e++) {
-        const int dim = gmsh_type_of(file->type[e]).dim;
-        highest = dim > highest ? dim : highest;
-    }
-    return highest;
-}
 
 /* Do all surfaces lie in one plane z = constant, but for rounding? */
 static bool is_flat(const gmsh_file *file)
@@ -135,7 +94,11 @@ static bool is_flat(const gmsh_file *file)
 
 static uz_status choose_dim(int *dim, const gmsh_file *file)
 {
-    *dim = highest_dim(file);
+    *dim = 0;
+    for (int64_t e = 0; e < file->n_elements; e++) {
+        const int its_dim = gmsh_type_of(file->type[e]).dim;
+        *dim = its_dim > *dim ? its_dim : *dim;
+    }
     if (*dim < 2)
         return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
                             "there are only %s; mesh the surface of a plane body, or the volume of a solid",
@@ -175,13 +138,6 @@ static void number_elements(int64_t *new_element, uz_given_mesh *out, const gmsh
     }
 }
 
-static void copy_element(int64_t *to, const int64_t *from, uz_element_kind kind)
-{
-    const uz_element_type *type = uz_element_type_of(kind);
-    for (int i = 0; i < type->nodes; i++)
-        to[i] = from[type->gmsh_node ? type->gmsh_node[i] : i];
-}
-
 static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const int64_t *new_element, int64_t places)
 {
     int64_t at = 0;
@@ -195,7 +151,9 @@ static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const 
         if (new_element[e] < done)
             continue; /* no element of the body, or repeated */
         const uz_element_kind kind = (uz_element_kind)gmsh_kind_of(file->type[e]);
-        copy_element(out->node + at, file->node + file->first[e], kind);
+        const uz_element_type *type = uz_element_type_of(kind);
+        for (int i = 0; i < type->nodes; i++)
+            out->node[at + i] = file->node[file->first[e] + (type->gmsh_node ? type->gmsh_node[i] : i)];
         at += file->first[e + 1] - file->first[e];
         out->kind[done++] = (unsigned char)kind;
         out->first[done] = at;
@@ -250,13 +208,33 @@ bool uz_gmsh_recognises(const char *text, size_t len)
 uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t max_bytes, uz_error *err)
 {
     gmsh_file file = {.text = {text, text, text + len, 1, false, err}, .max_bytes = max_bytes};
+    char name[GMSH_NAME];
     uz_error_reset(err);
     memset(out, 0, sizeof *out);
-    uz_status status = read_file(&file);
+    uz_status status = read_header(&file);
+    while (status == UZ_OK) {
+        status = gmsh_section(&file.text, name);
+        if (status != UZ_OK || !name[0])
+            break;
+        status = read_section(&file, name);
+    }
+    if (status == UZ_OK && !file.tag)
+        status = gmsh_fail(&file.text, UZ_ERR_FORMAT, "the file has no $Nodes");
+    if (status == UZ_OK && file.n_elements == 0)
+        status = gmsh_fail(&file.text, UZ_ERR_FORMAT, "the file has no elements; mesh it in Gmsh before saving it");
     if (status == UZ_OK)
         status = gmsh_to_given(out, &file);
     if (status != UZ_OK)
         uz_given_mesh_clear(out);
-    clear_file(&file);
+    free(file.xyz);
+    free(file.tag);
+    free(file.by_tag);
+    free(file.type);
+    free(file.part_tag);
+    free(file.first);
+    free(file.node);
+    free(file.parts);
+    free(file.physical);
+    free(file.names);
     return status;
 }

@@ -104,6 +104,10 @@ uz_status gmsh_read_elements(gmsh_file *file);
 /* Index of the node with that tag, -1: there is none. */
 int64_t gmsh_find_node(const gmsh_file *file, int64_t tag);
 
+/* By dimension, then by tag: keys, and parts (for qsort). */
+int gmsh_compare_keys(int dim, int64_t tag, int other_dim, int64_t other_tag);
+int gmsh_compare_parts(const void *a, const void *b);
+
 /* ---- elements of Gmsh */
 
 /* What is known of a type; nodes 0: unknown. */

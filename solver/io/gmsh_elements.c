@@ -132,24 +132,16 @@ static uz_status read_element_nodes(gmsh_file *file, int64_t type, int64_t part_
 
 /* ---- version 2.2 */
 
-/* The physical tag is the first of the tags. */
-static uz_status read_tags(gmsh_text *text, int64_t count, int64_t *physical)
-{
-    int64_t tag = 0;
-    uz_status status = UZ_OK;
-    *physical = 0;
-    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
-        status = gmsh_int(text, &tag, "a tag of an element");
-        if (i == 0)
-            *physical = tag < 0 ? -tag : tag;
-    }
-    return status;
-}
-
+/* tags... nodes...; the physical tag is the first of the tags. */
 static uz_status read_element_2(gmsh_file *file, int64_t type, int64_t tags)
 {
-    int64_t physical = 0;
-    uz_status status = read_tags(&file->text, tags, &physical);
+    int64_t physical = 0, tag = 0;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < tags && status == UZ_OK; i++) {
+        status = gmsh_int(&file->text, &tag, "a tag of an element");
+        if (i == 0)
+            physical = tag < 0 ? -tag : tag;
+    }
     if (status == UZ_OK)
         status = make_room(file, 0, gmsh_type_of(type).nodes);
     return status == UZ_OK ? read_element_nodes(file, type, physical) : status;

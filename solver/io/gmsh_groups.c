@@ -33,23 +33,10 @@ static uz_status fail_groups(const gmsh_file *file, const char *what)
     return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED, "%s", what);
 }
 
-static int compare_keys(int dim, int64_t tag, int other_dim, int64_t other_tag)
-{
-    if (dim != other_dim)
-        return dim < other_dim ? -1 : 1;
-    return (tag > other_tag) - (tag < other_tag);
-}
-
 static int compare_groups(const void *a, const void *b)
 {
     const physical_group *x = a, *y = b;
-    return compare_keys(x->dim, x->tag, y->dim, y->tag);
-}
-
-static int compare_parts(const void *a, const void *b)
-{
-    const gmsh_part *x = a, *y = b;
-    return compare_keys(x->dim, x->tag, y->dim, y->tag);
+    return gmsh_compare_keys(x->dim, x->tag, y->dim, y->tag);
 }
 
 /* ---- parts */
@@ -58,9 +45,9 @@ static int64_t unique_parts(gmsh_part *part, int64_t count)
 {
     int64_t kept = 0;
     if (count > 1)
-        qsort(part, (size_t)count, sizeof *part, compare_parts);
+        qsort(part, (size_t)count, sizeof *part, gmsh_compare_parts);
     for (int64_t i = 0; i < count; i++)
-        if (i == 0 || compare_parts(&part[i], &part[kept - 1]) != 0)
+        if (i == 0 || gmsh_compare_parts(&part[i], &part[kept - 1]) != 0)
             part[kept++] = part[i];
     return kept;
 }
@@ -70,7 +57,7 @@ static uz_status parts_of_tags(gmsh_file *file)
 {
     for (int64_t e = 0; e < file->n_elements; e++) {
         const gmsh_part part = {.dim = gmsh_type_of(file->type[e]).dim, .tag = file->part_tag[e]};
-        if (part.tag == 0 || (file->n_parts > 0 && compare_parts(&part, &file->parts[file->n_parts - 1]) == 0))
+        if (part.tag == 0 || (file->n_parts > 0 && gmsh_compare_parts(&part, &file->parts[file->n_parts - 1]) == 0))
             continue;
         if (!gmsh_grow((void **)&file->parts, file->n_parts, &file->part_room, sizeof *file->parts))
             return gmsh_no_memory(file);
@@ -93,11 +80,11 @@ static uz_status parts_of_tags(gmsh_file *file)
 static gmsh_part *part_of(const gmsh_file *file, int64_t e, gmsh_part **last)
 {
     const gmsh_part key = {.dim = gmsh_type_of(file->type[e]).dim, .tag = file->part_tag[e]};
-    if (*last && compare_parts(&key, *last) == 0)
+    if (*last && gmsh_compare_parts(&key, *last) == 0)
         return *last;
     if (file->n_parts == 0)
         return NULL;
-    gmsh_part *found = bsearch(&key, file->parts, (size_t)file->n_parts, sizeof key, compare_parts);
+    gmsh_part *found = bsearch(&key, file->parts, (size_t)file->n_parts, sizeof key, gmsh_compare_parts);
     *last = found ? found : *last;
     return found;
 }
@@ -131,21 +118,6 @@ static uz_status list_groups(grouping *g)
     return kept > UZ_MESH_MAX_GROUPS ? fail_groups(file, "there are more than 4096 physical groups") : UZ_OK;
 }
 
-/* Which group the k-th physical tag of a part is. */
-static int64_t group_of(const grouping *g, const gmsh_part *part, int64_t k)
-{
-    const physical_group key = {part->dim, g->file->physical[part->first + k], 0, 0};
-    const physical_group *found = bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups);
-    return found - g->group;
-}
-
-/* One element as a member of its group: counts it, or puts it into its place. */
-static void count_member(physical_group *group, int64_t nodes)
-{
-    group->items++;
-    group->nodes += nodes;
-}
-
 static void add_member(uz_given_group *to, const grouping *g, int64_t e)
 {
     const gmsh_file *file = g->file;
@@ -165,17 +137,21 @@ static void add_member(uz_given_group *to, const grouping *g, int64_t e)
     }
 }
 
+/* Goes through the members of all groups: counts them, or adds them. */
 static void walk_members(grouping *g, bool add)
 {
     gmsh_part *last = NULL;
     for (int64_t e = 0; e < g->file->n_elements; e++) {
         const gmsh_part *part = part_of(g->file, e, &last);
         for (int64_t k = 0; part && k < part->count; k++) {
-            const int64_t i = group_of(g, part, k);
-            if (add)
-                add_member(&g->out->groups[i], g, e);
-            else
-                count_member(&g->group[i], g->file->first[e + 1] - g->file->first[e]);
+            const physical_group key = {part->dim, g->file->physical[part->first + k], 0, 0};
+            physical_group *found = bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups);
+            if (add) {
+                add_member(&g->out->groups[found - g->group], g, e);
+            } else {
+                found->items++;
+                found->nodes += g->file->first[e + 1] - g->file->first[e];
+            }
         }
     }
 }
@@ -186,7 +162,7 @@ static void walk_members(grouping *g, bool add)
 static int compare_names(const void *a, const void *b)
 {
     const gmsh_name *x = a, *y = b;
-    return compare_keys(x->dim, x->tag, y->dim, y->tag);
+    return gmsh_compare_keys(x->dim, x->tag, y->dim, y->tag);
 }
 
 static const gmsh_name *find_name(const gmsh_file *file, int dim, int64_t tag)
@@ -209,24 +185,18 @@ static bool shares_tag(const grouping *g, int64_t i)
     return false;
 }
 
-static void name_group(char out[64], const grouping *g, int64_t i)
-{
-    const physical_group *group = &g->group[i];
-    const gmsh_name *found = find_name(g->file, group->dim, group->tag);
-    if (found)
-        memcpy(out, found->name, sizeof found->name);
-    else if (shares_tag(g, i))
-        snprintf(out, 64, "physical_%lld_dim%d", (long long)group->tag, group->dim);
-    else
-        snprintf(out, 64, "physical_%lld", (long long)group->tag);
-}
-
 static uz_status make_group(const grouping *g, int64_t i)
 {
     const physical_group *from = &g->group[i];
     uz_given_group *to = &g->out->groups[i];
+    const gmsh_name *found = find_name(g->file, from->dim, from->tag);
     bool good;
-    name_group(to->name, g, i);
+    if (found)
+        memcpy(to->name, found->name, sizeof found->name);
+    else if (shares_tag(g, i))
+        snprintf(to->name, 64, "physical_%lld_dim%d", (long long)from->tag, from->dim);
+    else
+        snprintf(to->name, 64, "physical_%lld", (long long)from->tag);
     if (from->dim == g->dim) {
         good = (to->element = uz_alloc(from->items, sizeof *to->element)) != NULL;
     } else if (from->dim == g->dim - 1) {

@@ -63,13 +63,13 @@ uz_status gmsh_read_names(gmsh_file *file)
 
 /* ---- entities (4.1) */
 
-/* Skips so many numbers: real, or whole. */
-static uz_status skip_reals(gmsh_text *text, int count)
+/* Reads so many reals; xyz == NULL: skips them. */
+static uz_status read_reals(gmsh_text *text, int count, double *xyz)
 {
     double value;
     uz_status status = UZ_OK;
     for (int i = 0; i < count && status == UZ_OK; i++)
-        status = gmsh_real(text, &value);
+        status = gmsh_real(text, xyz ? &xyz[i] : &value);
     return status;
 }
 
@@ -128,7 +128,7 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
     if (status == UZ_OK && partitioned)
         status = skip_partition(text);
     if (status == UZ_OK)
-        status = skip_reals(text, dim == 0 ? 3 : 6);
+        status = read_reals(text, dim == 0 ? 3 : 6, NULL);
     if (status == UZ_OK)
         status = read_physicals(file, &part);
     if (status == UZ_OK && dim > 0)
@@ -155,12 +155,17 @@ static uz_status skip_ghosts(gmsh_text *text)
     return status == UZ_OK ? skip_ints(text, 2 * ghosts) : status;
 }
 
-static int compare_parts(const void *a, const void *b)
+int gmsh_compare_keys(int dim, int64_t tag, int other_dim, int64_t other_tag)
+{
+    if (dim != other_dim)
+        return dim < other_dim ? -1 : 1;
+    return (tag > other_tag) - (tag < other_tag);
+}
+
+int gmsh_compare_parts(const void *a, const void *b)
 {
     const gmsh_part *x = a, *y = b;
-    if (x->dim != y->dim)
-        return x->dim < y->dim ? -1 : 1;
-    return (x->tag > y->tag) - (x->tag < y->tag);
+    return gmsh_compare_keys(x->dim, x->tag, y->dim, y->tag);
 }
 
 /* Elements of a partitioned mesh name partitioned entities, which have the physical groups of their parents. */
@@ -182,7 +187,7 @@ uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
             status = read_entity(file, dim, partitioned);
     }
     if (status == UZ_OK && file->n_parts > 1)
-        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, compare_parts);
+        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, gmsh_compare_parts);
     file->entities_read = true;
     return status;
 }
@@ -206,14 +211,6 @@ static uz_status make_nodes(gmsh_file *file, int64_t count)
     return UZ_OK;
 }
 
-static uz_status read_point(gmsh_text *text, double *xyz)
-{
-    uz_status status = UZ_OK;
-    for (int c = 0; c < 3 && status == UZ_OK; c++)
-        status = gmsh_real(text, &xyz[c]);
-    return status;
-}
-
 static uz_status read_nodes_2(gmsh_file *file)
 {
     gmsh_text *text = &file->text;
@@ -226,7 +223,7 @@ static uz_status read_nodes_2(gmsh_file *file)
     for (; file->n_nodes < count && status == UZ_OK; file->n_nodes += status == UZ_OK) {
         status = gmsh_int(text, &file->tag[file->n_nodes], "the number of a node");
         if (status == UZ_OK)
-            status = read_point(text, file->xyz + 3 * file->n_nodes);
+            status = read_reals(text, 3, file->xyz + 3 * file->n_nodes);
     }
     return status;
 }
@@ -248,9 +245,9 @@ static uz_status read_node_block(gmsh_file *file, int64_t count)
     for (int64_t i = 0; i < n && status == UZ_OK; i++)
         status = gmsh_size(text, &file->tag[file->n_nodes + i], "the number of a node");
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
-        status = read_point(text, file->xyz + 3 * (file->n_nodes + i));
+        status = read_reals(text, 3, file->xyz + 3 * (file->n_nodes + i));
         if (status == UZ_OK && head[2])
-            status = skip_reals(text, (int)head[0]);
+            status = read_reals(text, (int)head[0], NULL);
     }
     file->n_nodes += status == UZ_OK ? n : 0;
     return status;
@@ -290,27 +287,36 @@ static uz_status twice(const gmsh_file *file, int64_t tag)
     return gmsh_fail(&file->text, UZ_ERR_FORMAT, "$Nodes has two nodes with the number %lld", (long long)tag);
 }
 
-/* Tags with few gaps: a table over their range. */
-static uz_status list_dense(gmsh_file *file, int64_t range)
+/* Prepares gmsh_find_node. */
+static uz_status list_tags(gmsh_file *file)
 {
-    file->by_tag = uz_alloc(range, sizeof *file->by_tag);
-    if (!file->by_tag)
-        return gmsh_no_memory(file);
-    file->dense = true;
-    file->n_by_tag = range;
-    memset(file->by_tag, 0xff, (size_t)range * sizeof *file->by_tag);
+    int64_t low = INT64_MAX, high = -1;
     for (int64_t i = 0; i < file->n_nodes; i++) {
-        int64_t *at = &file->by_tag[file->tag[i] - file->low_tag];
-        if (*at >= 0)
-            return twice(file, file->tag[i]);
-        *at = i;
+        if (file->tag[i] < 0)
+            return gmsh_fail(&file->text, UZ_ERR_FORMAT, "$Nodes has a node with the number %lld",
+                             (long long)file->tag[i]);
+        low = file->tag[i] < low ? file->tag[i] : low;
+        high = file->tag[i] > high ? file->tag[i] : high;
     }
-    return UZ_OK;
-}
-
-/* Other tags: the nodes in the order of their tags. */
-static uz_status list_sorted(gmsh_file *file)
-{
+    file->low_tag = file->n_nodes > 0 ? low : 0;
+    if (file->n_nodes == 0 || high - low < 2 * file->n_nodes + 1024) {
+        /* Tags with few gaps: a table over their range. */
+        int64_t range = file->n_nodes > 0 ? high - low + 1 : 0;
+        file->by_tag = uz_alloc(range, sizeof *file->by_tag);
+        if (!file->by_tag)
+            return gmsh_no_memory(file);
+        file->dense = true;
+        file->n_by_tag = range;
+        memset(file->by_tag, 0xff, (size_t)range * sizeof *file->by_tag);
+        for (int64_t i = 0; i < file->n_nodes; i++) {
+            int64_t *at = &file->by_tag[file->tag[i] - file->low_tag];
+            if (*at >= 0)
+                return twice(file, file->tag[i]);
+            *at = i;
+        }
+        return UZ_OK;
+    }
+    /* Other tags: the nodes in the order of their tags. */
     tagged_node *node = uz_alloc(file->n_nodes, sizeof *node);
     file->by_tag = uz_alloc(file->n_nodes, sizeof *file->by_tag);
     uz_status status = node && file->by_tag ? UZ_OK : gmsh_no_memory(file);
@@ -325,22 +331,6 @@ static uz_status list_sorted(gmsh_file *file)
     }
     free(node);
     return status;
-}
-
-static uz_status list_tags(gmsh_file *file)
-{
-    int64_t low = INT64_MAX, high = -1;
-    for (int64_t i = 0; i < file->n_nodes; i++) {
-        if (file->tag[i] < 0)
-            return gmsh_fail(&file->text, UZ_ERR_FORMAT, "$Nodes has a node with the number %lld",
-                             (long long)file->tag[i]);
-        low = file->tag[i] < low ? file->tag[i] : low;
-        high = file->tag[i] > high ? file->tag[i] : high;
-    }
-    file->low_tag = file->n_nodes > 0 ? low : 0;
-    if (file->n_nodes == 0 || high - low < 2 * file->n_nodes + 1024)
-        return list_dense(file, file->n_nodes > 0 ? high - low + 1 : 0);
-    return list_sorted(file);
 }
 
 uz_status gmsh_read_nodes(gmsh_file *file)

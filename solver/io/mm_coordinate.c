@@ -129,12 +129,6 @@ static uz_status sort_entries(gather *g, const mm_text *body, const uz_mm_info *
     return status == UZ_OK && repeated >= 0 ? fail_at_entry(*body, info, repeated) : status;
 }
 
-static void sum_counts(uz_csc *A)
-{
-    for (int64_t j = 0; j < A->cols; j++)
-        A->ptr[j + 1] += A->ptr[j];
-}
-
 uz_status mm_read_coordinate(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
 {
     gather g = {.A = A, .capacity = room, .last_row = -1, .last_col = -1};
@@ -142,8 +136,9 @@ uz_status mm_read_coordinate(uz_csc *A, mm_text *text, const uz_mm_info *info, i
     uz_status status = read_entries(&g, text, info);
     if (status == UZ_OK && g.col)
         status = sort_entries(&g, &body, info);
-    else if (status == UZ_OK)
-        sum_counts(A);
+    else
+        for (int64_t j = 0; status == UZ_OK && j < A->cols; j++)
+            A->ptr[j + 1] += A->ptr[j];
     free(g.col);
     return status;
 }

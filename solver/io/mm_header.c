@@ -56,20 +56,6 @@ static uz_status read_tag(mm_text *text)
     return UZ_OK;
 }
 
-static uz_status read_banner(mm_text *text, banner *b)
-{
-    uz_status status = read_tag(text);
-    if (status == UZ_OK)
-        status = read_word(text, OBJECTS, "the banner's object must be matrix", &b->object);
-    if (status == UZ_OK)
-        status = read_word(text, FORMATS, "the banner's format must be coordinate or array", &b->format);
-    if (status == UZ_OK)
-        status = read_word(text, FIELDS, "the banner's field must be real or integer", &b->field);
-    if (status == UZ_OK)
-        status = read_word(text, SYMMETRIES, "the banner's symmetry must be general or symmetric", &b->symmetry);
-    return status;
-}
-
 /* The report's table of kinds: a pattern has no values to fill an array or to change sign; only a complex matrix can
  * differ from its conjugate. */
 static bool kind_exists(const banner *b)
@@ -163,7 +149,15 @@ uz_status mm_read_header(mm_text *text, uz_mm_info *info)
 {
     banner b = {0};
     bool found = false;
-    uz_status status = read_banner(text, &b);
+    uz_status status = read_tag(text);
+    if (status == UZ_OK)
+        status = read_word(text, OBJECTS, "the banner's object must be matrix", &b.object);
+    if (status == UZ_OK)
+        status = read_word(text, FORMATS, "the banner's format must be coordinate or array", &b.format);
+    if (status == UZ_OK)
+        status = read_word(text, FIELDS, "the banner's field must be real or integer", &b.field);
+    if (status == UZ_OK)
+        status = read_word(text, SYMMETRIES, "the banner's symmetry must be general or symmetric", &b.symmetry);
     if (status == UZ_OK)
         status = check_banner(text, &b);
     if (status == UZ_OK)

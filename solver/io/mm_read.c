@@ -15,17 +15,12 @@ static const int64_t BYTES_PER_TEXT_BYTE = 64;
 /* The shortest lines: "1 1 1" and "1", each with its end. */
 enum { COORDINATE_LINE = 6, ARRAY_LINE = 2 };
 
-static int64_t smaller(int64_t a, int64_t b)
-{
-    return a < b ? a : b;
-}
-
 /* How many entries to make room for: no more than are announced, and no more than the rest of the text can hold. */
 static int64_t entry_room(const mm_text *text, const uz_mm_info *info)
 {
     int64_t line = info->format == UZ_MM_COORDINATE ? COORDINATE_LINE : ARRAY_LINE;
-    int64_t left = (int64_t)(text->end - text->at);
-    return smaller(info->entries, left / line + 1); /* the last line may lack its end */
+    int64_t most = (int64_t)(text->end - text->at) / line + 1; /* the last line may lack its end */
+    return info->entries < most ? info->entries : most;
 }
 
 static uz_status fail_limit(const uz_mm_info *info, int64_t line, uz_error *err)

@@ -144,14 +144,6 @@ static bool is_whole(const char *digits, size_t length)
     return true;
 }
 
-static uz_status bad_value(mm_text *text, bool integer)
-{
-    if (is_nan_or_inf(text))
-        return not_finite(text);
-    return mm_fail(text, integer ? "a whole number was expected" : "a number was expected",
-                   integer ? "write digits only, or say real in the banner" : "write it like -1.5e-3");
-}
-
 uz_status mm_read_value(mm_text *text, bool integer, double *value)
 {
     const char *start = text->at;
@@ -164,7 +156,10 @@ uz_status mm_read_value(mm_text *text, bool integer, double *value)
         return not_finite(text);
     }
     text->at = start;
-    return bad_value(text, integer);
+    if (is_nan_or_inf(text))
+        return not_finite(text);
+    return mm_fail(text, integer ? "a whole number was expected" : "a number was expected",
+                   integer ? "write digits only, or say real in the banner" : "write it like -1.5e-3");
 }
 
 uz_status mm_expect_end(mm_text *text, const uz_mm_info *info)
