@@ -241,7 +241,7 @@ static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_error *err)
 
 /* ---- the whole */
 
-static void measure(uz_mesh *mesh, const uz_box *box)
+static uz_status fill(uz_mesh *mesh, const uz_box *box, uz_error *err)
 {
     const uz_element_type *type = uz_element_type_of(uz_box_element(box));
     int64_t cells = 1;
@@ -255,11 +255,6 @@ static void measure(uz_mesh *mesh, const uz_box *box)
     }
     mesh->n_nodes = (int64_t)uz_box_node_count(box);
     mesh->n_elements = cells * uz_element_type_of(type->linear)->parts;
-}
-
-static uz_status fill(uz_mesh *mesh, const uz_box *box, uz_error *err)
-{
-    measure(mesh, box);
     mesh->xyz = uz_alloc(mesh->n_nodes * box->dim, sizeof *mesh->xyz);
     mesh->kind = uz_alloc(mesh->n_elements, sizeof *mesh->kind);
     mesh->first = uz_alloc(mesh->n_elements + 1, sizeof *mesh->first);

@@ -109,28 +109,6 @@ static int64_t range_count(const box_range *range)
     return count;
 }
 
-static void fill_side_nodes(uz_group *group, const uz_box_lattice *lattice, const box_range *range)
-{
-    for (int64_t k = range->from[2]; k < range->end[2]; k++)
-        for (int64_t j = range->from[1]; j < range->end[1]; j++)
-            for (int64_t i = range->from[0]; i < range->end[0]; i++) {
-                const int64_t node = uz_box_node(lattice, (int64_t[3]){i, j, k});
-                if (node >= 0)
-                    group->node[group->n_nodes++] = node;
-            }
-}
-
-static void fill_side_faces(uz_group *group, const uz_box *box, int parts, const box_range *range, const cell_side *on)
-{
-    for (int64_t k = range->from[2]; k < range->end[2]; k++)
-        for (int64_t j = range->from[1]; j < range->end[1]; j++)
-            for (int64_t i = range->from[0]; i < range->end[0]; i++)
-                for (int s = 0; s < on->count; s++) {
-                    const int64_t cell = (k * box->cells[1] + j) * box->cells[0] + i;
-                    group->face[group->n_faces++] = (uz_face){cell * parts + on->part[s], on->side[s]};
-                }
-}
-
 static uz_status fill_side(uz_group *group, const uz_box *box, int side, uz_error *err)
 {
     const int axis = BOX_SIDES[side].axis;
@@ -146,8 +124,21 @@ static uz_status fill_side(uz_group *group, const uz_box *box, int side, uz_erro
     group->face = uz_alloc(range_count(&cells) * on.count, sizeof *group->face);
     if (!group->node || !group->face)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the side \"%s\" of a box", group->name);
-    fill_side_nodes(group, &lattice, &nodes);
-    fill_side_faces(group, box, uz_element_type_of(uz_element_type_of(kind)->linear)->parts, &cells, &on);
+    for (int64_t k = nodes.from[2]; k < nodes.end[2]; k++)
+        for (int64_t j = nodes.from[1]; j < nodes.end[1]; j++)
+            for (int64_t i = nodes.from[0]; i < nodes.end[0]; i++) {
+                const int64_t node = uz_box_node(&lattice, (int64_t[3]){i, j, k});
+                if (node >= 0)
+                    group->node[group->n_nodes++] = node;
+            }
+    int parts = uz_element_type_of(uz_element_type_of(kind)->linear)->parts;
+    for (int64_t k = cells.from[2]; k < cells.end[2]; k++)
+        for (int64_t j = cells.from[1]; j < cells.end[1]; j++)
+            for (int64_t i = cells.from[0]; i < cells.end[0]; i++)
+                for (int s = 0; s < on.count; s++) {
+                    const int64_t cell = (k * box->cells[1] + j) * box->cells[0] + i;
+                    group->face[group->n_faces++] = (uz_face){cell * parts + on.part[s], on.side[s]};
+                }
     return UZ_OK;
 }
 

@@ -66,20 +66,6 @@ static int64_t number_nodes(int64_t *new_node, const uz_given_mesh *given)
 
 /* ---- copying */
 
-static double measure(const uz_mesh *mesh)
-{
-    double extent = 0;
-    for (int c = 0; c < mesh->dim; c++) {
-        double low = mesh->xyz[c], high = low;
-        for (int64_t i = 0; i < mesh->n_nodes; i++) {
-            low = fmin(low, mesh->xyz[i * mesh->dim + c]);
-            high = fmax(high, mesh->xyz[i * mesh->dim + c]);
-        }
-        extent = hypot(extent, high - low);
-    }
-    return extent;
-}
-
 static uz_status copy_mesh(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err)
 {
     const int dim = given->dim;
@@ -99,7 +85,16 @@ static uz_status copy_mesh(uz_mesh *mesh, const uz_given_mesh *given, const int6
     memcpy(mesh->first, given->first, (size_t)(n_elements + 1) * sizeof *mesh->first);
     for (int64_t q = 0; q < n_places; q++)
         mesh->node[q] = new_node[given->node[q]];
-    mesh->extent = measure(mesh);
+    double extent = 0;
+    for (int c = 0; c < mesh->dim; c++) {
+        double low = mesh->xyz[c], high = low;
+        for (int64_t i = 0; i < mesh->n_nodes; i++) {
+            low = fmin(low, mesh->xyz[i * mesh->dim + c]);
+            high = fmax(high, mesh->xyz[i * mesh->dim + c]);
+        }
+        extent = hypot(extent, high - low);
+    }
+    mesh->extent = extent;
     if (isfinite(mesh->extent))
         return UZ_OK;
     return uz_fail(err, UZ_ERR_NOT_FINITE, given->from_file ? "/mesh/gmsh" : "/mesh/nodes",

@@ -109,11 +109,6 @@ static int middle_node(const uz_element_type *type, int a, int b)
     return -1;
 }
 
-static double length_of(const double *v, int dim)
-{
-    return hypot(hypot(v[0], v[1]), dim == 3 ? v[2] : 0);
-}
-
 /* The tangent of the edge from a to b at a. */
 static double tangent(double out[3], const uz_given_mesh *given, int64_t e, int a, int b)
 {
@@ -126,7 +121,7 @@ static double tangent(double out[3], const uz_given_mesh *given, int64_t e, int 
         chord[c] = to[c] - from[c];
         out[c] = mid ? 4 * (mid[c] - from[c]) - chord[c] : chord[c];
     }
-    return length_of(chord, dim);
+    return hypot(hypot(chord[0], chord[1]), dim == 3 ? chord[2] : 0);
 }
 
 static double determinant(double t[3][3], int dim)

@@ -23,21 +23,16 @@ void uz_mesh_clear(uz_mesh *mesh)
     memset(mesh, 0, sizeof *mesh);
 }
 
-static void list_names(char *text, size_t size, const uz_mesh *mesh)
-{
-    size_t used = 0;
-    text[0] = '\0';
-    for (int64_t i = 0; i < mesh->n_groups && used < size; i++)
-        used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", mesh->groups[i].name);
-}
-
 const uz_group *uz_mesh_group(const uz_mesh *mesh, const char *name, const char *where, uz_error *err)
 {
     char names[256];
+    size_t used = 0;
     for (int64_t i = 0; i < mesh->n_groups; i++)
         if (strncmp(mesh->groups[i].name, name, sizeof mesh->groups[i].name) == 0)
             return &mesh->groups[i];
-    list_names(names, sizeof names, mesh);
+    names[0] = '\0';
+    for (int64_t i = 0; i < mesh->n_groups && used < sizeof names; i++)
+        used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i ? ", " : "", mesh->groups[i].name);
     uz_fail(err, UZ_ERR_SCENE, where, "there is no group \"%.63s\"; this mesh has: %s", name, names);
     return NULL;
 }
