@@ -40,35 +40,12 @@ static void put_doubles(uz_buffer *key, const double *x, int64_t n)
         put_double(key, x[i]);
 }
 
-static void put_box(uz_buffer *key, const uz_box *box)
-{
-    put_int(key, box->dim);
-    put_name(key, box->element, sizeof box->element);
-    for (int c = 0; c < box->dim && c < 3; c++) {
-        const double grading = box->grading[c];
-        put_double(key, box->origin[c]);
-        put_double(key, box->size[c]);
-        put_int(key, box->cells[c]);
-        put_double(key, grading == 0 ? 1 : grading);
-    }
-}
-
 static void add_array(uz_digest *digest, const void *array, int64_t count, size_t size)
 {
     const int64_t n = array ? count : 0;
     uz_digest_add(digest, &n, sizeof n);
     if (n > 0)
         uz_digest_add(digest, array, (size_t)n * size);
-}
-
-static void add_given_group(uz_digest *digest, const uz_given_group *group)
-{
-    const int64_t faces = group->n_faces;
-    add_array(digest, group->name, (int64_t)strnlen(group->name, sizeof group->name), 1);
-    add_array(digest, group->node, group->n_nodes, sizeof *group->node);
-    add_array(digest, group->face_first, faces > 0 ? faces + 1 : 0, sizeof *group->face_first);
-    add_array(digest, group->face_node, faces > 0 ? group->face_first[faces] : 0, sizeof *group->face_node);
-    add_array(digest, group->element, group->n_elements, sizeof *group->element);
 }
 
 /* A mesh in numbers is as large as a request may be: its digest stands for it. */
@@ -84,26 +61,21 @@ static void put_given(uz_buffer *key, const uz_given_mesh *mesh)
     add_array(digest, mesh->kind, mesh->n_elements, sizeof *mesh->kind);
     add_array(digest, mesh->first, mesh->n_elements + 1, sizeof *mesh->first);
     add_array(digest, mesh->node, mesh->first ? mesh->first[mesh->n_elements] : 0, sizeof *mesh->node);
-    for (int64_t i = 0; i < mesh->n_groups; i++)
-        add_given_group(digest, &mesh->groups[i]);
+    for (int64_t i = 0; i < mesh->n_groups; i++) {
+        const uz_given_group *group = &mesh->groups[i];
+        const int64_t faces = group->n_faces;
+        add_array(digest, group->name, (int64_t)strnlen(group->name, sizeof group->name), 1);
+        add_array(digest, group->node, group->n_nodes, sizeof *group->node);
+        add_array(digest, group->face_first, faces > 0 ? faces + 1 : 0, sizeof *group->face_first);
+        add_array(digest, group->face_node, faces > 0 ? group->face_first[faces] : 0, sizeof *group->face_node);
+        add_array(digest, group->element, group->n_elements, sizeof *group->element);
+    }
     if (!uz_digest_end(digest, hex))
         key->failed = true;
     put_int(key, mesh->dim);
     put_int(key, mesh->n_groups);
     put_int(key, mesh->from_file);
     uz_buffer_put(key, hex, sizeof hex);
-}
-
-static void put_materials(uz_buffer *key, const uz_scene *scene)
-{
-    put_int(key, scene->n_materials);
-    for (int64_t i = 0; i < scene->n_materials; i++) {
-        put_name(key, scene->materials[i].on, sizeof scene->materials[i].on);
-        put_double(key, scene->materials[i].young);
-        put_double(key, scene->materials[i].poisson);
-        put_double(key, scene->materials[i].density); /* not in K, but kept with the body */
-        put_double(key, scene->materials[i].expansion);
-    }
 }
 
 static int directions_held(const uz_support *support, int dim)
@@ -121,22 +93,6 @@ static int by_group(const void *a, const void *b)
 {
     const uz_support *const *left = a, *const *right = b;
     return strncmp((*left)->on, (*right)->on, sizeof(*left)->on);
-}
-
-/* What stands in no axis's way: springs, and inclined normals, which turn nodes in their order. */
-static void put_inclined_and_springs(uz_buffer *key, const uz_scene *scene, int dim)
-{
-    double n[3] = {0};
-    for (int64_t i = 0; i < scene->n_supports; i++) {
-        const uz_support *support = &scene->supports[i];
-        const bool inclined = uz_support_is_inclined(n, support, dim);
-        if (!inclined && support->kind != UZ_SUPPORT_SPRING)
-            continue;
-        put_int(key, support->kind);
-        put_name(key, support->on, sizeof support->on);
-        put_doubles(key, inclined ? n : support->spring, dim);
-    }
-    put_int(key, -1);
 }
 
 /* Which directions each group is held in: neither the values nor the order of the supports matter. */
@@ -160,7 +116,18 @@ static void put_supports(uz_buffer *key, const uz_scene *scene, int dim)
     }
     put_int(key, -1);
     free(sorted);
-    put_inclined_and_springs(key, scene, dim);
+    /* What stands in no axis's way: springs, and inclined normals, which turn nodes in their order. */
+    double n[3] = {0};
+    for (int64_t i = 0; i < scene->n_supports; i++) {
+        const uz_support *support = &scene->supports[i];
+        const bool inclined = uz_support_is_inclined(n, support, dim);
+        if (!inclined && support->kind != UZ_SUPPORT_SPRING)
+            continue;
+        put_int(key, support->kind);
+        put_name(key, support->on, sizeof support->on);
+        put_doubles(key, inclined ? n : support->spring, dim);
+    }
+    put_int(key, -1);
 }
 
 /* Of a plane only the normal: where it is, is the load's matter. Of others the normals of the rows depend on all. */
@@ -204,11 +171,27 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
     put_double(&key, scene->thickness);
     put_int(&key, scene->formulation);
     put_int(&key, scene->source);
-    if (scene->source == UZ_MESH_GIVEN)
+    if (scene->source == UZ_MESH_GIVEN) {
         put_given(&key, &scene->given);
-    else
-        put_box(&key, &scene->box);
-    put_materials(&key, scene);
+    } else {
+        put_int(&key, scene->box.dim);
+        put_name(&key, scene->box.element, sizeof scene->box.element);
+        for (int c = 0; c < scene->box.dim && c < 3; c++) {
+            const double grading = scene->box.grading[c];
+            put_double(&key, scene->box.origin[c]);
+            put_double(&key, scene->box.size[c]);
+            put_int(&key, scene->box.cells[c]);
+            put_double(&key, grading == 0 ? 1 : grading);
+        }
+    }
+    put_int(&key, scene->n_materials);
+    for (int64_t i = 0; i < scene->n_materials; i++) {
+        put_name(&key, scene->materials[i].on, sizeof scene->materials[i].on);
+        put_double(&key, scene->materials[i].young);
+        put_double(&key, scene->materials[i].poisson);
+        put_double(&key, scene->materials[i].density); /* not in K, but kept with the body */
+        put_double(&key, scene->materials[i].expansion);
+    }
     put_supports(&key, scene, dim);
     put_contacts(&key, scene, dim);
     if (uz_buffer_finish(&text, len, &key, NULL) != UZ_OK)

@@ -25,19 +25,6 @@ void uz_mesh_info_clear(uz_mesh_info *info)
     memset(info, 0, sizeof *info);
 }
 
-static void clear_sites(uz_body_model *model)
-{
-    for (int64_t k = 0; model->sites && k < model->n_sites; k++) {
-        free(model->sites[k].gap);
-        free(model->sites[k].normal);
-        free(model->sites[k].first);
-        free(model->sites[k].node);
-        free(model->sites[k].weight);
-        free(model->sites[k].face);
-    }
-    free(model->sites);
-}
-
 void uz_body_model_clear(uz_body_model *model)
 {
     if (!model)
@@ -55,7 +42,15 @@ void uz_body_model_clear(uz_body_model *model)
     free(model->material_of);
     free(model->spring);
     free(model->row_ends);
-    clear_sites(model);
+    for (int64_t k = 0; model->sites && k < model->n_sites; k++) {
+        free(model->sites[k].gap);
+        free(model->sites[k].normal);
+        free(model->sites[k].first);
+        free(model->sites[k].node);
+        free(model->sites[k].weight);
+        free(model->sites[k].face);
+    }
+    free(model->sites);
     memset(model, 0, sizeof *model);
 }
 
@@ -82,14 +77,6 @@ size_t uz_body_model_bytes(const uz_body_model *model)
     return bytes + (size_t)model->d * (size_t)model->n_modes * 8;
 }
 
-static void describe_mesh(uz_body_model *model)
-{
-    model->info.dim = model->mesh.dim;
-    model->info.n_nodes = model->mesh.n_nodes;
-    model->info.n_elements = model->mesh.n_elements;
-    model->info.xyz = model->mesh.xyz;
-}
-
 /* Everything but the stiffness. held: obstacles may hold the body where supports don't. */
 static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held, uz_error *err)
 {
@@ -98,7 +85,10 @@ static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held,
         status = uz_scene_check_body(scene, &model->mesh, err);
     if (status != UZ_OK)
         return status;
-    describe_mesh(model);
+    model->info.dim = model->mesh.dim;
+    model->info.n_nodes = model->mesh.n_nodes;
+    model->info.n_elements = model->mesh.n_elements;
+    model->info.xyz = model->mesh.xyz;
     status = uz_take_materials(model, scene, err);
     if (status == UZ_OK)
         status = uz_number_dofs(model, scene, err);

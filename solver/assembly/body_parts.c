@@ -154,16 +154,6 @@ static void hold_by_supports(uz_parts *parts, const uz_body_model *model)
         }
 }
 
-static void name_motions(uz_parts *parts, const uz_body_model *model)
-{
-    static const int plane[] = {0, 1, 5}, revolution[] = {1}, space[] = {0, 1, 2, 3, 4, 5};
-    const bool axisymmetric = model->kind == UZ_AXISYMMETRIC;
-    const int *which = parts->dim == 3 ? space : axisymmetric ? revolution : plane;
-    parts->motions = parts->dim == 3 ? 6 : axisymmetric ? 1 : 3;
-    for (int k = 0; k < parts->motions; k++)
-        parts->unit[k][which[k]] = 1;
-}
-
 void uz_parts_clear(uz_parts *parts)
 {
     free(parts->list);
@@ -173,7 +163,12 @@ void uz_parts_clear(uz_parts *parts)
 uz_status uz_find_parts(uz_parts *parts, const uz_body_model *model, uz_error *err)
 {
     *parts = (uz_parts){.dim = model->mesh.dim};
-    name_motions(parts, model);
+    static const int plane[] = {0, 1, 5}, revolution[] = {1}, space[] = {0, 1, 2, 3, 4, 5};
+    const bool axisymmetric = model->kind == UZ_AXISYMMETRIC;
+    const int *which = parts->dim == 3 ? space : axisymmetric ? revolution : plane;
+    parts->motions = parts->dim == 3 ? 6 : axisymmetric ? 1 : 3;
+    for (int k = 0; k < parts->motions; k++)
+        parts->unit[k][which[k]] = 1;
     parts->of = uz_alloc(model->mesh.n_nodes, sizeof *parts->of);
     parts->count = parts->of ? number_parts(parts->of, &model->mesh) : -1;
     parts->list = parts->count >= 0 ? uz_alloc_zero(parts->count, sizeof *parts->list) : NULL;

@@ -205,18 +205,6 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contact rows", (long long)model->m);
 }
 
-/* Room for so many entries. */
-static bool grow_work(row_work *work, int64_t entries)
-{
-    int64_t *row = uz_realloc(work->row, entries, sizeof *row);
-    work->row = row ? row : work->row;
-    int64_t *col = uz_realloc(work->col, entries, sizeof *col);
-    work->col = col ? col : work->col;
-    double *val = uz_realloc(work->val, entries, sizeof *val);
-    work->val = val ? val : work->val;
-    return row && col && val;
-}
-
 /* Adds the shares of their ends to the rows of middles. Entries come row by row. */
 static bool blend_entries(row_work *work, const uz_body_model *model)
 {
@@ -234,7 +222,14 @@ static bool blend_entries(row_work *work, const uz_body_model *model)
     for (int64_t i = 0; i < 2 * model->m; i++)
         if (model->row_ends[i] >= 0)
             most += start[model->row_ends[i] + 1] - start[model->row_ends[i]];
-    const bool room = grow_work(work, most);
+    /* Room for so many entries. */
+    int64_t *row = uz_realloc(work->row, most, sizeof *row);
+    work->row = row ? row : work->row;
+    int64_t *col = uz_realloc(work->col, most, sizeof *col);
+    work->col = col ? col : work->col;
+    double *val = uz_realloc(work->val, most, sizeof *val);
+    work->val = val ? val : work->val;
+    const bool room = row && col && val;
     for (int64_t i = 0; i < model->m && room; i++)
         for (int k = 0; k < 2 && model->row_ends[2 * i] >= 0; k++) {
             const int64_t end = model->row_ends[2 * i + k];

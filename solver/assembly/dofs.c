@@ -63,13 +63,6 @@ static void mark_support(uz_body_model *model, const uz_support *support, const 
                 model->dof[uz_group_node_at(group, i) * dim + c] = -1;
 }
 
-static void mark_axis_of_rotation(uz_body_model *model)
-{
-    for (int64_t a = 0; a < model->mesh.n_nodes && model->kind == UZ_AXISYMMETRIC; a++)
-        if (uz_is_on_axis(model, a))
-            model->dof[a * model->mesh.dim] = -1;
-}
-
 /* Turns the nodes of an inclined support so that what it holds is one of their dofs, unless it is held already. */
 static uz_status mark_inclined(uz_body_model *model, const uz_group *group, const double n[3], uz_error *err)
 {
@@ -88,7 +81,9 @@ static uz_status mark_all(uz_body_model *model, const uz_scene *scene, uz_error 
 {
     uz_status status = UZ_OK;
     double n[3];
-    mark_axis_of_rotation(model);
+    for (int64_t a = 0; a < model->mesh.n_nodes && model->kind == UZ_AXISYMMETRIC; a++)
+        if (uz_is_on_axis(model, a))
+            model->dof[a * model->mesh.dim] = -1;
     for (int inclined = 0; inclined < 2; inclined++) /* axes first: they stay what they are */
         for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++) {
             const uz_group *group = uz_mesh_group(&model->mesh, scene->supports[i].on, "/supports", err);
@@ -102,14 +97,6 @@ static uz_status mark_all(uz_body_model *model, const uz_scene *scene, uz_error 
     return status;
 }
 
-static void number(uz_body_model *model)
-{
-    const int64_t total = model->mesh.n_nodes * model->mesh.dim;
-    model->d = model->n_fixed = 0;
-    for (int64_t i = 0; i < total; i++)
-        model->dof[i] = model->dof[i] < 0 ? -1 - model->n_fixed++ : model->d++;
-}
-
 uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const uz_mesh *mesh = &model->mesh;
@@ -119,7 +106,10 @@ uz_status uz_number_dofs(uz_body_model *model, const uz_scene *scene, uz_error *
     uz_status status = mark_all(model, scene, err);
     if (status != UZ_OK)
         return status;
-    number(model);
+    const int64_t total = model->mesh.n_nodes * model->mesh.dim;
+    model->d = model->n_fixed = 0;
+    for (int64_t i = 0; i < total; i++)
+        model->dof[i] = model->dof[i] < 0 ? -1 - model->n_fixed++ : model->d++;
     if (model->d == 0)
         return uz_fail(err, UZ_ERR_SCENE, "/supports", "the supports hold every node: nothing is left to move");
     return UZ_OK;

@@ -113,15 +113,6 @@ static double free_direction(double out[3], const uz_body_model *model, int64_t 
     return length;
 }
 
-static void fill_frame(double *Q, const double n[3], int k, int dim)
-{
-    double w[3] = {n[0], n[1], n[2]};
-    w[k] += copysign(1, n[k]);
-    for (int i = 0; i < dim; i++)
-        for (int j = 0; j < dim; j++)
-            Q[i * dim + j] = i == k ? n[j] : (i == j) - w[i] * w[j] / fabs(w[k]);
-}
-
 /* Turns the node's free dofs so that one of them is along n, a unit vector along its present ones with a share in
  * several: Q = H Q. */
 static void turn_node(uz_body_model *model, int64_t node, const double n[3], int k)
@@ -129,7 +120,11 @@ static void turn_node(uz_body_model *model, int64_t node, const double n[3], int
     const int dim = model->mesh.dim;
     uz_mesh_info *info = &model->info;
     double H[9] = {0}, Q[9] = {0};
-    fill_frame(H, n, k, dim);
+    double w[3] = {n[0], n[1], n[2]};
+    w[k] += copysign(1, n[k]);
+    for (int i = 0; i < dim; i++)
+        for (int j = 0; j < dim; j++)
+            H[i * dim + j] = i == k ? n[j] : (i == j) - w[i] * w[j] / fabs(w[k]);
     if (model->frame_of[node] <= 0) {
         memcpy(info->frame + info->n_rotated * dim * dim, H, (size_t)(dim * dim) * sizeof *H);
         info->rotated_node[info->n_rotated] = node;

@@ -37,17 +37,6 @@ static void name_axis(char *text, size_t size, const double v[3], int dim, bool 
         name_vector(text, size, unit, dim);
 }
 
-/* The point nearest to the centre that a rotation leaves in its place, or a screw motion moves least. */
-static void still_point(double x[3], const uz_part *p, const double q[UZ_MOTIONS])
-{
-    const double *t = q, *w = q + 3, L = uz_part_size(p);
-    const double square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
-    for (int c = 0; c < 3; c++) {
-        const double offset = w[(c + 1) % 3] * t[(c + 2) % 3] - w[(c + 2) % 3] * t[(c + 1) % 3];
-        x[c] = tidy(uz_part_centre(p, c) + tidy(offset / square, 1) * L, L);
-    }
-}
-
 void uz_name_part_motion(char *text, size_t size, const uz_parts *parts, const uz_part *p, const double q[UZ_MOTIONS],
                          bool directed)
 {
@@ -59,7 +48,13 @@ void uz_name_part_motion(char *text, size_t size, const uz_parts *parts, const u
         snprintf(text, size, "translation along %s", axis);
         return;
     }
-    still_point(x, p, q);
+    /* The point nearest to the centre that a rotation leaves in its place, or a screw motion moves least. */
+    const double *t = q, *w = q + 3, L = uz_part_size(p);
+    const double square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
+    for (int c = 0; c < 3; c++) {
+        const double offset = w[(c + 1) % 3] * t[(c + 2) % 3] - w[(c + 2) % 3] * t[(c + 1) % 3];
+        x[c] = tidy(uz_part_centre(p, c) + tidy(offset / square, 1) * L, L);
+    }
     name_vector(point, sizeof point, x, parts->dim);
     if (parts->dim == 2) {
         snprintf(text, size, "rotation about %s%s", point,

@@ -18,14 +18,6 @@ typedef struct {
     int64_t n_near;
 } neighbours;
 
-static void neighbours_clear(neighbours *n)
-{
-    free(n->start);
-    free(n->around);
-    free(n->seen);
-    free(n->near);
-}
-
 /* Returns the most neighbours, each counted once for every element that it shares. */
 static int64_t fill_incidence(neighbours *n)
 {
@@ -163,6 +155,9 @@ uz_status uz_build_pattern(uz_body_model *model, uz_error *err)
 done:
     free(ptr);
     free(ptr_fixed);
-    neighbours_clear(&n);
+    free(n.start);
+    free(n.around);
+    free(n.seen);
+    free(n.near);
     return status;
 }

@@ -27,21 +27,6 @@ static uz_status other_body(uz_error *err)
     return uz_fail(err, UZ_ERR_ARGUMENT, "/supports", "the scene's supports are not those of this body");
 }
 
-static uz_status contradiction(const prescription *p, int64_t support, int64_t node, int c, double value, int64_t fixed,
-                               uz_error *err)
-{
-    char where[96];
-    const char axis = "xyz"[c];
-    const int64_t earlier = p->source[fixed] - 1;
-    const bool normal = p->scene->supports[support].kind == UZ_SUPPORT_NORMAL;
-    snprintf(where, sizeof where, normal ? "/supports/%lld/u" : "/supports/%lld/u%c", (long long)support, axis);
-    return uz_fail(err, UZ_ERR_SCENE, where,
-                   "node %lld, where \"%.63s\" meets \"%.63s\", is given u%c = %g here and %g by support %lld; "
-                   "leave one of them out or make them agree",
-                   (long long)node, p->scene->supports[support].on, p->scene->supports[earlier].on, axis, value,
-                   p->value[fixed], (long long)earlier);
-}
-
 static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c, double value, uz_error *err)
 {
     const int64_t dof = p->model->dof[node * p->model->mesh.dim + c];
@@ -52,8 +37,18 @@ static uz_status prescribe(prescription *p, int64_t support, int64_t node, int c
         return uz_fail(err, UZ_ERR_SCENE, "/supports",
                        "node %lld of \"%.63s\" is on the axis of rotation and cannot leave it: ux = %g must be 0",
                        (long long)node, p->scene->supports[support].on, value);
-    if (p->source[fixed] && p->value[fixed] != value)
-        return contradiction(p, support, node, c, value, fixed, err);
+    if (p->source[fixed] && p->value[fixed] != value) {
+        char where[96];
+        const char axis = "xyz"[c];
+        const int64_t earlier = p->source[fixed] - 1;
+        const bool normal = p->scene->supports[support].kind == UZ_SUPPORT_NORMAL;
+        snprintf(where, sizeof where, normal ? "/supports/%lld/u" : "/supports/%lld/u%c", (long long)support, axis);
+        return uz_fail(err, UZ_ERR_SCENE, where,
+                       "node %lld, where \"%.63s\" meets \"%.63s\", is given u%c = %g here and %g by support %lld; "
+                       "leave one of them out or make them agree",
+                       (long long)node, p->scene->supports[support].on, p->scene->supports[earlier].on, axis, value,
+                       p->value[fixed], (long long)earlier);
+    }
     p->value[fixed] = value;
     if (!p->source[fixed])
         p->source[fixed] = support + 1;

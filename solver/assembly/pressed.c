@@ -39,13 +39,6 @@ static bool allocate(nnls *s, int64_t m, int64_t k)
     return ok;
 }
 
-static void clear(nnls *s)
-{
-    void *room[] = {s->A, s->barred, s->passive, s->Q, s->R, s->b, s->y, s->x, s->trial, s->scratch};
-    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-        free(room[i]);
-}
-
 static double dot(const double *a, const double *b, int64_t n)
 {
     double sum = 0.0;
@@ -246,7 +239,9 @@ uz_status uz_load_on_modes(uz_pressing *how, double *y, const double *Z, int64_t
             *how = UZ_COSTS_NOTHING;
         memcpy(y, s.y, (size_t)k * sizeof *y);
     }
-    clear(&s);
+    void *room[] = {s.A, s.barred, s.passive, s.Q, s.R, s.b, s.y, s.x, s.trial, s.scratch};
+    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+        free(room[i]);
     free(load);
     return status;
 }

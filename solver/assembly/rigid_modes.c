@@ -12,23 +12,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void name_modes(char *names, size_t size, const uz_parts *parts, const uz_part *p)
+static uz_status refuse(const uz_parts *parts, const uz_part *p, const char *who, uz_error *err)
 {
-    char name[160];
+    char names[300], name[160], which[96] = "";
     double mode[UZ_MOTIONS][UZ_MOTIONS];
     const int n = uz_free_motions(mode, parts, p);
     names[0] = '\0';
     for (int i = 0; i < n; i++) {
         const size_t used = strlen(names);
         uz_name_part_motion(name, sizeof name, parts, p, mode[i], false);
-        snprintf(names + used, size - used, "%s%s", i ? ", " : "", name);
+        snprintf(names + used, sizeof names - used, "%s%s", i ? ", " : "", name);
     }
-}
-
-static uz_status refuse(const uz_parts *parts, const uz_part *p, const char *who, uz_error *err)
-{
-    char names[300], which[96] = "";
-    name_modes(names, sizeof names, parts, p);
     if (parts->count > 1)
         snprintf(which, sizeof which, " of the part with node %lld", (long long)p->node);
     return uz_fail(err, UZ_ERR_FREE_BODY, "/supports", "%s leave %s%s free; hold it by further supports", who, names,
@@ -51,14 +45,6 @@ uz_status uz_check_rigid_modes(const uz_body_model *model, uz_error *err)
         status = refuse_first(&parts, "the supports", err);
     uz_parts_clear(&parts);
     return status;
-}
-
-/* An obstacle stands in the way of one combination of the motions of its part, from one side. */
-static void hold_by_obstacles(uz_parts *parts, const uz_body_model *model)
-{
-    for (int64_t i = 0; i < model->m; i++)
-        uz_hold_part(parts, &model->mesh, model->info.contact_node[i],
-                     model->info.contact_normal + i * model->mesh.dim);
 }
 
 /* Displacements of the free dofs (d) for the motion q of part i. */
@@ -159,35 +145,30 @@ static void keep_free(uz_parts *parts, int64_t i, const double *basis, int64_t r
     memcpy(p->held, free_rows[moving], (size_t)p->rank * sizeof free_rows[0]);
 }
 
-/* The rows of N together hold what they span of all modes; what is left goes back to the parts. Gram and Schmidt, as
- * there are few modes. basis: n x n. */
-static void hold_jointly(uz_parts *parts, double *basis, const double *rows, int64_t m, int64_t n)
-{
-    int64_t rank = 0, all, first = 0;
-    for (int64_t i = 0; i < m && rank < n; i++) {
-        memcpy(basis + rank * n, rows + i * n, (size_t)n * sizeof *basis);
-        rank += reject_rows(basis + rank * n, basis, rank, n);
-    }
-    all = rank;
-    for (int64_t k = 0; k < n && all < n; k++) {
-        memset(basis + all * n, 0, (size_t)n * sizeof *basis);
-        basis[all * n + k] = 1;
-        all += reject_rows(basis + all * n, basis, all, n);
-    }
-    for (int64_t i = 0; i < parts->count; i++) {
-        const int own = parts->motions - parts->list[i].rank;
-        keep_free(parts, i, basis, rank, all, first);
-        first += own;
-    }
-}
-
 static uz_status hold_by_bodies(uz_parts *parts, const uz_body_model *model, const double *z, int64_t n, uz_error *err)
 {
     double *rows = uz_alloc_zero(model->m * n, sizeof *rows), *basis = uz_alloc(n * n, sizeof *basis);
     const bool ok = rows && basis;
     if (ok) {
         rows_on_modes(rows, model, z, n);
-        hold_jointly(parts, basis, rows, model->m, n);
+        /* The rows of N together hold what they span of all modes; what is left goes back to the parts. Gram and
+         * Schmidt, as there are few modes. basis: n x n. */
+        int64_t rank = 0, all, first = 0;
+        for (int64_t i = 0; i < model->m && rank < n; i++) {
+            memcpy(basis + rank * n, rows + i * n, (size_t)n * sizeof *basis);
+            rank += reject_rows(basis + rank * n, basis, rank, n);
+        }
+        all = rank;
+        for (int64_t k = 0; k < n && all < n; k++) {
+            memset(basis + all * n, 0, (size_t)n * sizeof *basis);
+            basis[all * n + k] = 1;
+            all += reject_rows(basis + all * n, basis, all, n);
+        }
+        for (int64_t i = 0; i < parts->count; i++) {
+            const int own = parts->motions - parts->list[i].rank;
+            keep_free(parts, i, basis, rank, all, first);
+            first += own;
+        }
     }
     free(rows);
     free(basis);
@@ -204,10 +185,14 @@ uz_status uz_rigid_modes(double **modes, int64_t *count, const uz_body_model *mo
     uz_status status = uz_find_parts(&parts, model, err);
     if (status == UZ_OK)
         status = fill_modes(&z, &n, &parts, model, err);
-    if (status == UZ_OK && n > 0 && model->n_pair_rows > 0)
+    if (status == UZ_OK && n > 0 && model->n_pair_rows > 0) {
         status = hold_by_bodies(&parts, model, z, n, err);
-    else if (status == UZ_OK)
-        hold_by_obstacles(&parts, model);
+    } else if (status == UZ_OK) {
+        /* An obstacle stands in the way of one combination of the motions of its part, from one side. */
+        for (int64_t i = 0; i < model->m; i++)
+            uz_hold_part(&parts, &model->mesh, model->info.contact_node[i],
+                         model->info.contact_normal + i * model->mesh.dim);
+    }
     if (status == UZ_OK)
         status = refuse_first(&parts, model->m > 0 ? "the supports and obstacles" : "the supports", err);
     uz_parts_clear(&parts);

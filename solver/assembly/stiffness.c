@@ -14,20 +14,6 @@
 
 enum { DOFS = UZ_ELEMENT_DOFS };
 
-/* A sum of a few entries must not overflow either, and a stiffness must not vanish by underflow. */
-static uz_status check_range(const double *ke, int n, int64_t element, uz_error *err)
-{
-    for (int i = 0; i < n * n; i++)
-        if (!(fabs(ke[i]) < DBL_MAX / 1024))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, "/materials",
-                           "the stiffness of element %lld overflows; use other units", (long long)element);
-    for (int i = 0; i < n; i++)
-        if (!(ke[(n + 1) * i] > DBL_MIN * 1024))
-            return uz_fail(err, UZ_ERR_SCENE, "/materials",
-                           "the stiffness of element %lld underflows to zero; use other units", (long long)element);
-    return UZ_OK;
-}
-
 static uz_status refuse_shape(const uz_body_model *model, int64_t element, uz_shape_fault fault, uz_error *err)
 {
     char nodes[256] = "";
@@ -49,7 +35,17 @@ static uz_status element_stiffness(double *ke, const uz_body_model *model, int64
     const uz_shape_fault fault = uz_element_stiffness(ke, &element);
     if (fault != UZ_SHAPE_GOOD)
         return refuse_shape(model, e, fault, err);
-    return check_range(ke, uz_element_node_count(element.kind) * model->mesh.dim, e, err);
+    /* A sum of a few entries must not overflow either, and a stiffness must not vanish by underflow. */
+    int n = uz_element_node_count(element.kind) * model->mesh.dim;
+    for (int i = 0; i < n * n; i++)
+        if (!(fabs(ke[i]) < DBL_MAX / 1024))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, "/materials",
+                           "the stiffness of element %lld overflows; use other units", (long long)e);
+    for (int i = 0; i < n; i++)
+        if (!(ke[(n + 1) * i] > DBL_MIN * 1024))
+            return uz_fail(err, UZ_ERR_SCENE, "/materials",
+                           "the stiffness of element %lld underflows to zero; use other units", (long long)e);
+    return UZ_OK;
 }
 
 /* Element by element, keeping what the next ones share: in a mesh of equal boxes one matrix per material. */
