@@ -42,13 +42,6 @@ static bool precedes(const order *by, int64_t a, int64_t b)
     return x < y || (x == y && a < b);
 }
 
-static void swap(int64_t *a, int64_t *b)
-{
-    const int64_t kept = *a;
-    *a = *b;
-    *b = kept;
-}
-
 /* Hoare's FIND (CACM 4 (1961) 321) with the middle item for pivot: items before `place` precede those from it on. */
 static void split_at(int64_t *item, int64_t first, int64_t end, int64_t place, const order *by)
 {
@@ -61,8 +54,11 @@ static void split_at(int64_t *item, int64_t first, int64_t end, int64_t place, c
                 i++;
             while (precedes(by, pivot, item[j]))
                 j--;
-            if (i <= j)
-                swap(&item[i++], &item[j--]);
+            if (i <= j) {
+                const int64_t kept = item[i];
+                item[i++] = item[j];
+                item[j--] = kept;
+            }
         }
         if (place <= j)
             high = j;

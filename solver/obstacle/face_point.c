@@ -102,15 +102,6 @@ typedef struct {
 
 static const double QUAD[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
 
-static void quad_shape(double w[4], double da[4], double db[4], double a, double b)
-{
-    for (int i = 0; i < 4; i++) {
-        w[i] = 0.25 * (1 + QUAD[i][0] * a) * (1 + QUAD[i][1] * b);
-        da[i] = 0.25 * QUAD[i][0] * (1 + QUAD[i][1] * b);
-        db[i] = 0.25 * QUAD[i][1] * (1 + QUAD[i][0] * a);
-    }
-}
-
 /* In area coordinates L: corners L (2 L - 1), middles 4 L L'. */
 static void triangle_shape(double *w, double *da, double *db, int count, double a, double b)
 {
@@ -130,28 +121,29 @@ static void triangle_shape(double *w, double *da, double *db, int count, double 
     }
 }
 
-/* The quadrilateral of eight nodes, corners first. */
-static void serendipity_shape(double w[8], double da[8], double db[8], const double at[2])
-{
-    double gradient[UZ_FACE_NODES][3];
-    const uz_element_type *type = uz_element_type_of(UZ_QUAD8);
-    const double point[3] = {at[0], at[1], 0};
-    type->shape(w, point);
-    type->gradients(gradient, point);
-    for (int i = 0; i < 8; i++) {
-        da[i] = gradient[i][0];
-        db[i] = gradient[i][1];
-    }
-}
-
 static void shape(double *w, double *da, double *db, int count, const double at[2])
 {
-    if (count == 8)
-        serendipity_shape(w, da, db, at);
-    else if (count == 4)
-        quad_shape(w, da, db, at[0], at[1]);
-    else
+    if (count == 8) {
+        /* The quadrilateral of eight nodes, corners first. */
+        double gradient[UZ_FACE_NODES][3];
+        const uz_element_type *type = uz_element_type_of(UZ_QUAD8);
+        const double point[3] = {at[0], at[1], 0};
+        type->shape(w, point);
+        type->gradients(gradient, point);
+        for (int i = 0; i < 8; i++) {
+            da[i] = gradient[i][0];
+            db[i] = gradient[i][1];
+        }
+    } else if (count == 4) {
+        const double a = at[0], b = at[1];
+        for (int i = 0; i < 4; i++) {
+            w[i] = 0.25 * (1 + QUAD[i][0] * a) * (1 + QUAD[i][1] * b);
+            da[i] = 0.25 * QUAD[i][0] * (1 + QUAD[i][1] * b);
+            db[i] = 0.25 * QUAD[i][1] * (1 + QUAD[i][0] * a);
+        }
+    } else {
         triangle_shape(w, da, db, count, at[0], at[1]);
+    }
 }
 
 /* Of the position on a face of eight nodes, where p, q are a node's own coordinates: those of (1 + p a) (1 + q b)

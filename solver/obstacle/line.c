@@ -80,18 +80,13 @@ static void gap_to_piece(uz_gap *out, const uz_line *line, int64_t i, const doub
     out->curvature = 0;
 }
 
-/* The pieces that meet at a point. */
-static void pieces_at(int64_t pair[2], const uz_line *line, int64_t corner)
-{
-    pair[0] = line->closed && corner == 0 ? line->n - 1 : corner;
-    pair[1] = line->closed && corner == line->n - 1 ? 1 : corner + 1;
-}
-
 /* From a corner: inside or outside by the sum of both normals, which is on the outer side of any corner. */
 static void gap_to_corner(uz_gap *out, const uz_line *line, int64_t corner, const double x[2])
 {
     int64_t pair[2];
-    pieces_at(pair, line, corner);
+    /* The pieces that meet at a point. */
+    pair[0] = line->closed && corner == 0 ? line->n - 1 : corner;
+    pair[1] = line->closed && corner == line->n - 1 ? 1 : corner + 1;
     const double *a = line->tangent + 2 * pair[0], *b = line->tangent + 2 * pair[1];
     const double turn = cross(a, b), *at = line->point + 2 * corner;
     if (fabs(turn) <= UZ_SAME_DIRECTION) {

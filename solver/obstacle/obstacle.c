@@ -28,14 +28,6 @@ double uz_obstacle_largest(double most, const double *v, int64_t n)
     return most;
 }
 
-/* The power of two that brings numbers up to `most` to 1/2..1. */
-static double scale_of(double most)
-{
-    int exponent;
-    frexp(most > 0 ? most : 1, &exponent);
-    return ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
-}
-
 uz_status uz_obstacle_new(uz_obstacle **out, const uz_contact *contact, int64_t index, uz_model model, uz_error *err)
 {
     *out = NULL;
@@ -51,7 +43,11 @@ uz_status uz_obstacle_new(uz_obstacle **out, const uz_contact *contact, int64_t 
     o->dim = model == UZ_SOLID ? 3 : 2;
     o->index = index;
     o->inside = contact->inside;
-    o->scale = scale_of(o->shape->largest(contact, o->dim));
+    /* The power of two that brings numbers up to `most` to 1/2..1. */
+    double most = o->shape->largest(contact, o->dim);
+    int exponent;
+    frexp(most > 0 ? most : 1, &exponent);
+    o->scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
     o->radius = contact->radius * o->scale;
     for (int c = 0; c < o->dim; c++)
         o->point[c] = contact->point[c] * o->scale;

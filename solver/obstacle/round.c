@@ -29,19 +29,6 @@ static double largest(const uz_contact *contact, int dim)
     return fmax(uz_obstacle_largest(0, contact->point, dim), contact->radius);
 }
 
-static uz_status refuse_centre(const uz_obstacle *o, const double x[3], uz_error *err)
-{
-    char where[96];
-    const bool cylinder = o->shape == &uz_shape_cylinder;
-    snprintf(where, sizeof where, "/contacts/%lld/obstacle/%s/%s", (long long)o->index, o->shape->name[o->dim - 2],
-             cylinder ? "point" : "center");
-    return uz_fail(
-        err, UZ_ERR_SCENE, where,
-        "a node that can touch, (%g, %g, %g), lies %s: there the obstacle has no normal; move the obstacle, or "
-        "leave the node out of the group",
-        x[0] / o->scale, x[1] / o->scale, x[2] / o->scale, cylinder ? "on the axis" : "at the centre");
-}
-
 /* The vector from the centre, or from the axis at right angles to it, as a length and a unit vector. */
 static double radial(double unit[3], const uz_obstacle *o, const double x[3])
 {
@@ -75,8 +62,17 @@ static uz_status gap(uz_gap *out, const uz_obstacle *o, const double x[3], uz_er
 {
     double unit[3];
     const double distance = radial(unit, o, x), sign = o->inside ? -1 : 1;
-    if (is_centre(o, x, distance))
-        return refuse_centre(o, x, err);
+    if (is_centre(o, x, distance)) {
+        char where[96];
+        const bool cylinder = o->shape == &uz_shape_cylinder;
+        snprintf(where, sizeof where, "/contacts/%lld/obstacle/%s/%s", (long long)o->index, o->shape->name[o->dim - 2],
+                 cylinder ? "point" : "center");
+        return uz_fail(
+            err, UZ_ERR_SCENE, where,
+            "a node that can touch, (%g, %g, %g), lies %s: there the obstacle has no normal; move the obstacle, or "
+            "leave the node out of the group",
+            x[0] / o->scale, x[1] / o->scale, x[2] / o->scale, cylinder ? "on the axis" : "at the centre");
+    }
     out->gap = sign * (distance - o->radius);
     out->curvature = sign / distance;
     for (int c = 0; c < 3; c++) {
