@@ -70,29 +70,22 @@ int uz_side_gauss_count(const uz_side *side)
     return side->nodes == 3 ? 3 : side->nodes == 6 ? 7 : face_type(side)->rule.count;
 }
 
-static double edge_gauss(double point[2], int nodes, int g)
-{
-    point[0] = nodes == 2 ? (g == 0 ? -UZ_GAUSS2 : UZ_GAUSS2) : (g - 1) * UZ_GAUSS3;
-    point[1] = 0;
-    return nodes == 2 ? 1 : g == 1 ? 8. / 9 : 5. / 9;
-}
-
-/* Three points for tri3 (degree 2), seven for tri6. */
-static double triangle_gauss(double point[2], int nodes, int g)
-{
-    const bool centre = nodes == 6 && g == 6, outer = nodes == 3 || g < 3;
-    const double each = centre ? 1. / 3 : nodes == 3 ? 1. / 6 : outer ? RING_A : RING_B;
-    point[0] = g % 3 == 1 && !centre ? 1 - 2 * each : each;
-    point[1] = g % 3 == 2 && !centre ? 1 - 2 * each : each;
-    return 0.5 * (centre ? 9. / 40 : nodes == 3 ? 1. / 3 : outer ? WEIGHT_A : WEIGHT_B);
-}
-
 double uz_side_gauss(double point[2], const uz_side *side, int g)
 {
-    if (side->dim == 2)
-        return edge_gauss(point, side->nodes, g);
-    if (side->nodes % 3 == 0)
-        return triangle_gauss(point, side->nodes, g);
+    if (side->dim == 2) {
+        point[0] = side->nodes == 2 ? (g == 0 ? -UZ_GAUSS2 : UZ_GAUSS2) : (g - 1) * UZ_GAUSS3;
+        point[1] = 0;
+        return side->nodes == 2 ? 1 : g == 1 ? 8. / 9 : 5. / 9;
+    }
+    if (side->nodes % 3 == 0) {
+        /* Three points for tri3 (degree 2), seven for tri6. */
+        const int nodes = side->nodes;
+        const bool centre = nodes == 6 && g == 6, outer = nodes == 3 || g < 3;
+        const double each = centre ? 1. / 3 : nodes == 3 ? 1. / 6 : outer ? RING_A : RING_B;
+        point[0] = g % 3 == 1 && !centre ? 1 - 2 * each : each;
+        point[1] = g % 3 == 2 && !centre ? 1 - 2 * each : each;
+        return 0.5 * (centre ? 9. / 40 : nodes == 3 ? 1. / 3 : outer ? WEIGHT_A : WEIGHT_B);
+    }
     double place[3];
     const double weight = face_type(side)->rule.point(place, g);
     memcpy(point, place, 2 * sizeof *point);
@@ -100,16 +93,6 @@ double uz_side_gauss(double point[2], const uz_side *side, int g)
 }
 
 /* ------------------------------------------------------------------- areas */
-
-/* Tangents along the reference coordinates, from differences to the first node. */
-static void tangents(double T[2][3], const uz_side *side, double slope[][3])
-{
-    memset(T, 0, 6 * sizeof T[0][0]);
-    for (int a = 1; a < side->nodes; a++)
-        for (int i = 0; i < side->dim - 1; i++)
-            for (int j = 0; j < side->dim; j++)
-                T[i][j] += slope[a][i] * (side->xyz[a * side->dim + j] - side->xyz[j]);
-}
 
 /* Thickness, 2 pi r, or 1. */
 static double depth(const uz_side *side, const double *N)
@@ -129,7 +112,12 @@ static void area_vector(double *area, double *N, const uz_side *side, const doub
 {
     double slope[UZ_SIDE_NODES][3], T[2][3];
     shape(N, slope, side, point);
-    tangents(T, side, slope);
+    /* Tangents along the reference coordinates, from differences to the first node. */
+    memset(T, 0, 6 * sizeof T[0][0]);
+    for (int a = 1; a < side->nodes; a++)
+        for (int i = 0; i < side->dim - 1; i++)
+            for (int j = 0; j < side->dim; j++)
+                T[i][j] += slope[a][i] * (side->xyz[a * side->dim + j] - side->xyz[j]);
     const double *s = T[0], *t = T[1], times = depth(side, N);
     if (side->dim == 2) { /* the element on the left: outward is the tangent turned clockwise */
         area[0] = times * s[1];

@@ -98,19 +98,6 @@ static double mean_direction_count(uz_model model)
     return model == UZ_PLANE_STRAIN ? 2 : 3;
 }
 
-/* What a ring adds at a point: lambda with the whole dilatation, and the hoop strain. */
-static void add_ring(double *K, const uz_element *element, const uz_gauss_state *state, const double *gradients,
-                     int size, double lambda)
-{
-    double dilatation[UZ_ELEMENT_DOFS], hoop[UZ_ELEMENT_DOFS];
-    for (int i = 0; i < size; i++) {
-        hoop[i] = i % 2 == 0 ? state->N[i / 2] / state->radius : 0;
-        dilatation[i] = gradients[i] + hoop[i];
-    }
-    add_product(K, size, lambda * state->volume, dilatation);
-    add_product(K, size, 2 * element->lame.mu * state->volume, hoop);
-}
-
 /* The mean dilatation's share of the energy. */
 static void add_mean(double *K, const uz_element *element, double modulus)
 {
@@ -144,8 +131,16 @@ static int integrate(double *K, const uz_element *element)
             flatten(v + dofs, mode, dim, dim);
         }
         add_product(S, size, state.volume, v);
-        if (ring)
-            add_ring(K, element, &state, v, dofs, lambda);
+        if (ring) {
+            /* What a ring adds at a point: lambda with the whole dilatation, and the hoop strain. */
+            double dilatation[UZ_ELEMENT_DOFS], hoop[UZ_ELEMENT_DOFS];
+            for (int i = 0; i < dofs; i++) {
+                hoop[i] = i % 2 == 0 ? state.N[i / 2] / state.radius : 0;
+                dilatation[i] = v[i] + hoop[i];
+            }
+            add_product(K, dofs, lambda * state.volume, dilatation);
+            add_product(K, dofs, 2 * element->lame.mu * state.volume, hoop);
+        }
     }
     finish_blocks(S, size, dim, ring ? 0 : lambda, element->lame.mu);
     for (int i = 0; i < size; i++)
@@ -168,9 +163,11 @@ static void factor_internal(double *K, int dofs, int size)
         }
 }
 
-/* L^-1 times the coupling, in its place. */
-static void solve_coupling(double *K, int dofs, int size)
+/* The internal parameters are those of least energy: K_uu - K_ua A^-1 K_au. */
+static void condense(double *K, int dofs, int size)
 {
+    factor_internal(K, dofs, size);
+    /* L^-1 times the coupling, in its place. */
     for (int i = dofs; i < size; i++)
         for (int j = 0; j < dofs; j++) {
             double sum = K[i * MOST + j];
@@ -178,13 +175,6 @@ static void solve_coupling(double *K, int dofs, int size)
                 sum -= K[i * MOST + k] * K[k * MOST + j];
             K[i * MOST + j] = sum / K[i * MOST + i];
         }
-}
-
-/* The internal parameters are those of least energy: K_uu - K_ua A^-1 K_au. */
-static void condense(double *K, int dofs, int size)
-{
-    factor_internal(K, dofs, size);
-    solve_coupling(K, dofs, size);
     for (int k = dofs; k < size; k++)
         for (int i = 0; i < dofs; i++)
             for (int j = 0; j <= i; j++)
