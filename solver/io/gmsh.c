@@ -11,23 +11,6 @@
 
 /* ---- the file */
 
-static uz_status check_version(gmsh_file *file, double version, int64_t binary, int64_t size)
-{
-    const gmsh_text *text = &file->text;
-    if (version != 2.2 && version != 4.1)
-        return gmsh_fail(text, UZ_ERR_UNSUPPORTED,
-                         "version %g of the format is not read; save as version 2.2 or 4.1 (Mesh.MshFileVersion)",
-                         version);
-    if (binary != 0 && binary != 1)
-        return gmsh_fail(text, UZ_ERR_FORMAT, "the file type is %lld; it is 0 (ASCII) or 1 (binary)",
-                         (long long)binary);
-    if (size != 8)
-        return gmsh_fail(text, UZ_ERR_UNSUPPORTED, "numbers of %lld bytes are not read; only those of 8",
-                         (long long)size);
-    file->version = version == 2.2 ? 22 : 41;
-    return UZ_OK;
-}
-
 /* version file-type data-size, in a binary file followed by the integer 1 in the byte order of the file. */
 static uz_status read_header(gmsh_file *file)
 {
@@ -45,8 +28,17 @@ static uz_status read_header(gmsh_file *file)
         status = gmsh_int_text(text, &binary, "the file type");
     if (status == UZ_OK)
         status = gmsh_int_text(text, &size, "the data size");
-    if (status == UZ_OK)
-        status = check_version(file, version, binary, size);
+    if (status == UZ_OK && version != 2.2 && version != 4.1)
+        status = gmsh_fail(text, UZ_ERR_UNSUPPORTED,
+                           "version %g of the format is not read; save as version 2.2 or 4.1 (Mesh.MshFileVersion)",
+                           version);
+    if (status == UZ_OK && binary != 0 && binary != 1)
+        status =
+            gmsh_fail(text, UZ_ERR_FORMAT, "the file type is %lld; it is 0 (ASCII) or 1 (binary)", (long long)binary);
+    if (status == UZ_OK && size != 8)
+        status =
+            gmsh_fail(text, UZ_ERR_UNSUPPORTED, "numbers of %lld bytes are not read; only those of 8", (long long)size);
+    file->version = version == 2.2 ? 22 : 41;
     if (status == UZ_OK)
         status = gmsh_end_line(text);
     if (status != UZ_OK)
@@ -161,19 +153,6 @@ static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const 
     return UZ_OK;
 }
 
-static uz_status fill_nodes(uz_given_mesh *out, const gmsh_file *file, int dim)
-{
-    out->dim = dim;
-    out->n_nodes = file->n_nodes;
-    out->from_file = true;
-    out->xyz = uz_alloc(file->n_nodes * dim, sizeof *out->xyz);
-    if (!out->xyz)
-        return gmsh_no_memory(file);
-    for (int64_t i = 0; i < file->n_nodes; i++)
-        memcpy(out->xyz + i * dim, file->xyz + 3 * i, (size_t)dim * sizeof(double));
-    return UZ_OK;
-}
-
 uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file)
 {
     int dim = 0;
@@ -185,7 +164,13 @@ uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file)
     if (!new_element)
         return gmsh_no_memory(file);
     number_elements(new_element, out, file, dim, &places);
-    status = fill_nodes(out, file, dim);
+    out->dim = dim;
+    out->n_nodes = file->n_nodes;
+    out->from_file = true;
+    out->xyz = uz_alloc(file->n_nodes * dim, sizeof *out->xyz);
+    status = out->xyz ? UZ_OK : gmsh_no_memory(file);
+    for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++)
+        memcpy(out->xyz + i * dim, file->xyz + 3 * i, (size_t)dim * sizeof(double));
     if (status == UZ_OK)
         status = fill_elements(out, file, new_element, places);
     if (status == UZ_OK)

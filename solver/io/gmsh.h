@@ -16,12 +16,10 @@ typedef struct {
     uz_error *err;
 } gmsh_text;
 
-/* Fails at the line, or in a binary file at the byte, that the text has come to. */
-uz_status gmsh_fail(const gmsh_text *text, uz_status status, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-/* Fails at a place that was passed before. */
+/* Fails at a line, or in a binary file at a byte: a place that was passed before, or that the text has come to. */
 uz_status gmsh_fail_at(const gmsh_text *text, const gmsh_text *place, uz_status status, const char *format, ...)
     __attribute__((format(printf, 4, 5)));
+#define gmsh_fail(text, ...) gmsh_fail_at(text, text, __VA_ARGS__)
 
 /* A number: 4 bytes, 8 bytes without a sign, 8 bytes, or a word. `what` is what it should be, for the message. */
 uz_status gmsh_int(gmsh_text *text, int64_t *value, const char *what);

@@ -24,13 +24,6 @@ uz_status gmsh_no_memory(const gmsh_file *file)
     return gmsh_fail(&file->text, UZ_ERR_MEMORY, "no memory for the mesh");
 }
 
-static uz_status check_limit(const gmsh_file *file, int64_t count, size_t each)
-{
-    if (file->max_bytes == 0 || (uint64_t)count <= file->max_bytes / each)
-        return UZ_OK;
-    return gmsh_fail(&file->text, UZ_ERR_LIMIT, "the mesh needs more memory than is allowed");
-}
-
 /* ---- names of physical groups: text also in binary files */
 
 uz_status gmsh_read_names(gmsh_file *file)
@@ -108,25 +101,20 @@ static uz_status read_physicals(gmsh_file *file, gmsh_part *part)
     return status;
 }
 
-/* parentDim parentTag numPartitions partitionTag... */
-static uz_status skip_partition(gmsh_text *text)
-{
-    int64_t count = 0;
-    uz_status status = skip_ints(text, 2);
-    if (status == UZ_OK)
-        status = gmsh_size(text, &count, "the number of partitions of an entity");
-    return status == UZ_OK ? skip_ints(text, count) : status;
-}
-
-/* tag [partition] box (a point for points) physical groups [bounding entities] */
+/* tag [partition] box (a point for points) physical groups [bounding entities], a partition being
+ * parentDim parentTag numPartitions partitionTag... */
 static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
 {
     gmsh_text *text = &file->text;
     gmsh_part part = {.dim = dim};
-    int64_t count = 0;
+    int64_t count = 0, partitions = 0;
     uz_status status = gmsh_int(text, &part.tag, "the number of an entity");
     if (status == UZ_OK && partitioned)
-        status = skip_partition(text);
+        status = skip_ints(text, 2);
+    if (status == UZ_OK && partitioned)
+        status = gmsh_size(text, &partitions, "the number of partitions of an entity");
+    if (status == UZ_OK)
+        status = skip_ints(text, partitions);
     if (status == UZ_OK)
         status = read_reals(text, dim == 0 ? 3 : 6, NULL);
     if (status == UZ_OK)
@@ -143,18 +131,6 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
     return UZ_OK;
 }
 
-/* numPartitions numGhosts (tag partition)... */
-static uz_status skip_ghosts(gmsh_text *text)
-{
-    int64_t partitions = 0, ghosts = 0;
-    uz_status status = gmsh_size(text, &partitions, "the number of partitions");
-    if (status == UZ_OK)
-        status = gmsh_size(text, &ghosts, "the number of ghost entities");
-    if (status == UZ_OK)
-        status = gmsh_count(text, ghosts, 2 * int_bytes(text), "ghost entities");
-    return status == UZ_OK ? skip_ints(text, 2 * ghosts) : status;
-}
-
 int gmsh_compare_keys(int dim, int64_t tag, int other_dim, int64_t other_tag)
 {
     if (dim != other_dim)
@@ -168,15 +144,23 @@ int gmsh_compare_parts(const void *a, const void *b)
     return gmsh_compare_keys(x->dim, x->tag, y->dim, y->tag);
 }
 
-/* Elements of a partitioned mesh name partitioned entities, which have the physical groups of their parents. */
+/* [numPartitions numGhosts (tag partition)...] entities. Elements of a partitioned mesh name partitioned entities,
+ * which have the physical groups of their parents. */
 uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
 {
-    int64_t count[4] = {0};
+    gmsh_text *text = &file->text;
+    int64_t count[4] = {0}, partitions = 0, ghosts = 0;
     uz_status status = UZ_OK;
     if (file->n_elements > 0 || (!partitioned && file->entities_read))
         return gmsh_fail(&file->text, UZ_ERR_FORMAT, "entities a second time, or after $Elements");
     if (partitioned)
-        status = skip_ghosts(&file->text);
+        status = gmsh_size(text, &partitions, "the number of partitions");
+    if (status == UZ_OK && partitioned)
+        status = gmsh_size(text, &ghosts, "the number of ghost entities");
+    if (status == UZ_OK && partitioned)
+        status = gmsh_count(text, ghosts, 2 * int_bytes(text), "ghost entities");
+    if (status == UZ_OK)
+        status = skip_ints(text, 2 * ghosts);
     for (int dim = 0; dim < 4 && status == UZ_OK; dim++)
         status = gmsh_size(&file->text, &count[dim], "a number of entities");
     if (partitioned)
@@ -200,8 +184,8 @@ static uz_status make_nodes(gmsh_file *file, int64_t count)
     if (file->tag)
         return gmsh_fail(&file->text, UZ_ERR_FORMAT, "a second $Nodes");
     uz_status status = gmsh_count(&file->text, count, least, "nodes");
-    if (status == UZ_OK)
-        status = check_limit(file, count, 8 * sizeof(double));
+    if (status == UZ_OK && file->max_bytes > 0 && (uint64_t)count > file->max_bytes / (8 * sizeof(double)))
+        status = gmsh_fail(&file->text, UZ_ERR_LIMIT, "the mesh needs more memory than is allowed");
     if (status != UZ_OK)
         return status;
     file->xyz = uz_alloc(3 * count, sizeof *file->xyz);

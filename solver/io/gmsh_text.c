@@ -10,33 +10,17 @@
 
 /* ---- failures */
 
-static uz_status fail_there(const gmsh_text *text, const gmsh_text *place, uz_status status, const char *format,
-                            va_list args)
+uz_status gmsh_fail_at(const gmsh_text *text, const gmsh_text *place, uz_status status, const char *format, ...)
 {
     char message[400];
+    va_list args;
+    va_start(args, format);
     vsnprintf(message, sizeof message, format, args);
+    va_end(args);
     if (place->binary)
         return uz_fail(text->err, status, "", "at byte %lld of the file: %s", (long long)(place->at - place->begin),
                        message);
     return uz_fail_line(text->err, status, place->line, "%s", message);
-}
-
-uz_status gmsh_fail(const gmsh_text *text, uz_status status, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    status = fail_there(text, text, status, format, args);
-    va_end(args);
-    return status;
-}
-
-uz_status gmsh_fail_at(const gmsh_text *text, const gmsh_text *place, uz_status status, const char *format, ...)
-{
-    va_list args;
-    va_start(args, format);
-    status = fail_there(text, place, status, format, args);
-    va_end(args);
-    return status;
 }
 
 /* ---- words */

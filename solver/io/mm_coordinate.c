@@ -109,24 +109,18 @@ static uz_status read_entries(gather *g, mm_text *text, const uz_mm_info *info)
     return status == UZ_OK ? mm_expect_end(text, info) : status;
 }
 
-/* Reads again from the first data line, which was found correct, to name the line of entry k. */
-static uz_status fail_at_entry(mm_text body, const uz_mm_info *info, int64_t k)
-{
-    entry e = {0};
-    for (bool found; mm_next_line(&body, &found) == UZ_OK && found; k--) {
-        if (read_entry(&body, info, &e) != UZ_OK || k == 0)
-            break;
-        if (mm_end_line(&body) != UZ_OK)
-            break;
-    }
-    return fail_repeated(&body, &e);
-}
-
-static uz_status sort_entries(gather *g, const mm_text *body, const uz_mm_info *info)
+/* Where an entry is repeated, reads again from the first data line, which was found correct, to name its line. */
+static uz_status sort_entries(gather *g, mm_text body, const uz_mm_info *info)
 {
     int64_t repeated;
-    uz_status status = mm_sort_columns(g->A, &g->col, g->count, &repeated, body->err);
-    return status == UZ_OK && repeated >= 0 ? fail_at_entry(*body, info, repeated) : status;
+    entry e = {0};
+    const uz_status status = mm_sort_columns(g->A, &g->col, g->count, &repeated, body.err);
+    if (status != UZ_OK || repeated < 0)
+        return status;
+    for (bool found; mm_next_line(&body, &found) == UZ_OK && found; repeated--)
+        if (read_entry(&body, info, &e) != UZ_OK || repeated == 0 || mm_end_line(&body) != UZ_OK)
+            break;
+    return fail_repeated(&body, &e);
 }
 
 uz_status mm_read_coordinate(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
@@ -135,7 +129,7 @@ uz_status mm_read_coordinate(uz_csc *A, mm_text *text, const uz_mm_info *info, i
     mm_text body = *text;
     uz_status status = read_entries(&g, text, info);
     if (status == UZ_OK && g.col)
-        status = sort_entries(&g, &body, info);
+        status = sort_entries(&g, body, info);
     else
         for (int64_t j = 0; status == UZ_OK && j < A->cols; j++)
             A->ptr[j + 1] += A->ptr[j];

@@ -58,33 +58,22 @@ static uz_status read_tag(mm_text *text)
 
 /* The report's table of kinds: a pattern has no values to fill an array or to change sign; only a complex matrix can
  * differ from its conjugate. */
-static bool kind_exists(const banner *b)
-{
-    if (b->field == FIELD_PATTERN)
-        return b->format == UZ_MM_COORDINATE && b->symmetry <= SYMMETRY_SYMMETRIC;
-    return b->symmetry != SYMMETRY_HERMITIAN || b->field == FIELD_COMPLEX;
-}
-
-static const char *unsupported_word(const banner *b)
-{
-    if (b->object != OBJECT_MATRIX)
-        return OBJECTS[b->object];
-    if (b->field > FIELD_INTEGER)
-        return FIELDS[b->field];
-    return b->symmetry > SYMMETRY_SYMMETRIC ? SYMMETRIES[b->symmetry] : NULL;
-}
-
 static uz_status check_banner(const mm_text *text, const banner *b)
 {
-    if (!kind_exists(b))
+    const bool exists = b->field == FIELD_PATTERN ? b->format == UZ_MM_COORDINATE && b->symmetry <= SYMMETRY_SYMMETRIC
+                                                  : b->symmetry != SYMMETRY_HERMITIAN || b->field == FIELD_COMPLEX;
+    const char *unsupported = b->object != OBJECT_MATRIX         ? OBJECTS[b->object]
+                              : b->field > FIELD_INTEGER         ? FIELDS[b->field]
+                              : b->symmetry > SYMMETRY_SYMMETRIC ? SYMMETRIES[b->symmetry]
+                                                                 : NULL;
+    if (!exists)
         return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line, "there is no %s %s %s matrix; %s", FORMATS[b->format],
                             FIELDS[b->field], SYMMETRIES[b->symmetry], BANNER_REMEDY);
-    const char *word = unsupported_word(b);
-    if (word)
+    if (unsupported)
         return uz_fail_line(text->err, UZ_ERR_UNSUPPORTED, text->line,
                             "%s is not supported here; send a real or integer, general or symmetric matrix (a vector "
                             "as a matrix of one column)",
-                            word);
+                            unsupported);
     return UZ_OK;
 }
 

@@ -41,17 +41,6 @@ static bool within_limit(int64_t slots, int64_t room, size_t len, size_t max_byt
     return max_bytes > 0 || dense <= FREE_BYTES + BYTES_PER_TEXT_BYTE * (int64_t)len;
 }
 
-static uz_status read_number_line(mm_text *text, const uz_mm_info *info, int64_t read, double *value)
-{
-    bool found;
-    uz_status status = mm_next_line(text, &found);
-    if (status == UZ_OK && !found)
-        status = mm_fail_missing(text, info, read);
-    if (status == UZ_OK)
-        status = mm_read_value(text, info->integer, value);
-    return status == UZ_OK ? mm_end_line(text) : status;
-}
-
 /* Column by column, all rows or those from the diagonal down; a symmetric array is its lower triangle. */
 static uz_status read_array(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
 {
@@ -59,8 +48,15 @@ static uz_status read_array(uz_csc *A, mm_text *text, const uz_mm_info *info, in
     int64_t at = 0;
     for (int64_t j = 0; j < A->cols; j++) {
         for (int64_t i = info->symmetry == UZ_MM_SYMMETRIC ? j : 0; i < A->rows; i++) {
-            double value;
-            status = read_number_line(text, info, at, &value);
+            double value = 0;
+            bool found;
+            status = mm_next_line(text, &found);
+            if (status == UZ_OK && !found)
+                status = mm_fail_missing(text, info, at);
+            if (status == UZ_OK)
+                status = mm_read_value(text, info->integer, &value);
+            if (status == UZ_OK)
+                status = mm_end_line(text);
             if (status != UZ_OK)
                 return status;
             if (at == room)

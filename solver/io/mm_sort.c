@@ -82,25 +82,18 @@ static void merge_sort(place *places, place *work, int64_t count)
         memcpy(places, from, (size_t)count * sizeof *places);
 }
 
-static int64_t longest_column(const uz_csc *A)
-{
-    int64_t longest = 0;
-    for (int64_t j = 0; j < A->cols; j++) {
-        if (A->ptr[j + 1] - A->ptr[j] > longest)
-            longest = A->ptr[j + 1] - A->ptr[j];
-    }
-    return longest;
-}
-
 static uz_status sort_rows(place *places, const uz_csc *A, uz_error *err)
 {
     place *work = NULL;
+    int64_t longest = 0;
+    for (int64_t j = 0; j < A->cols; j++)
+        longest = A->ptr[j + 1] - A->ptr[j] > longest ? A->ptr[j + 1] - A->ptr[j] : longest;
     for (int64_t j = 0; j < A->cols; j++) {
         int64_t length = A->ptr[j + 1] - A->ptr[j];
         place *column = places + A->ptr[j];
         if (rows_ascend(column, length))
             continue;
-        if (!work && !(work = uz_alloc(longest_column(A), sizeof *work)))
+        if (!work && !(work = uz_alloc(longest, sizeof *work)))
             return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to sort a column");
         merge_sort(column, work, length);
     }

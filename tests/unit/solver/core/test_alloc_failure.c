@@ -152,13 +152,13 @@ static uz_status read_sparse_vector(uz_error *err)
 
 static uz_status write_matrix(uz_error *err)
 {
-    int64_t ptr[2] = {0, 100}, idx[100];
-    double val[100];
-    for (int k = 0; k < 100; k++) {
+    int64_t ptr[2] = {0, 400}, idx[400];
+    double val[400];
+    for (int k = 0; k < 400; k++) {
         idx[k] = k;
         val[k] = k / 7.0;
     }
-    uz_csc A = {.rows = 100, .cols = 1, .ptr = ptr, .idx = idx, .val = val};
+    uz_csc A = {.rows = 400, .cols = 1, .ptr = ptr, .idx = idx, .val = val};
     char *text;
     size_t len;
     uz_status status = uz_mm_write(&text, &len, &A, UZ_MM_GENERAL, err);
@@ -169,12 +169,12 @@ static uz_status write_matrix(uz_error *err)
 
 static uz_status write_vector(uz_error *err)
 {
-    double x[100];
-    for (int k = 0; k < 100; k++)
+    double x[400];
+    for (int k = 0; k < 400; k++)
         x[k] = k / 7.0;
     char *text;
     size_t len;
-    uz_status status = uz_mm_write_vector(&text, &len, x, 100, err);
+    uz_status status = uz_mm_write_vector(&text, &len, x, 400, err);
     CHECK(status == UZ_OK || (!text && len == 0));
     free(text);
     return status;
