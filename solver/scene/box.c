@@ -188,52 +188,41 @@ double uz_box_node_count(const uz_box *box)
     return count;
 }
 
-/* A point of the lattice along one axis: a grid line, or the middle between two. */
-static double lattice_line(const uz_box *box, int axis, int order, int64_t i)
-{
-    if (order == 1 || i % 2 == 0)
-        return grid_line(box, axis, i / order);
-    if (!is_graded(box, axis))
-        return box->origin[axis] + box->size[axis] * ((double)i / (double)(order * box->cells[axis]));
-    return 0.5 * (grid_line(box, axis, i / 2) + grid_line(box, axis, i / 2 + 1));
-}
-
-/* Once for all nodes: logarithms for each of them would take longer than all the rest. */
+/* Points of the lattice along one axis: grid lines, and the middles between two. Once for all nodes: logarithms for
+ * each of them would take longer than all the rest. */
 double *uz_box_lines(const uz_box *box, int axis, int order)
 {
     const int64_t count = axis < box->dim ? order * box->cells[axis] + 1 : 1;
     double *line = uz_alloc(count, sizeof *line);
     for (int64_t i = 0; line && axis < box->dim && i < count; i++)
-        line[i] = lattice_line(box, axis, order, i);
+        if (order == 1 || i % 2 == 0)
+            line[i] = grid_line(box, axis, i / order);
+        else if (!is_graded(box, axis))
+            line[i] = box->origin[axis] + box->size[axis] * ((double)i / (double)(order * box->cells[axis]));
+        else
+            line[i] = 0.5 * (grid_line(box, axis, i / 2) + grid_line(box, axis, i / 2 + 1));
     return line;
 }
 
-static void place_nodes(uz_mesh *mesh, const uz_box *box, const uz_box_lattice *lattice, double *const line[3])
+static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_error *err)
 {
-    const int64_t end[3] = {lattice->order * box->cells[0], lattice->order * box->cells[1],
-                            box->dim == 3 ? lattice->order * box->cells[2] : 0};
-    double *xyz = mesh->xyz;
-    for (int64_t k = 0; k <= end[2]; k++)
+    const uz_box_lattice lattice = uz_box_lattice_of(box);
+    const int64_t end[3] = {lattice.order * box->cells[0], lattice.order * box->cells[1],
+                            box->dim == 3 ? lattice.order * box->cells[2] : 0};
+    double *line[3], *xyz = mesh->xyz;
+    for (int axis = 0; axis < 3; axis++)
+        line[axis] = uz_box_lines(box, axis, lattice.order);
+    const bool room = line[0] && line[1] && line[2];
+    for (int64_t k = 0; k <= end[2] && room; k++)
         for (int64_t j = 0; j <= end[1]; j++)
             for (int64_t i = 0; i <= end[0]; i++) {
-                if (!lattice->whole && !lattice->node[k % 2][j % 2][i % 2])
+                if (!lattice.whole && !lattice.node[k % 2][j % 2][i % 2])
                     continue;
                 *xyz++ = line[0][i];
                 *xyz++ = line[1][j];
                 if (box->dim == 3)
                     *xyz++ = line[2][k];
             }
-}
-
-static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_error *err)
-{
-    const uz_box_lattice lattice = uz_box_lattice_of(box);
-    double *line[3];
-    for (int axis = 0; axis < 3; axis++)
-        line[axis] = uz_box_lines(box, axis, lattice.order);
-    const bool room = line[0] && line[1] && line[2];
-    if (room)
-        place_nodes(mesh, box, &lattice, line);
     for (int axis = 0; axis < 3; axis++)
         free(line[axis]);
     return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the grid lines of a box");

@@ -81,29 +81,6 @@ static uz_status check_counts(const uz_scene *scene, uz_error *err)
     return UZ_OK;
 }
 
-static uz_status check_thickness(const uz_scene *scene, uz_error *err)
-{
-    if (scene->model != UZ_PLANE_STRESS && scene->model != UZ_PLANE_STRAIN)
-        return UZ_OK;
-    if (!isfinite(scene->thickness))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, "/thickness", "the thickness is not a finite number");
-    if (scene->thickness <= 0)
-        return uz_fail(err, UZ_ERR_SCENE, "/thickness", "the thickness must be positive");
-    return UZ_OK;
-}
-
-/* In a body of revolution x is the radius. */
-static uz_status check_radius(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    for (int64_t i = 0; scene->model == UZ_AXISYMMETRIC && i < mesh->n_nodes; i++)
-        if (mesh->xyz[2 * i] < -1e-12 * mesh->extent)
-            return uz_fail(err, UZ_ERR_SCENE, "/mesh",
-                           "node %lld at (%g, %g) has a negative x, which is the radius in a body of revolution; "
-                           "mesh the half with x >= 0",
-                           (long long)i, mesh->xyz[2 * i], mesh->xyz[2 * i + 1]);
-    return UZ_OK;
-}
-
 static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     const uz_formulation formulation = scene->formulation;
@@ -131,10 +108,18 @@ static uz_status check_model(const uz_scene *scene, const uz_mesh *mesh, uz_erro
     if (uz_model_dim(scene->model) != mesh->dim)
         return uz_fail(err, UZ_ERR_SCENE, "/model", "a mesh in %d dimensions needs the model %s", mesh->dim,
                        mesh->dim == 3 ? "solid" : "plane_stress, plane_strain or axisymmetric");
-    uz_status status = check_thickness(scene, err);
-    if (status == UZ_OK)
-        status = check_radius(scene, mesh, err);
-    return status == UZ_OK ? check_formulation(scene, mesh, err) : status;
+    const bool has_thickness = scene->model == UZ_PLANE_STRESS || scene->model == UZ_PLANE_STRAIN;
+    if (has_thickness && !isfinite(scene->thickness))
+        return uz_fail(err, UZ_ERR_NOT_FINITE, "/thickness", "the thickness is not a finite number");
+    if (has_thickness && scene->thickness <= 0)
+        return uz_fail(err, UZ_ERR_SCENE, "/thickness", "the thickness must be positive");
+    for (int64_t i = 0; scene->model == UZ_AXISYMMETRIC && i < mesh->n_nodes; i++) /* x is the radius */
+        if (mesh->xyz[2 * i] < -1e-12 * mesh->extent)
+            return uz_fail(err, UZ_ERR_SCENE, "/mesh",
+                           "node %lld at (%g, %g) has a negative x, which is the radius in a body of revolution; "
+                           "mesh the half with x >= 0",
+                           (long long)i, mesh->xyz[2 * i], mesh->xyz[2 * i + 1]);
+    return check_formulation(scene, mesh, err);
 }
 
 static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
@@ -161,13 +146,6 @@ static const char *const LOAD_KEY[UZ_LOAD_KINDS] = {
     [UZ_LOAD_TRACTION] = "traction",      [UZ_LOAD_PRESSURE] = "pressure", [UZ_LOAD_FORCE] = "force",
     [UZ_LOAD_BODY_FORCE] = "body_force",  [UZ_LOAD_GRAVITY] = "gravity",   [UZ_LOAD_NODE_FORCE] = "force",
     [UZ_LOAD_TEMPERATURE] = "temperature"};
-
-static uz_status check_load_value(const uz_load *load, int dim, int64_t i, uz_error *err)
-{
-    if (load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_TEMPERATURE)
-        return uz_check_number(load->value, "loads", i, LOAD_KEY[load->kind], err);
-    return uz_check_vector(load->v, dim, "loads", i, LOAD_KEY[load->kind], err);
-}
 
 static uz_status check_on_sides(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
@@ -265,7 +243,11 @@ static uz_status check_load(const uz_scene *scene, const uz_mesh *mesh, int64_t 
     default:
         return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "loads", i, NULL), "an unknown kind of load");
     }
-    return status == UZ_OK ? check_load_value(load, mesh->dim, i, err) : status;
+    if (status != UZ_OK)
+        return status;
+    if (load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_TEMPERATURE)
+        return uz_check_number(load->value, "loads", i, LOAD_KEY[load->kind], err);
+    return uz_check_vector(load->v, mesh->dim, "loads", i, LOAD_KEY[load->kind], err);
 }
 
 uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)

@@ -59,13 +59,6 @@ static uz_status check_direction(const double normal[3], int dim, const char *li
     return status;
 }
 
-static uz_status check_normal_support(const uz_support *support, int dim, int64_t i, uz_error *err)
-{
-    uz_status status =
-        check_direction(support->normal, dim, "supports", i, "normal", "it must be the direction that is held", err);
-    return status == UZ_OK ? uz_check_number(support->value, "supports", i, "u", err) : status;
-}
-
 static uz_status check_spring(const uz_support *support, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
@@ -91,13 +84,16 @@ static uz_status check_support(const uz_scene *scene, const uz_mesh *mesh, int64
 {
     char where[UZ_CHECK_POINTER];
     const uz_support *support = &scene->supports[i];
+    uz_status status;
     if (!uz_check_group(where, mesh, support->on, "supports", i, "on", err))
         return UZ_ERR_SCENE;
     switch (support->kind) {
     case UZ_SUPPORT_COMPONENTS:
         return check_components(support, mesh->dim, i, err);
     case UZ_SUPPORT_NORMAL:
-        return check_normal_support(support, mesh->dim, i, err);
+        status = check_direction(support->normal, mesh->dim, "supports", i, "normal",
+                                 "it must be the direction that is held", err);
+        return status == UZ_OK ? uz_check_number(support->value, "supports", i, "u", err) : status;
     case UZ_SUPPORT_SPRING:
         return check_spring(support, mesh, i, err);
     }

@@ -10,9 +10,18 @@
 #include <string.h>
 
 /* Positive strain energy needs -1 < poisson < 1/2; in plane stress 1/2 itself (incompressible) is harmless. */
-static uz_status check_poisson(const uz_scene *scene, double poisson, const char *where, uz_error *err)
+static uz_status check_values(const uz_scene *scene, int64_t i, uz_error *err)
 {
     static const char *const NAMES[] = {"", "in plane strain", "in a body of revolution", "in a solid"};
+    char where[UZ_CHECK_POINTER];
+    const uz_material *material = &scene->materials[i];
+    const double young = material->young, poisson = material->poisson;
+    uz_check_place(where, "materials", i, "young");
+    if (!isfinite(young))
+        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "Young's modulus is not a finite number");
+    if (young <= 0)
+        return uz_fail(err, UZ_ERR_SCENE, where, "Young's modulus must be positive; it is %g", young);
+    uz_check_place(where, "materials", i, "poisson");
     if (!isfinite(poisson))
         return uz_fail(err, UZ_ERR_NOT_FINITE, where, "Poisson's ratio is not a finite number");
     if (poisson == 0.5 && scene->model != UZ_PLANE_STRESS)
@@ -21,27 +30,7 @@ static uz_status check_poisson(const uz_scene *scene, double poisson, const char
                        NAMES[scene->model]);
     if (poisson <= -1 || poisson > 0.5)
         return uz_fail(err, UZ_ERR_SCENE, where, "Poisson's ratio must lie between -1 and 0.5; it is %g", poisson);
-    return UZ_OK;
-}
-
-static uz_status check_young(double young, const char *where, uz_error *err)
-{
-    if (!isfinite(young))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, where, "Young's modulus is not a finite number");
-    if (young <= 0)
-        return uz_fail(err, UZ_ERR_SCENE, where, "Young's modulus must be positive; it is %g", young);
-    return UZ_OK;
-}
-
-static uz_status check_values(const uz_scene *scene, int64_t i, uz_error *err)
-{
-    char where[UZ_CHECK_POINTER];
-    const uz_material *material = &scene->materials[i];
-    uz_status status = check_young(material->young, uz_check_place(where, "materials", i, "young"), err);
-    if (status == UZ_OK)
-        status = check_poisson(scene, material->poisson, uz_check_place(where, "materials", i, "poisson"), err);
-    if (status == UZ_OK)
-        status = uz_check_number(material->density, "materials", i, "density", err);
+    uz_status status = uz_check_number(material->density, "materials", i, "density", err);
     if (status == UZ_OK && material->density < 0)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "materials", i, "density"),
                        "a density must not be negative; it is %g", material->density);

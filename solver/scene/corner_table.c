@@ -102,18 +102,13 @@ static void sort_bucket(uz_corner_table *table, const uz_mesh *mesh, int64_t fro
     }
 }
 
-static int64_t largest_bucket(const uz_corner_table *table, int64_t n_nodes)
-{
-    int64_t largest = 0;
-    for (int64_t i = 0; i < n_nodes; i++)
-        if (table->start[i + 1] - table->start[i] > largest)
-            largest = table->start[i + 1] - table->start[i];
-    return largest;
-}
-
 static uz_status sort_buckets(uz_corner_table *table, const uz_mesh *mesh, uz_error *err)
 {
-    sort_entry *entry = uz_alloc(largest_bucket(table, mesh->n_nodes), sizeof *entry);
+    int64_t largest = 0;
+    for (int64_t i = 0; i < mesh->n_nodes; i++)
+        if (table->start[i + 1] - table->start[i] > largest)
+            largest = table->start[i + 1] - table->start[i];
+    sort_entry *entry = uz_alloc(largest, sizeof *entry);
     if (!entry)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare %lld elements", (long long)mesh->n_elements);
     for (int64_t i = 0; i < mesh->n_nodes; i++)

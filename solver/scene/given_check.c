@@ -149,19 +149,10 @@ static int corner_sign(const uz_given_mesh *given, int64_t e, int corner)
     return volume > 1e-12 ? 1 : volume < -1e-12 ? -1 : 0;
 }
 
-static uz_status refuse_inverted(const uz_given_mesh *given, int64_t e, uz_error *err)
-{
-    const uz_element_type *type = uz_element_type_of((uz_element_kind)given->kind[e]);
-    const char *remedy = uz_element_type_of(type->linear)->mirrored;
-    if (given->from_file)
-        remedy = given->dim == 2 ? "its nodes run clockwise: turn the surface over (ReverseMesh Surface in Gmsh)"
-                                 : "its nodes are those of its mirror image: orient the volume anew in Gmsh";
-    return refuse_element(given, e, "is inverted", remedy, err);
-}
-
 static uz_status check_shape(const uz_given_mesh *given, int64_t e, uz_error *err)
 {
-    const int corners = uz_element_type_of((uz_element_kind)given->kind[e])->corners;
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)given->kind[e]);
+    const int corners = type->corners;
     int negative = 0, worst = -1;
     char what[96];
     for (int i = 0; i < corners; i++) {
@@ -174,8 +165,14 @@ static uz_status check_shape(const uz_given_mesh *given, int64_t e, uz_error *er
         }
         worst = sign < 0 && worst < 0 ? i : worst;
     }
+    if (negative == corners && !given->from_file)
+        return refuse_element(given, e, "is inverted", uz_element_type_of(type->linear)->mirrored, err);
     if (negative == corners)
-        return refuse_inverted(given, e, err);
+        return refuse_element(given, e, "is inverted",
+                              given->dim == 2
+                                  ? "its nodes run clockwise: turn the surface over (ReverseMesh Surface in Gmsh)"
+                                  : "its nodes are those of its mirror image: orient the volume anew in Gmsh",
+                              err);
     if (negative == 0)
         return UZ_OK;
     snprintf(what, sizeof what, "is concave or twisted at its node %lld",

@@ -207,20 +207,25 @@ static uz_status collect_nodes(named_parts *parts, const group_work *work, const
     return UZ_OK;
 }
 
+static bool append_face(named_parts *parts, const group_work *work, uz_face face)
+{
+    int64_t node[UZ_FACE_NODES];
+    const int count = uz_mesh_face(node, work->mesh, face);
+    bool room = append(&parts->faces, face.element * UZ_SIDE_STEP + face.side);
+    for (int k = 0; k < count && room; k++)
+        room = append(&parts->nodes, node[k]);
+    return room;
+}
+
 static uz_status collect_faces(named_parts *parts, const group_work *work, const uz_given_group *group)
 {
     for (int64_t i = 0; i < group->n_faces; i++) {
-        int64_t node[UZ_FACE_NODES];
         uz_face face = {0, 0};
         bool inner = false;
         const uz_status status = match_face(&face, &inner, work, group, i);
         if (status != UZ_OK)
             return status;
-        const int count = uz_mesh_face(node, work->mesh, face);
-        bool room = append(&parts->faces, face.element * UZ_SIDE_STEP + face.side);
-        for (int k = 0; k < count && room; k++)
-            room = append(&parts->nodes, node[k]);
-        if (!room)
+        if (!append_face(parts, work, face))
             return no_memory(work);
         parts->n_inner += inner;
     }
@@ -249,16 +254,8 @@ static uz_status collect_elements(named_parts *parts, const group_work *work, co
     return UZ_OK;
 }
 
-static uz_status collect(named_parts *parts, const group_work *work, const uz_given_group *group)
-{
-    uz_status status = collect_nodes(parts, work, group);
-    if (status == UZ_OK)
-        status = collect_faces(parts, work, group);
-    return status == UZ_OK ? collect_elements(parts, work, group) : status;
-}
-
 /* Gives the lists to the group. */
-static uz_status finish_group(uz_group *out, named_parts *parts, const group_work *work)
+static uz_status fill_group(uz_group *out, named_parts *parts, const group_work *work)
 {
     sort_unique(&parts->nodes);
     sort_unique(&parts->elements);
@@ -283,10 +280,23 @@ static uz_status finish_group(uz_group *out, named_parts *parts, const group_wor
     return drop_repeated(out, &parts->faces) ? UZ_OK : no_memory(work);
 }
 
+/* A new group of what was collected, with this status; frees what it does not take. */
+static uz_status finish_group(const group_work *work, const char *name, named_parts *parts, uz_status status)
+{
+    if (status == UZ_OK) {
+        uz_group *out = &work->mesh->groups[work->mesh->n_groups++];
+        snprintf(out->name, sizeof out->name, "%s", name);
+        status = fill_group(out, parts, work);
+    }
+    free(parts->nodes.value);
+    free(parts->faces.value);
+    free(parts->elements.value);
+    return status;
+}
+
 /* The group of all that is given under the name of group i, unless an earlier one had it. */
 static uz_status add_named(const group_work *work, int64_t i)
 {
-    uz_mesh *mesh = work->mesh;
     const uz_given_group *groups = work->given->groups;
     named_parts parts = {0};
     uz_status status = UZ_OK;
@@ -294,54 +304,29 @@ static uz_status add_named(const group_work *work, int64_t i)
         if (strcmp(groups[k].name, groups[i].name) == 0)
             return UZ_OK;
     for (int64_t k = i; k < work->given->n_groups && status == UZ_OK; k++)
-        if (strcmp(groups[k].name, groups[i].name) == 0)
-            status = collect(&parts, work, &groups[k]);
-    if (status == UZ_OK) {
-        uz_group *out = &mesh->groups[mesh->n_groups++];
-        snprintf(out->name, sizeof out->name, "%s", groups[i].name);
-        status = finish_group(out, &parts, work);
-    }
-    free(parts.nodes.value);
-    free(parts.faces.value);
-    free(parts.elements.value);
-    return status;
+        if (strcmp(groups[k].name, groups[i].name) == 0) {
+            status = collect_nodes(&parts, work, &groups[k]);
+            if (status == UZ_OK)
+                status = collect_faces(&parts, work, &groups[k]);
+            if (status == UZ_OK)
+                status = collect_elements(&parts, work, &groups[k]);
+        }
+    return finish_group(work, groups[i].name, &parts, status);
 }
 
 /* ---- the groups that every mesh has */
 
 /* The faces that belong to one element only, in the order of their elements. */
-static uz_status collect_boundary(named_parts *parts, const group_work *work)
-{
-    const uz_corner_table *sides = &work->sides;
-    for (int64_t i = 0; i < sides->count; i++) {
-        int64_t node[UZ_FACE_NODES];
-        if (sides->same[i] || uz_corner_table_shared(sides, i))
-            continue;
-        const int count = uz_mesh_face(node, work->mesh, sides->item[i]);
-        bool room = append(&parts->faces, sides->item[i].element * UZ_SIDE_STEP + sides->item[i].side);
-        for (int k = 0; k < count && room; k++)
-            room = append(&parts->nodes, node[k]);
-        if (!room)
-            return no_memory(work);
-    }
-    sort_unique(&parts->faces);
-    return UZ_OK;
-}
-
 static uz_status add_boundary(const group_work *work)
 {
-    uz_mesh *mesh = work->mesh;
+    const uz_corner_table *sides = &work->sides;
     named_parts parts = {0};
-    uz_status status = collect_boundary(&parts, work);
-    if (status == UZ_OK) {
-        uz_group *out = &mesh->groups[mesh->n_groups++];
-        snprintf(out->name, sizeof out->name, "boundary");
-        status = finish_group(out, &parts, work);
-    }
-    free(parts.nodes.value);
-    free(parts.faces.value);
-    free(parts.elements.value);
-    return status;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; i < sides->count && status == UZ_OK; i++)
+        if (!sides->same[i] && !uz_corner_table_shared(sides, i) && !append_face(&parts, work, sides->item[i]))
+            status = no_memory(work);
+    sort_unique(&parts.faces);
+    return finish_group(work, "boundary", &parts, status);
 }
 
 static uz_group *find_group(uz_mesh *mesh, const char *name)
