@@ -107,11 +107,11 @@ static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held,
     return status;
 }
 
-static uz_status build(uz_body_model *out, const uz_scene *scene, bool held, uz_error *err)
+static uz_status build(uz_body_model *out, const uz_scene *scene, bool held, bool stiffness, uz_error *err)
 {
     memset(out, 0, sizeof *out);
     uz_status status = prepare(out, scene, held, err);
-    if (status == UZ_OK)
+    if (status == UZ_OK && stiffness)
         status = uz_build_stiffness(out, err);
     if (status != UZ_OK)
         uz_body_model_clear(out);
@@ -120,21 +120,17 @@ static uz_status build(uz_body_model *out, const uz_scene *scene, bool held, uz_
 
 uz_status uz_body_model_build(uz_body_model *out, const uz_scene *scene, uz_error *err)
 {
-    return build(out, scene, false, err);
+    return build(out, scene, false, true, err);
 }
 
 uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz_error *err)
 {
-    return build(out, scene, true, err);
+    return build(out, scene, true, true, err);
 }
 
 uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err)
 {
-    memset(out, 0, sizeof *out);
-    uz_status status = prepare(out, scene, true, err);
-    if (status != UZ_OK)
-        uz_body_model_clear(out);
-    return status;
+    return build(out, scene, true, false, err);
 }
 
 static uz_status check_finite(const double *x, int64_t n, const char *where, uz_error *err)
@@ -186,19 +182,6 @@ static uz_status new_load(double **p, double **h, const uz_body_model *model, co
     return uz_body_model_load(*p, *h, NULL, model, scene, err);
 }
 
-/* Moves what a caller of uz_scene_to_qp gets out of the model. */
-static void publish(uz_qp *qp, uz_mesh_info *info, uz_body_model *model, double *p, double *h)
-{
-    *qp = (uz_qp){model->K, model->N, p, h};
-    memset(&model->K, 0, sizeof model->K);
-    memset(&model->N, 0, sizeof model->N);
-    if (info) {
-        *info = model->info;
-        memset(&model->info, 0, sizeof model->info);
-        model->mesh.xyz = NULL;
-    }
-}
-
 uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, uz_error *err)
 {
     uz_body_model model;
@@ -211,8 +194,15 @@ uz_status uz_scene_to_qp(uz_qp *qp, uz_mesh_info *info, const uz_scene *scene, u
     if (status == UZ_OK)
         status = new_load(&p, &h, &model, scene, err);
     if (status == UZ_OK) {
-        publish(qp, info, &model, p, h);
+        *qp = (uz_qp){model.K, model.N, p, h};
+        memset(&model.K, 0, sizeof model.K);
+        memset(&model.N, 0, sizeof model.N);
         p = h = NULL;
+    }
+    if (status == UZ_OK && info) {
+        *info = model.info;
+        memset(&model.info, 0, sizeof model.info);
+        model.mesh.xyz = NULL;
     }
     free(p);
     free(h);

@@ -73,22 +73,17 @@ static uz_status load_sum(const loading *x, const uz_group *group, const char *w
     return status;
 }
 
-static uz_status load_node(const loading *x, const char *where, uz_error *err)
-{
-    const uz_mesh *mesh = &x->model->mesh;
-    if (x->load->node < 0 || x->load->node >= mesh->n_nodes)
-        return uz_fail(err, UZ_ERR_SCENE, where, "there is no node %lld; this mesh has 0 to %lld",
-                       (long long)x->load->node, (long long)mesh->n_nodes - 1);
-    for (int c = 0; c < mesh->dim; c++)
-        x->f[x->load->node * mesh->dim + c] += x->load->v[c];
-    return UZ_OK;
-}
-
 static uz_status add_load(const loading *x, const char *where, uz_error *err)
 {
     const uz_mesh *mesh = &x->model->mesh;
-    if (x->load->kind == UZ_LOAD_NODE_FORCE)
-        return load_node(x, where, err);
+    if (x->load->kind == UZ_LOAD_NODE_FORCE) {
+        if (x->load->node < 0 || x->load->node >= mesh->n_nodes)
+            return uz_fail(err, UZ_ERR_SCENE, where, "there is no node %lld; this mesh has 0 to %lld",
+                           (long long)x->load->node, (long long)mesh->n_nodes - 1);
+        for (int c = 0; c < mesh->dim; c++)
+            x->f[x->load->node * mesh->dim + c] += x->load->v[c];
+        return UZ_OK;
+    }
     const uz_group *group = uz_mesh_group(mesh, x->load->on, where, err);
     if (!group)
         return UZ_ERR_SCENE;

@@ -46,16 +46,12 @@ double uz_along_dof(const uz_body_model *model, int64_t node, int c, const doubl
     return local[c];
 }
 
-/* A held axis stays an axis when its node is turned. */
-static bool is_axis(const double *Q, int c, int dim)
-{
-    return !Q || Q[c * dim + c] == 1;
-}
-
 const char *uz_dof_name(const uz_body_model *model, int64_t node, int c)
 {
     static const char *const axes[] = {"x", "y", "z"};
-    return is_axis(uz_node_frame(model, node), c, model->mesh.dim) ? axes[c] : "the normal of its support";
+    const double *Q = uz_node_frame(model, node);
+    /* a held axis stays an axis when its node is turned */
+    return !Q || Q[c * model->mesh.dim + c] == 1 ? axes[c] : "the normal of its support";
 }
 
 double uz_turning_error(const uz_body_model *model, int64_t node, const double *v)
