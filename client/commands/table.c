@@ -184,7 +184,7 @@ static void print_answer(const table *t, const json_t *answer, const char *name)
             const json_t *stress = json_object_get(gauss, "stress");
             print_entry(t->to, json_array_get(stress, row), width_of(stress));
             fputc('\n', t->to);
-            return;
+            continue;
         }
         fprintf(t->to, "%zu", row);
         if (t->place == AT_CONTACTS && json_array_size(t->nodes)) {
