@@ -41,25 +41,6 @@ static client_exit complain_usage(const char *message, client_command command)
     return CLIENT_USAGE;
 }
 
-static client_exit explain(const client_options *options)
-{
-    client_command topic = options->command;
-    const char *format = options->json ? "json" : options->format ? options->format : "text";
-    if (strcmp(format, "json") == 0)
-        return client_help_print_json(stdout) ? CLIENT_OK : CLIENT_LOCAL;
-    if (strcmp(format, "man") == 0 || strcmp(format, "bash") == 0) {
-        (*format == 'm' ? client_manual_print : client_completion_print)(stdout);
-        return CLIENT_OK;
-    }
-    if (topic == CLIENT_HELP && options->operand) {
-        if (!client_command_find(&topic, options->operand))
-            return complain_usage("there is no such command", CLIENT_HELP);
-    } else if (topic == CLIENT_HELP)
-        topic = CLIENT_COMMANDS;
-    client_help_print(stdout, topic);
-    return CLIENT_OK;
-}
-
 static client_exit run_command(const client_options *options)
 {
     char message[256];
@@ -67,8 +48,23 @@ static client_exit run_command(const client_options *options)
         puts(options->json ? "{\"version\": \"" CLIENT_VERSION_TEXT "\"}" : "uzawa " CLIENT_VERSION_TEXT);
         return CLIENT_OK;
     }
-    if (options->help || options->command == CLIENT_HELP)
-        return explain(options);
+    if (options->help || options->command == CLIENT_HELP) {
+        client_command topic = options->command;
+        const char *format = options->json ? "json" : options->format ? options->format : "text";
+        if (strcmp(format, "json") == 0)
+            return client_help_print_json(stdout) ? CLIENT_OK : CLIENT_LOCAL;
+        if (strcmp(format, "man") == 0 || strcmp(format, "bash") == 0) {
+            (*format == 'm' ? client_manual_print : client_completion_print)(stdout);
+            return CLIENT_OK;
+        }
+        if (topic == CLIENT_HELP && options->operand) {
+            if (!client_command_find(&topic, options->operand))
+                return complain_usage("there is no such command", CLIENT_HELP);
+        } else if (topic == CLIENT_HELP)
+            topic = CLIENT_COMMANDS;
+        client_help_print(stdout, topic);
+        return CLIENT_OK;
+    }
     client_session session = {
         .options = options, .out = stdout, .err = stderr, .deadline = client_clock() + options->timeout_s};
     session.http = client_http_open(options->server, message, sizeof message);

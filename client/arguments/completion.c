@@ -3,12 +3,6 @@
 
 #include <string.h>
 
-static void print_commands(FILE *to)
-{
-    for (int i = 0; i < CLIENT_COMMANDS; i++)
-        fprintf(to, "%s%s", i ? " " : "", client_command_name((client_command)i));
-}
-
 /* "    submit) options='--K --N ...' ;;" */
 static void print_options(FILE *to, client_command command)
 {
@@ -56,21 +50,6 @@ static void print_operand(FILE *to, client_command command)
         fputs("words=$commands ;;\n", to);
 }
 
-/* The command is the first word that is one: bash takes a URL apart at its colons. Words are also taken apart at "=".
- */
-static void print_find_command(FILE *to)
-{
-    fputs("    if [[ $current == '=' ]]; then current=''; previous='='; fi\n"
-          "    if [[ $previous == '=' ]]; then\n"
-          "        previous=${COMP_WORDS[COMP_CWORD-1]}\n"
-          "        [[ $previous != '=' ]] || previous=${COMP_WORDS[COMP_CWORD-2]}\n"
-          "    fi\n"
-          "    for ((i = 1; i < COMP_CWORD; i++)); do\n"
-          "        if [[ \" $commands \" == *\" ${COMP_WORDS[i]} \"* ]]; then command=${COMP_WORDS[i]}; break; fi\n"
-          "    done\n",
-          to);
-}
-
 void client_completion_print(FILE *to)
 {
     fputs("# Completion of uzawa for bash. Made from client/arguments/commands.c by make man.\n\n"
@@ -80,9 +59,19 @@ void client_completion_print(FILE *to)
           "    local current=${COMP_WORDS[COMP_CWORD]} previous=${COMP_WORDS[COMP_CWORD-1]}\n"
           "    local command='' options='' words='' files='' i commands='",
           to);
-    print_commands(to);
+    for (int i = 0; i < CLIENT_COMMANDS; i++)
+        fprintf(to, "%s%s", i ? " " : "", client_command_name((client_command)i));
     fputs("'\n    COMPREPLY=()\n", to);
-    print_find_command(to);
+    /* The command is the first word that is one: bash takes a URL apart at its colons, and words at "=". */
+    fputs("    if [[ $current == '=' ]]; then current=''; previous='='; fi\n"
+          "    if [[ $previous == '=' ]]; then\n"
+          "        previous=${COMP_WORDS[COMP_CWORD-1]}\n"
+          "        [[ $previous != '=' ]] || previous=${COMP_WORDS[COMP_CWORD-2]}\n"
+          "    fi\n"
+          "    for ((i = 1; i < COMP_CWORD; i++)); do\n"
+          "        if [[ \" $commands \" == *\" ${COMP_WORDS[i]} \"* ]]; then command=${COMP_WORDS[i]}; break; fi\n"
+          "    done\n",
+          to);
     fputs("    case $command in\n    '') options='--server --timeout --retry --help --version'; words=$commands ;;\n",
           to);
     for (int i = 0; i < CLIENT_COMMANDS; i++)

@@ -129,44 +129,6 @@ static void print_command(FILE *to, client_command command)
     print_paragraph(to, p->exits);
 }
 
-static void print_environment(FILE *to)
-{
-    static const char *const LINES[][2] = {
-        {"UZAWA_SERVER", "the service, as for\n.Fl \\-server"},
-        {"UZAWA_TOKEN", "the token to send; it is never a part of the command line, which others can see"},
-        {"UZAWA_CA", "a file with certificates (PEM) to trust for https in place of the system's"},
-        {"COLUMNS", "the width to write for where standard error is no terminal"},
-        {"NO_COLOR", "if set, drawings have no colours"},
-    };
-    fputs(".Sh ENVIRONMENT\n.Bl -tag -width UZAWA_SERVER\n", to);
-    for (size_t i = 0; i < sizeof LINES / sizeof *LINES; i++)
-        fprintf(to, ".It Ev %s\n%s\n", LINES[i][0], LINES[i][1]);
-    fputs(".El\n", to);
-}
-
-static void print_exit_status(FILE *to)
-{
-    const client_exit_line *line;
-    fputs(".Sh EXIT STATUS\n.Bl -tag -width Ds -compact\n", to);
-    for (size_t i = 0; (line = client_exit_line_at(i)); i++) {
-        fprintf(to, ".It %d\n", line->code);
-        print_paragraph(to, line->about);
-    }
-    fputs(".El\n", to);
-}
-
-static void print_examples(FILE *to)
-{
-    fputs(".Sh EXAMPLES\n", to);
-    for (size_t i = 0; i < sizeof EXAMPLES / sizeof *EXAMPLES; i++) {
-        fputs(i ? ".Pp\n" : "", to);
-        print_paragraph(to, EXAMPLES[i].about);
-        fputs(".Bd -literal -offset indent\n", to);
-        print_roff(to, EXAMPLES[i].lines, false);
-        fputs("\n.Ed\n", to);
-    }
-}
-
 void client_manual_print(FILE *to)
 {
     fputs(".\\\" Made from client/arguments/commands.c and manual.c by make man.\n"
@@ -184,9 +146,32 @@ void client_manual_print(FILE *to)
     fputs(".Sh COMMANDS\n", to);
     for (int i = 0; i < CLIENT_COMMANDS; i++)
         print_command(to, (client_command)i);
-    print_environment(to);
-    print_exit_status(to);
-    print_examples(to);
+    static const char *const LINES[][2] = {
+        {"UZAWA_SERVER", "the service, as for\n.Fl \\-server"},
+        {"UZAWA_TOKEN", "the token to send; it is never a part of the command line, which others can see"},
+        {"UZAWA_CA", "a file with certificates (PEM) to trust for https in place of the system's"},
+        {"COLUMNS", "the width to write for where standard error is no terminal"},
+        {"NO_COLOR", "if set, drawings have no colours"},
+    };
+    fputs(".Sh ENVIRONMENT\n.Bl -tag -width UZAWA_SERVER\n", to);
+    for (size_t i = 0; i < sizeof LINES / sizeof *LINES; i++)
+        fprintf(to, ".It Ev %s\n%s\n", LINES[i][0], LINES[i][1]);
+    fputs(".El\n", to);
+    const client_exit_line *line;
+    fputs(".Sh EXIT STATUS\n.Bl -tag -width Ds -compact\n", to);
+    for (size_t i = 0; (line = client_exit_line_at(i)); i++) {
+        fprintf(to, ".It %d\n", line->code);
+        print_paragraph(to, line->about);
+    }
+    fputs(".El\n", to);
+    fputs(".Sh EXAMPLES\n", to);
+    for (size_t i = 0; i < sizeof EXAMPLES / sizeof *EXAMPLES; i++) {
+        fputs(i ? ".Pp\n" : "", to);
+        print_paragraph(to, EXAMPLES[i].about);
+        fputs(".Bd -literal -offset indent\n", to);
+        print_roff(to, EXAMPLES[i].lines, false);
+        fputs("\n.Ed\n", to);
+    }
 }
 
 /* ------------------------------------------------------------------- JSON */

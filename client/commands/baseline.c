@@ -94,21 +94,6 @@ static const char *other_mesh(const json_t *now, const json_t *then)
     return x && distance_of(x, y) > 1e-9 ? "the nodes are at other places" : NULL;
 }
 
-static void compare_displacements(client_checks *to, const char *group, const json_t *now, const json_t *then,
-                                  double tolerance)
-{
-    static const char NAME[] = "displacements";
-    const json_t *a = json_object_get(now, NAME), *b = json_object_get(then, NAME);
-    const double drift = distance_of(a, b);
-    if (isnan(drift))
-        client_checks_add(to, CLIENT_UNCERTAIN, group, NAME, "they are not known");
-    else
-        client_checks_add(to, drift <= tolerance ? CLIENT_PASS : CLIENT_FAIL, group, NAME,
-                          drift <= tolerance ? "%zu numbers differ by %.2g in norm"
-                                             : "%zu numbers differ by %.2g in norm, more than %.2g",
-                          count_numbers(a), drift, tolerance);
-}
-
 /* ---- what touches */
 
 /* The places of a contact, each of which touches or not: nodes of a scene, rows of matrices. */
@@ -160,21 +145,6 @@ static void list_changes(char *out, size_t size, const char *what, const touchin
     }
 }
 
-static void compare_marks(client_checks *to, const char *group, const touching *t, bool nodes, double tolerance)
-{
-    char changes[512] = "";
-    size_t changed = 0, either = 0;
-    for (size_t i = 0; i < t->size; i++) {
-        changed += t->now[i] != t->then[i];
-        either += t->now[i] || t->then[i];
-    }
-    list_changes(changes, sizeof changes, nodes ? "; opened at node" : "; opened at row", t, true);
-    list_changes(changes, sizeof changes, nodes ? "; closed at node" : "; closed at row", t, false);
-    const bool pass = (double)changed <= tolerance * (double)either;
-    client_checks_add(to, pass ? CLIENT_PASS : CLIENT_FAIL, group, "contact.active set",
-                      "%zu of %zu that touch have changed%s", changed, either, changes);
-}
-
 static void compare_contacts(client_checks *to, const char *group, const json_t *now, const json_t *then,
                              double tolerance)
 {
@@ -188,7 +158,17 @@ static void compare_contacts(client_checks *to, const char *group, const json_t 
     } else if (t.now && t.then) {
         mark(t.now, t.size, now);
         mark(t.then, t.size, then);
-        compare_marks(to, group, &t, nodes, tolerance);
+        char changes[512] = "";
+        size_t changed = 0, either = 0;
+        for (size_t i = 0; i < t.size; i++) {
+            changed += t.now[i] != t.then[i];
+            either += t.now[i] || t.then[i];
+        }
+        list_changes(changes, sizeof changes, nodes ? "; opened at node" : "; opened at row", &t, true);
+        list_changes(changes, sizeof changes, nodes ? "; closed at node" : "; closed at row", &t, false);
+        const bool pass = (double)changed <= tolerance * (double)either;
+        client_checks_add(to, pass ? CLIENT_PASS : CLIENT_FAIL, group, "contact.active set",
+                          "%zu of %zu that touch have changed%s", changed, either, changes);
     } else {
         to->failed = true;
     }
@@ -210,7 +190,16 @@ void client_baseline_results(client_checks *to, const char *group, const json_t 
                           count_numbers(json_object_get(then, "displacements")));
         return;
     }
-    compare_displacements(to, group, now, then, tolerance);
+    static const char NAME[] = "displacements";
+    const json_t *a = json_object_get(now, NAME), *b = json_object_get(then, NAME);
+    const double drift = distance_of(a, b);
+    if (isnan(drift))
+        client_checks_add(to, CLIENT_UNCERTAIN, group, NAME, "they are not known");
+    else
+        client_checks_add(to, drift <= tolerance ? CLIENT_PASS : CLIENT_FAIL, group, NAME,
+                          drift <= tolerance ? "%zu numbers differ by %.2g in norm"
+                                             : "%zu numbers differ by %.2g in norm, more than %.2g",
+                          count_numbers(a), drift, tolerance);
     compare_contacts(to, group, now, then, tolerance);
 }
 

@@ -7,20 +7,6 @@
 
 #define TOLERANCE 1e-3 /* where --tolerance is not given */
 
-/* How many cases ended how is asserted of the whole job: the lines of the summary that are not a case's. */
-static void add_whole(client_checks *to, const json_t *summary)
-{
-    const json_t *line;
-    size_t i;
-    json_array_foreach(json_object_get(summary, "assertions"), i, line)
-    {
-        json_t *one = json_object_get(line, "cases") ? NULL : json_pack("{s:[O]}", "assertions", line);
-        if (one)
-            client_checks_assertions(to, one, "");
-        json_decref(one);
-    }
-}
-
 /* Whether each converged, and its assertions. */
 static client_exit add_cases(client_session *s, client_checks *to, const json_t *job)
 {
@@ -57,15 +43,6 @@ static char *suite_name(const client_session *s, const json_t *job, const char *
     return asprintf(&name, "%s%s%s", base, label ? " " : "", label ? label : "") < 0 ? NULL : name;
 }
 
-static client_exit write_report(client_session *s, const json_t *job, const char *label, client_checks *checks)
-{
-    char message[512] = "no memory for the report", *name = suite_name(s, job, label);
-    const bool ok = name && client_suites_add(&s->suites, name, job, checks) &&
-                    client_junit_write(&s->suites, s->options->junit, message, sizeof message);
-    free(name);
-    return ok ? CLIENT_OK : client_complain(s, CLIENT_LOCAL, message);
-}
-
 static client_exit compare(client_session *s, client_checks *checks, const json_t *job)
 {
     const client_options *o = s->options;
@@ -92,16 +69,31 @@ client_exit client_contract(client_session *s, const json_t *job, const char *la
     if (!o->junit && !o->baseline)
         return code;
     client_checks_outcome(&checks, job);
-    if (cases)
-        add_whole(&checks, json_object_get(job, "summary"));
-    else
+    if (cases) {
+        /* How many cases ended how is asserted of the whole job: the lines of the summary that are not a case's. */
+        const json_t *summary = json_object_get(job, "summary");
+        const json_t *line;
+        size_t i;
+        json_array_foreach(json_object_get(summary, "assertions"), i, line)
+        {
+            json_t *one = json_object_get(line, "cases") ? NULL : json_pack("{s:[O]}", "assertions", line);
+            if (one)
+                client_checks_assertions(&checks, one, "");
+            json_decref(one);
+        }
+    } else
         client_checks_assertions(&checks, json_object_get(job, "summary"), "");
     if (cases && o->junit)
         more = add_cases(s, &checks, job);
     if (more == CLIENT_OK && o->baseline && answered)
         more = compare(s, &checks, job);
-    if (o->junit)
-        written = write_report(s, job, label, &checks);
+    if (o->junit) {
+        char message[512] = "no memory for the report", *name = suite_name(s, job, label);
+        const bool ok = name && client_suites_add(&s->suites, name, job, &checks) &&
+                        client_junit_write(&s->suites, s->options->junit, message, sizeof message);
+        free(name);
+        written = ok ? CLIENT_OK : client_complain(s, CLIENT_LOCAL, message);
+    }
     client_checks_clear(&checks);
     return code != CLIENT_OK ? code : more != CLIENT_OK ? more : written;
 }

@@ -205,23 +205,6 @@ static double metric(const char *text, const char *name)
     return NAN;
 }
 
-static void check_version(doctor *d, const char *metrics)
-{
-    static const char NAME[] = "uzawad_build_info{version=\"";
-    const char *at = metrics ? strstr(metrics, NAME) : NULL;
-    char version[32] = "";
-    if (at)
-        snprintf(version, sizeof version, "%.*s", (int)strcspn(at + sizeof NAME - 1, "\""), at + sizeof NAME - 1);
-    if (!*version)
-        say(d, WARNING, "version", "the service's option metrics tells it", "client %s, service unknown",
-            CLIENT_VERSION_TEXT);
-    else if (strcmp(version, CLIENT_VERSION_TEXT) != 0)
-        say(d, WARNING, "version", "use the client of the service's release", "client %s, service %s",
-            CLIENT_VERSION_TEXT, version);
-    else
-        say(d, FINE, "version", "", "client and service %s", version);
-}
-
 static void check_queue(doctor *d, const char *metrics, double limit)
 {
     double depth = metrics ? metric(metrics, "uzawad_queue_depth") : NAN;
@@ -247,33 +230,6 @@ static void check_disk(doctor *d, const char *metrics)
         "%.1f GB are free where the service keeps its jobs", left / 1e9);
 }
 
-static void check_limits(doctor *d, const json_t *limits)
-{
-    say(d, FINE, "limits", "", "request %.0f MB, upload %.0f MB, memory of a problem %.1f GB, time of a job %.0f s",
-        client_json_number(limits, "limits.max_body.value") / 1e6,
-        client_json_number(limits, "limits.max_upload.value") / 1e6,
-        client_json_number(limits, "limits.memory.value") / 1e9,
-        client_json_number(limits, "limits.max_solve_s.value"));
-}
-
-static void check_load(doctor *d)
-{
-    client_reply metrics, reply;
-    json_t *none, *limits;
-    bool told = ask(d, &metrics, &none, "GET", "/metrics", NULL) && metrics.status == 200;
-    const char *text = told ? metrics.body.data : NULL;
-    bool listed = ask(d, &reply, &limits, "GET", "/v1/limits", NULL) && reply.status == 200;
-    check_version(d, text);
-    check_queue(d, text, client_json_number(limits, "limits.max_queue.value"));
-    check_disk(d, text);
-    if (listed)
-        check_limits(d, limits);
-    json_decref(none);
-    json_decref(limits);
-    client_reply_clear(&metrics);
-    client_reply_clear(&reply);
-}
-
 client_exit client_doctor(client_session *s)
 {
     doctor d = {.s = s, .lines = s->options->json ? json_array() : NULL, .code = CLIENT_OK};
@@ -282,8 +238,41 @@ client_exit client_doctor(client_session *s)
         bool reads = try_scope(&d, "reading", "GET", "/v1/jobs?limit=1", NULL);
         if (reads)
             try_scope(&d, "submitting", "POST", "/v1/jobs?validate=true", PROBE);
-        if (reads)
-            check_load(&d);
+        if (reads) {
+            client_reply metrics, reply;
+            json_t *none, *limits;
+            bool told = ask(&d, &metrics, &none, "GET", "/metrics", NULL) && metrics.status == 200;
+            const char *text = told ? metrics.body.data : NULL;
+            bool listed = ask(&d, &reply, &limits, "GET", "/v1/limits", NULL) && reply.status == 200;
+            static const char NAME[] = "uzawad_build_info{version=\"";
+            const char *at = text ? strstr(text, NAME) : NULL;
+            char version[32] = "";
+            if (at)
+                snprintf(version, sizeof version, "%.*s", (int)strcspn(at + sizeof NAME - 1, "\""),
+                         at + sizeof NAME - 1);
+            if (!*version)
+                say(&d, WARNING, "version", "the service's option metrics tells it", "client %s, service unknown",
+                    CLIENT_VERSION_TEXT);
+            else if (strcmp(version, CLIENT_VERSION_TEXT) != 0)
+                say(&d, WARNING, "version", "use the client of the service's release", "client %s, service %s",
+                    CLIENT_VERSION_TEXT, version);
+            else
+                say(&d, FINE, "version", "", "client and service %s", version);
+            check_queue(&d, text, client_json_number(limits, "limits.max_queue.value"));
+            check_disk(&d, text);
+            if (listed) {
+                say(&d, FINE, "limits", "",
+                    "request %.0f MB, upload %.0f MB, memory of a problem %.1f GB, time of a job %.0f s",
+                    client_json_number(limits, "limits.max_body.value") / 1e6,
+                    client_json_number(limits, "limits.max_upload.value") / 1e6,
+                    client_json_number(limits, "limits.memory.value") / 1e9,
+                    client_json_number(limits, "limits.max_solve_s.value"));
+            }
+            json_decref(none);
+            json_decref(limits);
+            client_reply_clear(&metrics);
+            client_reply_clear(&reply);
+        }
     }
     if (d.lines && client_print_json(s, d.lines) != CLIENT_OK)
         d.code = CLIENT_LOCAL;

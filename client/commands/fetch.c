@@ -78,42 +78,24 @@ static client_exit check_ended(client_session *s, const char *path, bool wanted)
     return code;
 }
 
-/* The service knows one DELETE, which dismisses a job or deletes an ended one. One that arrived must not be sent again:
- * the second would delete what the first dismissed. */
-static client_exit dismiss(client_session *s, const char *path)
-{
-    client_reply reply;
-    client_request request = client_request_new(s, "DELETE", path);
-    request.repeatable = false;
-    client_exit code = client_ask(s, &reply, &request);
-    if (code == CLIENT_OK)
-        code = say_gone(s, reply.status == 204 ? "deleted" : "dismissed", &reply);
-    client_reply_clear(&reply);
-    return code;
-}
-
 client_exit client_cancel(client_session *s)
 {
     char *path = client_job_path(s, s->options->operand, "");
     if (!path)
         return CLIENT_LOCAL;
     client_exit code = check_ended(s, path, false);
-    if (code == CLIENT_OK)
-        code = dismiss(s, path);
+    if (code == CLIENT_OK) {
+        /* The service knows one DELETE, which dismisses a job or deletes an ended one. One that arrived must not be
+         * sent again: the second would delete what the first dismissed. */
+        client_reply reply;
+        client_request request = client_request_new(s, "DELETE", path);
+        request.repeatable = false;
+        code = client_ask(s, &reply, &request);
+        if (code == CLIENT_OK)
+            code = say_gone(s, reply.status == 204 ? "deleted" : "dismissed", &reply);
+        client_reply_clear(&reply);
+    }
     free(path);
-    return code;
-}
-
-/* Of a job that has ended, which it stays, so that it may be sent again: one that is not there then is gone by it. */
-static client_exit delete_ended(client_session *s, const char *path)
-{
-    client_reply reply;
-    client_request request = client_request_new(s, "DELETE", path);
-    client_http_end end = client_http_send(s->http, &reply, &request);
-    bool gone = end == CLIENT_HTTP_ANSWERED && (reply.status == 204 || (reply.status == 404 && reply.attempts > 1));
-    client_reply nothing = {0};
-    client_exit code = gone ? say_gone(s, "deleted", &nothing) : client_explain(s, end, &reply);
-    client_reply_clear(&reply);
     return code;
 }
 
@@ -123,8 +105,17 @@ client_exit client_delete(client_session *s)
     if (!path)
         return CLIENT_LOCAL;
     client_exit code = check_ended(s, path, true);
-    if (code == CLIENT_OK)
-        code = delete_ended(s, path);
+    if (code == CLIENT_OK) {
+        /* Of a job that has ended, which it stays, so that it may be sent again: one that is not there then is gone by
+         * it. */
+        client_reply reply;
+        client_request request = client_request_new(s, "DELETE", path);
+        client_http_end end = client_http_send(s->http, &reply, &request);
+        bool gone = end == CLIENT_HTTP_ANSWERED && (reply.status == 204 || (reply.status == 404 && reply.attempts > 1));
+        client_reply nothing = {0};
+        code = gone ? say_gone(s, "deleted", &nothing) : client_explain(s, end, &reply);
+        client_reply_clear(&reply);
+    }
     free(path);
     return code;
 }
@@ -188,26 +179,21 @@ static client_exit fetch_and_deliver(client_session *s, char *path)
     return code;
 }
 
-/* "a,b" of the words, "" of none. The caller frees; NULL: no memory, said. */
-static char *joined(client_session *s, const uz_words *words)
-{
-    client_buffer text = {0};
-    bool ok = client_buffer_append(&text, "", 0);
-    for (int i = 0; ok && i < words->count; i++)
-        ok = client_buffer_append(&text, ",", i > 0) &&
-             client_buffer_append(&text, words->item[i], strlen(words->item[i]));
-    if (!ok) {
-        free(text.data);
-        client_complain(s, CLIENT_LOCAL, "no memory");
-    }
-    return ok ? text.data : NULL;
-}
-
 client_exit client_result(client_session *s)
 {
     const client_options *o = s->options;
     const char *format = o->format ? o->format : "json";
-    char *fields = joined(s, &o->fields);
+    /* "a,b" of the words, "" of none. The caller frees; NULL: no memory, said. */
+    client_buffer text = {0};
+    bool ok = client_buffer_append(&text, "", 0);
+    for (int i = 0; ok && i < o->fields.count; i++)
+        ok = client_buffer_append(&text, ",", i > 0) &&
+             client_buffer_append(&text, o->fields.item[i], strlen(o->fields.item[i]));
+    if (!ok) {
+        free(text.data);
+        client_complain(s, CLIENT_LOCAL, "no memory");
+    }
+    char *fields = ok ? text.data : NULL;
     if (!fields)
         return CLIENT_LOCAL;
     const client_query query[] = {{"fields", *fields ? fields : NULL}, {"case", o->case_name}, {NULL, NULL}};

@@ -27,27 +27,6 @@ static client_exit list_page(client_session *s, json_t **page, long limit, const
     return code;
 }
 
-/* Up to `limit` jobs in as many pages as that takes. *jobs: array, released by the caller. */
-static client_exit list_all(client_session *s, json_t *jobs, long limit)
-{
-    char cursor[256] = "";
-    client_exit code = CLIENT_OK;
-    while (code == CLIENT_OK && (long)json_array_size(jobs) < limit) {
-        json_t *page;
-        long left = limit - (long)json_array_size(jobs);
-        code = list_page(s, &page, left < PAGE_JOBS ? left : PAGE_JOBS, *cursor ? cursor : NULL);
-        json_t *more = json_object_get(page, "jobs");
-        if (code == CLIENT_OK && (!json_is_array(more) || json_array_extend(jobs, more) != 0))
-            code = client_complain(s, CLIENT_SERVER_ERROR, "the reply is no list of jobs");
-        snprintf(cursor, sizeof cursor, "%s", client_json_text(page, "next"));
-        bool last = !*cursor || json_array_size(more) == 0;
-        json_decref(page);
-        if (last)
-            break;
-    }
-    return code;
-}
-
 static void print_cell(FILE *to, const char *text, int width)
 {
     client_print_safe(to, text);
@@ -71,25 +50,35 @@ static void print_row(FILE *to, const json_t *job)
     fputc('\n', to);
 }
 
-static void print_ids(FILE *to, const json_t *jobs)
-{
-    for (size_t i = 0; i < json_array_size(jobs); i++) {
-        client_print_safe(to, client_json_text(json_array_get(jobs, i), "id"));
-        fputc('\n', to);
-    }
-}
-
 client_exit client_list(client_session *s)
 {
     json_t *jobs = json_array();
     if (!jobs)
         return client_complain(s, CLIENT_LOCAL, "no memory");
-    client_exit code = list_all(s, jobs, s->options->limit);
+    /* Up to `limit` jobs in as many pages as that takes. *jobs: array, released by the caller. */
+    char cursor[256] = "";
+    client_exit code = CLIENT_OK;
+    while (code == CLIENT_OK && (long)json_array_size(jobs) < s->options->limit) {
+        json_t *page;
+        long left = s->options->limit - (long)json_array_size(jobs);
+        code = list_page(s, &page, left < PAGE_JOBS ? left : PAGE_JOBS, *cursor ? cursor : NULL);
+        json_t *more = json_object_get(page, "jobs");
+        if (code == CLIENT_OK && (!json_is_array(more) || json_array_extend(jobs, more) != 0))
+            code = client_complain(s, CLIENT_SERVER_ERROR, "the reply is no list of jobs");
+        snprintf(cursor, sizeof cursor, "%s", client_json_text(page, "next"));
+        bool last = !*cursor || json_array_size(more) == 0;
+        json_decref(page);
+        if (last)
+            break;
+    }
     if (code == CLIENT_OK && s->options->json)
         code = client_print_json(s, jobs);
-    else if (code == CLIENT_OK && s->options->quiet)
-        print_ids(s->out, jobs);
-    else if (code == CLIENT_OK) {
+    else if (code == CLIENT_OK && s->options->quiet) {
+        for (size_t i = 0; i < json_array_size(jobs); i++) {
+            client_print_safe(s->out, client_json_text(json_array_get(jobs, i), "id"));
+            fputc('\n', s->out);
+        }
+    } else if (code == CLIENT_OK) {
         fprintf(s->out, "%-32s  %-10s  %-15s  %-24s  %s\n", "id", "status", "outcome", "created", "tags");
         for (size_t i = 0; i < json_array_size(jobs); i++)
             print_row(s->out, json_array_get(jobs, i));

@@ -57,14 +57,6 @@ static void feed(int *to, const client_buffer *svg, size_t *at)
     }
 }
 
-/* False: the end, or no memory. */
-static bool drink(int from, client_buffer *png)
-{
-    char block[1 << 14];
-    ssize_t n = read(from, block, sizeof block);
-    return n > 0 ? client_buffer_append(png, block, (size_t)n) : n < 0 && errno == EINTR;
-}
-
 static client_exit convert(client_session *s, const client_buffer *svg, client_buffer *png)
 {
     int to, from, status = 0;
@@ -82,8 +74,12 @@ static client_exit convert(client_session *s, const client_buffer *svg, client_b
                 break;
             if (to >= 0 && ready[1].revents)
                 feed(&to, svg, &at);
-            if (ready[0].revents)
-                more = drink(from, png);
+            if (ready[0].revents) {
+                /* False: the end, or no memory. */
+                char block[1 << 14];
+                ssize_t n = read(from, block, sizeof block);
+                more = n > 0 ? client_buffer_append(png, block, (size_t)n) : n < 0 && errno == EINTR;
+            }
         }
         if (to >= 0)
             close(to);

@@ -34,14 +34,6 @@ static bool stays(const client_session *s)
     return s->options->wait || s->options->command == CLIENT_VERIFY;
 }
 
-static void tell_of_the_key(client_session *s, const char *key)
-{
-    char message[300];
-    snprintf(message, sizeof message,
-             "interrupted before the service answered; the same command with --key %.200s finds the job", key);
-    client_complain(s, CLIENT_INTERRUPTED, message);
-}
-
 /* One of several jobs, from 0; -1: the only one, which may be waited for at once. */
 static client_exit post_body(client_session *s, const char *path, const client_buffer *body, client_watch *watch,
                              int number, json_t **job)
@@ -64,8 +56,12 @@ static client_exit post_body(client_session *s, const char *path, const client_b
     if (stays(s) && number < 0)
         client_hold(&request, prefer, sizeof prefer, client_hold_seconds(s, watch->progress));
     client_exit code = client_ask_json(s, job, &request);
-    if (code == CLIENT_INTERRUPTED)
-        tell_of_the_key(s, given);
+    if (code == CLIENT_INTERRUPTED) {
+        char message[300];
+        snprintf(message, sizeof message,
+                 "interrupted before the service answered; the same command with --key %.200s finds the job", given);
+        client_complain(s, CLIENT_INTERRUPTED, message);
+    }
     free(header);
     free(key);
     return code;
@@ -129,40 +125,6 @@ static client_exit post_and_stay(client_session *s, const char *path, const clie
 
 /* -------------------------------------------------------------- several */
 
-static client_exit post_all(client_session *s, const client_bodies *bodies, client_watch *watch, json_t *jobs)
-{
-    client_exit code = CLIENT_OK;
-    for (size_t i = 0; code == CLIENT_OK && i < bodies->count; i++) {
-        char id[128];
-        json_t *job;
-        code = post_body(s, "/v1/jobs", &bodies->item[i].body, watch, (int)i, &job);
-        if (code == CLIENT_OK)
-            code = job_id(s, id, job);
-        if (code == CLIENT_OK && !s->options->json && (!stays(s) || s->options->quiet))
-            print_id(s, id);
-        if (code == CLIENT_OK && json_array_append(jobs, job) != 0)
-            code = client_complain(s, CLIENT_LOCAL, "no memory");
-        json_decref(job);
-    }
-    return code;
-}
-
-static void print_job_line(client_session *s, const json_t *job, const char *label)
-{
-    double error = client_json_number(job, "summary.certificate.relative_error");
-    char text[32];
-    client_print_safe(s->out, client_json_text(job, "id"));
-    fputs("  ", s->out);
-    const char *outcome = client_json_text(job, "summary.outcome");
-    fprintf(s->out, "%-15s  ", *outcome ? outcome : client_json_text(job, "status"));
-    if (isfinite(error))
-        fprintf(s->out, "%-9s  ", client_format_bound(text, error));
-    else
-        fprintf(s->out, "%-9s  ", "unknown");
-    client_print_safe(s->out, label);
-    fputc('\n', s->out);
-}
-
 /* Each job to its end. The first exit code that is not 0 counts, but an interrupt or a timeout ends it all. */
 static client_exit follow_all(client_session *s, const client_bodies *bodies, client_watch *watch, json_t *jobs)
 {
@@ -176,8 +138,21 @@ static client_exit follow_all(client_session *s, const client_bodies *bodies, cl
         bool ended = code == CLIENT_OK;
         if (ended)
             code = client_job_exit(job);
-        if (ended && !s->options->json && !s->options->quiet)
-            print_job_line(s, job, bodies->item[i].label);
+        if (ended && !s->options->json && !s->options->quiet) {
+            const char *label = bodies->item[i].label;
+            double error = client_json_number(job, "summary.certificate.relative_error");
+            char text[32];
+            client_print_safe(s->out, client_json_text(job, "id"));
+            fputs("  ", s->out);
+            const char *outcome = client_json_text(job, "summary.outcome");
+            fprintf(s->out, "%-15s  ", *outcome ? outcome : client_json_text(job, "status"));
+            if (isfinite(error))
+                fprintf(s->out, "%-9s  ", client_format_bound(text, error));
+            else
+                fprintf(s->out, "%-9s  ", "unknown");
+            client_print_safe(s->out, label);
+            fputc('\n', s->out);
+        }
         code = client_contract(s, job, bodies->item[i].label, code);
         json_decref(job);
         worst = worst == CLIENT_OK ? code : worst;
@@ -194,7 +169,19 @@ static client_exit post_several(client_session *s, const client_bodies *bodies)
     json_t *jobs = json_array();
     progress.shown = progress.shown && stays(s);
     client_watch_begin(&watch, s->http, &progress);
-    client_exit code = post_all(s, bodies, &watch, jobs);
+    client_exit code = CLIENT_OK;
+    for (size_t i = 0; code == CLIENT_OK && i < bodies->count; i++) {
+        char id[128];
+        json_t *job;
+        code = post_body(s, "/v1/jobs", &bodies->item[i].body, &watch, (int)i, &job);
+        if (code == CLIENT_OK)
+            code = job_id(s, id, job);
+        if (code == CLIENT_OK && !s->options->json && (!stays(s) || s->options->quiet))
+            print_id(s, id);
+        if (code == CLIENT_OK && json_array_append(jobs, job) != 0)
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        json_decref(job);
+    }
     if (code == CLIENT_OK && stays(s))
         code = follow_all(s, bodies, &watch, jobs);
     client_watch_end(&watch, s->http);

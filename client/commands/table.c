@@ -69,26 +69,23 @@ static client_exit read_fields(client_session *s, table *t, const char *fields)
 
 /* ----------------------------------------------------------------- numbers */
 
-/* The shortest decimal that reads back as x. */
-static void print_real(FILE *to, double x)
-{
-    char text[40];
-    for (int digits = 15; digits <= 17; digits++) {
-        snprintf(text, sizeof text, "%.*g", digits, x);
-        if (digits == 17 || !(strtod(text, NULL) < x || strtod(text, NULL) > x))
-            break;
-    }
-    fputs(text, to);
-}
-
 /* What is no number leaves its cell empty. */
 static void print_value(FILE *to, const json_t *value)
 {
     fputc(',', to);
     if (json_is_integer(value))
         fprintf(to, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
-    else if (json_is_real(value))
-        print_real(to, json_real_value(value));
+    else if (json_is_real(value)) {
+        /* The shortest decimal that reads back as x. */
+        double x = json_real_value(value);
+        char text[40];
+        for (int digits = 15; digits <= 17; digits++) {
+            snprintf(text, sizeof text, "%.*g", digits, x);
+            if (digits == 17 || !(strtod(text, NULL) < x || strtod(text, NULL) > x))
+                break;
+        }
+        fputs(text, to);
+    }
 }
 
 /* A number, or all of an array. `width`: so many cells, filled up with empty ones. */
@@ -110,35 +107,6 @@ static size_t width_of(const json_t *values)
 
 /* ------------------------------------------------------------------ header */
 
-static void print_names(const table *t, const json_t *answer, const char *field)
-{
-    static const char *const AXES[] = {"x", "y", "z"};
-    const json_t *values = json_object_get(answer, field), *components = json_object_get(answer, "components");
-    if (strcmp(field, "stress_gauss") == 0) {
-        field = "stress";
-        values = client_json_at(answer, "stress_gauss.stress");
-    }
-    bool vector = json_is_array(json_array_get(values, 0));
-    bool tensor = strcmp(field, "stress") == 0 || strcmp(field, "strain") == 0;
-    for (size_t k = 0; k < width_of(values); k++) {
-        const char *component = json_string_value(json_array_get(components, k));
-        if (!vector)
-            fprintf(t->to, ",%s", strcmp(field, "displacements") == 0 ? "u" : field);
-        else if (strcmp(field, "displacements") == 0)
-            fprintf(t->to, ",u%s", AXES[k < 3 ? k : 2]);
-        else if (tensor && component)
-            fprintf(t->to, ",%s_%s", field, component);
-        else
-            fprintf(t->to, ",%s_%zu", field, k + 1);
-    }
-}
-
-static void print_axes(const table *t, const json_t *points)
-{
-    for (size_t k = 0; json_array_size(points) && k < width_of(points); k++)
-        fprintf(t->to, ",%c", "xyz"[k < 3 ? k : 2]);
-}
-
 static void print_header(const table *t, const json_t *answer)
 {
     bool scene = json_array_size(t->nodes) > 0;
@@ -147,9 +115,31 @@ static void print_header(const table *t, const json_t *answer)
         fputs(scene ? "contact,node" : "contact", t->to);
     else
         fputs(t->place == AT_POINTS ? "element" : scene ? "node" : "dof", t->to);
-    print_axes(t, t->place == AT_POINTS ? client_json_at(answer, "stress_gauss.points") : t->nodes);
-    for (int i = 0; i < t->count; i++)
-        print_names(t, answer, t->name[i]);
+    const json_t *points = t->place == AT_POINTS ? client_json_at(answer, "stress_gauss.points") : t->nodes;
+    for (size_t k = 0; json_array_size(points) && k < width_of(points); k++)
+        fprintf(t->to, ",%c", "xyz"[k < 3 ? k : 2]);
+    for (int i = 0; i < t->count; i++) {
+        const char *field = t->name[i];
+        static const char *const AXES[] = {"x", "y", "z"};
+        const json_t *values = json_object_get(answer, field), *components = json_object_get(answer, "components");
+        if (strcmp(field, "stress_gauss") == 0) {
+            field = "stress";
+            values = client_json_at(answer, "stress_gauss.stress");
+        }
+        bool vector = json_is_array(json_array_get(values, 0));
+        bool tensor = strcmp(field, "stress") == 0 || strcmp(field, "strain") == 0;
+        for (size_t k = 0; k < width_of(values); k++) {
+            const char *component = json_string_value(json_array_get(components, k));
+            if (!vector)
+                fprintf(t->to, ",%s", strcmp(field, "displacements") == 0 ? "u" : field);
+            else if (strcmp(field, "displacements") == 0)
+                fprintf(t->to, ",u%s", AXES[k < 3 ? k : 2]);
+            else if (tensor && component)
+                fprintf(t->to, ",%s_%s", field, component);
+            else
+                fprintf(t->to, ",%s_%zu", field, k + 1);
+        }
+    }
     fputc('\n', t->to);
 }
 

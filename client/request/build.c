@@ -167,24 +167,6 @@ static void common_tag(client_session *s, char out[32], size_t jobs)
         fprintf(s->err, "uzawa: %zu jobs with the tag %s\n", jobs, out);
 }
 
-static client_exit add_variants(client_session *s, client_bodies *out, const json_t *request)
-{
-    char common[32];
-    json_t *requests = NULL, *labels = NULL;
-    client_exit code = client_build_variants(s, &requests, &labels, request);
-    size_t count = json_array_size(requests);
-    out->item = code == CLIENT_OK ? calloc(count ? count : 1, sizeof *out->item) : NULL;
-    if (code == CLIENT_OK && !out->item)
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
-    if (code == CLIENT_OK)
-        common_tag(s, common, count);
-    for (size_t i = 0; code == CLIENT_OK && i < count; i++)
-        code = add_request(s, out, json_array_get(requests, i), json_string_value(json_array_get(labels, i)), common);
-    json_decref(requests);
-    json_decref(labels);
-    return code;
-}
-
 /* FILE as an object to be changed; without FILE an empty one. */
 static client_exit parse_file(client_session *s, json_t **out, const client_buffer *file)
 {
@@ -207,8 +189,22 @@ static client_exit build_edited(client_session *s, client_bodies *out, const cli
         code = client_build_files(s, request);
     if (code == CLIENT_OK)
         code = client_build_values(s, request);
-    if (code == CLIENT_OK)
-        code = add_variants(s, out, request);
+    if (code == CLIENT_OK) {
+        char common[32];
+        json_t *requests = NULL, *labels = NULL;
+        code = client_build_variants(s, &requests, &labels, request);
+        size_t count = json_array_size(requests);
+        out->item = code == CLIENT_OK ? calloc(count ? count : 1, sizeof *out->item) : NULL;
+        if (code == CLIENT_OK && !out->item)
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        if (code == CLIENT_OK)
+            common_tag(s, common, count);
+        for (size_t i = 0; code == CLIENT_OK && i < count; i++)
+            code =
+                add_request(s, out, json_array_get(requests, i), json_string_value(json_array_get(labels, i)), common);
+        json_decref(requests);
+        json_decref(labels);
+    }
     json_decref(request);
     return code;
 }

@@ -142,18 +142,6 @@ static bool header_value(char *value, size_t size, const char *line, size_t len,
     return true;
 }
 
-/* Seconds from now, for both forms of Retry-After (RFC 9110, 10.2.3): a number or a date. */
-static double retry_after(const char *value)
-{
-    char *end;
-    double seconds = strtod(value, &end);
-    if (end == value) {
-        time_t then = curl_getdate(value, NULL);
-        seconds = then < 0 ? 0 : difftime(then, time(NULL));
-    }
-    return seconds > 0 && isfinite(seconds) ? seconds : 0;
-}
-
 static size_t take_header(char *bytes, size_t size, size_t count, void *ctx)
 {
     body_sink *sink = ctx;
@@ -163,9 +151,16 @@ static size_t take_header(char *bytes, size_t size, size_t count, void *ctx)
         sink->header_whole = true;
     else if (header_value(value, sizeof value, bytes, size * count, "HTTP/")) /* after a 1xx another one begins */
         sink->header_whole = false;
-    else if (header_value(value, sizeof value, bytes, size * count, "Retry-After:"))
-        reply->retry_after_s = retry_after(value);
-    else if (header_value(value, sizeof value, bytes, size * count, "Date:"))
+    else if (header_value(value, sizeof value, bytes, size * count, "Retry-After:")) {
+        /* Seconds from now, for both forms of Retry-After (RFC 9110, 10.2.3): a number or a date. */
+        char *end;
+        double seconds = strtod(value, &end);
+        if (end == value) {
+            time_t then = curl_getdate(value, NULL);
+            seconds = then < 0 ? 0 : difftime(then, time(NULL));
+        }
+        reply->retry_after_s = seconds > 0 && isfinite(seconds) ? seconds : 0;
+    } else if (header_value(value, sizeof value, bytes, size * count, "Date:"))
         reply->date = curl_getdate(value, NULL);
     return size * count;
 }
@@ -271,13 +266,6 @@ static CURLcode perform(client_http *http)
     return code;
 }
 
-/* "2026-11-26 16:58:04 GMT" of GnuTLS, or what curl_getdate knows; -1: neither. */
-static time_t certificate_date(const char *text)
-{
-    struct tm parts = {0};
-    return strptime(text, "%Y-%m-%d %H:%M:%S", &parts) ? timegm(&parts) : curl_getdate(text, NULL);
-}
-
 /* The server's own certificate is the first of the chain. */
 static void note_certificate(client_http *http, client_reply *reply)
 {
@@ -287,9 +275,12 @@ static void note_certificate(client_http *http, client_reply *reply)
         return;
     for (struct curl_slist *line = chain->certinfo[0]; line; line = line->next) {
         size_t len = strlen(line->data);
-        if (header_value(value, sizeof value, line->data, len, "Expire date:"))
-            reply->cert_until = certificate_date(value);
-        else if (header_value(value, sizeof value, line->data, len, "Subject:"))
+        if (header_value(value, sizeof value, line->data, len, "Expire date:")) {
+            /* "2026-11-26 16:58:04 GMT" of GnuTLS, or what curl_getdate knows; -1: neither. */
+            struct tm parts = {0};
+            reply->cert_until =
+                strptime(value, "%Y-%m-%d %H:%M:%S", &parts) ? timegm(&parts) : curl_getdate(value, NULL);
+        } else if (header_value(value, sizeof value, line->data, len, "Subject:"))
             snprintf(reply->cert_subject, sizeof reply->cert_subject, "%s", value);
     }
 }

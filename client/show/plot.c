@@ -128,14 +128,6 @@ static void print_marked(FILE *to, const client_plot_style *style, unsigned mark
         fputs(text, to);
 }
 
-static void print_cell(FILE *to, const canvas *c, int col, int row)
-{
-    unsigned marks, bits = cell_bits(c, col, row, &marks);
-    char braille[4] = {(char)0xe2, (char)(0xa0 | bits >> 6), (char)(0x80 | (bits & 0x3f)), '\0'};
-    const char *ascii = marks & SOLID ? "*" : marks & DOTTED ? "." : " ";
-    print_marked(to, c->style, marks, c->style->ascii ? ascii : bits ? braille : " ");
-}
-
 /* Decades between labels: the smallest of 1, 2, 5, 10, ... that leaves a label two rows of its own. */
 static int decade_step(const canvas *c)
 {
@@ -186,21 +178,6 @@ static bool label_in_cell(const canvas *c, int col)
     return false;
 }
 
-static void print_axis(FILE *to, const canvas *c, const client_series *s)
-{
-    bool ascii = c->style->ascii;
-    fprintf(to, "%*s%s", MARGIN - 1, "", ascii ? "+" : "└");
-    for (int col = 0; col < c->cols; col++) {
-        if (restart_in_cell(c, s, col))
-            fputs(ascii ? "^" : "▲", to);
-        else if (label_in_cell(c, col))
-            fputs(ascii ? "+" : "┬", to);
-        else
-            fputs(ascii ? "-" : "─", to);
-    }
-    fputc('\n', to);
-}
-
 /* Centred under its tick, as long as it fits between column `used` and column `end`. Returns the columns used. */
 static int print_iteration(FILE *to, const canvas *c, double at, int used, int end)
 {
@@ -213,17 +190,6 @@ static int print_iteration(FILE *to, const canvas *c, double at, int used, int e
     if (start < used || start + len > end)
         return used;
     return used + fprintf(to, "%*s%s", start - used, "", text);
-}
-
-static void print_iterations(FILE *to, const canvas *c)
-{
-    double step = iteration_step(c);
-    int end = MARGIN + c->cols, room = snprintf(NULL, 0, "%.0f", c->last) + 2;
-    int used = fprintf(to, "%*s ", MARGIN - 1, "iteration");
-    for (double at = 0; at < c->last; at += step)
-        used = print_iteration(to, c, at, used, end - room);
-    print_iteration(to, c, c->last, used, end);
-    fputc('\n', to);
 }
 
 #define LEGEND_WIDTH 56
@@ -255,12 +221,32 @@ bool client_plot_print(FILE *to, const client_series *series, const client_plot_
     print_legend(to, style);
     for (int row = 0; row < c.rows; row++) {
         print_margin(to, &c, row);
-        for (int col = 0; col < c.cols; col++)
-            print_cell(to, &c, col, row);
+        for (int col = 0; col < c.cols; col++) {
+            unsigned marks, bits = cell_bits(&c, col, row, &marks);
+            char braille[4] = {(char)0xe2, (char)(0xa0 | bits >> 6), (char)(0x80 | (bits & 0x3f)), '\0'};
+            const char *ascii = marks & SOLID ? "*" : marks & DOTTED ? "." : " ";
+            print_marked(to, c.style, marks, c.style->ascii ? ascii : bits ? braille : " ");
+        }
         fputc('\n', to);
     }
-    print_axis(to, &c, series);
-    print_iterations(to, &c);
+    bool ascii = c.style->ascii;
+    fprintf(to, "%*s%s", MARGIN - 1, "", ascii ? "+" : "└");
+    for (int col = 0; col < c.cols; col++) {
+        if (restart_in_cell(&c, series, col))
+            fputs(ascii ? "^" : "▲", to);
+        else if (label_in_cell(&c, col))
+            fputs(ascii ? "+" : "┬", to);
+        else
+            fputs(ascii ? "-" : "─", to);
+    }
+    fputc('\n', to);
+    double step = iteration_step(&c);
+    int end = MARGIN + c.cols, room = snprintf(NULL, 0, "%.0f", c.last) + 2;
+    int used = fprintf(to, "%*s ", MARGIN - 1, "iteration");
+    for (double at = 0; at < c.last; at += step)
+        used = print_iteration(to, &c, at, used, end - room);
+    print_iteration(to, &c, c.last, used, end);
+    fputc('\n', to);
     free(c.points);
     return true;
 }

@@ -1,3 +1,4 @@
+/* What a job came to, for a person: a block of lines under a label for each part of its summary. */
 #include "show/checks.h"
 #include "local/files.h"
 #include "show/report.h"
@@ -5,25 +6,56 @@
 #include <math.h>
 #include <string.h>
 
-static const char *outcome_in_words(const char *outcome)
+static const char *number_in_words(char text[32], const json_t *object, const char *path, int digits);
+static void label(FILE *to, const char *text);
+static void print_outcome(FILE *to, const json_t *summary);
+static const char *outcome_in_words(const char *outcome);
+static void print_ladder(FILE *to, const json_t *summary);
+static void print_cells(FILE *to, const json_t *cells);
+static void print_method(FILE *to, const json_t *summary);
+static void print_count(FILE *to, const json_t *summary, const char *path, const char *one, const char *many);
+static void print_contact(FILE *to, const json_t *summary);
+static void print_resultants(FILE *to, const json_t *summary);
+static void print_resultant(FILE *to, const char *kind, const json_t *one, bool first);
+static void print_warnings(FILE *to, const json_t *summary);
+static void print_certificate(FILE *to, const json_t *summary);
+static void print_bound(FILE *to, double bound);
+static void print_factor(FILE *to, const json_t *summary);
+static void print_cost(FILE *to, const json_t *summary);
+static void print_timings(FILE *to, const json_t *summary);
+
+void client_print_summary(FILE *to, const json_t *job)
 {
-    static const char *const WORDS[][2] = {
-        {"converged", "the certificate meets what was asked for"},
-        {"iteration_limit", "the iterations ran out first; this is the best answer so far"},
-        {"time_limit", "the time ran out first; this is the best answer so far"},
-        {"precision_limit", "double precision holds no more digits here"},
-        {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
-        {"infeasible", "no displacement satisfies all contact conditions"},
-        {"dismissed", "it was dismissed; this is the best answer so far"},
-        {"verified", "the certificate of the given answer meets what was asked for"},
-        {"mesh_limit", "a grid that meets what was asked for is larger than allowed"},
-        {"not_verified", "the certificate of the given answer does not meet what was asked for"},
-    };
-    for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
-        if (strcmp(WORDS[i][0], outcome) == 0)
-            return WORDS[i][1];
-    return "";
+    const json_t *summary = json_object_get(job, "summary");
+    char primal[32], dual[32];
+    client_print_job(to, job);
+    if (!json_is_object(summary))
+        return;
+    print_outcome(to, summary);
+    print_ladder(to, summary);
+    print_method(to, summary);
+    if (json_is_object(json_object_get(summary, "contact")))
+        print_contact(to, summary);
+    print_resultants(to, summary);
+    print_warnings(to, summary);
+    if (json_is_object(client_json_at(summary, "energy"))) {
+        label(to, "energy");
+        fprintf(to, "%s primal, %s dual\n", number_in_words(primal, summary, "energy.primal", 11),
+                number_in_words(dual, summary, "energy.dual", 11));
+    }
+    print_certificate(to, summary);
+    print_factor(to, summary);
+    print_cost(to, summary);
+    print_timings(to, summary);
+    client_checks checks = {.item = NULL};
+    client_checks_assertions(&checks, summary, "");
+    client_checks_print(to, &checks, 0, "assertions");
+    if (checks.failed)
+        fputs("assertions  no memory to show all of them\n", to);
+    client_checks_clear(&checks);
 }
+
+/* ---- words */
 
 /* A number for a person; "unknown" where the job has none, since nan looks like an answer. Buffer of 32. */
 static const char *number_in_words(char text[32], const json_t *object, const char *path, int digits)
@@ -48,113 +80,6 @@ static void label(FILE *to, const char *text)
     fprintf(to, "%-12s", text);
 }
 
-static void print_outcome(FILE *to, const json_t *summary)
-{
-    const char *outcome = client_json_text(summary, "outcome"), *words = outcome_in_words(outcome);
-    const char *message = client_json_text(summary, "message");
-    label(to, "outcome");
-    client_print_safe(to, outcome);
-    fprintf(to, "%s%s\n", *words ? ": " : "", words);
-    if (*message) {
-        label(to, "");
-        client_print_safe(to, message);
-        fputc('\n', to);
-    }
-}
-
-static void print_count(FILE *to, const json_t *summary, const char *path, const char *one, const char *many)
-{
-    double count = client_json_number(summary, path);
-    if (isfinite(count))
-        fprintf(to, ", %.0f %s", count, fabs(count - 1) < 0.5 ? one : many);
-}
-
-/* Where it began, unless that was nowhere special. */
-static void print_start(FILE *to, const json_t *summary)
-{
-    const char *from = client_json_text(summary, "started_from");
-    if (strcmp(from, "continued") == 0)
-        fputs(", continued from another job", to);
-    else if (strcmp(from, "warm") == 0)
-        fputs(", from known reactions", to);
-}
-
-static void print_method(FILE *to, const json_t *summary)
-{
-    label(to, "method");
-    client_print_safe(to, client_json_text(summary, "method"));
-    fputs(", ", to);
-    client_print_safe(to, client_json_text(summary, "operator"));
-    fputs(" operator", to);
-    print_count(to, summary, "iterations", "iteration", "iterations");
-    print_count(to, summary, "restarts", "restart", "restarts");
-    print_start(to, summary);
-    fputc('\n', to);
-}
-
-static void print_case_counts(FILE *to, const json_t *summary)
-{
-    char count[32];
-    if (!json_is_object(json_object_get(summary, "cases")))
-        return;
-    label(to, "cases");
-    fprintf(to, "%s; what follows is of the worst: ", number_in_words(count, summary, "cases.count", 9));
-    client_print_safe(to, client_json_text(summary, "cases.worst"));
-    fputc('\n', to);
-}
-
-static void print_problem_size(FILE *to, const json_t *summary)
-{
-    double d = client_json_number(summary, "problem.d"), m = client_json_number(summary, "problem.m");
-    if (!isfinite(d) || !isfinite(m))
-        return;
-    label(to, "problem");
-    client_print_safe(to, client_json_text(summary, "problem.kind"));
-    fprintf(to, ", %.0f unknowns, %.0f contact conditions\n", d, m);
-}
-
-static void print_cells(FILE *to, const json_t *cells)
-{
-    for (size_t i = 0; i < json_array_size(cells); i++)
-        fprintf(to, "%s%.0f", i ? " x " : "", json_number_value(json_array_get(cells, i)));
-}
-
-/* A box whose cells were chosen: the grid of the answer, and all that were tried. */
-static void print_ladder(FILE *to, const json_t *summary)
-{
-    const json_t *ladder = client_json_at(summary, "mesh.ladder"), *rung;
-    char d[32], mesh[32], certified[32], iterations[32], seconds[32];
-    size_t i;
-    if (!json_is_array(ladder))
-        return;
-    label(to, "mesh");
-    print_cells(to, client_json_at(summary, "mesh.cells"));
-    fprintf(to, " cells, chosen after %zu grid%s:\n", json_array_size(ladder), json_array_size(ladder) > 1 ? "s" : "");
-    fprintf(to, "%12s%9s  %10s  %10s  %10s  %s\n", "", "unknowns", "mesh error", "certified", "iterations", "time");
-    json_array_foreach((json_t *)ladder, i, rung)
-    {
-        fprintf(to, "%12s%9s  %10s  %10s  %10s  %s  ", "", number_in_words(d, rung, "d", 9),
-                number_in_words(mesh, rung, "discretization_error", 3),
-                number_in_words(certified, rung, "certified_error", 2),
-                number_in_words(iterations, rung, "iterations", 9),
-                client_format_seconds(seconds, sizeof seconds, client_json_number(rung, "seconds")));
-        print_cells(to, json_object_get(rung, "cells"));
-        fputc('\n', to);
-    }
-}
-
-/* A body that its supports leave free to move. */
-static void print_held(FILE *to, const json_t *summary)
-{
-    double modes = client_json_number(summary, "semicoercive.free_modes");
-    char held[32];
-    if (!isfinite(modes))
-        return;
-    label(to, "supports");
-    fprintf(to, "only the obstacle holds it: %.0f free motion%s, stopped by %s rows proved to be in contact\n", modes,
-            modes > 1 ? "s" : "", number_in_words(held, summary, "semicoercive.held", 9));
-}
-
 /* A point or a force in brackets behind the words; nothing where there is none. */
 static void print_vector(FILE *to, const char *before, const json_t *vector)
 {
@@ -171,65 +96,153 @@ static void print_vector(FILE *to, const char *before, const json_t *vector)
     fputs(n ? ")" : "", to);
 }
 
-static void print_pressure(FILE *to, const json_t *summary)
+/* ---- the parts, in the order in which they are printed */
+
+/* How it ended, and of what: the worst case where there are several. */
+static void print_outcome(FILE *to, const json_t *summary)
 {
-    char text[32];
-    if (!json_is_number(client_json_at(summary, "contact.max_pressure")))
-        return;
-    fprintf(to, ", largest pressure %s", number_in_words(text, summary, "contact.max_pressure", 6));
-    print_vector(to, " at ", client_json_at(summary, "contact.max_pressure_at.x"));
+    const char *outcome = client_json_text(summary, "outcome"), *words = outcome_in_words(outcome);
+    const char *message = client_json_text(summary, "message");
+    const double d = client_json_number(summary, "problem.d"), m = client_json_number(summary, "problem.m");
+    char count[32];
+    label(to, "outcome");
+    client_print_safe(to, outcome);
+    fprintf(to, "%s%s\n", *words ? ": " : "", words);
+    if (*message) {
+        label(to, "");
+        client_print_safe(to, message);
+        fputc('\n', to);
+    }
+    if (json_is_object(json_object_get(summary, "cases"))) {
+        label(to, "cases");
+        fprintf(to, "%s; what follows is of the worst: ", number_in_words(count, summary, "cases.count", 9));
+        client_print_safe(to, client_json_text(summary, "cases.worst"));
+        fputc('\n', to);
+    }
+    if (isfinite(d) && isfinite(m)) {
+        label(to, "problem");
+        client_print_safe(to, client_json_text(summary, "problem.kind"));
+        fprintf(to, ", %.0f unknowns, %.0f contact conditions\n", d, m);
+    }
 }
 
-/* Candidates that were left out, and those that had to be taken back. */
-static void print_kept(FILE *to, const json_t *summary)
+static const char *outcome_in_words(const char *outcome)
 {
-    double kept = client_json_number(summary, "contact.kept"), added = client_json_number(summary, "contact.added");
-    if (kept < client_json_number(summary, "contact.candidates"))
-        fprintf(to, "; solved with %.0f, the others are proved not to matter", kept);
-    if (added > 0)
-        fprintf(to, "; %.0f added in %.0f rounds", added, client_json_number(summary, "contact.rounds"));
+    static const char *const WORDS[][2] = {
+        {"converged", "the certificate meets what was asked for"},
+        {"iteration_limit", "the iterations ran out first; this is the best answer so far"},
+        {"time_limit", "the time ran out first; this is the best answer so far"},
+        {"precision_limit", "double precision holds no more digits here"},
+        {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
+        {"infeasible", "no displacement satisfies all contact conditions"},
+        {"dismissed", "it was dismissed; this is the best answer so far"},
+        {"verified", "the certificate of the given answer meets what was asked for"},
+        {"mesh_limit", "a grid that meets what was asked for is larger than allowed"},
+        {"not_verified", "the certificate of the given answer does not meet what was asked for"},
+    };
+    for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
+        if (strcmp(WORDS[i][0], outcome) == 0)
+            return WORDS[i][1];
+    return "";
+}
+
+/* A box whose cells were chosen: the grid of the answer, and all that were tried. */
+static void print_ladder(FILE *to, const json_t *summary)
+{
+    const json_t *ladder = client_json_at(summary, "mesh.ladder"), *level;
+    char d[32], mesh[32], certified[32], iterations[32], seconds[32];
+    size_t i;
+    if (!json_is_array(ladder))
+        return;
+    label(to, "mesh");
+    print_cells(to, client_json_at(summary, "mesh.cells"));
+    fprintf(to, " cells, chosen after %zu grid%s:\n", json_array_size(ladder), json_array_size(ladder) > 1 ? "s" : "");
+    fprintf(to, "%12s%9s  %10s  %10s  %10s  %s\n", "", "unknowns", "mesh error", "certified", "iterations", "time");
+    json_array_foreach((json_t *)ladder, i, level)
+    {
+        fprintf(to, "%12s%9s  %10s  %10s  %10s  %s  ", "", number_in_words(d, level, "d", 9),
+                number_in_words(mesh, level, "discretization_error", 3),
+                number_in_words(certified, level, "certified_error", 2),
+                number_in_words(iterations, level, "iterations", 9),
+                client_format_seconds(seconds, sizeof seconds, client_json_number(level, "seconds")));
+        print_cells(to, json_object_get(level, "cells"));
+        fputc('\n', to);
+    }
+}
+
+static void print_cells(FILE *to, const json_t *cells)
+{
+    for (size_t i = 0; i < json_array_size(cells); i++)
+        fprintf(to, "%s%.0f", i ? " x " : "", json_number_value(json_array_get(cells, i)));
+}
+
+/* The method, what it began with unless that was nothing special, and what holds a body that its supports leave free.
+ */
+static void print_method(FILE *to, const json_t *summary)
+{
+    const char *from = client_json_text(summary, "started_from");
+    const double modes = client_json_number(summary, "semicoercive.free_modes");
+    char held[32];
+    if (isfinite(modes)) {
+        label(to, "supports");
+        fprintf(to, "only the obstacle holds it: %.0f free motion%s, stopped by %s rows proved to be in contact\n",
+                modes, modes > 1 ? "s" : "", number_in_words(held, summary, "semicoercive.held", 9));
+    }
+    label(to, "method");
+    client_print_safe(to, client_json_text(summary, "method"));
+    fputs(", ", to);
+    client_print_safe(to, client_json_text(summary, "operator"));
+    fputs(" operator", to);
+    print_count(to, summary, "iterations", "iteration", "iterations");
+    print_count(to, summary, "restarts", "restart", "restarts");
+    if (strcmp(from, "continued") == 0)
+        fputs(", continued from another job", to);
+    else if (strcmp(from, "warm") == 0)
+        fputs(", from known reactions", to);
     fputc('\n', to);
 }
 
-/* The commonest mistake in a scene is converged, certified and without a warning: the obstacle on the other side. */
-static void print_nothing_touches(FILE *to, const json_t *summary)
+static void print_count(FILE *to, const json_t *summary, const char *path, const char *one, const char *many)
 {
-    const bool scene = strcmp(client_json_text(client_json_at(summary, "problem"), "kind"), "scene") == 0;
-    if (!scene || client_json_number(summary, "contact.active") != 0 ||
-        !(client_json_number(summary, "contact.candidates") > 0))
-        return;
-    label(to, "");
-    fputs("nothing touches; if it should: an obstacle's normal points to the body, a polyline has it on its left\n",
-          to);
+    double count = client_json_number(summary, path);
+    if (isfinite(count))
+        fprintf(to, ", %.0f %s", count, fabs(count - 1) < 0.5 ? one : many);
 }
 
 static void print_contact(FILE *to, const json_t *summary)
 {
+    const double candidates = client_json_number(summary, "contact.candidates");
+    const double kept = client_json_number(summary, "contact.kept"),
+                 added = client_json_number(summary, "contact.added");
     char text[32], more[32];
     label(to, "contact");
     fprintf(to, "%s of %s candidates touch", number_in_words(text, summary, "contact.active", 9),
             number_in_words(more, summary, "contact.candidates", 9));
     if (json_is_number(client_json_at(summary, "contact.area")))
         fprintf(to, ", on an area of %s", number_in_words(text, summary, "contact.area", 6));
-    print_kept(to, summary);
-    print_nothing_touches(to, summary);
+    if (kept < candidates)
+        fprintf(to, "; solved with %.0f, the others are proved not to matter", kept);
+    if (added > 0) /* candidates that had to be taken back */
+        fprintf(to, "; %.0f added in %.0f rounds", added, client_json_number(summary, "contact.rounds"));
+    fputc('\n', to);
+    /* The commonest mistake in a scene is converged, certified and without a warning: the obstacle on the other side.
+     */
+    if (strcmp(client_json_text(client_json_at(summary, "problem"), "kind"), "scene") == 0 &&
+        client_json_number(summary, "contact.active") == 0 && candidates > 0) {
+        label(to, "");
+        fputs("nothing touches; if it should: an obstacle's normal points to the body, a polyline has it on its left\n",
+              to);
+    }
     label(to, "reactions");
     fprintf(to, "sum %s", number_in_words(text, summary, "contact.reaction_sum", 10));
     print_vector(to, ", force ", client_json_at(summary, "contact.force"));
-    print_pressure(to, summary);
+    if (json_is_number(client_json_at(summary, "contact.max_pressure"))) {
+        fprintf(to, ", largest pressure %s", number_in_words(text, summary, "contact.max_pressure", 6));
+        print_vector(to, " at ", client_json_at(summary, "contact.max_pressure_at.x"));
+    }
     fputc('\n', to);
     label(to, "penetration");
     fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
-}
-
-/* One of the forces that act on the body: "contact bottom (0, 10.5)". */
-static void print_resultant(FILE *to, const char *kind, const json_t *one, bool first)
-{
-    label(to, first ? "forces" : "");
-    fputs(kind, to);
-    client_print_safe(to, client_json_text(one, "on"));
-    print_vector(to, " ", client_json_at(one, "force"));
-    fputc('\n', to);
 }
 
 /* What acts on the body; without moments. */
@@ -253,6 +266,16 @@ static void print_resultants(FILE *to, const json_t *summary)
     fprintf(to, "imbalance %s of their sizes\n", number_in_words(text, acts, "imbalance", 2));
 }
 
+/* One of the forces that act on the body: "contact bottom (0, 10.5)". */
+static void print_resultant(FILE *to, const char *kind, const json_t *one, bool first)
+{
+    label(to, first ? "forces" : "");
+    fputs(kind, to);
+    client_print_safe(to, client_json_text(one, "on"));
+    print_vector(to, " ", client_json_at(one, "force"));
+    fputc('\n', to);
+}
+
 static void print_warnings(FILE *to, const json_t *summary)
 {
     const json_t *one;
@@ -267,29 +290,41 @@ static void print_warnings(FILE *to, const json_t *summary)
     }
 }
 
-static void print_energy(FILE *to, const json_t *summary)
+/* The bound, whether it is what was asked for, what it is made of, and the error of the mesh, which it does not hold.
+ */
+static void print_certificate(FILE *to, const json_t *summary)
 {
-    char text[32], more[32];
-    if (!json_is_object(client_json_at(summary, "energy")))
+    const json_t *certificate = client_json_at(summary, "certificate");
+    const double relative = client_json_number(certificate, "relative_error");
+    const double mesh = client_json_number(summary, "discretization_error");
+    const double asked = client_json_number(summary, "requested_error"),
+                 total = client_json_number(summary, "total_error");
+    const char *outcome = client_json_text(summary, "outcome");
+    const char *met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0 ? "met" : "not met";
+    char absolute[32], gap[32], residual[32];
+    if (!json_is_object(certificate))
         return;
-    label(to, "energy");
-    fprintf(to, "%s primal, %s dual\n", number_in_words(text, summary, "energy.primal", 11),
-            number_in_words(more, summary, "energy.dual", 11));
-}
-
-static void print_request_met(FILE *to, const json_t *summary)
-{
-    double asked = client_json_number(summary, "requested_error"), total = client_json_number(summary, "total_error");
-    bool met = strcmp(client_json_text(summary, "outcome"), "converged") == 0 ||
-               strcmp(client_json_text(summary, "outcome"), "verified") == 0;
+    label(to, "certificate");
+    if (isfinite(relative))
+        print_bound(to, relative);
+    else
+        fputs("nothing could be certified", to);
     if (!isfinite(asked))
         fputs("\n", to);
     else if (isfinite(total))
-        fprintf(to, "\n%12stotal error about %.2g (asked for %.3g: %s)\n", "", total, asked, met ? "met" : "not met");
+        fprintf(to, "\n%12stotal error about %.2g (asked for %.3g: %s)\n", "", total, asked, met);
     else if (asked > 0)
-        fprintf(to, " (asked for %.3g: %s)\n", asked, met ? "met" : "not met");
+        fprintf(to, " (asked for %.3g: %s)\n", asked, met);
     else
-        fprintf(to, " (asked for rounding level: %s)\n", met ? "met" : "not met");
+        fprintf(to, " (asked for rounding level: %s)\n", met);
+    label(to, "");
+    fprintf(to, "absolute %s, duality gap %s, relative KKT residual %s\n",
+            bound_in_words(absolute, certificate, "absolute_error"), bound_in_words(gap, certificate, "gap"),
+            number_in_words(residual, certificate, "relative_residual.total", 3));
+    if (isfinite(mesh)) {
+        label(to, "");
+        fprintf(to, "the mesh itself is off by about %.2g\n", mesh);
+    }
 }
 
 /* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
@@ -307,51 +342,21 @@ static void print_bound(FILE *to, double bound)
         fprintf(to, "the exact displacement is within %s of this one, relative, in the energy norm", text);
 }
 
-static void print_certificate(FILE *to, const json_t *summary)
-{
-    const json_t *certificate = client_json_at(summary, "certificate");
-    double relative = client_json_number(certificate, "relative_error");
-    char absolute[32], gap[32], residual[32];
-    double mesh = client_json_number(summary, "discretization_error");
-    if (!json_is_object(certificate))
-        return;
-    label(to, "certificate");
-    if (isfinite(relative))
-        print_bound(to, relative);
-    else
-        fputs("nothing could be certified", to);
-    print_request_met(to, summary);
-    label(to, "");
-    fprintf(to, "absolute %s, duality gap %s, relative KKT residual %s\n",
-            bound_in_words(absolute, certificate, "absolute_error"), bound_in_words(gap, certificate, "gap"),
-            number_in_words(residual, certificate, "relative_residual.total", 3));
-    if (isfinite(mesh)) {
-        label(to, "");
-        fprintf(to, "the mesh itself is off by about %.2g\n", mesh);
-    }
-}
-
-/* In place of a factor. */
-static void print_levels(FILE *to, const json_t *factor)
-{
-    double bytes = client_json_number(factor, "bytes");
-    fprintf(to, "none: coarse levels of %.3g MB, %s\n", isfinite(bytes) ? bytes / 1e6 : 0.0,
-            json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new");
-}
-
+/* The factor, or the coarse levels that stand in its place. */
 static void print_factor(FILE *to, const json_t *summary)
 {
     const json_t *factor = client_json_at(summary, "factor");
-    double bytes = client_json_number(factor, "bytes");
+    const double bytes = client_json_number(factor, "bytes");
+    const char *from = json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new";
     char entries[32], rcond[32];
     if (!json_is_object(factor))
         return;
     label(to, "factor");
     if (strcmp(client_json_text(summary, "operator"), "matrix_free") == 0) {
-        print_levels(to, factor);
+        fprintf(to, "none: coarse levels of %.3g MB, %s\n", isfinite(bytes) ? bytes / 1e6 : 0.0, from);
         return;
     }
-    fprintf(to, "%s, ", json_is_true(json_object_get(factor, "cached")) ? "from the cache" : "new");
+    fprintf(to, "%s, ", from);
     client_print_safe(to, client_json_text(factor, "ordering"));
     fprintf(to, " ordering, %s entries", number_in_words(entries, factor, "nnz", 15));
     if (isfinite(bytes))
@@ -405,40 +410,6 @@ static void print_timings(FILE *to, const json_t *summary)
         before = ", ";
     }
     fputc('\n', to);
-}
-
-static void print_assertions(FILE *to, const json_t *summary)
-{
-    client_checks checks = {.item = NULL};
-    client_checks_assertions(&checks, summary, "");
-    client_checks_print(to, &checks, 0, "assertions");
-    if (checks.failed)
-        fputs("assertions  no memory to show all of them\n", to);
-    client_checks_clear(&checks);
-}
-
-void client_print_summary(FILE *to, const json_t *job)
-{
-    const json_t *summary = json_object_get(job, "summary");
-    client_print_job(to, job);
-    if (!json_is_object(summary))
-        return;
-    print_outcome(to, summary);
-    print_case_counts(to, summary);
-    print_problem_size(to, summary);
-    print_ladder(to, summary);
-    print_held(to, summary);
-    print_method(to, summary);
-    if (json_is_object(json_object_get(summary, "contact")))
-        print_contact(to, summary);
-    print_resultants(to, summary);
-    print_warnings(to, summary);
-    print_energy(to, summary);
-    print_certificate(to, summary);
-    print_factor(to, summary);
-    print_cost(to, summary);
-    print_timings(to, summary);
-    print_assertions(to, summary);
 }
 
 /* ---- load cases */
