@@ -160,26 +160,24 @@ static bool read_groups(uz_given_mesh *to, decoding *d, const json_value *groups
 
 /* ---- Gmsh */
 
-/* The bytes of a Gmsh file, in the request or uploaded before. A binary one can only be uploaded: JSON has no bytes. */
-static bool read_gmsh(uz_given_mesh *to, decoding *d, const json_value *gmsh)
-{
-    uz_error err = {.status = UZ_OK};
-    decode_source file;
-    if (!decode_source_open(&file, d, gmsh))
-        return false;
-    const bool good = uz_mesh_read(to, "gmsh", file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
-    decode_source_close(&file);
-    snprintf(err.where, sizeof err.where, "/mesh/gmsh");
-    return good || decode_refuse_text(d, gmsh, &err, UZ_PROBLEM_SCENE);
-}
-
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
 {
     const json_value *gmsh = json_get(mesh, "gmsh");
     const int dim = uz_scene_dim(out);
     out->source = UZ_MESH_GIVEN;
-    if (gmsh)
-        return read_gmsh(&out->given, d, gmsh);
+    if (gmsh) {
+        /* The bytes of a Gmsh file, in the request or uploaded before. A binary one can only be uploaded: JSON has no
+         * bytes. */
+        uz_error err = {.status = UZ_OK};
+        decode_source file;
+        if (!decode_source_open(&file, d, gmsh))
+            return false;
+        const bool good =
+            uz_mesh_read(&out->given, "gmsh", file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
+        decode_source_close(&file);
+        snprintf(err.where, sizeof err.where, "/mesh/gmsh");
+        return good || decode_refuse_text(d, gmsh, &err, UZ_PROBLEM_SCENE);
+    }
     return read_nodes(&out->given, d, json_get(mesh, "nodes"), dim) &&
            read_elements(&out->given, d, json_get(mesh, "elements")) &&
            read_groups(&out->given, d, json_get(mesh, "groups"), dim);

@@ -164,16 +164,6 @@ char *codec_encode_history(const char *case_name, const double *rows, int64_t co
     return text_finish(&t, len);
 }
 
-/* CSV has no null: what is not finite is written as inf, -inf or nan, which every reader of numbers understands. */
-static void put_cell(text *t, double x)
-{
-    char digits[TEXT_DOUBLE];
-    if (isfinite(x))
-        text_bytes(t, digits, text_shortest(digits, x));
-    else
-        text_put(t, isnan(x) ? "nan" : x < 0 ? "-inf" : "inf");
-}
-
 char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len)
 {
     text t = {0};
@@ -185,7 +175,14 @@ char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len)
     for (int64_t i = 0; i < count && !t.failed; i++)
         for (int j = 0; j < CODEC_HISTORY_COLUMNS; j++) {
             text_put(&t, j ? "," : "");
-            put_cell(&t, rows[i * CODEC_HISTORY_COLUMNS + j]);
+            /* CSV has no null: what is not finite is written as inf, -inf or nan, which every reader of numbers
+             * understands. */
+            double x = rows[i * CODEC_HISTORY_COLUMNS + j];
+            char digits[TEXT_DOUBLE];
+            if (isfinite(x))
+                text_bytes(&t, digits, text_shortest(digits, x));
+            else
+                text_put(&t, isnan(x) ? "nan" : x < 0 ? "-inf" : "inf");
             text_put(&t, j + 1 < CODEC_HISTORY_COLUMNS ? "" : "\n");
         }
     return text_finish(&t, len);

@@ -130,20 +130,6 @@ static void suggest(const schemas *all, const char *name, size_t len, problem_de
     free(names);
 }
 
-/* The first few numbers of an object. */
-static void list_members(schema_at at, const char *name, size_t len, problem_details *problem)
-{
-    const json_value *properties = json_get(at.node, "properties");
-    const char *before = ": ";
-    for (size_t i = 0; i < json_size(properties); i++) {
-        if (!is_number(schema_resolve(schema_child(at, &properties->items[i]))))
-            continue;
-        problem_add(problem, "%s%.*s.%s", before, (int)len, name, properties->items[i].key);
-        before = ", ";
-    }
-    problem_add(problem, ".");
-}
-
 bool quantity_check(const schemas *all, const json_value *quantity, problem_details *problem)
 {
     char shown[80];
@@ -164,7 +150,16 @@ bool quantity_check(const schemas *all, const json_value *quantity, problem_deta
                 shown);
     if (at.node && !own && (schema_types(at) & SCHEMA_OBJECT) && schema_types(at) != SCHEMA_ANY) {
         problem_add(problem, ", but holds some");
-        list_members(at, name, len, problem);
+        /* The first few numbers of an object. */
+        const json_value *properties = json_get(at.node, "properties");
+        const char *before = ": ";
+        for (size_t i = 0; i < json_size(properties); i++) {
+            if (!is_number(schema_resolve(schema_child(at, &properties->items[i]))))
+                continue;
+            problem_add(problem, "%s%.*s.%s", before, (int)len, name, properties->items[i].key);
+            before = ", ";
+        }
+        problem_add(problem, ".");
     } else {
         problem_add(problem, ".");
         suggest(all, name, len, problem);

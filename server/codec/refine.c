@@ -61,31 +61,27 @@ static void put_member(text *t, const char *key, const json_value *old, const js
     }
 }
 
-/* The old members, changed where they stand, then the new ones; a rule that may stop short of the accuracy goes. */
-static void put_solver(text *t, const json_value *old, const json_value *change, const char *id)
-{
-    static const char *const SET[] = {"stopping", "warm_start"}, *const KEYS[] = {"accuracy", "max_iterations",
-                                                                                  "time_limit_s"};
-    text_open(t, '{');
-    for (size_t i = 0; i < json_size(old); i++)
-        if (strcmp(old->items[i].key, "epsilon") != 0)
-            put_member(t, old->items[i].key, &old->items[i], change, id);
-    for (size_t i = 0; i < sizeof SET / sizeof SET[0]; i++)
-        if (!json_get(old, SET[i]))
-            put_member(t, SET[i], NULL, change, id);
-    for (size_t i = 0; i < sizeof KEYS / sizeof KEYS[0]; i++)
-        if (!json_get(old, KEYS[i]) && json_get(change, KEYS[i]))
-            put_member(t, KEYS[i], NULL, change, id);
-    text_close(t, '}');
-}
-
 /* at: the old solver, NULL: there was none. */
 static char *make_solver(const char *at, size_t len, const json_value *change, const char *id)
 {
     json_tree tree = {NULL, NULL};
     problem_details ignored;
     text t = {.failed = at && !json_scan(&tree, at, len, &ignored)};
-    put_solver(&t, tree.root, change, id);
+    /* The old members, changed where they stand, then the new ones; a rule that may stop short of the accuracy goes. */
+    const json_value *old = tree.root;
+    static const char *const SET[] = {"stopping", "warm_start"}, *const KEYS[] = {"accuracy", "max_iterations",
+                                                                                  "time_limit_s"};
+    text_open(&t, '{');
+    for (size_t i = 0; i < json_size(old); i++)
+        if (strcmp(old->items[i].key, "epsilon") != 0)
+            put_member(&t, old->items[i].key, &old->items[i], change, id);
+    for (size_t i = 0; i < sizeof SET / sizeof SET[0]; i++)
+        if (!json_get(old, SET[i]))
+            put_member(&t, SET[i], NULL, change, id);
+    for (size_t i = 0; i < sizeof KEYS / sizeof KEYS[0]; i++)
+        if (!json_get(old, KEYS[i]) && json_get(change, KEYS[i]))
+            put_member(&t, KEYS[i], NULL, change, id);
+    text_close(&t, '}');
     json_clear(&tree);
     return text_finish(&t, NULL);
 }
