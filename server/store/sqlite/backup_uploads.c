@@ -87,29 +87,6 @@ static bool put_or_forget(sqlite3 *db, sqlite3 *original, const folders *f, cons
     return false;
 }
 
-static bool put_files(sqlite3 *db, sqlite3 *original, const folders *f, char *message, size_t size)
-{
-    sqlite3_stmt *stmt = NULL;
-    int rc = sqlite3_prepare_v2(db, "SELECT id FROM upload", -1, &stmt, NULL);
-    bool ok = rc == SQLITE_OK;
-    while (ok && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
-        const char *id = (const char *)sqlite3_column_text(stmt, 0);
-        ok = id && !strchr(id, '/') && put_or_forget(db, original, f, id);
-        if (!ok)
-            snprintf(message, size, "cannot copy upload %s: %s", id ? id : "", strerror(errno));
-    }
-    sqlite3_finalize(stmt);
-    if (ok && rc != SQLITE_DONE) {
-        snprintf(message, size, "cannot read the uploads: %s", sqlite3_errmsg(db));
-        ok = false;
-    }
-    if (ok && fsync(f->to) != 0) {
-        snprintf(message, size, "cannot sync the folder of uploads: %s", strerror(errno));
-        ok = false;
-    }
-    return ok;
-}
-
 /* 1, 0; -1: can't be read. Files of formats before 3 have no such table. */
 static int has_uploads(sqlite3 *db)
 {
@@ -140,8 +117,26 @@ bool backup_uploads(sqlite3 *db, sqlite3 *original, const char *from, const char
     else if (any > 0 && ((f.from = open_folder(from, false)) < 0 || (f.to = open_folder(to, true)) < 0))
         snprintf(message, size, "cannot open the folder of uploads beside %s: %s", f.from < 0 ? from : to,
                  strerror(errno));
-    else if (any > 0)
-        ok = put_files(db, original, &f, message, size);
+    else if (any > 0) {
+        sqlite3_stmt *stmt = NULL;
+        int rc = sqlite3_prepare_v2(db, "SELECT id FROM upload", -1, &stmt, NULL);
+        ok = rc == SQLITE_OK;
+        while (ok && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
+            const char *id = (const char *)sqlite3_column_text(stmt, 0);
+            ok = id && !strchr(id, '/') && put_or_forget(db, original, &f, id);
+            if (!ok)
+                snprintf(message, size, "cannot copy upload %s: %s", id ? id : "", strerror(errno));
+        }
+        sqlite3_finalize(stmt);
+        if (ok && rc != SQLITE_DONE) {
+            snprintf(message, size, "cannot read the uploads: %s", sqlite3_errmsg(db));
+            ok = false;
+        }
+        if (ok && fsync(f.to) != 0) {
+            snprintf(message, size, "cannot sync the folder of uploads: %s", strerror(errno));
+            ok = false;
+        }
+    }
     if (f.from >= 0)
         close(f.from);
     if (f.to >= 0)

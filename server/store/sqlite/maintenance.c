@@ -58,32 +58,6 @@ static void check_upload(sqlite3 *db, const char *folder, const char *id, FILE *
         fprintf(text, "the file of upload %s cannot be read: %s\n", id, strerror(cause));
 }
 
-/* Ids first, a page of them at a time: no read transaction stays open while files are read. */
-static int check_uploads(sqlite3 *db, const char *file, FILE *text)
-{
-    char folder[4096];
-    enum { PAGE = 100 };
-    char ids[PAGE][UPLOAD_ID_LEN + 1], last[UPLOAD_ID_LEN + 1] = "";
-    int rc = SQLITE_OK;
-    snprintf(folder, sizeof folder, "%s-uploads", file);
-    for (int n = PAGE; n == PAGE && rc == SQLITE_OK;) {
-        sqlite3_stmt *stmt = NULL;
-        n = 0;
-        rc = sqlite3_prepare_v2(db, "SELECT id FROM upload WHERE id > ?1 ORDER BY id LIMIT 100", -1, &stmt, NULL);
-        if (rc == SQLITE_OK)
-            rc = sqlite3_bind_text(stmt, 1, last, -1, SQLITE_STATIC);
-        while (rc == SQLITE_OK && n < PAGE && sqlite3_step(stmt) == SQLITE_ROW)
-            snprintf(ids[n++], sizeof ids[0], "%s", (const char *)sqlite3_column_text(stmt, 0));
-        int ended = sqlite3_finalize(stmt);
-        rc = rc == SQLITE_OK ? ended : rc;
-        for (int i = 0; i < n; i++)
-            check_upload(db, folder, ids[i], text);
-        if (n > 0)
-            memcpy(last, ids[n - 1], sizeof last);
-    }
-    return rc;
-}
-
 /* Queries whose rows are findings, and the format that they need. What has a checksum is read whole. */
 static const struct {
     int version;
@@ -122,8 +96,29 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
     for (size_t i = 0; i < sizeof CHECKS / sizeof CHECKS[0] && rc == SQLITE_OK; i++)
         if (version >= CHECKS[i].version)
             rc = collect(db, CHECKS[i].sql, CHECKS[i].finding, text);
-    if (rc == SQLITE_OK && version >= 3)
-        rc = check_uploads(db, file, text);
+    if (rc == SQLITE_OK && version >= 3) {
+        /* Ids first, a page of them at a time: no read transaction stays open while files are read. */
+        char folder[4096];
+        enum { PAGE = 100 };
+        char ids[PAGE][UPLOAD_ID_LEN + 1], last[UPLOAD_ID_LEN + 1] = "";
+        rc = SQLITE_OK;
+        snprintf(folder, sizeof folder, "%s-uploads", file);
+        for (int n = PAGE; n == PAGE && rc == SQLITE_OK;) {
+            sqlite3_stmt *stmt = NULL;
+            n = 0;
+            rc = sqlite3_prepare_v2(db, "SELECT id FROM upload WHERE id > ?1 ORDER BY id LIMIT 100", -1, &stmt, NULL);
+            if (rc == SQLITE_OK)
+                rc = sqlite3_bind_text(stmt, 1, last, -1, SQLITE_STATIC);
+            while (rc == SQLITE_OK && n < PAGE && sqlite3_step(stmt) == SQLITE_ROW)
+                snprintf(ids[n++], sizeof ids[0], "%s", (const char *)sqlite3_column_text(stmt, 0));
+            int ended = sqlite3_finalize(stmt);
+            rc = rc == SQLITE_OK ? ended : rc;
+            for (int i = 0; i < n; i++)
+                check_upload(db, folder, ids[i], text);
+            if (n > 0)
+                memcpy(last, ids[n - 1], sizeof last);
+        }
+    }
     if (rc != SQLITE_OK)
         fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
     out->jobs = read_integer(db, "SELECT count(*) FROM job");
