@@ -51,16 +51,6 @@ static void add_state(answer_parts *to, const uz_result *result)
     add_vector(to, STATE_VECTOR, to->state, count);
 }
 
-static void add_vectors(answer_parts *to, const uz_result *result, bool is_scene)
-{
-    add_vector(to, "reactions", result->r, result->m);
-    add_vector(to, "gaps", result->g, result->m);
-    add_vector(to, "ray", result->ray, result->m);
-    add_vector(to, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
-    add_vector(to, "pressure", result->pressure, result->m);
-    add_state(to, result);
-}
-
 /* earlier: of the run that was continued, NULL: none was. */
 static void add_trade(answer_parts *to, const uz_result *result, const uz_trade *earlier)
 {
@@ -74,20 +64,14 @@ static void add_trade(answer_parts *to, const uz_result *result, const uz_trade 
 
 /* ---- history */
 
-/* Rows of the run that was continued up to where the new ones begin. */
-static int64_t count_earlier(const double *rows, int64_t count, const uz_history *later)
-{
-    int64_t n = 0;
-    double first = later->count > 0 ? (double)later->rows[0].iteration : 1e300;
-    while (n < count && rows[n * CODEC_HISTORY_COLUMNS] < first)
-        n++;
-    return n;
-}
-
 /* Seconds count from the first iteration of the first run; the time between the runs is left out. */
 static bool add_history(answer_parts *to, const uz_history *history, const double *earlier, int64_t earlier_rows)
 {
-    int64_t kept = count_earlier(earlier, earlier_rows, history);
+    /* Rows of the run that was continued up to where the new ones begin. */
+    int64_t kept = 0;
+    double first = history->count > 0 ? (double)history->rows[0].iteration : 1e300;
+    while (kept < earlier_rows && earlier[kept * CODEC_HISTORY_COLUMNS] < first)
+        kept++;
     double spent = earlier_rows > 0 ? earlier[(earlier_rows - 1) * CODEC_HISTORY_COLUMNS + 1] : 0.0;
     to->history = calloc((size_t)(kept + history->count) + 1, CODEC_HISTORY_COLUMNS * sizeof *to->history);
     if (!to->history)
@@ -118,7 +102,12 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     answer_parts *parts = &a->parts[i];
     codec_run run = {.started_from = request->answer.u ? NULL : origin_name(result->summary.origin)};
     parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
-    add_vectors(parts, result, is_scene);
+    add_vector(parts, "reactions", result->r, result->m);
+    add_vector(parts, "gaps", result->g, result->m);
+    add_vector(parts, "ray", result->ray, result->m);
+    add_vector(parts, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
+    add_vector(parts, "pressure", result->pressure, result->m);
+    add_state(parts, result);
     const char *name = request->problem.n_cases > 0 ? request->problem.cases[i].name : NULL;
     add_trade(parts, result, has_earlier ? &from->trades[i] : NULL);
     return parts->summary && judge_summary(&parts->summary, request, name, a->findings) &&
@@ -144,32 +133,22 @@ static void add_waiting(uz_timings *t, double queue_s, double parse_s)
     t->total += queue_s + parse_s;
 }
 
-/* Of all cases: that of the first which did not begin at zero. */
-static const char *started_from(uz_result *const *results, int64_t n)
-{
-    int64_t i = 0;
-    while (i + 1 < n && results[i]->summary.origin == UZ_FROM_ZERO)
-        i++;
-    return origin_name(results[i]->summary.origin);
-}
-
-static bool build_whole(answers *a, uz_result *const *results, const codec_request *request, double queue_s,
-                        double parse_s)
+/* All cases together: their summary, what they share, and the list of them. */
+static bool build_whole(answers *a, store_outcome *outcome, uz_result *const *results, const codec_request *request,
+                        double queue_s, double parse_s)
 {
     codec_cases counts;
     uz_summary overall;
+    int64_t first = 0; /* of those that did not begin at zero */
+    while (first + 1 < a->n && results[first]->summary.origin == UZ_FROM_ZERO)
+        first++;
     overall_summary(&overall, &counts, results, &request->problem);
     add_waiting(&overall.timings, queue_s, parse_s);
-    codec_run run = {.started_from = started_from(results, a->n), .cases = &counts};
+    codec_run run = {.started_from = origin_name(results[first]->summary.origin), .cases = &counts};
     a->shared.summary = codec_encode_run(&overall, request->problem.kind, &run);
-    return a->shared.summary && judge_whole(&a->shared.summary, request, a->findings) &&
-           add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE);
-}
-
-static bool build_cases(answers *a, store_outcome *outcome, const codec_request *request)
-{
     a->cases = calloc((size_t)a->n, sizeof *a->cases);
-    if (!a->cases)
+    if (!a->cases || !a->shared.summary || !judge_whole(&a->shared.summary, request, a->findings) ||
+        !add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE))
         return false;
     for (int64_t i = 0; i < a->n; i++)
         a->cases[i] = as_stored(&a->parts[i], request->problem.cases[i].name);
@@ -193,7 +172,7 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
     for (int64_t i = 0; ok && i < out->n; i++)
         ok = build_one(out, i, results[i], request, from);
     if (ok && has_cases)
-        return build_whole(out, results, request, queue_s, parse_s) && build_cases(out, outcome, request);
+        return build_whole(out, outcome, results, request, queue_s, parse_s);
     ok = ok && add_places(out, &out->parts[0], results[0], request->problem.kind == UZ_PROBLEM_SCENE);
     outcome->whole = as_stored(&out->parts[0], NULL);
     return ok;

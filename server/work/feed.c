@@ -149,8 +149,12 @@ void feed_unlisten(listener *l)
     free(l);
 }
 
-static bool take_signal(listener *l)
+bool feed_wait(listener *l, int fd, double seconds)
 {
+    struct pollfd p[2] = {{.fd = l->wake, .events = POLLIN}, {.fd = fd, .events = POLLRDHUP}};
+    double most = l->wake < 0 && seconds > LOOK_S ? LOOK_S : seconds;
+    int ms = most > 0.0 ? (int)fmin(ceil(most * 1e3), 1e9) : 0; /* NaN: at once */
+    poll(p, 2, ms); /* a signal handler's EINTR is as good as any other return */
     eventfd_t unused;
     pthread_mutex_lock(&l->feed->lock);
     bool was = l->signaled;
@@ -159,15 +163,6 @@ static bool take_signal(listener *l)
         eventfd_read(l->wake, &unused);
     pthread_mutex_unlock(&l->feed->lock);
     return was;
-}
-
-bool feed_wait(listener *l, int fd, double seconds)
-{
-    struct pollfd p[2] = {{.fd = l->wake, .events = POLLIN}, {.fd = fd, .events = POLLRDHUP}};
-    double most = l->wake < 0 && seconds > LOOK_S ? LOOK_S : seconds;
-    int ms = most > 0.0 ? (int)fmin(ceil(most * 1e3), 1e9) : 0; /* NaN: at once */
-    poll(p, 2, ms); /* a signal handler's EINTR is as good as any other return */
-    return take_signal(l);
 }
 
 int feed_descriptor(const listener *l)

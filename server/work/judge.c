@@ -37,11 +37,6 @@ static range limits_of(const codec_assertion *a)
     return (range){isnan(a->least) ? -INFINITY : a->least, isnan(a->most) ? INFINITY : a->most};
 }
 
-static double margin_of(range limits, double value)
-{
-    return isnan(value) ? -INFINITY : fmin(value - limits.lo, limits.hi - value);
-}
-
 /* ---- how far a number may be from that of the exact answer */
 
 static double number_at(const codec_summary *summary, const char *name)
@@ -110,14 +105,6 @@ static void say_missed(codec_finding *out, const codec_assertion *a, range limit
         snprintf(out->reason, sizeof out->reason, "%s is above %s", value, shown(limit, limits.hi));
 }
 
-static void say_between(codec_finding *out, range exact)
-{
-    char lo[DIGITS], hi[DIGITS];
-    snprintf(out->reason, sizeof out->reason,
-             "the exact value is between %s and %s, so that it may or may not meet the limit", shown(lo, exact.lo),
-             shown(hi, exact.hi));
-}
-
 /* A finding without a reason passes. */
 static void judge_value(codec_finding *out, const codec_assertion *a, const codec_summary *summary)
 {
@@ -128,7 +115,7 @@ static void judge_value(codec_finding *out, const codec_assertion *a, const code
     const bool bounded = !isnan(known.error) && !isnan(out->value);
     const range exact = bounded ? known.in : (range){out->value, out->value};
     out->error = bounded ? known.error : (double)NAN;
-    out->margin = margin_of(limits, out->value);
+    out->margin = isnan(out->value) ? -INFINITY : fmin(out->value - limits.lo, limits.hi - out->value);
     const bool misses = exact.hi < limits.lo || exact.lo > limits.hi;
     if (misses && (met || bounded)) {
         out->verdict = CODEC_FAIL;
@@ -139,7 +126,10 @@ static void judge_value(codec_finding *out, const codec_assertion *a, const code
                  met ? "" : outcome);
     } else if (exact.lo < limits.lo || exact.hi > limits.hi) {
         out->verdict = CODEC_UNCERTAIN;
-        say_between(out, exact);
+        char lo[DIGITS], hi[DIGITS];
+        snprintf(out->reason, sizeof out->reason,
+                 "the exact value is between %s and %s, so that it may or may not meet the limit", shown(lo, exact.lo),
+                 shown(hi, exact.hi));
     } else {
         out->verdict = CODEC_PASS;
     }

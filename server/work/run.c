@@ -254,23 +254,6 @@ static store_status try_to_store(const run *r, bool for_ever)
     }
 }
 
-/* The result cannot be kept: the job ends without it, which takes hardly any room, and says why. */
-static void give_up_result(run *r, store_status status)
-{
-    problem_details problem = {.status = 500, .code = "result_not_stored", .title = "The result could not be stored"};
-    const char *why = "The store failed, and the service's log has the cause: submit the job again.";
-    if (status == STORE_FULL) {
-        problem.status = 507;
-        strcpy(problem.code, "storage_full");
-        why = "The disk had no room for the result: delete ended jobs or free disk space, then submit the job again.";
-    }
-    snprintf(problem.detail, sizeof problem.detail, "%s", why);
-    log_store_failure(r, LOG_ERROR, "result_given_up");
-    fail_from_problem(r, &problem);
-    if (atomic_load(&r->me->cancel))
-        r->outcome = (store_outcome){.status = JOB_DISMISSED};
-}
-
 /* No job stays running for want of room: without a restart nobody would take it up. Where the service must end first,
  * the next start runs the job again. */
 static bool store_outcome_of(run *r)
@@ -278,7 +261,20 @@ static bool store_outcome_of(run *r)
     work *w = r->me->w;
     store_status status = try_to_store(r, false);
     if (!is_settled(status) && !atomic_load(&w->interrupt)) {
-        give_up_result(r, status);
+        /* The result cannot be kept: the job ends without it, which takes hardly any room, and says why. */
+        static const char TITLE[] = "The result could not be stored";
+        problem_details problem;
+        if (status == STORE_FULL)
+            http_problem(&problem, 507, "storage_full", TITLE, "%s",
+                         "The disk had no room for the result: delete ended jobs or free disk space, then submit the "
+                         "job again.");
+        else
+            http_problem(&problem, 500, "result_not_stored", TITLE, "%s",
+                         "The store failed, and the service's log has the cause: submit the job again.");
+        log_store_failure(r, LOG_ERROR, "result_given_up");
+        fail_from_problem(r, &problem);
+        if (atomic_load(&r->me->cancel))
+            r->outcome = (store_outcome){.status = JOB_DISMISSED};
         status = try_to_store(r, true);
     }
     if (status == STORE_OK)

@@ -5,7 +5,7 @@
 #include <string.h>
 
 /* The rule for changing this layout: another one gets another STATE_VERSION, and one that is not known is not read.
- * Numbers come first, in the order of numbers_of, then r, rho, Dr, Drho, best_r and anchor, m each. Counts are below
+ * Numbers come first, in the order of state_pack, then r, rho, Dr, Drho, best_r and anchor, m each. Counts are below
  * 2^53, so that a double holds them. */
 enum { STATE_VERSION = 1, STATE_NUMBERS = 16, STATE_VECTORS = 6 };
 
@@ -42,27 +42,6 @@ static void list_vectors(uz_state *s, double **list[STATE_VECTORS])
     memcpy(list, all, sizeof all);
 }
 
-static void numbers_of(double out[STATE_NUMBERS], const uz_state *s)
-{
-    const double all[STATE_NUMBERS] = {STATE_VERSION,
-                                       (double)s->m,
-                                       method_number(s->method),
-                                       method_number(s->made_by),
-                                       s->phase,
-                                       (double)s->phase_end,
-                                       (double)s->iteration,
-                                       (double)s->restarts,
-                                       (double)s->next_check,
-                                       (double)s->best_iteration,
-                                       s->alpha,
-                                       s->tau,
-                                       s->step_norm,
-                                       s->best_bound,
-                                       s->best_relative,
-                                       0.0};
-    memcpy(out, all, sizeof all);
-}
-
 double *state_pack(const uz_state *state, int64_t *count)
 {
     uz_state s = *state;
@@ -71,7 +50,23 @@ double *state_pack(const uz_state *state, int64_t *count)
     double *x = calloc((size_t)*count, sizeof *x);
     if (!x)
         return NULL;
-    numbers_of(x, state);
+    const double all[STATE_NUMBERS] = {STATE_VERSION,
+                                       (double)state->m,
+                                       method_number(state->method),
+                                       method_number(state->made_by),
+                                       state->phase,
+                                       (double)state->phase_end,
+                                       (double)state->iteration,
+                                       (double)state->restarts,
+                                       (double)state->next_check,
+                                       (double)state->best_iteration,
+                                       state->alpha,
+                                       state->tau,
+                                       state->step_norm,
+                                       state->best_bound,
+                                       state->best_relative,
+                                       0.0};
+    memcpy(x, all, sizeof all);
     list_vectors(&s, vectors);
     for (int k = 0; k < STATE_VECTORS; k++)
         if (*vectors[k] && s.m > 0)
