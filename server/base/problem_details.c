@@ -4,14 +4,6 @@
 #include <stdio.h>
 #include <string.h>
 
-/* A detail may quote bytes that a client sent: what is no printable ASCII becomes '?', so the text is always UTF-8. */
-static void keep_ascii(char *text)
-{
-    for (; *text; text++)
-        if ((unsigned char)*text < 0x20 || (unsigned char)*text > 0x7e)
-            *text = '?';
-}
-
 _Bool http_problem(problem_details *out, int status, const char *code, const char *title, const char *format, ...)
 {
     va_list args;
@@ -22,6 +14,9 @@ _Bool http_problem(problem_details *out, int status, const char *code, const cha
     va_start(args, format);
     vsnprintf(out->detail, sizeof out->detail, format, args);
     va_end(args);
-    keep_ascii(out->detail);
+    /* A detail may quote bytes that a client sent: so the text is always UTF-8. */
+    for (char *at = out->detail; *at; at++)
+        if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
+            *at = '?';
     return 0;
 }

@@ -54,23 +54,6 @@ void told_changes_free(struct told_changes *t)
 
 /* ---- texts */
 
-/* What has become of the job; NULL: no memory, or the store failed. */
-static char *describe(api *context, const char *id, const char **event)
-{
-    job j;
-    char *data = NULL;
-    store_status status = store_get(context->store, id, &j);
-    *event = status == STORE_NOT_FOUND ? "deleted" : "job";
-    if (status == STORE_NOT_FOUND && asprintf(&data, "{\"id\": \"%s\"}", id) < 0)
-        data = NULL;
-    if (status == STORE_OK) {
-        jobs_freshen(context, &j);
-        data = codec_encode_job(&j);
-        job_clear(&j);
-    }
-    return data;
-}
-
 /* Under the lock. It may describe a later state than the change made: then there is a later change, told after it. */
 static const told_text *text_of(api *context, const feed_change *change)
 {
@@ -78,7 +61,20 @@ static const told_text *text_of(api *context, const feed_change *change)
     if (kept->number == change->number)
         return kept;
     free(kept->data);
-    kept->data = describe(context, change->id, &kept->event);
+    /* What has become of the job; NULL: no memory, or the store failed. */
+    const char **event = &kept->event;
+    job j;
+    char *data = NULL;
+    store_status status = store_get(context->store, change->id, &j);
+    *event = status == STORE_NOT_FOUND ? "deleted" : "job";
+    if (status == STORE_NOT_FOUND && asprintf(&data, "{\"id\": \"%s\"}", change->id) < 0)
+        data = NULL;
+    if (status == STORE_OK) {
+        jobs_freshen(context, &j);
+        data = codec_encode_job(&j);
+        job_clear(&j);
+    }
+    kept->data = data;
     kept->number = kept->data ? change->number : 0;
     return kept->data ? kept : NULL;
 }

@@ -29,24 +29,6 @@ static void name_state(char *out, size_t size, const job *j, double iteration)
         snprintf(out, size, "%d.%s", j->attempts, job_status_name(j->status));
 }
 
-static bool say_status(job_stream *s, const job *j)
-{
-    char *data = codec_encode_job(j);
-    bool ok = stream_say(&s->base, "status", s->last, data);
-    free(data);
-    s->any = true;
-    s->base.ended = jobs_ended(j);
-    return ok;
-}
-
-static bool say_progress(job_stream *s, const job *j, const double *row)
-{
-    char *data = codec_encode_progress(j->progress, row);
-    bool ok = stream_say(&s->base, "progress", s->last, data);
-    free(data);
-    return ok;
-}
-
 /* The progress of a job that runs here, and its newest row in *row, or NULL; the caller frees *rows. */
 static void look_at_run(const job_stream *s, job *j, double **rows, const double **row)
 {
@@ -77,10 +59,17 @@ static bool look(event_stream *base)
     name_state(state, sizeof state, &j, s->iteration);
     bool seen = strcmp(state, s->last) == 0;
     snprintf(s->last, sizeof s->last, "%s", state);
-    if (!seen && (!s->any || j.status != s->status))
-        ok = say_status(s, &j);
-    else if (!seen && j.status == JOB_RUNNING)
-        ok = say_progress(s, &j, row);
+    if (!seen && (!s->any || j.status != s->status)) {
+        char *data = codec_encode_job(&j);
+        ok = stream_say(&s->base, "status", s->last, data);
+        free(data);
+        s->any = true;
+        s->base.ended = jobs_ended(&j);
+    } else if (!seen && j.status == JOB_RUNNING) {
+        char *data = codec_encode_progress(j.progress, row);
+        ok = stream_say(&s->base, "progress", s->last, data);
+        free(data);
+    }
     s->any = s->any || seen;
     s->status = j.status;
     free(rows);

@@ -33,20 +33,6 @@ void field_slots_free(field_slots *slots)
     free(slots);
 }
 
-static bool wait_a_little(field_slots *slots)
-{
-    struct timespec until;
-    clock_gettime(CLOCK_REALTIME, &until);
-    until.tv_nsec += (long)(BETWEEN_LOOKS_S * 1e9);
-    until.tv_sec += until.tv_nsec / 1000000000;
-    until.tv_nsec %= 1000000000;
-    int failed;
-    do
-        failed = sem_timedwait(&slots->free, &until);
-    while (failed && errno == EINTR);
-    return !failed;
-}
-
 /* Nobody would read the reply, or the daemon wants to end. */
 static bool is_over(void *ctx)
 {
@@ -57,8 +43,18 @@ static bool is_over(void *ctx)
 static bool take_slot(field_reader *reader, http_reply *reply)
 {
     const int looks = (int)(LONGEST_WAIT_S / BETWEEN_LOOKS_S);
-    for (int i = 0; i < looks && !reader->has_slot && (i == 0 || !is_over(reader)); i++)
-        reader->has_slot = wait_a_little(reader->context->fields);
+    for (int i = 0; i < looks && !reader->has_slot && (i == 0 || !is_over(reader)); i++) {
+        struct timespec until;
+        clock_gettime(CLOCK_REALTIME, &until);
+        until.tv_nsec += (long)(BETWEEN_LOOKS_S * 1e9);
+        until.tv_sec += until.tv_nsec / 1000000000;
+        until.tv_nsec %= 1000000000;
+        int failed;
+        do
+            failed = sem_timedwait(&reader->context->fields->free, &until);
+        while (failed && errno == EINTR);
+        reader->has_slot = !failed;
+    }
     if (!reader->has_slot) {
         reply->retry_after_s = 5;
         reply_refuse(reply, 503, "busy", "Too many replies are being computed",

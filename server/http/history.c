@@ -41,23 +41,6 @@ static bool find_case(api *context, const job *j, const char *name, int64_t *num
     return good;
 }
 
-/* Of an ended job, from the store. */
-static bool fetch_stored(api *context, const job *j, const char *name, int64_t after, found_rows *out,
-                         http_reply *reply)
-{
-    int64_t columns = 0, number;
-    if (!find_case(context, j, name, &number, reply))
-        return false;
-    snprintf(out->case_name, sizeof out->case_name, "%s", name ? name : "");
-    store_status status = store_get_history(context->store, j->id, number, after, &out->rows, &out->count, &columns);
-    if (status == STORE_OK && out->count > 0 && columns != CODEC_HISTORY_COLUMNS)
-        status = STORE_ERROR;
-    if (status == STORE_OK || status == STORE_NOT_FOUND)
-        return true;
-    reply_store_failure(context, status, reply);
-    return false;
-}
-
 /* The rows of a running job are with its worker, those of an ended one in the store; a job may end in between, and one
  * that waits has none. While a job with cases runs, the rows are those of the case that runs; another of its cases has
  * none to show. False with a reply. */
@@ -66,8 +49,21 @@ bool history_rows(api *context, const job *j, const char *name, int64_t after, f
     work_history live;
     if (j->status == JOB_ACCEPTED)
         return true;
-    if (j->status != JOB_RUNNING || !work_live_history(context->work, j->id, name, after, &live))
-        return fetch_stored(context, j, name, after, out, reply);
+    if (j->status != JOB_RUNNING || !work_live_history(context->work, j->id, name, after, &live)) {
+        /* Of an ended job, from the store. */
+        int64_t columns = 0, number;
+        if (!find_case(context, j, name, &number, reply))
+            return false;
+        snprintf(out->case_name, sizeof out->case_name, "%s", name ? name : "");
+        store_status status =
+            store_get_history(context->store, j->id, number, after, &out->rows, &out->count, &columns);
+        if (status == STORE_OK && out->count > 0 && columns != CODEC_HISTORY_COLUMNS)
+            status = STORE_ERROR;
+        if (status == STORE_OK || status == STORE_NOT_FOUND)
+            return true;
+        reply_store_failure(context, status, reply);
+        return false;
+    }
     out->rows = live.rows;
     out->count = live.count;
     snprintf(out->case_name, sizeof out->case_name, "%s", name ? name : live.case_name);

@@ -42,32 +42,29 @@ static void on_drop(void *ctx, http_request *rq)
     rq->upload = NULL;
 }
 
-static void log_request(const api *context, const http_request *rq, const char *end)
-{
-    char path[256];
-    snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
-    for (char *at = path; *at; at++)
-        if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
-            *at = '?';
-    log_field fields[] = {LOG_S("method", rq->method),
-                          LOG_S("path", path),
-                          LOG_S("request", rq->id),
-                          LOG_I("status", rq->status),
-                          LOG_I("bytes", rq->reply_len),
-                          LOG_N("seconds", http_now() - rq->started),
-                          LOG_S("job", rq->job_id),
-                          LOG_S("token", rq->token),
-                          LOG_S("end", end),
-                          {0}};
-    log_write(context->log, LOG_INFO, "request", fields);
-}
-
 static void on_account(void *ctx, const http_request *rq, bool completed, bool expired)
 {
     const api *context = ctx;
     const route *found = rq->route;
-    if (context->options.access_log || rq->status >= 500)
-        log_request(context, rq, completed ? "complete" : expired ? "deadline" : "aborted");
+    if (context->options.access_log || rq->status >= 500) {
+        const char *end = completed ? "complete" : expired ? "deadline" : "aborted";
+        char path[256];
+        snprintf(path, sizeof path, "%.*s", (int)strcspn(rq->raw_target, "?"), rq->raw_target);
+        for (char *at = path; *at; at++)
+            if ((unsigned char)*at < 0x20 || (unsigned char)*at > 0x7e)
+                *at = '?';
+        log_field fields[] = {LOG_S("method", rq->method),
+                              LOG_S("path", path),
+                              LOG_S("request", rq->id),
+                              LOG_I("status", rq->status),
+                              LOG_I("bytes", rq->reply_len),
+                              LOG_N("seconds", http_now() - rq->started),
+                              LOG_S("job", rq->job_id),
+                              LOG_S("token", rq->token),
+                              LOG_S("end", end),
+                              {0}};
+        log_write(context->log, LOG_INFO, "request", fields);
+    }
     metrics_request(context->metrics, found ? found->method : NULL, found ? found->pattern : NULL, rq->status,
                     http_now() - rq->started);
 }

@@ -275,25 +275,6 @@ static bool worth_predicting(const codec_request *request, size_t limit)
            (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit);
 }
 
-/* One prediction at a time: it takes memory and a processor that are counted for the workers. */
-static void reply_valid(api *context, const http_request *rq, codec_request *request, http_reply *reply)
-{
-    uz_prediction predicted;
-    uz_error err = {.status = UZ_OK};
-    asker a = {context, rq};
-    uz_hooks hooks = {.ctx = &a, .cancelled = is_unwanted};
-    request->settings.memory_limit = work_solve_bytes(context->work);
-    bool known = false;
-    if (worth_predicting(request, request->settings.memory_limit)) {
-        pthread_mutex_lock(&context->predict_lock);
-        uz_thread_init();
-        known =
-            !is_unwanted(&a) && uz_predict(&predicted, &request->problem, &request->settings, &hooks, &err) == UZ_OK;
-        pthread_mutex_unlock(&context->predict_lock);
-    }
-    reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
-}
-
 void jobs_submit(api *context, http_request *rq, http_reply *reply)
 {
     problem_details problem = {0};
@@ -307,7 +288,21 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         goto done;
     }
     if (validate_only) {
-        reply_valid(context, rq, &request, reply);
+        /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
+        uz_prediction predicted;
+        uz_error err = {.status = UZ_OK};
+        asker a = {context, rq};
+        uz_hooks hooks = {.ctx = &a, .cancelled = is_unwanted};
+        request.settings.memory_limit = work_solve_bytes(context->work);
+        bool known = false;
+        if (worth_predicting(&request, request.settings.memory_limit)) {
+            pthread_mutex_lock(&context->predict_lock);
+            uz_thread_init();
+            known =
+                !is_unwanted(&a) && uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
+            pthread_mutex_unlock(&context->predict_lock);
+        }
+        reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
     } else {
         codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
         store_request stored = jobs_request(&request, rq->body, rq->body_len, key);

@@ -66,25 +66,6 @@ static uz_status write_answer(void *ctx, const uz_scene *scene, const uz_field_s
     return w->row->write(&w->file, &w->len, &w->of, hooks, err);
 }
 
-static void reply_answer(api *context, http_request *rq, writing *w, http_reply *reply)
-{
-    job j = {0};
-    results_place at = {.cases = NULL};
-    field_reader reader;
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
-        results_one(&at, context, rq, &j, "a file", reply)) {
-        w->of.job_id = j.id;
-        w->of.case_name = at.name;
-        if (fields_open(&reader, context, rq, &j, reply) &&
-            fields_compute(w, write_answer, &reader, at.number, w->of.options->fields, reply))
-            reply_text(reply, 200, w->row->type, w->file, w->len);
-        fields_close(&reader);
-    }
-    results_place_clear(&at);
-    jobs_check_still_there(context, &j, reply);
-    job_clear(&j);
-}
-
 /* ---- of a history */
 
 static void reply_history(api *context, http_request *rq, writing *w, http_reply *reply)
@@ -134,6 +115,21 @@ void output_get(api *context, http_request *rq, http_reply *reply)
     writing w = {.row = row, .of = {.options = &options}};
     if (row->kind == OUTPUT_OF_HISTORY)
         reply_history(context, rq, &w, reply);
-    else
-        reply_answer(context, rq, &w, reply);
+    else {
+        job j = {0};
+        results_place at = {.cases = NULL};
+        field_reader reader;
+        if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
+            results_one(&at, context, rq, &j, "a file", reply)) {
+            w.of.job_id = j.id;
+            w.of.case_name = at.name;
+            if (fields_open(&reader, context, rq, &j, reply) &&
+                fields_compute(&w, write_answer, &reader, at.number, w.of.options->fields, reply))
+                reply_text(reply, 200, w.row->type, w.file, w.len);
+            fields_close(&reader);
+        }
+        results_place_clear(&at);
+        jobs_check_still_there(context, &j, reply);
+        job_clear(&j);
+    }
 }

@@ -134,20 +134,6 @@ static void cut(const double **x, int64_t *n, int64_t size, const field_list *fi
     *n = left * size;
 }
 
-static void cut_all(codec_result *r, const field_list *fields)
-{
-    const double **rows[] = {&r->gaps, &r->pressure, &r->ray, &r->contact_nodes, &r->reactions};
-    int64_t size = r->dim > 0 ? r->dim : 1, m = r->m;
-    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        r->m = m;
-        cut(rows[i], &r->m, 1, fields);
-    }
-    cut(&r->displacements, &r->n_u, size, fields);
-    cut(&r->nodes, &r->n_nodes, size, fields);
-    r->part = true;
-    r->from = fields->from;
-}
-
 /* The same of what was computed: a view that owns nothing. Gauss points are told whole. */
 static uz_fields cut_computed(const uz_fields *computed, const field_list *fields)
 {
@@ -196,8 +182,18 @@ static codec_result as_encoded(const place *at, const vectors *own, const vector
                       .displacements = own->displacements,
                       .nodes = shared->nodes,
                       .contact_nodes = shared->contact_nodes};
-    if (fields->part)
-        cut_all(&r, fields);
+    if (fields->part) {
+        const double **rows[] = {&r.gaps, &r.pressure, &r.ray, &r.contact_nodes, &r.reactions};
+        int64_t size = r.dim > 0 ? r.dim : 1, m = r.m;
+        for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+            r.m = m;
+            cut(rows[i], &r.m, 1, fields);
+        }
+        cut(&r.displacements, &r.n_u, size, fields);
+        cut(&r.nodes, &r.n_nodes, size, fields);
+        r.part = true;
+        r.from = fields->from;
+    }
     return r;
 }
 

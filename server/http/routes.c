@@ -102,22 +102,6 @@ auth_scope route_scope(const route *r)
     return strcmp(r->method, "GET") == 0 ? SCOPE_READ : SCOPE_SUBMIT;
 }
 
-/* 404, and why: an id of a wrong form is told from a path that nobody serves. */
-static bool refuse_path(const http_request *rq, problem_details *problem)
-{
-    char name[sizeof rq->name];
-    for (size_t i = 0; route_at(i); i++) {
-        const char *pattern = route_at(i)->pattern;
-        const bool of_job = strstr(pattern, "{id}"), of_upload = strstr(pattern, "{digest}");
-        if ((of_job || of_upload) && path_matches(pattern, rq->target.path, true, name, sizeof name))
-            return http_problem(problem, 404, "not_found", "Not found",
-                                "\"%.100s\" is not the id of %s: those have %d digits 0 to 9 and a to f", name,
-                                of_job ? "a job" : "an upload", of_job ? 32 : 64);
-    }
-    return http_problem(problem, 404, "not_found", "Not found",
-                        "there is nothing at %.200s: /openapi.json lists what is", rq->target.path);
-}
-
 bool route_find(http_request *rq, char *allow, size_t size, problem_details *problem)
 {
     const char *method = strcmp(rq->method, "HEAD") == 0 ? "GET" : rq->method;
@@ -141,7 +125,18 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
     if (allow[0])
         return http_problem(problem, 405, "method_not_allowed", "The method is not allowed here",
                             "%s is not allowed on %.200s, but %s", rq->method, rq->target.path, allow);
-    return refuse_path(rq, problem);
+    /* 404, and why: an id of a wrong form is told from a path that nobody serves. */
+    char name[sizeof rq->name];
+    for (size_t i = 0; route_at(i); i++) {
+        const char *pattern = route_at(i)->pattern;
+        const bool of_job = strstr(pattern, "{id}"), of_upload = strstr(pattern, "{digest}");
+        if ((of_job || of_upload) && path_matches(pattern, rq->target.path, true, name, sizeof name))
+            return http_problem(problem, 404, "not_found", "Not found",
+                                "\"%.100s\" is not the id of %s: those have %d digits 0 to 9 and a to f", name,
+                                of_job ? "a job" : "an upload", of_job ? 32 : 64);
+    }
+    return http_problem(problem, 404, "not_found", "Not found",
+                        "there is nothing at %.200s: /openapi.json lists what is", rq->target.path);
 }
 
 static bool refuse_parameter(const http_request *rq, const char *key, problem_details *problem)

@@ -51,18 +51,6 @@ static void reply_health(api *context, const char *status, const int64_t counts[
     reply_json(reply, 200, codec_encode_health(status, counts, work_workers(context->work)));
 }
 
-static void count_cache(api *context, metrics_now *now)
-{
-    uz_cache_entry *entries = NULL;
-    size_t count = 0;
-    if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) == UZ_OK)
-        for (size_t i = 0; i < count; i++)
-            now->cache_bytes += entries[i].bytes;
-    now->cache_entries = count;
-    now->cache_max_bytes = work_cache_bytes(context->work);
-    free(entries);
-}
-
 void service_metrics(api *context, http_request *rq, http_reply *reply)
 {
     const transport_counts counts = transport_count(context->server);
@@ -83,7 +71,14 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
         now.jobs[0] = -1;
     for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
         now.job_names[i] = job_status_name((job_status)i);
-    count_cache(context, &now);
+    uz_cache_entry *entries = NULL;
+    size_t count = 0;
+    if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) == UZ_OK)
+        for (size_t i = 0; i < count; i++)
+            now.cache_bytes += entries[i].bytes;
+    now.cache_entries = count;
+    now.cache_max_bytes = work_cache_bytes(context->work);
+    free(entries);
     char *text = metrics_text(context->metrics, &now, &len);
     reply_text(reply, 200, "text/plain; version=0.0.4; charset=utf-8", text, len);
 }

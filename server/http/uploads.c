@@ -89,26 +89,21 @@ static void reply_failure(api *context, store_status status, http_reply *reply)
         reply_store_failure(context, status, reply);
 }
 
-static void reply_bytes(api *context, http_request *rq, http_reply *reply)
-{
-    int fd;
-    int64_t bytes;
-    store_status status = store_upload_open(context->store, rq->name, &fd, &bytes);
-    if (status != STORE_OK)
-        reply_failure(context, status, reply);
-    else {
-        reply_file(reply, 200, "application/octet-stream", fd, (size_t)bytes);
-        snprintf(reply->tag, sizeof reply->tag, "%.32s", rq->name); /* half of a digest is name enough */
-        reply->takes_ranges = true;
-    }
-}
-
 void uploads_get(api *context, http_request *rq, http_reply *reply)
 {
     upload_info info;
     reply->varies_by_type = true;
     if (request_accepts(rq, "application/octet-stream")) {
-        reply_bytes(context, rq, reply);
+        int fd;
+        int64_t bytes;
+        store_status status = store_upload_open(context->store, rq->name, &fd, &bytes);
+        if (status != STORE_OK)
+            reply_failure(context, status, reply);
+        else {
+            reply_file(reply, 200, "application/octet-stream", fd, (size_t)bytes);
+            snprintf(reply->tag, sizeof reply->tag, "%.32s", rq->name); /* half of a digest is name enough */
+            reply->takes_ranges = true;
+        }
         return;
     }
     store_status status = store_upload_get(context->store, rq->name, &info);
