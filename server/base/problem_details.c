@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-_Bool http_problem(problem_details *out, int status, const char *code, const char *title, const char *format, ...)
+_Bool problem_fill(problem_details *out, int status, const char *code, const char *title, const char *format, ...)
 {
     va_list args;
     memset(out, 0, sizeof *out);

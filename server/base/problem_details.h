@@ -15,8 +15,8 @@ typedef struct {
 } problem_details;
 
 /* Fills *out with a formatted sentence as its detail; what is no printable ASCII in it becomes '?'. Returns false, so
- * that a failing check ends in `return http_problem(...)`. */
-_Bool http_problem(problem_details *out, int status, const char *code, const char *title, const char *format, ...)
+ * that a failing check ends in `return problem_fill(...)`. */
+_Bool problem_fill(problem_details *out, int status, const char *code, const char *title, const char *format, ...)
     __attribute__((format(printf, 5, 6)));
 
 #endif

@@ -14,7 +14,7 @@ static bool check_site(const http_request *rq, problem_details *problem)
     if (!site || !token_equal(site->value, site->value_len, "cross-site") || strcmp(rq->route->method, "GET") == 0 ||
         rq->reply.cors_origin)
         return true;
-    return http_problem(problem, 403, "cross_site", "Requests from other sites are refused",
+    return problem_fill(problem, 403, "cross_site", "Requests from other sites are refused",
                         "a browser sent this for a page of another site");
 }
 
@@ -66,7 +66,7 @@ static bool check_name(const api *context, const http_request *rq, problem_detai
     if (context->auth || !host || is_own_name(context, host->value, host->value_len) || !is_browser(rq) ||
         http_is_public(rq->fd))
         return true;
-    return http_problem(problem, 421, "unknown_host", "This service does not go by that name",
+    return problem_fill(problem, 421, "unknown_host", "This service does not go by that name",
                         "a browser asks for \"%.*s\" on an address that is for this machine only: use "
                         "http://127.0.0.1 or localhost, give the daemon a --token-file, or name the page's origin "
                         "with its option --cors",
@@ -77,11 +77,11 @@ static bool check_body(const api *context, const http_request *rq, problem_detai
 {
     bool takes_body = strcmp(rq->route->method, "POST") == 0;
     if (!takes_body && (rq->chunked || rq->length > 0))
-        return http_problem(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
+        return problem_fill(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
                             rq->route->method, rq->route->pattern);
     size_t limit = rq->route->streamed ? context->options.max_upload : context->options.max_body;
     if (rq->length > limit)
-        return http_problem(problem, 413, "body_too_large", "The request body is too large",
+        return problem_fill(problem, 413, "body_too_large", "The request body is too large",
                             "the body has %llu bytes, the limit of this server is %zu", (unsigned long long)rq->length,
                             limit);
     return true;
@@ -101,13 +101,13 @@ static bool check_type(const http_request *rq, problem_details *problem)
         return true;
     if (coding && (codings > 1 || (!token_equal(coding->value, coding->value_len, "identity") &&
                                    !(rq->route->streamed && is_gzip(coding)))))
-        return http_problem(problem, 415, "content_encoding", "The content coding is not supported",
+        return problem_fill(problem, 415, "content_encoding", "The content coding is not supported",
                             rq->route->streamed ? "send the body as it is, or with Content-Encoding: gzip"
                                                 : "send the body without Content-Encoding");
     if (rq->route->streamed)
         return true;
     if (!request_is_json(rq))
-        return http_problem(problem, 415, "content_type", "The body must be JSON",
+        return problem_fill(problem, 415, "content_type", "The body must be JSON",
                             "send the header field Content-Type: application/json");
     return true;
 }
@@ -117,7 +117,7 @@ static bool check_draining(const api *context, http_request *rq, problem_details
     if (!api_draining(context) || strcmp(rq->route->method, "POST") != 0)
         return true;
     rq->reply.retry_after_s = 5;
-    return http_problem(problem, 503, "draining", "The server is shutting down",
+    return problem_fill(problem, 503, "draining", "The server is shutting down",
                         "no new work is taken: try again when the server is back");
 }
 
@@ -153,7 +153,7 @@ static bool check_rate(api *context, http_request *rq, problem_details *problem)
         return true;
     metrics_add(context->metrics, METRIC_RATE_LIMITED, 1);
     rq->reply.retry_after_s = 1 + (int)wait;
-    return http_problem(problem, 429, "too_many_requests", "Too many requests",
+    return problem_fill(problem, 429, "too_many_requests", "Too many requests",
                         "one client may send %d requests per second (the daemon's option --max-client-rate)",
                         context->options.max_client_rate);
 }
@@ -168,12 +168,12 @@ static bool refuse_token(api *context, http_request *rq, auth_scope have, auth_s
     if (have != SCOPE_NONE) {
         snprintf(field, size, "Bearer realm=\"uzawad\", error=\"insufficient_scope\", scope=\"%s\"",
                  auth_scope_name(need));
-        return http_problem(problem, 403, "insufficient_scope", "This token does not allow that",
+        return problem_fill(problem, 403, "insufficient_scope", "This token does not allow that",
                             "the token \"%s\" has the scope %s, and this needs %s", rq->token, auth_scope_name(have),
                             auth_scope_name(need));
     }
     snprintf(field, size, "Bearer realm=\"uzawad\"%s", given ? ", error=\"invalid_token\"" : "");
-    return http_problem(problem, 401, "unauthorized", "A token is needed", "%s",
+    return problem_fill(problem, 401, "unauthorized", "A token is needed", "%s",
                         given ? "the token is not one of this server's"
                               : "send the header field Authorization: Bearer TOKEN");
 }

@@ -67,7 +67,7 @@ static bool add_job(curve_list *list, api *context, const job *j, const char *ca
 static bool refuse_with(http_reply *reply, int status, const char *code, const char *detail, const char *id, size_t len)
 {
     problem_details problem;
-    http_problem(&problem, status, code, "The list of other jobs can't be used", detail, (int)(len < 60 ? len : 60), id,
+    problem_fill(&problem, status, code, "The list of other jobs can't be used", detail, (int)(len < 60 ? len : 60), id,
                  (int)UZ_CURVES - 1);
     reply_problem(reply, &problem);
     return false;
@@ -128,7 +128,7 @@ static bool read_choice(const http_request *rq, const char *key, const char *con
         }
         snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i ? ", " : "", words[i]);
     }
-    return !text || http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+    return !text || problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
                                  "%s is one of %s, not \"%.60s\"", key, list, text);
 }
 

@@ -236,7 +236,7 @@ bool fields_parse(field_list *out, const char *text, unsigned allowed, problem_d
         const size_t len = strcspn(text, ",");
         if (!add_name(out, text, len, allowed)) {
             list_names(names, sizeof names, allowed);
-            return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+            return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
                                 "\"%.*s\" is no field of a result: fields is a list of %s, separated by commas",
                                 (int)(len < 60 ? len : 60), text, names);
         }

@@ -10,9 +10,9 @@ static bool refuse_case(http_reply *reply, int status, const char *name, const s
 {
     problem_details problem;
     if (name)
-        http_problem(&problem, status, "case_not_found", "Not found", "the job has no case \"%.63s\".", name);
+        problem_fill(&problem, status, "case_not_found", "Not found", "the job has no case \"%.63s\".", name);
     else
-        http_problem(&problem, status, "case_needed", "Each load case has a history of its own",
+        problem_fill(&problem, status, "case_needed", "Each load case has a history of its own",
                      "say which one with ?case=NAME.");
     if (name)
         cases_suggest(&problem, name, cases, count);

@@ -147,11 +147,11 @@ bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
     for (size_t i = 0; valid && i < field->value_len; i++)
         valid = field->value[i] >= 0x20 && field->value[i] <= 0x7e;
     if (!valid)
-        return http_problem(problem, 400, "bad_idempotency_key", "The Idempotency-Key is malformed",
+        return problem_fill(problem, 400, "bad_idempotency_key", "The Idempotency-Key is malformed",
                             "give one Idempotency-Key of 1 to 255 printable ASCII characters");
     *key = strndup(field->value, field->value_len);
     if (!*key)
-        return http_problem(problem, 503, "no_memory", "Out of memory", "try again later");
+        return problem_fill(problem, 503, "no_memory", "Out of memory", "try again later");
     return true;
 }
 
@@ -160,7 +160,7 @@ static bool read_validate(const http_request *rq, bool *only, problem_details *p
     const char *text = target_value(&rq->target, "validate");
     *only = text && strcmp(text, "true") == 0;
     if (text && !*only && strcmp(text, "false") != 0)
-        return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+        return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
                             "validate must be true or false");
     return true;
 }
@@ -183,7 +183,7 @@ bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
     const char *why;
     if (!url || webhooks_allow(context->webhooks, url, &why))
         return true;
-    http_problem(problem, 422, "webhook_not_allowed", "The webhook cannot be called", "/webhook/url: %s", why);
+    problem_fill(problem, 422, "webhook_not_allowed", "The webhook cannot be called", "/webhook/url: %s", why);
     strcpy(problem->pointer, "/webhook/url");
     return false;
 }

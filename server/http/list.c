@@ -9,7 +9,7 @@
 
 static bool refuse(problem_details *problem, const char *text)
 {
-    return http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed", "%s", text);
+    return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed", "%s", text);
 }
 
 /* ---- times */

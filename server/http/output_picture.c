@@ -19,7 +19,7 @@ static bool read_colour(const http_request *rq, uz_field *out, problem_details *
         return true;
     *out = UZ_FIELD_DISPLACEMENTS;
     return strcmp(text, "displacements") == 0 ||
-           http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+           problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
                         "colour is displacements or von_mises, not \"%.60s\"", text);
 }
 
@@ -31,7 +31,7 @@ static bool read_factor(const http_request *rq, double *out, problem_details *pr
         return true;
     const size_t used = uz_parse_double(out, text, strlen(text));
     return (used > 0 && text[used] == '\0' && *out >= 0 && *out <= 1e12) ||
-           http_problem(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+           problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
                         "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", text);
 }
 

@@ -49,7 +49,7 @@ bool results_exist(const job *j, http_reply *reply)
     if (j->status == JOB_FAILED) {
         bool known = j->error && codec_decode_problem(&error, j->error);
         problem_details problem;
-        http_problem(&problem, 409, "job_failed", TITLE, "the job failed: %s", known ? error.detail : "see its error");
+        problem_fill(&problem, 409, "job_failed", TITLE, "the job failed: %s", known ? error.detail : "see its error");
         if (known) {
             snprintf(problem.detail, sizeof problem.detail, "the job failed: %.480s", error.detail);
             memcpy(problem.pointer, error.pointer, sizeof problem.pointer);
@@ -366,7 +366,7 @@ bool results_cases(api *context, const http_request *rq, const job *j, store_cas
     if (status == STORE_OK)
         status = store_get_cases(context->store, j->id, NULL, cases, count);
     if (status == STORE_OK) {
-        http_problem(&problem, 404, "case_not_found", "Not found", "the job has no case \"%.63s\".", name);
+        problem_fill(&problem, 404, "case_not_found", "Not found", "the job has no case \"%.63s\".", name);
         cases_suggest(&problem, name, *cases, *count);
         cases_list(&problem, *cases, *count);
         reply_problem(reply, &problem);
@@ -391,7 +391,7 @@ bool results_one(results_place *out, api *context, const http_request *rq, const
         char title[96];
         problem_details problem;
         snprintf(title, sizeof title, "Each load case has %s of its own", what);
-        http_problem(&problem, 400, "case_needed", title, "say which one with ?case=NAME.");
+        problem_fill(&problem, 400, "case_needed", title, "say which one with ?case=NAME.");
         cases_list(&problem, out->cases, out->count);
         reply_problem(reply, &problem);
         return false;

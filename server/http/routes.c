@@ -123,7 +123,7 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
         return true;
     }
     if (allow[0])
-        return http_problem(problem, 405, "method_not_allowed", "The method is not allowed here",
+        return problem_fill(problem, 405, "method_not_allowed", "The method is not allowed here",
                             "%s is not allowed on %.200s, but %s", rq->method, rq->target.path, allow);
     /* 404, and why: an id of a wrong form is told from a path that nobody serves. */
     char name[sizeof rq->name];
@@ -131,11 +131,11 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
         const char *pattern = route_at(i)->pattern;
         const bool of_job = strstr(pattern, "{id}"), of_upload = strstr(pattern, "{digest}");
         if ((of_job || of_upload) && path_matches(pattern, rq->target.path, true, name, sizeof name))
-            return http_problem(problem, 404, "not_found", "Not found",
+            return problem_fill(problem, 404, "not_found", "Not found",
                                 "\"%.100s\" is not the id of %s: those have %d digits 0 to 9 and a to f", name,
                                 of_job ? "a job" : "an upload", of_job ? 32 : 64);
     }
-    return http_problem(problem, 404, "not_found", "Not found",
+    return problem_fill(problem, 404, "not_found", "Not found",
                         "there is nothing at %.200s: /openapi.json lists what is", rq->target.path);
 }
 
@@ -145,7 +145,7 @@ static bool refuse_parameter(const http_request *rq, const char *key, problem_de
     size_t used = strlen("it takes ");
     for (const char *const *known = rq->route->parameters; *known && used < sizeof takes; known++)
         used += (size_t)snprintf(takes + used, sizeof takes - used, "%s%s", *known, known[1] ? ", " : "");
-    return http_problem(problem, 400, "unknown_parameter", "A query parameter is unknown",
+    return problem_fill(problem, 400, "unknown_parameter", "A query parameter is unknown",
                         "\"%.100s\" is not a parameter of %s %s; %s", key, rq->route->method, rq->route->pattern,
                         takes);
 }

@@ -10,7 +10,7 @@
 /* 422 at a member of warm_start. */
 static bool refuse(problem_details *problem, const char *member, const char *code, const char *detail)
 {
-    http_problem(problem, 422, code, "The start cannot be used", "%s", detail);
+    problem_fill(problem, 422, code, "The start cannot be used", "%s", detail);
     snprintf(problem->pointer, sizeof problem->pointer, "/solver/warm_start/%s", member);
     return false;
 }
@@ -24,7 +24,7 @@ static bool refuse_store(api *context, const codec_start *start, store_status st
     }
     store_message(context->store, cause, sizeof cause);
     log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
-    return http_problem(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+    return problem_fill(problem, 500, "store_error", "The store failed", "the server's log has the cause");
 }
 
 /* The job must have ended with an answer. */

@@ -13,25 +13,25 @@ static bool refuse(api *context, http_request *rq, upload_status status, problem
     case UPLOAD_OK:
         return true;
     case UPLOAD_TOO_LARGE:
-        return http_problem(problem, 413, "upload_too_large", "The upload is too large",
+        return problem_fill(problem, 413, "upload_too_large", "The upload is too large",
                             "an upload has at most %lld bytes here, counted after decompression",
                             (long long)context->options.max_upload);
     case UPLOAD_NO_ROOM:
-        return http_problem(problem, 507, "uploads_full", "There is no room for more uploads",
+        return problem_fill(problem, 507, "uploads_full", "There is no room for more uploads",
                             "uploads that no job uses make room after a while: delete some, or the jobs that use them");
     case UPLOAD_DISK_FULL:
         rq->reply.retry_after_s = 60;
-        return http_problem(problem, 507, "storage_full", "The disk is full",
+        return problem_fill(problem, 507, "storage_full", "The disk is full",
                             "nothing was stored: delete uploads or ended jobs or free disk space, then try again");
     case UPLOAD_BAD_GZIP:
-        return http_problem(problem, 400, "bad_gzip", "The body is not what its Content-Encoding says",
+        return problem_fill(problem, 400, "bad_gzip", "The body is not what its Content-Encoding says",
                             "it is no gzip stream (RFC 1952), or it ends too early");
     case UPLOAD_FAILED:
         break;
     }
     store_message(context->store, cause, sizeof cause);
     log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
-    return http_problem(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+    return problem_fill(problem, 500, "store_error", "The store failed", "the server's log has the cause");
 }
 
 bool uploads_begin(api *context, http_request *rq)

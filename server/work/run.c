@@ -265,11 +265,11 @@ static bool store_outcome_of(run *r)
         static const char TITLE[] = "The result could not be stored";
         problem_details problem;
         if (status == STORE_FULL)
-            http_problem(&problem, 507, "storage_full", TITLE, "%s",
+            problem_fill(&problem, 507, "storage_full", TITLE, "%s",
                          "The disk had no room for the result: delete ended jobs or free disk space, then submit the "
                          "job again.");
         else
-            http_problem(&problem, 500, "result_not_stored", TITLE, "%s",
+            problem_fill(&problem, 500, "result_not_stored", TITLE, "%s",
                          "The store failed, and the service's log has the cause: submit the job again.");
         log_store_failure(r, LOG_ERROR, "result_given_up");
         fail_from_problem(r, &problem);

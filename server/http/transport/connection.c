@@ -136,7 +136,7 @@ static void send_directly(connection *c, const problem_details *problem)
 
 static bool refuse_header(problem_details *problem, int status)
 {
-    return http_problem(problem, status, "header_too_large", "The header is too large",
+    return problem_fill(problem, status, "header_too_large", "The header is too large",
                         "request line and header fields together may have %d bytes", HEADER_BYTES);
 }
 
@@ -150,17 +150,17 @@ void connection_refuse(connection *c, int status)
         atomic_fetch_add(&c->server->refusing, 1);
     c->refusing = true;
     if (status == 413 && rq->begun)
-        http_problem(&problem, status, "body_too_large", "The request body is too large",
+        problem_fill(&problem, status, "body_too_large", "The request body is too large",
                      "a chunk of it says that it is larger than any body may be");
     else if (status == 413 || status == 414 || status == 431)
         refuse_header(&problem, status);
     else if (status >= 500 && rq->chunked)
-        http_problem(&problem, 400, "bad_request_framing", "The request is malformed or ambiguous",
+        problem_fill(&problem, 400, "bad_request_framing", "The request is malformed or ambiguous",
                      "the line before a chunk is too long");
     else if (status >= 500)
-        http_problem(&problem, status, "http_error", "The request could not be served", "try again later");
+        problem_fill(&problem, status, "http_error", "The request could not be served", "try again later");
     else
-        http_problem(&problem, status, "bad_request_framing", "The request is malformed or ambiguous",
+        problem_fill(&problem, status, "bad_request_framing", "The request is malformed or ambiguous",
                      "the header fields, the body's length or its chunks are malformed, or Host is missing");
     send_directly(c, &problem);
 }
@@ -239,7 +239,7 @@ static bool read_framing(connection *c, struct MHD_Connection *mhd, const char *
     if (!framed)
         return false;
     if (!layout_is_sound(c, mhd, method, version))
-        return http_problem(&rq->refused, 400, "bad_request_framing", "The request is malformed or ambiguous",
+        return problem_fill(&rq->refused, 400, "bad_request_framing", "The request is malformed or ambiguous",
                             "lines must end in CR LF, must not be folded, and must not contain NUL");
     return true;
 }
@@ -286,12 +286,12 @@ static bool reserve(connection *c, size_t more)
     if (atomic_fetch_add(&c->server->body_bytes, added) + added > c->server->options.body_budget) {
         atomic_fetch_sub(&c->server->body_bytes, added);
         rq->reply.retry_after_s = 5;
-        return http_problem(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
+        return problem_fill(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
     }
     char *grown = realloc(rq->body, capacity);
     if (!grown) {
         atomic_fetch_sub(&c->server->body_bytes, added);
-        return http_problem(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
+        return problem_fill(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
     }
     rq->body = grown;
     rq->body_capacity = capacity;
@@ -315,7 +315,7 @@ bool connection_body(connection *c, const char *data, size_t size)
     const transport_handlers *handlers = &c->server->handlers;
     bool taken = false;
     if (size > rq->body_limit - rq->body_len) {
-        http_problem(&rq->refused, 413, "body_too_large", "The request body is too large",
+        problem_fill(&rq->refused, 413, "body_too_large", "The request body is too large",
                      "the body has more than %zu bytes, the limit of this server", rq->body_limit);
     } else if (rq->streamed) {
         rq->body_len += size;

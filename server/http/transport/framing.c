@@ -4,7 +4,7 @@
 
 static bool refuse(problem_details *problem, const char *detail)
 {
-    return http_problem(problem, 400, "bad_request_framing", "The request is malformed or ambiguous", "%s", detail);
+    return problem_fill(problem, 400, "bad_request_framing", "The request is malformed or ambiguous", "%s", detail);
 }
 
 const header_field *header_find(const header_list *headers, const char *name, size_t *count)
@@ -50,7 +50,7 @@ static bool is_value(const char *text, size_t len)
 static bool check_fields(const header_list *headers, problem_details *problem)
 {
     if (headers->overflow)
-        return http_problem(problem, 431, "too_many_headers", "Too many header fields", "at most %d header fields",
+        return problem_fill(problem, 431, "too_many_headers", "Too many header fields", "at most %d header fields",
                             HEADERS_MAX);
     for (size_t i = 0; i < headers->count; i++) {
         const header_field *field = &headers->fields[i];
@@ -126,7 +126,7 @@ bool framing_read(framing *out, const char *version, header_list *headers, probl
     size_t lengths, codings;
     memset(out, 0, sizeof *out);
     if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
-        return http_problem(problem, 505, "http_version", "The HTTP version is not supported",
+        return problem_fill(problem, 505, "http_version", "The HTTP version is not supported",
                             "use HTTP/1.1 or HTTP/1.0");
     if (!check_fields(headers, problem) || !check_host(version, headers, problem))
         return false;
@@ -142,7 +142,7 @@ bool framing_read(framing *out, const char *version, header_list *headers, probl
     size_t count;
     const header_field *field = header_find(headers, "Expect", &count);
     if (count > 1 || (field && !token_equal(field->value, field->value_len, "100-continue")))
-        return http_problem(problem, 417, "expectation_failed", "The expectation is not met",
+        return problem_fill(problem, 417, "expectation_failed", "The expectation is not met",
                             "the only expectation is \"100-continue\"");
     return true;
 }

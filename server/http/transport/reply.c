@@ -116,7 +116,7 @@ void reply_refuse(http_reply *reply, int status, const char *code, const char *t
     va_start(args, format);
     vsnprintf(detail, sizeof detail, format, args);
     va_end(args);
-    http_problem(&problem, status, code, title, "%s", detail);
+    problem_fill(&problem, status, code, title, "%s", detail);
     reply_problem(reply, &problem);
 }
 

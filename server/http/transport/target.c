@@ -59,13 +59,13 @@ static bool add_parameter(target *out, char *pair, problem_details *problem)
     else
         value = pair + strlen(pair);
     if (!percent_decode(pair, true) || !percent_decode(value, true))
-        return http_problem(problem, 400, "bad_target", "The request target is malformed",
+        return problem_fill(problem, 400, "bad_target", "The request target is malformed",
                             "the query has a '%%' that is not followed by two hexadecimal digits other than 00");
     if (target_value(out, pair) && strcmp(pair, TARGET_REPEATABLE) != 0)
-        return http_problem(problem, 400, "repeated_parameter", "A query parameter is given twice",
+        return problem_fill(problem, 400, "repeated_parameter", "A query parameter is given twice",
                             "\"%.100s\" occurs more than once in the query", pair);
     if (out->count == TARGET_MAX_PARAMETERS)
-        return http_problem(problem, 400, "bad_target", "The request target is malformed",
+        return problem_fill(problem, 400, "bad_target", "The request target is malformed",
                             "the query has more than %d parameters", TARGET_MAX_PARAMETERS);
     out->parameters[out->count].key = pair;
     out->parameters[out->count++].value = value;
@@ -90,14 +90,14 @@ bool target_parse(target *out, const char *raw, problem_details *problem)
     memset(out, 0, sizeof *out);
     target t = {.text = strdup(raw)};
     if (!t.text)
-        return http_problem(problem, 500, "no_memory", "Out of memory", "no memory for the request target");
+        return problem_fill(problem, 500, "no_memory", "Out of memory", "no memory for the request target");
     char *path = skip_authority(t.text);
     char *query = path ? strchr(path, '?') : NULL;
     if (query)
         *query++ = '\0';
     bool ok = false;
     if (!path || has_strange_byte(raw) || strchr(raw, '#') || !percent_decode(path, false)) {
-        http_problem(problem, 400, "bad_target", "The request target is malformed",
+        problem_fill(problem, 400, "bad_target", "The request target is malformed",
                      "the target must be a path such as /v1/jobs, with '%%' followed by two hexadecimal digits "
                      "other than 00");
     } else {
