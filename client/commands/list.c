@@ -55,7 +55,7 @@ client_exit client_list(client_session *s)
     json_t *jobs = json_array();
     if (!jobs)
         return client_complain(s, CLIENT_LOCAL, "no memory");
-    /* Up to `limit` jobs in as many pages as that takes. *jobs: array, released by the caller. */
+    /* Up to `limit` jobs in as many pages as that takes. */
     char cursor[256] = "";
     client_exit code = CLIENT_OK;
     while (code == CLIENT_OK && (long)json_array_size(jobs) < s->options->limit) {

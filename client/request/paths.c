@@ -69,15 +69,6 @@ static json_t *step(json_t *at, const char *part)
     return i >= 0 ? json_array_get(at, (size_t)i) : NULL;
 }
 
-/* "problem.loads" of the parts before the count-th. */
-static void name_so_far(char *out, size_t size, const client_path *path, int count)
-{
-    size_t len = 0;
-    snprintf(out, size, "the request");
-    for (int i = 0; i < count && len < size; i++)
-        len += (size_t)snprintf(out + len, size - len, "%s%s", i ? "." : "", path->part[i]);
-}
-
 static void list_keys(char *out, size_t size, const json_t *object)
 {
     const char *key;
@@ -93,10 +84,11 @@ static void list_keys(char *out, size_t size, const json_t *object)
 
 static void say_missing(const client_path *path, int i, const json_t *at, char *message, size_t size)
 {
-    char so_far[280], keys[400];
+    char so_far[280] = "the request", keys[400]; /* or "problem.loads" of the parts before */
     const char *part = path->part[i];
-    name_so_far(so_far, sizeof so_far, path, i);
-    size_t count = json_array_size(at);
+    size_t len = 0, count = json_array_size(at);
+    for (int k = 0; k < i && len < sizeof so_far; k++)
+        len += (size_t)snprintf(so_far + len, sizeof so_far - len, "%s%s", k ? "." : "", path->part[k]);
     list_keys(keys, sizeof keys, at);
     if (json_is_object(at))
         snprintf(message, size, "%s has no \"%s\"; it has: %s", so_far, part, keys);
@@ -123,20 +115,17 @@ json_t *client_path_get(const client_path *path, json_t *request, char *message,
     return at;
 }
 
-/* An object that is not there but may be made. */
-static json_t *make_object(const client_path *path, int i, json_t *at)
+/* Under solver and webhook an object that is not there is made, and a word in its place gives way:
+ * {"accuracy": "quick"}. */
+static json_t *step_or_make(const client_path *path, int i, json_t *at)
 {
+    json_t *next = step(at, path->part[i]);
+    if (json_is_object(next) || json_is_array(next))
+        return next;
     bool allowed = strcmp(path->part[0], "solver") == 0 || strcmp(path->part[0], "webhook") == 0;
     if (!allowed || !json_is_object(at) || json_object_set_new(at, path->part[i], json_object()) != 0)
         return NULL;
     return json_object_get(at, path->part[i]);
-}
-
-/* Under solver and webhook a word in the place of an object gives way: {"accuracy": "quick"}. */
-static json_t *step_or_make(const client_path *path, int i, json_t *at)
-{
-    json_t *next = step(at, path->part[i]);
-    return next && (json_is_object(next) || json_is_array(next)) ? next : make_object(path, i, at);
 }
 
 bool client_path_set(const client_path *path, json_t *request, json_t *value, char *message, size_t size)

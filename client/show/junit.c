@@ -48,22 +48,19 @@ void client_suites_clear(client_suites *suites)
 
 /* ---- XML */
 
-/* Three bytes of UTF-8 that no XML 1.0 text may have: U+FFFE and U+FFFF. */
-static bool is_no_character(const char *at)
-{
-    return (unsigned char)at[0] == 0xef && (unsigned char)at[1] == 0xbf && (unsigned char)at[2] >= 0xbe;
-}
-
 /* Text between tags or in an attribute: what XML gives a meaning is escaped, what it forbids becomes '?'. */
 static void put_text(FILE *to, const char *text)
 {
     for (const char *at = text; *at; at++) {
+        /* Three bytes of UTF-8 that no XML 1.0 text may have: U+FFFE and U+FFFF. */
+        const bool no_character =
+            (unsigned char)at[0] == 0xef && (unsigned char)at[1] == 0xbf && (unsigned char)at[2] >= 0xbe;
         const char *entity = strchr("<>&\"'\n\t", *at) ? at : NULL;
         if (entity)
             fprintf(to, "&#%d;", *at);
         else if ((unsigned char)*at < 0x20)
             fputc('?', to);
-        else if (is_no_character(at)) {
+        else if (no_character) {
             fputc('?', to);
             at += 2;
         } else

@@ -50,24 +50,6 @@ static double cell_value(const char *line, int place)
     return end == line || !strchr(",\r\n", *end) ? NAN : value;
 }
 
-static size_t count_lines(const char *text)
-{
-    size_t count = 0;
-    for (; *text; text = next_line(text))
-        count++;
-    return count;
-}
-
-static bool allocate(client_series *series, size_t count)
-{
-    for (int i = 0; i < CLIENT_COLUMNS; i++) {
-        series->column[i] = calloc(count ? count : 1, sizeof(double));
-        if (!series->column[i])
-            return false;
-    }
-    return true;
-}
-
 bool client_series_read(client_series *out, const char *csv, char *message, size_t size)
 {
     int place[CLIENT_COLUMNS];
@@ -81,10 +63,16 @@ bool client_series_read(client_series *out, const char *csv, char *message, size
         }
     }
     const char *line = next_line(csv);
-    if (!allocate(&series, count_lines(line))) {
-        snprintf(message, size, "no memory");
-        client_series_clear(&series);
-        return false;
+    size_t lines = 1;
+    for (const char *at = line; *at; at = next_line(at))
+        lines++;
+    for (int i = 0; i < CLIENT_COLUMNS; i++) {
+        series.column[i] = calloc(lines, sizeof(double));
+        if (!series.column[i]) {
+            snprintf(message, size, "no memory");
+            client_series_clear(&series);
+            return false;
+        }
     }
     for (; *line; line = next_line(line), series.count++)
         for (int i = 0; i < CLIENT_COLUMNS; i++)
