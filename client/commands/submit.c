@@ -9,23 +9,19 @@
 #include <sys/random.h>
 
 #define KEY_BYTES 16
-#define KEY_ROOM  (2 * KEY_BYTES + 1)
 
-/* Random, so that a repeated request is recognised as the same one and no other. */
-static bool make_key(char key[KEY_ROOM])
+/* One key for all that the command makes: whoever repeats it with that key finds what is there already. Random, so that
+ * a repeated request is recognised as the same one and no other. */
+static bool have_key(client_session *s)
 {
     unsigned char bytes[KEY_BYTES];
+    if (s->options->key || *s->key)
+        return true;
     if (getrandom(bytes, sizeof bytes, 0) != (ssize_t)sizeof bytes)
         return false;
     for (size_t i = 0; i < sizeof bytes; i++)
-        snprintf(key + 2 * i, 3, "%02x", bytes[i]);
+        snprintf(s->key + 2 * i, 3, "%02x", bytes[i]);
     return true;
-}
-
-/* One key for all that the command makes: whoever repeats it with that key finds what is there already. */
-static bool have_key(client_session *s)
-{
-    return s->options->key || *s->key || make_key(s->key);
 }
 
 /* A certificate is wanted at once. */

@@ -64,22 +64,20 @@ client_verdict client_checks_worst(const client_checks *checks, size_t from)
 
 /* ---- outcome */
 
-static const char *error_text(const json_t *job)
-{
-    const char *detail = client_json_text(job, "error.detail"), *title = client_json_text(job, "error.title");
-    return *detail ? detail : *title ? title : "the job left no answer and no reason";
-}
-
 void client_checks_outcome(client_checks *to, const json_t *job)
 {
     static const char NAME[] = "converged";
     const char *outcome = client_json_text(job, "summary.outcome"), *message = client_json_text(job, "summary.message");
+    const char *detail = client_json_text(job, "error.detail"), *title = client_json_text(job, "error.title");
     char bound[32];
     client_format_bound(bound, client_json_number(job, "summary.certificate.relative_error"));
     if (!client_job_ended(job))
         client_checks_add(to, CLIENT_NO_ANSWER, "", NAME, "the job has not ended");
     else if (!*outcome)
-        client_checks_add(to, CLIENT_NO_ANSWER, "", NAME, "%s", error_text(job));
+        client_checks_add(to, CLIENT_NO_ANSWER, "", NAME, "%s",
+                          *detail  ? detail
+                          : *title ? title
+                                   : "the job left no answer and no reason");
     else if (strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0)
         client_checks_add(to, CLIENT_PASS, "", NAME, "%s: certified relative error %s", outcome, bound);
     else
