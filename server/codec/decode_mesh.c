@@ -15,8 +15,10 @@ static bool read_indices(int64_t **out, int64_t *n, int *columns, decoding *d, c
     *columns = 0;
     *out = NULL;
     bool good = json_size(value) == 0 || decode_points(&numbers, n, columns, d, value);
-    if (good && !(*out = room_for((size_t)*n, sizeof **out)))
-        good = problem_no_memory(d->problem);
+    if (good && !(*out = room_for((size_t)*n, sizeof **out))) {
+        problem_no_memory(d->problem);
+        good = false;
+    }
     for (int64_t i = 0; good && i < *n; i++) /* whole and not negative; what no mesh can have as the largest */
         (*out)[i] = numbers[i] < 1e15 ? (int64_t)numbers[i] : INT64_MAX;
     free(numbers);
@@ -118,13 +120,47 @@ static bool read_list(int64_t **out, int64_t *n, decoding *d, const json_value *
                       (columns == 0 || decode_refuse(d, "wrong_type", value, "must be a list of numbers.")));
 }
 
-/* Edges or faces: all of the same size. */
-static bool read_faces(uz_given_group *to, decoding *d, const json_value *value)
+/* Faces of several sizes, as the triangles and quadrilaterals of wedges: a value each. */
+static bool read_mixed_faces(uz_given_group *to, decoding *d, const json_value *value)
+{
+    int64_t nodes = 0;
+    for (size_t i = 0; i < value->count; i++) {
+        if (!json_is(&value->items[i], JSON_IS_NUMBERS) || value->items[i].columns > 0)
+            return decode_refuse(d, "wrong_type", &value->items[i], "must be a list of node numbers.");
+        nodes += (int64_t)value->items[i].count;
+    }
+    to->face_first = room_for(value->count + 1, sizeof *to->face_first);
+    to->face_node = room_for((size_t)nodes, sizeof *to->face_node);
+    if (!to->face_first || !to->face_node)
+        return problem_no_memory(d->problem);
+    bool good = true;
+    nodes = 0;
+    for (size_t i = 0; good && i < value->count; i++) {
+        int64_t *node, count;
+        int columns;
+        to->face_first[i] = nodes;
+        good = read_indices(&node, &count, &columns, d, &value->items[i]);
+        if (good)
+            memcpy(to->face_node + nodes, node, (size_t)count * sizeof *node);
+        nodes += count;
+        free(node);
+    }
+    if (good) {
+        to->face_first[value->count] = nodes;
+        to->n_faces = (int64_t)value->count;
+    }
+    return good;
+}
+
+/* Edges, all of the same size, or faces. */
+static bool read_faces(uz_given_group *to, decoding *d, const json_value *value, int dim)
 {
     int columns;
     int64_t n = 0;
     if (!value)
         return true;
+    if (dim == 3 && json_is(value, JSON_IS_ARRAY) && value->count > 0)
+        return read_mixed_faces(to, d, value);
     if (!read_indices(&to->face_node, &n, &columns, d, value))
         return false;
     if (n > 0 && columns == 0)
@@ -151,7 +187,7 @@ static bool read_groups(uz_given_mesh *to, decoding *d, const json_value *groups
                                  dim == 2 ? "is for solids; sides of plane meshes are edges."
                                           : "is for plane meshes; sides of solids are faces.");
         if (!read_list(&group->node, &group->n_nodes, d, json_get(item, "nodes")) ||
-            !read_faces(group, d, json_get(item, key)) ||
+            !read_faces(group, d, json_get(item, key), dim) ||
             !read_list(&group->element, &group->n_elements, d, json_get(item, "elements")))
             return false;
     }

@@ -194,6 +194,19 @@ TEST(meshes_in_numbers)
     uz_scene_clear(&s);
 }
 
+/* Triangles and quadrilaterals in one group: the sides of wedges are both. */
+TEST(faces_of_several_sizes)
+{
+    uz_scene s = take(HEAD("solid") "\"mesh\":{\"nodes\":[[0,0,0],[0,1,0],[1,0,0],[0,0,1],[0,1,1],[1,0,1]],"
+                                    "\"elements\":{\"wedge6\":[[0,1,2,3,4,5]]},"
+                                    "\"groups\":{\"g\":{\"faces\":[[0,1,2],[0,3,4,1],[3,5,4]]}}}}}");
+    const uz_given_group *g = s.given.groups;
+    CHECK_INT(g->n_faces, 3);
+    CHECK(g->face_first[1] == 3 && g->face_first[2] == 7 && g->face_first[3] == 10);
+    CHECK(g->face_node[2] == 2 && g->face_node[4] == 3 && g->face_node[9] == 4);
+    uz_scene_clear(&s);
+}
+
 TEST(meshes_beyond_the_schema)
 {
     refuse(MESH ",\"groups\":{\"g\":{\"faces\":[[0,1,2]]}}}}}", "not_allowed", "/problem/mesh/groups/g/faces",
