@@ -68,6 +68,8 @@ typedef struct {
 void uz_body_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], const uz_body_model *model, int64_t e);
 /* Its material. */
 const uz_body_material *uz_element_material(const uz_body_model *model, int64_t e);
+/* What uz_resolve_formulation says of it. */
+uz_formulation uz_element_formulation(const uz_body_model *model, int64_t e);
 /* A face of it; node gets its nodes. */
 void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_FACE_NODES], const uz_body_model *model,
                   uz_face face);

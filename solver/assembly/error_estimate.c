@@ -20,32 +20,32 @@ enum { LANES = UZ_STRAIN_LANES };
 
 /* Averages: one place for each node and material that meet there. */
 typedef struct {
-    uz_stress_source from;
+    uz_strain_source from;
     int64_t *place; /* of each node of each element; NULL: the place is the node */
     int64_t count;
     int size;                /* of a row */
-    double *rows;            /* count x size, see uz_stress_group_add */
-    uz_stress_group *groups; /* one for each kind */
+    double *rows;            /* count x size, see uz_stress_rows_add */
+    uz_strain_group *groups; /* one for each kind */
     bool averaged;           /* what groups are for: false the averages, true the energies */
     double eta2, energy2;
 } averaging;
 
-static void finish_group(averaging *x, uz_stress_group *g)
+static void finish_group(averaging *x, uz_strain_group *g)
 {
     const int64_t *place[LANES];
     if (g->count == 0)
         return;
-    uz_stress_group_load(g, &x->from);
+    uz_strain_group_load(g, &x->from);
     for (int l = 0; l < LANES; l++)
         place[l] = x->place ? x->place + x->from.model->mesh.first[g->element[l]] : g->node[l];
     if (x->averaged)
-        uz_stress_group_compare(&x->eta2, &x->energy2, x->rows, g, place);
+        uz_stress_rows_compare(&x->eta2, &x->energy2, x->rows, g, place);
     else
-        uz_stress_group_add(x->rows, g, place);
+        uz_stress_rows_add(x->rows, g, place);
     g->count = 0;
 }
 
-static void begin_group(averaging *x, uz_stress_group *g, uz_element_kind kind, uz_formulation formulation)
+static void begin_group(averaging *x, uz_strain_group *g, uz_element_kind kind, uz_formulation formulation)
 {
     finish_group(x, g);
     uz_strain_rule_init(&g->rule, kind, x->from.model->kind, formulation);
@@ -54,15 +54,14 @@ static void begin_group(averaging *x, uz_stress_group *g, uz_element_kind kind, 
 }
 
 /* The group that has the element's kind; only the last material's formulation is known to it. */
-static uz_stress_group *group_of(averaging *x, int64_t e)
+static uz_strain_group *group_of(averaging *x, int64_t e)
 {
     const uz_body_model *model = x->from.model;
     const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
-    uz_stress_group *g = &x->groups[kind];
+    uz_strain_group *g = &x->groups[kind];
     if (g->begun && !model->material_of)
         return g;
-    const uz_formulation formulation =
-        uz_resolve_formulation(model->formulation, kind, model->kind, uz_element_material(model, e)->poisson);
+    const uz_formulation formulation = uz_element_formulation(model, e);
     if (!g->begun || formulation != g->rule.formulation)
         begin_group(x, g, kind, formulation);
     return g;
@@ -71,7 +70,7 @@ static uz_stress_group *group_of(averaging *x, int64_t e)
 static void pass(averaging *x)
 {
     for (int64_t e = 0; e < x->from.model->mesh.n_elements; e++) {
-        uz_stress_group *g = group_of(x, e);
+        uz_strain_group *g = group_of(x, e);
         g->element[g->count++] = e;
         if (g->count == LANES)
             finish_group(x, g);

@@ -60,6 +60,12 @@ static void fill_box(double *xyz, const uz_mesh *mesh, uz_element_kind kind)
             xyz[a * mesh->dim + c] = local[a][c] > 0 ? mesh->cell[c] : 0;
 }
 
+uz_formulation uz_element_formulation(const uz_body_model *model, int64_t e)
+{
+    return uz_resolve_formulation(model->formulation, (uz_element_kind)model->mesh.kind[e], model->kind,
+                                  uz_element_material(model, e)->poisson);
+}
+
 void uz_body_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], const uz_body_model *model, int64_t e)
 {
     const uz_mesh *mesh = &model->mesh;
@@ -72,13 +78,12 @@ void uz_body_element(uz_element *element, double xyz[3 * UZ_ELEMENT_NODES], cons
     else
         for (int a = 0; a < count; a++)
             memcpy(xyz + a * mesh->dim, mesh->xyz + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *xyz);
-    *element =
-        (uz_element){.kind = kind,
-                     .model = model->kind,
-                     .formulation = uz_resolve_formulation(model->formulation, kind, model->kind, material->poisson),
-                     .lame = material->lame,
-                     .thickness = model->thickness,
-                     .xyz = xyz};
+    *element = (uz_element){.kind = kind,
+                            .model = model->kind,
+                            .formulation = uz_element_formulation(model, e),
+                            .lame = material->lame,
+                            .thickness = model->thickness,
+                            .xyz = xyz};
 }
 
 void uz_body_side(uz_side *side, double xyz[3 * UZ_FACE_NODES], int64_t node[UZ_FACE_NODES], const uz_body_model *model,

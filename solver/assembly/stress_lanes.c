@@ -1,7 +1,6 @@
 #include "assembly/stress_lanes.h"
 
 #include "core/cpu.h"
-#include "scene/mesh.h"
 
 #include <string.h>
 
@@ -14,65 +13,6 @@ typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), align
 int uz_stress_row_size(uz_model model)
 {
     return uz_stress_count(model) < LANES ? LANES : MOST_ROW;
-}
-
-/* ---- loading */
-
-INLINE void take_material(uz_stress_group *g, const uz_stress_source *from)
-{
-    const uz_lame *lame[LANES];
-    for (int l = 0; l < LANES; l++)
-        lame[l] = &uz_element_material(from->model, g->element[l])->lame;
-    g->material.lambda = (uz_lanes){lame[0]->lambda, lame[1]->lambda, lame[2]->lambda, lame[3]->lambda};
-    g->material.mu = (uz_lanes){lame[0]->mu, lame[1]->mu, lame[2]->mu, lame[3]->mu};
-    g->thermal = (uz_lanes){0};
-    for (int l = 0; l < LANES && from->free_strain; l++) {
-        double strain[UZ_ELEMENT_STRESSES];
-        uz_thermal_strain(strain, from->model->kind, *lame[l], from->free_strain[g->element[l]]);
-        g->thermal[l] = strain[0];
-    }
-}
-
-/* Values (n_nodes x dim) at the nodes of the elements. */
-INLINE void gather(uz_lanes *out, const uz_stress_group *g, const double *value, int dim)
-{
-    for (int a = 0; a < g->rule.nodes; a++) {
-        const double *const at[LANES] = {value + g->node[0][a] * dim, value + g->node[1][a] * dim,
-                                         value + g->node[2][a] * dim, value + g->node[3][a] * dim};
-        for (int c = 0; c < dim; c++)
-            *out++ = (uz_lanes){at[0][c], at[1][c], at[2][c], at[3][c]};
-    }
-}
-
-static void take_equal_shape(uz_stress_group *g, const uz_body_model *model)
-{
-    uz_element element;
-    double xyz[3 * NODES];
-    uz_body_element(&element, xyz, model, g->element[0]);
-    for (int i = 0; i < g->rule.nodes * g->rule.dim; i++)
-        g->x[i] = xyz[i] - (uz_lanes){0};
-}
-
-INLINE void load(uz_stress_group *g, const uz_stress_source *from, int dim)
-{
-    const uz_mesh *mesh = &from->model->mesh;
-    for (int l = 0; l < LANES; l++) {
-        if (l >= g->count)
-            g->element[l] = g->element[0];
-        g->node[l] = mesh->node + mesh->first[g->element[l]];
-    }
-    take_material(g, from);
-    gather(g->u, g, from->nodal, dim);
-    if (!g->shaped) {
-        const bool equal = mesh->uniform && from->model->kind != UZ_AXISYMMETRIC;
-        if (equal)
-            take_equal_shape(g, from->model);
-        else
-            gather(g->x, g, mesh->xyz, dim);
-        uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
-        g->shaped = equal;
-    }
-    uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
 }
 
 /* ---- sums at nodes */
@@ -90,7 +30,7 @@ INLINE void transpose(uz_lanes out[LANES], const uz_lanes in[LANES])
 }
 
 /* Stress of the strains less the thermal strain. n: components, `direct` of them no shear. */
-INLINE void stress_of(uz_lanes *stress, const uz_stress_group *g, const uz_lanes *strain, int n, int direct)
+INLINE void stress_of(uz_lanes *stress, const uz_strain_group *g, const uz_lanes *strain, int n, int direct)
 {
     uz_lanes trace = {0};
     for (int c = 0; c < direct; c++)
@@ -101,7 +41,7 @@ INLINE void stress_of(uz_lanes *stress, const uz_stress_group *g, const uz_lanes
 }
 
 /* Adds one row for each lane at node a, or at all nodes where a < 0. */
-INLINE void add_rows(double *rows, const uz_stress_group *g, const int64_t *const place[LANES],
+INLINE void add_rows(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
                      const uz_lanes value[MOST_ROW], int a, int size)
 {
     const int from = a < 0 ? 0 : a, to = a < 0 ? g->rule.nodes : a + 1;
@@ -117,7 +57,7 @@ INLINE void add_rows(double *rows, const uz_stress_group *g, const int64_t *cons
 /* The element's mean stress with its volume as weight. The mean is the stress at the centre, where that of a linear
  * element is most accurate; stresses continued to the corners would bring the solution's own error back into the
  * average and hide a third of it. */
-INLINE void add_mean(double *rows, const uz_stress_group *g, const int64_t *const place[LANES], int n, int direct)
+INLINE void add_mean(double *rows, const uz_strain_group *g, const int64_t *const place[LANES], int n, int direct)
 {
     uz_lanes mean[UZ_ELEMENT_STRESSES] = {{0}}, value[MOST_ROW] = {{0}}, volume = {0};
     for (int p = 0; p < g->rule.points; p++) {
@@ -156,7 +96,7 @@ INLINE void solve_small(uz_lanes A[LINEAR][LINEAR], uz_lanes B[LINEAR][UZ_ELEMEN
 }
 
 /* y[a * dim + c]: places of the nodes from the first one on, over the element's size. */
-INLINE void scale_places(uz_lanes *y, const uz_stress_group *g, int dim)
+INLINE void scale_places(uz_lanes *y, const uz_strain_group *g, int dim)
 {
     const int count = g->rule.nodes * dim;
     const lane_bits no_sign = (lane_bits){0} + INT64_MAX;
@@ -171,7 +111,7 @@ INLINE void scale_places(uz_lanes *y, const uz_stress_group *g, int dim)
 
 /* At each node, the linear function that fits the stresses of the Gauss points best: that of a quadratic element is
  * most accurate there. */
-INLINE void add_linear_fit(double *rows, const uz_stress_group *g, const int64_t *const place[LANES], int n, int direct,
+INLINE void add_linear_fit(double *rows, const uz_strain_group *g, const int64_t *const place[LANES], int n, int direct,
                            int dim)
 {
     const int m = dim + 1, nodes = g->rule.nodes;
@@ -208,7 +148,7 @@ INLINE void add_linear_fit(double *rows, const uz_stress_group *g, const int64_t
     }
 }
 
-INLINE void add(double *rows, const uz_stress_group *g, const int64_t *const place[LANES], int n, int direct, int dim)
+INLINE void add(double *rows, const uz_strain_group *g, const int64_t *const place[LANES], int n, int direct, int dim)
 {
     if (g->rule.quadratic)
         add_linear_fit(rows, g, place, n, direct, dim);
@@ -219,7 +159,7 @@ INLINE void add(double *rows, const uz_stress_group *g, const int64_t *const pla
 /* ---- comparison */
 
 /* nodal[a][c]: the averages at the nodes. */
-INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, const uz_stress_group *g,
+INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, const uz_strain_group *g,
                         const int64_t *const place[LANES], int size)
 {
     for (int a = 0; a < g->rule.nodes; a++)
@@ -232,7 +172,7 @@ INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, con
 }
 
 /* Deviator and trace apart, as in uz_complementary. */
-INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_stress_group *g,
+INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
                     const int64_t *const place[LANES], int n, int direct)
 {
     uz_lanes nodal[NODES][MOST_ROW], eta = {0}, energy = {0};
@@ -272,15 +212,7 @@ INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_
 
 /* ---- for each model and kind of processor */
 
-INLINE void load_in_space(uz_stress_group *g, const uz_stress_source *from)
-{
-    if (g->rule.dim == 2)
-        load(g, from, 2);
-    else
-        load(g, from, 3);
-}
-
-INLINE void add_of_model(double *rows, const uz_stress_group *g, const int64_t *const place[LANES])
+INLINE void add_of_model(double *rows, const uz_strain_group *g, const int64_t *const place[LANES])
 {
     if (g->rule.stresses == 3)
         add(rows, g, place, 3, 2, 2);
@@ -290,7 +222,7 @@ INLINE void add_of_model(double *rows, const uz_stress_group *g, const int64_t *
         add(rows, g, place, 6, 3, 3);
 }
 
-INLINE void compare_of_model(double *eta2, double *energy2, const double *rows, const uz_stress_group *g,
+INLINE void compare_of_model(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
                              const int64_t *const place[LANES])
 {
     if (g->rule.stresses == 3)
@@ -301,34 +233,24 @@ INLINE void compare_of_model(double *eta2, double *energy2, const double *rows, 
         compare(eta2, energy2, rows, g, place, 6, 3);
 }
 
-UZ_AVX2_FMA static void load_fused(uz_stress_group *g, const uz_stress_source *from)
-{
-    load_in_space(g, from);
-}
-
-UZ_AVX2_FMA static void add_fused(double *rows, const uz_stress_group *g, const int64_t *const place[LANES])
+UZ_AVX2_FMA static void add_fused(double *rows, const uz_strain_group *g, const int64_t *const place[LANES])
 {
     add_of_model(rows, g, place);
 }
 
-UZ_AVX2_FMA static void compare_fused(double *eta2, double *energy2, const double *rows, const uz_stress_group *g,
+UZ_AVX2_FMA static void compare_fused(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
                                       const int64_t *const place[LANES])
 {
     compare_of_model(eta2, energy2, rows, g, place);
 }
 
-void uz_stress_group_load(uz_stress_group *group, const uz_stress_source *from)
-{
-    (uz_cpu_has_avx2_fma() ? load_fused : load_in_space)(group, from);
-}
-
-void uz_stress_group_add(double *rows, const uz_stress_group *group, const int64_t *const place[UZ_STRAIN_LANES])
+void uz_stress_rows_add(double *rows, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES])
 {
     (uz_cpu_has_avx2_fma() ? add_fused : add_of_model)(rows, group, place);
 }
 
-void uz_stress_group_compare(double *eta2, double *energy2, const double *rows, const uz_stress_group *group,
-                             const int64_t *const place[UZ_STRAIN_LANES])
+void uz_stress_rows_compare(double *eta2, double *energy2, const double *rows, const uz_strain_group *group,
+                            const int64_t *const place[UZ_STRAIN_LANES])
 {
     (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(eta2, energy2, rows, group, place);
 }

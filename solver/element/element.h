@@ -125,9 +125,6 @@ void uz_element_move(uz_element_motion *motion, const uz_element *element, const
  * strain' C strain. On the axis of a ring, where the hoop strain u_r / r has no value, it is that of rr. The stress is
  * uz_elastic_stress of the strain less the thermal strain. */
 void uz_element_strain(double *strain, const uz_element_motion *motion, const double point[3]);
-/* The same as a matrix, for elements of one shape and material: strain = B u; B is uz_stress_count x (nodes x dim), row
- * by row. */
-void uz_element_strain_operator(double *B, const uz_element *element, const double point[3]);
 
 /* -------------------------------------------------------------------- sides */
 

@@ -81,19 +81,3 @@ void uz_element_strain(double *strain, const uz_element_motion *motion, const do
     if (element->formulation == UZ_FORMULATION_BBAR)
         set_dilatation(strain, element->model == UZ_PLANE_STRAIN ? 2 : 3, motion->dilatation);
 }
-
-void uz_element_strain_operator(double *B, const uz_element *element, const double point[3])
-{
-    const int dofs = uz_element_node_count(element->kind) * uz_element_dim(element->kind);
-    const int n = uz_stress_count(element->model);
-    double unit[UZ_ELEMENT_DOFS] = {0}, strain[UZ_ELEMENT_STRESSES];
-    uz_element_motion motion;
-    for (int j = 0; j < dofs; j++) {
-        unit[j] = 1;
-        uz_element_move(&motion, element, unit);
-        uz_element_strain(strain, &motion, point);
-        for (int i = 0; i < n; i++)
-            B[i * dofs + j] = strain[i];
-        unit[j] = 0;
-    }
-}

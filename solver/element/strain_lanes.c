@@ -14,41 +14,54 @@ enum { MODES = UZ_ELEMENT_INTERNAL };
 
 typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), aligned(8)));
 
-static void set_point(uz_strain_rule *rule, int g)
+static void add_point(uz_strain_rule *rule, const double point[3], double weight)
 {
+    const int g = rule->points++;
+    memcpy(rule->point[g], point, sizeof rule->point[g]);
+    rule->weight[g] = weight;
     uz_element_shape(rule->N[g], rule->kind, rule->point[g]);
     uz_element_type_of(rule->kind)->gradients(rule->slope[g], rule->point[g]);
 }
 
-void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, const double point[][3], int count)
+static void add_gauss_points(uz_strain_rule *rule)
 {
+    double point[3];
+    for (int g = 0; g < uz_element_gauss_count(rule->kind, rule->model); g++) {
+        const double weight = uz_element_gauss(point, rule->kind, rule->model, g);
+        add_point(rule, point, weight);
+    }
+}
+
+static void begin_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
+{
+    static const double ORIGIN[3] = {0};
     memset(rule, 0, sizeof *rule);
     rule->kind = kind;
     rule->model = model;
-    rule->formulation = UZ_FORMULATION_STANDARD;
+    rule->formulation = formulation;
     rule->dim = uz_element_dim(kind);
     rule->nodes = uz_element_node_count(kind);
     rule->quadratic = rule->nodes > uz_element_type_of(kind)->corners;
-    rule->points = count;
     rule->stresses = uz_stress_count(model);
     rule->direct = rule->stresses == 3 ? 2 : 3;
-    for (int g = 0; g < count; g++) {
-        memcpy(rule->point[g], point[g], sizeof rule->point[g]);
-        set_point(rule, g);
-    }
+    uz_element_type_of(kind)->gradients(rule->centre, ORIGIN);
 }
 
 void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
 {
-    static const double ORIGIN[3] = {0};
-    uz_strain_rule_at(rule, kind, model, NULL, 0);
-    rule->formulation = formulation;
-    rule->points = uz_element_gauss_count(kind, model);
-    uz_element_type_of(kind)->gradients(rule->centre, ORIGIN);
-    for (int g = 0; g < rule->points; g++) {
-        rule->weight[g] = uz_element_gauss(rule->point[g], kind, model, g);
-        set_point(rule, g);
-    }
+    begin_rule(rule, kind, model, formulation);
+    add_gauss_points(rule);
+}
+
+void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
+                       const double point[][3], int count)
+{
+    begin_rule(rule, kind, model, formulation);
+    rule->averaged = count;
+    for (int k = 0; k < count; k++)
+        add_point(rule, point[k], 0);
+    if (formulation != UZ_FORMULATION_STANDARD)
+        add_gauss_points(rule);
 }
 
 /* ---- shape */
@@ -190,7 +203,7 @@ INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_l
                       const uz_lane_material *material, int dim)
 {
     uz_lanes A[MODES][MODES] = {{{0}}}, internal[MODES] = {{0}}, slope[3][3];
-    for (int g = 0; g < rule->points; g++) {
+    for (int g = rule->averaged; g < rule->points; g++) {
         mode_slopes(slope, rule, shape, g, dim);
         add_mode_equations(A, internal, H[g], slope, material, &shape->volume[g], dim);
     }
@@ -226,6 +239,8 @@ INLINE void take_mean_dilatation(uz_lanes strain[][UZ_ELEMENT_STRESSES], const u
         own[g] = strain[g][0] + strain[g][1];
         if (n == 3)
             own[g] += strain[g][2];
+        if (g < rule->averaged)
+            continue;
         sum += shape->volume[g] * own[g];
         volume += shape->volume[g];
     }

@@ -19,7 +19,8 @@ typedef struct {
     uz_formulation formulation; /* as uz_resolve_formulation gave it */
     bool quadratic;             /* has it middles of edges? */
     int dim, nodes, points, stresses;
-    int direct; /* of the stresses, which come first: those that are no shear */
+    int averaged; /* averages over the element are over the points from this one on */
+    int direct;   /* of the stresses, which come first: those that are no shear */
     double point[UZ_ELEMENT_GAUSS][3], weight[UZ_ELEMENT_GAUSS];
     double N[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES], slope[UZ_ELEMENT_GAUSS][UZ_ELEMENT_NODES][3];
     double centre[UZ_ELEMENT_NODES][3]; /* slope at the origin */
@@ -27,8 +28,10 @@ typedef struct {
 /* At the Gauss points. */
 void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation);
 
-/* At other points, whose weights are 0: for UZ_FORMULATION_STANDARD alone, as the others average over the element. */
-void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, const double point[][3], int count);
+/* At `count` other points, whose weights are 0. The Gauss points follow them where the formulation averages over the
+ * element, as all but the standard one do: UZ_ELEMENT_GAUSS bounds both together. */
+void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
+                       const double point[][3], int count);
 
 /* Of the elements' shape. */
 typedef struct {

@@ -313,17 +313,16 @@ static uz_status thermal_energy(double *energy, const balance *b, uz_error *err)
     uz_status status = uz_field_body_init(&body, b->scene, b->model, err);
     const uz_mesh *mesh = &b->model->mesh;
     *energy = 0;
-    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK && body.rise; e++) {
+    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK && body.free_strain; e++) {
         uz_element element;
         double xyz[3 * UZ_ELEMENT_NODES], strain[UZ_ELEMENT_STRESSES], f[UZ_ELEMENT_DOFS] = {0},
                                                                        stress[UZ_ELEMENT_STRESSES];
-        const uz_body_material *material = uz_element_material(b->model, e);
         int count;
         const int64_t *node = uz_mesh_element(mesh, e, &count);
-        if (body.rise[e] == 0)
+        if (body.free_strain[e] == 0)
             continue;
         uz_body_element(&element, xyz, b->model, e);
-        uz_thermal_strain(strain, element.model, element.lame, material->expansion * body.rise[e]);
+        uz_thermal_strain(strain, element.model, element.lame, body.free_strain[e]);
         uz_element_add_thermal_load(f, &element, strain);
         for (int i = 0; i < count * b->dim; i++)
             *energy -= f[i] * b->u[node[i / b->dim] * b->dim + i % b->dim];

@@ -2,9 +2,8 @@
 #ifndef UZ_FIELDS_PARTS_H
 #define UZ_FIELDS_PARTS_H
 
-#include "assembly/assembly.h"
+#include "assembly/strain_group.h"
 #include "element/element.h"
-#include "element/strain_lanes.h"
 #include "uzawa.h"
 
 enum { UZ_FIELD_COMPONENTS = 6 }; /* most components of a stress */
@@ -14,48 +13,34 @@ typedef struct {
     const uz_scene *scene;
     const uz_body_model *model; /* mesh and contact rows; neither K nor N is read */
     int components;             /* of a stress: 4 or 6 */
-    double *rise;               /* n_elements: of temperature; NULL: none has any */
+    double *free_strain;        /* n_elements: expansion times rise of temperature; NULL: none has any */
 } uz_field_body;
 
 /* Borrows scene and model. UZ_ERR_MEMORY; the caller clears *out in every case. */
 uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz_body_model *model, uz_error *err);
 void uz_field_body_clear(uz_field_body *body);
 
-/* One element, moved by u. It refers to itself: not to be copied. */
-typedef struct {
-    uz_element element;
-    uz_element_motion motion;
-    const uz_body_material *material;
-    double free_strain; /* expansion times rise of temperature */
-    double xyz[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
-} uz_field_element;
-void uz_field_element_at(uz_field_element *out, const uz_field_body *body, const double *u, int64_t element);
-
-/* Stress and strain (tensors, components of uz_fields) at a local point of it. */
+/* Stress and strain (tensors, components of uz_fields) at a point. */
 typedef struct {
     double stress[UZ_FIELD_COMPONENTS], strain[UZ_FIELD_COMPONENTS];
 } uz_field_state;
-void uz_field_state_at(uz_field_state *out, const uz_field_element *element, const double point[3]);
+/* From the strains of the model at a point of an element (see element.h; room for UZ_ELEMENT_STRESSES); shear strains
+ * are halved in place. */
+void uz_field_state_of_strain(uz_field_state *out, const uz_field_body *body, int64_t element, double *strain);
 
-/* The same local points of elements of one kind, one element after another: where all are one shape of one material, by
- * one matrix for each point, else a few elements at a time. count and point are the caller's; it refers to itself: not
- * to be copied. */
+/* The same local points of elements of one kind, a few elements at a time. count and point are the caller's. */
 typedef struct {
     int count;
     double point[UZ_ELEMENT_GAUSS][3];
     const uz_field_body *body;
     const double *u;
-    uz_element_kind kind;
-    bool alike;
-    uz_field_element at; /* the last element; where all are alike, any of them */
-    double strain_of[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES * UZ_ELEMENT_DOFS];
-    uz_strain_rule rule;
-    int64_t first, loaded; /* the elements whose strains these are, one in each lane */
-    uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES];
+    uz_strain_group group; /* the elements at hand, which follow each other */
+    double volume;         /* of the last element that was asked for; 0: none was */
 } uz_field_points;
-/* For elements of the kind that `element` is of. */
-void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const double *u, int64_t element);
+void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const double *u);
 void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element);
+/* Of an element whose states were asked for. */
+double uz_field_points_volume(uz_field_points *points, int64_t element);
 
 /* Nodal averages, n_nodes x components each; either may be NULL. UZ_ERR_CANCELLED, _MEMORY. */
 uz_status uz_field_recover(double *stress, double *strain, const uz_field_body *body, const double *u,

@@ -38,15 +38,11 @@ typedef struct {
 /* Incompatible modes have the whole slope, quadratic elements too: their own points serve better. */
 static bool is_plain(const uz_field_body *body, int64_t e)
 {
-    const uz_body_model *model = body->model;
-    const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
-    const uz_element_type *type = uz_element_type_of(kind);
-    return type->nodes == type->corners &&
-           uz_resolve_formulation(model->formulation, kind, model->kind, uz_element_material(model, e)->poisson) !=
-               UZ_FORMULATION_INCOMPATIBLE;
+    const uz_element_type *type = uz_element_type_of((uz_element_kind)body->model->mesh.kind[e]);
+    return type->nodes == type->corners && uz_element_formulation(body->model, e) != UZ_FORMULATION_INCOMPATIBLE;
 }
 
-static void take_sample(sample *to, uz_field_points *middle, int64_t e, double volume)
+static void take_sample(sample *to, uz_field_points *middle, int64_t e)
 {
     const uz_field_body *body = middle->body;
     const uz_mesh *mesh = &body->model->mesh;
@@ -56,7 +52,7 @@ static void take_sample(sample *to, uz_field_points *middle, int64_t e, double v
     const int64_t *node = uz_mesh_element(mesh, e, &nodes);
     uz_field_points_states(&state, middle, e);
     memset(to->x, 0, sizeof to->x);
-    to->volume = volume > 0 ? volume : uz_element_volume(&middle->at.element);
+    to->volume = uz_field_points_volume(middle, e);
     memcpy(to->value, state.stress, bytes);
     memcpy(to->value + body->components, state.strain, bytes);
     for (int a = 0; a < nodes; a++)
@@ -277,10 +273,10 @@ static uz_status take_samples(patches *p, uz_field_points *middle, const double 
         if (!known[kind]) {
             middle[kind].count = 1;
             memcpy(middle[kind].point[0], uz_element_type_of(kind)->centre, sizeof middle[kind].point[0]);
-            uz_field_points_init(&middle[kind], p->body, u, e);
+            uz_field_points_init(&middle[kind], p->body, u);
             known[kind] = true;
         }
-        take_sample(&p->of[e], &middle[kind], e, middle[kind].alike && e > 0 ? p->of[0].volume : 0);
+        take_sample(&p->of[e], &middle[kind], e);
     }
     return UZ_OK;
 }

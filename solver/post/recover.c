@@ -23,7 +23,6 @@ typedef struct {
     double share[UZ_ELEMENT_NODES][POINTS];
     uz_field_points states; /* at these points, once there is an element of the kind */
     bool known;
-    double volume; /* of each element where all are alike */
 } recovery;
 
 /* Sums at the nodes, but for those that are done. */
@@ -62,8 +61,7 @@ static void begin_plan(recovery *plan, const uz_field_body *body, const double *
     plan->points = uz_element_type_of(kind)->recover(plan->point, plan->share, kind);
     plan->states.count = plan->points;
     memcpy(plan->states.point, plan->point, sizeof plan->point);
-    uz_field_points_init(&plan->states, body, u, element);
-    plan->volume = plan->states.alike ? uz_element_volume(&plan->states.at.element) : 0;
+    uz_field_points_init(&plan->states, body, u);
     plan->known = true;
 }
 
@@ -78,7 +76,7 @@ static void add_element(const nodal_sums *to, recovery *plan, const uz_field_bod
         memcpy(sigma[k], state[k].stress, sizeof sigma[k]);
         memcpy(epsilon[k], state[k].strain, sizeof epsilon[k]);
     }
-    const double size = plan->states.alike ? plan->volume : uz_element_volume(&plan->states.at.element);
+    const double size = uz_field_points_volume(&plan->states, element);
     for (int a = 0; a < nodes; a++)
         to->volume[node[a]] += size;
     add_to_nodes(to->stress, to->done, plan, sigma, node, nodes, body->components, size);
@@ -163,7 +161,7 @@ static void plan_gauss(gauss_plan *plan, const uz_field_body *body, const double
         uz_element_gauss(plan->points.point[g], kind, body->scene->model, g);
         uz_element_shape(plan->N[g], kind, plan->points.point[g]);
     }
-    uz_field_points_init(&plan->points, body, u, element);
+    uz_field_points_init(&plan->points, body, u);
     plan->known = true;
 }
 

@@ -92,35 +92,51 @@ static double largest_slope(const doubts *d)
     return sqrt(largest);
 }
 
-/* |curl u| / 2 from the gradients at a point. */
-static double rotation_at(const uz_field_element *at, const double point[3])
+/* |curl u| / 2 from the gradients at a point; u: nodes x dim. */
+static double rotation_at(const uz_element *element, const double *u, const double point[3])
 {
     double grad[UZ_ELEMENT_NODES][3], G[3][3] = {{0}};
-    const int dim = uz_element_dim(at->element.kind);
-    uz_element_gradients(grad, &at->element, point);
-    for (int a = 0; a < uz_element_node_count(at->element.kind); a++)
+    const int dim = uz_element_dim(element->kind);
+    uz_element_gradients(grad, element, point);
+    for (int a = 0; a < uz_element_node_count(element->kind); a++)
         for (int i = 0; i < dim; i++)
             for (int j = 0; j < dim; j++)
-                G[i][j] += at->u[a * dim + i] * grad[a][j];
+                G[i][j] += u[a * dim + i] * grad[a][j];
     const double x = G[2][1] - G[1][2], y = G[0][2] - G[2][0], z = G[1][0] - G[0][1];
     return 0.5 * sqrt(x * x + y * y + z * z);
+}
+
+/* The largest principal strain, in absolute value, and the rotation in an element's middle. */
+static void look_at_element(double *strained, double *turned, const uz_field_body *body, const double *u, int64_t e)
+{
+    const uz_mesh *mesh = &body->model->mesh;
+    double xyz[3 * UZ_ELEMENT_NODES], ue[UZ_ELEMENT_DOFS], strain[UZ_ELEMENT_STRESSES] = {0}, principal[3];
+    int nodes;
+    const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+    uz_element element;
+    uz_element_motion motion;
+    uz_field_state state;
+    uz_body_element(&element, xyz, body->model, e);
+    const double *point = uz_element_type_of(uz_element_type_of(element.kind)->linear)->centre;
+    for (int a = 0; a < nodes; a++)
+        memcpy(ue + a * mesh->dim, u + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *u);
+    uz_element_move(&motion, &element, ue);
+    uz_element_strain(strain, &motion, point);
+    uz_field_state_of_strain(&state, body, e, strain);
+    uz_principal(principal, state.strain, body->components);
+    *strained = fmax(fabs(principal[0]), fabs(principal[2]));
+    *turned = rotation_at(&element, ue, point);
 }
 
 static void look_at_elements(const doubts *d)
 {
     const uz_mesh *mesh = &d->model->mesh;
     const uz_field_body body = {.scene = d->scene, .model = d->model, .components = mesh->dim == 2 ? 4 : 6};
-    double rotation = 0, strain = 0, principal[3];
+    double rotation = 0, strain = 0;
     int64_t turned = 0, strained = 0;
     for (int64_t e = 0; e < mesh->n_elements; e++) {
-        uz_field_element at;
-        uz_field_state state;
-        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
-        const double *point = uz_element_type_of(uz_element_type_of(kind)->linear)->centre;
-        uz_field_element_at(&at, &body, d->u, e);
-        uz_field_state_at(&state, &at, point);
-        uz_principal(principal, state.strain, body.components);
-        const double here = fmax(fabs(principal[0]), fabs(principal[2])), turn = rotation_at(&at, point);
+        double here, turn;
+        look_at_element(&here, &turn, &body, d->u, e);
         if (here > strain) {
             strain = here;
             strained = e;

@@ -93,6 +93,45 @@ TEST(strains_in_lanes_are_those_of_single_elements)
         }
 }
 
+/* Where the stress is recovered from, and in the middle: whatever the formulation averages, it averages over the Gauss
+ * points. */
+TEST(strains_in_lanes_at_other_points_are_those_of_single_elements)
+{
+    static const uz_formulation ASKED[] = {UZ_FORMULATION_STANDARD, UZ_FORMULATION_BBAR, UZ_FORMULATION_INCOMPATIBLE};
+    qp_random rng = {2025};
+    uz_lanes strain[POINTS][STRESSES];
+    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
+        for (int k = 0; k < 9; k++) {
+            double at[UZ_ELEMENT_SAMPLES + 1][3], share[NODES][UZ_ELEMENT_SAMPLES];
+            const uz_element_type *type = uz_element_type_of((uz_element_kind)kind);
+            four_elements f;
+            uz_strain_rule rule;
+            uz_lane_shape shape;
+            make_four(&f, (uz_element_kind)kind, MODELS[uz_element_dim((uz_element_kind)kind) == 3][k / 3],
+                      ASKED[k % 3], &rng);
+            const int count = type->recover(at, share, (uz_element_kind)kind);
+            memcpy(at[count], type->centre, sizeof at[count]);
+            uz_strain_rule_at(&rule, f.element[0].kind, f.element[0].model, f.element[0].formulation,
+                              (const double(*)[3])at, count + 1);
+            CHECK(rule.points <= UZ_ELEMENT_GAUSS);
+            uz_lane_shape_of(&shape, &rule, f.x, f.element[0].thickness);
+            uz_lane_strains(strain, &rule, &shape, &f.material, f.displacement);
+            for (int l = 0; l < LANES; l++)
+                for (int i = 0; i <= count; i++) {
+                    double want[STRESSES], size = 0;
+                    uz_element_motion motion;
+                    uz_element_move(&motion, &f.element[l], f.u[l]);
+                    uz_element_strain(want, &motion, at[i]);
+                    for (int c = 0; c < rule.stresses; c++)
+                        size = fmax(size, fabs(want[c]));
+                    for (int c = 0; c < rule.stresses; c++)
+                        CHECK_MSG(fabs(strain[i][c][l] - want[c]) < 1e-12 * size,
+                                  "kind %d, model %d, formulation %d: strain %d is %.17g, not %.17g", kind, rule.model,
+                                  rule.formulation, c, strain[i][c][l], want[c]);
+                }
+        }
+}
+
 /* ----------------------------------------------------------------- estimate */
 
 /* One element after the other; averages: n_nodes x n_materials x (STRESSES and the volume). */

@@ -1,0 +1,83 @@
+#include "assembly/strain_group.h"
+
+#include "core/cpu.h"
+#include "scene/mesh.h"
+
+#define INLINE static inline __attribute__((always_inline))
+
+enum { LANES = UZ_STRAIN_LANES };
+
+INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
+{
+    const uz_lame *lame[LANES];
+    for (int l = 0; l < LANES; l++)
+        lame[l] = &uz_element_material(from->model, g->element[l])->lame;
+    g->material.lambda = (uz_lanes){lame[0]->lambda, lame[1]->lambda, lame[2]->lambda, lame[3]->lambda};
+    g->material.mu = (uz_lanes){lame[0]->mu, lame[1]->mu, lame[2]->mu, lame[3]->mu};
+    g->thermal = (uz_lanes){0};
+    for (int l = 0; l < LANES && from->free_strain; l++) {
+        double strain[UZ_ELEMENT_STRESSES];
+        uz_thermal_strain(strain, from->model->kind, *lame[l], from->free_strain[g->element[l]]);
+        g->thermal[l] = strain[0];
+    }
+}
+
+/* Values (n_nodes x dim) at the nodes of the elements. */
+INLINE void gather(uz_lanes *out, const uz_strain_group *g, const double *value, int dim)
+{
+    for (int a = 0; a < g->rule.nodes; a++) {
+        const double *const at[LANES] = {value + g->node[0][a] * dim, value + g->node[1][a] * dim,
+                                         value + g->node[2][a] * dim, value + g->node[3][a] * dim};
+        for (int c = 0; c < dim; c++)
+            *out++ = (uz_lanes){at[0][c], at[1][c], at[2][c], at[3][c]};
+    }
+}
+
+static void take_equal_shape(uz_strain_group *g, const uz_body_model *model)
+{
+    uz_element element;
+    double xyz[3 * UZ_ELEMENT_NODES];
+    uz_body_element(&element, xyz, model, g->element[0]);
+    for (int i = 0; i < g->rule.nodes * g->rule.dim; i++)
+        g->x[i] = xyz[i] - (uz_lanes){0};
+}
+
+INLINE void load(uz_strain_group *g, const uz_strain_source *from, int dim)
+{
+    const uz_mesh *mesh = &from->model->mesh;
+    for (int l = 0; l < LANES; l++) {
+        if (l >= g->count)
+            g->element[l] = g->element[0];
+        g->node[l] = mesh->node + mesh->first[g->element[l]];
+    }
+    take_material(g, from);
+    gather(g->u, g, from->nodal, dim);
+    if (!g->shaped) {
+        const bool equal = mesh->uniform && from->model->kind != UZ_AXISYMMETRIC;
+        if (equal)
+            take_equal_shape(g, from->model);
+        else
+            gather(g->x, g, mesh->xyz, dim);
+        uz_lane_shape_of(&g->shape, &g->rule, g->x, from->model->thickness);
+        g->shaped = equal;
+    }
+    uz_lane_strains(g->strain, &g->rule, &g->shape, &g->material, g->u);
+}
+
+INLINE void load_in_space(uz_strain_group *g, const uz_strain_source *from)
+{
+    if (g->rule.dim == 2)
+        load(g, from, 2);
+    else
+        load(g, from, 3);
+}
+
+UZ_AVX2_FMA static void load_fused(uz_strain_group *g, const uz_strain_source *from)
+{
+    load_in_space(g, from);
+}
+
+void uz_strain_group_load(uz_strain_group *group, const uz_strain_source *from)
+{
+    (uz_cpu_has_avx2_fma() ? load_fused : load_in_space)(group, from);
+}

@@ -1,0 +1,34 @@
+/* strain_group.h: the strains of a few elements of a mesh at once: those of one kind and formulation, one in each lane.
+ */
+#ifndef UZ_ASSEMBLY_STRAIN_GROUP_H
+#define UZ_ASSEMBLY_STRAIN_GROUP_H
+
+#include "assembly/assembly.h"
+#include "element/strain_lanes.h"
+
+/* One element in each lane; those from count on repeat the first, and what they give is dropped. */
+typedef struct {
+    bool begun;  /* rule is made */
+    bool shaped; /* shape is that of all elements of the mesh */
+    int count;
+    int64_t element[UZ_STRAIN_LANES];
+    const int64_t *node[UZ_STRAIN_LANES]; /* of each element */
+    uz_strain_rule rule;
+    uz_lane_shape shape;
+    uz_lane_material material;
+    uz_lanes thermal; /* in each direct strain */
+    uz_lanes x[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
+    uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES];
+} uz_strain_group;
+
+/* What the elements of a group are taken from. */
+typedef struct {
+    const uz_body_model *model;
+    const double *nodal;       /* n_nodes x dim */
+    const double *free_strain; /* n_elements; NULL: no temperature */
+} uz_strain_source;
+
+/* From element[0..count) and the rule to the strains. */
+void uz_strain_group_load(uz_strain_group *group, const uz_strain_source *from);
+
+#endif
