@@ -4,6 +4,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "law/sign.h"
 
 #include <float.h>
 #include <math.h>
@@ -148,13 +149,13 @@ void uz_bounded_react(const uz_sparse_load *x, double *g, bool *active)
             row = box->force[j] > 0.0 ? box->lower[j] : box->upper[j];
         active[row] = true;
         box->r[row] = box->force[j] / bounds->scale[row];
-        if (box->r[row] > 0.0 && fabs(box->force[j]) <= NOISE * box->size[j])
+        if (uz_reaction_pulls(box->r[row]) && fabs(box->force[j]) <= NOISE * box->size[j])
             box->r[row] = 0.0;
     }
     for (int64_t i = 0; i < m; i++) {
         double reach = bounds->scale[i] * box->u[bounds->dof[i]];
         g[i] = h[i] - reach;
-        if (active[i] || (g[i] < 0.0 && -g[i] <= NOISE * (fabs(h[i]) + fabs(reach))))
+        if (active[i] || (uz_gap_penetrates(g[i]) && -g[i] <= NOISE * (fabs(h[i]) + fabs(reach))))
             g[i] = 0.0;
     }
 }

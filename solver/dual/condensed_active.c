@@ -6,6 +6,7 @@
 #include "linalg/blas.h"
 #include "core/error.h"
 #include "core/lock.h"
+#include "law/sign.h"
 
 #include <float.h>
 #include <math.h>
@@ -200,9 +201,9 @@ static void forgive_rounding(double *r, double *g, const uz_condensed_load *x, c
     int64_t m = x->load.dual->m;
     double r_noise = NOISE * largest(r, m), g_noise = NOISE * largest(x->load.g0, m);
     for (int64_t i = 0; i < m; i++) {
-        if (active[i] && r[i] > 0.0 && r[i] <= r_noise)
+        if (active[i] && uz_reaction_pulls(r[i]) && r[i] <= r_noise)
             r[i] = 0.0;
-        if (!active[i] && g[i] < 0.0 && g[i] >= -g_noise)
+        if (!active[i] && uz_gap_penetrates(g[i]) && g[i] >= -g_noise)
             g[i] = 0.0;
     }
 }
@@ -295,7 +296,7 @@ static bool correct_rows(uz_condensed_load *x, double *w, double *target, const 
     bool *in = uz_alloc(m, sizeof *in), feasible = false, ok = rows && in;
     double *D_AA = ok ? uz_alloc(m * m, sizeof *D_AA) : NULL, scale = 0.0;
     for (int64_t i = 0; D_AA && i < m; i++) {
-        in[i] = close[i] || g[i] < 0.0;
+        in[i] = close[i] || uz_gap_penetrates(g[i]);
         scale = in[i] ? fmax(scale, fabs(g[i])) : scale;
     }
     for (int round = 0; D_AA && ok && !feasible && round < CORRECTION_ROUNDS && !uz_stop_is_due(&x->load.stop);
@@ -308,7 +309,8 @@ static bool correct_rows(uz_condensed_load *x, double *w, double *target, const 
         double noise = 8.0 * DBL_EPSILON * sum;
         feasible = ok;
         for (int64_t i = 0; i < m; i++) {
-            bool wrong = g[i] - target[i] < -CORRECTION_TOLERANCE * scale - sqrt(D[i + i * m]) * noise;
+            bool wrong =
+                uz_gap_penetration(g[i] - target[i]) > CORRECTION_TOLERANCE * scale + sqrt(D[i + i * m]) * noise;
             feasible = feasible && !wrong;
             in[i] = in[i] || wrong;
         }
@@ -338,7 +340,7 @@ uz_status uz_condensed_correct(uz_dual_load *load, double *bound2, const double 
     int64_t m = x->load.dual->m;
     double *target = x->work, *z = x->load.correction, square = 0.0, complementarity = 0.0;
     for (int64_t i = 0; i < m; i++)
-        target[i] = close[i] ? g[i] : fmin(g[i], 0.0);
+        target[i] = close[i] ? g[i] : uz_gap_to_lift(g[i]);
     if (dense->scaled) {
         for (int64_t k = 0; k < m; k++)
             z[k] = target[dense->row_of[k]] / dense->scale[k];

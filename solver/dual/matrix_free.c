@@ -16,6 +16,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "law/sign.h"
 #include "linalg/blas.h"
 
 #include <math.h>
@@ -216,7 +217,7 @@ static uz_status solve_to(free_load *x, uz_cg *cg, double tolerance, double *g, 
     uz_bounded_balance(box, load->K);
     uz_bounded_react(&x->sparse, g, active);
     for (int64_t i = 0; *go_on && i < m; i++)
-        *go_on = !(active[i] ? box->r[i] > 0.0 : g[i] < 0.0);
+        *go_on = !(active[i] ? uz_reaction_pulls(box->r[i]) : uz_gap_penetrates(g[i]));
     return UZ_OK;
 }
 

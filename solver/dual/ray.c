@@ -4,6 +4,7 @@
 #include "core/alloc.h"
 #include "linalg/blas.h"
 #include "core/error.h"
+#include "law/sign.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -67,7 +68,7 @@ uz_status uz_ray_project(double *y, const uz_csc *N, uz_error *err)
         }
         project(&ls, y, support, N);
         for (int64_t i = 0; i < N->rows; i++)
-            y[i] = fmin(y[i], 0.0);
+            y[i] = uz_reaction_cut(y[i]);
     } else {
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory to look for contradicting rows");
     }

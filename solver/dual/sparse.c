@@ -3,6 +3,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "law/sign.h"
 
 #include <float.h>
 #include <math.h>
@@ -114,7 +115,7 @@ static double sweep(double *c, const uz_csc *Nt, const double *weight, const dou
         double weighted = 0.0; /* n_i'W n_i */
         for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
             weighted += Nt->val[k] * Nt->val[k] * weight[Nt->idx[k]];
-        if (weighted <= 0.0 || (!closing && miss >= 0.0))
+        if (weighted <= 0.0 || (!closing && uz_gap_is_open(miss)))
             continue;
         for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
             c[Nt->idx[k]] += miss / weighted * weight[Nt->idx[k]] * Nt->val[k];
@@ -132,7 +133,7 @@ static bool correct_by_sweeps(double *c, double *Nc, const uz_csc *Nt, const dou
     double scale = 0.0;
     memset(c, 0, (size_t)Nt->rows * sizeof *c);
     for (int64_t i = 0; i < Nt->cols; i++)
-        if (close[i] || g[i] < 0.0)
+        if (close[i] || uz_gap_penetrates(g[i]))
             scale = fmax(scale, fabs(g[i]));
     double small = 8.0 * DBL_EPSILON * scale, moved = scale;
     for (int k = 0; k < MAX_SWEEPS && moved > small; k++)
@@ -140,7 +141,7 @@ static bool correct_by_sweeps(double *c, double *Nc, const uz_csc *Nt, const dou
     bool feasible = true;
     for (int64_t i = 0; i < Nt->cols; i++) {
         Nc[i] = column_dot(Nt, i, c);
-        if (g[i] - Nc[i] < -4.0 * small)
+        if (uz_gap_penetration(g[i] - Nc[i]) > 4.0 * small)
             feasible = false;
     }
     return feasible;

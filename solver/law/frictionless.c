@@ -1,27 +1,21 @@
-/* frictionless.c: contact without friction: obstacles push and never pull, r <= 0, and nothing penetrates, g >= 0. One
- * row per contact. */
+/* frictionless.c: contact without friction, the sign rule of sign.h for whole vectors. One row per contact. */
 #include "law/laws.h"
+#include "law/sign.h"
 
 #include <math.h>
-
-/* -0 stays -0; NaN becomes 0. */
-static inline double cut(double r)
-{
-    return r <= 0.0 ? r : 0.0;
-}
 
 static void project(const uz_law *law, double *r, int64_t n)
 {
     (void)law;
     for (int64_t i = 0; i < n; i++)
-        r[i] = cut(r[i]);
+        r[i] = uz_reaction_cut(r[i]);
 }
 
 static bool admissible(const uz_law *law, const double *r, int64_t n)
 {
     (void)law;
     for (int64_t i = 0; i < n; i++)
-        if (r[i] > 0.0)
+        if (uz_reaction_pulls(r[i]))
             return false;
     return true;
 }
@@ -31,7 +25,7 @@ static double residual(const uz_law *law, const double *r, const double *g, doub
     double square = 0.0;
     (void)law;
     for (int64_t i = 0; i < n; i++) {
-        const double change = r[i] - cut(r[i] + step * g[i]), scaled = scale ? scale[i] * change : change;
+        const double change = r[i] - uz_reaction_cut(r[i] + step * g[i]), scaled = scale ? scale[i] * change : change;
         square += scaled * scaled;
     }
     return sqrt(square);
@@ -43,7 +37,7 @@ static double gap_bound(const uz_law *law, const double *r, const double *g, int
     double sum = 0.0;
     (void)law;
     for (int64_t i = 0; i < n; i++) {
-        if (g[i] < 0.0)
+        if (uz_gap_penetrates(g[i]))
             return INFINITY;
         sum -= r[i] * g[i];
     }
@@ -54,7 +48,7 @@ static void penetration(const uz_law *law, double *out, const double *g, int64_t
 {
     (void)law;
     for (int64_t i = 0; i < n; i++)
-        out[i] = g[i] < 0.0 ? -g[i] : 0.0;
+        out[i] = uz_gap_penetration(g[i]);
 }
 
 static int64_t active(const uz_law *law, bool *in, const double *r, int64_t n)
@@ -62,7 +56,7 @@ static int64_t active(const uz_law *law, bool *in, const double *r, int64_t n)
     int64_t count = 0;
     (void)law;
     for (int64_t i = 0; i < n; i++) {
-        const bool presses = r[i] < 0.0;
+        const bool presses = uz_reaction_presses(r[i]);
         count += presses;
         if (in)
             in[i] = presses;
@@ -74,7 +68,7 @@ static void predict(const uz_law *law, bool *in, const double *r, const double *
 {
     (void)law;
     for (int64_t i = 0; i < n; i++)
-        in[i] = r[i] + step * g[i] < 0.0;
+        in[i] = uz_reaction_presses(r[i] + step * g[i]);
 }
 
 static int64_t refute(const uz_law *law, bool *wrong, const bool *guess, const double *r, const double *g, int64_t n)
@@ -82,7 +76,7 @@ static int64_t refute(const uz_law *law, bool *wrong, const bool *guess, const d
     int64_t count = 0;
     (void)law;
     for (int64_t i = 0; i < n; i++) {
-        const bool refuted = guess[i] ? r[i] > 0.0 : g[i] < 0.0;
+        const bool refuted = guess[i] ? uz_reaction_pulls(r[i]) : uz_gap_penetrates(g[i]);
         count += refuted;
         if (wrong)
             wrong[i] = refuted;
@@ -94,7 +88,7 @@ static void reach(const uz_law *law, double *out, const double *r, const double 
 {
     (void)law;
     for (int64_t i = 0; i < n; i++)
-        out[i] = d[i] > 0.0 ? (r[i] < 0.0 ? -r[i] : 0.0) / d[i] : INFINITY;
+        out[i] = d[i] > 0.0 ? (uz_reaction_presses(r[i]) ? -r[i] : 0.0) / d[i] : INFINITY;
 }
 
 const uz_law_kind uz_frictionless = {

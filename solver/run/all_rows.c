@@ -44,11 +44,14 @@ static void add_sizes(double *size, const uz_csc *N, const double *h, const doub
 }
 
 /* Where no gap left out is negative at u, but some may be at the feasible displacement: what stays nearest. */
-static void take_nearest(uz_candidates *wants, const double *g)
+static void take_nearest(uz_candidates *wants, const uz_law *law, const double *g)
 {
     double nearest = INFINITY;
-    for (int64_t i = 0; i < wants->m; i++)
-        nearest = wants->in[i] ? nearest : fmin(nearest, fmax(g[i], 0.0));
+    for (int64_t i = 0; i < wants->m; i++) {
+        double depth;
+        law->kind->penetration(law, &depth, &g[i], 1);
+        nearest = wants->in[i] ? nearest : fmin(nearest, depth > 0.0 ? 0.0 : g[i]);
+    }
     for (int64_t i = 0; i < wants->m; i++)
         if (!wants->in[i] && !(g[i] > 2.0 * nearest)) {
             wants->in[i] = 1;
@@ -70,7 +73,7 @@ static uz_status want_rows(uz_run *run, bool suspect, uz_error *err)
         add_sizes(size, uz_setup_all_rows(run->asked->setup, run->asked->problem), run->load.h_all, run->answer.u);
         int64_t added = uz_candidates_extend(&wants, run->work.it.law, run->answer.g, size, ROUNDING);
         if (added == 0 && suspect)
-            take_nearest(&wants, run->answer.g);
+            take_nearest(&wants, run->work.it.law, run->answer.g);
     }
     free(size);
     if (status == UZ_OK && wants.count > rows->count)

@@ -145,7 +145,9 @@ uz_status uz_report_answer(uz_run *run, uz_error *err)
     summary->active += law->kind->active(law, NULL, result->r, run->answer.m);
     for (int64_t i = 0; i < run->answer.m; i++) {
         summary->reaction_sum += result->r[i];
-        summary->max_penetration = fmax(summary->max_penetration, -result->g[i]);
+        double depth;
+        law->kind->penetration(law, &depth, &result->g[i], 1);
+        summary->max_penetration = fmax(summary->max_penetration, depth);
     }
     uz_status status = report_displacements(run, err);
     if (status == UZ_OK)
