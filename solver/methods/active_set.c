@@ -163,70 +163,57 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
     return status;
 }
 
-/* One step: the answer of the guess, and the next guess. *over: a wrong guess is not left, or none can be solved. */
-static uz_status step(pivoting *p, bool *over, uz_end *end, uz_iterate *it, uz_dual_load *load,
-                      const uz_method_options *options, uz_history *history, uz_error *err)
-{
-    uz_status status = uz_dual_load_solve_active(load, &p->solved, p->r, p->g, p->active, err);
-    *over = p->solved != UZ_ACTIVE_SOLVED;
-    if (status != UZ_OK || *over)
-        return status; /* too little time is found by whoever goes on */
-    p->wrong = it->law->kind->refute(it->law, p->refuted, p->active, p->r, p->g, it->m);
-    status = take(it, p, load, err);
-    if (status == UZ_OK)
-        status = uz_iterate_record(it, load, options, history, 0.0, false, err);
-    if (p->wrong == 0)
-        *end = UZ_END_SOLVED;
-    else if (it->best_relative <= options->target)
-        *end = UZ_END_TARGET;
-    return status;
-}
-
-static uz_status steps(pivoting *p, uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                       uz_history *history, uz_error *err)
-{
-    *end = it->best_relative <= options->target ? UZ_END_TARGET : UZ_END_STALLED;
-    if (*end == UZ_END_TARGET)
-        return UZ_OK;
-    int extra = load->dual->can->cheap_steps ? EXTRA_STEPS : 0;
-    bool over = false;
-    for (int k = 0; k < MAX_STEPS && !over; k++) {
-        if (uz_should_stop(end, it, options))
-            return UZ_OK;
-        uz_status status = step(p, &over, end, it, load, options, history, err);
-        if (status != UZ_OK || *end == UZ_END_SOLVED)
-            return status;
-        if (*end == UZ_END_TARGET && (over || extra-- == 0))
-            return UZ_OK;
-        if (is_stuck(p) && may_exchange(it, load))
-            return solve_by_exchange(p, end, it, load, options, history, err);
-        if (!over)
-            exchange(p, load, it->m);
-    }
-    if (uz_should_stop(end, it, options))
-        return UZ_OK;
-    if (over && p->solved == UZ_ACTIVE_RAY) {
-        memcpy(it->ray, p->r, (size_t)it->m * sizeof *it->ray);
-        *end = UZ_END_RAY;
-        return UZ_OK;
-    }
-    if (may_exchange(it, load))
-        return solve_by_exchange(p, end, it, load, options, history, err);
-    *end = over ? UZ_END_UNSOLVED : UZ_END_STALLED;
-    return UZ_OK;
-}
-
+/* Steps: the answer of the guess, and the next guess, until a wrong guess is not left or none can be solved. */
 static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                      uz_history *history, uz_error *err)
 {
     pivoting p;
+    int extra = load->dual->can->cheap_steps ? EXTRA_STEPS : 0;
+    bool over = false; /* no guess can be solved; too little time is found by whoever goes on */
     uz_status status = it->begun ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
     if (!allocate(&p, it->m))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)it->m);
-    if (status == UZ_OK) {
-        guess(&p, it, load);
-        status = steps(&p, end, it, load, options, history, err);
+    if (status != UZ_OK)
+        goto done;
+    guess(&p, it, load);
+    *end = it->best_relative <= options->target ? UZ_END_TARGET : UZ_END_STALLED;
+    if (*end == UZ_END_TARGET)
+        goto done;
+    for (int k = 0; k < MAX_STEPS && !over; k++) {
+        if (uz_should_stop(end, it, options))
+            goto done;
+        status = uz_dual_load_solve_active(load, &p.solved, p.r, p.g, p.active, err);
+        over = p.solved != UZ_ACTIVE_SOLVED;
+        if (status == UZ_OK && !over) {
+            p.wrong = it->law->kind->refute(it->law, p.refuted, p.active, p.r, p.g, it->m);
+            status = take(it, &p, load, err);
+            if (status == UZ_OK)
+                status = uz_iterate_record(it, load, options, history, 0.0, false, err);
+            if (p.wrong == 0)
+                *end = UZ_END_SOLVED;
+            else if (it->best_relative <= options->target)
+                *end = UZ_END_TARGET;
+        }
+        if (status != UZ_OK || *end == UZ_END_SOLVED || (*end == UZ_END_TARGET && (over || extra-- == 0)))
+            goto done;
+        if (is_stuck(&p) && may_exchange(it, load)) {
+            status = solve_by_exchange(&p, end, it, load, options, history, err);
+            goto done;
+        }
+        if (!over)
+            exchange(&p, load, it->m);
     }
+    if (uz_should_stop(end, it, options))
+        goto done;
+    if (over && p.solved == UZ_ACTIVE_RAY) {
+        memcpy(it->ray, p.r, (size_t)it->m * sizeof *it->ray);
+        *end = UZ_END_RAY;
+    } else if (may_exchange(it, load)) {
+        status = solve_by_exchange(&p, end, it, load, options, history, err);
+    } else {
+        *end = over ? UZ_END_UNSOLVED : UZ_END_STALLED;
+    }
+done:
     release(&p);
     return status;
 }

@@ -9,39 +9,15 @@
  * less than what the inner iterations leave, and conjugate steps go astray. */
 enum { WARM_UP = 32 };
 
-/* The active set came to nothing: the iterations go on. */
-static bool gave_up(uz_end end)
-{
-    return end == UZ_END_STALLED || end == UZ_END_UNSOLVED;
-}
-
 /* Where auto stands: kept in the iterate, so that a run can go on from there. */
 enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING };
-
-static uz_method method_of_steps(const uz_dual_load *load)
-{
-    const bool wants_exact = uz_method_conjugate.exact;
-    return wants_exact && !load->dual->can->exact ? UZ_METHOD_ACCELERATED_RESTART : UZ_METHOD_CONJUGATE;
-}
-
-static uz_status run_phase(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                           uz_history *history, uz_error *err)
-{
-    uz_method_options phase = *options;
-    phase.method = method_of_steps(load);
-    if (it->phase == FIRST_GUESS || it->phase == SECOND_GUESS)
-        return uz_method_active_set.run(end, it, load, &phase, history, err);
-    if (it->phase == WARMING_UP && it->phase_end < options->max_iterations)
-        phase.max_iterations = it->phase_end;
-    return uz_steps_run(end, it, load, &phase, history, err);
-}
 
 /* Is the phase over, but not the run? */
 static bool phase_over(uz_end end, const uz_iterate *it, const uz_method_options *options)
 {
     if (it->phase == WARMING_UP)
         return end == UZ_END_ITERATIONS && it->iteration < options->max_iterations;
-    return it->phase != ITERATING && gave_up(end);
+    return it->phase != ITERATING && (end == UZ_END_STALLED || end == UZ_END_UNSOLVED);
 }
 
 static void warm_up(uz_iterate *it)
@@ -50,32 +26,32 @@ static void warm_up(uz_iterate *it)
     it->phase_end = it->iteration + WARM_UP;
 }
 
-/* Guesses that came to nothing leave r at the best that was found. */
-static void next_phase(uz_iterate *it)
-{
-    if (it->phase == FIRST_GUESS)
-        warm_up(it);
-    else
-        it->phase++;
-    if (it->phase != SECOND_GUESS)
-        uz_iterate_go_back(it);
-}
-
 static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                      uz_history *history, uz_error *err)
 {
-    uz_method_options engine = *options;
-    engine.method = UZ_METHOD_ACCELERATED_RESTART;
+    uz_method_options phase = *options;
+    phase.method = UZ_METHOD_ACCELERATED_RESTART;
     if (options->stopping != UZ_STOP_CERTIFIED || !it->law->kind->one_sided)
-        return uz_steps_run(end, it, load, &engine, history, err);
+        return uz_steps_run(end, it, load, &phase, history, err);
+    if (load->dual->can->exact || !uz_method_conjugate.exact)
+        phase.method = UZ_METHOD_CONJUGATE;
     if (options->again)
         warm_up(it);
-    uz_status status = run_phase(end, it, load, options, history, err);
-    while (status == UZ_OK && phase_over(*end, it, options)) {
-        next_phase(it);
-        status = run_phase(end, it, load, options, history, err);
+    for (;;) {
+        const bool guess = it->phase == FIRST_GUESS || it->phase == SECOND_GUESS;
+        const bool short_phase = it->phase == WARMING_UP && it->phase_end < options->max_iterations;
+        phase.max_iterations = short_phase ? it->phase_end : options->max_iterations;
+        uz_status status = guess ? uz_method_active_set.run(end, it, load, &phase, history, err)
+                                 : uz_steps_run(end, it, load, &phase, history, err);
+        if (status != UZ_OK || !phase_over(*end, it, options))
+            return status;
+        if (it->phase == FIRST_GUESS)
+            warm_up(it);
+        else
+            it->phase++;
+        if (it->phase != SECOND_GUESS) /* guesses that came to nothing leave r at the best that was found */
+            uz_iterate_go_back(it);
     }
-    return status;
 }
 
 const uz_method_kind uz_method_auto = {.method = UZ_METHOD_AUTO, .name = "auto", .run = run};

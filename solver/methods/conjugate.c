@@ -192,8 +192,10 @@ static double remaining(uz_iterate *it, const uz_dual_load *load)
 
 /* *step_norm: ||r - P(r + alpha g)|| at the new r, in the caller's forces: the paper's ||rho - r|| where rho is r.
  * *restart: a direction was given up, or a step was not taken. */
-static uz_status step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
+static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart,
+                      uz_error *err)
 {
+    (void)steps;
     make_gaps(it, load);
     *restart = it->tau > 1.0 && out_of_proportion(it);
     if (*restart)

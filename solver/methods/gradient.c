@@ -45,8 +45,8 @@ static bool extrapolate(uz_iterate *it, bool momentum, bool restarts)
 }
 
 /* A projected gradient step from rho, then the next rho. */
-static uz_status step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, bool momentum,
-                      bool restarts, uz_error *err)
+static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart,
+                      uz_error *err)
 {
     *step_norm = project(it, load);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
@@ -59,27 +59,12 @@ static uz_status step(uz_iterate *it, uz_dual_load *load, double *step_norm, boo
         *step_norm = NAN; /* no step was taken */
         return uz_dual_load_apply(load, it->Dr, it->r, err);
     }
-    *restart = extrapolate(it, momentum, restarts);
+    *restart = extrapolate(it, steps->momentum, steps->restarts);
     return UZ_OK;
 }
 
-static uz_status plain_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
-{
-    return step(it, load, step_norm, restart, false, false, err);
-}
-
-static uz_status accelerated_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
-{
-    return step(it, load, step_norm, restart, true, false, err);
-}
-
-static uz_status restarted_step(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err)
-{
-    return step(it, load, step_norm, restart, true, true, err);
-}
-
-static const uz_steps plain = {.step = plain_step}, accelerated = {.step = accelerated_step},
-                      restarted = {.step = restarted_step};
+static const uz_steps plain = {.step = step}, accelerated = {.step = step, .momentum = true},
+                      restarted = {.step = step, .momentum = true, .restarts = true};
 
 const uz_method_kind uz_method_uzawa = {
     .method = UZ_METHOD_UZAWA, .name = "uzawa", .run = uz_steps_run, .steps = &plain};

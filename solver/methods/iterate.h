@@ -48,7 +48,7 @@ struct uz_iterate {
 uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, int64_t m, double alpha, uz_error *err);
 void uz_iterate_clear(uz_iterate *it);
 
-/* Takes over where a run stood, or the reactions of a warm start, before the first call of uz_method_run. What the
+/* Takes over where a run stood, or the reactions of a warm start, before a method first runs. What the
  * state says is checked against this problem: where D r or the bound of its best answer differ, it is that of another
  * one, and only its reactions are taken. Errors: UZ_ERR_SIZE (another m), _NOT_FINITE, _ARGUMENT. */
 uz_status uz_iterate_start(uz_iterate *it, uz_dual_load *load, const uz_state *start, uz_error *err);

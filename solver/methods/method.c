@@ -42,14 +42,13 @@ bool uz_method_parse(uz_method *out, const char *name)
     return false;
 }
 
-uz_status uz_method_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
-                        uz_history *history, uz_error *err)
+uz_status uz_method_find(const uz_method_kind **out, uz_method method, const uz_law *law, uz_error *err)
 {
-    const uz_method_kind *kind = uz_method_kind_of(options->method);
-    if (!kind)
+    *out = uz_method_kind_of(method);
+    if (!*out)
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "there is no such method");
-    if (kind->one_sided && !it->law->kind->one_sided)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the method %s can't with the contact law %s", kind->name,
-                       it->law->kind->name);
-    return kind->run(end, it, load, options, history, err);
+    if ((*out)->one_sided && !law->kind->one_sided)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the method %s can't with the contact law %s", (*out)->name,
+                       law->kind->name);
+    return UZ_OK;
 }

@@ -41,14 +41,16 @@ typedef uz_status uz_method_runner(uz_end *end, uz_iterate *it, uz_dual_load *lo
 
 /* A method whose iterations are steps with one application of D each fills these and runs by uz_steps_run: the loop
  * with its bounds, its limits and its search for rays is there. */
-typedef struct {
+typedef struct uz_steps {
     /* One iteration: r, D r, rho, D rho and tau become the next ones. *step_norm: ||rho - r||, in the caller's forces,
-     * NAN: no step was taken. *restart: what was carried along was given up. */
-    uz_status (*step)(uz_iterate *it, uz_dual_load *load, double *step_norm, bool *restart, uz_error *err);
+     * NAN: no step was taken. *restart: what was carried along was given up. steps: these. */
+    uz_status (*step)(const struct uz_steps *steps, uz_iterate *it, uz_dual_load *load, double *step_norm,
+                      bool *restart, uz_error *err);
     /* After a step; due: a bound is. NULL: nothing to do. Else D r is carried along and gathers rounding: made again
      * here where it is time, and for the last bound of a run. */
     uz_status (*settle)(uz_iterate *it, uz_dual_load *load, bool due, uz_error *err);
-    bool rho_is_r; /* what is recorded is (u(r), r): rho is none of which there was a displacement */
+    bool rho_is_r;           /* what is recorded is (u(r), r): rho is none of which there was a displacement */
+    bool momentum, restarts; /* of gradient steps */
 } uz_steps;
 
 typedef struct {
@@ -66,7 +68,7 @@ uz_method_runner uz_steps_run;
 const uz_method_kind *uz_method_kind_at(int i);
 const uz_method_kind *uz_method_kind_of(uz_method method);
 
-/* Runs options->method. UZ_ERR_ARGUMENT: it can't with this law. */
-uz_method_runner uz_method_run;
+/* The kind to run with this law. UZ_ERR_ARGUMENT: there is none, or it can't with the law. */
+uz_status uz_method_find(const uz_method_kind **out, uz_method method, const uz_law *law, uz_error *err);
 
 #endif

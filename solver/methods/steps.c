@@ -221,7 +221,7 @@ uz_status uz_steps_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz
     it->before.kept = false;
     while (status == UZ_OK && !ray && !should_end(end, it, load, options, it->step_norm)) {
         it->fresh = false;
-        status = steps->step(it, load, &it->step_norm, &restart, err);
+        status = steps->step(steps, it, load, &it->step_norm, &restart, err);
         if (status == UZ_OK)
             status = look_along(&ray, it, load, err);
         if (status == UZ_OK)

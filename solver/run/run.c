@@ -145,9 +145,12 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
     const uz_stop stop = {asked->hooks, asked->deadline};
     uz_milestones_resume(&work->milestones, uz_run_time(run));
     double start = uz_seconds();
+    const uz_method_kind *method;
     uz_status status = uz_dual_load_aim(work->dual, work->target, &stop, err);
     if (status == UZ_OK)
-        status = uz_method_run(&work->end, &work->it, work->dual, &options, &run->result->history, err);
+        status = uz_method_find(&method, options.method, work->it.law, err);
+    if (status == UZ_OK)
+        status = method->run(&work->end, &work->it, work->dual, &options, &run->result->history, err);
     run->result->summary.timings.iterate += uz_seconds() - start;
     uz_milestones_pause(&work->milestones);
     return status == UZ_OK && work->end == UZ_END_RAY ? uz_run_prove_infeasible(run, err) : status;
