@@ -115,75 +115,6 @@ static bool gather_lower(double *D_AA, const double *D, const int64_t *rows, int
     return true;
 }
 
-enum { PASSES = 2 }; /* solve, and once more for the residual */
-
-/* r_A from D_AA r_A = g0_A. false: it had to stop. */
-static bool solve_by_operator(uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
-                              int64_t count)
-{
-    int64_t m = x->load.dual->m;
-    double *v = x->work;
-    memset(r, 0, (size_t)m * sizeof *r);
-    memcpy(g, x->load.g0, (size_t)m * sizeof *g);
-    for (int pass = 0; pass < PASSES; pass++) {
-        for (int64_t k = 0; k < count; k++)
-            v[k] = g[rows[k]];
-        uz_potrs_lower(count, chol, v);
-        if (uz_stop_is_due(&x->load.stop))
-            return false;
-        for (int64_t k = 0; k < count; k++)
-            r[rows[k]] += v[k];
-        uz_symv_lower(m, x->D, r, x->work2);
-        for (int64_t i = 0; i < m; i++)
-            g[i] = x->load.g0[i] - x->work2[i];
-        if (uz_stop_is_due(&x->load.stop))
-            return false;
-    }
-    return true;
-}
-
-/* With T = D^-1 and v = g0 - g: r = T v, and r_I = 0 gives T_II x_I = -T_IA g0_A: the rows that do not touch, mostly
- * the fewer, are solved for, and D is not needed. The second pass solves for what the first left of the gaps, computed
- * through the factor: T is badly conditioned, its answer is not yet that of the body. false: it had to stop. */
-static bool solve_by_inverse(uz_condensed_load *x, double *r, double *g, const double *chol, const int64_t *rows,
-                             int64_t count)
-{
-    int64_t m = x->load.dual->m;
-    double *v = x->work, *change = x->work2;
-    memset(r, 0, (size_t)m * sizeof *r);
-    memcpy(g, x->load.g0, (size_t)m * sizeof *g);
-    for (int pass = 0; pass < PASSES; pass++) {
-        memcpy(v, g, (size_t)m * sizeof *v);
-        for (int64_t k = 0; k < count; k++)
-            v[rows[k]] = 0.0;
-        uz_symv_lower(m, x->D_inverse, v, change);
-        for (int64_t k = 0; k < count; k++)
-            v[rows[k]] = change[rows[k]];
-        if (uz_stop_is_due(&x->load.stop))
-            return false;
-        for (int64_t k = 0; k < count; k++) /* v at the rows = -(block)^-1 v there */
-            change[k] = v[rows[k]];
-        uz_potrs_lower(count, chol, change);
-        for (int64_t k = 0; k < count; k++)
-            v[rows[k]] = -change[k];
-        if (uz_stop_is_due(&x->load.stop))
-            return false;
-        uz_symv_lower(m, x->D_inverse, v, change);
-        for (int64_t k = 0; k < count; k++)
-            change[rows[k]] = 0.0;
-        for (int64_t i = 0; i < m; i++)
-            r[i] += change[i];
-        if (uz_stop_is_due(&x->load.stop))
-            return false;
-        (void)uz_condensed_apply(&x->load, change, r, NULL);
-        for (int64_t i = 0; i < m; i++)
-            g[i] = x->load.g0[i] - change[i];
-        if (uz_stop_is_due(&x->load.stop))
-            return false;
-    }
-    return true;
-}
-
 /* Signs below this, relative to the largest of their kind, are rounding: weakly active rows must not make the steps
  * chatter. */
 #define NOISE (64.0 * DBL_EPSILON)
@@ -223,13 +154,20 @@ static bool are_independent(const double *chol, const double *D, const int64_t *
     return true;
 }
 
+enum { PASSES = 2 }; /* solve, and once more for the residual */
+
+/* By D_AA r_A = g0_A, or in the scaled form by T = D^-1: with v = g0 - g, r = T v, and r_I = 0 gives T_II x_I =
+ * -T_IA g0_A: the rows that do not touch, mostly the fewer, are solved for, and D is not needed. There the second pass
+ * solves for what the first left of the gaps, computed through the factor: T is badly conditioned, its answer is not
+ * yet that of the body. */
 uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active,
                                     uz_error *err)
 {
     uz_condensed_load *x = (uz_condensed_load *)load;
     const uz_stop *stop = &load->stop;
-    bool scaled = x->dense->scaled;
+    const bool scaled = x->dense->scaled;
     int64_t m = load->dual->m, count, *rows = uz_alloc(m, sizeof *rows);
+    double *v = x->work, *change = x->work2, *part = scaled ? change : v; /* part: at the rows, one after the other */
     uz_status status = UZ_OK;
     if (!rows)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)m);
@@ -240,9 +178,46 @@ uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, doub
     double *block = uz_alloc(count * count, sizeof *block);
     if (status == UZ_OK && !block)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)count);
-    if (status == UZ_OK && matrix && gather_lower(block, matrix, rows, count, m, stop) &&
-        uz_potrf_lower_while(count, block, stop) && (scaled || are_independent(block, x->D, rows, count, m)) &&
-        (scaled ? solve_by_inverse : solve_by_operator)(x, r, g, block, rows, count)) {
+    bool ok = status == UZ_OK && matrix && gather_lower(block, matrix, rows, count, m, stop) &&
+              uz_potrf_lower_while(count, block, stop) && (scaled || are_independent(block, x->D, rows, count, m));
+    if (ok) {
+        memset(r, 0, (size_t)m * sizeof *r);
+        memcpy(g, load->g0, (size_t)m * sizeof *g);
+    }
+    for (int pass = 0; ok && pass < PASSES; pass++) {
+        if (scaled) {
+            memcpy(v, g, (size_t)m * sizeof *v);
+            for (int64_t k = 0; k < count; k++)
+                v[rows[k]] = 0.0;
+            uz_symv_lower(m, matrix, v, change);
+            if (!(ok = !uz_stop_is_due(stop)))
+                break;
+        }
+        for (int64_t k = 0; k < count; k++)
+            part[k] = scaled ? change[rows[k]] : g[rows[k]]; /* rows ascend: none is written before it is read */
+        uz_potrs_lower(count, block, part);
+        if (!(ok = !uz_stop_is_due(stop)))
+            break;
+        for (int64_t k = 0; k < count; k++)
+            if (scaled)
+                v[rows[k]] = -part[k];
+            else
+                r[rows[k]] += part[k];
+        uz_symv_lower(m, matrix, scaled ? v : r, change);
+        if (!(ok = !uz_stop_is_due(stop)))
+            break;
+        if (scaled) {
+            for (int64_t k = 0; k < count; k++)
+                change[rows[k]] = 0.0;
+            for (int64_t i = 0; i < m; i++)
+                r[i] += change[i];
+            (void)uz_condensed_apply(load, change, r, NULL);
+            ok = !uz_stop_is_due(stop);
+        }
+        for (int64_t i = 0; i < m; i++)
+            g[i] = load->g0[i] - change[i];
+    }
+    if (ok) {
         *end = UZ_ACTIVE_SOLVED;
         forgive_rounding(r, g, x, active);
     }

@@ -164,42 +164,33 @@ static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_err
 /* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
 #define LAMBDA_TOLERANCE 1e-4
 
-/* Kept for the body's other runs, unless applications may have been cut short: then 0. Under `making`. */
-static uz_status find_lambda_max(uz_dual_load *load, double *lambda_max, uz_error *err)
-{
-    uz_dual_lazy *lazy = load->dual->lazy;
-    const uz_dual_form *form = load->dual->form;
-    if (form->probe)
-        form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
-    uz_status status = uz_lanczos_max(lambda_max, load->dual->m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
-    if (form->probe)
-        form->probe(load, false, 0.0);
-    if (status != UZ_OK || uz_stop_is_due(&load->stop)) {
-        *lambda_max = 0.0;
-        return status;
-    }
-    pthread_mutex_lock(&lazy->known);
-    lazy->lambda_max = *lambda_max;
-    pthread_mutex_unlock(&lazy->known);
-    return UZ_OK;
-}
-
 uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, uz_error *err)
 {
     uz_dual_lazy *lazy = load->dual->lazy;
+    const uz_dual_form *form = load->dual->form;
     uz_status status = UZ_OK;
     if (lambda_max)
         *lambda_max = 0.0;
-    if (load->dual->form->prepare)
-        status = load->dual->form->prepare(load, err);
-    if (status != UZ_OK || !lambda_max)
+    if (form->prepare)
+        status = form->prepare(load, err);
+    if (status != UZ_OK || !lambda_max || !uz_lock_while(&lazy->making, &load->stop))
         return status;
-    if (!uz_lock_while(&lazy->making, &load->stop))
-        return UZ_OK;
-    if (isnan(lazy->lambda_max))
-        status = find_lambda_max(load, lambda_max, err);
-    else
+    if (isnan(lazy->lambda_max)) {
+        if (form->probe)
+            form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
+        status = uz_lanczos_max(lambda_max, load->dual->m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
+        if (form->probe)
+            form->probe(load, false, 0.0);
+        if (status != UZ_OK || uz_stop_is_due(&load->stop)) {
+            *lambda_max = 0.0; /* applications may have been cut short */
+        } else {
+            pthread_mutex_lock(&lazy->known); /* kept for the body's other runs */
+            lazy->lambda_max = *lambda_max;
+            pthread_mutex_unlock(&lazy->known);
+        }
+    } else {
         *lambda_max = lazy->lambda_max;
+    }
     pthread_mutex_unlock(&lazy->making);
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }

@@ -43,36 +43,6 @@ static bool ritz(lanczos *z, int64_t k, double *value, double *residual)
     return true;
 }
 
-static uz_status iterate(lanczos *z, double *lambda, int64_t m, int64_t steps, uz_apply apply, void *ctx,
-                         double tolerance, uz_error *err)
-{
-    double value = 0.0, residual = 0.0;
-    start_vector(z->basis, m);
-    for (int64_t k = 0; k < steps; k++) {
-        double *v = z->basis + k * m, *w = v + m;
-        uz_status status = apply(ctx, w, v, err);
-        if (status != UZ_OK)
-            return status;
-        z->alpha[k] = uz_dot(m, v, w);
-        /* Two passes of Gram-Schmidt against all earlier vectors ("twice is enough", Parlett 1980). */
-        for (int pass = 0; pass < 2; pass++)
-            for (int64_t j = 0; j <= k; j++)
-                uz_axpy(m, -uz_dot(m, z->basis + j * m, w), z->basis + j * m, w);
-        z->beta[k] = uz_norm(m, w);
-        bool last = k + 1 == steps || z->beta[k] <= 1e-14 * fabs(z->alpha[0]);
-        if (last || k % CHECK_EVERY == CHECK_EVERY - 1) {
-            if (!ritz(z, k, &value, &residual))
-                return uz_fail(err, UZ_ERR_INTERNAL, "N", "the tridiagonal eigenproblem did not converge");
-            if (last || residual <= tolerance * value)
-                break;
-        }
-        for (int64_t i = 0; i < m; i++)
-            w[i] /= z->beta[k];
-    }
-    *lambda = fmax(0.0, value + residual);
-    return UZ_OK;
-}
-
 uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, double tolerance, uz_error *err)
 {
     int64_t steps = m < MAX_STEPS ? m : MAX_STEPS;
@@ -82,12 +52,36 @@ uz_status uz_lanczos_max(double *lambda, int64_t m, uz_apply apply, void *ctx, d
                  .d = uz_alloc(steps, sizeof(double)),
                  .e = uz_alloc(steps + 1, sizeof(double)),
                  .vectors = uz_alloc(steps * steps, sizeof(double))};
+    double value = 0.0, residual = 0.0;
     uz_status status = UZ_OK;
     *lambda = 0.0;
     if (!z.basis || !z.alpha || !z.beta || !z.d || !z.e || !z.vectors)
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld Lanczos vectors", (long long)steps);
     else if (m > 0)
-        status = iterate(&z, lambda, m, steps, apply, ctx, tolerance, err);
+        start_vector(z.basis, m);
+    for (int64_t k = 0; status == UZ_OK && k < steps; k++) {
+        double *v = z.basis + k * m, *w = v + m;
+        status = apply(ctx, w, v, err);
+        if (status != UZ_OK)
+            break;
+        z.alpha[k] = uz_dot(m, v, w);
+        /* Two passes of Gram-Schmidt against all earlier vectors ("twice is enough", Parlett 1980). */
+        for (int pass = 0; pass < 2; pass++)
+            for (int64_t j = 0; j <= k; j++)
+                uz_axpy(m, -uz_dot(m, z.basis + j * m, w), z.basis + j * m, w);
+        z.beta[k] = uz_norm(m, w);
+        bool last = k + 1 == steps || z.beta[k] <= 1e-14 * fabs(z.alpha[0]);
+        if (last || k % CHECK_EVERY == CHECK_EVERY - 1) {
+            if (!ritz(&z, k, &value, &residual))
+                status = uz_fail(err, UZ_ERR_INTERNAL, "N", "the tridiagonal eigenproblem did not converge");
+            if (last || residual <= tolerance * value)
+                break;
+        }
+        for (int64_t i = 0; i < m; i++)
+            w[i] /= z.beta[k];
+    }
+    if (status == UZ_OK)
+        *lambda = fmax(0.0, value + residual);
     free(z.basis);
     free(z.alpha);
     free(z.beta);

@@ -119,18 +119,6 @@ static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_opti
     return status;
 }
 
-/* alpha = 1 / lambda_max(D) where the user gave none. A run that is told to stop before lambda_max is known has no
- * alpha: who goes on with it chooses. */
-static uz_status prepare(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_error *err)
-{
-    const uz_stop stop = {options->hooks, options->deadline};
-    double lambda = 0.0;
-    uz_status status = uz_dual_load_prepare(load, it->alpha > 0.0 ? NULL : &lambda, err);
-    if (it->alpha <= 0.0 && (lambda > 0.0 || !uz_stop_is_due(&stop)))
-        it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
-    return status;
-}
-
 /* r may have been changed by another engine, and preparing overwrites what the last apply left. */
 static uz_status resume(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
@@ -159,10 +147,14 @@ static uz_status correct_again(uz_iterate *it, uz_dual_load *load, uz_error *err
     return status;
 }
 
-/* A start with reactions may be the solution: it is bounded before anything is prepared. */
+/* A start with reactions may be the solution: it is bounded before anything is prepared. alpha = 1 / lambda_max(D)
+ * where the user gave none. A run that is told to stop before lambda_max is known has no alpha: who goes on with it
+ * chooses. */
 static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                        uz_error *err)
 {
+    const uz_stop stop = {options->hooks, options->deadline};
+    double lambda = 0.0;
     uz_status status = UZ_OK;
     if (!it->begun && it->warm) {
         status = uz_iterate_begin(it, load, options, history, err);
@@ -170,7 +162,9 @@ static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_optio
             return UZ_OK;
     }
     if (status == UZ_OK)
-        status = prepare(it, load, options, err);
+        status = uz_dual_load_prepare(load, it->alpha > 0.0 ? NULL : &lambda, err);
+    if (status == UZ_OK && it->alpha <= 0.0 && (lambda > 0.0 || !uz_stop_is_due(&stop)))
+        it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
     if (status == UZ_OK && !it->begun)
         return uz_iterate_begin(it, load, options, history, err);
     if (status == UZ_OK)
