@@ -121,7 +121,8 @@ static uz_residual residual(uz_iterate *it, uz_dual_load *load)
     return e;
 }
 
-static uz_history_row describe(uz_iterate *it, uz_dual_load *load, double step_norm, bool restart)
+uz_status uz_iterate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
+                            double step_norm, bool restart, uz_error *err)
 {
     uz_history_row row = {.iteration = it->iteration, .step_norm = step_norm, .restart = restart};
     double norm2;
@@ -130,13 +131,6 @@ static uz_history_row describe(uz_iterate *it, uz_dual_load *load, double step_n
     row.contacts = it->law->kind->active(it->law, NULL, it->r, it->m);
     row.error_bound = it->best_bound;
     row.seconds = uz_seconds() - it->started;
-    return row;
-}
-
-uz_status uz_iterate_record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
-                            double step_norm, bool restart, uz_error *err)
-{
-    uz_history_row row = describe(it, load, step_norm, restart);
     uz_status status = uz_history_append(history, &row, err);
     if (status == UZ_OK && options->hooks && options->hooks->progress)
         options->hooks->progress(options->hooks->ctx, &row);

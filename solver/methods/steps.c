@@ -9,12 +9,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Bounds cost about one iteration; a check at every sixteenth of the way adds 6 % and overshoots by 6 %. */
-static void plan_next_check(uz_iterate *it)
-{
-    it->next_check = it->iteration + (it->iteration < 16 ? 1 : it->iteration / 16);
-}
-
 /* step_norm is in the units of the problem's own rows, r in those of the scaled ones. */
 static bool stalled(const uz_iterate *it, const uz_dual_load *load, double step_norm)
 {
@@ -76,19 +70,6 @@ static uz_status look_along(bool *found, uz_iterate *it, uz_dual_load *load, uz_
     return wanted ? try_ray(found, it, load, err) : UZ_OK;
 }
 
-/* The bound of a run's last answer is out of turn: a run that goes on from there as if it had not ended must not know
- * it. */
-static void set_aside(uz_iterate *it)
-{
-    uz_best *before = &it->before;
-    before->kept = true;
-    before->bound = it->best_bound;
-    before->relative = it->best_relative;
-    before->iteration = it->best_iteration;
-    before->made_by = it->made_by;
-    memcpy(before->r, it->best_r, (size_t)it->m * sizeof *it->r);
-}
-
 /* Where D r is carried along the bound is with the one that an apply gives, and the run goes on with its own. */
 static uz_status bound_last(uz_iterate *it, uz_dual_load *load, uz_method method, uz_error *err)
 {
@@ -108,7 +89,15 @@ static uz_status bound_last(uz_iterate *it, uz_dual_load *load, uz_method method
 static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                         uz_error *err)
 {
-    set_aside(it);
+    /* The bound of a run's last answer is out of turn: a run that goes on from there as if it had not ended must not
+     * know it. */
+    uz_best *before = &it->before;
+    before->kept = true;
+    before->bound = it->best_bound;
+    before->relative = it->best_relative;
+    before->iteration = it->best_iteration;
+    before->made_by = it->made_by;
+    memcpy(before->r, it->best_r, (size_t)it->m * sizeof *it->r);
     if (options->stopping == UZ_STOP_PAPER)
         it->best_bound = INFINITY;
     uz_status status = bound_last(it, load, options->method, err);
@@ -187,7 +176,8 @@ static uz_status check(uz_iterate *it, uz_dual_load *load, const uz_method_optio
     if (status != UZ_OK || !due)
         return status;
     status = uz_iterate_bound(it, load, options->method, err);
-    plan_next_check(it);
+    /* Bounds cost about one iteration; a check at every sixteenth of the way adds 6 % and overshoots by 6 %. */
+    it->next_check = it->iteration + (it->iteration < 16 ? 1 : it->iteration / 16);
     return status;
 }
 
