@@ -39,8 +39,9 @@ static uz_status make_evaluation(uz_evaluation **out, const uz_scene *scene, uz_
     return UZ_OK;
 }
 
-/* Force, area and peak of the contact: the obstacle pushes along its normal by -r. */
-static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_law *law)
+/* Force, area and peak of the contact: the obstacle pushes a row's node along its normal by -push (m, uz_row_forces).
+ */
+static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_law *law, const double *push)
 {
     uz_summary *summary = &result->summary;
     const uz_mesh_info *mesh = &result->mesh;
@@ -49,7 +50,7 @@ static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_law *
     for (int64_t i = 0; i < result->m; i++) {
         const int64_t node = mesh->contact_node[i];
         for (int axis = 0; axis < mesh->dim; axis++)
-            summary->force[axis] -= result->r[i] * mesh->contact_normal[i * mesh->dim + axis];
+            summary->force[axis] -= push[i] * mesh->contact_normal[i * mesh->dim + axis];
         if (law->kind->active(law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];
         if (!(result->pressure[i] > summary->max_pressure))
@@ -73,7 +74,12 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
     if (status != UZ_OK)
         return status;
-    evaluate_contact(result, result->evaluation, model->law);
+    double *push = uz_alloc(result->m, sizeof *push);
+    if (!push)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)result->m);
+    uz_row_forces(push, model, result->r);
+    evaluate_contact(result, result->evaluation, model->law, push);
+    free(push);
     status = uz_find_doubts(result->evaluation, model, scene, result->u, result->r, err);
     if (status != UZ_OK)
         return status;

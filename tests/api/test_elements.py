@@ -51,6 +51,8 @@ def test_every_output_of_a_ball_pressed_in(s):
         answer = expect(s.get(f"/v1/jobs/{job['id']}/result?fields={FIELDS}"), 200).json
         check(abs(sum(answer["reactions"]) + 36) < 0.5 and max(answer["pressure"]) > 6, element, answer["summary"])
         check(all(r <= 0 for r in answer["reactions"]) and min(answer["pressure"]) >= 0, element)
+        force = answer["summary"]["contact"]["force"]
+        check(abs(force[1] - 36) < 1e-6, element, force)  # nothing else holds the block along y
         check(expect(s.get(f"/v1/jobs/{job['id']}/deformed.svg"), 200).body.startswith(b"<"), element)
         vtu = expect(s.get(f"/v1/jobs/{job['id']}/result.vtu?fields=displacements,stress"), 200).body
         if meshio and element != "wedge15":  # meshio knows its number, but not its dimension
