@@ -19,7 +19,7 @@ static void delayed_free(void *ctx)
 
 static bool is_over(delayed_reply *d)
 {
-    return d->ready(d) || http_now() >= d->until || atomic_load(&d->rq->server->draining);
+    return d->ready(d) || http_now() >= d->until || atomic_load(&d->server->draining);
 }
 
 /* ---- without a thread */
@@ -69,6 +69,7 @@ static void delayed_answer(void *ctx)
 
 bool reply_delay(http_request *rq, delayed_reply *d, const char *id)
 {
+    d->server = rq->server;
     d->rq = rq;
     d->listener = feed_listen(rq->server->options.feed, id);
     if (!d->listener)

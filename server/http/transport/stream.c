@@ -13,7 +13,7 @@ static void stream_free(void *ctx)
 {
     event_stream *s = ctx;
     feed_unlisten(s->listener);
-    atomic_fetch_sub(&s->rq->server->streams, 1);
+    atomic_fetch_sub(&s->server->streams, 1);
     free(s->text);
     free(s);
 }
@@ -61,7 +61,7 @@ static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
             }
             return (ptrdiff_t)n;
         }
-        if (s->ended || atomic_load(&s->rq->server->draining))
+        if (s->ended || atomic_load(&s->server->draining))
             return REPLY_STREAM_ENDS;
         if (request_client_gone(s->rq) || !s->look(s))
             return REPLY_STREAM_BREAKS;
@@ -80,7 +80,7 @@ static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
         /* Until there may be something to tell; what comes in quick succession is told together. */
         double due = s->spoke + HEARTBEAT_S - http_now(), pause = s->told + s->every_s - http_now();
         if (feed_wait(s->listener, s->rq->fd, fmax(due, 0.001)))
-            for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->rq->server->draining);
+            for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->server->draining);
                  pause = s->told + s->every_s - http_now())
                 feed_wait(s->listener, s->rq->fd, pause);
     }
@@ -96,7 +96,7 @@ static double stream_due(void *ctx, bool told)
     const event_stream *s = ctx;
     if (!told)
         return s->spoke + HEARTBEAT_S;
-    return atomic_load(&s->rq->server->draining) ? 0.0 : s->told + s->every_s;
+    return atomic_load(&s->server->draining) ? 0.0 : s->told + s->every_s;
 }
 
 /* ---- the reply */
@@ -119,6 +119,7 @@ void stream_reply(http_request *rq, event_stream *s, const char *id, http_reply 
                      most);
         return;
     }
+    s->server = server;
     s->rq = rq;
     s->spoke = http_now();
     s->listener = feed_listen(server->options.feed, id);

@@ -202,7 +202,8 @@ typedef struct event_stream {
     double every_s; /* at least so long between two looks that found something; 0: none */
     bool ended;
     /* Private to stream.c. */
-    const http_request *rq; /* lives as long as the reply */
+    transport *server;
+    const http_request *rq; /* gone before the stream is freed */
     listener *listener;
     bool held;  /* a read without anything to tell returns */
     char *text; /* what is being sent */
@@ -230,7 +231,8 @@ typedef struct delayed_reply {
     void (*free)(struct delayed_reply *d);
     double until; /* on http_now's clock: then it is made in any case */
     /* Private to delayed.c. */
-    http_request *rq;
+    transport *server;
+    http_request *rq; /* gone before the reply is freed */
     listener *listener;
     char *message;
     size_t len, at;
