@@ -228,11 +228,6 @@ void *uz_item_object(const uz_item *item)
     return item->object;
 }
 
-const char *uz_item_digest(const uz_item *item)
-{
-    return item->digest;
-}
-
 void uz_table_visit(uz_cache *cache, uz_item_kind kind,
                     void (*visit)(const void *object, const char *digest, int64_t hits, size_t bytes, void *ctx),
                     void *ctx)

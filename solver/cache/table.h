@@ -27,7 +27,6 @@ void uz_table_release(uz_cache *cache, uz_item *item);
 uz_item *uz_table_search(uz_cache *cache, uz_item_kind kind, bool (*fits)(const void *object, void *ctx), void *ctx);
 
 void *uz_item_object(const uz_item *item); /* NULL until it is published */
-const char *uz_item_digest(const uz_item *item);
 
 /* Calls visit for each published object of the kind, most recently used first, under the mutex. */
 void uz_table_visit(uz_cache *cache, uz_item_kind kind,

@@ -38,12 +38,6 @@ static double measure_ray(bool *rounded, const double *y, const uz_csc *N, const
     return residual > 0.0 ? proven / residual : INFINITY;
 }
 
-double uz_ray_radius(const double *y, const uz_csc *N, const double *h)
-{
-    bool rounded;
-    return measure_ray(&rounded, y, N, h);
-}
-
 bool uz_ray_proves(double *radius, const double *y, const uz_csc *N, const double *h, double length)
 {
     bool rounded;
