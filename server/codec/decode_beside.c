@@ -107,6 +107,7 @@ void decode_settings(uz_settings *out, const json_value *object)
     uz_operator_parse(&s.op, text_or(object, "operator", "auto"));
     uz_ordering_parse(&s.ordering, text_or(object, "ordering", "auto"));
     uz_stopping_parse(&s.stopping, text_or(object, "stopping", "certified"));
+    uz_row_scaling_parse(&s.row_scaling, text_or(object, "row_scaling", "auto"));
     set_level(&s, s.stopping == UZ_STOP_PAPER ? "quick" : "precise");
     if (json_is(accuracy, JSON_IS_OBJECT))
         s.relative_error = decode_number(accuracy, "relative_error", s.relative_error);

@@ -226,6 +226,7 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     text_member_integer(&t, "iterations", summary->iterations);
     text_member_integer(&t, "restarts", summary->restarts);
     text_member_integer(&t, "refinements", summary->refinements);
+    text_member_string(&t, "row_scaling", uz_row_scaling_name(summary->row_scaling));
     if (run->started_from)
         text_member_string(&t, "started_from", run->started_from);
     if (run->cases)

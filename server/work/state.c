@@ -65,7 +65,7 @@ double *state_pack(const uz_state *state, int64_t *count)
                                        state->step_norm,
                                        state->best_bound,
                                        state->best_relative,
-                                       0.0};
+                                       state->as_given ? 1.0 : 0.0};
     memcpy(x, all, sizeof all);
     list_vectors(&s, vectors);
     for (int k = 0; k < STATE_VECTORS; k++)
@@ -96,6 +96,7 @@ static bool take_numbers(uz_state *s, const double *x)
     s->step_norm = x[12];
     s->best_bound = x[13];
     s->best_relative = x[14];
+    s->as_given = x[15] == 1.0;
     return ok;
 }
 

@@ -8,23 +8,37 @@
 #include "core/lock.h"
 #include "dual/lanczos.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* By 2^-k with 2^k nearest to the norm of the row (in the ratio's sense), 1 for a row of zeros. */
+/* By 2^-k with 2^k nearest to the norm of the row (in the ratio's sense), 1 for a row of zeros, which weighs nothing.
+ */
 static uz_status scale_rows(uz_dual *dual, uz_error *err)
 {
     uz_csc *N = &dual->N;
+    double least = INFINITY, most = 0.0;
     dual->row_scale = uz_alloc_zero(N->rows, sizeof(double));
-    if (!dual->row_scale)
+    dual->row_weight = uz_alloc_zero(N->rows, sizeof(double));
+    if (!dual->row_scale || !dual->row_weight)
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows", (long long)N->rows);
     for (int64_t k = 0; k < N->ptr[N->cols]; k++)
         dual->row_scale[N->idx[k]] = hypot(dual->row_scale[N->idx[k]], N->val[k]);
     for (int64_t i = 0; i < N->rows; i++) {
         int exponent;
         double share = frexp(dual->row_scale[i], &exponent);
-        dual->row_scale[i] = share > 0.0 ? ldexp(1.0, share < M_SQRT1_2 ? 1 - exponent : -exponent) : 1.0;
+        double scale = share > 0.0 ? ldexp(1.0, share < M_SQRT1_2 ? 1 - exponent : -exponent) : 1.0;
+        dual->row_scale[i] = scale;
+        least = share > 0.0 ? fmin(least, scale) : least;
+        most = share > 0.0 ? fmax(most, scale) : most;
+    }
+    dual->row_unit = isinf(least) ? 1.0 : least;
+    for (int64_t i = 0; i < N->rows; i++)
+        dual->row_weight[i] = fmin(1.0, fmax(UZ_LEAST_WEIGHT, dual->row_unit / dual->row_scale[i]));
+    if (!(least < most)) {
+        free(dual->row_weight);
+        dual->row_weight = NULL;
     }
     for (int64_t k = 0; k < N->ptr[N->cols]; k++)
         N->val[k] *= dual->row_scale[N->idx[k]];
@@ -53,7 +67,7 @@ uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_h
     if (dual->lazy) {
         pthread_mutex_init(&dual->lazy->making, NULL);
         pthread_mutex_init(&dual->lazy->known, NULL);
-        dual->lazy->lambda_max = NAN;
+        dual->lazy->lambda_max[0] = dual->lazy->lambda_max[1] = NAN;
     } else {
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the dual operator");
     }
@@ -82,6 +96,7 @@ void uz_dual_free(uz_dual *dual)
     uz_csc_clear(&dual->N);
     uz_csc_clear(&dual->Nt);
     free(dual->row_scale);
+    free(dual->row_weight);
     if (dual->lazy) {
         pthread_mutex_destroy(&dual->lazy->making);
         pthread_mutex_destroy(&dual->lazy->known);
@@ -90,12 +105,18 @@ void uz_dual_free(uz_dual *dual)
     free(dual);
 }
 
-double uz_dual_known_lambda_max(const uz_dual *dual)
+double uz_dual_known_lambda_max(const uz_dual *dual, bool weighted)
 {
     pthread_mutex_lock(&dual->lazy->known);
-    double value = dual->lazy->lambda_max;
+    double value = dual->lazy->lambda_max[weighted && dual->row_weight];
     pthread_mutex_unlock(&dual->lazy->known);
     return value;
+}
+
+double uz_dual_lambda_max_as_given(const uz_dual *dual)
+{
+    const double value = uz_dual_known_lambda_max(dual, true) / dual->row_unit / dual->row_unit;
+    return value >= DBL_MIN && value <= DBL_MAX ? value : NAN;
 }
 
 uz_status uz_dual_load_begin(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *h, uz_error *err)
@@ -153,18 +174,32 @@ uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_s
     return form->aim && !isnan(relative_error) ? form->aim(load, relative_error, err) : UZ_OK;
 }
 
+typedef struct {
+    uz_dual_load *load;
+    const double *weight; /* m; NULL: all 1 */
+    double *weighted;     /* m: room, with a weight */
+} lanczos_operator;
+
+/* y = W D W x */
 static uz_status apply_for_lanczos(void *ctx, double *y, const double *x, uz_error *err)
 {
-    const uz_dual_load *load = ctx;
-    if (uz_stop_is_due(&load->stop))
+    const lanczos_operator *op = ctx;
+    if (uz_stop_is_due(&op->load->stop))
         return UZ_ERR_CANCELLED;
-    return uz_dual_load_apply(ctx, y, x, err);
+    for (int64_t i = 0; op->weight && i < op->load->dual->m; i++)
+        op->weighted[i] = op->weight[i] * x[i];
+    uz_status status = uz_dual_load_apply(op->load, y, op->weight ? op->weighted : x, err);
+    for (int64_t i = 0; op->weight && i < op->load->dual->m; i++)
+        y[i] *= op->weight[i];
+    return status;
 }
+
+static uz_status find_lambda_max(double *lambda_max, uz_dual_load *load, bool weighted, uz_error *err);
 
 /* alpha = 1 / lambda_max must not be too long a step; 1e-4 too short costs nothing. */
 #define LAMBDA_TOLERANCE 1e-4
 
-uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, uz_error *err)
+uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weighted, uz_error *err)
 {
     uz_dual_lazy *lazy = load->dual->lazy;
     const uz_dual_form *form = load->dual->form;
@@ -175,24 +210,37 @@ uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, uz_error 
         status = form->prepare(load, err);
     if (status != UZ_OK || !lambda_max || !uz_lock_while(&lazy->making, &load->stop))
         return status;
-    if (isnan(lazy->lambda_max)) {
-        if (form->probe)
-            form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
-        status = uz_lanczos_max(lambda_max, load->dual->m, apply_for_lanczos, load, LAMBDA_TOLERANCE, err);
-        if (form->probe)
-            form->probe(load, false, 0.0);
+    double *known = &lazy->lambda_max[weighted && load->dual->row_weight];
+    if (isnan(*known)) {
+        status = find_lambda_max(lambda_max, load, weighted, err);
         if (status != UZ_OK || uz_stop_is_due(&load->stop)) {
             *lambda_max = 0.0; /* applications may have been cut short */
         } else {
             pthread_mutex_lock(&lazy->known); /* kept for the body's other runs */
-            lazy->lambda_max = *lambda_max;
+            *known = *lambda_max;
             pthread_mutex_unlock(&lazy->known);
         }
     } else {
-        *lambda_max = lazy->lambda_max;
+        *lambda_max = *known;
     }
     pthread_mutex_unlock(&lazy->making);
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
+}
+
+static uz_status find_lambda_max(double *lambda_max, uz_dual_load *load, bool weighted, uz_error *err)
+{
+    const uz_dual *dual = load->dual;
+    const uz_dual_form *form = dual->form;
+    lanczos_operator op = {.load = load, .weight = weighted ? dual->row_weight : NULL};
+    if (op.weight && !(op.weighted = uz_alloc(dual->m, sizeof *op.weighted)))
+        return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a vector of %lld contacts", (long long)dual->m);
+    if (form->probe)
+        form->probe(load, true, 0.1 * LAMBDA_TOLERANCE);
+    uz_status status = uz_lanczos_max(lambda_max, dual->m, apply_for_lanczos, &op, LAMBDA_TOLERANCE, err);
+    if (form->probe)
+        form->probe(load, false, 0.0);
+    free(op.weighted);
+    return status;
 }
 
 /* psi(r) = psi0 + r'g0 - 1/2 r'Dr, and psi(r) = -1/2 ||u(r)||_K^2 + r'h. */

@@ -21,19 +21,25 @@
  * rounding of D. */
 #define UZ_DEPENDENT_ROW 1e-13
 
+/* Rows smaller than this part of the largest have weights that their squares can hold. */
+#define UZ_LEAST_WEIGHT 0x1p-500
+
 typedef struct uz_dual_form uz_dual_form; /* form.h */
 
 typedef struct {
     const uz_dual_form *form;
     const uz_dual_abilities *can; /* the form's */
     int64_t d, m;
-    size_t bytes;            /* beside K, N and the factor, with what is made on demand */
-    bool rows_may_depend;    /* solve_active may fail because rows depend on each other; false where it can't, or where
-                              * rows that join one by one would cost an inexact solve each */
-    uz_csc N, Nt;            /* m x d, its rows scaled, and d x m */
-    const uz_csc *touched;   /* N, or N without columns of zeros, its columns in another order: for ||N'x|| */
-    double *row_scale;       /* m: the powers of two by which rows of N and h were multiplied: a gap here is scale x the
-                              * caller's, a caller's reaction is scale x the one here */
+    size_t bytes;          /* beside K, N and the factor, with what is made on demand */
+    bool rows_may_depend;  /* solve_active may fail because rows depend on each other; false where it can't, or where
+                            * rows that join one by one would cost an inexact solve each */
+    uz_csc N, Nt;          /* m x d, its rows scaled, and d x m */
+    const uz_csc *touched; /* N, or N without columns of zeros, its columns in another order: for ||N'x|| */
+    double *row_scale;     /* m: the powers of two by which rows of N and h were multiplied: a gap here is scale x the
+                            * caller's, a caller's reaction is scale x the one here */
+    double row_unit;       /* the least of them: that of the caller's largest row */
+    double *row_weight;    /* m: row_unit / row_scale, at least UZ_LEAST_WEIGHT: (W D W) row_unit^-2 is the operator of
+                            * the caller's rows. NULL: all 1, as the rows are scaled alike */
     const uz_factor *factor; /* the caller's, or NULL */
     const uz_amg *amg;       /* the caller's, or NULL */
     struct uz_dual_lazy *lazy;
@@ -64,7 +70,9 @@ typedef struct {
 uz_status uz_dual_create(uz_dual **out, const uz_dual_source *source, const uz_hooks *hooks, uz_error *err);
 void uz_dual_free(uz_dual *dual);
 /* The value of uz_dual_load_prepare if somebody asked for it, else NaN. */
-double uz_dual_known_lambda_max(const uz_dual *dual);
+double uz_dual_known_lambda_max(const uz_dual *dual, bool weighted);
+/* Of the caller's rows, else NaN; NaN also where it is out of range. */
+double uz_dual_lambda_max_as_given(const uz_dual *dual);
 
 /* K (lower triangle) is borrowed for the life of the load, p and h are only read. */
 uz_status uz_dual_load_create(uz_dual_load **out, const uz_dual *dual, const uz_csc *K, const double *p,
@@ -81,8 +89,9 @@ void uz_dual_load_free(uz_dual_load *load);
 uz_status uz_dual_load_aim(uz_dual_load *load, double relative_error, const uz_stop *stop, uz_error *err);
 
 /* Makes what only many applications of D pay for, once per body: a dense D. lambda_max (may be NULL: not wanted): of D,
- * Lanczos value plus its residual bound; 0 when m = 0 or D = 0. Overwrites what the last apply left. */
-uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, uz_error *err);
+ * or, weighted, of W D W with the row_weight; Lanczos value plus its residual bound; 0 when m = 0 or D = 0. Overwrites
+ * what the last apply left. */
+uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weighted, uz_error *err);
 
 /* Dr = D r (m). */
 uz_status uz_dual_load_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);

@@ -21,7 +21,7 @@
  * under either. Order: making, known. */
 typedef struct uz_dual_lazy {
     pthread_mutex_t making, known;
-    double lambda_max; /* NaN until known */
+    double lambda_max[2]; /* of D and of W D W, which is [0], too, without weights; NaN until known */
 } uz_dual_lazy;
 
 typedef struct {

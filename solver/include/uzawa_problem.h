@@ -47,16 +47,24 @@ typedef enum {
 typedef enum { UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED, UZ_OPERATOR_FACTORED, UZ_OPERATOR_MATRIX_FREE } uz_operator;
 typedef enum { UZ_ORDERING_AUTO, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, UZ_ORDERING_METIS } uz_ordering;
 typedef enum { UZ_STOP_CERTIFIED, UZ_STOP_PAPER } uz_stopping;
+/* The rows of N that steps on the reactions are taken on. */
+typedef enum {
+    UZ_ROW_SCALING_AUTO, /* NONE for the methods of the paper by name, with its stopping rule and with an alpha, else
+                            UNIT */
+    UZ_ROW_SCALING_NONE, /* as they are given */
+    UZ_ROW_SCALING_UNIT  /* each multiplied, with its h, by the power of two that makes its norm about 1 */
+} uz_row_scaling;
 
 typedef struct {
     uz_method method;
     uz_operator op;
     uz_ordering ordering;
     uz_stopping stopping;
-    double relative_error;  /* certified: ||u - u*||_K / ||u||_K (uz_certificate) asked for, in (0, 1]; 0: rounding */
-    bool balanced;          /* scenes: relative_error is a tenth of the estimated discretization error instead */
-    double epsilon;         /* UZ_STOP_PAPER: stop when ||rho - r|| <= epsilon, a force */
-    double alpha;           /* step size; 0: 1 / lambda_max(D) */
+    double relative_error; /* certified: ||u - u*||_K / ||u||_K (uz_certificate) asked for, in (0, 1]; 0: rounding */
+    bool balanced;         /* scenes: relative_error is a tenth of the estimated discretization error instead */
+    double epsilon;        /* UZ_STOP_PAPER: stop when ||rho - r|| <= epsilon, a force */
+    uz_row_scaling row_scaling;
+    double alpha;           /* step size, of the rows that row_scaling leaves; 0: 1 / lambda_max(D) */
     int64_t max_iterations; /* >= 0 */
     double time_limit_s;    /* of the whole solve; INFINITY: none */
     bool semidefinite;      /* matrices: K is meant to be singular, its eigenvalues within rounding of 0 being 0 */
@@ -70,10 +78,12 @@ const char *uz_method_name(uz_method);
 const char *uz_operator_name(uz_operator);
 const char *uz_ordering_name(uz_ordering);
 const char *uz_stopping_name(uz_stopping);
+const char *uz_row_scaling_name(uz_row_scaling);
 bool uz_method_parse(uz_method *out, const char *name);
 bool uz_operator_parse(uz_operator *out, const char *name);
 bool uz_ordering_parse(uz_ordering *out, const char *name);
 bool uz_stopping_parse(uz_stopping *out, const char *name);
+bool uz_row_scaling_parse(uz_row_scaling *out, const char *name);
 
 #ifdef __cplusplus
 }

@@ -161,10 +161,12 @@ typedef struct {
     int64_t added;       /* those of them that the first round had left out */
     int64_t rounds;      /* bodies that were solved: 1 unless a row that was left out turned out to matter */
     double reaction_sum, max_penetration;
-    int dim;                     /* scene: 2 or 3, else 0 */
-    double force[3];             /* scene: force of the body on the obstacle's normal side, sum of -r n */
-    double max_pressure;         /* scene: the largest of the result's pressure; NaN otherwise */
-    double alpha, lambda_max;    /* NaN where no gradient step was taken */
+    int dim;                    /* scene: 2 or 3, else 0 */
+    double force[3];            /* scene: force of the body on the obstacle's normal side, sum of -r n */
+    double max_pressure;        /* scene: the largest of the result's pressure; NaN otherwise */
+    uz_row_scaling row_scaling; /* NONE, also where scaling all rows alike changed nothing, or UNIT */
+    double alpha;               /* step size, of the rows that row_scaling says; NaN where no gradient step was taken */
+    double lambda_max;          /* of N K^-1 N' with the caller's rows; NaN where no gradient step needed it */
     double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
     double total_error;       /* cells chosen here: sqrt(discretization_error^2 + the certificate's relative_error^2) */
     double infeasible_radius; /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
@@ -193,8 +195,9 @@ typedef struct {
     double *rho;                         /* m or NULL: everything else below means something only beside it */
     double *Dr, *Drho, *best_r, *anchor; /* m */
     double alpha, tau;                   /* alpha 0: not chosen yet */
-    double step_norm;                    /* of the last iteration, as in the history; NaN: no step was taken */
-    double best_bound, best_relative;    /* of best_r; INFINITY: nothing was bounded yet */
+    bool as_given;                    /* alpha is of the rows as the caller wrote them; false: scaled to a norm of 1 */
+    double step_norm;                 /* of the last iteration, as in the history; NaN: no step was taken */
+    double best_bound, best_relative; /* of best_r; INFINITY: nothing was bounded yet */
     int64_t iteration, restarts, next_check, best_iteration;
     int64_t phase_end; /* iteration at which the phase ends; private to the methods, as is */
     int32_t phase;     /* of `auto` */

@@ -20,12 +20,14 @@ static bool admissible(const uz_law *law, const double *r, int64_t n)
     return true;
 }
 
-static double residual(const uz_law *law, const double *r, const double *g, double step, const double *scale, int64_t n)
+static double residual(const uz_law *law, const double *r, const double *g, const double *step, const double *scale,
+                       int64_t n)
 {
     double square = 0.0;
     (void)law;
     for (int64_t i = 0; i < n; i++) {
-        const double change = r[i] - uz_reaction_cut(r[i] + step * g[i]), scaled = scale ? scale[i] * change : change;
+        const double change = r[i] - uz_reaction_cut(r[i] + step[i] * g[i]),
+                     scaled = scale ? scale[i] * change : change;
         square += scaled * scaled;
     }
     return sqrt(square);
@@ -64,11 +66,11 @@ static int64_t active(const uz_law *law, bool *in, const double *r, int64_t n)
     return count;
 }
 
-static void predict(const uz_law *law, bool *in, const double *r, const double *g, double step, int64_t n)
+static void predict(const uz_law *law, bool *in, const double *r, const double *g, const double *step, int64_t n)
 {
     (void)law;
     for (int64_t i = 0; i < n; i++)
-        in[i] = uz_reaction_presses(r[i] + step * g[i]);
+        in[i] = uz_reaction_presses(r[i] + step[i] * g[i]);
 }
 
 static int64_t refute(const uz_law *law, bool *wrong, const bool *guess, const double *r, const double *g, int64_t n)

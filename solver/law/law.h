@@ -28,8 +28,9 @@ typedef struct {
     void (*project)(const uz_law *law, double *r, int64_t n);
     /* Is r in C? Without tolerance. */
     bool (*admissible)(const uz_law *law, const double *r, int64_t n);
-    /* The norm of r - P(r + step g), each row times its scale (NULL: 1): 0 for solutions, and only there. */
-    double (*residual)(const uz_law *law, const double *r, const double *g, double step, const double *scale,
+    /* The norm of r - P(r + step g), step (n) > 0 and the same for all rows of a contact, each row times its scale
+     * (NULL: 1): 0 for solutions, and only there. */
+    double (*residual)(const uz_law *law, const double *r, const double *g, const double *step, const double *scale,
                        int64_t n);
     /* What r and g add to the duality gap: the largest g's over s in C, less g'r. At least 0 for r in C, INFINITY
      * where g is no gap that the law allows. */
@@ -39,7 +40,7 @@ typedef struct {
     /* Rows whose contact transmits a force: how many; in (n; NULL: not wanted): which. */
     int64_t (*active)(const uz_law *law, bool *in, const double *r, int64_t n);
     /* Rows that still do after a projected step from r: the prediction of the primal-dual active set. */
-    void (*predict)(const uz_law *law, bool *in, const double *r, const double *g, double step, int64_t n);
+    void (*predict)(const uz_law *law, bool *in, const double *r, const double *g, const double *step, int64_t n);
 
     /* one_sided only, else NULL: */
     /* Rows of a solution for a guess of the active rows that refute it: active ones that pull, others that penetrate.

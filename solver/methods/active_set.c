@@ -70,7 +70,7 @@ static void guess(pivoting *p, const uz_iterate *it, uz_dual_load *load)
     for (int64_t i = 0; i < it->m; i++)
         p->g[i] = g0[i] - it->Dr[i];
     law->kind->active(law, p->active, it->r, it->m);
-    law->kind->predict(law, it->close, it->r, p->g, it->alpha, it->m);
+    law->kind->predict(law, it->close, it->r, p->g, it->step, it->m);
     law->kind->penetration(law, p->r, p->g, it->m);
     for (int64_t i = 0; i < it->m; i++)
         p->active[i] = p->active[i] ? it->close[i] : p->r[i] > 0.0;

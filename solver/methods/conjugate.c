@@ -53,41 +53,46 @@ static bool out_of_proportion(uz_iterate *it)
 {
     const double *penetration = it->r_next;
     const bool *presses = it->close;
+    const double *weight = it->weight;
     double asked = 0.0, left = 0.0;
     it->law->kind->active(it->law, it->close, it->r, it->m);
     it->law->kind->penetration(it->law, it->r_next, it->gamma, it->m);
     for (int64_t i = 0; i < it->m; i++) {
-        double g = it->gamma[i];
+        double w = weight ? weight[i] : 1.0, g = w * it->gamma[i];
         if (presses[i])
-            left += g * fmin(g, -it->r[i] / it->alpha);
+            left += g * fmin(g, w * (-it->r[i] / it->step[i]));
         else
-            asked += penetration[i] * penetration[i];
+            asked += (w * penetration[i]) * (w * penetration[i]);
     }
     return !(left > 0.0) || asked > left;
 }
 
-/* The direction (r_next): the gradient on the rows that press, made conjugate to the last step. Returns gamma'd. */
+/* The direction (r_next): the gradient on the rows that press, in the metric of their weights, made conjugate to the
+ * last step. Returns gamma'd. */
 static double make_direction(uz_iterate *it)
 {
+    const double *weight = it->weight;
     double curvature = 0.0, cross = 0.0, rise = 0.0, gradient = 0.0, *d = it->r_next;
     const bool *presses = it->close;
     it->law->kind->active(it->law, it->close, it->r, it->m);
     for (int64_t i = 0; i < it->m; i++) {
+        double w = weight ? weight[i] : 1.0, g = w * it->gamma[i];
+        d[i] = presses[i] ? w * g : 0.0;
         if (presses[i]) {
             curvature += (it->r[i] - it->rho[i]) * (it->Dr[i] - it->Drho[i]);
-            cross += it->gamma[i] * (it->Dr[i] - it->Drho[i]);
-            gradient += it->gamma[i] * it->gamma[i];
+            cross += d[i] * (it->Dr[i] - it->Drho[i]);
+            gradient += g * g;
         }
     }
     double beta = curvature > 0.0 ? -cross / curvature : 0.0;
     for (int64_t i = 0; i < it->m; i++) {
-        d[i] = presses[i] ? it->gamma[i] + beta * (it->r[i] - it->rho[i]) : 0.0;
+        d[i] += presses[i] ? beta * (it->r[i] - it->rho[i]) : 0.0;
         rise += it->gamma[i] * d[i];
     }
     if (rise > RISE * gradient)
         return rise;
     for (int64_t i = 0; i < it->m; i++)
-        d[i] = presses[i] ? it->gamma[i] : 0.0;
+        d[i] = !presses[i] ? 0.0 : weight ? weight[i] * weight[i] * it->gamma[i] : it->gamma[i];
     return gradient;
 }
 
@@ -101,8 +106,9 @@ static double best_length(double *bound, uz_iterate *it, double rise)
     it->law->kind->reach(it->law, reach, it->r, d, it->m);
     *bound = INFINITY;
     for (int64_t i = 0; i < it->m; i++) {
+        const double part = it->weight ? d[i] / it->weight[i] : d[i];
         curvature += d[i] * Dd[i];
-        square += d[i] * d[i];
+        square += part * part;
         if (reach[i] < *bound)
             *bound = reach[i];
     }
@@ -168,7 +174,7 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
 {
     bool plain = memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
     for (int64_t i = 0; i < it->m; i++)
-        it->r_next[i] = it->rho[i] + (plain ? it->alpha * it->gamma[i] : 0.0);
+        it->r_next[i] = it->rho[i] + (plain ? it->step[i] * it->gamma[i] : 0.0);
     it->law->kind->project(it->law, it->r_next, it->m);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     if (status != UZ_OK)
@@ -187,7 +193,7 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
 static double remaining(uz_iterate *it, const uz_dual_load *load)
 {
     make_gaps(it, load);
-    return it->law->kind->residual(it->law, it->r, it->gamma, it->alpha, load->dual->row_scale, it->m);
+    return it->law->kind->residual(it->law, it->r, it->gamma, it->step, load->dual->row_scale, it->m);
 }
 
 /* *step_norm: ||r - P(r + alpha g)|| at the new r, in the caller's forces: the paper's ||rho - r|| where rho is r.

@@ -14,7 +14,7 @@ static double project(uz_iterate *it, const uz_dual_load *load)
     double square = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
         it->gamma[i] = g0[i] - it->Drho[i];
-        it->r_next[i] = it->rho[i] + it->alpha * it->gamma[i];
+        it->r_next[i] = it->rho[i] + it->step[i] * it->gamma[i];
     }
     it->law->kind->project(it->law, it->r_next, it->m);
     for (int64_t i = 0; i < it->m; i++) {
@@ -67,8 +67,14 @@ static const uz_steps plain = {.step = step}, accelerated = {.step = step, .mome
                       restarted = {.step = step, .momentum = true, .restarts = true};
 
 const uz_method_kind uz_method_uzawa = {
-    .method = UZ_METHOD_UZAWA, .name = "uzawa", .run = uz_steps_run, .steps = &plain};
-const uz_method_kind uz_method_accelerated = {
-    .method = UZ_METHOD_ACCELERATED, .name = "accelerated", .run = uz_steps_run, .steps = &accelerated};
-const uz_method_kind uz_method_accelerated_restart = {
-    .method = UZ_METHOD_ACCELERATED_RESTART, .name = "accelerated_restart", .run = uz_steps_run, .steps = &restarted};
+    .method = UZ_METHOD_UZAWA, .name = "uzawa", .as_given = true, .run = uz_steps_run, .steps = &plain};
+const uz_method_kind uz_method_accelerated = {.method = UZ_METHOD_ACCELERATED,
+                                              .name = "accelerated",
+                                              .as_given = true,
+                                              .run = uz_steps_run,
+                                              .steps = &accelerated};
+const uz_method_kind uz_method_accelerated_restart = {.method = UZ_METHOD_ACCELERATED_RESTART,
+                                                      .name = "accelerated_restart",
+                                                      .as_given = true,
+                                                      .run = uz_steps_run,
+                                                      .steps = &restarted};

@@ -7,15 +7,18 @@
 #include "core/hooks.h"
 #include "methods/milestones.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, int64_t m, double alpha, uz_error *err)
+uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, const uz_dual *dual, bool as_given, double alpha,
+                          uz_error *err)
 {
+    const int64_t m = dual->m;
     memset(it, 0, sizeof *it);
-    double **vectors[] = {&it->r,     &it->Dr,     &it->r_next, &it->Dr_next, &it->rho,     &it->Drho,
-                          &it->gamma, &it->best_r, &it->anchor, &it->ray,     &it->before.r};
+    double **vectors[] = {&it->r,     &it->Dr,     &it->r_next, &it->Dr_next, &it->rho,      &it->Drho,
+                          &it->gamma, &it->best_r, &it->anchor, &it->ray,     &it->before.r, &it->step};
     bool ok = true;
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++) {
         *vectors[k] = uz_alloc_zero(m, sizeof(double));
@@ -28,7 +31,10 @@ uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, int64_t m, double a
     }
     it->law = law;
     it->m = m;
-    it->alpha = alpha;
+    it->weight = as_given ? dual->row_weight : NULL;
+    it->unit = as_given || !dual->row_weight ? dual->row_unit : 1.0;
+    /* the norm of the largest row may have a square that is out of range */
+    uz_iterate_set_alpha(it, alpha > 0.0 ? fmin(DBL_MAX, fmax(DBL_MIN, alpha / it->unit / it->unit)) : 0.0);
     it->tau = 1.0;
     it->best_bound = INFINITY;
     it->best_relative = INFINITY;
@@ -38,12 +44,24 @@ uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, int64_t m, double a
 
 void uz_iterate_clear(uz_iterate *it)
 {
-    double *vectors[] = {it->r,     it->Dr,     it->r_next, it->Dr_next, it->rho,     it->Drho,
-                         it->gamma, it->best_r, it->anchor, it->ray,     it->before.r};
+    double *vectors[] = {it->r,     it->Dr,     it->r_next, it->Dr_next, it->rho,      it->Drho,
+                         it->gamma, it->best_r, it->anchor, it->ray,     it->before.r, it->step};
     for (size_t k = 0; k < sizeof vectors / sizeof vectors[0]; k++)
         free(vectors[k]);
     free(it->close);
     memset(it, 0, sizeof *it);
+}
+
+void uz_iterate_set_alpha(uz_iterate *it, double alpha)
+{
+    it->alpha = alpha;
+    for (int64_t i = 0; i < it->m; i++)
+        it->step[i] = it->weight ? alpha * (it->weight[i] * it->weight[i]) : alpha;
+}
+
+double uz_iterate_alpha(const uz_iterate *it)
+{
+    return it->alpha > 0.0 ? fmin(DBL_MAX, fmax(DBL_MIN, it->alpha * it->unit * it->unit)) : 0.0;
 }
 
 /* Rows that a projected step would keep in contact are closed, so that the complementarity term of the bound vanishes
@@ -55,7 +73,7 @@ uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_
     double bound, psi, norm2;
     for (int64_t i = 0; i < it->m; i++)
         it->gamma[i] = g0[i] - it->Dr[i];
-    it->law->kind->predict(it->law, it->close, it->r, it->gamma, it->alpha, it->m);
+    it->law->kind->predict(it->law, it->close, it->r, it->gamma, it->step, it->m);
     uz_status status = uz_dual_load_correct(load, &bound, it->best_bound, it->r, it->gamma, it->close, err);
     if (status != UZ_OK || !(bound < it->best_bound))
         return status;
@@ -183,20 +201,20 @@ void uz_iterate_swap(double **a, double **b)
     *b = t;
 }
 
-/* s'Ds <= s's / alpha for s = r(k+1) - rho? */
+/* s'Ds <= s'W^-2 s / alpha for s = r(k+1) - rho? */
 bool uz_iterate_shorten(uz_iterate *it)
 {
     double curvature = 0.0, square = 0.0, size = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
-        double s = it->r_next[i] - it->rho[i];
+        double s = it->r_next[i] - it->rho[i], w = it->weight ? it->weight[i] : 1.0;
         curvature += s * (it->Dr_next[i] - it->Drho[i]);
-        square += s * s;
-        size += it->r_next[i] * it->r_next[i];
+        square += (s / w) * (s / w);
+        size += (it->r_next[i] / w) * (it->r_next[i] / w);
     }
     bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
     if (noise || !(it->alpha * curvature > square * (1.0 + 1e-6))) /* nor where it is NaN: no step size follows */
         return false;
-    it->alpha = 0.9 * square / curvature;
+    uz_iterate_set_alpha(it, 0.9 * square / curvature);
     memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
     memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     it->tau = 1.0;

@@ -17,8 +17,11 @@ typedef struct {
 struct uz_iterate {
     const uz_law *law;
     int64_t m, iteration, restarts, next_check;
-    double alpha, tau;
-    double *r, *Dr; /* r(k), which the law allows, and D r(k) */
+    double alpha, tau;    /* alpha: of the step, written by uz_iterate_set_alpha only */
+    double *step;         /* m: alpha, each row's times the square of its weight */
+    const double *weight; /* m: the dual operator's row_weight, borrowed; NULL: all 1, rows of unit norm about */
+    double unit;          /* alpha unit^2 is that of the rows that weights stand for */
+    double *r, *Dr;       /* r(k), which the law allows, and D r(k) */
     double *r_next, *Dr_next;
     double *rho, *Drho;   /* extrapolated point; of `conjugate` see conjugate.c */
     double *gamma;        /* gap at rho, or at r while a bound is computed */
@@ -44,8 +47,14 @@ struct uz_iterate {
     uz_best before; /* what was best before the last answer of a run that ended was bounded out of turn */
 };
 
-/* law: borrowed. alpha 0: chosen when the first gradient step needs it. */
-uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, int64_t m, double alpha, uz_error *err);
+/* law, dual: borrowed. as_given: steps are those that the caller's rows would take without scaling, else those of rows
+ * scaled to a norm of about 1; the same where they are scaled alike. alpha (0: chosen when the first gradient step
+ * needs it): of these rows, the caller's where all are scaled alike. */
+uz_status uz_iterate_init(uz_iterate *it, const uz_law *law, const uz_dual *dual, bool as_given, double alpha,
+                          uz_error *err);
+void uz_iterate_set_alpha(uz_iterate *it, double alpha);
+/* alpha as the caller knows it, 0: not chosen yet; cut where the square of the rows' size is out of range. */
+double uz_iterate_alpha(const uz_iterate *it);
 void uz_iterate_clear(uz_iterate *it);
 
 /* Takes over where a run stood, or the reactions of a warm start, before a method first runs. What the

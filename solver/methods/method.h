@@ -57,6 +57,7 @@ typedef struct {
     uz_method method;
     const char *name; /* as in the HTTP interface */
     bool one_sided;   /* needs a law that is (law.h); refused with another */
+    bool as_given;    /* by itself it steps on the caller's rows without scaling: the published methods */
     bool exact;       /* wants D applied without inner iterations; auto looks for another method elsewhere */
     uz_method_runner *run;
     const uz_steps *steps; /* of uz_steps_run, else NULL */

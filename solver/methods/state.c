@@ -8,6 +8,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -97,9 +98,11 @@ static void take_vectors(uz_iterate *it, const uz_state *s, const double *scale)
     times_scale(it->Drho, s->Drho, scale, it->m);
 }
 
-static void take_numbers(uz_iterate *it, const uz_state *s)
+static void take_numbers(uz_iterate *it, const uz_state *s, const uz_dual *dual)
 {
-    it->alpha = s->alpha;
+    /* of a state whose steps were those of other rows, it is no step size */
+    if (s->alpha > 0.0 && s->as_given == (it->weight || !dual->row_weight))
+        uz_iterate_set_alpha(it, fmin(DBL_MAX, fmax(DBL_MIN, s->alpha / it->unit / it->unit)));
     it->tau = s->tau;
     it->step_norm = s->step_norm;
     it->iteration = s->iteration;
@@ -127,7 +130,7 @@ static uz_status bound_best_again(bool *same, uz_iterate *it, uz_dual_load *load
 static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
 {
     take_vectors(it, s, load->dual->row_scale);
-    take_numbers(it, s);
+    take_numbers(it, s, load->dual);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
     *same = status == UZ_OK && alike(it->Dr, it->Dr_next, it->m);
     if (*same)
@@ -152,7 +155,7 @@ static void take_reactions(uz_iterate *it, const uz_state *s, const double *scal
         it->warm = true;
     memset(it->anchor, 0, (size_t)it->m * sizeof *it->anchor);
     memset(it->best_r, 0, (size_t)it->m * sizeof *it->best_r);
-    it->alpha = alpha;
+    uz_iterate_set_alpha(it, alpha);
     it->tau = 1.0;
     it->step_norm = NAN;
     it->best_bound = it->best_relative = INFINITY;
@@ -193,11 +196,12 @@ static void give_vectors(uz_state *s, const uz_iterate *it, const double *scale)
     to_scaled_forces(s->Drho, it->Drho, scale, it->m);
 }
 
-static void give_numbers(uz_state *s, const uz_iterate *it)
+static void give_numbers(uz_state *s, const uz_iterate *it, const uz_dual *dual)
 {
     const uz_best *before = &it->before;
     s->m = it->m;
-    s->alpha = it->alpha;
+    s->alpha = uz_iterate_alpha(it);
+    s->as_given = it->weight || !dual->row_weight;
     s->tau = it->tau;
     s->step_norm = it->step_norm;
     s->iteration = it->iteration;
@@ -221,7 +225,7 @@ uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_l
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
     }
     give_vectors(s, it, load->dual->row_scale);
-    give_numbers(s, it);
+    give_numbers(s, it, load->dual);
     s->method = method;
     *out = s;
     return UZ_OK;

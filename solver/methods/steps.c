@@ -151,9 +151,9 @@ static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_optio
             return UZ_OK;
     }
     if (status == UZ_OK)
-        status = uz_dual_load_prepare(load, it->alpha > 0.0 ? NULL : &lambda, err);
+        status = uz_dual_load_prepare(load, it->alpha > 0.0 ? NULL : &lambda, it->weight != NULL, err);
     if (status == UZ_OK && it->alpha <= 0.0 && (lambda > 0.0 || !uz_stop_is_due(&stop)))
-        it->alpha = lambda > 0.0 ? 1.0 / lambda : 1.0;
+        uz_iterate_set_alpha(it, lambda > 0.0 ? 1.0 / lambda : 1.0);
     if (status == UZ_OK && !it->begun)
         return uz_iterate_begin(it, load, options, history, err);
     if (status == UZ_OK)

@@ -33,6 +33,7 @@ void uz_report_setup(uz_run *run)
     uz_factor_info factor = describe_factor(setup);
     summary->discretization_error = NAN;
     summary->max_pressure = NAN;
+    summary->row_scaling = UZ_ROW_SCALING_NONE;
     summary->d = run->result->d = run->d;
     summary->m = run->result->m = run->all;
     summary->kept = run->m;
@@ -178,8 +179,10 @@ uz_status uz_report_run(uz_run *run, uz_error *err)
     summary->origin = it->origin;
     summary->iterations = it->iteration;
     summary->restarts = it->restarts;
-    summary->alpha = it->alpha > 0.0 ? it->alpha : NAN;
-    summary->lambda_max = uz_dual_known_lambda_max(asked->setup->dual);
+    summary->row_scaling = it->weight || !asked->setup->dual->row_weight ? UZ_ROW_SCALING_NONE : UZ_ROW_SCALING_UNIT;
+    const double alpha = uz_iterate_alpha(it);
+    summary->alpha = alpha > DBL_MIN && alpha < DBL_MAX ? alpha : NAN;
+    summary->lambda_max = uz_dual_lambda_max_as_given(asked->setup->dual);
     uz_status status = UZ_OK;
     if (!result->ray)
         status = uz_iterate_state(&state, it, run->work.dual, asked->settings->method, err);

@@ -104,6 +104,15 @@ static void tell_begin(const uz_request *asked)
         asked->hooks->begins(asked->hooks->ctx, asked->index);
 }
 
+/* Steps that others published, an alpha and a rule that were told belong to the rows as the caller wrote them. */
+static bool takes_rows_as_given(const uz_settings *settings)
+{
+    const uz_method_kind *method = uz_method_kind_of(settings->method);
+    if (settings->row_scaling != UZ_ROW_SCALING_AUTO)
+        return settings->row_scaling == UZ_ROW_SCALING_NONE;
+    return settings->alpha > 0.0 || settings->stopping == UZ_STOP_PAPER || (method && method->as_given);
+}
+
 uz_status uz_run_start(uz_run *run, uz_error *err)
 {
     const uz_request *asked = run->asked;
@@ -116,7 +125,8 @@ uz_status uz_run_start(uz_run *run, uz_error *err)
     if (status == UZ_OK)
         status = uz_answer_allocate(&run->answer, run->d, run->m, err);
     if (status == UZ_OK)
-        status = uz_iterate_init(&work->it, uz_setup_law(asked->setup), run->m, asked->settings->alpha, err);
+        status = uz_iterate_init(&work->it, uz_setup_law(asked->setup), asked->setup->dual,
+                                 takes_rows_as_given(asked->settings), asked->settings->alpha, err);
     /* bounds of iterations are relative to another norm where supports move the body */
     work->it.milestones = run->load.moved ? NULL : &work->milestones;
     uz_milestones_resume(&work->milestones, uz_run_time(run));

@@ -22,6 +22,11 @@ static const char *const STOPPINGS[] = {
     [UZ_STOP_CERTIFIED] = "certified",
     [UZ_STOP_PAPER] = "paper",
 };
+static const char *const ROW_SCALINGS[] = {
+    [UZ_ROW_SCALING_AUTO] = "auto",
+    [UZ_ROW_SCALING_NONE] = "none",
+    [UZ_ROW_SCALING_UNIT] = "unit",
+};
 static const char *const OUTCOMES[] = {
     [UZ_CONVERGED] = "converged",       [UZ_ITERATION_LIMIT] = "iteration_limit",
     [UZ_TIME_LIMIT] = "time_limit",     [UZ_PRECISION_LIMIT] = "precision_limit",
@@ -61,6 +66,11 @@ const char *uz_stopping_name(uz_stopping value)
     return name_at(STOPPINGS, COUNT(STOPPINGS), (unsigned)value);
 }
 
+const char *uz_row_scaling_name(uz_row_scaling value)
+{
+    return name_at(ROW_SCALINGS, COUNT(ROW_SCALINGS), (unsigned)value);
+}
+
 const char *uz_outcome_name(uz_outcome value)
 {
     return name_at(OUTCOMES, COUNT(OUTCOMES), (unsigned)value);
@@ -87,6 +97,14 @@ bool uz_stopping_parse(uz_stopping *out, const char *name)
     int found = find_name(STOPPINGS, COUNT(STOPPINGS), name);
     if (found >= 0)
         *out = (uz_stopping)found;
+    return found >= 0;
+}
+
+bool uz_row_scaling_parse(uz_row_scaling *out, const char *name)
+{
+    int found = find_name(ROW_SCALINGS, COUNT(ROW_SCALINGS), name);
+    if (found >= 0)
+        *out = (uz_row_scaling)found;
     return found >= 0;
 }
 
@@ -118,8 +136,10 @@ uz_status uz_check_settings(const uz_settings *s, uz_error *err)
     if (s->max_iterations < 0 || !(s->time_limit_s >= 0.0))
         return uz_fail(err, UZ_ERR_ARGUMENT, "", "max_iterations and time_limit_s must not be negative");
     if (s->method >= UZ_METHOD_GIVEN || !is_known(uz_method_name(s->method)) || !is_known(uz_operator_name(s->op)) ||
-        !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "method, operator, ordering or stopping is not one of the known ones");
+        !is_known(uz_ordering_name(s->ordering)) || !is_known(uz_stopping_name(s->stopping)) ||
+        !is_known(uz_row_scaling_name(s->row_scaling)))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "",
+                       "method, operator, ordering, stopping or row_scaling is not one of the known ones");
     return UZ_OK;
 }
 

@@ -238,5 +238,27 @@ def test_matrix_market_edge_cases_as_vectors(s):
                 check(reply.json["pointer"] == f"/problem/{member}", name, member, reply)
 
 
+# ---------------------------------------------------------------- requests that were answered wrongly
+
+def test_alpha_belongs_to_the_rows_as_given(s):
+    """The paper's body with N times 4 and alpha = 1 / lambda_max of that N; then without alpha, and on unit rows."""
+    request = json.loads((folder("core") / "alpha_rowscale_4.json").read_text())
+    alpha = request["solver"]["alpha"]
+    for more, scaling in (({}, "none"), ({"alpha": None}, "none"), ({"row_scaling": "unit"}, "none")):
+        solver = {key: value for key, value in {**request["solver"], **more}.items() if value is not None}
+        got = s.solve({**request, "solver": solver})["summary"]
+        check(got["iterations"] == 283 and got["restarts"] == 2 and got["row_scaling"] == scaling, more, got)
+        check(abs(got["alpha"] / alpha - 1) < 1e-4, more, got)
+        check("alpha" in solver or abs(got["alpha"] * got["lambda_max"] - 1) < 1e-12, more, got)
+    rows = [line.split() for line in request["problem"]["N"].splitlines()[2:]]
+    mixed = "\n".join(request["problem"]["N"].splitlines()[:2] +
+                      [f"{i} {j} {float(value) * (1, 8, 0.25)[int(i) % 3]!r}" for i, j, value in rows]) + "\n"
+    request["problem"]["N"] = mixed
+    for solver, scaling in (({}, "unit"), ({"method": "conjugate"}, "unit"), ({"method": "accelerated"}, "none"),
+                            ({"stopping": "paper"}, "none"), ({"method": "uzawa", "row_scaling": "unit"}, "unit")):
+        got = s.solve({**request, "solver": solver})["summary"]
+        check(got["row_scaling"] == scaling, solver, got)
+
+
 if __name__ == "__main__":
     service.main(globals())

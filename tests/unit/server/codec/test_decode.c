@@ -98,12 +98,15 @@ TEST(settings)
 {
     uz_settings s = settings_of("{}"), d = uz_settings_default();
     CHECK(s.method == UZ_METHOD_AUTO && s.op == UZ_OPERATOR_AUTO && s.ordering == UZ_ORDERING_AUTO);
-    CHECK(s.stopping == UZ_STOP_CERTIFIED && s.relative_error == 1e-8 && !s.balanced && s.alpha == 0);
+    CHECK(s.stopping == UZ_STOP_CERTIFIED && s.relative_error == 1e-8 && !s.balanced && s.alpha == 0 &&
+          s.row_scaling == UZ_ROW_SCALING_AUTO);
     CHECK(s.max_iterations == d.max_iterations && isinf(s.time_limit_s));
-    s = settings_of("{\"method\":\"accelerated\",\"operator\":\"condensed\",\"ordering\":\"amd\",\"alpha\":2.5,"
+    s = settings_of("{\"method\":\"accelerated\",\"operator\":\"condensed\",\"ordering\":\"amd\",\"alpha\":2.5,\"row_"
+                    "scaling\":\"unit\","
                     "\"max_iterations\":1000000000,\"time_limit_s\":0.5,\"accuracy\":{\"relative_error\":1e-4}}");
     CHECK(s.method == UZ_METHOD_ACCELERATED && s.op == UZ_OPERATOR_CONDENSED && s.ordering == UZ_ORDERING_AMD);
-    CHECK(s.alpha == 2.5 && s.max_iterations == 1000000000 && s.time_limit_s == 0.5 && s.relative_error == 1e-4);
+    CHECK(s.alpha == 2.5 && s.row_scaling == UZ_ROW_SCALING_UNIT && s.max_iterations == 1000000000 &&
+          s.time_limit_s == 0.5 && s.relative_error == 1e-4);
     s = settings_of("{\"stopping\":\"paper\"}");
     CHECK(s.stopping == UZ_STOP_PAPER && s.epsilon == 1e-6 && s.relative_error == 1e-2);
     s = settings_of("{\"stopping\":\"paper\",\"epsilon\":1e-9,\"accuracy\":\"precise\"}");

@@ -124,6 +124,7 @@ static uz_summary paper_summary(void)
 {
     uz_summary s = {.outcome = UZ_CONVERGED,
                     .method = UZ_METHOD_ACCELERATED_RESTART,
+                    .row_scaling = UZ_ROW_SCALING_UNIT,
                     .op = UZ_OPERATOR_CONDENSED,
                     .ordering = UZ_ORDERING_CAMD,
                     .d = 660,

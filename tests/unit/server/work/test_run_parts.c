@@ -21,6 +21,7 @@ static uz_state full_state(double vectors[6][M])
                       .best_r = vectors[4],
                       .anchor = vectors[5],
                       .alpha = 1.0 / 3.0,
+                      .as_given = true,
                       .tau = 2.5,
                       .step_norm = NAN,
                       .best_bound = INFINITY,
@@ -47,7 +48,7 @@ TEST(states_come_back_bit_for_bit)
         const double *back[6] = {t->r, t->rho, t->Dr, t->Drho, t->best_r, t->anchor};
         for (int k = 0; k < 6; k++)
             CHECK(memcmp(back[k], vectors[k], sizeof vectors[k]) == 0);
-        CHECK(t->alpha == s.alpha && t->tau == s.tau && isnan(t->step_norm) && isinf(t->best_bound) &&
+        CHECK(t->alpha == s.alpha && t->as_given && t->tau == s.tau && isnan(t->step_norm) && isinf(t->best_bound) &&
               t->best_relative == s.best_relative);
         CHECK(t->iteration == s.iteration && t->restarts == 2 && t->next_check == 3 && t->best_iteration == 4);
         CHECK(t->phase == 1 && t->phase_end == 5 && t->method == s.method && t->made_by == s.made_by);

@@ -89,8 +89,8 @@ static void compare(const uz_qp *qp)
         close[i] = r[i] < 0;
     }
     check_close(any.load->g0, last.load->g0, m, 1e-12, "g0");
-    CHECK(uz_dual_load_prepare(last.load, &lambda[0], &err) == UZ_OK);
-    CHECK(uz_dual_load_prepare(any.load, &lambda[1], &err) == UZ_OK);
+    CHECK(uz_dual_load_prepare(last.load, &lambda[0], false, &err) == UZ_OK);
+    CHECK(uz_dual_load_prepare(any.load, &lambda[1], false, &err) == UZ_OK);
     CHECK_REL(lambda[1], lambda[0], 1e-6);
     CHECK(uz_dual_load_apply(last.load, Dr, r, &err) == UZ_OK && uz_dual_load_apply(any.load, other, r, &err) == UZ_OK);
     check_close(other, Dr, m, 1e-12, "D r");

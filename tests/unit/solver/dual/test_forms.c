@@ -103,8 +103,8 @@ static void check_operator(subject *s, subject *first, const double *x, const do
     }
     int64_t applied = s->load->applications;
     double lambda = NAN;
-    CHECK_INT(uz_dual_load_prepare(s->load, &lambda, &err), UZ_OK);
-    CHECK(lambda > 0 && s->load->applications > applied && uz_dual_known_lambda_max(s->dual) == lambda);
+    CHECK_INT(uz_dual_load_prepare(s->load, &lambda, false, &err), UZ_OK);
+    CHECK(lambda > 0 && s->load->applications > applied && uz_dual_known_lambda_max(s->dual, false) == lambda);
     CHECK_MSG(dot(x, Dx, m) <= lambda * dot(x, x, m) * (1 + s->tolerance), "%s: lambda_max",
               uz_operator_name(s->can->op));
     CHECK_INT(uz_dual_load_apply(s->load, other, x, &err), UZ_OK); /* by what was prepared */
@@ -172,7 +172,7 @@ static void check_active(subject *s, bool bounds)
     for (int64_t i = 0; i < m; i++)
         count += active[i];
     CHECK(count > 1 && count < m);
-    CHECK_INT(uz_dual_load_prepare(s->load, NULL, &err), UZ_OK);
+    CHECK_INT(uz_dual_load_prepare(s->load, NULL, false, &err), UZ_OK);
     CHECK_INT(uz_dual_load_solve_active(s->load, &end, r, g, active, &err), UZ_OK);
     CHECK(end == UZ_ACTIVE_SOLVED || (end == UZ_ACTIVE_UNSOLVED && !bounds && !s->can->cheap_steps));
     if (end == UZ_ACTIVE_SOLVED) {

@@ -159,6 +159,174 @@ static double *probe_operator(const probe *p)
     return D;
 }
 
+typedef struct {
+    int64_t iterations, restarts;
+} step_count;
+
+/* Algorithm 2 as it is printed (tau and rho as in its box), on the rows that D and g0 belong to. */
+static step_count plain_algorithm_2(const double *D, const double *g0, int64_t m, double alpha, double epsilon)
+{
+    double *r = vector(m), *rho = vector(m), *next = vector(m), *gap = vector(m), tau = 1, change = INFINITY;
+    step_count count = {0, 0};
+    for (; change > epsilon && count.iterations < 20000; count.iterations++) {
+        double square = 0, ascent = 0, grown = 0.5 * (1 + sqrt(1 + 4 * tau * tau));
+        for (int64_t i = 0; i < m; i++) {
+            gap[i] = g0[i];
+            for (int64_t j = 0; j < m; j++)
+                gap[i] -= D[i + j * m] * rho[j];
+            next[i] = fmin(0, rho[i] + alpha * gap[i]);
+            square += (rho[i] - next[i]) * (rho[i] - next[i]);
+            ascent += gap[i] * (next[i] - r[i]);
+        }
+        for (int64_t i = 0; i < m; i++) {
+            rho[i] = next[i] + (ascent < 0 ? 0 : (tau - 1) / grown) * (next[i] - r[i]);
+            r[i] = next[i];
+        }
+        tau = ascent < 0 ? 1 : grown;
+        count.restarts += ascent < 0;
+        change = sqrt(square);
+    }
+    free(r);
+    free(rho);
+    free(next);
+    free(gap);
+    return count;
+}
+
+/* Rows of N and h times factor[i % 4]. */
+static void scale_rows(uz_qp *qp, const double *factor)
+{
+    for (int64_t k = 0; k < qp->N.ptr[qp->N.cols]; k++)
+        qp->N.val[k] *= factor[qp->N.idx[k] % 4];
+    for (int64_t i = 0; i < qp->N.rows; i++)
+        qp->h[i] *= factor[i % 4];
+}
+
+static double largest_eigenvalue(const double *D, int64_t m)
+{
+    double *x = vector(m), *y = vector(m), value = 0;
+    for (int64_t i = 0; i < m; i++)
+        x[i] = 1 + (double)i / (double)m;
+    for (int step = 0; step < 3000; step++) {
+        double norm = 0;
+        for (int64_t i = 0; i < m; i++) {
+            y[i] = 0;
+            for (int64_t j = 0; j < m; j++)
+                y[i] += D[i + j * m] * x[j];
+            norm += y[i] * y[i];
+        }
+        value = sqrt(norm);
+        for (int64_t i = 0; i < m; i++)
+            x[i] = y[i] / value;
+    }
+    free(x);
+    free(y);
+    return value;
+}
+
+/* alpha and lambda_max belong to the rows as the caller wrote them, and so do the steps: where all are larger or
+ * smaller by a factor the counts stay those of the table; where they are mixed the counts are those of the algorithm
+ * itself. */
+TEST(steps_are_those_of_the_rows_as_given)
+{
+    static const double factors[][4] = {{1, 1, 1, 1},         {4, 4, 4, 4},   {1e-3, 1e-3, 1e-3, 1e-3},
+                                        {1e3, 1e3, 1e3, 1e3}, {1, 4, 0.5, 2}, {3, 1, 0.7, 1.5}};
+    for (size_t k = 0; k < sizeof factors / sizeof factors[0]; k++) {
+        const double *factor = factors[k], c = factor[0];
+        const bool alike = factor[1] == c && factor[2] == c && factor[3] == c;
+        probe p = make_probe(30, 10);
+        const int64_t m = p.qp.N.rows;
+        scale_rows(&p.qp, factor);
+        double *D = probe_operator(&p), *u = vector(p.qp.K.cols), *g0 = vector(m), lambda = largest_eigenvalue(D, m);
+        memcpy(u, p.qp.p, (size_t)p.qp.K.cols * sizeof *u);
+        probe_solve(&p, u);
+        memcpy(g0, p.qp.h, (size_t)m * sizeof *g0);
+        uz_csc_gaxpy(g0, &p.qp.N, -1, u);
+        for (int given = 0; given < 2; given++) {
+            const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = p.qp};
+            uz_settings settings = paper_settings(UZ_METHOD_ACCELERATED_RESTART, given ? 0.75 / lambda : 0);
+            settings.epsilon = 1e-6 / c;
+            uz_result *result = solve_problem(&problem, &settings);
+            if (!result)
+                continue;
+            const uz_summary *s = &result->summary;
+            const step_count plain = plain_algorithm_2(D, g0, m, s->alpha, settings.epsilon);
+            CHECK_MSG(s->iterations == plain.iterations, "rows times %g, %g, ..: %lld iterations, the algorithm %lld",
+                      c, factor[1], (long long)s->iterations, (long long)plain.iterations);
+            CHECK_INT(s->restarts, plain.restarts);
+            CHECK_INT(s->row_scaling, UZ_ROW_SCALING_NONE);
+            if (!given) {
+                CHECK_REL(s->lambda_max, lambda, 2e-4);
+                CHECK_REL(s->alpha * s->lambda_max, 1.0, 1e-12);
+            } else {
+                CHECK(s->alpha == settings.alpha);
+            }
+            if (alike && !given) {
+                CHECK_INT(s->iterations, 283);
+                CHECK_REL(s->lambda_max, c * c * bodies[0].lambda_max, 5e-4);
+            }
+            uz_result_free(result);
+        }
+        free(D);
+        free(u);
+        free(g0);
+        free_probe(&p);
+    }
+}
+
+/* What is scaled to unit rows takes the steps of unit rows, whatever powers of two they were multiplied by. */
+TEST(unit_rows_take_the_same_steps_on_mixed_ones)
+{
+    static const double factor[4] = {1, 4, 0x1p-10, 0x1p12};
+    static const uz_method methods[] = {UZ_METHOD_ACCELERATED_RESTART, UZ_METHOD_CONJUGATE};
+    for (size_t k = 0; k < 2; k++) {
+        probe p = make_probe(30, 10);
+        const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = p.qp};
+        uz_settings settings = uz_settings_default();
+        settings.method = methods[k];
+        uz_result *as_is = solve_problem(&problem, &settings);
+        scale_rows(&p.qp, factor);
+        settings.row_scaling = UZ_ROW_SCALING_UNIT;
+        uz_result *mixed = solve_problem(&problem, &settings);
+        if (as_is && mixed) {
+            CHECK_INT(mixed->summary.row_scaling, UZ_ROW_SCALING_UNIT);
+            CHECK_INT(mixed->summary.outcome, UZ_CONVERGED);
+            CHECK_INT(mixed->summary.iterations, as_is->summary.iterations);
+            CHECK(mixed->summary.alpha == as_is->summary.alpha && isnan(mixed->summary.lambda_max));
+            for (int64_t j = 0; j < mixed->d; j++)
+                CHECK(mixed->u[j] == as_is->u[j]);
+        }
+        uz_result_free(mixed);
+        settings.row_scaling = UZ_ROW_SCALING_AUTO;
+        mixed = solve_problem(&problem, &settings);
+        if (mixed) /* the paper's methods by name are the paper's */
+            CHECK_INT(mixed->summary.row_scaling, k == 0 ? UZ_ROW_SCALING_NONE : UZ_ROW_SCALING_UNIT);
+        uz_result_free(mixed);
+        uz_result_free(as_is);
+        free_probe(&p);
+    }
+}
+
+/* Rows whose norms have no squares: nothing is told that is not a number. */
+TEST(rows_of_extreme_size_have_no_step_size_to_tell)
+{
+    static const double sizes[] = {1e-200, 1e200};
+    for (int k = 0; k < 2; k++) {
+        const double factor[4] = {sizes[k], sizes[k], sizes[k], sizes[k]};
+        probe p = make_probe(30, 10);
+        const uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = p.qp};
+        scale_rows(&p.qp, factor);
+        uz_settings settings = paper_settings(UZ_METHOD_ACCELERATED_RESTART, 0);
+        settings.epsilon = 1e-6 / sizes[k];
+        uz_result *result = solve_problem(&problem, &settings);
+        if (result)
+            CHECK_MSG(isnan(result->summary.alpha) && isnan(result->summary.lambda_max), "alpha %g, lambda_max %g",
+                      result->summary.alpha, result->summary.lambda_max);
+        uz_result_free(result);
+        free_probe(&p);
+    }
+}
+
 /* 1 / the largest eigenvalue of D^-1, by power iteration with a dense factor. */
 static double smallest_eigenvalue(double *D, int64_t m)
 {

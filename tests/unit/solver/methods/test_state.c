@@ -36,7 +36,7 @@ static void check_same_state(const uz_state *x, const uz_state *y)
     CHECK(same_vector(x->Drho, y->Drho, x->m));
     CHECK(same_vector(x->best_r, y->best_r, x->m));
     CHECK(same_vector(x->anchor, y->anchor, x->m));
-    CHECK(x->alpha == y->alpha && x->tau == y->tau);
+    CHECK(x->alpha == y->alpha && x->tau == y->tau && x->as_given == y->as_given);
     CHECK(x->best_bound == y->best_bound && x->best_relative == y->best_relative);
     CHECK(x->step_norm == y->step_norm || (isnan(x->step_norm) && isnan(y->step_norm)));
     CHECK_INT(x->iteration, y->iteration);
