@@ -1,9 +1,307 @@
 /* contract.c: --junit and --baseline: what a pipeline asks about a job beyond its exit status. */
-#include "commands/baseline.h"
+#include "commands/contract.h"
 #include "show/report.h"
 
+#include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Numbers with the digits that a drift of this size changes. */
+#define NUMBER "%.9g"
+
+/* ---- single numbers */
+
+/* How far apart, relative to the larger; 0 where both are. */
+static double drift_of(double now, double then)
+{
+    const double scale = fmax(fabs(now), fabs(then));
+    return scale > 0.0 ? fabs(now - then) / scale : 0.0;
+}
+
+/* error: how far both together may be from the exact numbers; 0 where nothing is known of that. */
+static void compare_numbers(client_checks *to, const char *group, const char *name, double now, double then,
+                            double error, double tolerance)
+{
+    const double drift = drift_of(now, then), doubt = error / fmax(fabs(now), fabs(then));
+    const double least = drift - (doubt > 0.0 ? doubt : 0.0), most = drift + (doubt > 0.0 ? doubt : 0.0);
+    if (!isfinite(now) && !isfinite(then))
+        return; /* matrices have no pressure */
+    if (!isfinite(now) || !isfinite(then))
+        client_checks_add(to, CLIENT_UNCERTAIN, group, name, "%s",
+                          isfinite(now) ? "the baseline does not know it" : "this job does not know it");
+    else if (most <= tolerance)
+        client_checks_add(to, CLIENT_PASS, group, name, NUMBER ", was " NUMBER ": differs by %.2g", now, then, drift);
+    else if (least > tolerance)
+        client_checks_add(to, CLIENT_FAIL, group, name, NUMBER ", was " NUMBER ": differs by %.2g, more than %.2g", now,
+                          then, drift, tolerance);
+    else
+        client_checks_add(to, CLIENT_UNCERTAIN, group, name,
+                          NUMBER ", was " NUMBER ": the exact ones differ by %.2g to %.2g", now, then, fmax(least, 0.0),
+                          most);
+}
+
+static void compare_summaries(client_checks *to, const char *group, const json_t *now, const json_t *then,
+                              double tolerance)
+{
+    static const char *const NAMES[] = {"energy.primal", "contact.reaction_sum", "contact.max_pressure"};
+    const double gaps = client_json_number(now, "certificate.gap") + client_json_number(then, "certificate.gap");
+    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
+        compare_numbers(to, group, NAMES[i], client_json_number(now, NAMES[i]), client_json_number(then, NAMES[i]),
+                        i == 0 ? gaps : 0.0, tolerance);
+}
+
+/* ---- displacements */
+
+/* A list of numbers, or of points; how many numbers there are. */
+static size_t count_numbers(const json_t *list)
+{
+    const json_t *first = json_array_get(list, 0);
+    return json_array_size(list) * (json_is_array(first) ? json_array_size(first) : 1);
+}
+
+static double number_in(const json_t *list, size_t i)
+{
+    const size_t columns = json_array_size(json_array_get(list, 0));
+    const json_t *value =
+        columns ? json_array_get(json_array_get(list, i / columns), i % columns) : json_array_get(list, i);
+    return json_is_number(value) ? json_number_value(value) : NAN;
+}
+
+/* ||a - b|| over the larger of ||a|| and ||b||; NaN where a number is not known. */
+static double distance_of(const json_t *a, const json_t *b)
+{
+    double size_a = 0.0, size_b = 0.0, difference = 0.0;
+    const size_t n = count_numbers(a);
+    for (size_t i = 0; i < n; i++) {
+        const double x = number_in(a, i), y = number_in(b, i);
+        size_a = hypot(size_a, x);
+        size_b = hypot(size_b, y);
+        difference = hypot(difference, x - y);
+    }
+    const double size = fmax(size_a, size_b);
+    return difference > 0.0 || isnan(difference) ? difference / size : 0.0;
+}
+
+/* Where the nodes are another mesh's, what stands at them can't be compared; the words say so. NULL: it can. */
+static const char *other_mesh(const json_t *now, const json_t *then)
+{
+    const json_t *a = json_object_get(now, "displacements"), *b = json_object_get(then, "displacements");
+    const json_t *x = json_object_get(now, "nodes"), *y = json_object_get(then, "nodes");
+    if (!json_is_array(x) != !json_is_array(y))
+        return "one job is a scene and the other a problem in matrices";
+    if (count_numbers(a) != count_numbers(b) || count_numbers(x) != count_numbers(y))
+        return x ? "the meshes differ in their number of nodes" : "the problems differ in their number of unknowns";
+    return x && distance_of(x, y) > 1e-9 ? "the nodes are at other places" : NULL;
+}
+
+/* ---- what touches */
+
+/* The places of a contact, each of which touches or not: nodes of a scene, rows of matrices. */
+typedef struct {
+    bool *now, *then; /* size each */
+    size_t size;
+} touching;
+
+/* The place of row i; SIZE_MAX: it has none. */
+static size_t place_of(const json_t *result, size_t i)
+{
+    const json_t *nodes = json_object_get(result, "contact_nodes");
+    if (!json_is_array(nodes))
+        return i;
+    const double node = json_number_value(json_array_get(nodes, i)); /* written as 1e5 where that is shorter */
+    return node >= 0.0 && node < 1e15 ? (size_t)node : SIZE_MAX;
+}
+
+/* A row that a result leaves out, since it surely does not touch, is apart. */
+static void mark(bool *out, size_t size, const json_t *result)
+{
+    const json_t *reactions = json_object_get(result, "reactions");
+    for (size_t i = 0; i < json_array_size(reactions); i++) {
+        const size_t place = place_of(result, i);
+        if (place < size && json_number_value(json_array_get(reactions, i)) < 0.0)
+            out[place] = true;
+    }
+}
+
+static size_t places_of(const json_t *result)
+{
+    const size_t nodes = json_array_size(json_object_get(result, "nodes"));
+    return nodes ? nodes : json_array_size(json_object_get(result, "reactions"));
+}
+
+/* "; opened at 3, 4, 5, ..." with the places that touch in `was` and not in `is`. */
+static void list_changes(char *out, size_t size, const char *what, const touching *t, bool opened)
+{
+    enum { SHOWN = 12 };
+    size_t found = 0, used = strlen(out);
+    for (size_t i = 0; i < t->size && used < size; i++) {
+        if (t->now[i] == t->then[i] || t->now[i] == opened || found++ > SHOWN)
+            continue;
+        if (found > SHOWN)
+            used += (size_t)snprintf(out + used, size - used, ", ...");
+        else
+            used += (size_t)snprintf(out + used, size - used, "%s%s%zu", found == 1 ? what : "",
+                                     found == 1 ? " " : ", ", i);
+    }
+}
+
+static void compare_contacts(client_checks *to, const char *group, const json_t *now, const json_t *then,
+                             double tolerance)
+{
+    const bool nodes = json_is_array(json_object_get(now, "nodes"));
+    const size_t a = places_of(now), b = places_of(then);
+    touching t = {.size = a > b ? a : b};
+    t.now = calloc(t.size + 1, sizeof *t.now);
+    t.then = calloc(t.size + 1, sizeof *t.then);
+    if (!nodes && a != b) {
+        client_checks_add(to, CLIENT_FAIL, group, "contact.active set", "%zu rows can't be compared with %zu", a, b);
+    } else if (t.now && t.then) {
+        mark(t.now, t.size, now);
+        mark(t.then, t.size, then);
+        char changes[512] = "";
+        size_t changed = 0, either = 0;
+        for (size_t i = 0; i < t.size; i++) {
+            changed += t.now[i] != t.then[i];
+            either += t.now[i] || t.then[i];
+        }
+        list_changes(changes, sizeof changes, nodes ? "; opened at node" : "; opened at row", &t, true);
+        list_changes(changes, sizeof changes, nodes ? "; closed at node" : "; closed at row", &t, false);
+        const bool pass = (double)changed <= tolerance * (double)either;
+        client_checks_add(to, pass ? CLIENT_PASS : CLIENT_FAIL, group, "contact.active set",
+                          "%zu of %zu that touch have changed%s", changed, either, changes);
+    } else {
+        to->failed = true;
+    }
+    free(t.now);
+    free(t.then);
+}
+
+void client_baseline_results(client_checks *to, const char *group, const json_t *now, const json_t *then,
+                             double tolerance)
+{
+    const char *other = other_mesh(now, then), *outcome = client_json_text(then, "summary.outcome");
+    if (strcmp(outcome, "converged") != 0 && strcmp(outcome, "verified") != 0)
+        client_checks_add(to, CLIENT_UNCERTAIN, group, "baseline", "it ended with %s", outcome);
+    compare_summaries(to, group, json_object_get(now, "summary"), json_object_get(then, "summary"), tolerance);
+    if (other) {
+        client_checks_add(to, CLIENT_FAIL, group, "mesh",
+                          "%s (%zu and %zu): displacements and contacts can't be compared", other,
+                          count_numbers(json_object_get(now, "displacements")),
+                          count_numbers(json_object_get(then, "displacements")));
+        return;
+    }
+    static const char NAME[] = "displacements";
+    const json_t *a = json_object_get(now, NAME), *b = json_object_get(then, NAME);
+    const double drift = distance_of(a, b);
+    if (isnan(drift))
+        client_checks_add(to, CLIENT_UNCERTAIN, group, NAME, "they are not known");
+    else
+        client_checks_add(to, drift <= tolerance ? CLIENT_PASS : CLIENT_FAIL, group, NAME,
+                          drift <= tolerance ? "%zu numbers differ by %.2g in norm"
+                                             : "%zu numbers differ by %.2g in norm, more than %.2g",
+                          count_numbers(a), drift, tolerance);
+    compare_contacts(to, group, now, then, tolerance);
+}
+
+/* ---- fetching */
+
+static client_exit fetch_result(client_session *s, json_t **out, const char *id, const char *query, const char *name)
+{
+    client_buffer suffix = {0};
+    client_exit code = CLIENT_LOCAL;
+    *out = NULL;
+    bool ok = client_buffer_append(&suffix, query, strlen(query));
+    if (ok && name)
+        ok = client_buffer_append(&suffix, "&case=", 6) && client_http_append_escaped(&suffix, name);
+    char *path = ok ? client_job_path(s, id, suffix.data) : NULL;
+    if (path) {
+        client_request request = client_request_new(s, "GET", path);
+        code = client_ask_json(s, out, &request);
+    } else if (!ok) {
+        client_complain(s, code, "no memory");
+    }
+    free(path);
+    free(suffix.data);
+    return code;
+}
+
+/* name NULL: the jobs have no load cases. */
+static client_exit compare_one(client_session *s, client_checks *to, const char *new_id, const char *old_id,
+                               const char *name, double tolerance)
+{
+    static const char QUERY[] = "/result?fields=summary,reactions,displacements,nodes";
+    json_t *now = NULL, *then = NULL;
+    client_exit code = fetch_result(s, &now, new_id, QUERY, name);
+    if (code == CLIENT_OK)
+        code = fetch_result(s, &then, old_id, QUERY, name);
+    if (code == CLIENT_OK)
+        client_baseline_results(to, name ? name : "", now, then, tolerance);
+    json_decref(now);
+    json_decref(then);
+    return code;
+}
+
+static bool has_case(const json_t *result, const char *name)
+{
+    const json_t *one;
+    size_t i;
+    json_array_foreach(json_object_get(result, "cases"), i, one)
+    {
+        if (strcmp(client_json_text(one, "name"), name) == 0)
+            return true;
+    }
+    return false;
+}
+
+static client_exit compare_cases(client_session *s, client_checks *to, const json_t *now, const json_t *then,
+                                 double tolerance)
+{
+    client_exit code = CLIENT_OK;
+    const json_t *one;
+    size_t i;
+    json_array_foreach(json_object_get(now, "cases"), i, one)
+    {
+        const char *name = client_json_text(one, "name");
+        if (code != CLIENT_OK)
+            break;
+        if (has_case(then, name))
+            code = compare_one(s, to, client_json_text(now, "job"), client_json_text(then, "job"), name, tolerance);
+        else
+            client_checks_add(to, CLIENT_FAIL, name, "baseline", "it has no load case of this name");
+    }
+    json_array_foreach(json_object_get(then, "cases"), i, one)
+    {
+        const char *name = client_json_text(one, "name");
+        if (!has_case(now, name))
+            client_checks_add(to, CLIENT_FAIL, name, "baseline", "this job has no load case of this name");
+    }
+    return code;
+}
+
+/* Compares an ended job that has an answer with the baseline `id`, case by case where they have load cases. Fetches
+ * both results, one case at a time. Not CLIENT_OK: one could not be had, said on s->err. */
+static client_exit compare_with_baseline(client_session *s, client_checks *to, const json_t *job, const char *id,
+                                         double tolerance)
+{
+    json_t *now = NULL, *then = NULL;
+    client_exit code = fetch_result(s, &now, client_json_text(job, "id"), "/result?fields=summary", NULL);
+    if (code == CLIENT_OK)
+        code = fetch_result(s, &then, id, "/result?fields=summary", NULL);
+    const bool cases = json_object_get(now, "cases"), has_cases = json_object_get(then, "cases");
+    if (code == CLIENT_OK && cases != has_cases)
+        client_checks_add(to, CLIENT_FAIL, "", "baseline", "it has %s load cases, and this job has %s",
+                          has_cases ? "some" : "no", cases ? "some" : "none");
+    else if (code == CLIENT_OK && cases)
+        code = compare_cases(s, to, now, then, tolerance);
+    else if (code == CLIENT_OK)
+        code = compare_one(s, to, client_json_text(now, "job"), client_json_text(then, "job"), NULL, tolerance);
+    json_decref(now);
+    json_decref(then);
+    return code;
+}
+
+/* ---- the contract */
 
 #define TOLERANCE 1e-3 /* where --tolerance is not given */
 
@@ -48,7 +346,7 @@ static client_exit compare(client_session *s, client_checks *checks, const json_
     const client_options *o = s->options;
     const size_t from = checks->compared = checks->count;
     const client_exit code =
-        client_baseline_compare(s, checks, job, o->baseline, o->tolerance >= 0 ? o->tolerance : TOLERANCE);
+        compare_with_baseline(s, checks, job, o->baseline, o->tolerance >= 0 ? o->tolerance : TOLERANCE);
     if (code != CLIENT_OK)
         return code;
     if (checks->failed)

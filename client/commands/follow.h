@@ -3,7 +3,6 @@
 #define CLIENT_FOLLOW_H
 
 #include "commands/run.h"
-#include "session/watch.h"
 
 /* How long the next question may be held by the server: whole seconds within the deadline. */
 double client_hold_seconds(const client_session *s, const client_progress *progress);

@@ -1,4 +1,4 @@
-/* session.h: what every command needs: its options, the connection and where to print. */
+/* session.h: what every command needs: its options, the connection, where to print, and how a wait is interrupted. */
 #ifndef CLIENT_SESSION_H
 #define CLIENT_SESSION_H
 
@@ -6,8 +6,10 @@
 #include "local/exit_codes.h"
 #include "service/http.h"
 #include "show/junit.h"
+#include "show/progress.h"
 
 #include <jansson.h>
+#include <signal.h>
 
 typedef struct {
     const client_options *options;
@@ -36,5 +38,19 @@ char *client_job_path(client_session *s, const char *id, const char *suffix);
 client_exit client_print_json(client_session *s, const json_t *value);
 /* "uzawa: MESSAGE" on s->err, with --json {"detail": MESSAGE, "exit": code}; returns `code`. */
 client_exit client_complain(client_session *s, client_exit code, const char *message);
+
+/* ---- SIGINT and SIGWINCH as something to read, so that a wait ends or its line is drawn anew without a handler. */
+
+typedef struct {
+    client_http_watch http;
+    client_progress *progress;
+    sigset_t before;
+    bool interrupted;
+} client_watch;
+
+/* From here to client_watch_end the signals are blocked and requests of `http` look after them; `watch` and `progress`
+ * must stay where they are. A SIGINT that was ignored (a shell's background job) stays so. */
+void client_watch_begin(client_watch *watch, client_http *http, client_progress *progress);
+void client_watch_end(client_watch *watch, client_http *http);
 
 #endif

@@ -1,5 +1,5 @@
 /* Checks, JUnit reports and comparisons with a baseline. */
-#include "commands/baseline.h"
+#include "commands/contract.h"
 #include "harness.h"
 #include "show/junit.h"
 #include "show/report.h"

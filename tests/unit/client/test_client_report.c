@@ -4,7 +4,6 @@
 #include "local/files.h"
 #include "show/plot.h"
 #include "show/report.h"
-#include "show/series.h"
 
 /* ------------------------------------------------------------ CSV, drawing */
 

@@ -3,7 +3,7 @@
 #include "failing_heap.h"
 #include "harness.h"
 
-#include "commands/baseline.h"
+#include "commands/contract.h"
 #include "show/junit.h"
 
 #define ANSWER                                                                                                         \
