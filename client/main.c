@@ -67,10 +67,10 @@ static client_exit run_command(const client_options *options)
     }
     client_session session = {
         .options = options, .out = stdout, .err = stderr, .deadline = client_clock() + options->timeout_s};
-    session.http = client_http_open(options->server, message, sizeof message);
+    session.http =
+        client_http_open(options->server, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"), message, sizeof message);
     if (!session.http)
         return complain_usage(message, options->command);
-    client_http_trust(session.http, getenv("UZAWA_TOKEN"), getenv("UZAWA_CA"));
     client_exit code = RUN[options->command](&session);
     client_suites_clear(&session.suites);
     client_http_close(session.http);

@@ -22,61 +22,51 @@ __attribute__((format(printf, 2, 3))) static bool fail(parser *p, const char *fo
     return false;
 }
 
-/* Of the options of the command that was named, or of all before there is one. */
-static bool fail_unknown_option(parser *p, const char *word)
-{
-    const char *name = word + strspn(word, "-");
-    const char *near =
-        uz_option_closest(client_option_table(), p->have_command ? CLIENT_IN(p->options->command) : CLIENT_EVERYWHERE,
-                          name, strcspn(name, "="));
-    return fail(p, near ? "unknown option %s; did you mean --%s?" : "unknown option %s", word, near);
-}
-
-static bool take_option(parser *p, const uz_option *row, const char *value)
-{
-    char wants[200];
-    if (!(row->places & CLIENT_IN(p->options->command)))
-        return fail(p, "%s does not take --%s", client_command_name(p->options->command), row->name);
-    if (uz_option_set(p->options, row, value))
-        return true;
-    if (row->kind == UZ_OPTION_FLAG)
-        return fail(p, "--%s takes no value", row->name);
-    uz_option_wants(wants, sizeof wants, row);
-    return fail(p, "--%s wants %s, not \"%s\"", row->name, wants, value);
-}
-
 /* One walk finds the command, the next one (apply) takes the options as that command understands them. */
 static bool take_words(parser *p, int argc, char *const *argv, bool apply)
 {
     uz_option_walk walk = {.table = client_option_table(), .argc = argc, .argv = argv};
     bool command_seen = false;
+    char wants[200];
     for (;;) {
         walk.places = CLIENT_IN(p->options->command);
         switch (uz_option_next(&walk)) {
         case UZ_WALK_END:
             return true;
-        case UZ_WALK_UNKNOWN:
-            return fail_unknown_option(p, walk.word);
+        case UZ_WALK_UNKNOWN: {
+            /* Of the options of the command that was named, or of all before there is one. */
+            const char *name = walk.word + strspn(walk.word, "-");
+            const unsigned places = p->have_command ? walk.places : CLIENT_EVERYWHERE;
+            const char *near = uz_option_closest(walk.table, places, name, strcspn(name, "="));
+            return fail(p, near ? "unknown option %s; did you mean --%s?" : "unknown option %s", walk.word, near);
+        }
         case UZ_WALK_LACKS:
             return fail(p, "--%s wants a value", walk.row->name);
         case UZ_WALK_OPTION:
-            if (apply && !take_option(p, walk.row, walk.value))
-                return false;
-            break;
+            if (!apply)
+                break;
+            if (!(walk.row->places & walk.places))
+                return fail(p, "%s does not take --%s", client_page_of(p->options->command)->name, walk.row->name);
+            if (uz_option_set(p->options, walk.row, walk.value))
+                break;
+            if (walk.row->kind == UZ_OPTION_FLAG)
+                return fail(p, "--%s takes no value", walk.row->name);
+            uz_option_wants(wants, sizeof wants, walk.row);
+            return fail(p, "--%s wants %s, not \"%s\"", walk.row->name, wants, walk.value);
         case UZ_WALK_OPERAND:
             if (!p->have_command) {
                 p->have_command = client_command_find(&p->options->command, walk.word);
                 if (!p->have_command) {
                     const char *names[CLIENT_COMMANDS];
                     for (int i = 0; i < CLIENT_COMMANDS; i++)
-                        names[i] = client_command_name((client_command)i);
+                        names[i] = client_page_of((client_command)i)->name;
                     const int near = uz_closest(walk.word, strlen(walk.word), names, CLIENT_COMMANDS);
                     return near >= 0 ? fail(p, "unknown command \"%s\"; did you mean \"%s\"?", walk.word, names[near])
                                      : fail(p, "unknown command \"%s\"", walk.word);
                 }
             } else if (apply && command_seen) {
                 if (p->options->operand)
-                    return fail(p, "%s: one operand too many: \"%s\"", client_command_name(p->options->command),
+                    return fail(p, "%s: one operand too many: \"%s\"", client_page_of(p->options->command)->name,
                                 walk.word);
                 p->options->operand = walk.word;
             }
@@ -107,45 +97,6 @@ static bool check_operand(parser *p)
                        : fail(p, "submit wants a FILE, or --K and --p");
     if (!o->operand && o->command == CLIENT_SUBMIT && (!o->K || !o->p || !o->N != !o->h))
         return fail(p, "without a FILE submit wants --K and --p, and --N and --h both or neither");
-    return true;
-}
-
-/* At most one of the files is standard input. */
-static bool check_standard_input(parser *p)
-{
-    const client_options *o = p->options;
-    const char *files[] = {o->operand, o->K, o->N, o->h, o->p, o->mesh};
-    int count = 0;
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++)
-        count += files[i] && strcmp(files[i], "-") == 0;
-    return count < 2 || fail(p, "only one file can be \"-\", standard input");
-}
-
-static bool check_submit(parser *p)
-{
-    const client_options *o = p->options;
-    if (o->mesh && has_matrices(o))
-        return fail(p, "--mesh is of a scene, --K, --N, --h and --p of a problem in matrices: choose one");
-    return check_standard_input(p);
-}
-
-/* Options that change nothing without another. */
-static bool check_idle(parser *p)
-{
-    const client_options *o = p->options;
-    const bool stays = o->wait || o->command == CLIENT_WAIT || o->command == CLIENT_VERIFY;
-    if (o->progress && !stays)
-        return fail(p, "--progress wants --wait");
-    if ((o->junit || o->baseline) && !stays)
-        return fail(p, "%s wants --wait", o->junit ? "--junit" : "--baseline");
-    if (o->tolerance >= 0 && !o->baseline)
-        return fail(p, "--tolerance wants --baseline");
-    if (o->progress && o->quiet)
-        return fail(p, "--progress and --quiet contradict each other");
-    if (o->quiet && o->json)
-        return fail(p, "--quiet and --json contradict each other");
-    if (o->command == CLIENT_HISTORY && !o->plot && (o->width >= 0 || o->height >= 0 || o->ascii))
-        return fail(p, "--width, --height and --ascii want --plot");
     return true;
 }
 
@@ -188,7 +139,30 @@ static bool check_combination(parser *p)
         return fail(p, "refine wants --accuracy: a relative error such as 1e-8, or quick, balanced, precise, exact");
     if (o->command == CLIENT_LIST && o->tags.count > 1)
         return fail(p, "list filters by one --tag");
-    return check_idle(p) && check_submit(p) && (o->command != CLIENT_PLOT || check_plot(p));
+    /* Options that change nothing without another. */
+    const bool stays = o->wait || o->command == CLIENT_WAIT || o->command == CLIENT_VERIFY;
+    if (o->progress && !stays)
+        return fail(p, "--progress wants --wait");
+    if ((o->junit || o->baseline) && !stays)
+        return fail(p, "%s wants --wait", o->junit ? "--junit" : "--baseline");
+    if (o->tolerance >= 0 && !o->baseline)
+        return fail(p, "--tolerance wants --baseline");
+    if (o->progress && o->quiet)
+        return fail(p, "--progress and --quiet contradict each other");
+    if (o->quiet && o->json)
+        return fail(p, "--quiet and --json contradict each other");
+    if (o->command == CLIENT_HISTORY && !o->plot && (o->width >= 0 || o->height >= 0 || o->ascii))
+        return fail(p, "--width, --height and --ascii want --plot");
+    if (o->mesh && has_matrices(o))
+        return fail(p, "--mesh is of a scene, --K, --N, --h and --p of a problem in matrices: choose one");
+    /* At most one of the files is standard input. */
+    const char *files[] = {o->operand, o->K, o->N, o->h, o->p, o->mesh};
+    int count = 0;
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++)
+        count += files[i] && strcmp(files[i], "-") == 0;
+    if (count > 1)
+        return fail(p, "only one file can be \"-\", standard input");
+    return o->command != CLIENT_PLOT || check_plot(p);
 }
 
 bool client_arguments_parse(client_options *out, int argc, char *const *argv, const char *env_server, char *message,

@@ -243,11 +243,6 @@ const client_exit_line *client_exit_line_at(size_t i)
     return i < sizeof EXITS / sizeof *EXITS ? &EXITS[i] : NULL;
 }
 
-const char *client_command_name(client_command command)
-{
-    return command < CLIENT_COMMANDS ? PAGES[command].name : "";
-}
-
 bool client_command_find(client_command *out, const char *name)
 {
     for (int i = 0; i < CLIENT_COMMANDS; i++) {

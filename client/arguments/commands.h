@@ -54,7 +54,6 @@ bool client_option_is_own(const uz_option *option, client_command command);
 /* True of the options that every command that talks to the server has. */
 bool client_option_is_general(const uz_option *option);
 
-const char *client_command_name(client_command command);
 bool client_command_find(client_command *out, const char *name);
 
 /* The exit codes, "0" first; NULL past the end. */

@@ -3,17 +3,6 @@
 
 #include <string.h>
 
-/* "    submit) options='--K --N ...' ;;" */
-static void print_options(FILE *to, client_command command)
-{
-    const uz_option_table all = client_option_table();
-    fprintf(to, "    %s) options='", client_command_name(command));
-    for (size_t i = 0; i < all.count; i++)
-        if (client_option_is_own(&all.rows[i], command))
-            fprintf(to, "--%s ", all.rows[i].name);
-    fputs("' ;;\n", to);
-}
-
 /* Patterns of `case $command$previous`: what may follow an option. */
 static void print_values(FILE *to, client_command command)
 {
@@ -22,9 +11,9 @@ static void print_values(FILE *to, client_command command)
         const uz_option *o = &all.rows[i];
         if (!o->value || !client_option_is_own(o, command))
             continue;
-        fprintf(to, "    %s--%s", client_command_name(command), o->name);
+        fprintf(to, "    %s--%s", client_page_of(command)->name, o->name);
         if (o->letter)
-            fprintf(to, "|%s-%c", client_command_name(command), o->letter);
+            fprintf(to, "|%s-%c", client_page_of(command)->name, o->letter);
         if (o->choices)
             fprintf(to, ") words='%s' ;;\n", o->choices);
         else if (strcmp(o->value, "FILE") == 0)
@@ -34,20 +23,6 @@ static void print_values(FILE *to, client_command command)
         else
             fputs(") words='' ;;\n", to);
     }
-}
-
-static void print_operand(FILE *to, client_command command)
-{
-    const client_page *p = client_page_of(command);
-    if (!p->operand)
-        return;
-    fprintf(to, "    %s) ", p->name);
-    if (strcmp(p->operand, "FILE") == 0)
-        fputs("files=1 ;;\n", to);
-    else if (strcmp(p->operand, "ID") == 0)
-        fputs("words=$(_uzawa_ids) ;;\n", to);
-    else
-        fputs("words=$commands ;;\n", to);
 }
 
 void client_completion_print(FILE *to)
@@ -60,7 +35,7 @@ void client_completion_print(FILE *to)
           "    local command='' options='' words='' files='' i commands='",
           to);
     for (int i = 0; i < CLIENT_COMMANDS; i++)
-        fprintf(to, "%s%s", i ? " " : "", client_command_name((client_command)i));
+        fprintf(to, "%s%s", i ? " " : "", client_page_of((client_command)i)->name);
     fputs("'\n    COMPREPLY=()\n", to);
     /* The command is the first word that is one: bash takes a URL apart at its colons, and words at "=". */
     fputs("    if [[ $current == '=' ]]; then current=''; previous='='; fi\n"
@@ -74,14 +49,31 @@ void client_completion_print(FILE *to)
           to);
     fputs("    case $command in\n    '') options='--server --timeout --retry --help --version'; words=$commands ;;\n",
           to);
-    for (int i = 0; i < CLIENT_COMMANDS; i++)
-        print_options(to, (client_command)i);
+    for (int i = 0; i < CLIENT_COMMANDS; i++) {
+        /* "    submit) options='--K --N ...' ;;" */
+        const uz_option_table all = client_option_table();
+        fprintf(to, "    %s) options='", client_page_of((client_command)i)->name);
+        for (size_t k = 0; k < all.count; k++)
+            if (client_option_is_own(&all.rows[k], (client_command)i))
+                fprintf(to, "--%s ", all.rows[k].name);
+        fputs("' ;;\n", to);
+    }
     fputs("    esac\n    case $command$previous in\n    -s|--server|-t|--timeout|--retry) words='' ;;\n", to);
     for (int i = 0; i < CLIENT_COMMANDS; i++)
         print_values(to, (client_command)i);
     fputs("    *)  if [[ $current == -* ]]; then words=$options; else case $command in\n", to);
-    for (int i = 0; i < CLIENT_COMMANDS; i++)
-        print_operand(to, (client_command)i);
+    for (int i = 0; i < CLIENT_COMMANDS; i++) {
+        const client_page *p = client_page_of((client_command)i);
+        if (!p->operand)
+            continue;
+        fprintf(to, "    %s) ", p->name);
+        if (strcmp(p->operand, "FILE") == 0)
+            fputs("files=1 ;;\n", to);
+        else if (strcmp(p->operand, "ID") == 0)
+            fputs("words=$(_uzawa_ids) ;;\n", to);
+        else
+            fputs("words=$commands ;;\n", to);
+    }
     fputs("        esac; fi ;;\n    esac\n"
           "    if [[ $files ]]; then\n"
           "        mapfile -t COMPREPLY < <(compgen -f -- \"$current\")\n"

@@ -176,27 +176,21 @@ void client_manual_print(FILE *to)
 
 /* ------------------------------------------------------------------- JSON */
 
-static json_t *options_json(client_command command)
-{
-    json_t *options = json_array();
-    const uz_option_table all = client_option_table();
-    for (size_t i = 0; options && i < all.count; i++) {
-        const uz_option *o = &all.rows[i];
-        if (client_option_is_own(o, command))
-            json_array_append_new(
-                options, json_pack("{s:s+, s:s?, s:s}", "name", "--", o->name, "value", o->value, "about", o->about));
-    }
-    return options;
-}
-
 bool client_help_print_json(FILE *to)
 {
     json_t *commands = json_array();
     for (int i = 0; commands && i < CLIENT_COMMANDS; i++) {
         const client_page *p = client_page_of((client_command)i);
-        json_array_append_new(commands,
-                              json_pack("{s:s, s:s?, s:s, s:s, s:o}", "name", p->name, "operand", p->operand, "usage",
-                                        p->usage, "about", p->about, "options", options_json((client_command)i)));
+        const uz_option_table table = client_option_table();
+        json_t *options = json_array();
+        for (size_t k = 0; options && k < table.count; k++) {
+            const uz_option *o = &table.rows[k];
+            if (client_option_is_own(o, (client_command)i))
+                json_array_append_new(options, json_pack("{s:s+, s:s?, s:s}", "name", "--", o->name, "value", o->value,
+                                                         "about", o->about));
+        }
+        json_array_append_new(commands, json_pack("{s:s, s:s?, s:s, s:s, s:o}", "name", p->name, "operand", p->operand,
+                                                  "usage", p->usage, "about", p->about, "options", options));
     }
     json_t *all = json_pack("{s:s, s:o}", "version", CLIENT_VERSION_TEXT, "commands", commands);
     bool ok = all && json_dumpf(all, to, JSON_INDENT(2)) == 0;

@@ -12,18 +12,12 @@
 
 /* ---- single numbers */
 
-/* How far apart, relative to the larger; 0 where both are. */
-static double drift_of(double now, double then)
-{
-    const double scale = fmax(fabs(now), fabs(then));
-    return scale > 0.0 ? fabs(now - then) / scale : 0.0;
-}
-
 /* error: how far both together may be from the exact numbers; 0 where nothing is known of that. */
 static void compare_numbers(client_checks *to, const char *group, const char *name, double now, double then,
                             double error, double tolerance)
 {
-    const double drift = drift_of(now, then), doubt = error / fmax(fabs(now), fabs(then));
+    const double scale = fmax(fabs(now), fabs(then)), doubt = error / scale;
+    const double drift = scale > 0.0 ? fabs(now - then) / scale : 0.0; /* relative to the larger; 0 where both are */
     const double least = drift - (doubt > 0.0 ? doubt : 0.0), most = drift + (doubt > 0.0 ? doubt : 0.0);
     if (!isfinite(now) && !isfinite(then))
         return; /* matrices have no pressure */
@@ -39,16 +33,6 @@ static void compare_numbers(client_checks *to, const char *group, const char *na
         client_checks_add(to, CLIENT_UNCERTAIN, group, name,
                           NUMBER ", was " NUMBER ": the exact ones differ by %.2g to %.2g", now, then, fmax(least, 0.0),
                           most);
-}
-
-static void compare_summaries(client_checks *to, const char *group, const json_t *now, const json_t *then,
-                              double tolerance)
-{
-    static const char *const NAMES[] = {"energy.primal", "contact.reaction_sum", "contact.max_pressure"};
-    const double gaps = client_json_number(now, "certificate.gap") + client_json_number(then, "certificate.gap");
-    for (size_t i = 0; i < sizeof NAMES / sizeof NAMES[0]; i++)
-        compare_numbers(to, group, NAMES[i], client_json_number(now, NAMES[i]), client_json_number(then, NAMES[i]),
-                        i == 0 ? gaps : 0.0, tolerance);
 }
 
 /* ---- displacements */
@@ -103,22 +87,16 @@ typedef struct {
     size_t size;
 } touching;
 
-/* The place of row i; SIZE_MAX: it has none. */
-static size_t place_of(const json_t *result, size_t i)
-{
-    const json_t *nodes = json_object_get(result, "contact_nodes");
-    if (!json_is_array(nodes))
-        return i;
-    const double node = json_number_value(json_array_get(nodes, i)); /* written as 1e5 where that is shorter */
-    return node >= 0.0 && node < 1e15 ? (size_t)node : SIZE_MAX;
-}
-
 /* A row that a result leaves out, since it surely does not touch, is apart. */
 static void mark(bool *out, size_t size, const json_t *result)
 {
-    const json_t *reactions = json_object_get(result, "reactions");
+    const json_t *reactions = json_object_get(result, "reactions"), *nodes = json_object_get(result, "contact_nodes");
     for (size_t i = 0; i < json_array_size(reactions); i++) {
-        const size_t place = place_of(result, i);
+        size_t place = i;
+        if (json_is_array(nodes)) {
+            const double node = json_number_value(json_array_get(nodes, i)); /* written as 1e5 where that is shorter */
+            place = node >= 0.0 && node < 1e15 ? (size_t)node : SIZE_MAX;
+        }
         if (place < size && json_number_value(json_array_get(reactions, i)) < 0.0)
             out[place] = true;
     }
@@ -183,7 +161,13 @@ void client_baseline_results(client_checks *to, const char *group, const json_t 
     const char *other = other_mesh(now, then), *outcome = client_json_text(then, "summary.outcome");
     if (strcmp(outcome, "converged") != 0 && strcmp(outcome, "verified") != 0)
         client_checks_add(to, CLIENT_UNCERTAIN, group, "baseline", "it ended with %s", outcome);
-    compare_summaries(to, group, json_object_get(now, "summary"), json_object_get(then, "summary"), tolerance);
+    /* The exact energies are within the gaps of these. */
+    static const char *const NUMBERS[] = {"energy.primal", "contact.reaction_sum", "contact.max_pressure"};
+    const json_t *is = json_object_get(now, "summary"), *was = json_object_get(then, "summary");
+    const double gaps = client_json_number(is, "certificate.gap") + client_json_number(was, "certificate.gap");
+    for (size_t i = 0; i < sizeof NUMBERS / sizeof NUMBERS[0]; i++)
+        compare_numbers(to, group, NUMBERS[i], client_json_number(is, NUMBERS[i]), client_json_number(was, NUMBERS[i]),
+                        i == 0 ? gaps : 0.0, tolerance);
     if (other) {
         client_checks_add(to, CLIENT_FAIL, group, "mesh",
                           "%s (%zu and %zu): displacements and contacts can't be compared", other,
@@ -254,53 +238,6 @@ static bool has_case(const json_t *result, const char *name)
     return false;
 }
 
-static client_exit compare_cases(client_session *s, client_checks *to, const json_t *now, const json_t *then,
-                                 double tolerance)
-{
-    client_exit code = CLIENT_OK;
-    const json_t *one;
-    size_t i;
-    json_array_foreach(json_object_get(now, "cases"), i, one)
-    {
-        const char *name = client_json_text(one, "name");
-        if (code != CLIENT_OK)
-            break;
-        if (has_case(then, name))
-            code = compare_one(s, to, client_json_text(now, "job"), client_json_text(then, "job"), name, tolerance);
-        else
-            client_checks_add(to, CLIENT_FAIL, name, "baseline", "it has no load case of this name");
-    }
-    json_array_foreach(json_object_get(then, "cases"), i, one)
-    {
-        const char *name = client_json_text(one, "name");
-        if (!has_case(now, name))
-            client_checks_add(to, CLIENT_FAIL, name, "baseline", "this job has no load case of this name");
-    }
-    return code;
-}
-
-/* Compares an ended job that has an answer with the baseline `id`, case by case where they have load cases. Fetches
- * both results, one case at a time. Not CLIENT_OK: one could not be had, said on s->err. */
-static client_exit compare_with_baseline(client_session *s, client_checks *to, const json_t *job, const char *id,
-                                         double tolerance)
-{
-    json_t *now = NULL, *then = NULL;
-    client_exit code = fetch_result(s, &now, client_json_text(job, "id"), "/result?fields=summary", NULL);
-    if (code == CLIENT_OK)
-        code = fetch_result(s, &then, id, "/result?fields=summary", NULL);
-    const bool cases = json_object_get(now, "cases"), has_cases = json_object_get(then, "cases");
-    if (code == CLIENT_OK && cases != has_cases)
-        client_checks_add(to, CLIENT_FAIL, "", "baseline", "it has %s load cases, and this job has %s",
-                          has_cases ? "some" : "no", cases ? "some" : "none");
-    else if (code == CLIENT_OK && cases)
-        code = compare_cases(s, to, now, then, tolerance);
-    else if (code == CLIENT_OK)
-        code = compare_one(s, to, client_json_text(now, "job"), client_json_text(then, "job"), NULL, tolerance);
-    json_decref(now);
-    json_decref(then);
-    return code;
-}
-
 /* ---- the contract */
 
 #define TOLERANCE 1e-3 /* where --tolerance is not given */
@@ -329,24 +266,45 @@ static client_exit add_cases(client_session *s, client_checks *to, const json_t 
     return code;
 }
 
-/* "scene.json young=2e5": what was sent, and which of several jobs. NULL: no memory. */
-static char *suite_name(const client_session *s, const json_t *job, const char *label)
-{
-    char *name = NULL;
-    const client_options *o = s->options;
-    const bool of_file = o->command == CLIENT_SUBMIT || o->command == CLIENT_VERIFY;
-    const char *file = of_file && o->operand && strcmp(o->operand, "-") != 0 ? o->operand : NULL;
-    const char *slash = file ? strrchr(file, '/') : NULL;
-    const char *base = slash ? slash + 1 : file ? file : client_json_text(job, "id");
-    return asprintf(&name, "%s%s%s", base, label ? " " : "", label ? label : "") < 0 ? NULL : name;
-}
-
+/* An ended job that has an answer with the baseline, case by case where they have load cases. Fetches both results, one
+ * case at a time. Not CLIENT_OK: one could not be had, said on s->err, or something differs. */
 static client_exit compare(client_session *s, client_checks *checks, const json_t *job)
 {
     const client_options *o = s->options;
     const size_t from = checks->compared = checks->count;
-    const client_exit code =
-        compare_with_baseline(s, checks, job, o->baseline, o->tolerance >= 0 ? o->tolerance : TOLERANCE);
+    const double tolerance = o->tolerance >= 0 ? o->tolerance : TOLERANCE;
+    json_t *now = NULL, *then = NULL, *one;
+    size_t i;
+    client_exit code = fetch_result(s, &now, client_json_text(job, "id"), "/result?fields=summary", NULL);
+    if (code == CLIENT_OK)
+        code = fetch_result(s, &then, o->baseline, "/result?fields=summary", NULL);
+    const char *now_id = client_json_text(now, "job"), *then_id = client_json_text(then, "job");
+    const json_t *cases = json_object_get(now, "cases"), *old_cases = json_object_get(then, "cases");
+    if (code == CLIENT_OK && !cases != !old_cases)
+        client_checks_add(checks, CLIENT_FAIL, "", "baseline", "it has %s load cases, and this job has %s",
+                          old_cases ? "some" : "no", cases ? "some" : "none");
+    else if (code == CLIENT_OK && !cases)
+        code = compare_one(s, checks, now_id, then_id, NULL, tolerance);
+    else if (code == CLIENT_OK) {
+        json_array_foreach((json_t *)cases, i, one)
+        {
+            const char *name = client_json_text(one, "name");
+            if (code != CLIENT_OK)
+                break;
+            if (has_case(then, name))
+                code = compare_one(s, checks, now_id, then_id, name, tolerance);
+            else
+                client_checks_add(checks, CLIENT_FAIL, name, "baseline", "it has no load case of this name");
+        }
+        json_array_foreach((json_t *)old_cases, i, one)
+        {
+            const char *name = client_json_text(one, "name");
+            if (!has_case(now, name))
+                client_checks_add(checks, CLIENT_FAIL, name, "baseline", "this job has no load case of this name");
+        }
+    }
+    json_decref(now);
+    json_decref(then);
     if (code != CLIENT_OK)
         return code;
     if (checks->failed)
@@ -386,7 +344,14 @@ client_exit client_contract(client_session *s, const json_t *job, const char *la
     if (more == CLIENT_OK && o->baseline && answered)
         more = compare(s, &checks, job);
     if (o->junit) {
-        char message[512] = "no memory for the report", *name = suite_name(s, job, label);
+        /* "scene.json young=2e5": what was sent, and which of several jobs. */
+        char message[512] = "no memory for the report", *name = NULL;
+        const bool of_file = o->command == CLIENT_SUBMIT || o->command == CLIENT_VERIFY;
+        const char *file = of_file && o->operand && strcmp(o->operand, "-") != 0 ? o->operand : NULL;
+        const char *slash = file ? strrchr(file, '/') : NULL;
+        const char *base = slash ? slash + 1 : file ? file : client_json_text(job, "id");
+        if (asprintf(&name, "%s%s%s", base, label ? " " : "", label ? label : "") < 0)
+            name = NULL;
         const bool ok = name && client_suites_add(&s->suites, name, job, &checks) &&
                         client_junit_write(&s->suites, s->options->junit, message, sizeof message);
         free(name);

@@ -66,61 +66,27 @@ static bool ask(doctor *d, client_reply *reply, json_t **json, const char *metho
 
 /* ----------------------------------------------------------------- the way */
 
-static const char *remedy_of(client_http_cause cause)
-{
-    switch (cause) {
-    case CLIENT_CAUSE_NAME:
-        return "check the host's name in --server or $UZAWA_SERVER, and the name service";
-    case CLIENT_CAUSE_CONNECTION:
-        return "check host and port in --server or $UZAWA_SERVER; is uzawad running, is a firewall between?";
-    case CLIENT_CAUSE_CERTIFICATE:
-        return "name the authority's certificates (PEM) in $UZAWA_CA, or use the host's name that the certificate has";
-    case CLIENT_CAUSE_TLS:
-        return "does the service speak TLS there? Without it the URL begins with http://";
-    case CLIENT_CAUSE_SILENCE:
-        return "something listens there and says nothing: a proxy, or another kind of service?";
-    case CLIENT_CAUSE_NONE:
-    case CLIENT_CAUSE_OTHER:
-        break;
-    }
-    return "does an HTTP service listen there? With TLS the URL begins with https://";
-}
-
-static void check_clock(doctor *d, time_t date)
-{
-    double ahead = date < 0 ? NAN : difftime(time(NULL), date);
-    if (!isfinite(ahead))
-        say(d, WARNING, "clock", "", "the server does not say what time it is");
-    else if (fabs(ahead) > CLOCK_OFF_S)
-        say(d, WARNING, "clock", "set both by NTP: times of jobs and certificates are judged by it",
-            "this machine is %.0f s %s the server", fabs(ahead), ahead > 0 ? "ahead of" : "behind");
-    else
-        say(d, FINE, "clock", "", "as on the server");
-}
-
-static void check_certificate(doctor *d, const client_reply *reply)
-{
-    if (strncmp(d->s->options->server, "https:", 6) != 0)
-        return;
-    double left = reply->cert_until > 0 ? difftime(reply->cert_until, time(NULL)) : NAN;
-    if (!isfinite(left))
-        say(d, FINE, "certificate", "", "trusted");
-    else
-        say(d, left < CERTIFICATE_S ? WARNING : FINE, "certificate",
-            left < CERTIFICATE_S ? "renew it, and send the service SIGHUP or restart it" : "",
-            "%s, trusted, %.0f days left", reply->cert_subject, left / 86400);
-}
-
 /* False: nothing more can be asked. */
 static bool check_way(doctor *d)
 {
+    static const char *const REMEDIES[] = {
+        [CLIENT_CAUSE_NAME] = "check the host's name in --server or $UZAWA_SERVER, and the name service",
+        [CLIENT_CAUSE_CONNECTION] =
+            "check host and port in --server or $UZAWA_SERVER; is uzawad running, is a firewall between?",
+        [CLIENT_CAUSE_CERTIFICATE] =
+            "name the authority's certificates (PEM) in $UZAWA_CA, or use the host's name that "
+            "the certificate has",
+        [CLIENT_CAUSE_TLS] = "does the service speak TLS there? Without it the URL begins with http://",
+        [CLIENT_CAUSE_SILENCE] = "something listens there and says nothing: a proxy, or another kind of service?",
+        [CLIENT_CAUSE_OTHER] = "does an HTTP service listen there? With TLS the URL begins with https://",
+    };
     client_reply reply;
     json_t *health;
     bool answered = ask(d, &reply, &health, "GET", "/healthz", NULL);
     const char *status = client_json_text(health, "status");
     bool good = answered && json_is_object(json_object_get(health, "jobs"));
     if (!answered) {
-        say(d, WRONG, "connection", remedy_of(reply.cause), "%s", reply.message);
+        say(d, WRONG, "connection", REMEDIES[reply.cause ? reply.cause : CLIENT_CAUSE_OTHER], "%s", reply.message);
         fail(d, CLIENT_UNREACHABLE);
     } else if (!good) {
         say(d, WRONG, "service", "check the URL: this is another service, or a proxy before it",
@@ -128,8 +94,22 @@ static bool check_way(doctor *d)
         fail(d, CLIENT_SERVER_ERROR);
     } else {
         say(d, FINE, "connection", "", "%s, %s", d->s->options->server, reply.address);
-        check_certificate(d, &reply);
-        check_clock(d, reply.date);
+        const double left = reply.cert_until > 0 ? difftime(reply.cert_until, time(NULL)) : NAN;
+        const double ahead = reply.date < 0 ? NAN : difftime(time(NULL), reply.date);
+        const bool tls = strncmp(d->s->options->server, "https:", 6) == 0;
+        if (tls && !isfinite(left))
+            say(d, FINE, "certificate", "", "trusted");
+        else if (tls)
+            say(d, left < CERTIFICATE_S ? WARNING : FINE, "certificate",
+                left < CERTIFICATE_S ? "renew it, and send the service SIGHUP or restart it" : "",
+                "%s, trusted, %.0f days left", reply.cert_subject, left / 86400);
+        if (!isfinite(ahead))
+            say(d, WARNING, "clock", "", "the server does not say what time it is");
+        else if (fabs(ahead) > CLOCK_OFF_S)
+            say(d, WARNING, "clock", "set both by NTP: times of jobs and certificates are judged by it",
+                "this machine is %.0f s %s the server", fabs(ahead), ahead > 0 ? "ahead of" : "behind");
+        else
+            say(d, FINE, "clock", "", "as on the server");
         say(d, strcmp(status, "ok") == 0 ? FINE : WRONG, "alive",
             strcmp(status, "ok") == 0 ? "" : "see the server's log", "%s, %.0f workers", status,
             client_json_number(health, "workers"));
@@ -175,26 +155,6 @@ static bool try_scope(doctor *d, const char *scope, const char *method, const ch
 
 /* ----------------------------------------------------------------- service */
 
-static void check_ready(doctor *d)
-{
-    client_reply reply;
-    json_t *answer;
-    bool answered = ask(d, &reply, &answer, "GET", "/readyz", NULL);
-    const char *code = client_json_text(answer, "code");
-    const char *remedy = strcmp(code, "store_unavailable") == 0
-                             ? "is the disk full, or the database file not writable? See the server's log"
-                         : strcmp(code, "draining") == 0 ? "it is shutting down: wait until it is back"
-                                                         : "see the server's log";
-    if (answered && reply.status == 200)
-        say(d, FINE, "ready", "", "it solves, and it writes to its store");
-    else {
-        say(d, WRONG, "ready", remedy, "%s: %s", client_json_text(answer, "title"), client_json_text(answer, "detail"));
-        fail(d, CLIENT_SERVER_ERROR);
-    }
-    json_decref(answer);
-    client_reply_clear(&reply);
-}
-
 /* The number behind "name " at the beginning of a line of Prometheus text, NAN if there is none. */
 static double metric(const char *text, const char *name)
 {
@@ -205,73 +165,78 @@ static double metric(const char *text, const char *name)
     return NAN;
 }
 
-static void check_queue(doctor *d, const char *metrics, double limit)
+/* Of which release it is, and how much room it has. */
+static void check_service(doctor *d)
 {
-    double depth = metrics ? metric(metrics, "uzawad_queue_depth") : NAN;
-    if (!isfinite(depth))
-        return;
-    if (isfinite(limit) && depth >= limit) {
+    static const char NAME[] = "uzawad_build_info{version=\"";
+    client_reply metrics, reply;
+    json_t *none, *limits;
+    bool told = ask(d, &metrics, &none, "GET", "/metrics", NULL) && metrics.status == 200;
+    const char *text = told ? metrics.body.data : NULL, *at = text ? strstr(text, NAME) : NULL;
+    bool listed = ask(d, &reply, &limits, "GET", "/v1/limits", NULL) && reply.status == 200;
+    char version[32] = "";
+    if (at)
+        snprintf(version, sizeof version, "%.*s", (int)strcspn(at + sizeof NAME - 1, "\""), at + sizeof NAME - 1);
+    if (!*version)
+        say(d, WARNING, "version", "the service's option metrics tells it", "client %s, service unknown",
+            CLIENT_VERSION_TEXT);
+    else if (strcmp(version, CLIENT_VERSION_TEXT) != 0)
+        say(d, WARNING, "version", "use the client of the service's release", "client %s, service %s",
+            CLIENT_VERSION_TEXT, version);
+    else
+        say(d, FINE, "version", "", "client and service %s", version);
+    const double depth = text ? metric(text, "uzawad_queue_depth") : NAN;
+    const double limit = client_json_number(limits, "limits.max_queue.value");
+    if (isfinite(depth) && isfinite(limit) && depth >= limit) {
         say(d, WRONG, "queue", "wait, or raise the service's --max-queue or --workers", "full: %.0f of %.0f jobs wait",
             depth, limit);
         fail(d, CLIENT_SERVER_ERROR);
-    } else if (isfinite(limit) && depth >= QUEUE_NEAR_FULL * limit)
+    } else if (isfinite(depth) && isfinite(limit) && depth >= QUEUE_NEAR_FULL * limit)
         say(d, WARNING, "queue", "it is nearly full", "%.0f of %.0f jobs wait", depth, limit);
-    else
+    else if (isfinite(depth))
         say(d, FINE, "queue", "", isfinite(limit) ? "%.0f of at most %.0f jobs wait" : "%.0f jobs wait", depth, limit);
-}
-
-static void check_disk(doctor *d, const char *metrics)
-{
-    double left = metrics ? metric(metrics, "uzawad_store_free_bytes") : NAN;
-    if (!isfinite(left))
-        return;
-    bool little = left < DISK_LEAST;
-    say(d, little ? WARNING : FINE, "disk", little ? "delete old jobs (uzawa delete, --keep-days) or make room" : "",
-        "%.1f GB are free where the service keeps its jobs", left / 1e9);
+    const double left = text ? metric(text, "uzawad_store_free_bytes") : NAN;
+    const bool little = left < DISK_LEAST;
+    if (isfinite(left))
+        say(d, little ? WARNING : FINE, "disk",
+            little ? "delete old jobs (uzawa delete, --keep-days) or make room" : "",
+            "%.1f GB are free where the service keeps its jobs", left / 1e9);
+    if (listed)
+        say(d, FINE, "limits", "", "request %.0f MB, upload %.0f MB, memory of a problem %.1f GB, time of a job %.0f s",
+            client_json_number(limits, "limits.max_body.value") / 1e6,
+            client_json_number(limits, "limits.max_upload.value") / 1e6,
+            client_json_number(limits, "limits.memory.value") / 1e9,
+            client_json_number(limits, "limits.max_solve_s.value"));
+    json_decref(none);
+    json_decref(limits);
+    client_reply_clear(&metrics);
+    client_reply_clear(&reply);
 }
 
 client_exit client_doctor(client_session *s)
 {
     doctor d = {.s = s, .lines = s->options->json ? json_array() : NULL, .code = CLIENT_OK};
     if (check_way(&d)) {
-        check_ready(&d);
-        bool reads = try_scope(&d, "reading", "GET", "/v1/jobs?limit=1", NULL);
-        if (reads)
+        client_reply reply;
+        json_t *answer;
+        const bool ready = ask(&d, &reply, &answer, "GET", "/readyz", NULL) && reply.status == 200;
+        const char *code = client_json_text(answer, "code");
+        const char *remedy = strcmp(code, "store_unavailable") == 0
+                                 ? "is the disk full, or the database file not writable? See the server's log"
+                             : strcmp(code, "draining") == 0 ? "it is shutting down: wait until it is back"
+                                                             : "see the server's log";
+        if (ready)
+            say(&d, FINE, "ready", "", "it solves, and it writes to its store");
+        else {
+            say(&d, WRONG, "ready", remedy, "%s: %s", client_json_text(answer, "title"),
+                client_json_text(answer, "detail"));
+            fail(&d, CLIENT_SERVER_ERROR);
+        }
+        json_decref(answer);
+        client_reply_clear(&reply);
+        if (try_scope(&d, "reading", "GET", "/v1/jobs?limit=1", NULL)) {
             try_scope(&d, "submitting", "POST", "/v1/jobs?validate=true", PROBE);
-        if (reads) {
-            client_reply metrics, reply;
-            json_t *none, *limits;
-            bool told = ask(&d, &metrics, &none, "GET", "/metrics", NULL) && metrics.status == 200;
-            const char *text = told ? metrics.body.data : NULL;
-            bool listed = ask(&d, &reply, &limits, "GET", "/v1/limits", NULL) && reply.status == 200;
-            static const char NAME[] = "uzawad_build_info{version=\"";
-            const char *at = text ? strstr(text, NAME) : NULL;
-            char version[32] = "";
-            if (at)
-                snprintf(version, sizeof version, "%.*s", (int)strcspn(at + sizeof NAME - 1, "\""),
-                         at + sizeof NAME - 1);
-            if (!*version)
-                say(&d, WARNING, "version", "the service's option metrics tells it", "client %s, service unknown",
-                    CLIENT_VERSION_TEXT);
-            else if (strcmp(version, CLIENT_VERSION_TEXT) != 0)
-                say(&d, WARNING, "version", "use the client of the service's release", "client %s, service %s",
-                    CLIENT_VERSION_TEXT, version);
-            else
-                say(&d, FINE, "version", "", "client and service %s", version);
-            check_queue(&d, text, client_json_number(limits, "limits.max_queue.value"));
-            check_disk(&d, text);
-            if (listed) {
-                say(&d, FINE, "limits", "",
-                    "request %.0f MB, upload %.0f MB, memory of a problem %.1f GB, time of a job %.0f s",
-                    client_json_number(limits, "limits.max_body.value") / 1e6,
-                    client_json_number(limits, "limits.max_upload.value") / 1e6,
-                    client_json_number(limits, "limits.memory.value") / 1e9,
-                    client_json_number(limits, "limits.max_solve_s.value"));
-            }
-            json_decref(none);
-            json_decref(limits);
-            client_reply_clear(&metrics);
-            client_reply_clear(&reply);
+            check_service(&d);
         }
     }
     if (d.lines && client_print_json(s, d.lines) != CLIENT_OK)

@@ -58,53 +58,41 @@ client_exit client_draw_history(client_session *s, const char *csv)
 
 /* ------------------------------------------------------- what digits took */
 
-/* The least and the largest time that is there, as powers of ten. */
-static bool time_range(const json_t *decades, double *low, double *high)
-{
-    *low = INFINITY;
-    *high = -INFINITY;
-    for (size_t i = 0; i < json_array_size(decades); i++) {
-        double seconds = client_json_number(json_array_get(decades, i), "seconds");
-        if (!(seconds > 0))
-            continue;
-        *low = fmin(*low, log10(seconds));
-        *high = fmax(*high, log10(seconds));
-    }
-    *low -= 0.1; /* so that the shortest has a bar as well */
-    return *high > -INFINITY;
-}
-
-static void print_decade(FILE *to, const json_t *decade, double low, double high, int cells, bool ascii)
-{
-    char time[16] = "never", steps[24] = "";
-    double seconds = client_json_number(decade, "seconds"), iterations = client_json_number(decade, "iterations");
-    if (seconds >= 0)
-        client_format_seconds(time, sizeof time, seconds);
-    if (isfinite(iterations))
-        snprintf(steps, sizeof steps, "%.0f", iterations);
-    fprintf(to, "%5.0e  %9s  %7s", client_json_number(decade, "relative_error"), time, steps);
-    if (seconds > 0 && cells > 0) {
-        fputs("  ", to);
-        /* A bar whose length is the logarithm of the time. */
-        int full = (int)lround((log10(seconds) - low) / (high - low) * cells);
-        for (int i = 0; i < full; i++)
-            fputs(ascii ? "#" : "\u2588", to);
-    }
-    fputc('\n', to);
-}
-
 void client_draw_trade(client_session *s, const json_t *trade)
 {
     const json_t *decades = json_object_get(trade, "decades");
     const bool ascii = s->options->ascii || !locale_is_utf8();
-    double low, high;
-    int cells = drawing_width(s) - 27;
-    bool any = time_range(decades, &low, &high);
+    const int cells = drawing_width(s) - 27;
+    /* The least and the largest time that is there, as powers of ten. */
+    double low = INFINITY, high = -INFINITY;
+    for (size_t i = 0; i < json_array_size(decades); i++) {
+        const double seconds = client_json_number(json_array_get(decades, i), "seconds");
+        low = seconds > 0 ? fmin(low, log10(seconds)) : low;
+        high = seconds > 0 ? fmax(high, log10(seconds)) : high;
+    }
+    low -= 0.1; /* so that the shortest has a bar as well */
     fprintf(s->out, "%5s  %9s  %7s%s\n", "error", "certified", "steps",
-            any && cells >= 17 ? "  time, logarithmic" : "");
-    for (size_t i = 0; i < json_array_size(decades); i++)
-        print_decade(s->out, json_array_get(decades, i), low, high, cells > 0 ? cells : 0, ascii);
-    double mesh = client_json_number(trade, "mesh_error");
+            high > -INFINITY && cells >= 17 ? "  time, logarithmic" : "");
+    for (size_t i = 0; i < json_array_size(decades); i++) {
+        const json_t *decade = json_array_get(decades, i);
+        char time[16] = "never", steps[24] = "";
+        const double seconds = client_json_number(decade, "seconds");
+        const double iterations = client_json_number(decade, "iterations");
+        if (seconds >= 0)
+            client_format_seconds(time, sizeof time, seconds);
+        if (isfinite(iterations))
+            snprintf(steps, sizeof steps, "%.0f", iterations);
+        fprintf(s->out, "%5.0e  %9s  %7s", client_json_number(decade, "relative_error"), time, steps);
+        if (seconds > 0 && cells > 0) {
+            fputs("  ", s->out);
+            /* A bar whose length is the logarithm of the time. */
+            const int full = (int)lround((log10(seconds) - low) / (high - low) * cells);
+            for (int k = 0; k < full; k++)
+                fputs(ascii ? "#" : "\u2588", s->out);
+        }
+        fputc('\n', s->out);
+    }
+    const double mesh = client_json_number(trade, "mesh_error");
     if (isfinite(mesh))
         fprintf(s->out, "the mesh itself is off by about %.2g\n", mesh);
 }

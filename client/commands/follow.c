@@ -13,37 +13,16 @@
 #define SILENCE_STREAM_S   60.0
 #define EVENT_MOST         (1u << 24)
 
-double client_hold_seconds(const client_session *s, const client_progress *progress)
+void client_hold(const client_session *s, client_request *request, const client_progress *progress, char header[40])
 {
-    double left = fmax(s->deadline - client_clock(), 0);
-    return floor(fmin(progress->shown ? SHORT_POLL_S : LONG_POLL_S, left));
-}
-
-void client_hold(client_request *request, char *header, size_t size, double seconds)
-{
+    const double left = fmax(s->deadline - client_clock(), 0);
+    const double seconds = floor(fmin(progress->shown ? SHORT_POLL_S : LONG_POLL_S, left));
     request->silence_s += seconds;
     request->deadline += GRACE_S;
     if (seconds < 1)
         return;
-    snprintf(header, size, "Prefer: wait=%.0f", seconds);
+    snprintf(header, 40, "Prefer: wait=%.0f", seconds);
     request->headers[1] = header;
-}
-
-/* One look at the job, which may take a while. *job is replaced only by a newer one. */
-static client_exit poll_job(client_session *s, const char *path, const client_progress *progress, json_t **job)
-{
-    char prefer[40];
-    json_t *newer;
-    client_request request = client_request_new(s, "GET", path);
-    client_hold(&request, prefer, sizeof prefer, client_hold_seconds(s, progress));
-    if (s->options->retry_s < 0)
-        request.patience_s = PATIENCE_WAITING_S;
-    client_exit code = client_ask_json(s, &newer, &request);
-    if (newer) {
-        json_decref(*job);
-        *job = newer;
-    }
-    return code;
 }
 
 /* ------------------------------------------- Server-Sent Events (WHATWG HTML, 9.2) */
@@ -55,24 +34,6 @@ typedef struct {
     client_progress *progress;
     int events;
 } stream;
-
-static bool dispatch(stream *st)
-{
-    json_t *value = st->data.len ? json_loadb(st->data.data, st->data.len, 0, NULL) : NULL;
-    if (json_is_object(value) && strcmp(st->event, "status") == 0) {
-        json_decref(st->job);
-        st->job = json_incref(value);
-        client_progress_show(st->progress, value);
-        st->events++;
-    } else if (json_is_object(value) && strcmp(st->event, "progress") == 0) {
-        client_progress_row(st->progress, value);
-        st->events++;
-    }
-    json_decref(value);
-    st->data.len = 0;
-    st->event[0] = '\0';
-    return !client_job_ended(st->job);
-}
 
 /* What follows "name:" and one blank in the line, or NULL. */
 static const char *field(const char *line, const char *name)
@@ -87,9 +48,22 @@ static bool take_line(stream *st)
 {
     const char *line = st->line.data ? st->line.data : "", *value;
     bool go_on = true;
-    if (!*line)
-        go_on = dispatch(st);
-    else if ((value = field(line, "event")))
+    if (!*line) { /* the end of an event */
+        json_t *told = st->data.len ? json_loadb(st->data.data, st->data.len, 0, NULL) : NULL;
+        if (json_is_object(told) && strcmp(st->event, "status") == 0) {
+            json_decref(st->job);
+            st->job = json_incref(told);
+            client_progress_show(st->progress, told);
+            st->events++;
+        } else if (json_is_object(told) && strcmp(st->event, "progress") == 0) {
+            client_progress_row(st->progress, told);
+            st->events++;
+        }
+        json_decref(told);
+        st->data.len = 0;
+        st->event[0] = '\0';
+        go_on = !client_job_ended(st->job);
+    } else if ((value = field(line, "event")))
         snprintf(st->event, sizeof st->event, "%s", value);
     else if ((value = field(line, "data")) && st->data.len < EVENT_MOST)
         go_on = client_buffer_append(&st->data, value, strlen(value));
@@ -138,36 +112,6 @@ static bool watch_stream(client_session *s, const char *id, json_t **job, client
 
 /* ---------------------------------------------------------------- waiting */
 
-/* CLIENT_OK: ask again. */
-static client_exit wait_once(client_session *s, const char *id, const char *path, json_t **job, client_watch *watch,
-                             bool *streams)
-{
-    double asked = client_clock();
-    if (*job && asked >= s->deadline)
-        return CLIENT_WAIT_TIMEOUT;
-    if (*streams)
-        *streams = watch_stream(s, id, job, watch);
-    if (watch->interrupted || client_job_ended(*job))
-        return CLIENT_OK;
-    client_exit code = poll_job(s, path, watch->progress, job);
-    if (code == CLIENT_OK)
-        client_progress_show(watch->progress, *job);
-    /* A server that does not hold the request must not be asked without a pause. */
-    if (code == CLIENT_OK && !client_job_ended(*job) && client_clock() - asked < 0.2)
-        client_http_pause(s->http, fmin(0.2, s->deadline - client_clock()));
-    return code;
-}
-
-static client_exit tell_how_to_come_back(client_session *s, client_exit code, const char *id)
-{
-    char message[400], why[64] = "interrupted";
-    if (code == CLIENT_WAIT_TIMEOUT)
-        snprintf(why, sizeof why, "the job has not ended after %g s", s->options->timeout_s);
-    snprintf(message, sizeof message,
-             "%s; it goes on; see it with: uzawa wait %.128s; stop it with: uzawa cancel %.128s", why, id, id);
-    return client_complain(s, code, message);
-}
-
 client_exit client_follow(client_session *s, const char *id, json_t **job, client_watch *watch)
 {
     client_exit code = CLIENT_OK;
@@ -175,37 +119,65 @@ client_exit client_follow(client_session *s, const char *id, json_t **job, clien
     char *path = client_job_path(s, id, "");
     if (!path)
         return CLIENT_LOCAL;
-    while (code == CLIENT_OK && !watch->interrupted && !client_job_ended(*job))
-        code = wait_once(s, id, path, job, watch, &streams);
+    while (code == CLIENT_OK && !watch->interrupted && !client_job_ended(*job)) {
+        const double asked = client_clock();
+        if (*job && asked >= s->deadline) {
+            code = CLIENT_WAIT_TIMEOUT;
+            break;
+        }
+        if (streams)
+            streams = watch_stream(s, id, job, watch);
+        if (watch->interrupted || client_job_ended(*job))
+            break;
+        /* One look at the job, which may take a while. *job is replaced only by a newer one. */
+        char prefer[40];
+        json_t *newer;
+        client_request request = client_request_new(s, "GET", path);
+        client_hold(s, &request, watch->progress, prefer);
+        if (s->options->retry_s < 0)
+            request.patience_s = PATIENCE_WAITING_S;
+        code = client_ask_json(s, &newer, &request);
+        if (newer) {
+            json_decref(*job);
+            *job = newer;
+        }
+        if (code == CLIENT_OK)
+            client_progress_show(watch->progress, *job);
+        /* A server that does not hold the request must not be asked without a pause. */
+        if (code == CLIENT_OK && !client_job_ended(*job) && client_clock() - asked < 0.2)
+            client_http_pause(s->http, fmin(0.2, s->deadline - client_clock()));
+    }
     if (watch->interrupted && !client_job_ended(*job))
         code = CLIENT_INTERRUPTED;
     client_progress_end(watch->progress);
-    if (code == CLIENT_WAIT_TIMEOUT || code == CLIENT_INTERRUPTED)
-        tell_how_to_come_back(s, code, id);
+    if (code == CLIENT_WAIT_TIMEOUT || code == CLIENT_INTERRUPTED) {
+        char message[400], why[64] = "interrupted";
+        if (code == CLIENT_WAIT_TIMEOUT)
+            snprintf(why, sizeof why, "the job has not ended after %g s", s->options->timeout_s);
+        snprintf(message, sizeof message,
+                 "%s; it goes on; see it with: uzawa wait %.128s; stop it with: uzawa cancel %.128s", why, id, id);
+        client_complain(s, code, message);
+    }
     free(path);
     return code;
 }
 
-static client_exit tell_end(client_session *s, const json_t *job, client_exit waited)
+client_exit client_report_end(client_session *s, const json_t *job, client_exit waited)
 {
     const json_t *error = json_object_get(job, "error");
     client_exit code = waited == CLIENT_OK ? client_job_exit(job) : waited;
-    if (s->options->json && job)
-        return client_print_json(s, job) == CLIENT_OK ? code : CLIENT_LOCAL;
-    if (waited != CLIENT_OK)
-        return waited;
-    if (code == CLIENT_JOB_FAILED || json_is_object(error))
-        client_print_problem(s->err, 0, error);
-    if (s->options->quiet)
-        return code;
-    client_print_summary(s->out, job);
-    client_exit shown = client_show_cases(s, job);
-    return shown == CLIENT_OK ? code : shown;
-}
-
-client_exit client_report_end(client_session *s, const json_t *job, client_exit waited)
-{
-    const client_exit code = tell_end(s, job, waited);
+    if (s->options->json && job) {
+        if (client_print_json(s, job) != CLIENT_OK)
+            code = CLIENT_LOCAL;
+    } else if (waited == CLIENT_OK) {
+        if (code == CLIENT_JOB_FAILED || json_is_object(error))
+            client_print_problem(s->err, 0, error);
+        if (!s->options->quiet) {
+            client_print_summary(s->out, job);
+            const client_exit shown = client_show_cases(s, job);
+            code = shown == CLIENT_OK ? code : shown;
+        }
+    }
     return job ? client_contract(s, job, NULL, code) : code;
 }
 

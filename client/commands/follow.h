@@ -4,10 +4,9 @@
 
 #include "commands/run.h"
 
-/* How long the next question may be held by the server: whole seconds within the deadline. */
-double client_hold_seconds(const client_session *s, const client_progress *progress);
-/* Lets the request be held for so long (header[1], in the buffer that must live as long). */
-void client_hold(client_request *request, char *header, size_t size, double seconds);
+/* Lets the server hold the request for whole seconds within the deadline, shorter while progress is shown. header: the
+ * text of headers[1], which must live as long as the request. */
+void client_hold(const client_session *s, client_request *request, const client_progress *progress, char header[40]);
 
 /* Until *job, which may be NULL at first, has ended; *job is the newest state in any case. CLIENT_OK says that it has
  * ended, however. A timeout and an interrupt are told on s->err, with how to come back. */

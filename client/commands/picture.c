@@ -10,12 +10,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-static bool ends_in(const char *text, const char *end)
-{
-    size_t len = strlen(text), n = strlen(end);
-    return len > n && strcmp(text + len - n, end) == 0;
-}
-
 /* ------------------------------------------------------------------- PNG */
 
 /* rsvg-convert between two pipes. Returns its pid, -1: no process. */
@@ -45,18 +39,6 @@ static pid_t start_converter(int *to, int *from)
     return pid;
 }
 
-/* Writes what the pipe takes; *to becomes -1 when all is written or nobody reads. */
-static void feed(int *to, const client_buffer *svg, size_t *at)
-{
-    ssize_t n = write(*to, svg->data + *at, svg->len - *at < 4096 ? svg->len - *at : 4096);
-    if (n > 0)
-        *at += (size_t)n;
-    if ((n < 0 && errno != EINTR) || *at == svg->len) {
-        close(*to);
-        *to = -1;
-    }
-}
-
 static client_exit convert(client_session *s, const client_buffer *svg, client_buffer *png)
 {
     int to, from, status = 0;
@@ -72,8 +54,15 @@ static client_exit convert(client_session *s, const client_buffer *svg, client_b
             struct pollfd ready[2] = {{.fd = from, .events = POLLIN}, {.fd = to, .events = POLLOUT}};
             if (poll(ready, 2, -1) < 0 && errno != EINTR)
                 break;
-            if (to >= 0 && ready[1].revents)
-                feed(&to, svg, &at);
+            if (to >= 0 && ready[1].revents) {
+                /* What the pipe takes, until all is written or nobody reads. */
+                const ssize_t n = write(to, svg->data + at, svg->len - at < 4096 ? svg->len - at : 4096);
+                at += n > 0 ? (size_t)n : 0;
+                if ((n < 0 && errno != EINTR) || at == svg->len) {
+                    close(to);
+                    to = -1;
+                }
+            }
             if (ready[0].revents) {
                 /* False: the end, or no memory. */
                 char block[1 << 14];
@@ -126,28 +115,6 @@ static char *picture_path(client_session *s)
     return path;
 }
 
-static client_exit fetch_picture(client_session *s)
-{
-    client_reply reply;
-    client_buffer png = {0};
-    const char *output = s->options->output;
-    char *path = picture_path(s);
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask(s, &reply, &request);
-    const bool as_png = output && ends_in(output, ".png");
-    if (code == CLIENT_OK && as_png)
-        code = convert(s, &reply.body, &png);
-    const client_buffer *picture = as_png ? &png : &reply.body;
-    if (code == CLIENT_OK)
-        code = client_deliver(s, picture->data, picture->len);
-    free(png.data);
-    client_reply_clear(&reply);
-    free(path);
-    return code;
-}
-
 static client_exit fetch_trade(client_session *s)
 {
     json_t *trade = NULL;
@@ -170,5 +137,24 @@ static client_exit fetch_trade(client_session *s)
 
 client_exit client_plot(client_session *s)
 {
-    return s->options->trade ? fetch_trade(s) : fetch_picture(s);
+    client_reply reply;
+    client_buffer png = {0};
+    const char *output = s->options->output;
+    if (s->options->trade)
+        return fetch_trade(s);
+    char *path = picture_path(s);
+    if (!path)
+        return CLIENT_LOCAL;
+    client_request request = client_request_new(s, "GET", path);
+    client_exit code = client_ask(s, &reply, &request);
+    const bool as_png = output && strlen(output) > 4 && strcmp(output + strlen(output) - 4, ".png") == 0;
+    if (code == CLIENT_OK && as_png)
+        code = convert(s, &reply.body, &png);
+    const client_buffer *picture = as_png ? &png : &reply.body;
+    if (code == CLIENT_OK)
+        code = client_deliver(s, picture->data, picture->len);
+    free(png.data);
+    client_reply_clear(&reply);
+    free(path);
+    return code;
 }

@@ -50,7 +50,7 @@ static client_exit post_body(client_session *s, const char *path, const client_b
     request.body = body->data ? body->data : "";
     request.body_len = body->len;
     if (stays(s) && number < 0)
-        client_hold(&request, prefer, sizeof prefer, client_hold_seconds(s, watch->progress));
+        client_hold(s, &request, watch->progress, prefer);
     client_exit code = client_ask_json(s, job, &request);
     if (code == CLIENT_INTERRUPTED) {
         char message[300];
@@ -81,29 +81,9 @@ static client_exit job_id(client_session *s, char id[128], const json_t *job)
 
 /* --------------------------------------------------------------- one job */
 
-static client_exit stay(client_session *s, json_t **job, client_watch *watch)
-{
-    char id[128];
-    client_exit code = job_id(s, id, *job);
-    if (code != CLIENT_OK)
-        return code;
-    if (!stays(s) && s->options->json)
-        return client_print_json(s, *job);
-    if (!stays(s) || (s->options->quiet && s->options->command != CLIENT_VERIFY))
-        print_id(s, id);
-    if (!stays(s))
-        return CLIENT_OK;
-    if (*client_json_text(*job, "job")) { /* verify answered with a result, which is no job */
-        json_decref(*job);
-        *job = NULL;
-    } else {
-        client_progress_show(watch->progress, *job);
-    }
-    return client_follow(s, id, job, watch);
-}
-
 static client_exit post_and_stay(client_session *s, const char *path, const client_buffer *body)
 {
+    char id[128];
     json_t *job = NULL;
     client_watch watch;
     client_progress progress = client_progress_new(s->err, s->options->progress, s->options->quiet);
@@ -111,7 +91,20 @@ static client_exit post_and_stay(client_session *s, const char *path, const clie
     client_watch_begin(&watch, s->http, &progress);
     client_exit code = post_body(s, path, body, &watch, -1, &job);
     if (code == CLIENT_OK)
-        code = stay(s, &job, &watch);
+        code = job_id(s, id, job);
+    if (code == CLIENT_OK && !stays(s) && s->options->json)
+        code = client_print_json(s, job);
+    else if (code == CLIENT_OK && (!stays(s) || (s->options->quiet && s->options->command != CLIENT_VERIFY)))
+        print_id(s, id);
+    if (code == CLIENT_OK && stays(s)) {
+        if (*client_json_text(job, "job")) { /* verify answered with a result, which is no job */
+            json_decref(job);
+            job = NULL;
+        } else {
+            client_progress_show(watch.progress, job);
+        }
+        code = client_follow(s, id, &job, &watch);
+    }
     client_watch_end(&watch, s->http);
     if (stays(s))
         code = client_report_end(s, job, code);
@@ -214,32 +207,30 @@ client_exit client_verify(client_session *s)
     return code;
 }
 
-/* {"accuracy": {"relative_error": 1e-8}} or {"accuracy": "exact"}, and the limits that were given. NULL: no memory. */
-static char *refine_body(const client_options *o)
-{
-    char *end;
-    double error = strtod(o->accuracy, &end);
-    bool number = *end == '\0' && isfinite(error);
-    json_t *body = number ? json_pack("{s:{s:f}}", "accuracy", "relative_error", error)
-                          : json_pack("{s:s}", "accuracy", o->accuracy);
-    bool ok = body != NULL;
-    if (ok && o->max_iterations >= 0)
-        ok = json_object_set_new(body, "max_iterations", json_integer(o->max_iterations)) == 0;
-    if (ok && isfinite(o->time_limit_s))
-        ok = json_object_set_new(body, "time_limit_s", json_real(o->time_limit_s)) == 0;
-    char *text = ok ? json_dumps(body, JSON_COMPACT) : NULL;
-    json_decref(body);
-    return text;
-}
-
 client_exit client_refine(client_session *s)
 {
-    char *path = client_job_path(s, s->options->operand, "/refine"), *text = refine_body(s->options);
+    const client_options *o = s->options;
+    char *path = client_job_path(s, o->operand, "/refine"), *text = NULL, *end;
     client_exit code = CLIENT_LOCAL;
-    if (path && text) {
+    if (!path)
+        return code;
+    /* {"accuracy": {"relative_error": 1e-8}} or {"accuracy": "exact"}, and the limits that were given. */
+    const double error = strtod(o->accuracy, &end);
+    const bool number = *end == '\0' && isfinite(error);
+    json_t *wanted = number ? json_pack("{s:{s:f}}", "accuracy", "relative_error", error)
+                            : json_pack("{s:s}", "accuracy", o->accuracy);
+    bool ok = wanted != NULL;
+    if (ok && o->max_iterations >= 0)
+        ok = json_object_set_new(wanted, "max_iterations", json_integer(o->max_iterations)) == 0;
+    if (ok && isfinite(o->time_limit_s))
+        ok = json_object_set_new(wanted, "time_limit_s", json_real(o->time_limit_s)) == 0;
+    if (ok)
+        text = json_dumps(wanted, JSON_COMPACT);
+    json_decref(wanted);
+    if (text) {
         client_buffer body = {.data = text, .len = strlen(text)};
         code = post_and_stay(s, path, &body);
-    } else if (path) {
+    } else {
         client_complain(s, code, "no memory, or the accuracy is not UTF-8");
     }
     free(text);

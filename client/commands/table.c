@@ -29,14 +29,6 @@ typedef struct {
     FILE *to;
 } table;
 
-static int find_field(const char *name, size_t len)
-{
-    for (size_t i = 0; i < sizeof FIELDS / sizeof *FIELDS; i++)
-        if (strlen(FIELDS[i].name) == len && memcmp(FIELDS[i].name, name, len) == 0)
-            return (int)i;
-    return -1;
-}
-
 static client_exit refuse(client_session *s, const char *format, const char *name, int len)
 {
     char message[300];
@@ -48,9 +40,12 @@ static client_exit refuse(client_session *s, const char *format, const char *nam
 static client_exit read_fields(client_session *s, table *t, const char *fields)
 {
     for (const char *at = fields; *at;) {
-        size_t len = strcspn(at, ",");
-        int i = find_field(at, len), shown = (int)(len < 60 ? len : 60);
-        if (i < 0)
+        const size_t len = strcspn(at, ","), most = sizeof FIELDS / sizeof *FIELDS;
+        const int shown = (int)(len < 60 ? len : 60);
+        size_t i = 0;
+        while (i < most && (strlen(FIELDS[i].name) != len || memcmp(FIELDS[i].name, at, len) != 0))
+            i++;
+        if (i == most)
             return refuse(s, "\"%.*s\" is no field that a table can have", at, shown);
         if (t->count && FIELDS[i].place != t->place)
             return refuse(s,
@@ -145,28 +140,20 @@ static void print_header(const table *t, const json_t *answer)
 
 /* -------------------------------------------------------------------- rows */
 
-/* A text in quotes, those inside doubled. */
-static void print_quoted(FILE *to, const char *text)
-{
-    fputc('"', to);
-    for (; *text; text++)
-        fprintf(to, *text == '"' ? "\"\"" : "%c", *text);
-    fputs("\",", to);
-}
-
-static size_t count_rows(const table *t, const json_t *answer)
-{
-    if (t->place == AT_POINTS)
-        return json_array_size(client_json_at(answer, "stress_gauss.elements"));
-    return json_array_size(t->count ? json_object_get(answer, t->name[0]) : t->nodes);
-}
-
 static void print_answer(const table *t, const json_t *answer, const char *name)
 {
-    for (size_t row = 0, rows = count_rows(t, answer); row < rows; row++) {
-        const json_t *gauss = json_object_get(answer, "stress_gauss"), *at = json_array_get(t->nodes, row);
-        if (t->cases)
-            print_quoted(t->to, name);
+    const json_t *gauss = json_object_get(answer, "stress_gauss");
+    const json_t *list = t->place == AT_POINTS ? json_object_get(gauss, "elements")
+                         : t->count            ? json_object_get(answer, t->name[0])
+                                               : t->nodes;
+    for (size_t row = 0, rows = json_array_size(list); row < rows; row++) {
+        const json_t *at = json_array_get(t->nodes, row);
+        if (t->cases) { /* in quotes, those inside doubled */
+            fputc('"', t->to);
+            for (const char *c = name; *c; c++)
+                fprintf(t->to, *c == '"' ? "\"\"" : "%c", *c);
+            fputs("\",", t->to);
+        }
         if (t->place == AT_POINTS) {
             const json_t *points = json_object_get(gauss, "points");
             fprintf(t->to, "%.0f", json_number_value(json_array_get(json_object_get(gauss, "elements"), row)));
@@ -194,23 +181,6 @@ static void print_answer(const table *t, const json_t *answer, const char *name)
 
 /* ------------------------------------------------------------- the command */
 
-static client_exit fetch_result(client_session *s, json_t **result, const table *t)
-{
-    char wanted[400] = "nodes";
-    for (int i = 0; i < t->count; i++) {
-        size_t len = strlen(wanted);
-        snprintf(wanted + len, sizeof wanted - len, ",%s", t->name[i]);
-    }
-    const client_query query[] = {{"fields", wanted}, {"case", s->options->case_name}, {NULL, NULL}};
-    char *path = client_path_with_query(s, "/result", query);
-    if (!path)
-        return CLIENT_LOCAL;
-    client_request request = client_request_new(s, "GET", path);
-    client_exit code = client_ask_json(s, result, &request);
-    free(path);
-    return code;
-}
-
 client_exit client_table(client_session *s, const char *fields)
 {
     char *text = NULL;
@@ -218,8 +188,20 @@ client_exit client_table(client_session *s, const char *fields)
     json_t *result = NULL;
     table t = {0};
     client_exit code = read_fields(s, &t, fields);
-    if (code == CLIENT_OK)
-        code = fetch_result(s, &result, &t);
+    if (code != CLIENT_OK)
+        return code;
+    char wanted[400] = "nodes";
+    for (int i = 0; i < t.count; i++) {
+        const size_t used = strlen(wanted);
+        snprintf(wanted + used, sizeof wanted - used, ",%s", t.name[i]);
+    }
+    const client_query query[] = {{"fields", wanted}, {"case", s->options->case_name}, {NULL, NULL}};
+    char *path = client_path_with_query(s, "/result", query);
+    if (!path)
+        return CLIENT_LOCAL;
+    client_request request = client_request_new(s, "GET", path);
+    code = client_ask_json(s, &result, &request);
+    free(path);
     t.to = code == CLIENT_OK ? open_memstream(&text, &len) : NULL;
     if (t.to) {
         const json_t *cases = json_object_get(result, "cases");

@@ -36,30 +36,26 @@ static bool complain(char *message, size_t size, const char *doing, const char *
     return false;
 }
 
-static bool read_all(client_buffer *out, int fd)
-{
-    char block[1 << 16];
-    ssize_t got;
-    while ((got = read(fd, block, sizeof block)) != 0) {
-        if (got < 0 && errno == EINTR)
-            continue;
-        if (got < 0)
-            return false;
-        if (!client_buffer_append(out, block, (size_t)got)) {
-            errno = ENOMEM;
-            return false;
-        }
-    }
-    return client_buffer_append(out, "", 0);
-}
-
 bool client_file_read(client_buffer *out, const char *path, char *message, size_t size)
 {
+    char block[1 << 16];
     client_buffer read_in = {0};
     bool standard = strcmp(path, "-") == 0;
     *out = (client_buffer){0};
     int fd = standard ? STDIN_FILENO : open(path, O_RDONLY | O_CLOEXEC);
-    bool ok = fd >= 0 && read_all(&read_in, fd);
+    bool ok = fd >= 0;
+    while (ok) {
+        ssize_t got = read(fd, block, sizeof block);
+        if (got < 0 && errno == EINTR)
+            continue;
+        ok = got >= 0;
+        if (ok && !client_buffer_append(&read_in, block, (size_t)got)) {
+            errno = ENOMEM;
+            ok = false;
+        }
+        if (got == 0)
+            break;
+    }
     if (ok)
         *out = read_in;
     else {
@@ -83,15 +79,6 @@ static bool write_all(int fd, const char *bytes, size_t count)
         count -= (size_t)done;
     }
     return true;
-}
-
-static bool write_directly(const char *path, const char *bytes, size_t count)
-{
-    int fd = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC);
-    bool ok = fd >= 0 && write_all(fd, bytes, count);
-    if (fd >= 0 && close(fd) != 0)
-        ok = false;
-    return ok;
 }
 
 static bool write_beside(const char *path, const char *bytes, size_t count)
@@ -122,25 +109,25 @@ bool client_file_write(const char *path, const char *bytes, size_t count, char *
     if (strcmp(path, "-") == 0)
         return (fwrite(bytes, 1, count, stdout) == count && fflush(stdout) == 0) ||
                complain(message, size, "write to", "standard output");
-    bool plain = lstat(path, &st) != 0 || S_ISREG(st.st_mode);
-    bool ok = plain ? write_beside(path, bytes, count) : write_directly(path, bytes, count);
+    bool ok;
+    if (lstat(path, &st) != 0 || S_ISREG(st.st_mode))
+        ok = write_beside(path, bytes, count);
+    else {
+        int fd = open(path, O_WRONLY | O_TRUNC | O_CLOEXEC);
+        ok = fd >= 0 && write_all(fd, bytes, count);
+        if (fd >= 0 && close(fd) != 0)
+            ok = false;
+    }
     return ok || complain(message, size, "write", path);
-}
-
-/* Length of the control character at `text`: C0 and DEL are one byte, C1 (U+0080..U+009F) two in UTF-8; else 0. */
-static size_t control_length(const char *text)
-{
-    unsigned char first = (unsigned char)text[0], second = first ? (unsigned char)text[1] : 0;
-    if (first < 0x20 || first == 0x7f)
-        return 1;
-    return first == 0xc2 && second >= 0x80 && second <= 0x9f ? 2 : 0;
 }
 
 void client_print_safe(FILE *to, const char *text)
 {
     while (*text) {
-        size_t skip = control_length(text);
-        fputc(skip ? '?' : *text, to);
-        text += skip ? skip : 1;
+        /* A control character: C0 and DEL are one byte, C1 (U+0080..U+009F) two in UTF-8. */
+        const unsigned char first = (unsigned char)text[0], second = (unsigned char)text[1];
+        const bool one = first < 0x20 || first == 0x7f, two = first == 0xc2 && second >= 0x80 && second <= 0x9f;
+        fputc(one || two ? '?' : *text, to);
+        text += two ? 2 : 1;
     }
 }

@@ -37,6 +37,8 @@ json_t *client_vary_values(const char *text, char *message, size_t size);
 /* The command upload. */
 client_exit client_upload(client_session *s);
 
+/* By its name: the bytes are gzip's. */
+bool client_is_packed(const char *name);
 /* The id of a file's bytes on the service, which is sent them unless it has them. `name` tells whether it is packed. */
 client_exit client_upload_once(client_session *s, char id[65], const char *name, const client_buffer *file);
 

@@ -4,34 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What a request may have at its top (schemas/request.json). */
-static const char *const TOP[] = {"problem",       "cases",   "solver", "tags",  "priority",
-                                  "queue_limit_s", "webhook", "assert", "answer"};
-
-static bool is_top(const json_t *request, const char *key)
-{
-    for (size_t i = 0; i < sizeof TOP / sizeof *TOP; i++)
-        if (strcmp(TOP[i], key) == 0)
-            return true;
-    return json_object_get(request, key) != NULL;
-}
-
-/* Splits at dots in place. */
-static bool split(client_path *path, char *text)
-{
-    for (char *at = text;; at++) {
-        if (path->count == CLIENT_PATH_PARTS || *at == '\0' || *at == '.')
-            return false;
-        path->part[path->count++] = at;
-        at += strcspn(at, ".");
-        if (!*at)
-            return true;
-        *at = '\0';
-    }
-}
-
 bool client_path_read(client_path *out, const json_t *request, const char *text, size_t len, char *message, size_t size)
 {
+    /* What a request may have at its top (schemas/request.json). */
+    static const char *const TOP[] = {"problem",       "cases",   "solver", "tags",  "priority",
+                                      "queue_limit_s", "webhook", "assert", "answer"};
     size_t room = sizeof out->text;
     *out = (client_path){0};
     if (len >= room || !len) {
@@ -40,13 +17,21 @@ bool client_path_read(client_path *out, const json_t *request, const char *text,
     }
     memcpy(out->text, text, len);
     out->text[len] = '\0';
-    size_t first = strcspn(out->text, ".");
     char key[256];
-    snprintf(key, sizeof key, "%.*s", (int)first, out->text);
-    if (!is_top(request, key))
+    snprintf(key, sizeof key, "%.*s", (int)strcspn(out->text, "."), out->text);
+    bool is_top = json_object_get(request, key) != NULL;
+    for (size_t i = 0; i < sizeof TOP / sizeof *TOP; i++)
+        is_top = is_top || strcmp(TOP[i], key) == 0;
+    if (!is_top)
         out->part[out->count++] = "problem";
-    if (split(out, out->text))
-        return true;
+    /* Split at dots in place. */
+    for (char *at = out->text; out->count < CLIENT_PATH_PARTS && *at && *at != '.'; at++) {
+        out->part[out->count++] = at;
+        at += strcspn(at, ".");
+        if (!*at)
+            return true;
+        *at = '\0';
+    }
     snprintf(message, size, "\"%.*s\" is no path: keys and indices with a dot between them, such as loads.1.traction.0",
              (int)len, text);
     return false;
@@ -69,19 +54,6 @@ static json_t *step(json_t *at, const char *part)
     return i >= 0 ? json_array_get(at, (size_t)i) : NULL;
 }
 
-static void list_keys(char *out, size_t size, const json_t *object)
-{
-    const char *key;
-    json_t *value;
-    size_t len = 0;
-    snprintf(out, size, "nothing");
-    json_object_foreach((json_t *)object, key, value)
-    {
-        if (len < size)
-            len += (size_t)snprintf(out + len, size - len, "%s%s", len ? ", " : "", key);
-    }
-}
-
 static void say_missing(const client_path *path, int i, const json_t *at, char *message, size_t size)
 {
     char so_far[280] = "the request", keys[400]; /* or "problem.loads" of the parts before */
@@ -89,10 +61,18 @@ static void say_missing(const client_path *path, int i, const json_t *at, char *
     size_t len = 0, count = json_array_size(at);
     for (int k = 0; k < i && len < sizeof so_far; k++)
         len += (size_t)snprintf(so_far + len, sizeof so_far - len, "%s%s", k ? "." : "", path->part[k]);
-    list_keys(keys, sizeof keys, at);
-    if (json_is_object(at))
+    if (json_is_object(at)) {
+        const char *key;
+        json_t *value;
+        size_t used = 0;
+        snprintf(keys, sizeof keys, "nothing");
+        json_object_foreach((json_t *)at, key, value)
+        {
+            if (used < sizeof keys)
+                used += (size_t)snprintf(keys + used, sizeof keys - used, "%s%s", used ? ", " : "", key);
+        }
         snprintf(message, size, "%s has no \"%s\"; it has: %s", so_far, part, keys);
-    else if (!json_is_array(at))
+    } else if (!json_is_array(at))
         snprintf(message, size, "%s is a single value and has no \"%s\"", so_far, part);
     else if (!count)
         snprintf(message, size, "%s is an empty list and has no \"%s\"", so_far, part);
@@ -115,26 +95,18 @@ json_t *client_path_get(const client_path *path, json_t *request, char *message,
     return at;
 }
 
-/* Under solver and webhook an object that is not there is made, and a word in its place gives way:
- * {"accuracy": "quick"}. */
-static json_t *step_or_make(const client_path *path, int i, json_t *at)
-{
-    json_t *next = step(at, path->part[i]);
-    if (json_is_object(next) || json_is_array(next))
-        return next;
-    bool allowed = strcmp(path->part[0], "solver") == 0 || strcmp(path->part[0], "webhook") == 0;
-    if (!allowed || !json_is_object(at) || json_object_set_new(at, path->part[i], json_object()) != 0)
-        return NULL;
-    return json_object_get(at, path->part[i]);
-}
-
 bool client_path_set(const client_path *path, json_t *request, json_t *value, char *message, size_t size)
 {
     json_t *at = request, *next;
     const char *last = path->part[path->count - 1];
+    const bool makes = strcmp(path->part[0], "solver") == 0 || strcmp(path->part[0], "webhook") == 0;
     for (int i = 0; i + 1 < path->count; i++, at = next) {
-        next = step_or_make(path, i, at);
-        next = next ? next : step(at, path->part[i]);
+        next = step(at, path->part[i]);
+        /* Under solver and webhook an object that is not there is made, and a word in its place gives way:
+         * {"accuracy": "quick"}. */
+        if (makes && !json_is_object(next) && !json_is_array(next) && json_is_object(at) &&
+            json_object_set_new(at, path->part[i], json_object()) == 0)
+            next = json_object_get(at, path->part[i]);
         if (!next) {
             say_missing(path, i, at, message, size);
             json_decref(value);

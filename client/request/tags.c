@@ -72,57 +72,42 @@ static bool find_place(tags_place *place, const client_buffer *text)
     return at < text->len && text->data[at] == '}';
 }
 
-static bool has_string(const json_t *array, const char *text)
-{
-    for (size_t i = 0; i < json_array_size(array); i++) {
-        const char *item = json_string_value(json_array_get(array, i));
-        if (item && strcmp(item, text) == 0)
-            return true;
-    }
-    return false;
-}
-
-/* The new array's text on one line, or NULL; the caller frees. *ok false: no memory. */
-static char *merged_tags(const client_buffer *body, const tags_place *place, const char *const *tags, int n_tags,
-                         bool *ok)
-{
-    json_t *array =
-        place->has_tags ? json_loadb(body->data + place->from, place->to - place->from, 0, NULL) : json_array();
-    char *text = NULL;
-    if (json_is_array(array)) {
-        for (int i = 0; *ok && i < n_tags; i++)
-            if (!has_string(array, tags[i]))
-                *ok = json_array_append_new(array, json_string(tags[i])) == 0;
-        text = *ok ? json_dumps(array, JSON_COMPACT) : NULL;
-        *ok = text != NULL;
-    }
-    json_decref(array);
-    return text;
-}
-
-static bool append_new_tags(client_buffer *out, const client_buffer *body, const tags_place *place, const char *text)
-{
-    bool ok = client_buffer_append(out, body->data, place->from);
-    if (!place->has_tags)
-        ok = ok && client_buffer_append(out, "\"tags\":", 7);
-    ok = ok && client_buffer_append(out, text, strlen(text));
-    /* An array that was written over several lines keeps its line breaks. */
-    for (size_t i = place->from; ok && i < place->to; i++)
-        if (body->data[i] == '\n')
-            ok = client_buffer_append(out, "\n", 1);
-    if (!place->has_tags && !place->empty_object)
-        ok = ok && client_buffer_append(out, ",", 1);
-    return ok && client_buffer_append(out, body->data + place->to, body->len - place->to);
-}
-
 bool client_tags_add(client_buffer *out, const client_buffer *body, const char *const *tags, int n_tags)
 {
-    tags_place place;
+    tags_place place = {0};
     bool ok = true;
-    char *text = n_tags > 0 && find_place(&place, body) ? merged_tags(body, &place, tags, n_tags, &ok) : NULL;
+    char *text = NULL; /* the new array on one line */
     *out = (client_buffer){0};
-    if (ok)
-        ok = text ? append_new_tags(out, body, &place, text) : client_buffer_append(out, body->data, body->len);
+    if (n_tags > 0 && find_place(&place, body)) {
+        json_t *array =
+            place.has_tags ? json_loadb(body->data + place.from, place.to - place.from, 0, NULL) : json_array();
+        for (int i = 0; ok && json_is_array(array) && i < n_tags; i++) {
+            bool has = false;
+            for (size_t k = 0; k < json_array_size(array) && !has; k++) {
+                const char *item = json_string_value(json_array_get(array, k));
+                has = item && strcmp(item, tags[i]) == 0;
+            }
+            ok = has || json_array_append_new(array, json_string(tags[i])) == 0;
+        }
+        if (ok && json_is_array(array)) {
+            text = json_dumps(array, JSON_COMPACT);
+            ok = text != NULL;
+        }
+        json_decref(array);
+    }
+    if (!text)
+        ok = ok && client_buffer_append(out, body->data, body->len);
+    else {
+        ok = client_buffer_append(out, body->data, place.from) &&
+             (place.has_tags || client_buffer_append(out, "\"tags\":", 7)) &&
+             client_buffer_append(out, text, strlen(text));
+        /* An array that was written over several lines keeps its line breaks. */
+        for (size_t i = place.from; ok && i < place.to; i++)
+            if (body->data[i] == '\n')
+                ok = client_buffer_append(out, "\n", 1);
+        ok = ok && (place.has_tags || place.empty_object || client_buffer_append(out, ",", 1)) &&
+             client_buffer_append(out, body->data + place.to, body->len - place.to);
+    }
     if (!ok) {
         free(out->data);
         *out = (client_buffer){0};

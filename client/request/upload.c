@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool is_packed(const char *name)
+bool client_is_packed(const char *name)
 {
     const char *end = strrchr(name, '.');
     return end && strcmp(end, ".gz") == 0;
@@ -19,7 +19,7 @@ static client_exit send_bytes(client_session *s, json_t **upload, const char *na
     request.body = file->data;
     request.body_len = file->len;
     request.body_type = "Content-Type: application/octet-stream";
-    if (is_packed(name))
+    if (client_is_packed(name))
         request.headers[0] = "Content-Encoding: gzip";
     client_exit code = client_ask_json(s, upload, &request);
     if (code == CLIENT_OK && !*client_json_text(*upload, "id"))
@@ -27,34 +27,24 @@ static client_exit send_bytes(client_session *s, json_t **upload, const char *na
     return code;
 }
 
-/* The SHA-256 (FIPS 180-4) of the bytes in hexadecimal digits. */
-static bool digest_of(char id[65], const client_buffer *file)
-{
-    unsigned char digest[32];
-    if (gnutls_hash_fast(GNUTLS_DIG_SHA256, file->data, file->len, digest) != 0)
-        return false;
-    for (size_t i = 0; i < sizeof digest; i++)
-        snprintf(id + 2 * i, 3, "%02x", digest[i]);
-    return true;
-}
-
-/* Whatever goes wrong here is met, and told, when the bytes are sent. */
-static bool is_known(client_session *s, const char *id)
-{
-    char path[100];
-    client_reply reply;
-    snprintf(path, sizeof path, "/v1/uploads/%s", id);
-    client_request request = client_request_new(s, "GET", path);
-    bool known = client_http_send(s->http, &reply, &request) == CLIENT_HTTP_ANSWERED && reply.status == 200;
-    client_reply_clear(&reply);
-    return known;
-}
-
 client_exit client_upload_once(client_session *s, char id[65], const char *name, const client_buffer *file)
 {
+    unsigned char digest[32];
     json_t *upload = NULL;
-    if (!is_packed(name) && digest_of(id, file) && is_known(s, id))
-        return CLIENT_OK;
+    /* The id is the SHA-256 (FIPS 180-4) of the bytes in hexadecimal digits. Whatever goes wrong with asking for it is
+     * met, and told, when the bytes are sent. */
+    if (!client_is_packed(name) && gnutls_hash_fast(GNUTLS_DIG_SHA256, file->data, file->len, digest) == 0) {
+        char path[100];
+        client_reply reply;
+        for (size_t i = 0; i < sizeof digest; i++)
+            snprintf(id + 2 * i, 3, "%02x", digest[i]);
+        snprintf(path, sizeof path, "/v1/uploads/%s", id);
+        client_request request = client_request_new(s, "GET", path);
+        bool known = client_http_send(s->http, &reply, &request) == CLIENT_HTTP_ANSWERED && reply.status == 200;
+        client_reply_clear(&reply);
+        if (known)
+            return CLIENT_OK;
+    }
     client_exit code = send_bytes(s, &upload, name, file);
     snprintf(id, 65, "%s", client_json_text(upload, "id"));
     json_decref(upload);

@@ -19,17 +19,6 @@ typedef struct {
 
 /* ------------------------------------------------------------------ values */
 
-/* The number that a person would write, where that is the same to 14 digits: 0.3, not 0.30000000000000004. */
-static json_t *tidy_number(double x)
-{
-    char text[40];
-    snprintf(text, sizeof text, "%.14g", x);
-    double tidy = strtod(text, NULL);
-    if (floor(tidy) == tidy && fabs(tidy) < 9e15)
-        return json_integer((json_int_t)tidy);
-    return json_real(tidy);
-}
-
 /* FIRST:LAST:COUNT. NULL: it is not. */
 static json_t *read_range(const char *text)
 {
@@ -46,26 +35,16 @@ static json_t *read_range(const char *text)
     if (end == rest || *end || count < 2 || count > MOST_CASES)
         return NULL;
     json_t *values = json_array();
-    for (long i = 0; values && i < count; i++)
-        if (json_array_append_new(values, tidy_number(first + (last - first) * (double)i / (double)(count - 1))) != 0) {
+    for (long i = 0; values && i < count; i++) {
+        /* The number that a person would write, where that is the same to 14 digits: 0.3, not 0.30000000000000004. */
+        char tidy[40];
+        snprintf(tidy, sizeof tidy, "%.14g", first + (last - first) * (double)i / (double)(count - 1));
+        const double x = strtod(tidy, NULL);
+        const bool whole = floor(x) == x && fabs(x) < 9e15;
+        if (json_array_append_new(values, whole ? json_integer((json_int_t)x) : json_real(x)) != 0) {
             json_decref(values);
             return NULL;
         }
-    return values;
-}
-
-static json_t *read_words(const char *text)
-{
-    json_t *values = json_array();
-    for (const char *at = text; values;) {
-        size_t len = strcspn(at, ",");
-        if (!len || json_array_append_new(values, client_value_read(at, len)) != 0) {
-            json_decref(values);
-            return NULL;
-        }
-        if (!at[len])
-            break;
-        at += len + 1;
     }
     return values;
 }
@@ -83,7 +62,18 @@ static json_t *read_list(const char *text, bool *memory)
     if (json_array_size(values) || !*memory)
         return values;
     json_decref(values);
-    return read_words(text);
+    values = json_array();
+    for (const char *at = text; values; at++) {
+        const size_t len = strcspn(at, ",");
+        if (!len || json_array_append_new(values, client_value_read(at, len)) != 0) {
+            json_decref(values);
+            return NULL;
+        }
+        at += len;
+        if (!*at)
+            break;
+    }
+    return values;
 }
 
 json_t *client_vary_values(const char *text, char *message, size_t size)
@@ -104,27 +94,6 @@ json_t *client_vary_values(const char *text, char *message, size_t size)
 
 /* -------------------------------------------------------------- what varies */
 
-/* Can a load case carry it (scene_case and matrices_case of schemas/request.json)? */
-static bool fits_case(const client_path *path, const json_t *request)
-{
-    const char *kind = json_string_value(json_object_get(json_object_get(request, "problem"), "kind"));
-    if (path->count < 2 || strcmp(path->part[0], "problem") != 0 || !kind)
-        return false;
-    if (strcmp(kind, "scene") == 0)
-        return strcmp(path->part[1], "loads") == 0;
-    return strcmp(path->part[1], "p") == 0 || strcmp(path->part[1], "h") == 0;
-}
-
-/* Tries the first value, so that a wrong path is told before anything is sent. */
-static bool try_path(const varied *v, const json_t *request, char *message, size_t size)
-{
-    json_t *copy = json_deep_copy(request);
-    bool ok = strcmp(v->path.part[0], "problem") != 0 || client_path_get(&v->path, copy, message, size);
-    ok = ok && client_path_set(&v->path, copy, json_incref(json_array_get(v->values, 0)), message, size);
-    json_decref(copy);
-    return ok;
-}
-
 static client_exit read_varied(client_session *s, varied *out, const json_t *request, const char *word)
 {
     char message[1024], why[900] = "it wants PATH=VALUES";
@@ -132,8 +101,21 @@ static client_exit read_varied(client_session *s, varied *out, const json_t *req
     size_t len = equals ? (size_t)(equals - word) : strlen(word);
     bool ok = equals && client_path_read(&out->path, request, word, len, why, sizeof why);
     out->values = ok ? client_vary_values(equals + 1, why, sizeof why) : NULL;
-    ok = out->values && try_path(out, request, why, sizeof why);
-    out->in_case = ok && fits_case(&out->path, request);
+    ok = out->values != NULL;
+    if (ok) {
+        /* The first value is tried, so that a wrong path is told before anything is sent. */
+        json_t *copy = json_deep_copy(request);
+        ok = strcmp(out->path.part[0], "problem") != 0 || client_path_get(&out->path, copy, why, sizeof why);
+        ok = ok && client_path_set(&out->path, copy, json_incref(json_array_get(out->values, 0)), why, sizeof why);
+        json_decref(copy);
+    }
+    /* Can a load case carry it (scene_case and matrices_case of schemas/request.json)? */
+    const char *kind = json_string_value(json_object_get(json_object_get(request, "problem"), "kind"));
+    if (ok && kind && out->path.count >= 2 && strcmp(out->path.part[0], "problem") == 0) {
+        const char *what = out->path.part[1];
+        out->in_case =
+            strcmp(kind, "scene") == 0 ? strcmp(what, "loads") == 0 : strcmp(what, "p") == 0 || strcmp(what, "h") == 0;
+    }
     if (ok && out->in_case && json_object_get(request, "cases")) {
         snprintf(why, sizeof why, "a load is varied by cases, and the request has cases of its own: take them out");
         ok = false;
@@ -187,23 +169,6 @@ static bool put_combination(const varied *all, int count, bool in_case, size_t k
     return ok;
 }
 
-/* The load case that the request with its values put in stands for. NULL: no memory. */
-static json_t *case_of(const varied *all, int count, const json_t *request, const char *name)
-{
-    json_t *made = json_pack("{s:s}", "name", name), *problem = json_object_get(request, "problem");
-    bool ok = made != NULL;
-    for (int i = 0; ok && i < count; i++) {
-        const char *key = all[i].path.part[1];
-        if (all[i].in_case)
-            ok = json_object_set_new(made, key, json_deep_copy(json_object_get(problem, key))) == 0;
-    }
-    if (!ok) {
-        json_decref(made);
-        made = NULL;
-    }
-    return made;
-}
-
 static client_exit add_cases(client_session *s, json_t *request, const varied *all, int count)
 {
     char name[160], message[256];
@@ -217,9 +182,19 @@ static client_exit add_cases(client_session *s, json_t *request, const varied *a
         if (json_object_get(names, name)) {
             snprintf(message, sizeof message, "--vary gives \"%.100s\" twice: a case's name must be its own", name);
             code = client_complain(s, CLIENT_USAGE, message);
-        } else if (!ok || json_object_set_new(names, name, json_true()) != 0 ||
-                   json_array_append_new(cases, case_of(all, count, copy, name)) != 0)
+            break;
+        }
+        /* The load case that the request with its values put in stands for. */
+        json_t *made = json_pack("{s:s}", "name", name), *problem = json_object_get(copy, "problem");
+        ok = ok && made && json_object_set_new(names, name, json_true()) == 0;
+        for (int i = 0; ok && i < count; i++) {
+            const char *key = all[i].path.part[1];
+            if (all[i].in_case)
+                ok = json_object_set_new(made, key, json_deep_copy(json_object_get(problem, key))) == 0;
+        }
+        if (!ok || json_array_append(cases, made) != 0)
             code = client_complain(s, CLIENT_LOCAL, "no memory, or a value is not UTF-8");
+        json_decref(made);
     }
     if (code == CLIENT_OK && json_object_set(request, "cases", cases) != 0)
         code = client_complain(s, CLIENT_LOCAL, "no memory");
@@ -229,45 +204,33 @@ static client_exit add_cases(client_session *s, json_t *request, const varied *a
     return code;
 }
 
-static bool varies_cases(const varied *all, int count)
-{
-    for (int i = 0; i < count; i++)
-        if (all[i].in_case)
-            return true;
-    return false;
-}
-
-static client_exit add_job(client_session *s, json_t *requests, json_t *labels, const json_t *request,
-                           const varied *all, int count, size_t k)
-{
-    char label[160];
-    json_t *copy = json_deep_copy(request);
-    client_exit code = CLIENT_OK;
-    if (!copy || !put_combination(all, count, false, k, copy, label, sizeof label))
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
-    if (code == CLIENT_OK && varies_cases(all, count))
-        code = add_cases(s, copy, all, count);
-    if (code == CLIENT_OK &&
-        (json_array_append(requests, copy) != 0 || json_array_append_new(labels, json_string(label)) != 0))
-        code = client_complain(s, CLIENT_LOCAL, "no memory");
-    json_decref(copy);
-    return code;
-}
-
 client_exit client_build_variants(client_session *s, json_t **requests, json_t **labels, const json_t *request)
 {
     varied all[MOST_VARIED] = {0};
     const uz_words *words = &s->options->vary;
     client_exit code = CLIENT_OK;
+    bool cases = false;
     *requests = json_array();
     *labels = json_array();
-    for (int i = 0; code == CLIENT_OK && i < words->count; i++)
+    for (int i = 0; code == CLIENT_OK && i < words->count; i++) {
         code = read_varied(s, &all[i], request, words->item[i]);
+        cases = cases || all[i].in_case;
+    }
     size_t jobs = code == CLIENT_OK ? combinations(all, words->count, false) : 0;
     if (code == CLIENT_OK && (jobs > MOST_JOBS || combinations(all, words->count, true) > MOST_CASES))
         code = client_complain(s, CLIENT_USAGE, "--vary makes more than 1000 jobs or 10000 cases");
-    for (size_t k = 0; code == CLIENT_OK && k < jobs; k++)
-        code = add_job(s, *requests, *labels, request, all, words->count, k);
+    for (size_t k = 0; code == CLIENT_OK && k < jobs; k++) {
+        char label[160];
+        json_t *copy = json_deep_copy(request);
+        if (!copy || !put_combination(all, words->count, false, k, copy, label, sizeof label))
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        if (code == CLIENT_OK && cases)
+            code = add_cases(s, copy, all, words->count);
+        if (code == CLIENT_OK &&
+            (json_array_append(*requests, copy) != 0 || json_array_append_new(*labels, json_string(label)) != 0))
+            code = client_complain(s, CLIENT_LOCAL, "no memory");
+        json_decref(copy);
+    }
     for (int i = 0; i < words->count; i++)
         json_decref(all[i].values);
     return code;

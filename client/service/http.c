@@ -46,13 +46,7 @@ void client_reply_clear(client_reply *reply)
     *reply = (client_reply){0};
 }
 
-static bool is_loopback(const char *host)
-{
-    return strcasecmp(host, "localhost") == 0 || strncmp(host, "127.", 4) == 0 || strcmp(host, "[::1]") == 0;
-}
-
-/* Checks the URL and tells whether a proxy from the environment must be left out: nobody means one for this machine. */
-static bool inspect_url(const char *server, bool *direct, char *message, size_t size)
+client_http *client_http_open(const char *server, const char *token, const char *ca_file, char *message, size_t size)
 {
     char *scheme = NULL, *host = NULL;
     CURLU *url = curl_url();
@@ -60,21 +54,16 @@ static bool inspect_url(const char *server, bool *direct, char *message, size_t 
               curl_url_get(url, CURLUPART_SCHEME, &scheme, 0) == CURLUE_OK &&
               curl_url_get(url, CURLUPART_HOST, &host, 0) == CURLUE_OK &&
               (strcmp(scheme, "http") == 0 || strcmp(scheme, "https") == 0) && !strpbrk(server, "?#");
-    if (ok)
-        *direct = is_loopback(host);
-    else
-        snprintf(message, size, "the server must be a URL like http://host:8080, not \"%s\"", server);
+    /* A proxy from the environment is left out: nobody means one for this machine. */
+    const bool direct =
+        ok && (strcasecmp(host, "localhost") == 0 || strncmp(host, "127.", 4) == 0 || strcmp(host, "[::1]") == 0);
     curl_free(scheme);
     curl_free(host);
     curl_url_cleanup(url);
-    return ok;
-}
-
-client_http *client_http_open(const char *server, char *message, size_t size)
-{
-    bool direct = false;
-    if (!inspect_url(server, &direct, message, size))
+    if (!ok) {
+        snprintf(message, size, "the server must be a URL like http://host:8080, not \"%s\"", server);
         return NULL;
+    }
     client_http *http = calloc(1, sizeof *http);
     if (http && curl_global_init(CURL_GLOBAL_DEFAULT) != CURLE_OK) {
         free(http);
@@ -87,6 +76,8 @@ client_http *client_http_open(const char *server, char *message, size_t size)
     http->curl = curl_easy_init();
     http->multi = curl_multi_init();
     http->base = strdup(server);
+    http->token = token && *token ? token : NULL;
+    http->ca_file = ca_file && *ca_file ? ca_file : NULL;
     if (!http->curl || !http->multi || !http->base) {
         client_http_close(http);
         snprintf(message, size, "no memory");
@@ -163,32 +154,6 @@ static size_t take_header(char *bytes, size_t size, size_t count, void *ctx)
     } else if (header_value(value, sizeof value, bytes, size * count, "Date:"))
         reply->date = curl_getdate(value, NULL);
     return size * count;
-}
-
-/* NULL: no memory. "Expect:" keeps curl from holding back a large body for a second. */
-static struct curl_slist *header_list(const client_request *request)
-{
-    struct curl_slist *list = curl_slist_append(NULL, "Expect:");
-    bool ok = list != NULL;
-    const char *of_body = request->body_type ? request->body_type : "Content-Type: application/json";
-    const char *type = request->body ? of_body : NULL;
-    for (int i = -1; ok && i < CLIENT_HTTP_MAX_HEADERS; i++) {
-        const char *header = i < 0 ? type : request->headers[i];
-        struct curl_slist *longer = header ? curl_slist_append(list, header) : list;
-        ok = longer != NULL;
-        list = ok ? longer : list;
-    }
-    if (!ok) {
-        curl_slist_free_all(list);
-        list = NULL;
-    }
-    return list;
-}
-
-void client_http_trust(client_http *http, const char *token, const char *ca_file)
-{
-    http->token = token && *token ? token : NULL;
-    http->ca_file = ca_file && *ca_file ? ca_file : NULL;
 }
 
 void client_http_set_watch(client_http *http, const client_http_watch *watch)
@@ -289,14 +254,23 @@ static CURLcode send_once(client_http *http, client_reply *reply, const client_r
 {
     char *url = NULL, *address = NULL;
     CURLcode code = CURLE_OUT_OF_MEMORY;
-    struct curl_slist *headers = header_list(request);
+    /* "Expect:" keeps curl from holding back a large body for a second. */
+    struct curl_slist *headers = curl_slist_append(NULL, "Expect:");
+    const char *of_body = request->body_type ? request->body_type : "Content-Type: application/json";
+    bool ok = headers != NULL;
+    for (int i = -1; ok && i < CLIENT_HTTP_MAX_HEADERS; i++) {
+        const char *header = i >= 0 ? request->headers[i] : request->body ? of_body : NULL;
+        struct curl_slist *longer = header ? curl_slist_append(headers, header) : headers;
+        ok = longer != NULL;
+        headers = ok ? longer : headers;
+    }
     body_sink sink = {.http = http, .reply = reply, .request = request};
     int attempts = reply->attempts + 1;
     client_reply_clear(reply);
     reply->attempts = attempts;
     reply->date = -1;
     http->curl_says[0] = '\0';
-    if (headers && asprintf(&url, "%s%s", http->base, request->path) >= 0) {
+    if (ok && asprintf(&url, "%s%s", http->base, request->path) >= 0) {
         set_request(http, &sink, request);
         curl_easy_setopt(http->curl, CURLOPT_URL, url);
         curl_easy_setopt(http->curl, CURLOPT_HTTPHEADER, headers);
@@ -315,55 +289,26 @@ static CURLcode send_once(client_http *http, client_reply *reply, const client_r
     return code;
 }
 
-/* Nothing of the request can have reached the server. */
-static bool never_arrived(CURLcode code)
-{
-    return code == CURLE_COULDNT_CONNECT || code == CURLE_COULDNT_RESOLVE_HOST || code == CURLE_COULDNT_RESOLVE_PROXY;
-}
-
-/* A local cause, or one that another attempt will meet again. */
-static bool hopeless(CURLcode code)
-{
-    return code == CURLE_ABORTED_BY_CALLBACK || code == CURLE_OUT_OF_MEMORY || code == CURLE_WRITE_ERROR ||
-           code == CURLE_UNSUPPORTED_PROTOCOL || code == CURLE_URL_MALFORMAT ||
-           code == CURLE_PEER_FAILED_VERIFICATION || code == CURLE_SSL_CONNECT_ERROR;
-}
-
 static bool worth_another(CURLcode code, const client_reply *reply, const client_request *request)
 {
-    if (code == CURLE_OK)
+    switch (code) {
+    case CURLE_OK:
         return request->repeatable &&
                (reply->status == 429 || reply->status == 502 || reply->status == 503 || reply->status == 504);
-    return never_arrived(code) || (request->repeatable && !hopeless(code));
-}
-
-/* 0.1 s, doubling up to 2 s, up to a quarter shorter by chance so that many clients don't return at once. */
-static double pause_before(int attempt, const client_reply *reply)
-{
-    double pause = attempt < 5 ? 0.1 * (double)(1 << attempt) : 2;
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    pause *= 1 - 0.25 * (double)(now.tv_nsec % 1000) / 1000;
-    return fmax(pause, reply->retry_after_s);
-}
-
-static client_http_cause cause_of(CURLcode code)
-{
-    switch (code) {
+    case CURLE_COULDNT_CONNECT: /* nothing of the request can have reached the server */
     case CURLE_COULDNT_RESOLVE_HOST:
     case CURLE_COULDNT_RESOLVE_PROXY:
-        return CLIENT_CAUSE_NAME;
-    case CURLE_COULDNT_CONNECT:
-        return CLIENT_CAUSE_CONNECTION;
+        return true;
+    case CURLE_ABORTED_BY_CALLBACK: /* a local cause, or one that another attempt will meet again */
+    case CURLE_OUT_OF_MEMORY:
+    case CURLE_WRITE_ERROR:
+    case CURLE_UNSUPPORTED_PROTOCOL:
+    case CURLE_URL_MALFORMAT:
     case CURLE_PEER_FAILED_VERIFICATION:
-    case CURLE_SSL_CACERT_BADFILE:
-        return CLIENT_CAUSE_CERTIFICATE;
     case CURLE_SSL_CONNECT_ERROR:
-        return CLIENT_CAUSE_TLS;
-    case CURLE_OPERATION_TIMEDOUT:
-        return CLIENT_CAUSE_SILENCE;
+        return false;
     default:
-        return CLIENT_CAUSE_OTHER;
+        return request->repeatable;
     }
 }
 
@@ -373,7 +318,27 @@ static client_http_end end_of(client_http *http, client_reply *reply, CURLcode c
         return CLIENT_HTTP_ANSWERED;
     const char *why = http->curl_says[0] ? http->curl_says : curl_easy_strerror(code);
     snprintf(reply->message, sizeof reply->message, "no answer from %.60s: %.220s", http->base, why);
-    reply->cause = cause_of(code);
+    switch (code) {
+    case CURLE_COULDNT_RESOLVE_HOST:
+    case CURLE_COULDNT_RESOLVE_PROXY:
+        reply->cause = CLIENT_CAUSE_NAME;
+        break;
+    case CURLE_COULDNT_CONNECT:
+        reply->cause = CLIENT_CAUSE_CONNECTION;
+        break;
+    case CURLE_PEER_FAILED_VERIFICATION:
+    case CURLE_SSL_CACERT_BADFILE:
+        reply->cause = CLIENT_CAUSE_CERTIFICATE;
+        break;
+    case CURLE_SSL_CONNECT_ERROR:
+        reply->cause = CLIENT_CAUSE_TLS;
+        break;
+    case CURLE_OPERATION_TIMEDOUT:
+        reply->cause = CLIENT_CAUSE_SILENCE;
+        break;
+    default:
+        reply->cause = CLIENT_CAUSE_OTHER;
+    }
     if (code == CURLE_ABORTED_BY_CALLBACK)
         return CLIENT_HTTP_INTERRUPTED;
     if (code == CURLE_OUT_OF_MEMORY || code == CURLE_WRITE_ERROR)
@@ -396,7 +361,12 @@ client_http_end client_http_send(client_http *http, client_reply *reply, const c
     *reply = (client_reply){0};
     for (int attempt = 0;; attempt++) {
         CURLcode code = send_once(http, reply, request);
-        double pause = pause_before(attempt, reply), then = client_clock() + pause;
+        /* 0.1 s, doubling up to 2 s, up to a quarter shorter by chance so that many clients don't return at once. */
+        struct timespec now;
+        clock_gettime(CLOCK_REALTIME, &now);
+        double pause = attempt < 5 ? 0.1 * (double)(1 << attempt) : 2;
+        pause = fmax(pause * (1 - 0.25 * (double)(now.tv_nsec % 1000) / 1000), reply->retry_after_s);
+        const double then = client_clock() + pause;
         bool again =
             worth_another(code, reply, request) && then <= start + request->patience_s && then < request->deadline;
         if (!again)

@@ -72,12 +72,11 @@ typedef struct {
 } client_reply;
 void client_reply_clear(client_reply *reply);
 
-/* NULL: message says what is wrong with the URL. The caller frees. */
-client_http *client_http_open(const char *server, char *message, size_t size);
+/* A connection to the service at the URL. token: the bearer token to send (RFC 6750); ca_file: with the certificates
+ * (PEM) to trust for https instead of the system's; NULL or "": none, else both must outlive it. NULL: message says
+ * what is wrong with the URL. The caller frees. */
+client_http *client_http_open(const char *server, const char *token, const char *ca_file, char *message, size_t size);
 void client_http_close(client_http *http);
-/* From now on: the bearer token to send (RFC 6750), and the file with the certificates (PEM) to trust for https instead
- * of the system's. NULL or "": none. Both must outlive http. */
-void client_http_trust(client_http *http, const char *token, const char *ca_file);
 
 /* From now on; NULL: none. Must outlive http. */
 void client_http_set_watch(client_http *http, const client_http_watch *watch);

@@ -42,13 +42,6 @@ client_request client_request_new(const client_session *s, const char *method, c
                             .deadline = s->deadline};
 }
 
-static client_exit exit_of_end(client_http_end end)
-{
-    if (end == CLIENT_HTTP_INTERRUPTED)
-        return CLIENT_INTERRUPTED;
-    return end == CLIENT_HTTP_MEMORY ? CLIENT_LOCAL : CLIENT_UNREACHABLE;
-}
-
 client_exit client_explain(client_session *s, client_http_end end, const client_reply *reply)
 {
     if (end == CLIENT_HTTP_INTERRUPTED)
@@ -58,7 +51,7 @@ client_exit client_explain(client_session *s, client_http_end end, const client_
         const bool nobody = reply->cause == CLIENT_CAUSE_CONNECTION;
         snprintf(message, sizeof message, "%s%s", reply->message,
                  nobody ? ". Is uzawad running there? uzawa doctor says more" : "");
-        return client_complain(s, exit_of_end(end), message);
+        return client_complain(s, end == CLIENT_HTTP_MEMORY ? CLIENT_LOCAL : CLIENT_UNREACHABLE, message);
     }
     client_exit code = reply->status >= 400 && reply->status < 500 ? CLIENT_REFUSED : CLIENT_SERVER_ERROR;
     json_t *problem = reply->body.data ? json_loadb(reply->body.data, reply->body.len, 0, NULL) : NULL;

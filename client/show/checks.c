@@ -9,19 +9,6 @@
 
 /* ---- the list */
 
-static bool grow(client_checks *to)
-{
-    if (to->count < to->capacity)
-        return true;
-    size_t capacity = to->capacity ? 2 * to->capacity : 16;
-    client_check *grown = realloc(to->item, capacity * sizeof *grown);
-    if (!grown)
-        return false;
-    to->item = grown;
-    to->capacity = capacity;
-    return true;
-}
-
 static void clear_check(client_check *check)
 {
     free(check->group);
@@ -38,12 +25,20 @@ void client_checks_add(client_checks *to, client_verdict verdict, const char *gr
     if (vasprintf(&check.text, format, args) < 0)
         check.text = NULL;
     va_end(args);
-    if (check.group && check.name && check.text && grow(to)) {
-        to->item[to->count++] = check;
-        return;
+    bool ok = check.group && check.name && check.text;
+    if (ok && to->count == to->capacity) {
+        const size_t capacity = to->capacity ? 2 * to->capacity : 16;
+        client_check *grown = realloc(to->item, capacity * sizeof *grown);
+        ok = grown != NULL;
+        to->item = ok ? grown : to->item;
+        to->capacity = ok ? capacity : to->capacity;
     }
-    clear_check(&check);
-    to->failed = true;
+    if (ok)
+        to->item[to->count++] = check;
+    else {
+        clear_check(&check);
+        to->failed = true;
+    }
 }
 
 void client_checks_clear(client_checks *checks)
@@ -86,85 +81,67 @@ void client_checks_outcome(client_checks *to, const json_t *job)
 
 /* ---- assertions */
 
-static client_verdict verdict_of(const json_t *line)
-{
-    const char *result = client_json_text(line, "result");
-    return strcmp(result, "pass") == 0        ? CLIENT_PASS
-           : strcmp(result, "uncertain") == 0 ? CLIENT_UNCERTAIN
-                                              : CLIENT_FAIL;
-}
-
-/* The user's own name, or what is asserted. */
-static void name_line(char *out, size_t size, const json_t *line)
-{
-    const char *name = client_json_text(line, "name");
-    snprintf(out, size, "%s", *name ? name : client_json_text(line, "quantity"));
-    if (!*name) {
-        /* " at least 1 at most 3"; " near 5". */
-        static const char *const LIMITS[][2] = {{"min", "at least"}, {"max", "at most"}, {"near", "near"}};
-        for (size_t i = 0; i < sizeof LIMITS / sizeof LIMITS[0]; i++) {
-            double value = client_json_number(line, LIMITS[i][0]);
-            size_t used = strlen(out);
-            if (isfinite(value))
-                snprintf(out + used, size - used, " %s %.9g", LIMITS[i][1], value);
-        }
-    }
-}
-
-static void find_text(char *out, size_t size, const json_t *line)
-{
-    const double value = client_json_number(line, "value"), error = client_json_number(line, "error");
-    const double failed = client_json_number(line, "cases.fail"), open = client_json_number(line, "cases.uncertain");
-    const char *reason = client_json_text(line, "reason"), *of = client_json_text(line, "case");
-    char bound[32];
-    int used = snprintf(out, size, "%s", reason);
-    if (!*reason && error > 0)
-        used = snprintf(out, size, "%.9g, the exact one within %s", value, client_format_bound(bound, error));
-    else if (!*reason)
-        used = snprintf(out, size, "%.9g", value);
-    if (*of && used > 0 && (size_t)used < size)
-        used += snprintf(out + used, size - (size_t)used, " (case %s", of);
-    if (*of && used > 0 && (size_t)used < size)
-        snprintf(out + used, size - (size_t)used, failed + open > 1 ? "; %.0f cases in all)" : ")", failed + open);
-}
-
 void client_checks_assertions(client_checks *to, const json_t *summary, const char *group)
 {
+    static const char *const LIMITS[][2] = {{"min", "at least"}, {"max", "at most"}, {"near", "near"}};
     const json_t *lines = json_object_get(summary, "assertions"), *line;
-    char name[400], text[400];
+    char name[400], text[400], bound[32];
     size_t i;
     json_array_foreach((json_t *)lines, i, line)
     {
-        name_line(name, sizeof name, line);
-        find_text(text, sizeof text, line);
-        client_checks_add(to, verdict_of(line), group, name, "%s", text);
+        const char *result = client_json_text(line, "result"), *own = client_json_text(line, "name");
+        const client_verdict verdict = strcmp(result, "pass") == 0        ? CLIENT_PASS
+                                       : strcmp(result, "uncertain") == 0 ? CLIENT_UNCERTAIN
+                                                                          : CLIENT_FAIL;
+        /* The user's own name, or what is asserted: "energy at least 1 at most 3"; "gap near 5". */
+        snprintf(name, sizeof name, "%s", *own ? own : client_json_text(line, "quantity"));
+        for (size_t k = 0; !*own && k < sizeof LIMITS / sizeof LIMITS[0]; k++) {
+            double value = client_json_number(line, LIMITS[k][0]);
+            size_t end = strlen(name);
+            if (isfinite(value))
+                snprintf(name + end, sizeof name - end, " %s %.9g", LIMITS[k][1], value);
+        }
+        /* What was found: the value, how exact it is, and of how many cases that is true. */
+        const double found = client_json_number(line, "value"), error = client_json_number(line, "error");
+        const double failed = client_json_number(line, "cases.fail");
+        const double open = client_json_number(line, "cases.uncertain");
+        const char *reason = client_json_text(line, "reason"), *of = client_json_text(line, "case");
+        int used = snprintf(text, sizeof text, "%s", reason);
+        if (!*reason && error > 0)
+            used =
+                snprintf(text, sizeof text, "%.9g, the exact one within %s", found, client_format_bound(bound, error));
+        else if (!*reason)
+            used = snprintf(text, sizeof text, "%.9g", found);
+        if (*of && used > 0 && (size_t)used < sizeof text)
+            used += snprintf(text + used, sizeof text - (size_t)used, " (case %s", of);
+        if (*of && used > 0 && (size_t)used < sizeof text)
+            snprintf(text + used, sizeof text - (size_t)used, failed + open > 1 ? "; %.0f cases in all)" : ")",
+                     failed + open);
+        client_checks_add(to, verdict, group, name, "%s", text);
     }
 }
 
 /* ---- print */
 
-static void print_check(FILE *to, const client_check *check)
-{
-    static const char *const WORDS[] = {"pass", "uncertain", "FAIL", "FAIL"};
-    fprintf(to, "%12s%-11s", "", WORDS[check->verdict]);
-    if (*check->group) {
-        client_print_safe(to, check->group);
-        fputs(": ", to);
-    }
-    client_print_safe(to, check->name);
-    fputs(": ", to);
-    client_print_safe(to, check->text);
-    fputc('\n', to);
-}
-
 void client_checks_print(FILE *to, const client_checks *checks, size_t from, const char *heading)
 {
+    static const char *const WORDS[] = {"pass", "uncertain", "FAIL", "FAIL"};
     size_t passed = 0;
     if (from >= checks->count)
         return;
     for (size_t i = from; i < checks->count; i++)
         passed += checks->item[i].verdict == CLIENT_PASS;
     fprintf(to, "%-12s%zu of %zu pass\n", heading, passed, checks->count - from);
-    for (size_t i = from; i < checks->count; i++)
-        print_check(to, &checks->item[i]);
+    for (size_t i = from; i < checks->count; i++) {
+        const client_check *check = &checks->item[i];
+        fprintf(to, "%12s%-11s", "", WORDS[check->verdict]);
+        if (*check->group) {
+            client_print_safe(to, check->group);
+            fputs(": ", to);
+        }
+        client_print_safe(to, check->name);
+        fputs(": ", to);
+        client_print_safe(to, check->text);
+        fputc('\n', to);
+    }
 }

@@ -75,12 +75,6 @@ static void put_attribute(FILE *to, const char *name, const char *value)
     fputc('"', to);
 }
 
-/* Seconds, with a point whatever the locale: the client never sets LC_NUMERIC. */
-static void put_seconds(FILE *to, double seconds)
-{
-    fprintf(to, " time=\"%.6f\"", isfinite(seconds) ? seconds : 0.0);
-}
-
 static const char *tag_of(client_verdict verdict)
 {
     return verdict == CLIENT_PASS ? NULL : verdict == CLIENT_NO_ANSWER ? "error" : "failure";
@@ -100,7 +94,7 @@ static void put_check(FILE *to, const client_suite *suite, size_t i)
     fputs(checks->compared > 0 && i >= checks->compared ? "\" name=\"baseline: " : "\" name=\"", to);
     put_text(to, check->name);
     fputc('"', to);
-    put_seconds(to, i == 0 ? suite->seconds : 0.0);
+    fprintf(to, " time=\"%.6f\"", i == 0 && isfinite(suite->seconds) ? suite->seconds : 0.0);
     if (tag) {
         fprintf(to, ">\n      <%s", tag);
         put_attribute(to, "type", TYPES[check->verdict]);
@@ -123,36 +117,11 @@ static size_t count_tag(const client_checks *checks, const char *tag)
     return count;
 }
 
-static void put_property(FILE *to, const char *name, const char *value)
-{
-    fprintf(to, "      <property name=\"%s\"", name);
-    put_attribute(to, "value", value);
-    fputs("/>\n", to);
-}
-
+/* Seconds have a point whatever the locale: the client never sets LC_NUMERIC. */
 static void put_counts(FILE *to, size_t tests, size_t failures, size_t errors, double seconds)
 {
     fprintf(to, " tests=\"%zu\" failures=\"%zu\" errors=\"%zu\" skipped=\"0\"", tests, failures, errors);
-    put_seconds(to, seconds);
-}
-
-/* The common shape has whole seconds without a zone. */
-static void put_suite(FILE *to, const client_suite *suite)
-{
-    char created[20];
-    const client_checks *checks = &suite->checks;
-    snprintf(created, sizeof created, "%.19s", suite->created);
-    fputs("  <testsuite", to);
-    put_attribute(to, "name", suite->name);
-    put_counts(to, checks->count, count_tag(checks, "failure"), count_tag(checks, "error"), suite->seconds);
-    put_attribute(to, "timestamp", created);
-    fputs(">\n    <properties>\n", to);
-    put_property(to, "job", suite->id);
-    put_property(to, "outcome", suite->outcome);
-    fputs("    </properties>\n", to);
-    for (size_t i = 0; i < checks->count; i++)
-        put_check(to, suite, i);
-    fputs("  </testsuite>\n", to);
+    fprintf(to, " time=\"%.6f\"", isfinite(seconds) ? seconds : 0.0);
 }
 
 bool client_junit_write(const client_suites *suites, const char *path, char *message, size_t size)
@@ -173,8 +142,27 @@ bool client_junit_write(const client_suites *suites, const char *path, char *mes
         fputs("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"uzawa\"", report);
         put_counts(report, tests, failures, errors, seconds);
         fputs(">\n", report);
-        for (size_t i = 0; i < suites->count; i++)
-            put_suite(report, &suites->item[i]);
+        for (size_t i = 0; i < suites->count; i++) {
+            const client_suite *suite = &suites->item[i];
+            const client_checks *checks = &suite->checks;
+            const char *const properties[][2] = {{"job", suite->id}, {"outcome", suite->outcome}};
+            char created[20]; /* the common shape has whole seconds without a zone */
+            snprintf(created, sizeof created, "%.19s", suite->created);
+            fputs("  <testsuite", report);
+            put_attribute(report, "name", suite->name);
+            put_counts(report, checks->count, count_tag(checks, "failure"), count_tag(checks, "error"), suite->seconds);
+            put_attribute(report, "timestamp", created);
+            fputs(">\n    <properties>\n", report);
+            for (size_t k = 0; k < sizeof properties / sizeof *properties; k++) {
+                fprintf(report, "      <property name=\"%s\"", properties[k][0]);
+                put_attribute(report, "value", properties[k][1]);
+                fputs("/>\n", report);
+            }
+            fputs("    </properties>\n", report);
+            for (size_t k = 0; k < checks->count; k++)
+                put_check(report, suite, k);
+            fputs("  </testsuite>\n", report);
+        }
         fputs("</testsuites>\n", report);
     }
     bool ok = report && fflush(report) == 0 && !ferror(report);

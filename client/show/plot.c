@@ -23,20 +23,6 @@ static const char *next_line(const char *line)
     return line + strspn(line, "\r\n");
 }
 
-/* The place of `name` in the header line, -1 if it is not there. */
-static int find_column(const char *header, const char *name)
-{
-    size_t len = strlen(name);
-    for (int place = 0;; place++) {
-        size_t cell = strcspn(header, ",\r\n");
-        if (cell == len && memcmp(header, name, len) == 0)
-            return place;
-        if (header[cell] != ',')
-            return -1;
-        header += cell + 1;
-    }
-}
-
 /* The number in the cell `place` of a line, NaN where there is none. */
 static double cell_value(const char *line, int place)
 {
@@ -59,7 +45,16 @@ bool client_series_read(client_series *out, const char *csv, char *message, size
     client_series series = {0};
     *out = series;
     for (int i = 0; i < CLIENT_COLUMNS; i++) {
-        place[i] = find_column(csv, NAMES[i]);
+        const char *cell = csv;
+        place[i] = -1;
+        for (int at = 0; place[i] < 0; at++) {
+            const size_t len = strcspn(cell, ",\r\n");
+            if (len == strlen(NAMES[i]) && memcmp(cell, NAMES[i], len) == 0)
+                place[i] = at;
+            if (cell[len] != ',')
+                break;
+            cell += len + 1;
+        }
         if (place[i] < 0) {
             snprintf(message, size, "the history has no column \"%s\"", NAMES[i]);
             return false;
@@ -87,6 +82,7 @@ bool client_series_read(client_series *out, const char *csv, char *message, size
 /* ---- the drawing */
 
 #define MARGIN       10 /* characters left of the first cell, the axis included */
+#define LEGEND_WIDTH 56
 #define MOST_DECADES 40 /* smaller values are drawn at the bottom */
 
 enum { SOLID = 1, DOTTED = 2 }; /* bits of a point */
@@ -94,56 +90,23 @@ enum { SOLID = 1, DOTTED = 2 }; /* bits of a point */
 /* The drawing area: cells of sx x sy points. */
 typedef struct {
     int cols, rows, sx, sy;
-    unsigned char *points;  /* (rows sy) x (cols sx) */
+    int across, down;       /* points: cols sx, rows sy */
+    unsigned char *points;  /* down x across */
     double low, high, last; /* decades at bottom and top; iteration at the right edge */
     unsigned travelled;     /* points passed by the lines so far */
     const client_plot_style *style;
 } canvas;
 
-static int points_across(const canvas *c)
-{
-    return c->cols * c->sx;
-}
-
-static int points_down(const canvas *c)
-{
-    return c->rows * c->sy;
-}
-
 static int across(const canvas *c, double iteration)
 {
-    return (int)lround(iteration / c->last * (points_across(c) - 1));
+    return (int)lround(iteration / c->last * (c->across - 1));
 }
 
 /* 0 is the top. */
 static int down(const canvas *c, double decade)
 {
     double part = (c->high - decade) / (c->high - c->low);
-    return (int)lround(fmin(fmax(part, 0), 1) * (points_down(c) - 1));
-}
-
-/* The iterations and decades that the drawing must hold. False: there is nothing to draw. */
-static bool find_range(canvas *c, const client_series *s)
-{
-    uz_range values = uz_range_none();
-    double last = 0;
-    for (size_t i = 0; i < s->count; i++) {
-        double at = s->column[CLIENT_ITERATION][i];
-        for (int k = CLIENT_ERROR_BOUND; k <= CLIENT_RESIDUAL; k++) {
-            double value = s->column[k][i];
-            if (!uz_axis_has(value, true) || !isfinite(at) || at < 0)
-                continue;
-            uz_range_take(&values, value, true);
-            last = fmax(last, at);
-        }
-    }
-    if (values.low > values.high)
-        return false;
-    const uz_range decades = uz_range_decades(values);
-    c->high = decades.high;
-    c->low = fmax(decades.low, c->high - MOST_DECADES);
-    c->last = fmax(last, 1);
-    return true;
+    return (int)lround(fmin(fmax(part, 0), 1) * (c->down - 1));
 }
 
 /* A dotted line is two points on, two off along its path, so that the two lines differ without colour too. */
@@ -151,19 +114,7 @@ static void set_point(canvas *c, int x, int y, unsigned char mark)
 {
     if (mark == DOTTED && c->sx > 1 && c->travelled % 4 >= 2)
         return;
-    c->points[(size_t)y * (size_t)points_across(c) + (size_t)x] |= mark;
-}
-
-static void draw_segment(canvas *c, const int from[2], const int to[2], unsigned char mark)
-{
-    int dx = to[0] - from[0], dy = to[1] - from[1];
-    int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
-    set_point(c, from[0], from[1], mark);
-    for (int k = 1; k <= steps; k++) {
-        double part = (double)k / steps;
-        c->travelled++;
-        set_point(c, from[0] + (int)lround(part * dx), from[1] + (int)lround(part * dy), mark);
-    }
+    c->points[(size_t)y * (size_t)c->across + (size_t)x] |= mark;
 }
 
 static void draw_series(canvas *c, const client_series *s, client_column column, unsigned char mark)
@@ -177,27 +128,18 @@ static void draw_series(canvas *c, const client_series *s, client_column column,
             continue;
         }
         int here[2] = {across(c, at), down(c, log10(value))};
-        draw_segment(c, have_previous ? previous : here, here, mark);
+        const int *from = have_previous ? previous : here;
+        const int dx = here[0] - from[0], dy = here[1] - from[1];
+        const int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+        set_point(c, from[0], from[1], mark);
+        for (int k = 1; k <= steps; k++) {
+            const double part = (double)k / steps;
+            c->travelled++;
+            set_point(c, from[0] + (int)lround(part * dx), from[1] + (int)lround(part * dy), mark);
+        }
         memcpy(previous, here, sizeof here);
         have_previous = true;
     }
-}
-
-/* Bit of each point of a Braille cell, by row and column (Unicode 15, section 21.1). */
-static const unsigned BRAILLE[4][2] = {{0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
-
-/* *marks: which lines pass through the cell. */
-static unsigned cell_bits(const canvas *c, int col, int row, unsigned *marks)
-{
-    unsigned bits = 0;
-    *marks = 0;
-    for (int y = 0; y < c->sy; y++)
-        for (int x = 0; x < c->sx; x++) {
-            size_t at = (size_t)(row * c->sy + y) * (size_t)points_across(c) + (size_t)(col * c->sx + x);
-            *marks |= c->points[at];
-            bits |= c->points[at] ? BRAILLE[y][x] : 0;
-        }
-    return bits;
 }
 
 static void print_marked(FILE *to, const client_plot_style *style, unsigned marks, const char *text)
@@ -207,56 +149,6 @@ static void print_marked(FILE *to, const client_plot_style *style, unsigned mark
         fprintf(to, "%s%s\033[0m", colour, text);
     else
         fputs(text, to);
-}
-
-/* Decades between labels: the smallest of 1, 2, 5, 10, ... that leaves a label two rows of its own. */
-static int decade_step(const canvas *c)
-{
-    static const int STEPS[] = {1, 2, 3, 5, 10, 20};
-    double decades_per_row = (c->high - c->low) / c->rows;
-    for (size_t i = 0; i < sizeof STEPS / sizeof *STEPS; i++)
-        if (STEPS[i] >= 2 * decades_per_row)
-            return STEPS[i];
-    return MOST_DECADES;
-}
-
-/* Writes the left margin of a row with the label of the decade that falls into it, if any. */
-static void print_margin(FILE *to, const canvas *c, int row)
-{
-    int step = decade_step(c);
-    for (int decade = (int)c->high; decade >= (int)c->low; decade--) {
-        if (decade % step != 0 || down(c, decade) / c->sy != row)
-            continue;
-        char label[24];
-        snprintf(label, sizeof label, "1e%+03d", decade);
-        fprintf(to, "%*s %s", MARGIN - 2, label, c->style->ascii ? "+" : "┤");
-        return;
-    }
-    fprintf(to, "%*s%s", MARGIN - 1, "", c->style->ascii ? "|" : "│");
-}
-
-/* Iterations between labels: 1, 2 or 5 times a power of ten, about one label for 14 cells. */
-static double iteration_step(const canvas *c)
-{
-    return uz_round_step(fmax(c->last * 14 / c->cols, 1));
-}
-
-static bool restart_in_cell(const canvas *c, const client_series *s, int col)
-{
-    for (size_t i = 0; i < s->count; i++)
-        if (s->column[CLIENT_RESTART][i] > 0 && s->column[CLIENT_ITERATION][i] <= c->last &&
-            across(c, s->column[CLIENT_ITERATION][i]) / c->sx == col)
-            return true;
-    return false;
-}
-
-static bool label_in_cell(const canvas *c, int col)
-{
-    double step = iteration_step(c);
-    for (double at = 0; at <= c->last; at += step)
-        if (across(c, at) / c->sx == col)
-            return true;
-    return false;
 }
 
 /* Centred under its tick, as long as it fits between column `used` and column `end`. Returns the columns used. */
@@ -273,10 +165,105 @@ static int print_iteration(FILE *to, const canvas *c, double at, int used, int e
     return used + fprintf(to, "%*s%s", start - used, "", text);
 }
 
-#define LEGEND_WIDTH 56
-
-static void print_legend(FILE *to, const client_plot_style *style)
+/* The lines of the drawing: in the margin the label of the decade that falls into the row, if any; then the cells. */
+static void print_rows(FILE *to, const canvas *c)
 {
+    /* Bit of each point of a Braille cell, by row and column (Unicode 15, section 21.1). */
+    static const unsigned BRAILLE[4][2] = {{0x01, 0x08}, {0x02, 0x10}, {0x04, 0x20}, {0x40, 0x80}};
+    static const int STEPS[] = {1, 2, 3, 5, 10, 20};
+    const bool ascii = c->style->ascii;
+    /* Decades between labels: the smallest step that leaves a label two rows of its own. */
+    int step = MOST_DECADES;
+    for (size_t i = sizeof STEPS / sizeof *STEPS; i-- > 0;)
+        if (STEPS[i] >= 2 * ((c->high - c->low) / c->rows))
+            step = STEPS[i];
+    for (int row = 0; row < c->rows; row++) {
+        int decade = (int)c->high;
+        while (decade >= (int)c->low && (decade % step != 0 || down(c, decade) / c->sy != row))
+            decade--;
+        if (decade >= (int)c->low) {
+            char label[24];
+            snprintf(label, sizeof label, "1e%+03d", decade);
+            fprintf(to, "%*s %s", MARGIN - 2, label, ascii ? "+" : "┤");
+        } else {
+            fprintf(to, "%*s%s", MARGIN - 1, "", ascii ? "|" : "│");
+        }
+        for (int col = 0; col < c->cols; col++) {
+            unsigned bits = 0, marks = 0; /* marks: which lines pass through the cell */
+            for (int y = 0; y < c->sy; y++)
+                for (int x = 0; x < c->sx; x++) {
+                    const size_t at = (size_t)(row * c->sy + y) * (size_t)c->across + (size_t)(col * c->sx + x);
+                    marks |= c->points[at];
+                    bits |= c->points[at] ? BRAILLE[y][x] : 0;
+                }
+            char braille[4] = {(char)0xe2, (char)(0xa0 | bits >> 6), (char)(0x80 | (bits & 0x3f)), '\0'};
+            const char *plain = marks & SOLID ? "*" : marks & DOTTED ? "." : " ";
+            print_marked(to, c->style, marks, ascii ? plain : bits ? braille : " ");
+        }
+        fputc('\n', to);
+    }
+}
+
+/* The axis with the restarts and the ticks of the iterations, and the labels below it. */
+static void print_axis(FILE *to, const canvas *c, const client_series *s)
+{
+    const bool ascii = c->style->ascii;
+    /* Iterations between labels: 1, 2 or 5 times a power of ten, about one label for 14 cells. */
+    const double step = uz_round_step(fmax(c->last * 14 / c->cols, 1));
+    fprintf(to, "%*s%s", MARGIN - 1, "", ascii ? "+" : "└");
+    for (int col = 0; col < c->cols; col++) {
+        bool restart = false, label = false;
+        for (size_t i = 0; i < s->count && !restart; i++)
+            restart = s->column[CLIENT_RESTART][i] > 0 && s->column[CLIENT_ITERATION][i] <= c->last &&
+                      across(c, s->column[CLIENT_ITERATION][i]) / c->sx == col;
+        for (double at = 0; at <= c->last && !label; at += step)
+            label = across(c, at) / c->sx == col;
+        if (restart)
+            fputs(ascii ? "^" : "▲", to);
+        else if (label)
+            fputs(ascii ? "+" : "┬", to);
+        else
+            fputs(ascii ? "-" : "─", to);
+    }
+    fputc('\n', to);
+    int end = MARGIN + c->cols, room = snprintf(NULL, 0, "%.0f", c->last) + 2;
+    int used = fprintf(to, "%*s ", MARGIN - 1, "iteration");
+    for (double at = 0; at < c->last; at += step)
+        used = print_iteration(to, c, at, used, end - room);
+    print_iteration(to, c, c->last, used, end);
+    fputc('\n', to);
+}
+
+bool client_plot_print(FILE *to, const client_series *series, const client_plot_style *style)
+{
+    canvas c = {.cols = style->width - MARGIN, .rows = style->height - 3, .style = style};
+    c.sx = style->ascii ? 1 : 2;
+    c.sy = style->ascii ? 1 : 4;
+    c.across = c.cols * c.sx;
+    c.down = c.rows * c.sy;
+    /* The iterations and decades that the drawing must hold. */
+    uz_range values = uz_range_none();
+    for (size_t i = 0; i < series->count; i++) {
+        const double at = series->column[CLIENT_ITERATION][i];
+        for (int k = CLIENT_ERROR_BOUND; k <= CLIENT_RESIDUAL; k++) {
+            const double value = series->column[k][i];
+            if (!uz_axis_has(value, true) || !isfinite(at) || at < 0)
+                continue;
+            uz_range_take(&values, value, true);
+            c.last = fmax(c.last, at);
+        }
+    }
+    if (c.cols < 1 || c.rows < 1 || values.low > values.high)
+        return false;
+    const uz_range decades = uz_range_decades(values);
+    c.high = decades.high;
+    c.low = fmax(decades.low, c.high - MOST_DECADES);
+    c.last = fmax(c.last, 1);
+    c.points = calloc((size_t)c.across, (size_t)c.down);
+    if (!c.points)
+        return false;
+    draw_series(&c, series, CLIENT_RESIDUAL, DOTTED);
+    draw_series(&c, series, CLIENT_ERROR_BOUND, SOLID);
     const bool narrow = style->width < LEGEND_WIDTH;
     fprintf(to, "%*s", narrow ? 0 : MARGIN, "");
     print_marked(to, style, SOLID, style->ascii ? "**" : "⠒⠒");
@@ -285,49 +272,8 @@ static void print_legend(FILE *to, const client_plot_style *style)
     fputs(narrow ? " residual\n" : " KKT residual   ", to);
     if (!narrow)
         fprintf(to, "%s restart\n", style->ascii ? "^" : "▲");
-}
-
-bool client_plot_print(FILE *to, const client_series *series, const client_plot_style *style)
-{
-    canvas c = {.cols = style->width - MARGIN, .rows = style->height - 3, .style = style};
-    c.sx = style->ascii ? 1 : 2;
-    c.sy = style->ascii ? 1 : 4;
-    if (c.cols < 1 || c.rows < 1 || !find_range(&c, series))
-        return false;
-    c.points = calloc((size_t)points_across(&c), (size_t)points_down(&c));
-    if (!c.points)
-        return false;
-    draw_series(&c, series, CLIENT_RESIDUAL, DOTTED);
-    draw_series(&c, series, CLIENT_ERROR_BOUND, SOLID);
-    print_legend(to, style);
-    for (int row = 0; row < c.rows; row++) {
-        print_margin(to, &c, row);
-        for (int col = 0; col < c.cols; col++) {
-            unsigned marks, bits = cell_bits(&c, col, row, &marks);
-            char braille[4] = {(char)0xe2, (char)(0xa0 | bits >> 6), (char)(0x80 | (bits & 0x3f)), '\0'};
-            const char *ascii = marks & SOLID ? "*" : marks & DOTTED ? "." : " ";
-            print_marked(to, c.style, marks, c.style->ascii ? ascii : bits ? braille : " ");
-        }
-        fputc('\n', to);
-    }
-    bool ascii = c.style->ascii;
-    fprintf(to, "%*s%s", MARGIN - 1, "", ascii ? "+" : "└");
-    for (int col = 0; col < c.cols; col++) {
-        if (restart_in_cell(&c, series, col))
-            fputs(ascii ? "^" : "▲", to);
-        else if (label_in_cell(&c, col))
-            fputs(ascii ? "+" : "┬", to);
-        else
-            fputs(ascii ? "-" : "─", to);
-    }
-    fputc('\n', to);
-    double step = iteration_step(&c);
-    int end = MARGIN + c.cols, room = snprintf(NULL, 0, "%.0f", c.last) + 2;
-    int used = fprintf(to, "%*s ", MARGIN - 1, "iteration");
-    for (double at = 0; at < c.last; at += step)
-        used = print_iteration(to, &c, at, used, end - room);
-    print_iteration(to, &c, c.last, used, end);
-    fputc('\n', to);
+    print_rows(to, &c);
+    print_axis(to, &c, series);
     free(c.points);
     return true;
 }

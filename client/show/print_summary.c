@@ -6,55 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-static const char *number_in_words(char text[32], const json_t *object, const char *path, int digits);
-static void label(FILE *to, const char *text);
-static void print_outcome(FILE *to, const json_t *summary);
-static const char *outcome_in_words(const char *outcome);
-static void print_ladder(FILE *to, const json_t *summary);
-static void print_cells(FILE *to, const json_t *cells);
-static void print_method(FILE *to, const json_t *summary);
-static void print_count(FILE *to, const json_t *summary, const char *path, const char *one, const char *many);
-static void print_contact(FILE *to, const json_t *summary);
-static void print_resultants(FILE *to, const json_t *summary);
-static void print_resultant(FILE *to, const char *kind, const json_t *one, bool first);
-static void print_warnings(FILE *to, const json_t *summary);
-static void print_certificate(FILE *to, const json_t *summary);
-static void print_bound(FILE *to, double bound);
-static void print_factor(FILE *to, const json_t *summary);
-static void print_cost(FILE *to, const json_t *summary);
-static void print_timings(FILE *to, const json_t *summary);
-
-void client_print_summary(FILE *to, const json_t *job)
-{
-    const json_t *summary = json_object_get(job, "summary");
-    char primal[32], dual[32];
-    client_print_job(to, job);
-    if (!json_is_object(summary))
-        return;
-    print_outcome(to, summary);
-    print_ladder(to, summary);
-    print_method(to, summary);
-    if (json_is_object(json_object_get(summary, "contact")))
-        print_contact(to, summary);
-    print_resultants(to, summary);
-    print_warnings(to, summary);
-    if (json_is_object(client_json_at(summary, "energy"))) {
-        label(to, "energy");
-        fprintf(to, "%s primal, %s dual\n", number_in_words(primal, summary, "energy.primal", 11),
-                number_in_words(dual, summary, "energy.dual", 11));
-    }
-    print_certificate(to, summary);
-    print_factor(to, summary);
-    print_cost(to, summary);
-    print_timings(to, summary);
-    client_checks checks = {.item = NULL};
-    client_checks_assertions(&checks, summary, "");
-    client_checks_print(to, &checks, 0, "assertions");
-    if (checks.failed)
-        fputs("assertions  no memory to show all of them\n", to);
-    client_checks_clear(&checks);
-}
-
 /* ---- words */
 
 /* A number for a person; "unknown" where the job has none, since nan looks like an answer. Buffer of 32. */
@@ -96,15 +47,36 @@ static void print_vector(FILE *to, const char *before, const json_t *vector)
     fputs(n ? ")" : "", to);
 }
 
+/* "12 x 4" */
+static void print_cells(FILE *to, const json_t *cells)
+{
+    for (size_t i = 0; i < json_array_size(cells); i++)
+        fprintf(to, "%s%.0f", i ? " x " : "", json_number_value(json_array_get(cells, i)));
+}
+
 /* ---- the parts, in the order in which they are printed */
 
 /* How it ended, and of what: the worst case where there are several. */
 static void print_outcome(FILE *to, const json_t *summary)
 {
-    const char *outcome = client_json_text(summary, "outcome"), *words = outcome_in_words(outcome);
+    static const char *const WORDS[][2] = {
+        {"converged", "the certificate meets what was asked for"},
+        {"iteration_limit", "the iterations ran out first; this is the best answer so far"},
+        {"time_limit", "the time ran out first; this is the best answer so far"},
+        {"precision_limit", "double precision holds no more digits here"},
+        {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
+        {"infeasible", "no displacement satisfies all contact conditions"},
+        {"dismissed", "it was dismissed; this is the best answer so far"},
+        {"verified", "the certificate of the given answer meets what was asked for"},
+        {"mesh_limit", "a grid that meets what was asked for is larger than allowed"},
+        {"not_verified", "the certificate of the given answer does not meet what was asked for"},
+    };
+    const char *outcome = client_json_text(summary, "outcome"), *words = "";
     const char *message = client_json_text(summary, "message");
     const double d = client_json_number(summary, "problem.d"), m = client_json_number(summary, "problem.m");
     char count[32];
+    for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
+        words = strcmp(WORDS[i][0], outcome) == 0 ? WORDS[i][1] : words;
     label(to, "outcome");
     client_print_safe(to, outcome);
     fprintf(to, "%s%s\n", *words ? ": " : "", words);
@@ -124,26 +96,6 @@ static void print_outcome(FILE *to, const json_t *summary)
         client_print_safe(to, client_json_text(summary, "problem.kind"));
         fprintf(to, ", %.0f unknowns, %.0f contact conditions\n", d, m);
     }
-}
-
-static const char *outcome_in_words(const char *outcome)
-{
-    static const char *const WORDS[][2] = {
-        {"converged", "the certificate meets what was asked for"},
-        {"iteration_limit", "the iterations ran out first; this is the best answer so far"},
-        {"time_limit", "the time ran out first; this is the best answer so far"},
-        {"precision_limit", "double precision holds no more digits here"},
-        {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
-        {"infeasible", "no displacement satisfies all contact conditions"},
-        {"dismissed", "it was dismissed; this is the best answer so far"},
-        {"verified", "the certificate of the given answer meets what was asked for"},
-        {"mesh_limit", "a grid that meets what was asked for is larger than allowed"},
-        {"not_verified", "the certificate of the given answer does not meet what was asked for"},
-    };
-    for (size_t i = 0; i < sizeof WORDS / sizeof *WORDS; i++)
-        if (strcmp(WORDS[i][0], outcome) == 0)
-            return WORDS[i][1];
-    return "";
 }
 
 /* A box whose cells were chosen: the grid of the answer, and all that were tried. */
@@ -170,16 +122,11 @@ static void print_ladder(FILE *to, const json_t *summary)
     }
 }
 
-static void print_cells(FILE *to, const json_t *cells)
-{
-    for (size_t i = 0; i < json_array_size(cells); i++)
-        fprintf(to, "%s%.0f", i ? " x " : "", json_number_value(json_array_get(cells, i)));
-}
-
 /* The method, what it began with unless that was nothing special, and what holds a body that its supports leave free.
  */
 static void print_method(FILE *to, const json_t *summary)
 {
+    static const char *const COUNTS[][2] = {{"iteration", "iterations"}, {"restart", "restarts"}};
     const char *from = client_json_text(summary, "started_from");
     const double modes = client_json_number(summary, "semicoercive.free_modes");
     char held[32];
@@ -193,20 +140,16 @@ static void print_method(FILE *to, const json_t *summary)
     fputs(", ", to);
     client_print_safe(to, client_json_text(summary, "operator"));
     fputs(" operator", to);
-    print_count(to, summary, "iterations", "iteration", "iterations");
-    print_count(to, summary, "restarts", "restart", "restarts");
+    for (size_t i = 0; i < sizeof COUNTS / sizeof *COUNTS; i++) {
+        const double count = client_json_number(summary, COUNTS[i][1]);
+        if (isfinite(count))
+            fprintf(to, ", %.0f %s", count, COUNTS[i][fabs(count - 1) >= 0.5]);
+    }
     if (strcmp(from, "continued") == 0)
         fputs(", continued from another job", to);
     else if (strcmp(from, "warm") == 0)
         fputs(", from known reactions", to);
     fputc('\n', to);
-}
-
-static void print_count(FILE *to, const json_t *summary, const char *path, const char *one, const char *many)
-{
-    double count = client_json_number(summary, path);
-    if (isfinite(count))
-        fprintf(to, ", %.0f %s", count, fabs(count - 1) < 0.5 ? one : many);
 }
 
 static void print_contact(FILE *to, const json_t *summary)
@@ -245,49 +188,29 @@ static void print_contact(FILE *to, const json_t *summary)
     fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
 }
 
-/* What acts on the body; without moments. */
+/* What acts on the body, without moments: "contact bottom (0, 10.5)". */
 static void print_resultants(FILE *to, const json_t *summary)
 {
-    const json_t *acts = client_json_at(summary, "resultants"), *one;
-    static const char *const LISTS[][2] = {{"contacts", "contact "}, {"supports", "support "}};
+    static const char *const LISTS[][2] = {{"contacts", "contact "}, {"supports", "support "}, {"loads", "loads"}};
+    const json_t *acts = client_json_at(summary, "resultants");
     bool first = true;
     char text[32];
-    size_t i;
     if (!json_is_object(acts))
         return;
-    for (int k = 0; k < 2; k++)
-        json_array_foreach(json_object_get(acts, LISTS[k][0]), i, one)
-        {
-            print_resultant(to, LISTS[k][1], one, first);
+    for (int k = 0; k < 3; k++) {
+        const json_t *list = json_object_get(acts, LISTS[k][0]); /* the loads are one object */
+        for (size_t i = 0, n = k < 2 ? json_array_size(list) : 1; i < n; i++) {
+            const json_t *one = k < 2 ? json_array_get(list, i) : list;
+            label(to, first ? "forces" : "");
+            fputs(LISTS[k][1], to);
+            client_print_safe(to, client_json_text(one, "on"));
+            print_vector(to, " ", client_json_at(one, "force"));
+            fputc('\n', to);
             first = false;
         }
-    print_resultant(to, "loads", json_object_get(acts, "loads"), first);
+    }
     label(to, "");
     fprintf(to, "imbalance %s of their sizes\n", number_in_words(text, acts, "imbalance", 2));
-}
-
-/* One of the forces that act on the body: "contact bottom (0, 10.5)". */
-static void print_resultant(FILE *to, const char *kind, const json_t *one, bool first)
-{
-    label(to, first ? "forces" : "");
-    fputs(kind, to);
-    client_print_safe(to, client_json_text(one, "on"));
-    print_vector(to, " ", client_json_at(one, "force"));
-    fputc('\n', to);
-}
-
-static void print_warnings(FILE *to, const json_t *summary)
-{
-    const json_t *one;
-    size_t i;
-    json_array_foreach(json_object_get(summary, "warnings"), i, one)
-    {
-        label(to, "warning");
-        client_print_safe(to, client_json_text(one, "code"));
-        fputs(": ", to);
-        client_print_safe(to, client_json_text(one, "message"));
-        fputc('\n', to);
-    }
 }
 
 /* The bound, whether it is what was asked for, what it is made of, and the error of the mesh, which it does not hold.
@@ -305,10 +228,16 @@ static void print_certificate(FILE *to, const json_t *summary)
     if (!json_is_object(certificate))
         return;
     label(to, "certificate");
-    if (isfinite(relative))
-        print_bound(to, relative);
-    else
+    /* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
+    const double digits = floor(-log10(relative));
+    if (!isfinite(relative))
         fputs("nothing could be certified", to);
+    else
+        fprintf(to, "the exact displacement is within %s of this one, relative, in the energy norm",
+                client_format_bound(absolute, relative));
+    if (relative > 0 && relative < 1 && digits >= 1)
+        fprintf(to, ":\n%12s%.0f digit%s %s certain", "", fmin(digits, 15), digits > 1 ? "s" : "",
+                digits > 1 ? "are" : "is");
     if (!isfinite(asked))
         fputs("\n", to);
     else if (isfinite(total))
@@ -325,21 +254,6 @@ static void print_certificate(FILE *to, const json_t *summary)
         label(to, "");
         fprintf(to, "the mesh itself is off by about %.2g\n", mesh);
     }
-}
-
-/* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
-static void print_bound(FILE *to, double bound)
-{
-    const double digits = floor(-log10(bound));
-    char text[32];
-    client_format_bound(text, bound);
-    if (bound > 0 && bound < 1 && digits >= 1)
-        fprintf(to,
-                "the exact displacement is within %s of this one, relative, in the energy norm:\n%12s"
-                "%.0f digit%s %s certain",
-                text, "", fmin(digits, 15), digits > 1 ? "s" : "", digits > 1 ? "are" : "is");
-    else
-        fprintf(to, "the exact displacement is within %s of this one, relative, in the energy norm", text);
 }
 
 /* The factor, or the coarse levels that stand in its place. */
@@ -412,27 +326,50 @@ static void print_timings(FILE *to, const json_t *summary)
     fputc('\n', to);
 }
 
+/* ---- the whole */
+
+void client_print_summary(FILE *to, const json_t *job)
+{
+    const json_t *summary = json_object_get(job, "summary"), *warning;
+    char primal[32], dual[32];
+    size_t i;
+    client_print_job(to, job);
+    if (!json_is_object(summary))
+        return;
+    print_outcome(to, summary);
+    print_ladder(to, summary);
+    print_method(to, summary);
+    if (json_is_object(json_object_get(summary, "contact")))
+        print_contact(to, summary);
+    print_resultants(to, summary);
+    json_array_foreach(json_object_get(summary, "warnings"), i, warning)
+    {
+        label(to, "warning");
+        client_print_safe(to, client_json_text(warning, "code"));
+        fputs(": ", to);
+        client_print_safe(to, client_json_text(warning, "message"));
+        fputc('\n', to);
+    }
+    if (json_is_object(client_json_at(summary, "energy"))) {
+        label(to, "energy");
+        fprintf(to, "%s primal, %s dual\n", number_in_words(primal, summary, "energy.primal", 11),
+                number_in_words(dual, summary, "energy.dual", 11));
+    }
+    print_certificate(to, summary);
+    print_factor(to, summary);
+    print_cost(to, summary);
+    print_timings(to, summary);
+    client_checks checks = {.item = NULL};
+    client_checks_assertions(&checks, summary, "");
+    client_checks_print(to, &checks, 0, "assertions");
+    if (checks.failed)
+        fputs("assertions  no memory to show all of them\n", to);
+    client_checks_clear(&checks);
+}
+
 /* ---- load cases */
 
 enum { NAME_WIDTH = 24 };
-
-/* A name, at most NAME_WIDTH characters of it, and padding; UTF-8 counts characters. */
-static void print_name(FILE *to, const char *name)
-{
-    char text[4 * NAME_WIDTH + 1];
-    size_t used = 0;
-    int width = 0;
-    for (; name[used] && used + 4 < sizeof text; used++) {
-        bool begins = ((unsigned char)name[used] & 0xc0) != 0x80;
-        if (begins && width == NAME_WIDTH)
-            break;
-        width += begins;
-        text[used] = name[used];
-    }
-    text[used] = '\0';
-    client_print_safe(to, text);
-    fprintf(to, "%*s", NAME_WIDTH - width, "");
-}
 
 void client_print_cases(FILE *to, const json_t *result)
 {
@@ -445,8 +382,21 @@ void client_print_cases(FILE *to, const json_t *result)
     json_array_foreach(cases, i, item)
     {
         const json_t *summary = json_object_get(item, "summary");
-        print_name(to, client_json_text(item, "name"));
-        fputs("  ", to);
+        /* At most NAME_WIDTH characters of the name, and padding; UTF-8 counts characters. */
+        const char *name = client_json_text(item, "name");
+        char text[4 * NAME_WIDTH + 1];
+        size_t used = 0;
+        int width = 0;
+        for (; name[used] && used + 4 < sizeof text; used++) {
+            bool begins = ((unsigned char)name[used] & 0xc0) != 0x80;
+            if (begins && width == NAME_WIDTH)
+                break;
+            width += begins;
+            text[used] = name[used];
+        }
+        text[used] = '\0';
+        client_print_safe(to, text);
+        fprintf(to, "%*s  ", NAME_WIDTH - width, "");
         client_print_safe(to, client_json_text(summary, "outcome"));
         fprintf(to, "%*s  %10s  %8s  %s\n", 15 - (int)strlen(client_json_text(summary, "outcome")), "",
                 number_in_words(iterations, summary, "iterations", 9),

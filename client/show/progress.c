@@ -46,34 +46,19 @@ client_progress client_progress_new(FILE *to, bool wanted, bool quiet)
 
 /* -------------------------------------------------------------------- ETA */
 
-static void note_sample(client_progress *p)
-{
-    if (!(p->relative > 0) || !isfinite(p->relative))
-        return;
-    if (!isfinite(p->first))
-        p->first = p->relative;
-    int at = p->samples++ % CLIENT_PROGRESS_SAMPLES;
-    p->at[at] = client_clock();
-    p->value[at] = log(p->relative);
-}
-
-/* How fast log(error) falls over the samples that are kept, per second; 0: it does not. */
-static double slope(const client_progress *p)
-{
-    int kept = p->samples < CLIENT_PROGRESS_SAMPLES ? p->samples : CLIENT_PROGRESS_SAMPLES;
-    if (kept < 3)
-        return 0;
-    int last = (p->samples - 1) % CLIENT_PROGRESS_SAMPLES;
-    int first = p->samples > kept ? p->samples % CLIENT_PROGRESS_SAMPLES : 0;
-    double seconds = p->at[last] - p->at[first], fallen = p->value[first] - p->value[last];
-    return seconds > 0.2 && fallen > 0 ? fallen / seconds : 0;
-}
-
 double client_progress_left(const client_progress *p, double now)
 {
-    double share = (p->percent - FIRST_ROW) / (LAST_ROW - FIRST_ROW), rate = slope(p);
+    double share = (p->percent - FIRST_ROW) / (LAST_ROW - FIRST_ROW), rate = 0;
     if (!(p->percent >= 2) || now - p->start < 1)
         return NAN;
+    /* How fast log(error) falls over the samples that are kept, per second; 0: it does not. */
+    const int kept = p->samples < CLIENT_PROGRESS_SAMPLES ? p->samples : CLIENT_PROGRESS_SAMPLES;
+    if (kept >= 3) {
+        const int last = (p->samples - 1) % CLIENT_PROGRESS_SAMPLES;
+        const int first = p->samples > kept ? p->samples % CLIENT_PROGRESS_SAMPLES : 0;
+        const double seconds = p->at[last] - p->at[first], drop = p->value[first] - p->value[last];
+        rate = seconds > 0.2 && drop > 0 ? drop / seconds : 0;
+    }
     /* The service's share of the way is one of log(error): what is fallen so far tells the rest. */
     double fallen = log(p->first / p->relative);
     if (share > 0 && share <= 1 && rate > 0 && fallen > 0)
@@ -82,19 +67,6 @@ double client_progress_left(const client_progress *p, double now)
 }
 
 /* ------------------------------------------------------------------- line */
-
-static const char *phase_of(const client_progress *p)
-{
-    if (strcmp(p->status, "accepted") == 0)
-        return "waiting for its turn";
-    if (strcmp(p->status, "running") != 0)
-        return "";
-    if (p->percent >= LAST_ROW)
-        return "finishing";
-    if (isfinite(p->iteration))
-        return "iterating";
-    return p->percent >= 5 ? "factorizing" : "starting";
-}
 
 typedef struct {
     char text[48];
@@ -110,30 +82,7 @@ __attribute__((format(printf, 3, 4))) static void put(part *to, int rank, const 
     to->rank = to->text[0] ? rank : 0;
 }
 
-static void put_left(part *to, int rank, double seconds)
-{
-    if (!isfinite(seconds) || seconds < 0)
-        return;
-    if (seconds < 90)
-        put(to, rank, "ETA %.0f s", ceil(seconds));
-    else if (seconds < 5400)
-        put(to, rank, "ETA %.0f min", seconds / 60);
-    else
-        put(to, rank, "ETA %.1f h", seconds / 3600);
-}
-
 enum { PARTS = 7 };
-
-/* The parts of rank 1..most with two blanks between them. Returns the length. */
-static int join(char out[ROOM], const part parts[PARTS], int most)
-{
-    int len = 0;
-    out[0] = '\0';
-    for (int i = 0; i < PARTS; i++)
-        if (parts[i].rank > 0 && parts[i].rank <= most)
-            len += snprintf(out + len, (size_t)(ROOM - len), "%s%s", len ? "  " : "", parts[i].text);
-    return len;
-}
 
 /* As many parts as fit into `room` characters, and the first even if it does not. */
 static int compose(char out[ROOM], const client_progress *p, int room)
@@ -143,30 +92,42 @@ static int compose(char out[ROOM], const client_progress *p, int room)
     memset(parts, 0, PARTS * sizeof *parts);
     put(&parts[0], 1, "%.10s %3.0f %%", p->status, isfinite(p->percent) ? p->percent : 0);
     put(&parts[1], 6, "%.1f s", now - p->start);
-    put(&parts[2], 5, "%s", phase_of(p));
+    const bool running = strcmp(p->status, "running") == 0;
+    const char *phase = strcmp(p->status, "accepted") == 0 ? "waiting for its turn"
+                        : !running                         ? ""
+                        : p->percent >= LAST_ROW           ? "finishing"
+                        : isfinite(p->iteration)           ? "iterating"
+                        : p->percent >= 5                  ? "factorizing"
+                                                           : "starting";
+    put(&parts[2], 5, "%s", phase);
     if (isfinite(p->iteration))
         put(&parts[3], 4, "iteration %.0f", p->iteration);
     if (isfinite(p->relative))
         put(&parts[4], 2, "error ~%.1e", p->relative);
     if (isfinite(p->bound))
         put(&parts[5], 7, "bound %.2e", p->bound);
-    if (strcmp(p->status, "running") == 0)
-        put_left(&parts[6], 3, client_progress_left(p, now));
-    int most = PARTS, len;
-    while ((len = join(out, parts, most)) > room && most > 1)
+    const double left = running ? client_progress_left(p, now) : NAN;
+    if (isfinite(left) && left >= 0) {
+        if (left < 90)
+            put(&parts[6], 3, "ETA %.0f s", ceil(left));
+        else if (left < 5400)
+            put(&parts[6], 3, "ETA %.0f min", left / 60);
+        else
+            put(&parts[6], 3, "ETA %.1f h", left / 3600);
+    }
+    /* The parts of rank 1..most with two blanks between them. */
+    int most = PARTS + 1, len = room + 1;
+    while (len > room && most > 1) {
         most--;
+        len = 0;
+        out[0] = '\0';
+        for (int i = 0; i < PARTS; i++)
+            if (parts[i].rank > 0 && parts[i].rank <= most)
+                len += snprintf(out + len, (size_t)(ROOM - len), "%s%s", len ? "  " : "", parts[i].text);
+    }
     if (len > room && room >= 0 && room < ROOM)
         out[room] = '\0';
     return len < room ? len : room;
-}
-
-static void print_bar(FILE *to, double percent, int cells)
-{
-    int full = (int)lround(fmin(fmax(percent, 0), 100) / 100 * cells);
-    fputc('[', to);
-    for (int i = 0; i < cells; i++)
-        fputc(i < full ? '#' : '.', to);
-    fputs("] ", to);
 }
 
 void client_progress_redraw(client_progress *p)
@@ -177,8 +138,14 @@ void client_progress_redraw(client_progress *p)
     /* The last column stays free: some terminals go on to the next line when it is written. */
     int room = client_columns(p->to, 80) - 1, len = compose(text, p, room), cells = room - len - 3;
     fputs("\r\033[K", p->to);
-    if (cells >= BAR_LEAST)
-        print_bar(p->to, p->percent, cells < BAR_CELLS ? cells : BAR_CELLS);
+    if (cells >= BAR_LEAST) {
+        const int width = cells < BAR_CELLS ? cells : BAR_CELLS;
+        const int full = (int)lround(fmin(fmax(p->percent, 0), 100) / 100 * width);
+        fputc('[', p->to);
+        for (int i = 0; i < width; i++)
+            fputc(i < full ? '#' : '.', p->to);
+        fputs("] ", p->to);
+    }
     client_print_safe(p->to, text);
     fflush(p->to);
 }
@@ -228,7 +195,14 @@ void client_progress_row(client_progress *p, const json_t *event)
     if (isfinite(bound)) {
         p->bound = bound;
         p->relative = scale > 0 ? bound / scale : NAN;
-        note_sample(p);
+    }
+    /* A sample of how the error falls, for the time that is left. */
+    if (isfinite(bound) && p->relative > 0 && isfinite(p->relative)) {
+        if (!isfinite(p->first))
+            p->first = p->relative;
+        const int at = p->samples++ % CLIENT_PROGRESS_SAMPLES;
+        p->at[at] = client_clock();
+        p->value[at] = log(p->relative);
     }
     say(p);
 }

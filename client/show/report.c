@@ -40,30 +40,22 @@ bool client_job_ended(const json_t *job)
     return strcmp(status, "successful") == 0 || strcmp(status, "failed") == 0 || strcmp(status, "dismissed") == 0;
 }
 
-/* Surely, whatever a finer answer would be. */
-static bool fails_assertion(const json_t *summary)
-{
-    const json_t *line;
-    size_t i;
-    json_array_foreach(json_object_get(summary, "assertions"), i, line)
-    {
-        if (strcmp(client_json_text(line, "result"), "fail") == 0)
-            return true;
-    }
-    return false;
-}
-
 client_exit client_job_exit(const json_t *job)
 {
     const char *status = client_json_text(job, "status"), *outcome = client_json_text(job, "summary.outcome");
+    const json_t *line;
+    size_t i;
     if (strcmp(outcome, "infeasible") == 0)
         return CLIENT_INFEASIBLE;
     if (strcmp(status, "dismissed") == 0 || strcmp(outcome, "dismissed") == 0)
         return CLIENT_DISMISSED;
     if (strcmp(status, "failed") == 0)
         return CLIENT_JOB_FAILED;
-    if (fails_assertion(json_object_get(job, "summary")))
-        return CLIENT_ASSERTION_FAILED;
+    json_array_foreach(client_json_at(job, "summary.assertions"), i, line)
+    {
+        if (strcmp(client_json_text(line, "result"), "fail") == 0)
+            return CLIENT_ASSERTION_FAILED; /* surely, whatever a finer answer would be */
+    }
     if (strcmp(outcome, "converged") != 0 && strcmp(outcome, "verified") != 0)
         return CLIENT_NOT_CONVERGED;
     return json_is_false(client_json_at(job, "summary.assertions_passed")) ? CLIENT_ASSERTION_FAILED : CLIENT_OK;
@@ -90,32 +82,19 @@ const char *client_format_bound(char buffer[32], double bound)
     return buffer;
 }
 
-static void print_tags(FILE *to, const json_t *job)
+void client_print_tags(FILE *to, const json_t *job, const char *separator)
 {
     const json_t *tags = json_object_get(job, "tags");
-    if (json_array_size(tags) == 0)
-        return;
-    fputs("tags       ", to);
     for (size_t i = 0; i < json_array_size(tags); i++) {
         const json_t *tag = json_array_get(tags, i);
-        fputs(" ", to);
+        fputs(i ? separator : "", to);
         client_print_safe(to, json_is_string(tag) ? json_string_value(tag) : "?");
     }
-    fputc('\n', to);
-}
-
-static void print_time(FILE *to, const json_t *job, const char *name)
-{
-    const char *text = client_json_text(job, name);
-    if (!*text)
-        return;
-    fprintf(to, "%-12s", name);
-    client_print_safe(to, text);
-    fputc('\n', to);
 }
 
 void client_print_job(FILE *to, const json_t *job)
 {
+    static const char *const TIMES[] = {"created", "started", "finished"};
     double progress = client_json_number(job, "progress");
     fputs("job         ", to);
     client_print_safe(to, client_json_text(job, "id"));
@@ -124,26 +103,31 @@ void client_print_job(FILE *to, const json_t *job)
     if (!client_job_ended(job) && isfinite(progress))
         fprintf(to, ", %.0f %%", progress);
     fputc('\n', to);
-    print_tags(to, job);
-    print_time(to, job, "created");
-    print_time(to, job, "started");
-    print_time(to, job, "finished");
-}
-
-static const char *without_reply(long http_status)
-{
-    if (http_status >= 500)
-        return "the server failed";
-    return http_status >= 400 ? "the server refused the request" : "this is no reply of a contact solver service";
+    if (json_array_size(json_object_get(job, "tags"))) {
+        fputs("tags        ", to);
+        client_print_tags(to, job, " ");
+        fputc('\n', to);
+    }
+    for (size_t i = 0; i < sizeof TIMES / sizeof *TIMES; i++) {
+        const char *text = client_json_text(job, TIMES[i]);
+        if (!*text)
+            continue;
+        fprintf(to, "%-12s", TIMES[i]);
+        client_print_safe(to, text);
+        fputc('\n', to);
+    }
 }
 
 void client_print_problem(FILE *to, long http_status, const json_t *problem)
 {
     const char *code = client_json_text(problem, "code"), *pointer = client_json_text(problem, "pointer");
     const char *detail = client_json_text(problem, "detail"), *title = client_json_text(problem, "title");
+    const char *otherwise = http_status >= 500   ? "the server failed"
+                            : http_status >= 400 ? "the server refused the request"
+                                                 : "this is no reply of a contact solver service";
     double line = client_json_number(problem, "line");
     fputs("uzawa: ", to);
-    client_print_safe(to, *detail ? detail : *title ? title : without_reply(http_status));
+    client_print_safe(to, *detail ? detail : *title ? title : otherwise);
     fputc('\n', to);
     if (strcmp(code, "case_needed") == 0)
         fputs("  here: --case NAME\n", to);

@@ -20,6 +20,8 @@ client_exit client_job_exit(const json_t *job);
 
 /* A job's state; its tags and times; no summary. */
 void client_print_job(FILE *to, const json_t *job);
+/* Its tags, safe for a terminal, with the separator between them. */
+void client_print_tags(FILE *to, const json_t *job, const char *separator);
 /* What came of an ended job, about 15 lines. Parts that the job lacks are left out. */
 void client_print_summary(FILE *to, const json_t *job);
 /* A line for each load case of a result. */
