@@ -1,0 +1,393 @@
+/* scenery.c: the parts of a picture of a deformed body, from the projection to the legend. */
+#include "picture/scenery.h"
+
+#include "core/error.h"
+#include "core/hooks.h"
+#include "obstacle/shape.h"
+#include "obstacle/vectors.h"
+
+#include <math.h>
+#include <string.h>
+
+/* ---- from the body's coordinates to pixels */
+
+enum { MARGIN = 50, LEAST_HEIGHT = 160, MOST_HEIGHT = 1600 };
+
+uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x)
+{
+    double seen[3] = {0, 0, 0};
+    for (int i = 0; i < 3; i++)
+        for (int c = 0; c < scenery->model->mesh.dim; c++)
+            seen[i] += scenery->axes[i][c] * x[c];
+    return (uz_raster_point){.x = scenery->offset[0] + scenery->scale * seen[0],
+                             .y = scenery->offset[1] - scenery->scale * seen[1],
+                             .z = scenery->scale * seen[2]};
+}
+
+uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double factor)
+{
+    const int dim = scenery->model->mesh.dim;
+    double x[3] = {0, 0, 0};
+    for (int c = 0; c < dim; c++)
+        x[c] = scenery->model->mesh.xyz[node * dim + c] + factor * scenery->answer->u[node * dim + c];
+    uz_raster_point point = uz_scenery_point(scenery, x);
+    const double range = scenery->high - scenery->low;
+    point.value = range > 0 ? (scenery->value[node] - scenery->low) / range : 0.5;
+    return point;
+}
+
+/* Adds where the nodes are, drawn with this factor, to the box low..high in lengths. */
+static void extend_box(double low[2], double high[2], const uz_scenery *scenery, double factor)
+{
+    for (int64_t a = 0; a < scenery->model->mesh.n_nodes; a++) {
+        const uz_raster_point p = uz_scenery_node(scenery, a, factor);
+        const double at[2] = {p.x, -p.y};
+        for (int i = 0; i < 2; i++) {
+            low[i] = fmin(low[i], at[i]);
+            high[i] = fmax(high[i], at[i]);
+        }
+    }
+}
+
+/* A power of ten times 1, 2 or 5: a factor that reads well. */
+static double round_factor(double x)
+{
+    const double power = pow(10, floor(log10(x))), rest = x / power;
+    return power * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
+}
+
+double uz_show_factor(const uz_mesh *mesh, const double *u)
+{
+    double largest = 0;
+    for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
+        largest = fmax(largest, fabs(u[i]));
+    const double ideal = 0.06 * mesh->extent / largest;
+    return largest > 0 && isfinite(ideal) ? fmax(round_factor(ideal), 1) : 1;
+}
+
+uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
+{
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    /* The plane as it is; a solid from a corner, 30 degrees from the right and 25 from above. */
+    static const double PLANE[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const double a = 30 * 3.14159265358979 / 180, b = 25 * 3.14159265358979 / 180;
+    const double solid[3][3] = {
+        {cos(a), 0, -sin(a)}, {-sin(a) * sin(b), cos(b), -cos(a) * sin(b)}, {sin(a) * cos(b), sin(b), cos(a) * cos(b)}};
+    memcpy(scenery->axes, scenery->model->mesh.dim == 2 ? PLANE : solid, sizeof scenery->axes);
+    scenery->extent = scenery->model->mesh.extent;
+    if (!(scenery->factor > 0))
+        scenery->factor = uz_show_factor(&scenery->model->mesh, scenery->answer->u);
+    scenery->scale = 1;
+    scenery->offset[0] = scenery->offset[1] = 0;
+    extend_box(low, high, scenery, 0);
+    extend_box(low, high, scenery, scenery->factor);
+    const double wide = high[0] - low[0], tall = high[1] - low[1];
+    if (!(isfinite(wide) && isfinite(tall) && wide + tall > 0))
+        return uz_fail(err, UZ_ERR_NOT_FINITE, "u", "the displacements cannot be drawn: they are not finite");
+    scenery->scale = fmin((scenery->width - 2 * MARGIN) / fmax(wide, 1e-9 * tall),
+                          (MOST_HEIGHT - 2 * MARGIN) / fmax(tall, 1e-9 * wide));
+    scenery->height = (int)fmax(ceil(scenery->scale * tall) + 2 * MARGIN, LEAST_HEIGHT);
+    scenery->offset[0] = 0.5 * scenery->width - 0.5 * scenery->scale * (low[0] + high[0]);
+    scenery->offset[1] = 0.5 * scenery->height + 0.5 * scenery->scale * (low[1] + high[1]);
+    return UZ_OK;
+}
+
+/* ---- the body as coloured triangles: the elements of a plane, the outer faces of a solid */
+
+/* Grids of more elements than this would hide their colours behind the lines. */
+enum { MOST_LINED = 4000 };
+
+static void paint_cell(uz_raster *raster, const uz_scenery *scenery, const int64_t *around, int n, bool lined)
+{
+    uz_raster_point p[UZ_CELL_POINTS];
+    double area = 0, light = 1;
+    for (int i = 0; i < n; i++)
+        p[i] = uz_scenery_node(scenery, around[i], scenery->factor);
+    for (int i = 0; i < n; i++)
+        area += p[i].x * p[(i + 1) % n].y - p[i].y * p[(i + 1) % n].x;
+    if (scenery->model->mesh.dim == 3) {
+        /* Faces that look away are hidden; those that look aside are darker. The pixels' y points down. */
+        double size = 0;
+        for (int i = 0; i < n; i++) {
+            const uz_raster_point *a = &p[i], *b = &p[(i + 1) % n];
+            size = fmax(size, hypot(hypot(b->x - a->x, b->y - a->y), b->z - a->z));
+        }
+        if (area >= 0)
+            return;
+        light = 0.55 + 0.45 * fmin(1, -area / (2 * size * size));
+    }
+    /* A convex polygon of corners with the middles of its edges, as a fan about its mean: `count` points in order. */
+    uz_raster_point mean = {0, 0, 0, 0};
+    for (int i = 0; i < n; i++) {
+        mean.x += p[i].x / n;
+        mean.y += p[i].y / n;
+        mean.z += p[i].z / n;
+        mean.value += p[i].value / n;
+    }
+    for (int i = 0; i < n; i++) {
+        const uz_raster_point triangle[3] = {p[i], p[(i + 1) % n], mean};
+        uz_raster_triangle(raster, triangle, light);
+    }
+    for (int i = 0; lined && i < n; i++)
+        uz_raster_line(raster, &p[i], &p[(i + 1) % n], 0.5);
+}
+
+uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
+                           uz_error *err)
+{
+    const uz_mesh *mesh = &scenery->model->mesh;
+    const bool lined = mesh->n_elements <= (mesh->dim == 2 ? 1 : 4) * MOST_LINED;
+    for (int64_t i = 0; i < skin->n_cells; i++) {
+        if (i % 4096 == 0 && uz_cancelled(hooks))
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the picture was drawn");
+        paint_cell(raster, scenery, skin->point + skin->first[i], (int)(skin->first[i + 1] - skin->first[i]), lined);
+    }
+    return UZ_OK;
+}
+
+/* ---- obstacles of solids near the body, as grey surfaces */
+
+enum { CELLS = 40 };
+
+/* Full light where it faces the eye. */
+static double light_on(const uz_raster_point p[3])
+{
+    const double a[3] = {p[1].x - p[0].x, p[1].y - p[0].y, p[1].z - p[0].z},
+                 b[3] = {p[2].x - p[0].x, p[2].y - p[0].y, p[2].z - p[0].z};
+    double n[3];
+    uz_cross3(n, a, b);
+    uz_make_unit3(n, (const double[3]){0, 0, 1});
+    return 0.75 + 0.25 * fabs(n[2]);
+}
+
+static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const uz_obstacle_patch *p)
+{
+    const uz_obstacle_shape *shape = uz_obstacle_shape_of(p->contact->kind);
+    for (int j = 0; j < CELLS; j++)
+        for (int i = 0; i < CELLS; i++) {
+            static const int CORNER[2][3] = {{0, 1, 3}, {0, 3, 2}};
+            uz_raster_point at[4];
+            for (int k = 0; k < 4; k++) {
+                double x[3];
+                const int to_the_right = k % 2, above = k / 2;
+                shape->surface(x, p, 2.0 * (i + to_the_right) / CELLS - 1, 2.0 * (j + above) / CELLS - 1);
+                at[k] = uz_scenery_point(scenery, x);
+                at[k].value = NAN;
+            }
+            for (int k = 0; k < 2; k++) {
+                const uz_raster_point triangle[3] = {at[CORNER[k][0]], at[CORNER[k][1]], at[CORNER[k][2]]};
+                uz_raster_triangle(raster, triangle, light_on(triangle));
+            }
+        }
+}
+
+bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery)
+{
+    const uz_mesh *mesh = &scenery->model->mesh;
+    bool painted = false;
+    uz_obstacle_patch p;
+    memset(&p, 0, sizeof p);
+    if (mesh->dim == 3) {
+        double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+        for (int64_t i = 0; i < 3 * mesh->n_nodes; i++) {
+            low[i % 3] = fmin(low[i % 3], mesh->xyz[i]);
+            high[i % 3] = fmax(high[i % 3], mesh->xyz[i]);
+        }
+        for (int c = 0; c < 3; c++)
+            p.middle[c] = 0.5 * low[c] + 0.5 * high[c];
+        p.size = mesh->extent;
+    }
+    for (int64_t k = 0; mesh->dim == 3 && k < scenery->scene->n_contacts; k++) {
+        p.contact = &scenery->scene->contacts[k];
+        const uz_obstacle_shape *shape = uz_obstacle_shape_of(p.contact->kind);
+        if (!shape)
+            continue;
+        memset(p.foot, 0, sizeof p.foot);
+        shape->place(&p);
+        paint_patch(raster, scenery, &p);
+        painted = true;
+    }
+    return painted;
+}
+
+/* ---- around the body: its outline before, obstacles of a plane, contact forces, the legend */
+
+enum { MOST_OUTLINE = 20000, MOST_ARROWS = 80, ARROW = 55, TICK = 9 };
+
+uz_status uz_scenery_put_outline(uz_buffer *svg, const uz_scenery *scenery, const uz_skin *skin, uz_error *err)
+{
+    uz_skin_edges edges;
+    uz_status status = uz_skin_edges_build(&edges, skin, &scenery->model->mesh, err);
+    if (status != UZ_OK)
+        return status;
+    uz_buffer_print(svg, "<path class=\"before\" d=\"");
+    for (int64_t i = 0; i < edges.n_outline && i < MOST_OUTLINE; i++) {
+        const uz_raster_point a = uz_scenery_node(scenery, edges.outline[2 * i], 0),
+                              b = uz_scenery_node(scenery, edges.outline[2 * i + 1], 0);
+        uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1f", a.x, a.y, b.x, b.y);
+    }
+    uz_buffer_print(svg, "\"/>\n");
+    uz_skin_edges_clear(&edges);
+    return UZ_OK;
+}
+
+/* One stroke of an obstacle's border with the obstacle on its right, and ticks into it. */
+typedef struct {
+    uz_buffer *svg, ticks;
+    uz_raster_point last;
+    bool started;
+    double travelled; /* since the last tick */
+} border;
+
+static void border_to(border *b, uz_raster_point p)
+{
+    const double reach = 1e4; /* far outside of every picture, and short enough to print */
+    p.x = fmin(fmax(p.x, -reach), reach);
+    p.y = fmin(fmax(p.y, -reach), reach);
+    uz_buffer_print(b->svg, "%c%.1f %.1f", b->started ? 'L' : 'M', p.x, p.y);
+    const double dx = p.x - b->last.x, dy = p.y - b->last.y, length = b->started ? hypot(dx, dy) : 0;
+    if (length > 0) {
+        double at = TICK - b->travelled;
+        for (; at <= length; at += TICK) {
+            const double x = b->last.x + at * dx / length, y = b->last.y + at * dy / length;
+            /* Right of the way on the paper, where y points down, is (-dy, dx); the tick leans back. */
+            uz_buffer_print(&b->ticks, "M%.1f %.1fl%.1f %.1f", x, y, (-dy - dx) / length * 0.7 * TICK,
+                            (dx - dy) / length * 0.7 * TICK);
+        }
+        b->travelled = length - (at - TICK);
+    }
+    b->last = p;
+    b->started = true;
+}
+
+/* The line through `point` along `way`, well beyond the picture. */
+static void border_line(border *b, const uz_scenery *scenery, const double point[2], const double way[2])
+{
+    const uz_raster_point p = uz_scenery_point(scenery, point);
+    const double length = hypot(way[0], way[1]), reach = 2.0 * (scenery->width + scenery->height);
+    const double dx = way[0] / length, dy = -way[1] / length;
+    /* The part of it that is nearest to the middle of the picture. */
+    const double along = (0.5 * scenery->width - p.x) * dx + (0.5 * scenery->height - p.y) * dy;
+    for (int side = -1; side <= 1; side += 2)
+        border_to(b, (uz_raster_point){.x = p.x + (along + side * reach / 2) * dx,
+                                       .y = p.y + (along + side * reach / 2) * dy});
+}
+
+/* The obstacle's outline, going on well beyond the picture at its ends. */
+static void border_outline(border *b, const uz_scenery *scenery, const uz_contact *contact)
+{
+    const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
+    const double far = 10 * scenery->extent;
+    double at[2], way[2];
+    const int64_t n = shape->outline(at, way, contact, 0);
+    if (n == 1) {
+        border_line(b, scenery, at, way);
+        return;
+    }
+    for (int64_t i = -1; i <= n; i++) {
+        const int64_t k = i < 0 ? 0 : i < n ? i : n - 1;
+        shape->outline(at, way, contact, k);
+        const double length = hypot(way[0], way[1]);
+        if (k != i && !(length > 0))
+            continue;
+        for (int c = 0; k != i && c < 2; c++)
+            at[c] += far * way[c] / length;
+        border_to(b, uz_scenery_point(scenery, at));
+    }
+}
+
+static void put_obstacle(uz_buffer *svg, const uz_scenery *scenery, const uz_contact *contact)
+{
+    border b = {.svg = svg};
+    uz_buffer_print(svg, "<path class=\"obstacle\" d=\"");
+    border_outline(&b, scenery, contact);
+    uz_buffer_print(svg, "\"/><path class=\"ticks\" d=\"");
+    uz_buffer_put(svg, b.ticks.data, b.ticks.len);
+    svg->failed = svg->failed || b.ticks.failed;
+    uz_buffer_drop(&b.ticks);
+    uz_buffer_print(svg, "\"/>\n");
+}
+
+void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
+{
+    for (int64_t k = 0; scenery->model->mesh.dim == 2 && k < scenery->scene->n_contacts; k++)
+        if (uz_obstacle_shape_of(scenery->scene->contacts[k].kind))
+            put_obstacle(svg, scenery, &scenery->scene->contacts[k]);
+}
+
+/* Arrows follow the pressure and not the mesh. */
+static double push_of(const uz_scenery *scenery, int64_t row)
+{
+    return scenery->pressure[row] > 0 ? scenery->pressure[row] : 0;
+}
+
+static double largest_push(const uz_scenery *scenery)
+{
+    double largest = 0;
+    for (int64_t i = 0; i < scenery->model->m; i++)
+        largest = fmax(largest, push_of(scenery, i));
+    return largest;
+}
+
+static void put_arrow(uz_buffer *svg, const uz_scenery *scenery, int64_t row, double length)
+{
+    const uz_mesh_info *info = &scenery->model->info;
+    const double *n = info->contact_normal + row * info->dim;
+    const uz_raster_point tip = uz_scenery_node(scenery, info->contact_node[row], scenery->factor);
+    double dx = 0, dy = 0;
+    for (int c = 0; c < info->dim; c++) {
+        dx += scenery->axes[0][c] * n[c];
+        dy -= scenery->axes[1][c] * n[c];
+    }
+    const double head = fmin(6, 0.4 * length);
+    uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1fM%.1f %.1fL%.1f %.1fL%.1f %.1f", tip.x - length * dx, tip.y - length * dy,
+                    tip.x, tip.y, tip.x - head * (dx + 0.5 * dy), tip.y - head * (dy - 0.5 * dx), tip.x, tip.y,
+                    tip.x - head * (dx - 0.5 * dy), tip.y - head * (dy + 0.5 * dx));
+}
+
+void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
+{
+    const int64_t m = scenery->model->m;
+    const double largest = largest_push(scenery);
+    int64_t pushing = 0, seen = 0;
+    for (int64_t i = 0; i < m; i++)
+        pushing += push_of(scenery, i) > 0;
+    if (!(largest > 0))
+        return;
+    const int64_t every = (pushing + MOST_ARROWS - 1) / MOST_ARROWS;
+    uz_buffer_print(svg, "<path class=\"push\" d=\"");
+    for (int64_t i = 0; i < m; i++)
+        if (push_of(scenery, i) > 0 && seen++ % every == 0)
+            put_arrow(svg, scenery, i, ARROW * push_of(scenery, i) / largest);
+    uz_buffer_print(svg, "\"/>\n");
+}
+
+void uz_scenery_put_legend(uz_buffer *svg, const uz_scenery *scenery, const char *title)
+{
+    /* The text on the left takes up to 160 pixels; below the bar three texts need 210. */
+    enum { LEFT = 180, LEAST = 210, MOST = 300, STOPS = 8 };
+    const int room = scenery->width - 20 - LEFT, bar = room < LEAST ? LEAST : room < MOST ? room : MOST;
+    const int y = scenery->height + 12, x = scenery->width - bar - 20;
+    uz_buffer_print(svg, "<defs><linearGradient id=\"scale\">");
+    for (int i = 0; i <= STOPS; i++) {
+        unsigned char rgb[3];
+        uz_colour(rgb, (double)i / STOPS);
+        uz_buffer_print(svg, "<stop offset=\"%g\" stop-color=\"#%02x%02x%02x\"/>", (double)i / STOPS, rgb[0], rgb[1],
+                        rgb[2]);
+    }
+    uz_buffer_print(svg,
+                    "</linearGradient></defs>\n<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"12\" "
+                    "fill=\"url(#scale)\"/>\n",
+                    x, y, bar);
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\">%.3g</text><text x=\"%d\" y=\"%d\" text-anchor=\"end\">%.3g</text>",
+                    x, y + 26, scenery->low, x + bar, y + 26, scenery->high);
+    uz_buffer_print(svg, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">%s</text>\n", x + bar / 2, y + 26,
+                    scenery->what);
+    uz_buffer_print(svg, "<text x=\"20\" y=\"%d\" class=\"title\">", y + 10);
+    uz_buffer_put_escaped(svg, title ? title : "");
+    uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">displacements \u00d7 %.6g", y + 26, scenery->factor);
+    if (largest_push(scenery) > 0)
+        uz_buffer_print(svg, "</text><text x=\"20\" y=\"%d\">longest arrow: pressure %.3g", y + 42,
+                        largest_push(scenery));
+    uz_buffer_print(svg, "</text>\n");
+}
