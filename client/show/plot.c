@@ -242,7 +242,7 @@ bool client_plot_print(FILE *to, const client_series *series, const client_plot_
     c.across = c.cols * c.sx;
     c.down = c.rows * c.sy;
     /* The iterations and decades that the drawing must hold. */
-    uz_range values = uz_range_none();
+    uz_range values = UZ_RANGE_NONE;
     for (size_t i = 0; i < series->count; i++) {
         const double at = series->column[CLIENT_ITERATION][i];
         for (int k = CLIENT_ERROR_BOUND; k <= CLIENT_RESIDUAL; k++) {

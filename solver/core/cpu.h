@@ -15,27 +15,23 @@
 #include <stdbool.h>
 
 #ifdef __x86_64__
-#define UZ_AVX2     __attribute__((target("avx2")))
-#define UZ_AVX2_FMA __attribute__((target("avx2,fma")))
-static inline bool uz_cpu_has_avx2(void)
-{
-    return __builtin_cpu_supports("avx2");
-}
-static inline bool uz_cpu_has_avx2_fma(void)
-{
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-}
+#define UZ_AVX2             __attribute__((target("avx2")))
+#define UZ_AVX2_FMA         __attribute__((target("avx2,fma")))
+#define UZ_CPU_HAS(FEATURE) (__builtin_cpu_supports(FEATURE) != 0)
 #else
 #define UZ_AVX2
 #define UZ_AVX2_FMA
+#define UZ_CPU_HAS(FEATURE) false
+#endif
+
 static inline bool uz_cpu_has_avx2(void)
 {
-    return false;
+    return UZ_CPU_HAS("avx2");
 }
+
 static inline bool uz_cpu_has_avx2_fma(void)
 {
-    return false;
+    return UZ_CPU_HAS("avx2") && UZ_CPU_HAS("fma");
 }
-#endif
 
 #endif

@@ -50,26 +50,10 @@ static void walk_from(arc_walk *w, int64_t node)
     w->parts++;
 }
 
-/* Ends first, then what is left: rings. */
-static void walk_group(arc_walk *w)
-{
-    int64_t on[UZ_FACE_NODES];
-    for (int64_t f = 0; f < w->group->n_faces; f++) {
-        uz_mesh_face(on, &w->model->mesh, w->group->face[f]);
-        w->next[on[0]] = f + 1;
-        w->follows[on[1]] = true;
-    }
-    for (int rings = 0; rings < 2; rings++)
-        for (int64_t f = 0; f < w->group->n_faces; f++) {
-            uz_mesh_face(on, &w->model->mesh, w->group->face[f]);
-            if (w->next[on[0]] > 0 && (rings || !w->follows[on[0]]))
-                walk_from(w, on[0]);
-        }
-}
-
 uz_status uz_contact_arc(double *arc, unsigned *part, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     const int64_t n = model->mesh.n_nodes, m = model->m, *contact = model->info.contact_of;
+    int64_t on[UZ_FACE_NODES];
     arc_walk w = {.model = model,
                   .next = uz_alloc(n, sizeof *w.next),
                   .follows = uz_alloc(n, sizeof *w.follows),
@@ -87,8 +71,19 @@ uz_status uz_contact_arc(double *arc, unsigned *part, const uz_body_model *model
         w.length = 0;
         w.parts = 0;
         w.group = uz_mesh_group(&model->mesh, scene->contacts[contact[first]].on, "", NULL);
-        if (w.group)
-            walk_group(&w);
+        const int64_t n_faces = w.group ? w.group->n_faces : 0;
+        for (int64_t f = 0; f < n_faces; f++) {
+            uz_mesh_face(on, &model->mesh, w.group->face[f]);
+            w.next[on[0]] = f + 1;
+            w.follows[on[1]] = true;
+        }
+        /* Ends first, then what is left: rings. */
+        for (int rings = 0; rings < 2; rings++)
+            for (int64_t f = 0; f < n_faces; f++) {
+                uz_mesh_face(on, &model->mesh, w.group->face[f]);
+                if (w.next[on[0]] > 0 && (rings || !w.follows[on[0]]))
+                    walk_from(&w, on[0]);
+            }
         /* Rows [first, last) are those of one contact. */
         for (int64_t i = first; i < last; i++) {
             const int64_t node = w.model->info.contact_node[i];

@@ -43,41 +43,6 @@ static double unit_of(double largest)
 
 /* --------------------------------------------------------------- triangles */
 
-static void count_triangles(uz_surface *s, const uz_skin *skin)
-{
-    const int(*triangle)[3];
-    for (int64_t i = 0; i < skin->n_cells; i++)
-        s->n_triangles += uz_cell_triangles(&triangle, (int)(skin->first[i + 1] - skin->first[i]));
-}
-
-/* Numbers the nodes that are drawn. */
-static uz_status number_vertices(uz_surface *s, surface_work *w, uz_error *err)
-{
-    w->vertex_of = uz_alloc_zero(s->n_nodes, sizeof *w->vertex_of);
-    if (!w->vertex_of)
-        return fail_memory(err, s);
-    for (int64_t i = 0; i < w->skin.first[w->skin.n_cells]; i++)
-        w->vertex_of[w->skin.point[i]] = 1;
-    for (int64_t a = 0; a < s->n_nodes; a++)
-        w->vertex_of[a] = w->vertex_of[a] ? s->n_vertices++ : -1;
-    return UZ_OK;
-}
-
-static uz_status fill_triangles(uz_surface *s, const surface_work *w, uz_error *err)
-{
-    s->triangle = uz_alloc(3 * s->n_triangles, sizeof *s->triangle);
-    if (!s->triangle)
-        return fail_memory(err, s);
-    for (int64_t i = 0, n = 0; i < w->skin.n_cells; i++) {
-        const int(*triangle)[3];
-        const int64_t *point = w->skin.point + w->skin.first[i];
-        const int count = uz_cell_triangles(&triangle, (int)(w->skin.first[i + 1] - w->skin.first[i]));
-        for (int k = 0; k < 3 * count; k++)
-            s->triangle[n++] = (unsigned)w->vertex_of[point[triangle[k / 3][k % 3]]];
-    }
-    return UZ_OK;
-}
-
 static unsigned *as_vertices(const surface_work *w, const int64_t *node, int64_t count)
 {
     unsigned *out = uz_alloc(count, sizeof *out);
@@ -87,12 +52,6 @@ static unsigned *as_vertices(const surface_work *w, const int64_t *node, int64_t
 }
 
 /* ---------------------------------------------------------------- vertices */
-
-static void extend(float *low, float *high, float x)
-{
-    *low = fminf(*low, x);
-    *high = fmaxf(*high, x);
-}
 
 static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *err)
 {
@@ -128,8 +87,10 @@ static uz_status fill_vertices(uz_surface *s, const surface_work *w, uz_error *e
             const float at = (float)((x[c] - s->origin[c]) / s->unit), by = (float)(u[c] / s->unit);
             s->position[3 * vertex + c] = at;
             s->displacement[3 * vertex + c] = by;
-            extend(&s->low[c], &s->high[c], at);
-            extend(&s->least[c], &s->most[c], by);
+            s->low[c] = fminf(s->low[c], at);
+            s->high[c] = fmaxf(s->high[c], at);
+            s->least[c] = fminf(s->least[c], by);
+            s->most[c] = fmaxf(s->most[c], by);
             length = hypot(length, u[c]);
         }
         s->largest = fmax(s->largest, length);
@@ -165,35 +126,19 @@ static uz_status draw_values(uz_drawn *out, const uz_surface *s, const double *v
     return UZ_OK;
 }
 
-static uz_status fill_stress(uz_surface *s, const surface_work *w, uz_error *err)
-{
-    double *stress = w->fields.von_mises;
-    if (!stress)
-        return UZ_OK;
-    for (int64_t a = 0; a < s->n_nodes; a++) /* moves only to the front: vertices are numbered like nodes */
-        if (w->vertex_of[a] >= 0)
-            stress[w->vertex_of[a]] = stress[a];
-    return draw_values(&s->von_mises, s, stress, NULL, s->n_vertices, err);
-}
-
 /* ----------------------------------------------------------------- contact */
 
-/* A group between two elements has nodes within the body: their rows are left out. */
-static uz_status choose_rows(uz_surface *s, surface_work *w, uz_error *err)
+static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
 {
     const uz_mesh_info *info = &w->model->info;
-    w->drawn = uz_alloc(w->model->m, sizeof *w->drawn);
+    const int64_t m = w->model->m;
+    /* A group between two elements has nodes within the body: their rows are left out. */
+    w->drawn = uz_alloc(m, sizeof *w->drawn);
     if (!w->drawn)
         return fail_memory(err, s);
-    for (int64_t i = 0; i < w->model->m; i++)
+    for (int64_t i = 0; i < m; i++)
         if (w->vertex_of[info->contact_node[i]] >= 0)
             w->drawn[s->n_rows++] = i;
-    return UZ_OK;
-}
-
-static uz_status fill_places(uz_surface *s, const surface_work *w, uz_error *err)
-{
-    const uz_mesh_info *info = &w->model->info;
     s->row_vertex = uz_alloc(s->n_rows, sizeof *s->row_vertex);
     s->row_contact = uz_alloc(s->n_rows, sizeof *s->row_contact);
     s->row_normal = uz_alloc_zero(3 * s->n_rows, sizeof *s->row_normal);
@@ -206,36 +151,22 @@ static uz_status fill_places(uz_surface *s, const surface_work *w, uz_error *err
         for (int c = 0; c < s->dim; c++)
             s->row_normal[3 * i + c] = (float)info->contact_normal[row * s->dim + c];
     }
-    return UZ_OK;
-}
-
-static uz_status fill_arc(uz_surface *s, surface_work *w, uz_error *err)
-{
-    if (s->dim != 2)
-        return UZ_OK;
-    w->arc = uz_alloc(w->model->m, sizeof *w->arc);
-    w->part = uz_alloc(w->model->m, sizeof *w->part);
-    s->row_part = uz_alloc(s->n_rows, sizeof *s->row_part);
-    if (!w->arc || !w->part || !s->row_part)
-        return fail_memory(err, s);
-    uz_status status = uz_contact_arc(w->arc, w->part, w->model, w->scene, err);
-    for (int64_t i = 0; status == UZ_OK && i < s->n_rows; i++)
-        s->row_part[i] = w->part[w->drawn[i]];
-    return status == UZ_OK ? draw_values(&s->arc, s, w->arc, w->drawn, s->n_rows, err) : status;
-}
-
-static uz_status fill_rows(uz_surface *s, surface_work *w, uz_error *err)
-{
-    uz_status status = choose_rows(s, w, err);
-    if (status == UZ_OK)
-        status = fill_places(s, w, err);
-    if (status == UZ_OK)
-        status = draw_values(&s->reaction, s, w->answer->r, w->drawn, s->n_rows, err);
+    uz_status status = draw_values(&s->reaction, s, w->answer->r, w->drawn, s->n_rows, err);
     if (status == UZ_OK && w->answer->g)
         status = draw_values(&s->gap, s, w->answer->g, w->drawn, s->n_rows, err);
     if (status == UZ_OK && w->fields.pressure)
         status = draw_values(&s->pressure, s, w->fields.pressure, w->drawn, s->n_rows, err);
-    return status == UZ_OK ? fill_arc(s, w, err) : status;
+    if (status != UZ_OK || s->dim != 2)
+        return status;
+    w->arc = uz_alloc(m, sizeof *w->arc);
+    w->part = uz_alloc(m, sizeof *w->part);
+    s->row_part = uz_alloc(s->n_rows, sizeof *s->row_part);
+    if (!w->arc || !w->part || !s->row_part)
+        return fail_memory(err, s);
+    status = uz_contact_arc(w->arc, w->part, w->model, w->scene, err);
+    for (int64_t i = 0; status == UZ_OK && i < s->n_rows; i++)
+        s->row_part[i] = w->part[w->drawn[i]];
+    return status == UZ_OK ? draw_values(&s->arc, s, w->arc, w->drawn, s->n_rows, err) : status;
 }
 
 /* ------------------------------------------------------------------- whole */
@@ -256,36 +187,54 @@ static uz_status build(uz_surface *s, surface_work *w, const uz_field_body *body
                        const uz_hooks *hooks, uz_error *err)
 {
     const uz_mesh *mesh = &w->model->mesh;
+    const uz_skin *skin = &w->skin;
+    const int(*triangle)[3];
     *s = (uz_surface){.dim = mesh->dim, .n_nodes = mesh->n_nodes, .n_elements = mesh->n_elements};
     uz_status status = uz_skin_build(&w->skin, mesh, hooks, err);
+    if (status != UZ_OK)
+        return status;
+    /* The nodes that are drawn are numbered. */
+    w->vertex_of = uz_alloc_zero(s->n_nodes, sizeof *w->vertex_of);
+    if (!w->vertex_of)
+        return fail_memory(err, s);
+    for (int64_t i = 0; i < skin->first[skin->n_cells]; i++)
+        w->vertex_of[skin->point[i]] = 1;
+    for (int64_t a = 0; a < s->n_nodes; a++)
+        w->vertex_of[a] = w->vertex_of[a] ? s->n_vertices++ : -1;
+    if (s->n_vertices == 0)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh", "every side lies between two elements: there is no surface");
+    for (int64_t i = 0; i < skin->n_cells; i++)
+        s->n_triangles += uz_cell_triangles(&triangle, (int)(skin->first[i + 1] - skin->first[i]));
+    status = check_size(s, w, most_bytes, err); /* edges take several times as much while they are found */
     if (status == UZ_OK)
-        status = number_vertices(s, w, err);
-    if (status == UZ_OK && s->n_vertices == 0)
-        status = uz_fail(err, UZ_ERR_SCENE, "/mesh", "every side lies between two elements: there is no surface");
-    if (status == UZ_OK) {
-        count_triangles(s, &w->skin);
-        status = check_size(s, w, most_bytes, err); /* edges take several times as much while they are found */
-    }
-    if (status == UZ_OK)
-        status = uz_skin_edges_build(&w->edges, &w->skin, mesh, err);
+        status = uz_skin_edges_build(&w->edges, skin, mesh, err);
     if (status == UZ_OK)
         status = check_size(s, w, most_bytes, err);
     if (status == UZ_OK)
         status = uz_fields_of_body(&w->fields, body, w->answer, which & (UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE), hooks,
                                    err);
-    if (status == UZ_OK)
-        status = fill_triangles(s, w, err);
-    if (status == UZ_OK) {
-        s->n_lines = w->edges.n_lines;
-        s->n_outline = w->edges.n_outline;
-        s->line = as_vertices(w, w->edges.line, 2 * s->n_lines);
-        s->outline = as_vertices(w, w->edges.outline, 2 * s->n_outline);
-        status = s->line && s->outline ? UZ_OK : fail_memory(err, s);
+    if (status != UZ_OK)
+        return status;
+    s->n_lines = w->edges.n_lines;
+    s->n_outline = w->edges.n_outline;
+    s->line = as_vertices(w, w->edges.line, 2 * s->n_lines);
+    s->outline = as_vertices(w, w->edges.outline, 2 * s->n_outline);
+    s->triangle = uz_alloc(3 * s->n_triangles, sizeof *s->triangle);
+    if (!s->line || !s->outline || !s->triangle)
+        return fail_memory(err, s);
+    for (int64_t i = 0, n = 0; i < skin->n_cells; i++) {
+        const int64_t *point = skin->point + skin->first[i];
+        const int count = uz_cell_triangles(&triangle, (int)(skin->first[i + 1] - skin->first[i]));
+        for (int k = 0; k < 3 * count; k++)
+            s->triangle[n++] = (unsigned)w->vertex_of[point[triangle[k / 3][k % 3]]];
     }
-    if (status == UZ_OK)
-        status = fill_vertices(s, w, err);
-    if (status == UZ_OK)
-        status = fill_stress(s, w, err);
+    status = fill_vertices(s, w, err);
+    double *stress = w->fields.von_mises;
+    for (int64_t a = 0; status == UZ_OK && stress && a < s->n_nodes; a++)
+        if (w->vertex_of[a] >= 0) /* moves only to the front: vertices are numbered like nodes */
+            stress[w->vertex_of[a]] = stress[a];
+    if (status == UZ_OK && stress)
+        status = draw_values(&s->von_mises, s, stress, NULL, s->n_vertices, err);
     return status == UZ_OK ? fill_rows(s, w, err) : status;
 }
 

@@ -35,32 +35,26 @@ static const struct {
                    {"certified bound on the error, energy norm", TALL, true, false},
                    {"rows in contact", LOW, false, false}};
 
-/* The largest lower bound that is known: a run ends at the last of its own. */
-static double best_dual(const uz_curve *c)
-{
-    double best = isfinite(c->dual) ? c->dual : -INFINITY;
-    for (int64_t i = 0; i < c->count; i++) {
-        const double psi = c->dual_objective[i * c->stride];
-        if (isfinite(psi))
-            best = fmax(best, psi);
-    }
-    return best;
-}
-
 static uz_curve_of curve_of(const uz_curve *c, quantity q, uz_plot_x x)
 {
     const double *y = q == DUAL       ? c->dual_objective
                       : q == RESIDUAL ? c->residual
                       : q == BOUND    ? c->error_bound
                                       : c->contacts;
+    /* The largest lower bound that is known: a run ends at the last of its own. */
+    double best = isfinite(c->dual) ? c->dual : -INFINITY;
+    for (int64_t i = 0; q == DUAL && i < c->count; i++) {
+        const double psi = c->dual_objective[i * c->stride];
+        best = isfinite(psi) ? fmax(best, psi) : best;
+    }
     return (uz_curve_of){.x = {x == UZ_PLOT_SECONDS ? c->seconds : c->iteration, c->count, c->stride},
                          .y = {y, c->count, c->stride},
-                         .minuend = q == DUAL ? best_dual(c) : (double)NAN};
+                         .minuend = q == DUAL ? best : (double)NAN};
 }
 
-static uz_panel make_panel(const uz_curve *curves, int n, quantity q, const uz_plot *how, double top)
+static void put_panel(uz_buffer *svg, const uz_curve *curves, int n, quantity q, const uz_plot *how, double top)
 {
-    uz_range x = {0.0, 0.0}, y = uz_range_none();
+    uz_range x = {0.0, 0.0}, y = UZ_RANGE_NONE;
     for (int k = 0; k < n; k++) {
         const uz_curve_of of = curve_of(&curves[k], q, how->x);
         for (int64_t i = 0; i < curves[k].count; i++) {
@@ -68,12 +62,7 @@ static uz_panel make_panel(const uz_curve *curves, int n, quantity q, const uz_p
             uz_range_take(&y, uz_curve_value(&of, i), PANEL[q].log);
         }
     }
-    return uz_panel_make(LEFT, top, how->width - LEFT - RIGHT, PANEL[q].height, x, y, PANEL[q].log);
-}
-
-static void put_panel(uz_buffer *svg, const uz_curve *curves, int n, quantity q, const uz_plot *how, double top)
-{
-    const uz_panel panel = make_panel(curves, n, q, how, top);
+    const uz_panel panel = uz_panel_make(LEFT, top, how->width - LEFT - RIGHT, PANEL[q].height, x, y, PANEL[q].log);
     uz_buffer_print(svg, "<g id=\"panel%d\">\n", (int)q);
     uz_panel_put_axes(svg, &panel, PANEL[q].name, q == PANELS - 1);
     for (int k = 0; k < n; k++) {
@@ -85,18 +74,7 @@ static void put_panel(uz_buffer *svg, const uz_curve *curves, int n, quantity q,
     uz_buffer_print(svg, "</g>\n");
 }
 
-static void put_style(uz_buffer *svg, uz_theme theme)
-{
-    uz_buffer_print(svg, "<style>");
-    uz_buffer_put(svg, LIGHT, sizeof LIGHT - 1);
-    if (theme == UZ_THEME_AUTO)
-        uz_buffer_print(svg, "@media(prefers-color-scheme:dark){");
-    if (theme != UZ_THEME_LIGHT)
-        uz_buffer_put(svg, DARK, sizeof DARK - 1);
-    uz_buffer_print(svg, "%s</style>\n", theme == UZ_THEME_AUTO ? "}" : "");
-}
-
-static void put_head(uz_buffer *svg, const uz_plot *how, int height)
+static void put_head(uz_buffer *svg, const uz_curve *curves, int n, const uz_plot *how, int height)
 {
     uz_buffer_print(svg,
                     "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" "
@@ -104,61 +82,24 @@ static void put_head(uz_buffer *svg, const uz_plot *how, int height)
                     how->width, height, how->width, height);
     uz_buffer_put_escaped(svg, how->title ? how->title : "convergence");
     uz_buffer_print(svg, "</title>\n");
-    put_style(svg, how->theme);
+    uz_buffer_print(svg, "<style>");
+    uz_buffer_put(svg, LIGHT, sizeof LIGHT - 1);
+    if (how->theme == UZ_THEME_AUTO)
+        uz_buffer_print(svg, "@media(prefers-color-scheme:dark){");
+    if (how->theme != UZ_THEME_LIGHT)
+        uz_buffer_put(svg, DARK, sizeof DARK - 1);
+    uz_buffer_print(svg, "%s</style>\n", how->theme == UZ_THEME_AUTO ? "}" : "");
     uz_buffer_print(svg, "<rect class=\"paper\" width=\"%d\" height=\"%d\"/>\n<text class=\"title\" x=\"%d\" y=\"22\">",
                     how->width, height, LEFT);
     uz_buffer_put_escaped(svg, how->title ? how->title : "convergence");
     uz_buffer_print(svg, "</text>\n");
-}
-
-/* A line for each curve. */
-static void put_legend(uz_buffer *svg, const uz_curve *curves, int n)
-{
-    for (int k = 0; k < n; k++) {
+    for (int k = 0; k < n; k++) { /* the legend: a line for each curve */
         const int y = HEAD + k * LINE + 6;
         uz_buffer_print(svg, "<path class=\"curve c%d\" d=\"M%d %dh22\"/><text x=\"%d\" y=\"%d\">", k, LEFT, y,
                         LEFT + 30, y + 4);
         uz_buffer_put_escaped(svg, curves[k].name ? curves[k].name : "");
         uz_buffer_print(svg, "</text>\n");
     }
-}
-
-static bool any_restart(const uz_curve *curves, int n)
-{
-    for (int k = 0; k < n; k++)
-        for (int64_t i = 0; i < curves[k].count; i++)
-            if (curves[k].restart[i * curves[k].stride] > 0.0)
-                return true;
-    return false;
-}
-
-static void put_foot(uz_buffer *svg, const uz_curve *curves, int n, const uz_plot *how, double y)
-{
-    bool empty = true;
-    for (int k = 0; k < n; k++)
-        empty = empty && curves[k].count == 0;
-    uz_buffer_print(svg, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%s</text>\n", how->width - RIGHT, y,
-                    how->x == UZ_PLOT_SECONDS ? "seconds since the first iteration" : "iterations");
-    if (empty)
-        uz_buffer_print(svg, "<text x=\"%d\" y=\"%.1f\">no iterations yet</text>\n", LEFT, y);
-    else if (any_restart(curves, n))
-        uz_buffer_print(svg,
-                        "<path class=\"restart c0\" d=\"M%d %.1fl-3.5 -7h7z\"/><text x=\"%d\" y=\"%.1f\">momentum "
-                        "dropped (restart)</text>\n",
-                        LEFT + 4, y, LEFT + 14, y);
-}
-
-static uz_status check(const uz_curve *curves, int n, const uz_plot *how, uz_error *err)
-{
-    if (how->width != 0 && (how->width < 300 || how->width > 4000))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a diagram must lie in 300 to 4000, it is %d",
-                       how->width);
-    if (n < 1 || n > UZ_CURVES)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a diagram has 1 to %d curves, not %d", (int)UZ_CURVES, n);
-    for (int k = 0; k < n; k++)
-        if (curves[k].count < 0 || curves[k].stride < 1)
-            return uz_fail(err, UZ_ERR_ARGUMENT, "", "curve %d has no rows that could be read", k);
-    return UZ_OK;
 }
 
 uz_status uz_picture_convergence(char **svg, size_t *len, const uz_curve *curves, int n, const uz_plot *how,
@@ -169,24 +110,44 @@ uz_status uz_picture_convergence(char **svg, size_t *len, const uz_curve *curves
     uz_error_reset(err);
     *svg = NULL;
     *len = 0;
-    uz_status status = check(curves, n, how, err);
-    if (status != UZ_OK)
-        return status;
+    if (how->width != 0 && (how->width < 300 || how->width > 4000))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a diagram must lie in 300 to 4000, it is %d",
+                       how->width);
+    if (n < 1 || n > UZ_CURVES)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a diagram has 1 to %d curves, not %d", (int)UZ_CURVES, n);
+    for (int k = 0; k < n; k++)
+        if (curves[k].count < 0 || curves[k].stride < 1)
+            return uz_fail(err, UZ_ERR_ARGUMENT, "", "curve %d has no rows that could be read", k);
     plot.width = how->width ? how->width : WIDTH;
     const int first = HEAD + n * LINE;
     int height = first + FOOT;
     for (int q = 0; q < PANELS; q++)
         height += ABOVE + PANEL[q].height;
-    put_head(&text, &plot, height);
-    put_legend(&text, curves, n);
+    put_head(&text, curves, n, &plot, height);
     double top = first;
     for (int q = 0; q < PANELS; q++) {
         put_panel(&text, curves, n, (quantity)q, &plot, top + ABOVE);
         top += ABOVE + PANEL[q].height;
     }
-    put_foot(&text, curves, n, &plot, height - 10);
+    /* The foot: what x is, and what a mark means. */
+    const double foot = height - 10;
+    bool empty = true, restart = false;
+    for (int k = 0; k < n; k++) {
+        empty = empty && curves[k].count == 0;
+        for (int64_t i = 0; i < curves[k].count && !restart; i++)
+            restart = curves[k].restart[i * curves[k].stride] > 0.0;
+    }
+    uz_buffer_print(&text, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%s</text>\n", plot.width - RIGHT, foot,
+                    how->x == UZ_PLOT_SECONDS ? "seconds since the first iteration" : "iterations");
+    if (empty)
+        uz_buffer_print(&text, "<text x=\"%d\" y=\"%.1f\">no iterations yet</text>\n", LEFT, foot);
+    else if (restart)
+        uz_buffer_print(&text,
+                        "<path class=\"restart c0\" d=\"M%d %.1fl-3.5 -7h7z\"/><text x=\"%d\" y=\"%.1f\">momentum "
+                        "dropped (restart)</text>\n",
+                        LEFT + 4, foot, LEFT + 14, foot);
     uz_buffer_print(&text, "</svg>\n");
-    status = uz_buffer_finish(svg, len, &text, err);
+    const uz_status status = uz_buffer_finish(svg, len, &text, err);
     uz_buffer_drop(&text);
     return status;
 }

@@ -37,15 +37,6 @@ static uz_status make_values(double **out, uz_scenery *scenery, const uz_field_b
     return UZ_OK;
 }
 
-static uz_status make_pressure(double **out, const uz_scenery *scenery, uz_error *err)
-{
-    const uz_body_model *model = scenery->model;
-    *out = uz_alloc(model->m, sizeof **out);
-    if (!*out)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)model->m);
-    return uz_contact_pressure(*out, model, scenery->scene, scenery->answer->r, err);
-}
-
 static uz_status put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)
 {
     uz_buffer_print(svg, "<image width=\"%d\" height=\"%d\" href=\"data:image/png;base64,", raster->width,
@@ -83,8 +74,11 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
     uz_status status = uz_skin_build(&skin, &scenery->model->mesh, hooks, err);
     if (status == UZ_OK)
         status = make_values(&value, scenery, body, how->colour, hooks, err);
+    if (status == UZ_OK && !(pressure = uz_alloc(scenery->model->m, sizeof *pressure)))
+        status =
+            uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)scenery->model->m);
     if (status == UZ_OK)
-        status = make_pressure(&pressure, scenery, err);
+        status = uz_contact_pressure(pressure, scenery->model, scenery->scene, scenery->answer->r, err);
     scenery->value = value;
     scenery->pressure = pressure;
     if (status == UZ_OK) {
@@ -135,18 +129,6 @@ uz_status uz_scenery_check_answer(const uz_field_source *answer, const uz_body_m
     return UZ_OK;
 }
 
-static uz_status check(const uz_field_source *answer, const uz_body_model *model, const uz_picture *how, uz_error *err)
-{
-    if (how->width != 0 && (how->width < 200 || how->width > 4000))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a picture must lie in 200 to 4000, it is %d",
-                       how->width);
-    if (!(how->factor >= 0 && isfinite(how->factor)))
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "the factor of the displacements must not be negative");
-    if (how->colour != UZ_FIELD_DISPLACEMENTS && how->colour != UZ_FIELD_VON_MISES)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a picture shows displacements or von_mises");
-    return uz_scenery_check_answer(answer, model, err);
-}
-
 uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
                               const uz_picture *how, const uz_hooks *hooks, uz_error *err)
 {
@@ -157,8 +139,15 @@ uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, co
     *svg = NULL;
     *len = 0;
     uz_status status = uz_body_model_outline(&model, scene, err);
+    if (status == UZ_OK && how->width != 0 && (how->width < 200 || how->width > 4000))
+        status =
+            uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a picture must lie in 200 to 4000, it is %d", how->width);
+    if (status == UZ_OK && !(how->factor >= 0 && isfinite(how->factor)))
+        status = uz_fail(err, UZ_ERR_ARGUMENT, "", "the factor of the displacements must not be negative");
+    if (status == UZ_OK && how->colour != UZ_FIELD_DISPLACEMENTS && how->colour != UZ_FIELD_VON_MISES)
+        status = uz_fail(err, UZ_ERR_ARGUMENT, "", "a picture shows displacements or von_mises");
     if (status == UZ_OK)
-        status = check(answer, &model, how, err);
+        status = uz_scenery_check_answer(answer, &model, err);
     if (status == UZ_OK)
         status = uz_field_body_init(&body, scene, &model, err);
     if (status == UZ_OK) {

@@ -49,24 +49,22 @@ bool uz_panel_place(double *px, double *py, const uz_panel *panel, double x, dou
     return true;
 }
 
-static void put_x_ticks(uz_buffer *svg, const uz_panel *panel, bool numbers)
+void uz_panel_put_axes(uz_buffer *svg, const uz_panel *panel, const char *name, bool x_numbers)
 {
-    const double step = step_of(panel->x, panel->width, ROOM_X, false), foot = panel->top + panel->height;
-    const int64_t first = (int64_t)ceil(panel->x.low / step - 1e-9), last = (int64_t)floor(panel->x.high / step + 1e-9);
-    for (int64_t k = first; k <= last; k++) {
+    uz_buffer_print(svg, "<text class=\"title\" x=\"%.1f\" y=\"%.1f\">", panel->left, panel->top - 6);
+    uz_buffer_put_escaped(svg, name);
+    uz_buffer_print(svg, "</text>\n");
+    double step = step_of(panel->x, panel->width, ROOM_X, false);
+    const double foot = panel->top + panel->height;
+    for (int64_t k = (int64_t)ceil(panel->x.low / step - 1e-9); k <= (int64_t)floor(panel->x.high / step + 1e-9); k++) {
         const double x = across(panel, (double)k * step);
         uz_buffer_print(svg, "<path class=\"grid\" d=\"M%.2f %.2fV%.2f\"/>", x, panel->top, foot);
-        if (numbers)
+        if (x_numbers)
             uz_buffer_print(svg, "<text class=\"x\" x=\"%.2f\" y=\"%.1f\" text-anchor=\"middle\">%.10g</text>", x,
                             foot + 15, (double)k * step);
     }
-}
-
-static void put_y_ticks(uz_buffer *svg, const uz_panel *panel)
-{
-    const double step = step_of(panel->y, panel->height, ROOM_Y, panel->log);
-    const double first = ceil(panel->y.low / step - 1e-9), last = floor(panel->y.high / step + 1e-9);
-    for (double k = first; k <= last; k++) {
+    step = step_of(panel->y, panel->height, ROOM_Y, panel->log);
+    for (double k = ceil(panel->y.low / step - 1e-9); k <= floor(panel->y.high / step + 1e-9); k++) {
         const double y = up(panel, k * step);
         uz_buffer_print(svg,
                         "<path class=\"grid\" d=\"M%.2f %.2fH%.2f\"/><text class=\"y\" x=\"%.1f\" y=\"%.2f\" "
@@ -74,15 +72,6 @@ static void put_y_ticks(uz_buffer *svg, const uz_panel *panel)
                         panel->left, y, panel->left + panel->width, panel->left - 6, y + 4, panel->log ? "1e" : "",
                         k * step + 0.0);
     }
-}
-
-void uz_panel_put_axes(uz_buffer *svg, const uz_panel *panel, const char *name, bool x_numbers)
-{
-    uz_buffer_print(svg, "<text class=\"title\" x=\"%.1f\" y=\"%.1f\">", panel->left, panel->top - 6);
-    uz_buffer_put_escaped(svg, name);
-    uz_buffer_print(svg, "</text>\n");
-    put_x_ticks(svg, panel, x_numbers);
-    put_y_ticks(svg, panel);
     uz_buffer_print(svg, "\n<rect class=\"frame\" x=\"%.2f\" y=\"%.2f\" width=\"%.2f\" height=\"%.2f\"/>\n",
                     panel->left, panel->top, panel->width, panel->height);
 }
@@ -148,24 +137,6 @@ static void lift(pen *p)
     p->column = NAN;
 }
 
-static void go_to(pen *p, point at)
-{
-    if (p->count == 0) {
-        p->first = p->lowest = p->highest = at;
-        p->lowest_at = p->highest_at = 0;
-    }
-    if (at.y > p->lowest.y) { /* down the paper */
-        p->lowest = at;
-        p->lowest_at = p->count;
-    }
-    if (at.y < p->highest.y) {
-        p->highest = at;
-        p->highest_at = p->count;
-    }
-    p->last = at;
-    p->count++;
-}
-
 void uz_panel_put_curve(uz_buffer *svg, const uz_panel *panel, const uz_curve_of *curve, int colour)
 {
     pen p = {.svg = svg, .colour = colour, .column = NAN};
@@ -183,7 +154,20 @@ void uz_panel_put_curve(uz_buffer *svg, const uz_panel *panel, const uz_curve_of
             put_column(&p);
         p.column = floor(at.x);
         gap = false;
-        go_to(&p, at);
+        if (p.count == 0) {
+            p.first = p.lowest = p.highest = at;
+            p.lowest_at = p.highest_at = 0;
+        }
+        if (at.y > p.lowest.y) { /* down the paper */
+            p.lowest = at;
+            p.lowest_at = p.count;
+        }
+        if (at.y < p.highest.y) {
+            p.highest = at;
+            p.highest_at = p.count;
+        }
+        p.last = at;
+        p.count++;
     }
     lift(&p);
 }

@@ -49,20 +49,17 @@ static void extend_box(double low[2], double high[2], const uz_scenery *scenery,
     }
 }
 
-/* A power of ten times 1, 2 or 5: a factor that reads well. */
-static double round_factor(double x)
-{
-    const double power = pow(10, floor(log10(x))), rest = x / power;
-    return power * (rest < 2 ? 1 : rest < 5 ? 2 : 5);
-}
-
 double uz_show_factor(const uz_mesh *mesh, const double *u)
 {
     double largest = 0;
     for (int64_t i = 0; i < mesh->n_nodes * mesh->dim; i++)
         largest = fmax(largest, fabs(u[i]));
     const double ideal = 0.06 * mesh->extent / largest;
-    return largest > 0 && isfinite(ideal) ? fmax(round_factor(ideal), 1) : 1;
+    if (!(largest > 0 && isfinite(ideal)))
+        return 1;
+    /* A power of ten times 1, 2 or 5: a factor that reads well. */
+    const double power = pow(10, floor(log10(ideal))), rest = ideal / power;
+    return fmax(power * (rest < 2 ? 1 : rest < 5 ? 2 : 5), 1);
 }
 
 uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
@@ -97,41 +94,6 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
 /* Grids of more elements than this would hide their colours behind the lines. */
 enum { MOST_LINED = 4000 };
 
-static void paint_cell(uz_raster *raster, const uz_scenery *scenery, const int64_t *around, int n, bool lined)
-{
-    uz_raster_point p[UZ_CELL_POINTS];
-    double area = 0, light = 1;
-    for (int i = 0; i < n; i++)
-        p[i] = uz_scenery_node(scenery, around[i], scenery->factor);
-    for (int i = 0; i < n; i++)
-        area += p[i].x * p[(i + 1) % n].y - p[i].y * p[(i + 1) % n].x;
-    if (scenery->model->mesh.dim == 3) {
-        /* Faces that look away are hidden; those that look aside are darker. The pixels' y points down. */
-        double size = 0;
-        for (int i = 0; i < n; i++) {
-            const uz_raster_point *a = &p[i], *b = &p[(i + 1) % n];
-            size = fmax(size, hypot(hypot(b->x - a->x, b->y - a->y), b->z - a->z));
-        }
-        if (area >= 0)
-            return;
-        light = 0.55 + 0.45 * fmin(1, -area / (2 * size * size));
-    }
-    /* A convex polygon of corners with the middles of its edges, as a fan about its mean: `count` points in order. */
-    uz_raster_point mean = {0, 0, 0, 0};
-    for (int i = 0; i < n; i++) {
-        mean.x += p[i].x / n;
-        mean.y += p[i].y / n;
-        mean.z += p[i].z / n;
-        mean.value += p[i].value / n;
-    }
-    for (int i = 0; i < n; i++) {
-        const uz_raster_point triangle[3] = {p[i], p[(i + 1) % n], mean};
-        uz_raster_triangle(raster, triangle, light);
-    }
-    for (int i = 0; lined && i < n; i++)
-        uz_raster_line(raster, &p[i], &p[(i + 1) % n], 0.5);
-}
-
 uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                            uz_error *err)
 {
@@ -140,7 +102,39 @@ uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const u
     for (int64_t i = 0; i < skin->n_cells; i++) {
         if (i % 4096 == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the picture was drawn");
-        paint_cell(raster, scenery, skin->point + skin->first[i], (int)(skin->first[i + 1] - skin->first[i]), lined);
+        const int64_t *around = skin->point + skin->first[i];
+        const int n = (int)(skin->first[i + 1] - skin->first[i]);
+        uz_raster_point p[UZ_CELL_POINTS];
+        double area = 0, light = 1;
+        for (int k = 0; k < n; k++)
+            p[k] = uz_scenery_node(scenery, around[k], scenery->factor);
+        for (int k = 0; k < n; k++)
+            area += p[k].x * p[(k + 1) % n].y - p[k].y * p[(k + 1) % n].x;
+        if (mesh->dim == 3) {
+            /* Faces that look away are hidden; those that look aside are darker. The pixels' y points down. */
+            double size = 0;
+            for (int k = 0; k < n; k++) {
+                const uz_raster_point *a = &p[k], *b = &p[(k + 1) % n];
+                size = fmax(size, hypot(hypot(b->x - a->x, b->y - a->y), b->z - a->z));
+            }
+            if (area >= 0)
+                continue;
+            light = 0.55 + 0.45 * fmin(1, -area / (2 * size * size));
+        }
+        /* A convex polygon of corners with the middles of its edges, as a fan about its mean. */
+        uz_raster_point mean = {0, 0, 0, 0};
+        for (int k = 0; k < n; k++) {
+            mean.x += p[k].x / n;
+            mean.y += p[k].y / n;
+            mean.z += p[k].z / n;
+            mean.value += p[k].value / n;
+        }
+        for (int k = 0; k < n; k++) {
+            const uz_raster_point triangle[3] = {p[k], p[(k + 1) % n], mean};
+            uz_raster_triangle(raster, triangle, light);
+        }
+        for (int k = 0; lined && k < n; k++)
+            uz_raster_line(raster, &p[k], &p[(k + 1) % n], 0.5);
     }
     return UZ_OK;
 }
@@ -148,17 +142,6 @@ uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const u
 /* ---- obstacles of solids near the body, as grey surfaces */
 
 enum { CELLS = 40 };
-
-/* Full light where it faces the eye. */
-static double light_on(const uz_raster_point p[3])
-{
-    const double a[3] = {p[1].x - p[0].x, p[1].y - p[0].y, p[1].z - p[0].z},
-                 b[3] = {p[2].x - p[0].x, p[2].y - p[0].y, p[2].z - p[0].z};
-    double n[3];
-    uz_cross3(n, a, b);
-    uz_make_unit3(n, (const double[3]){0, 0, 1});
-    return 0.75 + 0.25 * fabs(n[2]);
-}
 
 static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const uz_obstacle_patch *p)
 {
@@ -176,7 +159,13 @@ static void paint_patch(uz_raster *raster, const uz_scenery *scenery, const uz_o
             }
             for (int k = 0; k < 2; k++) {
                 const uz_raster_point triangle[3] = {at[CORNER[k][0]], at[CORNER[k][1]], at[CORNER[k][2]]};
-                uz_raster_triangle(raster, triangle, light_on(triangle));
+                const uz_raster_point *o = &triangle[0], *p1 = &triangle[1], *p2 = &triangle[2];
+                const double a[3] = {p1->x - o->x, p1->y - o->y, p1->z - o->z};
+                const double b[3] = {p2->x - o->x, p2->y - o->y, p2->z - o->z};
+                double n[3];
+                uz_cross3(n, a, b);
+                uz_make_unit3(n, (const double[3]){0, 0, 1});
+                uz_raster_triangle(raster, triangle, 0.75 + 0.25 * fabs(n[2])); /* full where it faces the eye */
             }
         }
 }
@@ -260,28 +249,22 @@ static void border_to(border *b, uz_raster_point p)
     b->started = true;
 }
 
-/* The line through `point` along `way`, well beyond the picture. */
-static void border_line(border *b, const uz_scenery *scenery, const double point[2], const double way[2])
-{
-    const uz_raster_point p = uz_scenery_point(scenery, point);
-    const double length = hypot(way[0], way[1]), reach = 2.0 * (scenery->width + scenery->height);
-    const double dx = way[0] / length, dy = -way[1] / length;
-    /* The part of it that is nearest to the middle of the picture. */
-    const double along = (0.5 * scenery->width - p.x) * dx + (0.5 * scenery->height - p.y) * dy;
-    for (int side = -1; side <= 1; side += 2)
-        border_to(b, (uz_raster_point){.x = p.x + (along + side * reach / 2) * dx,
-                                       .y = p.y + (along + side * reach / 2) * dy});
-}
-
 /* The obstacle's outline, going on well beyond the picture at its ends. */
-static void border_outline(border *b, const uz_scenery *scenery, const uz_contact *contact)
+static void put_border(border *b, const uz_scenery *scenery, const uz_contact *contact)
 {
     const uz_obstacle_shape *shape = uz_obstacle_shape_of(contact->kind);
     const double far = 10 * scenery->extent;
     double at[2], way[2];
     const int64_t n = shape->outline(at, way, contact, 0);
     if (n == 1) {
-        border_line(b, scenery, at, way);
+        /* A line: the part of it that is nearest to the middle of the picture. */
+        const uz_raster_point p = uz_scenery_point(scenery, at);
+        const double length = hypot(way[0], way[1]), reach = 2.0 * (scenery->width + scenery->height);
+        const double dx = way[0] / length, dy = -way[1] / length;
+        const double along = (0.5 * scenery->width - p.x) * dx + (0.5 * scenery->height - p.y) * dy;
+        for (int side = -1; side <= 1; side += 2)
+            border_to(b, (uz_raster_point){.x = p.x + (along + side * reach / 2) * dx,
+                                           .y = p.y + (along + side * reach / 2) * dy});
         return;
     }
     for (int64_t i = -1; i <= n; i++) {
@@ -296,69 +279,61 @@ static void border_outline(border *b, const uz_scenery *scenery, const uz_contac
     }
 }
 
-static void put_obstacle(uz_buffer *svg, const uz_scenery *scenery, const uz_contact *contact)
-{
-    border b = {.svg = svg};
-    uz_buffer_print(svg, "<path class=\"obstacle\" d=\"");
-    border_outline(&b, scenery, contact);
-    uz_buffer_print(svg, "\"/><path class=\"ticks\" d=\"");
-    uz_buffer_put(svg, b.ticks.data, b.ticks.len);
-    svg->failed = svg->failed || b.ticks.failed;
-    uz_buffer_drop(&b.ticks);
-    uz_buffer_print(svg, "\"/>\n");
-}
-
 void uz_scenery_put_obstacles(uz_buffer *svg, const uz_scenery *scenery)
 {
-    for (int64_t k = 0; scenery->model->mesh.dim == 2 && k < scenery->scene->n_contacts; k++)
-        if (uz_obstacle_shape_of(scenery->scene->contacts[k].kind))
-            put_obstacle(svg, scenery, &scenery->scene->contacts[k]);
+    for (int64_t k = 0; scenery->model->mesh.dim == 2 && k < scenery->scene->n_contacts; k++) {
+        const uz_contact *contact = &scenery->scene->contacts[k];
+        border b = {.svg = svg};
+        if (!uz_obstacle_shape_of(contact->kind))
+            continue;
+        uz_buffer_print(svg, "<path class=\"obstacle\" d=\"");
+        put_border(&b, scenery, contact);
+        uz_buffer_print(svg, "\"/><path class=\"ticks\" d=\"");
+        uz_buffer_put(svg, b.ticks.data, b.ticks.len);
+        svg->failed = svg->failed || b.ticks.failed;
+        uz_buffer_drop(&b.ticks);
+        uz_buffer_print(svg, "\"/>\n");
+    }
 }
 
-/* Arrows follow the pressure and not the mesh. */
-static double push_of(const uz_scenery *scenery, int64_t row)
-{
-    return scenery->pressure[row] > 0 ? scenery->pressure[row] : 0;
-}
-
+/* Of the pressures, NaN where a row has no area; at least 0. */
 static double largest_push(const uz_scenery *scenery)
 {
     double largest = 0;
     for (int64_t i = 0; i < scenery->model->m; i++)
-        largest = fmax(largest, push_of(scenery, i));
+        largest = fmax(largest, scenery->pressure[i]);
     return largest;
-}
-
-static void put_arrow(uz_buffer *svg, const uz_scenery *scenery, int64_t row, double length)
-{
-    const uz_mesh_info *info = &scenery->model->info;
-    const double *n = info->contact_normal + row * info->dim;
-    const uz_raster_point tip = uz_scenery_node(scenery, info->contact_node[row], scenery->factor);
-    double dx = 0, dy = 0;
-    for (int c = 0; c < info->dim; c++) {
-        dx += scenery->axes[0][c] * n[c];
-        dy -= scenery->axes[1][c] * n[c];
-    }
-    const double head = fmin(6, 0.4 * length);
-    uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1fM%.1f %.1fL%.1f %.1fL%.1f %.1f", tip.x - length * dx, tip.y - length * dy,
-                    tip.x, tip.y, tip.x - head * (dx + 0.5 * dy), tip.y - head * (dy - 0.5 * dx), tip.x, tip.y,
-                    tip.x - head * (dx - 0.5 * dy), tip.y - head * (dy + 0.5 * dx));
 }
 
 void uz_scenery_put_arrows(uz_buffer *svg, const uz_scenery *scenery)
 {
+    const uz_mesh_info *info = &scenery->model->info;
     const int64_t m = scenery->model->m;
     const double largest = largest_push(scenery);
     int64_t pushing = 0, seen = 0;
     for (int64_t i = 0; i < m; i++)
-        pushing += push_of(scenery, i) > 0;
+        pushing += scenery->pressure[i] > 0;
     if (!(largest > 0))
         return;
     const int64_t every = (pushing + MOST_ARROWS - 1) / MOST_ARROWS;
     uz_buffer_print(svg, "<path class=\"push\" d=\"");
-    for (int64_t i = 0; i < m; i++)
-        if (push_of(scenery, i) > 0 && seen++ % every == 0)
-            put_arrow(svg, scenery, i, ARROW * push_of(scenery, i) / largest);
+    for (int64_t i = 0; i < m; i++) {
+        if (!(scenery->pressure[i] > 0) || seen++ % every != 0)
+            continue;
+        /* Arrows follow the pressure and not the mesh. */
+        const double length = ARROW * scenery->pressure[i] / largest, head = fmin(6, 0.4 * length);
+        const double *n = info->contact_normal + i * info->dim;
+        const uz_raster_point tip = uz_scenery_node(scenery, info->contact_node[i], scenery->factor);
+        double dx = 0, dy = 0;
+        for (int c = 0; c < info->dim; c++) {
+            dx += scenery->axes[0][c] * n[c];
+            dy -= scenery->axes[1][c] * n[c];
+        }
+        uz_buffer_print(svg, "M%.1f %.1fL%.1f %.1fM%.1f %.1fL%.1f %.1fL%.1f %.1f", tip.x - length * dx,
+                        tip.y - length * dy, tip.x, tip.y, tip.x - head * (dx + 0.5 * dy),
+                        tip.y - head * (dy - 0.5 * dx), tip.x, tip.y, tip.x - head * (dx - 0.5 * dy),
+                        tip.y - head * (dy + 0.5 * dx));
+    }
     uz_buffer_print(svg, "\"/>\n");
 }
 

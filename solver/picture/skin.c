@@ -37,52 +37,43 @@ static bool make_room(uz_skin *skin, int64_t cells, int64_t points)
     return skin->first && skin->point;
 }
 
-static uz_status cover_plane(uz_skin *skin, const uz_mesh *mesh, uz_error *err)
-{
-    if (!make_room(skin, mesh->n_elements, mesh->first[mesh->n_elements]))
-        return fail_memory(err, mesh->n_elements);
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        int count;
-        const int64_t *node = uz_mesh_element(mesh, e, &count);
-        add_cell(skin, node, uz_element_type_of((uz_element_kind)mesh->kind[e])->corners, count);
-    }
-    return UZ_OK;
-}
-
 static bool is_outer(const uz_corner_table *sides, int64_t i)
 {
     return !sides->same[i] && !uz_corner_table_shared(sides, i);
 }
 
-static uz_status cover_solid(uz_skin *skin, const uz_mesh *mesh, const uz_hooks *hooks, uz_error *err)
-{
-    uz_corner_table sides;
-    int64_t cells = 0;
-    uz_status status = uz_corner_table_build(&sides, mesh, true, err);
-    for (int64_t i = 0; status == UZ_OK && i < sides.count; i++)
-        cells += is_outer(&sides, i);
-    if (status == UZ_OK && uz_cancelled(hooks))
-        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the surface was found");
-    if (status == UZ_OK && !make_room(skin, cells, UZ_CELL_POINTS * cells))
-        status = fail_memory(err, mesh->n_elements);
-    for (int64_t i = 0; status == UZ_OK && i < sides.count; i++) {
-        int64_t node[UZ_FACE_NODES];
-        if (!is_outer(&sides, i))
-            continue;
-        const int count = uz_mesh_face(node, mesh, sides.item[i]);
-        add_cell(
-            skin, node,
-            uz_element_type_of((uz_element_kind)mesh->kind[sides.item[i].element])->side[sides.item[i].side].corners,
-            count);
-    }
-    uz_corner_table_clear(&sides);
-    return status;
-}
-
 uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks, uz_error *err)
 {
+    uz_corner_table sides = {0};
+    int64_t cells = 0;
+    uz_status status = UZ_OK;
     memset(out, 0, sizeof *out);
-    uz_status status = mesh->dim == 2 ? cover_plane(out, mesh, err) : cover_solid(out, mesh, hooks, err);
+    if (mesh->dim == 2) {
+        if (!make_room(out, mesh->n_elements, mesh->first[mesh->n_elements]))
+            status = fail_memory(err, mesh->n_elements);
+        for (int64_t e = 0; status == UZ_OK && e < mesh->n_elements; e++) {
+            int count;
+            const int64_t *node = uz_mesh_element(mesh, e, &count);
+            add_cell(out, node, uz_element_type_of((uz_element_kind)mesh->kind[e])->corners, count);
+        }
+    } else {
+        status = uz_corner_table_build(&sides, mesh, true, err);
+        for (int64_t i = 0; status == UZ_OK && i < sides.count; i++)
+            cells += is_outer(&sides, i);
+        if (status == UZ_OK && uz_cancelled(hooks))
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the surface was found");
+        if (status == UZ_OK && !make_room(out, cells, UZ_CELL_POINTS * cells))
+            status = fail_memory(err, mesh->n_elements);
+        for (int64_t i = 0; status == UZ_OK && i < sides.count; i++) {
+            int64_t node[UZ_FACE_NODES];
+            if (!is_outer(&sides, i))
+                continue;
+            const int count = uz_mesh_face(node, mesh, sides.item[i]);
+            const uz_element_kind kind = (uz_element_kind)mesh->kind[sides.item[i].element];
+            add_cell(out, node, uz_element_type_of(kind)->side[sides.item[i].side].corners, count);
+        }
+        uz_corner_table_clear(&sides);
+    }
     if (status != UZ_OK)
         uz_skin_clear(out);
     return status;
@@ -149,23 +140,6 @@ static int compare_halves(const void *a, const void *b)
     return (x->cell > y->cell) - (x->cell < y->cell);
 }
 
-/* Few edges begin at a node of a regular mesh; at the hub of a wheel all of them may. */
-static void sort_halves(half_edge *half, int64_t count)
-{
-    enum { FEW = 16 };
-    if (count > FEW) {
-        qsort(half, (size_t)count, sizeof *half, compare_halves);
-        return;
-    }
-    for (int64_t i = 1; i < count; i++) {
-        const half_edge moved = half[i];
-        int64_t j = i;
-        for (; j > 0 && compare_halves(&half[j - 1], &moved) > 0; j--)
-            half[j] = half[j - 1];
-        half[j] = moved;
-    }
-}
-
 /* Area vector of a cell by Newell's sum over its corners (I. Sutherland et al., ACM Computing Surveys 6 (1974) 1). */
 static void cell_normal(double normal[3], const int64_t *point, int n, const double *xyz)
 {
@@ -186,6 +160,7 @@ static void cell_normal(double normal[3], const int64_t *point, int n, const dou
 
 static uz_status prepare_edges(edge_work *w, const uz_mesh *mesh, uz_error *err)
 {
+    enum { FEW = 16 };
     w->start = uz_alloc_zero(mesh->n_nodes + 1, sizeof *w->start);
     if (!w->start)
         return fail_memory(err, mesh->n_elements);
@@ -200,22 +175,24 @@ static uz_status prepare_edges(edge_work *w, const uz_mesh *mesh, uz_error *err)
     walk_edges(w, true);
     memmove(w->start + 1, w->start, (size_t)mesh->n_nodes * sizeof *w->start); /* placing moved each on */
     w->start[0] = 0;
-    for (int64_t i = 0; i < mesh->n_nodes; i++)
-        sort_halves(w->half + w->start[i], w->start[i + 1] - w->start[i]);
+    /* Few edges begin at a node of a regular mesh; at the hub of a wheel all of them may. */
+    for (int64_t a = 0; a < mesh->n_nodes; a++) {
+        half_edge *half = w->half + w->start[a];
+        const int64_t count = w->start[a + 1] - w->start[a];
+        if (count > FEW)
+            qsort(half, (size_t)count, sizeof *half, compare_halves);
+        for (int64_t i = 1; count <= FEW && i < count; i++) {
+            const half_edge moved = half[i];
+            int64_t j = i;
+            for (; j > 0 && compare_halves(&half[j - 1], &moved) > 0; j--)
+                half[j] = half[j - 1];
+            half[j] = moved;
+        }
+    }
     for (int64_t i = 0; w->normal && i < w->skin->n_cells; i++)
         cell_normal(w->normal + 3 * i, w->skin->point + w->skin->first[i],
                     (int)(w->skin->first[i + 1] - w->skin->first[i]), mesh->xyz);
     return UZ_OK;
-}
-
-/* Does the edge that these `count` cells share belong to the outline? */
-static bool is_border(const edge_work *w, const half_edge *half, int64_t count)
-{
-    static const double COSINE = 0.8; /* of 37 degrees */
-    if (!w->normal || count != 2)
-        return count != 2;
-    const double *a = w->normal + 3 * half[0].cell, *b = w->normal + 3 * half[1].cell;
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < COSINE;
 }
 
 /* line NULL: only counts. */
@@ -232,13 +209,20 @@ static int64_t put_edge(int64_t *line, int64_t n, int64_t low, const half_edge *
 
 static void collect_edges(uz_skin_edges *out, const edge_work *w, int64_t n_nodes)
 {
+    static const double COSINE = 0.8; /* of 37 degrees */
     out->n_lines = out->n_outline = 0;
     for (int64_t low = 0; low < n_nodes; low++)
         for (int64_t i = w->start[low], next; i < w->start[low + 1]; i = next) {
             for (next = i + 1; next < w->start[low + 1] && w->half[next].high == w->half[i].high;)
                 next++;
             out->n_lines = put_edge(out->line, out->n_lines, low, &w->half[i]);
-            if (is_border(w, &w->half[i], next - i))
+            /* Does the edge that these cells share belong to the outline? */
+            bool border = next - i != 2;
+            if (w->normal && !border) {
+                const double *a = w->normal + 3 * w->half[i].cell, *b = w->normal + 3 * w->half[i + 1].cell;
+                border = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] < COSINE;
+            }
+            if (border)
                 out->n_outline = put_edge(out->outline, out->n_outline, low, &w->half[i]);
         }
 }

@@ -2,11 +2,6 @@
 
 #include <math.h>
 
-uz_range uz_range_none(void)
-{
-    return (uz_range){INFINITY, -INFINITY};
-}
-
 bool uz_axis_has(double x, bool log)
 {
     return isfinite(x) && (!log || x > 0.0);

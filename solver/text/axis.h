@@ -2,13 +2,14 @@
 #ifndef UZ_TEXT_AXIS_H
 #define UZ_TEXT_AXIS_H
 
+#include <math.h>
 #include <stdbool.h>
 
 /* A range of numbers, empty (low > high) at first. */
 typedef struct {
     double low, high;
 } uz_range;
-uz_range uz_range_none(void);
+#define UZ_RANGE_NONE ((uz_range){INFINITY, -INFINITY})
 /* What is not finite stays out, and what is not positive where it is for a logarithm. */
 void uz_range_take(uz_range *range, double x, bool log);
 /* The exponents of the powers of ten around a range of positive numbers that is not empty; at least one apart. */

@@ -55,29 +55,6 @@ static bool holds(const interval *i, uint64_t at)
     return above && below;
 }
 
-/* Of s and s + 1 the one nearer to v, the even one when there is a tie. */
-static uint64_t nearer(const position *v, uint64_t s)
-{
-    uint64_t half = 4 * s + 2;
-    if (v->floor != half || !v->whole)
-        return v->floor >= half ? s + 1 : s;
-    return s + (s & 1);
-}
-
-static bool choose(decimal *out, const interval *i, int k)
-{
-    uint64_t s = i->middle.floor / 4, tens = s / 10 * 10;
-    bool lower = holds(i, 4 * tens), upper = holds(i, 4 * (tens + 10));
-    out->exponent = k;
-    out->digits = lower ? tens : tens + 10;
-    if (lower || upper)
-        return true;
-    lower = holds(i, 4 * s);
-    upper = holds(i, 4 * (s + 1));
-    out->digits = lower && upper ? nearer(&i->middle, s) : lower ? s : s + 1;
-    return lower || upper;
-}
-
 /* |x| > 0, finite. False: undecided. */
 static bool shortest(decimal *out, double x)
 {
@@ -92,8 +69,25 @@ static bool shortest(decimal *out, double x)
     int n = 127 - (e - k + scale);
     bool exact = k <= 0 && -k <= EXACT_POWERS;
     interval i = {.closed = c % 2 == 0};
-    return place(&i.low, 4 * c - (narrow ? 1 : 2), power, n, exact) && place(&i.middle, 4 * c, power, n, exact) &&
-           place(&i.high, 4 * c + 2, power, n, exact) && choose(out, &i, k);
+    if (!(place(&i.low, 4 * c - (narrow ? 1 : 2), power, n, exact) && place(&i.middle, 4 * c, power, n, exact) &&
+          place(&i.high, 4 * c + 2, power, n, exact)))
+        return false;
+    /* A number with fewer digits, or else the one of s and s + 1 that is nearer to v, the even one when there is a tie.
+     */
+    uint64_t s = i.middle.floor / 4, tens = s / 10 * 10, half = 4 * s + 2;
+    bool lower = holds(&i, 4 * tens), upper = holds(&i, 4 * (tens + 10));
+    out->exponent = k;
+    out->digits = lower ? tens : tens + 10;
+    if (lower || upper)
+        return true;
+    lower = holds(&i, 4 * s);
+    upper = holds(&i, 4 * (s + 1));
+    const bool tie = i.middle.floor == half && i.middle.whole;
+    if (lower && upper)
+        out->digits = tie ? s + (s & 1) : i.middle.floor >= half ? s + 1 : s;
+    else
+        out->digits = lower ? s : s + 1;
+    return lower || upper;
 }
 
 /* printf writes the locale's decimal point, whatever bytes that is: only digits and the exponent are taken. */
@@ -114,14 +108,6 @@ static void by_printf(decimal *out, double x)
     }
 }
 
-static void drop_zeros(decimal *x)
-{
-    while (x->digits % 10 == 0) {
-        x->digits /= 10;
-        x->exponent++;
-    }
-}
-
 static const char PAIRS[] =
     "0001020304050607080910111213141516171819202122232425262728293031323334353637383940414243444546"
     "47484950515253545556575859606162636465666768697071727374757677787980818283848586878889909192"
@@ -138,17 +124,6 @@ static char *digits_before(char *end, uint64_t value)
     return end;
 }
 
-static char *put_exponent(char *out, int exponent)
-{
-    *out++ = 'e';
-    *out++ = exponent < 0 ? '-' : '+';
-    exponent = abs(exponent);
-    if (exponent >= 100)
-        *out++ = (char)('0' + exponent / 100);
-    memcpy(out, PAIRS + 2 * (exponent % 100), 2);
-    return out + 2;
-}
-
 /* Where %g puts the point. */
 enum { PLAIN_LEAST = -4, PLAIN_DIGITS = 15 };
 
@@ -161,7 +136,14 @@ static char *put_decimal(char *out, const decimal *x)
         if (count > 1)
             *out++ = '.';
         memcpy(out, digits + 1, (size_t)count - 1);
-        return put_exponent(out + count - 1, first);
+        out += count - 1;
+        *out++ = 'e';
+        *out++ = first < 0 ? '-' : '+';
+        first = abs(first);
+        if (first >= 100)
+            *out++ = (char)('0' + first / 100);
+        memcpy(out, PAIRS + 2 * (first % 100), 2);
+        return out + 2;
     }
     if (first < 0) { /* 0.00ddd */
         memcpy(out, "0.000", 5);
@@ -200,6 +182,9 @@ size_t uz_format_double(char *out, double x)
         return (size_t)(at - out) + uz_format_integer(at, (uint64_t)x);
     if (!shortest(&number, x))
         by_printf(&number, x);
-    drop_zeros(&number);
+    while (number.digits % 10 == 0) {
+        number.digits /= 10;
+        number.exponent++;
+    }
     return (size_t)(put_decimal(at, &number) - out);
 }

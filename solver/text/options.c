@@ -134,24 +134,9 @@ bool uz_option_set(void *values, const uz_option *row, const char *text)
     return true;
 }
 
-/* "a, b or c" */
-static void write_choices(char *out, size_t size, const char *words)
-{
-    size_t used = 0;
-    while (*words) {
-        const size_t len = strcspn(words, " ");
-        const char *rest = words + len + strspn(words + len, " ");
-        used += (size_t)snprintf(out + used, size - used, "%.*s%s", (int)len, words,
-                                 !*rest              ? ""
-                                 : strchr(rest, ' ') ? ", "
-                                                     : " or ");
-        used = used < size ? used : size - 1;
-        words = rest;
-    }
-}
-
 void uz_option_wants(char *out, size_t size, const uz_option *row)
 {
+    size_t used = 0;
     switch (row->kind) {
     case UZ_OPTION_FLAG:
         snprintf(out, size, "no value");
@@ -184,7 +169,13 @@ void uz_option_wants(char *out, size_t size, const uz_option *row)
         return;
     case UZ_OPTION_LEVEL:
     case UZ_OPTION_CHOICE:
-        write_choices(out, size, row->choices);
+        for (const char *words = row->choices, *rest; *words; words = rest) { /* "a, b or c" */
+            const int len = (int)strcspn(words, " ");
+            rest = words + len + strspn(words + len, " ");
+            const char *between = !*rest ? "" : strchr(rest, ' ') ? ", " : " or ";
+            used += (size_t)snprintf(out + used, size - used, "%.*s%s", len, words, between);
+            used = used < size ? used : size - 1;
+        }
         return;
     case UZ_OPTION_WORD:
         snprintf(out, size, "a value that is not empty");
@@ -246,19 +237,6 @@ static const uz_option *find_long(const uz_option_walk *walk, const char *name, 
     return other ? other : walk->abbreviated && !several && len > 0 ? begins : NULL;
 }
 
-static const uz_option *find_letter(const uz_option_walk *walk, char letter)
-{
-    const uz_option *other = NULL;
-    for (size_t i = 0; i < walk->table.count; i++) {
-        const uz_option *row = &walk->table.rows[i];
-        if (row->letter == letter && row->places & walk->places)
-            return row;
-        if (row->letter == letter)
-            other = row;
-    }
-    return other;
-}
-
 uz_walk_step uz_option_next(uz_option_walk *walk)
 {
     walk->row = NULL;
@@ -277,7 +255,14 @@ uz_walk_step uz_option_next(uz_option_walk *walk)
         walk->row = find_long(walk, word + 2, len);
         walk->value = word[2 + len] ? word + 3 + len : NULL;
     } else if (!word[2]) {
-        walk->row = find_letter(walk, word[1]);
+        for (size_t i = 0; i < walk->table.count; i++) {
+            const uz_option *row = &walk->table.rows[i];
+            if (row->letter != word[1])
+                continue;
+            walk->row = row;
+            if (row->places & walk->places)
+                break;
+        }
     }
     if (!walk->row)
         return UZ_WALK_UNKNOWN;

@@ -126,14 +126,6 @@ static bool scan_number(scan *s, const char *text, size_t len)
 static const double POWERS_OF_TEN[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
                                        1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
 
-static bool exact_product(double *value, uint64_t digits, int64_t exponent)
-{
-    if (digits > (UINT64_C(1) << 53) || exponent < -22 || exponent > 22)
-        return false;
-    *value = exponent < 0 ? (double)digits / POWERS_OF_TEN[-exponent] : (double)digits * POWERS_OF_TEN[exponent];
-    return true;
-}
-
 /* Rounds digits * 10^q, -345 < q < 310, digits > 0, to *bits of a double. False: too near halfway to be decided. */
 static bool interval_product(uint64_t *bits, uint64_t digits, int q)
 {
@@ -155,18 +147,6 @@ static bool interval_product(uint64_t *bits, uint64_t digits, int q)
         return false;
     uint64_t biased = exponent < -1022 ? 0 : (uint64_t)(exponent + 1022); /* the mantissa's top bit adds the 1 */
     *bits = (biased << 52) + (uint64_t)(product >> drop) + (rest > half);
-    return true;
-}
-
-static bool interval_value(double *value, const scan *s)
-{
-    uint64_t bits, above;
-    int q = (int)s->exponent;
-    if (!interval_product(&bits, s->digits, q))
-        return false;
-    if (s->truncated && (!interval_product(&above, s->digits + 1, q) || above != bits))
-        return false;
-    memcpy(value, &bits, sizeof *value);
     return true;
 }
 
@@ -199,29 +179,29 @@ static double fallback_value(const scan *s, const char *text)
     return value;
 }
 
-static double magnitude(const scan *s, const char *text)
-{
-    double value;
-    if (s->digits == 0)
-        return 0.0;
-    if (!s->truncated && exact_product(&value, s->digits, s->exponent))
-        return value;
-    if (s->exponent >= LARGEST_EXPONENT)
-        return INFINITY;
-    if (s->exponent <= SMALLEST_EXPONENT - WORD_DIGITS)
-        return 0.0;
-    if (s->exponent > SMALLEST_EXPONENT && interval_value(&value, s))
-        return value;
-    return fallback_value(s, text);
-}
-
 size_t uz_parse_double(double *value, const char *text, size_t len)
 {
     scan s;
+    uint64_t bits, above;
+    double size = 0.0;
     *value = 0.0;
     if (!scan_number(&s, text, len))
         return 0;
-    double size = magnitude(&s, text);
+    if (s.digits == 0) {
+        *value = s.negative ? -0.0 : 0.0;
+        return s.used;
+    }
+    if (!s.truncated && s.digits <= (UINT64_C(1) << 53) && s.exponent >= -22 && s.exponent <= 22) {
+        size = s.exponent < 0 ? (double)s.digits / POWERS_OF_TEN[-s.exponent]
+                              : (double)s.digits * POWERS_OF_TEN[s.exponent];
+    } else if (s.exponent >= LARGEST_EXPONENT) {
+        size = INFINITY;
+    } else if (s.exponent > SMALLEST_EXPONENT && interval_product(&bits, s.digits, (int)s.exponent) &&
+               (!s.truncated || (interval_product(&above, s.digits + 1, (int)s.exponent) && above == bits))) {
+        memcpy(&size, &bits, sizeof size);
+    } else if (s.exponent > SMALLEST_EXPONENT - WORD_DIGITS) {
+        size = fallback_value(&s, text);
+    }
     *value = s.negative ? -size : size;
     return s.used;
 }
