@@ -58,6 +58,7 @@ typedef struct {
     int64_t n_sites;
     const uz_law *law;   /* of the contacts */
     int64_t n_pair_rows; /* contact rows against another part of the body */
+    int64_t *row_place;  /* m: the place of each row in the sites of its contact */
     int64_t *row_ends; /* m x 2: of a row whose node is a middle of eight-node faces, the rows of the ends of its edge,
                         * else -1; NULL: there are no such rows. See contact_rows.c */
     int64_t n_modes;   /* motions that only obstacles hold; 0: the supports hold the body */

@@ -41,6 +41,7 @@ void uz_body_model_clear(uz_body_model *model)
     free(model->materials);
     free(model->material_of);
     free(model->spring);
+    free(model->row_place);
     free(model->row_ends);
     for (int64_t k = 0; model->sites && k < model->n_sites; k++) {
         free(model->sites[k].gap);

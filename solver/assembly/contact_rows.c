@@ -99,6 +99,7 @@ static void add_row(uz_body_model *model, row_work *work, int64_t row, int64_t c
     info->contact_node[row] = r->node;
     info->contact_area[row] = work->area[place];
     info->contact_of[row] = contact;
+    model->row_place[row] = place;
     info->contact_face[2 * row] = r->masters > 0 ? r->face.element : -1;
     info->contact_face[2 * row + 1] = r->masters > 0 ? r->face.side : -1;
     memcpy(info->contact_normal + row * dim, r->normal, (size_t)dim * sizeof *r->normal);
@@ -134,6 +135,7 @@ static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries, in
     info->contact_normal = uz_alloc(model->m * dim, sizeof *info->contact_normal);
     info->contact_of = uz_alloc(model->m, sizeof *info->contact_of);
     info->contact_face = uz_alloc(2 * model->m, sizeof *info->contact_face);
+    model->row_place = uz_alloc(model->m, sizeof *model->row_place);
     work->count = 0;
     work->row = uz_alloc(entries, sizeof *work->row);
     work->col = uz_alloc(entries, sizeof *work->col);
@@ -141,7 +143,7 @@ static bool alloc_rows(uz_body_model *model, row_work *work, int64_t entries, in
     work->area = uz_alloc(most_places, sizeof *work->area);
     work->room = uz_alloc_zero(model->mesh.n_nodes, sizeof *work->room);
     return info->contact_node && info->contact_area && info->contact_normal && info->contact_of && info->contact_face &&
-           work->row && work->col && work->val && work->area && work->room;
+           model->row_place && work->row && work->col && work->val && work->area && work->room;
 }
 
 /* ---- middles of eight-node faces */

@@ -340,7 +340,8 @@ static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, co
     return UZ_OK;
 }
 
-static uz_status check_groups(const uz_group *on, const uz_group *with, int64_t index, uz_error *err)
+uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const uz_group *with, int64_t index,
+                                uz_error *err)
 {
     char where[96];
     snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
@@ -351,14 +352,7 @@ static uz_status check_groups(const uz_group *on, const uz_group *with, int64_t 
     if (on == with)
         return uz_fail(err, UZ_ERR_SCENE, where, "\"%.63s\" is both bodies; name the faces of the other one",
                        with->name);
-    return UZ_OK;
-}
-
-/* No node of the master may be among the slaves: its gap to itself is zero for every motion. */
-static uz_status check_apart(const uz_mesh *mesh, const uz_group *on, const uz_group *with, int64_t index,
-                             uz_error *err)
-{
-    char where[96];
+    /* No node of the master may be among the slaves: its gap to itself is zero for every motion. */
     unsigned char *of_master = uz_alloc_zero(mesh->n_nodes, 1);
     uz_status status = of_master ? UZ_OK : out_of_memory(err);
     for (int64_t f = 0; f < with->n_faces && status == UZ_OK; f++) {
@@ -406,9 +400,7 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
     int exponent;
     *out = NULL;
     *count = 0;
-    uz_status status = check_groups(on, with, index, err);
-    if (status == UZ_OK)
-        status = check_apart(mesh, on, with, index, err);
+    uz_status status = uz_contact_pair_check(mesh, on, with, index, err);
     if (status != UZ_OK)
         return status;
     frexp(mesh->extent, &exponent);

@@ -32,6 +32,10 @@ typedef struct {
     double gap;       /* (x_s - x_m) . normal; < 0: the bodies overlap */
 } uz_contact_pair;
 
+/* May the two touch? UZ_ERR_SCENE: `with` has no faces, is `on`, or the two have a node in common. */
+uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const uz_group *with, int64_t index,
+                                uz_error *err);
+
 /* The rows of all nodes of `on` that face `with` (behind it, only those that look at it), in the order of the nodes
  * (ascending). O((n + f) log f) for n nodes within a few faces' size of f faces. `index` is the contact's place in the
  * scene, for pointers. The caller frees *out with free(). Errors: UZ_ERR_SCENE ("/contacts/i/with": not faces;

@@ -59,10 +59,11 @@ static void add_force(balance *b, uz_resultant *to, int64_t node, const double *
 /* ---- contact */
 
 /* The obstacle pushes along its normal by -r; another part of the body is pushed back. */
-static void add_row(balance *b, int64_t row, const uz_contact_sites *sites, int64_t place)
+static void add_row(balance *b, int64_t row)
 {
     const uz_mesh_info *info = &b->model->info;
-    const int64_t k = info->contact_of[row], node = info->contact_node[row];
+    const int64_t k = info->contact_of[row], node = info->contact_node[row], place = b->model->row_place[row];
+    const uz_contact_sites *sites = b->model->sites ? &b->model->sites[k] : NULL;
     double f[DIM] = {0};
     for (int c = 0; c < b->dim; c++) {
         f[c] = -b->r[row] * info->contact_normal[row * b->dim + c];
@@ -77,22 +78,6 @@ static void add_row(balance *b, int64_t row, const uz_contact_sites *sites, int6
             b->contact[sites->node[j] * b->dim + c] += back[c];
         }
         add_force(b, NULL, sites->node[j], back);
-    }
-}
-
-/* Rows come contact by contact, in the order of the group's nodes; some nodes have none. */
-static void add_contacts(balance *b)
-{
-    const uz_body_model *model = b->model;
-    int64_t row = 0;
-    for (int64_t k = 0; k < b->scene->n_contacts; k++) {
-        const uz_group *group = uz_mesh_group(&model->mesh, b->scene->contacts[k].on, "", NULL);
-        const int64_t count = group ? uz_group_node_count(&model->mesh, group) : 0;
-        for (int64_t i = 0; i < count && row < model->m && model->info.contact_of[row] == k; i++)
-            if (model->info.contact_node[row] == uz_group_node_at(group, i)) {
-                add_row(b, row, model->sites ? &model->sites[k] : NULL, i);
-                row++;
-            }
     }
 }
 
@@ -360,7 +345,8 @@ static uz_status add_everything(balance *b, uz_error *err)
 {
     double thermal = 0, energy = 0;
     memcpy(b->centre, b->model->mesh.xyz, (size_t)b->dim * sizeof *b->centre);
-    add_contacts(b);
+    for (int64_t row = 0; row < b->model->m; row++)
+        add_row(b, row);
     uz_status status = add_loads(b, err);
     if (status == UZ_OK)
         status = add_supports(b, err);

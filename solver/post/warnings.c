@@ -223,12 +223,9 @@ static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obs
     const uz_mesh_info *info = &d->model->info;
     const uz_law *law = d->model->law;
     const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
-    const uz_group *group = uz_mesh_group(&d->model->mesh, d->scene->contacts[k].on, "", NULL);
-    const int64_t count = group ? uz_group_node_count(&d->model->mesh, group) : 0;
-    for (int64_t i = 0; i < count && *row < d->model->m && info->contact_of[*row] == k; i++) {
+    for (; *row < d->model->m && info->contact_of[*row] == k; ++*row) {
         double v[3];
-        if (info->contact_node[*row] != uz_group_node_at(group, i))
-            continue;
+        const int64_t i = d->model->row_place[*row];
         const double face = sites && sites->first ? size_of_face(&d->model->mesh, sites->face[i]) : 0;
         const bool active = law->kind->active(law, NULL, &d->r[*row], 1) > 0;
         if (active && obstacle)
@@ -241,7 +238,6 @@ static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obs
             most->depth = -sites->gap[i] / face;
             most->deepest = info->contact_node[*row];
         }
-        ++*row;
     }
 }
 
