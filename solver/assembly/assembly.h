@@ -36,6 +36,11 @@ typedef struct {
     int64_t *node;  /* the nodes of the face that each node meets ... */
     double *weight; /* ... and their shares in the point that it meets: each sum is 1 */
     uz_face *face;  /* n: of the group `with` */
+    /* Surface to surface only: n places, which nodes they are, and the part of the surface that the reaction of each
+     * acts on; NULL: the nodes of the group. Is `with` the slave? */
+    int64_t *at;
+    double *area;
+    bool swapped;
 } uz_contact_sites;
 
 typedef struct {

@@ -155,12 +155,15 @@ static void put_contacts(uz_buffer *key, const uz_scene *scene, int dim)
         put_doubles(key, contact->y, n[1]);
         put_doubles(key, contact->z, n[2]);
         put_name(key, contact->with, sizeof contact->with);
+        put_int(key, contact->between);
+        put_int(key, contact->faceted);
+        put_double(key, contact->feature_angle);
     }
 }
 
 uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *scene, uz_error *err)
 {
-    static const char format[] = "uzawa body 2";
+    static const char format[] = "uzawa body 3";
     uz_buffer key = {0};
     char *text = NULL;
     const int dim = uz_model_dim(scene->model);

@@ -50,6 +50,8 @@ void uz_body_model_clear(uz_body_model *model)
         free(model->sites[k].node);
         free(model->sites[k].weight);
         free(model->sites[k].face);
+        free(model->sites[k].at);
+        free(model->sites[k].area);
     }
     free(model->sites);
     memset(model, 0, sizeof *model);
@@ -69,11 +71,11 @@ size_t uz_body_model_bytes(const uz_body_model *model)
     bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
     bytes +=
         8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
-    bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim) + rows * 8 * (4 + dim + (model->row_ends ? 2 : 0));
+    bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim) + rows * 8 * (5 + dim + (model->row_ends ? 2 : 0));
     for (int64_t k = 0; k < model->n_sites; k++) {
         const uz_contact_sites *s = &model->sites[k];
         const size_t n = (size_t)s->n;
-        bytes += n * 8 * (1 + dim) + (s->first ? 16 * n + 16 * (size_t)s->first[n] : 0);
+        bytes += n * 8 * (1 + dim) + (s->first ? 16 * n + 16 * (size_t)s->first[n] : 0) + (s->at ? 16 * n : 0);
     }
     return bytes + (size_t)model->d * (size_t)model->n_modes * 8;
 }

@@ -12,7 +12,9 @@
 
 const uz_contact_discretization *uz_discretization_of(const uz_contact *contact)
 {
-    return contact->kind == UZ_OBSTACLE_BODY ? &uz_node_to_face : &uz_node_to_obstacle;
+    if (contact->kind != UZ_OBSTACLE_BODY)
+        return &uz_node_to_obstacle;
+    return contact->between == UZ_CONTACT_SURFACES ? &uz_surface_to_surface : &uz_node_to_face;
 }
 
 uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, const uz_scene *scene, int64_t index,
@@ -28,6 +30,11 @@ uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, 
         return UZ_OK;
     snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
     in->with = uz_mesh_group(&model->mesh, contact->with, where, err);
+    if (in->with && model->sites && model->sites[index].swapped) {
+        const uz_group *slave = in->with;
+        in->with = in->on;
+        in->on = slave;
+    }
     return in->with ? UZ_OK : UZ_ERR_SCENE;
 }
 

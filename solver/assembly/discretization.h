@@ -17,7 +17,7 @@ typedef struct {
     const uz_body_model *model; /* mesh, kind and thickness are there, dofs and frames too */
     const uz_contact *contact;
     int64_t index;        /* its number in the scene, for pointers such as "/contacts/2/with" */
-    const uz_group *on;   /* the surface that can touch */
+    const uz_group *on;   /* the surface that has the rows: once sites are found that of the slave */
     const uz_group *with; /* that of another body; NULL: an obstacle */
     double *room;         /* n_nodes, zero, and left zero */
 } uz_contact_input;
@@ -54,7 +54,7 @@ uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, 
 /* uz_contact_discretization.row of the contact's own discretization, of a model whose sites are found. */
 bool uz_contact_row_at(uz_contact_row *row, const uz_contact_input *in, int64_t place);
 
-extern const uz_contact_discretization uz_node_to_obstacle, uz_node_to_face;
+extern const uz_contact_discretization uz_node_to_obstacle, uz_node_to_face, uz_surface_to_surface;
 
 /* For both: the sites of the nodes of a group, n gaps that are INFINITY and n normals; the normal of one, in which what
  * is zero but for rounding becomes zero; areas that a constant pressure gives nodes. */

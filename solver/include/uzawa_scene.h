@@ -133,6 +133,11 @@ typedef enum {
     UZ_OBSTACLE_HEIGHT,   /* z over x (2D: n_y = 0, z has n_x) or over x and y (z[j * n_x + i]): the obstacle below */
     UZ_OBSTACLE_BODY      /* the group `with` of another part of the mesh */
 } uz_obstacle_kind;
+/* Between two parts of the body. */
+typedef enum {
+    UZ_CONTACT_NODES,   /* nodes of `on` against faces of `with` */
+    UZ_CONTACT_SURFACES /* 2D: the two surfaces in the mean, by dual mortar rows; on and with may be exchanged */
+} uz_contact_between;
 typedef struct {
     char on[64];
     uz_obstacle_kind kind;
@@ -142,6 +147,9 @@ typedef struct {
     int64_t n_x, n_y;
     double *x, *y, *z;
     char with[64];
+    uz_contact_between between;
+    bool faceted;         /* surfaces: their facets are what they are, and stand for no smooth curve */
+    double feature_angle; /* surfaces: those that turn by more keep their corner; degrees, 0: 40 */
 } uz_contact;
 
 typedef enum { UZ_MESH_BOX, UZ_MESH_GIVEN } uz_mesh_source;

@@ -117,6 +117,11 @@ static void forget(pressure_work *w, const uz_mesh *mesh, const uz_group *group)
 static bool press(double *pressure, pressure_work *w, const uz_body_model *model, const uz_scene *scene, int64_t k,
                   const double *r, int64_t first, int64_t last)
 {
+    /* Between surfaces the pressure is that of the rows' own functions, whose integrals are the areas. */
+    for (int64_t i = first; i < last && scene->contacts[k].between == UZ_CONTACT_SURFACES; i++)
+        pressure[i] = -r[i] / model->info.contact_area[i];
+    if (scene->contacts[k].between == UZ_CONTACT_SURFACES)
+        return true;
     const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
     if (!group)
         return true;

@@ -160,6 +160,9 @@ TEST(key_holds_supports_obstacles_and_meshes_of_all_kinds)
     KEY((s.supports[0].kind = UZ_SUPPORT_SPRING, s.supports[0].spring[0] = 3), true);
     KEY(make_round(&s, 1), true);
     KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, memcpy(s.contacts[0].with, "top", 4)), true);
+    KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, s.contacts[0].between = UZ_CONTACT_SURFACES), true);
+    KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, s.contacts[0].faceted = true), true);
+    KEY((s.contacts[0].kind = UZ_OBSTACLE_BODY, s.contacts[0].feature_angle = 20), true);
     KEY(s.source = UZ_MESH_GIVEN, true);
     KEY(s.all_candidates = true, true);
 }

@@ -228,6 +228,8 @@ TEST(every_allocation_for_a_second_part_may_fail)
     CHECK(fail_each(uz_scene_check, &s) > 40);
     body_hold(&s, "high", NAN, 0, NAN);
     CHECK(fail_each(to_qp, &s) > 40);
+    contact->between = UZ_CONTACT_SURFACES;
+    CHECK(fail_each(to_qp, &s) > 50);
     s.given = (uz_given_mesh){0};
     uz_scene_clear(&s);
 }

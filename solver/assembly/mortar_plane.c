@@ -1,0 +1,419 @@
+/* mortar_plane.c: two surfaces in the plane, or two of revolution, integrated over together.
+ *
+ * Facets stand for a smooth curve unless they turn by more than the feature angle. The gap is that of the facets plus
+ * what the smooth curves are off them, both taken before anything moves:
+ *
+ *     g = g_facets + ((x_smooth - x_facet)_master - (x_smooth - x_facet)_slave) . n
+ *
+ * The curve is a cubic Bezier one on each edge, with handles of 2 L / (3 (1 + cos phi)) along the tangents at its ends
+ * (phi: between tangent and chord; exact to fourth order on arcs). The tangent at a node is that of its two edges,
+ * weighted by their inverse lengths, which is the circle's through the three nodes to second order; at a free end it is
+ * the inner one mirrored at the chord's bisector, as a circle has it. Edges of three nodes are two such halves. */
+#include "assembly/mortar.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+/* Less than this part of an edge is no segment: it is what rounding leaves between two nodes that face each other. */
+#define LEAST_SEGMENT 1e-9
+
+/* Degrees. */
+#define FEATURE_ANGLE 40
+
+static double dot(const double a[2], const double b[2])
+{
+    return a[0] * b[0] + a[1] * b[1];
+}
+
+static double cross(const double a[2], const double b[2])
+{
+    return a[0] * b[1] - a[1] * b[0];
+}
+
+/* to - from as a unit vector; returns the length. */
+static double direction(double out[2], const double from[2], const double to[2])
+{
+    const double length = hypot(to[0] - from[0], to[1] - from[1]);
+    for (int c = 0; c < 2; c++)
+        out[c] = length > 0 ? (to[c] - from[c]) / length : 0;
+    return length;
+}
+
+/* Out of the body, which is on the left. */
+static void turn_outward(double n[2], const double tangent[2])
+{
+    n[0] = tangent[1];
+    n[1] = -tangent[0];
+}
+
+/* Shape functions of an edge at s in [-1, 1]. */
+static void shape_at(double *N, int nodes, double s)
+{
+    N[0] = nodes == 2 ? 0.5 * (1 - s) : -0.5 * s * (1 - s);
+    N[1] = nodes == 2 ? 0.5 * (1 + s) : 0.5 * s * (1 + s);
+    N[2] = nodes == 2 ? 0 : (1 - s) * (1 + s);
+}
+
+/* The edge's point at s, and dx/ds where it is not NULL. */
+static void edge_at(double x[2], double slope[2], const uz_mortar_side *e, double s)
+{
+    double N[3];
+    const double D[3] = {e->nodes == 2 ? -0.5 : s - 0.5, e->nodes == 2 ? 0.5 : s + 0.5, e->nodes == 2 ? 0 : -2 * s};
+    shape_at(N, e->nodes, s);
+    for (int c = 0; c < 2; c++) {
+        x[c] = 0;
+        for (int a = 0; a < e->nodes; a++)
+            x[c] += N[a] * e->xyz[2 * a + c];
+        if (!slope)
+            continue;
+        slope[c] = 0;
+        for (int a = 1; a < e->nodes; a++)
+            slope[c] += D[a] * (e->xyz[2 * a + c] - e->xyz[c]);
+    }
+}
+
+/* The smooth curve less the edge at s. */
+static void offset_at(double offset[2], const uz_mortar_side *e, double s)
+{
+    const bool halves = e->nodes == 3;
+    const double *A = e->xyz, *B = e->xyz + 2, *middle = e->xyz + 4;
+    double t = 0.5 * (1 + s), T[2][2], x[2], chord[2], along[2];
+    memcpy(T, e->tangent, sizeof T);
+    if (halves) { /* of a parabola the tangent in the middle is along the chord of its ends */
+        const int first = s < 0;
+        double inner[2];
+        direction(inner, A, B);
+        memcpy(T[first], inner, sizeof inner);
+        t = first ? 1 + s : s;
+        *(first ? &B : &A) = middle;
+        direction(chord, A, B);
+        for (int c = 0; c < 2 && !e->joined[!first]; c++)
+            T[!first][c] = 2 * dot(inner, chord) * chord[c] - inner[c];
+    }
+    const double length = direction(chord, A, B);
+    for (int k = 0; k < 2; k++)
+        along[k] = 2 * length / (3 * (1 + dot(T[k], chord)));
+    edge_at(x, NULL, e, s);
+    for (int c = 0; c < 2; c++)
+        offset[c] = A[c] * (1 - t) * (1 - t) * (1 + 2 * t) + B[c] * t * t * (3 - 2 * t) +
+                    3 * t * (1 - t) * ((1 - t) * along[0] * T[0][c] - t * along[1] * T[1][c]) - x[c];
+}
+
+/* ---- a surface */
+
+/* The edges that begin and end at each node: 1 + their number, 0: none, -1: several. */
+static void list_ends(int64_t *at, const uz_mortar_surface *surface)
+{
+    for (int64_t i = 0; i < surface->n; i++)
+        for (int k = 0; k < 2; k++) {
+            int64_t *there = at + 2 * surface->side[i].node[k] + k;
+            *there = *there == 0 ? 1 + i : -1;
+        }
+}
+
+/* Tangents at the ends of all edges, and which edges go on into each other. */
+static void find_tangents(uz_mortar_surface *surface, const int64_t *at, double least_cosine)
+{
+    for (int64_t i = 0; i < surface->n; i++)
+        for (int k = 0; k < 2; k++) {
+            double x[2], slope[2];
+            static const double ORIGIN[2] = {0};
+            edge_at(x, slope, &surface->side[i], k ? 1 : -1);
+            direction(surface->side[i].tangent[k], ORIGIN, slope);
+        }
+    for (int64_t i = 0; i < surface->n; i++) {
+        uz_mortar_side *e = &surface->side[i];
+        const int64_t next = at[2 * e->node[1]] - 1;
+        if (at[2 * e->node[1] + 1] != 1 + i || next < 0)
+            continue;
+        uz_mortar_side *f = &surface->side[next];
+        double t[2], chord[2];
+        static const double ORIGIN[2] = {0};
+        if (dot(e->tangent[1], f->tangent[0]) <= least_cosine)
+            continue;
+        const bool linear = e->nodes == 2 && f->nodes == 2;
+        const double first = linear ? 1 / direction(chord, e->xyz, e->xyz + 2) : 1;
+        const double second = linear ? 1 / direction(chord, f->xyz, f->xyz + 2) : 1;
+        for (int c = 0; c < 2; c++)
+            t[c] = first * e->tangent[1][c] + second * f->tangent[0][c];
+        direction(e->tangent[1], ORIGIN, t);
+        memcpy(f->tangent[0], e->tangent[1], sizeof f->tangent[0]);
+        e->joined[1] = f->joined[0] = true;
+    }
+    for (int64_t i = 0; i < surface->n; i++) {
+        uz_mortar_side *e = &surface->side[i];
+        double chord[2];
+        direction(chord, e->xyz, e->xyz + 2);
+        for (int k = 0; k < 2 && e->nodes == 2; k++)
+            for (int c = 0; c < 2 && !e->joined[k] && e->joined[!k]; c++)
+                e->tangent[k][c] = 2 * dot(e->tangent[!k], chord) * chord[c] - e->tangent[!k][c];
+    }
+}
+
+static int by_node(const void *a, const void *b)
+{
+    const int64_t *x = a, *y = b;
+    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
+}
+
+/* Places in the order of their nodes: one for each end of an edge but where it goes on into the next. */
+static bool number_places(uz_mortar_surface *surface)
+{
+    int64_t(*key)[2] = uz_alloc(3 * surface->n, sizeof *key), n = 0; /* node; 3 * edge + its node */
+    surface->node = uz_alloc(3 * surface->n, sizeof *surface->node);
+    surface->normal = uz_alloc(6 * surface->n, sizeof *surface->normal);
+    if (!key || !surface->node || !surface->normal) {
+        free(key);
+        return false;
+    }
+    for (int64_t i = 0; i < surface->n; i++)
+        for (int a = 0; a < surface->side[i].nodes; a++)
+            if (a != 0 || !surface->side[i].joined[0]) {
+                key[n][0] = surface->side[i].node[a];
+                key[n++][1] = 3 * i + a;
+            }
+    qsort(key, (size_t)n, sizeof *key, by_node);
+    for (int64_t p = 0; p < n; p++) {
+        uz_mortar_side *e = &surface->side[key[p][1] / 3];
+        const int a = (int)(key[p][1] % 3);
+        double x[2], slope[2];
+        static const double ORIGIN[2] = {0};
+        edge_at(x, slope, e, 0);
+        direction(slope, ORIGIN, slope);
+        surface->node[p] = key[p][0];
+        turn_outward(surface->normal + 2 * p, a == 2 ? slope : e->tangent[a]);
+        e->place[a] = p;
+    }
+    surface->n_places = n;
+    free(key);
+    return true;
+}
+
+void uz_mortar_surface_clear(uz_mortar_surface *surface)
+{
+    free(surface->side);
+    free(surface->node);
+    free(surface->normal);
+    memset(surface, 0, sizeof *surface);
+}
+
+uz_status uz_mortar_plane_surface(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
+                                  uz_error *err)
+{
+    const uz_mesh *mesh = &in->model->mesh;
+    const double feature = in->contact->feature_angle;
+    *out = (uz_mortar_surface){.n = group->n_faces, .side = uz_alloc_zero(group->n_faces, sizeof *out->side)};
+    int64_t *at = uz_alloc_zero(2 * mesh->n_nodes, sizeof *at);
+    bool room = out->side && at;
+    for (int64_t i = 0; i < out->n && room; i++) {
+        uz_side side;
+        double chord[2];
+        char where[96];
+        out->side[i].face = group->face[i];
+        uz_body_side(&side, out->side[i].xyz, out->side[i].node, in->model, group->face[i]);
+        out->side[i].nodes = side.nodes;
+        if (direction(chord, side.xyz, side.xyz + 2) > 0)
+            continue;
+        free(at);
+        snprintf(where, sizeof where, "/contacts/%lld", (long long)in->index);
+        return uz_fail(err, UZ_ERR_SCENE, where, "the edge at node %lld of \"%.63s\" has no length, and so no normal",
+                       (long long)out->side[i].node[0], group->name);
+    }
+    if (room) {
+        list_ends(at, out);
+        find_tangents(out, at, cos((feature > 0 ? feature : FEATURE_ANGLE) * PI / 180));
+        room = number_places(out);
+        for (int64_t i = 0; i < out->n && room; i++) /* an edge that goes on has its neighbour's place */
+            if (out->side[i].joined[0]) {
+                const uz_mortar_side *before = &out->side[at[2 * out->side[i].node[0] + 1] - 1];
+                out->side[i].place[0] = before->place[1];
+            }
+    }
+    free(at);
+    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a surface of %lld edges", (long long)out->n);
+}
+
+/* ---- points */
+
+/* The slave's normal at s: between those of its nodes. */
+static void normal_at(double n[2], const uz_mortar_surface *slave, const uz_mortar_side *e, double s)
+{
+    static const double ORIGIN[2] = {0};
+    double N[3], sum[2] = {0, 0};
+    shape_at(N, e->nodes, s);
+    for (int a = 0; a < e->nodes; a++)
+        for (int c = 0; c < 2; c++)
+            sum[c] += N[a] * slave->normal[2 * e->place[a] + c];
+    direction(n, ORIGIN, sum);
+}
+
+/* Where x lies on the edge as seen along its normals: Newton's method from the chord. */
+static double project_on_slave(const uz_mortar_surface *slave, const uz_mortar_side *e, const double x[2])
+{
+    double chord[2], off[2] = {x[0] - e->xyz[0], x[1] - e->xyz[1]};
+    const double length = direction(chord, e->xyz, e->xyz + 2), step = 1e-6;
+    double s = fmin(fmax(2 * dot(off, chord) / length - 1, -3), 3);
+    for (int k = 0; k < 20; k++) {
+        double f[3];
+        for (int i = 0; i < 3; i++) {
+            double at[2], n[2], to[2];
+            edge_at(at, NULL, e, s + (i - 1) * step);
+            normal_at(n, slave, e, s + (i - 1) * step);
+            for (int c = 0; c < 2; c++)
+                to[c] = x[c] - at[c];
+            f[i] = cross(to, n);
+        }
+        const double change = f[1] / ((f[2] - f[0]) / (2 * step));
+        if (!isfinite(change))
+            break;
+        s = fmin(fmax(s - fmin(fmax(change, -0.6), 0.6), -3), 3);
+        if (fabs(change) < 1e-14)
+            break;
+    }
+    return s;
+}
+
+/* Where the line from x along n meets an edge; returns the distance along n. */
+static double project_on_master(double *s, const uz_mortar_side *e, const double x[2], const double n[2])
+{
+    double at[2], slope[2];
+    for (int k = 0; k < 30; k++) {
+        edge_at(at, slope, e, *s);
+        const double off[2] = {at[0] - x[0], at[1] - x[1]};
+        const double change = cross(off, n) / cross(slope, n);
+        if (!isfinite(change))
+            return INFINITY;
+        *s = fmin(fmax(*s - change, -4), 4);
+        if (fabs(change) < 1e-15)
+            break;
+    }
+    edge_at(at, slope, e, *s);
+    const double off[2] = {at[0] - x[0], at[1] - x[1]};
+    return dot(off, n);
+}
+
+/* The nearest of some master edges that the line through x along n meets from outside; -1: none. */
+static int64_t edge_across(const uz_mortar_surface *master, const int64_t *near, int64_t n_near, const double x[2],
+                           const double n[2])
+{
+    int64_t best = -1;
+    double least = INFINITY;
+    for (int64_t k = 0; k < n_near; k++) {
+        const uz_mortar_side *e = &master->side[near[k]];
+        double chord[2], outward[2], s = 0;
+        direction(chord, e->xyz, e->xyz + 2);
+        turn_outward(outward, chord);
+        if (dot(outward, n) >= 0)
+            continue;
+        const double distance = fabs(project_on_master(&s, e, x, n));
+        if (fabs(s) <= 1 + 2e-9 && distance < least) {
+            least = distance;
+            best = near[k];
+        }
+    }
+    return best;
+}
+
+static bool add_point(uz_mortar_points *points, const uz_mortar_point *p)
+{
+    if (points->n == points->room) {
+        const int64_t room = 2 * points->room + 256;
+        uz_mortar_point *grown = uz_realloc(points->point, room, sizeof *grown);
+        if (!grown)
+            return false;
+        points->point = grown;
+        points->room = room;
+    }
+    points->point[points->n++] = *p;
+    return true;
+}
+
+/* The Gauss points between a and b of slave edge i, which has master edge k across. */
+static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
+                        const uz_mortar_surface *master, int64_t k, double a, double b)
+{
+    static const double AT[4] = {-0.86113631159405257522, -0.33998104358485626480, 0.33998104358485626480,
+                                 0.86113631159405257522};
+    static const double WEIGHT[4] = {0.34785484513745385737, 0.65214515486254614263, 0.65214515486254614263,
+                                     0.34785484513745385737};
+    const uz_mortar_side *e = &slave->side[i], *f = &master->side[k];
+    bool room = true;
+    for (int g = 0; g < 4 && room; g++) {
+        uz_mortar_point p = {.slave = i, .master = k};
+        double x[2], slope[2], n[2], mine[2], other[2], t = 0;
+        const double s = 0.5 * (a + b) + 0.5 * (b - a) * AT[g];
+        edge_at(x, slope, e, s);
+        normal_at(n, slave, e, s);
+        p.gap = project_on_master(&t, f, x, n);
+        p.weight = 0.5 * (b - a) * WEIGHT[g] * hypot(slope[0], slope[1]);
+        p.weight *= in->model->kind == UZ_AXISYMMETRIC ? 2 * PI * x[0] : in->model->thickness;
+        shape_at(p.N, e->nodes, s);
+        shape_at(p.M, f->nodes, t);
+        if (!in->contact->faceted) {
+            offset_at(mine, e, s);
+            offset_at(other, f, t);
+            for (int c = 0; c < 2; c++)
+                p.gap += (other[c] - mine[c]) * n[c];
+        }
+        room = !isfinite(p.gap) || add_point(points, &p);
+    }
+    return room;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+uz_status uz_mortar_plane_points(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave,
+                                 const uz_mortar_surface *master, uz_error *err)
+{
+    double *cut = uz_alloc(2 * master->n + 2, sizeof *cut);
+    int64_t *near = uz_alloc(master->n, sizeof *near);
+    bool room = cut && near;
+    for (int64_t i = 0; i < slave->n && room; i++) {
+        const uz_mortar_side *e = &slave->side[i];
+        double chord[2];
+        const double length = direction(chord, e->xyz, e->xyz + 2);
+        int64_t n_near = 0, n_cuts = 0;
+        /* Edges beside this one, and where their ends cut it. */
+        for (int64_t k = 0; k < master->n; k++) {
+            double along[2], s;
+            for (int end = 0; end < 2; end++) {
+                const double *x = master->side[k].xyz + 2 * end;
+                along[end] = ((x[0] - e->xyz[0]) * chord[0] + (x[1] - e->xyz[1]) * chord[1]) / length;
+            }
+            if (fmax(along[0], along[1]) < -0.9 || fmin(along[0], along[1]) > 1.9)
+                continue;
+            near[n_near++] = k;
+            for (int end = 0; end < 2; end++)
+                if (fabs(s = project_on_slave(slave, e, master->side[k].xyz + 2 * end)) < 1)
+                    cut[n_cuts++] = s;
+        }
+        cut[n_cuts++] = -1;
+        cut[n_cuts++] = 1;
+        qsort(cut, (size_t)n_cuts, sizeof *cut, ascending);
+        for (int64_t k = 0; k + 1 < n_cuts && room; k++) {
+            double x[2], n[2];
+            const double middle = 0.5 * (cut[k] + cut[k + 1]);
+            if (cut[k + 1] - cut[k] < LEAST_SEGMENT)
+                continue;
+            edge_at(x, NULL, e, middle);
+            normal_at(n, slave, e, middle);
+            const int64_t across = edge_across(master, near, n_near, x, n);
+            if (across >= 0)
+                room = add_segment(points, in, slave, i, master, across, cut[k], cut[k + 1]);
+        }
+    }
+    free(cut);
+    free(near);
+    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
+}

@@ -1,0 +1,177 @@
+"""Contact between two surfaces through the daemon: patch tests and press fits. usage: test_mortar.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
+import itertools
+import math
+
+import service
+from service import check, expect
+
+WAIT = {"Prefer": "wait=120"}
+PLANE = ["tri3", "quad4", "tri6", "quad8"]
+
+
+def plate(kind, cells, first, place):
+    """The unit square in cells, mapped by place(x, y): nodes, elements (numbered from first) and edges by side."""
+    step = 2 if kind in ("quad8", "tri6") else 1
+    wide, high = step * cells[0], step * cells[1]
+    number, nodes, elements = {}, [], []
+
+    def node(i, j):
+        if (i, j) not in number:
+            number[i, j] = first + len(nodes)
+            nodes.append(list(place(i / wide, j / high)))
+        return number[i, j]
+
+    for j, i in itertools.product(range(0, high, step), range(0, wide, step)):
+        a, b, c, d = (i, j), (i + step, j), (i + step, j + step), (i, j + step)
+        ab, bc, cd, da, ac = (i + 1, j), (i + 2, j + 1), (i + 1, j + 2), (i, j + 1), (i + 1, j + 1)
+        elements += [[node(*x) for x in e] for e in
+                     {"quad4": [[a, b, c, d]], "quad8": [[a, b, c, d, ab, bc, cd, da]],
+                      "tri3": [[a, b, c], [a, c, d]], "tri6": [[a, b, c, ab, bc, ac], [a, c, d, ac, cd, da]]}[kind]]
+    edges = {"bottom": [((k, 0), (k + step, 0)) for k in range(0, wide, step)],
+             "top": [((k, high), (k + step, high)) for k in range(0, wide, step)],
+             "left": [((0, k), (0, k + step)) for k in range(0, high, step)],
+             "right": [((wide, k), (wide, k + step)) for k in range(0, high, step)]}
+    return nodes, elements, {side: [[node(*x) for x in e] for e in pairs] for side, pairs in edges.items()}
+
+
+def body(kinds, cells, places, groups, **scene):
+    """Two plates; groups: name -> list of (plate, side)."""
+    nodes, elements, edges = [], {}, []
+    for kind, n, place in zip(kinds, cells, places):
+        part = plate(kind, n, len(nodes), place)
+        nodes += part[0]
+        elements.setdefault(kind, []).extend(part[1])
+        edges.append(part[2])
+    mesh = {"nodes": nodes, "elements": elements,
+            "groups": {name: {"edges": sum((edges[k][side] for k, side in parts), [])}
+                       for name, parts in groups.items()}}
+    return {"problem": {"kind": "scene", "mesh": mesh, **scene}}
+
+
+def stacked(kinds, slope, on, model="plane_strain", turn=0.0, scale=1.0):
+    """A block on another under a pressure of 1 from above and from the right: everything is pressed by 1."""
+    def place(x, y):
+        x, y = scale * x, scale * y
+        return math.cos(turn) * x - math.sin(turn) * y, math.sin(turn) * x + math.cos(turn) * y
+    supports = [{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}]
+    if turn:
+        supports = [{"on": "left", "normal": [math.cos(turn), math.sin(turn)], "u": 0},
+                    {"on": "bottom", "normal": [-math.sin(turn), math.cos(turn)], "u": 0}]
+    return body(kinds, [(5, 3), (7, 4)],
+                [lambda x, y: place(10 * x, 5 * y + slope * (10 * x - 5) * y),
+                 lambda x, y: place(10 * x, 5 + 5 * y + slope * (10 * x - 5) * (1 - y))],
+                {"low": [(0, "top")], "high": [(1, "bottom")], "left": [(0, "left"), (1, "left")],
+                 "right": [(0, "right"), (1, "right")], "bottom": [(0, "bottom")], "top": [(1, "top")]},
+                model=model, materials=[{"on": "all", "young": 1000, "poisson": 0.3}], supports=supports,
+                loads=[{"on": "top", "pressure": 1}, {"on": "right", "pressure": 1}],
+                contacts=[{"on": on, "with": "high" if on == "low" else "low", "discretization": "surfaces"}])
+
+
+def press_fit(kind, facets, interference, **contact):
+    """A quarter of a shaft from 10 to 20 that stands out into a hub from 20 to 40."""
+    def ring(inner, outer):
+        return lambda x, y: ((inner + (outer - inner) * x) * math.cos(math.pi / 2 * y),
+                             (inner + (outer - inner) * x) * math.sin(math.pi / 2 * y))
+    return body([kind, kind], [(6, facets[0]), (8, facets[1])], [ring(10, 20 + interference), ring(20, 40)],
+                {"shaft": [(0, "right")], "hub": [(1, "left")], "x": [(0, "bottom"), (1, "bottom")],
+                 "y": [(0, "top"), (1, "top")]},
+                model="plane_stress", materials=[{"on": "all", "young": 210000, "poisson": 0.3}],
+                supports=[{"on": "x", "uy": 0}, {"on": "y", "ux": 0}],
+                contacts=[{"on": "shaft", "with": "hub", "discretization": "surfaces", **contact}])
+
+
+def lame(interference):
+    """Pressure of a solid ring 10 to 20 in one from 20 to 40, plane stress, E = 210000."""
+    return interference * 210000 / 20 / ((40**2 + 20**2) / (40**2 - 20**2) + (20**2 + 10**2) / (20**2 - 10**2))
+
+
+def answer_of(s, request):
+    job = expect(s.post(request, WAIT), 200).json
+    check(job["status"] == "successful" and job["summary"]["outcome"] == "converged", job)
+    return expect(s.get(f"/v1/jobs/{job['id']}/result?fields=pressure,reactions,gaps,stress,displacements"), 200).json
+
+
+def check_uniform(answer, tolerance, *context):
+    for p in answer["pressure"]:
+        check(abs(p - 1) < tolerance, p, *context)
+    for stress in answer["stress"]:
+        check(abs(stress[0] + 1) < 10 * tolerance and abs(stress[1] + 1) < 10 * tolerance, stress, *context)
+
+
+def test_patch_test_of_all_mixtures(s):
+    for kinds in itertools.product(PLANE, PLANE):
+        check_uniform(answer_of(s, stacked(kinds, 0, "low")), 1e-10, kinds)
+        check_uniform(answer_of(s, stacked(kinds, 0.3, "high")), 1e-10, kinds, "slope")
+
+
+def test_patch_test_of_other_models(s):
+    for kinds in (("quad4", "tri3"), ("quad8", "quad4"), ("tri6", "quad8")):
+        check_uniform(answer_of(s, stacked(kinds, 0.3, "low", "plane_stress")), 1e-10, kinds)
+        check_uniform(answer_of(s, stacked(kinds, 0, "low", "axisymmetric")), 1e-9, kinds)
+    check_uniform(answer_of(s, stacked(("quad4", "quad8"), 0.3, "low", "axisymmetric")), 1e-9)
+
+
+def test_rotated_and_scaled_bodies(s):
+    for turn, scale in ((0.7, 1), (0, 1e6), (2.5, 1e-5)):
+        check_uniform(answer_of(s, stacked(("quad4", "quad8"), 0.3, "low", turn=turn, scale=scale)), 1e-8, turn, scale)
+
+
+def test_sides_may_be_exchanged(s):
+    for kinds in (("quad4", "quad4"), ("tri3", "quad8")):
+        low, high = (answer_of(s, stacked(kinds, 0.3, on)) for on in ("low", "high"))
+        check(low["displacements"] == high["displacements"] and low["pressure"] == high["pressure"], kinds)
+
+
+def test_press_fit_of_facets_is_lames(s):
+    for kind, mean_off, most_off in (("quad4", 3e-3, 1e-2), ("quad8", 2e-3, 2e-3)):
+        for facets, interference in (((15, 11), 0.005), ((15, 11), 0.02), ((30, 22), 0.005)):
+            answer = answer_of(s, press_fit(kind, facets, interference))
+            mean = -sum(answer["reactions"]) / (20 * math.pi / 2) / lame(interference)
+            most = max(answer["pressure"]) / lame(interference)
+            check(abs(mean - 1) < mean_off and abs(most - 1) < most_off, kind, facets, interference, mean, most)
+
+
+def test_facets_as_they_are_press_more(s):
+    """What `smooth` corrects, and what a feature angle below the turn of the facets, 6 degrees, gives up."""
+    for contact in ({"smooth": False}, {"feature_angle": 3}):
+        answer = answer_of(s, press_fit("quad4", (15, 11), 0.005, **contact))
+        check(max(answer["pressure"]) > 5 * lame(0.005), contact)
+
+
+def test_an_overhang_ends_where_the_other_side_does(s):
+    """The upper block is half as wide: what it does not cover carries nothing, and all of its load goes through."""
+    request = body(["quad4", "quad4"], [(10, 4), (7, 4)],
+                   [lambda x, y: (10 * x, 5 * y), lambda x, y: (5 * x, 5 + 5 * y)],
+                   {"low": [(0, "top")], "high": [(1, "bottom")], "bottom": [(0, "bottom")],
+                    "left": [(0, "left"), (1, "left")], "top": [(1, "top")]},
+                   model="plane_strain", materials=[{"on": "all", "young": 1000, "poisson": 0.3}],
+                   supports=[{"on": "bottom", "ux": 0, "uy": 0}, {"on": "left", "ux": 0}],
+                   loads=[{"on": "top", "pressure": 1}],
+                   contacts=[{"on": "low", "with": "high", "discretization": "surfaces"}])
+    answer = answer_of(s, request)
+    force = answer["summary"]["resultants"]["contacts"][0]["force"]
+    check(abs(abs(force[1]) - 5) < 1e-9 and abs(sum(answer["reactions"]) + 5) < 1e-9, force)
+    check(0.5 < min(answer["pressure"]) and max(answer["pressure"]) < 3, answer["pressure"])
+
+
+def test_refusals_name_the_place(s):
+    def refused(change, *words):
+        request = stacked(("quad4", "quad4"), 0, "low")
+        change(request["problem"])
+        reply = s.post(request, WAIT)
+        said = str(reply.json)
+        check((reply.status == 422 or reply.json["status"] == "failed") and all(w in said for w in words), said)
+
+    refused(lambda p: p["contacts"][0].update({"with": "low"}), "/contacts/0/with", "touch itself")
+    refused(lambda p: p["contacts"][0].update({"with": "top"}), "/contacts/0/on", "faces")
+    refused(lambda p: p["contacts"][0].update({"discretization": "mortar"}), "/contacts/0/discretization", "surfaces")
+    refused(lambda p: p["contacts"][0].update({"feature_angle": 0}), "/contacts/0/feature_angle")
+    refused(lambda p: p["contacts"][0].update({"obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}),
+            "/contacts/0", "obstacle")
+    refused(lambda p: p["contacts"].append({"on": "high", "discretization": "surfaces",
+                                            "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}),
+            "/contacts/1", "with")
+
+
+service.main(globals())
