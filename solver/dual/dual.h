@@ -51,9 +51,10 @@ typedef struct {
     const uz_csc *K; /* d x d lower triangle: the caller's */
     double *h, *g0;  /* m: right-hand sides of the rows, scaled; gaps of the body without reactions */
     double psi0;
-    int64_t applications;      /* of D by uz_dual_load_apply, those for lambda_max included */
-    size_t bytes;              /* what it holds, but for a factor of the free dofs, which comes and goes */
-    uz_stop stop;              /* of uz_dual_load_aim */
+    int64_t applications; /* of D by uz_dual_load_apply, those for lambda_max included */
+    double left;  /* the last apply's error of K^-1 N'r, a bound in the energy norm: (s'(Dr - D r))^2 <= left^2 s'D s */
+    size_t bytes; /* what it holds, but for a factor of the free dofs, which comes and goes */
+    uz_stop stop; /* of uz_dual_load_aim */
     double *correction, *kept; /* feasible corrections, as the form writes them: the last, and the kept one */
     bool has_kept;
 } uz_dual_load;
@@ -82,7 +83,7 @@ void uz_dual_load_free(uz_dual_load *load);
 /* What the answers will be needed for, and how long that may take. Called before the methods run, and again when the
  * aim gets smaller.
  *   relative_error  in the energy norm: forms that are not exact solve no better than that (before the first call: than
- *                   1e-10). NaN: as before
+ *                   1e-10). 0: no worse than rounding, so that iterations are those of the exact D. NaN: as before
  *   stop            asked inside long work; NULL or no call: never. Where it came, solve_active comes back unsolved,
  *                   and uz_dual_load_prepare leaves D to be applied by its factors and lambda_max 0: nothing is wrong,
  *                   and whoever asks next finds that it came */

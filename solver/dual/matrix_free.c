@@ -8,7 +8,8 @@
  * (N delta)'(r - r*) <= ||delta||_K ||u(r) - u*||_K, so the iteration comes as near as delta, and no step of it should
  * be falsified by more than a share of its own size (Schmidt, Le Roux, Bach, NIPS 2011, for proximal gradients with
  * decreasing errors). Each solve starts at the last response and reduces the residual, which is the size of the change,
- * by CHANGE_KEPT, unless a FLOOR of the aim is reached before.
+ * by CHANGE_KEPT, unless a FLOOR of the aim is reached before. Where the iterations are to be those of the exact
+ * operator (an aim of 0) the share is EXACT_CHANGE, which no test of a step or its direction can tell from 0.
  *
  * Given rows as equations, where each row bounds a single dof: conjugate gradients on the dofs that are free, with a
  * multigrid of their own. */
@@ -29,6 +30,9 @@
 #define FIRST_AIM  1e-10
 /* Share of a change of the response that an application of D may leave unsolved. */
 #define CHANGE_KEPT 0.01
+/* The same where the iterations are to be those of the exact operator, and an aim for the floor. */
+#define EXACT_CHANGE 1e-6
+#define EXACT_AIM    1e-11
 enum { STEPS_MOST = 5000 };
 
 /* How well the equations of a load are solved. Slacks are bounds in the energy norm. */
@@ -40,7 +44,8 @@ typedef struct {
     uz_stop stop;
     double base_slack; /* of base = K^-1 p */
     double slack;      /* of what the last apply or solve_active left */
-    double tight;      /* relative accuracy of a change of the response */
+    double tight;      /* relative accuracy of a change of the response, */
+    double probed;     /* and while probing */
     bool probing;      /* r is a vector of any size: the answer's says nothing about how accurate D r must be */
     double coarse;     /* accuracy at which the next guess of the active rows is judged */
     double *right;     /* d: a right-hand side */
@@ -116,9 +121,10 @@ static uz_status aim_at(uz_dual_load *load, double relative_error, uz_error *err
 {
     free_load *x = (free_load *)load;
     bool finer = relative_error < x->aim;
-    x->aim = relative_error;
+    x->tight = relative_error > 0.0 ? CHANGE_KEPT : EXACT_CHANGE;
+    x->aim = relative_error > 0.0 ? relative_error : EXACT_AIM;
     x->stop = load->stop;
-    return finer ? solve_base(x, BASE_FLOOR * relative_error, err) : UZ_OK;
+    return finer ? solve_base(x, BASE_FLOOR * x->aim, err) : UZ_OK;
 }
 
 /* ||u(r)||_K about, with the response as it stands; Dr is room. */
@@ -136,7 +142,7 @@ static void probe(uz_dual_load *load, bool begin, double accuracy)
 {
     free_load *x = (free_load *)load;
     x->probing = begin;
-    x->tight = begin ? accuracy : CHANGE_KEPT;
+    x->probed = accuracy;
     /* Of another size than what comes: no start for it. */
     memset(x->sparse.response, 0, (size_t)load->dual->d * sizeof *x->sparse.response);
 }
@@ -146,7 +152,7 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     free_load *x = (free_load *)load;
     const uz_dual *dual = load->dual;
     double root = root_of_lambda(load), norm = expected_norm(x, r, Dr);
-    uz_cg_stop stop = stop_at(x, x->tight, x->probing ? 0.0 : FLOOR * x->aim * norm * root);
+    uz_cg_stop stop = x->probing ? stop_at(x, x->probed, 0.0) : stop_at(x, x->tight, FLOOR * x->aim * norm * root);
     uz_cg_info info;
     memset(x->right, 0, (size_t)dual->d * sizeof *x->right);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, r);
@@ -155,7 +161,8 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
     if (status != UZ_OK)
         return status;
     uz_csc_gaxpy(Dr, &dual->N, 1.0, x->sparse.response);
-    x->slack = x->base_slack + info.last / root;
+    load->left = info.last / root;
+    x->slack = x->base_slack + load->left;
     return UZ_OK;
 }
 

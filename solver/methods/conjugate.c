@@ -179,7 +179,7 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     if (status != UZ_OK)
         return status;
-    bool taken = plain ? !uz_iterate_shorten(it) : gain(it, load) >= 0.0;
+    bool taken = plain ? !uz_iterate_shorten(it, load) : gain(it, load) >= 0.0;
     if (taken) {
         uz_iterate_swap(&it->r, &it->r_next);
         uz_iterate_swap(&it->Dr, &it->Dr_next);

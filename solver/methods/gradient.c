@@ -51,7 +51,7 @@ static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load,
     *step_norm = project(it, load);
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     it->iteration++;
-    *restart = status == UZ_OK && uz_iterate_shorten(it);
+    *restart = status == UZ_OK && uz_iterate_shorten(it, load);
     if (status != UZ_OK)
         return status;
     if (*restart) {

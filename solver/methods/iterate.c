@@ -201,8 +201,12 @@ void uz_iterate_swap(double **a, double **b)
     *b = t;
 }
 
-/* s'Ds <= s'W^-2 s / alpha for s = r(k+1) - rho? */
-bool uz_iterate_shorten(uz_iterate *it)
+enum { APPLICATIONS = 4 };
+
+/* s'Ds <= s'W^-2 s / alpha for s = r(k+1) - rho? Of Dr(k+1) and of the two that Drho combines what inner iterations may
+ * have left is taken off: alpha is within 1e-4 of the longest, and much less than that would look like a step too long.
+ */
+bool uz_iterate_shorten(uz_iterate *it, const uz_dual_load *load)
 {
     double curvature = 0.0, square = 0.0, size = 0.0;
     for (int64_t i = 0; i < it->m; i++) {
@@ -211,6 +215,7 @@ bool uz_iterate_shorten(uz_iterate *it)
         square += (s / w) * (s / w);
         size += (it->r_next[i] / w) * (it->r_next[i] / w);
     }
+    curvature -= APPLICATIONS * load->left * sqrt(square / it->alpha);
     bool noise = square <= 1e-20 * size; /* differences of this size are rounding, not curvature */
     if (noise || !(it->alpha * curvature > square * (1.0 + 1e-6))) /* nor where it is NaN: no step size follows */
         return false;

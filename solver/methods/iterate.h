@@ -88,7 +88,7 @@ void uz_iterate_go_back(uz_iterate *it);
 uz_status uz_iterate_bound_best(uz_iterate *it, uz_dual_load *load, uz_error *err);
 /* After a projected step from rho to r_next: psi must curve by no more than 1/alpha along it (Beck and Teboulle 2009,
  * Lemma 2.3). true: it curves more, the step was too long. alpha is shortened to what was seen, and rho is r again. */
-bool uz_iterate_shorten(uz_iterate *it);
+bool uz_iterate_shorten(uz_iterate *it, const uz_dual_load *load);
 void uz_iterate_swap(double **a, double **b);
 /* The limits that every method honours: cancel, iterations, time. */
 bool uz_should_stop(uz_end *end, const uz_iterate *it, const uz_method_options *options);

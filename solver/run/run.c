@@ -156,7 +156,9 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
     uz_milestones_resume(&work->milestones, uz_run_time(run));
     double start = uz_seconds();
     const uz_method_kind *method;
-    uz_status status = uz_dual_load_aim(work->dual, work->target, &stop, err);
+    /* The counts of the paper's rule are those of the exact operator. */
+    const double aim = options.stopping == UZ_STOP_PAPER ? 0.0 : work->target;
+    uz_status status = uz_dual_load_aim(work->dual, aim, &stop, err);
     if (status == UZ_OK)
         status = uz_method_find(&method, options.method, work->it.law, err);
     if (status == UZ_OK)
