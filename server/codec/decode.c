@@ -77,7 +77,7 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
 static bool decode_tags(char **out, decoding *d, const json_value *tags)
 {
     text t = {0};
-    text_open(&t, '[');
+    text_open(&t, NULL, '[');
     for (size_t i = 0; i < json_size(tags); i++) {
         const json_value *tag = &tags->items[i];
         for (size_t k = 0; k < tag->count; k++)
@@ -85,7 +85,7 @@ static bool decode_tags(char **out, decoding *d, const json_value *tags)
                 free(t.data);
                 return decode_refuse(d, "not_allowed", tag, "has a control character; tags are words.");
             }
-        text_string(&t, tag->text);
+        text_string(&t, NULL, tag->text);
     }
     text_close(&t, ']');
     *out = text_finish(&t, NULL);

@@ -12,17 +12,17 @@
 
 static void put_problem(text *t, const problem_details *problem)
 {
-    text_open(t, '{');
+    text_open(t, NULL, '{');
     text_key(t, "type");
     text_format(t, "\"/schemas/problem-details.json#%s\"", problem->code);
-    text_member_string(t, "title", problem->title);
-    text_member_integer(t, "status", problem->status);
-    text_member_string(t, "code", problem->code);
-    text_member_string(t, "detail", problem->detail);
+    text_string(t, "title", problem->title);
+    text_integer(t, "status", problem->status);
+    text_string(t, "code", problem->code);
+    text_string(t, "detail", problem->detail);
     if (problem->pointer[0] || problem->status == 422)
-        text_member_string(t, "pointer", problem->pointer);
+        text_string(t, "pointer", problem->pointer);
     if (problem->line > 0)
-        text_member_integer(t, "line", problem->line);
+        text_integer(t, "line", problem->line);
     text_close(t, '}');
 }
 
@@ -60,8 +60,8 @@ static void put_time(text *t, const char *key, double unix_s)
 
 static void put_link(text *t, const char *rel, const char *id, const char *tail)
 {
-    text_open(t, '{');
-    text_member_string(t, "rel", rel);
+    text_open(t, NULL, '{');
+    text_string(t, "rel", rel);
     text_key(t, "href");
     text_format(t, "\"/v1/jobs%s%s%s\"", *id ? "/" : "", id, tail);
     text_close(t, '}');
@@ -77,7 +77,7 @@ static bool has_cases(const job *j)
 /* A job that was dismissed while it ran may have left its best answer so far. */
 static void put_links(text *t, const job *j)
 {
-    text_member_open(t, "links", '[');
+    text_open(t, "links", '[');
     put_link(t, "self", j->id, "");
     bool has_answer = !j->damaged && (j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary));
     if (has_answer)
@@ -95,24 +95,24 @@ static void put_links(text *t, const job *j)
 
 static void put_job(text *t, const job *j)
 {
-    text_open(t, '{');
-    text_member_string(t, "id", j->id);
-    text_member_string(t, "status", job_status_name(j->status));
-    text_member_integer(t, "progress", j->progress);
+    text_open(t, NULL, '{');
+    text_string(t, "id", j->id);
+    text_string(t, "status", job_status_name(j->status));
+    text_integer(t, "progress", j->progress);
     put_time(t, "created", j->created);
     put_time(t, "started", j->started);
     put_time(t, "finished", j->finished);
-    text_member_integer(t, "attempts", j->attempts);
-    text_member_integer(t, "priority", j->priority);
-    text_member_raw(t, "tags", j->tags ? j->tags : "[]");
-    text_member_raw(t, "summary", j->summary);
+    text_integer(t, "attempts", j->attempts);
+    text_integer(t, "priority", j->priority);
+    text_raw(t, "tags", j->tags ? j->tags : "[]");
+    text_raw(t, "summary", j->summary);
     text_key(t, "error");
     if (j->damaged) {
         problem_details problem;
         codec_problem_damaged(&problem, j->id);
         put_problem(t, &problem);
     } else {
-        text_raw(t, j->error);
+        text_raw(t, NULL, j->error);
     }
     put_links(t, j);
     text_close(t, '}');
@@ -128,13 +128,13 @@ char *codec_encode_job(const job *j)
 char *codec_encode_jobs(const job *jobs, size_t count, bool more)
 {
     text t = {0};
-    text_open(&t, '{');
-    text_member_open(&t, "jobs", '[');
+    text_open(&t, NULL, '{');
+    text_open(&t, "jobs", '[');
     for (size_t i = 0; i < count; i++)
         put_job(&t, &jobs[i]);
     text_close(&t, ']');
-    text_member_string(&t, "next", more && count > 0 ? jobs[count - 1].id : NULL);
-    text_member_open(&t, "links", '[');
+    text_string(&t, "next", more && count > 0 ? jobs[count - 1].id : NULL);
+    text_open(&t, "links", '[');
     put_link(&t, "self", "", "");
     text_close(&t, ']');
     text_close(&t, '}');
@@ -147,23 +147,23 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
 {
     text t = {0};
     size_t bytes = 0;
-    text_open(&t, '{');
-    text_member_open(&t, "factors", '[');
+    text_open(&t, NULL, '{');
+    text_open(&t, "factors", '[');
     for (size_t i = 0; i < count; i++) {
         const uz_cache_entry *e = &entries[i];
         bytes += e->bytes;
-        text_open(&t, '{');
-        text_member_string(&t, "digest", e->digest);
-        text_member_integer(&t, "d", e->d);
-        text_member_integer(&t, "m", e->m);
-        text_member_integer(&t, "nnz", e->nnz);
-        text_member_integer(&t, "bytes", (int64_t)e->bytes);
-        text_member_integer(&t, "hits", e->hits);
+        text_open(&t, NULL, '{');
+        text_string(&t, "digest", e->digest);
+        text_integer(&t, "d", e->d);
+        text_integer(&t, "m", e->m);
+        text_integer(&t, "nnz", e->nnz);
+        text_integer(&t, "bytes", (int64_t)e->bytes);
+        text_integer(&t, "hits", e->hits);
         text_close(&t, '}');
     }
     text_close(&t, ']');
-    text_member_integer(&t, "bytes", (int64_t)bytes);
-    text_member_integer(&t, "max_bytes", (int64_t)max_bytes);
+    text_integer(&t, "bytes", (int64_t)bytes);
+    text_integer(&t, "max_bytes", (int64_t)max_bytes);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }
@@ -171,20 +171,20 @@ char *codec_encode_factors(const uz_cache_entry *entries, size_t count, size_t m
 char *codec_encode_valid(const uz_prediction *predicted)
 {
     text t = {0};
-    text_open(&t, '{');
-    text_member_bool(&t, "valid", true);
+    text_open(&t, NULL, '{');
+    text_bool(&t, "valid", true);
     text_key(&t, "predicted");
     if (!predicted) {
-        text_raw(&t, NULL);
+        text_raw(&t, NULL, NULL);
     } else {
-        text_open(&t, '{');
-        text_member_integer(&t, "d", predicted->d);
-        text_member_integer(&t, "m", predicted->m);
-        text_member_string(&t, "operator", uz_operator_name(predicted->op));
-        text_member_integer(&t, "factor_nnz", predicted->factor_nnz);
-        text_member_number(&t, "bytes", predicted->bytes);
-        text_member_number(&t, "seconds", predicted->seconds);
-        text_member_bool(&t, "fits", predicted->fits);
+        text_open(&t, NULL, '{');
+        text_integer(&t, "d", predicted->d);
+        text_integer(&t, "m", predicted->m);
+        text_string(&t, "operator", uz_operator_name(predicted->op));
+        text_integer(&t, "factor_nnz", predicted->factor_nnz);
+        text_number(&t, "bytes", predicted->bytes);
+        text_number(&t, "seconds", predicted->seconds);
+        text_bool(&t, "fits", predicted->fits);
         text_close(&t, '}');
     }
     text_close(&t, '}');
@@ -195,10 +195,10 @@ char *codec_encode_progress(int progress, const double *row)
 {
     static const int SHOWN[] = {0, 2, 3, 9, 10}; /* columns of the history */
     text t = {0};
-    text_open(&t, '{');
-    text_member_integer(&t, "progress", progress);
+    text_open(&t, NULL, '{');
+    text_integer(&t, "progress", progress);
     for (size_t i = 0; row && i < sizeof SHOWN / sizeof SHOWN[0]; i++)
-        text_member_number(&t, CODEC_HISTORY_NAMES[SHOWN[i]], row[SHOWN[i]]);
+        text_number(&t, CODEC_HISTORY_NAMES[SHOWN[i]], row[SHOWN[i]]);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }
@@ -206,15 +206,15 @@ char *codec_encode_progress(int progress, const double *row)
 char *codec_encode_upload(const upload_info *info)
 {
     text t = {0};
-    text_open(&t, '{');
-    text_member_string(&t, "id", info->id);
-    text_member_integer(&t, "bytes", info->bytes);
+    text_open(&t, NULL, '{');
+    text_string(&t, "id", info->id);
+    text_integer(&t, "bytes", info->bytes);
     put_time(&t, "created", info->created);
     put_time(&t, "used", info->used);
-    text_member_integer(&t, "used_by", info->jobs);
-    text_member_open(&t, "links", '[');
-    text_open(&t, '{');
-    text_member_string(&t, "rel", "self");
+    text_integer(&t, "used_by", info->jobs);
+    text_open(&t, "links", '[');
+    text_open(&t, NULL, '{');
+    text_string(&t, "rel", "self");
     text_key(&t, "href");
     text_format(&t, "\"/v1/uploads/%s\"", info->id);
     text_close(&t, '}');
@@ -227,18 +227,18 @@ char *codec_encode_findings(const char *findings, int64_t jobs, double seconds)
 {
     text t = {0};
     char line[512];
-    text_open(&t, '{');
-    text_member_bool(&t, "whole", findings[0] == '\0');
-    text_member_open(&t, "findings", '[');
+    text_open(&t, NULL, '{');
+    text_bool(&t, "whole", findings[0] == '\0');
+    text_open(&t, "findings", '[');
     for (const char *at = findings; *at;) {
         size_t len = strcspn(at, "\n");
         snprintf(line, sizeof line, "%.*s", (int)len, at);
-        text_string(&t, line);
+        text_string(&t, NULL, line);
         at += len + (at[len] == '\n');
     }
     text_close(&t, ']');
-    text_member_integer(&t, "jobs", jobs);
-    text_member_number(&t, "seconds", seconds);
+    text_integer(&t, "jobs", jobs);
+    text_number(&t, "seconds", seconds);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }
@@ -246,14 +246,13 @@ char *codec_encode_findings(const char *findings, int64_t jobs, double seconds)
 char *codec_encode_limits(const codec_limit *limits, size_t count)
 {
     text t = {0};
-    text_open(&t, '{');
-    text_member_open(&t, "limits", '{');
+    text_open(&t, NULL, '{');
+    text_open(&t, "limits", '{');
     for (size_t i = 0; i < count; i++) {
-        text_key(&t, limits[i].name);
-        text_open(&t, '{');
-        text_member_number(&t, "value", limits[i].value);
-        text_member_string(&t, "unit", limits[i].unit);
-        text_member_string(&t, "description", limits[i].meaning);
+        text_open(&t, limits[i].name, '{');
+        text_number(&t, "value", limits[i].value);
+        text_string(&t, "unit", limits[i].unit);
+        text_string(&t, "description", limits[i].meaning);
         text_close(&t, '}');
     }
     text_close(&t, '}');
@@ -264,12 +263,12 @@ char *codec_encode_limits(const codec_limit *limits, size_t count)
 char *codec_encode_health(const char *status, const int64_t counts[5], int workers)
 {
     text t = {0};
-    text_open(&t, '{');
-    text_member_string(&t, "status", status);
-    text_member_integer(&t, "workers", workers);
-    text_member_open(&t, "jobs", '{');
+    text_open(&t, NULL, '{');
+    text_string(&t, "status", status);
+    text_integer(&t, "workers", workers);
+    text_open(&t, "jobs", '{');
     for (int i = JOB_ACCEPTED; i <= JOB_DISMISSED; i++)
-        text_member_integer(&t, job_status_name((job_status)i), counts[i]);
+        text_integer(&t, job_status_name((job_status)i), counts[i]);
     text_close(&t, '}');
     text_close(&t, '}');
     return text_finish(&t, NULL);

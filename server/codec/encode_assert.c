@@ -9,7 +9,7 @@
 static void put_word(text *t, const char *key, const char *value)
 {
     if (value[0])
-        text_member_string(t, key, value);
+        text_string(t, key, value);
 }
 
 static void put_finding(text *t, const codec_judged *judged)
@@ -22,21 +22,21 @@ static void put_finding(text *t, const codec_judged *judged)
         double value;
     } GIVEN[] = {
         {"min", a->least}, {"max", a->most}, {"near", a->near}, {"absolute", a->absolute}, {"relative", a->relative}};
-    text_open(t, '{');
+    text_open(t, NULL, '{');
     put_word(t, "name", a->name);
     put_word(t, "quantity", a->quantity);
     put_word(t, "case", f->case_name);
     for (size_t i = 0; i < sizeof GIVEN / sizeof GIVEN[0]; i++)
         if (!isnan(GIVEN[i].value))
-            text_member_number(t, GIVEN[i].key, GIVEN[i].value);
-    text_member_number(t, "value", f->value);
-    text_member_number(t, "error", f->error);
+            text_number(t, GIVEN[i].key, GIVEN[i].value);
+    text_number(t, "value", f->value);
+    text_number(t, "error", f->error);
     put_word(t, "result", WORDS[f->verdict]);
     put_word(t, "reason", f->reason);
     if (judged->of_cases) {
-        text_member_open(t, "cases", '{');
+        text_open(t, "cases", '{');
         for (int i = 0; i < CODEC_VERDICTS; i++)
-            text_member_integer(t, WORDS[i], f->counts[i]);
+            text_integer(t, WORDS[i], f->counts[i]);
         text_close(t, '}');
     }
     text_close(t, '}');
@@ -47,13 +47,13 @@ bool codec_add_findings(char **summary, const codec_judged *list, int64_t n)
     text t = {0};
     bool passed = true;
     text_bytes(&t, *summary, strlen(*summary) - 1); /* but the closing brace */
-    text_member_open(&t, "assertions", '[');
+    text_open(&t, "assertions", '[');
     for (int64_t i = 0; i < n; i++) {
         passed = passed && list[i].found.verdict == CODEC_PASS;
         put_finding(&t, &list[i]);
     }
     text_close(&t, ']');
-    text_member_bool(&t, "assertions_passed", passed);
+    text_bool(&t, "assertions_passed", passed);
     text_close(&t, '}');
     char *longer = text_finish(&t, NULL);
     if (!longer)

@@ -12,12 +12,12 @@ static void put_vector(text *t, const char *key, const double *x, int64_t n, int
         return;
     text_key(t, key);
     if (dim < 2) {
-        text_numbers(t, x, n);
+        text_numbers(t, NULL, x, n);
         return;
     }
-    text_open(t, '[');
+    text_open(t, NULL, '[');
     for (int64_t i = 0; i + dim <= n && !t->failed; i += dim)
-        text_numbers(t, x + i, dim);
+        text_numbers(t, NULL, x + i, dim);
     text_close(t, ']');
 }
 
@@ -26,9 +26,9 @@ static void put_computed(text *t, const uz_fields *f)
 {
     const char *const *names = uz_field_components(f->dim);
     if (f->stress || f->strain || f->gauss_stress) {
-        text_member_open(t, "components", '[');
+        text_open(t, "components", '[');
         for (int c = 0; c < f->components; c++)
-            text_string(t, names[c]);
+            text_string(t, NULL, names[c]);
         text_close(t, ']');
     }
     put_vector(t, "contact_status", f->contact_status, f->m, 0);
@@ -37,7 +37,7 @@ static void put_computed(text *t, const uz_fields *f)
     put_vector(t, "von_mises", f->von_mises, f->n_nodes, 0);
     put_vector(t, "strain", f->strain, f->n_nodes * f->components, f->components);
     if (f->gauss_stress) {
-        text_member_open(t, "stress_gauss", '{');
+        text_open(t, "stress_gauss", '{');
         put_vector(t, "elements", f->gauss_element, f->n_points, 0);
         put_vector(t, "points", f->gauss_point, f->n_points * f->dim, f->dim);
         put_vector(t, "stress", f->gauss_stress, f->n_points * f->components, f->components);
@@ -60,7 +60,7 @@ static void put_fields(text *t, const codec_result *result)
 static void put_places(text *t, const codec_result *result)
 {
     if (result->part)
-        text_member_integer(t, "from", result->from);
+        text_integer(t, "from", result->from);
     put_vector(t, "nodes", result->nodes, result->n_nodes, result->dim);
     put_vector(t, "contact_nodes", result->contact_nodes, result->m, 0);
 }
@@ -68,11 +68,11 @@ static void put_places(text *t, const codec_result *result)
 char *codec_encode_result(const codec_result *result, size_t *len)
 {
     text t = {0};
-    text_open(&t, '{');
-    text_member_string(&t, "job", result->job_id);
+    text_open(&t, NULL, '{');
+    text_string(&t, "job", result->job_id);
     if (result->case_name)
-        text_member_string(&t, "case", result->case_name);
-    text_member_raw(&t, "summary", result->summary);
+        text_string(&t, "case", result->case_name);
+    text_raw(&t, "summary", result->summary);
     put_fields(&t, result);
     put_places(&t, result);
     text_close(&t, '}');
@@ -90,18 +90,18 @@ codec_results *codec_results_begin(const char *job_id, const char *summary)
     codec_results *all = calloc(1, sizeof *all);
     if (!all)
         return NULL;
-    text_open(&all->t, '{');
-    text_member_string(&all->t, "job", job_id);
-    text_member_raw(&all->t, "summary", summary);
-    text_member_open(&all->t, "cases", '[');
+    text_open(&all->t, NULL, '{');
+    text_string(&all->t, "job", job_id);
+    text_raw(&all->t, "summary", summary);
+    text_open(&all->t, "cases", '[');
     return all;
 }
 
 void codec_results_add(codec_results *all, const codec_result *one)
 {
-    text_open(&all->t, '{');
-    text_member_string(&all->t, "name", one->case_name);
-    text_member_raw(&all->t, "summary", one->summary);
+    text_open(&all->t, NULL, '{');
+    text_string(&all->t, "name", one->case_name);
+    text_raw(&all->t, "summary", one->summary);
     put_fields(&all->t, one);
     text_close(&all->t, '}');
 }
@@ -149,16 +149,16 @@ void codec_history_row(double out[CODEC_HISTORY_COLUMNS], const uz_history_row *
 char *codec_encode_history(const char *case_name, const double *rows, int64_t count, size_t *len)
 {
     text t = {0};
-    text_open(&t, '{');
+    text_open(&t, NULL, '{');
     if (case_name)
-        text_member_string(&t, "case", case_name);
-    text_member_open(&t, "columns", '[');
+        text_string(&t, "case", case_name);
+    text_open(&t, "columns", '[');
     for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++)
-        text_string(&t, CODEC_HISTORY_NAMES[i]);
+        text_string(&t, NULL, CODEC_HISTORY_NAMES[i]);
     text_close(&t, ']');
-    text_member_open(&t, "rows", '[');
+    text_open(&t, "rows", '[');
     for (int64_t i = 0; i < count && !t.failed; i++)
-        text_numbers(&t, rows + i * CODEC_HISTORY_COLUMNS, CODEC_HISTORY_COLUMNS);
+        text_numbers(&t, NULL, rows + i * CODEC_HISTORY_COLUMNS, CODEC_HISTORY_COLUMNS);
     text_close(&t, ']');
     text_close(&t, '}');
     return text_finish(&t, len);

@@ -12,14 +12,13 @@ typedef struct {
 static void put_named(text *t, const named *list, size_t count)
 {
     for (size_t i = 0; i < count; i++) {
-        text_key(t, list[i].key);
-        text_number(t, list[i].value);
+        text_number(t, list[i].key, list[i].value);
     }
 }
 
 static void put_object(text *t, const char *key, const named *list, size_t count)
 {
-    text_member_open(t, key, '{');
+    text_open(t, key, '{');
     put_named(t, list, count);
     text_close(t, '}');
 }
@@ -31,17 +30,17 @@ static void put_residual(text *t, const char *key, const uz_residual *e)
 
 static void put_resultant(text *t, const uz_resultant *r, int dim)
 {
-    text_open(t, '{');
+    text_open(t, NULL, '{');
     if (r->on[0])
-        text_member_string(t, "on", r->on);
-    text_member_numbers(t, "force", r->force, dim);
-    text_member_numbers(t, "moment", dim == 2 ? r->moment + 2 : r->moment, dim == 2 ? 1 : 3);
+        text_string(t, "on", r->on);
+    text_numbers(t, "force", r->force, dim);
+    text_numbers(t, "moment", dim == 2 ? r->moment + 2 : r->moment, dim == 2 ? 1 : 3);
     text_close(t, '}');
 }
 
 static void put_resultants(text *t, const char *key, const uz_resultant *list, int64_t count, int dim)
 {
-    text_member_open(t, key, '[');
+    text_open(t, key, '[');
     for (int64_t i = 0; i < count; i++)
         put_resultant(t, &list[i], dim);
     text_close(t, ']');
@@ -50,19 +49,19 @@ static void put_resultants(text *t, const char *key, const uz_resultant *list, i
 /* Scenes: what acts on the body, and what makes the answer doubtful. */
 static void put_evaluation(text *t, const uz_evaluation *e, int dim)
 {
-    text_member_open(t, "resultants", '{');
+    text_open(t, "resultants", '{');
     put_resultants(t, "contacts", e->contacts, e->n_contacts, dim);
     put_resultants(t, "supports", e->supports, e->n_supports, dim);
     text_key(t, "loads");
     put_resultant(t, &e->loads, dim);
-    text_member_number(t, "imbalance", e->imbalance);
+    text_number(t, "imbalance", e->imbalance);
     text_close(t, '}');
-    text_member_open(t, "warnings", '[');
+    text_open(t, "warnings", '[');
     for (int i = 0; i < e->n_warnings; i++) {
-        text_open(t, '{');
-        text_member_string(t, "code", e->warnings[i].code);
-        text_member_string(t, "message", e->warnings[i].message);
-        text_member_number(t, "value", e->warnings[i].value);
+        text_open(t, NULL, '{');
+        text_string(t, "code", e->warnings[i].code);
+        text_string(t, "message", e->warnings[i].message);
+        text_number(t, "value", e->warnings[i].value);
         text_close(t, '}');
     }
     text_close(t, ']');
@@ -71,24 +70,24 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
 static void put_contact(text *t, const uz_summary *s, bool scene)
 {
     const uz_evaluation *e = s->evaluation;
-    text_member_open(t, "contact", '{');
-    text_member_integer(t, "candidates", s->m);
-    text_member_integer(t, "kept", s->kept);
-    text_member_integer(t, "added", s->added);
-    text_member_integer(t, "rounds", s->rounds);
-    text_member_integer(t, "active", s->active);
+    text_open(t, "contact", '{');
+    text_integer(t, "candidates", s->m);
+    text_integer(t, "kept", s->kept);
+    text_integer(t, "added", s->added);
+    text_integer(t, "rounds", s->rounds);
+    text_integer(t, "active", s->active);
     put_named(t, (named[]){{"reaction_sum", s->reaction_sum}, {"max_penetration", s->max_penetration}}, 2);
     if (scene) {
-        text_member_numbers(t, "force", s->force, s->dim);
-        text_member_number(t, "max_pressure", s->max_pressure);
+        text_numbers(t, "force", s->force, s->dim);
+        text_number(t, "max_pressure", s->max_pressure);
         if (e)
-            text_member_number(t, "area", e->contact_area);
+            text_number(t, "area", e->contact_area);
         if (e && e->peak_node < 0) {
-            text_member_raw(t, "max_pressure_at", NULL);
+            text_raw(t, "max_pressure_at", NULL);
         } else if (e) {
-            text_member_open(t, "max_pressure_at", '{');
-            text_member_integer(t, "node", e->peak_node);
-            text_member_numbers(t, "x", e->peak_at, s->dim);
+            text_open(t, "max_pressure_at", '{');
+            text_integer(t, "node", e->peak_node);
+            text_numbers(t, "x", e->peak_at, s->dim);
             text_close(t, '}');
         }
     }
@@ -97,7 +96,7 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
 
 static void put_certificate(text *t, const uz_certificate *c)
 {
-    text_member_open(t, "certificate", '{');
+    text_open(t, "certificate", '{');
     put_named(
         t, (named[]){{"relative_error", c->relative_error}, {"absolute_error", c->absolute_error}, {"gap", c->gap}}, 3);
     put_residual(t, "residual", &c->residual);
@@ -107,18 +106,18 @@ static void put_certificate(text *t, const uz_certificate *c)
 
 static void put_factor(text *t, const uz_summary *s)
 {
-    text_member_open(t, "factor", '{');
-    text_member_bool(t, "cached", s->factor_cached);
-    text_member_open(t, "reused", '{');
-    text_member_bool(t, "assembly", s->reused.assembly);
-    text_member_bool(t, "ordering", s->reused.ordering);
-    text_member_bool(t, "factor", s->reused.factor);
-    text_member_bool(t, "operator", s->reused.op);
+    text_open(t, "factor", '{');
+    text_bool(t, "cached", s->factor_cached);
+    text_open(t, "reused", '{');
+    text_bool(t, "assembly", s->reused.assembly);
+    text_bool(t, "ordering", s->reused.ordering);
+    text_bool(t, "factor", s->reused.factor);
+    text_bool(t, "operator", s->reused.op);
     text_close(t, '}');
-    text_member_string(t, "ordering", uz_ordering_name(s->ordering));
-    text_member_bool(t, "contact_last", s->contact_last);
-    text_member_integer(t, "nnz", s->factor_nnz);
-    text_member_integer(t, "bytes", (int64_t)s->factor_bytes);
+    text_string(t, "ordering", uz_ordering_name(s->ordering));
+    text_bool(t, "contact_last", s->contact_last);
+    text_integer(t, "nnz", s->factor_nnz);
+    text_integer(t, "bytes", (int64_t)s->factor_bytes);
     put_named(t, (named[]){{"flops", s->factor_flops}, {"rcond", s->rcond}}, 2);
     text_close(t, '}');
 }
@@ -127,29 +126,29 @@ static void put_factor(text *t, const uz_summary *s)
 static void put_semicoercive(text *t, const uz_semicoercive *s)
 {
     const int64_t most = (int64_t)(sizeof s->held_by / sizeof s->held_by[0]);
-    text_member_open(t, "semicoercive", '{');
-    text_member_integer(t, "free_modes", s->free_modes);
-    text_member_integer(t, "rounds", s->rounds);
-    text_member_integer(t, "held", s->held);
-    text_member_open(t, "held_by_rows", '[');
+    text_open(t, "semicoercive", '{');
+    text_integer(t, "free_modes", s->free_modes);
+    text_integer(t, "rounds", s->rounds);
+    text_integer(t, "held", s->held);
+    text_open(t, "held_by_rows", '[');
     for (int64_t i = 0; i < s->held && i < most; i++)
-        text_integer(t, s->held_by[i]);
+        text_integer(t, NULL, s->held_by[i]);
     text_close(t, ']');
     text_close(t, '}');
 }
 
 static void put_cost(text *t, const uz_cost *c)
 {
-    text_member_open(t, "cost", '{');
+    text_open(t, "cost", '{');
     put_object(t, "predicted", (named[]){{"seconds", c->seconds}, {"bytes", c->bytes}, {"flops", c->flops}}, 3);
     put_object(t, "actual", (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}}, 2);
-    text_member_open(t, "considered", '[');
+    text_open(t, "considered", '[');
     for (int k = 0; k < c->n_considered; k++) {
         const uz_cost_option *form = &c->considered[k];
-        text_open(t, '{');
-        text_member_string(t, "operator", uz_operator_name(form->op));
+        text_open(t, NULL, '{');
+        text_string(t, "operator", uz_operator_name(form->op));
         put_named(t, (named[]){{"seconds", form->seconds}, {"bytes", form->bytes}}, 2);
-        text_member_bool(t, "fits", form->fits);
+        text_bool(t, "fits", form->fits);
         text_close(t, '}');
     }
     text_close(t, ']');
@@ -159,24 +158,24 @@ static void put_cost(text *t, const uz_cost *c)
 /* cells: as many as the box has directions. */
 static void put_cells(text *t, const int64_t *cells, int dim)
 {
-    text_member_open(t, "cells", '[');
+    text_open(t, "cells", '[');
     for (int axis = 0; axis < dim; axis++)
-        text_integer(t, cells[axis]);
+        text_integer(t, NULL, cells[axis]);
     text_close(t, ']');
 }
 
 /* A box whose cells were chosen: the grids that were tried for it. */
 static void put_grids(text *t, const uz_grid_sequence *grids)
 {
-    text_member_open(t, "mesh", '{');
+    text_open(t, "mesh", '{');
     put_cells(t, grids->cells, grids->dim);
-    text_member_open(t, "ladder", '[');
+    text_open(t, "ladder", '[');
     for (int i = 0; i < grids->count; i++) {
         const uz_grid_level *level = &grids->level[i];
-        text_open(t, '{');
+        text_open(t, NULL, '{');
         put_cells(t, level->cells, grids->dim);
-        text_member_integer(t, "d", level->d);
-        text_member_integer(t, "iterations", level->iterations);
+        text_integer(t, "d", level->d);
+        text_integer(t, "iterations", level->iterations);
         put_named(t,
                   (named[]){{"discretization_error", level->discretization_error},
                             {"certified_error", level->certified_error},
@@ -190,12 +189,12 @@ static void put_grids(text *t, const uz_grid_sequence *grids)
 
 static void put_cases(text *t, const codec_cases *cases)
 {
-    text_member_open(t, "cases", '{');
-    text_member_integer(t, "count", cases->count);
-    text_member_string(t, "worst", cases->worst);
+    text_open(t, "cases", '{');
+    text_integer(t, "count", cases->count);
+    text_string(t, "worst", cases->worst);
     for (int i = 0; i < CODEC_OUTCOMES; i++)
         if (cases->outcomes[i] > 0 || i == UZ_CONVERGED)
-            text_member_integer(t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
+            text_integer(t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
     text_close(t, '}');
 }
 
@@ -218,23 +217,23 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     const named timings[] = {{"queue", s->queue},     {"parse", s->parse},     {"assemble", s->assemble},
                              {"order", s->order},     {"factor", s->factor},   {"condense", s->condense},
                              {"iterate", s->iterate}, {"certify", s->certify}, {"total", s->total}};
-    text_open(&t, '{');
-    text_member_string(&t, "outcome", uz_outcome_name(summary->outcome));
-    text_member_string(&t, "message", summary->message);
-    text_member_string(&t, "method", uz_method_name(summary->method));
-    text_member_string(&t, "operator", uz_operator_name(summary->op));
-    text_member_integer(&t, "iterations", summary->iterations);
-    text_member_integer(&t, "restarts", summary->restarts);
-    text_member_integer(&t, "refinements", summary->refinements);
-    text_member_string(&t, "row_scaling", uz_row_scaling_name(summary->row_scaling));
+    text_open(&t, NULL, '{');
+    text_string(&t, "outcome", uz_outcome_name(summary->outcome));
+    text_string(&t, "message", summary->message);
+    text_string(&t, "method", uz_method_name(summary->method));
+    text_string(&t, "operator", uz_operator_name(summary->op));
+    text_integer(&t, "iterations", summary->iterations);
+    text_integer(&t, "restarts", summary->restarts);
+    text_integer(&t, "refinements", summary->refinements);
+    text_string(&t, "row_scaling", uz_row_scaling_name(summary->row_scaling));
     if (run->started_from)
-        text_member_string(&t, "started_from", run->started_from);
+        text_string(&t, "started_from", run->started_from);
     if (run->cases)
         put_cases(&t, run->cases);
-    text_member_open(&t, "problem", '{');
-    text_member_string(&t, "kind", scene ? "scene" : "matrices");
-    text_member_integer(&t, "d", summary->d);
-    text_member_integer(&t, "m", summary->m);
+    text_open(&t, "problem", '{');
+    text_string(&t, "kind", scene ? "scene" : "matrices");
+    text_integer(&t, "d", summary->d);
+    text_integer(&t, "m", summary->m);
     text_close(&t, '}');
     put_contact(&t, summary, scene);
     put_object(&t, "energy", energy, summary->evaluation ? 3 : 2);
@@ -248,11 +247,11 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
                         {"lambda_max", summary->lambda_max}},
               4);
     if (summary->grids) {
-        text_member_number(&t, "total_error", summary->total_error);
+        text_number(&t, "total_error", summary->total_error);
         put_grids(&t, summary->grids);
     }
     if (summary->outcome == UZ_INFEASIBLE)
-        text_member_number(&t, "infeasible_radius", summary->infeasible_radius);
+        text_number(&t, "infeasible_radius", summary->infeasible_radius);
     if (summary->semicoercive.free_modes > 0)
         put_semicoercive(&t, &summary->semicoercive);
     put_factor(&t, summary);

@@ -66,36 +66,36 @@ static int add_indices(surface_writer *w, const unsigned *data, int64_t count)
 static void put_arrays(surface_writer *w)
 {
     text *t = &w->json;
-    text_member_open(t, "accessors", '[');
+    text_open(t, "accessors", '[');
     for (int i = 0; i < w->n_arrays; i++) {
         const array *a = &w->arrays[i];
-        text_open(t, '{');
-        text_member_integer(t, "bufferView", i);
-        text_member_integer(t, "componentType", a->type);
-        text_member_integer(t, "count", (int64_t)a->count);
-        text_member_string(t, "type", a->components == 3 ? "VEC3" : "SCALAR");
+        text_open(t, NULL, '{');
+        text_integer(t, "bufferView", i);
+        text_integer(t, "componentType", a->type);
+        text_integer(t, "count", (int64_t)a->count);
+        text_string(t, "type", a->components == 3 ? "VEC3" : "SCALAR");
         if (a->low) { /* of vectors */
-            text_member_numbers(t, "min", (const double[]){a->low[0], a->low[1], a->low[2]}, 3);
-            text_member_numbers(t, "max", (const double[]){a->high[0], a->high[1], a->high[2]}, 3);
+            text_numbers(t, "min", (const double[]){a->low[0], a->low[1], a->low[2]}, 3);
+            text_numbers(t, "max", (const double[]){a->high[0], a->high[1], a->high[2]}, 3);
         }
         text_close(t, '}');
     }
     text_close(t, ']');
-    text_member_open(t, "bufferViews", '[');
+    text_open(t, "bufferViews", '[');
     for (int i = 0; i < w->n_arrays; i++) {
         const array *a = &w->arrays[i];
-        text_open(t, '{');
-        text_member_integer(t, "buffer", 0);
-        text_member_integer(t, "byteOffset", (int64_t)a->offset);
-        text_member_integer(t, "byteLength", (int64_t)(4 * a->count * a->components));
+        text_open(t, NULL, '{');
+        text_integer(t, "buffer", 0);
+        text_integer(t, "byteOffset", (int64_t)a->offset);
+        text_integer(t, "byteLength", (int64_t)(4 * a->count * a->components));
         if (a->target)
-            text_member_integer(t, "target", a->target);
+            text_integer(t, "target", a->target);
         text_close(t, '}');
     }
     text_close(t, ']');
-    text_member_open(t, "buffers", '[');
-    text_open(t, '{');
-    text_member_integer(t, "byteLength", (int64_t)w->bytes);
+    text_open(t, "buffers", '[');
+    text_open(t, NULL, '{');
+    text_integer(t, "byteLength", (int64_t)w->bytes);
     text_close(t, '}');
     text_close(t, ']');
 }
@@ -103,7 +103,7 @@ static void put_arrays(surface_writer *w)
 static void put_accessor(text *t, const char *key, int accessor)
 {
     if (accessor != NONE)
-        text_member_integer(t, key, accessor);
+        text_integer(t, key, accessor);
 }
 
 /* What the primitives share. */
@@ -115,18 +115,18 @@ static void put_primitive(text *t, int mode, int indices, const vertices *v, boo
 {
     if (indices == NONE)
         return;
-    text_open(t, '{');
-    text_member_open(t, "attributes", '{');
-    text_member_integer(t, "POSITION", v->position);
+    text_open(t, NULL, '{');
+    text_open(t, "attributes", '{');
+    text_integer(t, "POSITION", v->position);
     put_accessor(t, "_NODE", coloured ? v->node : NONE);
     put_accessor(t, "_VON_MISES", coloured ? v->von_mises : NONE);
     text_close(t, '}');
-    text_member_integer(t, "indices", indices);
-    text_member_integer(t, "mode", mode);
+    text_integer(t, "indices", indices);
+    text_integer(t, "mode", mode);
     if (moves) {
-        text_member_open(t, "targets", '[');
-        text_open(t, '{');
-        text_member_integer(t, "POSITION", v->displacement);
+        text_open(t, "targets", '[');
+        text_open(t, NULL, '{');
+        text_integer(t, "POSITION", v->displacement);
         text_close(t, '}');
         text_close(t, ']');
     }
@@ -141,31 +141,31 @@ static void put_meshes(surface_writer *w, const vertices *v, int row_vertex)
     const int lines = add_indices(w, s->line, 2 * s->n_lines);
     const int outline = add_indices(w, s->outline, 2 * s->n_outline);
     const int n_meshes = outline == NONE ? 1 : 2;
-    text_member_integer(t, "scene", 0);
+    text_integer(t, "scene", 0);
     text_key(t, "scenes");
     text_put(t, n_meshes == 2 ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
-    text_member_open(t, "nodes", '[');
+    text_open(t, "nodes", '[');
     for (int mesh = 0; mesh < n_meshes; mesh++) {
-        text_open(t, '{');
-        text_member_string(t, "name", mesh == 0 ? "body" : "undeformed outline");
-        text_member_integer(t, "mesh", mesh);
-        text_member_numbers(t, "translation", s->origin, 3);
-        text_member_numbers(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
+        text_open(t, NULL, '{');
+        text_string(t, "name", mesh == 0 ? "body" : "undeformed outline");
+        text_integer(t, "mesh", mesh);
+        text_numbers(t, "translation", s->origin, 3);
+        text_numbers(t, "scale", (const double[]){s->unit, s->unit, s->unit}, 3);
         text_close(t, '}');
     }
     text_close(t, ']');
-    text_member_open(t, "meshes", '[');
-    text_open(t, '{');
-    text_member_open(t, "primitives", '[');
+    text_open(t, "meshes", '[');
+    text_open(t, NULL, '{');
+    text_open(t, "primitives", '[');
     put_primitive(t, TRIANGLES, triangles, v, true, true);
     put_primitive(t, LINES, lines, v, false, true);
     put_primitive(t, POINTS, row_vertex, v, false, true);
     text_close(t, ']');
-    text_member_numbers(t, "weights", &s->factor, 1);
+    text_numbers(t, "weights", &s->factor, 1);
     text_close(t, '}');
     if (n_meshes == 2) {
-        text_open(t, '{');
-        text_member_open(t, "primitives", '[');
+        text_open(t, NULL, '{');
+        text_open(t, "primitives", '[');
         put_primitive(t, LINES, outline, v, false, false);
         text_close(t, ']');
         text_close(t, '}');
@@ -179,11 +179,11 @@ static void put_drawn(text *t, const char *key, const uz_drawn *drawn, int acces
 {
     if (!drawn->x)
         return;
-    text_member_open(t, key, '{');
+    text_open(t, key, '{');
     put_accessor(t, "accessor", accessor);
-    text_member_number(t, "unit", drawn->unit);
-    text_member_number(t, "low", drawn->low);
-    text_member_number(t, "high", drawn->high);
+    text_number(t, "unit", drawn->unit);
+    text_number(t, "low", drawn->low);
+    text_number(t, "high", drawn->high);
     text_close(t, '}');
 }
 
@@ -192,8 +192,8 @@ static void put_contact(surface_writer *w, int row_vertex)
     const uz_surface *s = w->in->surface;
     const int64_t n = s->n_rows;
     text *t = &w->json;
-    text_member_open(t, "contact", '{');
-    text_member_integer(t, "rows", n);
+    text_open(t, "contact", '{');
+    text_integer(t, "rows", n);
     put_accessor(t, "vertex", row_vertex);
     put_accessor(t, "contact", add_array(w, UNSIGNED, 0, s->row_contact, n, 1));
     put_accessor(t, "normal", add_array(w, FLOAT, 0, s->row_normal, n, 3));
@@ -207,28 +207,27 @@ static void put_contact(surface_writer *w, int row_vertex)
 
 static void put_round(text *t, const uz_contact *c, int dim)
 {
-    text_key(t, c->kind == UZ_OBSTACLE_CYLINDER ? "cylinder" : dim == 2 ? "circle" : "sphere");
-    text_open(t, '{');
-    text_member_numbers(t, c->kind == UZ_OBSTACLE_CYLINDER ? "point" : "center", c->point, dim);
+    text_open(t, c->kind == UZ_OBSTACLE_CYLINDER ? "cylinder" : dim == 2 ? "circle" : "sphere", '{');
+    text_numbers(t, c->kind == UZ_OBSTACLE_CYLINDER ? "point" : "center", c->point, dim);
     if (c->kind == UZ_OBSTACLE_CYLINDER)
-        text_member_numbers(t, "axis", c->normal, dim);
-    text_member_number(t, "radius", c->radius);
-    text_member_bool(t, "inside", c->inside);
+        text_numbers(t, "axis", c->normal, dim);
+    text_number(t, "radius", c->radius);
+    text_bool(t, "inside", c->inside);
     text_close(t, '}');
 }
 
 static void put_height(text *t, const uz_contact *c)
 {
-    text_member_open(t, "height", '{');
-    text_member_numbers(t, "x", c->x, c->n_x);
+    text_open(t, "height", '{');
+    text_numbers(t, "x", c->x, c->n_x);
     if (c->n_y > 0) {
-        text_member_numbers(t, "y", c->y, c->n_y);
-        text_member_open(t, "z", '[');
+        text_numbers(t, "y", c->y, c->n_y);
+        text_open(t, "z", '[');
         for (int64_t j = 0; j < c->n_y; j++)
-            text_numbers(t, c->z + j * c->n_x, c->n_x);
+            text_numbers(t, NULL, c->z + j * c->n_x, c->n_x);
         text_close(t, ']');
     } else {
-        text_member_numbers(t, "z", c->z, c->n_x);
+        text_numbers(t, "z", c->z, c->n_x);
     }
     text_close(t, '}');
 }
@@ -236,24 +235,24 @@ static void put_height(text *t, const uz_contact *c)
 /* An obstacle in the words of a request. */
 static void put_obstacle(text *t, const uz_contact *c, int dim)
 {
-    text_open(t, '{');
-    text_member_string(t, "on", c->on);
+    text_open(t, NULL, '{');
+    text_string(t, "on", c->on);
     if (c->kind == UZ_OBSTACLE_BODY) {
-        text_member_string(t, "with", c->with);
+        text_string(t, "with", c->with);
         text_close(t, '}');
         return;
     }
-    text_member_open(t, "obstacle", '{');
+    text_open(t, "obstacle", '{');
     if (c->kind == UZ_OBSTACLE_PLANE) {
-        text_member_open(t, "plane", '{');
-        text_member_numbers(t, "point", c->point, dim);
-        text_member_numbers(t, "normal", c->normal, dim);
+        text_open(t, "plane", '{');
+        text_numbers(t, "point", c->point, dim);
+        text_numbers(t, "normal", c->normal, dim);
         text_close(t, '}');
     } else if (c->kind == UZ_OBSTACLE_POLYLINE) {
-        text_member_open(t, "polyline", '{');
-        text_member_open(t, "points", '[');
+        text_open(t, "polyline", '{');
+        text_open(t, "points", '[');
         for (int64_t i = 0; i < c->n_x; i++)
-            text_numbers(t, (const double[]){c->x[i], c->y[i]}, 2);
+            text_numbers(t, NULL, (const double[]){c->x[i], c->y[i]}, 2);
         text_close(t, ']');
         text_close(t, '}');
     } else if (c->kind == UZ_OBSTACLE_HEIGHT) {
@@ -270,22 +269,22 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     const uz_surface *s = w->in->surface;
     const uz_scene *scene = w->in->scene;
     text *t = &w->json;
-    text_member_open(t, "extras", '{');
-    text_member_string(t, "job", w->in->job_id);
-    text_member_string(t, "case", w->in->case_name);
-    text_member_integer(t, "dim", s->dim);
-    text_member_bool(t, "axisymmetric", scene->model == UZ_AXISYMMETRIC);
-    text_member_integer(t, "nodes", s->n_nodes);
-    text_member_integer(t, "elements", s->n_elements);
-    text_member_numbers(t, "origin", s->origin, 3);
-    text_member_number(t, "unit", s->unit);
-    text_member_number(t, "factor", s->factor);
-    text_member_number(t, "largest_displacement", s->largest);
-    text_member_integer(t, "position", v->position);
-    text_member_integer(t, "displacement", v->displacement);
+    text_open(t, "extras", '{');
+    text_string(t, "job", w->in->job_id);
+    text_string(t, "case", w->in->case_name);
+    text_integer(t, "dim", s->dim);
+    text_bool(t, "axisymmetric", scene->model == UZ_AXISYMMETRIC);
+    text_integer(t, "nodes", s->n_nodes);
+    text_integer(t, "elements", s->n_elements);
+    text_numbers(t, "origin", s->origin, 3);
+    text_number(t, "unit", s->unit);
+    text_number(t, "factor", s->factor);
+    text_number(t, "largest_displacement", s->largest);
+    text_integer(t, "position", v->position);
+    text_integer(t, "displacement", v->displacement);
     put_drawn(t, "von_mises", &s->von_mises, v->von_mises);
     put_contact(w, row_vertex);
-    text_member_open(t, "contacts", '[');
+    text_open(t, "contacts", '[');
     for (int64_t k = 0; k < scene->n_contacts; k++)
         put_obstacle(t, &scene->contacts[k], s->dim);
     text_close(t, ']');
@@ -310,7 +309,7 @@ static void put_json(surface_writer *w)
     w->arrays[v.displacement].low = s->least;
     w->arrays[v.displacement].high = s->most;
     const int row_vertex = add_indices(w, s->row_vertex, s->n_rows);
-    text_open(t, '{');
+    text_open(t, NULL, '{');
     text_key(t, "asset");
     text_put(t, "{\"version\":\"2.0\",\"generator\":\"uzawad\"}");
     put_meshes(w, &v, row_vertex);

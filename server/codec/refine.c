@@ -29,18 +29,18 @@ bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len
 static void put_value(text *t, const json_value *value)
 {
     if (value->kind == JSON_IS_OBJECT) {
-        text_open(t, '{');
+        text_open(t, NULL, '{');
         for (size_t i = 0; i < value->count; i++) {
             text_key(t, value->items[i].key);
             put_value(t, &value->items[i]);
         }
         text_close(t, '}');
     } else if (value->kind == JSON_IS_STRING) {
-        text_string(t, json_text(value));
+        text_string(t, NULL, json_text(value));
     } else if (value->kind == JSON_IS_BOOLEAN) {
-        text_bool(t, value->truth);
+        text_bool(t, NULL, value->truth);
     } else {
-        text_number(t, json_number(value, 0));
+        text_number(t, NULL, json_number(value, 0));
     }
 }
 
@@ -50,11 +50,11 @@ static void put_member(text *t, const char *key, const json_value *old, const js
     const json_value *asked = json_get(change, key);
     text_key(t, key);
     if (strcmp(key, "stopping") == 0) {
-        text_string(t, "certified");
+        text_string(t, NULL, "certified");
     } else if (strcmp(key, "warm_start") == 0) {
-        text_open(t, '{');
-        text_member_string(t, "job", id);
-        text_member_bool(t, "continue", true);
+        text_open(t, NULL, '{');
+        text_string(t, "job", id);
+        text_bool(t, "continue", true);
         text_close(t, '}');
     } else {
         put_value(t, asked ? asked : old);
@@ -71,7 +71,7 @@ static char *make_solver(const char *at, size_t len, const json_value *change, c
     const json_value *old = tree.root;
     static const char *const SET[] = {"stopping", "warm_start"}, *const KEYS[] = {"accuracy", "max_iterations",
                                                                                   "time_limit_s"};
-    text_open(&t, '{');
+    text_open(&t, NULL, '{');
     for (size_t i = 0; i < json_size(old); i++)
         if (strcmp(old->items[i].key, "epsilon") != 0)
             put_member(&t, old->items[i].key, &old->items[i], change, id);

@@ -1,3 +1,4 @@
+/* text.c: a growing text; JSON values in it. */
 #include "codec/text.h"
 #include "codec/json.h"
 #include "uzawa.h"
@@ -56,16 +57,21 @@ void text_format(text *t, const char *format, ...)
         text_bytes(t, line, (size_t)n);
 }
 
-static void comma(text *t)
+void text_key(text *t, const char *key)
 {
-    char last = t->len > 0 ? t->data[t->len - 1] : '[';
+    const char last = t->len > 0 ? t->data[t->len - 1] : '[';
     if (last != '{' && last != '[' && last != ':')
         text_bytes(t, ",", 1);
+    if (key) {
+        text_bytes(t, "\"", 1);
+        text_put(t, key);
+        text_bytes(t, "\":", 2);
+    }
 }
 
-void text_open(text *t, char bracket)
+void text_open(text *t, const char *key, char bracket)
 {
-    comma(t);
+    text_key(t, key);
     text_bytes(t, &bracket, 1);
 }
 
@@ -74,19 +80,11 @@ void text_close(text *t, char bracket)
     text_bytes(t, &bracket, 1);
 }
 
-void text_key(text *t, const char *key)
-{
-    comma(t);
-    text_bytes(t, "\"", 1);
-    text_put(t, key);
-    text_bytes(t, "\":", 2);
-}
-
-void text_string(text *t, const char *string)
+void text_string(text *t, const char *key, const char *string)
 {
     static const char NAMED[] = "\b\f\n\r\t\"\\", NAMES[] = "bfnrt\"\\";
     const size_t len = string ? strlen(string) : 0;
-    comma(t);
+    text_key(t, key);
     text_put(t, string ? "\"" : "null");
     for (size_t i = 0; i < len;) {
         const size_t step = json_utf8_length(string + i, len - i);
@@ -105,64 +103,22 @@ void text_string(text *t, const char *string)
     text_put(t, string ? "\"" : "");
 }
 
-void text_integer(text *t, int64_t value)
+void text_integer(text *t, const char *key, int64_t value)
 {
-    comma(t);
+    text_key(t, key);
     text_format(t, "%" PRId64, value);
 }
 
-void text_bool(text *t, bool value)
+void text_bool(text *t, const char *key, bool value)
 {
-    comma(t);
+    text_key(t, key);
     text_put(t, value ? "true" : "false");
 }
 
-void text_raw(text *t, const char *json)
+void text_raw(text *t, const char *key, const char *json)
 {
-    comma(t);
+    text_key(t, key);
     text_put(t, json ? json : "null");
-}
-
-void text_member_string(text *t, const char *key, const char *string)
-{
-    text_key(t, key);
-    text_string(t, string);
-}
-
-void text_member_integer(text *t, const char *key, int64_t value)
-{
-    text_key(t, key);
-    text_integer(t, value);
-}
-
-void text_member_number(text *t, const char *key, double value)
-{
-    text_key(t, key);
-    text_number(t, value);
-}
-
-void text_member_bool(text *t, const char *key, bool value)
-{
-    text_key(t, key);
-    text_bool(t, value);
-}
-
-void text_member_open(text *t, const char *key, char bracket)
-{
-    text_key(t, key);
-    text_open(t, bracket);
-}
-
-void text_member_raw(text *t, const char *key, const char *json)
-{
-    text_key(t, key);
-    text_raw(t, json);
-}
-
-void text_member_numbers(text *t, const char *key, const double *x, int64_t n)
-{
-    text_key(t, key);
-    text_numbers(t, x, n);
 }
 
 size_t text_shortest(char out[TEXT_DOUBLE], double x)
@@ -172,20 +128,20 @@ size_t text_shortest(char out[TEXT_DOUBLE], double x)
     return length;
 }
 
-void text_number(text *t, double value)
+void text_number(text *t, const char *key, double value)
 {
-    comma(t);
+    text_key(t, key);
     if (!isfinite(value))
         text_put(t, "null");
     else if (reserve(t, TEXT_DOUBLE))
         t->len += text_shortest(t->data + t->len, value);
 }
 
-void text_numbers(text *t, const double *x, int64_t n)
+void text_numbers(text *t, const char *key, const double *x, int64_t n)
 {
-    text_open(t, '[');
+    text_open(t, key, '[');
     for (int64_t i = 0; i < n && !t->failed; i++)
-        text_number(t, x[i]);
+        text_number(t, NULL, x[i]);
     text_close(t, ']');
 }
 

@@ -89,12 +89,12 @@ TEST(doubles_read_back_from_the_fewest_digits)
 TEST(strings_are_escaped)
 {
     text t = {0};
-    text_string(&t, "a\"b\\c\n\t\x01\x7f \xc3\xa9 \xf0\x9f\x98\x80 \xff \xed\xa0\x80");
+    text_string(&t, NULL, "a\"b\\c\n\t\x01\x7f \xc3\xa9 \xf0\x9f\x98\x80 \xff \xed\xa0\x80");
     char *json = text_finish(&t, NULL);
     CHECK_STR(json, "\"a\\\"b\\\\c\\n\\t\\u0001\\u007f \xc3\xa9 \xf0\x9f\x98\x80 \xef\xbf\xbd "
                     "\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\"");
     free(json);
-    text_string(&t, NULL);
+    text_string(&t, NULL, NULL);
     json = text_finish(&t, NULL);
     CHECK_STR(json, "null");
     free(json);
