@@ -70,13 +70,10 @@ typedef struct {
 typedef enum { CODEC_SOLVE, CODEC_VERIFY, CODEC_STORED } codec_kind;
 
 /* Decodes and checks a body. False: *problem is filled (400 json_syntax, 422 with pointer, ...). Everything that can be
- * known without factoring K and without the store is known here. On success the caller clears *out. */
-bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem);
-/* The same where the body may name uploads of this store. */
-bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
-                       problem_details *problem);
-/* The same of a POST /v1/jobs body. */
-bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem);
+ * known without factoring K is known here. uploads: the store whose uploads the body may name, NULL: none. On success
+ * the caller clears *out. */
+bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
+                  problem_details *problem);
 void codec_request_clear(codec_request *request);
 /* Frees the problem and all numbers, and leaves what the store keeps beside the body. */
 void codec_request_strip(codec_request *request);
@@ -110,7 +107,6 @@ char *codec_encode_problem(const problem_details *problem); /* application/probl
 char *codec_encode_job(const job *j);
 char *codec_encode_jobs(const job *jobs, size_t count,
                         bool more); /* {"jobs": [...], "next": cursor or null, "links": ...} */
-char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind);
 
 /* A summary of this service, read back from its text, which must outlive it. NULL: no memory. */
 typedef struct codec_summary codec_summary;
@@ -127,12 +123,13 @@ typedef struct {
     int64_t count, outcomes[CODEC_OUTCOMES];
     const char *worst; /* name */
 } codec_cases;
-/* The same with what is known of the run around it. */
+/* What is known of the run around a summary. */
 typedef struct {
     const char *started_from; /* "zero", "warm", "continued"; NULL: not said */
     const codec_cases *cases; /* a job with cases: `summary` is what they come to together; else NULL */
 } codec_run;
-char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run);
+char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind,
+                           const codec_run *run); /* run NULL: nothing */
 
 /* What became of an assertion: the exact value meets it, does not, or may or may not. In the order of their badness. */
 typedef enum { CODEC_PASS, CODEC_UNCERTAIN, CODEC_FAIL, CODEC_VERDICTS } codec_verdict;

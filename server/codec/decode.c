@@ -227,8 +227,8 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
            decode_assertions(out, d, json_get(root, "assert")) && (!answer || decode_answer(&out->answer, d, answer));
 }
 
-bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
-                       problem_details *problem)
+bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,
+                  problem_details *problem)
 {
     json_tree tree;
     codec_request request = {.tags = NULL};
@@ -248,16 +248,6 @@ bool codec_decode_with(codec_request *out, codec_kind kind, const char *body, si
     else
         codec_request_clear(&request);
     return good;
-}
-
-bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, problem_details *problem)
-{
-    return codec_decode_with(out, kind, body, len, NULL, problem);
-}
-
-bool codec_decode_request(codec_request *out, const char *body, size_t len, problem_details *problem)
-{
-    return codec_decode(out, CODEC_SOLVE, body, len, problem);
 }
 
 void codec_request_strip(codec_request *request)

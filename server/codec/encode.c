@@ -58,43 +58,19 @@ static void put_time(text *t, const char *key, double unix_s)
         text_format(t, "\"%s.%03dZ\"", date, (int)(ms % 1000));
 }
 
-static void put_link(text *t, const char *rel, const char *id, const char *tail)
+static void put_link(text *t, const char *rel, const char *all, const char *id, const char *tail)
 {
     text_open(t, NULL, '{');
     text_string(t, "rel", rel);
     text_key(t, "href");
-    text_format(t, "\"/v1/jobs%s%s%s\"", *id ? "/" : "", id, tail);
+    text_format(t, "\"/v1/%s%s%s%s\"", all, *id ? "/" : "", id, tail);
     text_close(t, '}');
-}
-
-/* Each case has a history of its own, under its name. */
-static bool has_cases(const job *j)
-{
-    size_t len;
-    return j->summary && json_member_text(j->summary, strlen(j->summary), "cases", &len);
-}
-
-/* A job that was dismissed while it ran may have left its best answer so far. */
-static void put_links(text *t, const job *j)
-{
-    text_open(t, "links", '[');
-    put_link(t, "self", j->id, "");
-    bool has_answer = !j->damaged && (j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary));
-    if (has_answer)
-        put_link(t, "result", j->id, "/result");
-    if (has_answer && !has_cases(j)) {
-        put_link(t, "history", j->id, "/history");
-        put_link(t, "history_csv", j->id, "/history.csv");
-    }
-    if (j->status == JOB_ACCEPTED || j->status == JOB_RUNNING)
-        put_link(t, "events", j->id, "/events");
-    if (j->refines[0])
-        put_link(t, "refines", j->refines, "");
-    text_close(t, ']');
 }
 
 static void put_job(text *t, const job *j)
 {
+    size_t len; /* each case has a history of its own, under its name */
+    const bool has_cases = j->summary && json_member_text(j->summary, strlen(j->summary), "cases", &len);
     text_open(t, NULL, '{');
     text_string(t, "id", j->id);
     text_string(t, "status", job_status_name(j->status));
@@ -114,7 +90,21 @@ static void put_job(text *t, const job *j)
     } else {
         text_raw(t, NULL, j->error);
     }
-    put_links(t, j);
+    text_open(t, "links", '[');
+    put_link(t, "self", "jobs", j->id, "");
+    /* A job that was dismissed while it ran may have left its best answer so far. */
+    const bool has_answer = !j->damaged && (j->status == JOB_SUCCESSFUL || (j->status == JOB_DISMISSED && j->summary));
+    if (has_answer)
+        put_link(t, "result", "jobs", j->id, "/result");
+    if (has_answer && !has_cases) {
+        put_link(t, "history", "jobs", j->id, "/history");
+        put_link(t, "history_csv", "jobs", j->id, "/history.csv");
+    }
+    if (j->status == JOB_ACCEPTED || j->status == JOB_RUNNING)
+        put_link(t, "events", "jobs", j->id, "/events");
+    if (j->refines[0])
+        put_link(t, "refines", "jobs", j->refines, "");
+    text_close(t, ']');
     text_close(t, '}');
 }
 
@@ -135,7 +125,7 @@ char *codec_encode_jobs(const job *jobs, size_t count, bool more)
     text_close(&t, ']');
     text_string(&t, "next", more && count > 0 ? jobs[count - 1].id : NULL);
     text_open(&t, "links", '[');
-    put_link(&t, "self", "", "");
+    put_link(&t, "self", "jobs", "", "");
     text_close(&t, ']');
     text_close(&t, '}');
     return text_finish(&t, NULL);
@@ -213,11 +203,7 @@ char *codec_encode_upload(const upload_info *info)
     put_time(&t, "used", info->used);
     text_integer(&t, "used_by", info->jobs);
     text_open(&t, "links", '[');
-    text_open(&t, NULL, '{');
-    text_string(&t, "rel", "self");
-    text_key(&t, "href");
-    text_format(&t, "\"/v1/uploads/%s\"", info->id);
-    text_close(&t, '}');
+    put_link(&t, "self", "uploads", info->id, "");
     text_close(&t, ']');
     text_close(&t, '}');
     return text_finish(&t, NULL);

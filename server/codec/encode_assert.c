@@ -6,51 +6,46 @@
 #include <stdlib.h>
 #include <string.h>
 
-static void put_word(text *t, const char *key, const char *value)
-{
-    if (value[0])
-        text_string(t, key, value);
-}
-
-static void put_finding(text *t, const codec_judged *judged)
-{
-    static const char *const WORDS[CODEC_VERDICTS] = {"pass", "uncertain", "fail"};
-    const codec_assertion *a = judged->of;
-    const codec_finding *f = &judged->found;
-    const struct {
-        const char *key;
-        double value;
-    } GIVEN[] = {
-        {"min", a->least}, {"max", a->most}, {"near", a->near}, {"absolute", a->absolute}, {"relative", a->relative}};
-    text_open(t, NULL, '{');
-    put_word(t, "name", a->name);
-    put_word(t, "quantity", a->quantity);
-    put_word(t, "case", f->case_name);
-    for (size_t i = 0; i < sizeof GIVEN / sizeof GIVEN[0]; i++)
-        if (!isnan(GIVEN[i].value))
-            text_number(t, GIVEN[i].key, GIVEN[i].value);
-    text_number(t, "value", f->value);
-    text_number(t, "error", f->error);
-    put_word(t, "result", WORDS[f->verdict]);
-    put_word(t, "reason", f->reason);
-    if (judged->of_cases) {
-        text_open(t, "cases", '{');
-        for (int i = 0; i < CODEC_VERDICTS; i++)
-            text_integer(t, WORDS[i], f->counts[i]);
-        text_close(t, '}');
-    }
-    text_close(t, '}');
-}
-
 bool codec_add_findings(char **summary, const codec_judged *list, int64_t n)
 {
+    static const char *const WORDS[CODEC_VERDICTS] = {"pass", "uncertain", "fail"};
     text t = {0};
     bool passed = true;
     text_bytes(&t, *summary, strlen(*summary) - 1); /* but the closing brace */
     text_open(&t, "assertions", '[');
     for (int64_t i = 0; i < n; i++) {
-        passed = passed && list[i].found.verdict == CODEC_PASS;
-        put_finding(&t, &list[i]);
+        const codec_assertion *a = list[i].of;
+        const codec_finding *f = &list[i].found;
+        const struct {
+            const char *key, *word; /* a number where there is no word */
+            double value;
+        } MEMBERS[] = {{"name", a->name, 0},
+                       {"quantity", a->quantity, 0},
+                       {"case", f->case_name, 0},
+                       {"min", NULL, a->least},
+                       {"max", NULL, a->most},
+                       {"near", NULL, a->near},
+                       {"absolute", NULL, a->absolute},
+                       {"relative", NULL, a->relative}};
+        passed = passed && f->verdict == CODEC_PASS;
+        text_open(&t, NULL, '{');
+        for (size_t k = 0; k < sizeof MEMBERS / sizeof MEMBERS[0]; k++)
+            if (MEMBERS[k].word && MEMBERS[k].word[0])
+                text_string(&t, MEMBERS[k].key, MEMBERS[k].word);
+            else if (!MEMBERS[k].word && !isnan(MEMBERS[k].value))
+                text_number(&t, MEMBERS[k].key, MEMBERS[k].value);
+        text_number(&t, "value", f->value);
+        text_number(&t, "error", f->error);
+        text_string(&t, "result", WORDS[f->verdict]);
+        if (f->reason[0])
+            text_string(&t, "reason", f->reason);
+        if (list[i].of_cases) {
+            text_open(&t, "cases", '{');
+            for (int k = 0; k < CODEC_VERDICTS; k++)
+                text_integer(&t, WORDS[k], f->counts[k]);
+            text_close(&t, '}');
+        }
+        text_close(&t, '}');
     }
     text_close(&t, ']');
     text_bool(&t, "assertions_passed", passed);

@@ -1,9 +1,10 @@
-/* Results and histories: long texts, written straight from the numbers. */
+/* encode_result.c: results and histories: long texts, written straight from the numbers. */
 #include "codec/codec.h"
 #include "codec/text.h"
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Numbers, or points of `dim` numbers each; nothing for a vector that was not asked for. */
 static void put_vector(text *t, const char *key, const double *x, int64_t n, int dim)
@@ -21,14 +22,22 @@ static void put_vector(text *t, const char *key, const double *x, int64_t n, int
     text_close(t, ']');
 }
 
-/* What was computed; first the names of the components that stresses and strains have. */
-static void put_computed(text *t, const uz_fields *f)
+/* What each case has of its own. */
+static void put_fields(text *t, const codec_result *result)
 {
-    const char *const *names = uz_field_components(f->dim);
+    const uz_fields *f = result->fields;
+    put_vector(t, "reactions", result->reactions, result->m, 0);
+    put_vector(t, "gaps", result->gaps, result->m, 0);
+    put_vector(t, "pressure", result->pressure, result->m, 0);
+    put_vector(t, "ray", result->ray, result->m, 0);
+    put_vector(t, "displacements", result->displacements, result->n_u, result->dim);
+    if (!f)
+        return;
+    /* What was computed; first the names of the components that stresses and strains have. */
     if (f->stress || f->strain || f->gauss_stress) {
         text_open(t, "components", '[');
         for (int c = 0; c < f->components; c++)
-            text_string(t, NULL, names[c]);
+            text_string(t, NULL, uz_field_components(f->dim)[c]);
         text_close(t, ']');
     }
     put_vector(t, "contact_status", f->contact_status, f->m, 0);
@@ -43,18 +52,6 @@ static void put_computed(text *t, const uz_fields *f)
         put_vector(t, "stress", f->gauss_stress, f->n_points * f->components, f->components);
         text_close(t, '}');
     }
-}
-
-/* What each case has of its own. */
-static void put_fields(text *t, const codec_result *result)
-{
-    put_vector(t, "reactions", result->reactions, result->m, 0);
-    put_vector(t, "gaps", result->gaps, result->m, 0);
-    put_vector(t, "pressure", result->pressure, result->m, 0);
-    put_vector(t, "ray", result->ray, result->m, 0);
-    put_vector(t, "displacements", result->displacements, result->n_u, result->dim);
-    if (result->fields)
-        put_computed(t, result->fields);
 }
 
 static void put_places(text *t, const codec_result *result)
@@ -130,20 +127,11 @@ const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS] = {
 void codec_history_row(double out[CODEC_HISTORY_COLUMNS], const uz_history_row *row)
 {
     const uz_residual *e = &row->residual;
-    const double values[CODEC_HISTORY_COLUMNS] = {(double)row->iteration,
-                                                  row->seconds,
-                                                  row->dual_objective,
-                                                  e->total,
-                                                  e->e1,
-                                                  e->e2,
-                                                  e->e3,
-                                                  e->e4,
-                                                  row->step_norm,
-                                                  row->error_bound,
-                                                  (double)row->contacts,
-                                                  row->restart ? 1.0 : 0.0};
-    for (int i = 0; i < CODEC_HISTORY_COLUMNS; i++)
-        out[i] = values[i];
+    memcpy(out,
+           (const double[CODEC_HISTORY_COLUMNS]){(double)row->iteration, row->seconds, row->dual_objective, e->total,
+                                                 e->e1, e->e2, e->e3, e->e4, row->step_norm, row->error_bound,
+                                                 (double)row->contacts, row->restart ? 1.0 : 0.0},
+           CODEC_HISTORY_COLUMNS * sizeof *out);
 }
 
 char *codec_encode_history(const char *case_name, const double *rows, int64_t count, size_t *len)

@@ -1,3 +1,4 @@
+/* encode_summary.c: the summary of an answer. */
 #include "codec/codec.h"
 #include "codec/text.h"
 
@@ -11,9 +12,8 @@ typedef struct {
 
 static void put_named(text *t, const named *list, size_t count)
 {
-    for (size_t i = 0; i < count; i++) {
+    for (size_t i = 0; i < count; i++)
         text_number(t, list[i].key, list[i].value);
-    }
 }
 
 static void put_object(text *t, const char *key, const named *list, size_t count)
@@ -23,14 +23,9 @@ static void put_object(text *t, const char *key, const named *list, size_t count
     text_close(t, '}');
 }
 
-static void put_residual(text *t, const char *key, const uz_residual *e)
+static void put_resultant(text *t, const char *key, const uz_resultant *r, int dim)
 {
-    put_object(t, key, (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
-}
-
-static void put_resultant(text *t, const uz_resultant *r, int dim)
-{
-    text_open(t, NULL, '{');
+    text_open(t, key, '{');
     if (r->on[0])
         text_string(t, "on", r->on);
     text_numbers(t, "force", r->force, dim);
@@ -38,22 +33,19 @@ static void put_resultant(text *t, const uz_resultant *r, int dim)
     text_close(t, '}');
 }
 
-static void put_resultants(text *t, const char *key, const uz_resultant *list, int64_t count, int dim)
-{
-    text_open(t, key, '[');
-    for (int64_t i = 0; i < count; i++)
-        put_resultant(t, &list[i], dim);
-    text_close(t, ']');
-}
-
 /* Scenes: what acts on the body, and what makes the answer doubtful. */
 static void put_evaluation(text *t, const uz_evaluation *e, int dim)
 {
     text_open(t, "resultants", '{');
-    put_resultants(t, "contacts", e->contacts, e->n_contacts, dim);
-    put_resultants(t, "supports", e->supports, e->n_supports, dim);
-    text_key(t, "loads");
-    put_resultant(t, &e->loads, dim);
+    text_open(t, "contacts", '[');
+    for (int64_t i = 0; i < e->n_contacts; i++)
+        put_resultant(t, NULL, &e->contacts[i], dim);
+    text_close(t, ']');
+    text_open(t, "supports", '[');
+    for (int64_t i = 0; i < e->n_supports; i++)
+        put_resultant(t, NULL, &e->supports[i], dim);
+    text_close(t, ']');
+    put_resultant(t, "loads", &e->loads, dim);
     text_number(t, "imbalance", e->imbalance);
     text_close(t, '}');
     text_open(t, "warnings", '[');
@@ -94,18 +86,65 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
     text_close(t, '}');
 }
 
-static void put_certificate(text *t, const uz_certificate *c)
+/* The energies, and how far the answer may be off. */
+static void put_certificate(text *t, const uz_summary *s)
 {
+    const uz_certificate *c = &s->certificate;
+    const uz_residual *const residuals[] = {&c->residual, &c->relative_residual};
+    /* the primal one bounds the minimum from above only where a feasible displacement was found, so with a finite gap
+     */
+    put_object(t, "energy",
+               (named[]){{"primal", isfinite(c->gap) ? c->energy_primal : (double)INFINITY},
+                         {"dual", c->energy_dual},
+                         {"strain", s->evaluation ? s->evaluation->strain_energy : (double)NAN}},
+               s->evaluation ? 3 : 2);
     text_open(t, "certificate", '{');
     put_named(
         t, (named[]){{"relative_error", c->relative_error}, {"absolute_error", c->absolute_error}, {"gap", c->gap}}, 3);
-    put_residual(t, "residual", &c->residual);
-    put_residual(t, "relative_residual", &c->relative_residual);
+    for (int i = 0; i < 2; i++) {
+        const uz_residual *e = residuals[i];
+        put_object(t, i == 0 ? "residual" : "relative_residual",
+                   (named[]){{"total", e->total}, {"e1", e->e1}, {"e2", e->e2}, {"e3", e->e3}, {"e4", e->e4}}, 5);
+    }
     text_close(t, '}');
 }
 
-static void put_factor(text *t, const uz_summary *s)
+static void put_integers(text *t, const char *key, const int64_t *x, int64_t n)
 {
+    text_open(t, key, '[');
+    for (int64_t i = 0; i < n; i++)
+        text_integer(t, NULL, x[i]);
+    text_close(t, ']');
+}
+
+/* A box whose cells were chosen: the grids that were tried for it. */
+static void put_grids(text *t, const uz_grid_sequence *grids)
+{
+    text_open(t, "mesh", '{');
+    put_integers(t, "cells", grids->cells, grids->dim);
+    text_open(t, "ladder", '[');
+    for (int i = 0; i < grids->count; i++) {
+        const uz_grid_level *level = &grids->level[i];
+        text_open(t, NULL, '{');
+        put_integers(t, "cells", level->cells, grids->dim);
+        text_integer(t, "d", level->d);
+        text_integer(t, "iterations", level->iterations);
+        put_named(t,
+                  (named[]){{"discretization_error", level->discretization_error},
+                            {"certified_error", level->certified_error},
+                            {"seconds", level->seconds}},
+                  3);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+    text_close(t, '}');
+}
+
+/* What the answer took: the factor, predicted and actual cost, times. */
+static void put_effort(text *t, const uz_summary *s)
+{
+    const uz_cost *c = &s->cost;
+    const uz_timings *spent = &s->timings;
     text_open(t, "factor", '{');
     text_bool(t, "cached", s->factor_cached);
     text_open(t, "reused", '{');
@@ -120,25 +159,6 @@ static void put_factor(text *t, const uz_summary *s)
     text_integer(t, "bytes", (int64_t)s->factor_bytes);
     put_named(t, (named[]){{"flops", s->factor_flops}, {"rcond", s->rcond}}, 2);
     text_close(t, '}');
-}
-
-/* Of a body that only the obstacle holds. */
-static void put_semicoercive(text *t, const uz_semicoercive *s)
-{
-    const int64_t most = (int64_t)(sizeof s->held_by / sizeof s->held_by[0]);
-    text_open(t, "semicoercive", '{');
-    text_integer(t, "free_modes", s->free_modes);
-    text_integer(t, "rounds", s->rounds);
-    text_integer(t, "held", s->held);
-    text_open(t, "held_by_rows", '[');
-    for (int64_t i = 0; i < s->held && i < most; i++)
-        text_integer(t, NULL, s->held_by[i]);
-    text_close(t, ']');
-    text_close(t, '}');
-}
-
-static void put_cost(text *t, const uz_cost *c)
-{
     text_open(t, "cost", '{');
     put_object(t, "predicted", (named[]){{"seconds", c->seconds}, {"bytes", c->bytes}, {"flops", c->flops}}, 3);
     put_object(t, "actual", (named[]){{"seconds", c->actual_seconds}, {"bytes", c->actual_bytes}}, 2);
@@ -153,70 +173,25 @@ static void put_cost(text *t, const uz_cost *c)
     }
     text_close(t, ']');
     text_close(t, '}');
+    put_object(t, "timings_s",
+               (named[]){{"queue", spent->queue},
+                         {"parse", spent->parse},
+                         {"assemble", spent->assemble},
+                         {"order", spent->order},
+                         {"factor", spent->factor},
+                         {"condense", spent->condense},
+                         {"iterate", spent->iterate},
+                         {"certify", spent->certify},
+                         {"total", spent->total}},
+               9);
 }
 
-/* cells: as many as the box has directions. */
-static void put_cells(text *t, const int64_t *cells, int dim)
-{
-    text_open(t, "cells", '[');
-    for (int axis = 0; axis < dim; axis++)
-        text_integer(t, NULL, cells[axis]);
-    text_close(t, ']');
-}
-
-/* A box whose cells were chosen: the grids that were tried for it. */
-static void put_grids(text *t, const uz_grid_sequence *grids)
-{
-    text_open(t, "mesh", '{');
-    put_cells(t, grids->cells, grids->dim);
-    text_open(t, "ladder", '[');
-    for (int i = 0; i < grids->count; i++) {
-        const uz_grid_level *level = &grids->level[i];
-        text_open(t, NULL, '{');
-        put_cells(t, level->cells, grids->dim);
-        text_integer(t, "d", level->d);
-        text_integer(t, "iterations", level->iterations);
-        put_named(t,
-                  (named[]){{"discretization_error", level->discretization_error},
-                            {"certified_error", level->certified_error},
-                            {"seconds", level->seconds}},
-                  3);
-        text_close(t, '}');
-    }
-    text_close(t, ']');
-    text_close(t, '}');
-}
-
-static void put_cases(text *t, const codec_cases *cases)
-{
-    text_open(t, "cases", '{');
-    text_integer(t, "count", cases->count);
-    text_string(t, "worst", cases->worst);
-    for (int i = 0; i < CODEC_OUTCOMES; i++)
-        if (cases->outcomes[i] > 0 || i == UZ_CONVERGED)
-            text_integer(t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
-    text_close(t, '}');
-}
-
-char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind)
-{
-    return codec_encode_run(summary, kind, &(codec_run){.cases = NULL});
-}
-
-char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const codec_run *run)
+char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, const codec_run *run)
 {
     text t = {0};
     const bool scene = kind == UZ_PROBLEM_SCENE;
-    const uz_certificate *c = &summary->certificate;
-    const uz_timings *s = &summary->timings;
-    /* the primal one bounds the minimum from above only where a feasible displacement was found, so with a finite gap
-     */
-    const named energy[] = {{"primal", isfinite(c->gap) ? c->energy_primal : (double)INFINITY},
-                            {"dual", c->energy_dual},
-                            {"strain", summary->evaluation ? summary->evaluation->strain_energy : (double)NAN}};
-    const named timings[] = {{"queue", s->queue},     {"parse", s->parse},     {"assemble", s->assemble},
-                             {"order", s->order},     {"factor", s->factor},   {"condense", s->condense},
-                             {"iterate", s->iterate}, {"certify", s->certify}, {"total", s->total}};
+    const uz_semicoercive *held = &summary->semicoercive;
+    const codec_cases *cases = run ? run->cases : NULL;
     text_open(&t, NULL, '{');
     text_string(&t, "outcome", uz_outcome_name(summary->outcome));
     text_string(&t, "message", summary->message);
@@ -226,18 +201,24 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     text_integer(&t, "restarts", summary->restarts);
     text_integer(&t, "refinements", summary->refinements);
     text_string(&t, "row_scaling", uz_row_scaling_name(summary->row_scaling));
-    if (run->started_from)
+    if (run && run->started_from)
         text_string(&t, "started_from", run->started_from);
-    if (run->cases)
-        put_cases(&t, run->cases);
+    if (cases) {
+        text_open(&t, "cases", '{');
+        text_integer(&t, "count", cases->count);
+        text_string(&t, "worst", cases->worst);
+        for (int i = 0; i < CODEC_OUTCOMES; i++)
+            if (cases->outcomes[i] > 0 || i == UZ_CONVERGED)
+                text_integer(&t, uz_outcome_name((uz_outcome)i), cases->outcomes[i]);
+        text_close(&t, '}');
+    }
     text_open(&t, "problem", '{');
     text_string(&t, "kind", scene ? "scene" : "matrices");
     text_integer(&t, "d", summary->d);
     text_integer(&t, "m", summary->m);
     text_close(&t, '}');
     put_contact(&t, summary, scene);
-    put_object(&t, "energy", energy, summary->evaluation ? 3 : 2);
-    put_certificate(&t, c);
+    put_certificate(&t, summary);
     if (summary->evaluation)
         put_evaluation(&t, summary->evaluation, summary->dim);
     put_named(&t,
@@ -252,11 +233,16 @@ char *codec_encode_run(const uz_summary *summary, uz_problem_kind kind, const co
     }
     if (summary->outcome == UZ_INFEASIBLE)
         text_number(&t, "infeasible_radius", summary->infeasible_radius);
-    if (summary->semicoercive.free_modes > 0)
-        put_semicoercive(&t, &summary->semicoercive);
-    put_factor(&t, summary);
-    put_cost(&t, &summary->cost);
-    put_object(&t, "timings_s", timings, sizeof timings / sizeof timings[0]);
+    if (held->free_modes > 0) { /* a body that only the obstacle holds */
+        const int64_t most = (int64_t)(sizeof held->held_by / sizeof held->held_by[0]);
+        text_open(&t, "semicoercive", '{');
+        text_integer(&t, "free_modes", held->free_modes);
+        text_integer(&t, "rounds", held->rounds);
+        text_integer(&t, "held", held->held);
+        put_integers(&t, "held_by_rows", held->held_by, held->held < most ? held->held : most);
+        text_close(&t, '}');
+    }
+    put_effort(&t, summary);
     text_close(&t, '}');
     return text_finish(&t, NULL);
 }

@@ -50,16 +50,6 @@ static int add_array(surface_writer *w, int type, int target, const void *data, 
     return w->n_arrays++;
 }
 
-static int add_floats(surface_writer *w, const float *data, int64_t count)
-{
-    return add_array(w, FLOAT, 0, data, count, 1);
-}
-
-static int add_indices(surface_writer *w, const unsigned *data, int64_t count)
-{
-    return add_array(w, UNSIGNED, INDEX_DATA, data, count, 1);
-}
-
 /* -------------------------------------------------------------------- JSON */
 
 /* The arrays: an accessor and a view of the one buffer for each of them. */
@@ -137,13 +127,12 @@ static void put_meshes(surface_writer *w, const vertices *v, int row_vertex)
 {
     const uz_surface *s = w->in->surface;
     text *t = &w->json;
-    const int triangles = add_indices(w, s->triangle, 3 * s->n_triangles);
-    const int lines = add_indices(w, s->line, 2 * s->n_lines);
-    const int outline = add_indices(w, s->outline, 2 * s->n_outline);
+    const int triangles = add_array(w, UNSIGNED, INDEX_DATA, s->triangle, 3 * s->n_triangles, 1);
+    const int lines = add_array(w, UNSIGNED, INDEX_DATA, s->line, 2 * s->n_lines, 1);
+    const int outline = add_array(w, UNSIGNED, INDEX_DATA, s->outline, 2 * s->n_outline, 1);
     const int n_meshes = outline == NONE ? 1 : 2;
     text_integer(t, "scene", 0);
-    text_key(t, "scenes");
-    text_put(t, n_meshes == 2 ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
+    text_raw(t, "scenes", n_meshes == 2 ? "[{\"nodes\":[0,1]}]" : "[{\"nodes\":[0]}]");
     text_open(t, "nodes", '[');
     for (int mesh = 0; mesh < n_meshes; mesh++) {
         text_open(t, NULL, '{');
@@ -187,54 +176,10 @@ static void put_drawn(text *t, const char *key, const uz_drawn *drawn, int acces
     text_close(t, '}');
 }
 
-static void put_contact(surface_writer *w, int row_vertex)
-{
-    const uz_surface *s = w->in->surface;
-    const int64_t n = s->n_rows;
-    text *t = &w->json;
-    text_open(t, "contact", '{');
-    text_integer(t, "rows", n);
-    put_accessor(t, "vertex", row_vertex);
-    put_accessor(t, "contact", add_array(w, UNSIGNED, 0, s->row_contact, n, 1));
-    put_accessor(t, "normal", add_array(w, FLOAT, 0, s->row_normal, n, 3));
-    put_drawn(t, "reaction", &s->reaction, add_floats(w, s->reaction.x, n));
-    put_drawn(t, "gap", &s->gap, add_floats(w, s->gap.x, n));
-    put_drawn(t, "pressure", &s->pressure, add_floats(w, s->pressure.x, n));
-    put_drawn(t, "arc", &s->arc, add_floats(w, s->arc.x, n));
-    put_accessor(t, "part", add_array(w, UNSIGNED, 0, s->row_part, n, 1));
-    text_close(t, '}');
-}
-
-static void put_round(text *t, const uz_contact *c, int dim)
-{
-    text_open(t, c->kind == UZ_OBSTACLE_CYLINDER ? "cylinder" : dim == 2 ? "circle" : "sphere", '{');
-    text_numbers(t, c->kind == UZ_OBSTACLE_CYLINDER ? "point" : "center", c->point, dim);
-    if (c->kind == UZ_OBSTACLE_CYLINDER)
-        text_numbers(t, "axis", c->normal, dim);
-    text_number(t, "radius", c->radius);
-    text_bool(t, "inside", c->inside);
-    text_close(t, '}');
-}
-
-static void put_height(text *t, const uz_contact *c)
-{
-    text_open(t, "height", '{');
-    text_numbers(t, "x", c->x, c->n_x);
-    if (c->n_y > 0) {
-        text_numbers(t, "y", c->y, c->n_y);
-        text_open(t, "z", '[');
-        for (int64_t j = 0; j < c->n_y; j++)
-            text_numbers(t, NULL, c->z + j * c->n_x, c->n_x);
-        text_close(t, ']');
-    } else {
-        text_numbers(t, "z", c->z, c->n_x);
-    }
-    text_close(t, '}');
-}
-
 /* An obstacle in the words of a request. */
 static void put_obstacle(text *t, const uz_contact *c, int dim)
 {
+    const bool cylinder = c->kind == UZ_OBSTACLE_CYLINDER;
     text_open(t, NULL, '{');
     text_string(t, "on", c->on);
     if (c->kind == UZ_OBSTACLE_BODY) {
@@ -247,19 +192,33 @@ static void put_obstacle(text *t, const uz_contact *c, int dim)
         text_open(t, "plane", '{');
         text_numbers(t, "point", c->point, dim);
         text_numbers(t, "normal", c->normal, dim);
-        text_close(t, '}');
     } else if (c->kind == UZ_OBSTACLE_POLYLINE) {
         text_open(t, "polyline", '{');
         text_open(t, "points", '[');
         for (int64_t i = 0; i < c->n_x; i++)
             text_numbers(t, NULL, (const double[]){c->x[i], c->y[i]}, 2);
         text_close(t, ']');
-        text_close(t, '}');
     } else if (c->kind == UZ_OBSTACLE_HEIGHT) {
-        put_height(t, c);
+        text_open(t, "height", '{');
+        text_numbers(t, "x", c->x, c->n_x);
+        if (c->n_y > 0) {
+            text_numbers(t, "y", c->y, c->n_y);
+            text_open(t, "z", '[');
+            for (int64_t j = 0; j < c->n_y; j++)
+                text_numbers(t, NULL, c->z + j * c->n_x, c->n_x);
+            text_close(t, ']');
+        } else {
+            text_numbers(t, "z", c->z, c->n_x);
+        }
     } else {
-        put_round(t, c, dim);
+        text_open(t, cylinder ? "cylinder" : dim == 2 ? "circle" : "sphere", '{');
+        text_numbers(t, cylinder ? "point" : "center", c->point, dim);
+        if (cylinder)
+            text_numbers(t, "axis", c->normal, dim);
+        text_number(t, "radius", c->radius);
+        text_bool(t, "inside", c->inside);
     }
+    text_close(t, '}');
     text_close(t, '}');
     text_close(t, '}');
 }
@@ -268,6 +227,7 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
 {
     const uz_surface *s = w->in->surface;
     const uz_scene *scene = w->in->scene;
+    const int64_t n = s->n_rows;
     text *t = &w->json;
     text_open(t, "extras", '{');
     text_string(t, "job", w->in->job_id);
@@ -283,7 +243,17 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     text_integer(t, "position", v->position);
     text_integer(t, "displacement", v->displacement);
     put_drawn(t, "von_mises", &s->von_mises, v->von_mises);
-    put_contact(w, row_vertex);
+    text_open(t, "contact", '{');
+    text_integer(t, "rows", n);
+    put_accessor(t, "vertex", row_vertex);
+    put_accessor(t, "contact", add_array(w, UNSIGNED, 0, s->row_contact, n, 1));
+    put_accessor(t, "normal", add_array(w, FLOAT, 0, s->row_normal, n, 3));
+    put_drawn(t, "reaction", &s->reaction, add_array(w, FLOAT, 0, s->reaction.x, n, 1));
+    put_drawn(t, "gap", &s->gap, add_array(w, FLOAT, 0, s->gap.x, n, 1));
+    put_drawn(t, "pressure", &s->pressure, add_array(w, FLOAT, 0, s->pressure.x, n, 1));
+    put_drawn(t, "arc", &s->arc, add_array(w, FLOAT, 0, s->arc.x, n, 1));
+    put_accessor(t, "part", add_array(w, UNSIGNED, 0, s->row_part, n, 1));
+    text_close(t, '}');
     text_open(t, "contacts", '[');
     for (int64_t k = 0; k < scene->n_contacts; k++)
         put_obstacle(t, &scene->contacts[k], s->dim);
@@ -291,64 +261,50 @@ static void put_extras(surface_writer *w, const vertices *v, int row_vertex)
     text_close(t, '}');
 }
 
-static void put_json(surface_writer *w)
+char *codec_encode_surface(const codec_surface *surface, size_t *len)
 {
-    const uz_surface *s = w->in->surface;
+    const uz_surface *s = surface->surface;
+    surface_writer writer = {.in = surface}, *w = &writer;
     text *t = &w->json;
+    char *file = NULL;
+    *len = 0;
     vertices v;
     v.position = add_array(w, FLOAT, VERTEX_DATA, s->position, s->n_vertices, 3);
     v.displacement = add_array(w, FLOAT, VERTEX_DATA, s->displacement, s->n_vertices, 3);
     v.node = add_array(w, FLOAT, VERTEX_DATA, s->node, s->n_vertices, 1);
     v.von_mises = add_array(w, FLOAT, VERTEX_DATA, s->von_mises.x, s->n_vertices, 1);
-    if (v.position == NONE || v.displacement == NONE) {
-        t->failed = true; /* glTF has no mesh without vertices */
-        return;
-    }
+    if (v.position == NONE || v.displacement == NONE)
+        return NULL; /* glTF has no mesh without vertices */
     w->arrays[v.position].low = s->low;
     w->arrays[v.position].high = s->high;
     w->arrays[v.displacement].low = s->least;
     w->arrays[v.displacement].high = s->most;
-    const int row_vertex = add_indices(w, s->row_vertex, s->n_rows);
+    const int row_vertex = add_array(w, UNSIGNED, INDEX_DATA, s->row_vertex, s->n_rows, 1);
     text_open(t, NULL, '{');
-    text_key(t, "asset");
-    text_put(t, "{\"version\":\"2.0\",\"generator\":\"uzawad\"}");
+    text_raw(t, "asset", "{\"version\":\"2.0\",\"generator\":\"uzawad\"}");
     put_meshes(w, &v, row_vertex);
     put_extras(w, &v, row_vertex);
     put_arrays(w);
     text_close(t, '}');
-    while (w->json.len % 4 != 0 && !w->json.failed)
+    while (t->len % 4 != 0 && !t->failed)
         text_put(t, " ");
-}
 
-/* --------------------------------------------------------------- container */
-
-static char *put_words(char *at, const unsigned *word, size_t count)
-{
-    memcpy(at, word, 4 * count);
-    return at + 4 * count;
-}
-
-static char *assemble(const surface_writer *w, size_t *len)
-{
-    const size_t total = HEAD + CHUNK_HEAD + w->json.len + CHUNK_HEAD + w->bytes;
-    char *file = total <= UINT32_MAX ? room_for(total, 1) : NULL, *at = file;
-    if (!file)
-        return NULL;
-    at = put_words(at, (const unsigned[]){MAGIC, 2, (unsigned)total, (unsigned)w->json.len, JSON_CHUNK}, 5);
-    memcpy(at, w->json.data, w->json.len);
-    at = put_words(at + w->json.len, (const unsigned[]){(unsigned)w->bytes, BINARY_CHUNK}, 2);
-    for (int i = 0; i < w->n_arrays; i++)
-        memcpy(at + w->arrays[i].offset, w->arrays[i].data, 4 * w->arrays[i].count * w->arrays[i].components);
-    *len = total;
-    return file;
-}
-
-char *codec_encode_surface(const codec_surface *surface, size_t *len)
-{
-    surface_writer w = {.in = surface};
-    *len = 0;
-    put_json(&w);
-    char *file = w.json.failed ? NULL : assemble(&w, len);
-    free(w.json.data);
+    /* the container: a head, the JSON, the arrays */
+    const size_t total = HEAD + CHUNK_HEAD + t->len + CHUNK_HEAD + w->bytes;
+    if (!t->failed && total <= UINT32_MAX)
+        file = room_for(total, 1);
+    if (file) {
+        const unsigned head[] = {MAGIC, 2, (unsigned)total, (unsigned)t->len, JSON_CHUNK};
+        const unsigned behind[] = {(unsigned)w->bytes, BINARY_CHUNK};
+        char *at = file + sizeof head + t->len;
+        memcpy(file, head, sizeof head);
+        memcpy(file + sizeof head, t->data, t->len);
+        memcpy(at, behind, sizeof behind);
+        for (int i = 0; i < w->n_arrays; i++)
+            memcpy(at + sizeof behind + w->arrays[i].offset, w->arrays[i].data,
+                   4 * w->arrays[i].count * w->arrays[i].components);
+        *len = total;
+    }
+    free(t->data);
     return file;
 }

@@ -6,31 +6,24 @@
 
 enum { DECADES = 10 };
 
-static void put_count(text *t, const char *key, const int64_t *value)
-{
-    text_key(t, key);
-    if (value)
-        text_integer(t, NULL, *value);
-    else
-        text_raw(t, NULL, NULL);
-}
-
-/* seconds: when the bound was established, or what the whole solve would have taken. step NULL: it never was. */
-static void put_step(text *t, double seconds, const uz_trade_step *step)
-{
-    text_number(t, "seconds", seconds);
-    put_count(t, "iterations", step ? &step->iterations : NULL);
-    put_count(t, "applications", step ? &step->applications : NULL);
-    text_string(t, "by", !step ? NULL : step->by_certificate ? "certificate" : "iteration");
-}
-
-static void put_level(text *t, const char *name, double relative_error, const uz_trade *trade)
+/* What a relative error took; level NULL: none has it as its aim. seconds: when the bound was established, or what the
+ * whole solve would have taken. */
+static void put_reached(text *t, const char *level, double relative_error, const uz_trade *trade)
 {
     const uz_trade_step *step = isfinite(relative_error) ? uz_trade_reach(trade, relative_error) : NULL;
     text_open(t, NULL, '{');
-    text_string(t, "level", name);
+    if (level)
+        text_string(t, "level", level);
     text_number(t, "relative_error", relative_error);
-    put_step(t, step ? uz_trade_cost(trade, step) : NAN, step);
+    text_number(t, "seconds", !step ? (double)NAN : level ? uz_trade_cost(trade, step) : step->seconds);
+    if (step) {
+        text_integer(t, "iterations", step->iterations);
+        text_integer(t, "applications", step->applications);
+    } else {
+        text_raw(t, "iterations", NULL);
+        text_raw(t, "applications", NULL);
+    }
+    text_string(t, "by", !step ? NULL : step->by_certificate ? "certificate" : "iteration");
     text_close(t, '}');
 }
 
@@ -44,19 +37,14 @@ char *codec_encode_trade(const codec_trade *of, size_t *len)
     if (of->case_name)
         text_string(&t, "case", of->case_name);
     text_open(&t, "decades", '[');
-    for (int k = 0; k < DECADES; k++) {
-        const uz_trade_step *step = uz_trade_reach(trade, DECADE[k]);
-        text_open(&t, NULL, '{');
-        text_number(&t, "relative_error", DECADE[k]);
-        put_step(&t, step ? step->seconds : (double)NAN, step);
-        text_close(&t, '}');
-    }
+    for (int k = 0; k < DECADES; k++)
+        put_reached(&t, NULL, DECADE[k], trade);
     text_close(&t, ']');
     text_open(&t, "levels", '[');
-    put_level(&t, "quick", 1e-2, trade);
-    put_level(&t, "balanced", of->mesh_error > 0.0 ? fmin(1.0, 0.1 * of->mesh_error) : (double)NAN, trade);
-    put_level(&t, "precise", 1e-8, trade);
-    put_level(&t, "exact", 1e-12, trade);
+    put_reached(&t, "quick", 1e-2, trade);
+    put_reached(&t, "balanced", of->mesh_error > 0.0 ? fmin(1.0, 0.1 * of->mesh_error) : (double)NAN, trade);
+    put_reached(&t, "precise", 1e-8, trade);
+    put_reached(&t, "exact", 1e-12, trade);
     text_close(&t, ']');
     text_number(&t, "iterated_s", trade->iterated_s);
     text_number(&t, "total_s", trade->total_s);

@@ -75,7 +75,7 @@ static bool read_request(field_reader *reader, http_reply *reply)
         reply_store_failure(reader->context, status, reply);
         return false;
     }
-    reader->is_open = codec_decode_with(&reader->request, CODEC_STORED, body, len, reader->context->store, &problem);
+    reader->is_open = codec_decode(&reader->request, CODEC_STORED, body, len, reader->context->store, &problem);
     free(body);
     if (!reader->is_open)
         reply_problem(reply, &problem);

@@ -282,7 +282,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
     char *key = NULL;
     bool validate_only = false;
     if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
-        !codec_decode_with(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
+        !codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
         !start_check(context, &request, rq, &problem) || !jobs_check_webhook(context, request.webhook, &problem)) {
         refuse_or_repeat(context, rq, validate_only ? NULL : key, &problem, reply);
         goto done;

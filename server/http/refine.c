@@ -44,7 +44,7 @@ static void make_request(api *context, const http_request *rq, const job *old, c
 {
     problem_details problem = {0};
     *body = codec_refine(old_body, old_len, old->id, rq->body ? rq->body : "", rq->body_len, len, &problem);
-    if (*body && codec_decode_with(request, CODEC_SOLVE, *body, *len, context->store, &problem)) {
+    if (*body && codec_decode(request, CODEC_SOLVE, *body, *len, context->store, &problem)) {
         codec_request_strip(request);
         return;
     }

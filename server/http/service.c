@@ -108,7 +108,7 @@ static bool solve_probe(void)
     uz_result *result = NULL;
     uz_error err = {0};
     uz_thread_init();
-    if (!codec_decode_request(&request, PROBE, sizeof PROBE - 1, &problem))
+    if (!codec_decode(&request, CODEC_SOLVE, PROBE, sizeof PROBE - 1, NULL, &problem))
         return false;
     bool good = uz_solve(&result, &request.problem, &request.settings, NULL, NULL, &err) == UZ_OK &&
                 result->summary.outcome == UZ_CONVERGED && fabs(result->summary.reaction_sum + 1.0) < 1e-6;

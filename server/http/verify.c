@@ -32,7 +32,7 @@ void verify_submit(api *context, http_request *rq, http_reply *reply)
     job j = {0};
     char *key = NULL;
     if (!jobs_read_key(rq, &key, &problem) ||
-        !codec_decode_with(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem)) {
+        !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem)) {
         if (!jobs_find_repeat(context, rq, key, &j))
             reply_problem(reply, &problem);
         else if (jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))

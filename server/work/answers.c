@@ -101,7 +101,7 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     bool has_earlier = from->histories != NULL && result->summary.origin == UZ_FROM_STATE;
     answer_parts *parts = &a->parts[i];
     codec_run run = {.started_from = request->answer.u ? NULL : origin_name(result->summary.origin)};
-    parts->summary = codec_encode_run(&result->summary, request->problem.kind, &run);
+    parts->summary = codec_encode_summary(&result->summary, request->problem.kind, &run);
     add_vector(parts, "reactions", result->r, result->m);
     add_vector(parts, "gaps", result->g, result->m);
     add_vector(parts, "ray", result->ray, result->m);
@@ -145,7 +145,7 @@ static bool build_whole(answers *a, store_outcome *outcome, uz_result *const *re
     overall_summary(&overall, &counts, results, &request->problem);
     add_waiting(&overall.timings, queue_s, parse_s);
     codec_run run = {.started_from = origin_name(results[first]->summary.origin), .cases = &counts};
-    a->shared.summary = codec_encode_run(&overall, request->problem.kind, &run);
+    a->shared.summary = codec_encode_summary(&overall, request->problem.kind, &run);
     a->cases = calloc((size_t)a->n, sizeof *a->cases);
     if (!a->cases || !a->shared.summary || !judge_whole(&a->shared.summary, request, a->findings) ||
         !add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE))

@@ -123,7 +123,7 @@ static bool decode_body(run *r, char *body, size_t body_len)
 {
     problem_details problem = {0};
     double start = work_clock();
-    bool ok = body && codec_decode_with(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
+    bool ok = body && codec_decode(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
     if (!body)
         codec_problem_damaged(&problem, r->job->id);
     free(body);

@@ -43,7 +43,7 @@ static void check_refined(const char *body, size_t size, const codec_request *ol
     size_t len;
     char *made = codec_refine(body, size, ID, CHANGE, sizeof CHANGE - 1, &len, &problem);
     if (!made || !codec_same_problem(body, size, made, len) ||
-        !codec_decode(&request, CODEC_SOLVE, made, len, &problem))
+        !codec_decode(&request, CODEC_SOLVE, made, len, NULL, &problem))
         abort();
     if (!request.start.continued || strcmp(request.start.job, ID) != 0 || strcmp(request.tags, old->tags) != 0 ||
         request.settings.relative_error != 1e-2 || request.settings.method != old->settings.method ||
@@ -58,7 +58,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const char *body = (const char *)data;
     codec_request request;
     problem_details problem;
-    if (!codec_decode(&request, CODEC_STORED, body, size, &problem)) {
+    if (!codec_decode(&request, CODEC_STORED, body, size, NULL, &problem)) {
         check_problem(&problem);
         return 0;
     }

@@ -46,7 +46,7 @@ static bool paper_body(state *s, int64_t nx)
                        "-0.05]}, {\"on\": \"right\", \"traction\": [0.5, 0]}], \"contacts\": [{\"on\": \"bottom\", "
                        "\"obstacle\": {\"plane\": {\"point\": [0, 0], \"normal\": [0, 1]}}}]}}",
                        (long long)nx, (long long)(nx / 3));
-    if (!codec_decode_request(&decoded, request, (size_t)len, &problem))
+    if (!codec_decode(&decoded, CODEC_SOLVE, request, (size_t)len, NULL, &problem))
         return fail("the paper's body", problem.detail);
     s->problem = decoded.problem; /* the rest of the request has nothing of it */
     memset(&decoded.problem, 0, sizeof decoded.problem);
@@ -132,7 +132,7 @@ static bool decode(state *s)
 {
     codec_request request;
     problem_details problem;
-    if (!codec_decode_request(&request, s->text, s->len, &problem))
+    if (!codec_decode(&request, CODEC_SOLVE, s->text, s->len, NULL, &problem))
         return fail("request", problem.detail);
     codec_request_clear(&request);
     return true;

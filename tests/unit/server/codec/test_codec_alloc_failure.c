@@ -93,7 +93,7 @@ static bool try_decode(const char *path)
     countdown = -1;
     char *body = test_read_file(path, &len);
     countdown = planned;
-    bool good = codec_decode(&request, CODEC_STORED, body, len, &problem);
+    bool good = codec_decode(&request, CODEC_STORED, body, len, NULL, &problem);
     if (good)
         codec_request_clear(&request);
     else

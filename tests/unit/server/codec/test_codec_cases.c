@@ -16,7 +16,7 @@ static codec_request take(codec_kind kind, const char *body)
 {
     codec_request request = {0};
     problem_details problem = {0};
-    bool good = ready() && codec_decode(&request, kind, body, strlen(body), &problem);
+    bool good = ready() && codec_decode(&request, kind, body, strlen(body), NULL, &problem);
     CHECK_MSG(good, "%s %s: %s", problem.code, problem.pointer, problem.detail);
     return request;
 }
@@ -25,7 +25,7 @@ static problem_details refuse(codec_kind kind, const char *body, const char *cod
 {
     codec_request request;
     problem_details problem = {0};
-    bool good = ready() && codec_decode(&request, kind, body, strlen(body), &problem);
+    bool good = ready() && codec_decode(&request, kind, body, strlen(body), NULL, &problem);
     CHECK_MSG(!good, "taken: %.200s", body);
     CHECK_MSG(strcmp(problem.code, code) == 0, "code %s, want %s: %s", problem.code, code, problem.detail);
     CHECK_STR(problem.pointer, pointer);
@@ -298,11 +298,11 @@ TEST(summaries_of_cases)
 {
     uz_summary summary = {.outcome = UZ_ITERATION_LIMIT};
     codec_cases counts = {.count = 3, .outcomes = {[UZ_CONVERGED] = 2, [UZ_ITERATION_LIMIT] = 1}, .worst = "b"};
-    char *text = codec_encode_run(&summary, UZ_PROBLEM_SCENE, &(codec_run){"warm", &counts});
+    char *text = codec_encode_summary(&summary, UZ_PROBLEM_SCENE, &(codec_run){"warm", &counts});
     CHECK(text && strstr(text, "\"started_from\":\"warm\",\"cases\":{\"count\":3,\"worst\":\"b\",\"converged\":2,"
                                "\"iteration_limit\":1}"));
     free(text);
-    text = codec_encode_summary(&summary, UZ_PROBLEM_SCENE);
+    text = codec_encode_summary(&summary, UZ_PROBLEM_SCENE, NULL);
     CHECK(text && !strstr(text, "cases") && !strstr(text, "started_from"));
     free(text);
 }

@@ -14,7 +14,7 @@ static codec_request take(const char *body)
 {
     codec_request request = {0};
     problem_details problem = {0};
-    bool good = ready() && codec_decode_request(&request, body, strlen(body), &problem);
+    bool good = ready() && codec_decode(&request, CODEC_SOLVE, body, strlen(body), NULL, &problem);
     CHECK_MSG(good, "%s %s: %s", problem.code, problem.pointer, problem.detail);
     return request;
 }
@@ -24,7 +24,7 @@ static problem_details refuse(const char *body, int status, const char *code, co
 {
     codec_request request;
     problem_details problem = {0};
-    bool good = ready() && codec_decode_request(&request, body, strlen(body), &problem);
+    bool good = ready() && codec_decode(&request, CODEC_SOLVE, body, strlen(body), NULL, &problem);
     CHECK_MSG(!good, "taken: %s", body);
     CHECK_INT(problem.status, status);
     CHECK_MSG(strcmp(problem.code, code) == 0, "code %s, want %s: %s", problem.code, code, problem.detail);

@@ -202,7 +202,7 @@ TEST(summary_of_a_scene)
                    {"lambda_max", 9.427e-4}};
     json_tree doc;
     uz_summary s = paper_summary();
-    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
     read_reply(&doc, reply, "summary.json");
     for (size_t i = 0; i < sizeof NUMBERS / sizeof NUMBERS[0]; i++)
         CHECK_MSG(number_at(&doc, NUMBERS[i].place) == NUMBERS[i].want, "%s", NUMBERS[i].place);
@@ -223,13 +223,13 @@ TEST(summary_of_a_body_held_by_contact)
 {
     json_tree doc;
     uz_summary s = paper_summary();
-    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
     read_reply(&doc, reply, "summary.json");
     CHECK(!json_get(doc.root, "semicoercive"));
     json_clear(&doc);
     free(reply);
     s.semicoercive = (uz_semicoercive){.free_modes = 2, .held = 9, .held_by = {3, 5, 6, 7, 8, 9, 10, 12}, .rounds = 4};
-    reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
     read_reply(&doc, reply, "summary.json");
     CHECK(number_at(&doc, "semicoercive/free_modes") == 2 && number_at(&doc, "semicoercive/held") == 9);
     CHECK(number_at(&doc, "semicoercive/rounds") == 4);
@@ -245,7 +245,7 @@ TEST(summary_of_matrices)
     uz_summary s = paper_summary();
     s.outcome = UZ_PRECISION_LIMIT;
     snprintf(s.message, sizeof s.message, "reached 1e-9");
-    char *reply = codec_encode_summary(&s, UZ_PROBLEM_MATRICES);
+    char *reply = codec_encode_summary(&s, UZ_PROBLEM_MATRICES, NULL);
     read_reply(&doc, reply, "summary.json");
     const json_value *contact = json_get(doc.root, "contact");
     CHECK(!json_get(contact, "force") && !json_get(contact, "max_pressure"));
@@ -294,7 +294,7 @@ TEST(every_outcome_fits_the_schema)
         json_tree doc;
         uz_summary s = paper_summary();
         s.outcome = (uz_outcome)i;
-        char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+        char *reply = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
         read_reply(&doc, reply, "summary.json");
         json_clear(&doc);
         free(reply);
@@ -308,7 +308,7 @@ TEST(jobs)
     job list[2] = {{.id = "0193aa", .status = JOB_SUCCESSFUL, .progress = 100, .attempts = 1, .created = 1769860800.25},
                    {.id = "0193ab", .status = JOB_FAILED, .created = 1769860799.9996}};
     list[0].started = list[0].finished = 1769860801;
-    list[0].summary = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    list[0].summary = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
     list[0].tags = "[\"demo\"]";
     list[1].tags = "[]";
     list[1].error = codec_encode_problem(&(problem_details){.status = 422, .code = "free_body"});
@@ -363,7 +363,7 @@ TEST(result)
     json_tree doc;
     size_t len;
     uz_summary s = paper_summary();
-    char *summary = codec_encode_summary(&s, UZ_PROBLEM_SCENE);
+    char *summary = codec_encode_summary(&s, UZ_PROBLEM_SCENE, NULL);
     const double r[2] = {-0.1, 0}, g[2] = {0, NAN}, u[4] = {1, 2, 3, 0.5}, at[2] = {0, 1};
     codec_result result = {.job_id = "x",
                            .summary = summary,

@@ -73,7 +73,7 @@ static bool decode(void)
 {
     codec_request request;
     problem_details problem;
-    bool good = codec_decode_with(&request, CODEC_SOLVE, body, strlen(body), here.s, &problem);
+    bool good = codec_decode(&request, CODEC_SOLVE, body, strlen(body), here.s, &problem);
     if (good) {
         CHECK(request.n_uploads == 1 && request.webhook);
         codec_request_strip(&request);

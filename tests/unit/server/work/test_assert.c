@@ -22,7 +22,7 @@ static bool decode(codec_request *out, const char *rest, problem_details *proble
 {
     char body[4096];
     snprintf(body, sizeof body, "%s%s}", SPRINGS, rest);
-    return codec_decode_request(out, body, strlen(body), problem);
+    return codec_decode(out, CODEC_SOLVE, body, strlen(body), NULL, problem);
 }
 
 /* ---- decoding */
