@@ -73,25 +73,6 @@ void codec_problem_from_error(problem_details *out, const uz_error *err, uz_prob
     out->line = err->line;
 }
 
-/* The array as text. Tags are compared as C strings by the store, and shown in terminals. */
-static bool decode_tags(char **out, decoding *d, const json_value *tags)
-{
-    text t = {0};
-    text_open(&t, NULL, '[');
-    for (size_t i = 0; i < json_size(tags); i++) {
-        const json_value *tag = &tags->items[i];
-        for (size_t k = 0; k < tag->count; k++)
-            if ((unsigned char)tag->text[k] < 0x20 || tag->text[k] == 0x7f) {
-                free(t.data);
-                return decode_refuse(d, "not_allowed", tag, "has a control character; tags are words.");
-            }
-        text_string(&t, NULL, tag->text);
-    }
-    text_close(&t, ']');
-    *out = text_finish(&t, NULL);
-    return *out || problem_no_memory(d->problem);
-}
-
 /* ---- sizes that only the whole request tells */
 
 bool codec_request_sizes(const codec_request *request, int64_t *m, int64_t *n_u, problem_details *problem)
@@ -208,23 +189,48 @@ static bool decode_automatic(codec_request *out, decoding *d, const json_value *
 /* The parts of a checked tree, each where the next may need it. */
 static bool decode_parts(codec_request *out, decoding *d, const json_value *root)
 {
-    const json_value *solver = json_get(root, "solver"), *answer = json_get(root, "answer");
-    const json_value *problem = json_get(root, "problem");
-    const char *webhook = json_text_of(json_get(root, "webhook"), "url");
+    const json_value *solver = json_get(root, "solver"), *start = json_get(solver, "warm_start");
+    const json_value *of = json_get(start, "case"), *reactions = json_get(start, "reactions");
+    const json_value *problem = json_get(root, "problem"), *answer = json_get(root, "answer");
+    const json_value *tags = json_get(root, "tags");
+    const char *webhook = json_text_of(json_get(root, "webhook"), "url"), *from = json_text_of(start, "job");
+    text t = {0};
     decode_settings(&out->settings, solver);
     out->priority = (int)decode_number(root, "priority", 0);
     out->queue_limit_s = decode_number(root, "queue_limit_s", 0);
     out->webhook = webhook ? strdup(webhook) : NULL;
     if (webhook && !out->webhook)
         return problem_no_memory(d->problem);
-    if (!decode_tags(&out->tags, d, json_get(root, "tags")))
-        return false;
+
+    /* Tags are compared as C strings by the store, and shown in terminals. */
+    text_open(&t, NULL, '[');
+    for (size_t i = 0; i < json_size(tags); i++) {
+        const json_value *tag = &tags->items[i];
+        for (size_t k = 0; k < tag->count; k++)
+            if ((unsigned char)tag->text[k] < 0x20 || tag->text[k] == 0x7f) {
+                free(t.data);
+                return decode_refuse(d, "not_allowed", tag, "has a control character; tags are words.");
+            }
+        text_string(&t, NULL, tag->text);
+    }
+    text_close(&t, ']');
+    out->tags = text_finish(&t, NULL);
+    if (!out->tags)
+        return problem_no_memory(d->problem);
+
     out->problem.kind = json_text_is(json_get(problem, "kind"), "scene") ? UZ_PROBLEM_SCENE : UZ_PROBLEM_MATRICES;
     const bool good = out->problem.kind == UZ_PROBLEM_SCENE ? decode_scene(&out->problem.scene, d, problem)
                                                             : decode_matrices(&out->problem.qp, d, problem);
-    return good && decode_automatic(out, d, root) && decode_cases(&out->problem, d, json_get(root, "cases")) &&
-           decode_start(&out->start, d, json_get(solver, "warm_start")) &&
-           decode_assertions(out, d, json_get(root, "assert")) && (!answer || decode_answer(&out->answer, d, answer));
+    if (!good || !decode_automatic(out, d, root) || !decode_cases(&out->problem, d, json_get(root, "cases")))
+        return false;
+    snprintf(out->start.job, sizeof out->start.job, "%s", from ? from : "");
+    out->start.continued = json_truth(json_get(start, "continue"));
+    return (!of || decode_label(out->start.case_name, d, of, "A name of a case")) &&
+           (!reactions || decode_vector(&out->start.reactions, &out->start.n_reactions, d, reactions)) &&
+           decode_assertions(out, d, json_get(root, "assert")) &&
+           (!answer || (decode_points(&out->answer.u, &out->answer.n_u, &out->answer.columns, d,
+                                      json_get(answer, "displacements")) &&
+                        decode_vector(&out->answer.r, &out->answer.n_r, d, json_get(answer, "reactions"))));
 }
 
 bool codec_decode(codec_request *out, codec_kind kind, const char *body, size_t len, store *uploads,

@@ -30,12 +30,10 @@ bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list
 /* A scene's mesh (not a box) and contacts (decode_mesh.c, decode_contacts.c); out->model is there. */
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh);
 bool decode_contacts(uz_scene *out, decoding *d, const json_value *list);
-/* What stands beside the problem (decode_beside.c). NULL: none, or the defaults. */
+/* What stands beside the problem (decode_beside.c); list or object NULL: none, or the defaults. */
 bool decode_cases(uz_problem *problem, decoding *d, const json_value *list);
-bool decode_start(codec_start *out, decoding *d, const json_value *object);
-bool decode_answer(codec_answer *out, decoding *d, const json_value *object);
 void decode_settings(uz_settings *out, const json_value *object);
-/* Assertions about the summary, after the cases; list NULL: none. */
+/* Assertions about the summary; after the cases. */
 bool decode_assertions(codec_request *out, decoding *d, const json_value *list);
 
 /* ---- pieces (decode_pieces.c) */

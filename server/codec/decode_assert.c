@@ -9,20 +9,6 @@
 /* Each summary has a line for each assertion about it. */
 #define MOST_LINES 100000
 
-static bool take_case(codec_assertion *out, decoding *d, const uz_problem *p, const json_value *value)
-{
-    char shown[80];
-    if (!decode_label(out->case_name, d, value, "A name of a case"))
-        return false;
-    for (int64_t i = 0; i < p->n_cases; i++)
-        if (strcmp(p->cases[i].name, out->case_name) == 0)
-            return true;
-    problem_quote(shown, sizeof shown, out->case_name, strlen(out->case_name));
-    problem_set(d->problem, 422, "not_allowed", value, "The request has no case %s%s.", shown,
-                p->n_cases == 0 ? "; it has none at all" : "");
-    return false;
-}
-
 static bool take_assertion(codec_assertion *out, decoding *d, const uz_problem *p, const json_value *object)
 {
     const json_value *quantity = json_get(object, "quantity"), *name = json_get(object, "name");
@@ -35,10 +21,18 @@ static bool take_assertion(codec_assertion *out, decoding *d, const uz_problem *
     out->near = decode_number(object, "near", (double)NAN);
     out->absolute = decode_number(object, "absolute", (double)NAN);
     out->relative = decode_number(object, "relative", (double)NAN);
-    if ((name && !decode_label(out->name, d, name, "The name of an assertion")) || (of && !take_case(out, d, p, of)))
+    if ((name && !decode_label(out->name, d, name, "The name of an assertion")) ||
+        (of && !decode_label(out->case_name, d, of, "A name of a case")))
         return false;
-    /* limits that no number can meet are a mistake */
-    if (out->least > out->most)
+    bool there = !of;
+    for (int64_t i = 0; i < p->n_cases && !there; i++)
+        there = strcmp(p->cases[i].name, out->case_name) == 0;
+    if (!there) {
+        char shown[80];
+        problem_quote(shown, sizeof shown, out->case_name, strlen(out->case_name));
+        problem_set(d->problem, 422, "not_allowed", of, "The request has no case %s%s.", shown,
+                    p->n_cases == 0 ? "; it has none at all" : "");
+    } else if (out->least > out->most) /* limits that no number can meet are a mistake */
         problem_set(d->problem, 422, "out_of_range", json_get(object, "min"),
                     "min is %.15g, above max, %.15g: no number is between them.", out->least, out->most);
     else if (out->near == 0.0 && isnan(out->absolute))

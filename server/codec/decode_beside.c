@@ -120,20 +120,3 @@ void decode_settings(uz_settings *out, const json_value *object)
     s.semidefinite = json_truth(json_get(object, "semidefinite"));
     *out = s;
 }
-
-/* ---- start and answer */
-
-bool decode_start(codec_start *out, decoding *d, const json_value *object)
-{
-    const json_value *of = json_get(object, "case"), *reactions = json_get(object, "reactions");
-    snprintf(out->job, sizeof out->job, "%s", text_or(object, "job", ""));
-    out->continued = json_truth(json_get(object, "continue"));
-    return (!of || decode_label(out->case_name, d, of, "A name of a case")) &&
-           (!reactions || decode_vector(&out->reactions, &out->n_reactions, d, reactions));
-}
-
-bool decode_answer(codec_answer *out, decoding *d, const json_value *object)
-{
-    return decode_points(&out->u, &out->n_u, &out->columns, d, json_get(object, "displacements")) &&
-           decode_vector(&out->r, &out->n_r, d, json_get(object, "reactions"));
-}

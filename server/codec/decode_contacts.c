@@ -14,30 +14,6 @@ typedef struct {
     int dim;
 } obstacle;
 
-static bool read_plane(const obstacle *o)
-{
-    o->to->kind = UZ_OBSTACLE_PLANE;
-    return decode_components(o->to->point, o->d, o->shape, "point", 0, o->dim) &&
-           decode_direction(o->to->normal, o->d, o->shape, "normal", o->dim, "it must point out of the obstacle");
-}
-
-static bool read_round(const obstacle *o)
-{
-    o->to->kind = UZ_OBSTACLE_ROUND;
-    o->to->radius = decode_number(o->shape, "radius", 0);
-    o->to->inside = json_truth(json_get(o->shape, "inside"));
-    return decode_components(o->to->point, o->d, o->shape, "center", 0, o->dim);
-}
-
-static bool read_cylinder(const obstacle *o)
-{
-    o->to->kind = UZ_OBSTACLE_CYLINDER;
-    o->to->radius = decode_number(o->shape, "radius", 0);
-    o->to->inside = json_truth(json_get(o->shape, "inside"));
-    return decode_components(o->to->point, o->d, o->shape, "point", 0, o->dim) &&
-           decode_direction(o->to->normal, o->d, o->shape, "axis", o->dim, "it must be the direction of the axis");
-}
-
 static bool read_polyline(const obstacle *o)
 {
     const json_value *value = json_get(o->shape, "points");
@@ -45,7 +21,6 @@ static bool read_polyline(const obstacle *o)
     int64_t n = 0;
     int columns = 0;
     uz_contact *to = o->to;
-    to->kind = UZ_OBSTACLE_POLYLINE;
     bool good = decode_points(&points, &n, &columns, o->d, value);
     if (good && columns != 2)
         good = decode_refuse(o->d, "size_mismatch", value, "must have points of 2 numbers.");
@@ -71,7 +46,6 @@ static bool read_height(const obstacle *o)
     uz_contact *to = o->to;
     int64_t n = 0;
     int columns = 0;
-    to->kind = UZ_OBSTACLE_HEIGHT;
     if (!decode_vector(&to->x, &to->n_x, o->d, json_get(o->shape, "x")))
         return false;
     if (!y) {
@@ -97,11 +71,20 @@ static bool read_height(const obstacle *o)
     return to->z || problem_no_memory(o->d->problem);
 }
 
+/* A shape has a point, a direction (what: that is not zero) and a radius, or a reader of its own. */
 static const struct {
     const char *key;
+    uz_obstacle_kind kind;
+    const char *point, *direction, *what;
     bool (*read)(const obstacle *o);
-} SHAPES[] = {{"plane", read_plane},       {"circle", read_round},      {"sphere", read_round},
-              {"cylinder", read_cylinder}, {"polyline", read_polyline}, {"height", read_height}};
+} SHAPES[] = {
+    {"plane", UZ_OBSTACLE_PLANE, "point", "normal", "it must point out of the obstacle", NULL},
+    {"circle", UZ_OBSTACLE_ROUND, "center", NULL, NULL, NULL},
+    {"sphere", UZ_OBSTACLE_ROUND, "center", NULL, NULL, NULL},
+    {"cylinder", UZ_OBSTACLE_CYLINDER, "point", "axis", "it must be the direction of the axis", NULL},
+    {"polyline", UZ_OBSTACLE_POLYLINE, NULL, NULL, NULL, read_polyline},
+    {"height", UZ_OBSTACLE_HEIGHT, NULL, NULL, NULL, read_height},
+};
 
 bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
 {
@@ -118,7 +101,15 @@ bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
         to->feature_angle = decode_number(item, "feature_angle", 0);
         for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {
             const obstacle o = {to, d, json_get(given, SHAPES[k].key), uz_scene_dim(out)};
-            if (o.shape && !SHAPES[k].read(&o))
+            if (!o.shape)
+                continue;
+            to->kind = SHAPES[k].kind;
+            to->radius = decode_number(o.shape, "radius", 0);
+            to->inside = json_truth(json_get(o.shape, "inside"));
+            if ((SHAPES[k].point && !decode_components(to->point, d, o.shape, SHAPES[k].point, 0, o.dim)) ||
+                (SHAPES[k].direction &&
+                 !decode_direction(to->normal, d, o.shape, SHAPES[k].direction, o.dim, SHAPES[k].what)) ||
+                (SHAPES[k].read && !SHAPES[k].read(&o)))
                 return false;
         }
     }

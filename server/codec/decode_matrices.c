@@ -16,34 +16,19 @@ static bool refuse_call(decoding *d, uz_error *err, const char *name)
     return false;
 }
 
-static bool read_matrix(uz_csc *out, uz_mm_info *info, decoding *d, const json_value *object, const char *name)
+static bool read_matrix(uz_csc *out, uz_mm_info *info, decoding *d, const json_value *value, const char *name)
 {
     uz_error err = {.status = UZ_OK};
     decode_source text;
-    if (!decode_source_open(&text, d, json_get(object, name)))
+    if (!decode_source_open(&text, d, value))
         return false;
     const bool good = uz_mm_read(out, info, text.data, text.len, d->bound + 32 * text.len, &err) == UZ_OK;
     decode_source_close(&text);
     return good || refuse_call(d, &err, name);
 }
 
-/* Each stored entry, and its mirror image where it lies off the diagonal; returns how many. */
-static int64_t list_both_halves(const uz_csc *A, int64_t *row, int64_t *col, double *val)
-{
-    int64_t count = 0;
-    for (int64_t j = 0; j < A->cols; j++)
-        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
-            int copies = A->idx[k] == j ? 1 : 2;
-            for (int mirror = 0; mirror < copies; mirror++, count++) {
-                row[count] = mirror ? j : A->idx[k];
-                col[count] = mirror ? A->idx[k] : j;
-                val[count] = A->val[k];
-            }
-        }
-    return count;
-}
-
-/* A symmetric file gave its lower triangle; N is general, so the other half is added. */
+/* A symmetric file gave its lower triangle; N is general, so the mirror image of each entry off the diagonal is added.
+ */
 static bool add_upper_half(decoding *d, uz_csc *A)
 {
     const size_t nnz = (size_t)A->ptr[A->cols];
@@ -54,7 +39,14 @@ static bool add_upper_half(decoding *d, uz_csc *A)
     const bool room = row && col && val;
     bool good = false;
     if (room) {
-        int64_t count = list_both_halves(A, row, col, val);
+        int64_t count = 0;
+        for (int64_t j = 0; j < A->cols; j++)
+            for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++)
+                for (int mirror = 0; mirror <= (A->idx[k] != j); mirror++, count++) {
+                    row[count] = mirror ? j : A->idx[k];
+                    col[count] = mirror ? A->idx[k] : j;
+                    val[count] = A->val[k];
+                }
         good = uz_csc_from_triplets(&full, A->rows, A->cols, count, row, col, val, &err) == UZ_OK;
     }
     if (good) {
@@ -69,20 +61,6 @@ static bool add_upper_half(decoding *d, uz_csc *A)
     return good || refuse_call(d, &err, "N");
 }
 
-static bool read_stiffness(uz_qp *out, decoding *d, const json_value *object)
-{
-    uz_mm_info info;
-    uz_error err = {.status = UZ_OK};
-    uz_csc *K = &out->K;
-    if (!read_matrix(K, &info, d, object, "K"))
-        return false;
-    if (K->rows != K->cols || K->rows == 0)
-        return decode_refuse(d, "size_mismatch", json_get(object, "K"),
-                             "is %lld x %lld, but a stiffness matrix is square and not empty.", (long long)K->rows,
-                             (long long)K->cols);
-    return info.symmetry == UZ_MM_SYMMETRIC || uz_symmetric_lower(K, &err) == UZ_OK || refuse_call(d, &err, "K");
-}
-
 /* A member that does not go with K. */
 static bool refuse_size(decoding *d, const uz_qp *out, const json_value *at, int64_t rows, int64_t cols,
                         const char *should)
@@ -91,37 +69,40 @@ static bool refuse_size(decoding *d, const uz_qp *out, const json_value *at, int
                          (long long)cols, (long long)out->K.rows, (long long)out->K.cols, should);
 }
 
-/* Without N there are no contacts. */
-static bool read_normals(uz_qp *out, decoding *d, const json_value *object)
+bool decode_matrices(uz_qp *out, decoding *d, const json_value *object)
 {
     uz_mm_info info;
     uz_error err = {.status = UZ_OK};
-    const json_value *value = json_get(object, "N");
-    uz_csc *N = &out->N;
-    if (!value)
-        return uz_csc_init(N, 0, out->K.cols, 0, &err) == UZ_OK || refuse_call(d, &err, "N");
-    if (!read_matrix(N, &info, d, object, "N"))
-        return false;
-    if (N->cols != out->K.cols)
-        return refuse_size(d, out, value, N->rows, N->cols, "they must have as many columns");
-    return info.symmetry == UZ_MM_GENERAL || add_upper_half(d, N);
-}
-
-bool decode_matrices(uz_qp *out, decoding *d, const json_value *object)
-{
-    uz_error err = {.status = UZ_OK};
+    const json_value *of_K = json_get(object, "K"), *of_N = json_get(object, "N");
     const json_value *p = json_get(object, "p"), *h = json_get(object, "h");
+    uz_csc *K = &out->K, *N = &out->N;
     int64_t n = 0, m = 0;
-    if (!read_stiffness(out, d, object) || !decode_vector(&out->p, &n, d, p))
+    if (!read_matrix(K, &info, d, of_K, "K"))
         return false;
-    if (n != out->K.rows)
+    if (K->rows != K->cols || K->rows == 0)
+        return decode_refuse(d, "size_mismatch", of_K,
+                             "is %lld x %lld, but a stiffness matrix is square and not empty.", (long long)K->rows,
+                             (long long)K->cols);
+    if (info.symmetry != UZ_MM_SYMMETRIC && uz_symmetric_lower(K, &err) != UZ_OK)
+        return refuse_call(d, &err, "K");
+    if (!decode_vector(&out->p, &n, d, p))
+        return false;
+    if (n != K->rows)
         return refuse_size(d, out, p, n, 1, "p needs a number for each row");
-    if (!read_normals(out, d, object))
+
+    /* without N there are no contacts */
+    if (!of_N && uz_csc_init(N, 0, K->cols, 0, &err) != UZ_OK)
+        return refuse_call(d, &err, "N");
+    if (of_N && !read_matrix(N, &info, d, of_N, "N"))
+        return false;
+    if (N->cols != K->cols)
+        return refuse_size(d, out, of_N, N->rows, N->cols, "they must have as many columns");
+    if (of_N && info.symmetry != UZ_MM_GENERAL && !add_upper_half(d, N))
         return false;
     if (h ? !decode_vector(&out->h, &m, d, h) : !(out->h = room_for(0, sizeof(double))))
         return h ? false : problem_no_memory(d->problem);
-    if (h && m != out->N.rows)
+    if (h && m != N->rows)
         return decode_refuse(d, "size_mismatch", h, "has %lld numbers, but N has %lld rows.", (long long)m,
-                             (long long)out->N.rows);
+                             (long long)N->rows);
     return uz_qp_check(out, &err) == UZ_OK || refuse_call(d, &err, "");
 }

@@ -25,70 +25,39 @@ static bool read_indices(int64_t **out, int64_t *n, int *columns, decoding *d, c
     return good;
 }
 
-/* ---- nodes */
-
-static bool read_nodes(uz_given_mesh *to, decoding *d, const json_value *nodes, int dim)
-{
-    int64_t n = 0;
-    int columns = 0;
-    if (!decode_points(&to->xyz, &n, &columns, d, nodes))
-        return false;
-    to->dim = dim;
-    to->n_nodes = n / dim;
-    if (columns == dim)
-        return true;
-    problem_set(d->problem, 422, "size_mismatch", nodes, "Nodes have %d coordinates here, not %d: the model is %s.",
-                dim, columns, dim == 3 ? "solid" : "one in the plane");
-    return false;
-}
-
-/* ---- elements */
-
-/* The tables of all kinds, before they are put together. */
-typedef struct {
-    int64_t *node[UZ_ELEMENT_KINDS], n[UZ_ELEMENT_KINDS];
-} element_tables;
-
-static bool join_tables(uz_given_mesh *to, decoding *d, const element_tables *tables)
-{
-    int64_t places = 0, e = 0;
-    for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
-        places += tables->n[k];
-        to->n_elements += tables->n[k] / uz_element_node_count((uz_element_kind)k);
-    }
-    to->kind = room_for((size_t)to->n_elements, sizeof *to->kind);
-    to->first = room_for((size_t)to->n_elements + 1, sizeof *to->first);
-    to->node = room_for((size_t)places, sizeof *to->node);
-    if (!to->kind || !to->first || !to->node)
-        return problem_no_memory(d->problem);
-    to->first[0] = 0;
-    for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
-        const int count = uz_element_node_count((uz_element_kind)k);
-        if (tables->n[k] > 0)
-            memcpy(to->node + to->first[e], tables->node[k], (size_t)tables->n[k] * sizeof *to->node);
-        for (int64_t i = 0; i < tables->n[k] / count; i++, e++) {
-            to->kind[e] = (unsigned char)k;
-            to->first[e + 1] = to->first[e] + count;
-        }
-    }
-    return true;
-}
-
+/* The tables of all kinds, then all of them in one. */
 static bool read_elements(uz_given_mesh *to, decoding *d, const json_value *elements)
 {
-    element_tables tables = {0};
+    int64_t *node[UZ_ELEMENT_KINDS] = {NULL}, n[UZ_ELEMENT_KINDS] = {0}, places = 0, e = 0;
     bool good = true;
     for (int k = 0; k < UZ_ELEMENT_KINDS && good; k++) {
         const json_value *table = json_get(elements, uz_element_name((uz_element_kind)k));
         const int count = uz_element_node_count((uz_element_kind)k);
         int columns = 0;
-        good = !table || read_indices(&tables.node[k], &tables.n[k], &columns, d, table);
-        if (good && tables.n[k] > 0 && columns != count)
+        good = !table || read_indices(&node[k], &n[k], &columns, d, table);
+        if (good && n[k] > 0 && columns != count)
             good = decode_refuse(d, "size_mismatch", table, "has elements of %d nodes; they have %d.", columns, count);
+        places += n[k];
+        to->n_elements += n[k] / count;
     }
-    good = good && join_tables(to, d, &tables);
-    for (int k = 0; k < UZ_ELEMENT_KINDS; k++)
-        free(tables.node[k]);
+    if (good) {
+        to->kind = room_for((size_t)to->n_elements, sizeof *to->kind);
+        to->first = room_for((size_t)to->n_elements + 1, sizeof *to->first);
+        to->node = room_for((size_t)places, sizeof *to->node);
+        good = (to->kind && to->first && to->node) || problem_no_memory(d->problem);
+    }
+    if (good)
+        to->first[0] = 0;
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
+        const int count = uz_element_node_count((uz_element_kind)k);
+        if (good && n[k] > 0)
+            memcpy(to->node + to->first[e], node[k], (size_t)n[k] * sizeof *to->node);
+        for (int64_t i = 0; good && i < n[k] / count; i++, e++) {
+            to->kind[e] = (unsigned char)k;
+            to->first[e + 1] = to->first[e] + count;
+        }
+        free(node[k]);
+    }
     return good;
 }
 
@@ -194,12 +163,11 @@ static bool read_groups(uz_given_mesh *to, decoding *d, const json_value *groups
     return to->groups != NULL;
 }
 
-/* ---- Gmsh */
-
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
 {
-    const json_value *gmsh = json_get(mesh, "gmsh");
+    const json_value *gmsh = json_get(mesh, "gmsh"), *nodes = json_get(mesh, "nodes");
     const int dim = uz_scene_dim(out);
+    uz_given_mesh *to = &out->given;
     out->source = UZ_MESH_GIVEN;
     if (gmsh) {
         /* The bytes of a Gmsh file, in the request or uploaded before. A binary one can only be uploaded: JSON has no
@@ -208,13 +176,21 @@ bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
         decode_source file;
         if (!decode_source_open(&file, d, gmsh))
             return false;
-        const bool good =
-            uz_mesh_read(&out->given, "gmsh", file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
+        const bool good = uz_mesh_read(to, "gmsh", file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
         decode_source_close(&file);
         snprintf(err.where, sizeof err.where, "/mesh/gmsh");
         return good || decode_refuse_text(d, gmsh, &err, UZ_PROBLEM_SCENE);
     }
-    return read_nodes(&out->given, d, json_get(mesh, "nodes"), dim) &&
-           read_elements(&out->given, d, json_get(mesh, "elements")) &&
-           read_groups(&out->given, d, json_get(mesh, "groups"), dim);
+    int64_t n = 0;
+    int columns = 0;
+    if (!decode_points(&to->xyz, &n, &columns, d, nodes))
+        return false;
+    to->dim = dim;
+    to->n_nodes = n / dim;
+    if (columns != dim) {
+        problem_set(d->problem, 422, "size_mismatch", nodes, "Nodes have %d coordinates here, not %d: the model is %s.",
+                    dim, columns, dim == 3 ? "solid" : "one in the plane");
+        return false;
+    }
+    return read_elements(to, d, json_get(mesh, "elements")) && read_groups(to, d, json_get(mesh, "groups"), dim);
 }

@@ -91,20 +91,6 @@ size_t decode_memory_bound(size_t body_len)
     return ((size_t)64 << 20) + 32 * body_len;
 }
 
-/* Notes that the request uses it, once. */
-static bool note_upload(decoding *d, const char *id)
-{
-    for (size_t i = 0; i < d->n_uploads; i++)
-        if (strcmp(d->uploads[i], id) == 0)
-            return true;
-    char(*grown)[65] = room_grow(d->uploads, d->n_uploads + 1, sizeof *grown);
-    if (!grown)
-        return problem_no_memory(d->problem);
-    d->uploads = grown;
-    snprintf(d->uploads[d->n_uploads++], sizeof *grown, "%s", id);
-    return true;
-}
-
 bool decode_source_open(decode_source *out, decoding *d, const json_value *value)
 {
     const json_value *upload = json_get(value, "upload");
@@ -120,10 +106,17 @@ bool decode_source_open(decode_source *out, decoding *d, const json_value *value
     if (status == STORE_OK) {
         out->data = out->mapped.data;
         out->len = out->mapped.len;
-        if (note_upload(d, id))
-            return true;
-        decode_source_close(out);
-        return false;
+        for (size_t i = 0; i < d->n_uploads; i++) /* each is noted once */
+            if (strcmp(d->uploads[i], id) == 0)
+                return true;
+        char(*grown)[65] = room_grow(d->uploads, d->n_uploads + 1, sizeof *grown);
+        if (!grown) {
+            decode_source_close(out);
+            return problem_no_memory(d->problem);
+        }
+        d->uploads = grown;
+        snprintf(d->uploads[d->n_uploads++], sizeof *grown, "%s", id);
+        return true;
     }
     if (status == STORE_NOT_FOUND)
         return decode_refuse(d, "unknown_upload", upload,

@@ -44,21 +44,6 @@ static bool decode_box(uz_scene *out, decoding *d, const json_value *box)
 
 /* ---- lists */
 
-static bool decode_materials(uz_scene *out, decoding *d, const json_value *list)
-{
-    out->materials = decode_room(d, list, sizeof *out->materials, &out->n_materials);
-    for (int64_t i = 0; i < out->n_materials; i++) {
-        const json_value *item = &list->items[i];
-        uz_material *to = &out->materials[i];
-        decode_name(to->on, sizeof to->on, item, "on", "");
-        to->young = decode_number(item, "young", 0);
-        to->poisson = decode_number(item, "poisson", 0);
-        to->density = decode_number(item, "density", 0);
-        to->expansion = decode_number(item, "expansion", 0);
-    }
-    return out->materials != NULL;
-}
-
 static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
 {
     static const char *const KEYS[3] = {"ux", "uy", "uz"};
@@ -84,41 +69,34 @@ static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
     return out->supports && good;
 }
 
-static const struct {
-    const char *key;
-    uz_load_kind kind;
-    bool vector;
-} LOADS[] = {{"traction", UZ_LOAD_TRACTION, true}, {"pressure", UZ_LOAD_PRESSURE, false},
-             {"force", UZ_LOAD_FORCE, true},       {"body_force", UZ_LOAD_BODY_FORCE, true},
-             {"gravity", UZ_LOAD_GRAVITY, true},   {"temperature", UZ_LOAD_TEMPERATURE, false}};
-
-static bool decode_load(uz_load *to, decoding *d, const json_value *item, int dim)
-{
-    const json_value *node = json_get(item, "node");
-    decode_name(to->on, sizeof to->on, item, "on", "");
-    for (size_t k = 0; k < sizeof LOADS / sizeof LOADS[0]; k++) {
-        if (!json_get(item, LOADS[k].key))
-            continue;
-        to->kind = LOADS[k].kind;
-        to->value = LOADS[k].vector ? 0 : decode_number(item, LOADS[k].key, 0);
-        if (LOADS[k].vector && !decode_components(to->v, d, item, LOADS[k].key, 0, dim))
-            return false;
-    }
-    if (node) {
-        to->kind = UZ_LOAD_NODE_FORCE;
-        to->node = node->number < 1e15 ? (int64_t)node->number : INT64_MAX; /* no mesh has that one */
-    }
-    return true;
-}
-
 bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list, int dim)
 {
-    bool good = true;
-    uz_load *loads = decode_room(d, list, sizeof *loads, n);
-    for (int64_t i = 0; i < *n && good; i++)
-        good = decode_load(&loads[i], d, &list->items[i], dim);
-    *out = loads;
-    return loads != NULL && good;
+    static const struct {
+        const char *key;
+        uz_load_kind kind;
+        bool vector;
+    } LOADS[] = {{"traction", UZ_LOAD_TRACTION, true}, {"pressure", UZ_LOAD_PRESSURE, false},
+                 {"force", UZ_LOAD_FORCE, true},       {"body_force", UZ_LOAD_BODY_FORCE, true},
+                 {"gravity", UZ_LOAD_GRAVITY, true},   {"temperature", UZ_LOAD_TEMPERATURE, false}};
+    uz_load *loads = *out = decode_room(d, list, sizeof *loads, n);
+    for (int64_t i = 0; i < *n; i++) {
+        const json_value *item = &list->items[i], *node = json_get(item, "node");
+        uz_load *to = &loads[i];
+        decode_name(to->on, sizeof to->on, item, "on", "");
+        for (size_t k = 0; k < sizeof LOADS / sizeof LOADS[0]; k++) {
+            if (!json_get(item, LOADS[k].key))
+                continue;
+            to->kind = LOADS[k].kind;
+            to->value = LOADS[k].vector ? 0 : decode_number(item, LOADS[k].key, 0);
+            if (LOADS[k].vector && !decode_components(to->v, d, item, LOADS[k].key, 0, dim))
+                return false;
+        }
+        if (node) {
+            to->kind = UZ_LOAD_NODE_FORCE;
+            to->node = node->number < 1e15 ? (int64_t)node->number : INT64_MAX; /* no mesh has that one */
+        }
+    }
+    return loads != NULL;
 }
 
 /* ---- the whole */
@@ -128,13 +106,24 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
     static const char *const MODELS[] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
     static const char *const FORMULATIONS[] = {"auto", "standard", "bbar", "incompatible_modes"};
     const json_value *mesh = json_get(object, "mesh"), *box = json_get(mesh, "box");
+    const json_value *materials = json_get(object, "materials");
     out->model = (uz_model)word_of(object, "model", MODELS, 4);
     out->formulation = (uz_formulation)word_of(object, "formulation", FORMULATIONS, 4);
     out->thickness = decode_number(object, "thickness", 1);
     out->all_candidates = json_text_is(json_get(object, "candidates"), "all");
-    return (box ? decode_box(out, d, box) : decode_mesh(out, d, mesh)) &&
-           decode_materials(out, d, json_get(object, "materials")) &&
-           decode_supports(out, d, json_get(object, "supports")) &&
+    if (box ? !decode_box(out, d, box) : !decode_mesh(out, d, mesh))
+        return false;
+    out->materials = decode_room(d, materials, sizeof *out->materials, &out->n_materials);
+    for (int64_t i = 0; i < out->n_materials; i++) {
+        const json_value *item = &materials->items[i];
+        uz_material *to = &out->materials[i];
+        decode_name(to->on, sizeof to->on, item, "on", "");
+        to->young = decode_number(item, "young", 0);
+        to->poisson = decode_number(item, "poisson", 0);
+        to->density = decode_number(item, "density", 0);
+        to->expansion = decode_number(item, "expansion", 0);
+    }
+    return out->materials && decode_supports(out, d, json_get(object, "supports")) &&
            decode_loads(&out->loads, &out->n_loads, d, json_get(object, "loads"), uz_scene_dim(out)) &&
            decode_contacts(out, d, json_get(object, "contacts"));
 }

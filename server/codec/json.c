@@ -128,15 +128,6 @@ bool json_text_is(const json_value *value, const char *word)
     return text && value->count == strlen(word) && memcmp(text, word, value->count) == 0;
 }
 
-static bool same_long_texts(const json_value *a, const json_value *b)
-{
-    char *x = json_copy_text(a), *y = json_copy_text(b);
-    const bool same = x && y && memcmp(x, y, a->count) == 0;
-    free(x);
-    free(y);
-    return same;
-}
-
 bool json_same(const json_value *a, const json_value *b)
 {
     if (!a || !b || a->kind != b->kind)
@@ -149,8 +140,15 @@ bool json_same(const json_value *a, const json_value *b)
         return a->number == b->number;
     if (a->count != b->count)
         return false;
-    if (a->kind == JSON_IS_STRING)
-        return a->is_long ? same_long_texts(a, b) : memcmp(a->text, b->text, a->count) == 0;
+    if (a->kind == JSON_IS_STRING && !a->is_long)
+        return memcmp(a->text, b->text, a->count) == 0;
+    if (a->kind == JSON_IS_STRING) {
+        char *x = json_copy_text(a), *y = json_copy_text(b);
+        const bool equal = x && y && memcmp(x, y, a->count) == 0;
+        free(x);
+        free(y);
+        return equal;
+    }
     bool same = a->kind != JSON_IS_NUMBERS || a->columns == b->columns;
     for (size_t i = 0; same && i < a->count * (a->columns ? a->columns : 1); i++)
         same =
@@ -190,26 +188,6 @@ double *json_take_numbers(const json_value *array)
 
 /* ---- pointers */
 
-/* One step as it stands in a pointer, at most size - 1 bytes; returns its full length. */
-static size_t write_step(char *out, size_t size, const json_value *step)
-{
-    size_t used = 1;
-    if (!step->key)
-        return (size_t)snprintf(out, size, "/%zu", step->place);
-    if (size > 0)
-        out[0] = '/';
-    for (size_t i = 0; i < step->place; i++) {
-        const unsigned char c = (unsigned char)step->key[i];
-        const char one[2] = {(char)(c < 0x20 || c == 0x7f ? '?' : c), '\0'};
-        for (const char *shown = c == '~' ? "~0" : c == '/' ? "~1" : one; *shown; shown++, used++)
-            if (used < size)
-                out[used] = *shown;
-    }
-    if (used < size)
-        out[used] = '\0';
-    return used;
-}
-
 void json_pointer(char *out, size_t size, const json_value *value)
 {
     const json_value *steps[JSON_MAX_DEPTH + 2];
@@ -219,12 +197,24 @@ void json_pointer(char *out, size_t size, const json_value *value)
     if (size > 0)
         out[0] = '\0';
     while (n > 0 && size > 0) {
-        const size_t step = write_step(out + used, size - used, steps[--n]);
-        if (step >= size - used) {
-            out[used] = '\0';
-            return;
+        const json_value *step = steps[--n];
+        size_t end = used; /* of this step, if all of it is written */
+        if (step->key) {
+            for (size_t i = 0; i <= step->place; i++) {
+                const unsigned char c = i == 0 ? 0 : (unsigned char)step->key[i - 1];
+                const char one[2] = {(char)(i == 0 ? '/' : c < 0x20 || c == 0x7f ? '?' : c), '\0'};
+                for (const char *shown = c == '~' ? "~0" : c == '/' ? "~1" : one; *shown; shown++, end++)
+                    if (end < size)
+                        out[end] = *shown;
+            }
+        } else {
+            end += (size_t)snprintf(out + used, size - used, "/%zu", step->place);
         }
-        used += step;
+        if (end < size)
+            used = end;
+        out[used] = '\0';
+        if (end != used)
+            return;
     }
 }
 
@@ -245,46 +235,35 @@ static size_t string_end(const char *json, size_t len, size_t at)
     return at + 1;
 }
 
-/* Behind the value that begins at `at`. */
-static size_t value_end(const char *json, size_t len, size_t at)
-{
-    int depth = 0;
-    while (at < len) {
-        const char c = json[at];
-        if (depth == 0 && (c == ',' || c == '}'))
-            break;
-        depth += (c == '{' || c == '[') - (c == '}' || c == ']');
-        at = c == '"' ? string_end(json, len, at) : at + 1;
-    }
-    while (at > 0 && strchr(" \t\r\n", json[at - 1]))
-        at--;
-    return at;
-}
-
-/* text[0..len) is the inside of a key. It may be written with escapes, at most six bytes for each of its own. */
-static bool key_is(const char *text, size_t len, const char *key)
-{
-    char plain[64];
-    size_t end, bytes = 0;
-    const size_t wanted = strlen(key);
-    return len <= 6 * wanted && wanted + 4 <= sizeof plain && !json_text_check(text - 1, len + 2, 0, &end, &bytes) &&
-           bytes == wanted && json_text_decode(plain, text, bytes) == wanted && memcmp(plain, key, wanted) == 0;
-}
-
 const char *json_member_text(const char *json, size_t len, const char *key, size_t *member_len)
 {
-    *member_len = 0;
+    const size_t wanted = strlen(key);
     size_t at = skip_space(json, len, skip_space(json, len, 0) + 1);
+    *member_len = 0;
     while (at < len && json[at] == '"') {
-        const size_t end = string_end(json, len, at);
-        const size_t value = skip_space(json, len, skip_space(json, len, end) + 1),
-                     behind = value_end(json, len, value);
-        if (key_is(json + at + 1, end - at - 2, key)) {
+        const size_t end = string_end(json, len, at), inside = end - at - 2;
+        const size_t value = skip_space(json, len, skip_space(json, len, end) + 1);
+        int depth = 0;
+        size_t behind = value;
+        while (behind < len && (depth > 0 || (json[behind] != ',' && json[behind] != '}'))) {
+            const char c = json[behind];
+            depth += (c == '{' || c == '[') - (c == '}' || c == ']');
+            behind = c == '"' ? string_end(json, len, behind) : behind + 1;
+        }
+        const size_t next = behind;
+        while (behind > 0 && strchr(" \t\r\n", json[behind - 1]))
+            behind--;
+
+        /* the key may be written with escapes, at most six bytes for each of its own */
+        char plain[64];
+        size_t quote, bytes = 0;
+        if (inside <= 6 * wanted && wanted + 4 <= sizeof plain &&
+            !json_text_check(json + at, inside + 2, 0, &quote, &bytes) && bytes == wanted &&
+            json_text_decode(plain, json + at + 1, bytes) == wanted && memcmp(plain, key, wanted) == 0) {
             *member_len = behind - value;
             return json + value;
         }
-        at = skip_space(json, len, behind);
-        at = skip_space(json, len, at + (at < len && json[at] == ','));
+        at = skip_space(json, len, next + (next < len && json[next] == ','));
     }
     return NULL;
 }

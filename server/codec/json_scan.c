@@ -24,6 +24,8 @@ typedef struct {
     size_t used, capacity;
 } scanner;
 
+static const char EXPECTED[] = "a value was expected (an object, array, string, number, true, false or null)";
+
 static bool scan_value(scanner *s, json_value *out);
 static bool stop_syntax(scanner *s, size_t at, const char *why);
 static int peek(scanner *s);
@@ -74,11 +76,6 @@ static bool stop_syntax(scanner *s, size_t at, const char *why)
     return false;
 }
 
-static bool stop_expected(scanner *s)
-{
-    return stop_syntax(s, s->at, "a value was expected (an object, array, string, number, true, false or null)");
-}
-
 /* One more value, at this place. */
 static bool count_value(scanner *s, const json_value *at)
 {
@@ -121,48 +118,32 @@ static bool next_item(scanner *s, char close, bool *failed)
     return stop_syntax(s, s->at, close == ']' ? "a comma or ']' was expected" : "a comma or '}' was expected");
 }
 
-static bool is_digit(const scanner *s, size_t at)
-{
-    return at < s->len && s->text[at] >= '0' && s->text[at] <= '9';
-}
-
 static size_t digits_end(const scanner *s, size_t at)
 {
-    while (is_digit(s, at))
+    while (at < s->len && s->text[at] >= '0' && s->text[at] <= '9')
         at++;
     return at;
 }
 
-/* End of the number that starts at s->at by the grammar of RFC 8259, section 6; 0 if there is none, and *bad is the
- * offending byte. */
-static size_t number_end(const scanner *s, size_t *bad)
-{
-    size_t at = s->at + (s->text[s->at] == '-');
-    size_t end = at < s->len && s->text[at] == '0' ? at + 1 : digits_end(s, at);
-    *bad = end;
-    if (end == at || is_digit(s, end))
-        return 0;
-    if (end < s->len && s->text[end] == '.') {
-        at = end + 1;
-        *bad = end = digits_end(s, at);
-        if (end == at)
-            return 0;
-    }
-    if (end < s->len && (s->text[end] == 'e' || s->text[end] == 'E')) {
-        at = end + 1;
-        at += at < s->len && (s->text[at] == '+' || s->text[at] == '-');
-        *bad = end = digits_end(s, at);
-        if (end == at)
-            return 0;
-    }
-    return end;
-}
-
+/* The number at s->at by the grammar of RFC 8259, section 6. */
 static bool scan_number(scanner *s, const json_value *at, double *value)
 {
-    size_t bad, start = s->at, end = number_end(s, &bad);
-    if (end == 0)
-        return stop_syntax(s, bad, "a number is malformed");
+    const size_t start = s->at, whole = start + (s->text[start] == '-');
+    size_t part = whole, end = whole < s->len && s->text[whole] == '0' ? whole + 1 : digits_end(s, whole);
+    bool good = end > part && digits_end(s, end) == end;
+    if (good && end < s->len && s->text[end] == '.') {
+        part = end + 1;
+        end = digits_end(s, part);
+        good = end > part;
+    }
+    if (good && end < s->len && (s->text[end] == 'e' || s->text[end] == 'E')) {
+        part = end + 1;
+        part += part < s->len && (s->text[part] == '+' || s->text[part] == '-');
+        end = digits_end(s, part);
+        good = end > part;
+    }
+    if (!good)
+        return stop_syntax(s, end, "a number is malformed");
     if (uz_parse_double(value, s->text + start, end - start) != end - start)
         return stop_syntax(s, start, "a number is malformed");
     if (!isfinite(*value)) {
@@ -180,7 +161,7 @@ static bool scan_word(scanner *s, json_value *out, const char *word, json_kind k
 {
     const size_t n = strlen(word);
     if (s->len - s->at < n || memcmp(s->text + s->at, word, n) != 0)
-        return stop_expected(s);
+        return stop_syntax(s, s->at, EXPECTED);
     s->at += n;
     out->kind = kind;
     if (kind == JSON_IS_BOOLEAN)
@@ -282,8 +263,8 @@ static bool scan_row(scanner *s, const json_value *row, double *numbers, bool on
         const int c = peek(s);
         if (!one && !count_value(s, &here))
             return false;
-        if (c != '-' && !is_digit(s, s->at))
-            return one ? stop_syntax(s, s->at, "a number was expected") : stop_expected(s);
+        if (c != '-' && (c < '0' || c > '9'))
+            return stop_syntax(s, s->at, one ? "a number was expected" : EXPECTED);
         if (!scan_number(s, &here, &numbers[i]))
             return false;
         if (!next_item(s, ']', &failed))
@@ -291,45 +272,40 @@ static bool scan_row(scanner *s, const json_value *row, double *numbers, bool on
     }
 }
 
-static bool scan_table(scanner *s, json_value *out, double *numbers, size_t columns, bool one)
-{
-    bool failed = false;
-    s->at++;
-    for (size_t i = 0;; i++) {
-        const json_value row = {.parent = out, .place = i};
-        const int c = peek(s);
-        if (!one && !count_value(s, &row))
-            return false;
-        if (c != '[')
-            return one ? stop_syntax(s, s->at, "a row of numbers was expected") : stop_expected(s);
-        if (!one && !check_depth(s, &row))
-            return false;
-        if (!scan_row(s, &row, numbers + i * columns, one || columns > JSON_SHORT_ARRAY))
-            return false;
-        if (!next_item(s, ']', &failed))
-            return !failed;
-    }
-}
-
+/* The block at s->at, of which looks_like_numbers said how large it is. */
 static bool scan_numbers(scanner *s, json_value *out, size_t count, size_t columns)
 {
-    const bool one = count > JSON_SHORT_ARRAY && columns <= JSON_SHORT_ARRAY;
-    const size_t row = (columns ? columns : 1) * sizeof(double);
-    const bool is_long = count * row > JSON_SHORT_ARRAY * sizeof(double);
-    double *numbers = is_long ? room_for(count, row) : json_room(s->tree, count * row);
+    const bool one = count > JSON_SHORT_ARRAY && columns <= JSON_SHORT_ARRAY; /* counts as one value */
+    const size_t row_size = (columns ? columns : 1) * sizeof(double);
+    const bool is_long = count * row_size > JSON_SHORT_ARRAY * sizeof(double);
+    double *numbers = is_long ? room_for(count, row_size) : json_room(s->tree, count * row_size);
+    bool failed = false, more = columns > 0;
     if (!numbers)
         return problem_no_memory(s->problem);
-    if (columns ? scan_table(s, out, numbers, columns, one) : scan_row(s, out, numbers, one)) {
-        out->kind = JSON_IS_NUMBERS;
-        out->numbers = numbers;
-        out->count = count;
-        out->columns = (uint32_t)columns;
-        out->is_long = is_long;
-        return true;
+    if (columns == 0)
+        failed = !scan_row(s, out, numbers, one);
+    else
+        s->at++;
+    for (size_t i = 0; more; i++) {
+        const json_value row = {.parent = out, .place = i};
+        const int c = peek(s);
+        failed = !one && !count_value(s, &row);
+        if (!failed && c != '[')
+            failed = !stop_syntax(s, s->at, one ? "a row of numbers was expected" : EXPECTED);
+        failed = failed || (!one && !check_depth(s, &row)) ||
+                 !scan_row(s, &row, numbers + i * columns, one || columns > JSON_SHORT_ARRAY);
+        more = !failed && next_item(s, ']', &failed);
     }
-    if (is_long)
+    if (failed && is_long)
         free(numbers);
-    return false;
+    if (failed)
+        return false;
+    out->kind = JSON_IS_NUMBERS;
+    out->numbers = numbers;
+    out->count = count;
+    out->columns = (uint32_t)columns;
+    out->is_long = is_long;
+    return true;
 }
 
 /* ------------------------------------------------------ arrays and objects */
@@ -407,32 +383,6 @@ static bool scan_key(scanner *s, size_t base, json_value *member, void **keys)
     return !failed;
 }
 
-/* Where a value stands at last, what is in it learns where that is. */
-static void adopt(json_value *value)
-{
-    if (value->kind == JSON_IS_ARRAY || value->kind == JSON_IS_OBJECT)
-        for (size_t i = 0; i < value->count; i++)
-            value->items[i].parent = value;
-}
-
-/* Moves what was pushed since `base` into the tree. */
-static bool close_container(scanner *s, json_value *out, size_t base, json_kind kind)
-{
-    const size_t count = s->used - base;
-    json_value *items = json_room(s->tree, count * sizeof *items);
-    if (!items)
-        return problem_no_memory(s->problem);
-    if (count > 0)
-        memcpy(items, s->stack + base, count * sizeof *items);
-    for (size_t i = 0; i < count; i++)
-        adopt(&items[i]);
-    s->used = base;
-    out->kind = kind;
-    out->items = items;
-    out->count = count;
-    return true;
-}
-
 static void keep_key(void *key)
 {
     (void)key;
@@ -462,7 +412,22 @@ static bool scan_container(scanner *s, json_value *out, bool object)
         failed = (object && !scan_key(s, base, &item, &keys)) || !scan_value(s, &item) || !push(s, &item);
         more = !failed && next_item(s, close, &failed);
     }
-    failed = failed || !close_container(s, out, base, object ? JSON_IS_OBJECT : JSON_IS_ARRAY);
+    /* What was pushed moves into the tree, where what is in it learns where that is. */
+    json_value *items = failed ? NULL : json_room(s->tree, (s->used - base) * sizeof *items);
+    if (!failed && !items)
+        failed = !problem_no_memory(s->problem);
+    if (!failed) {
+        out->kind = object ? JSON_IS_OBJECT : JSON_IS_ARRAY;
+        out->items = items;
+        out->count = s->used - base;
+        if (out->count > 0)
+            memcpy(items, s->stack + base, out->count * sizeof *items);
+        for (size_t i = 0; i < out->count; i++)
+            if (items[i].kind == JSON_IS_ARRAY || items[i].kind == JSON_IS_OBJECT)
+                for (size_t k = 0; k < items[i].count; k++)
+                    items[i].items[k].parent = &items[i];
+        s->used = base;
+    }
     while (s->used > base)
         json_free_numbers(&s->stack[--s->used]);
     tdestroy(keys, keep_key);
@@ -493,7 +458,7 @@ static bool scan_value(scanner *s, json_value *out)
         return scan_word(s, out, "null", JSON_IS_NULL, false);
     default:
         if (c != '-' && (c < '0' || c > '9'))
-            return stop_expected(s);
+            return stop_syntax(s, s->at, EXPECTED);
         out->kind = JSON_IS_NUMBER;
         return scan_number(s, out, &out->number);
     }

@@ -3,53 +3,35 @@
 
 #include <string.h>
 
-static bool continues(const char *text, size_t i)
-{
-    return ((unsigned char)text[i] & 0xc0) == 0x80;
-}
-
 /* Unicode 15, table 3-7: the second byte's range excludes overlongs, surrogates and what lies above U+10FFFF. */
 size_t json_utf8_length(const char *text, size_t len)
 {
-    unsigned char a = len > 0 ? (unsigned char)text[0] : 0xff;
-    unsigned char b = len > 1 ? (unsigned char)text[1] : 0;
+    const unsigned char a = len > 0 ? (unsigned char)text[0] : 0xff, b = len > 1 ? (unsigned char)text[1] : 0;
+    const unsigned char low = a == 0xe0 ? 0xa0 : a == 0xf0 ? 0x90 : 0x80;
+    const unsigned char high = a == 0xed ? 0x9f : a == 0xf4 ? 0x8f : 0xbf;
     if (a < 0x80)
         return 1;
-    if (a >= 0xc2 && a <= 0xdf)
-        return len > 1 && continues(text, 1) ? 2 : 0;
-    if (a >= 0xe0 && a <= 0xef) {
-        unsigned char low = a == 0xe0 ? 0xa0 : 0x80, high = a == 0xed ? 0x9f : 0xbf;
-        return len > 2 && b >= low && b <= high && continues(text, 2) ? 3 : 0;
-    }
-    if (a >= 0xf0 && a <= 0xf4) {
-        unsigned char low = a == 0xf0 ? 0x90 : 0x80, high = a == 0xf4 ? 0x8f : 0xbf;
-        return len > 3 && b >= low && b <= high && continues(text, 2) && continues(text, 3) ? 4 : 0;
-    }
-    return 0;
-}
-
-static int hex_digit(char c)
-{
-    if (c >= '0' && c <= '9')
-        return c - '0';
-    if (c >= 'a' && c <= 'f')
-        return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F')
-        return c - 'A' + 10;
-    return -1;
+    const size_t bytes = a < 0xc2 ? 0 : a <= 0xdf ? 2 : a <= 0xef ? 3 : a <= 0xf4 ? 4 : 0;
+    if (bytes == 0 || len < bytes || b < low || b > high)
+        return 0;
+    for (size_t i = 2; i < bytes; i++)
+        if (((unsigned char)text[i] & 0xc0) != 0x80)
+            return 0;
+    return bytes;
 }
 
 /* The four hex digits at text[0..len), or -1. */
 static int hex4(const char *text, size_t len)
 {
+    static const char DIGITS[] = "0123456789abcdefABCDEF";
     int value = 0;
     if (len < 4)
         return -1;
     for (int i = 0; i < 4; i++) {
-        int digit = hex_digit(text[i]);
-        if (digit < 0)
+        const char *digit = text[i] ? strchr(DIGITS, text[i]) : NULL;
+        if (!digit)
             return -1;
-        value = value * 16 + digit;
+        value = value * 16 + (int)(digit - DIGITS) - (digit - DIGITS > 15 ? 6 : 0);
     }
     return value;
 }
@@ -123,22 +105,9 @@ const char *json_text_check(const char *text, size_t len, size_t at, size_t *end
     return at < len ? NULL : "a string has no closing quote";
 }
 
-static inline size_t put_utf8(char *out, unsigned code)
-{
-    if (code < 0x80) {
-        out[0] = (char)code;
-        return 1;
-    }
-    static const unsigned char FIRST[] = {0, 0, 0xc0, 0xe0, 0xf0};
-    const size_t bytes = utf8_bytes(code);
-    for (size_t i = bytes - 1; i > 0; i--, code >>= 6)
-        out[i] = (char)(0x80 | (code & 0x3f));
-    out[0] = (char)(FIRST[bytes] | code);
-    return bytes;
-}
-
 size_t json_text_decode(char *out, const char *from, size_t bytes)
 {
+    static const unsigned char FIRST[] = {0, 0, 0xc0, 0xe0, 0xf0}; /* bits of the first of so many bytes */
     size_t used = 0;
     while (used < bytes) {
         const char *escape = memchr(from, '\\', bytes - used);
@@ -146,12 +115,16 @@ size_t json_text_decode(char *out, const char *from, size_t bytes)
         memcpy(out + used, from, run);
         used += run;
         from += run;
-        if (escape) {
-            unsigned code = 0;
-            const char *why;
-            from += read_escape(from, 12, &code, &why); /* was checked: what is behind a shorter one is not looked at */
-            used += put_utf8(out + used, code);
-        }
+        if (!escape)
+            break;
+        unsigned code = 0;
+        const char *why;
+        from += read_escape(from, 12, &code, &why); /* was checked: what is behind a shorter one is not looked at */
+        const size_t length = utf8_bytes(code);
+        for (size_t i = length - 1; i > 0; i--, code >>= 6)
+            out[used + i] = (char)(0x80 | (code & 0x3f));
+        out[used] = (char)(FIRST[length] | code);
+        used += length;
     }
     return used;
 }

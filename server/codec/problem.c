@@ -37,14 +37,6 @@ static const struct {
     {"internal", "A fault of this service"},
 };
 
-const char *problem_title(const char *code)
-{
-    for (size_t i = 0; i < sizeof TITLES / sizeof TITLES[0]; i++)
-        if (strcmp(TITLES[i].code, code) == 0)
-            return TITLES[i].title;
-    return "The request was refused";
-}
-
 /* Takes back the last character of out[0..len) if the size cut it in two. */
 static void mend_utf8(char *out)
 {
@@ -62,7 +54,10 @@ void problem_set(problem_details *out, int status, const char *code, const json_
     va_list args;
     *out = (problem_details){.status = status};
     snprintf(out->code, sizeof out->code, "%s", code);
-    snprintf(out->title, sizeof out->title, "%s", problem_title(code));
+    snprintf(out->title, sizeof out->title, "The request was refused");
+    for (size_t i = 0; i < sizeof TITLES / sizeof TITLES[0]; i++)
+        if (strcmp(TITLES[i].code, code) == 0)
+            snprintf(out->title, sizeof out->title, "%s", TITLES[i].title);
     json_pointer(out->pointer, sizeof out->pointer, at);
     va_start(args, format);
     vsnprintf(out->detail, sizeof out->detail, format, args);

@@ -16,9 +16,6 @@ void problem_add(problem_details *out, const char *format, ...) __attribute__((f
 
 bool problem_no_memory(problem_details *out); /* 503; returns false */
 
-/* The title of every problem with this code; never NULL. */
-const char *problem_title(const char *code);
-
 /* Writes text[0..len) in double quotes for a person to read: control characters become '?', a long text is shortened
  * with "..." after a whole character. */
 void problem_quote(char *out, size_t size, const char *text, size_t len);

@@ -7,13 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool same_member(const char *a, size_t a_len, const char *b, size_t b_len, const char *key)
-{
-    size_t x_len, y_len;
-    const char *x = json_member_text(a, a_len, key, &x_len), *y = json_member_text(b, b_len, key, &y_len);
-    return x_len == y_len && (x_len == 0 || memcmp(x, y, x_len) == 0);
-}
-
 bool codec_is_verify(const char *body, size_t len)
 {
     size_t answer_len;
@@ -22,25 +15,30 @@ bool codec_is_verify(const char *body, size_t len)
 
 bool codec_same_problem(const char *a, size_t a_len, const char *b, size_t b_len)
 {
-    return same_member(a, a_len, b, b_len, "problem") && same_member(a, a_len, b, b_len, "cases");
+    static const char *const KEYS[] = {"problem", "cases"};
+    bool same = true;
+    for (size_t i = 0; i < sizeof KEYS / sizeof KEYS[0]; i++) {
+        size_t x_len, y_len;
+        const char *x = json_member_text(a, a_len, KEYS[i], &x_len), *y = json_member_text(b, b_len, KEYS[i], &y_len);
+        same = same && x_len == y_len && (x_len == 0 || memcmp(x, y, x_len) == 0);
+    }
+    return same;
 }
 
 /* Writes a small value. Keys are of the schema, so that nothing in them needs an escape. */
-static void put_value(text *t, const json_value *value)
+static void put_value(text *t, const char *key, const json_value *value)
 {
     if (value->kind == JSON_IS_OBJECT) {
-        text_open(t, NULL, '{');
-        for (size_t i = 0; i < value->count; i++) {
-            text_key(t, value->items[i].key);
-            put_value(t, &value->items[i]);
-        }
+        text_open(t, key, '{');
+        for (size_t i = 0; i < value->count; i++)
+            put_value(t, value->items[i].key, &value->items[i]);
         text_close(t, '}');
     } else if (value->kind == JSON_IS_STRING) {
-        text_string(t, NULL, json_text(value));
+        text_string(t, key, json_text(value));
     } else if (value->kind == JSON_IS_BOOLEAN) {
-        text_bool(t, NULL, value->truth);
+        text_bool(t, key, value->truth);
     } else {
-        text_number(t, NULL, json_number(value, 0));
+        text_number(t, key, json_number(value, 0));
     }
 }
 
@@ -48,73 +46,59 @@ static void put_value(text *t, const json_value *value)
 static void put_member(text *t, const char *key, const json_value *old, const json_value *change, const char *id)
 {
     const json_value *asked = json_get(change, key);
-    text_key(t, key);
     if (strcmp(key, "stopping") == 0) {
-        text_string(t, NULL, "certified");
+        text_string(t, key, "certified");
     } else if (strcmp(key, "warm_start") == 0) {
-        text_open(t, NULL, '{');
+        text_open(t, key, '{');
         text_string(t, "job", id);
         text_bool(t, "continue", true);
         text_close(t, '}');
     } else {
-        put_value(t, asked ? asked : old);
+        put_value(t, key, asked ? asked : old);
     }
-}
-
-/* at: the old solver, NULL: there was none. */
-static char *make_solver(const char *at, size_t len, const json_value *change, const char *id)
-{
-    json_tree tree = {NULL, NULL};
-    problem_details ignored;
-    text t = {.failed = at && !json_scan(&tree, at, len, &ignored)};
-    /* The old members, changed where they stand, then the new ones; a rule that may stop short of the accuracy goes. */
-    const json_value *old = tree.root;
-    static const char *const SET[] = {"stopping", "warm_start"}, *const KEYS[] = {"accuracy", "max_iterations",
-                                                                                  "time_limit_s"};
-    text_open(&t, NULL, '{');
-    for (size_t i = 0; i < json_size(old); i++)
-        if (strcmp(old->items[i].key, "epsilon") != 0)
-            put_member(&t, old->items[i].key, &old->items[i], change, id);
-    for (size_t i = 0; i < sizeof SET / sizeof SET[0]; i++)
-        if (!json_get(old, SET[i]))
-            put_member(&t, SET[i], NULL, change, id);
-    for (size_t i = 0; i < sizeof KEYS / sizeof KEYS[0]; i++)
-        if (!json_get(old, KEYS[i]) && json_get(change, KEYS[i]))
-            put_member(&t, KEYS[i], NULL, change, id);
-    text_close(&t, '}');
-    json_clear(&tree);
-    return text_finish(&t, NULL);
-}
-
-static char *replace_solver(const char *old, size_t old_len, const char *id, const json_value *change, size_t *out_len)
-{
-    size_t len;
-    const char *at = json_member_text(old, old_len, "solver", &len);
-    const char *head = at ? at : (const char *)memchr(old, '{', old_len) + 1, *tail = head + len;
-    char *solver = make_solver(at, len, change, id);
-    text t = {.failed = !solver};
-    text_bytes(&t, old, (size_t)(head - old));
-    text_put(&t, at ? "" : "\"solver\": ");
-    text_put(&t, solver);
-    text_put(&t, at ? "" : ", ");
-    text_bytes(&t, tail, old_len - (size_t)(tail - old));
-    free(solver);
-    return text_finish(&t, out_len);
 }
 
 char *codec_refine(const char *old, size_t old_len, const char *id, const char *body, size_t len, size_t *out_len,
                    problem_details *problem)
 {
-    json_tree change;
-    char *made = NULL;
+    static const char *const SET[] = {"stopping", "warm_start"}, *const KEYS[] = {"accuracy", "max_iterations",
+                                                                                  "time_limit_s"};
+    json_tree changes, tree = {NULL, NULL};
+    problem_details ignored;
+    size_t solver_len;
     *out_len = 0;
-    if (!json_scan(&change, body, len, problem))
+    if (!json_scan(&changes, body, len, problem))
         return NULL;
-    if (schemas_check(decode_schemas(), "refine.json", change.root, problem)) {
-        made = replace_solver(old, old_len, id, change.root, out_len);
-        if (!made)
-            problem_no_memory(problem);
+    const json_value *change = changes.root;
+    if (!schemas_check(decode_schemas(), "refine.json", change, problem)) {
+        json_clear(&changes);
+        return NULL;
     }
-    json_clear(&change);
+    const char *at = json_member_text(old, old_len, "solver", &solver_len); /* NULL: there was none */
+    const char *head = at ? at : (const char *)memchr(old, '{', old_len) + 1, *tail = head + solver_len;
+    text t = {.failed = at && !json_scan(&tree, at, solver_len, &ignored)};
+    text_bytes(&t, old, (size_t)(head - old));
+    text_put(&t, at ? "" : "\"solver\": ");
+
+    /* The old members, changed where they stand, then the new ones; a rule that may stop short of the accuracy goes. */
+    const json_value *solver = tree.root;
+    text_put(&t, "{");
+    for (size_t i = 0; i < json_size(solver); i++)
+        if (strcmp(solver->items[i].key, "epsilon") != 0)
+            put_member(&t, solver->items[i].key, &solver->items[i], change, id);
+    for (size_t i = 0; i < sizeof SET / sizeof SET[0]; i++)
+        if (!json_get(solver, SET[i]))
+            put_member(&t, SET[i], NULL, change, id);
+    for (size_t i = 0; i < sizeof KEYS / sizeof KEYS[0]; i++)
+        if (!json_get(solver, KEYS[i]) && json_get(change, KEYS[i]))
+            put_member(&t, KEYS[i], NULL, change, id);
+    text_close(&t, '}');
+    text_put(&t, at ? "" : ", ");
+    text_bytes(&t, tail, old_len - (size_t)(tail - old));
+    json_clear(&tree);
+    json_clear(&changes);
+    char *made = text_finish(&t, out_len);
+    if (!made)
+        problem_no_memory(problem);
     return made;
 }
