@@ -11,36 +11,31 @@
 /* ---- steps of a name */
 
 typedef struct {
-    const char *at, *end; /* of the step; end points at '.' or behind the name */
+    const char *at; /* len bytes, then '.' or the end of the name */
+    size_t len;
 } step;
 
 static step first_step(const char *name, const char *end)
 {
     const char *dot = memchr(name, '.', (size_t)(end - name));
-    return (step){name, dot ? dot : end};
-}
-
-static size_t step_length(step s)
-{
-    return (size_t)(s.end - s.at);
+    return (step){name, (size_t)((dot ? dot : end) - name)};
 }
 
 static bool step_is(step s, const char *word)
 {
-    return strlen(word) == step_length(s) && memcmp(s.at, word, step_length(s)) == 0;
+    return strlen(word) == s.len && memcmp(s.at, word, s.len) == 0;
 }
 
 /* A decimal index without leading zeros, of at most 9 digits; -1: the step is none. */
 static long step_index(step s)
 {
-    size_t len = step_length(s);
     long index = 0;
-    if (len == 0 || len > 9 || (len > 1 && *s.at == '0'))
+    if (s.len == 0 || s.len > 9 || (s.len > 1 && *s.at == '0'))
         return -1;
-    for (const char *c = s.at; c < s.end; c++) {
-        if (*c < '0' || *c > '9')
+    for (size_t i = 0; i < s.len; i++) {
+        if (s.at[i] < '0' || s.at[i] > '9')
             return -1;
-        index = 10 * index + (*c - '0');
+        index = 10 * index + (s.at[i] - '0');
     }
     return index;
 }
@@ -53,11 +48,18 @@ static bool is_verdict(const char *key)
     return strncmp(key, "assertions", 10) == 0;
 }
 
+/* Does the schema name its types, and one of these? */
+static bool may_be(schema_at at, unsigned wanted)
+{
+    const unsigned types = schema_types(at);
+    return types != SCHEMA_ANY && (types & wanted);
+}
+
 /* The schema one step further; node NULL: there is none. A code leads to the warning's value. */
 static schema_at schema_step(schema_at at, step s)
 {
     if (!(schema_types(at) & SCHEMA_ARRAY))
-        return schema_resolve(schema_child(at, json_get_n(json_get(at.node, "properties"), s.at, step_length(s))));
+        return schema_resolve(schema_child(at, json_get_n(json_get(at.node, "properties"), s.at, s.len)));
     schema_at items = schema_resolve(schema_child(at, json_get(at.node, "items")));
     if (step_index(s) >= 0)
         return items;
@@ -69,11 +71,7 @@ static schema_at schema_step(schema_at at, step s)
     return schema_resolve(schema_child(items, value));
 }
 
-static bool is_number(schema_at at)
-{
-    unsigned types = schema_types(at);
-    return types != SCHEMA_ANY && (types & (SCHEMA_FRACTION | SCHEMA_INTEGER));
-}
+enum { SCHEMA_NUMBER = SCHEMA_FRACTION | SCHEMA_INTEGER };
 
 /* ---- what may have been meant */
 
@@ -85,32 +83,23 @@ typedef struct {
     size_t count;
 } name_list;
 
-static void collect(name_list *out, schema_at at, const char *name);
-
-static void collect_below(name_list *out, schema_at at, const char *name, const char *key)
+/* The names of all numbers from this one on; arrays by their first item. */
+static void collect(name_list *out, schema_at at, const char *above, const char *key)
 {
-    char longer[64];
-    int len = snprintf(longer, sizeof longer, "%s%s%s", name, name[0] ? "." : "", key);
-    if (at.node && len < (int)sizeof longer && !is_verdict(longer))
-        collect(out, at, longer);
-}
-
-/* Arrays by their first item. */
-static void collect(name_list *out, schema_at at, const char *name)
-{
+    char name[64];
     const json_value *properties = json_get(at.node, "properties");
-    const bool array = schema_types(at) != SCHEMA_ANY && (schema_types(at) & SCHEMA_ARRAY);
-    if ((is_number(at) || array) && out->count < MOST_NAMES) {
-        memcpy(out->name[out->count], name, strlen(name) + 1);
-        out->whole[out->count] = out->name[out->count];
-        const char *dot = strrchr(out->whole[out->count], '.');
-        out->last[out->count] = dot ? dot + 1 : out->whole[out->count];
-        out->count++;
+    const int len = snprintf(name, sizeof name, "%s%s%s", above, above[0] ? "." : "", key);
+    if (!at.node || len >= (int)sizeof name || is_verdict(name))
+        return;
+    if (may_be(at, SCHEMA_NUMBER | SCHEMA_ARRAY) && out->count < MOST_NAMES) {
+        const char *whole = strcpy(out->name[out->count], name), *dot = strrchr(whole, '.');
+        out->whole[out->count] = whole;
+        out->last[out->count++] = dot ? dot + 1 : whole;
     }
-    if (array)
-        collect_below(out, schema_resolve(schema_child(at, json_get(at.node, "items"))), name, "0");
+    if (may_be(at, SCHEMA_ARRAY))
+        collect(out, schema_resolve(schema_child(at, json_get(at.node, "items"))), name, "0");
     for (size_t i = 0; i < json_size(properties); i++)
-        collect_below(out, schema_resolve(schema_child(at, &properties->items[i])), name, properties->items[i].key);
+        collect(out, schema_resolve(schema_child(at, &properties->items[i])), name, properties->items[i].key);
 }
 
 /* Without memory for the names the refusal has no suggestion. */
@@ -119,7 +108,7 @@ static void suggest(const schemas *all, const char *name, size_t len, problem_de
     name_list *names = calloc(1, sizeof *names);
     if (!names)
         return;
-    collect(names, schema_root(all, "summary.json"), "");
+    collect(names, schema_root(all, "summary.json"), "", "");
     /* the whole name with the fewest edits, else the one that ends as this one does */
     const char *dot = memrchr(name, '.', len), *last = dot ? dot + 1 : name;
     int found = uz_closest(name, len, names->whole, names->count);
@@ -138,23 +127,23 @@ bool quantity_check(const schemas *all, const json_value *quantity, problem_deta
     const char *end = name + len;
     schema_at at = schema_root(all, "summary.json");
     bool own = len >= 10 && is_verdict(name);
-    for (step s = first_step(name, end); at.node && !own; s = first_step(s.end + 1, end)) {
+    for (step s = first_step(name, end); at.node && !own; s = first_step(s.at + s.len + 1, end)) {
         at = schema_step(at, s);
-        if (s.end == end)
+        if (s.at + s.len == end)
             break;
     }
-    if (at.node && !own && (is_number(at) || (schema_types(at) != SCHEMA_ANY && (schema_types(at) & SCHEMA_ARRAY))))
+    if (at.node && !own && may_be(at, SCHEMA_NUMBER | SCHEMA_ARRAY))
         return true;
     problem_quote(shown, sizeof shown, name, len);
     problem_set(problem, 422, "not_allowed", quantity, "%s is no number of a job's summary (/schemas/summary.json)",
                 shown);
-    if (at.node && !own && (schema_types(at) & SCHEMA_OBJECT) && schema_types(at) != SCHEMA_ANY) {
+    if (at.node && !own && may_be(at, SCHEMA_OBJECT)) {
         problem_add(problem, ", but holds some");
         /* The first few numbers of an object. */
         const json_value *properties = json_get(at.node, "properties");
         const char *before = ": ";
         for (size_t i = 0; i < json_size(properties); i++) {
-            if (!is_number(schema_resolve(schema_child(at, &properties->items[i]))))
+            if (!may_be(schema_resolve(schema_child(at, &properties->items[i])), SCHEMA_NUMBER))
                 continue;
             problem_add(problem, "%s%.*s.%s", before, (int)len, name, properties->items[i].key);
             before = ", ";
@@ -175,7 +164,7 @@ bool quantity_read(double *value, const json_value *summary, const char *name)
     const json_value *node = summary;
     json_value rooms[2]; /* a number of a row of a table */
     *value = (double)NAN;
-    for (step s = first_step(name, end);; s = first_step(s.end + 1, end)) {
+    for (step s = first_step(name, end);; s = first_step(s.at + s.len + 1, end)) {
         if (json_is(node, JSON_IS_NULL)) /* max_pressure_at.node where nothing presses */
             return true;
         if (json_is_list(node) &&
@@ -191,10 +180,10 @@ bool quantity_read(double *value, const json_value *summary, const char *name)
             return true;
         }
         node = json_is_list(node) ? json_item(node, (size_t)step_index(s), &rooms[node == &rooms[0]])
-                                  : json_get_n(node, s.at, step_length(s));
+                                  : json_get_n(node, s.at, s.len);
         if (!node)
             return false;
-        if (s.end == end) {
+        if (s.at + s.len == end) {
             *value = json_is_list(node) ? (double)node->count : json_number(node, (double)NAN);
             return json_is_list(node) || node->kind == JSON_IS_NUMBER || node->kind == JSON_IS_NULL;
         }

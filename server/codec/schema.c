@@ -85,35 +85,29 @@ schema_at schema_child(schema_at at, const json_value *node)
     return at;
 }
 
-/* What the reference of a schema points at: "#/$defs/x", "file.json" or "file.json#/$defs/x"; no escapes in it. */
-static schema_at follow(schema_at at, const char *ref)
-{
-    char name[64];
-    const size_t len = strcspn(ref, "#");
-    snprintf(name, sizeof name, "%.*s", (int)len, ref);
-    at = len > 0 ? schema_root(at.all, name) : schema_child(at, at.file->tree.root);
-    for (ref += len; at.node && *ref;) {
-        const char *start = ref + 1; /* behind '#' or '/' */
-        ref = strchrnul(start, '/');
-        if (ref > start)
-            at.node = json_get_n(at.node, start, (size_t)(ref - start));
-    }
-    return at;
-}
-
 schema_at schema_resolve(schema_at at)
 {
     for (int i = 0; i < MAX_REFS && at.node; i++) {
+        char name[64];
         const char *ref = json_text_of(at.node, "$ref");
         if (!ref)
             return at;
-        at = follow(at, ref);
+        /* "#/$defs/x", "file.json" or "file.json#/$defs/x"; no escapes in it */
+        const size_t len = strcspn(ref, "#");
+        snprintf(name, sizeof name, "%.*s", (int)len, ref);
+        at = len > 0 ? schema_root(at.all, name) : schema_child(at, at.file->tree.root);
+        for (ref += len; at.node && *ref;) {
+            const char *start = ref + 1; /* behind '#' or '/' */
+            ref = strchrnul(start, '/');
+            if (ref > start)
+                at.node = json_get_n(at.node, start, (size_t)(ref - start));
+        }
     }
     at.node = NULL;
     return at;
 }
 
-static unsigned type_bits(const json_value *name)
+unsigned schema_types(schema_at at)
 {
     static const struct {
         const char *name;
@@ -122,21 +116,17 @@ static unsigned type_bits(const json_value *name)
                  {"integer", SCHEMA_INTEGER}, {"number", SCHEMA_INTEGER | SCHEMA_FRACTION},
                  {"string", SCHEMA_STRING},   {"array", SCHEMA_ARRAY},
                  {"object", SCHEMA_OBJECT}};
-    for (size_t i = 0; i < sizeof TYPES / sizeof TYPES[0]; i++)
-        if (json_text_is(name, TYPES[i].name))
-            return TYPES[i].bits;
-    return 0;
-}
-
-unsigned schema_types(schema_at at)
-{
     const json_value *type = json_get(at.node, "type");
+    const bool list = json_is_list(type);
     json_value room;
     unsigned all = 0;
-    if (!json_is_list(type))
-        return type ? type_bits(type) : SCHEMA_ANY;
-    for (size_t i = 0; i < json_size(type); i++) {
-        const unsigned bits = type_bits(json_item(type, i, &room));
+    if (!type)
+        return SCHEMA_ANY;
+    for (size_t i = 0; i < (list ? json_size(type) : 1); i++) {
+        unsigned bits = 0;
+        for (size_t k = 0; k < sizeof TYPES / sizeof TYPES[0]; k++)
+            if (json_text_is(list ? json_item(type, i, &room) : type, TYPES[k].name))
+                bits = TYPES[k].bits;
         if (bits == 0)
             return 0;
         all |= bits;
@@ -171,29 +161,10 @@ static bool apart(schema_at a, schema_at b)
     return i && j && strcmp(i, j) == 0 && !json_same(x, y);
 }
 
-/* Walks into the schemas that the argument of a keyword holds. */
-static void audit_argument(fault *f, schema_at at, const json_value *argument, schema_shape shape, int depth)
-{
-    json_value room, other;
-    if (shape == SHAPE_REF && !schema_resolve(at).node)
-        fail(f, at.file->name, "a reference leads nowhere:", json_text(argument) ? json_text(argument) : "");
-    if (shape == SHAPE_SCHEMA)
-        audit(f, schema_child(at, argument), depth);
-    for (size_t i = 0; shape == SHAPE_MAP && json_is(argument, JSON_IS_OBJECT) && i < argument->count; i++)
-        audit(f, schema_child(at, &argument->items[i]), depth);
-    if (shape != SHAPE_LIST)
-        return;
-    for (size_t i = 0; i < json_size(argument); i++)
-        audit(f, schema_child(at, json_item(argument, i, &room)), depth);
-    for (size_t i = 0; !f->failed && i < json_size(argument); i++)
-        for (size_t j = 0; j < i; j++)
-            if (!apart(schema_resolve(schema_child(at, json_item(argument, i, &room))),
-                       schema_resolve(schema_child(at, json_item(argument, j, &other)))))
-                fail(f, at.file->name, "two branches that no type and no const tells apart in", argument->key);
-}
-
+/* A schema and, by way of its keywords, all that it holds. */
 static void audit(fault *f, schema_at at, int depth)
 {
+    json_value room, other;
     if (json_is(at.node, JSON_IS_BOOLEAN))
         return;
     if (!json_is(at.node, JSON_IS_OBJECT) || depth > JSON_MAX_DEPTH) {
@@ -205,12 +176,23 @@ static void audit(fault *f, schema_at at, int depth)
     /* short enough for a comparison of all pairs */
     if (json_get(at.node, "uniqueItems") && !(json_number(json_get(at.node, "maxItems"), 1e9) <= JSON_SHORT_ARRAY))
         fail(f, at.file->name, "no small maxItems beside", "uniqueItems");
-    for (size_t i = 0; i < at.node->count && !f->failed; i++) {
-        const json_value *argument = &at.node->items[i];
-        schema_shape shape;
-        if (schema_keyword(argument->key, &shape))
-            audit_argument(f, at, argument, shape, depth + 1);
-        else
+    for (size_t k = 0; k < at.node->count && !f->failed; k++) {
+        const json_value *argument = &at.node->items[k];
+        const bool object = json_is(argument, JSON_IS_OBJECT);
+        schema_shape shape = SHAPE_NONE;
+        if (!schema_keyword(argument->key, &shape))
             fail(f, at.file->name, "a keyword that is not checked here:", argument->key);
+        if (shape == SHAPE_REF && !schema_resolve(at).node)
+            fail(f, at.file->name, "a reference leads nowhere:", json_text(argument) ? json_text(argument) : "");
+        if (shape == SHAPE_SCHEMA)
+            audit(f, schema_child(at, argument), depth + 1);
+        for (size_t i = 0; ((shape == SHAPE_MAP && object) || shape == SHAPE_LIST) && i < json_size(argument); i++)
+            audit(f, schema_child(at, shape == SHAPE_MAP ? &argument->items[i] : json_item(argument, i, &room)),
+                  depth + 1);
+        for (size_t i = 0; shape == SHAPE_LIST && !f->failed && i < json_size(argument); i++)
+            for (size_t j = 0; j < i; j++)
+                if (!apart(schema_resolve(schema_child(at, json_item(argument, i, &room))),
+                           schema_resolve(schema_child(at, json_item(argument, j, &other)))))
+                    fail(f, at.file->name, "two branches that no type and no const tells apart in", argument->key);
     }
 }

@@ -17,19 +17,18 @@ typedef struct {
     const json_value *value;
 } visit;
 
-/* A keyword; the rule is NULL for an annotation, or one that another rule uses. Numbers that a keyword bounds: the
- * measure of the value, NaN where it has none. */
+/* A keyword; the rule is NULL for an annotation, or one that another rule uses. One that bounds a number says of what
+ * values. */
 typedef struct keyword {
     const char *name;
     schema_shape shape;
     bool (*rule)(const visit *v, const json_value *argument, const struct keyword *k);
-    double (*measure)(const json_value *value);
+    enum { NUMBERS = 1, TEXTS, ARRAYS } of; /* the value, characters, items */
     enum { AT_LEAST, AT_MOST, ABOVE, BELOW } sense;
-    const char *says; /* bound, measure */
+    const char *says; /* bound, number */
 } keyword;
 
 static bool check(const visit *v);
-static schema_at below(const visit *v, const json_value *schema);
 
 /* ------------------------------------------------------------- refusals */
 
@@ -177,25 +176,17 @@ static bool rule_const(const visit *v, const json_value *argument, const keyword
     return refuse(v, "not_allowed", "is %s; it must be %.15g.", got, json_number(argument, 0));
 }
 
-static double measure_number(const json_value *value)
-{
-    return json_number(value, (double)NAN);
-}
-
-/* Characters, not bytes. */
-static double measure_text(const json_value *value)
-{
-    return value->kind == JSON_IS_STRING ? (double)json_text_characters(value) : (double)NAN;
-}
-
-static double measure_array(const json_value *value)
-{
-    return json_is_list(value) ? (double)value->count : (double)NAN;
-}
-
 static bool rule_bound(const visit *v, const json_value *argument, const keyword *k)
 {
-    const double x = k->measure(v->value), bound = json_number(argument, 0);
+    const json_value *value = v->value;
+    double x = (double)NAN; /* meets every bound */
+    if (k->of == NUMBERS)
+        x = json_number(value, x);
+    else if (k->of == TEXTS && value->kind == JSON_IS_STRING)
+        x = (double)json_text_characters(value);
+    else if (k->of == ARRAYS && json_is_list(value))
+        x = (double)value->count;
+    const double bound = json_number(argument, 0);
     const bool misses[] = {[AT_LEAST] = x<bound, [AT_MOST] = x> bound, [ABOVE] = x <= bound, [BELOW] = x >= bound};
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wformat-nonliteral"
@@ -228,13 +219,22 @@ static bool only_keywords(const json_value *node, const char *const *known, size
     return true;
 }
 
-static number_range range_of(schema_at at)
+/* Of a number, or of those in a row of a table, where nothing is asked of the row but its length and its items. */
+static number_range range_of(schema_at at, bool row)
 {
     static const char *const KNOWN[] = {"type", "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"};
+    static const char *const OF_ROW[] = {"type", "minItems", "maxItems", "items"};
     at = schema_resolve(at);
+    const json_value *items = json_get(at.node, "items");
     const unsigned types = schema_types(at);
     number_range out = {json_truth(at.node), false, -INFINITY, -INFINITY, INFINITY, INFINITY};
-    if (!json_is(at.node, JSON_IS_OBJECT) || !only_keywords(at.node, KNOWN, sizeof KNOWN / sizeof KNOWN[0]))
+    if (!json_is(at.node, JSON_IS_OBJECT))
+        return out;
+    if (row) {
+        out.plain = only_keywords(at.node, OF_ROW, sizeof OF_ROW / sizeof OF_ROW[0]);
+        return out.plain && items ? range_of(schema_child(at, items), false) : out;
+    }
+    if (!only_keywords(at.node, KNOWN, sizeof KNOWN / sizeof KNOWN[0]))
         return out;
     out.plain = (types & SCHEMA_INTEGER) != 0;
     out.whole = !(types & SCHEMA_FRACTION);
@@ -245,44 +245,24 @@ static number_range range_of(schema_at at)
     return out;
 }
 
-/* The same of the numbers in a row of a table, where the schema asks nothing of the row but its length and its items.
- */
-static number_range row_range(schema_at row)
-{
-    static const char *const KNOWN[] = {"type", "minItems", "maxItems", "items"};
-    row = schema_resolve(row);
-    const json_value *items = json_get(row.node, "items");
-    number_range out = {true, false, -INFINITY, -INFINITY, INFINITY, INFINITY};
-    if (json_truth(row.node))
-        return out;
-    out.plain = json_is(row.node, JSON_IS_OBJECT) && only_keywords(row.node, KNOWN, sizeof KNOWN / sizeof KNOWN[0]);
-    return out.plain && items ? range_of(schema_child(row, items)) : out;
-}
-
-static bool in_range(const number_range *r, const double *x, size_t count)
-{
-    for (size_t i = 0; i < count; i++)
-        if (!(x[i] >= r->least && x[i] > r->above && x[i] <= r->most && x[i] < r->below) ||
-            (r->whole && x[i] != floor(x[i])))
-            return false;
-    return r->plain;
-}
-
 /* A million numbers need no visit for each of them. */
 static bool rule_items(const visit *v, const json_value *argument, const keyword *k)
 {
     const json_value *list = v->value;
-    const schema_at items = below(v, argument);
+    const schema_at items = schema_child(v->at, argument);
     const size_t columns = list->columns ? list->columns : 1;
     const bool table = list->columns > 0, numbers = list->kind == JSON_IS_NUMBERS;
-    const number_range range = table ? row_range(items) : numbers ? range_of(items) : (number_range){.plain = false};
+    const number_range r = numbers ? range_of(items, table) : (number_range){.plain = false};
     json_value room;
     (void)k;
     for (size_t i = 0; json_is_list(list) && i < list->count; i++) {
         /* rows are of one size: what holds for the first one holds for others whose numbers are in range */
-        if (numbers && !(table && i == 0) && in_range(&range, list->numbers + i * columns, columns))
-            continue;
-        if (!check(&(visit){v->problem, items, json_item(list, i, &room)}))
+        bool fits = r.plain && !(table && i == 0);
+        const double *x = fits ? list->numbers + i * columns : NULL;
+        for (size_t c = 0; fits && c < columns; c++)
+            fits = x[c] >= r.least && x[c] > r.above && x[c] <= r.most && x[c] < r.below &&
+                   (!r.whole || x[c] == floor(x[c]));
+        if (!fits && !check(&(visit){v->problem, items, json_item(list, i, &room)}))
             return false;
     }
     return true;
@@ -306,22 +286,6 @@ static bool rule_unique_items(const visit *v, const json_value *argument, const 
 
 /* ------------------------------------------------------------- objects */
 
-static bool refuse_key(const visit *v, const json_value *member)
-{
-    const json_value *properties = json_get(v->at.node, "properties");
-    const char *names[MAX_NAMES];
-    char shown[64];
-    size_t count = 0;
-    for (; count < json_size(properties) && count < MAX_NAMES; count++)
-        names[count] = properties->items[count].key;
-    problem_quote(shown, sizeof shown, member->key, member->place);
-    refuse(&(visit){v->problem, v->at, member}, "unknown_key", "is not known: there is no key %s here.", shown);
-    suggest(v, member->key, member->place, names, count);
-    if (count > 0)
-        add_names(v, " Known: ", names, count, ".");
-    return false;
-}
-
 static bool rule_additional_properties(const visit *v, const json_value *argument, const keyword *k)
 {
     const json_value *properties = json_get(v->at.node, "properties");
@@ -330,10 +294,23 @@ static bool rule_additional_properties(const visit *v, const json_value *argumen
         const json_value *member = &v->value->items[i];
         if (json_get_n(properties, member->key, member->place))
             continue;
-        if (json_is(argument, JSON_IS_BOOLEAN) && !argument->truth)
-            return refuse_key(v, member);
-        if (!check(&(visit){v->problem, below(v, argument), member}))
-            return false;
+        if (!json_is(argument, JSON_IS_BOOLEAN) || argument->truth) {
+            if (!check(&(visit){v->problem, schema_child(v->at, argument), member}))
+                return false;
+            continue;
+        }
+        /* not known: which are */
+        const char *names[MAX_NAMES];
+        char shown[64];
+        size_t count = 0;
+        for (; count < json_size(properties) && count < MAX_NAMES; count++)
+            names[count] = properties->items[count].key;
+        problem_quote(shown, sizeof shown, member->key, member->place);
+        refuse(&(visit){v->problem, v->at, member}, "unknown_key", "is not known: there is no key %s here.", shown);
+        suggest(v, member->key, member->place, names, count);
+        if (count > 0)
+            add_names(v, " Known: ", names, count, ".");
+        return false;
     }
     return true;
 }
@@ -360,25 +337,18 @@ static bool rule_dependent_required(const visit *v, const json_value *argument, 
     return true;
 }
 
-static bool rule_min_properties(const visit *v, const json_value *argument, const keyword *k)
+static bool rule_count(const visit *v, const json_value *argument, const keyword *k)
 {
     const json_value *known = json_get(v->at.node, "properties");
-    const double least = json_number(argument, 0);
-    (void)k;
-    if (!json_is(v->value, JSON_IS_OBJECT) || (double)v->value->count >= least)
+    const double n = (double)json_size(v->value), bound = json_number(argument, 0);
+    if (!json_is(v->value, JSON_IS_OBJECT) || (k->sense == AT_MOST ? n <= bound : n >= bound))
         return true;
-    refuse(v, "missing_key", "must have at least %.15g of the keys", least);
+    if (k->sense == AT_MOST)
+        return refuse(v, "not_allowed", "has %.15g keys, but at most %.15g of them go together.", n, bound);
+    refuse(v, "missing_key", "must have at least %.15g of the keys", bound);
     for (size_t i = 0; v->problem && i < json_size(known); i++)
         problem_add(v->problem, " \"%s\"", known->items[i].key);
     return false;
-}
-
-static bool rule_max_properties(const visit *v, const json_value *argument, const keyword *k)
-{
-    const double n = (double)json_size(v->value), most = json_number(argument, 0);
-    (void)k;
-    return !json_is(v->value, JSON_IS_OBJECT) || n <= most ||
-           refuse(v, "not_allowed", "has %.15g keys, but at most %.15g of them go together.", n, most);
 }
 
 static bool rule_properties(const visit *v, const json_value *argument, const keyword *k)
@@ -386,18 +356,13 @@ static bool rule_properties(const visit *v, const json_value *argument, const ke
     (void)k;
     for (size_t i = 0; i < json_size(argument); i++) {
         const json_value *schema = &argument->items[i], *value = json_get_n(v->value, schema->key, schema->place);
-        if (value && !check(&(visit){v->problem, below(v, schema), value}))
+        if (value && !check(&(visit){v->problem, schema_child(v->at, schema), value}))
             return false;
     }
     return true;
 }
 
 /* -------------------------------------------------------- combinations */
-
-static schema_at below(const visit *v, const json_value *schema)
-{
-    return schema_child(v->at, schema);
-}
 
 static bool rule_ref(const visit *v, const json_value *argument, const keyword *k)
 {
@@ -414,7 +379,7 @@ static bool choose_by_key(const visit *v, const json_value *branches)
     json_value room;
     const json_value *wanted = NULL, *named = NULL;
     for (size_t i = 0; i < branches->count; i++) {
-        const schema_at at = schema_resolve(below(v, json_item(branches, i, &room)));
+        const schema_at at = schema_resolve(schema_child(v->at, json_item(branches, i, &room)));
         const char *key = schema_discriminator(at, &wanted);
         if (!key)
             continue;
@@ -445,7 +410,7 @@ static bool rule_choice(const visit *v, const json_value *argument, const keywor
     json_value room;
     (void)k;
     for (size_t i = 0; i < json_size(argument); i++) {
-        const schema_at at = schema_resolve(below(v, json_item(argument, i, &room)));
+        const schema_at at = schema_resolve(schema_child(v->at, json_item(argument, i, &room)));
         const unsigned types = schema_types(at);
         all |= types;
         if (types & type_of(v->value)) {
@@ -461,10 +426,10 @@ static bool rule_choice(const visit *v, const json_value *argument, const keywor
 /* "then" and "else" say in their description why they ask for more; it is added to what they refuse. */
 static bool rule_if(const visit *v, const json_value *argument, const keyword *k)
 {
-    const bool holds = check(&(visit){NULL, below(v, argument), v->value});
+    const bool holds = check(&(visit){NULL, schema_child(v->at, argument), v->value});
     const json_value *branch = json_get(v->at.node, holds ? "then" : "else");
     (void)k;
-    if (!branch || check(&(visit){v->problem, below(v, branch), v->value}))
+    if (!branch || check(&(visit){v->problem, schema_child(v->at, branch), v->value}))
         return true;
     const char *why = json_text_of(branch, "description");
     if (why && v->problem)
@@ -476,41 +441,41 @@ static bool rule_if(const visit *v, const json_value *argument, const keyword *k
 
 /* In the order of checking: what names the culprit best comes first. */
 static const keyword KEYWORDS[] = {
-    {"$ref", SHAPE_REF, rule_ref, NULL, 0, NULL},
-    {"type", SHAPE_NONE, rule_type, NULL, 0, NULL},
-    {"const", SHAPE_NONE, rule_const, NULL, 0, NULL},
-    {"enum", SHAPE_NONE, rule_enum, NULL, 0, NULL},
-    {"minimum", SHAPE_NONE, rule_bound, measure_number, AT_LEAST, "must be at least %.15g, not %.15g."},
-    {"maximum", SHAPE_NONE, rule_bound, measure_number, AT_MOST, "must be at most %.15g, not %.15g."},
-    {"exclusiveMinimum", SHAPE_NONE, rule_bound, measure_number, ABOVE, "must be greater than %.15g, not %.15g."},
-    {"exclusiveMaximum", SHAPE_NONE, rule_bound, measure_number, BELOW, "must be less than %.15g, not %.15g."},
-    {"minLength", SHAPE_NONE, rule_bound, measure_text, AT_LEAST, "must have at least %.15g characters, not %.15g."},
-    {"maxLength", SHAPE_NONE, rule_bound, measure_text, AT_MOST, "must have at most %.15g characters, not %.15g."},
-    {"minItems", SHAPE_NONE, rule_bound, measure_array, AT_LEAST, "must have at least %.15g items, not %.15g."},
-    {"maxItems", SHAPE_NONE, rule_bound, measure_array, AT_MOST, "must have at most %.15g items, not %.15g."},
-    {"items", SHAPE_SCHEMA, rule_items, NULL, 0, NULL},
-    {"uniqueItems", SHAPE_NONE, rule_unique_items, NULL, 0, NULL},
-    {"additionalProperties", SHAPE_SCHEMA, rule_additional_properties, NULL, 0, NULL},
-    {"required", SHAPE_NONE, rule_required, NULL, 0, NULL},
-    {"dependentRequired", SHAPE_NONE, rule_dependent_required, NULL, 0, NULL},
-    {"minProperties", SHAPE_NONE, rule_min_properties, NULL, 0, NULL},
-    {"maxProperties", SHAPE_NONE, rule_max_properties, NULL, 0, NULL},
-    {"properties", SHAPE_MAP, rule_properties, NULL, 0, NULL},
-    {"oneOf", SHAPE_LIST, rule_choice, NULL, 0, NULL},
-    {"anyOf", SHAPE_LIST, rule_choice, NULL, 0, NULL},
-    {"if", SHAPE_SCHEMA, rule_if, NULL, 0, NULL},
-    {"then", SHAPE_SCHEMA, NULL, NULL, 0, NULL},
-    {"else", SHAPE_SCHEMA, NULL, NULL, 0, NULL},
-    {"$defs", SHAPE_MAP, NULL, NULL, 0, NULL},
-    {"$schema", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"$id", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"$comment", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"title", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"description", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"default", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"examples", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"format", SHAPE_NONE, NULL, NULL, 0, NULL},
-    {"contentMediaType", SHAPE_NONE, NULL, NULL, 0, NULL},
+    {"$ref", SHAPE_REF, rule_ref, 0, 0, NULL},
+    {"type", SHAPE_NONE, rule_type, 0, 0, NULL},
+    {"const", SHAPE_NONE, rule_const, 0, 0, NULL},
+    {"enum", SHAPE_NONE, rule_enum, 0, 0, NULL},
+    {"minimum", SHAPE_NONE, rule_bound, NUMBERS, AT_LEAST, "must be at least %.15g, not %.15g."},
+    {"maximum", SHAPE_NONE, rule_bound, NUMBERS, AT_MOST, "must be at most %.15g, not %.15g."},
+    {"exclusiveMinimum", SHAPE_NONE, rule_bound, NUMBERS, ABOVE, "must be greater than %.15g, not %.15g."},
+    {"exclusiveMaximum", SHAPE_NONE, rule_bound, NUMBERS, BELOW, "must be less than %.15g, not %.15g."},
+    {"minLength", SHAPE_NONE, rule_bound, TEXTS, AT_LEAST, "must have at least %.15g characters, not %.15g."},
+    {"maxLength", SHAPE_NONE, rule_bound, TEXTS, AT_MOST, "must have at most %.15g characters, not %.15g."},
+    {"minItems", SHAPE_NONE, rule_bound, ARRAYS, AT_LEAST, "must have at least %.15g items, not %.15g."},
+    {"maxItems", SHAPE_NONE, rule_bound, ARRAYS, AT_MOST, "must have at most %.15g items, not %.15g."},
+    {"items", SHAPE_SCHEMA, rule_items, 0, 0, NULL},
+    {"uniqueItems", SHAPE_NONE, rule_unique_items, 0, 0, NULL},
+    {"additionalProperties", SHAPE_SCHEMA, rule_additional_properties, 0, 0, NULL},
+    {"required", SHAPE_NONE, rule_required, 0, 0, NULL},
+    {"dependentRequired", SHAPE_NONE, rule_dependent_required, 0, 0, NULL},
+    {"minProperties", SHAPE_NONE, rule_count, 0, AT_LEAST, NULL},
+    {"maxProperties", SHAPE_NONE, rule_count, 0, AT_MOST, NULL},
+    {"properties", SHAPE_MAP, rule_properties, 0, 0, NULL},
+    {"oneOf", SHAPE_LIST, rule_choice, 0, 0, NULL},
+    {"anyOf", SHAPE_LIST, rule_choice, 0, 0, NULL},
+    {"if", SHAPE_SCHEMA, rule_if, 0, 0, NULL},
+    {"then", SHAPE_SCHEMA, NULL, 0, 0, NULL},
+    {"else", SHAPE_SCHEMA, NULL, 0, 0, NULL},
+    {"$defs", SHAPE_MAP, NULL, 0, 0, NULL},
+    {"$schema", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"$id", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"$comment", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"title", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"description", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"default", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"examples", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"format", SHAPE_NONE, NULL, 0, 0, NULL},
+    {"contentMediaType", SHAPE_NONE, NULL, 0, 0, NULL},
 };
 enum { KEYWORD_COUNT = sizeof KEYWORDS / sizeof KEYWORDS[0] };
 
