@@ -187,9 +187,8 @@ char *codec_encode_result(const codec_result *result, size_t *len);
 typedef struct codec_results codec_results;
 codec_results *codec_results_begin(const char *job_id, const char *summary); /* NULL: no memory */
 void codec_results_add(codec_results *all, const codec_result *one);         /* job_id, nodes, contact_nodes unused */
-/* Ends the text and frees `all`; shared: nodes and contact_nodes. NULL: no memory. */
+/* Ends the text and frees `all`; shared: nodes and contact_nodes. NULL: no memory. shared NULL frees only. */
 char *codec_results_end(codec_results *all, const codec_result *shared, size_t *len);
-void codec_results_drop(codec_results *all); /* frees without a text; NULL is fine */
 
 /* The surface of a deformed body as a binary glTF file. NULL: no memory. */
 typedef struct {

@@ -225,7 +225,7 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
         return false;
     snprintf(out->start.job, sizeof out->start.job, "%s", from ? from : "");
     out->start.continued = json_truth(json_get(start, "continue"));
-    return (!of || decode_label(out->start.case_name, d, of, "A name of a case")) &&
+    return (!of || decode_label(out->start.case_name, d, of, of->text, of->count, "A name of a case")) &&
            (!reactions || decode_vector(&out->start.reactions, &out->start.n_reactions, d, reactions)) &&
            decode_assertions(out, d, json_get(root, "assert")) &&
            (!answer || (decode_points(&out->answer.u, &out->answer.n_u, &out->answer.columns, d,

@@ -45,9 +45,9 @@ bool decode_refuse(decoding *d, const char *code, const json_value *at, const ch
 void *decode_room(decoding *d, const json_value *list, size_t size, int64_t *count);
 /* A group's name; one that no mesh has (too long, or with a NUL in it) becomes "". */
 void decode_name(char *out, size_t size, const json_value *object, const char *key, const char *otherwise);
-/* A short text of the user's: 1 to 63 bytes without control characters, since it is compared as a C string by the store
- * and shown in terminals. what: "A name of a case". */
-bool decode_label(char out[64], decoding *d, const json_value *value, const char *what);
+/* A short text of the user's, label[0..len): 1 to 63 bytes without control characters, since it is compared as a C
+ * string by the store and shown in terminals. at: where the refusal points; what: "A name of a case". */
+bool decode_label(char out[64], decoding *d, const json_value *at, const char *label, size_t len, const char *what);
 /* A number of an object that may be absent. */
 double decode_number(const json_value *object, const char *key, double otherwise);
 /* The vector `key` of an object into out[0..dim), `otherwise` in what is absent and 0 beyond dim; false if it has not
@@ -69,7 +69,5 @@ void decode_source_close(decode_source *source);
 bool decode_vector(double **out, int64_t *n, decoding *d, const json_value *value);
 /* The same for an array whose items may be points; *columns is their size, 0 for numbers; *n counts numbers. */
 bool decode_points(double **out, int64_t *n, int *columns, decoding *d, const json_value *value);
-/* The library's error about a text of the request. */
-bool decode_refuse_text(decoding *d, const json_value *value, const uz_error *err, uz_problem_kind kind);
 
 #endif

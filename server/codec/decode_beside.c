@@ -16,30 +16,6 @@ static int compare_names(const void *a, const void *b)
     return order ? order : (*x > *y) - (*x < *y);
 }
 
-/* The first case whose name an earlier one has is refused. */
-static bool check_names(const uz_problem *p, decoding *d, const json_value *list)
-{
-    char shown[80];
-    int64_t found = p->n_cases, earlier = 0;
-    const uz_load_case **sorted = room_for((size_t)p->n_cases, sizeof *sorted);
-    if (!sorted)
-        return problem_no_memory(d->problem);
-    for (int64_t i = 0; i < p->n_cases; i++)
-        sorted[i] = &p->cases[i];
-    qsort(sorted, (size_t)p->n_cases, sizeof *sorted, compare_names);
-    for (int64_t i = 1; i < p->n_cases; i++)
-        if (strcmp(sorted[i - 1]->name, sorted[i]->name) == 0 && sorted[i] - p->cases < found) {
-            found = sorted[i] - p->cases;
-            earlier = sorted[i - 1] - p->cases;
-        }
-    free(sorted);
-    if (found == p->n_cases)
-        return true;
-    problem_quote(shown, sizeof shown, p->cases[found].name, strlen(p->cases[found].name));
-    return decode_refuse(d, "not_allowed", json_get(&list->items[found], "name"),
-                         "is %s, which is the name of case %lld already.", shown, (long long)earlier);
-}
-
 /* The vector `key` of a case in matrices, `wanted` numbers; absent: NULL. */
 static bool take_vector(double **out, decoding *d, const json_value *item, const char *key, int64_t wanted,
                         const char *matrix)
@@ -61,8 +37,9 @@ bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
     problem->cases = decode_room(d, list, sizeof *problem->cases, &problem->n_cases);
     for (int64_t i = 0; i < problem->n_cases; i++) {
         const json_value *item = &list->items[i];
+        const json_value *name = json_get(item, "name");
         uz_load_case *out = &problem->cases[i];
-        if (!decode_label(out->name, d, json_get(item, "name"), "A name of a case"))
+        if (!decode_label(out->name, d, name, name->text, name->count, "A name of a case"))
             return false;
         const bool good =
             problem->kind == UZ_PROBLEM_SCENE
@@ -72,25 +49,32 @@ bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
         if (!good)
             return false;
     }
-    return problem->cases && check_names(problem, d, list);
+    if (!problem->cases)
+        return false;
+
+    /* the first case whose name an earlier one has is refused */
+    int64_t found = problem->n_cases, earlier = 0;
+    const uz_load_case **sorted = room_for((size_t)problem->n_cases, sizeof *sorted);
+    if (!sorted)
+        return problem_no_memory(d->problem);
+    for (int64_t i = 0; i < problem->n_cases; i++)
+        sorted[i] = &problem->cases[i];
+    qsort(sorted, (size_t)problem->n_cases, sizeof *sorted, compare_names);
+    for (int64_t i = 1; i < problem->n_cases; i++)
+        if (strcmp(sorted[i - 1]->name, sorted[i]->name) == 0 && sorted[i] - problem->cases < found) {
+            found = sorted[i] - problem->cases;
+            earlier = sorted[i - 1] - problem->cases;
+        }
+    free(sorted);
+    if (found == problem->n_cases)
+        return true;
+    char shown[80];
+    problem_quote(shown, sizeof shown, problem->cases[found].name, strlen(problem->cases[found].name));
+    return decode_refuse(d, "not_allowed", json_get(&list->items[found], "name"),
+                         "is %s, which is the name of case %lld already.", shown, (long long)earlier);
 }
 
 /* ---- settings */
-
-static const struct {
-    const char *name;
-    double relative_error; /* 0: rounding level */
-    bool balanced;
-} LEVELS[] = {{"quick", 1e-2, false}, {"balanced", 1e-2, true}, {"precise", 1e-8, false}, {"exact", 0, false}};
-
-static void set_level(uz_settings *out, const char *name)
-{
-    for (size_t i = 0; i < sizeof LEVELS / sizeof LEVELS[0]; i++)
-        if (strcmp(LEVELS[i].name, name) == 0) {
-            out->relative_error = LEVELS[i].relative_error;
-            out->balanced = LEVELS[i].balanced;
-        }
-}
 
 static const char *text_or(const json_value *object, const char *key, const char *otherwise)
 {
@@ -101,6 +85,11 @@ static const char *text_or(const json_value *object, const char *key, const char
 /* The schema's enums and the library's names are the same words (a test compares them), so parsing cannot fail. */
 void decode_settings(uz_settings *out, const json_value *object)
 {
+    static const struct {
+        const char *name;
+        double relative_error; /* 0: rounding level */
+        bool balanced;
+    } LEVELS[] = {{"quick", 1e-2, false}, {"balanced", 1e-2, true}, {"precise", 1e-8, false}, {"exact", 0, false}};
     uz_settings s = uz_settings_default();
     const json_value *accuracy = json_get(object, "accuracy");
     uz_method_parse(&s.method, text_or(object, "method", "auto"));
@@ -108,11 +97,13 @@ void decode_settings(uz_settings *out, const json_value *object)
     uz_ordering_parse(&s.ordering, text_or(object, "ordering", "auto"));
     uz_stopping_parse(&s.stopping, text_or(object, "stopping", "certified"));
     uz_row_scaling_parse(&s.row_scaling, text_or(object, "row_scaling", "auto"));
-    set_level(&s, s.stopping == UZ_STOP_PAPER ? "quick" : "precise");
-    if (json_is(accuracy, JSON_IS_OBJECT))
-        s.relative_error = decode_number(accuracy, "relative_error", s.relative_error);
-    else if (accuracy)
-        set_level(&s, accuracy->text);
+    const char *level = text_or(object, "accuracy", s.stopping == UZ_STOP_PAPER ? "quick" : "precise");
+    for (size_t i = 0; i < sizeof LEVELS / sizeof LEVELS[0]; i++)
+        if (strcmp(LEVELS[i].name, level) == 0) {
+            s.relative_error = LEVELS[i].relative_error;
+            s.balanced = LEVELS[i].balanced;
+        }
+    s.relative_error = decode_number(accuracy, "relative_error", s.relative_error);
     s.epsilon = decode_number(object, "epsilon", 1e-6);
     s.alpha = decode_number(object, "alpha", s.alpha);
     s.max_iterations = (int64_t)decode_number(object, "max_iterations", (double)s.max_iterations);

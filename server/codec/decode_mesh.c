@@ -63,24 +63,6 @@ static bool read_elements(uz_given_mesh *to, decoding *d, const json_value *elem
 
 /* ---- groups */
 
-static bool take_group_name(uz_given_group *to, decoding *d, const json_value *group)
-{
-    const size_t len = group->place;
-    bool fits = len > 0 && len < sizeof to->name;
-    for (size_t i = 0; fits && i < len; i++)
-        fits = (unsigned char)group->key[i] >= 0x20 && group->key[i] != 0x7f;
-    if (fits) {
-        memcpy(to->name, group->key, len + 1);
-        return true;
-    }
-    problem_set(d->problem, 422, "out_of_range", group->parent,
-                "A name of a group has 1 to 63 bytes and no control characters; this one %s.",
-                len == 0                ? "is empty"
-                : len < sizeof to->name ? "has one"
-                                        : "is longer");
-    return false;
-}
-
 /* A list of numbers of nodes or elements. */
 static bool read_list(int64_t **out, int64_t *n, decoding *d, const json_value *value)
 {
@@ -89,56 +71,46 @@ static bool read_list(int64_t **out, int64_t *n, decoding *d, const json_value *
                       (columns == 0 || decode_refuse(d, "wrong_type", value, "must be a list of numbers.")));
 }
 
-/* Faces of several sizes, as the triangles and quadrilaterals of wedges: a value each. */
-static bool read_mixed_faces(uz_given_group *to, decoding *d, const json_value *value)
-{
-    int64_t nodes = 0;
-    for (size_t i = 0; i < value->count; i++) {
-        if (!json_is(&value->items[i], JSON_IS_NUMBERS) || value->items[i].columns > 0)
-            return decode_refuse(d, "wrong_type", &value->items[i], "must be a list of node numbers.");
-        nodes += (int64_t)value->items[i].count;
-    }
-    to->face_first = room_for(value->count + 1, sizeof *to->face_first);
-    to->face_node = room_for((size_t)nodes, sizeof *to->face_node);
-    if (!to->face_first || !to->face_node)
-        return problem_no_memory(d->problem);
-    bool good = true;
-    nodes = 0;
-    for (size_t i = 0; good && i < value->count; i++) {
-        int64_t *node, count;
-        int columns;
-        to->face_first[i] = nodes;
-        good = read_indices(&node, &count, &columns, d, &value->items[i]);
-        if (good)
-            memcpy(to->face_node + nodes, node, (size_t)count * sizeof *node);
-        nodes += count;
-        free(node);
-    }
-    if (good) {
-        to->face_first[value->count] = nodes;
-        to->n_faces = (int64_t)value->count;
-    }
-    return good;
-}
-
-/* Edges, all of the same size, or faces. */
+/* Edges, all of the same size, or faces: of one size, or, as the triangles and quadrilaterals of wedges, a value each.
+ */
 static bool read_faces(uz_given_group *to, decoding *d, const json_value *value, int dim)
 {
-    int columns;
-    int64_t n = 0;
+    const bool mixed = dim == 3 && json_is(value, JSON_IS_ARRAY) && value->count > 0;
+    int columns = 0;
+    int64_t n = 0, count = 0, *node = NULL;
     if (!value)
         return true;
-    if (dim == 3 && json_is(value, JSON_IS_ARRAY) && value->count > 0)
-        return read_mixed_faces(to, d, value);
-    if (!read_indices(&to->face_node, &n, &columns, d, value))
-        return false;
-    if (n > 0 && columns == 0)
-        return decode_refuse(d, "wrong_type", value, "must be a list of lists of node numbers.");
-    to->n_faces = n > 0 ? n / columns : 0;
-    to->face_first = room_for((size_t)to->n_faces + 1, sizeof *to->face_first);
-    for (int64_t i = 0; to->face_first && i <= to->n_faces; i++)
-        to->face_first[i] = i * columns;
-    return to->face_first || problem_no_memory(d->problem);
+    for (size_t i = 0; mixed && i < value->count; i++) {
+        if (!json_is(&value->items[i], JSON_IS_NUMBERS) || value->items[i].columns > 0)
+            return decode_refuse(d, "wrong_type", &value->items[i], "must be a list of node numbers.");
+        n += (int64_t)value->items[i].count;
+    }
+    if (!mixed) {
+        if (!read_indices(&to->face_node, &n, &columns, d, value))
+            return false;
+        if (n > 0 && columns == 0)
+            return decode_refuse(d, "wrong_type", value, "must be a list of lists of node numbers.");
+    } else if (!(to->face_node = room_for((size_t)n, sizeof *to->face_node))) {
+        return problem_no_memory(d->problem);
+    }
+    const int64_t n_faces = mixed ? (int64_t)value->count : n > 0 ? n / columns : 0;
+    to->face_first = room_for((size_t)n_faces + 1, sizeof *to->face_first);
+    if (!to->face_first)
+        return problem_no_memory(d->problem);
+    to->face_first[0] = 0;
+    for (int64_t i = 0; i < n_faces; i++) {
+        int64_t *nodes = to->face_node + to->face_first[i];
+        const bool good = !mixed || read_indices(&node, &count, &columns, d, &value->items[i]);
+        if (mixed && good)
+            memcpy(nodes, node, (size_t)count * sizeof *node);
+        free(node);
+        node = NULL;
+        if (!good)
+            return false;
+        to->face_first[i + 1] = to->face_first[i] + (mixed ? count : columns);
+    }
+    to->n_faces = n_faces;
+    return true;
 }
 
 static bool read_groups(uz_given_mesh *to, decoding *d, const json_value *groups, int dim)
@@ -149,7 +121,7 @@ static bool read_groups(uz_given_mesh *to, decoding *d, const json_value *groups
     for (int64_t i = 0; i < count; i++) {
         const json_value *item = &groups->items[i], *wrong = json_get(item, other);
         uz_given_group *group = &to->groups[to->n_groups++];
-        if (!take_group_name(group, d, item))
+        if (!decode_label(group->name, d, item->parent, item->key, item->place, "A name of a group"))
             return false;
         if (wrong)
             return decode_refuse(d, "not_allowed", wrong,
@@ -179,7 +151,11 @@ bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh)
         const bool good = uz_mesh_read(to, "gmsh", file.data, file.len, d->bound + 32 * file.len, &err) == UZ_OK;
         decode_source_close(&file);
         snprintf(err.where, sizeof err.where, "/mesh/gmsh");
-        return good || decode_refuse_text(d, gmsh, &err, UZ_PROBLEM_SCENE);
+        if (!good) {
+            codec_problem_from_error(d->problem, &err, UZ_PROBLEM_SCENE);
+            json_pointer(d->problem->pointer, sizeof d->problem->pointer, gmsh);
+        }
+        return good;
     }
     int64_t n = 0;
     int columns = 0;

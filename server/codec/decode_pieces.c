@@ -40,19 +40,20 @@ void decode_name(char *out, size_t size, const json_value *object, const char *k
     memcpy(out, whole ? text : "", whole ? len + 1 : 1);
 }
 
-bool decode_label(char out[64], decoding *d, const json_value *value, const char *what)
+bool decode_label(char out[64], decoding *d, const json_value *at, const char *label, size_t len, const char *what)
 {
-    const char *label = json_text(value);
-    bool fits = label && value->count < 64;
-    for (size_t i = 0; fits && i < value->count; i++)
+    bool fits = len > 0 && len < 64;
+    for (size_t i = 0; fits && i < len; i++)
         fits = (unsigned char)label[i] >= 0x20 && label[i] != 0x7f;
-    if (fits) {
-        memcpy(out, label, value->count + 1);
-        return true;
-    }
-    problem_set(d->problem, 422, "out_of_range", value, "%s has 1 to 63 bytes and no control characters; this one %s.",
-                what, label && value->count < 64 ? "has one" : "is longer");
-    return false;
+    if (fits)
+        memcpy(out, label, len + 1);
+    else
+        problem_set(d->problem, 422, "out_of_range", at, "%s has 1 to 63 bytes and no control characters; this one %s.",
+                    what,
+                    len == 0   ? "is empty"
+                    : len < 64 ? "has one"
+                               : "is longer");
+    return fits;
 }
 
 double decode_number(const json_value *object, const char *key, double otherwise)
@@ -137,13 +138,6 @@ void decode_source_close(decode_source *source)
     *source = (decode_source){.data = NULL};
 }
 
-bool decode_refuse_text(decoding *d, const json_value *value, const uz_error *err, uz_problem_kind kind)
-{
-    codec_problem_from_error(d->problem, err, kind);
-    json_pointer(d->problem->pointer, sizeof d->problem->pointer, value);
-    return false;
-}
-
 /* ---- vectors */
 
 bool decode_vector(double **out, int64_t *n, decoding *d, const json_value *value)
@@ -159,7 +153,11 @@ bool decode_vector(double **out, int64_t *n, decoding *d, const json_value *valu
         return false;
     const bool good = uz_mm_read_vector(out, n, text.data, text.len, d->bound + 32 * text.len, &err) == UZ_OK;
     decode_source_close(&text);
-    return good || decode_refuse_text(d, value, &err, UZ_PROBLEM_MATRICES);
+    if (!good) {
+        codec_problem_from_error(d->problem, &err, UZ_PROBLEM_MATRICES);
+        json_pointer(d->problem->pointer, sizeof d->problem->pointer, value);
+    }
+    return good;
 }
 
 bool decode_points(double **out, int64_t *n, int *columns, decoding *d, const json_value *value)

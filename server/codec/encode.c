@@ -5,31 +5,27 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 /* ------------------------------------------------------------- problems */
 
-static void put_problem(text *t, const problem_details *problem)
-{
-    text_open(t, NULL, '{');
-    text_key(t, "type");
-    text_format(t, "\"/schemas/problem-details.json#%s\"", problem->code);
-    text_string(t, "title", problem->title);
-    text_integer(t, "status", problem->status);
-    text_string(t, "code", problem->code);
-    text_string(t, "detail", problem->detail);
-    if (problem->pointer[0] || problem->status == 422)
-        text_string(t, "pointer", problem->pointer);
-    if (problem->line > 0)
-        text_integer(t, "line", problem->line);
-    text_close(t, '}');
-}
-
 char *codec_encode_problem(const problem_details *problem)
 {
     text t = {0};
-    put_problem(&t, problem);
+    text_open(&t, NULL, '{');
+    text_key(&t, "type");
+    text_format(&t, "\"/schemas/problem-details.json#%s\"", problem->code);
+    text_string(&t, "title", problem->title);
+    text_integer(&t, "status", problem->status);
+    text_string(&t, "code", problem->code);
+    text_string(&t, "detail", problem->detail);
+    if (problem->pointer[0] || problem->status == 422)
+        text_string(&t, "pointer", problem->pointer);
+    if (problem->line > 0)
+        text_integer(&t, "line", problem->line);
+    text_close(&t, '}');
     return text_finish(&t, NULL);
 }
 
@@ -82,13 +78,15 @@ static void put_job(text *t, const job *j)
     text_integer(t, "priority", j->priority);
     text_raw(t, "tags", j->tags ? j->tags : "[]");
     text_raw(t, "summary", j->summary);
-    text_key(t, "error");
     if (j->damaged) {
         problem_details problem;
         codec_problem_damaged(&problem, j->id);
-        put_problem(t, &problem);
+        char *error = codec_encode_problem(&problem);
+        t->failed = t->failed || !error;
+        text_raw(t, "error", error);
+        free(error);
     } else {
-        text_raw(t, NULL, j->error);
+        text_raw(t, "error", j->error);
     }
     text_open(t, "links", '[');
     put_link(t, "self", "jobs", j->id, "");

@@ -105,19 +105,16 @@ void codec_results_add(codec_results *all, const codec_result *one)
 
 char *codec_results_end(codec_results *all, const codec_result *shared, size_t *len)
 {
-    text_close(&all->t, ']');
-    put_places(&all->t, shared);
-    text_close(&all->t, '}');
-    char *finished = text_finish(&all->t, len);
+    if (all && shared) {
+        text_close(&all->t, ']');
+        put_places(&all->t, shared);
+        text_close(&all->t, '}');
+    }
+    char *finished = all && shared ? text_finish(&all->t, len) : NULL;
+    if (all)
+        free(all->t.data); /* NULL after the end */
     free(all);
     return finished;
-}
-
-void codec_results_drop(codec_results *all)
-{
-    if (all)
-        free(all->t.data);
-    free(all);
 }
 
 const char *const CODEC_HISTORY_NAMES[CODEC_HISTORY_COLUMNS] = {
@@ -166,9 +163,9 @@ char *codec_encode_history_csv(const double *rows, int64_t count, size_t *len)
             /* CSV has no null: what is not finite is written as inf, -inf or nan, which every reader of numbers
              * understands. */
             double x = rows[i * CODEC_HISTORY_COLUMNS + j];
-            char digits[TEXT_DOUBLE];
+            char digits[UZ_DOUBLE_ROOM];
             if (isfinite(x))
-                text_bytes(&t, digits, text_shortest(digits, x));
+                text_bytes(&t, digits, uz_format_double(digits, x));
             else
                 text_put(&t, isnan(x) ? "nan" : x < 0 ? "-inf" : "inf");
             text_put(&t, j + 1 < CODEC_HISTORY_COLUMNS ? "" : "\n");

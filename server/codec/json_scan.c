@@ -157,18 +157,6 @@ static bool scan_number(scanner *s, const json_value *at, double *value)
     return true;
 }
 
-static bool scan_word(scanner *s, json_value *out, const char *word, json_kind kind, bool truth)
-{
-    const size_t n = strlen(word);
-    if (s->len - s->at < n || memcmp(s->text + s->at, word, n) != 0)
-        return stop_syntax(s, s->at, EXPECTED);
-    s->at += n;
-    out->kind = kind;
-    if (kind == JSON_IS_BOOLEAN)
-        out->truth = truth;
-    return true;
-}
-
 /* The string at s->at: the bytes, short ones copied and long ones as they stand; a key is always copied. */
 static const char *scan_string(scanner *s, bool key, size_t *bytes)
 {
@@ -438,6 +426,11 @@ static bool scan_container(scanner *s, json_value *out, bool object)
 /* out: where it stands is filled in. */
 static bool scan_value(scanner *s, json_value *out)
 {
+    static const struct {
+        const char *word;
+        json_kind kind;
+        bool truth;
+    } WORDS[] = {{"true", JSON_IS_BOOLEAN, true}, {"false", JSON_IS_BOOLEAN, false}, {"null", JSON_IS_NULL, false}};
     const int c = peek(s);
     if (!count_value(s, out))
         return false;
@@ -450,16 +443,20 @@ static bool scan_value(scanner *s, json_value *out)
         out->kind = out->text ? JSON_IS_STRING : JSON_IS_NULL;
         out->is_long = out->count > JSON_SHORT_TEXT;
         return out->text != NULL;
-    case 't':
-        return scan_word(s, out, "true", JSON_IS_BOOLEAN, true);
-    case 'f':
-        return scan_word(s, out, "false", JSON_IS_BOOLEAN, false);
-    case 'n':
-        return scan_word(s, out, "null", JSON_IS_NULL, false);
     default:
-        if (c != '-' && (c < '0' || c > '9'))
-            return stop_syntax(s, s->at, EXPECTED);
-        out->kind = JSON_IS_NUMBER;
-        return scan_number(s, out, &out->number);
+        if (c == '-' || (c >= '0' && c <= '9')) {
+            out->kind = JSON_IS_NUMBER;
+            return scan_number(s, out, &out->number);
+        }
+        for (size_t i = 0; i < sizeof WORDS / sizeof WORDS[0]; i++) {
+            const size_t n = strlen(WORDS[i].word);
+            if (s->len - s->at < n || memcmp(s->text + s->at, WORDS[i].word, n) != 0)
+                continue;
+            s->at += n;
+            out->kind = WORDS[i].kind;
+            out->truth = WORDS[i].truth;
+            return true;
+        }
+        return stop_syntax(s, s->at, EXPECTED);
     }
 }

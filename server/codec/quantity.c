@@ -102,23 +102,6 @@ static void collect(name_list *out, schema_at at, const char *above, const char 
         collect(out, schema_resolve(schema_child(at, &properties->items[i])), name, properties->items[i].key);
 }
 
-/* Without memory for the names the refusal has no suggestion. */
-static void suggest(const schemas *all, const char *name, size_t len, problem_details *problem)
-{
-    name_list *names = calloc(1, sizeof *names);
-    if (!names)
-        return;
-    collect(names, schema_root(all, "summary.json"), "", "");
-    /* the whole name with the fewest edits, else the one that ends as this one does */
-    const char *dot = memrchr(name, '.', len), *last = dot ? dot + 1 : name;
-    int found = uz_closest(name, len, names->whole, names->count);
-    if (found < 0)
-        found = uz_closest(last, len - (size_t)(last - name), names->last, names->count);
-    if (found >= 0)
-        problem_add(problem, " Did you mean \"%s\"?", names->whole[found]);
-    free(names);
-}
-
 bool quantity_check(const schemas *all, const json_value *quantity, problem_details *problem)
 {
     char shown[80];
@@ -151,7 +134,18 @@ bool quantity_check(const schemas *all, const json_value *quantity, problem_deta
         problem_add(problem, ".");
     } else {
         problem_add(problem, ".");
-        suggest(all, name, len, problem);
+        /* The whole name with the fewest edits, else the one that ends as this one does; without memory none. */
+        const char *dot = memrchr(name, '.', len), *last = dot ? dot + 1 : name;
+        name_list *names = calloc(1, sizeof *names);
+        if (!names)
+            return false;
+        collect(names, schema_root(all, "summary.json"), "", "");
+        int found = uz_closest(name, len, names->whole, names->count);
+        if (found < 0)
+            found = uz_closest(last, len - (size_t)(last - name), names->last, names->count);
+        if (found >= 0)
+            problem_add(problem, " Did you mean \"%s\"?", names->whole[found]);
+        free(names);
     }
     return false;
 }

@@ -315,24 +315,20 @@ static bool rule_additional_properties(const visit *v, const json_value *argumen
     return true;
 }
 
+/* A list of keys, or for each of some keys the list of those that go with it. */
 static bool rule_required(const visit *v, const json_value *argument, const keyword *k)
 {
+    const bool depends = json_is(argument, JSON_IS_OBJECT);
     (void)k;
-    for (size_t i = 0; json_is(v->value, JSON_IS_OBJECT) && i < json_size(argument); i++)
-        if (!json_get(v->value, argument->items[i].text))
-            return refuse(v, "missing_key", "has no \"%s\", which is required.", argument->items[i].text);
-    return true;
-}
-
-static bool rule_dependent_required(const visit *v, const json_value *argument, const keyword *k)
-{
-    (void)k;
-    for (size_t i = 0; i < json_size(argument); i++) {
-        const json_value *needed = &argument->items[i];
-        for (size_t j = 0; json_get(v->value, needed->key) && j < json_size(needed); j++)
-            if (!json_get(v->value, needed->items[j].text))
-                return refuse(v, "missing_key", "has \"%s\" but no \"%s\", which goes with it.", needed->key,
-                              needed->items[j].text);
+    for (size_t i = 0; json_is(v->value, JSON_IS_OBJECT) && i < (depends ? argument->count : 1); i++) {
+        const json_value *needed = depends ? &argument->items[i] : argument;
+        for (size_t j = 0; (!depends || json_get(v->value, needed->key)) && j < json_size(needed); j++) {
+            const char *key = needed->items[j].text;
+            if (json_get(v->value, key))
+                continue;
+            return depends ? refuse(v, "missing_key", "has \"%s\" but no \"%s\", which goes with it.", needed->key, key)
+                           : refuse(v, "missing_key", "has no \"%s\", which is required.", key);
+        }
     }
     return true;
 }
@@ -457,7 +453,7 @@ static const keyword KEYWORDS[] = {
     {"uniqueItems", SHAPE_NONE, rule_unique_items, 0, 0, NULL},
     {"additionalProperties", SHAPE_SCHEMA, rule_additional_properties, 0, 0, NULL},
     {"required", SHAPE_NONE, rule_required, 0, 0, NULL},
-    {"dependentRequired", SHAPE_NONE, rule_dependent_required, 0, 0, NULL},
+    {"dependentRequired", SHAPE_NONE, rule_required, 0, 0, NULL},
     {"minProperties", SHAPE_NONE, rule_count, 0, AT_LEAST, NULL},
     {"maxProperties", SHAPE_NONE, rule_count, 0, AT_MOST, NULL},
     {"properties", SHAPE_MAP, rule_properties, 0, 0, NULL},

@@ -15,12 +15,6 @@ static bool read_own(json_tree *tree, const char *json)
     return json_scan(tree, json, strlen(json), &problem);
 }
 
-static void copy_member(char *out, size_t size, const json_value *object, const char *key)
-{
-    const char *text = json_text_of(object, key);
-    snprintf(out, size, "%s", text ? text : "");
-}
-
 bool codec_decode_problem(problem_details *out, const char *json)
 {
     json_tree tree;
@@ -31,10 +25,18 @@ bool codec_decode_problem(problem_details *out, const char *json)
     const bool good = json_is(object, JSON_IS_OBJECT);
     out->status = (int)json_number(json_get(object, "status"), 0);
     out->line = (int64_t)json_number(json_get(object, "line"), 0);
-    copy_member(out->code, sizeof out->code, object, "code");
-    copy_member(out->title, sizeof out->title, object, "title");
-    copy_member(out->detail, sizeof out->detail, object, "detail");
-    copy_member(out->pointer, sizeof out->pointer, object, "pointer");
+    const struct {
+        const char *key;
+        char *out;
+        size_t size;
+    } TEXTS[] = {{"code", out->code, sizeof out->code},
+                 {"title", out->title, sizeof out->title},
+                 {"detail", out->detail, sizeof out->detail},
+                 {"pointer", out->pointer, sizeof out->pointer}};
+    for (size_t i = 0; i < sizeof TEXTS / sizeof TEXTS[0]; i++) {
+        const char *text = json_text_of(object, TEXTS[i].key);
+        snprintf(TEXTS[i].out, TEXTS[i].size, "%s", text ? text : "");
+    }
     json_clear(&tree);
     return good;
 }
@@ -88,7 +90,8 @@ void codec_read_method(char *method, char *op, size_t size, const char *summary)
 {
     json_tree tree; /* left empty where there is no memory */
     read_own(&tree, summary);
-    copy_member(method, size, tree.root, "method");
-    copy_member(op, size, tree.root, "operator");
+    const char *of_method = json_text_of(tree.root, "method"), *of_op = json_text_of(tree.root, "operator");
+    snprintf(method, size, "%s", of_method ? of_method : "");
+    snprintf(op, size, "%s", of_op ? of_op : "");
     json_clear(&tree);
 }

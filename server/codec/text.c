@@ -121,20 +121,13 @@ void text_raw(text *t, const char *key, const char *json)
     text_put(t, json ? json : "null");
 }
 
-size_t text_shortest(char out[TEXT_DOUBLE], double x)
-{
-    size_t length = uz_format_double(out, x);
-    out[length] = '\0';
-    return length;
-}
-
 void text_number(text *t, const char *key, double value)
 {
     text_key(t, key);
     if (!isfinite(value))
         text_put(t, "null");
-    else if (reserve(t, TEXT_DOUBLE))
-        t->len += text_shortest(t->data + t->len, value);
+    else if (reserve(t, UZ_DOUBLE_ROOM))
+        t->len += uz_format_double(t->data + t->len, value);
 }
 
 void text_numbers(text *t, const char *key, const double *x, int64_t n)

@@ -32,8 +32,4 @@ void text_key(text *t, const char *key); /* the comma and the key only: the call
 /* The NUL-terminated text, owned by the caller; NULL if memory ran out. *len (may be NULL) without the NUL. */
 char *text_finish(text *t, size_t *len);
 
-/* The shortest decimal that reads back as x, at most 24 bytes and a NUL; x must be finite. Returns its length. */
-enum { TEXT_DOUBLE = 32 };
-size_t text_shortest(char out[TEXT_DOUBLE], double x);
-
 #endif

@@ -341,7 +341,7 @@ static void reply_cases(many *of, const http_request *rq, http_reply *reply)
         if (!of->all) {
             reply_no_memory(reply);
         } else if (!add_cases(of, reply)) {
-            codec_results_drop(of->all);
+            codec_results_end(of->all, NULL, NULL);
         } else {
             codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL, of->fields);
             char *text = codec_results_end(of->all, &rest, &len);

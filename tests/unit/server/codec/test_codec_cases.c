@@ -290,8 +290,8 @@ TEST(results_of_cases)
                     "\"nodes\":[[0,0],[1,0]],\"contact_nodes\":[1,2]}");
     CHECK_INT(len, strlen(text));
     free(text);
-    codec_results_drop(codec_results_begin("id", "{}"));
-    codec_results_drop(NULL);
+    codec_results_end(codec_results_begin("id", "{}"), NULL, NULL);
+    codec_results_end(NULL, NULL, NULL);
 }
 
 TEST(summaries_of_cases)

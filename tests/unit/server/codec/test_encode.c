@@ -68,10 +68,10 @@ TEST(doubles_read_back_from_the_fewest_digits)
                  {5e-324, "5e-324"},
                  {1.7976931348623157e308, "1.7976931348623157e+308"},
                  {1.0 / 3, "0.3333333333333333"}};
-    char digits[TEXT_DOUBLE];
+    char digits[UZ_DOUBLE_ROOM];
     uint64_t state = 42;
     for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; i++) {
-        text_shortest(digits, CASES[i].x);
+        digits[uz_format_double(digits, CASES[i].x)] = '\0';
         CHECK_STR(digits, CASES[i].want);
     }
     for (int i = 0; i < 20000; i++) {
@@ -80,8 +80,9 @@ TEST(doubles_read_back_from_the_fewest_digits)
         memcpy(&x, &bits, sizeof x);
         if (!isfinite(x))
             continue;
-        size_t n = text_shortest(digits, x);
-        CHECK(n == strlen(digits) && n < 25);
+        const size_t n = uz_format_double(digits, x);
+        CHECK(n < 25);
+        digits[n] = '\0';
         CHECK_MSG(strtod(digits, NULL) == x, "%s is not %.17g", digits, x);
     }
 }
