@@ -27,9 +27,8 @@ const schemas *decode_schemas(void);
 bool decode_matrices(uz_qp *out, decoding *d, const json_value *object);
 bool decode_scene(uz_scene *out, decoding *d, const json_value *object);
 bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list, int dim);
-/* A scene's mesh (not a box) and contacts (decode_mesh.c, decode_scene.c); out->model is there. */
+/* A scene's mesh, not a box; out->model is there. */
 bool decode_mesh(uz_scene *out, decoding *d, const json_value *mesh);
-bool decode_contacts(uz_scene *out, decoding *d, const json_value *list);
 /* What stands beside the problem (decode_beside.c); list or object NULL: none, or the defaults. */
 bool decode_cases(uz_problem *problem, decoding *d, const json_value *list);
 void decode_settings(uz_settings *out, const json_value *object);

@@ -183,7 +183,7 @@ static const struct {
     {"height", UZ_OBSTACLE_HEIGHT, NULL, NULL, NULL, read_height},
 };
 
-bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
+static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
 {
     out->contacts = decode_room(d, list, sizeof *out->contacts, &out->n_contacts);
     for (int64_t i = 0; i < out->n_contacts; i++) {
