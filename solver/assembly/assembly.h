@@ -40,6 +40,7 @@ typedef struct {
      * acts on; NULL: the nodes of the group. Is `with` the slave? */
     int64_t *at;
     double *area;
+    int64_t *ends; /* n x 2: of a middle of a face's edge the places of the edge's ends, as for row_ends; else -1 */
     bool swapped;
 } uz_contact_sites;
 

@@ -52,6 +52,7 @@ void uz_body_model_clear(uz_body_model *model)
         free(model->sites[k].face);
         free(model->sites[k].at);
         free(model->sites[k].area);
+        free(model->sites[k].ends);
     }
     free(model->sites);
     memset(model, 0, sizeof *model);
@@ -75,7 +76,7 @@ size_t uz_body_model_bytes(const uz_body_model *model)
     for (int64_t k = 0; k < model->n_sites; k++) {
         const uz_contact_sites *s = &model->sites[k];
         const size_t n = (size_t)s->n;
-        bytes += n * 8 * (1 + dim) + (s->first ? 16 * n + 16 * (size_t)s->first[n] : 0) + (s->at ? 16 * n : 0);
+        bytes += n * 8 * (1 + dim) + (s->first ? 16 * n + 16 * (size_t)s->first[n] : 0) + (s->at ? 32 * n : 0);
     }
     return bytes + (size_t)model->d * (size_t)model->n_modes * 8;
 }

@@ -159,9 +159,25 @@ static bool has_eight_nodes(const uz_mesh *mesh, uz_face face)
     return uz_element_type_of((uz_element_kind)mesh->kind[face.element])->side[face.side].nodes == 8;
 }
 
-/* Rows [first, end) are those of a contact's group. row_of: n_nodes. */
-static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_of, int64_t first, int64_t end)
+/* Rows [first, end) are those of contact k. row_of: room for a number by node, or by place. */
+static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_of, int64_t k, int64_t first,
+                      int64_t end)
 {
+    const uz_contact_sites *sites = &model->sites[k];
+    if (sites->ends) { /* places say what they are between */
+        for (int64_t p = 0; p < sites->n; p++)
+            row_of[p] = -1;
+        for (int64_t row = first; row < end; row++)
+            row_of[model->row_place[row]] = row;
+        for (int64_t row = first; row < end; row++) {
+            const int64_t *place = sites->ends + 2 * model->row_place[row];
+            if (place[0] < 0 || row_of[place[0]] < 0 || row_of[place[1]] < 0)
+                continue;
+            model->row_ends[2 * row] = row_of[place[0]];
+            model->row_ends[2 * row + 1] = row_of[place[1]];
+        }
+        return;
+    }
     for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++)
         row_of[uz_group_node_at(group, i)] = -1;
     for (int64_t row = first; row < end; row++)
@@ -184,14 +200,19 @@ static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_
 static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
     bool any = false;
+    int64_t most = model->mesh.n_nodes, row = 0;
     for (int64_t k = 0; k < scene->n_contacts; k++) {
         const uz_group *group = group_that_touches(model, scene, k, err);
-        for (int64_t f = 0; f < group->n_faces && !any; f++)
+        const uz_contact_sites *sites = &model->sites[k];
+        for (int64_t p = 0; sites->ends && p < sites->n && !any; p++)
+            any = sites->ends[2 * p] >= 0;
+        for (int64_t f = 0; !sites->ends && f < group->n_faces && !any; f++)
             any = has_eight_nodes(&model->mesh, group->face[f]);
+        most = sites->n > most ? sites->n : most;
     }
     if (!any)
         return UZ_OK;
-    int64_t *row_of = uz_alloc(model->mesh.n_nodes, sizeof *row_of), row = 0;
+    int64_t *row_of = uz_alloc(most, sizeof *row_of);
     model->row_ends = uz_alloc(2 * model->m, sizeof *model->row_ends);
     if (row_of && model->row_ends) {
         memset(model->row_ends, 0xff, (size_t)(2 * model->m) * sizeof *model->row_ends);
@@ -199,7 +220,7 @@ static uz_status find_ends(uz_body_model *model, const uz_scene *scene, uz_error
             const int64_t first = row;
             while (row < model->m && model->info.contact_of[row] == k)
                 row++;
-            list_ends(model, group_that_touches(model, scene, k, err), row_of, first, row);
+            list_ends(model, group_that_touches(model, scene, k, err), row_of, k, first, row);
         }
     }
     const bool room = row_of && model->row_ends;

@@ -35,50 +35,247 @@
 #define ROUNDING 1e-13
 
 /* So has the area of a place: of a quadratic edge that ends on the axis of revolution the end has none. */
-#define ROUNDING_AREA 1e-9
+#define LEAST_AREA 1e-9
+
+int uz_mortar_by_node(const void *a, const void *b)
+{
+    const int64_t *x = a, *y = b;
+    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
+}
+
+/* ---- surfaces */
+
+uz_side uz_mortar_side_of(const uz_mortar_side *side, const uz_body_model *model)
+{
+    return (uz_side){.dim = model->mesh.dim,
+                     .nodes = side->nodes,
+                     .model = model->kind,
+                     .thickness = model->thickness,
+                     .xyz = side->xyz};
+}
+
+static void clear_surface(uz_mortar_surface *surface)
+{
+    uz_box_tree_clear(&surface->tree);
+    free(surface->side);
+    free(surface->node);
+    free(surface->normal);
+}
+
+static uz_status no_memory(uz_error *err)
+{
+    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
+}
+
+/* Between the corners of one side; box: 2 dim. */
+static double enclose(double *box, const uz_mortar_side *side, int dim)
+{
+    double size = 0;
+    for (int c = 0; c < dim; c++) {
+        box[c] = INFINITY;
+        box[dim + c] = -INFINITY;
+        for (int a = 0; a < side->nodes; a++) {
+            box[c] = fmin(box[c], side->xyz[dim * a + c]);
+            box[dim + c] = fmax(box[dim + c], side->xyz[dim * a + c]);
+        }
+        size = hypot(size, box[dim + c] - box[c]);
+    }
+    return size;
+}
+
+static uz_status make_surface(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group, uz_error *err)
+{
+    const int dim = in->model->mesh.dim;
+    char where[96];
+    double *box = uz_alloc(group->n_faces, 6 * sizeof *box);
+    *out = (uz_mortar_surface){.n = group->n_faces, .side = uz_alloc_zero(group->n_faces, sizeof *out->side)};
+    uz_status status = box && out->side ? UZ_OK : no_memory(err);
+    for (int64_t i = 0; i < out->n && status == UZ_OK; i++) {
+        uz_mortar_side *side = &out->side[i];
+        uz_side shape;
+        side->face = group->face[i];
+        uz_body_side(&shape, side->xyz, side->node, in->model, side->face);
+        side->nodes = shape.nodes;
+        side->area = uz_side_area(&shape);
+        enclose(box + 2 * dim * i, side, dim);
+        if (side->area > 0)
+            continue;
+        snprintf(where, sizeof where, "/contacts/%lld", (long long)in->index);
+        status = uz_fail(err, UZ_ERR_SCENE, where, "the side at node %lld of \"%.63s\" has no area, and so no normal",
+                         (long long)side->node[0], group->name);
+    }
+    if (status == UZ_OK)
+        status = uz_box_tree_init(&out->tree, out->n, dim, box, err);
+    if (status == UZ_OK && !(dim == 2 ? &uz_mortar_plane : &uz_mortar_space)->places(out, in))
+        status = no_memory(err);
+    free(box);
+    return status;
+}
+
+/* ---- points */
+
+bool uz_mortar_add_point(uz_mortar_points *points, const uz_mortar_point *p)
+{
+    if (points->n == points->room) {
+        const int64_t room = 2 * points->room + 256;
+        uz_mortar_point *grown = uz_realloc(points->point, room, sizeof *grown);
+        if (!grown)
+            return false;
+        points->point = grown;
+        points->room = room;
+    }
+    points->point[points->n++] = *p;
+    return true;
+}
+
+/* Room that serves one slave side after the other. */
+typedef struct {
+    uz_mortar_points points;
+    int64_t *near, n_near;
+    double *A; /* points.room x UZ_FACE_NODES */
+    int64_t A_room;
+} side_work;
+
+static bool list_near(void *ctx, int64_t item)
+{
+    side_work *work = ctx;
+    work->near[work->n_near++] = item;
+    return false;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* The area of all points. Where the master has several layers, as of a plate and what is behind it, only the nearest is
+ * kept: what is farther than it by more than the side's size goes. */
+static double covered_area(uz_mortar_points *points, double size)
+{
+    double area = 0, nearest = INFINITY;
+    int64_t kept = 0;
+    for (int64_t g = 0; g < points->n; g++)
+        nearest = fmin(nearest, fabs(points->point[g].gap));
+    for (int64_t g = 0; g < points->n; g++)
+        if (fabs(points->point[g].gap) <= nearest + size) {
+            area += points->point[g].weight;
+            points->point[kept++] = points->point[g];
+        }
+    points->n = kept;
+    return area;
+}
+
+/* The points of slave side i. The master is looked for close by, then farther away as long as the side is not covered:
+ * most sides are covered at once. False: no memory. */
+static bool find_points(side_work *work, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
+                        const uz_mortar_surface *master)
+{
+    const int dim = in->model->mesh.dim;
+    const uz_mortar_geometry *geometry = dim == 2 ? &uz_mortar_plane : &uz_mortar_space;
+    double box[6], covered = 0;
+    const double size = enclose(box, &slave->side[i], dim);
+    int64_t before = -1;
+    for (double reach = size; covered < (1 - 1e-9) * slave->side[i].area; reach *= 8) {
+        double wide[6];
+        for (int c = 0; c < dim; c++) {
+            wide[c] = box[c] - reach;
+            wide[dim + c] = box[dim + c] + reach;
+        }
+        work->n_near = 0;
+        uz_box_tree_meet(&master->tree, wide, list_near, work);
+        if (work->n_near > before) {
+            before = work->n_near;
+            qsort(work->near, (size_t)work->n_near, sizeof *work->near, ascending);
+            work->points.n = 0;
+            if (!geometry->points(&work->points, in, slave, i, master, work->near, work->n_near))
+                return false;
+        }
+        covered = covered_area(&work->points, size);
+        if (before == master->n || reach > 2 * in->model->mesh.extent)
+            break;
+    }
+    if (work->points.n * UZ_FACE_NODES <= work->A_room)
+        return true;
+    double *A = uz_realloc(work->A, UZ_FACE_NODES * work->points.room, sizeof *A);
+    work->A = A ? A : work->A;
+    work->A_room = A ? UZ_FACE_NODES * work->points.room : work->A_room;
+    return A != NULL;
+}
 
 /* ---- which side is the slave */
 
-/* Distance between neighbouring nodes. */
-static double spacing(const uz_mortar_side *side)
+/* Distance between neighbouring nodes, whichever edge of its side a face begins with. */
+static double spacing(const uz_mortar_side *side, int dim)
 {
-    return hypot(side->xyz[2] - side->xyz[0], side->xyz[3] - side->xyz[1]) / (side->nodes - 1);
+    const bool triangle = side->nodes % 3 == 0;
+    const double length = dim == 2   ? hypot(side->xyz[2] - side->xyz[0], side->xyz[3] - side->xyz[1])
+                          : triangle ? sqrt(2 * side->area)
+                                     : sqrt(side->area);
+    return side->nodes > (dim == 2 ? 2 : triangle ? 3 : 4) ? length / 2 : length;
 }
 
-/* Is the master finer than the slave where they face each other? */
-static bool is_master_finer(const uz_mortar_points *points, const uz_mortar_surface *slave,
+/* Is the master finer than the slave where they face each other? Looked at on some of the slave's sides. */
+static bool is_master_finer(bool *finer, side_work *work, const uz_contact_input *in, const uz_mortar_surface *slave,
                             const uz_mortar_surface *master)
 {
+    enum { LOOKED_AT = 500 };
+    const int dim = in->model->mesh.dim;
     double fine[2] = {0, 0};
-    for (int64_t q = 0; q < points->n; q++) {
-        const uz_mortar_point *p = &points->point[q];
-        fine[0] += p->weight / spacing(&slave->side[p->slave]);
-        fine[1] += p->weight / spacing(&master->side[p->master]);
+    for (int64_t i = 0; i < slave->n; i += 1 + slave->n / LOOKED_AT) {
+        if (!find_points(work, in, slave, i, master))
+            return false;
+        for (int64_t g = 0; g < work->points.n; g++) {
+            const uz_mortar_point *p = &work->points.point[g];
+            fine[0] += p->weight / spacing(&slave->side[i], dim);
+            fine[1] += p->weight / spacing(&master->side[p->master], dim);
+        }
     }
-    return fine[1] > (1 + 1e-6) * fine[0];
+    *finer = fine[1] > (1 + 1e-6) * fine[0];
+    return true;
 }
 
 /* ---- rows */
 
-/* The integrals that rows are made of; M by entries. */
+/* The integrals that rows are made of, by place; the masters' by entries. */
 typedef struct {
-    double *D, *whole, *gap; /* n_places; whole: of the shape function over all of its sides ... */
+    double *D, *whole, *gap; /* whole: of the shape function over all of its sides ... */
     double *around;          /* ... and their areas */
-    double *most;            /* n_places: the largest weight of a point, whose master face the row is told by */
+    double *most;            /* the largest share that a master side has, by which the row is told */
     int64_t entries, room, *place, *node;
     double *value;
 } integrals;
 
-static void clear(integrals *to)
+static void clear_integrals(integrals *of)
 {
-    free(to->D);
-    free(to->place);
-    free(to->node);
-    free(to->value);
+    free(of->D);
+    free(of->place);
+    free(of->node);
+    free(of->value);
 }
 
-/* Orthonormal columns by Gram and Schmidt, twice for rounding: A (count x n, by columns) = Q R, R by columns. A column
- * that is nothing new but for rounding: false. */
+static bool add_master(integrals *to, int64_t place, int64_t node, double value)
+{
+    if (to->entries == to->room) {
+        const int64_t room = 2 * to->room + 1024;
+        int64_t *places = uz_realloc(to->place, room, sizeof *places);
+        to->place = places ? places : to->place;
+        int64_t *nodes = uz_realloc(to->node, room, sizeof *nodes);
+        to->node = nodes ? nodes : to->node;
+        double *values = uz_realloc(to->value, room, sizeof *values);
+        to->value = values ? values : to->value;
+        if (!places || !nodes || !values)
+            return false;
+        to->room = room;
+    }
+    to->place[to->entries] = place;
+    to->node[to->entries] = node;
+    to->value[to->entries++] = value;
+    return true;
+}
+
+/* Orthonormal columns by Gram and Schmidt, twice for rounding: A (count x n, by columns) = Q R, R by columns. False: a
+ * column is nothing new but for rounding. */
 static bool orthonormalize(double *A, double R[UZ_FACE_NODES][UZ_FACE_NODES], int64_t count, int n)
 {
     memset(R, 0, (size_t)UZ_FACE_NODES * sizeof *R);
@@ -106,47 +303,45 @@ static bool orthonormalize(double *A, double R[UZ_FACE_NODES][UZ_FACE_NODES], in
     return true;
 }
 
-static bool add_master(integrals *to, int64_t place, int64_t node, double value)
+/* Of a face with middles the shape functions that take the part of shape functions: those of corners have a share of
+ * their edges' middles, without which they are of integral 0 (six nodes) or negative (eight). See
+ * uz_side_positive_weights. Integrals transform alike. */
+static void transform(double *N, int nodes, int dim)
 {
-    if (to->entries == to->room) {
-        const int64_t room = 2 * to->room + 1024;
-        int64_t *places = uz_realloc(to->place, room, sizeof *places);
-        to->place = places ? places : to->place;
-        int64_t *nodes = uz_realloc(to->node, room, sizeof *nodes);
-        to->node = nodes ? nodes : to->node;
-        double *values = uz_realloc(to->value, room, sizeof *values);
-        to->value = values ? values : to->value;
-        if (!places || !nodes || !values)
-            return false;
-        to->room = room;
+    const int corners = nodes / 2;
+    for (int j = 0; j < corners && dim == 3 && nodes >= 6; j++) {
+        N[j] += UZ_MIDDLE_SHARE * N[corners + j];
+        N[(j + 1) % corners] += UZ_MIDDLE_SHARE * N[corners + j];
     }
-    to->place[to->entries] = place;
-    to->node[to->entries] = node;
-    to->value[to->entries++] = value;
-    return true;
+    for (int j = 0; j < corners && dim == 3 && nodes >= 6; j++)
+        N[corners + j] *= 1 - 2 * UZ_MIDDLE_SHARE;
 }
 
-/* The share of one slave side, whose points these are: with A = sqrt(w) N = Q R the dual functions at the points are
- * Q R^-T diag(int N) / sqrt(w). Where the part that is covered is too small for that it is left out. A: room for count
- * x nodes. */
-static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_surface *slave,
-                     const uz_mortar_surface *master, const uz_mortar_point *point, int64_t count, double *A)
+/* The share of one slave side with its points: with A = sqrt(w) N = Q R the dual functions at the points are
+ * Q R^-T diag(int N) / sqrt(w). A side of which too little is covered for that is left out. */
+static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_side *side,
+                     const uz_mortar_surface *master, const uz_mortar_points *points, double *A, int dim)
 {
-    const uz_mortar_side *side = &slave->side[point->slave];
     const int n = side->nodes;
-    double R[UZ_FACE_NODES][UZ_FACE_NODES], D[UZ_FACE_NODES] = {0};
-    for (int a = 0; a < n; a++)
-        for (int64_t g = 0; g < count; g++) {
-            A[a * count + g] = sqrt(point[g].weight) * point[g].N[a];
-            D[a] += point[g].weight * point[g].N[a];
+    const int64_t count = points->n;
+    double R[UZ_FACE_NODES][UZ_FACE_NODES], D[UZ_FACE_NODES] = {0}, M[UZ_FACE_NODES][UZ_FACE_NODES] = {{0}};
+    for (int64_t g = 0; g < count; g++) {
+        double N[UZ_FACE_NODES];
+        memcpy(N, points->point[g].N, sizeof N);
+        transform(N, n, dim);
+        for (int a = 0; a < n; a++) {
+            A[a * count + g] = sqrt(points->point[g].weight) * N[a];
+            D[a] += points->point[g].weight * N[a];
         }
-    if (!orthonormalize(A, R, count, n))
+    }
+    if (count < n || !orthonormalize(A, R, count, n))
         return true;
     for (int a = 0; a < n; a++)
         to->D[side->place[a]] += D[a];
     for (int64_t g = 0; g < count; g++) {
-        const uz_mortar_side *other = &master->side[point[g].master];
-        double psi[UZ_FACE_NODES]; /* R psi' = Q', from the last row up */
+        const uz_mortar_point *p = &points->point[g];
+        const uz_mortar_side *other = &master->side[p->master];
+        double psi[UZ_FACE_NODES] = {0}; /* R psi' = Q', from the last row up */
         for (int j = n - 1; j >= 0; j--) {
             psi[j] = A[j * count + g];
             for (int k = j + 1; k < n; k++)
@@ -154,87 +349,126 @@ static bool add_side(integrals *to, uz_contact_sites *sites, const uz_mortar_sur
             psi[j] /= R[j][j];
         }
         for (int a = 0; a < n; a++) {
+            const double share = psi[a] * D[a] * sqrt(p->weight);
+            to->gap[side->place[a]] += share * p->gap;
+            for (int b = 0; b < other->nodes; b++)
+                M[a][b] += share * p->M[b];
+        }
+        if (g + 1 < count && points->point[g + 1].master == p->master)
+            continue;
+        for (int a = 0; a < n; a++) { /* all points on this master side are seen */
             const int64_t place = side->place[a];
-            const double share = psi[a] * D[a] * sqrt(point[g].weight);
-            to->gap[place] += share * point[g].gap;
-            if (point[g].weight * fabs(point[g].N[a]) > to->most[place]) {
-                to->most[place] = point[g].weight * fabs(point[g].N[a]);
+            double sum = 0;
+            for (int b = 0; b < other->nodes; b++) {
+                sum += M[a][b];
+                if (!add_master(to, place, other->node[b], M[a][b]))
+                    return false;
+            }
+            if (fabs(sum) > to->most[place]) {
+                to->most[place] = fabs(sum);
                 sites->face[place] = other->face;
             }
-            for (int b = 0; b < other->nodes; b++)
-                if (!add_master(to, place, other->node[b], share * point[g].M[b]))
-                    return false;
         }
+        memset(M, 0, sizeof M);
     }
     return true;
 }
 
-static bool add_sides(integrals *to, uz_contact_sites *sites, const uz_mortar_points *points,
-                      const uz_mortar_surface *slave, const uz_mortar_surface *master, const uz_body_model *model)
+/* Integrals over all of the slave. False: no memory. */
+static bool integrate(integrals *of, uz_contact_sites *sites, side_work *work, const uz_contact_input *in,
+                      const uz_mortar_surface *slave, const uz_mortar_surface *master)
 {
-    int64_t most = 0, end;
-    for (int64_t first = 0; first < points->n; first = end) {
-        for (end = first; end < points->n && points->point[end].slave == points->point[first].slave;)
-            end++;
-        most = end - first > most ? end - first : most;
-    }
-    double *A = uz_alloc(UZ_FACE_NODES * most, sizeof *A);
-    bool room = A != NULL;
-    for (int64_t first = 0; first < points->n && room; first = end) {
-        for (end = first; end < points->n && points->point[end].slave == points->point[first].slave;)
-            end++;
-        room = add_side(to, sites, slave, master, points->point + first, end - first, A);
-    }
-    free(A);
-    for (int64_t i = 0; i < slave->n && room; i++) {
-        uz_side side;
-        double xyz[3 * UZ_FACE_NODES], weight[UZ_FACE_NODES];
-        int64_t node[UZ_FACE_NODES];
-        uz_body_side(&side, xyz, node, model, slave->side[i].face);
-        uz_side_weights(weight, &side);
-        for (int a = 0; a < side.nodes; a++) {
-            to->whole[slave->side[i].place[a]] += weight[a];
-            to->around[slave->side[i].place[a]] += uz_side_area(&side);
+    const int dim = in->model->mesh.dim;
+    for (int64_t i = 0; i < slave->n; i++) {
+        const uz_mortar_side *side = &slave->side[i];
+        const uz_side shape = uz_mortar_side_of(side, in->model);
+        const int corners = side->nodes / 2;
+        double weight[UZ_FACE_NODES];
+        uz_side_weights(weight, &shape);
+        transform(weight, side->nodes, dim);
+        for (int a = 0; a < side->nodes; a++) {
+            const int64_t place = side->place[a];
+            of->whole[place] += weight[a];
+            of->around[place] += side->area;
+            for (int k = 0; k < 2 && dim == 3 && side->nodes >= 6 && a >= corners; k++)
+                sites->ends[2 * place + k] = side->place[(a - corners + k) % corners];
         }
+        if (!find_points(work, in, slave, i, master) || !add_side(of, sites, side, master, &work->points, work->A, dim))
+            return false;
     }
-    return room;
+    return true;
 }
 
-/* Fills the sites from the integrals: places without a row keep an infinite gap. */
+/* A place with a row that is a middle between two ends with rows. */
+static bool is_middle(const uz_contact_sites *sites, int64_t place)
+{
+    const int64_t *end = sites->ends + 2 * place;
+    return end[0] >= 0 && isfinite(sites->gap[place]) && isfinite(sites->gap[end[0]]) && isfinite(sites->gap[end[1]]);
+}
+
+/* Fills the sites from the integrals: places without a row keep an infinite gap. contact_rows.c makes of the row of a
+ * middle the transformed one, (row - s (first + second)) / (1 - 2 s), which moves the right slaves; the masters and the
+ * gap, which are those of the transformed row already, are put in here so that they come out right. */
 static uz_status fill_sites(uz_contact_sites *sites, const integrals *of, const uz_mortar_surface *slave,
                             const uz_body_model *model, uz_error *err)
 {
+    const double s = UZ_MIDDLE_SHARE;
     const int dim = model->mesh.dim;
-    int64_t kept = 0;
     uz_csc M = {0};
-    const uz_status status =
+    int64_t kept = 0, most = 0;
+    uz_status status =
         uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, of->entries, of->node, of->place, of->value, err);
     if (status != UZ_OK)
         return status;
-    sites->first = uz_alloc_zero(sites->n + 1, sizeof *sites->first);
-    sites->node = uz_alloc(M.ptr[M.cols], sizeof *sites->node);
-    sites->weight = uz_alloc(M.ptr[M.cols], sizeof *sites->weight);
-    const bool room = sites->first && sites->node && sites->weight;
-    for (int64_t p = 0; p < sites->n && room; p++) {
-        const double D = of->D[p];
-        const bool row = D > LEAST_COVER * of->whole[p] && D > ROUNDING_AREA * of->around[p];
-        for (int64_t q = M.ptr[p]; q < M.ptr[p + 1] && row; q++)
-            if (fabs(M.val[q]) > ROUNDING * D) {
-                sites->node[kept] = M.idx[q];
-                sites->weight[kept++] = M.val[q] / D;
-            }
-        sites->first[p + 1] = kept;
-        sites->gap[p] = row ? of->gap[p] / D : INFINITY;
-        sites->area[p] = row ? D : 0;
+    for (int64_t p = 0; p < sites->n; p++) {
+        const bool row = of->D[p] > LEAST_COVER * of->whole[p] && of->D[p] > LEAST_AREA * of->around[p];
+        sites->gap[p] = row ? of->gap[p] / of->D[p] : INFINITY;
+        sites->area[p] = row ? of->D[p] : 0;
         sites->at[p] = slave->node[p];
         for (int c = 0; c < dim; c++)
             sites->normal[p * dim + c] = -slave->normal[p * dim + c];
+        most += M.ptr[p + 1] - M.ptr[p];
+        for (int k = 0; k < 2 && sites->ends[2 * p] >= 0; k++)
+            most += M.ptr[sites->ends[2 * p + k] + 1] - M.ptr[sites->ends[2 * p + k]];
     }
+    /* A column of masters for each row; of a middle with those of its ends. */
+    int64_t *node = uz_alloc(most, sizeof *node), *place = uz_alloc(most, sizeof *place);
+    double *value = uz_alloc(most, sizeof *value);
+    bool room = node && place && value;
+    for (int64_t p = 0; p < sites->n && room; p++) {
+        const bool middle = isfinite(sites->gap[p]) && is_middle(sites, p);
+        for (int k = 0; k < (middle ? 3 : 1) && isfinite(sites->gap[p]); k++) {
+            const int64_t from = k == 0 ? p : sites->ends[2 * p + k - 1];
+            const double share = (!middle ? 1 : k == 0 ? 1 - 2 * s : s) / of->D[from];
+            for (int64_t q = M.ptr[from]; q < M.ptr[from + 1]; q++)
+                if (fabs(M.val[q]) > ROUNDING * of->D[from]) {
+                    node[kept] = M.idx[q];
+                    place[kept] = p;
+                    value[kept++] = share * M.val[q];
+                }
+        }
+    }
+    for (int64_t p = 0; p < sites->n && room; p++) /* ends are no middles: their gaps are their own yet */
+        if (is_middle(sites, p))
+            sites->gap[p] =
+                (1 - 2 * s) * sites->gap[p] + s * (sites->gap[sites->ends[2 * p]] + sites->gap[sites->ends[2 * p + 1]]);
+        else
+            sites->ends[2 * p] = sites->ends[2 * p + 1] = -1;
     uz_csc_clear(&M);
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
+    status =
+        room ? uz_csc_from_triplets(&M, model->mesh.n_nodes, sites->n, kept, node, place, value, err) : no_memory(err);
+    free(node);
+    free(place);
+    free(value);
+    if (status != UZ_OK)
+        return status;
+    sites->first = M.ptr;
+    sites->node = M.idx;
+    sites->weight = M.val;
+    return UZ_OK;
 }
 
-static uz_status make_rows(uz_contact_sites *sites, const uz_contact_input *in, const uz_mortar_points *points,
+static uz_status make_rows(uz_contact_sites *sites, side_work *work, const uz_contact_input *in,
                            const uz_mortar_surface *slave, const uz_mortar_surface *master, uz_error *err)
 {
     const int64_t n = slave->n_places;
@@ -243,62 +477,58 @@ static uz_status make_rows(uz_contact_sites *sites, const uz_contact_input *in, 
     sites->normal = uz_alloc(n * in->model->mesh.dim, sizeof *sites->normal);
     sites->area = uz_alloc(n, sizeof *sites->area);
     sites->at = uz_alloc(n, sizeof *sites->at);
+    sites->ends = uz_alloc(2 * n, sizeof *sites->ends);
     sites->face = uz_alloc_zero(n, sizeof *sites->face);
-    uz_status status = UZ_ERR_MEMORY;
-    if (of.D && sites->gap && sites->normal && sites->area && sites->at && sites->face) {
+    bool room = of.D && sites->gap && sites->normal && sites->area && sites->at && sites->ends && sites->face;
+    if (room) {
         sites->n = n;
         of.whole = of.D + n;
         of.gap = of.D + 2 * n;
         of.most = of.D + 3 * n;
         of.around = of.D + 4 * n;
-        if (add_sides(&of, sites, points, slave, master, in->model))
-            status = fill_sites(sites, &of, slave, in->model, err);
+        memset(sites->ends, 0xff, (size_t)(2 * n) * sizeof *sites->ends);
+        room = integrate(&of, sites, work, in, slave, master);
     }
-    clear(&of);
-    return status != UZ_ERR_MEMORY ? status
-                                   : uz_fail(err, UZ_ERR_MEMORY, "",
-                                             "no memory for contact between two surfaces of %lld nodes", (long long)n);
+    const uz_status status = room ? fill_sites(sites, &of, slave, in->model, err) : no_memory(err);
+    clear_integrals(&of);
+    return status;
 }
 
-/* The lowest node of a group: which surface is looked at first may not depend on what the two are called. */
-static bool begins_before(const uz_group *a, const uz_group *b)
-{
-    return a->node[0] < b->node[0];
-}
-
+/* The surface that has the lowest node is looked at first, whatever the two are called. */
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
-    uz_mortar_surface slave = {0}, master = {0};
-    uz_mortar_points points = {0};
+    uz_mortar_surface surface[2] = {{0}, {0}};
+    side_work work = {.near = NULL};
     char where[96];
+    bool finer = false;
     uz_status status = uz_contact_pair_check(&in->model->mesh, in->on, in->with, in->index, err);
     if (status != UZ_OK)
         return status;
-    const bool straight = begins_before(in->on, in->with);
-    sites->swapped = !straight;
-    status = uz_mortar_plane_surface(&slave, in, straight ? in->on : in->with, err);
+    sites->swapped = in->on->node[0] > in->with->node[0];
+    status = make_surface(&surface[0], in, sites->swapped ? in->with : in->on, err);
     if (status == UZ_OK)
-        status = uz_mortar_plane_surface(&master, in, straight ? in->with : in->on, err);
-    if (status == UZ_OK)
-        status = uz_mortar_plane_points(&points, in, &slave, &master, err);
-    if (status == UZ_OK && is_master_finer(&points, &slave, &master)) {
-        const uz_mortar_surface other = slave;
-        slave = master;
-        master = other;
-        sites->swapped = straight;
-        points.n = 0;
-        status = uz_mortar_plane_points(&points, in, &slave, &master, err);
+        status = make_surface(&surface[1], in, sites->swapped ? in->on : in->with, err);
+    if (status != UZ_OK)
+        goto done;
+    const int64_t most = surface[0].n > surface[1].n ? surface[0].n : surface[1].n;
+    work.near = uz_alloc(most, sizeof *work.near);
+    if (!work.near || !is_master_finer(&finer, &work, in, &surface[0], &surface[1])) {
+        status = no_memory(err);
+        goto done;
     }
-    if (status == UZ_OK && points.n == 0) {
+    sites->swapped = sites->swapped != finer;
+    status = make_rows(sites, &work, in, &surface[finer], &surface[!finer], err);
+    if (status == UZ_OK && sites->first[sites->n] == 0) {
         snprintf(where, sizeof where, "/contacts/%lld/on", (long long)in->index);
         status =
             uz_fail(err, UZ_ERR_SCENE, where, "no part of \"%.63s\" faces \"%.63s\"", in->on->name, in->with->name);
     }
-    if (status == UZ_OK)
-        status = make_rows(sites, in, &points, &slave, &master, err);
-    uz_mortar_surface_clear(&slave);
-    uz_mortar_surface_clear(&master);
-    free(points.point);
+done:
+    clear_surface(&surface[0]);
+    clear_surface(&surface[1]);
+    free(work.points.point);
+    free(work.near);
+    free(work.A);
     return status;
 }
 

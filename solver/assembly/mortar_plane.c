@@ -12,10 +12,8 @@
 #include "assembly/mortar.h"
 
 #include "core/alloc.h"
-#include "core/error.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -23,9 +21,6 @@
 
 /* Less than this part of an edge is no segment: it is what rounding leaves between two nodes that face each other. */
 #define LEAST_SEGMENT 1e-9
-
-/* Degrees. */
-#define FEATURE_ANGLE 40
 
 static double dot(const double a[2], const double b[2])
 {
@@ -157,29 +152,26 @@ static void find_tangents(uz_mortar_surface *surface, const int64_t *at, double 
     }
 }
 
-static int by_node(const void *a, const void *b)
+/* Places in the order of their nodes: one for each end of an edge, but where it goes on into the next. */
+static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
 {
-    const int64_t *x = a, *y = b;
-    return x[0] != y[0] ? (x[0] > y[0]) - (x[0] < y[0]) : (x[1] > y[1]) - (x[1] < y[1]);
-}
-
-/* Places in the order of their nodes: one for each end of an edge but where it goes on into the next. */
-static bool number_places(uz_mortar_surface *surface)
-{
-    int64_t(*key)[2] = uz_alloc(3 * surface->n, sizeof *key), n = 0; /* node; 3 * edge + its node */
+    const double feature = in->contact->feature_angle > 0 ? in->contact->feature_angle : UZ_FEATURE_ANGLE;
+    int64_t(*key)[2] = uz_alloc(3 * surface->n, sizeof *key), n = 0; /* node; 3 * edge + which of its nodes */
+    int64_t *at = uz_alloc_zero(2 * in->model->mesh.n_nodes, sizeof *at);
     surface->node = uz_alloc(3 * surface->n, sizeof *surface->node);
     surface->normal = uz_alloc(6 * surface->n, sizeof *surface->normal);
-    if (!key || !surface->node || !surface->normal) {
-        free(key);
-        return false;
-    }
+    const bool room = key && at && surface->node && surface->normal;
+    if (!room)
+        goto done;
+    list_ends(at, surface);
+    find_tangents(surface, at, cos(feature * PI / 180));
     for (int64_t i = 0; i < surface->n; i++)
         for (int a = 0; a < surface->side[i].nodes; a++)
             if (a != 0 || !surface->side[i].joined[0]) {
                 key[n][0] = surface->side[i].node[a];
                 key[n++][1] = 3 * i + a;
             }
-    qsort(key, (size_t)n, sizeof *key, by_node);
+    qsort(key, (size_t)n, sizeof *key, uz_mortar_by_node);
     for (int64_t p = 0; p < n; p++) {
         uz_mortar_side *e = &surface->side[key[p][1] / 3];
         const int a = (int)(key[p][1] % 3);
@@ -190,54 +182,14 @@ static bool number_places(uz_mortar_surface *surface)
         surface->node[p] = key[p][0];
         turn_outward(surface->normal + 2 * p, a == 2 ? slope : e->tangent[a]);
         e->place[a] = p;
+        if (a == 1 && e->joined[1])
+            surface->side[at[2 * e->node[1]] - 1].place[0] = p;
     }
     surface->n_places = n;
+done:
     free(key);
-    return true;
-}
-
-void uz_mortar_surface_clear(uz_mortar_surface *surface)
-{
-    free(surface->side);
-    free(surface->node);
-    free(surface->normal);
-    memset(surface, 0, sizeof *surface);
-}
-
-uz_status uz_mortar_plane_surface(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
-                                  uz_error *err)
-{
-    const uz_mesh *mesh = &in->model->mesh;
-    const double feature = in->contact->feature_angle;
-    *out = (uz_mortar_surface){.n = group->n_faces, .side = uz_alloc_zero(group->n_faces, sizeof *out->side)};
-    int64_t *at = uz_alloc_zero(2 * mesh->n_nodes, sizeof *at);
-    bool room = out->side && at;
-    for (int64_t i = 0; i < out->n && room; i++) {
-        uz_side side;
-        double chord[2];
-        char where[96];
-        out->side[i].face = group->face[i];
-        uz_body_side(&side, out->side[i].xyz, out->side[i].node, in->model, group->face[i]);
-        out->side[i].nodes = side.nodes;
-        if (direction(chord, side.xyz, side.xyz + 2) > 0)
-            continue;
-        free(at);
-        snprintf(where, sizeof where, "/contacts/%lld", (long long)in->index);
-        return uz_fail(err, UZ_ERR_SCENE, where, "the edge at node %lld of \"%.63s\" has no length, and so no normal",
-                       (long long)out->side[i].node[0], group->name);
-    }
-    if (room) {
-        list_ends(at, out);
-        find_tangents(out, at, cos((feature > 0 ? feature : FEATURE_ANGLE) * PI / 180));
-        room = number_places(out);
-        for (int64_t i = 0; i < out->n && room; i++) /* an edge that goes on has its neighbour's place */
-            if (out->side[i].joined[0]) {
-                const uz_mortar_side *before = &out->side[at[2 * out->side[i].node[0] + 1] - 1];
-                out->side[i].place[0] = before->place[1];
-            }
-    }
     free(at);
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a surface of %lld edges", (long long)out->n);
+    return room;
 }
 
 /* ---- points */
@@ -321,32 +273,18 @@ static int64_t edge_across(const uz_mortar_surface *master, const int64_t *near,
     return best;
 }
 
-static bool add_point(uz_mortar_points *points, const uz_mortar_point *p)
-{
-    if (points->n == points->room) {
-        const int64_t room = 2 * points->room + 256;
-        uz_mortar_point *grown = uz_realloc(points->point, room, sizeof *grown);
-        if (!grown)
-            return false;
-        points->point = grown;
-        points->room = room;
-    }
-    points->point[points->n++] = *p;
-    return true;
-}
-
 /* The Gauss points between a and b of slave edge i, which has master edge k across. */
-static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
-                        const uz_mortar_surface *master, int64_t k, double a, double b)
+static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave,
+                        const uz_mortar_side *e, const uz_mortar_surface *master, int64_t k, double a, double b)
 {
     static const double AT[4] = {-0.86113631159405257522, -0.33998104358485626480, 0.33998104358485626480,
                                  0.86113631159405257522};
     static const double WEIGHT[4] = {0.34785484513745385737, 0.65214515486254614263, 0.65214515486254614263,
                                      0.34785484513745385737};
-    const uz_mortar_side *e = &slave->side[i], *f = &master->side[k];
+    const uz_mortar_side *f = &master->side[k];
     bool room = true;
     for (int g = 0; g < 4 && room; g++) {
-        uz_mortar_point p = {.slave = i, .master = k};
+        uz_mortar_point p = {.master = k};
         double x[2], slope[2], n[2], mine[2], other[2], t = 0;
         const double s = 0.5 * (a + b) + 0.5 * (b - a) * AT[g];
         edge_at(x, slope, e, s);
@@ -362,7 +300,7 @@ static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, co
             for (int c = 0; c < 2; c++)
                 p.gap += (other[c] - mine[c]) * n[c];
         }
-        room = !isfinite(p.gap) || add_point(points, &p);
+        room = !isfinite(p.gap) || uz_mortar_add_point(points, &p);
     }
     return room;
 }
@@ -373,47 +311,40 @@ static int ascending(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-uz_status uz_mortar_plane_points(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave,
-                                 const uz_mortar_surface *master, uz_error *err)
+/* Segments between the master's nodes, projected along the slave's field of normals. */
+static bool points(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
+                   const uz_mortar_surface *master, const int64_t *near, int64_t n_near)
 {
-    double *cut = uz_alloc(2 * master->n + 2, sizeof *cut);
-    int64_t *near = uz_alloc(master->n, sizeof *near);
-    bool room = cut && near;
-    for (int64_t i = 0; i < slave->n && room; i++) {
-        const uz_mortar_side *e = &slave->side[i];
-        double chord[2];
-        const double length = direction(chord, e->xyz, e->xyz + 2);
-        int64_t n_near = 0, n_cuts = 0;
-        /* Edges beside this one, and where their ends cut it. */
-        for (int64_t k = 0; k < master->n; k++) {
-            double along[2], s;
-            for (int end = 0; end < 2; end++) {
-                const double *x = master->side[k].xyz + 2 * end;
-                along[end] = ((x[0] - e->xyz[0]) * chord[0] + (x[1] - e->xyz[1]) * chord[1]) / length;
-            }
-            if (fmax(along[0], along[1]) < -0.9 || fmin(along[0], along[1]) > 1.9)
-                continue;
-            near[n_near++] = k;
-            for (int end = 0; end < 2; end++)
-                if (fabs(s = project_on_slave(slave, e, master->side[k].xyz + 2 * end)) < 1)
-                    cut[n_cuts++] = s;
-        }
+    const uz_mortar_side *e = &slave->side[i];
+    int64_t n_cuts = 0;
+    double *cut = uz_alloc(2 * n_near + 2, sizeof *cut), chord[2];
+    bool room = cut != NULL;
+    const double length = direction(chord, e->xyz, e->xyz + 2);
+    for (int64_t k = 0; k < 2 * n_near && room; k++) {
+        const double *x = master->side[near[k / 2]].xyz + 2 * (k % 2);
+        const double along = ((x[0] - e->xyz[0]) * chord[0] + (x[1] - e->xyz[1]) * chord[1]) / length;
+        const double s = along > -0.9 && along < 1.9 ? project_on_slave(slave, e, x) : 2;
+        if (fabs(s) < 1)
+            cut[n_cuts++] = s;
+    }
+    if (room) {
         cut[n_cuts++] = -1;
         cut[n_cuts++] = 1;
         qsort(cut, (size_t)n_cuts, sizeof *cut, ascending);
-        for (int64_t k = 0; k + 1 < n_cuts && room; k++) {
-            double x[2], n[2];
-            const double middle = 0.5 * (cut[k] + cut[k + 1]);
-            if (cut[k + 1] - cut[k] < LEAST_SEGMENT)
-                continue;
-            edge_at(x, NULL, e, middle);
-            normal_at(n, slave, e, middle);
-            const int64_t across = edge_across(master, near, n_near, x, n);
-            if (across >= 0)
-                room = add_segment(points, in, slave, i, master, across, cut[k], cut[k + 1]);
-        }
+    }
+    for (int64_t k = 0; k + 1 < n_cuts && room; k++) {
+        double x[2], n[2];
+        const double middle = 0.5 * (cut[k] + cut[k + 1]);
+        if (cut[k + 1] - cut[k] < LEAST_SEGMENT)
+            continue;
+        edge_at(x, NULL, e, middle);
+        normal_at(n, slave, e, middle);
+        const int64_t across = edge_across(master, near, n_near, x, n);
+        if (across >= 0)
+            room = add_segment(points, in, slave, e, master, across, cut[k], cut[k + 1]);
     }
     free(cut);
-    free(near);
-    return room ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
+    return room;
 }
+
+const uz_mortar_geometry uz_mortar_plane = {places, points};

@@ -139,6 +139,8 @@ typedef struct {
 } uz_side;
 
 void uz_side_shape(double *N, const uz_side *side, const double point[2]);
+/* With derivatives: slope[node][reference coordinate]. */
+void uz_side_gradients(double *N, double slope[][3], const uz_side *side, const double point[2]);
 /* Reference coordinates of the nodes: [node][3], of which one or two are used. */
 const double (*uz_side_local_nodes(const uz_side *side))[3];
 /* Gauss rule that integrates the mass matrix of an undistorted side exactly: edges 2 or 3 points, faces 3, 4, 7

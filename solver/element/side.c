@@ -44,7 +44,7 @@ static void edge_shape(double *N, double slope[][3], int nodes, double s)
     }
 }
 
-static void shape(double *N, double slope[][3], const uz_side *side, const double point[2])
+void uz_side_gradients(double *N, double slope[][3], const uz_side *side, const double point[2])
 {
     if (side->dim == 2) {
         edge_shape(N, slope, side->nodes, point[0]);
@@ -58,7 +58,7 @@ static void shape(double *N, double slope[][3], const uz_side *side, const doubl
 void uz_side_shape(double *N, const uz_side *side, const double point[2])
 {
     double slope[UZ_SIDE_NODES][3];
-    shape(N, slope, side, point);
+    uz_side_gradients(N, slope, side, point);
 }
 
 /* ------------------------------------------------------------- Gauss rules */
@@ -111,7 +111,7 @@ static double depth(const uz_side *side, const double *N)
 static void area_vector(double *area, double *N, const uz_side *side, const double point[2])
 {
     double slope[UZ_SIDE_NODES][3], T[2][3];
-    shape(N, slope, side, point);
+    uz_side_gradients(N, slope, side, point);
     /* Tangents along the reference coordinates, from differences to the first node. */
     memset(T, 0, 6 * sizeof T[0][0]);
     for (int a = 1; a < side->nodes; a++)

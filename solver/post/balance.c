@@ -64,12 +64,13 @@ static void add_row(balance *b, int64_t row)
     const uz_mesh_info *info = &b->model->info;
     const int64_t k = info->contact_of[row], node = info->contact_node[row], place = b->model->row_place[row];
     const uz_contact_sites *sites = b->model->sites ? &b->model->sites[k] : NULL;
+    const bool swapped = sites && sites->swapped; /* `on` is pushed back */
     double f[DIM] = {0};
     for (int c = 0; c < b->dim; c++) {
         f[c] = -b->r[row] * info->contact_normal[row * b->dim + c];
         b->contact[node * b->dim + c] += f[c];
     }
-    add_force(b, &b->out->contacts[k], node, f);
+    add_force(b, swapped ? NULL : &b->out->contacts[k], node, f);
     for (int64_t j = sites && sites->first ? sites->first[place] : 0;
          sites && sites->first && j < sites->first[place + 1]; j++) {
         double back[DIM] = {0};
@@ -77,7 +78,7 @@ static void add_row(balance *b, int64_t row)
             back[c] = -sites->weight[j] * f[c];
             b->contact[sites->node[j] * b->dim + c] += back[c];
         }
-        add_force(b, NULL, sites->node[j], back);
+        add_force(b, swapped ? &b->out->contacts[k] : NULL, sites->node[j], back);
     }
 }
 

@@ -39,18 +39,20 @@ static uz_status make_evaluation(uz_evaluation **out, const uz_scene *scene, uz_
     return UZ_OK;
 }
 
-/* Force, area and peak of the contact: the obstacle pushes a row's node along its normal by -push (m, uz_row_forces).
- */
-static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_law *law, const double *push)
+/* Force, area and peak of the contact: the obstacle pushes a row's node along its normal by -push (m, uz_row_forces),
+ * and `on` is pushed the other way where the other side has the rows. */
+static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_body_model *model, const double *push)
 {
+    const uz_law *law = model->law;
     uz_summary *summary = &result->summary;
     const uz_mesh_info *mesh = &result->mesh;
     summary->dim = mesh->dim;
     summary->max_pressure = 0.0;
     for (int64_t i = 0; i < result->m; i++) {
         const int64_t node = mesh->contact_node[i];
+        const bool swapped = model->sites && model->sites[mesh->contact_of[i]].swapped;
         for (int axis = 0; axis < mesh->dim; axis++)
-            summary->force[axis] -= push[i] * mesh->contact_normal[i * mesh->dim + axis];
+            summary->force[axis] -= (swapped ? -push[i] : push[i]) * mesh->contact_normal[i * mesh->dim + axis];
         if (law->kind->active(law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];
         if (!(result->pressure[i] > summary->max_pressure))
@@ -78,7 +80,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     if (!push)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)result->m);
     uz_row_forces(push, model, result->r);
-    evaluate_contact(result, result->evaluation, model->law, push);
+    evaluate_contact(result, result->evaluation, model, push);
     free(push);
     status = uz_find_doubts(result->evaluation, model, scene, result->u, result->r, err);
     if (status != UZ_OK)

@@ -8,6 +8,17 @@ from service import check, expect
 
 WAIT = {"Prefer": "wait=120"}
 PLANE = ["tri3", "quad4", "tri6", "quad8"]
+SOLID = ["hex8", "tet4", "wedge6", "hex20", "tet10", "wedge15"]
+CORNERS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+# Parts of a brick by its corners, edges with a node amid them, and faces.
+TETS = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
+PIECES = {"hex": [tuple(range(8))], "tet": TETS, "wedge": [(0, 2, 1, 4, 6, 5), (0, 3, 2, 4, 7, 6)]}
+EDGES = {"hex": [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)],
+         "tet": [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)],
+         "wedge": [(0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)]}
+FACES = {"hex": [(0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)],
+         "tet": [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)],
+         "wedge": [(0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)]}
 
 
 def plate(kind, cells, first, place):
@@ -35,18 +46,65 @@ def plate(kind, cells, first, place):
     return nodes, elements, {side: [[node(*x) for x in e] for e in pairs] for side, pairs in edges.items()}
 
 
+def brick(kind, cells, first, place):
+    """The same of the unit cube, its sides named x0, x1, y0, ..."""
+    shape, step = kind.rstrip("0123456789"), 2 if kind in ("hex20", "tet10", "wedge15") else 1
+    size = [step * n for n in cells]
+    number, nodes, elements, faces = {}, [], [], {f"{axis}{end}": [] for axis in "xyz" for end in "01"}
+
+    def node(at):
+        if at not in number:
+            number[at] = first + len(nodes)
+            nodes.append(list(place(*(i / n for i, n in zip(at, size)))))
+        return number[at]
+
+    for cell in itertools.product(*(range(0, n, step) for n in size)):
+        corner = [tuple(i + step * c for i, c in zip(cell, at)) for at in CORNERS]
+        for piece in PIECES[shape]:
+            mine = [corner[c] for c in piece]
+            middles = [tuple((i + j) // 2 for i, j in zip(mine[a], mine[b])) for a, b in EDGES[shape]]
+            elements.append([node(x) for x in mine + (middles if step == 2 else [])])
+            for axis, end in itertools.product(range(3), (0, 1)):
+                faces["xyz"[axis] + "01"[end]] += [[node(mine[c]) for c in face] for face in FACES[shape]
+                                                   if all(mine[c][axis] == end * size[axis] for c in face)]
+    return nodes, elements, faces
+
+
 def body(kinds, cells, places, groups, **scene):
-    """Two plates; groups: name -> list of (plate, side)."""
-    nodes, elements, edges = [], {}, []
+    """Two plates or bricks; groups: name -> list of (part, side)."""
+    nodes, elements, sides = [], {}, []
+    solid = kinds[0] in SOLID
     for kind, n, place in zip(kinds, cells, places):
-        part = plate(kind, n, len(nodes), place)
+        part = (brick if solid else plate)(kind, n, len(nodes), place)
         nodes += part[0]
         elements.setdefault(kind, []).extend(part[1])
-        edges.append(part[2])
+        sides.append(part[2])
     mesh = {"nodes": nodes, "elements": elements,
-            "groups": {name: {"edges": sum((edges[k][side] for k, side in parts), [])}
+            "groups": {name: {"faces" if solid else "edges": sum((sides[k][side] for k, side in parts), [])}
                        for name, parts in groups.items()}}
     return {"problem": {"kind": "scene", "mesh": mesh, **scene}}
+
+
+def stacked_bricks(kinds, on, slope=0.0, warp=0.0):
+    """The same in space; warp: the interface is one plane of distorted faces, others on either side."""
+    def bent(x, y, by, at):
+        return x + by * x * (6 - x) * (y - at) / 27, y + by * y * (6 - y) * (x - at) / 27
+
+    def low(x, y, z):
+        x, y = bent(6 * x, 6 * y, -warp, 2)
+        return x, y, 3 * z + slope * (x - 3) * z
+
+    def high(x, y, z):
+        x, y = bent(6 * x, 6 * y, warp, 3)
+        return x, y, 3 + 3 * z + slope * (x - 3) * (1 - z)
+
+    both = {f"{axis}{end}": [(0, f"{axis}{end}"), (1, f"{axis}{end}")] for axis in "xy" for end in "01"}
+    return body(kinds, [(3, 2, 2), (4, 3, 2)], [low, high],
+                {"low": [(0, "z1")], "high": [(1, "z0")], "bottom": [(0, "z0")], "top": [(1, "z1")], **both},
+                model="solid", materials=[{"on": "all", "young": 1000, "poisson": 0.3}],
+                supports=[{"on": "x0", "ux": 0}, {"on": "y0", "uy": 0}, {"on": "bottom", "uz": 0}],
+                loads=[{"on": side, "pressure": 1} for side in ("top", "x1", "y1")],
+                contacts=[{"on": on, "with": "high" if on == "low" else "low", "discretization": "surfaces"}])
 
 
 def stacked(kinds, slope, on, model="plane_strain", turn=0.0, scale=1.0):
@@ -96,7 +154,8 @@ def check_uniform(answer, tolerance, *context):
     for p in answer["pressure"]:
         check(abs(p - 1) < tolerance, p, *context)
     for stress in answer["stress"]:
-        check(abs(stress[0] + 1) < 10 * tolerance and abs(stress[1] + 1) < 10 * tolerance, stress, *context)
+        for c in range(3 if len(stress) == 6 else 2):
+            check(abs(stress[c] + 1) < 10 * tolerance, stress, *context)
 
 
 def test_patch_test_of_all_mixtures(s):
@@ -112,6 +171,15 @@ def test_patch_test_of_other_models(s):
     check_uniform(answer_of(s, stacked(("quad4", "quad8"), 0.3, "low", "axisymmetric")), 1e-9)
 
 
+def test_patch_test_of_all_mixtures_in_space(s):
+    for kinds in itertools.product(SOLID, SOLID):
+        check_uniform(answer_of(s, stacked_bricks(kinds, "low")), 1e-10, kinds)
+    for kinds in (("hex8", "wedge6"), ("tet10", "hex20"), ("wedge15", "tet4")):
+        check_uniform(answer_of(s, stacked_bricks(kinds, "high", slope=0.3)), 1e-10, kinds, "slope")
+    for kinds in (("hex8", "hex8"), ("tet4", "hex8"), ("hex8", "wedge6")):
+        check_uniform(answer_of(s, stacked_bricks(kinds, "low", warp=0.3)), 1e-6, kinds, "distorted")
+
+
 def test_rotated_and_scaled_bodies(s):
     for turn, scale in ((0.7, 1), (0, 1e6), (2.5, 1e-5)):
         check_uniform(answer_of(s, stacked(("quad4", "quad8"), 0.3, "low", turn=turn, scale=scale)), 1e-8, turn, scale)
@@ -121,6 +189,8 @@ def test_sides_may_be_exchanged(s):
     for kinds in (("quad4", "quad4"), ("tri3", "quad8")):
         low, high = (answer_of(s, stacked(kinds, 0.3, on)) for on in ("low", "high"))
         check(low["displacements"] == high["displacements"] and low["pressure"] == high["pressure"], kinds)
+        forces = [a["summary"]["resultants"]["contacts"][0]["force"] for a in (low, high)]
+        check(all(abs(a + b) < 1e-9 for a, b in zip(*forces)) and forces[0][1] < -9.9, forces)  # on the side named
 
 
 def test_press_fit_of_facets_is_lames(s):

@@ -1,0 +1,330 @@
+/* mortar_space.c: two surfaces in space, integrated over together.
+ *
+ * Each slave face has a plane through its centre, across its normal there. Both faces are projected on it, cut with
+ * each other, and the convex pieces are split into triangles with Gauss points; each point is carried back along the
+ * plane's normal to both faces (M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
+ * solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629). Faces with nodes amid their edges are cut
+ * as the pieces between these nodes. Facets and quadratic faces are taken as they are. */
+#include "assembly/mortar.h"
+
+#include "core/alloc.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+enum { MOST_CORNERS = 12, MOST_PIECES = 5 };
+
+/* A piece smaller than this part of the slave face is what rounding leaves. */
+#define LEAST_PIECE 1e-12
+
+typedef struct {
+    double x[MOST_CORNERS][2];
+    int n;
+} polygon;
+
+/* A plane: centre, tangents, normal. */
+typedef struct {
+    double x[3], t[2][3], n[3];
+} plane;
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void cross(double out[3], const double a[3], const double b[3])
+{
+    for (int c = 0; c < 3; c++)
+        out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
+}
+
+static double unit(double v[3])
+{
+    const double length = sqrt(dot(v, v));
+    for (int c = 0; c < 3 && length > 0; c++)
+        v[c] /= length;
+    return length;
+}
+
+static int corners_of(const uz_mortar_side *side)
+{
+    return side->nodes % 3 == 0 ? 3 : 4;
+}
+
+static const double *centre_of(const uz_mortar_side *side)
+{
+    static const double CENTRE[2][2] = {{1. / 3, 1. / 3}, {0, 0}};
+    return CENTRE[corners_of(side) - 3];
+}
+
+/* ---- places */
+
+/* A face joins a place of its node whose normal so far is within the feature angle, else it begins one. */
+static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
+{
+    const double feature = in->contact->feature_angle > 0 ? in->contact->feature_angle : UZ_FEATURE_ANGLE;
+    const double least = cos(feature * PI / 180);
+    int64_t most = 0, n = 0;
+    for (int64_t i = 0; i < surface->n; i++)
+        most += surface->side[i].nodes;
+    int64_t(*key)[2] = uz_alloc(most, sizeof *key); /* node; UZ_FACE_NODES * face + which of its nodes */
+    surface->node = uz_alloc(most, sizeof *surface->node);
+    surface->normal = uz_alloc(3 * most, sizeof *surface->normal);
+    const bool room = key && surface->node && surface->normal;
+    for (int64_t i = 0; i < surface->n && room; i++)
+        for (int a = 0; a < surface->side[i].nodes; a++) {
+            key[n][0] = surface->side[i].node[a];
+            key[n++][1] = UZ_FACE_NODES * i + a;
+        }
+    if (room)
+        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_node);
+    int64_t first = 0;
+    for (int64_t k = 0; k < n; k++) {
+        uz_mortar_side *side = &surface->side[key[k][1] / UZ_FACE_NODES];
+        const int a = (int)(key[k][1] % UZ_FACE_NODES);
+        const uz_side shape = uz_mortar_side_of(side, in->model);
+        double normal[3];
+        int64_t place = surface->n_places;
+        uz_side_area_vector(normal, &shape, uz_side_local_nodes(&shape)[a]);
+        unit(normal);
+        if (k > 0 && key[k][0] != key[k - 1][0])
+            first = surface->n_places;
+        for (int64_t p = surface->n_places - 1; p >= first; p--) {
+            double mean[3];
+            memcpy(mean, surface->normal + 3 * p, sizeof mean);
+            unit(mean);
+            if (dot(mean, normal) > least)
+                place = p;
+        }
+        if (place == surface->n_places) {
+            memset(surface->normal + 3 * place, 0, 3 * sizeof(double));
+            surface->node[surface->n_places++] = key[k][0];
+        }
+        for (int c = 0; c < 3; c++)
+            surface->normal[3 * place + c] += normal[c];
+        side->place[a] = place;
+    }
+    for (int64_t p = 0; p < surface->n_places; p++)
+        unit(surface->normal + 3 * p);
+    free(key);
+    return room;
+}
+
+/* ---- polygons */
+
+/* Twice the area, positive counter-clockwise. */
+static double twice_area(const polygon *p)
+{
+    double sum = 0;
+    for (int i = 1; i + 1 < p->n; i++)
+        sum += (p->x[i][0] - p->x[0][0]) * (p->x[i + 1][1] - p->x[0][1]) -
+               (p->x[i][1] - p->x[0][1]) * (p->x[i + 1][0] - p->x[0][0]);
+    return sum;
+}
+
+/* What of a is on the left of all sides of b, both convex and counter-clockwise (I. Sutherland, G. Hodgman, "Reentrant
+ * polygon clipping", Comm. ACM 17 (1974) 32-42). */
+static void clip(polygon *a, const polygon *b)
+{
+    for (int e = 0; e < b->n && a->n > 0; e++) {
+        const double *from = b->x[e], *to = b->x[(e + 1) % b->n];
+        const double along[2] = {to[0] - from[0], to[1] - from[1]};
+        double off[MOST_CORNERS];
+        polygon out = {.n = 0};
+        for (int i = 0; i < a->n; i++)
+            off[i] = along[0] * (a->x[i][1] - from[1]) - along[1] * (a->x[i][0] - from[0]);
+        for (int i = 0; i < a->n; i++) {
+            const int j = (i + 1) % a->n;
+            if (off[i] >= 0 && out.n < MOST_CORNERS)
+                memcpy(out.x[out.n++], a->x[i], sizeof out.x[0]);
+            if ((off[i] > 0 && off[j] < 0) || (off[i] < 0 && off[j] > 0)) {
+                const double s = off[i] / (off[i] - off[j]);
+                for (int c = 0; c < 2 && out.n < MOST_CORNERS; c++)
+                    out.x[out.n][c] = a->x[i][c] + s * (a->x[j][c] - a->x[i][c]);
+                out.n += out.n < MOST_CORNERS;
+            }
+        }
+        *a = out;
+    }
+}
+
+/* A face on the plane: itself, or the pieces between its corners and middles. Returns how many. */
+static int project(polygon piece[MOST_PIECES], const uz_mortar_side *side, const plane *on)
+{
+    static const int SIX[4][4] = {{0, 3, 5, -1}, {1, 4, 3, -1}, {2, 5, 4, -1}, {3, 4, 5, -1}};
+    static const int EIGHT[5][4] = {{0, 4, 7, -1}, {1, 5, 4, -1}, {2, 6, 5, -1}, {3, 7, 6, -1}, {4, 5, 6, 7}};
+    static const int ALL[1][4] = {{0, 1, 2, 3}};
+    const int(*nodes)[4] = side->nodes == 6 ? SIX : side->nodes == 8 ? EIGHT : ALL;
+    const int count = side->nodes == 6 ? 4 : side->nodes == 8 ? 5 : 1;
+    for (int k = 0; k < count; k++) {
+        piece[k].n = 0;
+        for (int a = 0; a < 4 && nodes[k][a] >= 0 && nodes[k][a] < side->nodes; a++) {
+            const double *x = side->xyz + 3 * nodes[k][a];
+            const double off[3] = {x[0] - on->x[0], x[1] - on->x[1], x[2] - on->x[2]};
+            piece[k].x[piece[k].n][0] = dot(off, on->t[0]);
+            piece[k].x[piece[k].n++][1] = dot(off, on->t[1]);
+        }
+    }
+    return count;
+}
+
+static void turn_over(polygon *p)
+{
+    for (int i = 0; i < p->n / 2; i++) {
+        double x[2];
+        memcpy(x, p->x[i], sizeof x);
+        memcpy(p->x[i], p->x[p->n - 1 - i], sizeof x);
+        memcpy(p->x[p->n - 1 - i], x, sizeof x);
+    }
+}
+
+/* ---- points */
+
+/* The point of a face above y on the plane, by Newton's method from where `local` is: shape functions, area vector per
+ * reference area, height over the plane. False: there is none. */
+static bool lift(double *N, double area[3], double *height, double local[2], const uz_mortar_side *side,
+                 const uz_side *shape, const plane *on, const double y[2])
+{
+    for (int k = 0; k < 30; k++) {
+        double slope[UZ_FACE_NODES][3], x[3] = {0}, T[2][3] = {{0}};
+        uz_side_gradients(N, slope, shape, local);
+        for (int c = 0; c < 3; c++) {
+            for (int a = 0; a < side->nodes; a++)
+                x[c] += N[a] * (side->xyz[3 * a + c] - on->x[c]);
+            for (int a = 1; a < side->nodes; a++)
+                for (int i = 0; i < 2; i++)
+                    T[i][c] += slope[a][i] * (side->xyz[3 * a + c] - side->xyz[c]);
+        }
+        const double f[2] = {dot(x, on->t[0]) - y[0], dot(x, on->t[1]) - y[1]};
+        const double J[2][2] = {{dot(T[0], on->t[0]), dot(T[1], on->t[0])}, {dot(T[0], on->t[1]), dot(T[1], on->t[1])}};
+        const double det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
+        const double step[2] = {(J[1][1] * f[0] - J[0][1] * f[1]) / det, (J[0][0] * f[1] - J[1][0] * f[0]) / det};
+        *height = dot(x, on->n);
+        cross(area, T[0], T[1]);
+        if (!isfinite(step[0] + step[1]))
+            return false;
+        if (fabs(step[0]) + fabs(step[1]) < 1e-14)
+            return true;
+        for (int c = 0; c < 2; c++)
+            local[c] = fmin(fmax(local[c] - step[c], -4), 4);
+    }
+    return true; /* as near as rounding lets it come */
+}
+
+/* Points of a line of the Gauss rule with n points on [0, 1] (M. Abramowitz, I. Stegun, table 25.4). */
+static void gauss_line(double *at, double *weight, int n)
+{
+    static const double X3[] = {0, 0.77459666924148337704}, W3[] = {8. / 9, 5. / 9};
+    static const double X4[] = {0.33998104358485626480, 0.86113631159405257522},
+                        W4[] = {0.65214515486254614263, 0.34785484513745385737};
+    static const double X5[] = {0, 0.53846931010568309104, 0.90617984593866399280},
+                        W5[] = {0.56888888888888888889, 0.47862867049936646804, 0.23692688505618908751};
+    const double *x = n == 3 ? X3 : n == 4 ? X4 : X5, *w = n == 3 ? W3 : n == 4 ? W4 : W5;
+    for (int g = 0; g < n; g++) {
+        const int from_middle = 2 * g - (n - 1), k = n % 2 ? abs(from_middle) / 2 : (abs(from_middle) - 1) / 2;
+        at[g] = 0.5 + (from_middle < 0 ? -0.5 : 0.5) * x[k];
+        weight[g] = 0.5 * w[k];
+    }
+}
+
+/* Are corners those of a parallelogram or triangle and middles amid? Then shape functions are polynomials of the place.
+ */
+static bool is_affine(const uz_mortar_side *side)
+{
+    const int corners = corners_of(side);
+    double off = 0, size = 0;
+    for (int c = 0; c < 3; c++) {
+        const double *x = side->xyz + c;
+        size = fmax(size, fabs(x[3] - x[0]) + fabs(x[6] - x[0]));
+        if (corners == 4)
+            off = fmax(off, fabs(x[0] - x[3] + x[6] - x[9]));
+        for (int j = 0; j < side->nodes - corners; j++)
+            off = fmax(off, fabs(x[3 * (corners + j)] - 0.5 * (x[3 * j] + x[3 * ((j + 1) % corners)])));
+    }
+    return off <= 1e-9 * size;
+}
+
+/* One convex piece that both faces cover, as a fan of triangles with n x n points each: those of a square, one side of
+ * which falls together in a corner, exact to degree 2 n - 2. */
+static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_mortar_surface *slave,
+                      const uz_mortar_side *side, const uz_mortar_side *other, int64_t k, const uz_contact_input *in,
+                      const plane *on, int n)
+{
+    const uz_side mine = uz_mortar_side_of(side, in->model), its = uz_mortar_side_of(other, in->model);
+    double at[5], weight[5], local[2][2];
+    bool room = true;
+    memcpy(local[0], centre_of(side), sizeof local[0]);
+    memcpy(local[1], centre_of(other), sizeof local[1]);
+    gauss_line(at, weight, n);
+    for (int i = 1; i + 1 < piece->n; i++) {
+        const polygon triangle = {.x = {{piece->x[0][0], piece->x[0][1]},
+                                        {piece->x[i][0], piece->x[i][1]},
+                                        {piece->x[i + 1][0], piece->x[i + 1][1]}},
+                                  .n = 3};
+        const double twice = twice_area(&triangle);
+        for (int g = 0; g < n * n && room; g++) {
+            const double r = at[g / n], s = at[g % n] * (1 - r);
+            uz_mortar_point p = {.master = k, .weight = twice * weight[g / n] * weight[g % n] * (1 - r)};
+            double y[2], area[3], ignored[3], height[2], normal[3] = {0};
+            for (int c = 0; c < 2; c++)
+                y[c] = (1 - r - s) * triangle.x[0][c] + r * triangle.x[1][c] + s * triangle.x[2][c];
+            if (!lift(p.N, area, &height[0], local[0], side, &mine, on, y) ||
+                !lift(p.M, ignored, &height[1], local[1], other, &its, on, y))
+                continue;
+            for (int a = 0; a < side->nodes; a++)
+                for (int c = 0; c < 3; c++)
+                    normal[c] += p.N[a] * slave->normal[3 * side->place[a] + c];
+            unit(normal);
+            p.weight *= sqrt(dot(area, area)) / dot(area, on->n);
+            p.gap = (height[1] - height[0]) * dot(normal, on->n);
+            if (isfinite(p.gap) && p.weight > 0)
+                room = uz_mortar_add_point(points, &p);
+        }
+    }
+    return room;
+}
+
+static bool points(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
+                   const uz_mortar_surface *master, const int64_t *near, int64_t n_near)
+{
+    const uz_mortar_side *side = &slave->side[i];
+    const uz_side shape = uz_mortar_side_of(side, in->model);
+    plane on = {.x = {0}};
+    polygon mine[MOST_PIECES], its[MOST_PIECES];
+    bool room = true;
+    uz_side_area_vector(on.n, &shape, centre_of(side));
+    unit(on.n);
+    for (int c = 0; c < 3; c++) {
+        for (int a = 0; a < corners_of(side); a++)
+            on.x[c] += side->xyz[3 * a + c] / corners_of(side);
+        on.t[0][c] = side->xyz[3 + c] - side->xyz[c];
+    }
+    const double along = dot(on.t[0], on.n);
+    for (int c = 0; c < 3; c++)
+        on.t[0][c] -= along * on.n[c];
+    unit(on.t[0]);
+    cross(on.t[1], on.n, on.t[0]);
+    const int n_mine = project(mine, side, &on);
+    for (int64_t k = 0; k < n_near && room; k++) {
+        const uz_mortar_side *other = &master->side[near[k]];
+        const bool affine = is_affine(side) && is_affine(other);
+        const int n_its = project(its, other, &on), rule = !affine ? 5 : side->nodes > 4 || other->nodes > 4 ? 4 : 3;
+        for (int q = 0; q < n_its && room; q++) {
+            turn_over(&its[q]); /* it looks at the slave: from there it runs clockwise */
+            if (twice_area(&its[q]) <= 0)
+                continue;
+            for (int p = 0; p < n_mine && room; p++) {
+                polygon piece = mine[p];
+                clip(&piece, &its[q]);
+                if (piece.n >= 3 && twice_area(&piece) > LEAST_PIECE * side->area)
+                    room = add_piece(points, &piece, slave, side, other, near[k], in, &on, rule);
+            }
+        }
+    }
+    return room;
+}
+
+const uz_mortar_geometry uz_mortar_space = {places, points};
