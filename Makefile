@@ -16,7 +16,7 @@ PYTHON ?= /usr/bin/python3
 PACKAGES := gcc make pkg-config libmicrohttpd-dev libjansson-dev libsuitesparse-dev libsqlite3-dev \
             libopenblas-dev liblapacke-dev libcurl4-gnutls-dev libgnutls28-dev zlib1g-dev libdeflate-dev libpng-dev
 TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl locales clang clang-format clang-tidy cppcheck libclang-rt-14-dev valgrind \
-                 python3-yaml nodejs git mandoc librsvg2-bin
+                 python3-yaml nodejs git mandoc librsvg2-bin libgmp-dev
 
 # The web page's bundler and libraries; the browser that tests it.
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
@@ -174,7 +174,7 @@ unit_source = $(filter %/$(1).c,$(UNIT_SRC))
 .SECONDEXPANSION:
 $(UNIT_BIN): $(BUILD)/tests/%: $$(call obj,$$(call unit_source,$$*)) $(call obj,tests/support/harness.c tests/support/harness_files.c) $(BUILD)/libparts.a $(BUILD)/libuzawa.a
 	@mkdir -p $(@D)
-	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -lsE '__wrap_free|failing_heap' $(call unit_source,$*)),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath
+	$(CC) $(LDFLAGS_ALL) $(if $(filter %alloc_failure,$@),-Wl$(comma)--wrap=malloc$(comma)--wrap=calloc$(comma)--wrap=realloc) $(if $(shell grep -lsE '__wrap_free|failing_heap' $(call unit_source,$*)),-Wl$(comma)--wrap=free) -o $@ $^ $(SERVER_LIBS) $(CLIENT_LIBS) -lquadmath -lgmp
 comma := ,
 
 # Ipopt is what obstacle problems are compared with, where it is installed; nothing else needs it.
@@ -183,7 +183,7 @@ $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs ipopt) $(call pkg,--libs jansson) -lpthread
 
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
-	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath -lgmp
 
 $(BUILD)/theory: $(call obj,$(THEORY_SRC) tests/support/harness_measure.c) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread
@@ -316,7 +316,7 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 
-extremes: deps ## claims at the extremes against exact solutions: a table and build/extremes.json; FILTER=name: some, into extremes-part.json
+extremes: deps-test ## claims at the extremes against exact solutions: a table and build/extremes.json; FILTER=name: some, into extremes-part.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
 	@$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER)
 

@@ -111,9 +111,9 @@ static void scale_residuals(uz_certificate *out, const uz_bound_terms *t, const 
     b->total = hypot(hypot(b->e1, b->e2), hypot(b->e3, b->e4));
 }
 
-double uz_bound_doubt(double spread, double rcond, int64_t d)
+double uz_bound_doubt(double inverse, int64_t d)
 {
-    return DBL_EPSILON * sqrt((double)d) * (8.0 * spread + 1.0 / fmax(rcond, DBL_MIN));
+    return DBL_EPSILON * sqrt((double)d) * 8.0 * inverse;
 }
 
 double uz_bound_noise(double spread, double sum)
@@ -121,11 +121,14 @@ double uz_bound_noise(double spread, double sum)
     return DOUBLE_DOUBLE_ROUNDING * sqrt((1.0 + spread) * sum);
 }
 
+/* Beyond it too little is left of the factor to say anything. */
+#define MOST_DOUBT 0.9
+
 double uz_bound_enlarge(double square, double doubt, double noise)
 {
     double norm = sqrt(square);
     if (norm > 0.0)
-        norm = doubt < 0.5 ? norm / (1.0 - doubt) + noise : INFINITY;
+        norm = doubt < MOST_DOUBT ? norm / sqrt(1.0 - doubt) + noise : INFINITY;
     return norm * norm;
 }
 

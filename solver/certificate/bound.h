@@ -26,11 +26,10 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
  * uz_bound_noise) may hide of it. */
 double uz_bound_enlarge(double square, double doubt, double noise);
 
-/* How much the factor's rounding may falsify e'K^-1 e, relative. The factor is that of K + E with |E_ij| within d eps,
- * in practice sqrt(d) eps, of the root of K_ii K_jj; so with w = K^-1 e the error is w'E w to first order, against e'w:
- * sqrt(d) eps times the `spread` sum K_ii w_i^2 / e'w. Measured on random matrices conditioned up to 1e14: at most half
- * of that, where an estimate of the condition from the factor's diagonal is short by up to 3e5. */
-double uz_bound_doubt(double spread, double rcond, int64_t d);
+/* How much the factor's rounding may falsify e'K^-1 e, relative, where the inverse of diag(K)^-1/2 K diag(K)^-1/2 has
+ * the norm `inverse`: the factor is that of K + E with |E_ij| within d eps, in practice sqrt(d) eps, of the root of
+ * K_ii K_jj. Good enough to see where it does not matter; elsewhere uz_distrust measures it. */
+double uz_bound_doubt(double inverse, int64_t d);
 
 /* What the rounding of double-double sums may hide of e, in the norm of K^-1: it matters only where rounding hit u* by
  * chance. sum: of u_j^2 K_jj + (|K u|_j + |p_j|)^2 / K_jj. */

@@ -90,41 +90,27 @@ static bool bound_cheaply(const certifier *c, double *square)
     return *square <= c->in->sharp * c->in->sharp * energy;
 }
 
-static double doubt(const certifier *c, double spread)
-{
-    return uz_bound_doubt(spread, c->in->rcond, c->d);
-}
-
-/* The spread is at most the largest eigenvalue of diag(K)^1/2 K^-1 diag(K)^1/2, for which the factor's diagonal gives 1
- * / rcond: short by up to 3e5 where it was measured. Good enough wherever the doubt that follows is harmless, which
- * saves half a solve. */
+/* A doubt that does no harm need not be measured. */
 #define HARMLESS 1e-2
 
-static double assumed_spread(const certifier *c)
-{
-    return 1e6 / fmax(c->in->rcond, DBL_MIN);
-}
-
-/* From w = K^-1 e, which took the place of e. */
-static double spread_of_solution(const certifier *c, double square)
-{
-    double weighted = 0.0;
-    for (int64_t j = 0; j < c->d; j++)
-        weighted += c->res.e[j] / c->weight[j] * c->res.e[j];
-    return square > 0.0 ? weighted / square : 0.0;
-}
+/* How far estimates of the inverse's norm, from single vectors that rounding made, may be below it. */
+#define SURELY 1e3
 
 /* ||v - u_r||_K^2 = e'K^-1 e, enlarged by what rounding may hide. e is lost. */
 static uz_status distance(certifier *c, double *square, uz_error *err)
 {
-    double spread = c->in->inverse_bound;
-    bool measured = !bound_cheaply(c, square), exact = doubt(c, assumed_spread(c)) > HARMLESS;
+    double inverse = c->in->inverse_bound, doubt = 0.0;
     uz_status status = UZ_OK;
-    if (measured) {
-        status = c->in->inverse_norm(c->in->ctx, square, c->res.e, exact, err);
-        spread = exact ? spread_of_solution(c, *square) : assumed_spread(c);
+    if (!bound_cheaply(c, square)) {
+        status = c->in->inverse_norm(c->in->ctx, square, c->res.e, err);
+        /* a residual is rounding, in all directions alike: e'K^-1 e / e'W e is the mean of d eigenvalues */
+        inverse = SURELY * fmax(1.0 / fmax(c->in->rcond, DBL_MIN),
+                                c->weighted > 0.0 ? (double)c->d * (*square / c->weighted) : 0.0);
+        doubt = c->in->measure_doubt ? uz_bound_doubt(inverse, c->d) : 0.0;
+        if (status == UZ_OK && !(doubt <= HARMLESS))
+            status = c->in->measure_doubt(c->in->ctx, &doubt, err);
     }
-    *square = uz_bound_enlarge(*square, doubt(c, spread), uz_bound_noise(spread, c->noise));
+    *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, c->noise));
     return status;
 }
 

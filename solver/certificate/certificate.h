@@ -18,16 +18,20 @@
 
 #include "uzawa.h"
 
-/* *value = e'K^-1 e for e (d), within the accuracy of a factorization of K. solve: e becomes K^-1 e; else it is left.
- */
-typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, bool solve, uz_error *err);
+/* *value = e'K^-1 e for e (d, may be overwritten), within the accuracy of a factorization of K. */
+typedef uz_status (*uz_inverse_norm)(void *ctx, double *value, double *e, uz_error *err);
+
+/* *doubt: how much the factorization's rounding may falsify that, relative (uz_distrust). */
+typedef uz_status (*uz_measure_doubt)(void *ctx, double *doubt, uz_error *err);
 
 typedef struct {
     const uz_csc *K, *N; /* lower triangle; m x d */
     const double *p, *h;
     uz_inverse_norm inverse_norm;
-    void *ctx;
-    double rcond;         /* of K: how far inverse_norm may be trusted */
+    uz_measure_doubt
+        measure_doubt;    /* asked where rcond says that it may matter; NULL: inverse_norm is an upper bound */
+    void *ctx;            /* of both */
+    double rcond;         /* an estimate of the least eigenvalue of K, scaled by its diagonal */
     double inverse_bound; /* e'K^-1 e <= inverse_bound sum e_j^2 / K_jj; INFINITY: unknown. Spares inverse_norm where it
                              is sharp enough: */
     bool precise_energies; /* u'Ku and u'p in double-double precision too: what is shown, not what is bounded, needs it

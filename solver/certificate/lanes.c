@@ -27,7 +27,7 @@ typedef struct {
 
 struct uz_lane_certifier {
     const uz_csc *K, *N;
-    double rcond, inverse_bound;
+    double inverse_bound;
     double steepest;      /* the largest |N_ij| */
     double *weight;       /* d */
     int64_t n_b;          /* dofs that N touches */
@@ -115,8 +115,8 @@ static bool allocate(uz_lane_certifier *c)
     return c->weight && c->place && c->weight_b && c->u_b && c->r && c->Kc && c->hi && c->lo;
 }
 
-uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double rcond,
-                                   double inverse_bound, uz_error *err)
+uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double inverse_bound,
+                                   uz_error *err)
 {
     *out = NULL;
     uz_lane_certifier *c = uz_alloc_zero(1, sizeof *c);
@@ -124,7 +124,6 @@ uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, con
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify");
     c->K = K;
     c->N = N;
-    c->rcond = rcond;
     c->inverse_bound = inverse_bound;
     bool ok = allocate(c);
     uz_status status = UZ_OK;
@@ -342,8 +341,7 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     terms->force = sqrt(s->force[l]);
     terms->span = c->steepest * s->largest[l];
     terms->anything = s->sizes[l] > 0.0;
-    terms->square = uz_bound_enlarge(square, uz_bound_doubt(c->inverse_bound, c->rcond, c->K->cols),
-                                     uz_bound_noise(c->inverse_bound, s->noise[l]));
+    terms->square = uz_bound_enlarge(square, 0.0, uz_bound_noise(c->inverse_bound, s->noise[l]));
     memset(&a->certificate, 0, sizeof a->certificate);
     uz_bound_conclude(&a->certificate, terms, feasible, a->r, a->g, a->h, c->feasible.m);
     a->certified = true;

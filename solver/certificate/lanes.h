@@ -11,9 +11,9 @@ enum { UZ_CERTIFY_LANES = 8 };
 
 typedef struct uz_lane_certifier uz_lane_certifier; /* one thread */
 
-/* K and N are borrowed. rcond, inverse_bound: see uz_certify_input. */
-uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double rcond,
-                                   double inverse_bound, uz_error *err);
+/* K and N are borrowed. inverse_bound: see uz_certify_input. */
+uz_status uz_lane_certifier_create(uz_lane_certifier **out, const uz_csc *K, const uz_csc *N, double inverse_bound,
+                                   uz_error *err);
 void uz_lane_certifier_free(uz_lane_certifier *certifier);
 
 typedef struct {

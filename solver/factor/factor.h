@@ -28,7 +28,7 @@ typedef struct {
     uz_order_choice considered[UZ_CHOICES]; /* n_considered; the used one among them */
     int n_considered;
     size_t bytes;
-    double rcond;   /* min_j L_jj^2 / K_jj: an upper bound for 1 / cond(K) after diagonal scaling */
+    double rcond;   /* an estimate of the least eigenvalue of K after diagonal scaling, rather too large; kept with L */
     double order_s; /* what the analysis took, whoever waited for it */
     double factor_s;
 } uz_factor_info;
@@ -127,8 +127,5 @@ bool uz_group_dofs(int64_t *head, const uz_csc *K);
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);
-/* The big blocks, which are the factor's above all, come from the reserve from now on. Process-wide: called once at
- * most, after uz_factor_use_huge_pages and before anything is factored; the reserve outlives every factor. */
-void uz_factor_use_reserve(uz_reserve *used);
 
 #endif

@@ -5,6 +5,7 @@
 #include "core/alloc.h"
 #include "linalg/blas.h"
 #include "core/error.h"
+#include "core/random.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -15,19 +16,6 @@ enum { VECTORS = 8, POWER = 2 };
  * the largest eigenvalue c of B, ||B^q x|| >= c^q |v'x|: that all of VECTORS samples fall short of c^q t has a
  * probability below (0.8 t)^8, 1e-12 here (Dixon, SIAM J. Numer. Anal. 20 (1983), for the method). */
 #define LEAST_SHARE 0.04
-
-static double uniform(uint64_t *state)
-{
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return ((double)(*state >> 11) + 0.5) * 0x1p-53;
-}
-
-/* Box and Muller 1958. */
-static double normal(uint64_t *state)
-{
-    double radius = sqrt(-2.0 * log(uniform(state)));
-    return radius * cos(6.283185307179586 * uniform(state));
-}
 
 /* Y = B Y in the factor's order, B = D_K^1/2 K^-1 D_K^1/2; root: the square roots of diag(K) in that order. */
 static uz_status apply_scaled(double *Y, const uz_factor *factor, uz_factor_workspace *ws, const double *root,
@@ -59,7 +47,7 @@ uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_fact
         for (int64_t k = 0; k < factor->n; k++)
             root[k] = sqrt(K->val[K->ptr[perm[k]]]);
         for (int64_t k = 0; k < factor->n * VECTORS; k++)
-            Y[k] = normal(&state);
+            Y[k] = uz_normal(&state);
         for (int power = 0; status == UZ_OK && power < POWER; power++)
             status = uz_stop_is_due(stop)
                          ? uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the norm of the inverse was known")

@@ -4,6 +4,7 @@
 #include "certificate/infeasible.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/blas.h"
 #include "run/problem.h"
 #include "run/settings.h"
 
@@ -42,27 +43,27 @@ static uz_status need_workspace(uz_run *run, uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
 }
 
-/* e'K^-1 e = ||L^-1 P e||^2: half a linear solve; the other half makes e K^-1 e. */
-static uz_status inverse_norm(void *ctx, double *value, double *e, bool solve, uz_error *err)
+/* e'K^-1 e = ||L^-1 P e||^2: half a linear solve. */
+static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err)
 {
     uz_run *run = ctx;
     const uz_factor *factor = run->asked->setup->factor;
     if (!factor)
         return uz_dual_load_inverse_norm(run->work.dual, value, e, err);
-    uz_status status = need_workspace(run, err);
-    if (status != UZ_OK)
-        return status;
-    double *x = run->work.scratch, sum = 0.0;
+    double *x = run->work.scratch;
     uz_factor_permute(factor, x, e);
-    status = uz_factor_forward(factor, run->work.ws, x, 1, err);
-    for (int64_t j = 0; j < run->d; j++)
-        sum += x[j] * x[j];
-    *value = sum;
-    if (status != UZ_OK || !solve)
-        return status;
-    status = uz_factor_backward(factor, run->work.ws, x, 1, err);
-    uz_factor_unpermute(factor, e, x);
+    uz_status status = uz_factor_forward(factor, run->work.ws, x, 1, err);
+    const double norm = uz_norm(run->d, x);
+    *value = norm * norm;
     return status;
+}
+
+static uz_status measure_doubt(void *ctx, double *doubt, uz_error *err)
+{
+    uz_run *run = ctx;
+    const uz_request *asked = run->asked;
+    const uz_stop stop = {asked->hooks, asked->deadline};
+    return uz_setup_doubt(asked->setup, doubt, uz_setup_K(asked->setup, asked->problem), run->work.ws, &stop, err);
 }
 
 uz_status uz_run_whole_norm(double *norm, const uz_run *run, const double *u, uz_error *err)
@@ -90,6 +91,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .p = run->load.p,
         .h = all_rows ? run->load.h_all : run->load.h,
         .inverse_norm = inverse_norm,
+        .measure_doubt = setup->factor ? measure_doubt : NULL,
         .ctx = run,
         .rcond = run->result->summary.rcond,
         .inverse_bound =

@@ -1,5 +1,7 @@
 #include "run/setup.h"
 
+#include "certificate/bound.h"
+#include "certificate/distrust.h"
 #include "core/alloc.h"
 #include "core/clock.h"
 #include "core/digest.h"
@@ -156,7 +158,7 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     if (!setup)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
     pthread_mutex_init(&setup->mutex, NULL);
-    setup->inverse_bound = NAN;
+    setup->inverse_bound = setup->doubt = NAN;
     setup->is_scene = problem->kind == UZ_PROBLEM_SCENE;
     if (setup->is_scene)
         status = refuse_large_box(problem, settings, err);
@@ -189,6 +191,64 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     return UZ_OK;
 }
 
+/* What a half solve needs. */
+typedef struct {
+    const uz_factor *factor;
+    const uz_csc *K;
+    uz_factor_workspace *ws;
+    double *room; /* d */
+} half_solver;
+
+/* S^-1 = L^-1 P, S^-T = P'L'^-1. */
+static uz_status half_solve(void *ctx, double *X, int64_t columns, bool transposed, uz_error *err)
+{
+    const half_solver *s = ctx;
+    const int64_t d = s->K->cols;
+    uz_status status = transposed ? uz_factor_backward(s->factor, s->ws, X, columns, err) : UZ_OK;
+    for (int64_t k = 0; status == UZ_OK && k < columns; k++) {
+        (transposed ? uz_factor_unpermute : uz_factor_permute)(s->factor, s->room, X + k * d);
+        memcpy(X + k * d, s->room, (size_t)d * sizeof *X);
+    }
+    if (status == UZ_OK && !transposed)
+        status = uz_factor_forward(s->factor, s->ws, X, columns, err);
+    return status;
+}
+
+/* Under the mutex. */
+static uz_status know_doubt(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
+                            uz_error *err)
+{
+    half_solver solver = {setup->factor, K, ws, uz_alloc(K->cols, sizeof(double))};
+    double norm;
+    if (!isnan(setup->doubt)) {
+        free(solver.room);
+        return UZ_OK;
+    }
+    uz_status status = solver.room
+                           ? uz_distrust(&norm, K, half_solve, &solver, stop, err)
+                           : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)K->cols);
+    if (status == UZ_OK)
+        setup->doubt = norm;
+    free(solver.room);
+    return status;
+}
+
+uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
+                         uz_error *err)
+{
+    *doubt = INFINITY;
+    if (!uz_lock_while(&setup->mutex, stop))
+        return UZ_OK; /* who asks finds that it has to stop */
+    uz_status status = know_doubt(setup, K, ws, stop, err);
+    if (status == UZ_OK)
+        *doubt = setup->doubt;
+    pthread_mutex_unlock(&setup->mutex);
+    return status == UZ_ERR_CANCELLED ? UZ_OK : status;
+}
+
+/* A doubt that does no harm. */
+#define HARMLESS 1e-2
+
 double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)
 {
     uz_error ignored = {0};
@@ -196,8 +256,14 @@ double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_worksp
     if (!uz_lock_while(&setup->mutex, stop))
         return INFINITY;
     if (isnan(setup->inverse_bound) &&
-        uz_factor_inverse_norm(&bound, setup->factor, ws, K, stop, &ignored) != UZ_ERR_CANCELLED)
-        setup->inverse_bound = bound;
+        uz_factor_inverse_norm(&bound, setup->factor, ws, K, stop, &ignored) != UZ_ERR_CANCELLED) {
+        double doubt = uz_bound_doubt(bound, K->cols); /* that of the factor; K's may be so much larger */
+        uz_status status = doubt <= HARMLESS ? UZ_OK : know_doubt(setup, K, ws, stop, &ignored);
+        if (!(doubt <= HARMLESS))
+            doubt = setup->doubt;
+        if (status != UZ_ERR_CANCELLED)
+            setup->inverse_bound = doubt < 1.0 ? bound / (1.0 - doubt) : INFINITY;
+    }
     bound = isnan(setup->inverse_bound) ? INFINITY : setup->inverse_bound;
     pthread_mutex_unlock(&setup->mutex);
     return bound;

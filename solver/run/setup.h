@@ -24,8 +24,9 @@ typedef struct {
     const uz_factor *factor; /* shared.factor; NULL: matrix_free */
     uz_amg *amg;             /* matrix_free, else NULL */
     uz_dual *dual;
-    pthread_mutex_t mutex; /* guards inverse_bound */
+    pthread_mutex_t mutex; /* guards inverse_bound and doubt */
     double inverse_bound;  /* NaN until somebody asks */
+    double doubt;          /* likewise */
     double assemble_s, condense_s;
     uz_cost_plan plan; /* which form of the operator, and why */
     uz_reuse reused;   /* when it was made */
@@ -56,6 +57,10 @@ void uz_setup_free(uz_setup *setup);
 /* What the certificate of a setup that serves many loads saves by: uz_factor_inverse_norm, made at the first call.
  * INFINITY when that failed, or it had to stop (stop NULL: never) before it was known. */
 double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop);
+/* How far its factor may be trusted: uz_distrust, made at the first call and kept with the setup. Only certificates of
+ * bodies whose condition leaves doubts ask. UZ_ERR_NOT_SPD is not kept: nothing is solved on such a setup. */
+uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
+                         uz_error *err);
 
 /* Its matrices: the model's for a scene, the problem's otherwise. N has the rows it is solved with. */
 const uz_csc *uz_setup_K(const uz_setup *setup, const uz_problem *problem);

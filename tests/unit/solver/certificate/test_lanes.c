@@ -11,7 +11,7 @@
 typedef struct {
     uz_factor *factor;
     uz_factor_workspace *ws;
-    double bound, rcond;
+    double bound;
 } linear;
 
 static linear factor_of(const uz_csc *K)
@@ -20,13 +20,12 @@ static linear factor_of(const uz_csc *K)
     uz_error err = {0};
     CHECK_INT(factor_by(&x.factor, K, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
     CHECK_INT(uz_factor_inverse_norm(&x.bound, x.factor, x.ws, K, NULL, &err), UZ_OK);
-    x.rcond = uz_factor_describe(x.factor).rcond;
     return x;
 }
 
-static uz_status no_solve(void *ctx, double *value, double *e, bool solve, uz_error *err)
+static uz_status no_solve(void *ctx, double *value, double *e, uz_error *err)
 {
-    (void)ctx, (void)value, (void)e, (void)solve, (void)err;
+    (void)ctx, (void)value, (void)e, (void)err;
     return UZ_ERR_INTERNAL;
 }
 
@@ -38,7 +37,7 @@ static void check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng
     uz_lane_certifier *certifier = NULL;
     uz_lane_answer answers[UZ_CERTIFY_LANES];
     double *U = vector(d * UZ_CERTIFY_LANES), *P = vector(d * UZ_CERTIFY_LANES), *u = vector(d);
-    CHECK_INT(uz_lane_certifier_create(&certifier, &qp->K, &qp->N, f.rcond, f.bound, NULL), UZ_OK);
+    CHECK_INT(uz_lane_certifier_create(&certifier, &qp->K, &qp->N, f.bound, NULL), UZ_OK);
     for (int l = 0; l < UZ_CERTIFY_LANES; l++) {
         double size = pow(10, -2.0 * l);
         answers[l] = (uz_lane_answer){.r = vector(m), .g = vector(m), .h = qp->h, .sharp = INFINITY};
@@ -56,7 +55,6 @@ static void check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng
                                .p = qp->p,
                                .h = qp->h,
                                .inverse_norm = no_solve,
-                               .rcond = f.rcond,
                                .inverse_bound = f.bound,
                                .sharp = INFINITY};
         uz_certificate one;
