@@ -20,6 +20,7 @@ const OUTCOMES = {
   precision_limit: ["warn", "Precision limit", "More was asked for than double precision holds. The answer is as good as it can be, with its own certificate."],
   paper_rule: ["warn", "Stopped by the paper's rule", "The change of the reactions became small before the certificate met what was asked for."],
   infeasible: ["bad", "Infeasible", "No displacement satisfies all contact conditions: supports and obstacles contradict each other."],
+  out_of_reach: ["bad", "Out of reach", "Contact conditions contradict each other but for rounding: a displacement that meets them all, if there is one, is far away."],
   dismissed: ["warn", "Dismissed", "It was stopped. This is the best answer so far, with its own certificate."],
   mesh_limit: ["warn", "Mesh limit", "A grid fine enough would be larger than allowed. The answer is on the finest one that is."],
 };
@@ -30,6 +31,10 @@ export function outcome_words(summary) {
   return { tone, title, text };
 }
 
+function has_no_answer(summary) {
+  return summary.outcome === "infeasible" || summary.outcome === "out_of_reach";
+}
+
 function bound_of(summary) {
   const value = summary.certificate?.relative_error;
   return Number.isFinite(value) ? value : null;
@@ -38,7 +43,7 @@ function bound_of(summary) {
 /** The certificate in a sentence. */
 export function certificate_words(summary) {
   const bound = bound_of(summary);
-  if (summary.outcome === "infeasible") {
+  if (has_no_answer(summary)) {
     const radius = summary.infeasible_radius;
     return radius === null || radius === undefined
       ? "It is proved that no displacement at all satisfies the contact conditions."
@@ -77,7 +82,7 @@ export function result_words(job) {
   const summary = job.summary;
   if (!summary) return "";
   const bound = bound_of(summary);
-  if (summary.outcome === "infeasible") return "infeasible";
+  if (has_no_answer(summary)) return OUTCOMES[summary.outcome][1].toLowerCase();
   const error = bound === null ? "no bound" : `≤ ${percent_up(bound)}`;
   return summary.outcome === "converged" || summary.outcome === "verified" ? error : `${OUTCOMES[summary.outcome]?.[1].toLowerCase() || summary.outcome}, ${error}`;
 }

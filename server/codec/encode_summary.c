@@ -233,7 +233,7 @@ char *codec_encode_summary(const uz_summary *summary, uz_problem_kind kind, cons
         text_number(&t, "total_error", summary->total_error);
         put_grids(&t, summary->grids);
     }
-    if (summary->outcome == UZ_INFEASIBLE)
+    if (summary->outcome == UZ_INFEASIBLE || summary->outcome == UZ_OUT_OF_REACH)
         text_number(&t, "infeasible_radius", summary->infeasible_radius);
     if (held->free_modes > 0) { /* a body that only the obstacle holds */
         const int64_t most = (int64_t)(sizeof held->held_by / sizeof held->held_by[0]);

@@ -85,7 +85,8 @@ bool codec_read_trade(codec_trade *out, const char *summary)
     out->mesh_error = json_number(json_get(root, "discretization_error"), (double)NAN);
     out->solver_error = json_number(json_get(json_get(root, "certificate"), "relative_error"), (double)NAN);
     out->is_scene = json_text_is(json_get(json_get(root, "problem"), "kind"), "scene");
-    out->has_answer = !json_text_is(json_get(root, "outcome"), "infeasible");
+    const json_value *outcome = json_get(root, "outcome");
+    out->has_answer = !json_text_is(outcome, "infeasible") && !json_text_is(outcome, "out_of_reach");
     json_clear(&tree);
     return true;
 }

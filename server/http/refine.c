@@ -20,7 +20,7 @@ static bool has_reactions(api *context, const job *j, http_reply *reply)
         reply_store_failure(context, status, reply);
     else if (!finite)
         reply_refuse(reply, 409, "no_result", "The job has no result",
-                     "the problem is infeasible: no accuracy makes it feasible");
+                     "the problem is infeasible or out of reach: no accuracy makes it feasible");
     else
         return true;
     return false;

@@ -19,7 +19,7 @@ typedef struct {
     const double *u;      /* d: the answer */
     uz_csc Nt;            /* n_b x m: N' on the dofs that N touches */
     int64_t *dof;         /* n_b: these */
-    double *u_b;          /* n_b: u there */
+    double *u_b, *low_b;  /* n_b: u there, and in.low */
     double *weight_b;     /* n_b */
     double *weight;       /* d: W = diag(K)^-1 */
     double *c;            /* d: correction, zero elsewhere */
@@ -39,9 +39,10 @@ static bool allocate(certifier *c)
         ok = (*of_d[k] = uz_alloc(c->d, sizeof(double))) && ok;
     c->c = uz_alloc_zero(c->d, sizeof(double));
     c->u_b = uz_alloc(c->n_b, sizeof(double));
+    c->low_b = uz_alloc(c->n_b, sizeof(double));
     c->weight_b = uz_alloc(c->n_b, sizeof(double));
     c->res.weight = c->weight;
-    return ok && c->c && c->u_b && c->weight_b;
+    return ok && c->c && c->u_b && c->low_b && c->weight_b;
 }
 
 static uz_status prepare(certifier *c, const uz_certify_input *in, const double *u, uz_error *err)
@@ -60,6 +61,7 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, const double 
     for (int64_t b = 0; b < c->n_b; b++) {
         c->weight_b[b] = uz_dof_weight(in->K, c->dof[b]);
         c->u_b[b] = u[c->dof[b]];
+        c->low_b[b] = in->low ? in->low[c->dof[b]] : 0.0;
     }
     return UZ_OK;
 }
@@ -72,7 +74,7 @@ void uz_certify_weights(double *weight, const uz_csc *K)
 
 static void release(certifier *c)
 {
-    double *room[] = {c->res.e, c->res.e_u, c->res.Ku, c->res.Kc, c->weight, c->weight_b, c->u_b, c->c};
+    double *room[] = {c->res.e, c->res.e_u, c->res.Ku, c->res.Kc, c->weight, c->weight_b, c->u_b, c->low_b, c->c};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     uz_csc_clear(&c->Nt);
@@ -216,12 +218,17 @@ static uz_status measure(certifier *c, uz_certificate *out, const double *r, dou
         g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, c->u_b, NULL);
     c->feasible.u = c->u_b;
     c->feasible.h = c->in->h;
+    c->feasible.low = c->in->low ? c->low_b : NULL;
     bool feasible = uz_make_feasible(&c->feasible, r);
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[c->dof[b]] = c->feasible.correction[b];
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, c->u, c->c, r, err);
     if (status != UZ_OK)
         return status;
+    if (c->in->low_r) /* e is small beside N'r, which it is the difference of */
+        for (int64_t j = 0; j < c->d; j++)
+            for (int64_t k = c->in->N->ptr[j]; k < c->in->N->ptr[j + 1]; k++)
+                c->res.e[j] -= c->in->N->val[k] * c->in->low_r[c->in->N->idx[k]];
     add_up(c, &terms);
     if (c->in->precise_energies && isfinite(terms.stiffness) && isfinite(terms.load))
         sharpen_energies(c, &terms, r, g);

@@ -160,8 +160,13 @@ static double correction_size(const uz_feasible *c)
 bool uz_make_feasible(uz_feasible *c, const double *r)
 {
     uz_row_relax relax = {c->Nt, c->weight, r, c->h, c->u, c->move.x, c->correction};
-    memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
     size_rows(c, c->u);
+    if (c->low) {
+        memcpy(c->correction, c->low, (size_t)c->d * sizeof *c->correction);
+        if (choose_rows(c, r, false) <= NEGLIGIBLE)
+            return true;
+    }
+    memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
     choose_rows(c, r, true);
     double expected = STRETCH * sum_of_moves(c);
     bool feasible = move_rows(c, r, 0, CLOSING_ROUNDS);

@@ -1,8 +1,9 @@
 /* infeasible.h: the proof that no displacement meets all conditions h - N u >= 0.
  *
  * A ray is y <= 0 (m) with N'y = 0 and h'y > 0: for a feasible u, y'(h - N u) would be at most 0, and it is h'y > 0
- * (Farkas). With N'y = 0 to rounding only, |y'N u| <= ||N'y||_1 ||u||_inf, so every feasible u, if any, is at least
- * h'y / ||N'y||_1 large: the proof holds for all displacements below that radius. */
+ * (Farkas 1902). With N'y = 0 to rounding only, |y'N u| <= ||N'y||_1 ||u||_inf, so that every feasible u has an entry
+ * of at least h'y / ||N'y||_1: far away, but there may be one. What proves is an exact ray: one in rational numbers, of
+ * the data as they stand in doubles. */
 #ifndef UZ_INFEASIBLE_H
 #define UZ_INFEASIBLE_H
 
@@ -12,15 +13,20 @@
  * Rows of zeros don't count. */
 double uz_gap_length(const uz_csc *N, const double *h, const double *g, double *row_room);
 
-/* Whether y is a proof that a user can rely on. A radius of UZ_RAY_FACTOR times the problem's own lengths is one. Where
- * all that is left of N'y is the rounding of y's doubles, the rows of the ray depend on each other as far as doubles
- * can say, and UZ_RAY_ROUNDED lengths do: the contradiction h'y is then about that many times the rounding of N'u. So
- * rows that contradict each other by 1e-13 of the lengths are told from those that touch.
- *   radius  out: the length within which y proves that nothing is feasible; INFINITY for an exact ray, 0: none
- *   length  uz_gap_length
- * Double-double precision, original data. N: m x d. */
+/* Is y worth a proof? In double-double precision, original data, N: m x d. Where all that is left of N'y is the
+ * rounding of y's doubles UZ_RAY_ROUNDED of the problem's lengths (uz_gap_length) without a feasible u are enough,
+ * elsewhere UZ_RAY_FACTOR. */
 #define UZ_RAY_FACTOR  1e6
 #define UZ_RAY_ROUNDED 100.0
-bool uz_ray_proves(double *radius, const double *y, const uz_csc *N, const double *h, double length);
+bool uz_ray_is_likely(const double *y, const uz_csc *N, const double *h, double length);
+
+/* What y (m, <= 0) proves.
+ *   y       in: a candidate; out, where *radius is INFINITY: an exact ray rounded to doubles, of the rows that
+ *           contradict each other exactly
+ *   radius  every feasible u has an entry of at least this; INFINITY: no u is feasible; 0: nothing is proved
+ * The rows of y < 0 fall into parts that share no dof. In each the equations N'y = 0 are solved exactly by
+ * fraction-free elimination (Bareiss, Math. Comp. 22 (1968)), the largest |y_i| from the others: an exact ray near y,
+ * if there is one on these rows. A part that is too large for that is left out. Errors: UZ_ERR_MEMORY. */
+uz_status uz_prove_ray(double *radius, double *y, const uz_csc *N, const double *h, uz_error *err);
 
 #endif

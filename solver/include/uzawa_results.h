@@ -19,11 +19,12 @@ typedef enum {
     UZ_TIME_LIMIT,
     UZ_PRECISION_LIMIT, /* more was asked than double precision holds here */
     UZ_PAPER_RULE,      /* the paper's stopping rule ended it before the certificate met the request */
-    UZ_INFEASIBLE,
+    UZ_INFEASIBLE,      /* no u is feasible: an exact ray was found */
     UZ_DISMISSED,
     UZ_VERIFIED,     /* uz_verify: the certificate of the given answer meets the request */
     UZ_NOT_VERIFIED, /* uz_verify: it does not; the bound says how far it reaches */
-    UZ_MESH_LIMIT    /* cells chosen here: the grid that would meet the request is larger than allowed */
+    UZ_MESH_LIMIT,   /* cells chosen here: the grid that would meet the request is larger than allowed */
+    UZ_OUT_OF_REACH  /* every feasible u, if there is one, is at least infeasible_radius away, and none was certified */
 } uz_outcome;
 const char *uz_outcome_name(uz_outcome);
 
@@ -169,7 +170,7 @@ typedef struct {
     double lambda_max;          /* of N K^-1 N' with the caller's rows; NaN where no gradient step needed it */
     double discretization_error; /* scene: estimated relative energy-norm error of the mesh; NaN: not estimated */
     double total_error;       /* cells chosen here: sqrt(discretization_error^2 + the certificate's relative_error^2) */
-    double infeasible_radius; /* infeasible: no u with all |u_j| below this is feasible; INFINITY: none at all */
+    double infeasible_radius; /* out of reach: every feasible u has an entry of at least this; INFINITY: infeasible */
     double requested_error;   /* the relative error that `converged` had to meet */
     uz_certificate certificate;
     uz_semicoercive semicoercive;
@@ -212,7 +213,8 @@ typedef struct {
     double *r;         /* m */
     double *g;         /* m */
     double *pressure;  /* scene: m, as UZ_FIELD_PRESSURE; else NULL */
-    double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof; u, r, g are then NaN. Else NULL */
+    double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof, rounded; out of reach: what bounds
+                          infeasible_radius, h'y / ||N'y||_1. u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_evaluation *evaluation;
     uz_grid_sequence *grids; /* box whose cells were chosen here */

@@ -317,8 +317,8 @@ static void advance(exchange *x, int64_t q, double step)
     x->g[q] += step * fmax(0.0, x->compliance);
 }
 
-/* The direction in which q is pressed for ever, if it proves that the rows contradict. */
-static uz_status look_at_ray(bool *proven, double *ray, exchange *x, int64_t q, uz_error *err)
+/* The direction in which q is pressed for ever: are the rows likely to contradict along it? */
+static uz_status look_at_ray(bool *likely, double *ray, exchange *x, int64_t q, uz_error *err)
 {
     const uz_csc *N = &x->load->dual->N;
     const double *h = x->load->h;
@@ -328,13 +328,13 @@ static uz_status look_at_ray(bool *proven, double *ray, exchange *x, int64_t q, 
         ray[x->rows[k]] = x->w[k];
     x->law->kind->project(x->law, ray, x->m);
     uz_status status = uz_ray_project(ray, &x->load->dual->N, err);
-    double length = status == UZ_OK ? uz_gap_length(N, h, x->load->g0, x->size) : 0.0, radius;
-    *proven = status == UZ_OK && uz_ray_proves(&radius, ray, N, h, length);
+    double length = status == UZ_OK ? uz_gap_length(N, h, x->load->g0, x->size) : 0.0;
+    *likely = status == UZ_OK && uz_ray_is_likely(ray, N, h, length);
     return status;
 }
 
 /* Presses q until it joins the rows in contact, or can't. */
-static uz_status admit(exchange *x, int64_t q, bool *proven, double *ray, uz_error *err)
+static uz_status admit(exchange *x, int64_t q, bool *likely, double *ray, uz_error *err)
 {
     uz_status status = press(x, q, err);
     while (status == UZ_OK && !uz_stop_is_due(x->stop)) {
@@ -349,7 +349,7 @@ static uz_status admit(exchange *x, int64_t q, bool *proven, double *ray, uz_err
         if (gone < 0) {
             x->s[q] = 0.0;
             x->barred[q] = x->undecided = true;
-            return look_at_ray(proven, ray, x, q, err);
+            return look_at_ray(likely, ray, x, q, err);
         }
         advance(x, q, step);
         let_go(x, gone);
@@ -359,7 +359,7 @@ static uz_status admit(exchange *x, int64_t q, bool *proven, double *ray, uz_err
 
 static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *err)
 {
-    bool proven = false;
+    bool likely = false;
     for (int64_t k = 0; x->steps < x->most && k < CIRCLES * (x->m + 1); k++) {
         settle(x);
         if (uz_stop_is_due(x->stop))
@@ -369,10 +369,10 @@ static uz_status run(exchange *x, uz_exchange_end *end, double *ray, uz_error *e
             *end = x->undecided ? UZ_EXCHANGE_UNDECIDED : UZ_EXCHANGE_SOLVED;
             return UZ_OK;
         }
-        uz_status status = admit(x, q, &proven, ray, err);
-        if (proven)
+        uz_status status = admit(x, q, &likely, ray, err);
+        if (likely)
             *end = UZ_EXCHANGE_RAY;
-        if (status != UZ_OK || proven || uz_stop_is_due(x->stop))
+        if (status != UZ_OK || likely || uz_stop_is_due(x->stop))
             return status;
     }
     return UZ_OK;

@@ -44,8 +44,7 @@ static uz_status try_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_err
     if (status != UZ_OK)
         return status;
     double length = uz_gap_length(&load->dual->N, load->h, load->g0, it->gamma);
-    double radius;
-    *found = uz_ray_proves(&radius, it->ray, &load->dual->N, load->h, length);
+    *found = uz_ray_is_likely(it->ray, &load->dual->N, load->h, length);
     return UZ_OK;
 }
 

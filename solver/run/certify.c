@@ -98,6 +98,8 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
             asked->serves_many && setup->factor ? uz_setup_inverse_bound(setup, K, run->work.ws, &stop) : INFINITY,
         .moved = run->load.moved,
         .whole_norm = whole_norm,
+        .low = answer->low,
+        .low_r = answer->m == run->m ? answer->low_r : NULL,
         .sharp = 0.5 * run->work.requested,
     };
     return UZ_OK;
@@ -119,9 +121,8 @@ void uz_run_balance_request(uz_run *run)
         run->work.requested = fmin(1.0, fmax(UZ_EXACT_RELATIVE_ERROR, 0.1 * summary->discretization_error));
 }
 
-uz_status uz_run_prove_infeasible(uz_run *run, uz_error *err)
+uz_status uz_run_check_ray(uz_run *run, uz_error *err)
 {
-    uz_result *result = run->result;
     uz_iterate *it = &run->work.it;
     const uz_csc *N = uz_setup_N(run->asked->setup, run->asked->problem);
     const double *scale = run->work.dual->dual->row_scale, *g0 = run->work.dual->g0;
@@ -130,16 +131,30 @@ uz_status uz_run_prove_infeasible(uz_run *run, uz_error *err)
         it->r_next[i] = g0[i] / scale[i];
     }
     double length = uz_gap_length(N, run->load.h, it->r_next, it->gamma);
-    double radius;
-    if (!uz_ray_proves(&radius, it->ray, N, run->load.h, length)) {
-        run->work.end = UZ_END_UNDECIDED;
-        return UZ_OK;
-    }
-    result->ray = uz_alloc(run->m, sizeof *result->ray);
-    if (!result->ray)
+    run->work.end = UZ_END_UNDECIDED;
+    return uz_ray_is_likely(it->ray, N, run->load.h, length) ? uz_run_take_ray(run, it->ray, err) : UZ_OK;
+}
+
+uz_status uz_run_take_ray(uz_run *run, double *y, uz_error *err)
+{
+    const uz_csc *N = uz_setup_N(run->asked->setup, run->asked->problem);
+    double radius, *copy;
+    uz_status status = uz_prove_ray(&radius, y, N, run->load.h, err);
+    if (status != UZ_OK || !(radius > run->work.reach))
+        return status;
+    if (!(copy = uz_alloc(run->m, sizeof *copy)))
         return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for the proof of infeasibility");
-    memcpy(result->ray, it->ray, (size_t)run->m * sizeof *result->ray);
-    result->summary.infeasible_radius = radius;
+    memcpy(copy, y, (size_t)run->m * sizeof *copy);
+    free(run->work.far);
+    run->work.far = NULL;
+    run->work.reach = radius;
+    if (isinf(radius)) {
+        run->work.end = UZ_END_RAY;
+        run->result->ray = copy;
+        run->result->summary.infeasible_radius = radius;
+    } else {
+        run->work.far = copy;
+    }
     return UZ_OK;
 }
 
@@ -159,5 +174,7 @@ void uz_answer_clear(uz_answer *answer)
     free(answer->u);
     free(answer->r);
     free(answer->g);
+    free(answer->low);
+    free(answer->low_r);
     memset(answer, 0, sizeof *answer);
 }

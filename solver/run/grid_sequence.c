@@ -15,6 +15,7 @@
 #include "core/hooks.h"
 #include "methods/milestones.h"
 #include "run/problem.h"
+#include "run/results.h"
 #include "run/settings.h"
 #include "run/transfer.h"
 #include "scene/grids.h"
@@ -204,7 +205,7 @@ static uz_status estimate_case(uz_result *result, const uz_body_model *outline, 
 {
     uz_summary *s = &result->summary;
     s->total_error = INFINITY;
-    if (s->outcome == UZ_INFEASIBLE)
+    if (uz_has_no_answer(s))
         return UZ_OK;
     const double mesh = is_translation(result) ? 0.0 : uz_estimate_mesh_error(outline, scene, result->u);
     if (isnan(mesh))
@@ -227,7 +228,7 @@ static uz_status estimate(answers *x, uz_grid_level *level, const uz_problem *pr
         status = estimate_case(x->results[i], outline, &scene, err);
         level->iterations += s->iterations;
         level->d = s->d;
-        if (status != UZ_OK || s->outcome == UZ_INFEASIBLE)
+        if (status != UZ_OK || uz_has_no_answer(s))
             continue;
         x->error = fmax(x->error, s->total_error);
         level->discretization_error = fmax(level->discretization_error, s->discretization_error);
@@ -308,7 +309,7 @@ static stop_kind judge(const search *g, const answers *x)
             return STOP_CANCELLED;
         if (s->outcome == UZ_TIME_LIMIT)
             stop = STOP_TIME;
-        else if (s->outcome != UZ_INFEASIBLE && !(s->certificate.relative_error < g->requested) && stop == STOP_NOT)
+        else if (!uz_has_no_answer(s) && !(s->certificate.relative_error < g->requested) && stop == STOP_NOT)
             stop = STOP_ALGEBRA;
     }
     return stop;
@@ -343,7 +344,7 @@ static uz_status try_grid(search *g, int64_t n, uz_error *err)
 static void conclude(const search *g, uz_summary *s)
 {
     s->requested_error = g->requested;
-    if (s->outcome == UZ_INFEASIBLE)
+    if (uz_has_no_answer(s))
         return;
     if (s->total_error <= g->requested) {
         s->outcome = UZ_CONVERGED;

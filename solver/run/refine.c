@@ -8,8 +8,12 @@
  * tightest that has to bear the reaction. */
 #include "certificate/residual.h"
 #include "core/alloc.h"
+#include "core/clock.h"
 #include "core/error.h"
+#include "core/hooks.h"
+#include "run/problem.h"
 #include "methods/exchange.h"
+#include "precise/precise.h"
 #include "run/run.h"
 
 #include <float.h>
@@ -178,5 +182,42 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
     }
     uz_answer_clear(&latest);
     end(&x);
+    return status;
+}
+
+uz_status uz_run_decide(uz_run *run, uz_error *err)
+{
+    const uz_stop stop = {run->asked->hooks, run->asked->deadline};
+    const uz_end end = run->work.end;
+    const double before = run->answer.certificate.relative_error;
+    const bool gave_up = end == UZ_END_UNDECIDED || end == UZ_END_STALLED || end == UZ_END_SOLVED;
+    if (run->result->ray || !gave_up || !(end == UZ_END_UNDECIDED || isinf(before)) || before <= run->work.requested ||
+        !uz_precise_is_small(run->d, run->m) || uz_stop_is_due(&stop))
+        return UZ_OK;
+    double start = uz_seconds();
+    const uz_setup *setup = run->asked->setup;
+    const uz_problem *problem = run->asked->problem;
+    uz_precise_end ended = UZ_PRECISE_LEFT;
+    uz_answer answer = {0};
+    uz_status status = uz_answer_allocate(&answer, run->d, run->m, err);
+    if (status == UZ_OK && !((answer.low = uz_alloc_zero(run->d, sizeof *answer.low)) &&
+                             (answer.low_r = uz_alloc_zero(run->m, sizeof *answer.low_r))))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+    if (status == UZ_OK)
+        status = uz_precise_solve(&ended, answer.u, answer.low, answer.r, answer.low_r, uz_setup_K(setup, problem),
+                                  uz_setup_N(setup, problem), run->load.p, run->load.h, &stop, err);
+    if (status == UZ_OK && ended == UZ_PRECISE_RAY)
+        status = uz_run_take_ray(run, answer.r, err);
+    else if (status == UZ_OK && ended == UZ_PRECISE_SOLVED)
+        status = uz_run_certify_answer(run, &answer, err);
+    if (status == UZ_OK && ended == UZ_PRECISE_SOLVED && answer.certificate.relative_error < before) {
+        uz_answer swap = run->answer;
+        run->answer = answer;
+        answer = swap;
+        run->work.end = UZ_END_STALLED;
+        run->result->summary.refinements++;
+    }
+    uz_answer_clear(&answer);
+    run->result->summary.timings.certify += uz_seconds() - start;
     return status;
 }

@@ -29,13 +29,23 @@ void uz_blank_answer(uz_result *result)
     memset(&s->certificate, 0xff, sizeof s->certificate); /* every byte set is a NaN */
 }
 
-/* The rows with a share in the contradiction. */
-static void explain_infeasible(const uz_result *result, char *text, size_t size)
+/* The rows with a share in the contradiction: exactly, or by more than a ray's rounding. */
+static void explain_ray(const uz_result *result, char *text, size_t size)
 {
     int64_t named = 0, count = 0;
-    size_t at = (size_t)snprintf(text, size, "no displacement meets all contact conditions: these rows contradict:");
+    double most = 0.0;
+    size_t at = 0;
+    if (result->summary.outcome == UZ_INFEASIBLE)
+        at = (size_t)snprintf(text, size, "no displacement meets all contact conditions: these rows contradict:");
+    else
+        at = (size_t)snprintf(text, size,
+                              "a displacement that meets all contact conditions, if there is one, has a component of "
+                              "at least %.3g: these rows all but contradict:",
+                              result->summary.infeasible_radius);
+    for (int64_t i = 0; i < result->m && result->summary.outcome == UZ_OUT_OF_REACH; i++)
+        most = fmin(most, result->ray[i]);
     for (int64_t i = 0; i < result->m; i++) {
-        if (!(result->ray[i] < -1e-9))
+        if (!(result->ray[i] < 1e-9 * most))
             continue;
         count++;
         if (named < 8 && at < size) {
@@ -53,7 +63,8 @@ void uz_explain_outcome(uz_result *result, uz_end end)
     const char *why = "";
     switch (s->outcome) {
     case UZ_INFEASIBLE:
-        explain_infeasible(result, s->message, sizeof s->message);
+    case UZ_OUT_OF_REACH:
+        explain_ray(result, s->message, sizeof s->message);
         return;
     case UZ_ITERATION_LIMIT:
         why = "the iterations allowed were used up: raise max_iterations";

@@ -5,6 +5,10 @@
 #include "methods/method.h"
 #include "uzawa.h"
 
+static inline bool uz_has_no_answer(const uz_summary *s)
+{
+    return s->outcome == UZ_INFEASIBLE || s->outcome == UZ_OUT_OF_REACH;
+}
 /* There is no answer: nothing that looks like one may be left. */
 void uz_blank_answer(uz_result *result);
 /* The summary's message: one sentence on an outcome that is not `converged`. end: of the method. */

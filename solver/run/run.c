@@ -165,7 +165,7 @@ uz_status uz_run_iterate(uz_run *run, uz_error *err)
         status = method->run(&work->end, &work->it, work->dual, &options, &run->result->history, err);
     run->result->summary.timings.iterate += uz_seconds() - start;
     uz_milestones_pause(&work->milestones);
-    return status == UZ_OK && work->end == UZ_END_RAY ? uz_run_prove_infeasible(run, err) : status;
+    return status == UZ_OK && work->end == UZ_END_RAY ? uz_run_check_ray(run, err) : status;
 }
 
 uz_status uz_run_certify(uz_run *run, uz_error *err)
@@ -219,7 +219,7 @@ static uz_status improve(uz_run *run, uz_error *err)
         status = uz_run_refine(run, err);
     run->result->summary.timings.certify += uz_seconds() - start;
     bool found_ray = run->work.end == UZ_END_RAY && !run->result->ray;
-    return status == UZ_OK && found_ray ? uz_run_prove_infeasible(run, err) : status;
+    return status == UZ_OK && found_ray ? uz_run_check_ray(run, err) : status;
 }
 
 /* Is the certified answer the one to give? Otherwise the target of the next round is set: by how much the bound of
@@ -246,7 +246,7 @@ static uz_status judge(bool *done, uz_run *run, uz_error *err)
 static uz_outcome conclude(const uz_run *run)
 {
     if (run->result->ray)
-        return UZ_INFEASIBLE;
+        return isinf(run->result->summary.infeasible_radius) ? UZ_INFEASIBLE : UZ_OUT_OF_REACH;
     if (run->result->summary.certificate.relative_error <= run->work.requested)
         return UZ_CONVERGED;
     switch (run->work.end) {
@@ -286,6 +286,13 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
     }
     if (!done)
         run->work.end = UZ_END_STALLED;
+    if (status == UZ_OK)
+        status = uz_run_decide(run, err);
+    if (!run->result->ray && run->work.far && isinf(run->answer.certificate.absolute_error)) {
+        run->result->ray = run->work.far;
+        run->result->summary.infeasible_radius = run->work.reach;
+        run->work.far = NULL;
+    }
     run->result->summary.certificate = run->answer.certificate;
     if (status == UZ_OK)
         status = uz_run_certify_all_rows(run, err);
@@ -301,6 +308,7 @@ void uz_run_end(uz_run *run)
     uz_iterate_clear(&run->work.it);
     uz_factor_workspace_free(run->work.ws);
     free(run->work.scratch);
+    free(run->work.far);
     free(run->load.owned);
     uz_answer_clear(&run->answer);
     uz_candidates_clear(&run->wants);

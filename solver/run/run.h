@@ -45,13 +45,16 @@ typedef struct {
     double requested; /* relative error that the certificate must meet */
     double target;    /* relative error at which the method returns */
     bool again;       /* the method's target was met, the certificate was not */
+    double *far;      /* m, or NULL: a ray that is no proof, and how large every feasible u is by it */
+    double reach;
     uz_end end;
 } uz_work;
 
 /* What may become the result. */
 typedef struct {
-    int64_t m;         /* rows of the setup; after uz_run_certify_all_rows all of the problem's */
-    double *u, *r, *g; /* d, m, m */
+    int64_t m;           /* rows of the setup; after uz_run_certify_all_rows all of the problem's */
+    double *u, *r, *g;   /* d, m, m */
+    double *low, *low_r; /* d, m: what u and r rounded away; NULL: unknown */
     uz_certificate certificate;
 } uz_answer;
 uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err);
@@ -97,13 +100,18 @@ uz_status uz_run_certify_reactions(uz_run *run, uz_answer *answer, const double 
                                    uz_error *err);
 /* Scenes, `balanced`: the request from the estimated discretization error of answer.u. */
 void uz_run_balance_request(uz_run *run);
-/* UZ_END_RAY: the rows that contradict each other, checked on the original data; result->ray where that proves it. */
-uz_status uz_run_prove_infeasible(uz_run *run, uz_error *err);
+/* UZ_END_RAY: the rows that seem to contradict each other along it->ray, checked on the original data. */
+uz_status uz_run_check_ray(uz_run *run, uz_error *err);
+/* What y (m, <= 0, caller's rows) proves: result->ray where no u is feasible, else work.far where it reaches further
+ * than what stands there. y is overwritten. */
+uz_status uz_run_take_ray(uz_run *run, double *y, uz_error *err);
 
 /* ---- what may follow a certificate */
 
 /* Iterative refinement of the answer while its certificate misses the request and gets better (refine.c). */
 uz_status uz_run_refine(uz_run *run, uz_error *err);
+/* A small problem whose rows may contradict each other, as far as doubles can tell: solved again in 512 bits. */
+uz_status uz_run_decide(uz_run *run, uz_error *err);
 /* The answer and its certificate become those of all rows, where the setup left some out; run->wants (all_rows.c). */
 uz_status uz_run_certify_all_rows(uz_run *run, uz_error *err);
 

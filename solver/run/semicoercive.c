@@ -186,8 +186,8 @@ static uz_status find_null_space(uz_semi *s, uz_error *err)
 static bool is_over(const uz_semi *s)
 {
     uz_outcome outcome = s->last->summary.outcome;
-    return outcome == UZ_INFEASIBLE || outcome == UZ_TIME_LIMIT || outcome == UZ_DISMISSED ||
-           outcome == UZ_ITERATION_LIMIT;
+    return outcome == UZ_INFEASIBLE || outcome == UZ_OUT_OF_REACH || outcome == UZ_TIME_LIMIT ||
+           outcome == UZ_DISMISSED || outcome == UZ_ITERATION_LIMIT;
 }
 
 /* One step of the proximal point method. *settled: the rows that press are those of the round before. */

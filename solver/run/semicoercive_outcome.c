@@ -200,11 +200,9 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
     uz_status status = result->ray ? UZ_OK : certify(s, err);
     if (status != UZ_OK)
         return status;
-    if (result->ray)
-        summary->outcome = UZ_INFEASIBLE;
-    else if (s->proved && summary->certificate.relative_error <= s->requested)
+    if (!result->ray && s->proved && summary->certificate.relative_error <= s->requested)
         summary->outcome = UZ_CONVERGED;
-    else if (summary->outcome == UZ_CONVERGED)
+    else if (!result->ray && summary->outcome == UZ_CONVERGED)
         summary->outcome = UZ_PRECISION_LIMIT;
     summary->requested_error = s->requested;
     summary->discretization_error = s->discretization_error;

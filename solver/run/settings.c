@@ -33,6 +33,7 @@ static const char *const OUTCOMES[] = {
     [UZ_PAPER_RULE] = "paper_rule",     [UZ_INFEASIBLE] = "infeasible",
     [UZ_DISMISSED] = "dismissed",       [UZ_VERIFIED] = "verified",
     [UZ_NOT_VERIFIED] = "not_verified", [UZ_MESH_LIMIT] = "mesh_limit",
+    [UZ_OUT_OF_REACH] = "out_of_reach",
 };
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))

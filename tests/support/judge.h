@@ -4,6 +4,7 @@
 #define TESTS_JUDGE_H
 
 #include "quad_exact.h"
+#include "rational.h"
 #include "uzawa.h"
 
 #include <math.h>
@@ -18,7 +19,8 @@ typedef enum {
 /* The problem's own truth. Free with truth_clear. */
 typedef struct {
     bool definite;   /* K is positive definite; without that nothing else is known */
-    bool feasible;   /* some displacement meets all rows */
+    bool feasible;   /* some displacement meets all rows, as far as quadruple precision can tell */
+    bool far;        /* not so, but one does in rational numbers */
     quad_exact best; /* where both hold */
     quad norm;       /* ||u*||_K */
     quad noise;      /* of the reference: about ||error||_K, from the optimality conditions in the original data */
@@ -98,6 +100,7 @@ static inline truth find_truth(const uz_qp *qp, const bool *start)
     t.feasible = quad_exact_solve(&t.best, qp, start);
     for (int64_t i = 0; i < t.best.m; i++) /* a row without coefficients says 0 <= h */
         t.feasible = t.feasible && (t.best.D[i * t.best.m + i] > 0 || qp->h[i] >= 0);
+    t.far = !t.feasible && is_feasible_exactly(&qp->N, qp->h);
     if (t.feasible) {
         t.norm = quad_sqrt(t.best.norm2);
         t.noise = measure_noise(&t.best);
@@ -117,10 +120,11 @@ static inline judgement condemn(judgement j, const char *why)
     return j;
 }
 
-/* y <= 0 with h'y > radius ||N'y||_1: then h - N u >= 0 can't hold where all |u_j| < radius. */
-static inline bool proves_infeasible(const double *y, double radius, const uz_qp *qp)
+/* y <= 0 with h'y > radius ||N'y||_1: then h - N u >= 0 can't hold where all |u_j| < radius. An exact ray, radius
+ * INFINITY, was rounded to doubles. */
+static inline bool bounds_feasible(const double *y, double radius, const uz_qp *qp)
 {
-    quad work = 0, slack = 0;
+    quad work = 0, slack = 0, terms = 0;
     for (int64_t i = 0; i < qp->N.rows; i++) {
         if (!(y[i] <= 0))
             return false;
@@ -130,20 +134,24 @@ static inline bool proves_infeasible(const double *y, double radius, const uz_qp
         quad sum = 0;
         for (int64_t k = qp->N.ptr[j]; k < qp->N.ptr[j + 1]; k++)
             sum += (quad)qp->N.val[k] * y[qp->N.idx[k]];
+        for (int64_t k = qp->N.ptr[j]; k < qp->N.ptr[j + 1]; k++)
+            terms += quad_abs((quad)qp->N.val[k] * y[qp->N.idx[k]]);
         slack += quad_abs(sum);
     }
-    return isinf(radius) ? work > 0 && !(slack > 0) : work > 0 && work * (1 + (quad)1e-12) >= slack * radius;
+    return isinf(radius) ? slack <= (quad)1e-15 * terms : work > 0 && work * (1 + (quad)1e-12) >= slack * radius;
 }
 
-static inline judgement judge_infeasible(judgement j, const truth *t, const uz_qp *qp, const uz_result *result)
+static inline judgement judge_no_answer(judgement j, const truth *t, const uz_qp *qp, const uz_result *result)
 {
     double radius = result->summary.infeasible_radius;
-    if (!result->ray || !proves_infeasible(result->ray, radius, qp))
-        return condemn(j, "infeasible without a proof");
+    if (isinf(radius) != (result->summary.outcome == UZ_INFEASIBLE))
+        return condemn(j, "the radius is not that of the outcome");
+    if (!result->ray || !bounds_feasible(result->ray, radius, qp))
+        return condemn(j, "no answer, without a proof");
     for (int64_t k = 0; t->feasible && k < t->best.d; k++)
         if (quad_abs(t->best.u[k]) >= radius)
             return j;
-    return t->feasible ? condemn(j, "infeasible, but a displacement within the radius exists") : j;
+    return t->feasible || (t->far && isinf(radius)) ? condemn(j, "infeasible, but a displacement exists") : j;
 }
 
 static inline quad relative(quad error, quad norm)
@@ -203,10 +211,15 @@ static inline judgement judge(const truth *t, const uz_qp *qp, const uz_result *
 {
     judgement j = {.verdict = JUDGED_OK, .certified = NAN, .error = NAN, .floor = NAN, .ratio = NAN};
     bool claims = result->summary.outcome == UZ_CONVERGED || isfinite(result->summary.certificate.relative_error);
-    if (result->summary.outcome == UZ_INFEASIBLE)
-        return judge_infeasible(j, t, qp, result);
+    if (result->summary.outcome == UZ_INFEASIBLE || result->summary.outcome == UZ_OUT_OF_REACH)
+        return judge_no_answer(j, t, qp, result);
     if (!t->definite)
         return claims ? condemn(j, "an answer was certified although K is not positive definite") : j;
+    if (t->far) { /* there is no reference */
+        j.verdict = claims ? JUDGED_UNCERTAIN : JUDGED_OK;
+        snprintf(j.why, sizeof j.why, "the rows are too near to a contradiction for the reference");
+        return j;
+    }
     if (!t->feasible)
         return claims ? condemn(j, "an answer was certified although the rows contradict") : j;
     j = judge_bounds(j, t, result, u);

@@ -171,8 +171,8 @@ TEST(states_go_from_method_to_method)
     uz_problem_clear(&problem);
 }
 
-/* Rows in general position but for one, minus a combination of the first few: they contradict it by `overlap`, or leave
- * room where that is negative. More rows than dofs: D is singular. */
+/* Rows in general position but for one, minus a combination of the first few, exactly: they contradict it by `overlap`,
+ * or leave room where that is negative. More rows than dofs: D is singular. */
 static uz_problem dependent_rows(uint64_t seed, double overlap)
 {
     enum { D = 12, OTHERS = 10 };
@@ -185,7 +185,7 @@ static uz_problem dependent_rows(uint64_t seed, double overlap)
         qp.p[j] = random_signed(&rng);
     }
     for (int64_t i = 0; i < m * D; i++)
-        N[i] = random_signed(&rng);
+        N[i] = ldexp((double)random_int(&rng, -(1 << 20), 1 << 20), -20);
     for (int64_t j = 0; j < D; j++) {
         N[first * D + j] = 0;
         for (int64_t i = 0; i < first; i++)

@@ -196,14 +196,14 @@ TEST(a_corner_with_a_small_angle)
     }
 }
 
-/* One unit in the last place of h: told as what it is. */
-TEST(contradictions_below_rounding_are_named)
+/* One unit in the last place of h: rounding hides it from the method, not from the proof. */
+TEST(a_contradiction_of_one_unit_is_proved)
 {
     uz_problem problem = problem_of(overlapping(6, DBL_EPSILON, 1));
     uz_settings settings = uz_settings_default();
     uz_result *result = solve_problem(&problem, &settings);
-    CHECK(result && result->summary.outcome == UZ_PRECISION_LIMIT);
-    CHECK(result && strstr(result->summary.message, "contradict each other by less than rounding"));
+    CHECK(result && result->summary.outcome == UZ_INFEASIBLE);
+    CHECK(result && strstr(result->summary.message, "these rows contradict: 6, 7"));
     uz_result_free(result);
     uz_problem_clear(&problem);
 }

@@ -1,0 +1,28 @@
+/* precise.h: a small problem in numbers of 512 bits.
+ *
+ * Where rows nearly contradict each other D = N K^-1 N' has entries that differ by less than doubles hold, and the
+ * answer, if there is one, may be far away. This is what decides then: K = L L', B = L^-1 N', D = B'B and the dual
+ * active set method of Goldfarb and Idnani (Math. Programming 27 (1983)) on D as principal pivots of a full tableau
+ * (Keller, Math. Programming 5 (1973)), without regard to speed. What it says is a candidate: the certificate and the
+ * proof of infeasibility, which start from the data, decide. */
+#ifndef UZ_PRECISE_H
+#define UZ_PRECISE_H
+
+#include "core/hooks.h"
+#include "uzawa.h"
+
+typedef enum {
+    UZ_PRECISE_SOLVED,
+    UZ_PRECISE_RAY, /* r is a direction y <= 0 with N'y = 0 and h'y > 0 as far as 300 bits can tell */
+    UZ_PRECISE_LEFT /* told to stop, K not positive definite, or too many steps: nothing is known */
+} uz_precise_end;
+
+/* Does it take no more than about a second? d dofs, m rows. */
+bool uz_precise_is_small(int64_t d, int64_t m);
+
+/* u + low (d), r + low_r (m): out, each rounded to doubles. K (d x d, lower triangle), N (m x d), p, h: finite. stop
+ * may be NULL. Errors: UZ_ERR_MEMORY. */
+uz_status uz_precise_solve(uz_precise_end *end, double *u, double *low, double *r, double *low_r, const uz_csc *K,
+                           const uz_csc *N, const double *p, const double *h, const uz_stop *stop, uz_error *err);
+
+#endif
