@@ -13,6 +13,7 @@
 #include "work/work.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
@@ -31,6 +32,7 @@ typedef struct {
     server_log *log;
     metrics *metrics;
     store *store;
+    uz_reserve *reserve; /* outlives the work */
     work *work;
     webhooks *webhooks;
     http_server *http;
@@ -78,16 +80,14 @@ static void own_signals(char **argv, sigset_t *signals)
     }
 }
 
-/* Bytes from which glibc maps a block by itself, and that may stay free at the end of an arena. */
-#define HEAP_KEPT (2 << 20)
-
-/* Unless both are set, glibc raises them, up to 32 and 64 MiB, to twice the largest block that was ever freed; and
- * there are eight arenas for each processor, each of which then keeps as much of what the requests of a day took at
- * most. */
-static void keep_little_free_memory(void)
+/* What is freed stays in one heap, touched: a page given back to the system is dear to get again, and each of glibc's
+ * eight arenas for each processor would keep pages of its own. How much lies free is the housekeeper's business
+ * (work/reserve.h). */
+static void keep_freed_memory(void)
 {
-    mallopt(M_MMAP_THRESHOLD, HEAP_KEPT);
-    mallopt(M_TRIM_THRESHOLD, HEAP_KEPT);
+    mallopt(M_ARENA_MAX, 1);
+    mallopt(M_MMAP_MAX, 0);
+    mallopt(M_TRIM_THRESHOLD, INT_MAX);
 }
 
 static void raise_descriptor_limit(void)
@@ -165,6 +165,7 @@ static bool start_work(service *s, const server_options *options, char *message,
     const work_options workers = {.workers = options->workers,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
+                                  .reserve = s->reserve,
                                   .solve_bytes = options->memory,
                                   .max_solve_s = options->max_solve_s,
                                   .metrics = s->metrics,
@@ -213,7 +214,7 @@ static bool start_http(service *s, const server_options *options, int fd, char *
 
 static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
 {
-    keep_little_free_memory();
+    keep_freed_memory();
     raise_descriptor_limit();
     if (!codec_init(message, size))
         return false;
@@ -222,6 +223,9 @@ static bool start(service *s, const server_options *options, char *url, size_t u
                                      .rows = (int64_t)options->max_rows,
                                      .nonzeros = (int64_t)options->max_nonzeros});
     uz_process_init(options->workers);
+    s->reserve = uz_reserve_new(options->cache - options->cache / RESERVE_SHARE, options->cache / RESERVE_SHARE);
+    if (s->reserve)
+        uz_process_reserve(s->reserve);
     if (!read_secrets(s, options, message, size))
         return false;
     /* The port is taken before any job runs, so that a second daemon fails without a trace; and before the privileges
@@ -250,6 +254,7 @@ static void end(service *s)
     }
     if (s->store)
         store_close(s->store);
+    uz_reserve_free(s->reserve);
     auth_free(s->auth);
     http_tls_clear(&s->tls);
     webhook_forget_secret(&s->hooks);

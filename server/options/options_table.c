@@ -49,7 +49,7 @@ static const uz_option ROWS[] = {
     SETTING("workers", INTEGER, workers, .value = "N", .least = 1, .most = 1024,
             .otherwise = "as many as there are processors", .unit = "threads", .about = "problems solved at once"),
     SETTING("cache", BYTES, cache, .value = "BYTES", .least = 1, .normal = "1G", .unit = "bytes",
-            .about = "memory for factors that are kept"),
+            .about = "memory for factors that are kept; a quarter of it lies ready for the next one"),
     SETTING("memory", BYTES, memory, .value = "BYTES", .least = 1,
             .otherwise = "80 % of what the machine or its control group has, less the cache, divided by the workers",
             .unit = "bytes", .about = "memory that one problem may take"),

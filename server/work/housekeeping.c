@@ -5,10 +5,22 @@
 #include "store/uploads.h"
 
 #include <errno.h>
+#include <malloc.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <sys/mman.h>
 
 #define ROUND_S 0.5
+#define IDLE_S  300.0 /* then the reserve goes back to the system */
+
+#define HEAP_FREE  ((size_t)16 << 20) /* may lie free where no large body was solved */
+#define HUGE_PAGE  ((size_t)2 << 20)
+#define SMALL_PAGE 4096
+
+typedef struct {
+    long long jobs; /* ended, when memory was made ready last */
+    double since;   /* work_clock() */
+} idle_watch;
 
 static void expire(work *w)
 {
@@ -34,9 +46,50 @@ static void retain(work *w)
         log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
 }
 
+/* What is freed stays in the heap (main). Where more than `most` lies free there, all of it goes back to the system;
+ * where less than `least`, so much is touched now, in huge pages. */
+static void keep_heap(size_t least, size_t most)
+{
+    const struct mallinfo2 heap = mallinfo2();
+    void *block = NULL;
+    if (heap.uordblks == 0)
+        return; /* another allocator, which tells nothing */
+    if (heap.fordblks > most)
+        malloc_trim(0);
+    else if (heap.fordblks < least && posix_memalign(&block, HUGE_PAGE, least) == 0) {
+        madvise(block, least, MADV_HUGEPAGE);
+        for (size_t at = 0; at < least; at += SMALL_PAGE)
+            ((volatile char *)block)[at] = 0;
+        free(block);
+    }
+}
+
+/* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. */
+static void keep_reserve(work *w, idle_watch *idle)
+{
+    const long long jobs = atomic_load(&w->ended);
+    const double now = work_clock();
+    uz_reserve *reserve = w->options.reserve;
+    if (!reserve)
+        return;
+    const bool busy = work_busy(w) > 0, news = jobs != idle->jobs && !busy;
+    if (busy || news)
+        idle->since = now;
+    else if (now - idle->since > IDLE_S)
+        uz_reserve_empty(reserve);
+    while (news && work_busy(w) == 0 && !work_is_stopping(w) && uz_reserve_fill(reserve))
+        ;
+    const bool large = uz_reserve_bytes(reserve) > 0; /* bodies are solved here */
+    const size_t share = w->options.cache_bytes / 8;
+    keep_heap(large && news ? share : 0, HEAP_FREE + (large ? 4 * share : 0));
+    if (news)
+        idle->jobs = jobs;
+}
+
 void *housekeeping_loop(void *arg)
 {
     work *w = arg;
+    idle_watch idle = {.since = work_clock()};
     struct timespec deadline;
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {
@@ -44,6 +97,7 @@ void *housekeeping_loop(void *arg)
         if (pthread_cond_timedwait(&w->tick, &w->lock, &deadline) != ETIMEDOUT)
             continue;
         pthread_mutex_unlock(&w->lock);
+        keep_reserve(w, &idle);
         expire(w);
         retain(w);
         store_collect_uploads(w->store, NULL); /* also those of jobs that have just gone */

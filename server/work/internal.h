@@ -52,6 +52,7 @@ struct work {
     bool stopped;  /* every thread was joined */
     double drain_until; /* work_clock() */
 
+    atomic_llong ended;    /* jobs that have run, whatever became of them */
     atomic_bool interrupt; /* the time to drain is over */
     int n_started;         /* workers to join; set before any other thread may call */
     bool keeper_started, housekeeper_started;

@@ -79,6 +79,7 @@ static void *work_loop(void *arg)
             work_run(me, &claimed, body, body_len);
             publish(me, &(store_lease){.token = 0});
             feed_changed(w->feed, id); /* ended, or put back */
+            atomic_fetch_add(&w->ended, 1);
             continue;
         }
         if (status != STORE_NOT_FOUND) {
@@ -204,7 +205,7 @@ static work *make_work(store *s, const work_options *options, server_log *log)
     work_init_condition(&w->wake);
     work_init_condition(&w->idle);
     work_init_condition(&w->tick);
-    w->cache = uz_cache_new(options->cache_bytes);
+    w->cache = uz_cache_new(options->cache_bytes - (options->reserve ? options->cache_bytes / RESERVE_SHARE : 0));
     w->feed = feed_new();
     w->workers = calloc((size_t)w->options.workers, sizeof *w->workers);
     for (int i = 0; w->workers && i < w->options.workers; i++) {

@@ -31,12 +31,16 @@
 
 typedef struct work work;
 
+/* Of the cache's bytes one part in so many is the reserve's: memory that lies ready for the next factor. */
+enum { RESERVE_SHARE = 4 };
+
 typedef struct {
     int workers;
-    int max_attempts;   /* runs begun before a job that keeps killing the process is failed */
-    size_t cache_bytes; /* factor cache */
-    size_t solve_bytes; /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
-    double max_solve_s; /* of one job, whatever it asks for; 0: no limit */
+    int max_attempts;    /* runs begun before a job that keeps killing the process is failed */
+    size_t cache_bytes;  /* factor cache, with the reserve */
+    uz_reserve *reserve; /* that factors are made in, or NULL */
+    size_t solve_bytes;  /* of one solve: what would take more goes on without a factor or is refused; 0: no limit */
+    double max_solve_s;  /* of one job, whatever it asks for; 0: no limit */
     double lease_s;
     double room_wait_s;        /* a result that has no room on the disk waits so long before its job is failed; 0: 60 */
     store_retention retention; /* of ended jobs */

@@ -167,6 +167,8 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
         if (status == UZ_OK) {
             uz_factor_info predicted = uz_analysis_describe(analysis);
             status = accept(ctx, &predicted, err);
+            if (status == UZ_OK && cache)
+                uz_table_expect(cache, item, predicted.bytes);
         }
         if (status == UZ_OK)
             status = uz_factor_create(&factor, K, analysis, 0, hooks, err);

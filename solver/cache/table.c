@@ -16,7 +16,7 @@ struct uz_item {
     char digest[65];
     void *object;
     void (*destroy)(void *object);
-    size_t bytes;
+    size_t bytes; /* counted in the table's, also while they are only expected */
     int64_t users, hits;
     uz_item *newer, *older;
 };
@@ -178,13 +178,23 @@ uz_status uz_table_acquire(uz_item **item, bool *create, uz_cache *cache, uz_ite
     return status;
 }
 
+void uz_table_expect(uz_cache *cache, uz_item *item, size_t bytes)
+{
+    pthread_mutex_lock(&cache->mutex);
+    cache->bytes += bytes - item->bytes;
+    item->bytes = bytes;
+    uz_item *out = evict(cache);
+    pthread_mutex_unlock(&cache->mutex);
+    destroy_all(out);
+}
+
 void uz_table_publish(uz_cache *cache, uz_item *item, void *object, size_t bytes, void (*destroy)(void *object))
 {
     pthread_mutex_lock(&cache->mutex);
     item->object = object;
     item->destroy = destroy;
+    cache->bytes += bytes - item->bytes;
     item->bytes = bytes;
-    cache->bytes += bytes;
     uz_item *out = evict(cache);
     pthread_cond_broadcast(&cache->changed);
     pthread_mutex_unlock(&cache->mutex);
@@ -194,6 +204,7 @@ void uz_table_publish(uz_cache *cache, uz_item *item, void *object, size_t bytes
 void uz_table_abandon(uz_cache *cache, uz_item *item)
 {
     pthread_mutex_lock(&cache->mutex);
+    cache->bytes -= item->bytes;
     unlink_item(cache, item);
     pthread_cond_broadcast(&cache->changed);
     pthread_mutex_unlock(&cache->mutex);

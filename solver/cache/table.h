@@ -20,6 +20,9 @@ uz_status uz_table_acquire(uz_item **item, bool *create, uz_cache *cache, uz_ite
  * abandon: waiters try themselves; the item is gone. */
 void uz_table_publish(uz_cache *cache, uz_item *item, void *object, size_t bytes, void (*destroy)(void *object));
 void uz_table_abandon(uz_cache *cache, uz_item *item);
+/* Between acquire and publish: the object will take about so many bytes, which what nobody uses makes room for now, so
+ * that the object can lie where that was. */
+void uz_table_expect(uz_cache *cache, uz_item *item, size_t bytes);
 /* NULL is fine. */
 void uz_table_release(uz_cache *cache, uz_item *item);
 

@@ -127,5 +127,8 @@ bool uz_group_dofs(int64_t *head, const uz_csc *K);
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);
+/* The big blocks, which are the factor's above all, come from the reserve from now on. Process-wide: called once at
+ * most, after uz_factor_use_huge_pages and before anything is factored; the reserve outlives every factor. */
+void uz_factor_use_reserve(uz_reserve *used);
 
 #endif

@@ -52,6 +52,19 @@ typedef struct {
  * in the bytes of the first. */
 uz_status uz_cache_list(uz_cache *cache, uz_cache_entry **entries, size_t *count, uz_error *err);
 
+/* ----------------------------------------------------------------- reserve */
+
+/* Memory that factors are made in, and that is kept when they are freed as long as both together take at most `most`
+ * bytes: pages that went back to the system are dear to get again. Thread-safe. */
+typedef struct uz_reserve uz_reserve;
+uz_reserve *uz_reserve_new(size_t most, size_t ready); /* NULL: no memory */
+void uz_reserve_free(uz_reserve *reserve);             /* after every factor; NULL is fine */
+/* Touches some fresh memory, tens of megabytes, where less is kept than `ready` and the largest factor took since the
+ * reserve was emptied last; true: it is still less. To be called while nobody waits for a solve. */
+bool uz_reserve_fill(uz_reserve *reserve);
+void uz_reserve_empty(uz_reserve *reserve);   /* gives all that is kept to the system */
+size_t uz_reserve_bytes(uz_reserve *reserve); /* that are kept */
+
 /* ------------------------------------------------------------------ solve */
 
 /* What `balanced` asks for where the cells are chosen too. */
@@ -115,6 +128,8 @@ uz_status uz_predict(uz_prediction *out, const uz_problem *problem, const uz_set
 /* Process-wide settings that a library must not choose alone: BLAS threads. Call once from main before threads start;
  * `workers` is how many threads will call uz_solve at once. */
 void uz_process_init(int workers);
+/* After it, at most once: factors are made in the reserve, which has to outlive them. */
+void uz_process_reserve(uz_reserve *reserve);
 /* Per-thread cure for CHOLMOD's compiled-in OpenMP team (4 threads whatever the machine has). */
 void uz_thread_init(void);
 

@@ -17,6 +17,11 @@ void uz_process_init(int workers)
         openblas_set_num_threads(1);
 }
 
+void uz_process_reserve(uz_reserve *reserve)
+{
+    uz_factor_use_reserve(reserve);
+}
+
 /* Debian's CHOLMOD asks for a team of 4 threads whatever the machine has. No active parallel level means a team of one.
  * METIS, called by CHOLMOD, swaps the handlers of SIGTERM and SIGABRT: a thread that blocks them is never inside its
  * longjmp. */

@@ -5,6 +5,7 @@ refused, and the daemon lives through both. usage: test_memory.py BUILD_DIR [FIL
 import copy
 import http.client
 import threading
+import time
 
 import service
 from service import INSTRUMENTED, MATRICES, SCENE, Skip, check, expect, options
@@ -102,6 +103,26 @@ def test_large_requests_leave_nothing_behind(s):
     for one in connections:
         one.close()
     check(grown < 64, grown)
+
+
+def page_faults(s):
+    with open(f"/proc/{s.process.pid}/stat", encoding="ascii") as file:
+        return int(file.read().rsplit(")", 1)[1].split()[7])
+
+
+@options("--workers", "1", "--cache", "128M")
+def test_the_next_body_lands_on_memory_that_is_there(s):
+    if INSTRUMENTED:
+        raise Skip("the sanitizer has a heap of its own")
+    faults = []
+    for k in range(7):
+        before = page_faults(s)
+        job = s.solve(plate([300 + k, 100]))
+        check(job["status"] == "successful" and not job["summary"]["factor"]["cached"], job)
+        faults.append(page_faults(s) - before)
+        time.sleep(1.2)  # for the housekeeper
+    check(faults[0] > 4000, faults)
+    check(sorted(faults[-4:])[1] < faults[0] / 4, faults)
 
 
 if __name__ == "__main__":

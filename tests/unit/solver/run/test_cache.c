@@ -1,5 +1,6 @@
 /* The cache of bodies: one creator per key, a bound in bytes, and keys that tell bodies apart. */
 #include "run/setup_cache.h"
+#include "cache/table.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "scene_fixture.h"
@@ -122,6 +123,41 @@ TEST(least_recently_used_goes_first)
     uz_cache_free(cache);
     for (int k = 0; k < 4; k++)
         uz_problem_clear(&bodies[k]);
+}
+
+static void destroy_flag(void *object)
+{
+    *(bool *)object = true;
+}
+
+/* What an object will take is made room for before it is made, and given back when it is not. */
+TEST(room_is_made_before_the_object)
+{
+    static const char first[65] = "1", second[65] = "2";
+    uz_cache *cache = uz_cache_new(100);
+    uz_item *item;
+    uz_error err = {0};
+    bool create, gone = false, other = false;
+    CHECK(uz_table_acquire(&item, &create, cache, UZ_ITEM_FACTOR, first, NULL, &err) == UZ_OK && create);
+    uz_table_publish(cache, item, &gone, 60, destroy_flag);
+    uz_table_release(cache, item);
+    CHECK(uz_table_acquire(&item, &create, cache, UZ_ITEM_FACTOR, second, NULL, &err) == UZ_OK && create);
+    uz_table_expect(cache, item, 40);
+    CHECK(!gone);
+    uz_table_expect(cache, item, 41);
+    CHECK(gone);
+    uz_table_abandon(cache, item);
+    gone = false;
+    CHECK(uz_table_acquire(&item, &create, cache, UZ_ITEM_FACTOR, first, NULL, &err) == UZ_OK && create);
+    uz_table_publish(cache, item, &gone, 60, destroy_flag);
+    uz_table_release(cache, item);
+    CHECK(uz_table_acquire(&item, &create, cache, UZ_ITEM_FACTOR, second, NULL, &err) == UZ_OK && create);
+    uz_table_expect(cache, item, 10);
+    uz_table_publish(cache, item, &other, 40, destroy_flag); /* as large as it became: both fit */
+    uz_table_release(cache, item);
+    CHECK(!gone && !other);
+    uz_cache_free(cache);
+    CHECK(gone && other);
 }
 
 TEST(bodies_in_use_survive)

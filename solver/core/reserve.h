@@ -1,0 +1,14 @@
+/* reserve.h: what allocates from a reserve of touched pages (uzawa.h). */
+#ifndef UZ_CORE_RESERVE_H
+#define UZ_CORE_RESERVE_H
+
+#include "uzawa.h"
+
+/* An uninitialized block, on a huge page boundary; NULL: no memory. */
+void *uz_reserve_take(uz_reserve *reserve, size_t bytes);
+/* Of a block that was taken; 0: it was not. */
+size_t uz_reserve_size(uz_reserve *reserve, const void *block);
+/* Frees it; false: it was not taken here. */
+bool uz_reserve_give(uz_reserve *reserve, void *block);
+
+#endif

@@ -1,0 +1,112 @@
+/* The reserve of touched pages: blocks are whole and their own, pages of a freed block serve the next one, and no more
+ * is kept than was allowed. */
+#include "core/reserve.h"
+#include "harness.h"
+#include "qp_fixture.h"
+
+#include <string.h>
+#include <sys/resource.h>
+
+#define MB ((size_t)1 << 20)
+
+static long faults(void)
+{
+    struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_minflt;
+}
+
+static void write_all(unsigned char *block, size_t bytes, int value)
+{
+    memset(block, value, bytes);
+}
+
+static bool has_only(const unsigned char *block, size_t bytes, int value)
+{
+    for (size_t i = 0; i < bytes; i++)
+        if (block[i] != value)
+            return false;
+    return true;
+}
+
+TEST(pages_of_freed_blocks_serve_larger_ones)
+{
+    uz_reserve *reserve = uz_reserve_new(64 * MB, 0);
+    unsigned char *a = uz_reserve_take(reserve, 20 * MB), *b = uz_reserve_take(reserve, 30 * MB + 5);
+    CHECK(a && b && (size_t)a % (2 * MB) == 0 && (size_t)b % (2 * MB) == 0);
+    CHECK(uz_reserve_size(reserve, b) == 32 * MB);
+    write_all(a, 20 * MB, 1);
+    write_all(b, 32 * MB, 2);
+    CHECK(has_only(a, 20 * MB, 1));
+    CHECK(uz_reserve_give(reserve, a) && uz_reserve_give(reserve, b));
+    CHECK(uz_reserve_bytes(reserve) == 52 * MB);
+    long before = faults();
+    unsigned char *c = uz_reserve_take(reserve, 46 * MB); /* neither was as large */
+    CHECK(c && uz_reserve_bytes(reserve) == 6 * MB);
+    write_all(c, 46 * MB, 3);
+    CHECK_MSG(faults() - before < 64, "%ld page faults on pages that were there", faults() - before);
+    unsigned char *d = uz_reserve_take(reserve, 10 * MB); /* 6 kept, 4 fresh */
+    CHECK(d && uz_reserve_bytes(reserve) == 0);
+    write_all(d, 10 * MB, 4);
+    CHECK(has_only(c, 46 * MB, 3) && has_only(d, 10 * MB, 4));
+    CHECK(uz_reserve_give(reserve, c) && uz_reserve_give(reserve, d));
+    uz_reserve_free(reserve);
+}
+
+TEST(no_more_is_kept_than_allowed)
+{
+    uz_reserve *reserve = uz_reserve_new(16 * MB, 12 * MB);
+    unsigned char *a = uz_reserve_take(reserve, 40 * MB), *b = uz_reserve_take(reserve, 8 * MB);
+    int own = 0;
+    CHECK(a && b);
+    CHECK(!uz_reserve_give(reserve, &own) && uz_reserve_size(reserve, &own) == 0);
+    CHECK(uz_reserve_give(reserve, a));
+    CHECK(uz_reserve_bytes(reserve) == 8 * MB); /* and 8 are in use */
+    CHECK(uz_reserve_give(reserve, b));
+    CHECK(uz_reserve_bytes(reserve) == 16 * MB);
+    uz_reserve_empty(reserve);
+    CHECK(uz_reserve_bytes(reserve) == 0);
+    CHECK(!uz_reserve_fill(reserve) && uz_reserve_bytes(reserve) == 0); /* nothing was asked for since */
+    a = uz_reserve_take(reserve, 40 * MB);
+    CHECK(uz_reserve_give(reserve, a));
+    uz_reserve_empty(reserve);
+    a = uz_reserve_take(reserve, 10 * MB);
+    CHECK(uz_reserve_give(reserve, a) && uz_reserve_bytes(reserve) == 10 * MB);
+    a = uz_reserve_take(reserve, 2 * MB);
+    while (uz_reserve_fill(reserve))
+        ;
+    CHECK(uz_reserve_bytes(reserve) == 10 * MB); /* as much as the largest took */
+    CHECK(uz_reserve_take(reserve, SIZE_MAX) == NULL && uz_reserve_take(reserve, PTRDIFF_MAX) == NULL);
+    CHECK(uz_reserve_give(reserve, a));
+    uz_reserve_free(reserve);
+}
+
+/* Random sizes and lives; each block is filled with its own number and checked before it goes. */
+TEST(blocks_keep_to_themselves)
+{
+    enum { BLOCKS = 12, ROUNDS = 400 };
+    qp_random rng = {7};
+    uz_reserve *reserve = uz_reserve_new(48 * MB, 16 * MB);
+    unsigned char *block[BLOCKS] = {NULL};
+    size_t bytes[BLOCKS] = {0};
+    for (int round = 0; round < ROUNDS; round++) {
+        const int k = round * 7 % BLOCKS;
+        if (block[k]) {
+            CHECK(block[k][0] == k && block[k][bytes[k] / 2] == k && block[k][bytes[k] - 1] == k);
+            CHECK(uz_reserve_size(reserve, block[k]) >= bytes[k]);
+            CHECK(uz_reserve_give(reserve, block[k]));
+        }
+        bytes[k] = (size_t)(1.0 + 12.0 * random_unit(&rng) * (double)MB);
+        block[k] = uz_reserve_take(reserve, bytes[k]);
+        CHECK(block[k] != NULL);
+        for (size_t at = 0; at < bytes[k]; at += 4096)
+            block[k][at] = (unsigned char)k;
+        block[k][bytes[k] / 2] = block[k][bytes[k] - 1] = (unsigned char)k;
+        if (round % 17 == 0)
+            uz_reserve_fill(reserve);
+    }
+    for (int k = 0; k < BLOCKS; k++)
+        CHECK(!block[k] || uz_reserve_give(reserve, block[k]));
+    CHECK(uz_reserve_bytes(reserve) <= 48 * MB);
+    uz_reserve_free(reserve);
+}
