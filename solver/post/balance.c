@@ -59,73 +59,57 @@ static void add_force(balance *b, uz_resultant *to, int64_t node, const double *
 /* ---- contact */
 
 /* The obstacle pushes along its normal by -r; another part of the body is pushed back. */
-static void add_row(balance *b, int64_t row)
+static void add_contacts(balance *b)
 {
-    const uz_mesh_info *info = &b->model->info;
-    const int64_t k = info->contact_of[row], node = info->contact_node[row], place = b->model->row_place[row];
-    const uz_contact_sites *sites = b->model->sites ? &b->model->sites[k] : NULL;
-    const bool swapped = sites && sites->swapped; /* `on` is pushed back */
-    double f[DIM] = {0};
-    for (int c = 0; c < b->dim; c++) {
-        f[c] = -b->r[row] * info->contact_normal[row * b->dim + c];
-        b->contact[node * b->dim + c] += f[c];
-    }
-    add_force(b, swapped ? NULL : &b->out->contacts[k], node, f);
-    for (int64_t j = sites && sites->first ? sites->first[place] : 0;
-         sites && sites->first && j < sites->first[place + 1]; j++) {
-        double back[DIM] = {0};
+    const uz_body_model *model = b->model;
+    const uz_mesh_info *info = &model->info;
+    for (int64_t row = 0; row < model->m; row++) {
+        const int64_t k = info->contact_of[row], node = info->contact_node[row], place = model->row_place[row];
+        const uz_contact_sites *sites = model->sites && model->sites[k].first ? &model->sites[k] : NULL;
+        const bool swapped = model->sites && model->sites[k].swapped; /* `on` is pushed back */
+        double f[DIM] = {0};
         for (int c = 0; c < b->dim; c++) {
-            back[c] = -sites->weight[j] * f[c];
-            b->contact[sites->node[j] * b->dim + c] += back[c];
+            f[c] = -b->r[row] * info->contact_normal[row * b->dim + c];
+            b->contact[node * b->dim + c] += f[c];
         }
-        add_force(b, swapped ? &b->out->contacts[k] : NULL, sites->node[j], back);
+        add_force(b, swapped ? NULL : &b->out->contacts[k], node, f);
+        for (int64_t j = sites ? sites->first[place] : 0; sites && j < sites->first[place + 1]; j++) {
+            double back[DIM] = {0};
+            for (int c = 0; c < b->dim; c++) {
+                back[c] = -sites->weight[j] * f[c];
+                b->contact[sites->node[j] * b->dim + c] += back[c];
+            }
+            add_force(b, swapped ? &b->out->contacts[k] : NULL, sites->node[j], back);
+        }
     }
-}
-
-/* ---- loads */
-
-static uz_status add_loads(balance *b, uz_error *err)
-{
-    uz_status status = uz_nodal_loads(b->load, b->model, b->scene, err);
-    for (int64_t a = 0; a < b->model->mesh.n_nodes && status == UZ_OK; a++) {
-        const double *f = b->load + a * b->dim;
-        if (f[0] != 0 || f[1] != 0 || (b->dim == 3 && f[2] != 0))
-            add_force(b, &b->out->loads, a, f);
-    }
-    return status;
 }
 
 /* ---- supports */
 
-/* The springs of one support: -k u. */
-static uz_status add_springs(balance *b, double *share, int64_t s, uz_error *err)
+/* The springs of all supports: -k u. */
+static uz_status add_springs(balance *b, uz_error *err)
 {
     const uz_mesh *mesh = &b->model->mesh;
-    const uz_support *support = &b->scene->supports[s];
-    const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
-    memset(share, 0, (size_t)mesh->n_nodes * sizeof *share);
-    uz_status status = group ? uz_spread_over_group(share, b->model, group, true, "/supports", err) : UZ_ERR_SCENE;
-    for (int64_t a = 0; a < mesh->n_nodes && status == UZ_OK; a++) {
-        double f[DIM] = {0};
-        for (int c = 0; c < b->dim; c++)
-            f[c] = support->spring[c] > 0 ? -fmax(0, share[a]) * support->spring[c] * b->u[a * b->dim + c] : 0;
-        if (share[a] > 0)
-            add_force(b, &b->out->supports[s], a, f);
-    }
-    return status;
-}
-
-static uz_status add_all_springs(balance *b, uz_error *err)
-{
     uz_status status = UZ_OK;
     double *share = NULL;
     for (int64_t s = 0; s < b->scene->n_supports && status == UZ_OK && b->model->spring; s++) {
-        if (b->scene->supports[s].kind != UZ_SUPPORT_SPRING)
+        const uz_support *support = &b->scene->supports[s];
+        if (support->kind != UZ_SUPPORT_SPRING)
             continue;
-        if (!share && !(share = uz_alloc(b->model->mesh.n_nodes, sizeof *share)))
+        if (!share && !(share = uz_alloc(mesh->n_nodes, sizeof *share))) {
             status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of springs");
-        else
-            status = add_springs(b, share, s, err);
+            break;
+        }
+        const uz_group *group = uz_mesh_group(mesh, support->on, "/supports", err);
+        memset(share, 0, (size_t)mesh->n_nodes * sizeof *share);
+        status = group ? uz_spread_over_group(share, b->model, group, true, "/supports", err) : UZ_ERR_SCENE;
+        for (int64_t a = 0; a < mesh->n_nodes && status == UZ_OK; a++) {
+            double f[DIM] = {0};
+            for (int c = 0; c < b->dim; c++)
+                f[c] = support->spring[c] > 0 ? -fmax(0, share[a]) * support->spring[c] * b->u[a * b->dim + c] : 0;
+            if (share[a] > 0)
+                add_force(b, &b->out->supports[s], a, f);
+        }
     }
     free(share);
     return status;
@@ -157,21 +141,7 @@ static bool list_supports(balance *b)
     return true;
 }
 
-/* f_int of one element at its held nodes. */
-static void add_element(balance *b, const double *ke, const int64_t *node, int count)
-{
-    const int dim = b->dim, n = count * dim;
-    for (int i = 0; i < n; i++) {
-        double sum = 0;
-        if (!b->held[node[i / dim]])
-            continue;
-        for (int j = 0; j < n; j++)
-            sum += ke[i * n + j] * b->u[node[j / dim] * dim + j % dim];
-        b->inner[node[i / dim] * dim + i % dim] += sum;
-        b->size += fabs(sum);
-    }
-}
-
+/* f_int at held nodes, of the elements that touch one. */
 static void add_elements(balance *b)
 {
     const uz_body_model *model = b->model;
@@ -193,7 +163,16 @@ static void add_elements(balance *b)
             uz_element_stiffness(ke, &element);
             made = uz_element_material(model, e);
         }
-        add_element(b, ke, node, count);
+        const int dim = b->dim, n = count * dim;
+        for (int i = 0; i < n; i++) {
+            double sum = 0;
+            if (!b->held[node[i / dim]])
+                continue;
+            for (int j = 0; j < n; j++)
+                sum += ke[i * n + j] * b->u[node[j / dim] * dim + j % dim];
+            b->inner[node[i / dim] * dim + i % dim] += sum;
+            b->size += fabs(sum);
+        }
     }
 }
 
@@ -228,35 +207,29 @@ static void hold(held_directions *h, int64_t support, const double d[DIM])
     h->n++;
 }
 
-static void gather(held_directions *h, const balance *b, int64_t node)
+/* What the supports do at a node, each along its own directions; what is left over is the residual of free dofs. */
+static void add_reaction(balance *b, int64_t node)
 {
-    h->n = 0;
+    held_directions h = {.n = 0};
+    double R[DIM] = {0}, a[DIM] = {0};
+    for (int c = 0; c < b->dim; c++) {
+        const int64_t i = node * b->dim + c;
+        R[c] = b->inner[i] - b->load[i] - b->contact[i] + (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
+    }
     for (int64_t i = b->first[node]; i < b->first[node + 1]; i++) {
         const uz_support *support = &b->scene->supports[b->support[i]];
         double n[DIM] = {0}, u[DIM] = {NAN, NAN, NAN};
         if (uz_support_is_inclined(n, support, b->dim)) {
-            hold(h, b->support[i], n);
+            hold(&h, b->support[i], n);
             continue;
         }
         uz_support_values(u, support, b->dim);
         for (int c = 0; c < b->dim; c++) {
             const double axis[DIM] = {c == 0, c == 1, c == 2};
             if (!isnan(u[c]))
-                hold(h, b->support[i], axis);
+                hold(&h, b->support[i], axis);
         }
     }
-}
-
-/* What the supports do at a node, each along its own directions; what is left over is the residual of free dofs. */
-static void add_reaction(balance *b, int64_t node)
-{
-    held_directions h;
-    double R[DIM] = {0}, a[DIM] = {0};
-    for (int c = 0; c < b->dim; c++) {
-        const int64_t i = node * b->dim + c;
-        R[c] = b->inner[i] - b->load[i] - b->contact[i] + (b->model->spring ? b->model->spring[i] * b->u[i] : 0);
-    }
-    gather(&h, b, node);
     for (int i = h.n - 1; i >= 0; i--) {
         double f[DIM];
         a[i] = R[0] * h.q[i][0] + R[1] * h.q[i][1] + R[2] * h.q[i][2];
@@ -267,17 +240,6 @@ static void add_reaction(balance *b, int64_t node)
             f[c] = a[i] * h.d[i][c];
         add_force(b, &b->out->supports[h.support[i]], node, f);
     }
-}
-
-static uz_status add_supports(balance *b, uz_error *err)
-{
-    if (!list_supports(b))
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
-    add_elements(b);
-    for (int64_t a = 0; a < b->model->mesh.n_nodes; a++)
-        if (b->held[a])
-            add_reaction(b, a);
-    return add_all_springs(b, err);
 }
 
 /* ---- all together */
@@ -320,60 +282,57 @@ static uz_status thermal_energy(double *energy, const balance *b, uz_error *err)
     return status;
 }
 
-static uz_status make_room(balance *b, uz_error *err)
-{
-    const int64_t n = b->model->mesh.n_nodes;
-    b->load = uz_alloc_zero(n * b->dim, sizeof *b->load);
-    b->contact = uz_alloc_zero(n * b->dim, sizeof *b->contact);
-    b->inner = uz_alloc_zero(n * b->dim, sizeof *b->inner);
-    b->held = uz_alloc_zero(n, sizeof *b->held);
-    b->first = uz_alloc_zero(n + 2, sizeof *b->first);
-    if (b->load && b->contact && b->inner && b->held && b->first)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes", (long long)n);
-}
-
-/* Supports move the body, or do not hold it: then most of u may be rigid motion. */
-static bool is_carried(const balance *b)
-{
-    bool carried = b->model->n_modes > 0;
-    for (int64_t i = 0; i < b->model->mesh.n_nodes * b->dim && !carried; i++)
-        carried = b->model->dof[i] < 0 && b->u[i] != 0;
-    return carried;
-}
-
-static uz_status add_everything(balance *b, uz_error *err)
-{
-    double thermal = 0, energy = 0;
-    memcpy(b->centre, b->model->mesh.xyz, (size_t)b->dim * sizeof *b->centre);
-    for (int64_t row = 0; row < b->model->m; row++)
-        add_row(b, row);
-    uz_status status = add_loads(b, err);
-    if (status == UZ_OK)
-        status = add_supports(b, err);
-    if (status == UZ_OK)
-        status = thermal_energy(&thermal, b, err);
-    if (status == UZ_OK) /* not from the work of the forces: what they leave over works along with the whole body */
-        status = uz_strain_energy(&energy, b->model, b->u, is_carried(b), err);
-    b->out->strain_energy = energy + thermal;
-    b->out->imbalance = imbalance(b);
-    return status;
-}
-
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                             const double *r, uz_error *err)
 {
+    const int64_t n = model->mesh.n_nodes, dim = model->mesh.dim;
     balance b = {.model = model, .scene = scene, .u = u, .r = r, .out = out, .dim = model->mesh.dim};
-    double *force = model->row_ends ? uz_alloc(model->m, sizeof *force) : NULL;
-    uz_status status = make_room(&b, err);
-    if (status == UZ_OK && model->row_ends && !force)
+    double *force = model->row_ends ? uz_alloc(model->m, sizeof *force) : NULL, thermal = 0, energy = 0;
+    uz_status status = UZ_OK;
+    b.load = uz_alloc_zero(n * dim, sizeof *b.load);
+    b.contact = uz_alloc_zero(n * dim, sizeof *b.contact);
+    b.inner = uz_alloc_zero(n * dim, sizeof *b.inner);
+    b.held = uz_alloc_zero(n, sizeof *b.held);
+    b.first = uz_alloc_zero(n + 2, sizeof *b.first);
+    if (!b.load || !b.contact || !b.inner || !b.held || !b.first)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces on %lld nodes", (long long)n);
+    else if (model->row_ends && !force)
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld contact rows", (long long)model->m);
-    if (status == UZ_OK && force) {
+    if (status != UZ_OK)
+        goto done;
+    if (force) {
         uz_row_forces(force, model, r);
         b.r = force;
     }
+    memcpy(b.centre, model->mesh.xyz, (size_t)dim * sizeof *b.centre);
+    add_contacts(&b);
+    status = uz_nodal_loads(b.load, model, scene, err);
+    for (int64_t a = 0; a < n && status == UZ_OK; a++) {
+        const double *f = b.load + a * dim;
+        if (f[0] != 0 || f[1] != 0 || (dim == 3 && f[2] != 0))
+            add_force(&b, &out->loads, a, f);
+    }
+    if (status == UZ_OK && !list_supports(&b))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of supports");
     if (status == UZ_OK)
-        status = add_everything(&b, err);
+        add_elements(&b);
+    for (int64_t a = 0; a < n && status == UZ_OK; a++)
+        if (b.held[a])
+            add_reaction(&b, a);
+    if (status == UZ_OK)
+        status = add_springs(&b, err);
+    if (status == UZ_OK)
+        status = thermal_energy(&thermal, &b, err);
+    if (status == UZ_OK) { /* not from the work of the forces: what they leave over works along with the whole body */
+        /* Supports move the body, or do not hold it: then most of u may be rigid motion. */
+        bool carried = model->n_modes > 0;
+        for (int64_t i = 0; i < n * dim && !carried; i++)
+            carried = model->dof[i] < 0 && u[i] != 0;
+        status = uz_strain_energy(&energy, model, u, carried, err);
+    }
+    out->strain_energy = energy + thermal;
+    out->imbalance = imbalance(&b);
+done:
     free(force);
     free(b.load);
     free(b.contact);

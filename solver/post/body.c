@@ -7,35 +7,28 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Loads of temperature on one element add up, as loads do. */
-static bool fill_free_strain(uz_field_body *body)
+uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz_body_model *model, uz_error *err)
 {
-    const uz_mesh *mesh = &body->model->mesh;
+    const uz_mesh *mesh = &model->mesh;
+    *out = (uz_field_body){.scene = scene, .model = model, .components = mesh->dim == 2 ? 4 : 6};
     double *rise = NULL;
-    for (int64_t i = 0; i < body->scene->n_loads; i++) {
-        const uz_load *load = &body->scene->loads[i];
+    for (int64_t i = 0; i < scene->n_loads; i++) {
+        const uz_load *load = &scene->loads[i];
         if (load->kind != UZ_LOAD_TEMPERATURE)
             continue;
         if (!rise && !(rise = uz_alloc_zero(mesh->n_elements, sizeof *rise)))
-            return false;
+            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the temperature of %lld elements",
+                           (long long)mesh->n_elements);
+        /* Loads of temperature on one element add up, as loads do. */
         const uz_group *group = uz_mesh_group(mesh, load->on, "", NULL);
         const int64_t count = group ? uz_group_element_count(mesh, group) : 0;
         for (int64_t k = 0; k < count; k++)
             rise[uz_group_element_at(group, k)] += load->value;
     }
     for (int64_t e = 0; rise && e < mesh->n_elements; e++)
-        rise[e] *= uz_element_material(body->model, e)->expansion;
-    body->free_strain = rise;
-    return true;
-}
-
-uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz_body_model *model, uz_error *err)
-{
-    *out = (uz_field_body){.scene = scene, .model = model, .components = model->mesh.dim == 2 ? 4 : 6};
-    if (fill_free_strain(out))
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the temperature of %lld elements",
-                   (long long)model->mesh.n_elements);
+        rise[e] *= uz_element_material(model, e)->expansion;
+    out->free_strain = rise;
+    return UZ_OK;
 }
 
 void uz_field_body_clear(uz_field_body *body)
@@ -53,33 +46,29 @@ void uz_field_points_init(uz_field_points *out, const uz_field_body *body, const
     out->group.count = 0;
 }
 
-/* This element and those that follow it, as long as they are of its kind and formulation. */
-static void load_group(uz_field_points *points, int64_t element)
-{
-    const uz_body_model *model = points->body->model;
-    const uz_mesh *mesh = &model->mesh;
-    uz_strain_group *group = &points->group;
-    const uz_formulation formulation = uz_element_formulation(model, element);
-    if (!group->begun || formulation != group->rule.formulation) {
-        uz_strain_rule_at(&group->rule, (uz_element_kind)mesh->kind[element], model->kind, formulation,
-                          (const double(*)[3])points->point, points->count);
-        group->begun = true;
-        group->shaped = false;
-    }
-    group->count = 0;
-    do
-        group->element[group->count++] = element++;
-    while (group->count < UZ_STRAIN_LANES && element < mesh->n_elements &&
-           mesh->kind[element] == mesh->kind[element - 1] && uz_element_formulation(model, element) == formulation);
-    const uz_strain_source from = {.model = model, .nodal = points->u, .free_strain = points->body->free_strain};
-    uz_strain_group_load(group, &from);
-}
-
 void uz_field_points_states(uz_field_state *state, uz_field_points *points, int64_t element)
 {
-    const uz_strain_group *group = &points->group;
-    if (group->count == 0 || element < group->element[0] || element >= group->element[0] + group->count)
-        load_group(points, element);
+    uz_strain_group *group = &points->group;
+    if (group->count == 0 || element < group->element[0] || element >= group->element[0] + group->count) {
+        /* This element and those that follow it, as long as they are of its kind and formulation. */
+        const uz_body_model *model = points->body->model;
+        const uz_mesh *mesh = &model->mesh;
+        const uz_formulation formulation = uz_element_formulation(model, element);
+        if (!group->begun || formulation != group->rule.formulation) {
+            uz_strain_rule_at(&group->rule, (uz_element_kind)mesh->kind[element], model->kind, formulation,
+                              (const double(*)[3])points->point, points->count);
+            group->begun = true;
+            group->shaped = false;
+        }
+        group->count = 0;
+        int64_t e = element;
+        do
+            group->element[group->count++] = e++;
+        while (group->count < UZ_STRAIN_LANES && e < mesh->n_elements && mesh->kind[e] == mesh->kind[e - 1] &&
+               uz_element_formulation(model, e) == formulation);
+        const uz_strain_source from = {.model = model, .nodal = points->u, .free_strain = points->body->free_strain};
+        uz_strain_group_load(group, &from);
+    }
     const int lane = (int)(element - group->element[0]);
     for (int k = 0; k < points->count; k++) {
         double strain[UZ_ELEMENT_STRESSES] = {0};
@@ -98,15 +87,6 @@ double uz_field_points_volume(uz_field_points *points, int64_t element)
         points->volume = uz_element_volume(&own);
     }
     return points->volume;
-}
-
-/* What a plane model leaves out: strain across the plane. */
-static double strain_zz(uz_model model, const uz_body_material *material, const double *stress, double free_strain)
-{
-    if (model != UZ_PLANE_STRESS)
-        return 0;
-    const double poisson = material->poisson, young = 2 * material->lame.mu * (1 + poisson);
-    return free_strain - poisson / young * (stress[0] + stress[1]);
 }
 
 /* Shear strains become tensor components. Axisymmetric: rr, zz, hoop, rz are xx, yy, zz, xy here. */
@@ -131,8 +111,10 @@ void uz_field_state_of_strain(uz_field_state *out, const uz_field_body *body, in
         memcpy(out->strain, strain, (size_t)n * sizeof *strain);
         return;
     }
+    /* What a plane model leaves out: stress and strain across the plane. */
     const double zz = uz_stress_zz(model, material->lame, stress, free_strain);
+    const double poisson = material->poisson, young = 2 * material->lame.mu * (1 + poisson);
+    const double strain_zz = model == UZ_PLANE_STRESS ? free_strain - poisson / young * (stress[0] + stress[1]) : 0;
     memcpy(out->stress, (double[4]){stress[0], stress[1], zz, stress[2]}, 4 * sizeof *stress);
-    memcpy(out->strain, (double[4]){strain[0], strain[1], strain_zz(model, material, stress, free_strain), strain[2]},
-           4 * sizeof *strain);
+    memcpy(out->strain, (double[4]){strain[0], strain[1], strain_zz, strain[2]}, 4 * sizeof *strain);
 }

@@ -25,114 +25,41 @@ typedef struct {
     bool *has_row;
 } pressure_work;
 
-static int corners_of(const uz_side *side)
-{
-    return side->dim == 2 ? 2 : side->nodes % 4 == 0 ? 4 : 3;
-}
-
-static bool need_ends(pressure_work *w, int64_t n_nodes)
-{
-    if (!w->end)
-        w->end = uz_alloc_zero(2 * n_nodes, sizeof *w->end);
-    return w->end != NULL;
-}
-
-/* Middle j of a side lies between its corners j and j + 1. */
-static void add_side(pressure_work *w, const uz_side *side, const int64_t *node)
-{
-    double weight[UZ_FACE_NODES];
-    const int corners = corners_of(side);
-    uz_side_weights(weight, side);
-    for (int a = 0; a < corners; a++)
-        w->area[node[a]] += weight[a];
-    for (int j = 0; j < side->nodes - corners; j++) {
-        const int64_t middle = node[corners + j], ends[2] = {node[j], node[(j + 1) % corners]};
-        for (int k = 0; k < 2; k++) {
-            w->area[ends[k]] += 0.5 * weight[corners + j];
-            w->end[2 * middle + k] = 1 + ends[k];
-        }
-    }
-}
-
 static bool add_sides(pressure_work *w, const uz_body_model *model, const uz_group *group)
 {
     uz_side side;
-    double xyz[3 * UZ_FACE_NODES];
+    double xyz[3 * UZ_FACE_NODES], weight[UZ_FACE_NODES];
     int64_t node[UZ_FACE_NODES];
     for (int64_t f = 0; f < group->n_faces; f++) {
         uz_body_side(&side, xyz, node, model, group->face[f]);
-        if (side.nodes > corners_of(&side) && !need_ends(w, model->mesh.n_nodes))
+        const int corners = side.dim == 2 ? 2 : side.nodes % 4 == 0 ? 4 : 3;
+        if (side.nodes > corners && !w->end && !(w->end = uz_alloc_zero(2 * model->mesh.n_nodes, sizeof *w->end)))
             return false;
-        add_side(w, &side, node);
+        uz_side_weights(weight, &side);
+        for (int a = 0; a < corners; a++)
+            w->area[node[a]] += weight[a];
+        /* Middle j of a side lies between its corners j and j + 1. */
+        for (int j = 0; j < side.nodes - corners; j++) {
+            const int64_t middle = node[corners + j], ends[2] = {node[j], node[(j + 1) % corners]};
+            for (int k = 0; k < 2; k++) {
+                w->area[ends[k]] += 0.5 * weight[corners + j];
+                w->end[2 * middle + k] = 1 + ends[k];
+            }
+        }
     }
     return true;
-}
-
-static const int64_t *ends_of(const pressure_work *w, int64_t node)
-{
-    return w->end && w->end[2 * node] > 0 ? w->end + 2 * node : NULL;
-}
-
-static void add_reaction(pressure_work *w, int64_t node, double r)
-{
-    const int64_t *end = ends_of(w, node);
-    w->has_row[node] = true;
-    if (!end) {
-        w->force[node] -= r;
-        return;
-    }
-    w->force[end[0] - 1] -= 0.5 * r;
-    w->force[end[1] - 1] -= 0.5 * r;
-}
-
-static double at_corner(const pressure_work *w, int64_t node)
-{
-    return w->area[node] > 0 ? w->force[node] / w->area[node] : NAN;
 }
 
 /* An end that a support holds has no row, and what it carries went into the support. */
 static double pressure_at(const pressure_work *w, int64_t node)
 {
-    const int64_t *end = ends_of(w, node);
-    if (!end)
-        return at_corner(w, node);
-    const double first = at_corner(w, end[0] - 1), second = at_corner(w, end[1] - 1);
-    if (w->has_row[end[0] - 1] == w->has_row[end[1] - 1])
-        return 0.5 * (first + second);
-    return w->has_row[end[0] - 1] ? first : second;
-}
-
-static void forget(pressure_work *w, const uz_mesh *mesh, const uz_group *group)
-{
-    for (int64_t i = 0; i < uz_group_node_count(mesh, group); i++) {
-        const int64_t node = uz_group_node_at(group, i);
-        w->area[node] = w->force[node] = 0;
-        w->has_row[node] = false;
-        if (w->end)
-            w->end[2 * node] = w->end[2 * node + 1] = 0;
-    }
-}
-
-/* Rows [first, last) are those of contact k. */
-static bool press(double *pressure, pressure_work *w, const uz_body_model *model, const uz_scene *scene, int64_t k,
-                  const double *r, int64_t first, int64_t last)
-{
-    /* Between surfaces the pressure is that of the rows' own functions, whose integrals are the areas. */
-    for (int64_t i = first; i < last && scene->contacts[k].between == UZ_CONTACT_SURFACES; i++)
-        pressure[i] = -r[i] / model->info.contact_area[i];
-    if (scene->contacts[k].between == UZ_CONTACT_SURFACES)
-        return true;
-    const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
-    if (!group)
-        return true;
-    if (!add_sides(w, model, group))
-        return false;
-    for (int64_t i = first; i < last; i++)
-        add_reaction(w, model->info.contact_node[i], r[i]);
-    for (int64_t i = first; i < last; i++)
-        pressure[i] = pressure_at(w, model->info.contact_node[i]);
-    forget(w, &model->mesh, group);
-    return true;
+    const bool middle = w->end && w->end[2 * node] > 0;
+    const int64_t a = middle ? w->end[2 * node] - 1 : node, b = middle ? w->end[2 * node + 1] - 1 : node;
+    const double first = w->area[a] > 0 ? w->force[a] / w->area[a] : NAN;
+    const double second = w->area[b] > 0 ? w->force[b] / w->area[b] : NAN;
+    if (!middle || w->has_row[a] != w->has_row[b])
+        return !middle || w->has_row[a] ? first : second;
+    return 0.5 * (first + second);
 }
 
 uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
@@ -146,7 +73,34 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
     for (int64_t first = 0, last; done && first < m; first = last) {
         for (last = first; last < m && contact[last] == contact[first];)
             last++;
-        done = press(pressure, &w, model, scene, contact[first], r, first, last);
+        if (scene->contacts[contact[first]].between == UZ_CONTACT_SURFACES) {
+            /* Between surfaces the pressure is that of the rows' own functions, whose integrals are the areas. */
+            for (int64_t i = first; i < last; i++)
+                pressure[i] = -r[i] / model->info.contact_area[i];
+            continue;
+        }
+        const uz_group *group = uz_mesh_group(&model->mesh, scene->contacts[contact[first]].on, "", NULL);
+        if (!group)
+            continue;
+        done = add_sides(&w, model, group);
+        for (int64_t i = first; done && i < last; i++) {
+            const int64_t node = model->info.contact_node[i], *end = w.end ? w.end + 2 * node : NULL;
+            const bool middle = end && end[0] > 0;
+            w.has_row[node] = true;
+            for (int k = 0; k < 2 && middle; k++)
+                w.force[end[k] - 1] -= 0.5 * r[i];
+            if (!middle)
+                w.force[node] -= r[i];
+        }
+        for (int64_t i = first; done && i < last; i++)
+            pressure[i] = pressure_at(&w, model->info.contact_node[i]);
+        for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++) {
+            const int64_t node = uz_group_node_at(group, i);
+            w.area[node] = w.force[node] = 0;
+            w.has_row[node] = false;
+            if (w.end)
+                w.end[2 * node] = w.end[2 * node + 1] = 0;
+        }
     }
     free(w.area);
     free(w.force);

@@ -18,10 +18,12 @@ void uz_evaluation_free(uz_evaluation *evaluation)
     free(evaluation);
 }
 
-static uz_status make_evaluation(uz_evaluation **out, const uz_scene *scene, uz_error *err)
+uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err)
 {
+    uz_summary *summary = &result->summary;
+    const uz_mesh_info *mesh = &result->mesh;
     uz_evaluation *e = uz_alloc_zero(1, sizeof *e);
-    *out = e;
+    result->evaluation = e;
     if (!e)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a summary");
     e->n_contacts = scene->n_contacts;
@@ -36,16 +38,19 @@ static uz_status make_evaluation(uz_evaluation **out, const uz_scene *scene, uz_
         memcpy(e->contacts[i].on, scene->contacts[i].on, sizeof e->contacts[i].on);
     for (int64_t i = 0; i < e->n_supports; i++)
         memcpy(e->supports[i].on, scene->supports[i].on, sizeof e->supports[i].on);
-    return UZ_OK;
-}
-
-/* Force, area and peak of the contact: the obstacle pushes a row's node along its normal by -push (m, uz_row_forces),
- * and `on` is pushed the other way where the other side has the rows. */
-static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_body_model *model, const double *push)
-{
-    const uz_law *law = model->law;
-    uz_summary *summary = &result->summary;
-    const uz_mesh_info *mesh = &result->mesh;
+    summary->evaluation = e;
+    result->pressure = uz_alloc(result->m, sizeof *result->pressure);
+    if (!result->pressure)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)result->m);
+    uz_status status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
+    if (status != UZ_OK)
+        return status;
+    /* Force, area and peak of the contact: the obstacle pushes a row's node along its normal by -push, and `on` is
+     * pushed the other way where the other side has the rows. */
+    double *push = uz_alloc(result->m, sizeof *push);
+    if (!push)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)result->m);
+    uz_row_forces(push, model, result->r);
     summary->dim = mesh->dim;
     summary->max_pressure = 0.0;
     for (int64_t i = 0; i < result->m; i++) {
@@ -53,7 +58,7 @@ static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_body_
         const bool swapped = model->sites && model->sites[mesh->contact_of[i]].swapped;
         for (int axis = 0; axis < mesh->dim; axis++)
             summary->force[axis] -= (swapped ? -push[i] : push[i]) * mesh->contact_normal[i * mesh->dim + axis];
-        if (law->kind->active(law, NULL, &result->r[i], 1) > 0)
+        if (model->law->kind->active(model->law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];
         if (!(result->pressure[i] > summary->max_pressure))
             continue;
@@ -62,28 +67,7 @@ static void evaluate_contact(uz_result *result, uz_evaluation *e, const uz_body_
         for (int axis = 0; axis < mesh->dim; axis++)
             e->peak_at[axis] = mesh->xyz[node * mesh->dim + axis];
     }
-}
-
-uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_scene *scene, uz_error *err)
-{
-    uz_status status = make_evaluation(&result->evaluation, scene, err);
-    if (status != UZ_OK)
-        return status;
-    result->summary.evaluation = result->evaluation;
-    result->pressure = uz_alloc(result->m, sizeof *result->pressure);
-    if (!result->pressure)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)result->m);
-    status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
-    if (status != UZ_OK)
-        return status;
-    double *push = uz_alloc(result->m, sizeof *push);
-    if (!push)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)result->m);
-    uz_row_forces(push, model, result->r);
-    evaluate_contact(result, result->evaluation, model, push);
     free(push);
-    status = uz_find_doubts(result->evaluation, model, scene, result->u, result->r, err);
-    if (status != UZ_OK)
-        return status;
-    return uz_balance_forces(result->evaluation, model, scene, result->u, result->r, err);
+    status = uz_find_doubts(e, model, scene, result->u, result->r, err);
+    return status == UZ_OK ? uz_balance_forces(e, model, scene, result->u, result->r, err) : status;
 }

@@ -74,20 +74,6 @@ static uz_status make_room(double **out, bool wanted, int64_t count, int compone
     return UZ_OK;
 }
 
-static uz_status contact_fields(uz_fields *out, const uz_field_body *body, const double *r, unsigned which,
-                                uz_error *err)
-{
-    uz_status status = make_room(&out->pressure, which & UZ_FIELD_PRESSURE, out->m, 1, err);
-    if (status == UZ_OK)
-        status = make_room(&out->contact_status, which & UZ_FIELD_CONTACT_STATUS, out->m, 1, err);
-    if (status == UZ_OK && out->pressure)
-        status = uz_contact_pressure(out->pressure, body->model, body->scene, r, err);
-    const uz_law *law = body->model->law;
-    for (int64_t i = 0; status == UZ_OK && out->contact_status && i < out->m; i++)
-        out->contact_status[i] = (double)law->kind->active(law, NULL, &r[i], 1);
-    return status;
-}
-
 static const unsigned OF_STRESS = UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES;
 
 static uz_status nodal_fields(uz_fields *out, const uz_field_body *body, const double *u, unsigned which,
@@ -116,55 +102,46 @@ static uz_status nodal_fields(uz_fields *out, const uz_field_body *body, const d
     return UZ_OK;
 }
 
-static uz_status gauss_fields(uz_fields *out, const uz_field_body *body, const double *u, unsigned which,
-                              const uz_hooks *hooks, uz_error *err)
-{
-    if (!(which & UZ_FIELD_STRESS_GAUSS))
-        return UZ_OK;
-    out->n_points = uz_field_gauss_count(body);
-    uz_status status = make_room(&out->gauss_element, true, out->n_points, 1, err);
-    if (status == UZ_OK)
-        status = make_room(&out->gauss_point, true, out->n_points, out->dim, err);
-    if (status == UZ_OK)
-        status = make_room(&out->gauss_stress, true, out->n_points, out->components, err);
-    if (status == UZ_OK)
-        status = uz_field_gauss(out->gauss_element, out->gauss_point, out->gauss_stress, body, u, hooks, err);
-    return status;
-}
-
 static const unsigned OF_BODY = OF_STRESS | UZ_FIELD_STRAIN | UZ_FIELD_STRESS_GAUSS | UZ_FIELD_DISPLACEMENTS;
 static const unsigned OF_CONTACT = UZ_FIELD_PRESSURE | UZ_FIELD_CONTACT_STATUS | UZ_FIELD_REACTIONS;
-
-static uz_status check_source(const uz_field_source *answer, const uz_body_model *model, unsigned which, uz_error *err)
-{
-    const int64_t n_u = model->mesh.n_nodes * model->mesh.dim;
-    if (which & OF_BODY && (!answer->u || answer->n_u != n_u))
-        return uz_fail(err, UZ_ERR_SIZE, "u", "the fields of the body need %lld displacements", (long long)n_u);
-    if (which & OF_CONTACT && model->m > 0 && (!answer->r || answer->m != model->m))
-        return uz_fail(err, UZ_ERR_SIZE, "r", "the fields of the contact need %lld reactions", (long long)model->m);
-    if (which & UZ_FIELD_GAPS && model->m > 0 && (!answer->g || answer->m != model->m))
-        return uz_fail(err, UZ_ERR_SIZE, "g", "the fields of the contact need %lld gaps", (long long)model->m);
-    return UZ_OK;
-}
 
 uz_status uz_fields_of_body(uz_fields *out, const uz_field_body *body, const uz_field_source *answer, unsigned which,
                             const uz_hooks *hooks, uz_error *err)
 {
     const uz_body_model *model = body->model;
     memset(out, 0, sizeof *out);
-    uz_status status = check_source(answer, model, which, err);
-    if (status != UZ_OK)
-        return status;
+    const int64_t n_u = model->mesh.n_nodes * model->mesh.dim, m = model->m;
+    if (which & OF_BODY && (!answer->u || answer->n_u != n_u))
+        return uz_fail(err, UZ_ERR_SIZE, "u", "the fields of the body need %lld displacements", (long long)n_u);
+    if (which & OF_CONTACT && m > 0 && (!answer->r || answer->m != m))
+        return uz_fail(err, UZ_ERR_SIZE, "r", "the fields of the contact need %lld reactions", (long long)m);
+    if (which & UZ_FIELD_GAPS && m > 0 && (!answer->g || answer->m != m))
+        return uz_fail(err, UZ_ERR_SIZE, "g", "the fields of the contact need %lld gaps", (long long)m);
     out->dim = model->mesh.dim;
     out->components = body->components;
     out->n_nodes = model->mesh.n_nodes;
     out->n_elements = model->mesh.n_elements;
-    out->m = model->m;
-    status = contact_fields(out, body, answer->r, which, err);
+    out->m = m;
+    uz_status status = make_room(&out->pressure, which & UZ_FIELD_PRESSURE, m, 1, err);
+    if (status == UZ_OK)
+        status = make_room(&out->contact_status, which & UZ_FIELD_CONTACT_STATUS, m, 1, err);
+    if (status == UZ_OK && out->pressure)
+        status = uz_contact_pressure(out->pressure, model, body->scene, answer->r, err);
+    for (int64_t i = 0; status == UZ_OK && out->contact_status && i < m; i++)
+        out->contact_status[i] = (double)model->law->kind->active(model->law, NULL, &answer->r[i], 1);
     if (status == UZ_OK)
         status = nodal_fields(out, body, answer->u, which, hooks, err);
-    if (status == UZ_OK)
-        status = gauss_fields(out, body, answer->u, which, hooks, err);
+    const bool gauss = which & UZ_FIELD_STRESS_GAUSS;
+    if (status == UZ_OK && gauss) {
+        out->n_points = uz_field_gauss_count(body);
+        status = make_room(&out->gauss_element, true, out->n_points, 1, err);
+    }
+    if (status == UZ_OK && gauss)
+        status = make_room(&out->gauss_point, true, out->n_points, out->dim, err);
+    if (status == UZ_OK && gauss)
+        status = make_room(&out->gauss_stress, true, out->n_points, out->components, err);
+    if (status == UZ_OK && gauss)
+        status = uz_field_gauss(out->gauss_element, out->gauss_point, out->gauss_stress, body, answer->u, hooks, err);
     if (status != UZ_OK)
         uz_fields_clear(out);
     return status;

@@ -4,17 +4,6 @@
 #include <float.h>
 #include <math.h>
 
-static void sort_descending(double s[3])
-{
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2 - i; j++)
-            if (s[j] < s[j + 1]) {
-                const double larger = s[j + 1];
-                s[j + 1] = s[j];
-                s[j] = larger;
-            }
-}
-
 /* One rotation of Jacobi's method that makes A[p][q] zero (Golub and Van Loan, Matrix Computations, 8.5). */
 static void rotate(double A[3][3], int p, int q)
 {
@@ -31,23 +20,9 @@ static void rotate(double A[3][3], int p, int q)
     A[r][q] = A[q][r] = s * rp + c * rq;
 }
 
-static void eigenvalues(double out[3], double A[3][3])
-{
-    enum { SWEEPS = 12 };
-    const double size = fabs(A[0][0]) + fabs(A[1][1]) + fabs(A[2][2]) + fabs(A[0][1]) + fabs(A[1][2]) + fabs(A[2][0]);
-    for (int sweep = 0; sweep < SWEEPS; sweep++) {
-        if (!(fabs(A[0][1]) + fabs(A[1][2]) + fabs(A[2][0]) > DBL_EPSILON * DBL_EPSILON * size))
-            break;
-        rotate(A, 0, 1);
-        rotate(A, 0, 2);
-        rotate(A, 1, 2);
-    }
-    for (int i = 0; i < 3; i++)
-        out[i] = A[i][i];
-}
-
 void uz_principal(double principal[3], const double *stress, int components)
 {
+    enum { SWEEPS = 12 };
     if (components == 4) {
         const double mean = 0.5 * (stress[0] + stress[1]), radius = hypot(0.5 * (stress[0] - stress[1]), stress[3]);
         principal[0] = mean + radius;
@@ -56,9 +31,26 @@ void uz_principal(double principal[3], const double *stress, int components)
     } else {
         double A[3][3] = {
             {stress[0], stress[3], stress[5]}, {stress[3], stress[1], stress[4]}, {stress[5], stress[4], stress[2]}};
-        eigenvalues(principal, A);
+        const double size =
+            fabs(A[0][0]) + fabs(A[1][1]) + fabs(A[2][2]) + fabs(A[0][1]) + fabs(A[1][2]) + fabs(A[2][0]);
+        for (int sweep = 0; sweep < SWEEPS; sweep++) {
+            if (!(fabs(A[0][1]) + fabs(A[1][2]) + fabs(A[2][0]) > DBL_EPSILON * DBL_EPSILON * size))
+                break;
+            rotate(A, 0, 1);
+            rotate(A, 0, 2);
+            rotate(A, 1, 2);
+        }
+        for (int i = 0; i < 3; i++)
+            principal[i] = A[i][i];
     }
-    sort_descending(principal);
+    /* The largest first. */
+    for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2 - i; j++)
+            if (principal[j] < principal[j + 1]) {
+                const double larger = principal[j + 1];
+                principal[j + 1] = principal[j];
+                principal[j] = larger;
+            }
 }
 
 double uz_von_mises(const double *s, int components)

@@ -27,40 +27,13 @@ typedef struct {
     const uz_field_body *body;
     int dim, values;
     sample *of;              /* n_elements */
-    unsigned char *plain;    /* n_elements: is_plain */
+    unsigned char *plain;    /* n_elements: linear, with a slope that is not its own */
     int64_t *first, *around; /* elements around each node */
     int64_t *seen;           /* n_elements: 1 + the last patch that it was in */
     int64_t patches;
     int64_t *patch; /* elements of the patch at hand; capacity of them */
     int64_t count, capacity;
 } patches;
-
-/* Incompatible modes have the whole slope, quadratic elements too: their own points serve better. */
-static bool is_plain(const uz_field_body *body, int64_t e)
-{
-    const uz_element_type *type = uz_element_type_of((uz_element_kind)body->model->mesh.kind[e]);
-    return type->nodes == type->corners && uz_element_formulation(body->model, e) != UZ_FORMULATION_INCOMPATIBLE;
-}
-
-static void take_sample(sample *to, uz_field_points *middle, int64_t e)
-{
-    const uz_field_body *body = middle->body;
-    const uz_mesh *mesh = &body->model->mesh;
-    const size_t bytes = (size_t)body->components * sizeof(double);
-    uz_field_state state;
-    int nodes;
-    const int64_t *node = uz_mesh_element(mesh, e, &nodes);
-    uz_field_points_states(&state, middle, e);
-    memset(to->x, 0, sizeof to->x);
-    to->volume = uz_field_points_volume(middle, e);
-    memcpy(to->value, state.stress, bytes);
-    memcpy(to->value + body->components, state.strain, bytes);
-    for (int a = 0; a < nodes; a++)
-        for (int c = 0; c < mesh->dim; c++)
-            to->x[c] += mesh->xyz[node[a] * mesh->dim + c];
-    for (int c = 0; c < mesh->dim; c++)
-        to->x[c] /= nodes;
-}
 
 static bool list_around(patches *p)
 {
@@ -106,19 +79,6 @@ static bool add_ring(patches *p, int64_t node, int32_t material)
     return true;
 }
 
-static bool add_next_ring(patches *p, int32_t material)
-{
-    const int64_t inner = p->count;
-    for (int64_t i = 0; i < inner; i++) {
-        int nodes;
-        const int64_t *node = uz_mesh_element(&p->body->model->mesh, p->patch[i], &nodes);
-        for (int a = 0; a < nodes; a++)
-            if (!add_ring(p, node[a], material))
-                return false;
-    }
-    return true;
-}
-
 /* Volume of the patch and the mean of its values; returns how far the node is from the middle of the patch, in parts of
  * its radius. */
 static double average(double value[MOST_VALUES], double *volume, const patches *p, const double *x)
@@ -145,28 +105,7 @@ static double average(double value[MOST_VALUES], double *volume, const patches *
     return sqrt(offset / radius);
 }
 
-/* Solves G a = b for a[0] of each right-hand side. False: the samples do not determine a slope. */
-static bool solve_fit(double G[DIM + 1][DIM + 1], double b[DIM + 1][MOST_VALUES], int n, int values, double *at_node)
-{
-    const double least = 1e-3 * G[0][0];
-    for (int j = n - 1; j >= 0; j--) { /* from the last, so that the first unknown needs no substitution */
-        if (!(G[j][j] > least) && j > 0)
-            return false;
-        for (int i = 0; i < j; i++) {
-            const double factor = G[i][j] / G[j][j];
-            for (int k = 0; k <= j; k++)
-                G[i][k] -= factor * G[j][k];
-            for (int v = 0; v < values; v++)
-                b[i][v] -= factor * b[j][v];
-        }
-    }
-    if (!(G[0][0] > 1e-3 * least))
-        return false;
-    for (int v = 0; v < values; v++)
-        at_node[v] = b[0][v] / G[0][0];
-    return true;
-}
-
+/* The linear polynomial through the samples, at the node. False: they do not determine a slope. */
 static bool fit(double at_node[MOST_VALUES], const patches *p, const double *x)
 {
     double G[DIM + 1][DIM + 1] = {{0}}, b[DIM + 1][MOST_VALUES] = {{0}}, scale[DIM] = {0};
@@ -185,7 +124,24 @@ static bool fit(double at_node[MOST_VALUES], const patches *p, const double *x)
                 b[r][v] += basis[r] * s->value[v];
         }
     }
-    return solve_fit(G, b, p->dim + 1, p->values, at_node);
+    /* G a = b for a[0] of each right-hand side, from the last row, so that the first unknown needs no substitution. */
+    const double least = 1e-3 * G[0][0];
+    for (int j = p->dim; j >= 0; j--) {
+        if (!(G[j][j] > least) && j > 0)
+            return false;
+        for (int i = 0; i < j; i++) {
+            const double factor = G[i][j] / G[j][j];
+            for (int k = 0; k <= j; k++)
+                G[i][k] -= factor * G[j][k];
+            for (int v = 0; v < p->values; v++)
+                b[i][v] -= factor * b[j][v];
+        }
+    }
+    if (!(G[0][0] > 1e-3 * least))
+        return false;
+    for (int v = 0; v < p->values; v++)
+        at_node[v] = b[0][v] / G[0][0];
+    return true;
 }
 
 enum { IN_THE_MIDDLE, FITTED, UNKNOWN, NO_MEMORY };
@@ -206,8 +162,13 @@ static int recover_material(double value[MOST_VALUES], double *volume, patches *
         return IN_THE_MIDDLE;
     if (offset <= RIM && fit(value, p, x))
         return FITTED;
-    if (!add_next_ring(p, material))
-        return NO_MEMORY;
+    for (int64_t i = 0, inner = p->count; i < inner; i++) { /* the next ring */
+        int nodes;
+        const int64_t *next = uz_mesh_element(&p->body->model->mesh, p->patch[i], &nodes);
+        for (int a = 0; a < nodes; a++)
+            if (!add_ring(p, next[a], material))
+                return NO_MEMORY;
+    }
     average(mean, &unused, p, x);
     return fit(value, p, x) ? FITTED : UNKNOWN;
 }
@@ -263,6 +224,7 @@ static uz_status take_samples(patches *p, uz_field_points *middle, const double 
                               uz_error *err)
 {
     const uz_mesh *mesh = &p->body->model->mesh;
+    const size_t bytes = (size_t)p->body->components * sizeof(double);
     bool known[UZ_ELEMENT_KINDS] = {false};
     for (int64_t e = 0; e < mesh->n_elements; e++) {
         const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
@@ -276,50 +238,50 @@ static uz_status take_samples(patches *p, uz_field_points *middle, const double 
             uz_field_points_init(&middle[kind], p->body, u);
             known[kind] = true;
         }
-        take_sample(&p->of[e], &middle[kind], e);
+        sample *to = &p->of[e];
+        uz_field_state state;
+        int nodes;
+        const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+        uz_field_points_states(&state, &middle[kind], e);
+        memset(to->x, 0, sizeof to->x);
+        to->volume = uz_field_points_volume(&middle[kind], e);
+        memcpy(to->value, state.stress, bytes);
+        memcpy(to->value + p->body->components, state.strain, bytes);
+        for (int a = 0; a < nodes; a++)
+            for (int c = 0; c < mesh->dim; c++)
+                to->x[c] += mesh->xyz[node[a] * mesh->dim + c];
+        for (int c = 0; c < mesh->dim; c++)
+            to->x[c] /= nodes;
     }
     return UZ_OK;
-}
-
-static uz_status recover_all(double *stress, double *strain, unsigned char *done, patches *p, const uz_hooks *hooks,
-                             uz_error *err)
-{
-    const uz_mesh *mesh = &p->body->model->mesh;
-    for (int64_t a = 0; a < mesh->n_nodes; a++) {
-        if (a % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
-            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        if (!recover_node(stress, strain, &done[a], p, a))
-            return no_memory(err);
-    }
-    return UZ_OK;
-}
-
-/* False: no memory. */
-static bool find_plain(bool *any, patches *p)
-{
-    const int64_t n = p->body->model->mesh.n_elements;
-    *any = false;
-    p->plain = uz_alloc(n, 1);
-    for (int64_t e = 0; p->plain && e < n; e++) {
-        p->plain[e] = is_plain(p->body, e);
-        *any = *any || p->plain[e];
-    }
-    return p->plain != NULL;
 }
 
 uz_status uz_field_fit_patches(double *stress, double *strain, unsigned char *done, const uz_field_body *body,
                                const double *u, const uz_hooks *hooks, uz_error *err)
 {
-    patches p = {.body = body, .dim = body->model->mesh.dim, .values = 2 * body->components};
+    const uz_mesh *mesh = &body->model->mesh;
+    patches p = {.body = body, .dim = mesh->dim, .values = 2 * body->components};
     uz_field_points *middle = NULL;
-    bool any;
-    uz_status status = find_plain(&any, &p) ? UZ_OK : no_memory(err);
-    if (status == UZ_OK && any) {
-        p.of = uz_alloc(body->model->mesh.n_elements, sizeof *p.of);
+    bool any = false;
+    p.plain = uz_alloc(mesh->n_elements, 1);
+    uz_status status = p.plain ? UZ_OK : no_memory(err);
+    /* Incompatible modes have the whole slope, quadratic elements too: their own points serve better. */
+    for (int64_t e = 0; p.plain && e < mesh->n_elements; e++) {
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[e]);
+        p.plain[e] =
+            type->nodes == type->corners && uz_element_formulation(body->model, e) != UZ_FORMULATION_INCOMPATIBLE;
+        any = any || p.plain[e];
+    }
+    if (any) {
+        p.of = uz_alloc(mesh->n_elements, sizeof *p.of);
         middle = uz_alloc(UZ_ELEMENT_KINDS, sizeof *middle);
         status = p.of && middle && list_around(&p) ? take_samples(&p, middle, u, hooks, err) : no_memory(err);
-        if (status == UZ_OK)
-            status = recover_all(stress, strain, done, &p, hooks, err);
+    }
+    for (int64_t a = 0; any && status == UZ_OK && a < mesh->n_nodes; a++) {
+        if (a % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
+        else if (!recover_node(stress, strain, &done[a], &p, a))
+            status = no_memory(err);
     }
     free(middle);
     free(p.of);

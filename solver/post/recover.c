@@ -45,26 +45,6 @@ static void add_to_nodes(double *sum, const unsigned char *done, const recovery 
         }
 }
 
-static bool all_done(const unsigned char *done, const uz_mesh *mesh, int64_t element)
-{
-    int nodes, count = 0;
-    const int64_t *node = uz_mesh_element(mesh, element, &nodes);
-    while (count < nodes && done[node[count]])
-        count++;
-    return count == nodes;
-}
-
-static void begin_plan(recovery *plan, const uz_field_body *body, const double *u, int64_t element)
-{
-    const uz_element_kind kind = (uz_element_kind)body->model->mesh.kind[element];
-    memset(plan, 0, sizeof *plan);
-    plan->points = uz_element_type_of(kind)->recover(plan->point, plan->share, kind);
-    plan->states.count = plan->points;
-    memcpy(plan->states.point, plan->point, sizeof plan->point);
-    uz_field_points_init(&plan->states, body, u);
-    plan->known = true;
-}
-
 static void add_element(const nodal_sums *to, recovery *plan, const uz_field_body *body, int64_t element)
 {
     uz_field_state state[UZ_ELEMENT_GAUSS];
@@ -98,10 +78,21 @@ static uz_status average_the_others(const nodal_sums *to, recovery plan[UZ_ELEME
         recovery *own = &plan[mesh->kind[e]];
         if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        if (all_done(to->done, mesh, e))
+        int nodes, done = 0;
+        const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+        while (done < nodes && to->done[node[done]])
+            done++;
+        if (done == nodes)
             continue;
-        if (!own->known)
-            begin_plan(own, body, u, e);
+        if (!own->known) {
+            const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+            memset(own, 0, sizeof *own);
+            own->points = uz_element_type_of(kind)->recover(own->point, own->share, kind);
+            own->states.count = own->points;
+            memcpy(own->states.point, own->point, sizeof own->point);
+            uz_field_points_init(&own->states, body, u);
+            own->known = true;
+        }
         add_element(to, own, body, e);
     }
     divide(to->stress, to, mesh->n_nodes, body->components);
@@ -153,59 +144,45 @@ typedef struct {
     bool known;
 } gauss_plan;
 
-static void plan_gauss(gauss_plan *plan, const uz_field_body *body, const double *u, int64_t element)
-{
-    const uz_element_kind kind = (uz_element_kind)body->model->mesh.kind[element];
-    plan->points.count = uz_element_gauss_count(kind, body->scene->model);
-    for (int g = 0; g < plan->points.count; g++) {
-        uz_element_gauss(plan->points.point[g], kind, body->scene->model, g);
-        uz_element_shape(plan->N[g], kind, plan->points.point[g]);
-    }
-    uz_field_points_init(&plan->points, body, u);
-    plan->known = true;
-}
-
-static void place_of(double *x, const uz_mesh *mesh, int64_t element, const double *N)
-{
-    int nodes;
-    const int64_t *node = uz_mesh_element(mesh, element, &nodes);
-    for (int c = 0; c < mesh->dim; c++) {
-        x[c] = 0;
-        for (int a = 0; a < nodes; a++)
-            x[c] += N[a] * mesh->xyz[node[a] * mesh->dim + c];
-    }
-}
-
-static uz_status fill_gauss(double *element, double *point, double *stress, gauss_plan plan[UZ_ELEMENT_KINDS],
-                            const uz_field_body *body, const double *u, const uz_hooks *hooks, uz_error *err)
+uz_status uz_field_gauss(double *element, double *point, double *stress, const uz_field_body *body, const double *u,
+                         const uz_hooks *hooks, uz_error *err)
 {
     const uz_mesh *mesh = &body->model->mesh;
     uz_field_state state[UZ_ELEMENT_GAUSS];
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        gauss_plan *own = &plan[mesh->kind[e]];
-        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks))
-            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
-        if (!own->known)
-            plan_gauss(own, body, u, e);
+    uz_status status = UZ_OK;
+    gauss_plan *plan = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *plan);
+    if (!plan)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at Gauss points");
+    for (int64_t e = 0; status == UZ_OK && e < mesh->n_elements; e++) {
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+        gauss_plan *own = &plan[kind];
+        int nodes;
+        const int64_t *node = uz_mesh_element(mesh, e, &nodes);
+        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks)) {
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while stresses were computed");
+            break;
+        }
+        if (!own->known) {
+            own->points.count = uz_element_gauss_count(kind, body->scene->model);
+            for (int g = 0; g < own->points.count; g++) {
+                uz_element_gauss(own->points.point[g], kind, body->scene->model, g);
+                uz_element_shape(own->N[g], kind, own->points.point[g]);
+            }
+            uz_field_points_init(&own->points, body, u);
+            own->known = true;
+        }
         uz_field_points_states(state, &own->points, e);
         for (int g = 0; g < own->points.count; g++) {
             *element++ = (double)e;
-            place_of(point, mesh, e, own->N[g]);
-            point += mesh->dim;
+            for (int c = 0; c < mesh->dim; c++, point++) {
+                *point = 0;
+                for (int a = 0; a < nodes; a++)
+                    *point += own->N[g][a] * mesh->xyz[node[a] * mesh->dim + c];
+            }
             memcpy(stress, state[g].stress, (size_t)body->components * sizeof *stress);
             stress += body->components;
         }
     }
-    return UZ_OK;
-}
-
-uz_status uz_field_gauss(double *element, double *point, double *stress, const uz_field_body *body, const double *u,
-                         const uz_hooks *hooks, uz_error *err)
-{
-    gauss_plan *plan = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *plan);
-    if (!plan)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the stress at Gauss points");
-    const uz_status status = fill_gauss(element, point, stress, plan, body, u, hooks, err);
     free(plan);
     return status;
 }

@@ -92,20 +92,6 @@ static double largest_slope(const doubts *d)
     return sqrt(largest);
 }
 
-/* |curl u| / 2 from the gradients at a point; u: nodes x dim. */
-static double rotation_at(const uz_element *element, const double *u, const double point[3])
-{
-    double grad[UZ_ELEMENT_NODES][3], G[3][3] = {{0}};
-    const int dim = uz_element_dim(element->kind);
-    uz_element_gradients(grad, element, point);
-    for (int a = 0; a < uz_element_node_count(element->kind); a++)
-        for (int i = 0; i < dim; i++)
-            for (int j = 0; j < dim; j++)
-                G[i][j] += u[a * dim + i] * grad[a][j];
-    const double x = G[2][1] - G[1][2], y = G[0][2] - G[2][0], z = G[1][0] - G[0][1];
-    return 0.5 * sqrt(x * x + y * y + z * z);
-}
-
 /* The largest principal strain, in absolute value, and the rotation in an element's middle. */
 static void look_at_element(double *strained, double *turned, const uz_field_body *body, const double *u, int64_t e)
 {
@@ -125,7 +111,15 @@ static void look_at_element(double *strained, double *turned, const uz_field_bod
     uz_field_state_of_strain(&state, body, e, strain);
     uz_principal(principal, state.strain, body->components);
     *strained = fmax(fabs(principal[0]), fabs(principal[2]));
-    *turned = rotation_at(&element, ue, point);
+    /* |curl u| / 2 */
+    double grad[UZ_ELEMENT_NODES][3], G[3][3] = {{0}};
+    uz_element_gradients(grad, &element, point);
+    for (int a = 0; a < nodes; a++)
+        for (int i = 0; i < mesh->dim; i++)
+            for (int j = 0; j < mesh->dim; j++)
+                G[i][j] += ue[a * mesh->dim + i] * grad[a][j];
+    const double x = G[2][1] - G[1][2], y = G[0][2] - G[2][0], z = G[1][0] - G[0][1];
+    *turned = 0.5 * sqrt(x * x + y * y + z * z);
 }
 
 static void look_at_elements(const doubts *d)
@@ -158,42 +152,9 @@ static void look_at_elements(const doubts *d)
 
 /* ---- sliding */
 
-/* Across the normal, of a node against the point of the face that it meets. */
-static void relative_motion(double v[3], const doubts *d, int64_t row, const uz_contact_sites *sites, int64_t place)
-{
-    const int dim = d->model->mesh.dim;
-    const double *n = d->model->info.contact_normal + row * dim;
-    double along = 0;
-    memset(v, 0, 3 * sizeof *v);
-    for (int c = 0; c < dim; c++) {
-        v[c] = d->u[d->model->info.contact_node[row] * dim + c];
-        for (int64_t j = sites->first[place]; j < sites->first[place + 1]; j++)
-            v[c] -= sites->weight[j] * d->u[sites->node[j] * dim + c];
-        along += v[c] * n[c];
-    }
-    for (int c = 0; c < dim; c++)
-        v[c] -= along * n[c];
-}
-
 static double length(const double v[3])
 {
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
-/* By how much the obstacle's normal where the node has come to differs from the one that was kept. */
-static double turn_of(const doubts *d, const uz_obstacle *obstacle, int64_t row)
-{
-    const int dim = d->model->mesh.dim;
-    const int64_t first = d->model->info.contact_node[row] * dim;
-    double x[3] = {0}, chord = 0;
-    uz_gap there;
-    for (int c = 0; c < dim; c++)
-        x[c] = d->model->mesh.xyz[first + c] + d->u[first + c];
-    if (uz_obstacle_gap(&there, obstacle, x, NULL) != UZ_OK)
-        return 0;
-    for (int c = 0; c < dim; c++)
-        chord = hypot(chord, there.normal[c] - d->model->info.contact_normal[row * dim + c]);
-    return 2 * asin(fmin(1, 0.5 * chord));
 }
 
 /* Of the face that a node meets: its longest distance between corners. */
@@ -222,16 +183,36 @@ static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obs
 {
     const uz_mesh_info *info = &d->model->info;
     const uz_law *law = d->model->law;
+    const int dim = d->model->mesh.dim;
     const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
     for (; *row < d->model->m && info->contact_of[*row] == k; ++*row) {
-        double v[3];
         const int64_t i = d->model->row_place[*row];
+        const int64_t node = info->contact_node[*row] * dim;
+        const double *normal = info->contact_normal + *row * dim;
         const double face = sites && sites->first ? size_of_face(&d->model->mesh, sites->face[i]) : 0;
         const bool active = law->kind->active(law, NULL, &d->r[*row], 1) > 0;
-        if (active && obstacle)
-            most->turn = fmax(most->turn, turn_of(d, obstacle, *row));
+        if (active && obstacle) {
+            /* By how much the obstacle's normal where the node has come to differs from the one that was kept. */
+            double x[3] = {0}, chord = 0;
+            uz_gap there;
+            for (int c = 0; c < dim; c++)
+                x[c] = d->model->mesh.xyz[node + c] + d->u[node + c];
+            const bool known = uz_obstacle_gap(&there, obstacle, x, NULL) == UZ_OK;
+            for (int c = 0; known && c < dim; c++)
+                chord = hypot(chord, there.normal[c] - normal[c]);
+            most->turn = fmax(most->turn, 2 * asin(fmin(1, 0.5 * chord)));
+        }
         if (active && face > 0) {
-            relative_motion(v, d, *row, sites, i);
+            /* Across the normal, of a node against the point of the face that it meets. */
+            double v[3] = {0}, along = 0;
+            for (int c = 0; c < dim; c++) {
+                v[c] = d->u[node + c];
+                for (int64_t j = sites->first[i]; j < sites->first[i + 1]; j++)
+                    v[c] -= sites->weight[j] * d->u[sites->node[j] * dim + c];
+                along += v[c] * normal[c];
+            }
+            for (int c = 0; c < dim; c++)
+                v[c] -= along * normal[c];
             most->part = fmax(most->part, length(v) / face);
         }
         if (face > 0 && -sites->gap[i] > most->depth * face) {
@@ -241,44 +222,39 @@ static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obs
     }
 }
 
-/* Out of the body, in the middle of a face, and that place. */
-static void outward_normal(double n[3], double middle[3], const uz_mesh *mesh, uz_face face)
-{
-    int64_t node[UZ_FACE_NODES];
-    double side[2][3] = {{0}};
-    const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[face.element]);
-    const int dim = mesh->dim, corners = type->side[face.side].corners;
-    uz_mesh_face(node, mesh, face);
-    memset(middle, 0, 3 * sizeof *middle);
-    for (int a = 0; a < corners; a++)
-        for (int c = 0; c < dim; c++)
-            middle[c] += mesh->xyz[node[a] * dim + c] / corners;
-    for (int c = 0; c < dim; c++) {
-        side[0][c] = mesh->xyz[node[1] * dim + c] - mesh->xyz[node[0] * dim + c];
-        side[1][c] = dim == 3 ? mesh->xyz[node[2] * dim + c] - mesh->xyz[node[0] * dim + c] : 0;
-    }
-    if (dim == 2)
-        side[1][2] = 1; /* the element on the left */
-    for (int c = 0; c < 3; c++)
-        n[c] = side[0][(c + 1) % 3] * side[1][(c + 2) % 3] - side[0][(c + 2) % 3] * side[1][(c + 1) % 3];
-    const double size = length(n);
-    for (int c = 0; c < 3; c++)
-        n[c] /= size;
-}
-
 /* The least cosine between the faces' normals and the obstacle's, which points to where the body may be: where none is
  * against it the faces look away from the obstacle, and never meet it. -1: no faces. */
 static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz_contact *contact)
 {
     const uz_mesh *mesh = &d->model->mesh;
+    const int dim = mesh->dim;
     const uz_group *group = uz_mesh_group(mesh, contact->on, "", NULL);
     const bool faces = group && group->kind == UZ_GROUP_FACES && group->n_faces > 0;
     const double size = length(contact->normal);
     double least = faces ? 1 : -1;
     for (int64_t i = 0; faces && i < group->n_faces && least > MOST_TURN; i++) {
-        double n[3], middle[3], along = 0;
+        /* Out of the body, in the middle of a face, and that place. */
+        const uz_face face = group->face[i];
+        const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[face.element]);
+        const int corners = type->side[face.side].corners;
+        double n[3], middle[3] = {0}, side[2][3] = {{0}}, along = 0;
+        int64_t node[UZ_FACE_NODES];
         uz_gap there;
-        outward_normal(n, middle, mesh, group->face[i]);
+        uz_mesh_face(node, mesh, face);
+        for (int a = 0; a < corners; a++)
+            for (int c = 0; c < dim; c++)
+                middle[c] += mesh->xyz[node[a] * dim + c] / corners;
+        for (int c = 0; c < dim; c++) {
+            side[0][c] = mesh->xyz[node[1] * dim + c] - mesh->xyz[node[0] * dim + c];
+            side[1][c] = dim == 3 ? mesh->xyz[node[2] * dim + c] - mesh->xyz[node[0] * dim + c] : 0;
+        }
+        if (dim == 2)
+            side[1][2] = 1; /* the element on the left */
+        for (int c = 0; c < 3; c++)
+            n[c] = side[0][(c + 1) % 3] * side[1][(c + 2) % 3] - side[0][(c + 2) % 3] * side[1][(c + 1) % 3];
+        const double area = length(n);
+        for (int c = 0; c < 3; c++)
+            n[c] /= area;
         if (obstacle && uz_obstacle_gap(&there, obstacle, middle, NULL) != UZ_OK)
             return -1;
         for (int c = 0; c < mesh->dim; c++)
@@ -332,28 +308,22 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
 
 /* ---- mesh */
 
-/* Is it linear, of its own strain, and kept from changing its volume in all directions? */
-static bool may_lock(const uz_body_model *model, int64_t e)
-{
-    const uz_element_kind kind = (uz_element_kind)model->mesh.kind[e];
-    const double poisson = uz_element_material(model, e)->poisson;
-    if (model->kind == UZ_PLANE_STRESS || poisson < LOCKS)
-        return false;
-    const uz_element_type *type = uz_element_type_of(kind);
-    return type->nodes == type->corners &&
-           uz_resolve_formulation(model->formulation, kind, model->kind, poisson) == UZ_FORMULATION_STANDARD;
-}
-
 static void look_at_mesh(const doubts *d)
 {
     const uz_mesh *mesh = &d->model->mesh;
     double poisson = 0;
     int64_t stiff = 0;
-    for (int64_t e = 0; e < mesh->n_elements; e++)
-        if (may_lock(d->model, e) && uz_element_material(d->model, e)->poisson > poisson) {
-            poisson = uz_element_material(d->model, e)->poisson;
+    for (int64_t e = 0; e < mesh->n_elements && d->model->kind != UZ_PLANE_STRESS; e++) {
+        /* Is it linear, of its own strain, and kept from changing its volume in all directions? */
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+        const uz_element_type *type = uz_element_type_of(kind);
+        const double here = uz_element_material(d->model, e)->poisson;
+        if (here >= LOCKS && here > poisson && type->nodes == type->corners &&
+            uz_resolve_formulation(d->model->formulation, kind, d->model->kind, here) == UZ_FORMULATION_STANDARD) {
+            poisson = here;
             stiff = e;
         }
+    }
     if (poisson > 0)
         warn(d->out, "locking", poisson,
              "element %lld (%s) has Poisson's ratio %.5g: plain linear elements are too stiff there; use %s",

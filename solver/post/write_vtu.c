@@ -24,18 +24,6 @@ static void put_nodal(writing *w, uz_field field, const double *data, int compon
     uz_vtu_array(&w->vtu, uz_field_name(field), UZ_VTU_DOUBLE, data, w->fields->n_nodes, components, labels);
 }
 
-/* Vectors and tensors have all their components there, also in the plane. */
-static void put_vector(writing *w, const double *u)
-{
-    const int dim = w->fields->dim;
-    if (!u)
-        return;
-    memset(w->room, 0, (size_t)(3 * w->fields->n_nodes) * sizeof *w->room);
-    for (int64_t a = 0; a < w->fields->n_nodes; a++)
-        memcpy(w->room + 3 * a, u + dim * a, (size_t)dim * sizeof *u);
-    put_nodal(w, UZ_FIELD_DISPLACEMENTS, w->room, 3, (const char *const[]){"x", "y", "z"});
-}
-
 static void put_tensor(writing *w, uz_field field, const double *data)
 {
     const int components = w->fields->components;
@@ -66,28 +54,18 @@ static void put_rows(writing *w, uz_field field, const double *data, double else
     put_nodal(w, field, w->room, 1, NULL);
 }
 
-static void put_materials(writing *w)
-{
-    const int64_t n = w->fields->n_elements;
-    int64_t *material = uz_alloc(n, sizeof *material);
-    if (!material) {
-        w->vtu.failed = true;
-        return;
-    }
-    for (int64_t e = 0; e < n; e++)
-        material[e] = w->body->model->material_of ? w->body->model->material_of[e] : 0;
-    uz_vtu_open(&w->vtu, "CellData");
-    uz_vtu_array(&w->vtu, uz_field_name(UZ_FIELD_MATERIALS), UZ_VTU_INT64, material, n, 1, NULL);
-    uz_vtu_close(&w->vtu, "CellData");
-    free(material);
-}
-
 static void write_all(writing *w, const uz_field_source *answer, unsigned which)
 {
     const uz_fields *f = w->fields;
     uz_vtu_begin(&w->vtu, &w->body->model->mesh);
     uz_vtu_open(&w->vtu, "PointData");
-    put_vector(w, which & UZ_FIELD_DISPLACEMENTS ? answer->u : NULL);
+    /* Vectors and tensors have all their components there, also in the plane. */
+    if (which & UZ_FIELD_DISPLACEMENTS && answer->u) {
+        memset(w->room, 0, (size_t)(3 * f->n_nodes) * sizeof *w->room);
+        for (int64_t a = 0; a < f->n_nodes; a++)
+            memcpy(w->room + 3 * a, answer->u + f->dim * a, (size_t)f->dim * sizeof *answer->u);
+        put_nodal(w, UZ_FIELD_DISPLACEMENTS, w->room, 3, (const char *const[]){"x", "y", "z"});
+    }
     put_tensor(w, UZ_FIELD_STRESS, f->stress);
     if (f->principal)
         put_nodal(w, UZ_FIELD_PRINCIPAL, f->principal, 3, NULL);
@@ -99,40 +77,24 @@ static void write_all(writing *w, const uz_field_source *answer, unsigned which)
     put_rows(w, UZ_FIELD_REACTIONS, which & UZ_FIELD_REACTIONS ? answer->r : NULL, 0, false);
     put_rows(w, UZ_FIELD_GAPS, which & UZ_FIELD_GAPS ? answer->g : NULL, NAN, false);
     uz_vtu_close(&w->vtu, "PointData");
-    if (which & UZ_FIELD_MATERIALS)
-        put_materials(w);
-}
-
-/* The model is that of the scene: either may be cancelled, or run out of memory. */
-static uz_status write_body(char **text, size_t *len, const uz_field_body *body, const uz_field_source *answer,
-                            unsigned which, const uz_hooks *hooks, uz_error *err)
-{
-    uz_fields fields;
-    uz_status status = uz_fields_of_body(&fields, body, answer, which & ~(unsigned)UZ_FIELD_STRESS_GAUSS, hooks, err);
-    if (status != UZ_OK)
-        return status;
-    writing w = {.body = body,
-                 .fields = &fields,
-                 .room = uz_alloc(6 * fields.n_nodes, sizeof *w.room),
-                 .has_row = uz_alloc(fields.n_nodes, sizeof *w.has_row)};
-    if (!w.room || !w.has_row)
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vtu file");
-    else if (uz_cancelled(hooks))
-        status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the file was written");
-    if (status == UZ_OK) {
-        write_all(&w, answer, which);
-        status = uz_vtu_finish(text, len, &w.vtu, err);
+    int64_t *material = which & UZ_FIELD_MATERIALS ? uz_alloc(f->n_elements, sizeof *material) : NULL;
+    if (which & UZ_FIELD_MATERIALS && !material)
+        w->vtu.failed = true;
+    for (int64_t e = 0; material && e < f->n_elements; e++)
+        material[e] = w->body->model->material_of ? w->body->model->material_of[e] : 0;
+    if (material) {
+        uz_vtu_open(&w->vtu, "CellData");
+        uz_vtu_array(&w->vtu, uz_field_name(UZ_FIELD_MATERIALS), UZ_VTU_INT64, material, f->n_elements, 1, NULL);
+        uz_vtu_close(&w->vtu, "CellData");
     }
-    free(w.room);
-    free(w.has_row);
-    uz_fields_clear(&fields);
-    return status;
+    free(material);
 }
 
 uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                        const uz_hooks *hooks, uz_error *err)
 {
     uz_body_model model;
+    uz_fields fields;
     uz_field_body body = {.scene = scene};
     uz_error_reset(err);
     *text = NULL;
@@ -141,7 +103,24 @@ uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz
     if (status == UZ_OK)
         status = uz_field_body_init(&body, scene, &model, err);
     if (status == UZ_OK)
-        status = write_body(text, len, &body, answer, which, hooks, err);
+        status = uz_fields_of_body(&fields, &body, answer, which & ~(unsigned)UZ_FIELD_STRESS_GAUSS, hooks, err);
+    if (status == UZ_OK) {
+        writing w = {.body = &body,
+                     .fields = &fields,
+                     .room = uz_alloc(6 * fields.n_nodes, sizeof *w.room),
+                     .has_row = uz_alloc(fields.n_nodes, sizeof *w.has_row)};
+        if (!w.room || !w.has_row)
+            status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vtu file");
+        else if (uz_cancelled(hooks))
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the file was written");
+        if (status == UZ_OK) {
+            write_all(&w, answer, which);
+            status = uz_vtu_finish(text, len, &w.vtu, err);
+        }
+        free(w.room);
+        free(w.has_row);
+        uz_fields_clear(&fields);
+    }
     uz_field_body_clear(&body);
     uz_body_model_clear(&model);
     return status;
