@@ -51,38 +51,7 @@ static uz_status read_header(gmsh_file *file)
     return status == UZ_OK ? gmsh_section_end(text, "MeshFormat") : status;
 }
 
-static uz_status read_section(gmsh_file *file, const char *name)
-{
-    uz_status status;
-    if (strcmp(name, "PhysicalNames") == 0)
-        status = gmsh_read_names(file);
-    else if (strcmp(name, "Nodes") == 0)
-        status = gmsh_read_nodes(file);
-    else if (strcmp(name, "Elements") == 0)
-        status = gmsh_read_elements(file);
-    else if (file->version == 41 && strcmp(name, "Entities") == 0)
-        status = gmsh_read_entities(file, false);
-    else if (file->version == 41 && strcmp(name, "PartitionedEntities") == 0)
-        status = gmsh_read_entities(file, true);
-    else
-        return gmsh_skip_section(&file->text, name);
-    return status == UZ_OK ? gmsh_section_end(&file->text, name) : status;
-}
-
 /* ---- the body */
-
-/* Do all surfaces lie in one plane z = constant, but for rounding? */
-static bool is_flat(const gmsh_file *file)
-{
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (int64_t e = 0; e < file->n_elements; e++)
-        for (int64_t q = file->first[e]; q < file->first[e + 1] && gmsh_type_of(file->type[e]).dim == 2; q++)
-            for (int c = 0; c < 3; c++) {
-                low[c] = fmin(low[c], file->xyz[3 * file->node[q] + c]);
-                high[c] = fmax(high[c], file->xyz[3 * file->node[q] + c]);
-            }
-    return high[2] - low[2] <= 1e-9 * hypot(high[0] - low[0], high[1] - low[1]);
-}
 
 static uz_status choose_dim(int *dim, const gmsh_file *file)
 {
@@ -95,39 +64,20 @@ static uz_status choose_dim(int *dim, const gmsh_file *file)
         return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
                             "there are only %s; mesh the surface of a plane body, or the volume of a solid",
                             *dim == 1 ? "lines" : "points");
-    if (*dim == 2 && !is_flat(file))
+    /* Do all surfaces lie in one plane z = constant, but for rounding? */
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int64_t e = 0; *dim == 2 && e < file->n_elements; e++)
+        for (int64_t q = file->first[e]; q < file->first[e + 1] && gmsh_type_of(file->type[e]).dim == 2; q++)
+            for (int c = 0; c < 3; c++) {
+                low[c] = fmin(low[c], file->xyz[3 * file->node[q] + c]);
+                high[c] = fmax(high[c], file->xyz[3 * file->node[q] + c]);
+            }
+    if (*dim == 2 && !(high[2] - low[2] <= 1e-9 * hypot(high[0] - low[0], high[1] - low[1])))
         return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
                             "there are only surfaces, and they do not lie in a plane z = constant; shells are not "
                             "modelled: mesh the volume (and save it: as a physical volume, or with Mesh.SaveAll), or "
                             "turn a plane body into the plane of x and y");
     return UZ_OK;
-}
-
-/* Version 2.2 repeats an element for each of its physical groups. */
-static bool repeats_last(const gmsh_file *file, int64_t last, int64_t e)
-{
-    const int64_t count = file->first[e + 1] - file->first[e];
-    return file->version == 22 && last >= 0 && file->type[last] == file->type[e] &&
-           memcmp(file->node + file->first[last], file->node + file->first[e], (size_t)count * sizeof(int64_t)) == 0;
-}
-
-/* The numbers of the elements of the body; counts them and their nodes. */
-static void number_elements(int64_t *new_element, uz_given_mesh *out, const gmsh_file *file, int dim, int64_t *places)
-{
-    int64_t last = -1;
-    *places = 0;
-    for (int64_t e = 0; e < file->n_elements; e++) {
-        new_element[e] = -1;
-        if (gmsh_type_of(file->type[e]).dim != dim)
-            continue;
-        if (repeats_last(file, last, e)) {
-            new_element[e] = out->n_elements - 1;
-            continue;
-        }
-        new_element[e] = out->n_elements++;
-        *places += file->first[e + 1] - file->first[e];
-        last = e;
-    }
 }
 
 static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const int64_t *new_element, int64_t places)
@@ -153,7 +103,7 @@ static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const 
     return UZ_OK;
 }
 
-uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file)
+static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
 {
     int dim = 0;
     int64_t places = 0, *new_element = NULL;
@@ -163,7 +113,21 @@ uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file)
     new_element = uz_alloc(file->n_elements, sizeof *new_element);
     if (!new_element)
         return gmsh_no_memory(file);
-    number_elements(new_element, out, file, dim, &places);
+    /* The numbers of the elements of the body. Version 2.2 repeats an element for each of its physical groups. */
+    for (int64_t e = 0, last = -1; e < file->n_elements; e++) {
+        const int64_t count = file->first[e + 1] - file->first[e];
+        new_element[e] = -1;
+        if (gmsh_type_of(file->type[e]).dim != dim)
+            continue;
+        if (file->version == 22 && last >= 0 && file->type[last] == file->type[e] &&
+            memcmp(file->node + file->first[last], file->node + file->first[e], (size_t)count * sizeof(int64_t)) == 0) {
+            new_element[e] = out->n_elements - 1;
+            continue;
+        }
+        new_element[e] = out->n_elements++;
+        places += count;
+        last = e;
+    }
     out->dim = dim;
     out->n_nodes = file->n_nodes;
     out->from_file = true;
@@ -201,14 +165,29 @@ uz_status uz_gmsh_read(uz_given_mesh *out, const char *text, size_t len, size_t 
         status = gmsh_section(&file.text, name);
         if (status != UZ_OK || !name[0])
             break;
-        status = read_section(&file, name);
+        if (strcmp(name, "PhysicalNames") == 0)
+            status = gmsh_read_names(&file);
+        else if (strcmp(name, "Nodes") == 0)
+            status = gmsh_read_nodes(&file);
+        else if (strcmp(name, "Elements") == 0)
+            status = gmsh_read_elements(&file);
+        else if (file.version == 41 && strcmp(name, "Entities") == 0)
+            status = gmsh_read_entities(&file, false);
+        else if (file.version == 41 && strcmp(name, "PartitionedEntities") == 0)
+            status = gmsh_read_entities(&file, true);
+        else {
+            status = gmsh_skip_section(&file.text, name);
+            continue;
+        }
+        if (status == UZ_OK)
+            status = gmsh_section_end(&file.text, name);
     }
     if (status == UZ_OK && !file.tag)
         status = gmsh_fail(&file.text, UZ_ERR_FORMAT, "the file has no $Nodes");
     if (status == UZ_OK && file.n_elements == 0)
         status = gmsh_fail(&file.text, UZ_ERR_FORMAT, "the file has no elements; mesh it in Gmsh before saving it");
     if (status == UZ_OK)
-        status = gmsh_to_given(out, &file);
+        status = to_given(out, &file);
     if (status != UZ_OK)
         uz_given_mesh_clear(out);
     free(file.xyz);

@@ -31,6 +31,10 @@ uz_status gmsh_real_text(gmsh_text *text, double *value);
 /* A text in double quotes: at most 63 bytes of UTF-8 without control characters. */
 uz_status gmsh_quoted(gmsh_text *text, char out[64]);
 
+/* The head of a section in version 4.1: numbers of blocks and of items, the least and the largest tag. what: the
+ * numbers of blocks, of items, and of one of them, for messages. */
+uz_status gmsh_head_4(gmsh_text *text, int64_t *blocks, int64_t *count, const char *const what[3]);
+
 /* How many bytes are left. */
 size_t gmsh_left(const gmsh_text *text);
 /* A count of items that take at least so many bytes each: refused if the file is too short for them. */
@@ -117,9 +121,9 @@ gmsh_type gmsh_type_of(int64_t type);
 /* The element of that type; -1: none. */
 int gmsh_kind_of(int64_t type);
 
-/* ---- the mesh of what was read (gmsh_groups.c: its groups) */
-uz_status gmsh_to_given(uz_given_mesh *out, gmsh_file *file);
-/* new_element: the number of each element of the file in the mesh, -1: it is none of its elements. */
+/* ---- the mesh of what was read */
+
+/* Its groups. new_element: the number of each element of the file in the mesh, -1: it is none of its elements. */
 uz_status gmsh_make_groups(uz_given_mesh *out, gmsh_file *file, int dim, const int64_t *new_element);
 
 #endif

@@ -130,47 +130,20 @@ static uz_status read_element_nodes(gmsh_file *file, int64_t type, int64_t part_
     return UZ_OK;
 }
 
-/* ---- version 2.2 */
-
-/* tags... nodes...; the physical tag is the first of the tags. */
-static uz_status read_element_2(gmsh_file *file, int64_t type, int64_t tags)
-{
-    int64_t physical = 0, tag = 0;
-    uz_status status = UZ_OK;
-    for (int64_t i = 0; i < tags && status == UZ_OK; i++) {
-        status = gmsh_int(&file->text, &tag, "a tag of an element");
-        if (i == 0)
-            physical = tag < 0 ? -tag : tag;
-    }
-    if (status == UZ_OK)
-        status = make_room(file, 0, gmsh_type_of(type).nodes);
-    return status == UZ_OK ? read_element_nodes(file, type, physical) : status;
-}
-
-/* number type numTags tags... nodes... */
-static uz_status read_line_2(gmsh_file *file)
-{
-    gmsh_text *text = &file->text;
-    int64_t number = 0, type = 0, tags = 0;
-    uz_status status = gmsh_int(text, &number, "the number of an element");
-    if (status == UZ_OK)
-        status = gmsh_int(text, &type, "the type of an element");
-    if (status == UZ_OK)
-        status = check_type(file, type);
-    if (status == UZ_OK)
-        status = gmsh_int(text, &tags, "the number of tags of an element");
-    return status == UZ_OK ? read_element_2(file, type, tags) : status;
-}
-
-/* type numElements numTags, then for each of them: number tags... nodes... */
+/* A line: number type numTags tags... nodes... In binary files a block: type numElements numTags, then for each of them
+ * number tags... nodes... The physical tag is the first of the tags. */
 static uz_status read_block_2(gmsh_file *file, int64_t count)
 {
     gmsh_text *text = &file->text;
-    int64_t number = 0, type = 0, n = 0, tags = 0;
-    uz_status status = gmsh_int(text, &type, "the type of a block of elements");
+    int64_t number = 0, type = 0, n = 1, tags = 0;
+    uz_status status = UZ_OK;
+    if (!text->binary)
+        status = gmsh_int(text, &number, "the number of an element");
+    if (status == UZ_OK)
+        status = gmsh_int(text, &type, text->binary ? "the type of a block of elements" : "the type of an element");
     if (status == UZ_OK)
         status = check_type(file, type);
-    if (status == UZ_OK)
+    if (status == UZ_OK && text->binary)
         status = gmsh_int(text, &n, "the number of elements of a block");
     if (status == UZ_OK)
         status = gmsh_int(text, &tags, "the number of tags of an element");
@@ -178,30 +151,21 @@ static uz_status read_block_2(gmsh_file *file, int64_t count)
         status = gmsh_fail(text, UZ_ERR_FORMAT, "a block has %lld elements, but %lld are missing", (long long)n,
                            (long long)(count - file->n_elements));
     for (int64_t i = 0; i < n && status == UZ_OK; i++) {
-        status = gmsh_int(text, &number, "the number of an element");
+        int64_t physical = 0, tag = 0;
+        if (text->binary)
+            status = gmsh_int(text, &number, "the number of an element");
+        for (int64_t k = 0; k < tags && status == UZ_OK; k++) {
+            status = gmsh_int(text, &tag, "a tag of an element");
+            if (k == 0)
+                physical = tag < 0 ? -tag : tag;
+        }
         if (status == UZ_OK)
-            status = read_element_2(file, type, tags);
+            status = make_room(file, 0, gmsh_type_of(type).nodes);
+        if (status == UZ_OK)
+            status = read_element_nodes(file, type, physical);
     }
     return status;
 }
-
-static uz_status read_elements_2(gmsh_file *file)
-{
-    gmsh_text *text = &file->text;
-    int64_t count = 0;
-    uz_status status = gmsh_int_text(text, &count, "the number of elements");
-    if (status == UZ_OK)
-        status = gmsh_end_line(text);
-    if (status == UZ_OK)
-        status = gmsh_count(text, count, 8, "elements"); /* "1 15 0 1"; a number and a node */
-    if (status == UZ_OK)
-        status = make_room(file, count, 0);
-    while (file->n_elements < count && status == UZ_OK)
-        status = text->binary ? read_block_2(file, count) : read_line_2(file);
-    return status;
-}
-
-/* ---- version 4.1 */
 
 /* entityDim entityTag type numElements, then for each of them: number nodes... */
 static uz_status read_block_4(gmsh_file *file, int64_t count)
@@ -234,33 +198,31 @@ static uz_status read_block_4(gmsh_file *file, int64_t count)
     return status;
 }
 
-static uz_status read_elements_4(gmsh_file *file)
+uz_status gmsh_read_elements(gmsh_file *file)
 {
+    static const char *const WHAT[] = {"the number of blocks of elements", "the number of elements",
+                                       "the number of an element"};
     gmsh_text *text = &file->text;
-    int64_t blocks = 0, count = 0, ends = 0;
-    uz_status status = gmsh_size(text, &blocks, "the number of blocks of elements");
-    if (status == UZ_OK)
-        status = gmsh_size(text, &count, "the number of elements");
-    for (int i = 0; i < 2 && status == UZ_OK; i++)
-        status = gmsh_size(text, &ends, "the number of an element");
-    if (status == UZ_OK)
-        status = gmsh_count(text, count, text->binary ? 16 : 3, "elements"); /* 1 1 */
+    int64_t blocks = 0, count = 0;
+    if (!file->tag)
+        return gmsh_fail(text, UZ_ERR_FORMAT, "$Elements before $Nodes");
+    if (file->first)
+        return gmsh_fail(text, UZ_ERR_FORMAT, "a second $Elements");
+    file->elements_at = *text;
+    const bool old = file->version == 22;
+    uz_status status = old ? gmsh_int_text(text, &count, WHAT[1]) : gmsh_head_4(text, &blocks, &count, WHAT);
+    if (status == UZ_OK && old)
+        status = gmsh_end_line(text);
+    if (status == UZ_OK) /* at least "1 15 0 1"; a number and a node; 1 1 */
+        status = gmsh_count(text, count, old ? 8 : text->binary ? 16 : 3, "elements");
     if (status == UZ_OK)
         status = make_room(file, count, 0);
+    while (old && file->n_elements < count && status == UZ_OK)
+        status = read_block_2(file, count);
     for (int64_t b = 0; b < blocks && status == UZ_OK; b++)
         status = read_block_4(file, count);
     if (status == UZ_OK && file->n_elements < count)
         status = gmsh_fail(text, UZ_ERR_FORMAT, "%lld elements are announced, but there are %lld", (long long)count,
                            (long long)file->n_elements);
     return status;
-}
-
-uz_status gmsh_read_elements(gmsh_file *file)
-{
-    if (!file->tag)
-        return gmsh_fail(&file->text, UZ_ERR_FORMAT, "$Elements before $Nodes");
-    if (file->first)
-        return gmsh_fail(&file->text, UZ_ERR_FORMAT, "a second $Elements");
-    file->elements_at = file->text;
-    return file->version == 22 ? read_elements_2(file) : read_elements_4(file);
 }

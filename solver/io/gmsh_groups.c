@@ -28,11 +28,6 @@ typedef struct {
     int64_t n_groups;
 } grouping;
 
-static uz_status fail_groups(const gmsh_file *file, const char *what)
-{
-    return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED, "%s", what);
-}
-
 static int compare_groups(const void *a, const void *b)
 {
     const physical_group *x = a, *y = b;
@@ -40,17 +35,6 @@ static int compare_groups(const void *a, const void *b)
 }
 
 /* ---- parts */
-
-static int64_t unique_parts(gmsh_part *part, int64_t count)
-{
-    int64_t kept = 0;
-    if (count > 1)
-        qsort(part, (size_t)count, sizeof *part, gmsh_compare_parts);
-    for (int64_t i = 0; i < count; i++)
-        if (i == 0 || gmsh_compare_parts(&part[i], &part[kept - 1]) != 0)
-            part[kept++] = part[i];
-    return kept;
-}
 
 /* In version 2.2 elements name their physical group themselves: each is a part of one group. */
 static uz_status parts_of_tags(gmsh_file *file)
@@ -63,7 +47,13 @@ static uz_status parts_of_tags(gmsh_file *file)
             return gmsh_no_memory(file);
         file->parts[file->n_parts++] = part;
     }
-    file->n_parts = unique_parts(file->parts, file->n_parts);
+    int64_t kept = 0;
+    if (file->n_parts > 1)
+        qsort(file->parts, (size_t)file->n_parts, sizeof *file->parts, gmsh_compare_parts);
+    for (int64_t i = 0; i < file->n_parts; i++)
+        if (i == 0 || gmsh_compare_parts(&file->parts[i], &file->parts[kept - 1]) != 0)
+            file->parts[kept++] = file->parts[i];
+    file->n_parts = kept;
     free(file->physical);
     file->physical = uz_alloc(file->n_parts, sizeof *file->physical);
     if (!file->physical)
@@ -115,26 +105,10 @@ static uz_status list_groups(grouping *g)
         if (i == 0 || compare_groups(&g->group[i], &g->group[kept - 1]) != 0)
             g->group[kept++] = g->group[i];
     g->n_groups = kept;
-    return kept > UZ_MESH_MAX_GROUPS ? fail_groups(file, "there are more than 4096 physical groups") : UZ_OK;
-}
-
-static void add_member(uz_given_group *to, const grouping *g, int64_t e)
-{
-    const gmsh_file *file = g->file;
-    const int dim = gmsh_type_of(file->type[e]).dim;
-    if (dim == g->dim) {
-        to->element[to->n_elements++] = g->new_element[e];
-        return;
-    }
-    for (int64_t q = file->first[e]; q < file->first[e + 1]; q++)
-        if (dim == g->dim - 1)
-            to->face_node[to->face_first[to->n_faces] + (q - file->first[e])] = file->node[q];
-        else
-            to->node[to->n_nodes++] = file->node[q];
-    if (dim == g->dim - 1) {
-        to->n_faces++;
-        to->face_first[to->n_faces] = to->face_first[to->n_faces - 1] + file->first[e + 1] - file->first[e];
-    }
+    if (kept > UZ_MESH_MAX_GROUPS)
+        return gmsh_fail_at(&file->text, &file->elements_at, UZ_ERR_UNSUPPORTED,
+                            "there are more than 4096 physical groups");
+    return UZ_OK;
 }
 
 /* Goes through the members of all groups: counts them, or adds them. */
@@ -143,14 +117,23 @@ static void walk_members(grouping *g, bool add)
     gmsh_part *last = NULL;
     for (int64_t e = 0; e < g->file->n_elements; e++) {
         const gmsh_part *part = part_of(g->file, e, &last);
+        const int64_t *node = g->file->node + g->file->first[e], n = g->file->first[e + 1] - g->file->first[e];
         for (int64_t k = 0; part && k < part->count; k++) {
             const physical_group key = {part->dim, g->file->physical[part->first + k], 0, 0};
             physical_group *found = bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups);
-            if (add) {
-                add_member(&g->out->groups[found - g->group], g, e);
-            } else {
+            uz_given_group *to = &g->out->groups[found - g->group];
+            if (!add) {
                 found->items++;
-                found->nodes += g->file->first[e + 1] - g->file->first[e];
+                found->nodes += n;
+            } else if (part->dim == g->dim) {
+                to->element[to->n_elements++] = g->new_element[e];
+            } else if (part->dim == g->dim - 1) {
+                memcpy(to->face_node + to->face_first[to->n_faces], node, (size_t)n * sizeof *node);
+                to->n_faces++;
+                to->face_first[to->n_faces] = to->face_first[to->n_faces - 1] + n;
+            } else {
+                memcpy(to->node + to->n_nodes, node, (size_t)n * sizeof *node);
+                to->n_nodes += n;
             }
         }
     }
@@ -173,27 +156,20 @@ static const gmsh_name *find_name(const gmsh_file *file, int dim, int64_t tag)
     return bsearch(&key, file->names, (size_t)file->n_names, sizeof key, compare_names);
 }
 
-/* Has a nameless group of higher dimension the same tag? */
-static bool shares_tag(const grouping *g, int64_t i)
-{
-    for (int dim = g->group[i].dim + 1; dim <= 3; dim++) {
-        const physical_group key = {dim, g->group[i].tag, 0, 0};
-        if (!find_name(g->file, dim, key.tag) &&
-            bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups))
-            return true;
-    }
-    return false;
-}
-
 static uz_status make_group(const grouping *g, int64_t i)
 {
     const physical_group *from = &g->group[i];
     uz_given_group *to = &g->out->groups[i];
     const gmsh_name *found = find_name(g->file, from->dim, from->tag);
-    bool good;
+    bool good, shared = false; /* has a nameless group of higher dimension the same tag? */
+    for (int dim = from->dim + 1; dim <= 3 && !found; dim++) {
+        const physical_group key = {dim, from->tag, 0, 0};
+        shared = shared || (!find_name(g->file, dim, key.tag) &&
+                            bsearch(&key, g->group, (size_t)g->n_groups, sizeof key, compare_groups));
+    }
     if (found)
         memcpy(to->name, found->name, sizeof found->name);
-    else if (shares_tag(g, i))
+    else if (shared)
         snprintf(to->name, 64, "physical_%lld_dim%d", (long long)from->tag, from->dim);
     else
         snprintf(to->name, 64, "physical_%lld", (long long)from->tag);
@@ -211,32 +187,24 @@ static uz_status make_group(const grouping *g, int64_t i)
     return good ? UZ_OK : gmsh_no_memory(g->file);
 }
 
-static uz_status fill_groups(grouping *g)
-{
-    uz_given_mesh *out = g->out;
-    uz_status status = list_groups(g);
-    if (status != UZ_OK)
-        return status;
-    out->groups = uz_alloc_zero(g->n_groups, sizeof *out->groups);
-    if (!out->groups)
-        return gmsh_no_memory(g->file);
-    out->n_groups = g->n_groups;
-    walk_members(g, false);
-    if (g->file->n_names > 1)
-        qsort(g->file->names, (size_t)g->file->n_names, sizeof *g->file->names, compare_names);
-    for (int64_t i = 0; i < g->n_groups && status == UZ_OK; i++)
-        status = make_group(g, i);
-    if (status == UZ_OK)
-        walk_members(g, true);
-    return status;
-}
-
 uz_status gmsh_make_groups(uz_given_mesh *out, gmsh_file *file, int dim, const int64_t *new_element)
 {
     grouping g = {.file = file, .out = out, .new_element = new_element, .dim = dim};
     uz_status status = file->version == 22 ? parts_of_tags(file) : UZ_OK;
     if (status == UZ_OK)
-        status = fill_groups(&g);
+        status = list_groups(&g);
+    if (status == UZ_OK && !(out->groups = uz_alloc_zero(g.n_groups, sizeof *out->groups)))
+        status = gmsh_no_memory(file);
+    if (status == UZ_OK) {
+        out->n_groups = g.n_groups;
+        walk_members(&g, false);
+        if (file->n_names > 1)
+            qsort(file->names, (size_t)file->n_names, sizeof *file->names, compare_names);
+    }
+    for (int64_t i = 0; i < g.n_groups && status == UZ_OK; i++)
+        status = make_group(&g, i);
+    if (status == UZ_OK)
+        walk_members(&g, true);
     free(g.group);
     return status;
 }

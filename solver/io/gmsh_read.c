@@ -75,39 +75,13 @@ static uz_status skip_ints(gmsh_text *text, int64_t count)
     return status;
 }
 
-static size_t int_bytes(const gmsh_text *text)
-{
-    return text->binary ? 4 : 2;
-}
-
-/* The physical tags of an entity. A negative one asks for the opposite sense, which groups have not. */
-static uz_status read_physicals(gmsh_file *file, gmsh_part *part)
-{
-    gmsh_text *text = &file->text;
-    int64_t count = 0, tag = 0;
-    uz_status status = gmsh_size(text, &count, "the number of physical groups of an entity");
-    if (status == UZ_OK)
-        status = gmsh_count(text, count, int_bytes(text), "physical groups");
-    part->first = file->n_physical;
-    for (int64_t i = 0; i < count && status == UZ_OK; i++) {
-        status = gmsh_int(text, &tag, "the number of a physical group");
-        if (status != UZ_OK)
-            break;
-        if (!gmsh_grow((void **)&file->physical, file->n_physical, &file->physical_room, sizeof *file->physical))
-            return gmsh_no_memory(file);
-        file->physical[file->n_physical++] = tag < 0 ? -tag : tag;
-        part->count++;
-    }
-    return status;
-}
-
 /* tag [partition] box (a point for points) physical groups [bounding entities], a partition being
  * parentDim parentTag numPartitions partitionTag... */
 static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
 {
     gmsh_text *text = &file->text;
     gmsh_part part = {.dim = dim};
-    int64_t count = 0, partitions = 0;
+    int64_t count = 0, partitions = 0, groups = 0, tag = 0;
     uz_status status = gmsh_int(text, &part.tag, "the number of an entity");
     if (status == UZ_OK && partitioned)
         status = skip_ints(text, 2);
@@ -118,7 +92,18 @@ static uz_status read_entity(gmsh_file *file, int dim, bool partitioned)
     if (status == UZ_OK)
         status = read_reals(text, dim == 0 ? 3 : 6, NULL);
     if (status == UZ_OK)
-        status = read_physicals(file, &part);
+        status = gmsh_size(text, &groups, "the number of physical groups of an entity");
+    if (status == UZ_OK)
+        status = gmsh_count(text, groups, text->binary ? 4 : 2, "physical groups");
+    part.first = file->n_physical;
+    for (; part.count < groups && status == UZ_OK; part.count += status == UZ_OK) {
+        status = gmsh_int(text, &tag, "the number of a physical group");
+        if (status == UZ_OK &&
+            !gmsh_grow((void **)&file->physical, file->n_physical, &file->physical_room, sizeof *file->physical))
+            status = gmsh_no_memory(file);
+        if (status == UZ_OK) /* a negative one asks for the opposite sense, which groups have not */
+            file->physical[file->n_physical++] = tag < 0 ? -tag : tag;
+    }
     if (status == UZ_OK && dim > 0)
         status = gmsh_size(text, &count, "the number of bounding entities");
     if (status == UZ_OK)
@@ -158,7 +143,7 @@ uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
     if (status == UZ_OK && partitioned)
         status = gmsh_size(text, &ghosts, "the number of ghost entities");
     if (status == UZ_OK && partitioned)
-        status = gmsh_count(text, ghosts, 2 * int_bytes(text), "ghost entities");
+        status = gmsh_count(text, ghosts, text->binary ? 8 : 4, "ghost entities");
     if (status == UZ_OK)
         status = skip_ints(text, 2 * ghosts);
     for (int dim = 0; dim < 4 && status == UZ_OK; dim++)
@@ -177,40 +162,6 @@ uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
 }
 
 /* ---- nodes */
-
-static uz_status make_nodes(gmsh_file *file, int64_t count)
-{
-    const size_t least = file->text.binary ? 28 : 7; /* 1 0 0 0 */
-    if (file->tag)
-        return gmsh_fail(&file->text, UZ_ERR_FORMAT, "a second $Nodes");
-    uz_status status = gmsh_count(&file->text, count, least, "nodes");
-    if (status == UZ_OK && file->max_bytes > 0 && (uint64_t)count > file->max_bytes / (8 * sizeof(double)))
-        status = gmsh_fail(&file->text, UZ_ERR_LIMIT, "the mesh needs more memory than is allowed");
-    if (status != UZ_OK)
-        return status;
-    file->xyz = uz_alloc(3 * count, sizeof *file->xyz);
-    file->tag = uz_alloc(count, sizeof *file->tag);
-    if (!file->xyz || !file->tag)
-        return gmsh_no_memory(file);
-    return UZ_OK;
-}
-
-static uz_status read_nodes_2(gmsh_file *file)
-{
-    gmsh_text *text = &file->text;
-    int64_t count = 0;
-    uz_status status = gmsh_int_text(text, &count, "the number of nodes");
-    if (status == UZ_OK)
-        status = gmsh_end_line(text);
-    if (status == UZ_OK)
-        status = make_nodes(file, count);
-    for (; file->n_nodes < count && status == UZ_OK; file->n_nodes += status == UZ_OK) {
-        status = gmsh_int(text, &file->tag[file->n_nodes], "the number of a node");
-        if (status == UZ_OK)
-            status = read_reals(text, 3, file->xyz + 3 * file->n_nodes);
-    }
-    return status;
-}
 
 /* entityDim entityTag parametric numNodes, the tags of all, the coordinates of all. */
 static uz_status read_node_block(gmsh_file *file, int64_t count)
@@ -237,25 +188,6 @@ static uz_status read_node_block(gmsh_file *file, int64_t count)
     return status;
 }
 
-static uz_status read_nodes_4(gmsh_file *file)
-{
-    gmsh_text *text = &file->text;
-    int64_t blocks = 0, count = 0, ends = 0;
-    uz_status status = gmsh_size(text, &blocks, "the number of blocks of nodes");
-    if (status == UZ_OK)
-        status = gmsh_size(text, &count, "the number of nodes");
-    for (int i = 0; i < 2 && status == UZ_OK; i++)
-        status = gmsh_size(text, &ends, "the number of a node");
-    if (status == UZ_OK)
-        status = make_nodes(file, count);
-    for (int64_t b = 0; b < blocks && status == UZ_OK; b++)
-        status = read_node_block(file, count);
-    if (status == UZ_OK && file->n_nodes < count)
-        status = gmsh_fail(text, UZ_ERR_FORMAT, "%lld nodes are announced, but there are %lld", (long long)count,
-                           (long long)file->n_nodes);
-    return status;
-}
-
 typedef struct {
     int64_t tag, index;
 } tagged_node;
@@ -266,10 +198,7 @@ static int compare_tagged(const void *a, const void *b)
     return (x->tag > y->tag) - (x->tag < y->tag);
 }
 
-static uz_status twice(const gmsh_file *file, int64_t tag)
-{
-    return gmsh_fail(&file->text, UZ_ERR_FORMAT, "$Nodes has two nodes with the number %lld", (long long)tag);
-}
+#define TWICE "$Nodes has two nodes with the number %lld"
 
 /* Prepares gmsh_find_node. */
 static uz_status list_tags(gmsh_file *file)
@@ -295,7 +224,7 @@ static uz_status list_tags(gmsh_file *file)
         for (int64_t i = 0; i < file->n_nodes; i++) {
             int64_t *at = &file->by_tag[file->tag[i] - file->low_tag];
             if (*at >= 0)
-                return twice(file, file->tag[i]);
+                return gmsh_fail(&file->text, UZ_ERR_FORMAT, TWICE, (long long)file->tag[i]);
             *at = i;
         }
         return UZ_OK;
@@ -311,7 +240,7 @@ static uz_status list_tags(gmsh_file *file)
     for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++) {
         file->by_tag[i] = node[i].index;
         if (i > 0 && node[i].tag == node[i - 1].tag)
-            status = twice(file, node[i].tag);
+            status = gmsh_fail(&file->text, UZ_ERR_FORMAT, TWICE, (long long)node[i].tag);
     }
     free(node);
     return status;
@@ -319,7 +248,35 @@ static uz_status list_tags(gmsh_file *file)
 
 uz_status gmsh_read_nodes(gmsh_file *file)
 {
-    uz_status status = file->version == 22 ? read_nodes_2(file) : read_nodes_4(file);
+    static const char *const WHAT[] = {"the number of blocks of nodes", "the number of nodes", "the number of a node"};
+    gmsh_text *text = &file->text;
+    const bool old = file->version == 22;
+    int64_t blocks = 0, count = 0;
+    uz_status status = old ? gmsh_int_text(text, &count, WHAT[1]) : gmsh_head_4(text, &blocks, &count, WHAT);
+    if (status == UZ_OK && old)
+        status = gmsh_end_line(text);
+    if (status == UZ_OK && file->tag)
+        status = gmsh_fail(text, UZ_ERR_FORMAT, "a second $Nodes");
+    if (status == UZ_OK)
+        status = gmsh_count(text, count, text->binary ? 28 : 7, "nodes"); /* 1 0 0 0 */
+    if (status == UZ_OK && file->max_bytes > 0 && (uint64_t)count > file->max_bytes / (8 * sizeof(double)))
+        status = gmsh_fail(text, UZ_ERR_LIMIT, "the mesh needs more memory than is allowed");
+    if (status != UZ_OK)
+        return status;
+    file->xyz = uz_alloc(3 * count, sizeof *file->xyz);
+    file->tag = uz_alloc(count, sizeof *file->tag);
+    if (!file->xyz || !file->tag)
+        return gmsh_no_memory(file);
+    for (; old && file->n_nodes < count && status == UZ_OK; file->n_nodes += status == UZ_OK) {
+        status = gmsh_int(text, &file->tag[file->n_nodes], WHAT[2]);
+        if (status == UZ_OK)
+            status = read_reals(text, 3, file->xyz + 3 * file->n_nodes);
+    }
+    for (int64_t b = 0; b < blocks && status == UZ_OK; b++)
+        status = read_node_block(file, count);
+    if (status == UZ_OK && file->n_nodes < count)
+        status = gmsh_fail(text, UZ_ERR_FORMAT, "%lld nodes are announced, but there are %lld", (long long)count,
+                           (long long)file->n_nodes);
     return status == UZ_OK ? list_tags(file) : status;
 }
 

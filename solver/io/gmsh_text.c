@@ -77,17 +77,12 @@ static uz_status not_finite(const gmsh_text *text)
     return gmsh_fail(text, UZ_ERR_NOT_FINITE, "a coordinate is not a finite number");
 }
 
-static bool is_no_number(const gmsh_text *text)
-{
-    const char *at = text->at + (text->at < text->end && (*text->at == '-' || *text->at == '+'));
-    return text->end - at >= 3 && ((at[0] | 32) == 'n' || (at[0] | 32) == 'i') && (at[1] | 32) != 'o';
-}
-
 uz_status gmsh_real_text(gmsh_text *text, double *value)
 {
     skip_space(text);
     const size_t used = uz_parse_double(value, text->at, gmsh_left(text));
-    if (used == 0 && is_no_number(text))
+    const char *at = text->at + (text->at < text->end && (*text->at == '-' || *text->at == '+'));
+    if (used == 0 && text->end - at >= 3 && ((at[0] | 32) == 'n' || (at[0] | 32) == 'i') && (at[1] | 32) != 'o')
         return not_finite(text);
     if (used == 0 || !word_ends(text->at + used, text))
         return fail_word(text, "a number");
@@ -196,6 +191,17 @@ uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const ch
 }
 
 /* ---- sections */
+
+uz_status gmsh_head_4(gmsh_text *text, int64_t *blocks, int64_t *count, const char *const what[3])
+{
+    int64_t ends;
+    uz_status status = gmsh_size(text, blocks, what[0]);
+    if (status == UZ_OK)
+        status = gmsh_size(text, count, what[1]);
+    for (int i = 0; i < 2 && status == UZ_OK; i++)
+        status = gmsh_size(text, &ends, what[2]);
+    return status;
+}
 
 uz_status gmsh_end_line(gmsh_text *text)
 {

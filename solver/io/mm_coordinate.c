@@ -54,45 +54,10 @@ static uz_status fail_repeated(const mm_text *text, const entry *e)
                         (long long)e->row + 1, (long long)e->col + 1);
 }
 
-/* Leaves the ordered way: the columns of the entries so far follow from their counts. */
-static uz_status remember_columns(gather *g, uz_error *err)
-{
-    int64_t at = 0;
-    g->col = uz_alloc(g->capacity, sizeof *g->col);
-    if (!g->col)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to sort %lld entries", (long long)g->capacity);
-    for (int64_t j = 0; j <= g->last_col; j++) {
-        for (int64_t k = 0; k < g->A->ptr[1 + j]; k++)
-            g->col[at++] = j;
-    }
-    return UZ_OK;
-}
-
-static uz_status store_entry(gather *g, const mm_text *text, const entry *e)
-{
-    if (!g->col && e->col <= g->last_col && (e->col < g->last_col || e->row <= g->last_row)) {
-        if (e->col == g->last_col && e->row == g->last_row)
-            return fail_repeated(text, e);
-        uz_status status = remember_columns(g, text->err);
-        if (status != UZ_OK)
-            return status;
-    }
-    if (g->count == g->capacity)
-        return uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
-    g->A->idx[g->count] = e->row;
-    g->A->val[g->count] = e->value;
-    g->A->ptr[1 + e->col]++;
-    if (g->col)
-        g->col[g->count] = e->col;
-    g->count++;
-    g->last_row = e->row;
-    g->last_col = e->col;
-    return UZ_OK;
-}
-
 static uz_status read_entries(gather *g, mm_text *text, const uz_mm_info *info)
 {
     uz_status status = UZ_OK;
+    uz_csc *A = g->A;
     while (status == UZ_OK && g->count < info->entries) {
         entry e;
         bool found;
@@ -101,26 +66,32 @@ static uz_status read_entries(gather *g, mm_text *text, const uz_mm_info *info)
             status = mm_fail_missing(text, info, g->count);
         if (status == UZ_OK)
             status = read_entry(text, info, &e);
-        if (status == UZ_OK)
-            status = store_entry(g, text, &e);
-        if (status == UZ_OK)
-            status = mm_end_line(text);
+        if (status != UZ_OK)
+            return status;
+        if (!g->col && e.col <= g->last_col && (e.col < g->last_col || e.row <= g->last_row)) {
+            if (e.col == g->last_col && e.row == g->last_row)
+                return fail_repeated(text, &e);
+            /* Leaves the ordered way: the columns of the entries so far follow from their counts. */
+            g->col = uz_alloc(g->capacity, sizeof *g->col);
+            if (!g->col)
+                return uz_fail(text->err, UZ_ERR_MEMORY, "", "no memory to sort %lld entries", (long long)g->capacity);
+            for (int64_t j = 0, at = 0; j <= g->last_col; j++)
+                for (int64_t k = 0; k < A->ptr[1 + j]; k++)
+                    g->col[at++] = j;
+        }
+        if (g->count == g->capacity)
+            return uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
+        A->idx[g->count] = e.row;
+        A->val[g->count] = e.value;
+        A->ptr[1 + e.col]++;
+        if (g->col)
+            g->col[g->count] = e.col;
+        g->count++;
+        g->last_row = e.row;
+        g->last_col = e.col;
+        status = mm_end_line(text);
     }
     return status == UZ_OK ? mm_expect_end(text, info) : status;
-}
-
-/* Where an entry is repeated, reads again from the first data line, which was found correct, to name its line. */
-static uz_status sort_entries(gather *g, mm_text body, const uz_mm_info *info)
-{
-    int64_t repeated;
-    entry e = {0};
-    const uz_status status = mm_sort_columns(g->A, &g->col, g->count, &repeated, body.err);
-    if (status != UZ_OK || repeated < 0)
-        return status;
-    for (bool found; mm_next_line(&body, &found) == UZ_OK && found; repeated--)
-        if (read_entry(&body, info, &e) != UZ_OK || repeated == 0 || mm_end_line(&body) != UZ_OK)
-            break;
-    return fail_repeated(&body, &e);
 }
 
 uz_status mm_read_coordinate(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
@@ -128,11 +99,19 @@ uz_status mm_read_coordinate(uz_csc *A, mm_text *text, const uz_mm_info *info, i
     gather g = {.A = A, .capacity = room, .last_row = -1, .last_col = -1};
     mm_text body = *text;
     uz_status status = read_entries(&g, text, info);
+    int64_t repeated = -1;
+    for (int64_t j = 0; status == UZ_OK && !g.col && j < A->cols; j++)
+        A->ptr[j + 1] += A->ptr[j];
     if (status == UZ_OK && g.col)
-        status = sort_entries(&g, body, info);
-    else
-        for (int64_t j = 0; status == UZ_OK && j < A->cols; j++)
-            A->ptr[j + 1] += A->ptr[j];
+        status = mm_sort_columns(A, &g.col, g.count, &repeated, text->err);
+    if (status == UZ_OK && repeated >= 0) {
+        /* Reads again from the first data line, which was found correct, to name the line of the repeated entry. */
+        entry e = {0};
+        for (bool found; mm_next_line(&body, &found) == UZ_OK && found; repeated--)
+            if (read_entry(&body, info, &e) != UZ_OK || repeated == 0 || mm_end_line(&body) != UZ_OK)
+                break;
+        status = fail_repeated(&body, &e);
+    }
     free(g.col);
     return status;
 }

@@ -46,16 +46,6 @@ static uz_status read_word(mm_text *text, const char *const *words, const char *
     return mm_fail(text, what, BANNER_REMEDY);
 }
 
-static uz_status read_tag(mm_text *text)
-{
-    static const char tag[] = "%%MatrixMarket";
-    size_t length = sizeof tag - 1;
-    if (word_length(text) != length || strncasecmp(text->at, tag, length) != 0)
-        return mm_fail(text, "this is not a Matrix Market text: %%MatrixMarket was expected", BANNER_REMEDY);
-    text->at += length;
-    return UZ_OK;
-}
-
 /* The report's table of kinds: a pattern has no values to fill an array or to change sign; only a complex matrix can
  * differ from its conjugate. */
 static uz_status check_banner(const mm_text *text, const banner *b)
@@ -92,33 +82,15 @@ static uz_status read_size(mm_text *text, const char *what, const char *remedy, 
     return UZ_OK;
 }
 
-static uz_status read_size_line(mm_text *text, uz_mm_info *info)
-{
-    bool coordinate = info->format == UZ_MM_COORDINATE;
-    const char *remedy = coordinate ? "the size line of a coordinate text is ROWS COLUMNS ENTRIES"
-                                    : "the size line of an array text is ROWS COLUMNS";
-    uz_status status = read_size(text, "a number of rows was expected", remedy, &info->rows);
-    if (status == UZ_OK)
-        status = read_size(text, "a number of columns was expected", remedy, &info->cols);
-    if (status == UZ_OK && coordinate)
-        status = read_size(text, "a number of entries was expected", remedy, &info->entries);
-    return status;
-}
-
-/* How many entries the shape can hold, at most INT64_MAX; for an array exactly as many are written. */
-static int64_t places(const uz_mm_info *info)
-{
-    int64_t count;
-    if (info->symmetry == UZ_MM_GENERAL)
-        return __builtin_mul_overflow(info->rows, info->cols, &count) ? INT64_MAX : count;
-    int64_t half = info->rows % 2 == 0 ? info->rows / 2 : info->rows;
-    int64_t other = info->rows % 2 == 0 ? info->rows + 1 : info->rows / 2 + 1;
-    return __builtin_mul_overflow(half, other, &count) ? INT64_MAX : count;
-}
-
 static uz_status check_sizes(const mm_text *text, uz_mm_info *info)
 {
-    int64_t most = places(info);
+    /* How many entries the shape can hold, at most INT64_MAX; for an array exactly as many are written. */
+    const bool triangle = info->symmetry != UZ_MM_GENERAL, even = info->rows % 2 == 0;
+    const int64_t half = triangle && even ? info->rows / 2 : info->rows;
+    const int64_t other = !triangle ? info->cols : even ? info->rows + 1 : info->rows / 2 + 1;
+    int64_t most;
+    if (__builtin_mul_overflow(half, other, &most))
+        most = INT64_MAX;
     if (info->symmetry == UZ_MM_SYMMETRIC && info->rows != info->cols)
         return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line,
                             "a symmetric matrix is square, but this is %lld x %lld; correct the sizes or say general",
@@ -136,11 +108,13 @@ static uz_status check_sizes(const mm_text *text, uz_mm_info *info)
 
 uz_status mm_read_header(mm_text *text, uz_mm_info *info)
 {
+    static const char TAG[] = "%%MatrixMarket";
     banner b = {0};
     bool found = false;
-    uz_status status = read_tag(text);
-    if (status == UZ_OK)
-        status = read_word(text, OBJECTS, "the banner's object must be matrix", &b.object);
+    if (word_length(text) != sizeof TAG - 1 || strncasecmp(text->at, TAG, sizeof TAG - 1) != 0)
+        return mm_fail(text, "this is not a Matrix Market text: %%MatrixMarket was expected", BANNER_REMEDY);
+    text->at += sizeof TAG - 1;
+    uz_status status = read_word(text, OBJECTS, "the banner's object must be matrix", &b.object);
     if (status == UZ_OK)
         status = read_word(text, FORMATS, "the banner's format must be coordinate or array", &b.format);
     if (status == UZ_OK)
@@ -161,7 +135,14 @@ uz_status mm_read_header(mm_text *text, uz_mm_info *info)
     *info = (uz_mm_info){
         .format = (uz_mm_format)b.format, .symmetry = (uz_mm_symmetry)b.symmetry, .integer = b.field == FIELD_INTEGER};
     text->size_line = text->line;
-    status = read_size_line(text, info);
+    const bool coordinate = info->format == UZ_MM_COORDINATE;
+    const char *remedy = coordinate ? "the size line of a coordinate text is ROWS COLUMNS ENTRIES"
+                                    : "the size line of an array text is ROWS COLUMNS";
+    status = read_size(text, "a number of rows was expected", remedy, &info->rows);
+    if (status == UZ_OK)
+        status = read_size(text, "a number of columns was expected", remedy, &info->cols);
+    if (status == UZ_OK && coordinate)
+        status = read_size(text, "a number of entries was expected", remedy, &info->entries);
     if (status == UZ_OK)
         status = check_sizes(text, info); /* names the size line, so before the end of it is taken */
     return status == UZ_OK ? mm_end_line(text) : status;

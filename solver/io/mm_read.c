@@ -15,58 +15,22 @@ static const int64_t BYTES_PER_TEXT_BYTE = 64;
 /* The shortest lines: "1 1 1" and "1", each with its end. */
 enum { COORDINATE_LINE = 6, ARRAY_LINE = 2 };
 
-/* How many entries to make room for: no more than are announced, and no more than the rest of the text can hold. */
-static int64_t entry_room(const mm_text *text, const uz_mm_info *info)
+/* How many entries to make room for: no more than are announced, and no more than the rest of the text can hold.
+ * UZ_ERR_LIMIT: these, of 16 bytes each, and `slots` starts or numbers of 8 bytes may not be allocated for this text.
+ */
+static uz_status make_room(int64_t *room, const mm_text *text, const uz_mm_info *info, int64_t slots, size_t len,
+                           size_t max_bytes)
 {
-    int64_t line = info->format == UZ_MM_COORDINATE ? COORDINATE_LINE : ARRAY_LINE;
-    int64_t most = (int64_t)(text->end - text->at) / line + 1; /* the last line may lack its end */
-    return info->entries < most ? info->entries : most;
-}
-
-static uz_status fail_limit(const uz_mm_info *info, int64_t line, uz_error *err)
-{
-    return uz_fail_line(err, UZ_ERR_LIMIT, line,
+    const int64_t line = info->format == UZ_MM_COORDINATE ? COORDINATE_LINE : ARRAY_LINE;
+    const int64_t most = (int64_t)(text->end - text->at) / line + 1; /* the last line may lack its end */
+    int64_t dense, bytes;
+    *room = info->entries < most ? info->entries : most;
+    if (slots >= 0 && !__builtin_mul_overflow(slots, 8, &dense) && !__builtin_add_overflow(dense, 16 * *room, &bytes) &&
+        (max_bytes > 0 ? (uint64_t)bytes <= max_bytes : dense <= FREE_BYTES + BYTES_PER_TEXT_BYTE * (int64_t)len))
+        return UZ_OK;
+    return uz_fail_line(text->err, UZ_ERR_LIMIT, text->size_line,
                         "a %lld x %lld matrix with %lld entries takes more memory than is allowed here",
                         (long long)info->rows, (long long)info->cols, (long long)info->entries);
-}
-
-/* Whether `slots` starts or numbers of 8 bytes and `room` entries of 16 may be allocated for this text. */
-static bool within_limit(int64_t slots, int64_t room, size_t len, size_t max_bytes)
-{
-    int64_t dense, bytes;
-    if (__builtin_mul_overflow(slots, 8, &dense) || __builtin_add_overflow(dense, 16 * room, &bytes))
-        return false;
-    if (max_bytes > 0 && (uint64_t)bytes > max_bytes)
-        return false;
-    return max_bytes > 0 || dense <= FREE_BYTES + BYTES_PER_TEXT_BYTE * (int64_t)len;
-}
-
-/* Column by column, all rows or those from the diagonal down; a symmetric array is its lower triangle. */
-static uz_status read_array(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
-{
-    uz_status status = UZ_OK;
-    int64_t at = 0;
-    for (int64_t j = 0; j < A->cols; j++) {
-        for (int64_t i = info->symmetry == UZ_MM_SYMMETRIC ? j : 0; i < A->rows; i++) {
-            double value = 0;
-            bool found;
-            status = mm_next_line(text, &found);
-            if (status == UZ_OK && !found)
-                status = mm_fail_missing(text, info, at);
-            if (status == UZ_OK)
-                status = mm_read_value(text, info->integer, &value);
-            if (status == UZ_OK)
-                status = mm_end_line(text);
-            if (status != UZ_OK)
-                return status;
-            if (at == room)
-                return uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
-            A->idx[at] = i;
-            A->val[at++] = value;
-        }
-        A->ptr[j + 1] = at;
-    }
-    return mm_expect_end(text, info);
 }
 
 static uz_status read_body(uz_csc *A, mm_text *text, const uz_mm_info *info, int64_t room)
@@ -74,8 +38,32 @@ static uz_status read_body(uz_csc *A, mm_text *text, const uz_mm_info *info, int
     uz_status status = uz_csc_init(A, info->rows, info->cols, room, text->err);
     if (status == UZ_OK && info->format == UZ_MM_COORDINATE)
         status = mm_read_coordinate(A, text, info, room);
-    else if (status == UZ_OK)
-        status = read_array(A, text, info, room);
+    else if (status == UZ_OK) {
+        /* Column by column, all rows or those from the diagonal down; a symmetric array is its lower triangle. */
+        int64_t at = 0;
+        for (int64_t j = 0; status == UZ_OK && j < A->cols; j++) {
+            for (int64_t i = info->symmetry == UZ_MM_SYMMETRIC ? j : 0; status == UZ_OK && i < A->rows; i++) {
+                double value = 0;
+                bool found;
+                status = mm_next_line(text, &found);
+                if (status == UZ_OK && !found)
+                    status = mm_fail_missing(text, info, at);
+                if (status == UZ_OK)
+                    status = mm_read_value(text, info->integer, &value);
+                if (status == UZ_OK)
+                    status = mm_end_line(text);
+                if (status == UZ_OK && at == room)
+                    status = uz_fail(text->err, UZ_ERR_INTERNAL, "", "more entries than the text has room for");
+                if (status != UZ_OK)
+                    break;
+                A->idx[at] = i;
+                A->val[at++] = value;
+            }
+            A->ptr[j + 1] = at;
+        }
+        if (status == UZ_OK)
+            status = mm_expect_end(text, info);
+    }
     if (status != UZ_OK)
         uz_csc_clear(A);
     return status;
@@ -99,33 +87,16 @@ uz_status uz_mm_read(uz_csc *out, uz_mm_info *info, const char *text, size_t len
     uz_status status = mm_read_header(&t, &head);
     if (status != UZ_OK)
         return status;
-    int64_t room = entry_room(&t, &head);
-    if (!within_limit(head.cols + 1, room, len, max_bytes))
-        return fail_limit(&head, t.size_line, err);
-    status = read_body(&A, &t, &head, room);
+    int64_t room;
+    status = make_room(&room, &t, &head, head.cols + 1, len, max_bytes);
+    if (status == UZ_OK)
+        status = read_body(&A, &t, &head, room);
     if (status != UZ_OK)
         return status;
     *out = A;
     if (info)
         *info = head;
     return UZ_OK;
-}
-
-/* The numbers of a matrix of one row or one column; an array's values are taken as they are. */
-static double *take_numbers(uz_csc *A, const uz_mm_info *info, int64_t n)
-{
-    double *x = NULL;
-    if (info->format == UZ_MM_ARRAY) {
-        x = A->val;
-        A->val = NULL;
-        return x;
-    }
-    x = uz_alloc_zero(n, sizeof *x);
-    for (int64_t j = 0; x && j < A->cols; j++) {
-        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++)
-            x[A->cols == 1 ? A->idx[k] : j] = A->val[k];
-    }
-    return x;
 }
 
 uz_status uz_mm_read_vector(double **out, int64_t *n, const char *text, size_t len, size_t max_bytes, uz_error *err)
@@ -142,16 +113,26 @@ uz_status uz_mm_read_vector(double **out, int64_t *n, const char *text, size_t l
         return uz_fail_line(err, UZ_ERR_SIZE, t.size_line,
                             "a vector was expected, this matrix is %lld x %lld; send n x 1 or 1 x n",
                             (long long)head.rows, (long long)head.cols);
-    int64_t size = head.cols == 1 ? head.rows : head.cols, room = entry_room(&t, &head);
-    int64_t numbers = head.format == UZ_MM_COORDINATE ? size : 0, wanted;
-    if (__builtin_add_overflow(head.cols, 1, &wanted) || __builtin_add_overflow(wanted, numbers, &wanted) ||
-        !within_limit(wanted, room, len, max_bytes))
-        return fail_limit(&head, t.size_line, err);
-    status = read_body(&A, &t, &head, room);
-    double *x = status == UZ_OK ? take_numbers(&A, &head, size) : NULL;
-    uz_csc_clear(&A);
+    const int64_t size = head.cols == 1 ? head.rows : head.cols, numbers = head.format == UZ_MM_COORDINATE ? size : 0;
+    int64_t wanted, room;
+    if (__builtin_add_overflow(head.cols, 1, &wanted) || __builtin_add_overflow(wanted, numbers, &wanted))
+        wanted = -1;
+    status = make_room(&room, &t, &head, wanted, len, max_bytes);
+    if (status == UZ_OK)
+        status = read_body(&A, &t, &head, room);
     if (status != UZ_OK)
         return status;
+    /* The numbers of a matrix of one row or one column; an array's values are taken as they are. */
+    double *x = A.val;
+    if (head.format == UZ_MM_ARRAY) {
+        A.val = NULL;
+    } else {
+        x = uz_alloc_zero(size, sizeof *x);
+        for (int64_t j = 0; x && j < A.cols; j++)
+            for (int64_t k = A.ptr[j]; k < A.ptr[j + 1]; k++)
+                x[A.cols == 1 ? A.idx[k] : j] = A.val[k];
+    }
+    uz_csc_clear(&A);
     if (!x)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vector of %lld numbers", (long long)size);
     *out = x;

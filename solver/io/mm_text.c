@@ -36,16 +36,6 @@ uz_status mm_fail(const mm_text *text, const char *what, const char *remedy)
     return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line, "%s, found \"%s\"; %s", what, word, remedy);
 }
 
-static uz_status skip_comment(mm_text *text)
-{
-    const char *newline = memchr(text->at, '\n', (size_t)(text->end - text->at));
-    const char *stop = newline ? newline : text->end;
-    if (memchr(text->at, '\0', (size_t)(stop - text->at)))
-        return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line, "a NUL byte in a comment; send text only");
-    text->at = stop;
-    return UZ_OK;
-}
-
 /* Takes LF or CR LF. A CR at the very end of the text counts as an end of line that was cut. */
 static bool take_newline(mm_text *text)
 {
@@ -71,9 +61,11 @@ uz_status mm_next_line(mm_text *text, bool *found)
         if (text->at == text->end)
             return UZ_OK;
         if (*text->at == '%') {
-            uz_status status = skip_comment(text);
-            if (status != UZ_OK)
-                return status;
+            const char *newline = memchr(text->at, '\n', (size_t)(text->end - text->at));
+            const char *stop = newline ? newline : text->end;
+            if (memchr(text->at, '\0', (size_t)(stop - text->at)))
+                return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line, "a NUL byte in a comment; send text only");
+            text->at = stop;
         } else if (!take_newline(text)) {
             *found = true;
             return UZ_OK;
@@ -121,42 +113,31 @@ static uz_status not_finite(mm_text *text)
                         "\"%s\" is not a finite double; every value must be a number below 1.8e308 in size", word);
 }
 
-/* What C programs print for values that are no numbers: a sign, then nan, nan(...), inf or infinity. */
-static bool is_nan_or_inf(const mm_text *text)
-{
-    mm_text end = *text;
-    if (end.at < end.end && (*end.at == '-' || *end.at == '+'))
-        end.at++;
-    const char *word = end.at;
-    while (!mm_word_ends(&end))
-        end.at++;
-    size_t length = (size_t)(end.at - word);
-    return (length == 3 && (strncasecmp(word, "nan", 3) == 0 || strncasecmp(word, "inf", 3) == 0)) ||
-           (length == 8 && strncasecmp(word, "infinity", 8) == 0) || (length > 4 && strncasecmp(word, "nan(", 4) == 0);
-}
-
-static bool is_whole(const char *digits, size_t length)
-{
-    for (size_t k = digits[0] == '-' || digits[0] == '+'; k < length; k++) {
-        if (!mm_is_digit(digits[k]))
-            return false;
-    }
-    return true;
-}
-
 uz_status mm_read_value(mm_text *text, bool integer, double *value)
 {
     const char *start = text->at;
     size_t used = uz_parse_double(value, start, (size_t)(text->end - start));
+    bool whole = true;
+    for (size_t k = integer && used > 0 && (*start == '-' || *start == '+'); integer && k < used; k++)
+        whole = whole && mm_is_digit(start[k]);
     text->at += used;
-    if (used > 0 && mm_word_ends(text) && (!integer || is_whole(start, used))) {
+    if (used > 0 && mm_word_ends(text) && whole) {
         if (isfinite(*value))
             return UZ_OK;
         text->at = start;
         return not_finite(text);
     }
     text->at = start;
-    if (is_nan_or_inf(text))
+    /* What C programs print for values that are no numbers: a sign, then nan, nan(...), inf or infinity. */
+    mm_text end = *text;
+    if (end.at < end.end && (*end.at == '-' || *end.at == '+'))
+        end.at++;
+    const char *word = end.at;
+    while (!mm_word_ends(&end))
+        end.at++;
+    const size_t length = (size_t)(end.at - word);
+    if ((length == 3 && (strncasecmp(word, "nan", 3) == 0 || strncasecmp(word, "inf", 3) == 0)) ||
+        (length == 8 && strncasecmp(word, "infinity", 8) == 0) || (length > 4 && strncasecmp(word, "nan(", 4) == 0))
         return not_finite(text);
     return mm_fail(text, integer ? "a whole number was expected" : "a number was expected",
                    integer ? "write digits only, or say real in the banner" : "write it like -1.5e-3");

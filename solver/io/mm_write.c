@@ -9,25 +9,10 @@
 /* The longest line: two 19-digit numbers, a double of 24 characters, two blanks, LF and NUL. */
 enum { LINE_ROOM = 40 + UZ_DOUBLE_ROOM };
 
-static uz_status put_entry(uz_buffer *out, int64_t row, int64_t col, double value, uz_error *err)
-{
-    char line[LINE_ROOM];
-    if (!isfinite(value))
-        return uz_fail(err, UZ_ERR_NOT_FINITE, "", "entry (%lld, %lld) is not a finite number and cannot be written",
-                       (long long)row + 1, (long long)col + 1);
-    size_t used = uz_format_integer(line, (uint64_t)row + 1);
-    line[used++] = ' ';
-    used += uz_format_integer(line + used, (uint64_t)col + 1);
-    line[used++] = ' ';
-    used += uz_format_double(line + used, value);
-    line[used++] = '\n';
-    uz_buffer_put(out, line, used);
-    return UZ_OK;
-}
-
 uz_status uz_mm_write(char **text, size_t *len, const uz_csc *A, uz_mm_symmetry symmetry, uz_error *err)
 {
     uz_buffer out = {0};
+    char line[LINE_ROOM];
     const bool lower = symmetry == UZ_MM_SYMMETRIC;
     uz_status status = UZ_OK;
     *text = NULL;
@@ -40,11 +25,23 @@ uz_status uz_mm_write(char **text, size_t *len, const uz_csc *A, uz_mm_symmetry 
                     (long long)(A->ptr ? A->ptr[A->cols] : 0));
     for (int64_t j = 0; status == UZ_OK && A->ptr && j < A->cols; j++)
         for (int64_t k = A->ptr[j]; status == UZ_OK && !out.failed && k < A->ptr[j + 1]; k++) {
-            if (lower && A->idx[k] < j)
+            const int64_t row = A->idx[k];
+            if (lower && row < j)
                 status =
                     uz_fail(err, UZ_ERR_ARGUMENT, "", "a symmetric matrix is written from its lower triangle only");
-            else
-                status = put_entry(&out, A->idx[k], j, A->val[k], err);
+            else if (!isfinite(A->val[k]))
+                status = uz_fail(err, UZ_ERR_NOT_FINITE, "",
+                                 "entry (%lld, %lld) is not a finite number and cannot be written", (long long)row + 1,
+                                 (long long)j + 1);
+            if (status != UZ_OK)
+                break;
+            size_t used = uz_format_integer(line, (uint64_t)row + 1);
+            line[used++] = ' ';
+            used += uz_format_integer(line + used, (uint64_t)j + 1);
+            line[used++] = ' ';
+            used += uz_format_double(line + used, A->val[k]);
+            line[used++] = '\n';
+            uz_buffer_put(&out, line, used);
         }
     if (status == UZ_OK)
         return uz_buffer_finish(text, len, &out, err);

@@ -12,34 +12,29 @@ enum { BLOCK = 1 << 20 };
  */
 enum { LEVEL = 1 };
 
-/* Fills head (3 + blocks numbers) and the compressed bytes. */
-static bool compress_blocks(uint64_t *head, unsigned char *out, size_t *out_len, const unsigned char *bytes, size_t n)
-{
-    const size_t blocks = (n + BLOCK - 1) / BLOCK;
-    struct libdeflate_compressor *compressor = libdeflate_alloc_compressor(LEVEL);
-    bool ok = compressor != NULL;
-    head[0] = blocks;
-    head[1] = BLOCK;
-    head[2] = n % BLOCK; /* 0: the last one is whole */
-    *out_len = 0;
-    for (size_t b = 0; ok && b < blocks; b++) {
-        const size_t size = b + 1 < blocks || n % BLOCK == 0 ? (size_t)BLOCK : n % BLOCK;
-        const size_t room = libdeflate_zlib_compress_bound(compressor, size);
-        head[3 + b] = libdeflate_zlib_compress(compressor, bytes + b * BLOCK, size, out + *out_len, room);
-        *out_len += head[3 + b];
-        ok = head[3 + b] > 0;
-    }
-    libdeflate_free_compressor(compressor);
-    return ok;
-}
-
+/* The numbers of blocks and their sizes (3 + blocks), then the compressed blocks. */
 static void put_compressed(uz_buffer *vtu, const unsigned char *bytes, size_t n)
 {
     const size_t blocks = (n + BLOCK - 1) / BLOCK;
     size_t packed = 0;
     uint64_t *head = uz_alloc((int64_t)blocks + 3, sizeof *head);
     unsigned char *out = uz_alloc((int64_t)(blocks * libdeflate_zlib_compress_bound(NULL, BLOCK)), 1);
-    if (head && out && compress_blocks(head, out, &packed, bytes, n)) {
+    struct libdeflate_compressor *compressor = head && out ? libdeflate_alloc_compressor(LEVEL) : NULL;
+    bool ok = compressor != NULL;
+    if (ok) {
+        head[0] = blocks;
+        head[1] = BLOCK;
+        head[2] = n % BLOCK; /* 0: the last one is whole */
+    }
+    for (size_t b = 0; ok && b < blocks; b++) {
+        const size_t size = b + 1 < blocks || n % BLOCK == 0 ? (size_t)BLOCK : n % BLOCK;
+        const size_t room = libdeflate_zlib_compress_bound(compressor, size);
+        head[3 + b] = libdeflate_zlib_compress(compressor, bytes + b * BLOCK, size, out + packed, room);
+        packed += head[3 + b];
+        ok = head[3 + b] > 0;
+    }
+    libdeflate_free_compressor(compressor);
+    if (ok) {
         uz_buffer_put_base64(vtu, head, (3 + blocks) * sizeof *head);
         uz_buffer_put_base64(vtu, out, packed);
     } else {
@@ -66,48 +61,9 @@ void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void
     uz_buffer_print(vtu, "</DataArray>\n");
 }
 
-void uz_vtu_open(uz_buffer *vtu, const char *section)
+void uz_vtu_tag(uz_buffer *vtu, const char *section)
 {
     uz_buffer_print(vtu, "      <%s>\n", section);
-}
-
-void uz_vtu_close(uz_buffer *vtu, const char *section)
-{
-    uz_buffer_print(vtu, "      </%s>\n", section);
-}
-
-/* A point has three coordinates there, whatever the model. */
-static void put_points(uz_buffer *vtu, const uz_mesh *mesh)
-{
-    double *xyz = uz_alloc_zero(mesh->n_nodes * 3, sizeof *xyz);
-    if (!xyz) {
-        vtu->failed = true;
-        return;
-    }
-    for (int64_t a = 0; a < mesh->n_nodes; a++)
-        memcpy(xyz + 3 * a, mesh->xyz + a * mesh->dim, (size_t)mesh->dim * sizeof *xyz);
-    uz_vtu_open(vtu, "Points");
-    uz_vtu_array(vtu, "Points", UZ_VTU_DOUBLE, xyz, mesh->n_nodes, 3, NULL);
-    uz_vtu_close(vtu, "Points");
-    free(xyz);
-}
-
-/* Node order of all kinds is VTK's own. */
-static void put_cells(uz_buffer *vtu, const uz_mesh *mesh)
-{
-    unsigned char *type = uz_alloc(mesh->n_elements, sizeof *type);
-    if (!type) {
-        vtu->failed = true;
-        return;
-    }
-    for (int64_t e = 0; e < mesh->n_elements; e++)
-        type[e] = (unsigned char)uz_element_type_of((uz_element_kind)mesh->kind[e])->vtk;
-    uz_vtu_open(vtu, "Cells");
-    uz_vtu_array(vtu, "connectivity", UZ_VTU_INT64, mesh->node, mesh->first[mesh->n_elements], 1, NULL);
-    uz_vtu_array(vtu, "offsets", UZ_VTU_INT64, mesh->first + 1, mesh->n_elements, 1, NULL);
-    uz_vtu_array(vtu, "types", UZ_VTU_BYTE, type, mesh->n_elements, 1, NULL);
-    uz_vtu_close(vtu, "Cells");
-    free(type);
 }
 
 void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh)
@@ -121,8 +77,27 @@ void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh)
                     "  <UnstructuredGrid>\n"
                     "    <Piece NumberOfPoints=\"%lld\" NumberOfCells=\"%lld\">\n",
                     little ? "LittleEndian" : "BigEndian", (long long)mesh->n_nodes, (long long)mesh->n_elements);
-    put_points(vtu, mesh);
-    put_cells(vtu, mesh);
+    double *xyz = uz_alloc_zero(mesh->n_nodes * 3, sizeof *xyz);
+    unsigned char *type = uz_alloc(mesh->n_elements, sizeof *type);
+    vtu->failed = vtu->failed || !xyz || !type;
+    /* A point has three coordinates there, whatever the model. */
+    for (int64_t a = 0; xyz && a < mesh->n_nodes; a++)
+        memcpy(xyz + 3 * a, mesh->xyz + a * mesh->dim, (size_t)mesh->dim * sizeof *xyz);
+    /* Node order of all kinds is VTK's own. */
+    for (int64_t e = 0; type && e < mesh->n_elements; e++)
+        type[e] = (unsigned char)uz_element_type_of((uz_element_kind)mesh->kind[e])->vtk;
+    if (!vtu->failed) {
+        uz_vtu_tag(vtu, "Points");
+        uz_vtu_array(vtu, "Points", UZ_VTU_DOUBLE, xyz, mesh->n_nodes, 3, NULL);
+        uz_vtu_tag(vtu, "/Points");
+        uz_vtu_tag(vtu, "Cells");
+        uz_vtu_array(vtu, "connectivity", UZ_VTU_INT64, mesh->node, mesh->first[mesh->n_elements], 1, NULL);
+        uz_vtu_array(vtu, "offsets", UZ_VTU_INT64, mesh->first + 1, mesh->n_elements, 1, NULL);
+        uz_vtu_array(vtu, "types", UZ_VTU_BYTE, type, mesh->n_elements, 1, NULL);
+        uz_vtu_tag(vtu, "/Cells");
+    }
+    free(xyz);
+    free(type);
 }
 
 uz_status uz_vtu_finish(char **text, size_t *len, uz_buffer *vtu, uz_error *err)
