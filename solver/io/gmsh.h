@@ -121,9 +121,4 @@ gmsh_type gmsh_type_of(int64_t type);
 /* The element of that type; -1: none. */
 int gmsh_kind_of(int64_t type);
 
-/* ---- the mesh of what was read */
-
-/* Its groups. new_element: the number of each element of the file in the mesh, -1: it is none of its elements. */
-uz_status gmsh_make_groups(uz_given_mesh *out, gmsh_file *file, int dim, const int64_t *new_element);
-
 #endif

@@ -63,10 +63,6 @@ static inline int64_t mm_count(mm_text *text)
     return value;
 }
 
-/* The banner and the size line. Leaves *text behind the size line. On success info->entries is what the text must
- * hold, checked against the shape but not against the length of the text. */
-uz_status mm_read_header(mm_text *text, uz_mm_info *info);
-
 /* One number where a value must stand: finite, and whole if `integer`. */
 uz_status mm_read_value(mm_text *text, bool integer, double *value);
 
