@@ -3,7 +3,7 @@
 
 #include "certificate/one_sided.h"
 #include "certificate/residual.h"
-#include "certificate/row_relax.h"
+#include "certificate/row_exact.h"
 #include "core/alloc.h"
 #include "core/error.h"
 
@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LEAST_ROUNDS = 2, CLOSING_ROUNDS = 8, MAX_ROUNDS = 40 };
+enum { LEAST_ROUNDS = 2, MAX_ROUNDS = 8 };
 
 /* Double-double arithmetic carries about 100 bits: a violation of the constraints by 2^-80 of their size is rounding.
  */
@@ -110,12 +110,12 @@ static double gap_rounding(const uz_feasible *c, int64_t i)
 /* The rows to move in this round and by how much: target_i is the gap to take away and a little more, so that the
  * correction's own rounding leaves the gap open; 0 for rows left alone. Returns the worst violation, relative to the
  * size of its row. */
-static double choose_rows(const uz_feasible *c, const double *r, bool closing)
+static double choose_rows(const uz_feasible *c, const double *r)
 {
     double worst = 0.0;
     for (int64_t i = 0; i < c->m; i++) {
         double gap = uz_feasible_gap(c, i);
-        bool close = closing && worth_closing(c, r, i, fabs(gap));
+        bool close = worth_closing(c, r, i, fabs(gap));
         c->move.in[i] = close || uz_row_penetrates(gap);
         c->move.target[i] = c->move.in[i] ? gap - gap_rounding(c, i) : 0.0;
         worst = isnan(gap) ? INFINITY : uz_row_penetrates(gap) ? fmax(worst, -gap / c->size[i]) : worst;
@@ -123,18 +123,18 @@ static double choose_rows(const uz_feasible *c, const double *r, bool closing)
     return worst;
 }
 
-/* Rounds of equations from round `first` on: until CLOSING_ROUNDS gaps are closed, later penetrating rows are only
- * lifted. Each round starts from gaps in double-double precision, so what rounding left is moved by the next. True when
- * no gap of u + c is negative by more than the rounding of double-double arithmetic. */
-static bool move_rows(uz_feasible *c, const double *r, int first, int last)
+/* Rounds of equations. Each starts from gaps in double-double precision, so what rounding left is moved by the next.
+ * True when no gap of u + c is negative by more than the rounding of double-double arithmetic. */
+static bool move_rows(uz_feasible *c, const double *r)
 {
-    for (int round = first; round < last; round++) {
-        double worst = choose_rows(c, r, round < CLOSING_ROUNDS);
+    for (int round = 0; round < MAX_ROUNDS; round++) {
+        double worst = choose_rows(c, r);
         if (round >= LEAST_ROUNDS && worst <= NEGLIGIBLE)
             return true;
-        uz_row_move_solve(&c->move, c->correction, c->Nt, c->weight);
+        if (!uz_row_move_solve(&c->move, c->correction, c->Nt, c->weight) && round < LEAST_ROUNDS)
+            return false;
     }
-    return choose_rows(c, r, false) <= NEGLIGIBLE;
+    return choose_rows(c, r) <= NEGLIGIBLE;
 }
 
 /* Squared in the norm of W^-1: the moves that would close the chosen rows one by one, added up. */
@@ -155,26 +155,23 @@ static double correction_size(const uz_feasible *c)
     return sum;
 }
 
-/* Rows that nearly depend on each other can't all be closed as equations, or only by a correction
- * far larger than the gaps: then they are relaxed one by one, which is slower where rows share dofs. */
+/* Rows that depend on each other, or nearly so, can't all be closed as equations, or only by a correction far larger
+ * than the gaps; and in long chains of rows conjugate gradients take a step for each. Then an active set chooses. */
 bool uz_make_feasible(uz_feasible *c, const double *r)
 {
-    uz_row_relax relax = {c->Nt, c->weight, r, c->h, c->u, c->move.x, c->correction};
+    const uz_row_exact exact = {c->Nt, c->weight, r, c->h, c->u, c->size, NEGLIGIBLE, c->correction};
     size_rows(c, c->u);
     if (c->low) {
         memcpy(c->correction, c->low, (size_t)c->d * sizeof *c->correction);
-        if (choose_rows(c, r, false) <= NEGLIGIBLE)
+        if (choose_rows(c, r) <= NEGLIGIBLE)
             return true;
     }
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
-    choose_rows(c, r, true);
+    choose_rows(c, r);
     double expected = STRETCH * sum_of_moves(c);
-    bool feasible = move_rows(c, r, 0, CLOSING_ROUNDS);
-    if (feasible && correction_size(c) <= expected)
-        return true;
-    uz_row_relax_solve(&relax);
-    if (move_rows(c, r, CLOSING_ROUNDS, MAX_ROUNDS))
+    bool feasible = move_rows(c, r);
+    if ((feasible && correction_size(c) <= expected) || uz_row_exact_solve(&exact))
         return true;
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
-    return feasible && move_rows(c, r, 0, CLOSING_ROUNDS);
+    return feasible && move_rows(c, r);
 }

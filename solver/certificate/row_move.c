@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_STEPS = 400 };
+enum { MAX_STEPS = 100 };
 
 double uz_row_compliance(const uz_csc *Nt, int64_t i, const double *weight)
 {
@@ -96,7 +96,7 @@ static double advance(uz_row_move *move, double step)
     return rho;
 }
 
-void uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const double *weight)
+bool uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const double *weight)
 {
     double rho = start(move, Nt, weight), stop = rho * DBL_EPSILON * DBL_EPSILON;
     for (int step = 0; step < MAX_STEPS && rho > stop; step++) {
@@ -115,4 +115,5 @@ void uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const dou
             c[j] += move->dofs[j];
             move->dofs[j] = 0.0; /* a dof of several rows is added once */
         }
+    return rho <= stop;
 }

@@ -20,7 +20,7 @@ void uz_row_move_clear(uz_row_move *move);
 
 /* c += the vector of least W^-1 norm with n_i'c = target_i on the rows that take part: c = W N'x with
  * (N W N') x = target, by conjugate gradients with diagonal scaling (Hestenes and Stiefel 1952), which bears dependent
- * rows. Nt: columns are the rows of N. weight: diagonal of W. */
-void uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const double *weight);
+ * rows. Nt: columns are the rows of N. weight: diagonal of W. false: these steps have not ended. */
+bool uz_row_move_solve(uz_row_move *move, double *c, const uz_csc *Nt, const double *weight);
 
 #endif
