@@ -42,10 +42,10 @@ typedef struct {
     double sharp; /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
 } uz_certify_input;
 
-/* u (d): the answer to certify. r (m): <= 0, else its positive part counts as e3 and r is cut at 0. g (m): out, the
- * gaps of u. absolute_error bounds both ||u - u*||_K and ||u_r - u*||_K, with low_r the latter of
- * r + low_r. When no feasible v was found near u the errors
- * are INFINITY. */
+/* u (d): the answer to certify. r (m): <= 0, else its positive part counts as e3 and r is cut at 0; where rows depend
+ * on each other, reactions of rows that stay open go to rows that are closed. g (m): out, the gaps of u. absolute_error
+ * bounds both ||u - u*||_K and ||u_r - u*||_K, with low_r the latter of r + low_r. When no feasible v was found near u
+ * the errors are INFINITY. */
 uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,
                      uz_error *err);
 

@@ -58,13 +58,15 @@ bool uz_feasible_init(uz_feasible *c, const uz_csc *Nt, const double *weight)
     c->m = Nt->cols;
     c->size = uz_alloc_zero(c->m, sizeof(double));
     c->correction = uz_alloc_zero(c->d, sizeof(double));
-    return uz_row_move_init(&c->move, c->d, c->m) && c->size && c->correction;
+    c->push = uz_alloc_zero(c->m, sizeof(double));
+    return uz_row_move_init(&c->move, c->d, c->m) && c->size && c->correction && c->push;
 }
 
 void uz_feasible_clear(uz_feasible *c)
 {
     free(c->size);
     free(c->correction);
+    free(c->push);
     uz_row_move_clear(&c->move);
 }
 
@@ -159,7 +161,8 @@ static double correction_size(const uz_feasible *c)
  * than the gaps; and in long chains of rows conjugate gradients take a step for each. Then an active set chooses. */
 bool uz_make_feasible(uz_feasible *c, const double *r)
 {
-    const uz_row_exact exact = {c->Nt, c->weight, r, c->h, c->u, c->size, NEGLIGIBLE, c->correction};
+    const uz_row_exact exact = {c->Nt, c->weight, r, c->h, c->u, c->size, NEGLIGIBLE, c->correction, c->push};
+    c->pushed = false;
     size_rows(c, c->u);
     if (c->low) {
         memcpy(c->correction, c->low, (size_t)c->d * sizeof *c->correction);
@@ -170,7 +173,10 @@ bool uz_make_feasible(uz_feasible *c, const double *r)
     choose_rows(c, r);
     double expected = STRETCH * sum_of_moves(c);
     bool feasible = move_rows(c, r);
-    if ((feasible && correction_size(c) <= expected) || uz_row_exact_solve(&exact))
+    if (feasible && correction_size(c) <= expected)
+        return true;
+    c->pushed = uz_row_exact_solve(&exact);
+    if (c->pushed)
         return true;
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
     return feasible && move_rows(c, r);

@@ -13,6 +13,8 @@ typedef struct {
     const double *low;    /* d, or NULL: u + low is nearer to the exact answer; tried as a correction first */
     double *size;         /* m: what the rounding of a gap is relative to */
     double *correction;   /* d: c */
+    double *push;         /* m: see below */
+    bool pushed;          /* an active set chose the rows */
     uz_row_move move;     /* m each */
     int64_t d, m;
 } uz_feasible;
@@ -26,7 +28,9 @@ bool uz_feasible_init(uz_feasible *f, const uz_csc *Nt, const double *weight);
 void uz_feasible_clear(uz_feasible *f);
 
 /* Fills the correction: it lifts the negative gaps of u and closes those of the rows where r (m) makes that worth
- * while. true: no gap of u + c is negative by more than the rounding of double-double arithmetic. */
+ * while. true: no gap of u + c is negative by more than the rounding of double-double arithmetic. Where an active set
+ * chose the rows, r - push (<= 0) presses on closed rows only: -r'g is then nothing, where rows that r presses on can't
+ * all be closed, and N'(r - push) differs from N'r by W^-1 c. */
 bool uz_make_feasible(uz_feasible *f, const double *r);
 /* g_i(u + c) */
 double uz_feasible_gap(const uz_feasible *f, int64_t i);

@@ -18,20 +18,20 @@ enum { MASS_ROUNDS = 40, PATIENCE = 3, PASSES = 2, MANY = 64, CIRCLES = 4 };
 #define MOST_WORK 2e9
 
 /* A push this far below its bound, relative to the largest push, is rounding. It does no harm: the row is closed. */
-#define PULL_NOISE 1e-9
+#define PULL_NOISE 1e-13
 
 typedef struct {
     const uz_row_exact *in;
     int64_t d, m;
     uz_row_factor f;
-    double *y, *least; /* m: pushes, and their bounds */
-    double *g;         /* m: gaps of u + c, less `room` times what the rounding of c may do to them */
-    double *slack;     /* m: a penetration of this much is none */
-    double room;       /* 1; 0 where rows leave none between them */
-    double *t;         /* m, work */
-    int64_t *list;     /* m, work */
-    bool *barred;      /* m: depends on rows in contact that can't yield */
-    bool failed;       /* no memory, or too much work */
+    double *least; /* m: bounds on the pushes */
+    double *g;     /* m: gaps of u + c, less `room` times what the rounding of c may do to them */
+    double *slack; /* m: a penetration of this much is none */
+    double room;   /* 1; 0 where rows leave none between them */
+    double *t;     /* m, work */
+    int64_t *list; /* m, work */
+    bool *barred;  /* m: depends on rows in contact that can't yield */
+    bool failed;   /* no memory, or too much work */
 } exact;
 
 static void take_gaps(exact *x)
@@ -53,7 +53,7 @@ static void take_gaps(exact *x)
 static void push(exact *x, int64_t i, double change)
 {
     const uz_csc *Nt = x->in->Nt;
-    x->y[i] += change;
+    x->in->y[i] += change;
     for (int64_t e = Nt->ptr[i]; e < Nt->ptr[i + 1]; e++)
         x->in->c[Nt->idx[e]] -= change * x->in->weight[Nt->idx[e]] * Nt->val[e];
 }
@@ -77,14 +77,14 @@ static void close_gaps(exact *x)
 /* Does row i, in contact, pull u by more than its reaction is worth? */
 static bool pulls(const exact *x, int64_t i, double largest)
 {
-    return x->y[i] < x->least[i] - PULL_NOISE * largest / sqrt(x->f.size[i]);
+    return x->in->y[i] < x->least[i] - PULL_NOISE * largest / sqrt(x->f.size[i]);
 }
 
 static double largest_push(const exact *x)
 {
     double largest = 0.0;
     for (int64_t k = 0; k < x->f.count; k++)
-        largest = fmax(largest, fabs(x->y[x->f.row[k]]) * sqrt(x->f.size[x->f.row[k]]));
+        largest = fmax(largest, fabs(x->in->y[x->f.row[k]]) * sqrt(x->f.size[x->f.row[k]]));
     return largest;
 }
 
@@ -108,7 +108,7 @@ static int64_t let_go(exact *x)
         const int64_t i = x->f.row[k];
         if (pulls(x, i, largest)) {
             first = k < first ? k : first;
-            push(x, i, x->least[i] - x->y[i]);
+            push(x, i, x->least[i] - x->in->y[i]);
         } else if (k > first) {
             x->list[stay++] = i;
         }
@@ -134,7 +134,7 @@ static void exchange_many(exact *x)
         for (int64_t k = 0; k < x->f.count; k++) {
             const int64_t i = x->f.row[k];
             if (pulls(x, i, largest))
-                push(x, i, x->least[i] - x->y[i]);
+                push(x, i, x->least[i] - x->in->y[i]);
             else
                 x->list[n++] = i;
         }
@@ -155,51 +155,63 @@ static void exchange_many(exact *x)
     }
 }
 
-/* The row that penetrates most, by the displacement that would lift it; -1: none. */
+/* The row that penetrates most, by the displacement that would lift it; where none does, an open one that pushes more
+ * than its bound; -1: none. */
 static int64_t choose(const exact *x)
 {
-    int64_t q = -1;
-    double deepest = 0.0;
+    int64_t q = -1, open = -1;
+    double deepest = 0.0, widest = 0.0;
+    const double noise = PULL_NOISE * largest_push(x);
     for (int64_t i = 0; i < x->m; i++) {
-        const double depth = -x->g[i] / sqrt(x->f.size[i]);
-        if (x->f.place[i] < 0 && !x->barred[i] && penetrates(x, i) && !(depth <= deepest)) {
+        const double size = sqrt(x->f.size[i]), depth = -x->g[i] / size;
+        if (x->f.place[i] >= 0 || !(size > 0.0))
+            continue;
+        if (!x->barred[i] && penetrates(x, i) && !(depth <= deepest)) {
             deepest = depth;
             q = i;
         }
+        if (x->g[i] > x->slack[i] && x->in->y[i] > x->least[i] + noise / size && -depth > widest) {
+            widest = -depth;
+            open = i;
+        }
     }
-    return q;
+    return q >= 0 ? q : open;
 }
 
-/* Presses q until it joins the rows in contact, or can't. Pushed by `step`, it moves u along `left`, and the rows in
- * contact push less by w step. */
+/* Presses q, or eases it where it is open, until it joins the rows in contact, is at its bound or can't be pressed. By
+ * `step` that moves u along `left`, and the rows in contact push less by w step. */
 static void admit(exact *x, int64_t q)
 {
+    const double sign = penetrates(x, q) ? 1.0 : -1.0;
     while (!x->failed) {
         uz_row_factor_press(&x->f, q, true);
-        double step = x->f.dependent ? INFINITY : fmax(0.0, -x->g[q]) / x->f.compliance, noise = 0.0;
+        const double bound = sign > 0.0 ? INFINITY : x->in->y[q] - x->least[q];
+        double step = fmin(x->f.dependent ? INFINITY : fmax(0.0, -sign * x->g[q]) / x->f.compliance, bound),
+               noise = 0.0;
+        bool bounded = step == bound;
         int64_t gone = -1;
         for (int64_t k = 0; x->f.dependent && k < x->f.count; k++)
             noise = fmax(noise, PULL_NOISE * fabs(x->f.w[k]) * sqrt(x->f.size[x->f.row[k]]));
         for (int64_t k = 0; k < x->f.count; k++) {
             const int64_t i = x->f.row[k];
-            const double reach = fmax(0.0, x->y[i] - x->least[i]) / x->f.w[k];
-            if (x->f.w[k] * sqrt(x->f.size[i]) > noise && reach < step) {
+            const double reach = fmax(0.0, x->in->y[i] - x->least[i]) / (sign * x->f.w[k]);
+            if (sign * x->f.w[k] * sqrt(x->f.size[i]) > noise && reach < step) {
                 step = reach;
                 gone = k;
             }
         }
-        if (gone < 0 && x->f.dependent) {
+        if (!(step < INFINITY)) {
             x->barred[q] = true;
             return;
         }
-        x->y[q] += step;
+        x->in->y[q] += sign * step;
         for (int64_t k = 0; k < x->f.count; k++)
-            x->y[x->f.row[k]] -= step * x->f.w[k];
+            x->in->y[x->f.row[k]] -= sign * step * x->f.w[k];
         for (int64_t s = 0; !x->f.dependent && s < x->f.n_left; s++)
-            x->in->c[x->f.at[s]] -= step * x->in->weight[x->f.at[s]] * x->f.left[x->f.at[s]];
-        x->g[q] += x->f.dependent ? 0.0 : step * x->f.compliance;
+            x->in->c[x->f.at[s]] -= sign * step * x->in->weight[x->f.at[s]] * x->f.left[x->f.at[s]];
+        x->g[q] += x->f.dependent ? 0.0 : sign * step * x->f.compliance;
         if (gone < 0) {
-            x->failed = !uz_row_factor_join(&x->f, q);
+            x->failed = !bounded && !uz_row_factor_join(&x->f, q);
             return;
         }
         int64_t stay = 0;
@@ -243,16 +255,15 @@ bool uz_row_exact_solve(const uz_row_exact *problem)
     const uz_csc *Nt = problem->Nt;
     exact x = {.in = problem, .d = Nt->rows, .m = Nt->cols, .room = 1.0};
     bool found = false;
-    x.y = uz_alloc_zero(x.m, sizeof *x.y);
     x.least = uz_alloc_zero(x.m, sizeof *x.least);
     x.g = uz_alloc(x.m, sizeof *x.g);
     x.slack = uz_alloc(x.m, sizeof *x.slack);
     x.t = uz_alloc(x.m, sizeof *x.t);
     x.list = uz_alloc(x.m, sizeof *x.list);
     x.barred = uz_alloc_zero(x.m, sizeof *x.barred);
-    if (uz_row_factor_init(&x.f, Nt, problem->weight) && x.y && x.least && x.g && x.slack && x.t && x.list &&
-        x.barred) {
+    if (uz_row_factor_init(&x.f, Nt, problem->weight) && x.least && x.g && x.slack && x.t && x.list && x.barred) {
         memset(problem->c, 0, (size_t)x.d * sizeof *problem->c);
+        memset(problem->y, 0, (size_t)x.m * sizeof *problem->y);
         take_gaps(&x);
         int64_t n = 0;
         for (int64_t i = 0; i < x.m; i++) {
@@ -274,7 +285,7 @@ bool uz_row_exact_solve(const uz_row_exact *problem)
         }
     }
     uz_row_factor_clear(&x.f);
-    void *room[] = {x.y, x.least, x.g, x.slack, x.t, x.list, x.barred};
+    void *room[] = {x.least, x.g, x.slack, x.t, x.list, x.barred};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     return found;

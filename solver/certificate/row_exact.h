@@ -22,6 +22,7 @@ typedef struct {
     const double *size;   /* m: what the rounding of a gap is relative to */
     double negligible;    /* a penetration of this part of the size is none */
     double *c;            /* d: out */
+    double *y;            /* m: out, the pushes. r - y presses on closed rows only, and N'(r - y) = N'r + W^-1 c */
 } uz_row_exact;
 
 /* false: not found: the rows contradict each other, there is no memory, or it takes more work than a bound is worth. */

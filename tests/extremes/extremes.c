@@ -126,9 +126,17 @@ static void write_totals(suite *all)
 
 int main(int argc, char **argv)
 {
-    static void (*const families[])(suite *) = {
-        run_scenes, run_bodies,     run_scene_mixtures, run_stiffnesses,        run_rows,
-        run_ranges, run_exhaustive, run_invariance,     run_generated_problems, run_conditioned_problems};
+    static void (*const families[])(suite *) = {run_scenes,
+                                                run_bodies,
+                                                run_scene_mixtures,
+                                                run_stiffnesses,
+                                                run_rows,
+                                                run_ranges,
+                                                run_exhaustive,
+                                                run_invariance,
+                                                run_generated_problems,
+                                                run_conditioned_problems,
+                                                run_degenerate_problems};
     suite all = {.filter = argc > 2 ? argv[2] : NULL};
     if (argc < 2 || !(all.json = fopen(argv[1], "w"))) {
         fprintf(stderr, "usage: extremes OUTPUT.json [part of a family's name]\n");

@@ -103,7 +103,7 @@ static inline truth find_truth(const uz_qp *qp, const bool *start)
     t.far = !t.feasible && is_feasible_exactly(&qp->N, qp->h);
     if (t.feasible) {
         t.norm = quad_sqrt(t.best.norm2);
-        t.noise = measure_noise(&t.best);
+        t.noise = measure_noise(&t.best) + (quad)0x1p-108 * t.norm;
     }
     return t;
 }

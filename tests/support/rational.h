@@ -5,6 +5,7 @@
 #include "uzawa.h"
 
 #include <gmp.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
