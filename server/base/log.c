@@ -1,3 +1,4 @@
+/* log.c: lines of the log. */
 #include "base/log.h"
 
 #include <math.h>
@@ -67,56 +68,37 @@ static void write_string(FILE *out, const char *text)
     fputc('"', out);
 }
 
-/* JSON has no NaN or infinity. */
-static void write_number(FILE *out, double x)
-{
-    if (isfinite(x))
-        fprintf(out, "%.12g", x);
-    else
-        fputs("null", out);
-}
-
-static void write_field(FILE *out, const log_field *field)
-{
-    fputs(", ", out);
-    write_string(out, field->key);
-    fputs(": ", out);
-    if (field->kind == LOG_INTEGER)
-        fprintf(out, "%lld", field->integer);
-    else if (field->kind == LOG_NUMBER)
-        write_number(out, field->number);
-    else if (field->string)
-        write_string(out, field->string);
-    else
-        fputs("null", out);
-}
-
-static void write_line(FILE *out, log_level level, const char *event, const log_field *fields)
-{
-    static const char *const NAMES[] = {"debug", "info", "warn", "error"};
-    struct timespec now;
-    struct tm utc;
-    char time[32];
-    clock_gettime(CLOCK_REALTIME, &now);
-    gmtime_r(&now.tv_sec, &utc);
-    strftime(time, sizeof time, "%Y-%m-%dT%H:%M:%S", &utc);
-    fprintf(out, "{\"time\": \"%s.%03ldZ\", \"level\": \"%s\", \"event\": ", time, now.tv_nsec / 1000000, NAMES[level]);
-    write_string(out, event);
-    for (; fields && fields->key; fields++)
-        write_field(out, fields);
-    fputs("}\n", out);
-}
-
 void log_write(server_log *log, log_level level, const char *event, const log_field *fields)
 {
-    char *line = NULL;
+    static const char *const NAMES[] = {"debug", "info", "warn", "error"};
+    char *line = NULL, time[32];
     size_t len = 0;
+    struct timespec now;
+    struct tm utc;
     if (!log || level < log->least)
         return;
     FILE *out = open_memstream(&line, &len);
     if (!out)
         return;
-    write_line(out, level, event, fields);
+    clock_gettime(CLOCK_REALTIME, &now);
+    gmtime_r(&now.tv_sec, &utc);
+    strftime(time, sizeof time, "%Y-%m-%dT%H:%M:%S", &utc);
+    fprintf(out, "{\"time\": \"%s.%03ldZ\", \"level\": \"%s\", \"event\": ", time, now.tv_nsec / 1000000, NAMES[level]);
+    write_string(out, event);
+    for (; fields && fields->key; fields++) {
+        fputs(", ", out);
+        write_string(out, fields->key);
+        fputs(": ", out);
+        if (fields->kind == LOG_INTEGER)
+            fprintf(out, "%lld", fields->integer);
+        else if (fields->kind == LOG_NUMBER && isfinite(fields->number))
+            fprintf(out, "%.12g", fields->number);
+        else if (fields->kind == LOG_STRING && fields->string)
+            write_string(out, fields->string);
+        else
+            fputs("null", out); /* JSON has no NaN or infinity */
+    }
+    fputs("}\n", out);
     if (fclose(out) == 0) {
         pthread_mutex_lock(&log->lock);
         fwrite(line, 1, len, log->stream);

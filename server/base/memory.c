@@ -1,3 +1,4 @@
+/* memory.c: limits of the machine and of the control group. */
 #include "base/memory.h"
 
 #include <stdio.h>
@@ -19,11 +20,17 @@ static size_t read_limit(const char *path)
     return end == text ? (size_t)-1 : (size_t)value;
 }
 
-/* The limit of the group of this process and of those around it that can be seen, "0::/a/b" in version 2. */
-static size_t read_group_limit(void)
+size_t memory_available(void)
 {
     char line[2048], path[4096];
-    size_t least = read_limit("/sys/fs/cgroup/memory.max");
+    const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
+    size_t least = pages > 0 && page > 0 ? (size_t)pages * (size_t)page : (size_t)1 << 30;
+    const size_t root = read_limit("/sys/fs/cgroup/memory.max");
+    const size_t old = read_limit("/sys/fs/cgroup/memory/memory.limit_in_bytes"); /* version 1 */
+    least = root < least ? root : least;
+    least = old < least ? old : least;
+
+    /* The group of this process and those around it that can be seen, "0::/a/b" in version 2. */
     FILE *file = fopen("/proc/self/cgroup", "r");
     while (file && fgets(line, sizeof line, file)) {
         char *name = strncmp(line, "0::/", 4) == 0 ? line + 3 : NULL;
@@ -32,7 +39,7 @@ static size_t read_group_limit(void)
         name[strcspn(name, "\n")] = '\0';
         for (char *slash; (slash = strrchr(name, '/')) && name[1]; *slash = '\0') {
             snprintf(path, sizeof path, "/sys/fs/cgroup%s/memory.max", name);
-            size_t limit = read_limit(path);
+            const size_t limit = read_limit(path);
             least = limit < least ? limit : least;
             if (slash == name)
                 break;
@@ -41,15 +48,6 @@ static size_t read_group_limit(void)
     if (file)
         fclose(file);
     return least;
-}
-
-size_t memory_available(void)
-{
-    long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGESIZE);
-    size_t all = pages > 0 && page > 0 ? (size_t)pages * (size_t)page : (size_t)1 << 30;
-    size_t group = read_group_limit(), old = read_limit("/sys/fs/cgroup/memory/memory.limit_in_bytes");
-    all = group < all ? group : all;
-    return old < all ? old : all;
 }
 
 size_t memory_share(size_t available, size_t cache, int workers)

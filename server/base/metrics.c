@@ -1,3 +1,4 @@
+/* metrics.c: what is counted, and the text of it. */
 #include "base/metrics.h"
 
 #include <inttypes.h>
@@ -106,26 +107,20 @@ void metrics_job(metrics *m, const char *status, const char *outcome, int64_t n)
     pthread_mutex_unlock(&m->lock);
 }
 
-static void count_code(metrics *m, int code)
-{
-    size_t i = 0;
-    while (i < m->n_codes && m->codes[i].code != code)
-        i++;
-    if (i == m->n_codes && i < MAX_CODES)
-        m->codes[m->n_codes++].code = code;
-    if (i < MAX_CODES)
-        m->codes[i].count++;
-}
-
 void metrics_request(metrics *m, const char *method, const char *route, int status, double seconds)
 {
     if (!m)
         return;
-    size_t i = 0;
+    size_t i = 0, code = 0;
     method = route ? method : "any"; /* what has no route may have any method: a client's own words are no label */
     route = route ? route : "none";
     pthread_mutex_lock(&m->lock);
-    count_code(m, status);
+    while (code < m->n_codes && m->codes[code].code != status)
+        code++;
+    if (code == m->n_codes && code < MAX_CODES)
+        m->codes[m->n_codes++].code = status;
+    if (code < MAX_CODES)
+        m->codes[code].count++;
     while (i < m->n_routes && (strcmp(m->routes[i].route, route) != 0 || strcmp(m->routes[i].method, method) != 0))
         i++;
     if (i == m->n_routes && i < MAX_ROUTES)
@@ -181,10 +176,6 @@ static void write_counters(const metrics *m, FILE *out)
         write_head(out, ROWS[i].name, "counter", ROWS[i].help);
         fprintf(out, "uzawad_%s %" PRIu64 "\n", ROWS[i].name, m->counters[i]);
     }
-}
-
-static void write_labelled(const metrics *m, FILE *out)
-{
     write_head(out, "jobs_ended_total", "counter", "Jobs that ended, by status and outcome.");
     for (size_t i = 0; i < m->n_ends; i++)
         fprintf(out, "uzawad_jobs_ended_total{status=\"%s\",outcome=\"%s\"} %" PRIu64 "\n", m->ends[i].status,
@@ -244,12 +235,28 @@ static void write_now(const metrics *m, const metrics_now *now, FILE *out)
     write_gauge(out, "http_body_bytes", "Bytes of request bodies in memory.", (double)now->body_bytes);
 }
 
-/* The names that Prometheus's client libraries use for a process. Source: Prometheus documentation, "Writing client
- * libraries", process metrics. */
-static void write_process(FILE *out)
+char *metrics_text(metrics *m, const metrics_now *now, size_t *len)
 {
+    char *text = NULL;
     long pages = 0, resident = 0;
     struct timespec cpu;
+    metrics *copy = malloc(sizeof *copy); /* nobody waits while the text is made */
+    *len = 0;
+    FILE *out = copy ? open_memstream(&text, len) : NULL;
+    if (!out) {
+        free(copy);
+        return NULL;
+    }
+    pthread_mutex_lock(&m->lock);
+    memcpy(copy, m, sizeof *copy);
+    pthread_mutex_unlock(&m->lock);
+    write_now(copy, now, out);
+    write_counters(copy, out);
+    write_histograms(copy, out);
+    free(copy);
+
+    /* The names that Prometheus's client libraries use for a process. Source: Prometheus documentation, "Writing client
+     * libraries", process metrics. */
     FILE *file = fopen("/proc/self/statm", "re");
     if (file) {
         if (fscanf(file, "%ld %ld", &pages, &resident) == 2)
@@ -264,27 +271,7 @@ static void write_process(FILE *out)
                 "# HELP process_cpu_seconds_total Processor time.\n# TYPE process_cpu_seconds_total counter\n"
                 "process_cpu_seconds_total %.9g\n",
                 (double)cpu.tv_sec + 1e-9 * (double)cpu.tv_nsec);
-}
 
-char *metrics_text(metrics *m, const metrics_now *now, size_t *len)
-{
-    char *text = NULL;
-    metrics *copy = malloc(sizeof *copy); /* nobody waits while the text is made */
-    *len = 0;
-    FILE *out = copy ? open_memstream(&text, len) : NULL;
-    if (!out) {
-        free(copy);
-        return NULL;
-    }
-    pthread_mutex_lock(&m->lock);
-    memcpy(copy, m, sizeof *copy);
-    pthread_mutex_unlock(&m->lock);
-    write_now(copy, now, out);
-    write_counters(copy, out);
-    write_labelled(copy, out);
-    write_histograms(copy, out);
-    write_process(out);
-    free(copy);
     bool failed = ferror(out) != 0;
     if (fclose(out) != 0 || failed) {
         free(text);

@@ -44,26 +44,11 @@ typedef struct {
     options_verdict verdict;
 } flags;
 
-/* A flag that was given before adds its words to those; false: there are too many. */
-static bool take_words(flags *f, size_t i, const char *text)
-{
-    if (!f->value[i]) {
-        if (f->n_lists == LISTS || strlen(text) >= OPTION_PATH)
-            return false;
-        f->value[i] = strcpy(f->lists[f->n_lists++], text);
-        return true;
-    }
-    char *list = f->lists[0];
-    while (list != f->value[i])
-        list += OPTION_PATH;
-    size_t len = strlen(list);
-    return (size_t)snprintf(list + len, OPTION_PATH - len, " %s", text) < OPTION_PATH - len;
-}
-
 static bool take_flag(flags *f, const uz_option_walk *walk, char *message, size_t size)
 {
     const uz_option *row = walk->row;
     const size_t i = (size_t)(row - walk->table.rows);
+    bool fits = true;
     if (row->kind == UZ_OPTION_FLAG && walk->value) {
         snprintf(message, size, "--%s takes no value", row->name);
         return false;
@@ -73,11 +58,20 @@ static bool take_flag(flags *f, const uz_option_walk *walk, char *message, size_
         f->backup = walk->value;
     } else if (row->kind != UZ_OPTION_LIST) {
         f->value[i] = walk->value ? walk->value : "yes";
-    } else if (!take_words(f, i, walk->value)) {
-        snprintf(message, size, "--%s takes words of %d bytes together", row->name, OPTION_PATH - 1);
-        return false;
+    } else if (!f->value[i]) {
+        fits = f->n_lists < LISTS && strlen(walk->value) < OPTION_PATH;
+        if (fits)
+            f->value[i] = strcpy(f->lists[f->n_lists++], walk->value);
+    } else { /* one that was given before adds its words to those */
+        char *list = f->lists[0];
+        while (list != f->value[i])
+            list += OPTION_PATH;
+        const size_t len = strlen(list);
+        fits = (size_t)snprintf(list + len, OPTION_PATH - len, " %s", walk->value) < OPTION_PATH - len;
     }
-    return true;
+    if (!fits)
+        snprintf(message, size, "--%s takes words of %d bytes together", row->name, OPTION_PATH - 1);
+    return fits;
 }
 
 static options_verdict read_flags(flags *f, int argc, char **argv, char *message, size_t size)
@@ -121,62 +115,31 @@ static options_verdict read_flags(flags *f, int argc, char **argv, char *message
 
 /* ------------------------------------------------------------------- layers */
 
-static bool set_from_environment(server_options *o, char *message, size_t size)
+/* The values of a layer, FROM_ENVIRONMENT or FROM_FLAG, over those below it. */
+static bool set_layer(server_options *o, option_source layer, const flags *f, char *message, size_t size)
 {
     const uz_option_table table = options_table();
     char name[64], why[256];
     for (size_t i = 0; i < table.count && table.rows[i].places & OPTION_SETTING; i++) {
-        const char *text = uz_option_environment(&table.rows[i], ENVIRONMENT, name);
+        const bool flag = layer == FROM_FLAG;
+        const char *text = flag ? f->value[i] : uz_option_environment(&table.rows[i], ENVIRONMENT, name);
         if (!text)
             continue;
         if (!options_set(o, &table.rows[i], text, why, sizeof why)) {
-            snprintf(message, size, "%s in the environment: %s", name, why);
+            snprintf(message, size, flag ? "--%s%s" : "%s in the environment: %s", flag ? "" : name, why);
             return false;
         }
-        o->source[i] = FROM_ENVIRONMENT;
+        o->source[i] = layer;
     }
     return true;
-}
-
-static bool set_from_flags(server_options *o, const flags *f, char *message, size_t size)
-{
-    const uz_option_table table = options_table();
-    char why[256];
-    for (size_t i = 0; i < table.count; i++) {
-        if (!f->value[i])
-            continue;
-        if (!options_set(o, &table.rows[i], f->value[i], why, sizeof why)) {
-            snprintf(message, size, "--%s", why);
-            return false;
-        }
-        o->source[i] = FROM_FLAG;
-    }
-    return true;
-}
-
-/* The file is named by the layers above it. */
-static bool set_from_file(server_options *o, const flags *f, char *message, size_t size)
-{
-    char name[64];
-    const uz_option_table table = options_table();
-    const uz_option *row = uz_option_find(table, OPTION_SETTING, "config", strlen("config"));
-    const char *flag = f->value[row - table.rows], *path = flag ? flag : uz_option_environment(row, ENVIRONMENT, name);
-    return !path || !path[0] || options_read_file(o, path, message, size);
-}
-
-/* What needs two values to be seen. */
-static bool check_together(const server_options *o, char *message, size_t size)
-{
-    if (!o->tls_cert[0] == !o->tls_key[0])
-        return true;
-    snprintf(message, size, "tls-cert and tls-key need each other: give both or neither");
-    return false;
 }
 
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size)
 {
     flags f = {.verdict = OPTIONS_RUN};
+    char name[64];
     const uz_option_table table = options_table();
+    const uz_option *config = uz_option_find(table, OPTION_SETTING, "config", strlen("config"));
     long cores = sysconf(_SC_NPROCESSORS_ONLN);
     memset(out, 0, sizeof *out);
     for (size_t i = 0; i < table.count; i++)
@@ -186,9 +149,16 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     options_verdict verdict = read_flags(&f, argc, argv, message, size);
     if (verdict == OPTIONS_WRONG || verdict == OPTIONS_HELP || verdict == OPTIONS_VERSION)
         return verdict;
-    if (!set_from_file(out, &f, message, size) || !set_from_environment(out, message, size) ||
-        !set_from_flags(out, &f, message, size) || !check_together(out, message, size))
+    const char *path = f.value[config - table.rows]; /* the layers above the file name it */
+    if (!path)
+        path = uz_option_environment(config, ENVIRONMENT, name);
+    if ((path && path[0] && !options_read_file(out, path, message, size)) ||
+        !set_layer(out, FROM_ENVIRONMENT, NULL, message, size) || !set_layer(out, FROM_FLAG, &f, message, size))
         return OPTIONS_WRONG;
+    if (!out->tls_cert[0] != !out->tls_key[0]) {
+        snprintf(message, size, "tls-cert and tls-key need each other: give both or neither");
+        return OPTIONS_WRONG;
+    }
     if (out->max_streams == 0) /* they hold their connections for long: the others are for everything else */
         out->max_streams = out->max_connections - out->max_connections / 4;
     if (out->memory == 0)
@@ -196,11 +166,6 @@ options_verdict options_read(server_options *out, int argc, char **argv, char *b
     if (backup)
         snprintf(backup, OPTION_PATH, "%s", f.backup ? f.backup : "");
     return verdict;
-}
-
-options_verdict options_parse(server_options *out, int argc, char **argv, char *message, size_t size)
-{
-    return options_read(out, argc, argv, NULL, message, size);
 }
 
 size_t options_limits(const server_options *o, option_limit *out, size_t most)

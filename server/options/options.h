@@ -72,10 +72,8 @@ typedef enum {
 
 /* Reads argv, the environment and the file. backup (OPTION_PATH bytes, may be NULL) takes the FILE of --backup. */
 options_verdict options_read(server_options *out, int argc, char **argv, char *backup, char *message, size_t size);
-/* The same without backup. */
-options_verdict options_parse(server_options *out, int argc, char **argv, char *message, size_t size);
 
-/* The words of a list of words, as options_parse leaves it: separated by single spaces. */
+/* The words of a list of words, as options_read leaves it: separated by single spaces. */
 typedef struct {
     char text[OPTION_PATH];
     const char *words[OPTION_WORDS];

@@ -31,33 +31,27 @@ static char *trim(char *text)
     return text;
 }
 
-/* The value without its quotes, in place; false where the quotes are not closed or something follows them. */
-static bool unquote(char *text)
+/* The value without its quotes or a comment, in place; false where quotes are not closed or something follows them. */
+static bool read_value(char *text)
 {
     char *out = text, *in = text + 1;
+    if (text[0] != '"') {
+        while (*out && !(*out == '#' && (out == text || out[-1] == ' ' || out[-1] == '\t')))
+            out++;
+        *out = '\0';
+        trim(text); /* its start is trimmed already */
+        return true;
+    }
     while (*in && *in != '"') {
         if (*in == '\\' && (in[1] == '"' || in[1] == '\\'))
             in++;
         *out++ = *in++;
     }
-    bool closed = *in == '"';
+    const bool closed = *in == '"';
     in += closed + strspn(in + closed, " \t");
-    bool ends = *in == '\0' || *in == '#';
+    const bool ends = *in == '\0' || *in == '#';
     *out = '\0';
     return closed && ends;
-}
-
-static bool read_value(char *text)
-{
-    if (text[0] == '"')
-        return unquote(text);
-    for (char *at = text; *at; at++)
-        if (*at == '#' && (at == text || at[-1] == ' ' || at[-1] == '\t')) {
-            *at = '\0';
-            break;
-        }
-    trim(text); /* its start is trimmed already */
-    return true;
 }
 
 static bool take_line(server_options *o, char *text, const line_place *at)

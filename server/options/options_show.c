@@ -34,30 +34,22 @@ void options_usage(FILE *to)
         to);
 }
 
-static void write_text(FILE *to, const char *text)
-{
-    bool plain = text[0] && !strpbrk(text, " \t#\"\\");
-    if (plain) {
-        fputs(text, to);
-        return;
-    }
-    fputc('"', to);
-    for (; *text; text++) {
-        if (*text == '"' || *text == '\\')
-            fputc('\\', to);
-        fputc(*text, to);
-    }
-    fputc('"', to);
-}
-
 static void write_value(const server_options *o, const uz_option *row, FILE *to)
 {
     static const char *const LEVELS[] = {"debug", "info", "warn", "error"};
     const void *at = (const char *)o + row->offset;
+    const char *text = at;
     switch (row->kind) {
     case UZ_OPTION_TEXT:
     case UZ_OPTION_LIST:
-        write_text(to, at);
+        if (text[0] && !strpbrk(text, " \t#\"\\")) {
+            fputs(text, to);
+            return;
+        }
+        fputc('"', to);
+        for (; *text; text++)
+            fprintf(to, *text == '"' || *text == '\\' ? "\\%c" : "%c", *text);
+        fputc('"', to);
         return;
     case UZ_OPTION_INTEGER:
         fprintf(to, "%d", *(const int *)at);
@@ -83,19 +75,9 @@ static void write_value(const server_options *o, const uz_option *row, FILE *to)
     }
 }
 
-static void write_source(const server_options *o, size_t i, const uz_option *row, FILE *to)
-{
-    static const char *const NAMES[] = {"default", "file", "environment", "command line"};
-    if (o->source[i] == FROM_FILE)
-        fprintf(to, "line %d of the file", o->line[i]);
-    else if (o->source[i] == FROM_DEFAULT && !row->normal)
-        fprintf(to, "default: %s", row->otherwise);
-    else
-        fputs(NAMES[o->source[i]], to);
-}
-
 void options_show(const server_options *o, FILE *to)
 {
+    static const char *const NAMES[] = {"default", "file", "environment", "command line"};
     const uz_option_table table = options_table();
     const uz_option *rows = table.rows;
     for (size_t i = 0; i < table.count && rows[i].places & OPTION_SETTING; i++) {
@@ -103,8 +85,12 @@ void options_show(const server_options *o, FILE *to)
         fprintf(to, "%s%s = ", is_this_file ? "# " : "", rows[i].name);
         write_value(o, &rows[i], to);
         fputs("  # ", to);
-        write_source(o, i, &rows[i], to);
-        fputc('\n', to);
+        if (o->source[i] == FROM_FILE)
+            fprintf(to, "line %d of the file\n", o->line[i]);
+        else if (o->source[i] == FROM_DEFAULT && !rows[i].normal)
+            fprintf(to, "default: %s\n", rows[i].otherwise);
+        else
+            fprintf(to, "%s\n", NAMES[o->source[i]]);
     }
 }
 

@@ -20,9 +20,9 @@ TEST(option)
     server_options options;
     char message[256], *given[] = {"uzawad", "--memory", "3M", NULL}, *none[] = {"uzawad", NULL};
     char *wrong[] = {"uzawad", "--memory", "0", NULL};
-    CHECK_INT(options_parse(&options, 3, given, message, sizeof message), OPTIONS_RUN);
+    CHECK_INT(options_read(&options, 3, given, NULL, message, sizeof message), OPTIONS_RUN);
     CHECK_INT(options.memory, 3 << 20);
-    CHECK_INT(options_parse(&options, 1, none, message, sizeof message), OPTIONS_RUN);
+    CHECK_INT(options_read(&options, 1, none, NULL, message, sizeof message), OPTIONS_RUN);
     CHECK_INT(options.memory, memory_share(memory_available(), options.cache, options.workers));
-    CHECK_INT(options_parse(&options, 3, wrong, message, sizeof message), OPTIONS_WRONG);
+    CHECK_INT(options_read(&options, 3, wrong, NULL, message, sizeof message), OPTIONS_WRONG);
 }

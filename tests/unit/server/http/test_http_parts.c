@@ -260,7 +260,7 @@ static options_verdict parse(server_options *out, char *first, char *second)
     char message[256] = "";
     char program[] = "uzawad";
     char *argv[] = {program, first, second, NULL};
-    options_verdict verdict = options_parse(out, !first ? 1 : !second ? 2 : 3, argv, message, sizeof message);
+    options_verdict verdict = options_read(out, !first ? 1 : !second ? 2 : 3, argv, NULL, message, sizeof message);
     CHECK((verdict == OPTIONS_WRONG) == (message[0] != '\0'));
     return verdict;
 }
