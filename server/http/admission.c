@@ -6,18 +6,6 @@
 #include <string.h>
 #include <strings.h>
 
-/* A page of another site must not submit or delete through its visitor's browser, unless its origin is one that may
- * use the service. Programs send no such header. */
-static bool check_site(const http_request *rq, problem_details *problem)
-{
-    const header_field *site = header_find(&rq->headers, "Sec-Fetch-Site", NULL);
-    if (!site || !token_equal(site->value, site->value_len, "cross-site") || strcmp(rq->route->method, "GET") == 0 ||
-        rq->reply.cors_origin)
-        return true;
-    return problem_fill(problem, 403, "cross_site", "Requests from other sites are refused",
-                        "a browser sent this for a page of another site");
-}
-
 /* ---- names that are not ours */
 
 /* The name of a Host field or of an origin, "//name:port": what stands before the port. */
@@ -46,24 +34,19 @@ static bool is_own_name(const api *context, const char *host, size_t len)
     return false;
 }
 
-/* Header fields that a browser sends whatever its page wants; other programs hardly do. */
-static bool is_browser(const http_request *rq)
-{
-    static const char *const SENT[] = {"Accept-Language", "Origin", "Referer", "Sec-Fetch-Site"};
-    const header_field *agent = header_find(&rq->headers, "User-Agent", NULL);
-    for (size_t i = 0; i < sizeof SENT / sizeof SENT[0]; i++)
-        if (header_find(&rq->headers, SENT[i], NULL))
-            return true;
-    return agent && agent->value_len >= 8 && strncasecmp(agent->value, "Mozilla/", 8) == 0;
-}
-
 /* Without tokens it is the loopback address that lets nobody in. A page gets behind it where its own host name is made
  * to point here (DNS rebinding): for its visitor's browser this service is then the page's own server. The name that
  * it asks for tells. */
 static bool check_name(const api *context, const http_request *rq, problem_details *problem)
 {
+    /* header fields that a browser sends whatever its page wants; other programs hardly do */
+    static const char *const SENT[] = {"Accept-Language", "Origin", "Referer", "Sec-Fetch-Site"};
     const header_field *host = header_find(&rq->headers, "Host", NULL);
-    if (context->auth || !host || is_own_name(context, host->value, host->value_len) || !is_browser(rq) ||
+    const header_field *agent = header_find(&rq->headers, "User-Agent", NULL);
+    bool browser = agent && agent->value_len >= 8 && strncasecmp(agent->value, "Mozilla/", 8) == 0;
+    for (size_t i = 0; i < sizeof SENT / sizeof SENT[0]; i++)
+        browser = browser || header_find(&rq->headers, SENT[i], NULL);
+    if (context->auth || !host || is_own_name(context, host->value, host->value_len) || !browser ||
         http_is_public(rq->fd))
         return true;
     return problem_fill(problem, 421, "unknown_host", "This service does not go by that name",
@@ -73,48 +56,42 @@ static bool check_name(const api *context, const http_request *rq, problem_detai
                         (int)(host->value_len < 100 ? host->value_len : 100), host->value);
 }
 
-static bool check_body(const api *context, const http_request *rq, problem_details *problem)
+/* What the route takes: site, body, parameters, type. */
+static bool check_request(const api *context, http_request *rq, problem_details *problem)
 {
-    bool takes_body = strcmp(rq->route->method, "POST") == 0;
-    if (!takes_body && (rq->chunked || rq->length > 0))
+    const route *to = rq->route;
+    const bool post = strcmp(to->method, "POST") == 0;
+    const size_t limit = to->streamed ? context->options.max_upload : context->options.max_body;
+    size_t codings;
+    const header_field *site = header_find(&rq->headers, "Sec-Fetch-Site", NULL);
+    const header_field *coding = header_find(&rq->headers, "Content-Encoding", &codings);
+    /* A page of another site must not submit or delete through its visitor's browser, unless its origin is one that may
+     * use the service. Programs send no such header. */
+    if (site && token_equal(site->value, site->value_len, "cross-site") && strcmp(to->method, "GET") != 0 &&
+        !rq->reply.cors_origin)
+        return problem_fill(problem, 403, "cross_site", "Requests from other sites are refused",
+                            "a browser sent this for a page of another site");
+    if (!post && (rq->chunked || rq->length > 0))
         return problem_fill(problem, 400, "unexpected_body", "The request must not have a body", "%s %s takes no body",
-                            rq->route->method, rq->route->pattern);
-    size_t limit = rq->route->streamed ? context->options.max_upload : context->options.max_body;
+                            to->method, to->pattern);
     if (rq->length > limit)
         return problem_fill(problem, 413, "body_too_large", "The request body is too large",
                             "the body has %llu bytes, the limit of this server is %zu", (unsigned long long)rq->length,
                             limit);
-    return true;
-}
-
-static bool is_gzip(const header_field *coding)
-{
-    return token_equal(coding->value, coding->value_len, "gzip") ||
-           token_equal(coding->value, coding->value_len, "x-gzip");
-}
-
-static bool check_type(const http_request *rq, problem_details *problem)
-{
-    size_t codings;
-    const header_field *coding = header_find(&rq->headers, "Content-Encoding", &codings);
-    if (strcmp(rq->route->method, "POST") != 0)
+    if (!route_check_parameters(rq, problem))
+        return false;
+    if (!post)
         return true;
     if (coding && (codings > 1 || (!token_equal(coding->value, coding->value_len, "identity") &&
-                                   !(rq->route->streamed && is_gzip(coding)))))
+                                   !(to->streamed && (token_equal(coding->value, coding->value_len, "gzip") ||
+                                                      token_equal(coding->value, coding->value_len, "x-gzip"))))))
         return problem_fill(problem, 415, "content_encoding", "The content coding is not supported",
-                            rq->route->streamed ? "send the body as it is, or with Content-Encoding: gzip"
-                                                : "send the body without Content-Encoding");
-    if (rq->route->streamed)
-        return true;
-    if (!request_is_json(rq))
+                            to->streamed ? "send the body as it is, or with Content-Encoding: gzip"
+                                         : "send the body without Content-Encoding");
+    if (!to->streamed && !request_is_json(rq))
         return problem_fill(problem, 415, "content_type", "The body must be JSON",
                             "send the header field Content-Type: application/json");
-    return true;
-}
-
-static bool check_draining(const api *context, http_request *rq, problem_details *problem)
-{
-    if (!api_draining(context) || strcmp(rq->route->method, "POST") != 0)
+    if (!api_draining(context))
         return true;
     rq->reply.retry_after_s = 5;
     return problem_fill(problem, 503, "draining", "The server is shutting down",
@@ -122,22 +99,6 @@ static bool check_draining(const api *context, http_request *rq, problem_details
 }
 
 /* ---- who asks, and how often */
-
-/* The token of `Authorization: Bearer TOKEN`; NULL: no such field. */
-static const char *bearer(const http_request *rq, size_t *len)
-{
-    static const char SCHEME[] = "Bearer";
-    const header_field *field = header_find(&rq->headers, "Authorization", NULL);
-    *len = 0;
-    if (!field || field->value_len <= sizeof SCHEME || field->value[sizeof SCHEME - 1] != ' ' ||
-        !token_equal(field->value, sizeof SCHEME - 1, SCHEME))
-        return NULL;
-    const char *at = field->value + sizeof SCHEME, *end = field->value + field->value_len;
-    while (at < end && *at == ' ')
-        at++;
-    *len = (size_t)(end - at);
-    return at;
-}
 
 /* A known token counts by its name, everybody else by address: guesses too. */
 static bool check_rate(api *context, http_request *rq, problem_details *problem)
@@ -158,12 +119,30 @@ static bool check_rate(api *context, http_request *rq, problem_details *problem)
                         context->options.max_client_rate);
 }
 
-static bool refuse_token(api *context, http_request *rq, auth_scope have, auth_scope need, bool given,
-                         problem_details *problem)
+/* Before anything about the request is told, even whether its path exists. */
+static bool check_client(api *context, http_request *rq, bool has_route, problem_details *problem)
 {
-    http_reply *reply = &rq->reply;
-    char *field = reply->authenticate;
-    size_t size = sizeof reply->authenticate;
+    static const char SCHEME[] = "Bearer";
+    const auth_scope need = has_route ? route_scope(rq->route) : SCOPE_READ;
+    auth_scope have = SCOPE_NONE;
+    char *field = rq->reply.authenticate;
+    const size_t size = sizeof rq->reply.authenticate;
+    /* the token of `Authorization: Bearer TOKEN` */
+    const header_field *given = context->auth ? header_find(&rq->headers, "Authorization", NULL) : NULL;
+    if (given && (given->value_len <= sizeof SCHEME || given->value[sizeof SCHEME - 1] != ' ' ||
+                  !token_equal(given->value, sizeof SCHEME - 1, SCHEME)))
+        given = NULL;
+    if (given) {
+        const char *at = given->value + sizeof SCHEME, *end = given->value + given->value_len;
+        while (at < end && *at == ' ')
+            at++;
+        have = auth_check(context->auth, at, (size_t)(end - at), rq->token);
+    }
+    if (!check_rate(context, rq, problem))
+        return false;
+    if (!context->auth || have >= need)
+        return true;
+    rq->reply.allow[0] = '\0';
     metrics_add(context->metrics, METRIC_UNAUTHORIZED, 1);
     if (have != SCOPE_NONE) {
         snprintf(field, size, "Bearer realm=\"uzawad\", error=\"insufficient_scope\", scope=\"%s\"",
@@ -178,28 +157,11 @@ static bool refuse_token(api *context, http_request *rq, auth_scope have, auth_s
                               : "send the header field Authorization: Bearer TOKEN");
 }
 
-/* Before anything about the request is told, even whether its path exists. */
-static bool check_client(api *context, http_request *rq, bool has_route, problem_details *problem)
-{
-    auth_scope need = has_route ? route_scope(rq->route) : SCOPE_READ, have = SCOPE_NONE;
-    size_t len = 0;
-    const char *secret = context->auth ? bearer(rq, &len) : NULL;
-    if (secret)
-        have = auth_check(context->auth, secret, len, rq->token);
-    if (!check_rate(context, rq, problem))
-        return false;
-    if (!context->auth || have >= need)
-        return true;
-    rq->reply.allow[0] = '\0';
-    return refuse_token(context, rq, have, need, secret != NULL, problem);
-}
-
 bool admission_check(api *context, http_request *rq)
 {
     problem_details *problem = &rq->refused;
     bool found = target_parse(&rq->target, rq->raw_target, problem) &&
                  route_find(rq, rq->reply.allow, sizeof rq->reply.allow, problem);
     return check_name(context, rq, problem) && check_client(context, rq, found, problem) && found &&
-           check_site(rq, problem) && check_body(context, rq, problem) && route_check_parameters(rq, problem) &&
-           check_type(rq, problem) && check_draining(context, rq, problem);
+           check_request(context, rq, problem);
 }

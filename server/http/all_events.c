@@ -111,28 +111,20 @@ static bool look(event_stream *base)
     return ok;
 }
 
-/* True with the number that the client has seen, if it is one of this run. */
-static bool read_seen(const api *context, const http_request *rq, uint64_t *seen)
-{
-    char last[64];
-    size_t run = strlen(context->run);
-    stream_last_seen(rq, last, sizeof last);
-    const char *number = last + run + 1;
-    if (strncmp(last, context->run, run) != 0 || last[run] != '.' || strlen(number) < 1 || strlen(number) > 18 ||
-        number[strspn(number, "0123456789")])
-        return false;
-    *seen = strtoull(number, NULL, 10);
-    return true;
-}
-
 void events_get_all(api *context, http_request *rq, http_reply *reply)
 {
+    char last[64];
+    const size_t run = strlen(context->run);
     all_stream *s = calloc(1, sizeof *s);
+    stream_last_seen(rq, last, sizeof last);
+    const char *number = last + run + 1; /* of the change that the client has seen, if it is one of this run */
     if (s) {
         s->base.look = look;
         s->context = context;
         s->base.every_s = EVERY_S;
-        s->reset = !read_seen(context, rq, &s->seen);
+        s->reset = strncmp(last, context->run, run) != 0 || last[run] != '.' || strlen(number) < 1 ||
+                   strlen(number) > 18 || number[strspn(number, "0123456789")];
+        s->seen = s->reset ? 0 : strtoull(number, NULL, 10);
     }
     stream_reply(rq, s ? &s->base : NULL, NULL, reply);
 }

@@ -37,11 +37,19 @@ typedef struct {
 /* The daemon is about to end: nothing is waited for. */
 bool api_draining(const api *context);
 
+/* Whoever waits for what is computed. */
+typedef struct {
+    api *context;
+    const http_request *rq;
+} api_asker;
+/* Nobody would read the reply, or the daemon wants to end; asker: an api_asker, for the library's hooks. */
+bool api_is_over(void *asker);
+
 /* ---- before a body is read (admission.c, uploads.c): false with rq->refused */
 bool admission_check(api *context, http_request *rq);
 bool uploads_begin(api *context, http_request *rq);
-/* A piece of the body. */
-bool uploads_take(api *context, http_request *rq, const char *data, size_t size);
+/* A piece of the body; ctx: the api. */
+bool uploads_take(void *ctx, http_request *rq, const char *data, size_t size);
 
 /* ---- what streams over all jobs share: the texts of the latest changes, each encoded once for all of them */
 struct told_changes *told_changes_new(void);    /* NULL: no memory */
@@ -87,10 +95,8 @@ void admin_check(api *context, http_request *rq, http_reply *reply);
 void service_metrics(api *context, http_request *rq, http_reply *reply);
 void service_health(api *context, http_request *rq, http_reply *reply);
 void service_ready(api *context, http_request *rq, http_reply *reply);
-void service_openapi(api *context, http_request *rq, http_reply *reply);
 void service_schema(api *context, http_request *rq, http_reply *reply);
-void page_index(api *context, http_request *rq, http_reply *reply);
-void page_part(api *context, http_request *rq, http_reply *reply);
+void page_get(api *context, http_request *rq, http_reply *reply);
 
 /* Fills a reply for a store call that failed, and logs a STORE_ERROR. */
 void reply_store_failure(api *context, store_status status, http_reply *reply);

@@ -1,3 +1,4 @@
+/* auth.c: tokens of a file. */
 #include "http/auth.h"
 
 #include <errno.h>
@@ -43,44 +44,30 @@ static bool hash(const char *secret, size_t len, unsigned char out[DIGEST])
 
 /* ------------------------------------------------------------------- file */
 
-static const char *read_scope(const char *word, auth_scope *out)
-{
-    for (int i = SCOPE_READ; i <= SCOPE_ADMIN; i++)
-        if (strcmp(word, SCOPES[i]) == 0) {
-            *out = (auth_scope)i;
-            return NULL;
-        }
-    return "the second word must be read, submit or admin";
-}
-
-static bool has_name(const token_list *list, const char *name)
-{
-    for (size_t i = 0; i < list->count; i++)
-        if (strcmp(list->tokens[i].name, name) == 0)
-            return true;
-    return false;
-}
-
 /* What is wrong with a line, NULL: nothing. Never quotes the secret. */
 static const char *take_line(token_list *list, char *line)
 {
     static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-._~+/=";
     char *rest = NULL;
-    const char *name = strtok_r(line, " \t\r\n", &rest), *why;
+    const char *name = strtok_r(line, " \t\r\n", &rest);
     if (!name || name[0] == '#')
         return NULL;
     const char *scope = strtok_r(NULL, " \t\r\n", &rest), *secret = strtok_r(NULL, " \t\r\n", &rest);
     token t = {.scope = SCOPE_NONE};
     if (!scope || !secret || strtok_r(NULL, " \t\r\n", &rest))
         return "a line must be \"name scope secret\"";
-    if ((why = read_scope(scope, &t.scope)))
-        return why;
+    for (int i = SCOPE_READ; i <= SCOPE_ADMIN; i++)
+        if (strcmp(scope, SCOPES[i]) == 0)
+            t.scope = (auth_scope)i;
+    if (t.scope == SCOPE_NONE)
+        return "the second word must be read, submit or admin";
     if (strlen(name) >= sizeof t.name || strspn(name, ALLOWED) != strlen(name))
         return "the name must be 1 to 63 letters, digits and -._~+/=";
     if (strlen(secret) < SECRET_LEAST || strlen(secret) > SECRET_MOST || strspn(secret, ALLOWED) != strlen(secret))
         return "the secret must be 16 to 128 letters, digits and -._~+/= (openssl rand -hex 32 makes one)";
-    if (has_name(list, name))
-        return "this name stands in the file already";
+    for (size_t i = 0; i < list->count; i++)
+        if (strcmp(list->tokens[i].name, name) == 0)
+            return "this name stands in the file already";
     if (list->count == MAX_TOKENS)
         return "a file has at most 1000 tokens";
     strcpy(t.name, name);
@@ -94,11 +81,16 @@ static const char *take_line(token_list *list, char *line)
     return NULL;
 }
 
-/* A secret that every user of the machine can read is none. */
-static FILE *open_private(const char *path, char *message, size_t size)
+static bool read_file(token_list *out, const char *path, char *message, size_t size)
 {
+    char line[512];
+    int number = 0;
+    const char *why = NULL;
+    *out = (token_list){0};
+    /* a secret that every user of the machine can read is none */
     struct stat st;
-    int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+    FILE *file = NULL;
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (fd < 0)
         snprintf(message, size, "cannot read the token file %s: %s", path, strerror(errno));
     else if (fstat(fd, &st) != 0 || !S_ISREG(st.st_mode))
@@ -106,21 +98,12 @@ static FILE *open_private(const char *path, char *message, size_t size)
     else if (st.st_mode & S_IRWXO)
         snprintf(message, size, "the token file %s is open to every user of this machine: chmod o= %s", path, path);
     else
-        return fdopen(fd, "r");
-    if (fd >= 0)
-        close(fd);
-    return NULL;
-}
-
-static bool read_file(token_list *out, const char *path, char *message, size_t size)
-{
-    char line[512];
-    int number = 0;
-    const char *why = NULL;
-    *out = (token_list){0};
-    FILE *file = open_private(path, message, size);
-    if (!file)
+        file = fdopen(fd, "r");
+    if (!file) {
+        if (fd >= 0)
+            close(fd);
         return false;
+    }
     while (!why && fgets(line, sizeof line, file)) {
         number++;
         why = strchr(line, '\n') || feof(file) ? take_line(out, line) : "this line is too long";

@@ -18,9 +18,16 @@ static void append(problem_details *problem, const char *before, const char *nam
             *at = '?';
 }
 
-void cases_list(problem_details *problem, const store_case *cases, size_t count)
+void cases_list(problem_details *problem, const char *wrong, const store_case *cases, size_t count)
 {
     char number[48];
+    const char **names = wrong ? malloc((count + 1) * sizeof *names) : NULL;
+    for (size_t i = 0; names && i < count; i++)
+        names[i] = cases[i].name;
+    const int closest = names ? uz_closest(wrong, strlen(wrong), names, count) : -1;
+    if (closest >= 0)
+        append(problem, " Did you mean \"", names[closest], "\"?");
+    free(names);
     if (count == 0) {
         append(problem, " It has no cases.", "", "");
         return;
@@ -30,15 +37,4 @@ void cases_list(problem_details *problem, const store_case *cases, size_t count)
         append(problem, i ? ", \"" : "\"", cases[i].name, "\"");
     snprintf(number, sizeof number, ", ... (%zu in all)", count);
     append(problem, count > NAMES_SHOWN ? number : "", ".", "");
-}
-
-void cases_suggest(problem_details *problem, const char *name, const store_case *cases, size_t count)
-{
-    const char **names = malloc((count + 1) * sizeof *names);
-    for (size_t i = 0; names && i < count; i++)
-        names[i] = cases[i].name;
-    int closest = names ? uz_closest(name, strlen(name), names, count) : -1;
-    if (closest >= 0)
-        append(problem, " Did you mean \"", names[closest], "\"?");
-    free(names);
 }

@@ -28,18 +28,6 @@ typedef struct {
     int n;
 } curve_list;
 
-/* The end of an id tells jobs of one minute apart; the beginning is the time. */
-static curve_name name_curve(const job *j, const char *case_name)
-{
-    curve_name out;
-    char method[40] = "", op[40] = "";
-    if (j->summary)
-        codec_read_method(method, op, sizeof method, j->summary);
-    snprintf(out.text, sizeof out.text, "%s%s%s%s%s, job \u2026%s", case_name, case_name[0] ? ": " : "",
-             method[0] ? method : job_status_name(j->status), op[0] ? ", " : "", op, j->id + 24);
-    return out;
-}
-
 static bool add_job(curve_list *list, api *context, const job *j, const char *case_name, http_reply *reply)
 {
     found_rows *found = &list->rows[list->n];
@@ -47,7 +35,15 @@ static bool add_job(curve_list *list, api *context, const job *j, const char *ca
     list->n++;
     if (!history_rows(context, j, case_name, -1, found, reply))
         return false;
-    list->names[list->n - 1] = name_curve(j, found->case_name);
+    /* The end of an id tells jobs of one minute apart; the beginning is the time. */
+    char method[40] = "", op[40] = "";
+    if (j->summary)
+        codec_read_method(method, op, sizeof method, j->summary);
+    curve_name named;
+    snprintf(named.text, sizeof named.text, "%s%s%s%s%s, job \u2026%s", found->case_name,
+             found->case_name[0] ? ": " : "", method[0] ? method : job_status_name(j->status), op[0] ? ", " : "", op,
+             j->id + 24);
+    list->names[list->n - 1] = named;
     static const double NOTHING[CODEC_HISTORY_COLUMNS];
     const double *rows = found->rows ? found->rows : NOTHING;
     list->curves[list->n - 1] = (uz_curve){.name = list->names[list->n - 1].text,
@@ -73,43 +69,36 @@ static bool refuse_with(http_reply *reply, int status, const char *code, const c
     return false;
 }
 
-/* ID, or ID:CASE. */
-static bool add_other(curve_list *list, api *context, const char *text, size_t len, http_reply *reply)
-{
-    char id[33], case_name[64] = "";
-    job other = {0};
-    if (list->n == UZ_CURVES)
-        return refuse_with(reply, 400, "bad_parameter", "\"%.*s\" is one too many: with names up to %d", text, len);
-    if (len < 32 || strspn(text, "0123456789abcdef") < 32 || (len > 32 && text[32] != ':') ||
-        len >= 33 + sizeof case_name)
-        return refuse_with(reply, 400, "bad_parameter", "\"%.*s\" is not ID or ID:CASE; with names up to %d of them",
-                           text, len);
-    snprintf(id, sizeof id, "%.32s", text);
-    if (len > 33)
-        snprintf(case_name, sizeof case_name, "%.*s", (int)(len - 33), text + 33);
-    const char *own = reply->job;
-    store_status status = store_get(context->store, id, &other);
-    if (status == STORE_OK && other.damaged)
-        status = STORE_DAMAGED;
-    reply->job = id; /* a failure is about this one, and told at once */
-    bool done = status == STORE_OK && add_job(list, context, &other, case_name[0] ? case_name : NULL, reply);
-    job_clear(&other);
-    if (status == STORE_NOT_FOUND)
-        refuse_with(reply, 404, "job_not_found", "there is no job %.*s; with names up to %d of them", text, len);
-    else if (status != STORE_OK)
-        reply_store_failure(context, status, reply);
-    reply->job = own;
-    return done;
-}
-
 /* with=ID,ID:CASE: other jobs over this one. False with a reply. */
-static bool add_others(curve_list *list, api *context, const char *ids, http_reply *reply)
+static bool add_others(curve_list *list, api *context, const char *text, http_reply *reply)
 {
-    while (ids) {
-        const size_t len = strcspn(ids, ",");
-        if (!add_other(list, context, ids, len, reply))
+    for (size_t len; text; text = text[len] ? text + len + 1 : NULL) {
+        char id[33], case_name[64] = "";
+        job other = {0};
+        len = strcspn(text, ",");
+        if (list->n == UZ_CURVES)
+            return refuse_with(reply, 400, "bad_parameter", "\"%.*s\" is one too many: with names up to %d", text, len);
+        if (len < 32 || strspn(text, "0123456789abcdef") < 32 || (len > 32 && text[32] != ':') ||
+            len >= 33 + sizeof case_name)
+            return refuse_with(reply, 400, "bad_parameter",
+                               "\"%.*s\" is not ID or ID:CASE; with names up to %d of them", text, len);
+        snprintf(id, sizeof id, "%.32s", text);
+        if (len > 33)
+            snprintf(case_name, sizeof case_name, "%.*s", (int)(len - 33), text + 33);
+        const char *own = reply->job;
+        store_status status = store_get(context->store, id, &other);
+        if (status == STORE_OK && other.damaged)
+            status = STORE_DAMAGED;
+        reply->job = id; /* a failure is about this one, and told at once */
+        const bool done = status == STORE_OK && add_job(list, context, &other, case_name[0] ? case_name : NULL, reply);
+        job_clear(&other);
+        if (status == STORE_NOT_FOUND)
+            refuse_with(reply, 404, "job_not_found", "there is no job %.*s; with names up to %d of them", text, len);
+        else if (status != STORE_OK)
+            reply_store_failure(context, status, reply);
+        reply->job = own;
+        if (!done)
             return false;
-        ids = ids[len] ? ids + len + 1 : NULL;
     }
     return true;
 }
@@ -132,26 +121,17 @@ static bool read_choice(const http_request *rq, const char *key, const char *con
                                  "%s is one of %s, not \"%.60s\"", key, list, text);
 }
 
-static bool read_plot(const http_request *rq, uz_plot *out, problem_details *problem)
-{
-    static const char *const X[] = {"iterations", "seconds"}, *const THEMES[] = {"auto", "light", "dark"};
-    int64_t width = 900;
-    int x, theme;
-    if (!read_choice(rq, "x", X, 2, &x, problem) || !read_choice(rq, "theme", THEMES, 3, &theme, problem) ||
-        !request_integer(rq, "width", 300, 4000, &width, problem))
-        return false;
-    *out = (uz_plot){.width = (int)width, .x = (uz_plot_x)x, .theme = (uz_theme)theme};
-    return true;
-}
-
 void convergence_get(api *context, http_request *rq, http_reply *reply)
 {
+    static const char *const X[] = {"iterations", "seconds"}, *const THEMES[] = {"auto", "light", "dark"};
     problem_details problem;
-    uz_plot how;
+    int64_t width = 900;
+    int x, theme;
     curve_list list = {.n = 0};
     job j = {0};
     char title[96];
-    if (!read_plot(rq, &how, &problem)) {
+    if (!read_choice(rq, "x", X, 2, &x, &problem) || !read_choice(rq, "theme", THEMES, 3, &theme, &problem) ||
+        !request_integer(rq, "width", 300, 4000, &width, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
@@ -159,7 +139,7 @@ void convergence_get(api *context, http_request *rq, http_reply *reply)
     if (jobs_load(context, rq, &j, reply) && add_job(&list, context, &j, target_value(&rq->target, "case"), reply) &&
         add_others(&list, context, target_value(&rq->target, "with"), reply)) {
         snprintf(title, sizeof title, "Convergence of job %s", j.id);
-        how.title = title;
+        const uz_plot how = {.title = title, .width = (int)width, .x = (uz_plot_x)x, .theme = (uz_theme)theme};
         char *svg = NULL;
         size_t len = 0;
         uz_error err = {0};

@@ -29,32 +29,24 @@ static void name_state(char *out, size_t size, const job *j, double iteration)
         snprintf(out, size, "%d.%s", j->attempts, job_status_name(j->status));
 }
 
-/* The progress of a job that runs here, and its newest row in *row, or NULL; the caller frees *rows. */
-static void look_at_run(const job_stream *s, job *j, double **rows, const double **row)
-{
-    int progress;
-    int64_t count = 0;
-    *rows = NULL;
-    *row = NULL;
-    if (j->status != JOB_RUNNING ||
-        !work_live(s->context->work, j->id, (int64_t)fmax(s->iteration, -1.0), &progress, rows, &count))
-        return;
-    j->progress = progress;
-    if (count > 0)
-        *row = *rows + (count - 1) * CODEC_HISTORY_COLUMNS;
-}
-
 static bool look(event_stream *base)
 {
     job_stream *s = (job_stream *)base;
     job j;
-    double *rows;
-    const double *row;
+    int progress;
+    int64_t count = 0;
+    double *rows = NULL;
+    const double *row = NULL; /* the newest of a job that runs here */
     char state[64];
     bool ok = store_get(s->context->store, s->id, &j) == STORE_OK; /* deleted meanwhile: nothing more to tell */
     if (!ok)
         return false;
-    look_at_run(s, &j, &rows, &row);
+    if (j.status == JOB_RUNNING &&
+        work_live(s->context->work, j.id, (int64_t)fmax(s->iteration, -1.0), &progress, &rows, &count)) {
+        j.progress = progress;
+        if (count > 0)
+            row = rows + (count - 1) * CODEC_HISTORY_COLUMNS;
+    }
     s->iteration = row ? row[0] : s->iteration;
     name_state(state, sizeof state, &j, s->iteration);
     bool seen = strcmp(state, s->last) == 0;

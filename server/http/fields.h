@@ -12,8 +12,7 @@ void field_slots_free(field_slots *slots);
 
 /* A job's problem, opened for as many of its cases as wanted. */
 typedef struct {
-    api *context;
-    const http_request *rq;
+    api_asker asker;
     const job *j;
     codec_request request;
     bool has_slot, is_open;
@@ -32,16 +31,15 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
                     http_reply *reply);
 /* `which`: uz_field bits. */
 bool fields_of_case(uz_fields *out, const field_reader *reader, int64_t number, unsigned which, http_reply *reply);
-bool fields_mesh_error(double *error, const field_reader *reader, int64_t number, http_reply *reply);
 
-/* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits). False with a 400
- * that has the list. */
+/* Fields of a list separated by commas: "summary", "nodes" and those of `allowed` (uz_field bits); of no list (NULL)
+ * `otherwise`. False with a 400 that has the list. */
 typedef struct {
     unsigned which;
     bool nodes;
     bool part;           /* only entries from .. from + count - 1 of each field */
     int64_t from, count; /* an entry is a contact row, or a node (of matrices: a dof) */
 } field_list;
-bool fields_parse(field_list *out, const char *text, unsigned allowed, problem_details *problem);
+bool fields_parse(field_list *out, const char *text, unsigned otherwise, unsigned allowed, problem_details *problem);
 
 #endif

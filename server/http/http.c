@@ -25,11 +25,6 @@ static bool on_admit(void *ctx, http_request *rq)
     return !rq->streamed || uploads_begin(context, rq);
 }
 
-static bool on_take(void *ctx, http_request *rq, const char *data, size_t size)
-{
-    return uploads_take(ctx, rq, data, size);
-}
-
 static void on_answer(void *ctx, http_request *rq)
 {
     rq->route->handler(ctx, rq, &rq->reply);
@@ -115,7 +110,7 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     }
     const transport_handlers handlers = {.ctx = context,
                                          .admit = on_admit,
-                                         .take = on_take,
+                                         .take = uploads_take,
                                          .answer = on_answer,
                                          .account = on_account,
                                          .drop = on_drop};
@@ -141,6 +136,12 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
 bool api_draining(const api *context)
 {
     return atomic_load(transport_draining(context->server));
+}
+
+bool api_is_over(void *asker)
+{
+    const api_asker *a = asker;
+    return api_draining(a->context) || request_client_gone(a->rq);
 }
 
 void http_drain(http_server *server)

@@ -155,16 +155,6 @@ bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
     return true;
 }
 
-static bool read_validate(const http_request *rq, bool *only, problem_details *problem)
-{
-    const char *text = target_value(&rq->target, "validate");
-    *only = text && strcmp(text, "true") == 0;
-    if (text && !*only && strcmp(text, "false") != 0)
-        return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                            "validate must be true or false");
-    return true;
-}
-
 store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key)
 {
     return (store_request){.body = body,
@@ -237,69 +227,48 @@ void jobs_store_and_wait(api *context, http_request *rq, const store_request *re
     job_clear(&j);
 }
 
-/* What a refused request is answered: a problem, or the job that it became when it came before. */
-static void refuse_or_repeat(api *context, http_request *rq, const char *key, const problem_details *problem,
-                             http_reply *reply)
-{
-    job j;
-    if (!jobs_find_repeat(context, rq, key, &j))
-        reply_problem(reply, problem);
-    else
-        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
-    job_clear(&j);
-}
-
-/* ---- validate */
-
-typedef struct {
-    api *context;
-    const http_request *rq;
-} asker;
-
-static bool is_unwanted(void *ctx)
-{
-    const asker *a = ctx;
-    return api_draining(a->context) || request_client_gone(a->rq);
-}
-
 /* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
 #define ASSEMBLY_BYTES 1000.0
 /* Beyond it a prediction takes minutes. */
 #define PREDICTED_MOST 4e6
 
-static bool worth_predicting(const codec_request *request, size_t limit)
-{
-    int64_t m, n_u;
-    problem_details ignored;
-    return !request->settings.semidefinite && codec_request_sizes(request, &m, &n_u, &ignored) &&
-           (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit);
-}
-
 void jobs_submit(api *context, http_request *rq, http_reply *reply)
 {
-    problem_details problem = {0};
+    problem_details problem = {0}, ignored;
     codec_request request = {0};
     char *key = NULL;
-    bool validate_only = false;
-    if (!read_validate(rq, &validate_only, &problem) || !jobs_read_key(rq, &key, &problem) ||
-        !codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) ||
-        !start_check(context, &request, rq, &problem) || !jobs_check_webhook(context, request.webhook, &problem)) {
-        refuse_or_repeat(context, rq, validate_only ? NULL : key, &problem, reply);
-        goto done;
-    }
-    if (validate_only) {
+    const char *validate = target_value(&rq->target, "validate");
+    const bool validate_only = validate && strcmp(validate, "true") == 0;
+    bool good = !validate || validate_only || strcmp(validate, "false") == 0;
+    if (!good)
+        problem_fill(&problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                     "validate must be true or false");
+    good = good && jobs_read_key(rq, &key, &problem) &&
+           codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
+           start_check(context, &request, rq, &problem) && jobs_check_webhook(context, request.webhook, &problem);
+    if (!good) {
+        /* a problem, or the job that the request became when it came before */
+        job j;
+        if (!jobs_find_repeat(context, rq, validate_only ? NULL : key, &j))
+            reply_problem(reply, &problem);
+        else
+            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
+        job_clear(&j);
+    } else if (validate_only) {
         /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
         uz_prediction predicted;
         uz_error err = {.status = UZ_OK};
-        asker a = {context, rq};
-        uz_hooks hooks = {.ctx = &a, .cancelled = is_unwanted};
-        request.settings.memory_limit = work_solve_bytes(context->work);
+        api_asker asker = {context, rq};
+        const uz_hooks hooks = {.ctx = &asker, .cancelled = api_is_over};
+        const size_t limit = request.settings.memory_limit = work_solve_bytes(context->work);
+        int64_t m, n_u;
         bool known = false;
-        if (worth_predicting(&request, request.settings.memory_limit)) {
+        if (!request.settings.semidefinite && codec_request_sizes(&request, &m, &n_u, &ignored) &&
+            (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
             pthread_mutex_lock(&context->predict_lock);
             uz_thread_init();
-            known =
-                !is_unwanted(&a) && uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
+            known = !api_is_over(&asker) &&
+                    uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
             pthread_mutex_unlock(&context->predict_lock);
         }
         reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
@@ -308,7 +277,6 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
         jobs_store_and_wait(context, rq, &stored, reply);
     }
-done:
     codec_request_clear(&request);
     free(key);
 }

@@ -58,9 +58,8 @@ bool results_exist(const job *j, http_reply *reply);
 /* Answers with the default fields of the result, as GET /v1/jobs/{id}/result does. */
 void results_reply(api *context, const job *j, http_reply *reply);
 
-/* Appends up to some names of cases to the detail, quoted: `Its cases: "a", "b", ... (5 in all).` */
-void cases_list(problem_details *problem, const store_case *cases, size_t count);
-/* Appends `Did you mean "x"?` if a case has a name close to this one. */
-void cases_suggest(problem_details *problem, const char *name, const store_case *cases, size_t count);
+/* Appends up to some names of cases to the detail, quoted: `Its cases: "a", "b", ... (5 in all).` Before them `Did you
+ * mean "x"?` if a case has a name close to the wrong one; NULL: none was given. */
+void cases_list(problem_details *problem, const char *wrong, const store_case *cases, size_t count);
 
 #endif

@@ -14,27 +14,12 @@ static bool refuse(problem_details *problem, const char *text)
 
 /* ---- times */
 
-/* Seconds east of Greenwich for "Z", "+hh:mm" or "-hh:mm"; a '+' that was not escaped arrives as a space. */
-static bool read_zone(const char *at, int *seconds)
-{
-    int hours, minutes, used = 0;
-    *seconds = 0;
-    if (strcmp(at, "Z") == 0 || strcmp(at, "z") == 0)
-        return true;
-    if (!strchr("+- ", at[0]) || strspn(at + 1, "0123456789:") != 5 ||
-        sscanf(at + 1, "%2d:%2d%n", &hours, &minutes, &used) != 2 || at[1 + used] || hours > 23 || minutes > 59)
-        return false;
-    *seconds = (at[0] == '-' ? -1 : 1) * (hours * 3600 + minutes * 60);
-    return true;
-}
-
 /* A time of RFC 3339, "2026-01-31T12:00:00.5Z", as Unix seconds. */
 static bool parse_time(const char *text, double *out)
 {
     static const char FORM[] = "dddd-dd-ddTdd:dd:dd";
     struct tm t = {0}, back;
     double fraction = 0;
-    int zone;
     for (size_t i = 0; FORM[i]; i++)
         if (FORM[i] == 'd' ? text[i] < '0' || text[i] > '9' : (text[i] & ~0x20) != (FORM[i] & ~0x20))
             return false;
@@ -53,8 +38,15 @@ static bool parse_time(const char *text, double *out)
     bool exists = gmtime_r(&seconds, &back) && back.tm_mon == asked.tm_mon && back.tm_mday == asked.tm_mday &&
                   back.tm_hour == asked.tm_hour && back.tm_min == asked.tm_min &&
                   asked.tm_sec < 61; /* no 30th of February */
-    if (!exists || !read_zone(at, &zone))
+    if (!exists)
         return false;
+    /* the zone: "Z", "+hh:mm" or "-hh:mm" east of Greenwich; a '+' that was not escaped arrives as a space */
+    int hours = 0, minutes = 0, used = 0;
+    if (strcmp(at, "Z") != 0 && strcmp(at, "z") != 0 &&
+        (!strchr("+- ", at[0]) || strspn(at + 1, "0123456789:") != 5 ||
+         sscanf(at + 1, "%2d:%2d%n", &hours, &minutes, &used) != 2 || at[1 + used] || hours > 23 || minutes > 59))
+        return false;
+    const int zone = (at[0] == '-' ? -1 : 1) * (hours * 3600 + minutes * 60);
     *out = (double)seconds + fraction - zone;
     return true;
 }
@@ -74,21 +66,6 @@ static bool read_time(const http_request *rq, const char *key, double *out, prob
 
 /* ---- the query */
 
-static bool read_tags(const http_request *rq, store_query *query, problem_details *problem)
-{
-    int count = 0;
-    for (size_t i = 0; i < rq->target.count; i++) {
-        if (strcmp(rq->target.parameters[i].key, "tag") != 0)
-            continue;
-        if (count > STORE_MORE_TAGS)
-            return refuse(problem, "at most 4 tags may be asked for");
-        const char **slot = count == 0 ? &query->tag : &query->more[count - 1];
-        *slot = rq->target.parameters[i].value;
-        count++;
-    }
-    return true;
-}
-
 static bool read_query(const http_request *rq, store_query *query, problem_details *problem)
 {
     int64_t limit = 50;
@@ -106,8 +83,17 @@ static bool read_query(const http_request *rq, store_query *query, problem_detai
     if (!request_integer(rq, "limit", 1, 1000, &limit, problem))
         return false;
     query->limit = (int)limit;
-    return read_time(rq, "since", &query->since, problem) && read_time(rq, "until", &query->until, problem) &&
-           read_tags(rq, query, problem);
+    if (!read_time(rq, "since", &query->since, problem) || !read_time(rq, "until", &query->until, problem))
+        return false;
+    for (size_t i = 0, count = 0; i < rq->target.count; i++) {
+        if (strcmp(rq->target.parameters[i].key, "tag") != 0)
+            continue;
+        if (count > STORE_MORE_TAGS)
+            return refuse(problem, "at most 4 tags may be asked for");
+        *(count == 0 ? &query->tag : &query->more[count - 1]) = rq->target.parameters[i].value;
+        count++;
+    }
+    return true;
 }
 
 void jobs_list(api *context, http_request *rq, http_reply *reply)

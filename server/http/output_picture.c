@@ -10,37 +10,25 @@ uz_status output_picture(char **file, size_t *len, const output_source *of, cons
     return uz_picture_deformed(file, len, of->scene, of->answer, &how, hooks, err);
 }
 
-/* The colour: "displacements" or "von_mises". */
-static bool read_colour(const http_request *rq, uz_field *out, problem_details *problem)
-{
-    const char *text = target_value(&rq->target, "colour");
-    *out = UZ_FIELD_VON_MISES;
-    if (!text || strcmp(text, "von_mises") == 0)
-        return true;
-    *out = UZ_FIELD_DISPLACEMENTS;
-    return strcmp(text, "displacements") == 0 ||
-           problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                        "colour is displacements or von_mises, not \"%.60s\"", text);
-}
-
-static bool read_factor(const http_request *rq, double *out, problem_details *problem)
-{
-    const char *text = target_value(&rq->target, "factor");
-    *out = 0;
-    if (!text)
-        return true;
-    const size_t used = uz_parse_double(out, text, strlen(text));
-    return (used > 0 && text[used] == '\0' && *out >= 0 && *out <= 1e12) ||
-           problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                        "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", text);
-}
-
+/* The colour ("displacements" or "von_mises"), the factor of the displacements and the width. */
 bool output_picture_read(output_options *out, const http_request *rq, problem_details *problem)
 {
+    static const char TITLE[] = "A query parameter has a value that is not allowed";
+    const char *colour = target_value(&rq->target, "colour"), *factor = target_value(&rq->target, "factor");
+    uz_picture *to = &out->picture;
     int64_t width = 900;
-    if (!read_colour(rq, &out->picture.colour, problem) || !read_factor(rq, &out->picture.factor, problem) ||
-        !request_integer(rq, "width", 200, 4000, &width, problem))
+    const bool moved = colour && strcmp(colour, "displacements") == 0;
+    to->colour = moved ? UZ_FIELD_DISPLACEMENTS : UZ_FIELD_VON_MISES;
+    if (colour && !moved && strcmp(colour, "von_mises") != 0)
+        return problem_fill(problem, 400, "bad_parameter", TITLE, "colour is displacements or von_mises, not \"%.60s\"",
+                            colour);
+    to->factor = 0;
+    const size_t used = factor ? uz_parse_double(&to->factor, factor, strlen(factor)) : 0;
+    if (factor && (used == 0 || factor[used] != '\0' || !(to->factor >= 0 && to->factor <= 1e12)))
+        return problem_fill(problem, 400, "bad_parameter", TITLE,
+                            "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", factor);
+    if (!request_integer(rq, "width", 200, 4000, &width, problem))
         return false;
-    out->picture.width = (int)width;
+    to->width = (int)width;
     return true;
 }

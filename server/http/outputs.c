@@ -106,7 +106,8 @@ void output_get(api *context, http_request *rq, http_reply *reply)
         reply->varies_by_type = true;
         row += request_accepts(rq, type);
     }
-    if ((row->allowed && !results_fields(rq, &fields, row->by_default, row->allowed, &problem)) ||
+    if ((row->allowed &&
+         !fields_parse(&fields, target_value(&rq->target, "fields"), row->by_default, row->allowed, &problem)) ||
         (row->read && !row->read(&options, rq, &problem))) {
         reply_problem(reply, &problem);
         return;
@@ -120,7 +121,7 @@ void output_get(api *context, http_request *rq, http_reply *reply)
         results_place at = {.cases = NULL};
         field_reader reader;
         if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
-            results_one(&at, context, rq, &j, "a file", reply)) {
+            results_one(&at, context, &j, target_value(&rq->target, "case"), "a file", reply)) {
             w.of.job_id = j.id;
             w.of.case_name = at.name;
             if (fields_open(&reader, context, rq, &j, reply) &&

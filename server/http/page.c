@@ -10,8 +10,10 @@ static const char POLICY[] =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "base-uri 'none'; frame-ancestors 'none'; form-action 'none'";
 
-static void reply_page_file(const char *name, http_reply *reply)
+void page_get(api *context, http_request *rq, http_reply *reply)
 {
+    const char *name = rq->name[0] ? rq->name : "index.html"; /* GET / */
+    (void)context;
     page_file file;
     for (size_t i = 0; (file = page_file_at(i)).name; i++) {
         if (strcmp(file.name, name) != 0)
@@ -30,17 +32,4 @@ static void reply_page_file(const char *name, http_reply *reply)
         return;
     }
     reply_refuse(reply, 404, "not_found", "Not found", "the page has no file of this name");
-}
-
-void page_index(api *context, http_request *rq, http_reply *reply)
-{
-    (void)context;
-    (void)rq;
-    reply_page_file("index.html", reply);
-}
-
-void page_part(api *context, http_request *rq, http_reply *reply)
-{
-    (void)context;
-    reply_page_file(rq->name, reply);
 }

@@ -1,3 +1,4 @@
+/* rate.c: token buckets in sets, by a hash of the client. */
 #include "http/rate.h"
 
 #include <math.h>
@@ -54,25 +55,22 @@ static uint64_t hash(uint64_t seed, const unsigned char *key, size_t len)
     return h ? h : 1;
 }
 
-/* The client's bucket, or the one of its set that was not used for longest, filled. */
-static bucket *find(rate *r, uint64_t key, double now)
-{
-    bucket *set = r->buckets[key % SETS], *oldest = set;
-    for (size_t i = 0; i < WAYS; i++) {
-        if (set[i].key == key)
-            return &set[i];
-        if (set[i].key == 0 || (oldest->key != 0 && set[i].at < oldest->at))
-            oldest = &set[i];
-    }
-    *oldest = (bucket){.key = key, .left = r->burst, .at = now};
-    return oldest;
-}
-
 double rate_take(rate *r, const void *key, size_t len, double now)
 {
-    uint64_t hashed = hash(r->seed, key, len);
+    const uint64_t hashed = hash(r->seed, key, len);
+    bucket *set = r->buckets[hashed % SETS], *b = NULL, *oldest = set;
     pthread_mutex_lock(&r->lock);
-    bucket *b = find(r, hashed, now);
+    /* the client's bucket, or the one of its set that was not used for longest, filled */
+    for (size_t i = 0; i < WAYS && !b; i++) {
+        if (set[i].key == hashed)
+            b = &set[i];
+        else if (set[i].key == 0 || (oldest->key != 0 && set[i].at < oldest->at))
+            oldest = &set[i];
+    }
+    if (!b) {
+        b = oldest;
+        *b = (bucket){.key = hashed, .left = r->burst, .at = now};
+    }
     b->left = fmin(r->burst, b->left + fmax(0.0, now - b->at) * r->per_s);
     b->at = now;
     double wait = b->left >= 1.0 ? 0.0 : (1.0 - b->left) / r->per_s;

@@ -26,42 +26,27 @@ static bool has_reactions(api *context, const job *j, http_reply *reply)
     return false;
 }
 
-/* The pointers of a made request, seen from the request that it was made from. */
-static void point_outside(problem_details *problem)
-{
-    static const char SOLVER[] = "/solver";
-    size_t skip = sizeof SOLVER - 1;
-    if (strncmp(problem->pointer, SOLVER, skip) != 0)
-        return;
-    memmove(problem->pointer, problem->pointer + skip, strlen(problem->pointer + skip) + 1);
-    if (strncmp(problem->detail, SOLVER, skip) == 0)
-        memmove(problem->detail, problem->detail + skip, strlen(problem->detail + skip) + 1);
-}
-
 /* The body of the new job and what the store keeps beside it, checked as any other; NULL in *body: refused. */
 static void make_request(api *context, const http_request *rq, const job *old, const char *old_body, size_t old_len,
                          char **body, size_t *len, codec_request *request, http_reply *reply)
 {
+    static const char SOLVER[] = "/solver";
+    const size_t skip = sizeof SOLVER - 1;
     problem_details problem = {0};
     *body = codec_refine(old_body, old_len, old->id, rq->body ? rq->body : "", rq->body_len, len, &problem);
     if (*body && codec_decode(request, CODEC_SOLVE, *body, *len, context->store, &problem)) {
         codec_request_strip(request);
         return;
     }
-    point_outside(&problem);
+    /* pointers of the made request, seen from the one that it was made from */
+    if (strncmp(problem.pointer, SOLVER, skip) == 0) {
+        memmove(problem.pointer, problem.pointer + skip, strlen(problem.pointer + skip) + 1);
+        if (strncmp(problem.detail, SOLVER, skip) == 0)
+            memmove(problem.detail, problem.detail + skip, strlen(problem.detail + skip) + 1);
+    }
     reply_problem(reply, &problem);
     free(*body);
     *body = NULL;
-}
-
-/* A run on a grid that nobody gave can't go on: another accuracy asks for another grid. */
-static bool chose_cells(api *context, const job *j)
-{
-    double *cells = NULL;
-    int64_t count = 0;
-    const store_status status = store_get_vector(context->store, j->id, 0, "cells", &cells, &count);
-    free(cells);
-    return status == STORE_OK;
 }
 
 void jobs_refine(api *context, http_request *rq, http_reply *reply)
@@ -75,13 +60,16 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
         char *old_body = NULL, *body = NULL;
         codec_request made = {0};
         size_t old_len = 0, len = 0;
+        double *cells = NULL;
+        int64_t n_cells = 0;
         store_status status = store_get_body(context->store, old.id, &old_body, &old_len);
         if (status != STORE_OK) {
             reply_store_failure(context, status, reply);
         } else if (codec_is_verify(old_body, old_len)) {
             reply_refuse(reply, 409, "not_solved_here", "The job solved nothing",
                          "it certified an answer that was given to it, and there is no run to continue");
-        } else if (chose_cells(context, &old)) {
+        } else if (store_get_vector(context->store, old.id, 0, "cells", &cells, &n_cells) == STORE_OK) {
+            /* A run on a grid that nobody gave can't go on: another accuracy asks for another grid. */
             reply_refuse(
                 reply, 409, "mesh_is_chosen", "The job chose its mesh",
                 "the cells of its box were chosen for its accuracy: send the problem again with another accuracy, or "
@@ -95,6 +83,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             if (body)
                 jobs_store_and_wait(context, rq, &request, reply);
         }
+        free(cells);
         free(old_body);
         free(body);
         codec_request_clear(&made);

@@ -17,24 +17,6 @@ static const unsigned BY_ROW = UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_PRE
 static const unsigned BY_NODE =
     UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES | UZ_FIELD_STRAIN;
 
-bool results_fields(const http_request *rq, field_list *out, unsigned otherwise, unsigned allowed,
-                    problem_details *problem)
-{
-    const char *text = target_value(&rq->target, "fields");
-    *out = (field_list){.which = otherwise};
-    return !text || fields_parse(out, text, allowed, problem);
-}
-
-/* A part of every field: from, and how many. */
-static bool read_part(const http_request *rq, field_list *out, problem_details *problem)
-{
-    out->from = 0;
-    out->count = INT64_MAX;
-    out->part = target_value(&rq->target, "from") || target_value(&rq->target, "count");
-    return request_integer(rq, "from", 0, INT64_MAX, &out->from, problem) &&
-           request_integer(rq, "count", 0, INT64_MAX, &out->count, problem);
-}
-
 bool results_exist(const job *j, http_reply *reply)
 {
     static const char TITLE[] = "The job has no result";
@@ -197,31 +179,30 @@ static codec_result as_encoded(const place *at, const vectors *own, const vector
     return r;
 }
 
-/* Fields that the store does not have, of one case. False with a reply. */
-static bool compute_one(api *context, const http_request *rq, const place *at, const field_list *fields,
-                        uz_fields *computed, http_reply *reply)
+/* rq may be NULL where nothing is to be computed. */
+static void reply_one(api *context, const http_request *rq, const place *at, const field_list *fields,
+                      http_reply *reply)
 {
+    const unsigned which = fields->which & COMPUTED;
+    uz_fields computed = {.dim = 0};
     field_reader reader;
-    bool done = true;
-    if (!(fields->which & COMPUTED))
-        return true;
-    done = fields_open(&reader, context, rq, at->j, reply) &&
-           fields_of_case(computed, &reader, at->number, fields->which & COMPUTED, reply);
-    fields_close(&reader);
-    return done;
-}
-
-static void encode_one(api *context, const place *at, const field_list *fields, const uz_fields *computed,
-                       http_reply *reply)
-{
     vectors own = {0}, shared = {0};
     size_t len = 0;
+    if (which) {
+        const bool done = fields_open(&reader, context, rq, at->j, reply) &&
+                          fields_of_case(&computed, &reader, at->number, which, reply);
+        fields_close(&reader);
+        if (!done) {
+            uz_fields_clear(&computed);
+            return;
+        }
+    }
     store_status status = fetch_shared(context, at->j, fields, &shared);
     if (status == STORE_OK)
         status = fetch_own(context, at, fields, &own);
     if (status == STORE_OK) {
-        const uz_fields part = cut_computed(computed ? computed : &(uz_fields){.dim = 0}, fields);
-        codec_result result = as_encoded(at, &own, &shared, computed ? &part : NULL, fields);
+        const uz_fields part = cut_computed(&computed, fields);
+        codec_result result = as_encoded(at, &own, &shared, which ? &part : NULL, fields);
         char *text = codec_encode_result(&result, &len);
         reply_text(reply, 200, "application/json", text, len);
     } else {
@@ -229,14 +210,6 @@ static void encode_one(api *context, const place *at, const field_list *fields, 
     }
     vectors_free(&own);
     vectors_free(&shared);
-}
-
-static void reply_one(api *context, const http_request *rq, const place *at, const field_list *fields,
-                      http_reply *reply)
-{
-    uz_fields computed = {.dim = 0};
-    if (compute_one(context, rq, at, fields, &computed, reply))
-        encode_one(context, at, fields, &computed, reply);
     uz_fields_clear(&computed);
 }
 
@@ -244,15 +217,6 @@ static void reply_one(api *context, const http_request *rq, const place *at, con
 
 /* Numbers of all cases in one reply, about 20 bytes each: one reply must not fill the machine. openapi.json says so. */
 #define MOST_NUMBERS 4000000
-
-static bool refuse_large(int64_t total, http_reply *reply)
-{
-    reply_refuse(reply, 413, "result_too_large", "The result is too large for one reply",
-                 "all cases together have %lld numbers, a reply has at most %d: ask for one case with ?case=NAME, or "
-                 "for fewer fields",
-                 (long long)total, MOST_NUMBERS);
-    return false;
-}
 
 /* False with a 413, or a failure of the store. Numbers that are computed are counted with the first case of which they
  * are: `more`. */
@@ -273,15 +237,12 @@ static bool check_room(api *context, const job *j, size_t cases, const field_lis
         int64_t most = fields->part && fields->count < MOST_NUMBERS ? 3 * (int64_t)cases * fields->count : count;
         total += most < count ? most : count;
     }
-    return total <= MOST_NUMBERS || refuse_large(total, reply);
-}
-
-static int64_t count_numbers(const uz_fields *f)
-{
-    const int64_t k = f->components;
-    return (f->contact_status ? f->m : 0) +
-           f->n_nodes * ((f->stress ? k : 0) + (f->strain ? k : 0) + (f->principal ? 3 : 0) + (f->von_mises ? 1 : 0)) +
-           f->n_points * (1 + f->dim + k);
+    if (total > MOST_NUMBERS)
+        reply_refuse(reply, 413, "result_too_large", "The result is too large for one reply",
+                     "all cases together have %lld numbers, a reply has at most %d: ask for one case with ?case=NAME, "
+                     "or for fewer fields",
+                     (long long)total, MOST_NUMBERS);
+    return total <= MOST_NUMBERS;
 }
 
 /* All cases of a job in one reply. */
@@ -304,9 +265,14 @@ static bool add_case(many *of, size_t i, http_reply *reply)
     vectors own = {0};
     uz_fields computed = {.dim = 0};
     bool done = !which || fields_of_case(&computed, &of->reader, at.number, which, reply);
-    if (done && which && i == 0)
-        done =
-            check_room(of->context, of->j, of->count, of->fields, (int64_t)of->count * count_numbers(&computed), reply);
+    if (done && which && i == 0) {
+        const uz_fields *f = &computed;
+        const int64_t k = f->components;
+        const int64_t of_node =
+            (f->stress ? k : 0) + (f->strain ? k : 0) + (f->principal ? 3 : 0) + (f->von_mises ? 1 : 0);
+        const int64_t numbers = (f->contact_status ? f->m : 0) + f->n_nodes * of_node + f->n_points * (1 + f->dim + k);
+        done = check_room(of->context, of->j, of->count, of->fields, (int64_t)of->count * numbers, reply);
+    }
     store_status status = done ? fetch_own(of->context, &at, of->fields, &own) : STORE_OK;
     if (status != STORE_OK) {
         reply_store_failure(of->context, status, reply);
@@ -321,14 +287,6 @@ static bool add_case(many *of, size_t i, http_reply *reply)
     return done;
 }
 
-static bool add_cases(many *of, http_reply *reply)
-{
-    for (size_t i = 0; i < of->count; i++)
-        if (!add_case(of, i, reply))
-            return false;
-    return true;
-}
-
 static void reply_cases(many *of, const http_request *rq, http_reply *reply)
 {
     store_status status = fetch_shared(of->context, of->j, of->fields, &of->shared);
@@ -338,9 +296,12 @@ static void reply_cases(many *of, const http_request *rq, http_reply *reply)
         const place whole = {.j = of->j, .summary = of->j->summary};
         size_t len = 0;
         of->all = codec_results_begin(of->j->id, of->j->summary);
+        bool done = of->all != NULL;
+        for (size_t i = 0; done && i < of->count; i++)
+            done = add_case(of, i, reply);
         if (!of->all) {
             reply_no_memory(reply);
-        } else if (!add_cases(of, reply)) {
+        } else if (!done) {
             codec_results_end(of->all, NULL, NULL);
         } else {
             codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL, of->fields);
@@ -355,10 +316,11 @@ static void reply_cases(many *of, const http_request *rq, http_reply *reply)
 
 /* ------------------------------------------------------------ which of them */
 
-bool results_cases(api *context, const http_request *rq, const job *j, store_case **cases, size_t *count,
-                   http_reply *reply)
+/* The cases of the job, or the one of this name; *count 0: the job has none and none is named. The caller frees them.
+ * False with a 404, or a failure of the store. */
+static bool find_cases(api *context, const job *j, const char *name, store_case **cases, size_t *count,
+                       http_reply *reply)
 {
-    const char *name = target_value(&rq->target, "case");
     store_status status = store_get_cases(context->store, j->id, name, cases, count);
     if (status == STORE_OK && (!name || *count > 0))
         return true;
@@ -367,8 +329,7 @@ bool results_cases(api *context, const http_request *rq, const job *j, store_cas
         status = store_get_cases(context->store, j->id, NULL, cases, count);
     if (status == STORE_OK) {
         problem_fill(&problem, 404, "case_not_found", "Not found", "the job has no case \"%.63s\".", name);
-        cases_suggest(&problem, name, *cases, *count);
-        cases_list(&problem, *cases, *count);
+        cases_list(&problem, name, *cases, *count);
         reply_problem(reply, &problem);
     } else {
         reply_store_failure(context, status, reply);
@@ -379,20 +340,19 @@ bool results_cases(api *context, const http_request *rq, const job *j, store_cas
     return false;
 }
 
-bool results_one(results_place *out, api *context, const http_request *rq, const job *j, const char *what,
-                 http_reply *reply)
+bool results_one(results_place *out, api *context, const job *j, const char *name, const char *what, http_reply *reply)
 {
     *out = (results_place){.summary = j->summary};
-    if (!results_cases(context, rq, j, &out->cases, &out->count, reply))
+    if (!find_cases(context, j, name, &out->cases, &out->count, reply))
         return false;
     if (out->count == 0)
         return true;
-    if (!target_value(&rq->target, "case")) {
+    if (!name) {
         char title[96];
         problem_details problem;
         snprintf(title, sizeof title, "Each load case has %s of its own", what);
         problem_fill(&problem, 400, "case_needed", title, "say which one with ?case=NAME.");
-        cases_list(&problem, out->cases, out->count);
+        cases_list(&problem, NULL, out->cases, out->count);
         reply_problem(reply, &problem);
         return false;
     }
@@ -406,22 +366,6 @@ void results_place_clear(results_place *at)
 {
     store_cases_free(at->cases, at->count);
     *at = (results_place){.number = 0};
-}
-
-static void reply_result(api *context, const http_request *rq, const job *j, const field_list *fields,
-                         http_reply *reply)
-{
-    store_case *cases = NULL;
-    size_t count = 0;
-    if (!results_cases(context, rq, j, &cases, &count, reply))
-        return;
-    if (count == 0)
-        reply_one(context, rq, &(place){.j = j, .summary = j->summary}, fields, reply);
-    else if (target_value(&rq->target, "case"))
-        reply_one(context, rq, &(place){j, cases[0].number, cases[0].name, cases[0].summary}, fields, reply);
-    else if (check_room(context, j, count, fields, 0, reply))
-        reply_cases(&(many){.context = context, .j = j, .cases = cases, .count = count, .fields = fields}, rq, reply);
-    store_cases_free(cases, count);
 }
 
 bool results_known(const http_request *rq, const job *j, http_reply *reply)
@@ -440,12 +384,29 @@ void results_get(api *context, http_request *rq, http_reply *reply)
     field_list fields;
     problem_details problem;
     job j = {0};
-    if (!results_fields(rq, &fields, BY_DEFAULT, STORED | COMPUTED, &problem) || !read_part(rq, &fields, &problem)) {
+    store_case *cases = NULL;
+    size_t count = 0;
+    const char *name = target_value(&rq->target, "case");
+    bool good = fields_parse(&fields, target_value(&rq->target, "fields"), BY_DEFAULT, STORED | COMPUTED, &problem);
+    fields.from = 0;
+    fields.count = INT64_MAX;
+    fields.part = target_value(&rq->target, "from") || target_value(&rq->target, "count");
+    if (!good || !request_integer(rq, "from", 0, INT64_MAX, &fields.from, &problem) ||
+        !request_integer(rq, "count", 0, INT64_MAX, &fields.count, &problem)) {
         reply_problem(reply, &problem);
         return;
     }
-    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply))
-        reply_result(context, rq, &j, &fields, reply);
+    if (jobs_load(context, rq, &j, reply) && results_exist(&j, reply) && !results_known(rq, &j, reply) &&
+        find_cases(context, &j, name, &cases, &count, reply)) {
+        if (count == 0)
+            reply_one(context, rq, &(place){.j = &j, .summary = j.summary}, &fields, reply);
+        else if (name)
+            reply_one(context, rq, &(place){&j, cases[0].number, cases[0].name, cases[0].summary}, &fields, reply);
+        else if (check_room(context, &j, count, &fields, 0, reply))
+            reply_cases(&(many){.context = context, .j = &j, .cases = cases, .count = count, .fields = &fields}, rq,
+                        reply);
+        store_cases_free(cases, count);
+    }
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }
@@ -453,6 +414,6 @@ void results_get(api *context, http_request *rq, http_reply *reply)
 void results_reply(api *context, const job *j, http_reply *reply)
 {
     const field_list fields = {.which = BY_DEFAULT};
-    encode_one(context, &(place){.j = j, .summary = j->summary}, &fields, NULL, reply);
+    reply_one(context, NULL, &(place){.j = j, .summary = j->summary}, &fields, reply);
     jobs_check_still_there(context, j, reply);
 }

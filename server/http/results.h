@@ -11,20 +11,11 @@
     ((unsigned)(UZ_FIELD_CONTACT_STATUS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES |                  \
                 UZ_FIELD_STRAIN | UZ_FIELD_STRESS_GAUSS))
 
-/* The query's list of fields, or `otherwise`. False with a 400. */
-bool results_fields(const http_request *rq, field_list *out, unsigned otherwise, unsigned allowed,
-                    problem_details *problem);
-
 /* The answer of an ended job never changes: its tag follows from which one it is and what is asked of it. True: the
  * client has it, and the reply says so. */
 bool results_known(const http_request *rq, const job *j, http_reply *reply);
 
-/* The cases of the job, or the one that the query names; *count 0: the job has none and none is named. The caller frees
- * them. False with a 404, or a failure of the store. */
-bool results_cases(api *context, const http_request *rq, const job *j, store_case **cases, size_t *count,
-                   http_reply *reply);
-
-/* A job, or the one of its cases that the query names. */
+/* A job, or one of its cases. */
 typedef struct {
     int64_t number;      /* 0: the job has no cases */
     const char *name;    /* NULL with it */
@@ -32,10 +23,9 @@ typedef struct {
     store_case *cases;   /* what the texts live in */
     size_t count;
 } results_place;
-/* False with a reply, also where the job has cases and none is named; `what` each of them has of its own. The caller
- * clears *out in every case. */
-bool results_one(results_place *out, api *context, const http_request *rq, const job *j, const char *what,
-                 http_reply *reply);
+/* name NULL: none is asked for. False with a reply, also where the job has cases and none is named; `what` each of them
+ * has of its own. The caller clears *out in every case. */
+bool results_one(results_place *out, api *context, const job *j, const char *name, const char *what, http_reply *reply);
 void results_place_clear(results_place *place);
 
 #endif

@@ -30,9 +30,9 @@ static const route ROUTES[] = {
     {"GET", "/metrics", NONE, service_metrics, false},
     {"GET", "/healthz", NONE, service_health, false},
     {"GET", "/readyz", NONE, service_ready, false},
-    {"GET", "/", NONE, page_index, false},
-    {"GET", "/page/{name}", NONE, page_part, false},
-    {"GET", "/openapi.json", NONE, service_openapi, false},
+    {"GET", "/", NONE, page_get, false},
+    {"GET", "/page/{name}", NONE, page_get, false},
+    {"GET", "/openapi.json", NONE, service_schema, false},
     {"GET", "/schemas/{name}", NONE, service_schema, false},
 };
 
@@ -44,23 +44,17 @@ static const route *route_at(size_t i)
     return i < own ? &ROUTES[i] : row ? &row->route : NULL;
 }
 
-/* {id}: 32 hexadecimal digits in lower case. {digest}: 64 of them. {name}: a file name. */
-static bool placeholder_matches(const char *kind, const char *text, size_t len)
-{
-    if (strncmp(kind, "{id}", 4) == 0)
-        return len == 32 && strspn(text, "0123456789abcdef") >= 32;
-    if (strncmp(kind, "{digest}", 8) == 0)
-        return len == 64 && strspn(text, "0123456789abcdef") >= 64;
-    return len > 0 && len < sizeof((http_request *)0)->name;
-}
-
-/* Compares segment by segment; what stands for a placeholder is copied to name. any: whatever its form is. */
+/* Compares segment by segment; what stands for a placeholder is copied to name. any: whatever its form is, which is 32
+ * hexadecimal digits in lower case for {id}, 64 of them for {digest}, and a file name for {name}. */
 static bool path_matches(const char *pattern, const char *path, bool any, char *name, size_t size)
 {
     while (*pattern == '/' && *path == '/') {
-        size_t want = strcspn(++pattern, "/"), have = strcspn(++path, "/");
+        const size_t want = strcspn(++pattern, "/"), have = strcspn(++path, "/");
         if (*pattern == '{') {
-            if (any ? have == 0 : !placeholder_matches(pattern, path, have))
+            const size_t digits = strncmp(pattern, "{id}", 4) == 0 ? 32 : strncmp(pattern, "{digest}", 8) == 0 ? 64 : 0;
+            const bool fits = digits ? have == digits && strspn(path, "0123456789abcdef") >= digits
+                                     : have > 0 && have < sizeof((http_request *)0)->name;
+            if (any ? have == 0 : !fits)
                 return false;
             snprintf(name, size, "%.*s", (int)have, path);
         } else if (want != have || memcmp(pattern, path, have) != 0) {
@@ -139,25 +133,21 @@ bool route_find(http_request *rq, char *allow, size_t size, problem_details *pro
                         "there is nothing at %.200s: /openapi.json lists what is", rq->target.path);
 }
 
-static bool refuse_parameter(const http_request *rq, const char *key, problem_details *problem)
-{
-    char takes[160] = "it takes none";
-    size_t used = strlen("it takes ");
-    for (const char *const *known = rq->route->parameters; *known && used < sizeof takes; known++)
-        used += (size_t)snprintf(takes + used, sizeof takes - used, "%s%s", *known, known[1] ? ", " : "");
-    return problem_fill(problem, 400, "unknown_parameter", "A query parameter is unknown",
-                        "\"%.100s\" is not a parameter of %s %s; %s", key, rq->route->method, rq->route->pattern,
-                        takes);
-}
-
 bool route_check_parameters(const http_request *rq, problem_details *problem)
 {
     for (size_t i = 0; i < rq->target.count; i++) {
-        const char *const *known = rq->route->parameters;
-        while (*known && strcmp(*known, rq->target.parameters[i].key) != 0)
+        const char *const *known = rq->route->parameters, *key = rq->target.parameters[i].key;
+        while (*known && strcmp(*known, key) != 0)
             known++;
-        if (!*known)
-            return refuse_parameter(rq, rq->target.parameters[i].key, problem);
+        if (*known)
+            continue;
+        char takes[160] = "it takes none";
+        size_t used = strlen("it takes ");
+        for (known = rq->route->parameters; *known && used < sizeof takes; known++)
+            used += (size_t)snprintf(takes + used, sizeof takes - used, "%s%s", *known, known[1] ? ", " : "");
+        return problem_fill(problem, 400, "unknown_parameter", "A query parameter is unknown",
+                            "\"%.100s\" is not a parameter of %s %s; %s", key, rq->route->method, rq->route->pattern,
+                            takes);
     }
     return true;
 }

@@ -46,11 +46,6 @@ void service_limits(api *context, http_request *rq, http_reply *reply)
     free(all);
 }
 
-static void reply_health(api *context, const char *status, const int64_t counts[5], http_reply *reply)
-{
-    reply_json(reply, 200, codec_encode_health(status, counts, work_workers(context->work)));
-}
-
 void service_metrics(api *context, http_request *rq, http_reply *reply)
 {
     const transport_counts counts = transport_count(context->server);
@@ -90,7 +85,8 @@ void service_health(api *context, http_request *rq, http_reply *reply)
     int64_t counts[5] = {0};
     (void)rq;
     bool answered = store_counts(context->store, counts) == STORE_OK;
-    reply_health(context, answered ? "ok" : "store_unavailable", counts, reply);
+    reply_json(reply, 200,
+               codec_encode_health(answered ? "ok" : "store_unavailable", counts, work_workers(context->work)));
 }
 
 /* ---- ready: what a job needs, tried */
@@ -101,33 +97,27 @@ static const char PROBE[] =
     "2 2 2\\n1 1 2\\n2 2 1\\n\", \"N\": \"%%MatrixMarket matrix coordinate real general\\n1 2 1\\n1 1 1\\n\","
     " \"h\": [0.5], \"p\": [2, 2]}}";
 
-static bool solve_probe(void)
+static const char *why_not_ready(api *context)
 {
+    char cause[256];
     codec_request request;
     problem_details problem;
     uz_result *result = NULL;
     uz_error err = {0};
-    uz_thread_init();
-    if (!codec_decode(&request, CODEC_SOLVE, PROBE, sizeof PROBE - 1, NULL, &problem))
-        return false;
-    bool good = uz_solve(&result, &request.problem, &request.settings, NULL, NULL, &err) == UZ_OK &&
-                result->summary.outcome == UZ_CONVERGED && fabs(result->summary.reaction_sum + 1.0) < 1e-6;
-    uz_result_free(result);
-    codec_request_clear(&request);
-    return good;
-}
-
-static const char *why_not_ready(api *context)
-{
-    char cause[256];
     store_status status = store_try_write(context->store);
     if (status != STORE_OK) {
         store_message(context->store, cause, sizeof cause);
         log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
-    }
-    if (status != STORE_OK)
         return status == STORE_FULL ? "storage_full" : "store_unavailable";
-    return solve_probe() ? "" : "solver_unavailable";
+    }
+    uz_thread_init();
+    if (!codec_decode(&request, CODEC_SOLVE, PROBE, sizeof PROBE - 1, NULL, &problem))
+        return "solver_unavailable";
+    const bool solved = uz_solve(&result, &request.problem, &request.settings, NULL, NULL, &err) == UZ_OK &&
+                        result->summary.outcome == UZ_CONVERGED && fabs(result->summary.reaction_sum + 1.0) < 1e-6;
+    uz_result_free(result);
+    codec_request_clear(&request);
+    return solved ? "" : "solver_unavailable";
 }
 
 static const double READY_FOR_S = 1.0; /* so often at most it is tried, however many ask */
@@ -160,40 +150,28 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
         reply_refuse(reply, 503, why, "The store does not answer", "the server's log has the cause");
     } else {
         reply->retry_after_s = 0;
-        reply_health(context, "ready", counts, reply);
+        reply_json(reply, 200, codec_encode_health("ready", counts, work_workers(context->work)));
     }
 }
 
-static bool reply_embedded(const char *name, const char *type, http_reply *reply)
+void service_schema(api *context, http_request *rq, http_reply *reply)
 {
+    const char *name = rq->name[0] ? rq->name : "openapi.json"; /* /openapi.json has no name in its path */
+    (void)context;
     for (size_t i = 0; i < embedded_count(); i++) {
-        embedded_file file = embedded_at(i);
+        const embedded_file file = embedded_at(i);
         if (strcmp(file.name, name) != 0)
             continue;
         reply->status = 200;
-        reply->type = type;
+        reply->type = rq->name[0] ? "application/schema+json" : "application/json";
         reply->body = (char *)file.text; /* only read: body_is_static */
         reply->len = file.len;
         reply->body_is_static = true;
         reply->cacheable = true;
         reply->tag_by_body = true;
-        return true;
+        return;
     }
     reply_refuse(reply, 404, "not_found", "Not found", "there is no schema of this name: /openapi.json refers to all");
-    return false;
-}
-
-void service_openapi(api *context, http_request *rq, http_reply *reply)
-{
-    (void)context;
-    (void)rq;
-    reply_embedded("openapi.json", "application/json", reply);
-}
-
-void service_schema(api *context, http_request *rq, http_reply *reply)
-{
-    (void)context;
-    reply_embedded(rq->name, "application/schema+json", reply);
 }
 
 /* ---- for administrators */

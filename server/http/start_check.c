@@ -46,45 +46,40 @@ static bool check_job(api *context, const codec_start *start, problem_details *p
                         : "/solver/warm_start/job: this job has not ended");
 }
 
-/* 0 in *number: the job has no cases. */
-static bool find_case(api *context, const codec_start *start, int64_t *number, problem_details *problem)
+/* Its case, if it has some, must have as many reactions as the problem has rows. */
+static bool check_reactions(api *context, const codec_request *request, problem_details *problem)
 {
+    const codec_start *start = &request->start;
     store_case *cases = NULL;
-    size_t count = 0, i = 0;
-    *number = 0;
-    store_status status = store_get_cases(context->store, start->job, NULL, &cases, &count);
+    size_t n_cases = 0, i = 0;
+    store_status status = store_get_cases(context->store, start->job, NULL, &cases, &n_cases);
     if (status != STORE_OK)
         return refuse_store(context, start, status, problem);
-    while (i < count && strcmp(cases[i].name, start->case_name) != 0)
+    while (i < n_cases && strcmp(cases[i].name, start->case_name) != 0)
         i++;
-    bool good = i < count || (count == 0 && !start->case_name[0]);
-    if (good && i < count)
-        *number = cases[i].number;
-    else if (!good && start->case_name[0])
+    const bool good = i < n_cases || (n_cases == 0 && !start->case_name[0]);
+    const int64_t number = i < n_cases ? cases[i].number : 0; /* 0: the job has no cases */
+    if (!good && start->case_name[0])
         refuse(problem, "case", "not_allowed", "/solver/warm_start/case: that job has no case of this name.");
     else if (!good)
         refuse(problem, "job", "missing_key",
                "/solver/warm_start/job: that job has load cases: say which one in \"case\".");
-    if (!good) {
-        cases_suggest(problem, start->case_name, cases, count);
-        cases_list(problem, cases, count);
-    }
-    store_cases_free(cases, count);
-    return good;
-}
+    if (!good)
+        cases_list(problem, start->case_name, cases, n_cases);
+    store_cases_free(cases, n_cases);
+    if (!good)
+        return false;
 
-static bool check_reactions(api *context, const codec_request *request, int64_t number, problem_details *problem)
-{
     double *r = NULL;
     int64_t count = 0, m, n_u;
     char text[160];
-    store_status status = store_get_vector(context->store, request->start.job, number, "reactions", &r, &count);
+    status = store_get_vector(context->store, start->job, number, "reactions", &r, &count);
     bool finite = status == STORE_OK;
-    for (int64_t i = 0; finite && i < count; i++)
-        finite = isfinite(r[i]);
+    for (int64_t k = 0; finite && k < count; k++)
+        finite = isfinite(r[k]);
     free(r);
     if (status != STORE_OK && status != STORE_NOT_FOUND)
-        return refuse_store(context, &request->start, status, problem);
+        return refuse_store(context, start, status, problem);
     if (!finite)
         return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: this job ended without reactions");
     if (!codec_request_sizes(request, &m, &n_u, problem))
@@ -97,11 +92,18 @@ static bool check_reactions(api *context, const codec_request *request, int64_t 
     return refuse(problem, "job", "size_mismatch", text);
 }
 
-/* A run that goes on with another problem would be another run. */
-static bool check_same(api *context, const codec_start *start, const http_request *rq, problem_details *problem)
+bool start_check(api *context, const codec_request *request, const http_request *rq, problem_details *problem)
 {
+    const codec_start *start = &request->start;
     char *body = NULL;
     size_t len = 0;
+    if (!start->job[0])
+        return true;
+    if (!check_job(context, start, problem))
+        return false;
+    if (!start->continued)
+        return check_reactions(context, request, problem);
+    /* A run that goes on with another problem would be another run. */
     if (start->case_name[0])
         return refuse(problem, "case", "not_allowed",
                       "/solver/warm_start/case: a run is continued with all its cases; leave this out");
@@ -115,17 +117,4 @@ static bool check_same(api *context, const codec_start *start, const http_reques
     return refuse(problem, "continue", "not_allowed",
                   "/solver/warm_start/continue: problem and cases are not, byte by byte, those of that job; leave this "
                   "out to start from its reactions");
-}
-
-bool start_check(api *context, const codec_request *request, const http_request *rq, problem_details *problem)
-{
-    const codec_start *start = &request->start;
-    int64_t number;
-    if (!start->job[0])
-        return true;
-    if (!check_job(context, start, problem))
-        return false;
-    if (start->continued)
-        return check_same(context, start, rq, problem);
-    return find_case(context, start, &number, problem) && check_reactions(context, request, number, problem);
 }

@@ -44,10 +44,9 @@ bool uploads_begin(api *context, http_request *rq)
     return rq->upload || refuse(context, rq, status, &rq->refused);
 }
 
-bool uploads_take(api *context, http_request *rq, const char *data, size_t size)
+bool uploads_take(void *ctx, http_request *rq, const char *data, size_t size)
 {
-    upload_status status = store_upload_write(rq->upload, data, size);
-    return refuse(context, rq, status, &rq->refused);
+    return refuse(ctx, rq, store_upload_write(rq->upload, data, size), &rq->refused);
 }
 
 void uploads_create(api *context, http_request *rq, http_reply *reply)

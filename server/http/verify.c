@@ -5,24 +5,19 @@
 
 static const double VERIFY_WAIT_S = 30.0; /* where the request does not say; openapi.json says so */
 
-/* What kept the answer from being certified is an error in the request. */
-static void reply_failure(const job *j, http_reply *reply)
-{
-    problem_details error = {0};
-    if (j->error && codec_decode_problem(&error, j->error) && error.status >= 400)
-        reply_problem(reply, &error);
-    else
-        reply_refuse(reply, 500, "internal", "A fault of this service", "the job failed and left no reason");
-}
-
 static void reply_end(api *context, job *j, http_reply *reply)
 {
+    problem_details error = {0};
     if (!jobs_ended(j))
         jobs_acknowledge(context, j, reply);
-    else if (j->status == JOB_FAILED)
-        reply_failure(j, reply);
-    else if (results_exist(j, reply))
-        results_reply(context, j, reply);
+    else if (j->status != JOB_FAILED) {
+        if (results_exist(j, reply))
+            results_reply(context, j, reply);
+    } else if (j->error && codec_decode_problem(&error, j->error) && error.status >= 400) {
+        reply_problem(reply, &error); /* what kept the answer from being certified is an error in the request */
+    } else {
+        reply_refuse(reply, 500, "internal", "A fault of this service", "the job failed and left no reason");
+    }
 }
 
 void verify_submit(api *context, http_request *rq, http_reply *reply)
