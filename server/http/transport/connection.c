@@ -1,3 +1,4 @@
+/* connection.c: a connection's requests, from the first line to the end of the reply. */
 #include "http/transport/connection.h"
 #include "http/transport/message.h"
 
@@ -127,7 +128,7 @@ static void send_directly(connection *c, const problem_details *problem)
     reply->close = true;
     reply_problem(reply, problem);
     request_note_reply(c->request);
-    char *message = c->server->tls ? NULL : reply_message(reply, &len); /* TLS: the close must say it */
+    char *message = c->server->tls ? NULL : reply_message(reply, false, &len); /* TLS: the close must say it */
     if (message && send(c->fd, message, len, MSG_NOSIGNAL | MSG_DONTWAIT) > 0)
         linger(c);
     free(message);
@@ -186,35 +187,43 @@ static size_t header_size(struct MHD_Connection *mhd)
     return info ? info->header_size : 0;
 }
 
-static bool layout_is_sound(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
+/* False with rq->refused: the bytes can't be trusted, so nothing after them on this connection can. */
+static bool read_framing(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
-    if (!c->server->check_layout)
-        return true;
+    static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.:/+=@";
+    http_request *rq = c->request;
+    framing read;
+    snprintf(rq->method, sizeof rq->method, "%s", method);
+    MHD_get_connection_values_n(mhd, MHD_HEADER_KIND, collect_header, &rq->headers);
+    /* the request's name: the client's X-Request-Id where it is a word that a log can hold, else one of our own */
+    const header_field *name = header_find(&rq->headers, "X-Request-Id", NULL);
+    if (name && name->value_len > 0 && name->value_len < sizeof rq->id &&
+        strspn(name->value, ALLOWED) >= name->value_len)
+        snprintf(rq->id, sizeof rq->id, "%.*s", (int)name->value_len, name->value);
+    else
+        snprintf(rq->id, sizeof rq->id, "%s%08llx", c->server->id_prefix,
+                 (unsigned long long)atomic_fetch_add(&c->server->id, 1));
+    const bool framed = framing_read(&read, version, &rq->headers, &rq->refused);
+    rq->chunked = read.chunked;
+    rq->length = read.length;
+    if (!framed || !c->server->check_layout)
+        return framed;
     c->layout.method = method;
     c->layout.version = version;
     c->layout.block_len = header_size(mhd);
-    return framing_tiles(&c->layout, &c->request->headers);
+    return framing_tiles(&c->layout, &rq->headers) ||
+           problem_fill(&rq->refused, 400, "bad_request_framing", "The request is malformed or ambiguous",
+                        "lines must end in CR LF, must not be folded, and must not contain NUL");
 }
 
-/* The client's X-Request-Id where it is a word that a log can hold, else one of our own. */
-static void name_request(transport *server, http_request *rq)
+bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
 {
-    static const char ALLOWED[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.:/+=@";
-    const header_field *field = header_find(&rq->headers, "X-Request-Id", NULL);
-    if (field && field->value_len > 0 && field->value_len < sizeof rq->id &&
-        strspn(field->value, ALLOWED) >= field->value_len) {
-        memcpy(rq->id, field->value, field->value_len);
-        rq->id[field->value_len] = '\0';
-        return;
-    }
-    unsigned long long number = (unsigned long long)atomic_fetch_add(&server->id, 1);
-    snprintf(rq->id, sizeof rq->id, "%s%08llx", server->id_prefix, number);
-}
-
-/* Sets what the reply says to pages of other origins. */
-static void find_origin(const transport *server, http_request *rq)
-{
-    const transport_options *options = &server->options;
+    http_request *rq = c->request;
+    const transport_options *options = &c->server->options;
+    rq->begun = true;
+    rq->can_be_held = c->server->holder && strcmp(version, "HTTP/1.1") == 0 && strcmp(method, "HEAD") != 0;
+    bool framed = read_framing(c, mhd, method, version);
+    /* what the reply says to pages of other origins */
     const header_field *origin = header_find(&rq->headers, "Origin", NULL);
     rq->reply.cors = options->n_cors > 0;
     for (size_t i = 0; origin && i < options->n_cors && !rq->reply.cors_origin; i++) {
@@ -223,34 +232,6 @@ static void find_origin(const transport *server, http_request *rq)
             (strlen(one) == origin->value_len && memcmp(one, origin->value, origin->value_len) == 0))
             rq->reply.cors_origin = one;
     }
-}
-
-/* False with rq->refused: the bytes can't be trusted, so nothing after them on this connection can. */
-static bool read_framing(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
-{
-    http_request *rq = c->request;
-    snprintf(rq->method, sizeof rq->method, "%s", method);
-    MHD_get_connection_values_n(mhd, MHD_HEADER_KIND, collect_header, &rq->headers);
-    name_request(c->server, rq);
-    framing read;
-    bool framed = framing_read(&read, version, &rq->headers, &rq->refused);
-    rq->chunked = read.chunked;
-    rq->length = read.length;
-    if (!framed)
-        return false;
-    if (!layout_is_sound(c, mhd, method, version))
-        return problem_fill(&rq->refused, 400, "bad_request_framing", "The request is malformed or ambiguous",
-                            "lines must end in CR LF, must not be folded, and must not contain NUL");
-    return true;
-}
-
-bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *method, const char *version)
-{
-    http_request *rq = c->request;
-    rq->begun = true;
-    rq->can_be_held = c->server->holder && strcmp(version, "HTTP/1.1") == 0 && strcmp(method, "HEAD") != 0;
-    bool framed = read_framing(c, mhd, method, version);
-    find_origin(c->server, rq);
     if (header_size(mhd) > HEADER_BYTES) {
         framed = refuse_header(&rq->refused, 431);
         if (!c->server->tls) { /* libmicrohttpd may have no room for a reply */
@@ -259,8 +240,7 @@ bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *m
         }
     }
     if (framed && c->server->handlers.admit(c->server->handlers.ctx, rq)) {
-        deadline_set(c->deadline,
-                     rq->started + c->server->options.request_deadline_s + (double)rq->length / SLOWEST_RATE,
+        deadline_set(c->deadline, rq->started + options->request_deadline_s + (double)rq->length / SLOWEST_RATE,
                      !c->server->tls);
         return true;
     }
@@ -274,35 +254,27 @@ bool connection_headers(connection *c, struct MHD_Connection *mhd, const char *m
 
 /* -------------------------------------------------------------------- body */
 
-/* Room for `more` bytes and a NUL, within the server's budget for all bodies. */
-static bool reserve(connection *c, size_t more)
-{
-    http_request *rq = c->request;
-    size_t need = rq->body_len + more + 1;
-    if (need <= rq->body_capacity)
-        return true;
-    size_t capacity = need < 4096 ? 4096 : need + need / 2;
-    size_t added = capacity - rq->body_capacity;
-    if (atomic_fetch_add(&c->server->body_bytes, added) + added > c->server->options.body_budget) {
-        atomic_fetch_sub(&c->server->body_bytes, added);
-        rq->reply.retry_after_s = 5;
-        return problem_fill(&rq->refused, 503, "too_busy", "Too many large requests at once", "try again in a moment");
-    }
-    char *grown = realloc(rq->body, capacity);
-    if (!grown) {
-        atomic_fetch_sub(&c->server->body_bytes, added);
-        return problem_fill(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
-    }
-    rq->body = grown;
-    rq->body_capacity = capacity;
-    return true;
-}
-
+/* Within the server's budget for all bodies, and with a NUL behind it. */
 static bool keep(connection *c, const char *data, size_t size)
 {
     http_request *rq = c->request;
-    if (!reserve(c, size))
-        return false;
+    const size_t need = rq->body_len + size + 1;
+    if (need > rq->body_capacity) {
+        const size_t capacity = need < 4096 ? 4096 : need + need / 2, added = capacity - rq->body_capacity;
+        const bool fits = atomic_fetch_add(&c->server->body_bytes, added) + added <= c->server->options.body_budget;
+        char *grown = fits ? realloc(rq->body, capacity) : NULL;
+        if (!grown)
+            atomic_fetch_sub(&c->server->body_bytes, added);
+        if (!fits) {
+            rq->reply.retry_after_s = 5;
+            return problem_fill(&rq->refused, 503, "too_busy", "Too many large requests at once",
+                                "try again in a moment");
+        }
+        if (!grown)
+            return problem_fill(&rq->refused, 503, "no_memory", "Out of memory", "try again later");
+        rq->body = grown;
+        rq->body_capacity = capacity;
+    }
     memcpy(rq->body + rq->body_len, data, size);
     rq->body_len += size;
     rq->body[rq->body_len] = '\0';
@@ -343,12 +315,13 @@ static bool hold(connection *c)
     http_request *rq = c->request;
     reply_source source = rq->reply.source;
     char *head = NULL;
+    size_t len;
     if (!source.hold || !rq->can_be_held || !request_keep_fields(rq))
         return false;
     if (!source.is_message) {
         request_note_reply(rq);
         rq->reply.close = true;
-        head = reply_head(&rq->reply);
+        head = reply_message(&rq->reply, true, &len);
     }
     rq->reply.source.read = NULL;
     rq->place = c->place;
@@ -364,15 +337,6 @@ static bool hold(connection *c)
     return false;
 }
 
-/* The thread stays: the reply that was to come as a message is waited for here. */
-static void answer_here(http_reply *reply)
-{
-    reply_source source = reply->source;
-    reply->source.read = NULL;
-    source.answer(source.ctx);
-    source.free(source.ctx);
-}
-
 bool connection_answer(connection *c, struct MHD_Connection *mhd)
 {
     http_request *rq = c->request;
@@ -386,8 +350,13 @@ bool connection_answer(connection *c, struct MHD_Connection *mhd)
         drop_body(c->server, rq); /* what takes long is not beside it */
     if (rq->reply.source.read && hold(c))
         return false;
-    if (rq->reply.source.read && rq->reply.source.is_message)
-        answer_here(&rq->reply);
+    if (rq->reply.source.read && rq->reply.source.is_message) {
+        /* the thread stays: the reply that was to come as a message is waited for here */
+        const reply_source source = rq->reply.source;
+        rq->reply.source.read = NULL;
+        source.answer(source.ctx);
+        source.free(source.ctx);
+    }
     negotiate(rq, &rq->reply);
     return send_reply(c, mhd);
 }

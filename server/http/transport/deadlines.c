@@ -1,3 +1,4 @@
+/* deadlines.c: a thread that watches over all connections. */
 #include "http/transport/deadlines.h"
 #include "http/transport/transport.h"
 
@@ -33,41 +34,32 @@ double http_now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* Cuts what is overdue and returns the earliest deadline left. */
-static double sweep(const deadlines *all, double now)
-{
-    double earliest = INFINITY;
-    for (deadline *d = all->first; d; d = d->next) {
-        if (d->at <= now) {
-            d->expired = true;
-            d->at = INFINITY;
-            if (d->speak)
-                (void)send(d->fd, all->last_words, strlen(all->last_words), MSG_DONTWAIT | MSG_NOSIGNAL);
-            shutdown(d->fd, SHUT_RDWR);
-        }
-        earliest = fmin(earliest, d->at);
-    }
-    return earliest;
-}
-
-static void wait_until(deadlines *all, double at)
-{
-    if (isinf(at)) {
-        pthread_cond_wait(&all->changed, &all->mutex);
-        return;
-    }
-    struct timespec t = {.tv_sec = (time_t)at};
-    t.tv_nsec = (long)((at - (double)t.tv_sec) * 1e9);
-    pthread_cond_timedwait(&all->changed, &all->mutex, &t);
-}
-
 static void *watch(void *argument)
 {
     deadlines *all = argument;
     pthread_mutex_lock(&all->mutex);
     while (!all->stop) {
-        all->wake_at = sweep(all, http_now());
-        wait_until(all, all->wake_at);
+        /* what is overdue is cut */
+        const double now = http_now();
+        double earliest = INFINITY;
+        for (deadline *d = all->first; d; d = d->next) {
+            if (d->at <= now) {
+                d->expired = true;
+                d->at = INFINITY;
+                if (d->speak)
+                    (void)send(d->fd, all->last_words, strlen(all->last_words), MSG_DONTWAIT | MSG_NOSIGNAL);
+                shutdown(d->fd, SHUT_RDWR);
+            }
+            earliest = fmin(earliest, d->at);
+        }
+        all->wake_at = earliest;
+        if (isinf(earliest)) {
+            pthread_cond_wait(&all->changed, &all->mutex);
+            continue;
+        }
+        struct timespec t = {.tv_sec = (time_t)earliest};
+        t.tv_nsec = (long)((earliest - (double)t.tv_sec) * 1e9);
+        pthread_cond_timedwait(&all->changed, &all->mutex, &t);
     }
     pthread_mutex_unlock(&all->mutex);
     return NULL;
@@ -123,13 +115,6 @@ void deadlines_hear_no_more(deadlines *all)
     pthread_mutex_unlock(&all->mutex);
 }
 
-/* Under the mutex. */
-static void wake_for(deadlines *all, double at)
-{
-    if (at < all->wake_at)
-        pthread_cond_signal(&all->changed);
-}
-
 deadline *deadlines_add(deadlines *all, int fd, double at)
 {
     deadline *d = calloc(1, sizeof *d);
@@ -141,7 +126,8 @@ deadline *deadlines_add(deadlines *all, int fd, double at)
     if (d->next)
         d->next->previous = d;
     all->first = d;
-    wake_for(all, at);
+    if (at < all->wake_at)
+        pthread_cond_signal(&all->changed);
     pthread_mutex_unlock(&all->mutex);
     return d;
 }
@@ -152,7 +138,8 @@ void deadline_set(deadline *d, double at, bool speak)
     if (!d->expired) {
         d->at = at;
         d->speak = speak;
-        wake_for(d->all, at);
+        if (at < d->all->wake_at)
+            pthread_cond_signal(&d->all->changed);
     }
     pthread_mutex_unlock(&d->all->mutex);
 }

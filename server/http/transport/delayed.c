@@ -46,7 +46,7 @@ static ptrdiff_t delayed_read(void *ctx, char *out, size_t size)
         negotiate(rq, &rq->reply);
         request_note_reply(rq);
         rq->reply.close = true;
-        d->message = reply_message(&rq->reply, &d->len);
+        d->message = reply_message(&rq->reply, false, &d->len);
         reply_clear(&rq->reply);
     }
     if (!d->message)

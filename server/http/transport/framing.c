@@ -1,3 +1,4 @@
+/* framing.c: header fields and the length of the body. */
 #include "http/transport/framing.h"
 
 #include <string.h>
@@ -24,111 +25,49 @@ const header_field *header_find(const header_list *headers, const char *name, si
     return first;
 }
 
-/* RFC 9110, section 5.6.2: tchar. */
-static bool is_token(const char *text, size_t len)
+static bool check_fields(const char *version, const header_list *headers, problem_details *problem)
 {
-    for (size_t i = 0; i < len; i++) {
-        char c = text[i];
-        bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
-        if (!letter && (c == '\0' || !strchr("!#$%&'*+-.^_`|~", c)))
-            return false;
-    }
-    return len > 0;
-}
-
-/* A field value has no control characters but the tab. */
-static bool is_value(const char *text, size_t len)
-{
-    for (size_t i = 0; i < len; i++) {
-        unsigned char c = (unsigned char)text[i];
-        if ((c < 0x20 && c != '\t') || c == 0x7f)
-            return false;
-    }
-    return true;
-}
-
-static bool check_fields(const header_list *headers, problem_details *problem)
-{
+    size_t hosts;
     if (headers->overflow)
         return problem_fill(problem, 431, "too_many_headers", "Too many header fields", "at most %d header fields",
                             HEADERS_MAX);
     for (size_t i = 0; i < headers->count; i++) {
         const header_field *field = &headers->fields[i];
-        if (!is_token(field->name, field->name_len))
+        bool token = field->name_len > 0, text = true;
+        for (size_t k = 0; k < field->name_len; k++) { /* tchar of RFC 9110, section 5.6.2 */
+            const char c = field->name[k];
+            const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+            token = token && (letter || (c != '\0' && strchr("!#$%&'*+-.^_`|~", c)));
+        }
+        for (size_t k = 0; k < field->value_len; k++) { /* no control characters but the tab */
+            const unsigned char c = (unsigned char)field->value[k];
+            text = text && !((c < 0x20 && c != '\t') || c == 0x7f);
+        }
+        if (!token)
             return refuse(problem, "a header field's name has a character that is not allowed, or a space before ':'");
-        if (!is_value(field->value, field->value_len))
+        if (!text)
             return refuse(problem, "a header field's value has a control character");
     }
-    return true;
-}
-
-/* The characters of uri-host [":" port] (RFC 3986, section 3.2.2). */
-static bool is_host(const char *text, size_t len)
-{
-    while (len > 0 && (text[len - 1] == ' ' || text[len - 1] == '\t'))
-        len--;
-    for (size_t i = 0; i < len; i++)
-        if (strchr("\"#/<>?@\\^`{|} \t", text[i]) || (unsigned char)text[i] >= 0x7f)
-            return false;
-    return true;
-}
-
-static bool check_host(const char *version, const header_list *headers, problem_details *problem)
-{
-    size_t count;
-    const header_field *host = header_find(headers, "Host", &count);
-    bool required = strcmp(version, "HTTP/1.1") == 0;
-    if (count > 1 || (required && count == 0))
+    const header_field *host = header_find(headers, "Host", &hosts);
+    if (hosts > 1 || (strcmp(version, "HTTP/1.1") == 0 && hosts == 0))
         return refuse(problem, "exactly one Host header field is needed");
-    if (host && !is_host(host->value, host->value_len))
-        return refuse(problem, "the Host header field is no host name or address, with a port or without");
-    return true;
-}
-
-static bool read_length(framing *out, const header_field *field, problem_details *problem)
-{
-    size_t len = field->value_len;
-    while (len > 0 && (field->value[len - 1] == ' ' || field->value[len - 1] == '\t'))
+    size_t len = host ? host->value_len : 0;
+    while (len > 0 && (host->value[len - 1] == ' ' || host->value[len - 1] == '\t'))
         len--;
-    if (len == 0 || len > 18)
-        return refuse(problem, "Content-Length must be a number of 1 to 18 digits");
-    for (size_t i = 0; i < len; i++) {
-        if (field->value[i] < '0' || field->value[i] > '9')
-            return refuse(problem, "Content-Length must be digits only");
-        out->length = out->length * 10 + (uint64_t)(field->value[i] - '0');
-    }
+    for (size_t k = 0; k < len; k++) /* the characters of uri-host [":" port] (RFC 3986, section 3.2.2) */
+        if (strchr("\"#/<>?@\\^`{|} \t", host->value[k]) || (unsigned char)host->value[k] >= 0x7f)
+            return refuse(problem, "the Host header field is no host name or address, with a port or without");
     return true;
-}
-
-static bool read_coding(framing *out, const header_field *field, const char *version, problem_details *problem)
-{
-    if (strcmp(version, "HTTP/1.1") != 0)
-        return refuse(problem, "Transfer-Encoding needs HTTP/1.1");
-    if (!token_equal(field->value, field->value_len, "chunked"))
-        return refuse(problem, "the only transfer coding is \"chunked\"");
-    out->chunked = true;
-    return true;
-}
-
-/* White space behind a value is none of it (RFC 9110, section 5.5); libmicrohttpd leaves it there. Not before the
- * fields that say how long the body is have been read: libmicrohttpd takes those with it for something else. */
-static void trim_values(header_list *headers)
-{
-    for (size_t i = 0; i < headers->count; i++) {
-        header_field *field = &headers->fields[i];
-        while (field->value_len > 0 && strchr(" \t", field->value[field->value_len - 1]))
-            field->value_len--;
-    }
 }
 
 bool framing_read(framing *out, const char *version, header_list *headers, problem_details *problem)
 {
-    size_t lengths, codings;
+    size_t lengths, codings, expectations;
     memset(out, 0, sizeof *out);
     if (strcmp(version, "HTTP/1.1") != 0 && strcmp(version, "HTTP/1.0") != 0)
         return problem_fill(problem, 505, "http_version", "The HTTP version is not supported",
                             "use HTTP/1.1 or HTTP/1.0");
-    if (!check_fields(headers, problem) || !check_host(version, headers, problem))
+    if (!check_fields(version, headers, problem))
         return false;
     const header_field *length = header_find(headers, "Content-Length", &lengths);
     const header_field *coding = header_find(headers, "Transfer-Encoding", &codings);
@@ -136,12 +75,31 @@ bool framing_read(framing *out, const char *version, header_list *headers, probl
         return refuse(problem, "Content-Length and Transfer-Encoding may occur once");
     if (length && coding)
         return refuse(problem, "Content-Length and Transfer-Encoding exclude each other");
-    if ((length && !read_length(out, length, problem)) || (coding && !read_coding(out, coding, version, problem)))
-        return false;
-    trim_values(headers);
-    size_t count;
-    const header_field *field = header_find(headers, "Expect", &count);
-    if (count > 1 || (field && !token_equal(field->value, field->value_len, "100-continue")))
+    size_t len = length ? length->value_len : 0;
+    while (len > 0 && (length->value[len - 1] == ' ' || length->value[len - 1] == '\t'))
+        len--;
+    if (length && (len == 0 || len > 18))
+        return refuse(problem, "Content-Length must be a number of 1 to 18 digits");
+    for (size_t i = 0; i < len; i++) {
+        if (length->value[i] < '0' || length->value[i] > '9')
+            return refuse(problem, "Content-Length must be digits only");
+        out->length = out->length * 10 + (uint64_t)(length->value[i] - '0');
+    }
+    if (coding && strcmp(version, "HTTP/1.1") != 0)
+        return refuse(problem, "Transfer-Encoding needs HTTP/1.1");
+    if (coding && !token_equal(coding->value, coding->value_len, "chunked"))
+        return refuse(problem, "the only transfer coding is \"chunked\"");
+    out->chunked = coding != NULL;
+
+    /* White space behind a value is none of it (RFC 9110, section 5.5); libmicrohttpd leaves it there. Not before the
+     * fields that say how long the body is have been read: libmicrohttpd takes those with it for something else. */
+    for (size_t i = 0; i < headers->count; i++) {
+        header_field *field = &headers->fields[i];
+        while (field->value_len > 0 && strchr(" \t", field->value[field->value_len - 1]))
+            field->value_len--;
+    }
+    const header_field *expect = header_find(headers, "Expect", &expectations);
+    if (expectations > 1 || (expect && !token_equal(expect->value, expect->value_len, "100-continue")))
         return problem_fill(problem, 417, "expectation_failed", "The expectation is not met",
                             "the only expectation is \"100-continue\"");
     return true;

@@ -1,3 +1,4 @@
+/* held.c: one thread for all connections that wait. */
 #include "http/transport/held.h"
 
 #include <errno.h>
@@ -135,26 +136,20 @@ static bool flush(const holder *h, held *one)
     return true;
 }
 
-/* A piece of n bytes stands in the buffer with room before and after it. */
-static bool send_piece(holder *h, held *one, size_t n)
-{
-    char *piece = h->buffer + CHUNK - 2;
-    if (!one->chunked)
-        return send_some(one, piece, n);
-    char size[CHUNK];
-    int digits = snprintf(size, sizeof size, "%zx\r\n", n);
-    memcpy(piece - digits, size, (size_t)digits);
-    memcpy(piece + n, "\r\n", 2);
-    return send_some(one, piece - digits, (size_t)digits + n + 2);
-}
-
-/* Asks the source once. False: the connection is broken. */
+/* Asks the source once, for a piece with room before and after it in the buffer. False: the connection is broken. */
 static bool say(holder *h, held *one, bool *more)
 {
-    ptrdiff_t n = one->source.read(one->source.ctx, h->buffer + CHUNK - 2, PIECE);
+    char *piece = h->buffer + CHUNK - 2, size[CHUNK];
+    const ptrdiff_t n = one->source.read(one->source.ctx, piece, PIECE);
     *more = n > 0;
+    if (n > 0 && one->chunked) {
+        const int digits = snprintf(size, sizeof size, "%zx\r\n", (size_t)n);
+        memcpy(piece - digits, size, (size_t)digits);
+        memcpy(piece + n, "\r\n", 2);
+        return send_some(one, piece - digits, (size_t)digits + (size_t)n + 2);
+    }
     if (n > 0)
-        return send_piece(h, one, (size_t)n);
+        return send_some(one, piece, (size_t)n);
     if (n == 0) {
         one->due = one->source.due(one->source.ctx, false);
         return true;
@@ -163,30 +158,19 @@ static bool say(holder *h, held *one, bool *more)
     return n == REPLY_STREAM_ENDS && (!one->chunked || send_some(one, "0\r\n\r\n", 5));
 }
 
-static void begin_end(held *one)
-{
-    one->ending = true;
-    one->due = http_now() + LINGER_S;
-    shutdown(one->fd, SHUT_WR);
-}
-
-/* Drops what still comes, some of it at a time: who sends without end keeps nobody else waiting. False: the client has
- * closed too, or had its time. */
-static bool linger(holder *h, const held *one)
-{
-    ssize_t n = 1;
-    for (int i = 0; n > 0 && i < PIECES; i++)
-        n = recv(one->fd, h->buffer, PIECE, MSG_DONTWAIT);
-    bool open = n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
-    return open && http_now() < one->due;
-}
-
 /* Does what can be done now. False: it is over. */
 static bool serve(holder *h, held *one)
 {
     bool more = true;
-    if (one->ending)
-        return linger(h, one);
+    if (one->ending) {
+        /* Drops what still comes, some of it at a time: who sends without end keeps nobody else waiting. It is over
+         * when the client has closed too, or had its time. */
+        ssize_t n = 1;
+        for (int i = 0; n > 0 && i < PIECES; i++)
+            n = recv(one->fd, h->buffer, PIECE, MSG_DONTWAIT);
+        const bool open = n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
+        return open && http_now() < one->due;
+    }
     bool waits = !one->out && !one->last && http_now() < one->due;
     for (int i = 0; !waits && more && !one->last && i < PIECES; i++) {
         if (!flush(h, one))
@@ -200,9 +184,11 @@ static bool serve(holder *h, held *one)
     }
     if (!flush(h, one))
         return false;
-    if (one->last && !one->out)
-        begin_end(one);
-    else if (more && !waits && !one->out)
+    if (one->last && !one->out) {
+        one->ending = true;
+        one->due = http_now() + LINGER_S;
+        shutdown(one->fd, SHUT_WR);
+    } else if (more && !waits && !one->out)
         one->due = 0.0; /* it has more to say, after the others */
     watch_socket(h, one);
     h->soonest = fmin(h->soonest, one->due);
@@ -247,32 +233,6 @@ static void notice(holder *h, const struct epoll_event *e)
     make_ready(h, one);
 }
 
-static void attend_ready(holder *h)
-{
-    held *one = h->ready;
-    h->ready = NULL;
-    for (held *next; one; one = next) {
-        next = one->next_ready;
-        one->is_ready = false;
-        attend(h, one);
-    }
-}
-
-static void attend_due(holder *h)
-{
-    double now = http_now();
-    if (now < h->soonest)
-        return;
-    h->soonest = INFINITY;
-    for (held *one = h->first, *next; one; one = next) {
-        next = one->next;
-        if (one->due <= now)
-            attend(h, one);
-        if (!one->over)
-            h->soonest = fmin(h->soonest, one->due);
-    }
-}
-
 /* False: the thread is to end. */
 static bool receive(holder *h)
 {
@@ -295,21 +255,32 @@ static bool receive(holder *h)
     return !stop;
 }
 
-static int wait_ms(const holder *h)
-{
-    double left = h->soonest - http_now();
-    return left <= 0.0 ? 0 : (int)fmin(ceil(left * 1e3), 1e6);
-}
-
 static void *hold(void *argument)
 {
     holder *h = argument;
     struct epoll_event events[EVENTS];
     while (receive(h)) {
-        attend_ready(h);
-        attend_due(h);
+        held *one = h->ready;
+        h->ready = NULL;
+        for (held *next; one; one = next) {
+            next = one->next_ready;
+            one->is_ready = false;
+            attend(h, one);
+        }
+        const double now = http_now();
+        const bool due = now >= h->soonest;
+        if (due)
+            h->soonest = INFINITY;
+        for (held *next, *at = due ? h->first : NULL; at; at = next) {
+            next = at->next;
+            if (at->due <= now)
+                attend(h, at);
+            if (!at->over)
+                h->soonest = fmin(h->soonest, at->due);
+        }
         free_buried(h);
-        int n = epoll_wait(h->epoll, events, EVENTS, wait_ms(h));
+        const double left = h->soonest - http_now();
+        int n = epoll_wait(h->epoll, events, EVENTS, left <= 0.0 ? 0 : (int)fmin(ceil(left * 1e3), 1e6));
         for (int i = 0; i < n; i++)
             notice(h, &events[i]);
     }
@@ -364,42 +335,35 @@ void holder_free(holder *h)
     free(h);
 }
 
-/* The socket under a new descriptor, watched for nothing yet; another socket has taken its old one. -1: nothing has
- * happened. */
-static int take_socket(const holder *h, int fd)
-{
-    int yes = 1, taken = fcntl(fd, F_DUPFD_CLOEXEC, 0), other = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    bool done =
-        taken >= 0 && other >= 0 && watch(h, EPOLL_CTL_ADD, taken, 0, NULL, false) && dup3(other, fd, O_CLOEXEC) == fd;
-    if (!done && taken >= 0) {
-        epoll_ctl(h->epoll, EPOLL_CTL_DEL, taken, NULL);
-        close(taken);
-    }
-    if (other >= 0)
-        close(other);
-    if (done)
-        setsockopt(taken, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    return done ? taken : -1;
-}
-
 bool holder_take(holder *h, int fd, http_request *rq, char *head, bool chunked, const reply_source *source)
 {
     held *one = calloc(1, sizeof *one);
+    const int wake = feed_descriptor(source->listener);
+    int yes = 1;
     if (!one)
         return false;
     *one = (held){.rq = rq, .source = *source, .chunked = chunked, .listener = source->listener};
-    int wake = feed_descriptor(one->listener);
     if (wake < 0 || !watch(h, EPOLL_CTL_ADD, wake, 0, NULL, false)) {
         free(one);
         return false;
     }
-    one->fd = take_socket(h, fd);
-    if (one->fd < 0) {
+    /* The socket under a new descriptor, watched for nothing yet; another socket takes its old one. */
+    const int taken = fcntl(fd, F_DUPFD_CLOEXEC, 0), other = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const bool watched = taken >= 0 && other >= 0 && watch(h, EPOLL_CTL_ADD, taken, 0, NULL, false);
+    const bool done = watched && dup3(other, fd, O_CLOEXEC) == fd;
+    if (other >= 0)
+        close(other);
+    if (!done) {
+        if (taken >= 0) {
+            epoll_ctl(h->epoll, EPOLL_CTL_DEL, taken, NULL);
+            close(taken);
+        }
         epoll_ctl(h->epoll, EPOLL_CTL_DEL, wake, NULL);
         free(one);
         return false;
     }
-    rq->fd = one->fd;
+    setsockopt(taken, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
+    rq->fd = one->fd = taken;
     source->hold(source->ctx);
     one->out = head;
     one->len = head ? strlen(head) : 0;

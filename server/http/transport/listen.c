@@ -32,48 +32,10 @@ static bool split_host_port(const char *text, char host[256], char port[6])
     return atoi(port) <= 65535;
 }
 
-static int listen_on(const struct addrinfo *at)
-{
-    int on = 1;
-    int fd = socket(at->ai_family, at->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, at->ai_protocol);
-    if (fd < 0)
-        return -1;
-    /* A restart must not wait for the old connections' TIME_WAIT; a live listener still excludes a second one. */
-    if (setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 && bind(fd, at->ai_addr, at->ai_addrlen) == 0 &&
-        listen(fd, SOMAXCONN) == 0)
-        return fd;
-    int cause = errno;
-    close(fd);
-    errno = cause;
-    return -1;
-}
-
-/* What helps where a socket could not be had. */
-static const char *remedy(int cause)
-{
-    if (cause == EADDRINUSE)
-        return "; another program listens there: stop it, or give another port (0 takes a free one)";
-    if (cause == EACCES)
-        return "; ports below 1024 are for root: give another one, or start as root with --user";
-    return cause == EADDRNOTAVAIL ? "; this machine does not have that address" : "";
-}
-
-static bool describe(int fd, const char *scheme, char *url, size_t size)
-{
-    struct sockaddr_storage name;
-    socklen_t len = sizeof name;
-    char host[128], port[16];
-    if (getsockname(fd, (struct sockaddr *)&name, &len) != 0 ||
-        getnameinfo((struct sockaddr *)&name, len, host, sizeof host, port, sizeof port,
-                    NI_NUMERICHOST | NI_NUMERICSERV) != 0)
-        return false;
-    int n = snprintf(url, size, name.ss_family == AF_INET6 ? "%s://[%s]:%s" : "%s://%s:%s", scheme, host, port);
-    return n > 0 && (size_t)n < size;
-}
-
 int http_listen(const char *host_port, const char *scheme, char *url, size_t url_size, char *message, size_t size)
 {
-    char host[256], port[6];
+    char host[256], port[16];
+    int on = 1;
     if (!split_host_port(host_port, host, port)) {
         snprintf(message, size, "\"%s\" is not HOST:PORT or [IPv6]:PORT with a port from 0 to 65535", host_port);
         return -1;
@@ -84,16 +46,34 @@ int http_listen(const char *host_port, const char *scheme, char *url, size_t url
         snprintf(message, size, "cannot find the address of %s: %s", host, gai_strerror(failure));
         return -1;
     }
-    int fd = listen_on(found);
-    if (fd < 0)
-        snprintf(message, size, "cannot listen on %s: %m%s", host_port, remedy(errno));
+    /* A restart must not wait for the old connections' TIME_WAIT; a live listener still excludes a second one. */
+    int fd = socket(found->ai_family, found->ai_socktype | SOCK_CLOEXEC | SOCK_NONBLOCK, found->ai_protocol);
+    const bool listens = fd >= 0 && setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) == 0 &&
+                         bind(fd, found->ai_addr, found->ai_addrlen) == 0 && listen(fd, SOMAXCONN) == 0;
+    if (!listens)
+        snprintf(message, size, "cannot listen on %s: %m%s", host_port,
+                 errno == EADDRINUSE
+                     ? "; another program listens there: stop it, or give another port (0 takes a free one)"
+                 : errno == EACCES ? "; ports below 1024 are for root: give another one, or start as root with --user"
+                 : errno == EADDRNOTAVAIL ? "; this machine does not have that address"
+                                          : "");
     freeaddrinfo(found);
-    if (fd >= 0 && !describe(fd, scheme, url, url_size)) {
+
+    /* its address, with the port that was taken */
+    struct sockaddr_storage name;
+    socklen_t len = sizeof name;
+    int n = -1;
+    if (listens && getsockname(fd, (struct sockaddr *)&name, &len) == 0 &&
+        getnameinfo((struct sockaddr *)&name, len, host, sizeof host, port, sizeof port,
+                    NI_NUMERICHOST | NI_NUMERICSERV) == 0)
+        n = snprintf(url, url_size, name.ss_family == AF_INET6 ? "%s://[%s]:%s" : "%s://%s:%s", scheme, host, port);
+    if (n > 0 && (size_t)n < url_size)
+        return fd;
+    if (listens)
         snprintf(message, size, "cannot tell the address of the socket on %s", host_port);
+    if (fd >= 0)
         close(fd);
-        fd = -1;
-    }
-    return fd;
+    return -1;
 }
 
 bool http_is_public(int listen_fd)

@@ -5,10 +5,6 @@
 #include "http/transport/transport.h"
 
 void reply_drop_body(http_reply *reply);
-/* Takes ownership of body. */
-void reply_replace_body(http_reply *reply, char *body, size_t len);
-/* Takes ownership of source.ctx, also where it fails. */
-void reply_stream(http_reply *reply, int status, const char *type, reply_source source);
 void reply_clear(http_reply *reply);
 
 /* negotiate.c: turns the whole reply of a handler into what this request gets: conditional requests, ranges of bytes
@@ -24,10 +20,8 @@ bool request_keep_fields(http_request *rq);
 struct MHD_Connection;
 bool reply_send(struct MHD_Connection *connection, http_reply *reply);
 /* The reply as a whole HTTP/1.1 message for a connection that then closes, where libmicrohttpd takes no reply: in the
- * middle of a chunked body, before the request is complete, and where the connection waits without it. *len bytes and a
- * NUL, malloc'ed; NULL: no memory. */
-char *reply_message(const http_reply *reply, size_t *len);
-/* The head of such a message, whose body comes in chunks. */
-char *reply_head(const http_reply *reply);
+ * middle of a chunked body, before the request is complete, and where the connection waits without it. chunked: its
+ * head only, as the body comes in chunks. *len bytes and a NUL, malloc'ed; NULL: no memory. */
+char *reply_message(const http_reply *reply, bool chunked, size_t *len);
 
 #endif

@@ -30,26 +30,11 @@ void tag_make(char tag[REPLY_TAG], const char *const *parts, const size_t *lens,
 
 /* ---- If-None-Match */
 
-/* True if the member of an entity-tag list, `"x"` or `W/"x"`, is this tag in any coding. */
-static bool is_tag(const char *at, size_t len, const char *tag)
-{
-    size_t want = strlen(tag), mark = sizeof GZIP_MARK - 1;
-    if (len >= 2 && strncmp(at, "W/", 2) == 0) {
-        at += 2;
-        len -= 2;
-    }
-    if (len < 2 || at[0] != '"' || at[len - 1] != '"')
-        return false;
-    at++;
-    len -= 2;
-    if (len == want + mark && memcmp(at + want, GZIP_MARK, mark) == 0)
-        len = want;
-    return len == want && memcmp(at, tag, want) == 0;
-}
-
+/* True if a member of an entity-tag list, `"x"` or `W/"x"`, is this tag in any coding, or "*". */
 static bool field_has_tag(const header_field *field, const char *tag)
 {
     const char *at = field->value, *end = at + field->value_len;
+    const size_t want = strlen(tag), mark = sizeof GZIP_MARK - 1;
     while (at < end) {
         const char *comma = memchr(at, ',', (size_t)(end - at)); /* our tags have none */
         const char *from = at, *to = comma ? comma : end;
@@ -57,8 +42,17 @@ static bool field_has_tag(const header_field *field, const char *tag)
             from++;
         while (to > from && (to[-1] == ' ' || to[-1] == '\t'))
             to--;
-        if ((to - from == 1 && *from == '*') || is_tag(from, (size_t)(to - from), tag))
+        if (to - from == 1 && *from == '*')
             return true;
+        if (to - from >= 2 && strncmp(from, "W/", 2) == 0)
+            from += 2;
+        if (to - from >= 2 && *from == '"' && to[-1] == '"') {
+            size_t len = (size_t)(to - from) - 2;
+            if (len == want + mark && memcmp(from + 1 + want, GZIP_MARK, mark) == 0)
+                len = want;
+            if (len == want && memcmp(from + 1, tag, want) == 0)
+                return true;
+        }
         at = comma ? comma + 1 : end;
     }
     return false;
@@ -114,22 +108,19 @@ static range_kind read_range(const header_field *field, int64_t size, int64_t *f
     return *from >= size || (suffix && last == 0) ? RANGE_BEYOND : RANGE_GOOD;
 }
 
-/* A range is of the representation that the client has the first part of, if it says which (If-Range: strong). */
-static bool same_representation(const http_request *rq, const http_reply *reply)
-{
-    const header_field *field = header_find(&rq->headers, "If-Range", NULL);
-    size_t len = strlen(reply->tag);
-    return !field || (field->value_len == len + 2 && field->value[0] == '"' && field->value[len + 1] == '"' &&
-                      memcmp(field->value + 1, reply->tag, len) == 0);
-}
-
 /* True if the reply is a part, or says that there is no such part. */
 static bool apply_range(const http_request *rq, http_reply *reply)
 {
     size_t count;
     int64_t from = 0, to = 0;
     const header_field *field = header_find(&rq->headers, "Range", &count);
-    if (!field || count != 1 || strcmp(rq->method, "GET") != 0 || !same_representation(rq, reply))
+    const header_field *of = header_find(&rq->headers, "If-Range", NULL);
+    const size_t len = strlen(reply->tag);
+    if (!field || count != 1 || strcmp(rq->method, "GET") != 0)
+        return false;
+    /* A range is of the representation that the client has the first part of, if it says which (If-Range: strong). */
+    if (of && (of->value_len != len + 2 || of->value[0] != '"' || of->value[len + 1] != '"' ||
+               memcmp(of->value + 1, reply->tag, len) != 0))
         return false;
     size_t size = reply->len;
     range_kind kind = read_range(field, (int64_t)size, &from, &to);
@@ -152,14 +143,6 @@ static bool apply_range(const http_request *rq, http_reply *reply)
 }
 
 /* ---- gzip */
-
-/* Text, and the arrays of a surface, whose numbers repeat their leading bytes. */
-static bool shrinks(const http_reply *reply)
-{
-    return reply->body && reply->type &&
-           (strstr(reply->type, "json") || strstr(reply->type, "svg") || strncmp(reply->type, "text/", 5) == 0 ||
-            strncmp(reply->type, "model/", 6) == 0);
-}
 
 /* NULL: no memory. */
 static char *squeeze(const char *body, size_t len, size_t *out_len)
@@ -188,32 +171,28 @@ static char *squeeze(const char *body, size_t len, size_t *out_len)
     return NULL;
 }
 
-static void name_gzip(http_reply *reply)
-{
-    reply->gzip = true;
-    if (reply->tag[0])
-        strcat(reply->tag, GZIP_MARK); /* REPLY_TAG has room */
-}
-
 static void apply_gzip(const http_request *rq, http_reply *reply)
 {
-    size_t len;
-    if (!shrinks(reply) || reply->len < GZIP_LEAST)
+    const char *type = reply->type ? reply->type : "";
+    /* text, and the arrays of a surface, whose numbers repeat their leading bytes */
+    const bool shrinks = strstr(type, "json") || strstr(type, "svg") || strncmp(type, "text/", 5) == 0 ||
+                         strncmp(type, "model/", 6) == 0;
+    size_t len = reply->packed_len;
+    if (!reply->body || !shrinks || reply->len < GZIP_LEAST)
         return;
     reply->varies_by_coding = true;
     if (!request_takes_gzip(rq))
         return;
-    if (reply->packed) {
-        reply_replace_body(reply, (char *)(uintptr_t)reply->packed, reply->packed_len);
-        reply->body_is_static = true;
-        name_gzip(reply);
-        return;
-    }
-    char *small = squeeze(reply->body, reply->len, &len);
+    char *small = reply->packed ? (char *)(uintptr_t)reply->packed : squeeze(reply->body, reply->len, &len);
     if (!small)
         return; /* as it is, then */
-    reply_replace_body(reply, small, len);
-    name_gzip(reply);
+    reply_drop_body(reply);
+    reply->body = small;
+    reply->len = len;
+    reply->body_is_static = reply->packed != NULL;
+    reply->gzip = true;
+    if (reply->tag[0])
+        strcat(reply->tag, GZIP_MARK); /* REPLY_TAG has room */
 }
 
 void negotiate(const http_request *rq, http_reply *reply)

@@ -19,7 +19,7 @@ typedef struct {
     const char *name, *value;
 } field;
 
-static void clear_body(http_reply *reply)
+void reply_drop_body(http_reply *reply)
 {
     if (!reply->body_is_static)
         free(reply->body);
@@ -34,21 +34,9 @@ static void clear_body(http_reply *reply)
     reply->body_is_static = false;
 }
 
-void reply_drop_body(http_reply *reply)
-{
-    clear_body(reply);
-}
-
-void reply_replace_body(http_reply *reply, char *body, size_t len)
-{
-    clear_body(reply);
-    reply->body = body;
-    reply->len = len;
-}
-
 void reply_clear(http_reply *reply)
 {
-    clear_body(reply);
+    reply_drop_body(reply);
     memset(reply, 0, sizeof *reply);
 }
 
@@ -56,7 +44,7 @@ void reply_no_memory(http_reply *reply)
 {
     static char text[] = "{\"type\": \"about:blank\", \"title\": \"Out of memory\", \"status\": 503, "
                          "\"detail\": \"no memory for this reply: try again later\", \"code\": \"no_memory\"}";
-    clear_body(reply);
+    reply_drop_body(reply);
     reply->status = 503;
     reply->type = PROBLEM_TYPE;
     reply->body = text;
@@ -67,7 +55,7 @@ void reply_no_memory(http_reply *reply)
 
 void reply_text(http_reply *reply, int status, const char *type, char *text, size_t len)
 {
-    clear_body(reply);
+    reply_drop_body(reply);
     if (!text) {
         reply_no_memory(reply);
         return;
@@ -80,21 +68,13 @@ void reply_text(http_reply *reply, int status, const char *type, char *text, siz
 
 void reply_file(http_reply *reply, int status, const char *type, int fd, size_t len)
 {
-    clear_body(reply);
+    reply_drop_body(reply);
     reply->status = status;
     reply->type = type;
     reply->has_file = true;
     reply->fd = fd;
     reply->offset = 0;
     reply->len = len;
-}
-
-void reply_stream(http_reply *reply, int status, const char *type, reply_source source)
-{
-    clear_body(reply);
-    reply->status = status;
-    reply->type = type;
-    reply->source = source;
 }
 
 void reply_json(http_reply *reply, int status, char *text)
@@ -125,18 +105,6 @@ typedef struct {
     char number[16], tag[REPLY_TAG + 2], vary[64];
 } field_texts;
 
-static void write_texts(field_texts *out, const http_reply *reply)
-{
-    const char *const vary[] = {reply->varies_by_coding ? "Accept-Encoding" : NULL,
-                                reply->varies_by_type ? "Accept" : NULL, reply->cors ? "Origin" : NULL};
-    snprintf(out->number, sizeof out->number, "%d", reply->retry_after_s);
-    snprintf(out->tag, sizeof out->tag, "\"%s\"", reply->tag);
-    out->vary[0] = '\0';
-    for (size_t i = 0, used = 0; i < sizeof vary / sizeof vary[0]; i++)
-        if (vary[i])
-            used += (size_t)snprintf(out->vary + used, sizeof out->vary - used, "%s%s", used ? ", " : "", vary[i]);
-}
-
 /* What a page of another origin may do and see (WHATWG Fetch, CORS protocol). */
 static size_t list_cors(field *out, const http_reply *reply)
 {
@@ -158,23 +126,26 @@ static size_t list_cors(field *out, const http_reply *reply)
     return n;
 }
 
-/* Replies load and run nothing; a picture that is looked at by itself has a style and an image within it. */
-static const char *policy_of(const http_reply *reply)
-{
-    if (reply->policy)
-        return reply->policy;
-    return reply->type && strcmp(reply->type, "image/svg+xml") == 0
-               ? "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
-               : "default-src 'none'; frame-ancestors 'none'";
-}
-
 /* The header fields of a reply. */
 static size_t list_fields(field out[MAX_FIELDS], const http_reply *reply, field_texts *texts)
 {
+    const char *const vary[] = {reply->varies_by_coding ? "Accept-Encoding" : NULL,
+                                reply->varies_by_type ? "Accept" : NULL, reply->cors ? "Origin" : NULL};
+    /* Replies load and run nothing; a picture that is looked at by itself has a style and an image within it. */
+    const bool picture = reply->type && strcmp(reply->type, "image/svg+xml") == 0;
+    const char *policy = reply->policy ? reply->policy
+                         : picture
+                             ? "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'"
+                             : "default-src 'none'; frame-ancestors 'none'";
     size_t n = 0;
-    write_texts(texts, reply);
+    snprintf(texts->number, sizeof texts->number, "%d", reply->retry_after_s);
+    snprintf(texts->tag, sizeof texts->tag, "\"%s\"", reply->tag);
+    texts->vary[0] = '\0';
+    for (size_t i = 0, used = 0; i < sizeof vary / sizeof vary[0]; i++)
+        if (vary[i])
+            used += (size_t)snprintf(texts->vary + used, sizeof texts->vary - used, "%s%s", used ? ", " : "", vary[i]);
     out[n++] = (field){"X-Content-Type-Options", "nosniff"};
-    out[n++] = (field){"Content-Security-Policy", policy_of(reply)};
+    out[n++] = (field){"Content-Security-Policy", policy};
     out[n++] = (field){"Referrer-Policy", "no-referrer"};
     out[n++] = (field){"Cache-Control", reply->immutable   ? "public, max-age=31536000, immutable"
                                         : reply->cacheable ? "no-cache"
@@ -229,37 +200,31 @@ static void free_source(void *ctx)
 
 #define STREAM_PIECE 16384 /* bytes asked for at once */
 
-static struct MHD_Response *make_stream(http_reply *reply)
-{
-    reply_source *source = malloc(sizeof *source);
-    if (!source)
-        return NULL;
-    *source = reply->source;
-    struct MHD_Response *response =
-        MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, STREAM_PIECE, read_source, source, free_source);
-    if (response)
-        reply->source.read = NULL;
-    else
-        free(source);
-    return response;
-}
-
 /* Owns what the body was. */
 static struct MHD_Response *make_response(http_reply *reply)
 {
-    struct MHD_Response *response;
+    struct MHD_Response *response = NULL;
     if (reply->has_file) {
         response = MHD_create_response_from_fd_at_offset64(reply->len, reply->fd, reply->offset);
         reply->has_file = !response;
-        return response;
+    } else if (reply->source.read) {
+        reply_source *source = malloc(sizeof *source);
+        if (source) {
+            *source = reply->source;
+            response =
+                MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, STREAM_PIECE, read_source, source, free_source);
+        }
+        if (response)
+            reply->source.read = NULL;
+        else
+            free(source);
+    } else {
+        const bool borrowed = reply->body_is_static || !reply->body;
+        response = MHD_create_response_from_buffer(reply->len, reply->body,
+                                                   borrowed ? MHD_RESPMEM_PERSISTENT : MHD_RESPMEM_MUST_FREE);
+        if (response)
+            reply->body = NULL;
     }
-    if (reply->source.read)
-        return make_stream(reply);
-    bool copy_is_needed = reply->body_is_static || !reply->body;
-    response = MHD_create_response_from_buffer(reply->len, reply->body,
-                                               copy_is_needed ? MHD_RESPMEM_PERSISTENT : MHD_RESPMEM_MUST_FREE);
-    if (response)
-        reply->body = NULL;
     return response;
 }
 
@@ -282,7 +247,7 @@ done:
     return sent;
 }
 
-static char *write_message(const http_reply *reply, bool chunked, size_t *len)
+char *reply_message(const http_reply *reply, bool chunked, size_t *len)
 {
     field fields[MAX_FIELDS];
     field_texts texts = {.number = ""};
@@ -315,15 +280,4 @@ static char *write_message(const http_reply *reply, bool chunked, size_t *len)
         return NULL;
     }
     return text;
-}
-
-char *reply_message(const http_reply *reply, size_t *len)
-{
-    return write_message(reply, false, len);
-}
-
-char *reply_head(const http_reply *reply)
-{
-    size_t len;
-    return write_message(reply, true, &len);
 }

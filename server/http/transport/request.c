@@ -35,29 +35,6 @@ static const char *member_end(const char *at, const char *end, char separator)
     return at;
 }
 
-/* Whole seconds of one preference, -1 if it is not a valid "wait". */
-static long preference_wait(const char *at, const char *end)
-{
-    end = trim_end(at, member_end(at, end, ';'));
-    const char *equals = memchr(at, '=', (size_t)(end - at));
-    if (!equals || !token_equal(at, (size_t)(trim_end(at, equals) - at), "wait"))
-        return -1;
-    const char *value = skip_space(equals + 1, end);
-    if (end - value >= 2 && value[0] == '"' && end[-1] == '"') {
-        value++;
-        end--;
-    }
-    long seconds = 0;
-    if (value == end || end - value > 9)
-        return -1;
-    for (; value < end; value++) {
-        if (*value < '0' || *value > '9')
-            return -1;
-        seconds = seconds * 10 + (*value - '0');
-    }
-    return seconds;
-}
-
 /* A walk over the members of the lists (RFC 9110, section 5.6.1) in all header fields of one name. */
 typedef struct {
     const header_list *headers;
@@ -95,8 +72,23 @@ double request_wait(const http_request *rq, double otherwise, double max_wait_s)
 {
     member_walk w = {.headers = &rq->headers, .field = "Prefer"};
     while (next_member(&w)) {
-        long seconds = preference_wait(w.at, w.end);
-        if (seconds >= 0)
+        /* whole seconds, with quotes or without */
+        const char *end = trim_end(w.at, member_end(w.at, w.end, ';'));
+        const char *equals = memchr(w.at, '=', (size_t)(end - w.at));
+        if (!equals || !token_equal(w.at, (size_t)(trim_end(w.at, equals) - w.at), "wait"))
+            continue;
+        const char *value = skip_space(equals + 1, end);
+        if (end - value >= 2 && value[0] == '"' && end[-1] == '"') {
+            value++;
+            end--;
+        }
+        long seconds = 0;
+        bool good = value < end && end - value <= 9;
+        for (; good && value < end; value++) {
+            good = *value >= '0' && *value <= '9';
+            seconds = seconds * 10 + (*value - '0');
+        }
+        if (good)
             return fmin((double)seconds, max_wait_s);
     }
     return fmin(otherwise, max_wait_s);
@@ -161,24 +153,19 @@ void request_note_reply(http_request *rq)
     memcpy(reply->request_id, rq->id, sizeof reply->request_id);
 }
 
-static const char *keep_text(char **at, const char *text, size_t len)
-{
-    char *kept = memcpy(*at, text, len);
-    kept[len] = '\0';
-    *at += len + 1;
-    return kept;
-}
-
 bool request_keep_fields(http_request *rq)
 {
-    header_field *fields = rq->headers.fields;
     size_t size = 1;
     for (size_t i = 0; i < rq->headers.count; i++)
-        size += fields[i].name_len + fields[i].value_len + 2;
+        size += rq->headers.fields[i].name_len + rq->headers.fields[i].value_len + 2;
     char *at = rq->kept_fields = malloc(size);
-    for (size_t i = 0; at && i < rq->headers.count; i++) {
-        fields[i].name = keep_text(&at, fields[i].name, fields[i].name_len);
-        fields[i].value = keep_text(&at, fields[i].value, fields[i].value_len);
+    for (size_t i = 0; at && i < 2 * rq->headers.count; i++) {
+        header_field *field = &rq->headers.fields[i / 2];
+        const char **text = i % 2 == 0 ? &field->name : &field->value;
+        const size_t len = i % 2 == 0 ? field->name_len : field->value_len;
+        *text = memcpy(at, *text, len);
+        at[len] = '\0';
+        at += len + 1;
     }
     return at != NULL;
 }

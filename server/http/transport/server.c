@@ -114,7 +114,7 @@ static char *make_last_words(double deadline_s)
     reply_refuse(&reply, 408, "request_timeout", "The request took too long",
                  "a request must be complete within %g s, plus the time its body needs at 100 kB/s", deadline_s);
     size_t len;
-    char *text = reply_message(&reply, &len);
+    char *text = reply_message(&reply, false, &len);
     reply_clear(&reply);
     return text;
 }

@@ -124,8 +124,10 @@ void stream_reply(http_request *rq, event_stream *s, const char *id, http_reply 
     s->spoke = http_now();
     s->listener = feed_listen(server->options.feed, id);
     if (s->listener) {
-        reply_stream(reply, 200, "text/event-stream",
-                     (reply_source){stream_read, stream_free, s, s->listener, stream_hold, stream_due, false, NULL});
+        reply_drop_body(reply);
+        reply->status = 200;
+        reply->type = "text/event-stream";
+        reply->source = (reply_source){stream_read, stream_free, s, s->listener, stream_hold, stream_due, false, NULL};
     } else {
         stream_free(s);
         reply_no_memory(reply);

@@ -1,3 +1,4 @@
+/* target.c: the request target. */
 #include "http/transport/transport.h"
 
 #include <stdlib.h>
@@ -33,24 +34,6 @@ static bool percent_decode(char *text, bool in_query)
     return true;
 }
 
-/* Where the path begins; NULL for a form that is not served. */
-static char *skip_authority(char *text)
-{
-    if (strncasecmp(text, "http://", 7) == 0) {
-        text += 7 + strcspn(text + 7, "/?");
-        return text[0] == '/' ? text : NULL;
-    }
-    return text[0] == '/' ? text : NULL;
-}
-
-static bool has_strange_byte(const char *text)
-{
-    for (; *text; text++)
-        if ((unsigned char)*text <= 0x20 || (unsigned char)*text >= 0x7f)
-            return true;
-    return false;
-}
-
 static bool add_parameter(target *out, char *pair, problem_details *problem)
 {
     char *value = strchr(pair, '=');
@@ -72,44 +55,39 @@ static bool add_parameter(target *out, char *pair, problem_details *problem)
     return true;
 }
 
-static bool parse_query(target *out, char *query, problem_details *problem)
-{
-    while (query && *query) {
-        char *next = strchr(query, '&');
-        if (next)
-            *next++ = '\0';
-        if (*query && !add_parameter(out, query, problem))
-            return false;
-        query = next;
-    }
-    return true;
-}
-
 bool target_parse(target *out, const char *raw, problem_details *problem)
 {
     memset(out, 0, sizeof *out);
     target t = {.text = strdup(raw)};
     if (!t.text)
         return problem_fill(problem, 500, "no_memory", "Out of memory", "no memory for the request target");
-    char *path = skip_authority(t.text);
-    char *query = path ? strchr(path, '?') : NULL;
+    char *path = t.text;
+    if (strncasecmp(path, "http://", 7) == 0) /* absolute form: the path begins behind the authority */
+        path += 7 + strcspn(path + 7, "/?");
+    char *query = path[0] == '/' ? strchr(path, '?') : NULL;
     if (query)
         *query++ = '\0';
-    bool ok = false;
-    if (!path || has_strange_byte(raw) || strchr(raw, '#') || !percent_decode(path, false)) {
+    bool good = path[0] == '/' && !strchr(raw, '#');
+    for (const char *c = raw; *c; c++)
+        good = good && (unsigned char)*c > 0x20 && (unsigned char)*c < 0x7f;
+    good = good && percent_decode(path, false);
+    if (!good)
         problem_fill(problem, 400, "bad_target", "The request target is malformed",
                      "the target must be a path such as /v1/jobs, with '%%' followed by two hexadecimal digits "
                      "other than 00");
-    } else {
-        t.path = path;
-        ok = parse_query(&t, query, problem);
+    t.path = path;
+    while (good && query && *query) {
+        char *next = strchr(query, '&');
+        if (next)
+            *next++ = '\0';
+        good = !*query || add_parameter(&t, query, problem);
+        query = next;
     }
-    if (!ok) {
+    if (good)
+        *out = t;
+    else
         target_clear(&t);
-        return false;
-    }
-    *out = t;
-    return true;
+    return good;
 }
 
 void target_clear(target *t)

@@ -32,22 +32,6 @@ static char *read_text(const char *path, char *message, size_t size)
     return text;
 }
 
-static bool check_pair(char *cert, char *key, const char *cert_path, const char *key_path, char *message, size_t size)
-{
-    gnutls_certificate_credentials_t credentials;
-    gnutls_datum_t c = {(unsigned char *)cert, (unsigned)strlen(cert)};
-    gnutls_datum_t k = {(unsigned char *)key, (unsigned)strlen(key)};
-    int rc = gnutls_certificate_allocate_credentials(&credentials);
-    if (rc >= 0) {
-        rc = gnutls_certificate_set_x509_key_mem(credentials, &c, &k, GNUTLS_X509_FMT_PEM);
-        gnutls_certificate_free_credentials(credentials);
-    }
-    if (rc < 0)
-        snprintf(message, size, "%s and %s are no certificate and its key in PEM: %s", cert_path, key_path,
-                 gnutls_strerror(rc));
-    return rc >= 0;
-}
-
 bool http_tls_read(http_tls *out, const char *cert_path, const char *key_path, char *message, size_t size)
 {
     *out = (http_tls){NULL, NULL};
@@ -55,12 +39,28 @@ bool http_tls_read(http_tls *out, const char *cert_path, const char *key_path, c
         snprintf(message, size, "the installed libmicrohttpd has no TLS: put a proxy in front");
         return false;
     }
-    char *c = read_text(cert_path, message, size), *k = c ? read_text(key_path, message, size) : NULL;
-    if (k && check_pair(c, k, cert_path, key_path, message, size)) {
-        *out = (http_tls){c, k};
+    http_tls pair = {.cert = read_text(cert_path, message, size)};
+    if (pair.cert)
+        pair.key = read_text(key_path, message, size);
+    if (!pair.key) {
+        http_tls_clear(&pair);
+        return false;
+    }
+    gnutls_certificate_credentials_t credentials;
+    const gnutls_datum_t c = {(unsigned char *)pair.cert, (unsigned)strlen(pair.cert)};
+    const gnutls_datum_t k = {(unsigned char *)pair.key, (unsigned)strlen(pair.key)};
+    int rc = gnutls_certificate_allocate_credentials(&credentials);
+    if (rc >= 0) {
+        rc = gnutls_certificate_set_x509_key_mem(credentials, &c, &k, GNUTLS_X509_FMT_PEM);
+        gnutls_certificate_free_credentials(credentials);
+    }
+    if (rc >= 0) {
+        *out = pair;
         return true;
     }
-    http_tls_clear(&(http_tls){c, k});
+    snprintf(message, size, "%s and %s are no certificate and its key in PEM: %s", cert_path, key_path,
+             gnutls_strerror(rc));
+    http_tls_clear(&pair);
     return false;
 }
 
