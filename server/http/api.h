@@ -26,7 +26,7 @@ typedef struct {
     http_options options;
     transport *server;
     struct field_slots *fields;   /* turns of replies that are computed: fields.h */
-    struct told_changes *told;    /* texts of the latest changes of jobs: all_events.c */
+    struct told_changes *told;    /* texts of the latest changes of jobs: events.c */
     char run[17];                 /* a random name of this run of the daemon */
     pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
     pthread_mutex_t ready_lock;   /* the next two */

@@ -1,11 +1,19 @@
-/* events.c: GET /v1/jobs/{id}/events.
+/* events.c: what happens to jobs, as Server-Sent Events.
  *
- * There are two kinds of events. "status" is the whole job, at the start and whenever its status changed; after the
- * last one the stream ends. "progress" is how far a running job is. Both are states, not steps: who was away gets the
- * present one, and an event's id names the state, so that one who saw it already (Last-Event-ID) does not get it
- * twice. */
+ * GET /v1/jobs/{id}/events has two kinds of events. "status" is the whole job, at the start and whenever its status
+ * changed; after the last one the stream ends. "progress" is how far a running job is.
+ *
+ * GET /v1/events is for a list that is to stay as it is in the store. "job": a job as a list shows it, whenever it was
+ * created or its status or progress changed. "deleted": the id of one that is gone. "reset": load the list (again): it
+ * comes first on a stream that does not go on from another one, and where changes were missed. Of several changes of
+ * one job in quick succession only the last is told. An event's id is the number of its change in this run of the
+ * daemon; a stream that comes again with it (Last-Event-ID) goes on from there.
+ *
+ * All are states, not steps: who was away gets the present one, and an event's id names the state, so that one who saw
+ * it already (Last-Event-ID) does not get it twice. */
 #include "http/jobs.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +37,7 @@ static void name_state(char *out, size_t size, const job *j, double iteration)
         snprintf(out, size, "%d.%s", j->attempts, job_status_name(j->status));
 }
 
-static bool look(event_stream *base)
+static bool look_at_job(event_stream *base)
 {
     job_stream *s = (job_stream *)base;
     job j;
@@ -85,11 +93,130 @@ void events_get(api *context, http_request *rq, http_reply *reply)
     }
     job_stream *s = calloc(1, sizeof *s);
     if (s) {
-        s->base.look = look;
+        s->base.look = look_at_job;
         s->context = context;
         s->iteration = -1;
         memcpy(s->id, rq->job_id, sizeof s->id);
         memcpy(s->last, last, sizeof s->last);
     }
     stream_reply(rq, s ? &s->base : NULL, rq->job_id, reply);
+}
+
+/* ---- of all jobs */
+
+#define EVERY_S 0.1 /* a stream tells at most so often */
+#define AT_ONCE 64  /* changes that are told together */
+#define TEXTS   512 /* that are kept for other streams */
+
+typedef struct {
+    uint64_t number; /* of the change; 0: none */
+    const char *event;
+    char *data;
+} told_text;
+
+struct told_changes {
+    pthread_mutex_t lock;   /* taken before the store's and the workers' own */
+    told_text texts[TEXTS]; /* of change n at n % TEXTS */
+};
+
+typedef struct {
+    event_stream base;
+    api *context;
+    uint64_t seen; /* the number up to which all is told */
+    bool reset;    /* that it must be told first */
+} all_stream;
+
+struct told_changes *told_changes_new(void)
+{
+    struct told_changes *t = calloc(1, sizeof *t);
+    if (t)
+        pthread_mutex_init(&t->lock, NULL);
+    return t;
+}
+
+void told_changes_free(struct told_changes *t)
+{
+    if (!t)
+        return;
+    for (size_t i = 0; i < TEXTS; i++)
+        free(t->texts[i].data);
+    pthread_mutex_destroy(&t->lock);
+    free(t);
+}
+
+/* ---- texts */
+
+/* Under the lock. It may describe a later state than the change made: then there is a later change, told after it. */
+static const told_text *text_of(api *context, const feed_change *change)
+{
+    told_text *kept = &context->told->texts[change->number % TEXTS];
+    if (kept->number == change->number)
+        return kept;
+    free(kept->data);
+    /* What has become of the job; NULL: no memory, or the store failed. */
+    const char **event = &kept->event;
+    job j;
+    char *data = NULL;
+    store_status status = store_get(context->store, change->id, &j);
+    *event = status == STORE_NOT_FOUND ? "deleted" : "job";
+    if (status == STORE_NOT_FOUND && asprintf(&data, "{\"id\": \"%s\"}", change->id) < 0)
+        data = NULL;
+    if (status == STORE_OK) {
+        jobs_freshen(context, &j);
+        data = codec_encode_job(&j);
+        job_clear(&j);
+    }
+    kept->data = data;
+    kept->number = kept->data ? change->number : 0;
+    return kept->data ? kept : NULL;
+}
+
+/* ---- a stream */
+
+static bool say(all_stream *s, const char *event, uint64_t number, const char *data)
+{
+    char id[64];
+    snprintf(id, sizeof id, "%s.%" PRIu64, s->context->run, number);
+    return stream_say(&s->base, event, id, data);
+}
+
+static bool look_at_all(event_stream *base)
+{
+    all_stream *s = (all_stream *)base;
+    api *context = s->context;
+    feed_change changes[AT_ONCE];
+    size_t count;
+    uint64_t seen;
+    if (s->reset || !feed_since(work_feed(context->work), s->seen, changes, AT_ONCE, &count, &seen)) {
+        s->seen = feed_last(work_feed(s->context->work));
+        s->reset = false;
+        return say(s, "reset", s->seen, "{}");
+    }
+    bool ok = true;
+    pthread_mutex_lock(&context->told->lock);
+    for (size_t i = 0; ok && i < count; i++) {
+        const told_text *text = text_of(context, &changes[i]);
+        ok = text && say(s, text->event, changes[i].number, text->data);
+    }
+    pthread_mutex_unlock(&context->told->lock);
+    s->seen = seen;
+    return ok;
+}
+
+void events_get_all(api *context, http_request *rq, http_reply *reply)
+{
+    char last[64];
+    const size_t run = strlen(context->run);
+    all_stream *s = calloc(1, sizeof *s);
+    stream_last_seen(rq, last, sizeof last);
+    const char *number = last + run + 1; /* of the change that the client has seen, if it is one of this run */
+    if (s) {
+        s->base.look = look_at_all;
+        s->context = context;
+        s->base.every_s = EVERY_S;
+        s->reset = strncmp(last, context->run, run) != 0 || last[run] != '.' || strlen(number) < 1 ||
+                   strlen(number) > 18 || number[strspn(number, "0123456789")];
+        s->seen = s->reset ? 0 : strtoull(number, NULL, 10);
+    }
+    stream_reply(rq, s ? &s->base : NULL, NULL, reply);
 }

@@ -1,12 +1,13 @@
-/* jobs.c: /v1/jobs and /v1/jobs/{id}. */
+/* jobs.c: /v1/jobs and /v1/jobs/{id}: one job, a list of them, and waiting for one to end (`Prefer: wait`). */
 #include "codec/codec.h"
-#include "http/jobs.h"
 #include "http/api.h"
+#include "http/jobs.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 void reply_store_failure(api *context, store_status status, http_reply *reply)
 {
@@ -133,152 +134,10 @@ static void reply_job(api *context, int status, job *j, http_reply *reply)
     reply_json(reply, status, codec_encode_job(j));
 }
 
-/* ------------------------------------------------------------------ submit */
-
-/* A key is kept as sent: 1 to 255 printable ASCII characters. */
-bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
-{
-    size_t count;
-    const header_field *field = header_find(&rq->headers, "Idempotency-Key", &count);
-    *key = NULL;
-    if (!field)
-        return true;
-    bool valid = count == 1 && field->value_len >= 1 && field->value_len <= 255;
-    for (size_t i = 0; valid && i < field->value_len; i++)
-        valid = field->value[i] >= 0x20 && field->value[i] <= 0x7e;
-    if (!valid)
-        return problem_fill(problem, 400, "bad_idempotency_key", "The Idempotency-Key is malformed",
-                            "give one Idempotency-Key of 1 to 255 printable ASCII characters");
-    *key = strndup(field->value, field->value_len);
-    if (!*key)
-        return problem_fill(problem, 503, "no_memory", "Out of memory", "try again later");
-    return true;
-}
-
-store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key)
-{
-    return (store_request){.body = body,
-                           .body_len = len,
-                           .tags = request->tags,
-                           .idempotency_key = key,
-                           .uploads = (const char(*)[65])request->uploads,
-                           .n_uploads = request->n_uploads,
-                           .priority = request->priority,
-                           .queue_limit_s = request->queue_limit_s,
-                           .webhook = request->webhook};
-}
-
-bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
-{
-    const char *why;
-    if (!url || webhooks_allow(context->webhooks, url, &why))
-        return true;
-    problem_fill(problem, 422, "webhook_not_allowed", "The webhook cannot be called", "/webhook/url: %s", why);
-    strcpy(problem->pointer, "/webhook/url");
-    return false;
-}
-
-bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
-{
-    bool repeated = false;
-    problem_details problem;
-    if (!jobs_check_webhook(context, request->webhook, &problem)) {
-        reply_problem(reply, &problem);
-        return false;
-    }
-    store_status status = store_submit(context->store, request, out, &repeated);
-    if (status == STORE_CONFLICT)
-        reply_refuse(reply, 422, "idempotency_key_reused", "The Idempotency-Key was used for another request",
-                     "this key came before with a different body: use a new key for a new job");
-    else if (status == STORE_NOT_FOUND)
-        reply_refuse(reply, 422, "unknown_upload", "An upload is not there",
-                     "an upload that the request names was deleted meanwhile: send it again");
-    else if (status != STORE_OK)
-        reply_store_failure(context, status, reply);
-    if (status != STORE_OK)
-        return false;
-    memcpy(rq->job_id, out->id, sizeof rq->job_id);
-    if (!repeated)
-        metrics_add(context->metrics, METRIC_SUBMITTED, 1);
-    return true;
-}
-
-bool jobs_find_repeat(api *context, http_request *rq, const char *key, job *out)
-{
-    store_request request = {.body = rq->body ? rq->body : "", .body_len = rq->body_len, .idempotency_key = key};
-    memset(out, 0, sizeof *out);
-    if (!key || store_find_repeat(context->store, &request, out) != STORE_OK)
-        return false;
-    memcpy(rq->job_id, out->id, sizeof rq->job_id);
-    return true;
-}
-
 void jobs_acknowledge(api *context, job *j, http_reply *reply)
 {
     snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", j->id);
     reply_job(context, jobs_ended(j) ? 200 : 202, j, reply);
-}
-
-void jobs_store_and_wait(api *context, http_request *rq, const store_request *request, http_reply *reply)
-{
-    job j = {0};
-    if (jobs_store(context, rq, request, &j, reply))
-        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
-    job_clear(&j);
-}
-
-/* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
-#define ASSEMBLY_BYTES 1000.0
-/* Beyond it a prediction takes minutes. */
-#define PREDICTED_MOST 4e6
-
-void jobs_submit(api *context, http_request *rq, http_reply *reply)
-{
-    problem_details problem = {0}, ignored;
-    codec_request request = {0};
-    char *key = NULL;
-    const char *validate = target_value(&rq->target, "validate");
-    const bool validate_only = validate && strcmp(validate, "true") == 0;
-    bool good = !validate || validate_only || strcmp(validate, "false") == 0;
-    if (!good)
-        problem_fill(&problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                     "validate must be true or false");
-    good = good && jobs_read_key(rq, &key, &problem) &&
-           codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
-           start_check(context, &request, rq, &problem) && jobs_check_webhook(context, request.webhook, &problem);
-    if (!good) {
-        /* a problem, or the job that the request became when it came before */
-        job j;
-        if (!jobs_find_repeat(context, rq, validate_only ? NULL : key, &j))
-            reply_problem(reply, &problem);
-        else
-            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
-        job_clear(&j);
-    } else if (validate_only) {
-        /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
-        uz_prediction predicted;
-        uz_error err = {.status = UZ_OK};
-        api_asker asker = {context, rq};
-        const uz_hooks hooks = {.ctx = &asker, .cancelled = api_is_over};
-        const size_t limit = request.settings.memory_limit = work_solve_bytes(context->work);
-        int64_t m, n_u;
-        bool known = false;
-        if (!request.settings.semidefinite && codec_request_sizes(&request, &m, &n_u, &ignored) &&
-            (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
-            pthread_mutex_lock(&context->predict_lock);
-            uz_thread_init();
-            known = !api_is_over(&asker) &&
-                    uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
-            pthread_mutex_unlock(&context->predict_lock);
-        }
-        reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
-    } else {
-        codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
-        store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
-        jobs_store_and_wait(context, rq, &stored, reply);
-    }
-    codec_request_clear(&request);
-    free(key);
 }
 
 /* -------------------------------------------------------------------- read */
@@ -327,4 +186,171 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
     else
         reply_job(context, 200, &j, reply);
     job_clear(&j);
+}
+
+/* -------------------------------------------------------------------- list */
+
+static bool refuse_query(problem_details *problem, const char *text)
+{
+    return problem_fill(problem, 400, "bad_parameter", "A query parameter has a value that is not allowed", "%s", text);
+}
+
+/* ---- times */
+
+/* A time of RFC 3339, "2026-01-31T12:00:00.5Z", as Unix seconds. */
+static bool parse_time(const char *text, double *out)
+{
+    static const char FORM[] = "dddd-dd-ddTdd:dd:dd";
+    struct tm t = {0}, back;
+    double fraction = 0;
+    for (size_t i = 0; FORM[i]; i++)
+        if (FORM[i] == 'd' ? text[i] < '0' || text[i] > '9' : (text[i] & ~0x20) != (FORM[i] & ~0x20))
+            return false;
+    sscanf(text, "%4d-%2d-%2d%*c%2d:%2d:%2d", &t.tm_year, &t.tm_mon, &t.tm_mday, &t.tm_hour, &t.tm_min, &t.tm_sec);
+    const char *at = text + sizeof FORM - 1;
+    size_t digits = *at == '.' ? strspn(at + 1, "0123456789") : 0;
+    for (size_t i = digits; i > 0; i--)
+        fraction = (fraction + (at[i] - '0')) / 10;
+    if (*at == '.' && digits == 0)
+        return false;
+    at += digits ? digits + 1 : 0;
+    t.tm_year -= 1900;
+    t.tm_mon -= 1;
+    struct tm asked = t;
+    time_t seconds = timegm(&t);
+    bool exists = gmtime_r(&seconds, &back) && back.tm_mon == asked.tm_mon && back.tm_mday == asked.tm_mday &&
+                  back.tm_hour == asked.tm_hour && back.tm_min == asked.tm_min &&
+                  asked.tm_sec < 61; /* no 30th of February */
+    if (!exists)
+        return false;
+    /* the zone: "Z", "+hh:mm" or "-hh:mm" east of Greenwich; a '+' that was not escaped arrives as a space */
+    int hours = 0, minutes = 0, used = 0;
+    if (strcmp(at, "Z") != 0 && strcmp(at, "z") != 0 &&
+        (!strchr("+- ", at[0]) || strspn(at + 1, "0123456789:") != 5 ||
+         sscanf(at + 1, "%2d:%2d%n", &hours, &minutes, &used) != 2 || at[1 + used] || hours > 23 || minutes > 59))
+        return false;
+    const int zone = (at[0] == '-' ? -1 : 1) * (hours * 3600 + minutes * 60);
+    *out = (double)seconds + fraction - zone;
+    return true;
+}
+
+static bool read_time(const http_request *rq, const char *key, double *out, problem_details *problem)
+{
+    char text[160];
+    const char *value = target_value(&rq->target, key);
+    if (!value || parse_time(value, out)) {
+        if (value) /* 0 in a query is no bound, and no job is as old as 1970 */
+            *out = fmax(*out, 1e-3);
+        return true;
+    }
+    snprintf(text, sizeof text, "%s must be a time of RFC 3339 such as 2026-01-31T12:00:00Z", key);
+    return refuse_query(problem, text);
+}
+
+/* ---- the query */
+
+static bool read_query(const http_request *rq, store_query *query, problem_details *problem)
+{
+    int64_t limit = 50;
+    const char *status = target_value(&rq->target, "status"), *order = target_value(&rq->target, "order");
+    memset(query, 0, sizeof *query);
+    query->before = target_value(&rq->target, "cursor");
+    query->by_status = status != NULL;
+    query->ascending = order && strcmp(order, "asc") == 0;
+    if (status && !job_status_parse(&query->status, status))
+        return refuse_query(problem, "status must be accepted, running, successful, failed or dismissed");
+    if (query->before && !(strlen(query->before) == 32 && strspn(query->before, "0123456789abcdef") == 32))
+        return refuse_query(problem, "cursor must be the \"next\" of an earlier page");
+    if (order && !query->ascending && strcmp(order, "desc") != 0)
+        return refuse_query(problem, "order must be desc (newest first) or asc");
+    if (!request_integer(rq, "limit", 1, 1000, &limit, problem))
+        return false;
+    query->limit = (int)limit;
+    if (!read_time(rq, "since", &query->since, problem) || !read_time(rq, "until", &query->until, problem))
+        return false;
+    for (size_t i = 0, count = 0; i < rq->target.count; i++) {
+        if (strcmp(rq->target.parameters[i].key, "tag") != 0)
+            continue;
+        if (count > STORE_MORE_TAGS)
+            return refuse_query(problem, "at most 4 tags may be asked for");
+        *(count == 0 ? &query->tag : &query->more[count - 1]) = rq->target.parameters[i].value;
+        count++;
+    }
+    return true;
+}
+
+void jobs_list(api *context, http_request *rq, http_reply *reply)
+{
+    store_query query;
+    problem_details problem;
+    job *jobs = NULL;
+    size_t count = 0;
+    bool more = false;
+    if (!read_query(rq, &query, &problem)) {
+        reply_problem(reply, &problem);
+        return;
+    }
+    store_status status = store_list(context->store, &query, &jobs, &count, &more);
+    if (status != STORE_OK) {
+        reply_store_failure(context, status, reply);
+        return;
+    }
+    for (size_t i = 0; i < count; i++)
+        jobs_freshen(context, &jobs[i]);
+    reply->tag_by_body = true;
+    reply_json(reply, 200, codec_encode_jobs(jobs, count, more));
+    for (size_t i = 0; i < count; i++)
+        job_clear(&jobs[i]);
+    free(jobs);
+}
+
+/* ---- a reply that waits for a job to end */
+
+typedef struct {
+    delayed_reply base;
+    api *context;
+    char id[33];
+    jobs_then then;
+    store_status status; /* of the last look at the job, and what it found */
+    job found;
+} waiting;
+
+static bool waiting_ready(delayed_reply *d)
+{
+    waiting *w = (waiting *)d;
+    job_clear(&w->found);
+    w->status = store_get(w->context->store, w->id, &w->found);
+    return w->status == STORE_NOT_FOUND || (w->status == STORE_OK && jobs_ended(&w->found));
+}
+
+static void waiting_make(delayed_reply *d, http_reply *reply)
+{
+    waiting *w = (waiting *)d;
+    if (w->status == STORE_OK)
+        w->then(w->context, &w->found, reply);
+    else
+        reply_store_failure(w->context, w->status, reply);
+}
+
+static void waiting_free(delayed_reply *d)
+{
+    waiting *w = (waiting *)d;
+    job_clear(&w->found);
+    free(w);
+}
+
+bool jobs_delay(api *context, http_request *rq, const char *id, double seconds, jobs_then then)
+{
+    waiting *w = calloc(1, sizeof *w);
+    if (!w)
+        return false;
+    w->base = (delayed_reply){
+        .ready = waiting_ready, .make = waiting_make, .free = waiting_free, .until = http_now() + seconds};
+    w->context = context;
+    w->then = then;
+    memcpy(w->id, id, sizeof w->id);
+    if (reply_delay(rq, &w->base, id))
+        return true;
+    free(w);
+    return false;
 }

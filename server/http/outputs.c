@@ -1,4 +1,4 @@
-/* outputs.c: the table of what can be had of a job, and how a row is answered. */
+/* outputs.c: what can be had of a job: the table, the writers, and how a row is answered. */
 #include "codec/codec.h"
 #include "http/history.h"
 #include "http/jobs.h"
@@ -133,4 +133,73 @@ void output_get(api *context, http_request *rq, http_reply *reply)
         jobs_check_still_there(context, &j, reply);
         job_clear(&j);
     }
+}
+
+/* ---- writers */
+
+uz_status output_history(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    (void)hooks;
+    (void)err;
+    *file = codec_encode_history(of->case_name, of->rows, of->n_rows, len);
+    return *file ? UZ_OK : UZ_ERR_MEMORY;
+}
+
+uz_status output_history_csv(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    (void)hooks;
+    (void)err;
+    *file = codec_encode_history_csv(of->rows, of->n_rows, len);
+    return *file ? UZ_OK : UZ_ERR_MEMORY;
+}
+
+uz_status output_vtu(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    return uz_vtu_write(file, len, of->scene, of->answer, of->options->fields, hooks, err);
+}
+
+#define MOST_BYTES ((size_t)256000000) /* 413 above it; openapi.json says so */
+
+uz_status output_surface(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_surface surface;
+    *file = NULL;
+    uz_status status = uz_surface_compute(&surface, of->scene, of->answer, of->options->fields, MOST_BYTES, hooks, err);
+    if (status == UZ_OK) {
+        const codec_surface what = {&surface, of->scene, of->job_id, of->case_name};
+        *file = codec_encode_surface(&what, len);
+        status = *file ? UZ_OK : UZ_ERR_MEMORY;
+    }
+    uz_surface_clear(&surface);
+    return status;
+}
+
+uz_status output_picture(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_picture how = of->options->picture;
+    how.title = of->case_name;
+    return uz_picture_deformed(file, len, of->scene, of->answer, &how, hooks, err);
+}
+
+/* The colour ("displacements" or "von_mises"), the factor of the displacements and the width. */
+bool output_picture_read(output_options *out, const http_request *rq, problem_details *problem)
+{
+    static const char TITLE[] = "A query parameter has a value that is not allowed";
+    const char *colour = target_value(&rq->target, "colour"), *factor = target_value(&rq->target, "factor");
+    uz_picture *to = &out->picture;
+    int64_t width = 900;
+    const bool moved = colour && strcmp(colour, "displacements") == 0;
+    to->colour = moved ? UZ_FIELD_DISPLACEMENTS : UZ_FIELD_VON_MISES;
+    if (colour && !moved && strcmp(colour, "von_mises") != 0)
+        return problem_fill(problem, 400, "bad_parameter", TITLE, "colour is displacements or von_mises, not \"%.60s\"",
+                            colour);
+    to->factor = 0;
+    const size_t used = factor ? uz_parse_double(&to->factor, factor, strlen(factor)) : 0;
+    if (factor && (used == 0 || factor[used] != '\0' || !(to->factor >= 0 && to->factor <= 1e12)))
+        return problem_fill(problem, 400, "bad_parameter", TITLE,
+                            "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", factor);
+    if (!request_integer(rq, "width", 200, 4000, &width, problem))
+        return false;
+    to->width = (int)width;
+    return true;
 }

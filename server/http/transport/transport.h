@@ -201,7 +201,7 @@ typedef struct event_stream {
     bool (*look)(struct event_stream *s);
     double every_s; /* at least so long between two looks that found something; 0: none */
     bool ended;
-    /* Private to stream.c. */
+    /* Private to later.c. */
     transport *server;
     const http_request *rq; /* gone before the stream is freed */
     listener *listener;
@@ -230,7 +230,7 @@ typedef struct delayed_reply {
     /* Frees what d has, and d. */
     void (*free)(struct delayed_reply *d);
     double until; /* on http_now's clock: then it is made in any case */
-    /* Private to delayed.c. */
+    /* Private to later.c. */
     transport *server;
     http_request *rq; /* gone before the reply is freed */
     listener *listener;

@@ -1,0 +1,395 @@
+/* submit.c: requests that become jobs: POST /v1/jobs, /v1/verify and /v1/jobs/{id}/refine. */
+#include "http/jobs.h"
+#include "codec/codec.h"
+#include "http/api.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A key is kept as sent: 1 to 255 printable ASCII characters. */
+bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
+{
+    size_t count;
+    const header_field *field = header_find(&rq->headers, "Idempotency-Key", &count);
+    *key = NULL;
+    if (!field)
+        return true;
+    bool valid = count == 1 && field->value_len >= 1 && field->value_len <= 255;
+    for (size_t i = 0; valid && i < field->value_len; i++)
+        valid = field->value[i] >= 0x20 && field->value[i] <= 0x7e;
+    if (!valid)
+        return problem_fill(problem, 400, "bad_idempotency_key", "The Idempotency-Key is malformed",
+                            "give one Idempotency-Key of 1 to 255 printable ASCII characters");
+    *key = strndup(field->value, field->value_len);
+    if (!*key)
+        return problem_fill(problem, 503, "no_memory", "Out of memory", "try again later");
+    return true;
+}
+
+store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key)
+{
+    return (store_request){.body = body,
+                           .body_len = len,
+                           .tags = request->tags,
+                           .idempotency_key = key,
+                           .uploads = (const char(*)[65])request->uploads,
+                           .n_uploads = request->n_uploads,
+                           .priority = request->priority,
+                           .queue_limit_s = request->queue_limit_s,
+                           .webhook = request->webhook};
+}
+
+bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
+{
+    const char *why;
+    if (!url || webhooks_allow(context->webhooks, url, &why))
+        return true;
+    problem_fill(problem, 422, "webhook_not_allowed", "The webhook cannot be called", "/webhook/url: %s", why);
+    strcpy(problem->pointer, "/webhook/url");
+    return false;
+}
+
+bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
+{
+    bool repeated = false;
+    problem_details problem;
+    if (!jobs_check_webhook(context, request->webhook, &problem)) {
+        reply_problem(reply, &problem);
+        return false;
+    }
+    store_status status = store_submit(context->store, request, out, &repeated);
+    if (status == STORE_CONFLICT)
+        reply_refuse(reply, 422, "idempotency_key_reused", "The Idempotency-Key was used for another request",
+                     "this key came before with a different body: use a new key for a new job");
+    else if (status == STORE_NOT_FOUND)
+        reply_refuse(reply, 422, "unknown_upload", "An upload is not there",
+                     "an upload that the request names was deleted meanwhile: send it again");
+    else if (status != STORE_OK)
+        reply_store_failure(context, status, reply);
+    if (status != STORE_OK)
+        return false;
+    memcpy(rq->job_id, out->id, sizeof rq->job_id);
+    if (!repeated)
+        metrics_add(context->metrics, METRIC_SUBMITTED, 1);
+    return true;
+}
+
+bool jobs_find_repeat(api *context, http_request *rq, const char *key, job *out)
+{
+    store_request request = {.body = rq->body ? rq->body : "", .body_len = rq->body_len, .idempotency_key = key};
+    memset(out, 0, sizeof *out);
+    if (!key || store_find_repeat(context->store, &request, out) != STORE_OK)
+        return false;
+    memcpy(rq->job_id, out->id, sizeof rq->job_id);
+    return true;
+}
+
+void jobs_store_and_wait(api *context, http_request *rq, const store_request *request, http_reply *reply)
+{
+    job j = {0};
+    if (jobs_store(context, rq, request, &j, reply))
+        jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
+    job_clear(&j);
+}
+
+/* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
+#define ASSEMBLY_BYTES 1000.0
+/* Beyond it a prediction takes minutes. */
+#define PREDICTED_MOST 4e6
+
+void jobs_submit(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem = {0}, ignored;
+    codec_request request = {0};
+    char *key = NULL;
+    const char *validate = target_value(&rq->target, "validate");
+    const bool validate_only = validate && strcmp(validate, "true") == 0;
+    bool good = !validate || validate_only || strcmp(validate, "false") == 0;
+    if (!good)
+        problem_fill(&problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                     "validate must be true or false");
+    good = good && jobs_read_key(rq, &key, &problem) &&
+           codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
+           start_check(context, &request, rq, &problem) && jobs_check_webhook(context, request.webhook, &problem);
+    if (!good) {
+        /* a problem, or the job that the request became when it came before */
+        job j;
+        if (!jobs_find_repeat(context, rq, validate_only ? NULL : key, &j))
+            reply_problem(reply, &problem);
+        else
+            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
+        job_clear(&j);
+    } else if (validate_only) {
+        /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
+        uz_prediction predicted;
+        uz_error err = {.status = UZ_OK};
+        api_asker asker = {context, rq};
+        const uz_hooks hooks = {.ctx = &asker, .cancelled = api_is_over};
+        const size_t limit = request.settings.memory_limit = work_solve_bytes(context->work);
+        int64_t m, n_u;
+        bool known = false;
+        if (!request.settings.semidefinite && codec_request_sizes(&request, &m, &n_u, &ignored) &&
+            (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
+            pthread_mutex_lock(&context->predict_lock);
+            uz_thread_init();
+            known = !api_is_over(&asker) &&
+                    uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
+            pthread_mutex_unlock(&context->predict_lock);
+        }
+        reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
+    } else {
+        codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
+        store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
+        jobs_store_and_wait(context, rq, &stored, reply);
+    }
+    codec_request_clear(&request);
+    free(key);
+}
+
+/* ---- "warm_start": {"job": ...} against the store, before the request becomes a job. The other job may still be
+ * deleted before this one runs; the run then begins at zero. */
+
+/* 422 at a member of warm_start. */
+static bool refuse(problem_details *problem, const char *member, const char *code, const char *detail)
+{
+    problem_fill(problem, 422, code, "The start cannot be used", "%s", detail);
+    snprintf(problem->pointer, sizeof problem->pointer, "/solver/warm_start/%s", member);
+    return false;
+}
+
+static bool refuse_store(api *context, const codec_start *start, store_status status, problem_details *problem)
+{
+    char cause[256];
+    if (status == STORE_DAMAGED) {
+        codec_problem_damaged(problem, start->job);
+        return false;
+    }
+    store_message(context->store, cause, sizeof cause);
+    log_write(context->log, LOG_ERROR, "store_error", (log_field[]){LOG_S("cause", cause), {0}});
+    return problem_fill(problem, 500, "store_error", "The store failed", "the server's log has the cause");
+}
+
+/* The job must have ended with an answer. */
+static bool check_job(api *context, const codec_start *start, problem_details *problem)
+{
+    job other = {0};
+    store_status status = store_get(context->store, start->job, &other);
+    bool ended = status == STORE_OK && jobs_ended(&other), good = ended && other.summary;
+    status = status == STORE_OK && other.damaged ? STORE_DAMAGED : status;
+    job_clear(&other);
+    if (good)
+        return true;
+    if (status == STORE_NOT_FOUND)
+        return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: there is no job with this id");
+    if (status != STORE_OK)
+        return refuse_store(context, start, status, problem);
+    return refuse(problem, "job", "not_allowed",
+                  ended ? "/solver/warm_start/job: this job ended without an answer"
+                        : "/solver/warm_start/job: this job has not ended");
+}
+
+/* Its case, if it has some, must have as many reactions as the problem has rows. */
+static bool check_reactions(api *context, const codec_request *request, problem_details *problem)
+{
+    const codec_start *start = &request->start;
+    store_case *cases = NULL;
+    size_t n_cases = 0, i = 0;
+    store_status status = store_get_cases(context->store, start->job, NULL, &cases, &n_cases);
+    if (status != STORE_OK)
+        return refuse_store(context, start, status, problem);
+    while (i < n_cases && strcmp(cases[i].name, start->case_name) != 0)
+        i++;
+    const bool good = i < n_cases || (n_cases == 0 && !start->case_name[0]);
+    const int64_t number = i < n_cases ? cases[i].number : 0; /* 0: the job has no cases */
+    if (!good && start->case_name[0])
+        refuse(problem, "case", "not_allowed", "/solver/warm_start/case: that job has no case of this name.");
+    else if (!good)
+        refuse(problem, "job", "missing_key",
+               "/solver/warm_start/job: that job has load cases: say which one in \"case\".");
+    if (!good)
+        cases_list(problem, start->case_name, cases, n_cases);
+    store_cases_free(cases, n_cases);
+    if (!good)
+        return false;
+
+    double *r = NULL;
+    int64_t count = 0, m, n_u;
+    char text[160];
+    status = store_get_vector(context->store, start->job, number, "reactions", &r, &count);
+    bool finite = status == STORE_OK;
+    for (int64_t k = 0; finite && k < count; k++)
+        finite = isfinite(r[k]);
+    free(r);
+    if (status != STORE_OK && status != STORE_NOT_FOUND)
+        return refuse_store(context, start, status, problem);
+    if (!finite)
+        return refuse(problem, "job", "not_allowed", "/solver/warm_start/job: this job ended without reactions");
+    if (!codec_request_sizes(request, &m, &n_u, problem))
+        return false;
+    if (count == m)
+        return true;
+    snprintf(text, sizeof text,
+             "/solver/warm_start/job: that job has %lld contact rows, this problem has %lld: they must be as many",
+             (long long)count, (long long)m);
+    return refuse(problem, "job", "size_mismatch", text);
+}
+
+bool start_check(api *context, const codec_request *request, const http_request *rq, problem_details *problem)
+{
+    const codec_start *start = &request->start;
+    char *body = NULL;
+    size_t len = 0;
+    if (!start->job[0])
+        return true;
+    if (!check_job(context, start, problem))
+        return false;
+    if (!start->continued)
+        return check_reactions(context, request, problem);
+    /* A run that goes on with another problem would be another run. */
+    if (start->case_name[0])
+        return refuse(problem, "case", "not_allowed",
+                      "/solver/warm_start/case: a run is continued with all its cases; leave this out");
+    store_status status = store_get_body(context->store, start->job, &body, &len);
+    bool same = status == STORE_OK && codec_same_problem(rq->body, rq->body_len, body, len);
+    free(body);
+    if (same)
+        return true;
+    if (status != STORE_OK && status != STORE_NOT_FOUND)
+        return refuse_store(context, start, status, problem);
+    return refuse(problem, "continue", "not_allowed",
+                  "/solver/warm_start/continue: problem and cases are not, byte by byte, those of that job; leave this "
+                  "out to start from its reactions");
+}
+
+/* ---- verify: a job like any other, whose result is the answer to the call where it comes in time */
+
+static const double VERIFY_WAIT_S = 30.0; /* where the request does not say; openapi.json says so */
+
+static void reply_end(api *context, job *j, http_reply *reply)
+{
+    problem_details error = {0};
+    if (!jobs_ended(j))
+        jobs_acknowledge(context, j, reply);
+    else if (j->status != JOB_FAILED) {
+        if (results_exist(j, reply))
+            results_reply(context, j, reply);
+    } else if (j->error && codec_decode_problem(&error, j->error) && error.status >= 400) {
+        reply_problem(reply, &error); /* what kept the answer from being certified is an error in the request */
+    } else {
+        reply_refuse(reply, 500, "internal", "A fault of this service", "the job failed and left no reason");
+    }
+}
+
+void verify_submit(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem = {0};
+    codec_request request = {0};
+    job j = {0};
+    char *key = NULL;
+    if (!jobs_read_key(rq, &key, &problem) ||
+        !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem)) {
+        if (!jobs_find_repeat(context, rq, key, &j))
+            reply_problem(reply, &problem);
+        else if (jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
+            reply_end(context, &j, reply);
+        goto done;
+    }
+    codec_request_strip(&request);
+    store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
+    if (jobs_store(context, rq, &stored, &j, reply) && jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
+        reply_end(context, &j, reply);
+done:
+    job_clear(&j);
+    codec_request_clear(&request);
+    free(key);
+}
+
+/* ---- refine: a job that goes on where another one stopped */
+
+/* False with a 409: a job whose only answer is that there is none can't be refined. */
+static bool has_reactions(api *context, const job *j, http_reply *reply)
+{
+    double *r = NULL;
+    int64_t count = 0;
+    bool finite = true;
+    store_status status = store_get_vector(context->store, j->id, 0, "reactions", &r, &count);
+    for (int64_t i = 0; status == STORE_OK && finite && i < count; i++)
+        finite = isfinite(r[i]);
+    free(r);
+    if (status != STORE_OK && status != STORE_NOT_FOUND) /* with cases the job itself has none */
+        reply_store_failure(context, status, reply);
+    else if (!finite)
+        reply_refuse(reply, 409, "no_result", "The job has no result",
+                     "the problem is infeasible or out of reach: no accuracy makes it feasible");
+    else
+        return true;
+    return false;
+}
+
+/* The body of the new job and what the store keeps beside it, checked as any other; NULL in *body: refused. */
+static void make_request(api *context, const http_request *rq, const job *old, const char *old_body, size_t old_len,
+                         char **body, size_t *len, codec_request *request, http_reply *reply)
+{
+    static const char SOLVER[] = "/solver";
+    const size_t skip = sizeof SOLVER - 1;
+    problem_details problem = {0};
+    *body = codec_refine(old_body, old_len, old->id, rq->body ? rq->body : "", rq->body_len, len, &problem);
+    if (*body && codec_decode(request, CODEC_SOLVE, *body, *len, context->store, &problem)) {
+        codec_request_strip(request);
+        return;
+    }
+    /* pointers of the made request, seen from the one that it was made from */
+    if (strncmp(problem.pointer, SOLVER, skip) == 0) {
+        memmove(problem.pointer, problem.pointer + skip, strlen(problem.pointer + skip) + 1);
+        if (strncmp(problem.detail, SOLVER, skip) == 0)
+            memmove(problem.detail, problem.detail + skip, strlen(problem.detail + skip) + 1);
+    }
+    reply_problem(reply, &problem);
+    free(*body);
+    *body = NULL;
+}
+
+void jobs_refine(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem = {0};
+    job old = {0};
+    char *key = NULL;
+    if (!jobs_read_key(rq, &key, &problem))
+        reply_problem(reply, &problem);
+    else if (jobs_load(context, rq, &old, reply) && results_exist(&old, reply) && has_reactions(context, &old, reply)) {
+        char *old_body = NULL, *body = NULL;
+        codec_request made = {0};
+        size_t old_len = 0, len = 0;
+        double *cells = NULL;
+        int64_t n_cells = 0;
+        store_status status = store_get_body(context->store, old.id, &old_body, &old_len);
+        if (status != STORE_OK) {
+            reply_store_failure(context, status, reply);
+        } else if (codec_is_verify(old_body, old_len)) {
+            reply_refuse(reply, 409, "not_solved_here", "The job solved nothing",
+                         "it certified an answer that was given to it, and there is no run to continue");
+        } else if (store_get_vector(context->store, old.id, 0, "cells", &cells, &n_cells) == STORE_OK) {
+            /* A run on a grid that nobody gave can't go on: another accuracy asks for another grid. */
+            reply_refuse(
+                reply, 409, "mesh_is_chosen", "The job chose its mesh",
+                "the cells of its box were chosen for its accuracy: send the problem again with another accuracy, or "
+                "with the cells of this job's summary");
+        } else {
+            make_request(context, rq, &old, old_body, old_len, &body, &len, &made, reply);
+            free(old_body); /* as large as the new one: not kept while the client waits */
+            old_body = NULL;
+            store_request request = jobs_request(&made, body, len, key);
+            request.refines = old.id;
+            if (body)
+                jobs_store_and_wait(context, rq, &request, reply);
+        }
+        free(cells);
+        free(old_body);
+        free(body);
+        codec_request_clear(&made);
+    }
+    job_clear(&old);
+    free(key);
+}
