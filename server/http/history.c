@@ -1,7 +1,6 @@
 /* history.c: how jobs went: the rows of their histories, /v1/jobs/{id}/convergence.svg and
  * /v1/jobs/{id}/work-precision.
  */
-#include "http/history.h"
 #include "http/jobs.h"
 #include "http/results.h"
 #include "work/trade.h"

@@ -103,6 +103,58 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
     return load_again(context, j, reply);
 }
 
+/* A reply that waits. */
+typedef struct {
+    delayed_reply base;
+    api *context;
+    char id[33];
+    jobs_then then;
+    store_status status; /* of the last look at the job, and what it found */
+    job found;
+} waiting;
+
+static bool waiting_ready(delayed_reply *d)
+{
+    waiting *w = (waiting *)d;
+    job_clear(&w->found);
+    w->status = store_get(w->context->store, w->id, &w->found);
+    return w->status == STORE_NOT_FOUND || (w->status == STORE_OK && jobs_ended(&w->found));
+}
+
+static void waiting_make(delayed_reply *d, http_reply *reply)
+{
+    waiting *w = (waiting *)d;
+    if (w->status == STORE_OK)
+        w->then(w->context, &w->found, reply);
+    else
+        reply_store_failure(w->context, w->status, reply);
+}
+
+static void waiting_free(delayed_reply *d)
+{
+    waiting *w = (waiting *)d;
+    job_clear(&w->found);
+    free(w);
+}
+
+/* Puts a source into rq->reply that answers by `then` when the job has ended, or after so many seconds; its failures
+ * are answered too. False: no memory. */
+static bool delay(api *context, http_request *rq, const char *id, double seconds, jobs_then then)
+{
+    waiting *w = calloc(1, sizeof *w);
+    if (!w)
+        return false;
+    w->base = (delayed_reply){
+        .ready = waiting_ready, .make = waiting_make, .free = waiting_free, .until = http_now() + seconds};
+    w->context = context;
+    w->then = then;
+    memcpy(w->id, id, sizeof w->id);
+    if (reply_delay(rq, &w->base, id))
+        return true;
+    free(w);
+    return false;
+}
+
 /* So long a wait keeps its thread: a connection that has given it up ends with the reply (held.h). */
 static const double SHORT_WAIT_S = 1.0;
 
@@ -115,7 +167,7 @@ void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http
     }
     note_preference(context, rq, seconds, reply);
     if (work_wait_for(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server)) ||
-        rest == 0.0 || !jobs_delay(context, rq, j->id, rest, then)) {
+        rest == 0.0 || !delay(context, rq, j->id, rest, then)) {
         if (load_again(context, j, reply))
             then(context, j, reply);
     }
@@ -302,55 +354,4 @@ void jobs_list(api *context, http_request *rq, http_reply *reply)
     for (size_t i = 0; i < count; i++)
         job_clear(&jobs[i]);
     free(jobs);
-}
-
-/* ---- a reply that waits for a job to end */
-
-typedef struct {
-    delayed_reply base;
-    api *context;
-    char id[33];
-    jobs_then then;
-    store_status status; /* of the last look at the job, and what it found */
-    job found;
-} waiting;
-
-static bool waiting_ready(delayed_reply *d)
-{
-    waiting *w = (waiting *)d;
-    job_clear(&w->found);
-    w->status = store_get(w->context->store, w->id, &w->found);
-    return w->status == STORE_NOT_FOUND || (w->status == STORE_OK && jobs_ended(&w->found));
-}
-
-static void waiting_make(delayed_reply *d, http_reply *reply)
-{
-    waiting *w = (waiting *)d;
-    if (w->status == STORE_OK)
-        w->then(w->context, &w->found, reply);
-    else
-        reply_store_failure(w->context, w->status, reply);
-}
-
-static void waiting_free(delayed_reply *d)
-{
-    waiting *w = (waiting *)d;
-    job_clear(&w->found);
-    free(w);
-}
-
-bool jobs_delay(api *context, http_request *rq, const char *id, double seconds, jobs_then then)
-{
-    waiting *w = calloc(1, sizeof *w);
-    if (!w)
-        return false;
-    w->base = (delayed_reply){
-        .ready = waiting_ready, .make = waiting_make, .free = waiting_free, .until = http_now() + seconds};
-    w->context = context;
-    w->then = then;
-    memcpy(w->id, id, sizeof w->id);
-    if (reply_delay(rq, &w->base, id))
-        return true;
-    free(w);
-    return false;
 }

@@ -1,7 +1,5 @@
 /* output.h: what can be had of a job: one row for each thing under /v1/jobs/{id}/ that is no JSON about the job itself.
- * A new one is a file with a writer, a row in outputs.c and a path in schemas/openapi.json
- * (docs/architecture/output.md).
- */
+ * A new one is a writer and a row in outputs.c, and a path in schemas/openapi.json (docs/architecture/output.md). */
 #ifndef SERVER_HTTP_OUTPUT_H
 #define SERVER_HTTP_OUTPUT_H
 
@@ -48,13 +46,5 @@ typedef struct output {
 
 const output *output_at(size_t i); /* NULL past the end */
 void output_get(api *context, http_request *rq, http_reply *reply);
-
-/* ---- writers, each in a file of its own */
-uz_status output_vtu(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err);
-uz_status output_surface(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err);
-uz_status output_picture(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err);
-bool output_picture_read(output_options *out, const http_request *rq, problem_details *problem);
-uz_status output_history(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err);
-uz_status output_history_csv(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err);
 
 #endif

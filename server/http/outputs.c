@@ -1,12 +1,83 @@
 /* outputs.c: what can be had of a job: the table, the writers, and how a row is answered. */
 #include "codec/codec.h"
-#include "http/history.h"
 #include "http/jobs.h"
 #include "http/output.h"
 #include "http/results.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+/* ---- writers */
+
+#define MOST_BYTES ((size_t)256000000) /* 413 above it; openapi.json says so */
+
+static uz_status write_history(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    (void)hooks;
+    (void)err;
+    *file = codec_encode_history(of->case_name, of->rows, of->n_rows, len);
+    return *file ? UZ_OK : UZ_ERR_MEMORY;
+}
+
+static uz_status write_history_csv(char **file, size_t *len, const output_source *of, const uz_hooks *hooks,
+                                   uz_error *err)
+{
+    (void)hooks;
+    (void)err;
+    *file = codec_encode_history_csv(of->rows, of->n_rows, len);
+    return *file ? UZ_OK : UZ_ERR_MEMORY;
+}
+
+static uz_status write_vtu(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    return uz_vtu_write(file, len, of->scene, of->answer, of->options->fields, hooks, err);
+}
+
+static uz_status write_surface(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_surface surface;
+    *file = NULL;
+    uz_status status = uz_surface_compute(&surface, of->scene, of->answer, of->options->fields, MOST_BYTES, hooks, err);
+    if (status == UZ_OK) {
+        const codec_surface what = {&surface, of->scene, of->job_id, of->case_name};
+        *file = codec_encode_surface(&what, len);
+        status = *file ? UZ_OK : UZ_ERR_MEMORY;
+    }
+    uz_surface_clear(&surface);
+    return status;
+}
+
+static uz_status write_picture(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
+{
+    uz_picture how = of->options->picture;
+    how.title = of->case_name;
+    return uz_picture_deformed(file, len, of->scene, of->answer, &how, hooks, err);
+}
+
+/* The colour ("displacements" or "von_mises"), the factor of the displacements and the width. */
+static bool read_picture(output_options *out, const http_request *rq, problem_details *problem)
+{
+    static const char TITLE[] = "A query parameter has a value that is not allowed";
+    const char *colour = target_value(&rq->target, "colour"), *factor = target_value(&rq->target, "factor");
+    uz_picture *to = &out->picture;
+    int64_t width = 900;
+    const bool moved = colour && strcmp(colour, "displacements") == 0;
+    to->colour = moved ? UZ_FIELD_DISPLACEMENTS : UZ_FIELD_VON_MISES;
+    if (colour && !moved && strcmp(colour, "von_mises") != 0)
+        return problem_fill(problem, 400, "bad_parameter", TITLE, "colour is displacements or von_mises, not \"%.60s\"",
+                            colour);
+    to->factor = 0;
+    const size_t used = factor ? uz_parse_double(&to->factor, factor, strlen(factor)) : 0;
+    if (factor && (used == 0 || factor[used] != '\0' || !(to->factor >= 0 && to->factor <= 1e12)))
+        return problem_fill(problem, 400, "bad_parameter", TITLE,
+                            "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", factor);
+    if (!request_integer(rq, "width", 200, 4000, &width, problem))
+        return false;
+    to->width = (int)width;
+    return true;
+}
+
+/* ---- the table */
 
 #define IN_VTU ((STORED | COMPUTED | (unsigned)UZ_FIELD_MATERIALS) & ~(unsigned)UZ_FIELD_STRESS_GAUSS)
 #define VTU_BY_DEFAULT                                                                                                 \
@@ -28,15 +99,15 @@ static const char *const CURVES[] = {"case", "x", "with", "theme", "width", NULL
 
 static const output OUTPUTS[] = {
     {OUTPUT("result", RESULT, results_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
-    {OUTPUT("result.vtu", FILE_OF, output_get), "application/xml", OUTPUT_OF_ANSWER, output_vtu, VTU_BY_DEFAULT, IN_VTU,
+    {OUTPUT("result.vtu", FILE_OF, output_get), "application/xml", OUTPUT_OF_ANSWER, write_vtu, VTU_BY_DEFAULT, IN_VTU,
      NULL, false},
-    {OUTPUT("surface", FILE_OF, output_get), "model/gltf-binary", OUTPUT_OF_ANSWER, output_surface, IN_SURFACE,
+    {OUTPUT("surface", FILE_OF, output_get), "model/gltf-binary", OUTPUT_OF_ANSWER, write_surface, IN_SURFACE,
      IN_SURFACE, NULL, false},
-    {OUTPUT("deformed.svg", PICTURE, output_get), "image/svg+xml", OUTPUT_OF_ANSWER, output_picture, 0, 0,
-     output_picture_read, false},
-    {OUTPUT("history", HISTORY, output_get), "application/json", OUTPUT_OF_HISTORY, output_history, 0, 0, NULL, true},
+    {OUTPUT("deformed.svg", PICTURE, output_get), "image/svg+xml", OUTPUT_OF_ANSWER, write_picture, 0, 0, read_picture,
+     false},
+    {OUTPUT("history", HISTORY, output_get), "application/json", OUTPUT_OF_HISTORY, write_history, 0, 0, NULL, true},
     {OUTPUT("history.csv", HISTORY, output_get), "text/csv; charset=utf-8; header=present", OUTPUT_OF_HISTORY,
-     output_history_csv, 0, 0, NULL, false},
+     write_history_csv, 0, 0, NULL, false},
     {OUTPUT("work-precision", OF_CASE, trade_get), "application/json", OUTPUT_OWN, NULL, 0, 0, NULL, false},
     {OUTPUT("convergence.svg", CURVES, convergence_get), "image/svg+xml", OUTPUT_OWN, NULL, 0, 0, NULL, false},
 };
@@ -133,73 +204,4 @@ void output_get(api *context, http_request *rq, http_reply *reply)
         jobs_check_still_there(context, &j, reply);
         job_clear(&j);
     }
-}
-
-/* ---- writers */
-
-uz_status output_history(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
-{
-    (void)hooks;
-    (void)err;
-    *file = codec_encode_history(of->case_name, of->rows, of->n_rows, len);
-    return *file ? UZ_OK : UZ_ERR_MEMORY;
-}
-
-uz_status output_history_csv(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
-{
-    (void)hooks;
-    (void)err;
-    *file = codec_encode_history_csv(of->rows, of->n_rows, len);
-    return *file ? UZ_OK : UZ_ERR_MEMORY;
-}
-
-uz_status output_vtu(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
-{
-    return uz_vtu_write(file, len, of->scene, of->answer, of->options->fields, hooks, err);
-}
-
-#define MOST_BYTES ((size_t)256000000) /* 413 above it; openapi.json says so */
-
-uz_status output_surface(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
-{
-    uz_surface surface;
-    *file = NULL;
-    uz_status status = uz_surface_compute(&surface, of->scene, of->answer, of->options->fields, MOST_BYTES, hooks, err);
-    if (status == UZ_OK) {
-        const codec_surface what = {&surface, of->scene, of->job_id, of->case_name};
-        *file = codec_encode_surface(&what, len);
-        status = *file ? UZ_OK : UZ_ERR_MEMORY;
-    }
-    uz_surface_clear(&surface);
-    return status;
-}
-
-uz_status output_picture(char **file, size_t *len, const output_source *of, const uz_hooks *hooks, uz_error *err)
-{
-    uz_picture how = of->options->picture;
-    how.title = of->case_name;
-    return uz_picture_deformed(file, len, of->scene, of->answer, &how, hooks, err);
-}
-
-/* The colour ("displacements" or "von_mises"), the factor of the displacements and the width. */
-bool output_picture_read(output_options *out, const http_request *rq, problem_details *problem)
-{
-    static const char TITLE[] = "A query parameter has a value that is not allowed";
-    const char *colour = target_value(&rq->target, "colour"), *factor = target_value(&rq->target, "factor");
-    uz_picture *to = &out->picture;
-    int64_t width = 900;
-    const bool moved = colour && strcmp(colour, "displacements") == 0;
-    to->colour = moved ? UZ_FIELD_DISPLACEMENTS : UZ_FIELD_VON_MISES;
-    if (colour && !moved && strcmp(colour, "von_mises") != 0)
-        return problem_fill(problem, 400, "bad_parameter", TITLE, "colour is displacements or von_mises, not \"%.60s\"",
-                            colour);
-    to->factor = 0;
-    const size_t used = factor ? uz_parse_double(&to->factor, factor, strlen(factor)) : 0;
-    if (factor && (used == 0 || factor[used] != '\0' || !(to->factor >= 0 && to->factor <= 1e12)))
-        return problem_fill(problem, 400, "bad_parameter", TITLE,
-                            "factor is a number from 0 (chosen by the service) to 1e12, not \"%.60s\"", factor);
-    if (!request_integer(rq, "width", 200, 4000, &width, problem))
-        return false;
-    to->width = (int)width;
-    return true;
 }

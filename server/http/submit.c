@@ -1,5 +1,6 @@
 /* submit.c: requests that become jobs: POST /v1/jobs, /v1/verify and /v1/jobs/{id}/refine. */
 #include "http/jobs.h"
+#include "http/results.h"
 #include "codec/codec.h"
 #include "http/api.h"
 
@@ -8,8 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A key is kept as sent: 1 to 255 printable ASCII characters. */
-bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
+/* NULL in *key: none was given; freed by the caller. False with a 400. A key is kept as sent: 1 to 255 printable ASCII
+ * characters. */
+static bool read_key(const http_request *rq, char **key, problem_details *problem)
 {
     size_t count;
     const header_field *field = header_find(&rq->headers, "Idempotency-Key", &count);
@@ -28,7 +30,8 @@ bool jobs_read_key(const http_request *rq, char **key, problem_details *problem)
     return true;
 }
 
-store_request jobs_request(const codec_request *request, const char *body, size_t len, const char *key)
+/* What the store keeps of a decoded request, and of its body and key, which must outlive it. */
+static store_request kept_request(const codec_request *request, const char *body, size_t len, const char *key)
 {
     return (store_request){.body = body,
                            .body_len = len,
@@ -41,7 +44,8 @@ store_request jobs_request(const codec_request *request, const char *body, size_
                            .webhook = request->webhook};
 }
 
-bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
+/* url NULL: there is none. False: a 422. */
+static bool check_webhook(api *context, const char *url, problem_details *problem)
 {
     const char *why;
     if (!url || webhooks_allow(context->webhooks, url, &why))
@@ -51,11 +55,12 @@ bool jobs_check_webhook(api *context, const char *url, problem_details *problem)
     return false;
 }
 
-bool jobs_store(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
+/* Stores a request and tells the workers. False with a failure in reply; the caller clears *out. */
+static bool store_job(api *context, http_request *rq, const store_request *request, job *out, http_reply *reply)
 {
     bool repeated = false;
     problem_details problem;
-    if (!jobs_check_webhook(context, request->webhook, &problem)) {
+    if (!check_webhook(context, request->webhook, &problem)) {
         reply_problem(reply, &problem);
         return false;
     }
@@ -76,7 +81,9 @@ bool jobs_store(api *context, http_request *rq, const store_request *request, jo
     return true;
 }
 
-bool jobs_find_repeat(api *context, http_request *rq, const char *key, job *out)
+/* True with *out if the request came before with this key (NULL: none) and this body. Then it is answered as it was,
+ * also where it would be refused now: what it names may be gone since, or a limit lower. The caller clears *out. */
+static bool find_repeat(api *context, http_request *rq, const char *key, job *out)
 {
     store_request request = {.body = rq->body ? rq->body : "", .body_len = rq->body_len, .idempotency_key = key};
     memset(out, 0, sizeof *out);
@@ -86,66 +93,13 @@ bool jobs_find_repeat(api *context, http_request *rq, const char *key, job *out)
     return true;
 }
 
-void jobs_store_and_wait(api *context, http_request *rq, const store_request *request, http_reply *reply)
+/* Stores a request, waits as it prefers and answers with the job. */
+static void store_and_wait(api *context, http_request *rq, const store_request *request, http_reply *reply)
 {
     job j = {0};
-    if (jobs_store(context, rq, request, &j, reply))
+    if (store_job(context, rq, request, &j, reply))
         jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
     job_clear(&j);
-}
-
-/* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
-#define ASSEMBLY_BYTES 1000.0
-/* Beyond it a prediction takes minutes. */
-#define PREDICTED_MOST 4e6
-
-void jobs_submit(api *context, http_request *rq, http_reply *reply)
-{
-    problem_details problem = {0}, ignored;
-    codec_request request = {0};
-    char *key = NULL;
-    const char *validate = target_value(&rq->target, "validate");
-    const bool validate_only = validate && strcmp(validate, "true") == 0;
-    bool good = !validate || validate_only || strcmp(validate, "false") == 0;
-    if (!good)
-        problem_fill(&problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
-                     "validate must be true or false");
-    good = good && jobs_read_key(rq, &key, &problem) &&
-           codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
-           start_check(context, &request, rq, &problem) && jobs_check_webhook(context, request.webhook, &problem);
-    if (!good) {
-        /* a problem, or the job that the request became when it came before */
-        job j;
-        if (!jobs_find_repeat(context, rq, validate_only ? NULL : key, &j))
-            reply_problem(reply, &problem);
-        else
-            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
-        job_clear(&j);
-    } else if (validate_only) {
-        /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
-        uz_prediction predicted;
-        uz_error err = {.status = UZ_OK};
-        api_asker asker = {context, rq};
-        const uz_hooks hooks = {.ctx = &asker, .cancelled = api_is_over};
-        const size_t limit = request.settings.memory_limit = work_solve_bytes(context->work);
-        int64_t m, n_u;
-        bool known = false;
-        if (!request.settings.semidefinite && codec_request_sizes(&request, &m, &n_u, &ignored) &&
-            (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
-            pthread_mutex_lock(&context->predict_lock);
-            uz_thread_init();
-            known = !api_is_over(&asker) &&
-                    uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
-            pthread_mutex_unlock(&context->predict_lock);
-        }
-        reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
-    } else {
-        codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
-        store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
-        jobs_store_and_wait(context, rq, &stored, reply);
-    }
-    codec_request_clear(&request);
-    free(key);
 }
 
 /* ---- "warm_start": {"job": ...} against the store, before the request becomes a job. The other job may still be
@@ -236,7 +190,8 @@ static bool check_reactions(api *context, const codec_request *request, problem_
     return refuse(problem, "job", "size_mismatch", text);
 }
 
-bool start_check(api *context, const codec_request *request, const http_request *rq, problem_details *problem)
+/* What a request says of the job it starts from, against the store. False: *problem. */
+static bool check_start(api *context, const codec_request *request, const http_request *rq, problem_details *problem)
 {
     const codec_start *start = &request->start;
     char *body = NULL;
@@ -261,6 +216,62 @@ bool start_check(api *context, const codec_request *request, const http_request 
     return refuse(problem, "continue", "not_allowed",
                   "/solver/warm_start/continue: problem and cases are not, byte by byte, those of that job; leave this "
                   "out to start from its reactions");
+}
+
+/* ---- POST /v1/jobs */
+
+/* Bytes that assembly takes for each dof, about: a scene beyond the limit is not assembled only to say so. */
+#define ASSEMBLY_BYTES 1000.0
+/* Beyond it a prediction takes minutes. */
+#define PREDICTED_MOST 4e6
+
+void jobs_submit(api *context, http_request *rq, http_reply *reply)
+{
+    problem_details problem = {0}, ignored;
+    codec_request request = {0};
+    char *key = NULL;
+    const char *validate = target_value(&rq->target, "validate");
+    const bool validate_only = validate && strcmp(validate, "true") == 0;
+    bool good = !validate || validate_only || strcmp(validate, "false") == 0;
+    if (!good)
+        problem_fill(&problem, 400, "bad_parameter", "A query parameter has a value that is not allowed",
+                     "validate must be true or false");
+    good = good && read_key(rq, &key, &problem) &&
+           codec_decode(&request, CODEC_SOLVE, rq->body ? rq->body : "", rq->body_len, context->store, &problem) &&
+           check_start(context, &request, rq, &problem) && check_webhook(context, request.webhook, &problem);
+    if (!good) {
+        /* a problem, or the job that the request became when it came before */
+        job j;
+        if (!find_repeat(context, rq, validate_only ? NULL : key, &j))
+            reply_problem(reply, &problem);
+        else
+            jobs_wait_then(context, rq, &j, jobs_acknowledge, reply);
+        job_clear(&j);
+    } else if (validate_only) {
+        /* One prediction at a time: it takes memory and a processor that are counted for the workers. */
+        uz_prediction predicted;
+        uz_error err = {.status = UZ_OK};
+        api_asker asker = {context, rq};
+        const uz_hooks hooks = {.ctx = &asker, .cancelled = api_is_over};
+        const size_t limit = request.settings.memory_limit = work_solve_bytes(context->work);
+        int64_t m, n_u;
+        bool known = false;
+        if (!request.settings.semidefinite && codec_request_sizes(&request, &m, &n_u, &ignored) &&
+            (double)n_u < PREDICTED_MOST && (limit == 0 || (double)n_u * ASSEMBLY_BYTES < (double)limit)) {
+            pthread_mutex_lock(&context->predict_lock);
+            uz_thread_init();
+            known = !api_is_over(&asker) &&
+                    uz_predict(&predicted, &request.problem, &request.settings, &hooks, &err) == UZ_OK;
+            pthread_mutex_unlock(&context->predict_lock);
+        }
+        reply_json(reply, 200, codec_encode_valid(known ? &predicted : NULL));
+    } else {
+        codec_request_strip(&request); /* the worker decodes again: nothing decoded waits here while the client does */
+        store_request stored = kept_request(&request, rq->body, rq->body_len, key);
+        store_and_wait(context, rq, &stored, reply);
+    }
+    codec_request_clear(&request);
+    free(key);
 }
 
 /* ---- verify: a job like any other, whose result is the answer to the call where it comes in time */
@@ -288,17 +299,17 @@ void verify_submit(api *context, http_request *rq, http_reply *reply)
     codec_request request = {0};
     job j = {0};
     char *key = NULL;
-    if (!jobs_read_key(rq, &key, &problem) ||
+    if (!read_key(rq, &key, &problem) ||
         !codec_decode(&request, CODEC_VERIFY, rq->body ? rq->body : "", rq->body_len, context->store, &problem)) {
-        if (!jobs_find_repeat(context, rq, key, &j))
+        if (!find_repeat(context, rq, key, &j))
             reply_problem(reply, &problem);
         else if (jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
             reply_end(context, &j, reply);
         goto done;
     }
     codec_request_strip(&request);
-    store_request stored = jobs_request(&request, rq->body, rq->body_len, key);
-    if (jobs_store(context, rq, &stored, &j, reply) && jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
+    store_request stored = kept_request(&request, rq->body, rq->body_len, key);
+    if (store_job(context, rq, &stored, &j, reply) && jobs_wait(context, rq, VERIFY_WAIT_S, &j, reply))
         reply_end(context, &j, reply);
 done:
     job_clear(&j);
@@ -356,7 +367,7 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
     problem_details problem = {0};
     job old = {0};
     char *key = NULL;
-    if (!jobs_read_key(rq, &key, &problem))
+    if (!read_key(rq, &key, &problem))
         reply_problem(reply, &problem);
     else if (jobs_load(context, rq, &old, reply) && results_exist(&old, reply) && has_reactions(context, &old, reply)) {
         char *old_body = NULL, *body = NULL;
@@ -380,10 +391,10 @@ void jobs_refine(api *context, http_request *rq, http_reply *reply)
             make_request(context, rq, &old, old_body, old_len, &body, &len, &made, reply);
             free(old_body); /* as large as the new one: not kept while the client waits */
             old_body = NULL;
-            store_request request = jobs_request(&made, body, len, key);
+            store_request request = kept_request(&made, body, len, key);
             request.refines = old.id;
             if (body)
-                jobs_store_and_wait(context, rq, &request, reply);
+                store_and_wait(context, rq, &request, reply);
         }
         free(cells);
         free(old_body);
