@@ -216,12 +216,12 @@ static bool start(service *s, const server_options *options, char *url, size_t u
 {
     keep_freed_memory();
     raise_descriptor_limit();
-    if (!codec_init(message, size))
+    const codec_limits limits = {.json_depth = options->max_json_depth,
+                                 .dofs = (int64_t)options->max_dofs,
+                                 .rows = (int64_t)options->max_rows,
+                                 .nonzeros = (int64_t)options->max_nonzeros};
+    if (!codec_init(&limits, message, size))
         return false;
-    codec_set_limits(&(codec_limits){.json_depth = options->max_json_depth,
-                                     .dofs = (int64_t)options->max_dofs,
-                                     .rows = (int64_t)options->max_rows,
-                                     .nonzeros = (int64_t)options->max_nonzeros});
     uz_process_init(options->workers);
     s->reserve = uz_reserve_new(options->cache - options->cache / RESERVE_SHARE, options->cache / RESERVE_SHARE);
     if (s->reserve)

@@ -14,18 +14,15 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Once, before threads start: parses the embedded schemas. False: message says why. */
-bool codec_init(char *message, size_t size);
-void codec_end(void);
-
 /* What a request may ask for at most. */
 typedef struct {
     int json_depth;               /* 1..JSON_MAX_DEPTH */
     int64_t dofs, rows, nonzeros; /* d; m; entries of K and of N given as matrices */
 } codec_limits;
-/* After codec_init and before threads start; without it only the codec's own bounds hold. Jobs that are stored already
- * are not held to them. */
-void codec_set_limits(const codec_limits *limits);
+/* Once, before threads start: parses the embedded schemas. limits NULL: only the codec's own bounds hold; jobs that are
+ * stored already are not held to them. False: message says why. */
+bool codec_init(const codec_limits *limits, char *message, size_t size);
+void codec_end(void);
 
 /* ---- requests */
 

@@ -14,10 +14,10 @@ static codec_limits limits;
 
 static const codec_limits NO_LIMITS = {JSON_MAX_DEPTH, INT64_MAX, INT64_MAX, INT64_MAX};
 
-bool codec_init(char *message, size_t size)
+bool codec_init(const codec_limits *given, char *message, size_t size)
 {
     codec_end();
-    limits = NO_LIMITS;
+    limits = given ? *given : NO_LIMITS;
     loaded = schemas_load(message, size);
     return loaded != NULL;
 }
@@ -26,11 +26,6 @@ void codec_end(void)
 {
     schemas_free(loaded);
     loaded = NULL;
-}
-
-void codec_set_limits(const codec_limits *given)
-{
-    limits = *given;
 }
 
 int json_depth_limit(void)

@@ -15,7 +15,7 @@
 #include <stdint.h>
 
 #define JSON_MAX_DEPTH 64 /* nested arrays and objects */
-/* The depth allowed to requests, at most JSON_MAX_DEPTH (codec_set_limits). */
+/* The depth allowed to requests, at most JSON_MAX_DEPTH (codec_init). */
 int json_depth_limit(void);
 /* Values of a text. What is long counts as one: a string; an array of more than JSON_SHORT_ARRAY numbers; a table of
  * more rows than that of at most so many numbers each. A value takes sizeof(json_value) bytes, and while it is read

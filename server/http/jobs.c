@@ -180,31 +180,28 @@ void jobs_freshen(api *context, job *j)
         j->progress = progress;
 }
 
-static void reply_job(api *context, int status, job *j, http_reply *reply)
+static void reply_job(api *context, job *j, http_reply *reply)
 {
     jobs_freshen(context, j);
-    reply_json(reply, status, codec_encode_job(j));
+    reply_json(reply, 200, codec_encode_job(j));
 }
 
 void jobs_acknowledge(api *context, job *j, http_reply *reply)
 {
     snprintf(reply->location, sizeof reply->location, "/v1/jobs/%s", j->id);
-    reply_job(context, jobs_ended(j) ? 200 : 202, j, reply);
+    reply_job(context, j, reply);
+    if (reply->status == 200 && !jobs_ended(j))
+        reply->status = 202;
 }
 
 /* -------------------------------------------------------------------- read */
-
-static void reply_found(api *context, job *j, http_reply *reply)
-{
-    reply_job(context, 200, j, reply);
-}
 
 void jobs_get(api *context, http_request *rq, http_reply *reply)
 {
     job j;
     reply->tag_by_body = true;
     if (jobs_load(context, rq, &j, reply))
-        jobs_wait_then(context, rq, &j, reply_found, reply);
+        jobs_wait_then(context, rq, &j, reply_job, reply);
     job_clear(&j);
 }
 
@@ -236,7 +233,7 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
     if (status != STORE_OK && !jobs_ended(&j))
         reply_store_failure(context, status, reply);
     else
-        reply_job(context, 200, &j, reply);
+        reply_job(context, &j, reply);
     job_clear(&j);
 }
 

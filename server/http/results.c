@@ -13,10 +13,10 @@
 
 /* ------------------------------------------------------------------ result */
 
-static const unsigned BY_DEFAULT = UZ_FIELD_REACTIONS | UZ_FIELD_GAPS;
-static const unsigned BY_ROW = UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_PRESSURE | UZ_FIELD_CONTACT_STATUS;
-static const unsigned BY_NODE =
-    UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES | UZ_FIELD_STRAIN;
+#define BY_DEFAULT ((unsigned)(UZ_FIELD_REACTIONS | UZ_FIELD_GAPS))
+#define BY_ROW     ((unsigned)(UZ_FIELD_REACTIONS | UZ_FIELD_GAPS | UZ_FIELD_PRESSURE | UZ_FIELD_CONTACT_STATUS))
+#define BY_NODE                                                                                                        \
+    ((unsigned)(UZ_FIELD_DISPLACEMENTS | UZ_FIELD_STRESS | UZ_FIELD_PRINCIPAL | UZ_FIELD_VON_MISES | UZ_FIELD_STRAIN))
 
 bool results_exist(const job *j, http_reply *reply)
 {
@@ -47,21 +47,28 @@ bool results_exist(const job *j, http_reply *reply)
     return false;
 }
 
+/* Vectors of the store and the fields that need them: what each case has of its own, then what the job has once. */
+enum { REACTIONS, GAPS, RAY, PRESSURE, DISPLACEMENTS, DIM, CONTACT_NODES, NODES, VECTORS };
+static const struct {
+    const char *name;
+    unsigned fields; /* 0: all */
+} VECTOR[VECTORS] = {{"reactions", UZ_FIELD_REACTIONS},
+                     {"gaps", UZ_FIELD_GAPS},
+                     {"ray", UZ_FIELD_REACTIONS},
+                     {"pressure", UZ_FIELD_PRESSURE},
+                     {"displacements", UZ_FIELD_DISPLACEMENTS},
+                     {"dim", 0},
+                     {"contact_nodes", BY_ROW},
+                     {"nodes", BY_NODE}};
 typedef struct {
-    double *reactions, *gaps, *pressure, *ray, *displacements, *nodes, *contact_nodes, *dim;
-    int64_t n_pressure, n_ray, n_reactions, n_gaps, n_u, n_nodes, n_contact_nodes, n_dim;
+    double *x[VECTORS];
+    int64_t n[VECTORS];
 } vectors;
 
 static void vectors_free(vectors *v)
 {
-    free(v->reactions);
-    free(v->gaps);
-    free(v->pressure);
-    free(v->ray);
-    free(v->displacements);
-    free(v->nodes);
-    free(v->contact_nodes);
-    free(v->dim);
+    for (int i = 0; i < VECTORS; i++)
+        free(v->x[i]);
 }
 
 /* A job, and which of its cases: number 0 is the job itself. */
@@ -71,39 +78,18 @@ typedef struct {
     const char *name, *summary;
 } place;
 
-/* A vector that the result does not have stays NULL. */
-static store_status fetch(api *context, const place *at, const char *name, double **data, int64_t *count)
-{
-    store_status status = store_get_vector(context->store, at->j->id, at->number, name, data, count);
-    return status == STORE_NOT_FOUND ? STORE_OK : status;
-}
-
-/* What each case has of its own. */
-static store_status fetch_own(api *context, const place *at, const field_list *fields, vectors *v)
+/* The vectors first .. last that the fields need; one that the result does not have stays NULL. */
+static store_status fetch(api *context, const place *at, const field_list *fields, vectors *v, int first, int last)
 {
     store_status status = STORE_OK;
-    if (fields->which & UZ_FIELD_REACTIONS)
-        status = fetch(context, at, "reactions", &v->reactions, &v->n_reactions);
-    if (status == STORE_OK && fields->which & UZ_FIELD_GAPS)
-        status = fetch(context, at, "gaps", &v->gaps, &v->n_gaps);
-    if (status == STORE_OK && fields->which & UZ_FIELD_REACTIONS)
-        status = fetch(context, at, "ray", &v->ray, &v->n_ray);
-    if (status == STORE_OK && fields->which & UZ_FIELD_PRESSURE)
-        status = fetch(context, at, "pressure", &v->pressure, &v->n_pressure);
-    if (status == STORE_OK && fields->which & UZ_FIELD_DISPLACEMENTS)
-        status = fetch(context, at, "displacements", &v->displacements, &v->n_u);
-    return status;
-}
-
-/* What the job has once, for all its cases. */
-static store_status fetch_shared(api *context, const job *j, const field_list *fields, vectors *v)
-{
-    const place whole = {.j = j};
-    store_status status = fetch(context, &whole, "dim", &v->dim, &v->n_dim);
-    if (status == STORE_OK && fields->which & BY_ROW)
-        status = fetch(context, &whole, "contact_nodes", &v->contact_nodes, &v->n_contact_nodes);
-    if (status == STORE_OK && (fields->nodes || fields->which & BY_NODE))
-        status = fetch(context, &whole, "nodes", &v->nodes, &v->n_nodes);
+    for (int i = first; i <= last && status == STORE_OK; i++) {
+        if (VECTOR[i].fields && !(fields->which & VECTOR[i].fields) && !(i == NODES && fields->nodes))
+            continue;
+        status =
+            store_get_vector(context->store, at->j->id, i < DIM ? at->number : 0, VECTOR[i].name, &v->x[i], &v->n[i]);
+        if (status == STORE_NOT_FOUND)
+            status = STORE_OK;
+    }
     return status;
 }
 
@@ -150,21 +136,21 @@ static codec_result as_encoded(const place *at, const vectors *own, const vector
     codec_result r = {.job_id = at->j->id,
                       .summary = at->summary,
                       .case_name = at->name,
-                      .dim = shared->dim && shared->n_dim == 1 ? (int)shared->dim[0] : 0,
-                      .m = own->reactions  ? own->n_reactions
-                           : own->gaps     ? own->n_gaps
-                           : own->pressure ? own->n_pressure
-                                           : shared->n_contact_nodes,
-                      .n_u = own->n_u,
-                      .n_nodes = shared->n_nodes,
-                      .reactions = own->reactions,
-                      .gaps = own->gaps,
-                      .pressure = own->pressure,
-                      .ray = own->ray,
+                      .dim = shared->x[DIM] && shared->n[DIM] == 1 ? (int)shared->x[DIM][0] : 0,
+                      .m = own->x[REACTIONS]  ? own->n[REACTIONS]
+                           : own->x[GAPS]     ? own->n[GAPS]
+                           : own->x[PRESSURE] ? own->n[PRESSURE]
+                                              : shared->n[CONTACT_NODES],
+                      .n_u = own->n[DISPLACEMENTS],
+                      .n_nodes = shared->n[NODES],
+                      .reactions = own->x[REACTIONS],
+                      .gaps = own->x[GAPS],
+                      .pressure = own->x[PRESSURE],
+                      .ray = own->x[RAY],
                       .fields = computed,
-                      .displacements = own->displacements,
-                      .nodes = shared->nodes,
-                      .contact_nodes = shared->contact_nodes};
+                      .displacements = own->x[DISPLACEMENTS],
+                      .nodes = shared->x[NODES],
+                      .contact_nodes = shared->x[CONTACT_NODES]};
     if (fields->part) {
         const double **rows[] = {&r.gaps, &r.pressure, &r.ray, &r.contact_nodes, &r.reactions};
         int64_t size = r.dim > 0 ? r.dim : 1, m = r.m;
@@ -187,7 +173,7 @@ static void reply_one(api *context, const http_request *rq, const place *at, con
     const unsigned which = fields->which & COMPUTED;
     uz_fields computed = {.dim = 0};
     field_reader reader;
-    vectors own = {0}, shared = {0};
+    vectors own = {.n = {0}}, shared = {.n = {0}};
     size_t len = 0;
     if (which) {
         const bool done = fields_open(&reader, context, rq, at->j, reply) &&
@@ -198,9 +184,9 @@ static void reply_one(api *context, const http_request *rq, const place *at, con
             return;
         }
     }
-    store_status status = fetch_shared(context, at->j, fields, &shared);
+    store_status status = fetch(context, at, fields, &shared, DIM, NODES);
     if (status == STORE_OK)
-        status = fetch_own(context, at, fields, &own);
+        status = fetch(context, at, fields, &own, REACTIONS, DISPLACEMENTS);
     if (status == STORE_OK) {
         const uz_fields part = cut_computed(&computed, fields);
         codec_result result = as_encoded(at, &own, &shared, which ? &part : NULL, fields);
@@ -263,7 +249,7 @@ static bool add_case(many *of, size_t i, http_reply *reply)
 {
     const place at = {of->j, of->cases[i].number, of->cases[i].name, of->cases[i].summary};
     const unsigned which = of->fields->which & COMPUTED;
-    vectors own = {0};
+    vectors own = {.n = {0}};
     uz_fields computed = {.dim = 0};
     bool done = !which || fields_of_case(&computed, &of->reader, at.number, which, reply);
     if (done && which && i == 0) {
@@ -274,7 +260,7 @@ static bool add_case(many *of, size_t i, http_reply *reply)
         const int64_t numbers = (f->contact_status ? f->m : 0) + f->n_nodes * of_node + f->n_points * (1 + f->dim + k);
         done = check_room(of->context, of->j, of->count, of->fields, (int64_t)of->count * numbers, reply);
     }
-    store_status status = done ? fetch_own(of->context, &at, of->fields, &own) : STORE_OK;
+    store_status status = done ? fetch(of->context, &at, of->fields, &own, REACTIONS, DISPLACEMENTS) : STORE_OK;
     if (status != STORE_OK) {
         reply_store_failure(of->context, status, reply);
         done = false;
@@ -290,11 +276,11 @@ static bool add_case(many *of, size_t i, http_reply *reply)
 
 static void reply_cases(many *of, const http_request *rq, http_reply *reply)
 {
-    store_status status = fetch_shared(of->context, of->j, of->fields, &of->shared);
+    const place whole = {.j = of->j, .summary = of->j->summary};
+    store_status status = fetch(of->context, &whole, of->fields, &of->shared, DIM, NODES);
     if (status != STORE_OK)
         reply_store_failure(of->context, status, reply);
     else if (!(of->fields->which & COMPUTED) || fields_open(&of->reader, of->context, rq, of->j, reply)) {
-        const place whole = {.j = of->j, .summary = of->j->summary};
         size_t len = 0;
         of->all = codec_results_begin(of->j->id, of->j->summary);
         bool done = of->all != NULL;
@@ -305,7 +291,7 @@ static void reply_cases(many *of, const http_request *rq, http_reply *reply)
         } else if (!done) {
             codec_results_end(of->all, NULL, NULL);
         } else {
-            codec_result rest = as_encoded(&whole, &(vectors){0}, &of->shared, NULL, of->fields);
+            codec_result rest = as_encoded(&whole, &(vectors){.n = {0}}, &of->shared, NULL, of->fields);
             char *text = codec_results_end(of->all, &rest, &len);
             reply_text(reply, 200, "application/json", text, len);
         }

@@ -15,7 +15,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
     char message[256];
     (void)argc;
     (void)argv;
-    if (codec_init(message, sizeof message))
+    if (codec_init(NULL, message, sizeof message))
         return 0;
     fprintf(stderr, "fuzz_request: %s\n", message);
     abort();

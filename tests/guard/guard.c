@@ -182,7 +182,7 @@ int main(int argc, char **argv)
     uz_thread_init();
     for (size_t i = 0; argc >= 2 && i < N_PROBLEMS; i++)
         if (strcmp(argv[1], PROBLEMS[i].name) == 0) {
-            bool good = codec_init(message, sizeof message) && run(&PROBLEMS[i], argc > 2 ? atoi(argv[2]) : 0);
+            bool good = codec_init(NULL, message, sizeof message) && run(&PROBLEMS[i], argc > 2 ? atoi(argv[2]) : 0);
             codec_end();
             return !good;
         }

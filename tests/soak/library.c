@@ -75,8 +75,8 @@ int main(int argc, char **argv)
     char line[32];
     size_t len = 0;
     char *body = argc > 1 ? read_file(argv[1], &len) : NULL;
-    bool ok = body && codec_init(line, sizeof line) && codec_decode(&request, CODEC_SOLVE, body, len, NULL, &why) &&
-              request.problem.kind == UZ_PROBLEM_SCENE &&
+    bool ok = body && codec_init(NULL, line, sizeof line) &&
+              codec_decode(&request, CODEC_SOLVE, body, len, NULL, &why) && request.problem.kind == UZ_PROBLEM_SCENE &&
               uz_scene_to_qp(&matrices.qp, &info, &request.problem.scene, NULL) == UZ_OK &&
               (argc < 3 || write_matrices(&matrices.qp, argv[2]));
     while (ok && fgets(line, sizeof line, stdin))

@@ -40,8 +40,9 @@ static void drop_body(transport *server, http_request *rq)
     rq->body_capacity = 0;
 }
 
-static void request_free(transport *server, http_request *rq)
+static void request_free(transport *server, http_request **place)
 {
+    http_request *rq = *place;
     if (!rq)
         return;
     drop_body(server, rq);
@@ -51,12 +52,7 @@ static void request_free(transport *server, http_request *rq)
     free(rq->kept_fields);
     free(rq->raw_target);
     free(rq);
-}
-
-static void clear_request(connection *c)
-{
-    request_free(c->server, c->request);
-    c->request = NULL;
+    *place = NULL;
 }
 
 void connection_free(connection *c)
@@ -64,7 +60,7 @@ void connection_free(connection *c)
     if (!c)
         return;
     deadline_remove(c->deadline);
-    clear_request(c);
+    request_free(c->server, &c->request);
     peer_end(c->place);
     atomic_fetch_sub(&c->server->refusing, c->refusing);
     atomic_fetch_sub(&c->server->connections, 1);
@@ -73,7 +69,7 @@ void connection_free(connection *c)
 
 void connection_begin_request(connection *c, const char *raw_target)
 {
-    clear_request(c);
+    request_free(c->server, &c->request);
     http_request *rq = calloc(1, sizeof *rq);
     if (!rq)
         return;
@@ -316,7 +312,7 @@ static bool hold(connection *c)
     reply_source source = rq->reply.source;
     char *head = NULL;
     size_t len;
-    if (!source.hold || !rq->can_be_held || !request_keep_fields(rq))
+    if (!source.held || !rq->can_be_held || !request_keep_fields(rq))
         return false;
     if (!source.is_message) {
         request_note_reply(rq);
@@ -366,7 +362,7 @@ void connection_end_held(void *ctx, http_request *rq, bool completed)
     transport *server = ctx;
     server->handlers.account(server->handlers.ctx, rq, completed, false);
     peer_end(rq->place);
-    request_free(server, rq);
+    request_free(server, &rq);
 }
 
 void connection_end_request(connection *c, unsigned status, bool completed)
@@ -378,6 +374,6 @@ void connection_end_request(connection *c, unsigned status, bool completed)
     if (c->request->unread_body && completed)
         linger(c);
     c->server->handlers.account(c->server->handlers.ctx, c->request, completed, deadline_expired(c->deadline));
-    clear_request(c);
+    request_free(c->server, &c->request);
     deadline_set(c->deadline, http_now() + c->server->options.request_deadline_s, false);
 }

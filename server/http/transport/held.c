@@ -364,7 +364,7 @@ bool holder_take(holder *h, int fd, http_request *rq, char *head, bool chunked, 
     }
     setsockopt(taken, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
     rq->fd = one->fd = taken;
-    source->hold(source->ctx);
+    *source->held = true;
     one->out = head;
     one->len = head ? strlen(head) : 0;
     one->due = head ? http_now() + h->patience_s : 0.0;

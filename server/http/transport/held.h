@@ -28,7 +28,7 @@ holder *holder_new(double patience_s, holder_over over, void *ctx);
 /* Ends all connections, each after what its source still says at once. NULL is fine. */
 void holder_free(holder *h);
 
-/* Takes the socket fd, which is rq->fd, from whoever has it, and *source (its hold is set); sends `head` first, and
+/* Takes the socket fd, which is rq->fd, from whoever has it, and *source (its held is set); sends `head` first, and
  * what the source says in chunks (RFC 9112, section 7.1) if `chunked`. True: owns head, rq and what the source has, and
  * fd is another, unconnected socket. False: nothing has happened. */
 bool holder_take(holder *h, int fd, http_request *rq, char *head, bool chunked, const reply_source *source);

@@ -86,11 +86,6 @@ static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
     }
 }
 
-static void stream_hold(void *ctx)
-{
-    ((event_stream *)ctx)->held = true;
-}
-
 static double stream_due(void *ctx, bool told)
 {
     const event_stream *s = ctx;
@@ -127,7 +122,7 @@ void stream_reply(http_request *rq, event_stream *s, const char *id, http_reply 
         reply_drop_body(reply);
         reply->status = 200;
         reply->type = "text/event-stream";
-        reply->source = (reply_source){stream_read, stream_free, s, s->listener, stream_hold, stream_due, false, NULL};
+        reply->source = (reply_source){stream_read, stream_free, s, s->listener, &s->held, stream_due, false, NULL};
     } else {
         stream_free(s);
         reply_no_memory(reply);
@@ -153,11 +148,6 @@ static bool is_over(delayed_reply *d)
 }
 
 /* ---- without a thread */
-
-static void do_nothing(void *ctx)
-{
-    (void)ctx;
-}
 
 static double delayed_due(void *ctx, bool told)
 {
@@ -208,7 +198,7 @@ bool reply_delay(http_request *rq, delayed_reply *d, const char *id)
                                       .free = delayed_free,
                                       .ctx = d,
                                       .listener = d->listener,
-                                      .hold = do_nothing,
+                                      .held = &d->held,
                                       .due = delayed_due,
                                       .is_message = true,
                                       .answer = delayed_answer};

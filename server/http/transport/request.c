@@ -9,18 +9,13 @@
 #include <string.h>
 #include <strings.h>
 
-static const char *skip_space(const char *at, const char *end)
+/* Leaves out white space on both sides. */
+static void trim(const char **from, const char **to)
 {
-    while (at < end && (*at == ' ' || *at == '\t'))
-        at++;
-    return at;
-}
-
-static const char *trim_end(const char *from, const char *end)
-{
-    while (end > from && (end[-1] == ' ' || end[-1] == '\t'))
-        end--;
-    return end;
+    while (*from < *to && (**from == ' ' || **from == '\t'))
+        ++*from;
+    while (*to > *from && ((*to)[-1] == ' ' || (*to)[-1] == '\t'))
+        --*to;
 }
 
 /* The end of the list member at `at`: a separator outside quotes. */
@@ -57,16 +52,30 @@ static bool next_member(member_walk *w)
         w->to = field->value + field->value_len;
     }
     w->end = member_end(w->rest, w->to, ',');
-    w->at = skip_space(w->rest, w->end);
+    w->at = w->rest;
     w->rest = w->end + (w->end < w->to);
+    trim(&w->at, &w->end);
     return true;
 }
 
-/* The member without its parameters is this token. */
-static bool member_is(const member_walk *w, const char *token)
+/* Is the member this token, with a quality above 0 (1), or with ";q=0", ";q=0.000" among its parameters (0)? -1: it is
+ * another. */
+static int quality_of(const member_walk *w, const char *token)
 {
-    const char *end = trim_end(w->at, member_end(w->at, w->end, ';'));
-    return token_equal(w->at, (size_t)(end - w->at), token);
+    const char *name = w->at, *at = member_end(w->at, w->end, ';'), *end = at;
+    trim(&name, &end);
+    if (!token_equal(name, (size_t)(end - name), token))
+        return -1;
+    while (at < w->end) {
+        const char *next = w->end;
+        at++;
+        trim(&at, &next);
+        if (w->end - at >= 3 && (at[0] | 0x20) == 'q' && at[1] == '=')
+            return !(strtod(at + 2, NULL) <=
+                     0); /* ends at the first character that is no digit, at the latest at NUL */
+        at = member_end(at, w->end, ';');
+    }
+    return 1;
 }
 
 double request_wait(const http_request *rq, double otherwise, double max_wait_s)
@@ -74,11 +83,15 @@ double request_wait(const http_request *rq, double otherwise, double max_wait_s)
     member_walk w = {.headers = &rq->headers, .field = "Prefer"};
     while (next_member(&w)) {
         /* whole seconds, with quotes or without */
-        const char *end = trim_end(w.at, member_end(w.at, w.end, ';'));
+        const char *end = member_end(w.at, w.end, ';');
         const char *equals = memchr(w.at, '=', (size_t)(end - w.at));
-        if (!equals || !token_equal(w.at, (size_t)(trim_end(w.at, equals) - w.at), "wait"))
+        const char *value = equals ? equals + 1 : end;
+        if (!equals)
             continue;
-        const char *value = skip_space(equals + 1, end);
+        trim(&w.at, &equals);
+        trim(&value, &end);
+        if (!token_equal(w.at, (size_t)(equals - w.at), "wait"))
+            continue;
         if (end - value >= 2 && value[0] == '"' && end[-1] == '"') {
             value++;
             end--;
@@ -95,22 +108,11 @@ double request_wait(const http_request *rq, double otherwise, double max_wait_s)
     return fmin(otherwise, max_wait_s);
 }
 
-/* True for ";q=0", ";q=0.000" among a media range's parameters. */
-static bool quality_is_zero(const char *at, const char *end)
-{
-    for (at = member_end(at, end, ';'); at < end; at = member_end(at, end, ';')) {
-        at = skip_space(at + 1, end);
-        if (end - at >= 3 && (at[0] | 0x20) == 'q' && at[1] == '=')
-            return strtod(at + 2, NULL) <= 0; /* ends at the first character that is no digit, at the latest at NUL */
-    }
-    return false;
-}
-
 bool request_accepts(const http_request *rq, const char *type)
 {
     member_walk w = {.headers = &rq->headers, .field = "Accept"};
     while (next_member(&w))
-        if (member_is(&w, type) && !quality_is_zero(w.at, w.end))
+        if (quality_of(&w, type) > 0)
             return true;
     return false;
 }
@@ -118,13 +120,13 @@ bool request_accepts(const http_request *rq, const char *type)
 bool request_takes_gzip(const http_request *rq)
 {
     static const char *const NAMES[] = {"gzip", "x-gzip", "*"}; /* the star is for those that are not named */
-    for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0]; k++) {
+    int quality = -1;
+    for (size_t k = 0; k < sizeof NAMES / sizeof NAMES[0] && quality < 0; k++) {
         member_walk w = {.headers = &rq->headers, .field = "Accept-Encoding"};
-        while (next_member(&w))
-            if (member_is(&w, NAMES[k]))
-                return !quality_is_zero(w.at, w.end);
+        while (quality < 0 && next_member(&w))
+            quality = quality_of(&w, NAMES[k]);
     }
-    return false;
+    return quality > 0;
 }
 
 bool request_is_json(const http_request *rq)
@@ -133,11 +135,11 @@ bool request_is_json(const http_request *rq)
     const header_field *field = header_find(&rq->headers, "Content-Type", &count);
     if (!field)
         return true;
-    const char *end = field->value + field->value_len;
-    end = trim_end(field->value, member_end(field->value, end, ';'));
-    size_t len = (size_t)(end - field->value);
-    bool structured = len > 5 && memchr(field->value, '/', len) && strncasecmp(end - 5, "+json", 5) == 0;
-    return count == 1 && (structured || token_equal(field->value, len, "application/json"));
+    const char *type = field->value, *end = member_end(type, type + field->value_len, ';');
+    trim(&type, &end);
+    const size_t len = (size_t)(end - type);
+    const bool structured = len > 5 && memchr(type, '/', len) && strncasecmp(end - 5, "+json", 5) == 0;
+    return count == 1 && (structured || token_equal(type, len, "application/json"));
 }
 
 bool request_client_gone(const http_request *rq)
@@ -191,25 +193,19 @@ bool request_integer(const http_request *rq, const char *key, int64_t least, int
 
 /* ---- the target */
 
-static int hex_digit(char c)
-{
-    if (c >= '0' && c <= '9')
-        return c - '0';
-    c = (char)(c | 0x20);
-    return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
 /* Decodes in place; '+' is a space in a query only. */
 static bool percent_decode(char *text, bool in_query)
 {
+    static const char DIGITS[] = "0123456789abcdef0123456789ABCDEF";
     char *to = text;
     for (const char *from = text; *from; from++) {
         char c = *from;
         if (c == '%') {
-            int high = hex_digit(from[1]), low = high < 0 ? -1 : hex_digit(from[2]);
-            if (low < 0 || high * 16 + low == 0)
+            const char *high = from[1] ? strchr(DIGITS, from[1]) : NULL;
+            const char *low = high && from[2] ? strchr(DIGITS, from[2]) : NULL;
+            c = low ? (char)((high - DIGITS) % 16 * 16 + (low - DIGITS) % 16) : '\0';
+            if (c == '\0')
                 return false;
-            c = (char)(high * 16 + low);
             from += 2;
         } else if (c == '+' && in_query) {
             c = ' ';

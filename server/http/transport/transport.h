@@ -81,8 +81,8 @@ typedef struct {
     ptrdiff_t (*read)(void *ctx, char *out, size_t size);
     void (*free)(void *ctx);
     void *ctx;
-    listener *listener;      /* ctx's own: wakes whoever has to read */
-    void (*hold)(void *ctx); /* from now on read returns 0 instead of blocking; NULL: it can't */
+    listener *listener; /* ctx's own: wakes whoever has to read */
+    bool *held;         /* ctx's own; set: from now on read returns 0 instead of blocking; NULL: it can't */
     /* When to read again at the latest, on http_now's clock; told: the listener was. */
     double (*due)(void *ctx, bool told);
     bool is_message; /* what read gives is the whole message, header fields included */
@@ -234,6 +234,7 @@ typedef struct delayed_reply {
     transport *server;
     http_request *rq; /* gone before the reply is freed */
     listener *listener;
+    bool held;
     char *message;
     size_t len, at;
 } delayed_reply;

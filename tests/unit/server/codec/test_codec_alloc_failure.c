@@ -77,7 +77,7 @@ static bool try_init(const char *argument)
 {
     char message[256] = "";
     (void)argument;
-    bool good = codec_init(message, sizeof message);
+    bool good = codec_init(NULL, message, sizeof message);
     countdown = good ? countdown : -1;
     CHECK(good || message[0]);
     codec_end();
@@ -237,7 +237,7 @@ TEST(loading)
 TEST(decoding)
 {
     char message[256];
-    CHECK(codec_init(message, sizeof message));
+    CHECK(codec_init(NULL, message, sizeof message));
     exhaust(try_decode, "tests/data/paper_body.json");
     exhaust(try_decode, "tests/data/small_matrices.json");
     exhaust(try_decode, "tests/data/long_vectors.json");

@@ -4,7 +4,7 @@
 static bool ready(void)
 {
     char message[256] = "";
-    bool good = codec_init(message, sizeof message);
+    bool good = codec_init(NULL, message, sizeof message);
     CHECK_MSG(good, "%s", message);
     return good;
 }

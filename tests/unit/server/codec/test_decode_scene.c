@@ -6,7 +6,7 @@
 static bool ready(void)
 {
     char message[256] = "";
-    const bool good = codec_init(message, sizeof message);
+    const bool good = codec_init(NULL, message, sizeof message);
     CHECK_MSG(good, "%s", message);
     return good;
 }

@@ -101,7 +101,7 @@ static bool encode(void)
 TEST(uploads_and_requests_that_name_them)
 {
     char message[256], path[256];
-    if (!place_begin(&here) || !codec_init(message, sizeof message))
+    if (!place_begin(&here) || !codec_init(NULL, message, sizeof message))
         return;
     fail_each(send, 1);
     CHECK_INT(unfinished(), 0);

@@ -15,7 +15,7 @@
 static void load(void)
 {
     char message[256];
-    CHECK_MSG(codec_init(message, sizeof message), "%s", message);
+    CHECK_MSG(codec_init(NULL, message, sizeof message), "%s", message);
 }
 
 static bool decode(codec_request *out, const char *rest, problem_details *problem)

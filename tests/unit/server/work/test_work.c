@@ -61,7 +61,7 @@ static bool service_begin(service *v)
     memset(v, 0, sizeof *v);
     if (!ready) {
         uz_process_init(2);
-        ready = codec_init(message, sizeof message);
+        ready = codec_init(NULL, message, sizeof message);
         CHECK_MSG(ready, "%s", message);
     }
     v->log_file = tmpfile();

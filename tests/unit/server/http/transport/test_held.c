@@ -44,11 +44,6 @@ static ptrdiff_t speak(void *ctx, char *out, size_t size)
     return (ptrdiff_t)n;
 }
 
-static void hold_speaker(void *ctx)
-{
-    ((speaker *)ctx)->held = true;
-}
-
 static double speak_due(void *ctx, bool told)
 {
     const speaker *s = ctx;
@@ -75,7 +70,7 @@ static reply_source source_of(speaker *s)
     s->listener = feed_listen(s->feed, "job");
     s->every_s = s->every_s > 0.0 ? s->every_s : 60.0;
     return (reply_source){
-        .read = speak, .free = speaker_end, .ctx = s, .listener = s->listener, .hold = hold_speaker, .due = speak_due};
+        .read = speak, .free = speaker_end, .ctx = s, .listener = s->listener, .held = &s->held, .due = speak_due};
 }
 
 /* ends[0] is the client's. */
