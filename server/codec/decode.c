@@ -188,7 +188,8 @@ static bool decode_parts(codec_request *out, decoding *d, const json_value *root
     const json_value *of = json_get(start, "case"), *reactions = json_get(start, "reactions");
     const json_value *problem = json_get(root, "problem"), *answer = json_get(root, "answer");
     const json_value *tags = json_get(root, "tags");
-    const char *webhook = json_text_of(json_get(root, "webhook"), "url"), *from = json_text_of(start, "job");
+    const char *webhook = json_text(json_get(json_get(root, "webhook"), "url")),
+               *from = json_text(json_get(start, "job"));
     text t = {0};
     decode_settings(&out->settings, solver);
     out->priority = (int)decode_number(root, "priority", 0);

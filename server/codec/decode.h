@@ -50,11 +50,9 @@ bool decode_label(char out[64], decoding *d, const json_value *at, const char *l
 /* A number of an object that may be absent. */
 double decode_number(const json_value *object, const char *key, double otherwise);
 /* The vector `key` of an object into out[0..dim), `otherwise` in what is absent and 0 beyond dim; false if it has not
- * dim numbers. */
-bool decode_components(double out[3], decoding *d, const json_value *object, const char *key, double otherwise,
-                       int dim);
-/* The same, and false if it is zero; what: "it must point out of the obstacle". */
-bool decode_direction(double out[3], decoding *d, const json_value *object, const char *key, int dim, const char *what);
+ * dim numbers, or if it is zero where it must not be: what: "it must point out of the obstacle", or NULL. */
+bool decode_components(double out[3], decoding *d, const json_value *object, const char *key, double otherwise, int dim,
+                       const char *what);
 /* A text of the request: a string's bytes, or those of the upload that it names. */
 typedef struct {
     const char *data; /* not NUL-terminated */

@@ -80,7 +80,7 @@ bool decode_cases(uz_problem *problem, decoding *d, const json_value *list)
 
 static const char *text_or(const json_value *object, const char *key, const char *otherwise)
 {
-    const char *text = json_text_of(object, key);
+    const char *text = json_text(json_get(object, key));
     return text ? text : otherwise;
 }
 

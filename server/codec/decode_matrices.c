@@ -41,12 +41,14 @@ static bool add_upper_half(decoding *d, uz_csc *A)
     if (room) {
         int64_t count = 0;
         for (int64_t j = 0; j < A->cols; j++)
-            for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++)
-                for (int mirror = 0; mirror <= (A->idx[k] != j); mirror++, count++) {
+            for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
+                const int copies = A->idx[k] == j ? 1 : 2;
+                for (int mirror = 0; mirror < copies; mirror++, count++) {
                     row[count] = mirror ? j : A->idx[k];
                     col[count] = mirror ? A->idx[k] : j;
                     val[count] = A->val[k];
                 }
+            }
         good = uz_csc_from_triplets(&full, A->rows, A->cols, count, row, col, val, &err) == UZ_OK;
     }
     if (good) {

@@ -61,7 +61,8 @@ double decode_number(const json_value *object, const char *key, double otherwise
     return json_number(json_get(object, key), otherwise);
 }
 
-bool decode_components(double out[3], decoding *d, const json_value *object, const char *key, double otherwise, int dim)
+bool decode_components(double out[3], decoding *d, const json_value *object, const char *key, double otherwise, int dim,
+                       const char *what)
 {
     const json_value *value = json_get(object, key);
     if (value && json_size(value) != (size_t)dim) {
@@ -72,15 +73,8 @@ bool decode_components(double out[3], decoding *d, const json_value *object, con
     }
     for (int i = 0; i < 3; i++)
         out[i] = i >= dim ? 0 : value ? value->numbers[i] : otherwise;
-    return true;
-}
-
-bool decode_direction(double out[3], decoding *d, const json_value *object, const char *key, int dim, const char *what)
-{
-    if (!decode_components(out, d, object, key, 0, dim))
-        return false;
-    return out[0] != 0 || out[1] != 0 || out[2] != 0 ||
-           decode_refuse(d, "out_of_range", json_get(object, key), "is zero; %s.", what);
+    return !what || out[0] != 0 || out[1] != 0 || out[2] != 0 ||
+           decode_refuse(d, "out_of_range", value, "is zero; %s.", what);
 }
 
 /* ---- texts, in the request or uploaded before */

@@ -27,10 +27,10 @@ static bool decode_box(uz_scene *out, decoding *d, const json_value *box)
     const int dim = uz_scene_dim(out);
     const bool automatic = json_is(given, JSON_IS_STRING);
     double cells[3] = {0}, count = 1;
-    if (!decode_components(out->box.origin, d, box, "origin", 0, dim) ||
-        !decode_components(out->box.size, d, box, "size", 0, dim) ||
-        (!automatic && !decode_components(cells, d, box, "cells", 0, dim)) ||
-        !decode_components(out->box.grading, d, box, "grading", 1, dim))
+    if (!decode_components(out->box.origin, d, box, "origin", 0, dim, NULL) ||
+        !decode_components(out->box.size, d, box, "size", 0, dim, NULL) ||
+        (!automatic && !decode_components(cells, d, box, "cells", 0, dim, NULL)) ||
+        !decode_components(out->box.grading, d, box, "grading", 1, dim, NULL))
         return false;
     decode_name(out->box.element, sizeof out->box.element, box, "element", dim == 3 ? "hex8" : "quad4");
     out->source = UZ_MESH_BOX;
@@ -62,10 +62,10 @@ static bool decode_supports(uz_scene *out, decoding *d, const json_value *list)
         if (json_get(item, "normal")) {
             to->kind = UZ_SUPPORT_NORMAL;
             to->value = decode_number(item, "u", 0);
-            good = decode_direction(to->normal, d, item, "normal", dim, "it must be the direction that is held");
+            good = decode_components(to->normal, d, item, "normal", 0, dim, "it must be the direction that is held");
         } else if (json_get(item, "spring")) {
             to->kind = UZ_SUPPORT_SPRING;
-            good = decode_components(to->spring, d, item, "spring", 0, dim);
+            good = decode_components(to->spring, d, item, "spring", 0, dim, NULL);
         }
     }
     return out->supports && good;
@@ -90,7 +90,7 @@ bool decode_loads(uz_load **out, int64_t *n, decoding *d, const json_value *list
                 continue;
             to->kind = LOADS[k].kind;
             to->value = LOADS[k].vector ? 0 : decode_number(item, LOADS[k].key, 0);
-            if (LOADS[k].vector && !decode_components(to->v, d, item, LOADS[k].key, 0, dim))
+            if (LOADS[k].vector && !decode_components(to->v, d, item, LOADS[k].key, 0, dim, NULL))
                 return false;
         }
         if (node) {
@@ -203,9 +203,9 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
             to->kind = SHAPES[k].kind;
             to->radius = decode_number(o.shape, "radius", 0);
             to->inside = json_truth(json_get(o.shape, "inside"));
-            if ((SHAPES[k].point && !decode_components(to->point, d, o.shape, SHAPES[k].point, 0, o.dim)) ||
+            if ((SHAPES[k].point && !decode_components(to->point, d, o.shape, SHAPES[k].point, 0, o.dim, NULL)) ||
                 (SHAPES[k].direction &&
-                 !decode_direction(to->normal, d, o.shape, SHAPES[k].direction, o.dim, SHAPES[k].what)) ||
+                 !decode_components(to->normal, d, o.shape, SHAPES[k].direction, 0, o.dim, SHAPES[k].what)) ||
                 (SHAPES[k].read && !SHAPES[k].read(&o)))
                 return false;
         }

@@ -117,11 +117,6 @@ const char *json_text(const json_value *value)
     return json_is(value, JSON_IS_STRING) && !value->is_long ? value->text : NULL;
 }
 
-const char *json_text_of(const json_value *object, const char *key)
-{
-    return json_text(json_get(object, key));
-}
-
 bool json_text_is(const json_value *value, const char *word)
 {
     const char *text = json_text(value);

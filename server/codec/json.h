@@ -79,7 +79,6 @@ double json_number(const json_value *value, double otherwise);
 bool json_truth(const json_value *value); /* true, and nothing else */
 /* The bytes of a short string; NULL for all else. */
 const char *json_text(const json_value *value);
-const char *json_text_of(const json_value *object, const char *key); /* the same of a member */
 bool json_text_is(const json_value *value, const char *word);
 /* Do two values say the same? Numbers as doubles, members in any order. */
 bool json_same(const json_value *a, const json_value *b);

@@ -165,7 +165,7 @@ bool quantity_read(double *value, const json_value *summary, const char *name)
             step_index(s) < 0) { /* the value of the warning of this code; 0 where there is none */
             *value = 0.0;
             for (size_t i = 0; node->kind == JSON_IS_ARRAY && i < node->count; i++) {
-                const char *code = json_text_of(&node->items[i], "code");
+                const char *code = json_text(json_get(&node->items[i], "code"));
                 if (code && step_is(s, code)) {
                     *value = json_number(json_get(&node->items[i], "value"), (double)NAN);
                     return true;

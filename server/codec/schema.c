@@ -89,7 +89,7 @@ schema_at schema_resolve(schema_at at)
 {
     for (int i = 0; i < MAX_REFS && at.node; i++) {
         char name[64];
-        const char *ref = json_text_of(at.node, "$ref");
+        const char *ref = json_text(json_get(at.node, "$ref"));
         if (!ref)
             return at;
         /* "#/$defs/x", "file.json" or "file.json#/$defs/x"; no escapes in it */

@@ -427,7 +427,7 @@ static bool rule_if(const visit *v, const json_value *argument, const keyword *k
     (void)k;
     if (!branch || check(&(visit){v->problem, schema_child(v->at, branch), v->value}))
         return true;
-    const char *why = json_text_of(branch, "description");
+    const char *why = json_text(json_get(branch, "description"));
     if (why && v->problem)
         problem_add(v->problem, " %s", why);
     return false;

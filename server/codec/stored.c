@@ -12,18 +12,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* False: no memory. */
-static bool read_own(json_tree *tree, const char *json)
-{
-    problem_details problem;
-    return json_scan(tree, json, strlen(json), &problem);
-}
-
 bool codec_decode_problem(problem_details *out, const char *json)
 {
+    problem_details ignored;
     json_tree tree;
     memset(out, 0, sizeof *out);
-    if (!read_own(&tree, json))
+    if (!json_scan(&tree, json, strlen(json), &ignored))
         return false;
     const json_value *object = tree.root;
     const bool good = json_is(object, JSON_IS_OBJECT);
@@ -38,7 +32,7 @@ bool codec_decode_problem(problem_details *out, const char *json)
                  {"detail", out->detail, sizeof out->detail},
                  {"pointer", out->pointer, sizeof out->pointer}};
     for (size_t i = 0; i < sizeof TEXTS / sizeof TEXTS[0]; i++) {
-        const char *found = json_text_of(object, TEXTS[i].key);
+        const char *found = json_text(json_get(object, TEXTS[i].key));
         snprintf(TEXTS[i].out, TEXTS[i].size, "%s", found ? found : "");
     }
     json_clear(&tree);
@@ -51,8 +45,9 @@ struct codec_summary {
 
 codec_summary *codec_summary_read(const char *json)
 {
+    problem_details ignored;
     codec_summary *summary = calloc(1, sizeof *summary);
-    if (summary && read_own(&summary->tree, json))
+    if (summary && json_scan(&summary->tree, json, strlen(json), &ignored))
         return summary;
     free(summary);
     return NULL;
@@ -72,14 +67,15 @@ bool codec_summary_number(double *value, const codec_summary *summary, const cha
 
 const char *codec_summary_outcome(const codec_summary *summary)
 {
-    const char *outcome = json_text_of(summary->tree.root, "outcome");
+    const char *outcome = json_text(json_get(summary->tree.root, "outcome"));
     return outcome ? outcome : "";
 }
 
 bool codec_read_trade(codec_trade *out, const char *summary)
 {
+    problem_details ignored;
     json_tree tree;
-    if (!read_own(&tree, summary))
+    if (!json_scan(&tree, summary, strlen(summary), &ignored))
         return false;
     const json_value *root = tree.root;
     out->mesh_error = json_number(json_get(root, "discretization_error"), (double)NAN);
@@ -93,9 +89,11 @@ bool codec_read_trade(codec_trade *out, const char *summary)
 
 void codec_read_method(char *method, char *op, size_t size, const char *summary)
 {
+    problem_details ignored;
     json_tree tree; /* left empty where there is no memory */
-    read_own(&tree, summary);
-    const char *of_method = json_text_of(tree.root, "method"), *of_op = json_text_of(tree.root, "operator");
+    json_scan(&tree, summary, strlen(summary), &ignored);
+    const char *of_method = json_text(json_get(tree.root, "method")),
+               *of_op = json_text(json_get(tree.root, "operator"));
     snprintf(method, size, "%s", of_method ? of_method : "");
     snprintf(op, size, "%s", of_op ? of_op : "");
     json_clear(&tree);

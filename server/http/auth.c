@@ -37,11 +37,6 @@ const char *auth_scope_name(auth_scope scope)
     return SCOPES[scope];
 }
 
-static bool hash(const char *secret, size_t len, unsigned char out[DIGEST])
-{
-    return gnutls_hash_fast(GNUTLS_DIG_SHA256, secret, len, out) == 0;
-}
-
 /* ------------------------------------------------------------------- file */
 
 /* What is wrong with a line, NULL: nothing. Never quotes the secret. */
@@ -72,7 +67,7 @@ static const char *take_line(token_list *list, char *line)
         return "a file has at most 1000 tokens";
     strcpy(t.name, name);
     token *grown = realloc(list->tokens, (list->count + 1) * sizeof *grown);
-    if (!grown || !hash(secret, strlen(secret), t.digest)) {
+    if (!grown || gnutls_hash_fast(GNUTLS_DIG_SHA256, secret, strlen(secret), t.digest) != 0) {
         list->tokens = grown ? grown : list->tokens;
         return "no memory";
     }
@@ -166,7 +161,7 @@ auth_scope auth_check(auth *a, const char *secret, size_t len, char name[64])
     unsigned char digest[DIGEST];
     auth_scope scope = SCOPE_NONE;
     name[0] = '\0';
-    if (len > SECRET_MOST || !hash(secret, len, digest))
+    if (len > SECRET_MOST || gnutls_hash_fast(GNUTLS_DIG_SHA256, secret, len, digest) != 0)
         return SCOPE_NONE;
     pthread_rwlock_rdlock(&a->lock);
     for (size_t i = 0; i < a->list.count; i++)

@@ -34,7 +34,7 @@ bool history_rows(api *context, const job *j, const char *name, int64_t after, f
     int64_t columns = 0;
     const bool found = results_one(&at, context, j, name, "a history", reply);
     const int64_t number = at.number;
-    results_place_clear(&at);
+    store_cases_free(at.cases, at.count);
     if (!found)
         return false;
     snprintf(out->case_name, sizeof out->case_name, "%s", name ? name : "");
@@ -241,7 +241,7 @@ void trade_get(api *context, http_request *rq, http_reply *reply)
     }
 done:
     free(x);
-    results_place_clear(&at);
+    store_cases_free(at.cases, at.count);
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);
 }

@@ -200,7 +200,7 @@ void output_get(api *context, http_request *rq, http_reply *reply)
                 reply_text(reply, 200, w.row->type, w.file, w.len);
             fields_close(&reader);
         }
-        results_place_clear(&at);
+        store_cases_free(at.cases, at.count);
         jobs_check_still_there(context, &j, reply);
         job_clear(&j);
     }

@@ -349,12 +349,6 @@ bool results_one(results_place *out, api *context, const job *j, const char *nam
     return true;
 }
 
-void results_place_clear(results_place *at)
-{
-    store_cases_free(at->cases, at->count);
-    *at = (results_place){.number = 0};
-}
-
 bool results_known(const http_request *rq, const job *j, http_reply *reply)
 {
     char finished[32];
@@ -425,7 +419,7 @@ void cases_list(problem_details *problem, const char *wrong, const store_case *c
     const char **names = wrong ? malloc((count + 1) * sizeof *names) : NULL;
     for (size_t i = 0; names && i < count; i++)
         names[i] = cases[i].name;
-    const int closest = names ? uz_closest(wrong, strlen(wrong), names, count) : -1;
+    const int closest = wrong && names ? uz_closest(wrong, strlen(wrong), names, count) : -1;
     if (closest >= 0)
         append(problem, " Did you mean \"", names[closest], "\"?");
     free(names);

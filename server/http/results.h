@@ -29,9 +29,8 @@ typedef struct {
     size_t count;
 } results_place;
 /* name NULL: none is asked for. False with a reply, also where the job has cases and none is named; `what` each of them
- * has of its own. The caller clears *out in every case. */
+ * has of its own. The caller frees its cases in every case. */
 bool results_one(results_place *out, api *context, const job *j, const char *name, const char *what, http_reply *reply);
-void results_place_clear(results_place *place);
 
 /* Appends up to some names of cases to the detail, quoted: `Its cases: "a", "b", ... (5 in all).` Before them `Did you
  * mean "x"?` if a case has a name close to the wrong one; NULL: none was given. */
