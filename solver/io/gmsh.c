@@ -237,29 +237,6 @@ static uz_status choose_dim(int *dim, const gmsh_file *file)
     return UZ_OK;
 }
 
-static uz_status fill_elements(uz_given_mesh *out, const gmsh_file *file, const int64_t *new_element, int64_t places)
-{
-    int64_t at = 0;
-    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
-    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
-    out->node = uz_alloc(places, sizeof *out->node);
-    if (!out->kind || !out->first || !out->node)
-        return gmsh_no_memory(file);
-    out->first[0] = 0;
-    for (int64_t e = 0, done = 0; e < file->n_elements; e++) {
-        if (new_element[e] < done)
-            continue; /* no element of the body, or repeated */
-        const uz_element_kind kind = (uz_element_kind)gmsh_kind_of(file->type[e]);
-        const uz_element_type *type = uz_element_type_of(kind);
-        for (int i = 0; i < type->nodes; i++)
-            out->node[at + i] = file->node[file->first[e] + (type->gmsh_node ? type->gmsh_node[i] : i)];
-        at += file->first[e + 1] - file->first[e];
-        out->kind[done++] = (unsigned char)kind;
-        out->first[done] = at;
-    }
-    return UZ_OK;
-}
-
 static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
 {
     int dim = 0;
@@ -292,8 +269,24 @@ static uz_status to_given(uz_given_mesh *out, gmsh_file *file)
     status = out->xyz ? UZ_OK : gmsh_no_memory(file);
     for (int64_t i = 0; i < file->n_nodes && status == UZ_OK; i++)
         memcpy(out->xyz + i * dim, file->xyz + 3 * i, (size_t)dim * sizeof(double));
+    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
+    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
+    out->node = uz_alloc(places, sizeof *out->node);
+    if (status == UZ_OK && (!out->kind || !out->first || !out->node))
+        status = gmsh_no_memory(file);
     if (status == UZ_OK)
-        status = fill_elements(out, file, new_element, places);
+        out->first[0] = 0;
+    for (int64_t e = 0, done = 0, at = 0; status == UZ_OK && e < file->n_elements; e++) {
+        if (new_element[e] < done)
+            continue; /* no element of the body, or repeated */
+        const uz_element_kind kind = (uz_element_kind)gmsh_kind_of(file->type[e]);
+        const uz_element_type *type = uz_element_type_of(kind);
+        for (int i = 0; i < type->nodes; i++)
+            out->node[at + i] = file->node[file->first[e] + (type->gmsh_node ? type->gmsh_node[i] : i)];
+        at += file->first[e + 1] - file->first[e];
+        out->kind[done++] = (unsigned char)kind;
+        out->first[done] = at;
+    }
     if (status == UZ_OK)
         status = make_groups(out, file, dim, new_element);
     free(new_element);

@@ -35,8 +35,6 @@ uz_status gmsh_quoted(gmsh_text *text, char out[64]);
  * numbers of blocks, of items, and of one of them, for messages. */
 uz_status gmsh_head_4(gmsh_text *text, int64_t *blocks, int64_t *count, const char *const what[3]);
 
-/* How many bytes are left. */
-size_t gmsh_left(const gmsh_text *text);
 /* A count of items that take at least so many bytes each: refused if the file is too short for them. */
 uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const char *what);
 

@@ -163,31 +163,6 @@ uz_status gmsh_read_entities(gmsh_file *file, bool partitioned)
 
 /* ---- nodes */
 
-/* entityDim entityTag parametric numNodes, the tags of all, the coordinates of all. */
-static uz_status read_node_block(gmsh_file *file, int64_t count)
-{
-    gmsh_text *text = &file->text;
-    int64_t head[3] = {0}, n = 0;
-    uz_status status = UZ_OK;
-    for (int i = 0; i < 3 && status == UZ_OK; i++)
-        status = gmsh_int(text, &head[i], "the head of a block of nodes");
-    if (status == UZ_OK)
-        status = gmsh_size(text, &n, "the number of nodes of a block");
-    if (status == UZ_OK && (n > count - file->n_nodes || head[0] < 0 || head[0] > 3))
-        status = gmsh_fail(text, UZ_ERR_FORMAT,
-                           n > count - file->n_nodes ? "more nodes than are announced"
-                                                     : "a block of nodes has no such dimension");
-    for (int64_t i = 0; i < n && status == UZ_OK; i++)
-        status = gmsh_size(text, &file->tag[file->n_nodes + i], "the number of a node");
-    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
-        status = read_reals(text, 3, file->xyz + 3 * (file->n_nodes + i));
-        if (status == UZ_OK && head[2])
-            status = read_reals(text, (int)head[0], NULL);
-    }
-    file->n_nodes += status == UZ_OK ? n : 0;
-    return status;
-}
-
 typedef struct {
     int64_t tag, index;
 } tagged_node;
@@ -272,8 +247,26 @@ uz_status gmsh_read_nodes(gmsh_file *file)
         if (status == UZ_OK)
             status = read_reals(text, 3, file->xyz + 3 * file->n_nodes);
     }
-    for (int64_t b = 0; b < blocks && status == UZ_OK; b++)
-        status = read_node_block(file, count);
+    for (int64_t b = 0; b < blocks && status == UZ_OK; b++) {
+        /* entityDim entityTag parametric numNodes, the tags of all, the coordinates of all. */
+        int64_t head[3] = {0}, n = 0;
+        for (int i = 0; i < 3 && status == UZ_OK; i++)
+            status = gmsh_int(text, &head[i], "the head of a block of nodes");
+        if (status == UZ_OK)
+            status = gmsh_size(text, &n, "the number of nodes of a block");
+        if (status == UZ_OK && n > count - file->n_nodes)
+            status = gmsh_fail(text, UZ_ERR_FORMAT, "more nodes than are announced");
+        if (status == UZ_OK && (head[0] < 0 || head[0] > 3))
+            status = gmsh_fail(text, UZ_ERR_FORMAT, "a block of nodes has no such dimension");
+        for (int64_t i = 0; i < n && status == UZ_OK; i++)
+            status = gmsh_size(text, &file->tag[file->n_nodes + i], WHAT[2]);
+        for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+            status = read_reals(text, 3, file->xyz + 3 * (file->n_nodes + i));
+            if (status == UZ_OK && head[2])
+                status = read_reals(text, (int)head[0], NULL);
+        }
+        file->n_nodes += status == UZ_OK ? n : 0;
+    }
     if (status == UZ_OK && file->n_nodes < count)
         status = gmsh_fail(text, UZ_ERR_FORMAT, "%lld nodes are announced, but there are %lld", (long long)count,
                            (long long)file->n_nodes);

@@ -80,7 +80,7 @@ static uz_status not_finite(const gmsh_text *text)
 uz_status gmsh_real_text(gmsh_text *text, double *value)
 {
     skip_space(text);
-    const size_t used = uz_parse_double(value, text->at, gmsh_left(text));
+    const size_t used = uz_parse_double(value, text->at, (size_t)(text->end - text->at));
     const char *at = text->at + (text->at < text->end && (*text->at == '-' || *text->at == '+'));
     if (used == 0 && text->end - at >= 3 && ((at[0] | 32) == 'n' || (at[0] | 32) == 'i') && (at[1] | 32) != 'o')
         return not_finite(text);
@@ -139,14 +139,9 @@ uz_status gmsh_quoted(gmsh_text *text, char out[64])
 
 /* ---- bytes */
 
-size_t gmsh_left(const gmsh_text *text)
-{
-    return (size_t)(text->end - text->at);
-}
-
 static uz_status take_bytes(gmsh_text *text, void *to, size_t size, const char *what)
 {
-    if (gmsh_left(text) < size)
+    if ((size_t)(text->end - text->at) < size)
         return gmsh_fail(text, UZ_ERR_FORMAT, "%s was expected, but the file ends", what);
     memcpy(to, text->at, size);
     text->at += size;
@@ -184,10 +179,10 @@ uz_status gmsh_real(gmsh_text *text, double *value)
 
 uz_status gmsh_count(const gmsh_text *text, int64_t count, size_t each, const char *what)
 {
-    if (count >= 0 && (uint64_t)count <= gmsh_left(text) / each)
+    if (count >= 0 && (uint64_t)count <= (size_t)(text->end - text->at) / each)
         return UZ_OK;
     return gmsh_fail(text, UZ_ERR_FORMAT, "%lld %s are announced, but the rest of the file has %zu bytes",
-                     (long long)count, what, gmsh_left(text));
+                     (long long)count, what, (size_t)(text->end - text->at));
 }
 
 /* ---- sections */
@@ -239,7 +234,8 @@ uz_status gmsh_section_end(gmsh_text *text, const char *name)
     char end[GMSH_NAME + 8];
     const int len = snprintf(end, sizeof end, "$End%s", name);
     skip_space(text);
-    if (gmsh_left(text) < (size_t)len || memcmp(text->at, end, (size_t)len) != 0 || !word_ends(text->at + len, text))
+    if ((size_t)(text->end - text->at) < (size_t)len || memcmp(text->at, end, (size_t)len) != 0 ||
+        !word_ends(text->at + len, text))
         return fail_word(text, end);
     text->at += len;
     return UZ_OK;
@@ -249,7 +245,7 @@ uz_status gmsh_skip_section(gmsh_text *text, const char *name)
 {
     char end[GMSH_NAME + 8];
     const int len = snprintf(end, sizeof end, "$End%s", name);
-    const char *at = memmem(text->at, gmsh_left(text), end, (size_t)len);
+    const char *at = memmem(text->at, (size_t)(text->end - text->at), end, (size_t)len);
     if (!at)
         return gmsh_fail(text, UZ_ERR_FORMAT, "the section $%.*s has no end; %s is missing", GMSH_NAME, name, end);
     for (; text->at < at; text->at++)

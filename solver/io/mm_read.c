@@ -21,10 +21,6 @@ static const char *const FORMATS[] = {"coordinate", "array", NULL};
 static const char *const FIELDS[] = {"real", "integer", "complex", "pattern", NULL};
 static const char *const SYMMETRIES[] = {"general", "symmetric", "skew-symmetric", "hermitian", NULL};
 
-typedef struct {
-    int object, format, field, symmetry;
-} banner;
-
 static const char BANNER_REMEDY[] = "the first line is %%MatrixMarket matrix, then coordinate or array, then real or "
                                     "integer, then general or symmetric";
 
@@ -48,27 +44,6 @@ static uz_status read_word(mm_text *text, const char *const *words, const char *
         }
     }
     return mm_fail(text, what, BANNER_REMEDY);
-}
-
-/* The report's table of kinds: a pattern has no values to fill an array or to change sign; only a complex matrix can
- * differ from its conjugate. */
-static uz_status check_banner(const mm_text *text, const banner *b)
-{
-    const bool exists = b->field == FIELD_PATTERN ? b->format == UZ_MM_COORDINATE && b->symmetry <= SYMMETRY_SYMMETRIC
-                                                  : b->symmetry != SYMMETRY_HERMITIAN || b->field == FIELD_COMPLEX;
-    const char *unsupported = b->object != OBJECT_MATRIX         ? OBJECTS[b->object]
-                              : b->field > FIELD_INTEGER         ? FIELDS[b->field]
-                              : b->symmetry > SYMMETRY_SYMMETRIC ? SYMMETRIES[b->symmetry]
-                                                                 : NULL;
-    if (!exists)
-        return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line, "there is no %s %s %s matrix; %s", FORMATS[b->format],
-                            FIELDS[b->field], SYMMETRIES[b->symmetry], BANNER_REMEDY);
-    if (unsupported)
-        return uz_fail_line(text->err, UZ_ERR_UNSUPPORTED, text->line,
-                            "%s is not supported here; send a real or integer, general or symmetric matrix (a vector "
-                            "as a matrix of one column)",
-                            unsupported);
-    return UZ_OK;
 }
 
 /* Reads one number of the size line into *size. */
@@ -115,7 +90,9 @@ static uz_status check_sizes(const mm_text *text, uz_mm_info *info)
 static uz_status read_header(mm_text *text, uz_mm_info *info)
 {
     static const char TAG[] = "%%MatrixMarket";
-    banner b = {0};
+    struct {
+        int object, format, field, symmetry;
+    } b = {0};
     bool found = false;
     if (word_length(text) != sizeof TAG - 1 || strncasecmp(text->at, TAG, sizeof TAG - 1) != 0)
         return mm_fail(text, "this is not a Matrix Market text: %%MatrixMarket was expected", BANNER_REMEDY);
@@ -127,10 +104,25 @@ static uz_status read_header(mm_text *text, uz_mm_info *info)
         status = read_word(text, FIELDS, "the banner's field must be real or integer", &b.field);
     if (status == UZ_OK)
         status = read_word(text, SYMMETRIES, "the banner's symmetry must be general or symmetric", &b.symmetry);
-    if (status == UZ_OK)
-        status = check_banner(text, &b);
-    if (status == UZ_OK)
-        status = mm_end_line(text);
+    if (status != UZ_OK)
+        return status;
+    /* The report's table of kinds: a pattern has no values to fill an array or to change sign; only a complex matrix
+     * can differ from its conjugate. */
+    const bool exists = b.field == FIELD_PATTERN ? b.format == UZ_MM_COORDINATE && b.symmetry <= SYMMETRY_SYMMETRIC
+                                                 : b.symmetry != SYMMETRY_HERMITIAN || b.field == FIELD_COMPLEX;
+    const char *unsupported = b.object != OBJECT_MATRIX         ? OBJECTS[b.object]
+                              : b.field > FIELD_INTEGER         ? FIELDS[b.field]
+                              : b.symmetry > SYMMETRY_SYMMETRIC ? SYMMETRIES[b.symmetry]
+                                                                : NULL;
+    if (!exists)
+        return uz_fail_line(text->err, UZ_ERR_FORMAT, text->line, "there is no %s %s %s matrix; %s", FORMATS[b.format],
+                            FIELDS[b.field], SYMMETRIES[b.symmetry], BANNER_REMEDY);
+    if (unsupported)
+        return uz_fail_line(text->err, UZ_ERR_UNSUPPORTED, text->line,
+                            "%s is not supported here; send a real or integer, general or symmetric matrix (a vector "
+                            "as a matrix of one column)",
+                            unsupported);
+    status = mm_end_line(text);
     if (status == UZ_OK)
         status = mm_next_line(text, &found);
     if (status != UZ_OK)
@@ -218,18 +210,13 @@ static uz_status read_body(uz_csc *A, mm_text *text, const uz_mm_info *info, int
     return status;
 }
 
-static mm_text start_of(const char *text, size_t len, uz_error *err)
-{
-    const char *first = text ? text : ""; /* no bytes may come without an address */
-    uz_error_reset(err);
-    return (mm_text){.at = first, .end = first + len, .line = 1, .err = err};
-}
-
 uz_status uz_mm_read(uz_csc *out, uz_mm_info *info, const char *text, size_t len, size_t max_bytes, uz_error *err)
 {
-    mm_text t = start_of(text, len, err);
+    const char *first = text ? text : ""; /* no bytes may come without an address */
+    mm_text t = {.at = first, .end = first + len, .line = 1, .err = err};
     uz_mm_info head = {0};
     uz_csc A = {0};
+    uz_error_reset(err);
     memset(out, 0, sizeof *out);
     if (info)
         *info = head;
@@ -250,9 +237,11 @@ uz_status uz_mm_read(uz_csc *out, uz_mm_info *info, const char *text, size_t len
 
 uz_status uz_mm_read_vector(double **out, int64_t *n, const char *text, size_t len, size_t max_bytes, uz_error *err)
 {
-    mm_text t = start_of(text, len, err);
+    const char *first = text ? text : ""; /* no bytes may come without an address */
+    mm_text t = {.at = first, .end = first + len, .line = 1, .err = err};
     uz_mm_info head = {0};
     uz_csc A = {0};
+    uz_error_reset(err);
     *out = NULL;
     *n = 0;
     uz_status status = read_header(&t, &head);

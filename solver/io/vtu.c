@@ -12,10 +12,22 @@ enum { BLOCK = 1 << 20 };
  */
 enum { LEVEL = 1 };
 
-/* The numbers of blocks and their sizes (3 + blocks), then the compressed blocks. */
-static void put_compressed(uz_buffer *vtu, const unsigned char *bytes, size_t n)
+void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void *data, int64_t count, int components,
+                  const char *const *labels)
 {
-    const size_t blocks = (n + BLOCK - 1) / BLOCK;
+    static const struct {
+        const char *name;
+        size_t size;
+    } TYPES[] = {{"Float64", sizeof(double)}, {"Int64", sizeof(int64_t)}, {"UInt8", 1}};
+    uz_buffer_print(vtu, "        <DataArray type=\"%s\" Name=\"%s\"", TYPES[type].name, name);
+    if (components > 1)
+        uz_buffer_print(vtu, " NumberOfComponents=\"%d\"", components);
+    for (int c = 0; labels && c < components; c++)
+        uz_buffer_print(vtu, " ComponentName%d=\"%s\"", c, labels[c]);
+    uz_buffer_print(vtu, " format=\"binary\">");
+    /* The numbers of blocks and their sizes (3 + blocks), then the compressed blocks. */
+    const size_t n = (size_t)count * (size_t)components * TYPES[type].size, blocks = (n + BLOCK - 1) / BLOCK;
+    const unsigned char *bytes = data;
     size_t packed = 0;
     uint64_t *head = uz_alloc((int64_t)blocks + 3, sizeof *head);
     unsigned char *out = uz_alloc((int64_t)(blocks * libdeflate_zlib_compress_bound(NULL, BLOCK)), 1);
@@ -37,33 +49,11 @@ static void put_compressed(uz_buffer *vtu, const unsigned char *bytes, size_t n)
     if (ok) {
         uz_buffer_put_base64(vtu, head, (3 + blocks) * sizeof *head);
         uz_buffer_put_base64(vtu, out, packed);
-    } else {
-        vtu->failed = true;
     }
+    vtu->failed = vtu->failed || !ok;
     free(head);
     free(out);
-}
-
-void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void *data, int64_t count, int components,
-                  const char *const *labels)
-{
-    static const struct {
-        const char *name;
-        size_t size;
-    } TYPES[] = {{"Float64", sizeof(double)}, {"Int64", sizeof(int64_t)}, {"UInt8", 1}};
-    uz_buffer_print(vtu, "        <DataArray type=\"%s\" Name=\"%s\"", TYPES[type].name, name);
-    if (components > 1)
-        uz_buffer_print(vtu, " NumberOfComponents=\"%d\"", components);
-    for (int c = 0; labels && c < components; c++)
-        uz_buffer_print(vtu, " ComponentName%d=\"%s\"", c, labels[c]);
-    uz_buffer_print(vtu, " format=\"binary\">");
-    put_compressed(vtu, data, (size_t)count * (size_t)components * TYPES[type].size);
     uz_buffer_print(vtu, "</DataArray>\n");
-}
-
-void uz_vtu_tag(uz_buffer *vtu, const char *section)
-{
-    uz_buffer_print(vtu, "      <%s>\n", section);
 }
 
 void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh)
@@ -87,14 +77,14 @@ void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh)
     for (int64_t e = 0; type && e < mesh->n_elements; e++)
         type[e] = (unsigned char)uz_element_type_of((uz_element_kind)mesh->kind[e])->vtk;
     if (!vtu->failed) {
-        uz_vtu_tag(vtu, "Points");
+        uz_buffer_print(vtu, "      <Points>\n");
         uz_vtu_array(vtu, "Points", UZ_VTU_DOUBLE, xyz, mesh->n_nodes, 3, NULL);
-        uz_vtu_tag(vtu, "/Points");
-        uz_vtu_tag(vtu, "Cells");
+        uz_buffer_print(vtu, "      </Points>\n");
+        uz_buffer_print(vtu, "      <Cells>\n");
         uz_vtu_array(vtu, "connectivity", UZ_VTU_INT64, mesh->node, mesh->first[mesh->n_elements], 1, NULL);
         uz_vtu_array(vtu, "offsets", UZ_VTU_INT64, mesh->first + 1, mesh->n_elements, 1, NULL);
         uz_vtu_array(vtu, "types", UZ_VTU_BYTE, type, mesh->n_elements, 1, NULL);
-        uz_vtu_tag(vtu, "/Cells");
+        uz_buffer_print(vtu, "      </Cells>\n");
     }
     free(xyz);
     free(type);

@@ -13,9 +13,8 @@ typedef enum { UZ_VTU_DOUBLE, UZ_VTU_INT64, UZ_VTU_BYTE } uz_vtu_type;
 
 /* The file's head, points and cells. */
 void uz_vtu_begin(uz_buffer *vtu, const uz_mesh *mesh);
-/* Begins the section "PointData" or "CellData", in which arrays follow, or ends "/PointData" or "/CellData". */
-void uz_vtu_tag(uz_buffer *vtu, const char *section);
-/* `count` items of `components` numbers each. labels (may be NULL): names of the components. */
+/* An array of a section, which stands between <PointData> or <CellData> and its end: `count` items of `components`
+ * numbers each. labels (may be NULL): names of the components. */
 void uz_vtu_array(uz_buffer *vtu, const char *name, uz_vtu_type type, const void *data, int64_t count, int components,
                   const char *const *labels);
 /* Ends the file: uz_buffer_finish. */

@@ -110,17 +110,12 @@ typedef struct {
     double *normal; /* solids: n_cells x 3, of unit length */
 } edge_work;
 
-static int cell_step(int points)
-{
-    return points > 4 ? 2 : 1;
-}
-
 /* Counts the edges into start[low + 1], or, if `place`, puts them where start[low] says. */
 static void walk_edges(edge_work *w, bool place)
 {
     for (int64_t i = 0; i < w->skin->n_cells; i++) {
         const int64_t *point = w->skin->point + w->skin->first[i];
-        const int n = (int)(w->skin->first[i + 1] - w->skin->first[i]), step = cell_step(n);
+        const int n = (int)(w->skin->first[i + 1] - w->skin->first[i]), step = n > 4 ? 2 : 1;
         for (int k = 0; k < n; k += step) {
             const int64_t a = point[k], b = point[(k + step) % n];
             const int64_t low = a < b ? a : b;
@@ -145,7 +140,7 @@ static void cell_normal(double normal[3], const int64_t *point, int n, const dou
 {
     double length = 0;
     memset(normal, 0, 3 * sizeof *normal);
-    for (int k = 0, step = cell_step(n); k < n; k += step) {
+    for (int k = 0, step = n > 4 ? 2 : 1; k < n; k += step) {
         const double *o = xyz + 3 * point[0], *p = xyz + 3 * point[k], *q = xyz + 3 * point[(k + step) % n];
         for (int c = 0; c < 3; c++) {
             const int d = (c + 1) % 3, e = (c + 2) % 3;

@@ -58,7 +58,7 @@ static void write_all(writing *w, const uz_field_source *answer, unsigned which)
 {
     const uz_fields *f = w->fields;
     uz_vtu_begin(&w->vtu, &w->body->model->mesh);
-    uz_vtu_tag(&w->vtu, "PointData");
+    uz_buffer_print(&w->vtu, "      <PointData>\n");
     /* Vectors and tensors have all their components there, also in the plane. */
     if (which & UZ_FIELD_DISPLACEMENTS && answer->u) {
         memset(w->room, 0, (size_t)(3 * f->n_nodes) * sizeof *w->room);
@@ -76,16 +76,16 @@ static void write_all(writing *w, const uz_field_source *answer, unsigned which)
     put_rows(w, UZ_FIELD_CONTACT_STATUS, f->contact_status, -1, true);
     put_rows(w, UZ_FIELD_REACTIONS, which & UZ_FIELD_REACTIONS ? answer->r : NULL, 0, false);
     put_rows(w, UZ_FIELD_GAPS, which & UZ_FIELD_GAPS ? answer->g : NULL, NAN, false);
-    uz_vtu_tag(&w->vtu, "/PointData");
+    uz_buffer_print(&w->vtu, "      </PointData>\n");
     int64_t *material = which & UZ_FIELD_MATERIALS ? uz_alloc(f->n_elements, sizeof *material) : NULL;
     if (which & UZ_FIELD_MATERIALS && !material)
         w->vtu.failed = true;
     for (int64_t e = 0; material && e < f->n_elements; e++)
         material[e] = w->body->model->material_of ? w->body->model->material_of[e] : 0;
     if (material) {
-        uz_vtu_tag(&w->vtu, "CellData");
+        uz_buffer_print(&w->vtu, "      <CellData>\n");
         uz_vtu_array(&w->vtu, uz_field_name(UZ_FIELD_MATERIALS), UZ_VTU_INT64, material, f->n_elements, 1, NULL);
-        uz_vtu_tag(&w->vtu, "/CellData");
+        uz_buffer_print(&w->vtu, "      </CellData>\n");
     }
     free(material);
 }

@@ -9,24 +9,21 @@
 
 /* ---- values */
 
-static bool set_integer(int *out, const uz_option *row, const char *text)
+/* An integer or a number within its limits. */
+static bool set_number(void *out, const uz_option *row, const char *text)
 {
+    const bool integer = row->kind == UZ_OPTION_INTEGER;
     char *end;
     errno = 0;
-    const long value = strtol(text, &end, 10);
-    if (errno || end == text || *end || (double)value < row->least || (double)value > row->most)
+    const long whole = integer ? strtol(text, &end, 10) : 0;
+    const double value = integer ? (double)whole : strtod(text, &end);
+    if ((integer && errno) || end == text || *end || !isfinite(value) || value < row->least ||
+        ((integer || row->most > 0) && value > row->most))
         return false;
-    *out = (int)value;
-    return true;
-}
-
-static bool set_number(double *out, const uz_option *row, const char *text)
-{
-    char *end;
-    const double value = strtod(text, &end);
-    if (end == text || *end || !isfinite(value) || value < row->least || (row->most > 0 && value > row->most))
-        return false;
-    *out = value;
+    if (integer)
+        *(int *)out = (int)whole;
+    else
+        *(double *)out = value;
     return true;
 }
 
@@ -97,7 +94,6 @@ bool uz_option_set(void *values, const uz_option *row, const char *text)
             *(bool *)at = word % 2 == 1;
         return word >= 0;
     case UZ_OPTION_INTEGER:
-        return set_integer(at, row, text);
     case UZ_OPTION_NUMBER:
         return set_number(at, row, text);
     case UZ_OPTION_BYTES:

@@ -54,26 +54,6 @@ static size_t take_digits(uint64_t *w, const char *text, size_t at, size_t len)
     return at;
 }
 
-/* After the mantissa: e or E, a sign, digits. Without digits there is no exponent and nothing is used. */
-static size_t take_exponent(int64_t *exponent, const char *text, size_t at, size_t len)
-{
-    size_t start = at;
-    *exponent = 0;
-    if (at >= len || (text[at] | 0x20) != 'e')
-        return start;
-    at++;
-    bool negative = at < len && text[at] == '-';
-    if (at < len && (text[at] == '-' || text[at] == '+'))
-        at++;
-    if (at >= len || !is_digit(text[at]))
-        return start;
-    int64_t value = 0;
-    for (; at < len && is_digit(text[at]); at++)
-        value = value < EXPONENT_CEILING / 10 ? 10 * value + (int64_t)digit_value(text[at]) : EXPONENT_CEILING;
-    *exponent = negative ? -value : value;
-    return at;
-}
-
 /* Reads the mantissa again where it has more than 19 digits: leading zeros do not count, the rest is dropped. */
 static void keep_leading_digits(scan *s, const char *text)
 {
@@ -115,8 +95,21 @@ static bool scan_number(scan *s, const char *text, size_t len)
     }
     if (digits == 0)
         return false;
-    s->mantissa_end = at;
-    s->used = take_exponent(&s->written_exponent, text, at, len);
+    s->mantissa_end = s->used = at;
+    /* e or E, a sign, digits. Without digits there is no exponent and nothing is used. */
+    if (at < len && (text[at] | 0x20) == 'e') {
+        at++;
+        const bool negative = at < len && text[at] == '-';
+        if (at < len && (text[at] == '-' || text[at] == '+'))
+            at++;
+        if (at < len && is_digit(text[at])) {
+            int64_t value = 0;
+            for (; at < len && is_digit(text[at]); at++)
+                value = value < EXPONENT_CEILING / 10 ? 10 * value + (int64_t)digit_value(text[at]) : EXPONENT_CEILING;
+            s->written_exponent = negative ? -value : value;
+            s->used = at;
+        }
+    }
     s->exponent = s->written_exponent - (int64_t)point_digits;
     if (digits > WORD_DIGITS)
         keep_leading_digits(s, text);
