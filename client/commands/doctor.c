@@ -74,8 +74,7 @@ static bool check_way(doctor *d)
         [CLIENT_CAUSE_CONNECTION] =
             "check host and port in --server or $UZAWA_SERVER; is uzawad running, is a firewall between?",
         [CLIENT_CAUSE_CERTIFICATE] =
-            "name the authority's certificates (PEM) in $UZAWA_CA, or use the host's name that "
-            "the certificate has",
+            "name the authority's certificates (PEM) in $UZAWA_CA, or use the host's name that the certificate has",
         [CLIENT_CAUSE_TLS] = "does the service speak TLS there? Without it the URL begins with http://",
         [CLIENT_CAUSE_SILENCE] = "something listens there and says nothing: a proxy, or another kind of service?",
         [CLIENT_CAUSE_OTHER] = "does an HTTP service listen there? With TLS the URL begins with https://",

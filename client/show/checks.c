@@ -30,8 +30,10 @@ void client_checks_add(client_checks *to, client_verdict verdict, const char *gr
         const size_t capacity = to->capacity ? 2 * to->capacity : 16;
         client_check *grown = realloc(to->item, capacity * sizeof *grown);
         ok = grown != NULL;
-        to->item = ok ? grown : to->item;
-        to->capacity = ok ? capacity : to->capacity;
+        if (grown) {
+            to->item = grown;
+            to->capacity = capacity;
+        }
     }
     if (ok)
         to->item[to->count++] = check;
