@@ -84,16 +84,20 @@ static void judge_move(pivoting *p)
     p->before = p->wrong;
 }
 
-/* The next guess: all wrong rows change places, or the operator makes a guess of its own, whichever has done better. */
+/* The next guess: all wrong rows change places, or the operator makes a guess of its own, whichever has done better.
+ * Where only single exchanges are left, the operator's guesses come first, and one exchange after each that was in
+ * vain.
+ */
 static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
 {
     bool better = p->wrong < p->fewest, all = better || p->patience > 0;
     judge_move(p);
     p->patience = better ? PATIENCE : p->patience - 1;
+    const bool ask = all ? p->rate[GUESS] <= p->rate[EXCHANGE] : p->move != GUESS || p->rate[GUESS] < 1.0;
     p->move = EXCHANGE;
     if (better)
         p->fewest = p->wrong;
-    if (all && p->rate[GUESS] <= p->rate[EXCHANGE] && uz_dual_load_guess_active(load, p->active)) {
+    if (ask && uz_dual_load_guess_active(load, p->active)) {
         p->move = GUESS;
         return;
     }

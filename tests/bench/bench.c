@@ -215,6 +215,31 @@ static void bench_obstacles(report *out)
         printf("%-34s skipped: no Ipopt (Debian: coinor-libipopt-dev)\n", "ipopt_over_uzawa_obstclae");
 }
 
+/* Pressed so that few dofs touch, some, and many. */
+static void bench_floors(report *out)
+{
+    static const struct {
+        const char *name;
+        int64_t n;
+        bool plate;
+        double sink;
+    } rows[] = {{"membrane_500_weak", 500, false, 1.1},
+                {"plate_100_weak", 100, true, 1.5},
+                {"plate_100", 100, true, 5.0},
+                {"plate_100_strong", 100, true, 100.0}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        bench_value ratio;
+        int64_t steps;
+        if (!bench_floor(&ratio, &steps, rows[i].n, rows[i].plate, rows[i].sink)) {
+            printf("%s was not solved\n", rows[i].name);
+            exit(1);
+        }
+        print_row(out, rows[i].name, "x", ratio,
+                  rows[i].plate ? "linear solve (at most 10)" : "linear solve (at most 2.5)");
+        print_count(out, rows[i].name, "steps", steps);
+    }
+}
+
 static void bench_memories(report *out)
 {
     static const char *const sizes[] = {"300", "600", "900", BENCH_CUBE "32"};
@@ -413,6 +438,8 @@ int main(int argc, char **argv)
         bench_accuracies(&out);
     if (wanted(&out, "obstclae"))
         bench_obstacles(&out);
+    if (wanted(&out, "floor"))
+        bench_floors(&out);
     if (wanted(&out, "oblique"))
         bench_oblique_planes(&out);
     if (wanted(&out, "memory"))

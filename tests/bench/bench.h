@@ -30,6 +30,10 @@ double bench_ipopt(double *u, double *value, const uz_csc *K, const double *p, d
 /* OBSTCLAE: time of Ipopt over ours, and ours. *compared false: there is no Ipopt, and no ratio. false: no answer. */
 bool bench_obstacle(bench_value *ratio, bench_value *milliseconds, bool *compared);
 
+/* A membrane or a plate of n x n dofs that would sink to `sink` times the depth of its floor: a cold solve over
+ * CHOLMOD's linear solve of the same K, and the steps it took. false: no answer. */
+bool bench_floor(bench_value *ratio, int64_t *steps, int64_t n, bool plate, double sink);
+
 /* Peak memory of a cold contact solve over that of the linear solve of the same K with the ordering that takes least,
  * and that of the contact solve, in processes of their own. problem: cells along the paper's body as text, or "hex8_"
  * and those of a cube. */
