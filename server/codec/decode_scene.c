@@ -192,8 +192,7 @@ static bool decode_contacts(uz_scene *out, decoding *d, const json_value *list)
         decode_name(to->on, sizeof to->on, item, "on", "");
         decode_name(to->with, sizeof to->with, item, "with", "");
         to->kind = UZ_OBSTACLE_BODY;
-        to->between =
-            json_text_is(json_get(item, "discretization"), "surfaces") ? UZ_CONTACT_SURFACES : UZ_CONTACT_NODES;
+        to->between = json_text_is(json_get(item, "discretization"), "nodes") ? UZ_CONTACT_NODES : UZ_CONTACT_SURFACES;
         to->faceted = json_is(json_get(item, "smooth"), JSON_IS_BOOLEAN) && !json_truth(json_get(item, "smooth"));
         to->feature_angle = decode_number(item, "feature_angle", 0);
         for (size_t k = 0; k < sizeof SHAPES / sizeof SHAPES[0]; k++) {

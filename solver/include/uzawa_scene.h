@@ -135,8 +135,8 @@ typedef enum {
 } uz_obstacle_kind;
 /* Between two parts of the body. */
 typedef enum {
-    UZ_CONTACT_NODES,   /* nodes of `on` against faces of `with` */
-    UZ_CONTACT_SURFACES /* the two surfaces in the mean, by dual mortar rows; on and with may be exchanged */
+    UZ_CONTACT_SURFACES, /* the two surfaces in the mean, by dual mortar rows; on and with may be exchanged */
+    UZ_CONTACT_NODES     /* nodes of `on` against faces of `with` */
 } uz_contact_between;
 typedef struct {
     char on[64];

@@ -73,7 +73,7 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
     for (int64_t first = 0, last; done && first < m; first = last) {
         for (last = first; last < m && contact[last] == contact[first];)
             last++;
-        if (scene->contacts[contact[first]].between == UZ_CONTACT_SURFACES) {
+        if (model->sites && model->sites[contact[first]].at) {
             /* Between surfaces the pressure is that of the rows' own functions, whose integrals are the areas. */
             for (int64_t i = first; i < last; i++)
                 pressure[i] = -r[i] / model->info.contact_area[i];

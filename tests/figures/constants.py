@@ -73,8 +73,11 @@ PHRASES = {
     "| 60 x 20 | 1.838e-3 | 1603 | -3.9620174378e-3 | -10.53866779 | 44 |": reference(("-3.9620174378e-3", "-10.53866779")),
     "| 120 x 40 | 3.625e-3 | 3161 | -3.9624809230e-3 | -10.54546589 | 88 |": reference(("-3.9624809230e-3", "-10.54546589")),
     "SIAM J. Imaging Sciences 2, 2009": None, "Foundations of Computational Mathematics 15, 2015": None, "Methods in Engineering 24, 1987": None,
-    "Computing 56, 1996": None, "Contact Mechanics, 1985": None,
+    "Computing 56, 1996": None, "Contact Mechanics, 1985": None, "SIAM J. Numerical Analysis 38, 2000": None,
+    "Int. J. Numerical Methods in Engineering 83, 2010": None, "Applied Mechanics and Engineering 193, 2004": None,
+    "Applied Mechanics and Engineering 200, 2011": None,
     # rules of the program
+    "A node of which less than 5 % is covered": constant(0.05, r"LEAST_COVER ([\d.]+)"),
     "from Poisson's ratio 0.4 on, except in plane stress": constant(0.4, r"#define NEARLY_INCOMPRESSIBLE ([\d.]+)"),
     "the default there, is 5 %": constant(5e-2, r"UZ_BALANCED_TOTAL_ERROR ([\de.-]+)"), "the paper's body 5 % takes": None, "cells, and 2 % takes": None,  # asked for
     "start near an obstacle (2 % of the body's extent": constant(0.02, r"UZ_CANDIDATES_REACH ([\d.]+)"),

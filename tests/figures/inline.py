@@ -25,12 +25,6 @@ def touching(name):
     return lambda data: None if not data.get("gallery") else f"{scene(data, name, 'active')} of {scene(data, name, 'candidates')} nodes"
 
 
-def press_fit_scatter(data):
-    if not data.get("gallery"):
-        return None
-    return f"{scene(data, 'press_fit', 'max_pressure') / scene(data, 'press_fit', 'mean_pressure'):.1f} times"
-
-
 def of_bench(name, text):
     def value(data):
         row = next((row for row in (data.get("bench") or {"ratios": []})["ratios"] if row["name"] == name), None)
@@ -129,7 +123,7 @@ VALUES = {
     "cylinder.hertz_pressure": of_scene("cylinder", "hertz_pressure", "{:.0f}".format), "cylinder.half_width": of_scene("cylinder", "area", "{:.3f}".format),
     "cylinder.hertz_half_width": of_scene("cylinder", "hertz_half_width", "{:.3f}".format),
     "press_fit.pressure": of_scene("press_fit", "mean_pressure", "{:.1f}".format), "press_fit.lame": of_scene("press_fit", "lame_pressure", "{:.1f}".format),
-    "press_fit.scatter": press_fit_scatter, "gear.unknowns": of_scene("gear", "d", "{:,}".format), "paper_body.touching": touching("paper_body"),
+    "press_fit.most": of_scene("press_fit", "max_pressure", "{:.1f}".format), "gear.unknowns": of_scene("gear", "d", "{:,}".format), "paper_body.touching": touching("paper_body"),
     "paper_body.reaction_sum": of_scene("paper_body", "reaction_sum", "{:.6f}".format),
     "page.list": of_page("list_bytes"), "page.job": of_page("job_bytes"),
     "ladder.5": grids(0.05, True), "ladder.2": grids(0.02, True), "ladder.2.before": grids(0.02, False),

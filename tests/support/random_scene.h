@@ -396,6 +396,7 @@ static inline random_scene make_random_scene(uint64_t seed)
     if (two) {
         uz_contact *x = new_contact(&s, UZ_OBSTACLE_BODY, "abottom");
         snprintf(x->with, sizeof x->with, "btop");
+        x->between = random_chance(rng, 0.5) ? UZ_CONTACT_NODES : UZ_CONTACT_SURFACES;
         if (random_chance(rng, 0.7)) {
             hold_all(&s, "bbottom", 0);
         } else { /* it lies on a plane */

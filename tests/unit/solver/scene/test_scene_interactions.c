@@ -152,8 +152,8 @@ static void check_gaps(examined *e)
         const uz_contact *o = &e->s->scene.contacts[info->contact_of[i]];
         double gap = 0, n[3] = {0};
         const bool body = o->kind == UZ_OBSTACLE_BODY;
-        bool known =
-            body ? dim == 2 && gap_to_edges(&gap, n, e, o, node) : gap_by_hand(&gap, n, o, info->xyz + node * dim, dim);
+        bool known = body ? dim == 2 && o->between == UZ_CONTACT_NODES && gap_to_edges(&gap, n, e, o, node)
+                          : gap_by_hand(&gap, n, o, info->xyz + node * dim, dim);
         for (int c = 0; c < dim; c++)
             reach = fmax(reach, fabs(info->xyz[node * dim + c]) + o->radius);
         HOLDS(e, e->x->r[i] <= 0, "row %lld pulls", (long long)i);
@@ -169,20 +169,18 @@ static void check_gaps(examined *e)
 
 /* ------------------------------------------------------------------- forces */
 
-static void add_row_force(examined *e, int64_t i, int64_t *place)
+/* r: what the row's node gets (uz_row_forces). */
+static void add_row_force(examined *e, int64_t i, double r)
 {
     const uz_mesh_info *info = &e->model.info;
-    const int64_t k = info->contact_of[i];
-    const uz_contact_sites *sites = e->model.sites ? &e->model.sites[k] : NULL;
-    const uz_group *group = uz_mesh_group(&e->model.mesh, e->s->scene.contacts[k].on, "", NULL);
-    while (uz_group_node_at(group, *place) != info->contact_node[i])
-        ++*place;
+    const uz_contact_sites *sites = e->model.sites ? &e->model.sites[info->contact_of[i]] : NULL;
+    const int64_t place = e->model.row_place[i];
     for (int c = 0; c < info->dim; c++) {
-        const double f = -e->x->r[i] * info->contact_normal[i * info->dim + c];
+        const double f = -r * info->contact_normal[i * info->dim + c];
         e->contact[info->contact_node[i] * info->dim + c] += f;
         e->size += fabs(f);
-        for (int64_t j = sites && sites->first ? sites->first[*place] : 0;
-             sites && sites->first && j < sites->first[*place + 1]; j++)
+        for (int64_t j = sites && sites->first ? sites->first[place] : 0;
+             sites && sites->first && j < sites->first[place + 1]; j++)
             e->contact[sites->node[j] * info->dim + c] -= sites->weight[j] * f;
     }
 }
@@ -191,17 +189,17 @@ static void find_forces(examined *e)
 {
     const uz_mesh_info *info = &e->model.info;
     const int64_t total = info->n_nodes * info->dim;
-    int64_t place = 0;
+    double *push = scene_room(e->x->m, sizeof *push);
     uz_error err = {0};
     e->load = scene_room(total, sizeof *e->load);
     e->inner = scene_room(total, sizeof *e->inner);
     e->contact = scene_room(total, sizeof *e->contact);
     CHECK(uz_nodal_loads(e->load, &e->model, &e->s->scene, &err) == UZ_OK);
     CHECK(uz_internal_forces(e->inner, &e->model, e->x->u, &err) == UZ_OK);
-    for (int64_t i = 0; i < e->x->m; i++) {
-        place = i > 0 && info->contact_of[i] == info->contact_of[i - 1] ? place : 0;
-        add_row_force(e, i, &place);
-    }
+    uz_row_forces(push, &e->model, e->x->r);
+    for (int64_t i = 0; i < e->x->m; i++)
+        add_row_force(e, i, push[i]);
+    free(push);
     for (int64_t i = 0; i < total; i++) {
         e->inner[i] += e->model.spring ? e->model.spring[i] * e->x->u[i] : 0;
         e->size += fabs(e->load[i]);
