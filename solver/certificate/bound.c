@@ -116,6 +116,11 @@ double uz_bound_doubt(double inverse, int64_t d)
     return DBL_EPSILON * sqrt((double)d) * 8.0 * inverse;
 }
 
+double uz_bound_rounding(double size, int64_t d)
+{
+    return 8.0 * DBL_EPSILON * sqrt((double)d) * size;
+}
+
 double uz_bound_noise(double spread, double sum)
 {
     return DOUBLE_DOUBLE_ROUNDING * sqrt((1.0 + spread) * sum);
@@ -126,9 +131,7 @@ double uz_bound_noise(double spread, double sum)
 
 double uz_bound_enlarge(double square, double doubt, double noise)
 {
-    double norm = sqrt(square);
-    if (norm > 0.0)
-        norm = doubt < MOST_DOUBT ? norm / sqrt(1.0 - doubt) + noise : INFINITY;
+    const double norm = doubt < MOST_DOUBT ? sqrt(square) / sqrt(1.0 - doubt) + noise : INFINITY;
     return norm * norm;
 }
 
@@ -154,6 +157,9 @@ double uz_bound_reference(double whole_norm, double free_norm, double error)
  * nothing. Above it they keep all of the digits that matter. */
 #define ENERGY_LEAST 0x1p-850
 
+/* What the rounding of sums may hide of terms that do not cancel, relative. */
+#define SUMS 0x1p-40
+
 static bool has_underflown(const uz_certificate *out, const uz_bound_terms *t)
 {
     return t->anything && fmax(out->energy_norm * out->energy_norm, 0x1p106 * t->square) < ENERGY_LEAST;
@@ -172,8 +178,12 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
     bool number = !isnan(t->stiffness) && !isnan(t->load) && !isnan(t->change) && !isnan(t->square);
     if (isnan(out->gap) || !number) /* overflow on the way; fmax would make 0 of it */
         out->gap = INFINITY;
+    if (t->anything) /* whatever squares and products lose by underflow */
+        out->gap = fmax(out->gap, DBL_MIN);
     out->energy_dual = out->energy_primal - out->gap;
     out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;
+    if (t->anything)
+        out->absolute_error = (1.0 + SUMS) * out->absolute_error + sqrt(DBL_MIN);
     if (t->moved)
         out->energy_norm = uz_bound_reference(t->whole_norm, out->energy_norm, out->absolute_error);
     out->relative_error = relative_to_exact(out->absolute_error, out->energy_norm);

@@ -31,6 +31,9 @@ double uz_bound_enlarge(double square, double doubt, double noise);
  * K_ii K_jj. Good enough to see where it does not matter; elsewhere uz_distrust measures it. */
 double uz_bound_doubt(double inverse, int64_t d);
 
+/* What the rounding of K c, summed in double precision, may hide of c'K c; size: the sum of K_jj c_j^2. */
+double uz_bound_rounding(double size, int64_t d);
+
 /* What the rounding of double-double sums may hide of e, in the norm of K^-1: it matters only where rounding hit u* by
  * chance. sum: of u_j^2 K_jj + (|K u|_j + |p_j|)^2 / K_jj. */
 double uz_bound_noise(double spread, double sum);

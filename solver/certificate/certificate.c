@@ -223,6 +223,10 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
             for (int64_t k = c->in->N->ptr[j]; k < c->in->N->ptr[j + 1]; k++)
                 c->res.e[j] -= c->in->N->val[k] * c->in->low_r[c->in->N->idx[k]];
     add_up(c, &terms);
+    double size = 0.0; /* of the correction, in the norm of W^-1 */
+    for (int64_t b = 0; b < c->n_b; b++)
+        size += c->c[c->dof[b]] / c->weight_b[b] * c->c[c->dof[b]];
+    terms.correction_energy += uz_bound_rounding(size, c->d);
     if (c->in->precise_energies && isfinite(terms.stiffness) && isfinite(terms.load))
         sharpen_energies(c, &terms, r, g);
     if (feasible)

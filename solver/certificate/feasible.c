@@ -78,8 +78,10 @@ double uz_feasible_gap(const uz_feasible *c, int64_t i)
 double uz_feasible_complementarity(const uz_feasible *c, const double *r)
 {
     double sum = 0.0;
-    for (int64_t i = 0; i < c->m; i++)
-        sum -= r[i] * fabs(uz_feasible_gap(c, i));
+    for (int64_t i = 0; i < c->m; i++) {
+        const double gap = fabs(uz_feasible_gap(c, i)), product = -r[i] * gap;
+        sum += r[i] != 0.0 && gap > 0.0 ? fmax(product, DBL_MIN) : product; /* never 0 by underflow */
+    }
     return sum;
 }
 

@@ -336,7 +336,10 @@ static void conclude_lane(const uz_lane_certifier *c, int lane, uz_lane_answer *
     terms->stiffness = s->stiffness[l];
     terms->load = s->load[l];
     terms->change = s->change[l];
-    terms->correction_energy = s->correction_energy[l];
+    double size = 0.0;
+    for (int64_t b = 0; b < c->n_b; b++)
+        size += c->c[b * WIDTH + lane] / c->weight_b[b] * c->c[b * WIDTH + lane];
+    terms->correction_energy = s->correction_energy[l] + uz_bound_rounding(size, c->K->cols);
     terms->e1 = sqrt(s->e_square[l]);
     terms->force = sqrt(s->force[l]);
     terms->span = c->steepest * s->largest[l];

@@ -12,6 +12,7 @@ static const char *const STATUS_NAMES[] = {
     [UZ_ERR_UNSUPPORTED] = "matrix_market_unsupported",
     [UZ_ERR_SIZE] = "size_mismatch",
     [UZ_ERR_NOT_FINITE] = "not_finite",
+    [UZ_ERR_RANGE] = "out_of_range",
     [UZ_ERR_NOT_SYMMETRIC] = "not_symmetric",
     [UZ_ERR_NOT_SPD] = "not_positive_definite",
     [UZ_ERR_FREE_BODY] = "free_body",

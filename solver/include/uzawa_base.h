@@ -21,6 +21,7 @@ typedef enum {
     UZ_ERR_UNSUPPORTED,   /* well formed, but a kind that is not solved here (complex, pattern, ...) */
     UZ_ERR_SIZE,          /* shapes do not agree */
     UZ_ERR_NOT_FINITE,    /* NaN or Inf in the input, or produced by overflow */
+    UZ_ERR_RANGE,         /* a number so small that its products have no digits left */
     UZ_ERR_NOT_SYMMETRIC, /* K differs from K' */
     UZ_ERR_NOT_SPD,       /* K is not positive definite to working precision */
     UZ_ERR_FREE_BODY,     /* supports leave a rigid-body mode free */

@@ -79,6 +79,22 @@ static uz_status check_shapes(const uz_qp *qp, uz_error *err)
     return UZ_OK;
 }
 
+/* Below it the errors of products with it leave the range of normal numbers, and its own digits are gone soon after. */
+#define STIFFNESS_LEAST 0x1p-960
+
+static uz_status check_diagonal(const uz_csc *K, uz_error *err)
+{
+    for (int64_t j = 0; j < K->cols; j++) {
+        const int64_t k = K->ptr[j];
+        if (k < K->ptr[j + 1] && K->idx[k] == j && K->val[k] > 0.0 && K->val[k] < STIFFNESS_LEAST)
+            return uz_fail(err, UZ_ERR_RANGE, "K",
+                           "K(%lld, %lld) = %.3g (counted from 1) is too small to calculate with in double precision: "
+                           "choose other units of force or length",
+                           (long long)j + 1, (long long)j + 1, K->val[k]);
+    }
+    return UZ_OK;
+}
+
 /* N may be a zeroed struct when there are no contacts. */
 uz_status uz_qp_check(const uz_qp *qp, uz_error *err)
 {
@@ -86,6 +102,8 @@ uz_status uz_qp_check(const uz_qp *qp, uz_error *err)
     uz_status status = check_shapes(qp, err);
     if (status == UZ_OK)
         status = check_matrix(&qp->K, true, "K", err);
+    if (status == UZ_OK)
+        status = check_diagonal(&qp->K, err);
     if (status == UZ_OK && qp->N.cols > 0)
         status = check_matrix(&qp->N, false, "N", err);
     if (status == UZ_OK)

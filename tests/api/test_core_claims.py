@@ -92,6 +92,22 @@ def test_ill_conditioned_answers_are_not_said_to_be_better_than_they_are(s):
     check_claims(s, "bound_below_small", 1e-9)
 
 
+def test_a_bound_is_not_zero_by_underflow(s):
+    for name in ("zero_bound_denormal", "zero_bound_tiny_load"):
+        claimed = s.solve(request_of(name))["summary"]["certificate"]
+        for what in ("relative_error", "absolute_error", "gap"):
+            check(claimed[what] is None or claimed[what] > 0, name, what, claimed)
+
+
+def test_a_stiffness_without_digits_is_refused(s):
+    for value in ("5e-324", "3e-310", "1e-300"):
+        request = {"problem": {"kind": "matrices", "p": [1], "h": [1],
+                               "K": f"%%MatrixMarket matrix coordinate real symmetric\n1 1 1\n1 1 {value}\n",
+                               "N": "%%MatrixMarket matrix coordinate real general\n1 1 1\n1 1 1\n"}}
+        refused = expect(s.post(request), 422, "out_of_range").json
+        check(refused["pointer"] == "/problem/K", refused)
+
+
 def test_a_matrix_that_is_not_definite_by_less_than_rounding_is_refused(s):
     job = s.solve(request_of("not_positive_definite"))
     check(job["status"] == "failed" and job["error"]["code"] == "not_positive_definite", job)

@@ -1,4 +1,5 @@
-/* conditioned.h: ill-conditioned problems of known kinds, and their solutions in 100 digits.
+/* conditioned.h: ill-conditioned problems of known kinds, problems at the ends of the range of double, and their
+ * solutions in 100 digits.
  *
  * The condition of K, after scaling by its diagonal, goes from 1e8 to 1e17, where quadruple precision is no reference
  * any more and rounding alone may decide whether K is positive definite. GMP's floating-point numbers keep 384 bits:
@@ -83,26 +84,29 @@ typedef struct {
     double condition; /* of diag(K)^-1/2 K diag(K)^-1/2, to a factor of about 2 */
     big *L, *u;       /* d x d, d */
     double norm;      /* ||u*||_K */
+    big *error;       /* 3: ||u - u*||_K of the answer judged last, ||u*||_K, and what of both may be rounding */
 } big_truth;
 
 static inline void big_truth_clear(big_truth *t)
 {
     big_free(t->L, t->d * t->d);
     big_free(t->u, t->d);
+    big_free(t->error, 2);
     memset(t, 0, sizeof *t);
 }
 
-static inline double big_norm(const big *x, int64_t n)
+/* *norm = ||x||, and as a double, toward zero. */
+static inline double big_norm(big *norm, const big *x, int64_t n)
 {
-    big *room = big_zeros(1);
+    big *room = big_zeros(0);
+    mpf_set_ui(norm, 0);
     for (int64_t i = 0; i < n; i++) {
         mpf_mul(room, &x[i], &x[i]);
-        mpf_add(&room[1], &room[1], room);
+        mpf_add(norm, norm, room);
     }
-    mpf_sqrt(&room[1], &room[1]);
-    const double norm = mpf_get_d(&room[1]);
-    big_free(room, 1);
-    return norm;
+    mpf_sqrt(norm, norm);
+    big_free(room, 0);
+    return mpf_get_d(norm);
 }
 
 /* ||u - u*||_K = ||L'(u - u*)||, toward zero. */
@@ -117,7 +121,7 @@ static inline double big_error(const big_truth *t, const double *u)
     for (int64_t j = 0; j < d; j++)
         for (int64_t i = j; i < d; i++)
             big_subtract(&turned[j], &t->L[i * d + j], &e[i], &e[d]);
-    const double error = big_norm(turned, d);
+    const double error = big_norm(&t->error[0], turned, d);
     big_free(e, d);
     big_free(turned, d);
     return error;
@@ -150,7 +154,7 @@ static inline double big_condition(const big *L, const uz_csc *K, qp_random *rng
         most = norm;
     }
     for (int pass = 0; pass < 4; pass++) {
-        const double before = big_norm(z, d);
+        const double before = big_norm(&z[d], z, d);
         for (int64_t j = 0; j < d; j++) {
             mpf_set_d(&z[d], root[j]);
             mpf_mul(&z[j], &z[j], &z[d]);
@@ -161,7 +165,7 @@ static inline double big_condition(const big *L, const uz_csc *K, qp_random *rng
             mpf_set_d(&z[d], root[j]);
             mpf_mul(&z[j], &z[j], &z[d]);
         }
-        size = big_norm(z, d) / before;
+        size = big_norm(&z[d], z, d) / before;
     }
     big_free(z, d);
     free(x);
@@ -228,7 +232,7 @@ static inline bool big_contact(big *r, bool *active, const big *D, const big *g0
 static inline big_truth find_big_truth(const uz_qp *qp, bool *active)
 {
     const int64_t d = qp->K.cols, m = qp->N.rows;
-    big_truth t = {.d = d, .L = big_zeros(d * d), .u = big_zeros(d)};
+    big_truth t = {.d = d, .L = big_zeros(d * d), .u = big_zeros(d), .error = big_zeros(2)};
     big *Z = big_zeros(m * d), *D = big_zeros(m * m), *g0 = big_zeros(m), *r = big_zeros(m), *room = &t.u[d];
     qp_random rng = {1};
     for (int64_t j = 0; j < d; j++) {
@@ -254,13 +258,15 @@ static inline big_truth find_big_truth(const uz_qp *qp, bool *active)
                 mpf_neg(&D[i * m + k], &D[i * m + k]);
             }
         }
+        big_norm(&t.error[2], t.u, d);
+        mpf_div_2exp(&t.error[2], &t.error[2], 300);
         t.solved = big_contact(r, active, D, g0, m);
         for (int64_t i = 0; i < m; i++) {
             mpf_neg(&r[i], &r[i]);
             for (int64_t j = 0; j < d; j++)
                 big_subtract(&t.u[j], &Z[i * d + j], &r[i], room);
         }
-        t.norm = big_norm(t.u, d);
+        t.norm = big_norm(&t.error[1], t.u, d);
         big_solve(t.u, t.L, d, true);
     }
     big_free(Z, m * d);
@@ -425,12 +431,26 @@ static inline double *conditioned_stiffness(qp_random *rng, int64_t *d)
     return K;
 }
 
-/* The same problem for the same seed; the rows do not depend on each other, and something meets them all. */
-static inline uz_qp conditioned_qp(uint64_t seed)
+/* A power of ten from all that double has, or 1. */
+static inline double random_range(qp_random *rng)
+{
+    return random_chance(rng, 0.3)   ? 1
+           : random_chance(rng, 0.5) ? random_power(rng, -200, 0)
+                                     : random_power(rng, -323, 300);
+}
+
+/* The same problem for the same seed; the rows do not depend on each other, and something meets them all. ranged: the
+ * condition is moderate, but sizes are from the whole range of double. */
+static inline uz_qp conditioned_qp(uint64_t seed, bool ranged)
 {
     qp_random rng = {seed * 0x9E3779B97F4A7C15u + 5};
-    int64_t d;
-    double *K = conditioned_stiffness(&rng, &d);
+    int64_t d = 1 + (int64_t)(seed % 9);
+    double *K = ranged
+                    ? random_spd(&rng, d, random_power(&rng, 0, 8), random_chance(&rng, 0.8) ? 1 : random_range(&rng))
+                    : conditioned_stiffness(&rng, &d);
+    if (ranged && random_chance(&rng, 0.4)) /* dofs that nothing couples may have answers of any size */
+        for (int64_t k = 0; k < d * d; k++)
+            K[k] = k % (d + 1) == 0 ? floor(1 + 20 * random_unit(&rng)) : 0;
     int64_t m = random_int(&rng, 0, CONDITIONED_ROWS + 1);
     m = m > d ? d : m;
     double *N = vector(m * d);
@@ -450,6 +470,14 @@ static inline uz_qp conditioned_qp(uint64_t seed)
         uz_csc_symv(qp.p, &qp.K, 1, u);
     for (int64_t i = 0; i < m; i++)
         qp.h[i] = random_chance(&rng, 0.3) ? 0 : random_signed(&rng) * (smooth ? 1 : random_power(&rng, 0, 4));
+    const double force = ranged ? random_range(&rng) : 1, length = ranged ? random_range(&rng) : 1;
+    const bool apart = ranged && random_chance(&rng, 0.5);
+    for (int64_t j = 0; j < d; j++)
+        qp.p[j] = fmax(-1e300, fmin(1e300, qp.p[j] * (apart ? random_range(&rng) : force)));
+    for (int64_t i = 0; i < m; i++)
+        qp.h[i] = fmax(-1e300, fmin(1e300, qp.h[i] * (apart                      ? random_range(&rng)
+                                                      : random_chance(&rng, 0.7) ? force
+                                                                                 : length)));
     free(u);
     free(K);
     free(N);
@@ -476,18 +504,32 @@ static inline const char *judge_conditioned(conditioned_tally *t, const big_trut
         return "infeasible, but it is not";
     if (!exact->definite)
         return claims ? "certified, but K is not positive definite" : NULL;
-    const double error = big_error(exact, result->u), relative = error > 0 ? error / exact->norm : 0;
-    if (error > 0 && isfinite(c->relative_error))
-        t->least_ratio = fmin(t->least_ratio, c->relative_error / relative);
-    if (s->outcome == UZ_CONVERGED && !(relative <= s->requested_error))
+    for (int64_t j = 0; j < exact->d; j++)
+        if (!isfinite(result->u[j]))
+            return claims ? "certified, but not a number" : NULL;
+    big_error(exact, result->u);
+    big *relative = big_zeros(0);
+    const bool off = mpf_cmp(&exact->error[0], &exact->error[2]) > 0,
+               zero = mpf_cmp(&exact->error[1], &exact->error[2]) <= 0;
+    if (off && !zero)
+        mpf_div(relative, &exact->error[0], &exact->error[1]);
+    const double ratio = off && !zero ? mpf_get_d(relative) : off ? INFINITY : 0;
+    if (off && isfinite(c->relative_error) && ratio > 0)
+        t->least_ratio = fmin(t->least_ratio, c->relative_error / ratio);
+    const bool low = isfinite(c->relative_error) && off && (zero || mpf_cmp_d(relative, c->relative_error) > 0),
+               low_absolute = isfinite(c->absolute_error) && off && mpf_cmp_d(&exact->error[0], c->absolute_error) > 0;
+    big_free(relative, 0);
+    if (s->outcome == UZ_CONVERGED && !(ratio <= s->requested_error))
         return "converged, but the true error is above the request";
-    if (!(relative <= c->relative_error) || !(error <= c->absolute_error))
+    if (off && (c->relative_error == 0 || c->absolute_error == 0 || c->gap == 0))
+        return "a bound is zero, but the answer is not exact";
+    if (low || low_absolute)
         return "a bound is below the true error";
     return NULL;
 }
 
-/* Several requests on the problem of a seed: cold, or twice with a cache. The condition out of range: none. */
-static inline void run_conditioned(conditioned_tally *t, uint64_t seed,
+/* Several requests on the problem of a seed: cold, or twice with a cache. None where its condition is not meant. */
+static inline void run_conditioned(conditioned_tally *t, uint64_t seed, bool ranged,
                                    void (*fail)(void *ctx, uint64_t seed, const big_truth *exact,
                                                 const uz_result *result, const char *why),
                                    void *ctx)
@@ -496,7 +538,7 @@ static inline void run_conditioned(conditioned_tally *t, uint64_t seed,
     static const uz_operator forms[] = {UZ_OPERATOR_AUTO, UZ_OPERATOR_AUTO, UZ_OPERATOR_CONDENSED,
                                         UZ_OPERATOR_FACTORED};
     qp_random rng = {seed + 3};
-    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = conditioned_qp(seed)};
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES, .qp = conditioned_qp(seed, ranged)};
     bool active[CONDITIONED_ROWS] = {false}, known = false;
     big_truth exact = {0};
     uz_cache *cache = random_chance(&rng, 0.3) ? uz_cache_new((size_t)1 << 24) : NULL;
@@ -515,7 +557,7 @@ static inline void run_conditioned(conditioned_tally *t, uint64_t seed,
         if (!known)
             exact = find_big_truth(&problem.qp, active);
         known = true;
-        if (exact.definite && !(exact.condition >= 1e8 && exact.condition <= 1e17))
+        if (!ranged && exact.definite && !(exact.condition >= 1e8 && exact.condition <= 1e17))
             break;
         t->problems += turn == 0;
         t->indefinite += turn == 0 && !exact.definite;
@@ -525,12 +567,14 @@ static inline void run_conditioned(conditioned_tally *t, uint64_t seed,
         const char *why = NULL;
         if (exact.definite && strstr(err.message, "u'K u < 0"))
             why = "K is said not to be positive definite, but it is";
-        const int decade = exact.definite ? (int)log10(exact.condition) : 20;
+        const int decade = exact.definite ? (int)fmin(19, fmax(0, log10(exact.condition))) : 20;
         t->by_decade[decade][0]++;
         if (status == UZ_OK) {
             t->by_decade[decade][1] += result->summary.certificate.relative_error <= 1e-2;
             why = exact.definite && !exact.solved ? NULL : judge_conditioned(t, &exact, result);
         }
+        if (status == UZ_ERR_INTERNAL)
+            why = "a fault";
         t->wrong += why != NULL;
         if (why)
             fail(ctx, seed, &exact, result, why);

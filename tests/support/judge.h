@@ -203,7 +203,7 @@ static inline judgement judge_bounds(judgement j, const truth *t, const uz_resul
 /* The reference is exact enough to contradict the claim, if it is false by a quarter. */
 static inline bool is_sharp(const truth *t, const judgement *j)
 {
-    return !(t->noise > 0) || isinf(j->certified) || t->noise <= (quad)0.25 * j->certified * t->norm;
+    return t->noise <= (quad)1e-27 * t->norm || isinf(j->certified) || t->noise <= (quad)0.25 * j->certified * t->norm;
 }
 
 /* u (d): the answer, by dof. */

@@ -19,7 +19,7 @@ TEST(claims_on_ill_conditioned_problems_are_true)
     uz_process_init(2);
     uz_thread_init();
     for (uint64_t seed = 0; t.problems < PROBLEMS; seed++)
-        run_conditioned(&t, seed, fail, NULL);
+        run_conditioned(&t, seed, false, fail, NULL);
     for (int k = 8; k < 14; k++) {
         solves += t.by_decade[k][0];
         answers += t.by_decade[k][1];
@@ -40,7 +40,20 @@ TEST(bounds_that_were_once_too_small_hold)
     static const uint64_t seeds[] = {101, 262, 318, 349, 420, 440, 1411, 2533};
     conditioned_tally t = {.least_ratio = INFINITY};
     for (size_t k = 0; k < sizeof seeds / sizeof seeds[0]; k++)
-        run_conditioned(&t, seeds[k], fail, NULL);
+        run_conditioned(&t, seeds[k], false, fail, NULL);
     CHECK_INT(t.problems, (int64_t)(sizeof seeds / sizeof seeds[0]));
     CHECK_INT(t.wrong, 0);
+}
+
+/* Loads, gaps and stiffnesses from the whole range of double: no bound is zero after underflow, none is false, and what
+ * can't be calculated with is refused by name. */
+TEST(claims_at_the_ends_of_the_range_are_true)
+{
+    conditioned_tally t = {.least_ratio = INFINITY};
+    for (uint64_t seed = 0; t.problems < 2 * PROBLEMS; seed++)
+        run_conditioned(&t, seed, true, fail, NULL);
+    printf("# %d problems: %d solves, %d converged, %d refused\n", (int)t.problems, (int)t.solves, (int)t.converged,
+           (int)t.refused);
+    CHECK_INT(t.wrong, 0);
+    CHECK(t.converged > t.solves / 3);
 }
