@@ -307,7 +307,7 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
     }
     f->u = c->u_b;
     f->h = a->h;
-    bool feasible = uz_make_feasible(f, a->r);
+    bool feasible = uz_make_feasible(f, a->r) && !f->pushed; /* what pushes say of r is for uz_certify */
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[b * WIDTH + lane] = f->correction[b];
     couple(c, lane);

@@ -30,7 +30,7 @@ static uz_status no_solve(void *ctx, double *value, double *e, uz_error *err)
 }
 
 /* Certificates in lanes of answers that are off by anything: the bounds hold, and are those of uz_certify. */
-static void check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng)
+static int check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng)
 {
     int64_t d = qp->K.cols, m = qp->N.rows;
     linear f = factor_of(&qp->K);
@@ -49,6 +49,7 @@ static void check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng
         }
     }
     double *r = vector(m), *g = vector(m);
+    int certified = 0;
     for (int l = 0; l < UZ_CERTIFY_LANES; l++) {
         uz_certify_input in = {.K = &qp->K,
                                .N = &qp->N,
@@ -64,9 +65,10 @@ static void check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng
             u[j] = U[j * UZ_CERTIFY_LANES + l];
         CHECK_INT(uz_certify(&one, r, g, u, &in, NULL), UZ_OK);
         const uz_certificate *c = &answers[l].certificate;
-        CHECK(answers[l].certified == isfinite(one.absolute_error));
+        CHECK(!answers[l].certified || isfinite(one.absolute_error));
         if (!answers[l].certified)
             continue;
+        certified++;
         CHECK_MSG(c->absolute_error >= quad_error(exact, u), "lane %d: off by %.17g, bound %.17g", l,
                   quad_error(exact, u), c->absolute_error);
         CHECK(c->absolute_error >= quad_error_of_reactions(exact, r));
@@ -87,21 +89,26 @@ static void check_lanes(const uz_qp *qp, const quad_exact *exact, qp_random *rng
     uz_lane_certifier_free(certifier);
     uz_factor_workspace_free(f.ws);
     uz_factor_free(f.factor);
+    return certified;
 }
 
 TEST(certificates_in_lanes_are_those_of_single_answers)
 {
+    int lanes = 0, certified = 0;
     for (uint64_t seed = 0; seed < 40; seed++) {
         qp_random rng = {seed + 300};
         qp_kind kind = {
             .d = random_int(&rng, 1, 30), .m = random_int(&rng, 1, 10), .condition = pow(10, (double)(seed % 6))};
         uz_qp qp = random_qp(&rng, &kind);
         quad_exact exact;
-        if (quad_exact_solve(&exact, &qp, NULL))
-            check_lanes(&qp, &exact, &rng);
+        if (quad_exact_solve(&exact, &qp, NULL)) {
+            lanes += UZ_CERTIFY_LANES;
+            certified += check_lanes(&qp, &exact, &rng);
+        }
         quad_exact_free(&exact);
         uz_qp_clear(&qp);
     }
+    CHECK_MSG(100 * certified >= 95 * lanes, "%d of %d", certified, lanes); /* others are left to single answers */
 }
 
 /* L^-1 and L'^-1 in lanes against the substitutions of single vectors. */
