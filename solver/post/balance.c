@@ -46,7 +46,7 @@ static void add_force(balance *b, uz_resultant *to, int64_t node, const double *
         arm[c] = x[c] - b->centre[c];
         b->force[c] += f[c];
         b->size += fabs(f[c]);
-        if (to)
+        if (to && (c > 0 || b->model->kind != UZ_AXISYMMETRIC)) /* around the ring a radial force sums to nothing */
             to->force[c] += f[c];
     }
     if (b->model->kind == UZ_AXISYMMETRIC)

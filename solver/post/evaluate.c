@@ -46,8 +46,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     uz_status status = uz_contact_pressure(result->pressure, model, scene, result->r, err);
     if (status != UZ_OK)
         return status;
-    /* Force, area and peak of the contact: the obstacle pushes a row's node along its normal by -push, and `on` is
-     * pushed the other way where the other side has the rows. */
+    /* Force (of rings: axial), area and peak of the contact: the obstacle pushes a row's node along its normal by
+     * -push, and `on` is pushed the other way where the other side has the rows. */
     double *push = uz_alloc(result->m, sizeof *push);
     if (!push)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the forces of %lld rows", (long long)result->m);
@@ -57,7 +57,7 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     for (int64_t i = 0; i < result->m; i++) {
         const int64_t node = mesh->contact_node[i];
         const bool swapped = model->sites && model->sites[mesh->contact_of[i]].swapped;
-        for (int axis = 0; axis < mesh->dim; axis++)
+        for (int axis = model->kind == UZ_AXISYMMETRIC ? 1 : 0; axis < mesh->dim; axis++)
             summary->force[axis] -= (swapped ? -push[i] : push[i]) * mesh->contact_normal[i * mesh->dim + axis];
         if (model->law->kind->active(model->law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];
