@@ -12,10 +12,10 @@
  * zero. */
 enum { BITS = 512, SURE = 300, STEPS_PER_ROW = 20 };
 
-bool uz_precise_is_small(int64_t d, int64_t m)
+bool uz_precise_is_small(int64_t d, int64_t m, double seconds)
 {
     const double n = (double)d, k = (double)m;
-    return n * n * n / 6.0 + 0.5 * n * k * (n + k) + 4.0 * k * k * k <= 1e7;
+    return n * n * n / 6.0 + 0.5 * n * k * (n + k) + 4.0 * k * k * k <= 1e7 * seconds;
 }
 
 typedef struct {

@@ -17,8 +17,8 @@ typedef enum {
     UZ_PRECISE_LEFT /* told to stop, K not positive definite, or too many steps: nothing is known */
 } uz_precise_end;
 
-/* Does it take no more than about a second? d dofs, m rows. */
-bool uz_precise_is_small(int64_t d, int64_t m);
+/* Does it take no more than about so many seconds? d dofs, m rows. */
+bool uz_precise_is_small(int64_t d, int64_t m, double seconds);
 
 /* u + low (d), r + low_r (m): out, each rounded to doubles. K (d x d, lower triangle), N (m x d), p, h: finite. stop
  * may be NULL. Errors: UZ_ERR_MEMORY. */

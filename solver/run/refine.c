@@ -21,7 +21,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_PASSES = 20, FEW_ROWS = 1024 };
+/* IN_VAIN: so many iterations without any bound are a doubt whether there is an answer. */
+enum { MAX_PASSES = 20, FEW_ROWS = 1024, IN_VAIN = 4096 };
 
 /* At this relative error there is nothing to gain: u itself is rounded. */
 #define ROUNDED (16.0 * DBL_EPSILON)
@@ -190,9 +191,11 @@ uz_status uz_run_decide(uz_run *run, uz_error *err)
     const uz_stop stop = {run->asked->hooks, run->asked->deadline};
     const uz_end end = run->work.end;
     const double before = run->answer.certificate.relative_error;
-    const bool gave_up = end == UZ_END_UNDECIDED || end == UZ_END_STALLED || end == UZ_END_SOLVED;
-    if (run->result->ray || !gave_up || !(end == UZ_END_UNDECIDED || isinf(before)) || before <= run->work.requested ||
-        !uz_precise_is_small(run->d, run->m) || uz_stop_is_due(&stop))
+    const bool in_vain = end == UZ_END_ITERATIONS && run->work.it.iteration >= IN_VAIN && isinf(before),
+               gave_up = end == UZ_END_UNDECIDED || end == UZ_END_STALLED || end == UZ_END_SOLVED || in_vain,
+               near = end == UZ_END_UNDECIDED || isinf(before);
+    if (run->result->ray || !gave_up || before <= fmax(run->work.requested, ROUNDED) ||
+        !uz_precise_is_small(run->d, run->m, near ? 1.0 : 0.1) || uz_stop_is_due(&stop))
         return UZ_OK;
     double start = uz_seconds();
     const uz_setup *setup = run->asked->setup;
@@ -208,7 +211,13 @@ uz_status uz_run_decide(uz_run *run, uz_error *err)
                                   uz_setup_N(setup, problem), run->load.p, run->load.h, &stop, err);
     if (status == UZ_OK && ended == UZ_PRECISE_RAY)
         status = uz_run_take_ray(run, answer.r, err);
-    else if (status == UZ_OK && ended == UZ_PRECISE_SOLVED)
+    /* the digits below those of r only where the request needs them: the bound is not that of r alone then */
+    double *low_r = answer.low_r;
+    answer.low_r = NULL;
+    if (status == UZ_OK && ended == UZ_PRECISE_SOLVED)
+        status = uz_run_certify_answer(run, &answer, err);
+    answer.low_r = low_r;
+    if (status == UZ_OK && ended == UZ_PRECISE_SOLVED && answer.certificate.relative_error > run->work.requested)
         status = uz_run_certify_answer(run, &answer, err);
     if (status == UZ_OK && ended == UZ_PRECISE_SOLVED && answer.certificate.relative_error < before) {
         uz_answer swap = run->answer;

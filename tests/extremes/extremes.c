@@ -136,7 +136,8 @@ int main(int argc, char **argv)
                                                 run_invariance,
                                                 run_generated_problems,
                                                 run_conditioned_problems,
-                                                run_degenerate_problems};
+                                                run_degenerate_problems,
+                                                run_contradictions};
     suite all = {.filter = argc > 2 ? argv[2] : NULL};
     if (argc < 2 || !(all.json = fopen(argv[1], "w"))) {
         fprintf(stderr, "usage: extremes OUTPUT.json [part of a family's name]\n");

@@ -68,6 +68,7 @@ void run_exhaustive(suite *all);
 void run_invariance(suite *all);
 void run_generated_problems(suite *all);
 void run_degenerate_problems(suite *all);
+void run_contradictions(suite *all);
 void run_conditioned_problems(suite *all);
 
 const char *name_of(char *room, size_t size, const char *format, ...) __attribute__((format(printf, 3, 4)));
