@@ -21,6 +21,7 @@ const OUTCOMES = {
   paper_rule: ["warn", "Stopped by the paper's rule", "The change of the reactions became small before the certificate met what was asked for."],
   infeasible: ["bad", "Infeasible", "No displacement satisfies all contact conditions: supports and obstacles contradict each other."],
   out_of_reach: ["bad", "Out of reach", "Contact conditions contradict each other but for rounding: a displacement that meets them all, if there is one, is far away."],
+  loose: ["warn", "Loose", "No load presses the body on what would hold it: where the obstacles leave it room it may lie anywhere, and this is one such place."],
   dismissed: ["warn", "Dismissed", "It was stopped. This is the best answer so far, with its own certificate."],
   mesh_limit: ["warn", "Mesh limit", "A grid fine enough would be larger than allowed. The answer is on the finest one that is."],
 };

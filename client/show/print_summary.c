@@ -67,6 +67,7 @@ static void print_outcome(FILE *to, const json_t *summary)
         {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
         {"infeasible", "no displacement satisfies all contact conditions"},
         {"out_of_reach", "a displacement that satisfies all contact conditions, if there is one, is far away"},
+        {"loose", "nothing says where the body lies; this is one place of many"},
         {"dismissed", "it was dismissed; this is the best answer so far"},
         {"verified", "the certificate of the given answer meets what was asked for"},
         {"mesh_limit", "a grid that meets what was asked for is larger than allowed"},

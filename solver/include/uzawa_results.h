@@ -24,7 +24,8 @@ typedef enum {
     UZ_VERIFIED,     /* uz_verify: the certificate of the given answer meets the request */
     UZ_NOT_VERIFIED, /* uz_verify: it does not; the bound says how far it reaches */
     UZ_MESH_LIMIT,   /* cells chosen here: the grid that would meet the request is larger than allowed */
-    UZ_OUT_OF_REACH  /* every feasible u, if there is one, is at least infeasible_radius away, and none was certified */
+    UZ_OUT_OF_REACH, /* every feasible u, if there is one, is at least infeasible_radius away, and none was certified */
+    UZ_LOOSE         /* semicoercive: no load presses the body on what would hold it; u is one place of many */
 } uz_outcome;
 const char *uz_outcome_name(uz_outcome);
 
@@ -101,7 +102,7 @@ typedef struct {
 typedef enum { UZ_FROM_ZERO, UZ_FROM_REACTIONS, UZ_FROM_STATE } uz_origin;
 
 /* What acts on the body at a group: force by direction and moment about the origin (plane: moment[2] alone). Rings: the
- * force along y; that along x is its sum around the ring, and there is no moment. */
+ * force along y; what acts along the radius sums to nothing around them, and there is no moment. */
 typedef struct {
     char on[64];
     double force[3], moment[3];

@@ -344,7 +344,7 @@ static uz_status try_grid(search *g, int64_t n, uz_error *err)
 static void conclude(const search *g, uz_summary *s)
 {
     s->requested_error = g->requested;
-    if (uz_has_no_answer(s))
+    if (uz_has_no_answer(s) || s->outcome == UZ_LOOSE)
         return;
     if (s->total_error <= g->requested) {
         s->outcome = UZ_CONVERGED;

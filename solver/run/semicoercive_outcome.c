@@ -204,6 +204,8 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
         summary->outcome = UZ_CONVERGED;
     else if (!result->ray && summary->outcome == UZ_CONVERGED)
         summary->outcome = UZ_PRECISION_LIMIT;
+    if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT && is_loose(s))
+        summary->outcome = UZ_LOOSE;
     summary->requested_error = s->requested;
     summary->discretization_error = s->discretization_error;
     name_rows(s, &summary->semicoercive);
@@ -213,12 +215,13 @@ uz_status uz_semi_conclude(uz_semi *s, uz_error *err)
         uz_blank_answer(result);
     summary->message[0] = '\0';
     uz_explain_outcome(result, UZ_END_STALLED);
-    if (!s->proved && summary->outcome == UZ_PRECISION_LIMIT)
+    if (!s->proved && (summary->outcome == UZ_PRECISION_LIMIT || summary->outcome == UZ_LOOSE))
         snprintf(summary->message, sizeof summary->message, "%s",
-                 is_loose(s) ? "no load moves the body along a motion that no support holds: where the obstacles on "
-                               "both sides leave it room it may lie anywhere, and this is one such place"
-                             : "no rows could be proved to hold the body, which no support does: it may be balanced on "
-                               "the edge of its contact");
+                 summary->outcome == UZ_LOOSE
+                     ? "no load moves the body along a motion that no support holds: where the obstacles on both sides "
+                       "leave it room it may lie anywhere, and this is one such place"
+                     : "no rows could be proved to hold the body, which no support does: it may be balanced on the "
+                       "edge of its contact");
     summary->timings.assemble += s->assemble_s;
     summary->timings.total = uz_seconds() - s->started;
     /* bounds of iterations were about regularized problems; that of the certificate alone is about this one */

@@ -33,7 +33,7 @@ static const char *const OUTCOMES[] = {
     [UZ_PAPER_RULE] = "paper_rule",     [UZ_INFEASIBLE] = "infeasible",
     [UZ_DISMISSED] = "dismissed",       [UZ_VERIFIED] = "verified",
     [UZ_NOT_VERIFIED] = "not_verified", [UZ_MESH_LIMIT] = "mesh_limit",
-    [UZ_OUT_OF_REACH] = "out_of_reach",
+    [UZ_OUT_OF_REACH] = "out_of_reach", [UZ_LOOSE] = "loose",
 };
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
