@@ -8,6 +8,7 @@
 
 #include "assembly/discretization.h"
 #include "obstacle/box_tree.h"
+#include "obstacle/smooth_shape.h"
 
 /* Where a contact names no feature angle: degrees. */
 #define UZ_FEATURE_ANGLE 40
@@ -19,9 +20,10 @@ typedef struct {
     int nodes;
     int64_t node[UZ_FACE_NODES], place[UZ_FACE_NODES];
     double xyz[3 * UZ_FACE_NODES];
-    double area;          /* true area, with thickness or 2 pi r */
-    double tangent[2][2]; /* of an edge, at its ends: unit, of the smooth curve that the edges stand for */
-    bool joined[2];       /* does that curve go on into a neighbour? */
+    double area;           /* true area, with thickness or 2 pi r */
+    double tangent[2][2];  /* of an edge, at its ends: unit, of the smooth curve that the edges stand for */
+    bool joined[2];        /* does that curve go on into a neighbour? */
+    uz_smooth_shape shape; /* of a face: what its nodes and those of the faces that it goes on into lie on */
 } uz_mortar_side;
 
 typedef struct {

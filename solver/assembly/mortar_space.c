@@ -4,7 +4,10 @@
  * each other, and the convex pieces are split into triangles with Gauss points; each point is carried back along the
  * plane's normal to both faces (M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
  * solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629). Faces with nodes amid their edges are cut
- * as the pieces between these nodes. Facets and quadratic faces are taken as they are. */
+ * as the pieces between these nodes.
+ *
+ * Faces that go on into each other make a patch; where its nodes lie on a sphere, a cylinder or a cone, the gap is that
+ * of the facets plus what the shape is off them, as in the plane. Other facets are taken as they are. */
 #include "assembly/mortar.h"
 
 #include "core/alloc.h"
@@ -60,6 +63,51 @@ static const double *centre_of(const uz_mortar_side *side)
     return CENTRE[corners_of(side) - 3];
 }
 
+/* ---- patches */
+
+static int64_t root_of(int64_t *parent, int64_t i)
+{
+    while (parent[i] != i)
+        i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+/* Places of one patch are joined by their faces; each patch is looked at by itself. */
+static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
+{
+    const int64_t n = surface->n_places;
+    int64_t *parent = uz_alloc(n, sizeof *parent), (*key)[2] = uz_alloc(n, sizeof *key);
+    uz_smooth_shape *shape = uz_alloc_zero(n, sizeof *shape);
+    double *xyz = uz_alloc(n, 3 * sizeof *xyz), *normal = uz_alloc(n, 3 * sizeof *normal);
+    const bool room = parent && key && shape && xyz && normal;
+    for (int64_t p = 0; p < n && room; p++)
+        parent[p] = p;
+    for (int64_t i = 0; i < surface->n && room; i++)
+        for (int a = 1; a < surface->side[i].nodes; a++)
+            parent[root_of(parent, surface->side[i].place[a])] = root_of(parent, surface->side[i].place[0]);
+    for (int64_t p = 0; p < n && room; p++) {
+        key[p][0] = root_of(parent, p);
+        key[p][1] = p;
+    }
+    if (room)
+        qsort(key, (size_t)n, sizeof *key, uz_mortar_by_node);
+    for (int64_t first = 0, end; first < n && room; first = end) {
+        for (end = first; end < n && key[end][0] == key[first][0]; end++) {
+            memcpy(xyz + 3 * (end - first), mesh->xyz + 3 * surface->node[key[end][1]], 3 * sizeof *xyz);
+            memcpy(normal + 3 * (end - first), surface->normal + 3 * key[end][1], 3 * sizeof *normal);
+        }
+        shape[key[first][0]] = uz_smooth_shape_of(xyz, normal, end - first);
+    }
+    for (int64_t i = 0; i < surface->n && room; i++)
+        surface->side[i].shape = shape[root_of(parent, surface->side[i].place[0])];
+    free(parent);
+    free(key);
+    free(shape);
+    free(xyz);
+    free(normal);
+    return room;
+}
+
 /* ---- places */
 
 /* A face joins a place of its node whose normal so far is within the feature angle, else it begins one. */
@@ -110,7 +158,7 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
     for (int64_t p = 0; p < surface->n_places; p++)
         unit(surface->normal + 3 * p);
     free(key);
-    return room;
+    return room && (in->contact->faceted || recognise(surface, &in->model->mesh));
 }
 
 /* ---- polygons */
@@ -250,8 +298,8 @@ static bool is_affine(const uz_mortar_side *side)
 /* One convex piece that both faces cover, as a fan of triangles with n x n points each: those of a square, one side of
  * which falls together in a corner, exact to degree 2 n - 2. */
 static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_mortar_surface *slave,
-                      const uz_mortar_side *side, const uz_mortar_side *other, int64_t k, const uz_contact_input *in,
-                      const plane *on, int n)
+                      const uz_mortar_side *side, const uz_mortar_side *other, int64_t master,
+                      const uz_contact_input *in, const plane *on, int n)
 {
     const uz_side mine = uz_mortar_side_of(side, in->model), its = uz_mortar_side_of(other, in->model);
     double at[5], weight[5], local[2][2];
@@ -267,7 +315,7 @@ static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_m
         const double twice = twice_area(&triangle);
         for (int g = 0; g < n * n && room; g++) {
             const double r = at[g / n], s = at[g % n] * (1 - r);
-            uz_mortar_point p = {.master = k, .weight = twice * weight[g / n] * weight[g % n] * (1 - r)};
+            uz_mortar_point p = {.master = master, .weight = twice * weight[g / n] * weight[g % n] * (1 - r)};
             double y[2], area[3], ignored[3], height[2], normal[3] = {0};
             for (int c = 0; c < 2; c++)
                 y[c] = (1 - r - s) * triangle.x[0][c] + r * triangle.x[1][c] + s * triangle.x[2][c];
@@ -280,6 +328,14 @@ static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_m
             unit(normal);
             p.weight *= sqrt(dot(area, area)) / dot(area, on->n);
             p.gap = (height[1] - height[0]) * dot(normal, on->n);
+            for (int k = 0; k < 2; k++) { /* from the plane's point to either face, and from there to its shape */
+                const uz_smooth_shape *smooth = k == 0 ? &side->shape : &other->shape;
+                double x[3], off[3];
+                for (int c = 0; c < 3; c++)
+                    x[c] = on->x[c] + y[0] * on->t[0][c] + y[1] * on->t[1][c] + height[k] * on->n[c];
+                uz_smooth_offset(off, smooth, x);
+                p.gap += (k == 0 ? -1 : 1) * dot(off, normal);
+            }
             if (isfinite(p.gap) && p.weight > 0)
                 room = uz_mortar_add_point(points, &p);
         }

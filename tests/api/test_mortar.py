@@ -202,6 +202,32 @@ def test_press_fit_of_facets_is_lames(s):
             check(abs(mean - 1) < mean_off and abs(most - 1) < most_off, kind, facets, interference, mean, most)
 
 
+def fit_in_space(kind, inner, outer, **contact):
+    """A slice of the same press fit; inner and outer are maps from the unit cube."""
+    both = {f"{axis}{end}": [(0, f"{axis}{end}"), (1, f"{axis}{end}")] for axis in "yz" for end in "01"}
+    return body([kind, kind], [(4, 15, 2), (6, 11, 3)], [inner, outer],
+                {"shaft": [(0, "x1")], "hub": [(1, "x0")], **both},
+                model="solid", materials=[{"on": "all", "young": 210000, "poisson": 0.3}],
+                supports=[{"on": "y0", "uy": 0}, {"on": "y1", "ux": 0}, {"on": "z0", "uz": 0}],
+                contacts=[{"on": "shaft", "with": "hub", **contact}])
+
+
+def test_cylinders_and_cones_are_recognised(s):
+    def ring(inner, outer, taper):
+        def place(x, y, z):
+            r = (inner + (outer - inner) * x) * (1 + taper * z)
+            return r * math.cos(math.pi / 2 * y), r * math.sin(math.pi / 2 * y), 2 * z
+        return place
+    for kind, mean_off in (("hex8", 5e-3), ("tet10", 5e-3), ("tet4", 2e-2)):
+        for taper in (0, 0.01):
+            answer = answer_of(s, fit_in_space(kind, ring(10, 20.005, taper), ring(20, 40, taper)))
+            mean = -sum(answer["reactions"]) / (20 * math.pi / 2 * 2) / lame(0.005)
+            check(abs(mean - 1) < mean_off + taper, kind, taper, mean)
+            check(min(answer["pressure"]) > 0.7 * lame(0.005), kind, taper, answer["pressure"])
+    request = fit_in_space("hex8", ring(10, 20.005, 0), ring(20, 40, 0), smooth=False)
+    check(-sum(answer_of(s, request)["reactions"]) > 3 * lame(0.005) * 20 * math.pi / 2 * 2)
+
+
 def test_facets_as_they_are_press_more(s):
     """What `smooth` corrects, and what a feature angle below the turn of the facets, 6 degrees, gives up."""
     for contact in ({"smooth": False}, {"feature_angle": 3}):

@@ -1,0 +1,108 @@
+/* Spheres, cylinders and cones are found by nodes on them and rough normals, and nothing else is. */
+#include "harness.h"
+#include "obstacle/smooth_shape.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { ALONG = 5, AROUND = 9, N = ALONG * AROUND };
+
+typedef struct {
+    double xyz[3 * N], normal[3 * N];
+} cloud;
+
+/* Any rotation, and then a translation by much more than the size. */
+static void place(double out[3], const double x[3], double far)
+{
+    static const double R[3][3] = {{0.36, 0.48, -0.8}, {-0.8, 0.6, 0}, {0.48, 0.64, 0.6}};
+    for (int c = 0; c < 3; c++)
+        out[c] = R[c][0] * x[0] + R[c][1] * x[1] + R[c][2] * x[2] + far;
+}
+
+/* radius(z), on an arc; normals are off by `rough`, in directions that change. side: 1 out, -1 into the shape. */
+static cloud points_of(uz_smooth_kind kind, double radius, double slope, double arc, double rough, double side,
+                       double far)
+{
+    cloud made;
+    for (int i = 0; i < N; i++) {
+        const double phi = arc * (i % AROUND) / (AROUND - 1) + 0.01 * (i % 3), z = 0.3 * radius * (i / AROUND);
+        double x[3], n[3];
+        if (kind == UZ_SMOOTH_SPHERE) {
+            const double up = z / (2 * radius);
+            const double at[3] = {cos(phi) * cos(up), sin(phi) * cos(up), sin(up)};
+            for (int c = 0; c < 3; c++) {
+                x[c] = radius * at[c];
+                n[c] = at[c];
+            }
+        } else {
+            const double r = radius + slope * z, k = kind == UZ_SMOOTH_CONE ? slope : 0;
+            const double at[3] = {cos(phi), sin(phi), -k};
+            memcpy(x,
+                   (double[3]){(kind == UZ_SMOOTH_CONE ? r : radius) * at[0],
+                               (kind == UZ_SMOOTH_CONE ? r : radius) * at[1], z},
+                   sizeof x);
+            for (int c = 0; c < 3; c++)
+                n[c] = at[c] / sqrt(1 + k * k);
+        }
+        for (int c = 0; c < 3; c++)
+            n[c] = side * n[c] + rough * sin(7.3 * i + 2.1 * c);
+        const double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        for (int c = 0; c < 3; c++)
+            n[c] /= length;
+        place(made.xyz + 3 * i, x, far);
+        place(made.normal + 3 * i, n, 0);
+    }
+    return made;
+}
+
+TEST(shapes_are_found)
+{
+    static const uz_smooth_kind kinds[] = {UZ_SMOOTH_SPHERE, UZ_SMOOTH_CYLINDER, UZ_SMOOTH_CONE};
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 24; i++) {
+            const double radius = pow(10, i % 4 - 1), arc = i % 3 == 0 ? 6 : i % 3 == 1 ? 1.5 : 0.7;
+            const double far = i % 2 ? 0 : 30 * radius, side = i % 5 ? 1 : -1;
+            const cloud of = points_of(kinds[k], radius, 0.2, arc, i % 6 < 3 ? 0 : 0.02, side, far);
+            const uz_smooth_shape s = uz_smooth_shape_of(of.xyz, of.normal, N);
+            CHECK_MSG(s.kind == kinds[k], "shape %d case %d: found %d", k, i, (int)s.kind);
+            CHECK_MSG(s.kind == UZ_SMOOTH_CONE || fabs(s.radius / radius - 1) < 1e-9, "%d %d: %g", k, i, s.radius);
+            for (int j = 0; j < N; j++) { /* a point off the shape comes back to it */
+                double off[3], x[3], size = 0;
+                for (int c = 0; c < 3; c++)
+                    x[c] = of.xyz[3 * j + c];
+                uz_smooth_offset(off, &s, x);
+                for (int c = 0; c < 3; c++)
+                    size = fmax(size, fabs(off[c]));
+                CHECK_MSG(size < 1e-9 * radius, "%d %d: node %d is off by %g", k, i, j, size);
+            }
+        }
+}
+
+TEST(offsets_lead_to_the_nearest_point)
+{
+    const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75};
+    const uz_smooth_shape ball = {.kind = UZ_SMOOTH_SPHERE, .point = {1, 0, 0}, .radius = 2};
+    double off[3];
+    uz_smooth_offset(off, &cone, (double[3]){2 + 0.8, 0, -0.6}); /* by 1 along (0.8, -0.6) from (2, 0) */
+    CHECK(fabs(off[0] + 0.8) < 1e-14 && fabs(off[1]) < 1e-14 && fabs(off[2] - 0.6) < 1e-14);
+    uz_smooth_offset(off, &ball, (double[3]){1, 3, 0});
+    CHECK(fabs(off[0]) < 1e-14 && fabs(off[1] + 1) < 1e-14 && fabs(off[2]) < 1e-14);
+}
+
+TEST(other_surfaces_are_none)
+{
+    cloud plane, saddle, bent = points_of(UZ_SMOOTH_CYLINDER, 1, 0, 2, 0, 1, 0);
+    for (int i = 0; i < N; i++) {
+        const double x = 0.1 * (i % AROUND), y = 0.1 * (i / AROUND);
+        memcpy(plane.xyz + 3 * i, (double[3]){x, y, 0}, 3 * sizeof x);
+        memcpy(plane.normal + 3 * i, (double[3]){0, 0, 1}, 3 * sizeof x);
+        memcpy(saddle.xyz + 3 * i, (double[3]){x, y, x * y}, 3 * sizeof x);
+        const double length = sqrt(1 + x * x + y * y);
+        memcpy(saddle.normal + 3 * i, (double[3]){-y / length, -x / length, 1 / length}, 3 * sizeof x);
+    }
+    bent.xyz[3 * 20] += 1e-4; /* one node is not on it */
+    CHECK_INT(uz_smooth_shape_of(plane.xyz, plane.normal, N).kind, UZ_SMOOTH_NONE);
+    CHECK_INT(uz_smooth_shape_of(saddle.xyz, saddle.normal, N).kind, UZ_SMOOTH_NONE);
+    CHECK_INT(uz_smooth_shape_of(bent.xyz, bent.normal, N).kind, UZ_SMOOTH_NONE);
+    CHECK_INT(uz_smooth_shape_of(bent.xyz, bent.normal, 3).kind, UZ_SMOOTH_NONE);
+}
