@@ -226,23 +226,32 @@ static void sweep(uz_bounded *box, const uz_csc *K, bool backwards)
 }
 
 /* The point goes towards the last exact displacement, along a path that is cut to the bounds, by the first of the
- * lengths 1, 1/2, 1/4, ... that lowers the energy (Bertsekas, SIAM J. Control Optim. 20 (1982)). Where K is no
- * M-matrix, as that of a plate, exact steps by themselves go round in circles. */
-static void approach(uz_bounded *box, const uz_csc *K, const double *exact)
+ * lengths 1, 1/2, 1/4, ... that lowers the energy (Bertsekas, SIAM J. Control Optim. 20 (1982)). From 0, where it
+ * begins, by the best of them: what overshoots its bounds by far would begin with far too many held. Where K is no
+ * M-matrix, as that of a plate, exact steps by themselves go round in circles. chosen (d): room. */
+static void approach(uz_bounded *box, const uz_csc *K, const double *exact, double *chosen)
 {
+    const bool begins = isinf(box->point_energy);
     double length = 1.0, *trial = box->size;
-    if (isinf(box->point_energy))
-        memcpy(box->point, exact, (size_t)K->cols * sizeof *exact);
+    bool fell = false;
+    for (int64_t j = 0; begins && j < K->cols; j++)
+        box->point[j] = clip(0.0, box->bottom[j], box->top[j]);
+    if (begins)
+        box->point_energy = energy(box, K, box->point);
     for (int k = 0; k < HALVINGS; k++, length *= 0.5) {
         for (int64_t j = 0; j < K->cols; j++)
             trial[j] = clip(box->point[j] + length * (exact[j] - box->point[j]), box->bottom[j], box->top[j]);
-        double reached = energy(box, K, trial);
-        if (!(reached < box->point_energy))
-            continue;
-        memcpy(box->point, trial, (size_t)K->cols * sizeof *trial);
-        box->point_energy = reached;
-        return;
+        const double reached = energy(box, K, trial);
+        if (reached < box->point_energy) {
+            memcpy(chosen, trial, (size_t)K->cols * sizeof *trial);
+            box->point_energy = reached;
+            fell = true;
+        }
+        if (fell && !(begins && reached == box->point_energy)) /* it rises again, or any will do */
+            break;
     }
+    if (fell)
+        memcpy(box->point, chosen, (size_t)K->cols * sizeof *chosen);
 }
 
 /* How many dofs the point has at their bounds. */
@@ -261,7 +270,7 @@ bool uz_sparse_guess_active(uz_dual_load *load, bool *active)
     if (!box || box->contradictory)
         return false;
     /* The energy only falls, so the points converge to the solution whatever the exact steps do. */
-    approach(box, load->K, box->has_exact ? box->u : x->base);
+    approach(box, load->K, box->has_exact ? box->u : x->base, x->work);
     int64_t before = -1, held = count_held(box, load->K->cols);
     for (int k = 0; k < MOST_SWEEPS && (k < LEAST_SWEEPS || held != before); k += 2) {
         sweep(box, load->K, false);

@@ -466,7 +466,7 @@ TEST(plates_over_a_floor_take_few_steps)
         uz_result *got = solve_floor(100, true, sinks[k], 0, UZ_OPERATOR_FACTORED);
         CHECK(got && got->summary.outcome == UZ_CONVERGED && got->summary.method == UZ_METHOD_ACTIVE_SET);
         if (got)
-            CHECK_MSG(got->summary.iterations <= 40, "%g times its depth: %lld steps", sinks[k],
+            CHECK_MSG(got->summary.iterations <= 25, "%g times its depth: %lld steps", sinks[k],
                       (long long)got->summary.iterations);
         uz_result_free(got);
     }
