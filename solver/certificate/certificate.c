@@ -106,8 +106,9 @@ static uz_status distance(certifier *c, double *square, uz_error *err)
     if (!bound_cheaply(c, square)) {
         status = c->in->inverse_norm(c->in->ctx, square, c->res.e, err);
         /* a residual is rounding, in all directions alike: e'K^-1 e / e'W e is the mean of d eigenvalues */
-        inverse = SURELY * fmax(1.0 / fmax(c->in->rcond, DBL_MIN),
-                                c->weighted > 0.0 ? (double)c->d * (*square / c->weighted) : 0.0);
+        const double guess = SURELY * fmax(1.0 / fmax(c->in->rcond, DBL_MIN),
+                                           c->weighted > 0.0 ? (double)c->d * (*square / c->weighted) : 0.0);
+        inverse = fmin(inverse, guess);
         doubt = c->in->measure_doubt ? uz_bound_doubt(inverse, c->d) : 0.0;
         if (status == UZ_OK && !(doubt <= HARMLESS))
             status = c->in->measure_doubt(c->in->ctx, &doubt, err);

@@ -84,9 +84,16 @@ void uz_factor_unpermute_lanes(const uz_factor *factor, double *X, const double 
 uz_status uz_factor_forward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
 uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
 
+/* Vectors from which the norm of K^-1 is bounded; NULL: no memory. */
+typedef struct uz_norm_estimate uz_norm_estimate;
+uz_norm_estimate *uz_norm_estimate_new(const uz_factor *factor);
+void uz_norm_estimate_free(uz_norm_estimate *norm); /* NULL is fine */
 /* *bound >= lambda_max(D_K^1/2 K^-1 D_K^1/2) with D_K = diag(K), except with a probability below 1e-12; so e'K^-1 e is
- * at most *bound times the sum of e_j^2 / K_jj. Some six linear solves, cancellation points between them (stop NULL:
- * none): UZ_ERR_CANCELLED. */
+ * at most *bound times the sum of e_j^2 / K_jj. Each step takes about a linear solve and sharpens the bound, which the
+ * first leaves far too large; done: there is little more to win. */
+uz_status uz_norm_estimate_step(double *bound, bool *done, uz_norm_estimate *norm, const uz_factor *factor,
+                                uz_factor_workspace *ws, const uz_csc *K, uz_error *err);
+/* All steps at once, with cancellation points between them (stop NULL: none): UZ_ERR_CANCELLED. */
 uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
                                  const uz_stop *stop, uz_error *err);
 
@@ -127,6 +134,9 @@ bool uz_group_dofs(int64_t *head, const uz_csc *K);
 
 /* Makes CHOLMOD allocate its big blocks with uz_malloc_huge. Process-wide: called once, by uz_process_init. */
 void uz_factor_use_huge_pages(void);
+/* BLAS may use so many threads in a large factorization, of which there is one at a time; elsewhere it has one.
+ * Process-wide: called once at most, by uz_process_init. */
+void uz_factor_use_threads(int threads);
 /* The big blocks, which are the factor's above all, come from the reserve from now on. Process-wide: called once at
  * most, after uz_factor_use_huge_pages and before anything is factored; the reserve outlives every factor. */
 void uz_factor_use_reserve(uz_reserve *used);

@@ -1,5 +1,5 @@
 /* inverse_norm.c: a bound on the norm of K^-1, once per factor, that makes every later certificate half a solve
- * cheaper. */
+ * cheaper. It is made in half solves of a few vectors, each of which sharpens it. */
 #include "factor/factor_private.h"
 
 #include "core/alloc.h"
@@ -10,57 +10,85 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { VECTORS = 8, POWER = 2 };
+enum { VECTORS = 4 };
 
-/* For x with independent standard normal entries and any unit vector v, P(|v'x| < t) < 0.8 t. With v the eigenvector of
- * the largest eigenvalue c of B, ||B^q x|| >= c^q |v'x|: that all of VECTORS samples fall short of c^q t has a
- * probability below (0.8 t)^8, 1e-12 here (Dixon, SIAM J. Numer. Anal. 20 (1983), for the method). */
-#define LEAST_SHARE 0.04
+/* For x with independent entries spread evenly over [-1, 1] and any unit vector v, P(|v'x| < t) <= sqrt(2) t, as v'x
+ * has a density of at most sqrt(2) / 2 (Ball, Proc. AMS 97 (1986), on sections of the cube). With v the eigenvector of
+ * the largest eigenvalue c of B = D_K^1/2 K^-1 D_K^1/2, ||B^q x|| >= c^q |v'x|: that all of VECTORS samples fall short
+ * of c^q t has a probability of at most 4 t^4, 1e-12 here (Dixon, SIAM J. Numer. Anal. 20 (1983), for the method). With
+ * K = P'LL'P and q = 1/2, ||L^-1 P D_K^1/2 x|| is the same norm: one half of a solve is half a power. */
+#define LEAST_SHARE 7e-4
 
-/* Y = B Y in the factor's order, B = D_K^1/2 K^-1 D_K^1/2; root: the square roots of diag(K) in that order. */
-static uz_status apply_scaled(double *Y, const uz_factor *factor, uz_factor_workspace *ws, const double *root,
-                              const uz_stop *stop, uz_error *err)
+struct uz_norm_estimate {
+    double *Y; /* n x VECTORS, in the factor's order */
+    int half_solves;
+};
+
+uz_norm_estimate *uz_norm_estimate_new(const uz_factor *factor)
 {
+    uint64_t state = 0x9E3779B97F4A7C15u;
+    uz_norm_estimate *norm = uz_alloc_zero(1, sizeof *norm);
+    if (norm && !(norm->Y = uz_alloc(factor->n * VECTORS, sizeof *norm->Y))) {
+        free(norm);
+        norm = NULL;
+    }
+    for (int64_t k = 0; norm && k < factor->n * VECTORS; k++)
+        norm->Y[k] = 2.0 * uz_uniform(&state) - 1.0;
+    return norm;
+}
+
+void uz_norm_estimate_free(uz_norm_estimate *norm)
+{
+    if (norm)
+        free(norm->Y);
+    free(norm);
+}
+
+static void scale(double *Y, const uz_factor *factor, const uz_csc *K)
+{
+    const SuiteSparse_long *perm = factor->L.Perm;
+    for (int64_t k = 0; k < factor->n; k++) {
+        const double root = sqrt(K->val[K->ptr[perm[k]]]);
+        for (int v = 0; v < VECTORS; v++)
+            Y[k + v * factor->n] *= root;
+    }
+}
+
+uz_status uz_norm_estimate_step(double *bound, bool *done, uz_norm_estimate *norm, const uz_factor *factor,
+                                uz_factor_workspace *ws, const uz_csc *K, uz_error *err)
+{
+    enum { HALF_SOLVES = 6 }; /* B^3 x: more sharpens less than an eighth */
+    const bool back = norm->half_solves % 2 == 1;
+    if (!back)
+        scale(norm->Y, factor, K);
+    uz_status status = (back ? uz_factor_backward : uz_factor_forward)(factor, ws, norm->Y, VECTORS, err);
+    if (status != UZ_OK)
+        return status;
+    if (back)
+        scale(norm->Y, factor, K);
+    double largest = 0.0;
     for (int v = 0; v < VECTORS; v++)
-        for (int64_t k = 0; k < factor->n; k++)
-            Y[k + v * factor->n] *= root[k];
-    uz_status status = uz_factor_forward(factor, ws, Y, VECTORS, err);
-    if (status == UZ_OK && uz_stop_is_due(stop))
-        status = uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the norm of the inverse was known");
-    if (status == UZ_OK)
-        status = uz_factor_backward(factor, ws, Y, VECTORS, err);
-    for (int v = 0; status == UZ_OK && v < VECTORS; v++)
-        for (int64_t k = 0; k < factor->n; k++)
-            Y[k + v * factor->n] *= root[k];
-    return status;
+        largest = fmax(largest, uz_norm(factor->n, norm->Y + v * factor->n));
+    norm->half_solves++;
+    *bound = pow(largest / LEAST_SHARE, 2.0 / norm->half_solves);
+    *done = norm->half_solves >= HALF_SOLVES;
+    return UZ_OK;
 }
 
 uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
                                  const uz_stop *stop, uz_error *err)
 {
-    const SuiteSparse_long *perm = factor->L.Perm;
-    uint64_t state = 0x9E3779B97F4A7C15u;
-    double *Y = uz_alloc(factor->n * VECTORS, sizeof *Y), *root = uz_alloc(factor->n, sizeof *root);
-    uz_status status = UZ_OK;
-    *bound = INFINITY;
-    if (Y && root) {
-        for (int64_t k = 0; k < factor->n; k++)
-            root[k] = sqrt(K->val[K->ptr[perm[k]]]);
-        for (int64_t k = 0; k < factor->n * VECTORS; k++)
-            Y[k] = uz_normal(&state);
-        for (int power = 0; status == UZ_OK && power < POWER; power++)
-            status = uz_stop_is_due(stop)
-                         ? uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the norm of the inverse was known")
-                         : apply_scaled(Y, factor, ws, root, stop, err);
-    } else {
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory to bound the inverse of %lld dofs", (long long)factor->n);
-    }
-    double largest = 0.0;
-    for (int v = 0; status == UZ_OK && v < VECTORS; v++)
-        largest = fmax(largest, uz_norm(factor->n, Y + v * factor->n));
-    if (status == UZ_OK)
-        *bound = pow(largest / LEAST_SHARE, 1.0 / POWER);
-    free(Y);
-    free(root);
+    bool done = false;
+    uz_norm_estimate *norm = uz_norm_estimate_new(factor);
+    uz_status status =
+        norm ? UZ_OK
+             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to bound the inverse of %lld dofs", (long long)factor->n);
+    while (status == UZ_OK && !done)
+        status = uz_stop_is_due(stop)
+                     ? uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the norm of the inverse was known")
+                     : uz_norm_estimate_step(bound, &done, norm, factor, ws, K, err);
+    if (status != UZ_OK)
+        *bound = INFINITY;
+    uz_norm_estimate_free(norm);
     return status;
 }

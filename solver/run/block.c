@@ -54,7 +54,7 @@ uz_status uz_block_create(uz_block **out, uz_setup *setup, const uz_problem *pro
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a linear solve");
     if (status == UZ_OK) /* without a finite bound on K^-1 no lane can be certified; the loads then are one by one */
         status = uz_lane_certifier_create(&block->certifier, block->K, uz_setup_N(setup, problem),
-                                          uz_setup_inverse_bound(setup, block->K, ws, NULL), err);
+                                          uz_setup_inverse_bound(setup, UZ_ALL_STEPS, block->K, ws, NULL), err);
     uz_factor_workspace_free(ws);
     if (status == UZ_OK)
         *out = block;

@@ -78,7 +78,9 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
     uz_setup *setup = asked->setup;
     const uz_csc *K = uz_setup_K(setup, asked->problem);
     const uz_stop stop = {asked->hooks, asked->deadline};
-    const bool all_rows = answer->m == run->all;
+    const bool all_rows = answer->m == run->all, at_once = run->work.with_norm || asked->problem->n_cases > 1;
+    const int steps = at_once ? UZ_ALL_STEPS : asked->serves_many && !run->work.normed;
+    run->work.normed = true;
     double whole_norm = 0.0;
     uz_status status = need_workspace(run, err);
     if (status == UZ_OK)
@@ -94,8 +96,7 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .measure_doubt = setup->factor ? measure_doubt : NULL,
         .ctx = run,
         .rcond = run->result->summary.rcond,
-        .inverse_bound =
-            asked->serves_many && setup->factor ? uz_setup_inverse_bound(setup, K, run->work.ws, &stop) : INFINITY,
+        .inverse_bound = setup->factor ? uz_setup_inverse_bound(setup, steps, K, run->work.ws, &stop) : INFINITY,
         .moved = run->load.moved,
         .whole_norm = whole_norm,
         .low = answer->low,

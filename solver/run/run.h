@@ -45,6 +45,8 @@ typedef struct {
     double requested; /* relative error that the certificate must meet */
     double target;    /* relative error at which the method returns */
     bool again;       /* the method's target was met, the certificate was not */
+    bool with_norm;   /* certificates may use the norm of K^-1, as those of a body that serves many loads */
+    bool normed;      /* this run has done its part of that norm */
     double *far;      /* m, or NULL: a ray that is no proof, and how large every feasible u is by it */
     double reach;
     uz_end end;

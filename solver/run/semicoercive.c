@@ -257,7 +257,7 @@ static uz_status bound_noise(const uz_semi *s, double *bound, uz_error *err)
     if (setup) {
         for (int64_t j = 0; j < s->d; j++)
             sum += noise[j] > 0.0 ? noise[j] / augmented.qp.K.val[augmented.qp.K.ptr[j]] * noise[j] : 0.0;
-        rows = sum > 0.0 ? uz_setup_inverse_bound(setup, &augmented.qp.K, ws, NULL) * sum : 0.0;
+        rows = sum > 0.0 ? uz_setup_inverse_bound(setup, UZ_ALL_STEPS, &augmented.qp.K, ws, NULL) * sum : 0.0;
     }
     *bound = sqrt(rows);
     uz_setup_release(s->cache, setup);
@@ -286,7 +286,7 @@ static uz_status bound_inverse(const uz_semi *s, double *bound, uz_error *err)
         const uz_csc *K = &augmented.qp.K;
         for (int64_t j = 0; j < s->d; j++)
             most = fmax(most, 1.0 / (s->inverse[j] * K->val[K->ptr[j]]));
-        *bound = most * uz_setup_inverse_bound(setup, K, ws, NULL);
+        *bound = most * uz_setup_inverse_bound(setup, UZ_ALL_STEPS, K, ws, NULL);
     }
     uz_setup_release(s->cache, setup);
     uz_augmented_clear(&augmented);

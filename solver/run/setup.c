@@ -158,7 +158,8 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
     if (!setup)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
     pthread_mutex_init(&setup->mutex, NULL);
-    setup->inverse_bound = setup->doubt = NAN;
+    setup->inverse_bound = INFINITY;
+    setup->doubt = NAN;
     setup->is_scene = problem->kind == UZ_PROBLEM_SCENE;
     if (setup->is_scene)
         status = refuse_large_box(problem, settings, err);
@@ -249,22 +250,41 @@ uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, uz_fac
 /* A doubt that does no harm. */
 #define HARMLESS 1e-2
 
-double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)
+/* One step nearer to the bound, under the mutex. A doubt that would have to be measured waits for the last one. */
+static uz_status improve_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
+                               uz_error *err)
+{
+    double bound;
+    bool done = false;
+    if (!setup->norm && !(setup->norm = uz_norm_estimate_new(setup->factor)))
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to bound the inverse of %lld dofs", (long long)K->cols);
+    uz_status status = uz_norm_estimate_step(&bound, &done, setup->norm, setup->factor, ws, K, err);
+    if (status != UZ_OK)
+        return status;
+    double doubt = uz_bound_doubt(bound, K->cols); /* that of the factor; K's may be so much larger */
+    if (done && !(doubt <= HARMLESS)) {
+        status = know_doubt(setup, K, ws, stop, err);
+        doubt = status == UZ_OK ? setup->doubt : INFINITY;
+    }
+    if (status != UZ_ERR_CANCELLED)
+        setup->inverse_bound = doubt <= HARMLESS || (done && doubt < 1.0) ? bound / (1.0 - doubt) : INFINITY;
+    if (done && status != UZ_ERR_CANCELLED) {
+        setup->bound_known = true;
+        uz_norm_estimate_free(setup->norm);
+        setup->norm = NULL;
+    }
+    return status;
+}
+
+double uz_setup_inverse_bound(uz_setup *setup, int steps, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop)
 {
     uz_error ignored = {0};
-    double bound;
     if (!uz_lock_while(&setup->mutex, stop))
         return INFINITY;
-    if (isnan(setup->inverse_bound) &&
-        uz_factor_inverse_norm(&bound, setup->factor, ws, K, stop, &ignored) != UZ_ERR_CANCELLED) {
-        double doubt = uz_bound_doubt(bound, K->cols); /* that of the factor; K's may be so much larger */
-        uz_status status = doubt <= HARMLESS ? UZ_OK : know_doubt(setup, K, ws, stop, &ignored);
-        if (!(doubt <= HARMLESS))
-            doubt = setup->doubt;
-        if (status != UZ_ERR_CANCELLED)
-            setup->inverse_bound = doubt < 1.0 ? bound / (1.0 - doubt) : INFINITY;
-    }
-    bound = isnan(setup->inverse_bound) ? INFINITY : setup->inverse_bound;
+    for (; steps > 0 && !setup->bound_known && !uz_stop_is_due(stop); steps--)
+        if (improve_bound(setup, K, ws, stop, &ignored) != UZ_OK)
+            break;
+    const double bound = setup->inverse_bound;
     pthread_mutex_unlock(&setup->mutex);
     return bound;
 }
@@ -274,6 +294,7 @@ void uz_setup_free(uz_setup *setup)
     if (!setup)
         return;
     pthread_mutex_destroy(&setup->mutex);
+    uz_norm_estimate_free(setup->norm);
     uz_dual_free(setup->dual);
     uz_shared_factor_release(&setup->shared);
     uz_amg_free(setup->amg);

@@ -24,9 +24,11 @@ typedef struct {
     const uz_factor *factor; /* shared.factor; NULL: matrix_free */
     uz_amg *amg;             /* matrix_free, else NULL */
     uz_dual *dual;
-    pthread_mutex_t mutex; /* guards inverse_bound and doubt */
-    double inverse_bound;  /* NaN until somebody asks */
-    double doubt;          /* likewise */
+    pthread_mutex_t mutex;  /* guards what follows, down to doubt */
+    uz_norm_estimate *norm; /* while a bound is made */
+    double inverse_bound;   /* as good as it is known; INFINITY: not at all */
+    bool bound_known;       /* as well as it will be */
+    double doubt;           /* NaN until somebody asks */
     double assemble_s, condense_s;
     uz_cost_plan plan; /* which form of the operator, and why */
     uz_reuse reused;   /* when it was made */
@@ -54,9 +56,13 @@ uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, con
                                  const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
 void uz_setup_free(uz_setup *setup);
 
-/* What the certificate of a setup that serves many loads saves by: uz_factor_inverse_norm, made at the first call.
- * INFINITY when that failed, or it had to stop (stop NULL: never) before it was known. */
-double uz_setup_inverse_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop);
+/* What certificates of a setup that serves many loads save by: the bound of uz_norm_estimate_step. `steps` of those
+ * that are left are done first, each about a linear solve: one load after the other pays for one, so that none pays for
+ * all and all are paid for only where so many came. INFINITY: nothing good enough is known yet; also where it had to
+ * stop (stop NULL: never). */
+#define UZ_ALL_STEPS 1000
+double uz_setup_inverse_bound(uz_setup *setup, int steps, const uz_csc *K, uz_factor_workspace *ws,
+                              const uz_stop *stop);
 /* How far its factor may be trusted: uz_distrust, made at the first call and kept with the setup. Only certificates of
  * bodies whose condition leaves doubts ask. UZ_ERR_NOT_SPD is not kept: nothing is solved on such a setup. */
 uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
