@@ -101,11 +101,16 @@ static void destroy_factor(void *object)
     free(kept);
 }
 
+/* What another order of elimination changes in an answer grows with the root of the condition in the energy norm: below
+ * this an outcome might follow from what was solved before, and the factor has to be the request's own. */
+#define SHARED_RCOND 1e-8
+
 static bool fits(const void *object, void *ctx)
 {
     const kept_factor *kept = object;
     const wanted *w = ctx;
-    return kept->ordering == w->ordering && strcmp(kept->K, w->key->values) == 0;
+    return kept->ordering == w->ordering && strcmp(kept->K, w->key->values) == 0 &&
+           uz_factor_describe(kept->factor).rcond >= SHARED_RCOND;
 }
 
 /* The contact, and not much else, comes last: what is dense is as large as all that does. */
@@ -118,7 +123,8 @@ static bool fits_best(const void *object, void *ctx)
     return fits(object, ctx) && count <= 2 * w->n_dofs + 256 && uz_factor_ends_with(kept->factor, w->dofs, w->n_dofs);
 }
 
-/* A factor of K that is there, one that ends with the contact if possible, or a place that the caller has to fill. */
+/* A factor of K that is there, one that ends with the contact if possible, or a place that the caller has to fill. The
+ * place's key is that of the contact: what is found there is what the caller would make. */
 static uz_status find_or_reserve(uz_item **item, bool *create, uz_cache *cache, wanted *w, uz_error *err)
 {
     char digest[65];

@@ -204,8 +204,10 @@ uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weig
     uz_dual_lazy *lazy = load->dual->lazy;
     const uz_dual_form *form = load->dual->form;
     uz_status status = UZ_OK;
-    if (lambda_max)
+    if (lambda_max) {
         *lambda_max = 0.0;
+        load->asked_lambda_max = true;
+    }
     if (form->prepare)
         status = form->prepare(load, err);
     if (status != UZ_OK || !lambda_max || !uz_lock_while(&lazy->making, &load->stop))

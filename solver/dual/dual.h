@@ -57,6 +57,7 @@ typedef struct {
     uz_stop stop; /* of uz_dual_load_aim */
     double *correction, *kept; /* feasible corrections, as the form writes them: the last, and the kept one */
     bool has_kept;
+    bool asked_lambda_max; /* by uz_dual_load_prepare: others on the same body may have, too */
 } uz_dual_load;
 
 /* What an operator is made from. */

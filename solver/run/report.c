@@ -182,7 +182,7 @@ uz_status uz_report_run(uz_run *run, uz_error *err)
     summary->row_scaling = it->weight || !asked->setup->dual->row_weight ? UZ_ROW_SCALING_NONE : UZ_ROW_SCALING_UNIT;
     const double alpha = uz_iterate_alpha(it);
     summary->alpha = alpha > DBL_MIN && alpha < DBL_MAX ? alpha : NAN;
-    summary->lambda_max = uz_dual_lambda_max_as_given(asked->setup->dual);
+    summary->lambda_max = run->work.dual->asked_lambda_max ? uz_dual_lambda_max_as_given(asked->setup->dual) : NAN;
     uz_status status = UZ_OK;
     if (!result->ray)
         status = uz_iterate_state(&state, it, run->work.dual, asked->settings->method, err);

@@ -19,6 +19,7 @@ sys.path[:0] = [str(ROOT / "tests/api"), str(ROOT / "tests/figures")]
 
 import malformed  # noqa: E402  the path is set above
 import no_memory  # noqa: E402
+import orders  # noqa: E402
 import overhead  # noqa: E402
 import scenarios  # noqa: E402
 import stamp  # noqa: E402
@@ -44,6 +45,7 @@ RUNS = [
     ("2,000 event streams, 1,000 long polls", streams.crowds),
     ("200,000 malformed requests", lambda b: malformed.malformed(b, 200000)),
     ("every allocation of a job fails", no_memory.failing),
+    ("200 requests in random orders, cold and cached", lambda b: orders.counted(b, 200, 5)),
     ("600 x 200 cells: HTTP against the library", overhead.overhead),
     ("cancel", lambda b: scenarios.cancels(b, 200)),
     ("cancel while ordering and factoring", lambda b: scenarios.cancels(b, 50, scenarios.LARGE)),
