@@ -53,6 +53,19 @@ static cholmod_sparse *permute(const uz_csc *K, const int64_t *position, cholmod
     return S;
 }
 
+extern void openblas_set_num_threads(int threads);
+
+static int blas_threads =
+    1; /* in a large factorization; set once, before threads start, as it is one for all of BLAS */
+
+/* A tenth of a second: threads cost the milliseconds that they spin afterwards. */
+#define LARGE_FLOPS 5e9
+
+void uz_factor_use_threads(int threads)
+{
+    blas_threads = threads;
+}
+
 /* cholmod_factorize, told that the matrix is in the factor's order already. A TRUE from it is no proof: status and
  * minor are looked at before anything resets them. */
 static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *common, uz_error *err)
@@ -61,8 +74,13 @@ static uz_status factorize(uz_factor *factor, const uz_csc *K, cholmod_common *c
     bool ok = S != NULL;
     if (S) {
         int ordering = factor->L.ordering;
+        const bool threads = blas_threads > 1 && uz_analysis_describe(factor->analysis).flops > LARGE_FLOPS;
         factor->L.ordering = CHOLMOD_NATURAL;
+        if (threads)
+            openblas_set_num_threads(blas_threads);
         ok = cholmod_l_factorize(S, &factor->L, common);
+        if (threads)
+            openblas_set_num_threads(1);
         factor->L.ordering = ordering;
     }
     int status = common->status;

@@ -6,15 +6,18 @@
 #include <signal.h>
 
 /* Declared here rather than by the vendors' headers, which differ between compilers and packages. */
+extern int openblas_get_num_threads(void);
 extern void openblas_set_num_threads(int threads);
 extern void omp_set_max_active_levels(int levels);
 
-/* OpenBLAS's own threads under several workers oversubscribe the cores (13 times slower was measured). */
+/* OpenBLAS's own threads under several workers oversubscribe the cores (13 times slower was measured); under one they
+ * spin between the small calls of iterations and substitutions. Only a large factorization is worth them. */
 void uz_process_init(int workers)
 {
     uz_factor_use_huge_pages();
-    if (workers > 1)
-        openblas_set_num_threads(1);
+    if (workers == 1)
+        uz_factor_use_threads(openblas_get_num_threads());
+    openblas_set_num_threads(1);
 }
 
 void uz_process_reserve(uz_reserve *reserve)
