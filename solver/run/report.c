@@ -58,6 +58,9 @@ void uz_report_setup(uz_run *run)
 /* Of length d: p, u, the room of the run and of the certificate, which also transposes N. */
 #define RUN_VECTORS 10.0
 
+/* In units of K: the analysis, which is kept, and the permuted copy of K while a factor is made. */
+#define FACTOR_PASSES 2.0
+
 /* A cached setup is spared, of prediction and of what is measured alike. */
 static void report_cost(uz_run *run)
 {
@@ -76,12 +79,18 @@ static void report_cost(uz_run *run)
         cost->flops = form->flops;
     }
     cost->actual_seconds = t->order + t->factor + t->condense + t->iterate + t->certify;
+    const uz_setup *setup = run->asked->setup;
+    const bool shared = setup->factor && setup->shared.item; /* setup->bytes has no factor then */
+    const uz_csc *K = uz_setup_K(setup, run->asked->problem);
+    const double made = setup->factor && !run->asked->reused.factor ? FACTOR_PASSES * (double)uz_csc_bytes(K) : 0.0;
+    const double solved = 8.0 * RUN_VECTORS * (double)run->d;
     cost->actual_bytes =
-        (double)run->asked->setup->bytes + (run->work.dual ? (double)run->work.dual->bytes : 0.0) +
+        (double)setup->bytes + (shared ? (double)uz_factor_describe(setup->factor).bytes : 0.0) +
+        (run->work.dual ? (double)run->work.dual->bytes : 0.0) +
         (run->asked->setup->is_scene
              ? 0.0
              : (double)(uz_csc_bytes(&run->asked->problem->qp.K) + uz_csc_bytes(&run->asked->problem->qp.N))) +
-        8.0 * RUN_VECTORS * (double)run->d;
+        fmax(made, solved);
 }
 
 static uz_status report_displacements(uz_run *run, uz_error *err)

@@ -125,5 +125,33 @@ def test_the_next_body_lands_on_memory_that_is_there(s):
     check(sorted(faults[-4:])[1] < faults[0] / 4, faults)
 
 
+def cube(n):
+    return {"problem": {"kind": "scene", "model": "solid",
+                        "mesh": {"box": {"origin": [0, 0, -1], "size": [1, 1, 1], "cells": [n, n, n], "element": "hex8"}},
+                        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                        "supports": [{"on": "back", "ux": 0, "uy": 0, "uz": 0}],
+                        "contacts": [{"on": "front", "obstacle": {"sphere": {"center": [0.5, 0.5, 1.98], "radius": 2}}}]},
+            "solver": {"accuracy": {"relative_error": 1e-6}}}
+
+
+@options("--workers", "1", "--cache", "1")
+def test_a_summary_tells_by_how_much_the_process_grew(s):
+    """On a daemon that keeps nothing and has done nothing else."""
+    if INSTRUMENTED:
+        raise Skip("the sanitizer has a heap of its own")
+
+    def resident(name):
+        with open(f"/proc/{s.process.pid}/status", encoding="ascii") as file:
+            return 1024 * next(int(line.split()[1]) for line in file if line.startswith(name))
+    seen = []
+    for body in plate([450, 150]), plate([300, 100]), cube(16), cube(20):
+        s.end()
+        s.start()
+        before = resident("VmRSS")
+        cost = s.solve(body)["summary"]["cost"]
+        seen.append(round(cost["actual"]["bytes"] / (resident("VmHWM") - before), 3))
+    check(all(0.8 <= ratio <= 1.25 for ratio in seen), seen)
+
+
 if __name__ == "__main__":
     service.main(globals())
