@@ -404,6 +404,7 @@ const uz_dual_form uz_dual_condensed = {
     .prepare = uz_condensed_prepare,
     .apply = uz_condensed_apply,
     .column = column,
+    .inverse_column = uz_condensed_inverse_column,
     .correct = uz_condensed_correct,
     .recover = recover,
     .solve_active = uz_condensed_solve_active,

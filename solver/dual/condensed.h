@@ -47,6 +47,7 @@ void uz_condensed_response(double *z, const uz_condensed *dense, const double *w
 /* Operations; applying never fails. */
 uz_status uz_condensed_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
 uz_status uz_condensed_prepare(uz_dual_load *load, uz_error *err);
+uz_status uz_condensed_inverse_column(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err);
 uz_status uz_condensed_correct(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
 uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active,
                                     uz_error *err);

@@ -88,6 +88,21 @@ uz_status uz_condensed_prepare(uz_dual_load *load, uz_error *err)
     return need(&x->D, &x->dense->made->D, x, form_operator, err);
 }
 
+uz_status uz_condensed_inverse_column(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err)
+{
+    uz_condensed_load *x = (uz_condensed_load *)load;
+    const int64_t m = load->dual->m;
+    *can = false;
+    uz_status status = x->dense->scaled ? need(&x->D_inverse, &x->dense->made->D_inverse, x, form_inverse, err) : UZ_OK;
+    if (status != UZ_OK || !x->dense->scaled || !x->D_inverse)
+        return status;
+    *can = true;
+    for (int64_t k = 0; k < i; k++)
+        column[k] = x->D_inverse[i + k * m];
+    memcpy(column + i, x->D_inverse + i + i * m, (size_t)(m - i) * sizeof *column);
+    return UZ_OK;
+}
+
 /* Lists in `rows` the rows with in == which, ascending; their number. */
 static int64_t list_rows(int64_t *rows, const bool *in, bool which, int64_t m)
 {

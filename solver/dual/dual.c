@@ -278,6 +278,22 @@ uz_status uz_dual_load_column(uz_dual_load *load, double *column, int64_t i, uz_
     return status;
 }
 
+uz_status uz_dual_load_inverse_column(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err)
+{
+    const uz_dual_form *form = load->dual->form;
+    *can = form->inverse_column != NULL;
+    return *can ? form->inverse_column(load, can, column, i, err) : UZ_OK;
+}
+
+double uz_dual_load_column_work(const uz_dual_load *load)
+{
+    const uz_dual *dual = load->dual;
+    const double m = (double)dual->m;
+    if (dual->can->cheap_steps || !dual->factor)
+        return m * m;
+    return 4.0 * (double)uz_factor_describe(dual->factor).nnz + 2.0 * (double)dual->N.ptr[dual->d];
+}
+
 uz_status uz_dual_load_correct(uz_dual_load *load, double *bound, double best, const double *r, const double *g,
                                const bool *close, uz_error *err)
 {

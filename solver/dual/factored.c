@@ -3,13 +3,19 @@
  * solves K u = p on the others, and the reactions are what holds them. */
 #include "dual/sparse.h"
 
+#include "core/alloc.h"
 #include "core/error.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
     uz_sparse_load sparse;
     uz_factor_workspace *ws;
+    /* made when a column of D^-1 is first wanted */
+    uz_principal *held; /* K with every bounded dof held */
+    uz_factor_workspace *held_ws;
+    double *unit, *force; /* d */
 } factored_load;
 
 /* v = K^-1 v, through work2. */
@@ -42,6 +48,10 @@ static uz_status make_load(uz_dual_load *load, const double *p, uz_error *err)
 static void unload(uz_dual_load *load)
 {
     factored_load *x = (factored_load *)load;
+    uz_principal_free(x->held);
+    uz_factor_workspace_free(x->held_ws);
+    free(x->unit);
+    free(x->force);
     uz_factor_workspace_free(x->ws);
     uz_sparse_unload(&x->sparse);
 }
@@ -113,6 +123,59 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     return UZ_OK;
 }
 
+/* The factor of the dofs that no row bounds; held stays NULL where several rows bound a dof, or it had to stop. */
+static uz_status hold_all(factored_load *x, uz_error *err)
+{
+    const uz_dual_load *load = &x->sparse.load;
+    const uz_bounds *bounds = x->sparse.box ? x->sparse.box->bounds : NULL;
+    const int64_t d = load->dual->d, m = load->dual->m;
+    bool *fixed = uz_alloc_zero(d, sizeof *fixed), single = bounds != NULL;
+    uz_status status = UZ_OK;
+    for (int64_t i = 0; fixed && single && i < m; i++) {
+        single = !fixed[bounds->dof[i]];
+        fixed[bounds->dof[i]] = true;
+    }
+    if (fixed && single) {
+        x->held_ws = uz_factor_workspace_new();
+        x->unit = uz_alloc_zero(d, sizeof *x->unit);
+        x->force = uz_alloc_zero(d, sizeof *x->force);
+    }
+    if (!fixed || (single && (!x->held_ws || !x->unit || !x->force)))
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a load on %lld dofs", (long long)d);
+    else if (single)
+        status = uz_principal_create(&x->held, load->K, fixed, load->dual->factor, x->held_ws, &load->stop, err);
+    free(fixed);
+    return status;
+}
+
+/* With dof j moved by 1 and the other bounded ones held, the free ones follow by -K_FF^-1 K_Fj; what holds the bounded
+ * ones are the reactions. */
+static uz_status inverse_column(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err)
+{
+    factored_load *x = (factored_load *)load;
+    uz_status status = x->unit ? UZ_OK : hold_all(x, err);
+    *can = x->held != NULL;
+    if (status != UZ_OK || !*can)
+        return status;
+    const int64_t d = load->dual->d;
+    const uz_bounds *bounds = x->sparse.box->bounds;
+    memset(x->unit, 0, (size_t)d * sizeof *x->unit);
+    memset(x->force, 0, (size_t)d * sizeof *x->force);
+    x->unit[bounds->dof[i]] = 1.0 / bounds->scale[i];
+    uz_csc_symv(x->force, load->K, 1.0, x->unit);
+    status = uz_principal_solve(x->force, x->held, err);
+    /* the solve leaves held dofs as they are: unit is what moves */
+    for (int64_t k = 0; k < load->dual->m; k++)
+        x->force[bounds->dof[k]] = 0.0;
+    for (int64_t j = 0; j < d; j++)
+        x->unit[j] -= x->force[j];
+    memset(x->force, 0, (size_t)d * sizeof *x->force);
+    uz_csc_symv(x->force, load->K, 1.0, x->unit);
+    for (int64_t k = 0; k < load->dual->m; k++)
+        column[k] = x->force[bounds->dof[k]] / bounds->scale[k];
+    return status;
+}
+
 static bool suits(const uz_dual_shape *shape)
 {
     (void)shape;
@@ -154,6 +217,7 @@ const uz_dual_form uz_dual_factored = {
     .load = make_load,
     .unload = unload,
     .apply = apply,
+    .inverse_column = inverse_column,
     .correct = correct,
     .recover = uz_sparse_recover,
     .solve_active = solve_active,

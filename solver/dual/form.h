@@ -54,6 +54,8 @@ struct uz_dual_form {
 
     uz_status (*apply)(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
     bool (*column)(uz_dual_load *load, double *column, int64_t i); /* false, or NULL: it takes an application */
+    /* NULL: none. *can: true at entry. */
+    uz_status (*inverse_column)(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err);
     /* *bound2: the square of the bound, INFINITY at entry; load->correction: the correction. */
     uz_status (*correct)(uz_dual_load *load, double *bound2, const double *r, const double *g, const bool *close);
     /* corrected: load->kept is to be added. */

@@ -14,6 +14,7 @@ typedef struct {
     uz_dual *dual;
     uz_dual_load *load;
     double tolerance; /* of what it answers, relative */
+    int64_t inverted; /* columns of D^-1 that it gave */
 } subject;
 
 static void open_subject(subject *s, const uz_qp *qp, int k)
@@ -99,6 +100,13 @@ static void check_operator(subject *s, subject *first, const double *x, const do
         CHECK_INT(uz_dual_load_column(s->load, column, i, &err), UZ_OK);
         CHECK_INT(uz_dual_load_apply(s->load, other, unit, &err), UZ_OK);
         check_close(s, column, other, m, "column");
+        bool can = false;
+        CHECK_INT(uz_dual_load_inverse_column(s->load, &can, column, i, &err), UZ_OK);
+        if (can) {
+            CHECK_INT(uz_dual_load_apply(s->load, other, column, &err), UZ_OK);
+            check_close(s, other, unit, m, "D times a column of its inverse");
+        }
+        s->inverted += can;
         unit[i] = 0;
     }
     int64_t applied = s->load->applications;
@@ -262,6 +270,7 @@ static void check_forms(const uz_qp *qp, bool bounds)
         subject s;
         open_subject(&s, qp, k);
         check_operator(&s, &first, x, y);
+        CHECK((s.inverted > 0) == (bounds && s.can->needs_factor));
         check_recovery(&s, r);
         check_active(&s, bounds);
         if (!s.can->needs_factor)
