@@ -13,9 +13,10 @@ enum { STATE_VERSION = 1, STATE_NUMBERS = 16, STATE_VECTORS = 6 };
 static const struct {
     int stored;
     uz_method method;
-} METHODS[] = {{0, UZ_METHOD_AUTO},        {1, UZ_METHOD_UZAWA},
-               {2, UZ_METHOD_ACCELERATED}, {3, UZ_METHOD_ACCELERATED_RESTART},
-               {4, UZ_METHOD_ACTIVE_SET},  {5, UZ_METHOD_CONJUGATE}};
+} METHODS[] = {{0, UZ_METHOD_AUTO},           {1, UZ_METHOD_UZAWA},
+               {2, UZ_METHOD_ACCELERATED},    {3, UZ_METHOD_ACCELERATED_RESTART},
+               {4, UZ_METHOD_ACTIVE_SET},     {5, UZ_METHOD_CONJUGATE},
+               {6, UZ_METHOD_DUAL_ACTIVE_SET}};
 enum { N_METHODS = sizeof METHODS / sizeof METHODS[0] };
 
 static double method_number(uz_method method)

@@ -35,12 +35,14 @@ uz_scene uz_scene_of_case(const uz_problem *problem, int64_t i);
 /* -------------------------------------------------------------- settings */
 
 typedef enum {
-    UZ_METHOD_AUTO,                /* active_set, else conjugate; no factor or paper rule: accelerated_restart */
+    UZ_METHOD_AUTO,                /* active_set, else dual_active_set and conjugate by turns; no factor or paper rule:
+                                    * accelerated_restart */
     UZ_METHOD_UZAWA,               /* Kanno, Algorithm 1 */
     UZ_METHOD_ACCELERATED,         /* Algorithm 2 without restart */
     UZ_METHOD_ACCELERATED_RESTART, /* Algorithm 2 */
     UZ_METHOD_ACTIVE_SET,          /* exact, by guessing which rows touch: condensed, or rows of one entry */
     UZ_METHOD_CONJUGATE,           /* projected conjugate gradients on the dual */
+    UZ_METHOD_DUAL_ACTIVE_SET,     /* exact, one row after the other, with an updated factor */
     UZ_METHOD_GIVEN,               /* results of uz_verify only: the answer is the caller's */
     UZ_METHOD_LINEAR /* results only: without contact rows u is one linear solve, whatever was asked for */
 } uz_method;

@@ -110,26 +110,6 @@ static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
     }
 }
 
-/* The guess's answer as an iterate: r, projected, D r, and the bound on it. */
-static uz_status take(uz_iterate *it, const pivoting *p, uz_dual_load *load, uz_error *err)
-{
-    const double *g0 = load->g0;
-    bool admissible = it->law->kind->admissible(it->law, p->r, it->m);
-    for (int64_t i = 0; i < it->m; i++) {
-        it->r[i] = p->r[i];
-        it->Dr[i] = g0[i] - p->g[i];
-    }
-    it->law->kind->project(it->law, it->r, it->m);
-    uz_status status = admissible ? UZ_OK : uz_dual_load_apply(load, it->Dr, it->r, err);
-    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
-    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
-    it->tau = 1.0;
-    it->step_norm = NAN;
-    it->fresh = false;
-    it->iteration++;
-    return status == UZ_OK ? uz_iterate_bound(it, load, UZ_METHOD_ACTIVE_SET, err) : status;
-}
-
 /* Only single exchanges are left. Each costs a factorization here, and a small part of one where factors are updated.
  */
 static bool is_stuck(const pivoting *p)
@@ -158,10 +138,10 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
     if (status != UZ_OK)
         return status;
     *end = ends[exchanged];
-    it->iteration += n > 0 ? n - 1 : 0; /* take counts one */
+    it->iteration += n > 0 ? n - 1 : 0; /* uz_iterate_take counts one */
     if (exchanged == UZ_EXCHANGE_STOPPED && uz_should_stop(end, it, options))
         return UZ_OK;
-    status = take(it, p, load, err);
+    status = uz_iterate_take(it, p->r, p->g, load, UZ_METHOD_ACTIVE_SET, err);
     if (status == UZ_OK)
         status = uz_iterate_record(it, load, options, history, 0.0, false, err);
     return status;
@@ -190,7 +170,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
         over = p.solved != UZ_ACTIVE_SOLVED;
         if (status == UZ_OK && !over) {
             p.wrong = it->law->kind->refute(it->law, p.refuted, p.active, p.r, p.g, it->m);
-            status = take(it, &p, load, err);
+            status = uz_iterate_take(it, p.r, p.g, load, UZ_METHOD_ACTIVE_SET, err);
             if (status == UZ_OK)
                 status = uz_iterate_record(it, load, options, history, 0.0, false, err);
             if (p.wrong == 0)
@@ -202,6 +182,10 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
             goto done;
         if (is_stuck(&p) && may_exchange(it, load)) {
             status = solve_by_exchange(&p, end, it, load, options, history, err);
+            goto done;
+        }
+        if (is_stuck(&p) && options->yields) {
+            *end = UZ_END_STALLED;
             goto done;
         }
         if (!over)

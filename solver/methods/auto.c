@@ -1,55 +1,110 @@
-/* auto.c: which methods run, and in which order, where none was asked for. */
+/* auto.c: which methods run, and in which order, where none was asked for.
+ *
+ * The active set comes first: on the reference problems it ends in 1 to 10 steps from no contact at all, where
+ * conjugate steps need 30 to 100, and in the scaled and bounded forms without ever forming D. Where it fails (only
+ * single exchanges are left, dependent rows in the guess, a form that can't) its last answer is handed over to be
+ * certified, and then the others follow, each within the work that it is expected to need: exchanges with an updated
+ * factor, conjugate steps, which hand the active set a better guess once. From then on these two go on by turns, each
+ * turn several times as long as the last, until one is there: which is the faster is not known before, and so all of it
+ * takes at most a small multiple of what that one takes.
+ *
+ * Where D is applied by inner iterations accelerated steps take the place of both: with rows that depend on each other
+ * a direction's curvature is less than what the inner iterations leave, and conjugate steps go astray. */
 #include "methods/iterate.h"
 #include "methods/kinds.h"
 
-/* The active set comes first: on the reference problems it ends in 1 to 10 steps from no contact at all, where
- * conjugate steps need 30 to 100, and in the scaled and bounded forms without ever forming D. Where it fails
- * (dependent rows in the guess, a form that can't) conjugate steps take over, and hand it a better guess once. Where D
- * is applied by inner iterations accelerated steps do: with rows that depend on each other a direction's curvature is
- * less than what the inner iterations leave, and conjugate steps go astray. */
+#include <math.h>
+
 enum { WARM_UP = 32 };
 
-/* Where auto stands: kept in the iterate, so that a run can go on from there. */
-enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING };
+/* Where auto stands: kept in the iterate, so that a run can go on from there. From TURNS on each second phase is of
+ * exchanges, those between of iterations. */
+enum { FIRST_GUESS, WARMING_UP, SECOND_GUESS, ITERATING, FIRST_EXCHANGE, TURNS };
 
-/* Is the phase over, but not the run? */
-static bool phase_over(uz_end end, const uz_iterate *it, const uz_method_options *options)
+/* The first turns: iterations, twice as many as most problems need, and for exchanges the work of as many applications
+ * of D. Later ones are so many times as long; exchanges get more where the iterations have not bounded anything yet. */
+#define FIRST_TURN 660.0
+#define LONGER     4.0
+#define UNBOUNDED  16.0
+
+static bool is_guess(int32_t phase)
 {
-    if (it->phase == WARMING_UP)
-        return end == UZ_END_ITERATIONS && it->iteration < options->max_iterations;
-    return it->phase != ITERATING && (end == UZ_END_STALLED || end == UZ_END_UNSOLVED);
+    return phase == FIRST_GUESS || phase == SECOND_GUESS;
 }
 
-static void warm_up(uz_iterate *it)
+static bool is_exchange(int32_t phase)
 {
-    it->phase = WARMING_UP;
-    it->phase_end = it->iteration + WARM_UP;
+    return phase == FIRST_EXCHANGE || (phase >= TURNS && (phase - TURNS) % 2 == 0);
+}
+
+/* FIRST_TURN at first, longer with each turn of both. */
+static double turn_length(int32_t phase)
+{
+    return FIRST_TURN * pow(LONGER, phase < TURNS ? 0.0 : (double)((phase - TURNS) / 2 + 1));
+}
+
+static void begin_phase(uz_iterate *it, int32_t phase)
+{
+    const double most = phase == WARMING_UP ? WARM_UP : fmin(turn_length(phase), (double)(INT64_MAX / 4));
+    it->phase = phase;
+    if (!is_guess(phase) && !is_exchange(phase))
+        it->phase_end = it->iteration + (int64_t)most;
+}
+
+static int32_t next_phase(int32_t phase, bool exchanges)
+{
+    switch (phase) {
+    case FIRST_GUESS:
+        return exchanges ? FIRST_EXCHANGE : WARMING_UP;
+    case FIRST_EXCHANGE:
+        return WARMING_UP;
+    case WARMING_UP:
+        return SECOND_GUESS;
+    case SECOND_GUESS:
+        return ITERATING;
+    default:
+        return phase == ITERATING ? TURNS : phase + 1;
+    }
 }
 
 static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                      uz_history *history, uz_error *err)
 {
-    uz_method_options phase = *options;
-    phase.method = UZ_METHOD_ACCELERATED_RESTART;
+    uz_method_options part = *options;
+    part.method = UZ_METHOD_ACCELERATED_RESTART;
     if (options->stopping != UZ_STOP_CERTIFIED || !it->law->kind->one_sided)
-        return uz_steps_run(end, it, load, &phase, history, err);
-    if (load->dual->can->exact || !uz_method_conjugate.exact)
-        phase.method = UZ_METHOD_CONJUGATE;
+        return uz_steps_run(end, it, load, &part, history, err);
+    const bool exchanges = load->dual->can->exact;
+    if (exchanges || !uz_method_conjugate.exact)
+        part.method = UZ_METHOD_CONJUGATE;
+    part.yields = exchanges;
     if (options->again)
-        warm_up(it);
-    for (;;) {
-        const bool guess = it->phase == FIRST_GUESS || it->phase == SECOND_GUESS;
-        const bool short_phase = it->phase == WARMING_UP && it->phase_end < options->max_iterations;
-        phase.max_iterations = short_phase ? it->phase_end : options->max_iterations;
-        uz_status status = guess ? uz_method_active_set.run(end, it, load, &phase, history, err)
-                                 : uz_steps_run(end, it, load, &phase, history, err);
-        if (status != UZ_OK || !phase_over(*end, it, options))
+        begin_phase(it, WARMING_UP);
+    else if (it->phase == FIRST_EXCHANGE) /* what was handed over was not good enough */
+        uz_iterate_go_back(it);
+    for (bool stalled = false;;) {
+        const int32_t phase = it->phase;
+        const bool guess = is_guess(phase), exchange = is_exchange(phase),
+                   limited = !guess && !exchange && (phase == WARMING_UP || exchanges);
+        const double unbounded = phase >= TURNS && isinf(it->best_relative) ? UNBOUNDED : 1.0;
+        part.max_iterations =
+            limited && it->phase_end < options->max_iterations ? it->phase_end : options->max_iterations;
+        part.work = unbounded * turn_length(phase) * uz_dual_load_column_work(load);
+        uz_status status = guess      ? uz_method_active_set.run(end, it, load, &part, history, err)
+                           : exchange ? uz_method_dual_active_set.run(end, it, load, &part, history, err)
+                                      : uz_steps_run(end, it, load, &part, history, err);
+        const bool gave_up = *end == UZ_END_STALLED || *end == UZ_END_UNSOLVED,
+                   at_limit = *end == UZ_END_ITERATIONS && it->iteration < options->max_iterations;
+        if (status != UZ_OK || stalled ||
+            !(at_limit || (gave_up && (guess || exchange || (limited && phase > WARMING_UP)))))
             return status;
-        if (it->phase == FIRST_GUESS)
-            warm_up(it);
-        else
-            it->phase++;
-        if (it->phase != SECOND_GUESS) /* guesses that came to nothing leave r at the best that was found */
+        stalled = gave_up && !guess && !exchange; /* iterations do no better: the exchanges' turn is the last */
+        begin_phase(it, next_phase(phase, exchanges));
+        if (phase == FIRST_GUESS && exchanges && it->iteration > 0 && *end == UZ_END_STALLED) {
+            *end = UZ_END_NEXT;
+            return UZ_OK;
+        }
+        if (guess) /* guesses that came to nothing leave r at the best that was found */
             uz_iterate_go_back(it);
     }
 }

@@ -103,6 +103,26 @@ uz_status uz_iterate_bound_best(uz_iterate *it, uz_dual_load *load, uz_error *er
     return status;
 }
 
+uz_status uz_iterate_take(uz_iterate *it, const double *r, const double *g, uz_dual_load *load, uz_method by,
+                          uz_error *err)
+{
+    const double *g0 = load->g0;
+    const bool admissible = it->law->kind->admissible(it->law, r, it->m);
+    for (int64_t i = 0; i < it->m; i++) {
+        it->r[i] = r[i];
+        it->Dr[i] = g0[i] - g[i];
+    }
+    it->law->kind->project(it->law, it->r, it->m);
+    uz_status status = admissible ? UZ_OK : uz_dual_load_apply(load, it->Dr, it->r, err);
+    memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
+    memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
+    it->tau = 1.0;
+    it->step_norm = NAN;
+    it->fresh = false;
+    it->iteration++;
+    return status == UZ_OK ? uz_iterate_bound(it, load, by, err) : status;
+}
+
 /* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
 static double force_norm(const uz_dual *dual, const double *x)
 {

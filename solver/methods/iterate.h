@@ -73,6 +73,11 @@ uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_l
  * Overwrites gamma. */
 uz_status uz_iterate_bound(uz_iterate *it, uz_dual_load *load, uz_method by, uz_error *err);
 
+/* An exact answer to some rows as equations becomes the iterate, and is bounded: r (m), cut to what the law allows, and
+ * its gaps g (m). Counts an iteration. */
+uz_status uz_iterate_take(uz_iterate *it, const double *r, const double *g, uz_dual_load *load, uz_method by,
+                          uz_error *err);
+
 /* Row 0: applies D to the start and bounds it. */
 uz_status uz_iterate_begin(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
                            uz_error *err);

@@ -7,8 +7,8 @@
 #include <string.h>
 
 static const uz_method_kind *const kinds[] = {
-    &uz_method_auto,       &uz_method_uzawa,     &uz_method_accelerated, &uz_method_accelerated_restart,
-    &uz_method_active_set, &uz_method_conjugate,
+    &uz_method_auto,       &uz_method_uzawa,     &uz_method_accelerated,     &uz_method_accelerated_restart,
+    &uz_method_active_set, &uz_method_conjugate, &uz_method_dual_active_set,
 };
 
 const uz_method_kind *uz_method_kind_at(int i)

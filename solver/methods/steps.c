@@ -124,7 +124,8 @@ static uz_status correct_again(uz_iterate *it, uz_dual_load *load, uz_error *err
 {
     double bound = it->best_bound, relative = it->best_relative;
     int64_t iteration = it->best_iteration;
-    bool wanted = it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET;
+    bool wanted = it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET &&
+                  it->made_by != UZ_METHOD_DUAL_ACTIVE_SET;
     it->resumed = false;
     if (!wanted)
         return UZ_OK;

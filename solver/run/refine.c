@@ -90,8 +90,11 @@ static uz_status measure(refinement *x, const uz_answer *answer, uz_error *err)
 static uz_status correct(refinement *x, uz_error *err)
 {
     const uz_run *run = x->run;
-    bool small = run->work.dual->dual->can->cheap_steps || run->m <= FEW_ROWS,
-         exchange = run->work.dual->dual->rows_may_depend && small;
+    const uz_dual *dual = run->work.dual->dual;
+    const int64_t pressing = run->work.it.law->kind->active(run->work.it.law, NULL, x->r, run->m);
+    const bool small = dual->can->cheap_steps || run->m <= FEW_ROWS || pressing <= FEW_ROWS ||
+                       run->work.it.made_by == UZ_METHOD_DUAL_ACTIVE_SET;
+    const bool exchange = dual->rows_may_depend && small;
     uz_dual_load *correction = NULL;
     for (int64_t i = 0; i < run->m; i++)
         x->f[i] = exchange || x->active[i] ? x->f[i] : INFINITY;
@@ -150,7 +153,8 @@ static void copy_answer(uz_answer *to, const uz_answer *from, const uz_run *run)
 static bool is_worth_it(const uz_run *run)
 {
     double error = run->answer.certificate.relative_error;
-    bool ended = run->work.end == UZ_END_SOLVED || run->work.end == UZ_END_UNDECIDED || run->work.end == UZ_END_STALLED;
+    const uz_end how = run->work.end;
+    bool ended = how == UZ_END_SOLVED || how == UZ_END_UNDECIDED || how == UZ_END_STALLED || how == UZ_END_NEXT;
     uz_stop stop = {run->asked->hooks, run->asked->deadline};
     return ended && error > run->work.requested && error > ROUNDED && !uz_stop_is_due(&stop);
 }
@@ -175,6 +179,8 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
             copy_answer(&run->answer, &latest, run);
             run->result->summary.refinements += better;
         }
+        if (run->work.end == UZ_END_NEXT && pass > 0 && isinf(run->answer.certificate.relative_error))
+            break; /* the guess is not nearly right, and something else is there to be tried */
         idle = unbounded || run->answer.certificate.relative_error < LEAST_GAIN * before ? 0 : idle + 1;
     }
     if (x.contradictory && isinf(run->answer.certificate.relative_error)) {

@@ -228,14 +228,15 @@ static uz_status judge(bool *done, uz_run *run, uz_error *err)
 {
     const uz_certificate *c = &run->answer.certificate;
     uz_work *work = &run->work;
-    if (run->asked->settings->balanced && run->asked->setup->is_scene && !work->again) {
+    const bool next = work->end == UZ_END_NEXT;
+    if (run->asked->settings->balanced && run->asked->setup->is_scene && !work->again && !next) {
         uz_run_balance_request(run);
         work->target = work->requested;
     }
     uz_status status = improve(run, err);
-    *done = run->result->ray || c->relative_error <= work->requested || work->end != UZ_END_TARGET;
-    work->again = true;
-    if (*done || !(work->it.best_relative <= work->target))
+    *done = run->result->ray || c->relative_error <= work->requested || (work->end != UZ_END_TARGET && !next);
+    work->again = !next;
+    if (*done || next || !(work->it.best_relative <= work->target))
         return status;
     double share = isfinite(c->relative_error) ? work->requested / c->relative_error
                                                : work->requested * c->energy_norm / c->absolute_error;
@@ -269,13 +270,20 @@ enum { MAX_ROUNDS = 8 };
 
 uz_status uz_run_finish(uz_run *run, uz_error *err)
 {
+    uz_answer before = {0}; /* what was handed over, as long as nothing better follows */
     bool done = false;
     uz_status status = UZ_OK;
     for (int round = 0; status == UZ_OK && !done && round < MAX_ROUNDS; round++) {
         if (round > 0) {
             if (run->asked->in_block)
                 tell_begin(run->asked);
-            status = uz_run_iterate(run, err);
+            if (run->work.end == UZ_END_NEXT) {
+                before = run->answer;
+                run->answer = (uz_answer){0};
+                status = uz_answer_allocate(&run->answer, run->d, run->m, err);
+            }
+            if (status == UZ_OK)
+                status = uz_run_iterate(run, err);
             if (status == UZ_OK)
                 status = uz_run_certify(run, err);
         }
@@ -284,6 +292,12 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
             status = judge(&done, run, err);
         note_certificate(run);
     }
+    if (status == UZ_OK && before.u && before.certificate.relative_error < run->answer.certificate.relative_error) {
+        const uz_answer swap = run->answer;
+        run->answer = before;
+        before = swap;
+    }
+    uz_answer_clear(&before);
     if (!done)
         run->work.end = UZ_END_STALLED;
     if (status == UZ_OK)
