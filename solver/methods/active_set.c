@@ -19,7 +19,7 @@
 
 /* Where steps are small they go on to the exact answer after the target is met: there the certificate of a cached body
  * is cheaper by half a linear solve, which is more than the steps cost. */
-enum { PATIENCE = 3, MAX_STEPS = 400, EXTRA_STEPS = 12, FEW_ROWS = 1024 };
+enum { PATIENCE = 3, MAX_STEPS = 400, EXTRA_STEPS = 12, FEW_ROWS = 1024, GUESSES = 8, MANY_GUESSES = 32 };
 
 /* What an exchange of all wrong rows is expected to leave of them, before it was tried. */
 #define FAIR_RATE 0.5
@@ -30,12 +30,12 @@ typedef struct {
     bool *active;  /* m: the current guess */
     bool *refuted; /* m: rows whose part of it is wrong */
     uz_active_end solved;
-    double *r; /* m: its solution, signs unchecked */
-    double *g; /* m: its gaps */
-    int64_t wrong, fewest, patience;
-    move move;            /* the last one */
-    double rate[N_MOVES]; /* wrong rows after the last move of each kind over those before */
-    int64_t before;       /* wrong rows before it, 0: there was none */
+    double *r;                             /* m: its solution, signs unchecked */
+    double *g;                             /* m: its gaps */
+    int64_t wrong, fewest, patience, idle; /* idle: steps since there were `fewest` */
+    move move;                             /* the last one */
+    double rate[N_MOVES];                  /* wrong rows after the last move of each kind over those before */
+    int64_t before;                        /* wrong rows before it, 0: there was none */
 } pivoting;
 
 static bool allocate(pivoting *p, int64_t m)
@@ -93,6 +93,7 @@ static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
     bool better = p->wrong < p->fewest, all = better || p->patience > 0;
     judge_move(p);
     p->patience = better ? PATIENCE : p->patience - 1;
+    p->idle = better ? 0 : p->idle + 1;
     const bool ask = all ? p->rate[GUESS] <= p->rate[EXCHANGE] : p->move != GUESS || p->rate[GUESS] < 1.0;
     p->move = EXCHANGE;
     if (better)
@@ -184,7 +185,7 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
             status = solve_by_exchange(&p, end, it, load, options, history, err);
             goto done;
         }
-        if (is_stuck(&p) && options->yields) {
+        if (is_stuck(&p) && options->yields && (p.move != GUESS || p.idle >= GUESSES || k >= MANY_GUESSES)) {
             *end = UZ_END_STALLED;
             goto done;
         }
