@@ -70,6 +70,9 @@ SHOWN = {
     "200,000 malformed requests": (
         lambda f: f"{count(f['mutants'])} malformed requests: mutated JSON, meshes, matrices, heads",
         lambda f: errors(f, f"no error of the server, {none_of(f, 'stuck')}; {' to '.join(f['memory_mb'].split('/')[::max(1, len(f['memory_mb'].split('/')) - 1)])} MB")),
+    "200 requests in random orders, cold and cached": (
+        lambda f: f"{count(f['requests'])} requests in random orders, on an empty cache and on one that others filled",
+        lambda f: errors(f, f"{count(f['converged'])} bodies solved")),
     "every allocation of a job fails": (lambda f: f"every one of the {count(f['allocations'])} allocations of a job fails, once and from then on",
                                         lambda f: errors(f, f"no crash, other jobs finish; {none_of(f, 'stuck', 'leaked')}")),
     "600 x 200 cells: HTTP against the library": (lambda f: "a 600 x 200 scene through HTTP over the library call; as uploaded matrices",
