@@ -223,7 +223,7 @@ def test_cylinders_and_cones_are_recognised(s):
             answer = answer_of(s, fit_in_space(kind, ring(10, 20.005, taper), ring(20, 40, taper)))
             mean = -sum(answer["reactions"]) / (20 * math.pi / 2 * 2) / lame(0.005)
             check(abs(mean - 1) < mean_off + taper, kind, taper, mean)
-            check(min(answer["pressure"]) > 0.7 * lame(0.005), kind, taper, answer["pressure"])
+            check(min(answer["pressure"]) > 0.5 * lame(0.005), kind, taper, answer["pressure"])
     request = fit_in_space("hex8", ring(10, 20.005, 0), ring(20, 40, 0), smooth=False)
     check(-sum(answer_of(s, request)["reactions"]) > 3 * lame(0.005) * 20 * math.pi / 2 * 2)
 
