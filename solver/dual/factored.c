@@ -1,6 +1,7 @@
 /* factored.c: the dual operator by one sparse solve per application, the form of Kanno's algorithm. Where each row
  * bounds a single dof, the contact problem with given rows as equations holds the dofs that touch at their bounds,
- * solves K u = p on the others, and the reactions are what holds them. */
+ * solves K u = p on the others, and the reactions are what holds them; other rows become equations by multipliers. */
+#include "dual/multipliers.h"
 #include "dual/sparse.h"
 
 #include "core/alloc.h"
@@ -107,7 +108,7 @@ static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r,
     uz_bounded *box = x->sparse.box;
     bool solved = false;
     if (!box)
-        return UZ_OK;
+        return uz_multipliers_solve(&x->sparse, x->ws, end, r, g, active, err);
     if (!uz_bounded_hold(&x->sparse, active, false)) {
         *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
         return UZ_OK;

@@ -25,3 +25,75 @@ TEST(degenerate_problems_are_certified)
         CHECK_MSG(all.certified[kind] == all.problems[kind], "%s: %d of %d certified", DEGENERATE_NAMES[kind],
                   (int)all.certified[kind], (int)all.problems[kind]);
 }
+
+/* Isotonic regression by pool adjacent violators: blocks whose means ascend. Loads are multiples of 2^-20, so that the
+ * sums are exact. u and start (n each): work. */
+static void pool_violators(quad *u, int64_t *start, const double *p, int64_t n)
+{
+    quad *sum = quad_zeros(n);
+    int64_t blocks = 0;
+    for (int64_t i = 0; i < n; i++) {
+        start[blocks] = i;
+        sum[blocks++] = p[i];
+        for (; blocks > 1; blocks--) {
+            const quad after = (quad)(i + 1 - start[blocks - 1]),
+                       before = (quad)(start[blocks - 1] - start[blocks - 2]);
+            if (sum[blocks - 2] * after <= sum[blocks - 1] * before)
+                break;
+            sum[blocks - 2] += sum[blocks - 1];
+        }
+    }
+    for (int64_t b = 0; b < blocks; b++) {
+        const int64_t end = b + 1 < blocks ? start[b + 1] : n;
+        for (int64_t i = start[b]; i < end; i++)
+            u[i] = sum[b] / (quad)(end - start[b]);
+    }
+    free(sum);
+}
+
+TEST(a_long_chain_is_certified)
+{
+    enum { N = 3000 };
+    qp_random rng = {11};
+    quad *exact = quad_zeros(N);
+    int64_t *row = calloc(2 * N, sizeof *row), *column = calloc(2 * N, sizeof *column);
+    double *value = vector(2 * N);
+    uz_qp qp = {.p = vector(N), .h = vector(N - 1)};
+    if (!row || !column)
+        abort();
+    for (int64_t i = 0; i < N; i++) {
+        row[i] = column[i] = i;
+        value[i] = 1;
+        qp.p[i] = floor(0x1p20 * (3.0 * (double)i / N + random_signed(&rng))) * 0x1p-20;
+    }
+    CHECK_INT(uz_csc_from_triplets(&qp.K, N, N, N, row, column, value, NULL), UZ_OK);
+    for (int64_t i = 0; i + 1 < N; i++)
+        for (int k = 0; k < 2; k++) {
+            row[2 * i + k] = i;
+            column[2 * i + k] = i + k;
+            value[2 * i + k] = k ? -1 : 1;
+        }
+    CHECK_INT(uz_csc_from_triplets(&qp.N, N - 1, N, 2 * (N - 1), row, column, value, NULL), UZ_OK);
+    pool_violators(exact, row, qp.p, N);
+    uz_problem problem = problem_of(qp);
+    uz_settings settings = uz_settings_default();
+    uz_result *result = solve_problem(&problem, &settings);
+    if (result) {
+        quad error = 0, norm = 0;
+        for (int64_t i = 0; i < N; i++) {
+            error += (result->u[i] - exact[i]) * (result->u[i] - exact[i]);
+            norm += exact[i] * exact[i];
+        }
+        error = quad_sqrt(error / norm);
+        CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+        CHECK_MSG(result->summary.iterations <= 40, "%d iterations", (int)result->summary.iterations);
+        CHECK_MSG(error <= result->summary.certificate.relative_error, "off by %g, certified %g", (double)error,
+                  result->summary.certificate.relative_error);
+    }
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+    free(exact);
+    free(row);
+    free(column);
+    free(value);
+}
