@@ -106,11 +106,12 @@ static uz_status distance(certifier *c, double *square, uz_error *err)
     if (!bound_cheaply(c, square)) {
         status = c->in->inverse_norm(c->in->ctx, square, c->res.e, err);
         /* a residual is rounding, in all directions alike: e'K^-1 e / e'W e is the mean of d eigenvalues */
-        const double guess = SURELY * fmax(1.0 / fmax(c->in->rcond, DBL_MIN),
-                                           c->weighted > 0.0 ? (double)c->d * (*square / c->weighted) : 0.0);
-        inverse = fmin(inverse, guess);
-        doubt = c->in->measure_doubt ? uz_bound_doubt(inverse, c->d) : 0.0;
-        if (status == UZ_OK && !(doubt <= HARMLESS))
+        const double seen =
+            fmax(1.0 / fmax(c->in->rcond, DBL_MIN), c->weighted > 0.0 ? (double)c->d * (*square / c->weighted) : 0.0);
+        inverse = fmin(inverse, SURELY * seen);
+        /* Without a factor the solve is one of conjugate gradients, whose rounding is that of products with K. */
+        doubt = uz_bound_doubt(c->in->measure_doubt ? inverse : seen, c->d);
+        if (status == UZ_OK && c->in->measure_doubt && !(doubt <= HARMLESS))
             status = c->in->measure_doubt(c->in->ctx, &doubt, err);
     }
     *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, c->noise));
