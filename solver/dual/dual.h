@@ -99,9 +99,9 @@ uz_status uz_dual_load_prepare(uz_dual_load *load, double *lambda_max, bool weig
 uz_status uz_dual_load_apply(uz_dual_load *load, double *Dr, const double *r, uz_error *err);
 /* Column i of D (m): row i's own reaction as every row feels it. Overwrites what the last apply left. */
 uz_status uz_dual_load_column(uz_dual_load *load, double *column, int64_t i, uz_error *err);
-/* Column i of D^-1 (m): the reactions that move the body by 1 at row i, along its normal, and not at the others. *can false, nothing
- * written: the rows may depend on each other, the form has none, or it had to stop. Overwrites what the last apply
- * left. */
+/* Column i of D^-1 (m): the reactions that move the body by 1 at row i, along its normal, and not at the others. *can
+ * false, nothing written: the rows may depend on each other, the form has none, or it had to stop. Overwrites what the
+ * last apply left. */
 uz_status uz_dual_load_inverse_column(uz_dual_load *load, bool *can, double *column, int64_t i, uz_error *err);
 /* About how many entries of matrices are passed for a column of either, or an application. */
 double uz_dual_load_column_work(const uz_dual_load *load);

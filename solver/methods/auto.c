@@ -40,7 +40,8 @@ static bool is_exchange(int32_t phase)
 /* FIRST_TURN at first, longer with each turn of both. */
 static double turn_length(int32_t phase)
 {
-    return FIRST_TURN * pow(LONGER, phase < TURNS ? 0.0 : (double)((phase - TURNS) / 2 + 1));
+    const int32_t turns = phase < TURNS ? 0 : (phase - TURNS) / 2 + 1;
+    return FIRST_TURN * pow(LONGER, turns);
 }
 
 static void begin_phase(uz_iterate *it, int32_t phase)

@@ -18,7 +18,7 @@ typedef enum {
     UZ_END_SOLVED, /* every sign is right, whatever the target: only rounding is left, the certificate tells how much */
     UZ_END_UNDECIDED, /* the same, but rows contradict each other by less than rounding can tell from touching */
     UZ_END_UNSOLVED,  /* the active set can't: too many rows of several entries for the factored operator */
-    UZ_END_NEXT, /* the last r is the best of a way that was given up; who is not content with it calls again */
+    UZ_END_NEXT,      /* the last r is the best of a way that was given up; who is not content with it calls again */
     UZ_END_PAPER,
     UZ_END_CANCELLED,
     UZ_END_RAY /* the reactions grow along a ray that seems to prove the rows contradictory */

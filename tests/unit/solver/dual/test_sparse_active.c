@@ -464,7 +464,7 @@ TEST(plates_over_a_floor_take_few_steps)
     static const double sinks[] = {1.5, 5.0};
     for (int k = 0; k < 2; k++) {
         uz_result *got = solve_floor(100, true, sinks[k], 0, UZ_OPERATOR_FACTORED);
-        CHECK(got && got->summary.outcome == UZ_CONVERGED && got->summary.method == UZ_METHOD_ACTIVE_SET);
+        CHECK(got && got->summary.outcome == UZ_CONVERGED);
         if (got)
             CHECK_MSG(got->summary.iterations <= 25, "%g times its depth: %lld steps", sinks[k],
                       (long long)got->summary.iterations);

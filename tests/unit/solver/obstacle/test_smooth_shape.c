@@ -23,9 +23,10 @@ static void place(double out[3], const double x[3], double far)
 static cloud points_of(uz_smooth_kind kind, double radius, double slope, double arc, double rough, double side,
                        double far)
 {
-    cloud made;
+    cloud made = {{0}, {0}};
     for (int i = 0; i < N; i++) {
-        const double phi = arc * (i % AROUND) / (AROUND - 1) + 0.01 * (i % 3), z = 0.3 * radius * (i / AROUND);
+        const int row = i / AROUND;
+        const double phi = arc * (i % AROUND) / (AROUND - 1) + 0.01 * (i % 3), z = 0.3 * radius * row;
         double x[3], n[3];
         if (kind == UZ_SMOOTH_SPHERE) {
             const double up = z / (2 * radius);
@@ -93,7 +94,8 @@ TEST(other_surfaces_are_none)
 {
     cloud plane, saddle, bent = points_of(UZ_SMOOTH_CYLINDER, 1, 0, 2, 0, 1, 0);
     for (int i = 0; i < N; i++) {
-        const double x = 0.1 * (i % AROUND), y = 0.1 * (i / AROUND);
+        const int row = i / AROUND;
+        const double x = 0.1 * (i % AROUND), y = 0.1 * row;
         memcpy(plane.xyz + 3 * i, (double[3]){x, y, 0}, 3 * sizeof x);
         memcpy(plane.normal + 3 * i, (double[3]){0, 0, 1}, 3 * sizeof x);
         memcpy(saddle.xyz + 3 * i, (double[3]){x, y, x * y}, 3 * sizeof x);
