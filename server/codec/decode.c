@@ -17,8 +17,9 @@ static const codec_limits NO_LIMITS = {JSON_MAX_DEPTH, INT64_MAX, INT64_MAX, INT
 bool codec_init(const codec_limits *given, char *message, size_t size)
 {
     codec_end();
-    limits = given ? *given : NO_LIMITS;
+    limits = NO_LIMITS; /* the schemas are no request */
     loaded = schemas_load(message, size);
+    limits = given ? *given : NO_LIMITS;
     return loaded != NULL;
 }
 
