@@ -180,7 +180,7 @@ comma := ,
 # Ipopt is what obstacle problems are compared with, where it is installed; nothing else needs it.
 $(call obj,tests/bench/ipopt.c): CFLAGS += $(patsubst -I%,-isystem %,$(call pkg,--cflags ipopt))
 $(BUILD)/bench: $(call obj,$(BENCH_SRC)) $(BUILD)/libuzawa.a
-	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs ipopt) $(call pkg,--libs jansson) -lpthread
+	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) $(call pkg,--libs ipopt) $(call pkg,--libs jansson libcurl) -lpthread
 
 $(BUILD)/extremes: $(call obj,$(EXTREMES_SRC)) $(BUILD)/libuzawa.a
 	$(CC) $(LDFLAGS_ALL) -o $@ $^ $(SOLVER_LIBS) -lpthread -lquadmath -lgmp
@@ -298,7 +298,7 @@ $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(BUILD)/libparts.a $(BUILD)/libuza
 measured = $(PYTHON) -B tests/figures/measure.py $(BUILD) $(1)
 
 bench: deps ## measured ratios in one run: a table and build/bench.json
-	@$(MAKE) --no-print-directory -s $(BUILD)/bench
+	@$(MAKE) --no-print-directory -s $(BUILD)/bench $(BUILD)/uzawad
 	@$(call measured,bench $(if $(FILTER),--part)) $(BUILD)/bench $(BUILD)/bench.json $(FILTER)
 	@$(if $(FILTER),,$(MAKE) --no-print-directory -s $(BUILD)/guard && $(PYTHON) -B tests/guard/guard.py $(BUILD) --into $(BUILD)/bench.json)
 

@@ -99,14 +99,6 @@ static double seconds_of_solve(const uz_problem *problem, const uz_settings *set
     return seconds;
 }
 
-/* The better of AMD and METIS, decided once by a run of each. */
-static bench_ordering better_ordering(const uz_csc *K, const double *p)
-{
-    bench_linear amd = bench_cholmod(K, p, BENCH_AMD), metis = bench_cholmod(K, p, BENCH_METIS);
-    return amd.analyze + amd.factorize + amd.solve <= metis.analyze + metis.factorize + metis.solve ? BENCH_AMD
-                                                                                                    : BENCH_METIS;
-}
-
 typedef struct {
     uz_problem problem;
     uz_qp qp;
@@ -144,7 +136,7 @@ static void bench_body(report *out, int64_t nx, double relative_error)
     settings.relative_error = relative_error;
     body_begin(&b, nx);
     matrices.qp = b.qp;
-    bench_ordering ordering = better_ordering(&b.qp.K, b.qp.p);
+    bench_ordering ordering = bench_better_ordering(&b.qp.K, b.qp.p);
     for (int k = 0; k < 3; k++)
         seconds_of_solve(&b.problem, &settings, b.cache, NULL);
     for (int k = 0; k < runs; k++) {
@@ -401,6 +393,46 @@ static void bench_precisions(report *out)
     }
 }
 
+/* Condition numbers of slender bodies: as few linear solves as on others. */
+static void bench_slender_bodies(report *out)
+{
+    const char *row;
+    for (int k = 0; (row = bench_slender_name(k)) != NULL; k++) {
+        bench_value ratio, milliseconds;
+        int64_t steps;
+        char name[64];
+        if (!bench_slender(&ratio, &milliseconds, &steps, k)) {
+            printf("%s did not converge\n", row);
+            exit(1);
+        }
+        print_row(out, row, "x", ratio, "linear solve (target: 20)");
+        snprintf(name, sizeof name, "%s_milliseconds", row);
+        print_row(out, name, "ms", milliseconds, "");
+        print_count(out, row, "steps", steps);
+    }
+}
+
+/* The first jobs of a new daemon are in the row of all cold ones, and apart from the others. */
+static void bench_services(report *out)
+{
+    bench_service_cost cost;
+    if (!bench_service(&cost)) {
+        printf("the daemon was not measured\n");
+        exit(1);
+    }
+    print_row(out, "service_cold", "x", cost.cold, "linear solve (target: 1.1, at most 1.3)");
+    print_row(out, "service_cold_first", "x", cost.first, "those of a new daemon");
+    print_row(out, "service_cold_later", "x", cost.later, "those after them");
+    print_row(out, "service_second", "x", cost.second, "one CHOLMOD solve (target: 2.5)");
+    print_row(out, "service_tenth", "x", cost.tenth, "one CHOLMOD solve (target: 1.3)");
+    print_row(out, "service_cold_seconds", "s", cost.cold_s, "");
+    print_row(out, "service_linear_seconds", "s", cost.linear_s, "CHOLMOD's analyse, factorise, solve");
+    print_row(out, "service_factorize_seconds", "s", cost.factored_s, "the same without its analysis");
+    print_row(out, "service_second_milliseconds", "ms", cost.second_ms, "");
+    print_row(out, "service_tenth_milliseconds", "ms", cost.tenth_ms, "");
+    print_row(out, "service_solve_milliseconds", "ms", cost.solve_ms, "one CHOLMOD solve");
+}
+
 /* Memory that is given back and asked for again costs the kernel, or the host of a virtual machine, up to as much as
  * the factorization itself, now to us and now to the reference: both keep what they have touched once. */
 static void keep_memory(void)
@@ -440,6 +472,10 @@ int main(int argc, char **argv)
         bench_obstacles(&out);
     if (wanted(&out, "floor"))
         bench_floors(&out);
+    if (wanted(&out, "slender"))
+        bench_slender_bodies(&out);
+    if (wanted(&out, "service"))
+        bench_services(&out);
     if (wanted(&out, "oblique"))
         bench_oblique_planes(&out);
     if (wanted(&out, "memory"))

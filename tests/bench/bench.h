@@ -23,6 +23,8 @@ typedef struct {
 } bench_linear;
 typedef enum { BENCH_AMD, BENCH_METIS } bench_ordering;
 bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering ordering);
+/* The one whose solve is the faster, by a run of each. */
+bench_ordering bench_better_ordering(const uz_csc *K, const double *p);
 
 /* Seconds that Ipopt takes to minimize *value = 1/2 u'Ku - p'u over lower <= u <= upper (d each), from the given u.
  * NAN: it failed, or was not there when this was built. */
@@ -33,6 +35,23 @@ bool bench_obstacle(bench_value *ratio, bench_value *milliseconds, bool *compare
 /* A membrane or a plate of n x n dofs that would sink to `sink` times the depth of its floor: a cold solve over
  * CHOLMOD's linear solve of the same K, and the steps it took. false: no answer. */
 bool bench_floor(bench_value *ratio, int64_t *steps, int64_t n, bool plate, double sink);
+
+/* Beams 1000:1 on a plane and a chain of second differences, cold and certified 1e-8, over CHOLMOD's linear solve of
+ * the same K, in milliseconds, and in steps. name: NULL after the last. false: no answer. */
+const char *bench_slender_name(int which);
+bool bench_slender(bench_value *ratio, bench_value *milliseconds, int64_t *steps, int which);
+
+/* Jobs of a daemon at its default settings, HTTP and storage included, on bodies of about 600 x 200 cells that it has
+ * not seen: the first job on each over CHOLMOD's linear solve (analyse, factorise, solve) of its K, that of all bodies,
+ * of the first ones of a new daemon (whose memory the system has not given yet) and of those after them; the second
+ * and the tenth job over one CHOLMOD solve with the factor at hand. Then the times that these are made of. false: says
+ * why. */
+enum { BENCH_SERVICE_BODIES = 20, BENCH_SERVICE_FIRST = 3 };
+typedef struct {
+    bench_value cold, first, later, second, tenth;
+    bench_value cold_s, linear_s, factored_s, second_ms, tenth_ms, solve_ms;
+} bench_service_cost;
+bool bench_service(bench_service_cost *out);
 
 /* Peak memory of a cold contact solve over that of the linear solve of the same K with the ordering that takes least,
  * and that of the contact solve, in processes of their own. problem: cells along the paper's body as text, or "hex8_"

@@ -32,3 +32,10 @@ bench_linear bench_cholmod(const uz_csc *K, const double *p, bench_ordering orde
     cholmod_l_finish(&common);
     return t;
 }
+
+bench_ordering bench_better_ordering(const uz_csc *K, const double *p)
+{
+    const bench_linear amd = bench_cholmod(K, p, BENCH_AMD), metis = bench_cholmod(K, p, BENCH_METIS);
+    return amd.analyze + amd.factorize + amd.solve <= metis.analyze + metis.factorize + metis.solve ? BENCH_AMD
+                                                                                                    : BENCH_METIS;
+}

@@ -1,0 +1,105 @@
+/* slender.c: beams 1000:1 that are pressed on a plane, and a chain of second differences: bodies as stiff in one way
+ * and as soft in another as the solver meets, by cold certified solves in units of CHOLMOD's linear solve of the same
+ * K. */
+#include "bench/bench.h"
+#include "core/clock.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { RUNS = 11 };
+
+/* A beam of height 1, clamped at its left end, `gap` above the plane. */
+static uz_problem beam_problem(int64_t cells, int64_t layers, const char *element, double load, double gap)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = bench_paper_scene(3)};
+    uz_scene *scene = &problem.scene;
+    scene->model = UZ_PLANE_STRAIN;
+    scene->thickness = 1.0;
+    scene->box = (uz_box){.size = {1000.0, 1.0}, .cells = {cells, layers}, .dim = 2};
+    snprintf(scene->box.element, sizeof scene->box.element, "%s", element);
+    scene->loads[0].v[1] = -load;
+    scene->n_loads = 1; /* the one on the top */
+    scene->contacts[0].point[1] = -gap;
+    return problem;
+}
+
+/* CHENHARK of the CUTE collection, after B. Chen and P. T. Harker, SIAM J. Matrix Anal. Appl. 14 (1993): the sum of
+ * squares of u_1, u_n and the second differences of u, with 0 before and behind it, under u >= 0. The solution is 1 on
+ * the first half of the dofs and 0 behind it, on the first tenth of n there with r = 0. */
+static uz_status chain_qp(uz_qp *qp, int64_t n, uz_error *err)
+{
+    static const double entry[] = {6.0, -4.0, 1.0};
+    *qp = (uz_qp){.p = calloc((size_t)n, sizeof *qp->p), .h = calloc((size_t)n, sizeof *qp->h)};
+    uz_status status = qp->p && qp->h ? uz_csc_init(&qp->K, n, n, 3 * n - 3, err) : UZ_ERR_MEMORY;
+    if (status == UZ_OK)
+        status = uz_csc_init(&qp->N, n, n, n, err);
+    for (int64_t j = 0, nnz = 0; status == UZ_OK && j < n; j++) {
+        for (int64_t below = 0; below < 3 && j + below < n; below++) {
+            const double value = entry[below];
+            qp->K.idx[nnz] = j + below;
+            qp->K.val[nnz++] = value;
+            qp->p[j + below] += j < n / 2 ? value : 0.0; /* p = K u* - r* */
+            qp->p[j] += below > 0 && j + below < n / 2 ? value : 0.0;
+        }
+        qp->p[j] -= j >= n / 2 + n / 10 ? 1.0 : 0.0;
+        qp->K.ptr[j + 1] = nnz;
+        qp->N.idx[j] = j;
+        qp->N.val[j] = -1.0;
+        qp->N.ptr[j + 1] = j + 1;
+    }
+    return status;
+}
+
+static const struct {
+    const char *name, *element; /* NULL: the chain */
+    int64_t cells, layers;
+    double load, gap;
+} bodies[] = {{"beam_quad4_m400", "quad4", 400, 2, 1e-3, 0.01},
+              {"beam_quad4_m1000", "quad4", 1000, 4, 1e-3, 0.01},
+              {"beam_quad8_m400", "quad8", 200, 2, 1e-4, 0.5},
+              {"chenhark_d5000", NULL, 5000, 0, 0.0, 0.0}};
+
+const char *bench_slender_name(int which)
+{
+    return which < (int)(sizeof bodies / sizeof bodies[0]) ? bodies[which].name : NULL;
+}
+
+bool bench_slender(bench_value *ratio, bench_value *milliseconds, int64_t *steps, int which)
+{
+    uz_settings settings = uz_settings_default();
+    uz_problem problem = {.kind = UZ_PROBLEM_MATRICES};
+    uz_qp qp = {0}; /* of the beam */
+    uz_error err;
+    double ratios[RUNS], own[RUNS];
+    settings.relative_error = 1e-8;
+    if (bodies[which].element)
+        problem = beam_problem(bodies[which].cells, bodies[which].layers, bodies[which].element, bodies[which].load,
+                               bodies[which].gap);
+    bool ok = (bodies[which].element ? uz_scene_to_qp(&qp, NULL, &problem.scene, &err)
+                                     : chain_qp(&problem.qp, bodies[which].cells, &err)) == UZ_OK;
+    const uz_qp *matrices = bodies[which].element ? &qp : &problem.qp;
+    const bench_ordering ordering = ok ? bench_better_ordering(&matrices->K, matrices->p) : BENCH_AMD;
+    for (int k = -1; ok && k < RUNS; k++) { /* the first does not count */
+        const bench_linear linear = bench_cholmod(&matrices->K, matrices->p, ordering);
+        uz_result *result = NULL;
+        const double start = uz_seconds();
+        const uz_status status = uz_solve(&result, &problem, &settings, NULL, NULL, &err);
+        const double seconds = uz_seconds() - start;
+        ok = status == UZ_OK && result->summary.outcome == UZ_CONVERGED;
+        *steps = ok ? result->summary.iterations : 0;
+        if (k >= 0) {
+            ratios[k] = seconds / (linear.analyze + linear.factorize + linear.solve);
+            own[k] = 1e3 * seconds;
+        }
+        uz_result_free(result);
+    }
+    if (ok) {
+        *ratio = bench_summarise(ratios, RUNS);
+        *milliseconds = bench_summarise(own, RUNS);
+    }
+    uz_qp_clear(&qp);
+    uz_problem_clear(&problem);
+    return ok;
+}
