@@ -154,6 +154,9 @@ and symbolic analysis on the graph of nodes, and substitutions in strips, save m
 
 DIGITS = """The paper's body at 300 x 100 elements with its factor cached: time in units of one `cholmod_solve`, and iterations (`make bench FILTER=accuracy`)."""
 
+OTHERS = """The rows `service_` are jobs of a new daemon at its default settings, from the request to the reply that tells of the stored answer: ten on each of 20 bodies of
+600 to 619 x 200 elements, each with a load of its own, and CHOLMOD's linear solve of the same K between two bodies (`make bench FILTER=service`)."""
+
 GROWTH = """The paper's body, medians of 3 (`make bench-size`); the linear solve has the better of AMD and METIS."""
 
 EXTREMES = """Problems at the extremes, in six ways each (default, `exact`, cached, `factored`, `active_set`, `matrix_free`); every claim is held against a reference in `__float128`
@@ -200,7 +203,7 @@ def page(data, files):
     add("Against one linear solve", timed(tables.ratios(data), data, "bench", "ratios", tables.IN_RATIOS), LINEAR)
     add("Single measurements", tables.sentences(data))
     add("What digits cost", timed(tables.digits(data), data, "bench", "ratios", tables.IN_DIGITS), DIGITS)
-    add("Other ratios", tables.others(data))
+    add("Other ratios", tables.others(data), OTHERS)
     add("Cost against size", timed(tables.growth(data), data, "bench_size", "sizes"), GROWTH)
     if "peers" in data:
         limit = tables.sig(data["peers"]["time_limit_s"])

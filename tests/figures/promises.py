@@ -86,11 +86,35 @@ def service(data):
     return found
 
 
+SERVICE_JOB = "600 x 200 scene through HTTP, "
+# (row of the bench, which of its values, what, how many times at most, of how many runs at least)
+BENCH = [
+    ("service_cold", "median", SERVICE_JOB + "cold, over the linear solve: median", 1.1, 20),
+    ("service_cold", "max", SERVICE_JOB + "cold, over the linear solve: worst of 20, the first of a new daemon included", 1.3, 20),
+    ("service_second", "median", SERVICE_JOB + "second job on a body, over one `cholmod_solve`", 2.5, 20),
+    ("service_tenth", "median", SERVICE_JOB + "tenth job on a body, over one `cholmod_solve`", 1.3, 20),
+    ("beam_quad4_m400", "median", "beam 1000:1, `quad4`, 400 contacts, certified 1e-8, over the linear solve", 20, 5),
+    ("beam_quad4_m1000", "median", "the same, 1,000 contacts", 20, 5),
+    ("beam_quad8_m400", "median", "the same, `quad8`, 400 contacts", 20, 5),
+    ("chenhark_d5000", "median", "CHENHARK, 5,000 dofs, certified 1e-8, over the linear solve", 20, 5),
+]
+
+
+def bench(data):
+    rows = {row["name"]: row for row in (data.get("bench") or {}).get("ratios", [])}
+    found = []
+    for name, which, what, most, runs in BENCH:
+        row = rows.get(name)
+        kept = row and row["runs"] >= runs and row[which] <= most
+        found.append((what, f"at most {most} x", f"{sig(row[which], 3)} x" if row else NONE, kept, mark(row) if row else ""))
+    return found
+
+
 VERDICT = {True: "kept", False: "**missed**", None: "not measured"}
 
 
 def every(data):
-    return iterations(data) + peers(data) + service(data)
+    return iterations(data) + peers(data) + bench(data) + service(data)
 
 
 def lines(data):
