@@ -203,7 +203,7 @@ static bool percent_decode(char *text, bool in_query)
         if (c == '%') {
             const char *high = from[1] ? strchr(DIGITS, from[1]) : NULL;
             const char *low = high && from[2] ? strchr(DIGITS, from[2]) : NULL;
-            c = low ? (char)((high - DIGITS) % 16 * 16 + (low - DIGITS) % 16) : '\0';
+            c = (char)(low ? (high - DIGITS) % 16 * 16 + (low - DIGITS) % 16 : 0);
             if (c == '\0')
                 return false;
             from += 2;
