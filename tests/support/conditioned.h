@@ -557,8 +557,10 @@ static inline void run_conditioned(conditioned_tally *t, uint64_t seed, bool ran
         if (!known)
             exact = find_big_truth(&problem.qp, active);
         known = true;
-        if (!ranged && exact.definite && !(exact.condition >= 1e8 && exact.condition <= 1e17))
+        if (!ranged && exact.definite && !(exact.condition >= 1e8 && exact.condition <= 1e17)) {
+            uz_result_free(result);
             break;
+        }
         t->problems += turn == 0;
         t->indefinite += turn == 0 && !exact.definite;
         t->unsolved += turn == 0 && exact.definite && !exact.solved;
