@@ -79,6 +79,24 @@ void uz_put_normal(uz_contact_sites *sites, int64_t i, const double normal[3], i
         memcpy(sites->normal + i * dim, unit, (size_t)dim * sizeof *unit);
 }
 
+bool uz_row_of_sites(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place)
+{
+    static const double whole = 1;
+    const int dim = in->model->mesh.dim;
+    const int64_t first = sites->first[place];
+    *row = (uz_contact_row){.node = sites->at ? sites->at[place] : uz_group_node_at(in->on, place),
+                            .face = sites->face[place],
+                            .gap = sites->gap[place],
+                            .slaves = 1,
+                            .slave_share = &whole,
+                            .masters = (int)(sites->first[place + 1] - first),
+                            .master = sites->node + first,
+                            .master_share = sites->weight + first};
+    row->slave = &row->node;
+    memcpy(row->normal, sites->normal + place * dim, (size_t)dim * sizeof *row->normal);
+    return isfinite(row->gap);
+}
+
 int64_t uz_places_of_nodes(const uz_contact_input *in)
 {
     return uz_group_node_count(&in->model->mesh, in->on);

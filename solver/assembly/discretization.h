@@ -56,8 +56,11 @@ bool uz_contact_row_at(uz_contact_row *row, const uz_contact_input *in, int64_t 
 
 extern const uz_contact_discretization uz_node_to_obstacle, uz_node_to_face, uz_surface_to_surface;
 
-/* For both: the sites of the nodes of a group, n gaps that are INFINITY and n normals; the normal of one, in which what
- * is zero but for rounding becomes zero; areas that a constant pressure gives nodes. */
+/* Of rows against another body: the row that the sites have at a place, one slave node and its masters. */
+bool uz_row_of_sites(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place);
+
+/* For rows at nodes: the sites of the nodes of a group, n gaps that are INFINITY and n normals; the normal of one, in
+ * which what is zero but for rounding becomes zero; areas that a constant pressure gives nodes. */
 uz_status uz_sites_of_nodes(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err);
 void uz_put_normal(uz_contact_sites *sites, int64_t i, const double normal[3], int dim);
 int64_t uz_places_of_nodes(const uz_contact_input *in);

@@ -539,24 +539,6 @@ static int64_t places(const uz_contact_input *in)
     return in->model->sites[in->index].n;
 }
 
-static bool row(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place)
-{
-    static const double whole = 1;
-    const int dim = in->model->mesh.dim;
-    const int64_t first = sites->first[place];
-    *row = (uz_contact_row){.node = sites->at[place],
-                            .face = sites->face[place],
-                            .gap = sites->gap[place],
-                            .slaves = 1,
-                            .slave_share = &whole,
-                            .masters = (int)(sites->first[place + 1] - first),
-                            .master = sites->node + first,
-                            .master_share = sites->weight + first};
-    row->slave = &row->node;
-    memcpy(row->normal, sites->normal + place * dim, (size_t)dim * sizeof *row->normal);
-    return isfinite(row->gap);
-}
-
 static void areas(double *area, const uz_contact_input *in)
 {
     const uz_contact_sites *sites = &in->model->sites[in->index];
@@ -564,4 +546,4 @@ static void areas(double *area, const uz_contact_input *in)
 }
 
 const uz_contact_discretization uz_surface_to_surface = {
-    .name = "surface to surface", .places = places, .find = find, .row = row, .areas = areas};
+    .name = "surface to surface", .places = places, .find = find, .row = uz_row_of_sites, .areas = areas};

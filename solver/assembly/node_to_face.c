@@ -51,23 +51,8 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
     return status;
 }
 
-static bool row(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place)
-{
-    static const double whole = 1;
-    const int dim = in->model->mesh.dim;
-    const int64_t first = sites->first[place];
-    *row = (uz_contact_row){.node = uz_group_node_at(in->on, place),
-                            .face = sites->face[place],
-                            .gap = sites->gap[place],
-                            .slaves = 1,
-                            .slave_share = &whole,
-                            .masters = (int)(sites->first[place + 1] - first),
-                            .master = sites->node + first,
-                            .master_share = sites->weight + first};
-    row->slave = &row->node;
-    memcpy(row->normal, sites->normal + place * dim, (size_t)dim * sizeof *row->normal);
-    return isfinite(row->gap);
-}
-
-const uz_contact_discretization uz_node_to_face = {
-    .name = "node to face", .places = uz_places_of_nodes, .find = find, .row = row, .areas = uz_areas_of_nodes};
+const uz_contact_discretization uz_node_to_face = {.name = "node to face",
+                                                   .places = uz_places_of_nodes,
+                                                   .find = find,
+                                                   .row = uz_row_of_sites,
+                                                   .areas = uz_areas_of_nodes};
