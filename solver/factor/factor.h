@@ -93,9 +93,6 @@ void uz_norm_estimate_free(uz_norm_estimate *norm); /* NULL is fine */
  * first leaves far too large; done: there is little more to win. */
 uz_status uz_norm_estimate_step(double *bound, bool *done, uz_norm_estimate *norm, const uz_factor *factor,
                                 uz_factor_workspace *ws, const uz_csc *K, uz_error *err);
-/* All steps at once, with cancellation points between them (stop NULL: none): UZ_ERR_CANCELLED. */
-uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
-                                 const uz_stop *stop, uz_error *err);
 
 /* Where dof i stands in the factor's order: position[i], n. */
 const int64_t *uz_factor_position(const uz_factor *factor);

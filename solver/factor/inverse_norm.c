@@ -74,21 +74,3 @@ uz_status uz_norm_estimate_step(double *bound, bool *done, uz_norm_estimate *nor
     *done = norm->half_solves >= HALF_SOLVES;
     return UZ_OK;
 }
-
-uz_status uz_factor_inverse_norm(double *bound, const uz_factor *factor, uz_factor_workspace *ws, const uz_csc *K,
-                                 const uz_stop *stop, uz_error *err)
-{
-    bool done = false;
-    uz_norm_estimate *norm = uz_norm_estimate_new(factor);
-    uz_status status =
-        norm ? UZ_OK
-             : uz_fail(err, UZ_ERR_MEMORY, "", "no memory to bound the inverse of %lld dofs", (long long)factor->n);
-    while (status == UZ_OK && !done)
-        status = uz_stop_is_due(stop)
-                     ? uz_fail(err, UZ_ERR_CANCELLED, "", "stopped before the norm of the inverse was known")
-                     : uz_norm_estimate_step(bound, &done, norm, factor, ws, K, err);
-    if (status != UZ_OK)
-        *bound = INFINITY;
-    uz_norm_estimate_free(norm);
-    return status;
-}

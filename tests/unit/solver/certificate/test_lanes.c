@@ -19,7 +19,7 @@ static linear factor_of(const uz_csc *K)
     linear x = {.ws = uz_factor_workspace_new()};
     uz_error err = {0};
     CHECK_INT(factor_by(&x.factor, K, NULL, 0, UZ_ORDERING_AMD, 0, &err), UZ_OK);
-    CHECK_INT(uz_factor_inverse_norm(&x.bound, x.factor, x.ws, K, NULL, &err), UZ_OK);
+    CHECK_INT(whole_norm_estimate(&x.bound, x.factor, x.ws, K, &err), UZ_OK);
     return x;
 }
 
