@@ -30,6 +30,8 @@ double uz_bound_enlarge(double square, double doubt, double noise);
  * the norm `inverse`: the factor is that of K + E with |E_ij| within d eps, in practice sqrt(d) eps, of the root of
  * K_ii K_jj. Good enough to see where it does not matter; elsewhere uz_distrust measures it. */
 double uz_bound_doubt(double inverse, int64_t d);
+/* A doubt that does no harm need not be measured. */
+#define UZ_BOUND_HARMLESS 1e-2
 
 /* What the rounding of K c, summed in double precision, may hide of c'K c; size: the sum of K_jj c_j^2. */
 double uz_bound_rounding(double size, int64_t d);

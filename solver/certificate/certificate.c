@@ -92,9 +92,6 @@ static bool bound_cheaply(const certifier *c, double *square)
     return *square <= c->in->sharp * c->in->sharp * energy;
 }
 
-/* A doubt that does no harm need not be measured. */
-#define HARMLESS 1e-2
-
 /* How far estimates of the inverse's norm, from single vectors that rounding made, may be below it. */
 #define SURELY 1e3
 
@@ -111,7 +108,7 @@ static uz_status distance(certifier *c, double *square, uz_error *err)
         inverse = fmin(inverse, SURELY * seen);
         /* Without a factor the solve is one of conjugate gradients, whose rounding is that of products with K. */
         doubt = uz_bound_doubt(c->in->measure_doubt ? inverse : seen, c->d);
-        if (status == UZ_OK && c->in->measure_doubt && !(doubt <= HARMLESS))
+        if (status == UZ_OK && c->in->measure_doubt && !(doubt <= UZ_BOUND_HARMLESS))
             status = c->in->measure_doubt(c->in->ctx, &doubt, err);
     }
     *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, c->noise));

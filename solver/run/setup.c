@@ -247,9 +247,6 @@ uz_status uz_setup_doubt(uz_setup *setup, double *doubt, const uz_csc *K, uz_fac
     return status == UZ_ERR_CANCELLED ? UZ_OK : status;
 }
 
-/* A doubt that does no harm. */
-#define HARMLESS 1e-2
-
 /* One step nearer to the bound, under the mutex. A doubt that would have to be measured waits for the last one. */
 static uz_status improve_bound(uz_setup *setup, const uz_csc *K, uz_factor_workspace *ws, const uz_stop *stop,
                                uz_error *err)
@@ -262,12 +259,12 @@ static uz_status improve_bound(uz_setup *setup, const uz_csc *K, uz_factor_works
     if (status != UZ_OK)
         return status;
     double doubt = uz_bound_doubt(bound, K->cols); /* that of the factor; K's may be so much larger */
-    if (done && !(doubt <= HARMLESS)) {
+    if (done && !(doubt <= UZ_BOUND_HARMLESS)) {
         status = know_doubt(setup, K, ws, stop, err);
         doubt = status == UZ_OK ? setup->doubt : INFINITY;
     }
     if (status != UZ_ERR_CANCELLED)
-        setup->inverse_bound = doubt <= HARMLESS || (done && doubt < 1.0) ? bound / (1.0 - doubt) : INFINITY;
+        setup->inverse_bound = doubt <= UZ_BOUND_HARMLESS || (done && doubt < 1.0) ? bound / (1.0 - doubt) : INFINITY;
     if (done && status != UZ_ERR_CANCELLED) {
         setup->bound_known = true;
         uz_norm_estimate_free(setup->norm);
