@@ -4,6 +4,7 @@
 #include "scene/grids.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -58,17 +59,12 @@ void uz_body_model_clear(uz_body_model *model)
     memset(model, 0, sizeof *model);
 }
 
-static size_t csc_bytes(const uz_csc *A)
-{
-    return A->ptr ? 8 * (size_t)(A->cols + 1) + 16 * (size_t)A->ptr[A->cols] : 0;
-}
-
 size_t uz_body_model_bytes(const uz_body_model *model)
 {
     const uz_mesh *mesh = &model->mesh;
     const size_t nodes = (size_t)mesh->n_nodes, elements = (size_t)mesh->n_elements, rows = (size_t)model->m;
     const size_t dim = (size_t)mesh->dim;
-    size_t bytes = csc_bytes(&model->K) + csc_bytes(&model->N) + csc_bytes(&model->K_fixed);
+    size_t bytes = uz_csc_bytes(&model->K) + uz_csc_bytes(&model->N) + uz_csc_bytes(&model->K_fixed);
     bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
     bytes +=
         8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);

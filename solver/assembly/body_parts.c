@@ -3,6 +3,7 @@
 #include "assembly/parts.h"
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 
 #include <float.h>
 #include <math.h>
@@ -91,12 +92,6 @@ static void place_in_part(double place[3], const uz_part *p, const uz_mesh *mesh
         place[c] = c < mesh->dim ? (mesh->xyz[node * mesh->dim + c] - uz_part_centre(p, c)) / uz_part_size(p) : 0;
 }
 
-static void cross(double out[3], const double a[3], const double b[3])
-{
-    for (int c = 0; c < 3; c++)
-        out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
-}
-
 void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const double *n)
 {
     uz_part *p = &parts->list[parts->of[node]];
@@ -105,7 +100,7 @@ void uz_hold_part(uz_parts *parts, const uz_mesh *mesh, int64_t node, const doub
         return;
     place_in_part(at, p, mesh, node);
     memcpy(row, n, (size_t)mesh->dim * sizeof *n);
-    cross(row + 3, at, row);
+    uz_cross3(row + 3, at, row);
     for (int k = 0; k < parts->motions; k++)
         for (int c = 0; c < UZ_MOTIONS; c++)
             allowed[c] += parts->unit[k][c] * row[c];
@@ -117,7 +112,7 @@ void uz_move_node(double u[3], const uz_parts *parts, int64_t i, const uz_mesh *
 {
     double at[3];
     place_in_part(at, &parts->list[i], mesh, node);
-    cross(u, q + 3, at);
+    uz_cross3(u, q + 3, at);
     for (int c = 0; c < 3; c++)
         u[c] += q[c];
 }

@@ -11,6 +11,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 #include "scene/scene.h"
 
 #include <float.h>
@@ -245,14 +246,7 @@ static bool blend_entries(row_work *work, const uz_body_model *model)
     for (int64_t i = 0; i < 2 * model->m; i++)
         if (model->row_ends[i] >= 0)
             most += start[model->row_ends[i] + 1] - start[model->row_ends[i]];
-    /* Room for so many entries. */
-    int64_t *row = uz_realloc(work->row, most, sizeof *row);
-    work->row = row ? row : work->row;
-    int64_t *col = uz_realloc(work->col, most, sizeof *col);
-    work->col = col ? col : work->col;
-    double *val = uz_realloc(work->val, most, sizeof *val);
-    work->val = val ? val : work->val;
-    const bool room = row && col && val;
+    const bool room = uz_triplets_grow(&work->row, &work->col, &work->val, most);
     for (int64_t i = 0; i < model->m && room; i++)
         for (int k = 0; k < 2 && model->row_ends[2 * i] >= 0; k++) {
             const int64_t end = model->row_ends[2 * i + k];

@@ -20,6 +20,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "linalg/linalg.h"
 #include "obstacle/projection.h"
 
 #include <math.h>
@@ -30,6 +31,11 @@
 /* A place of which a smaller part is covered has no row: the pressure there would be that of a corner of the contact,
  * over an area that says nothing. */
 #define LEAST_COVER 0.05
+
+/* Where a contact names none: degrees. */
+#define FEATURE_ANGLE 40
+
+#define PI 3.14159265358979323846
 
 /* Contributions below this part of the whole are rounding. */
 #define ROUNDING 1e-13
@@ -44,6 +50,17 @@ int uz_mortar_by_node(const void *a, const void *b)
 }
 
 /* ---- surfaces */
+
+static const uz_mortar_geometry *geometry_of(int dim)
+{
+    return dim == 2 ? &uz_mortar_plane : &uz_mortar_space;
+}
+
+double uz_mortar_least_cosine(const uz_contact_input *in)
+{
+    const double degrees = in->contact->feature_angle > 0 ? in->contact->feature_angle : FEATURE_ANGLE;
+    return cos(degrees * PI / 180);
+}
 
 uz_side uz_mortar_side_of(const uz_mortar_side *side, const uz_body_model *model)
 {
@@ -106,7 +123,7 @@ static uz_status make_surface(uz_mortar_surface *out, const uz_contact_input *in
     }
     if (status == UZ_OK)
         status = uz_box_tree_init(&out->tree, out->n, dim, box, err);
-    if (status == UZ_OK && !(dim == 2 ? &uz_mortar_plane : &uz_mortar_space)->places(out, in))
+    if (status == UZ_OK && !geometry_of(dim)->places(out, in))
         status = no_memory(err);
     free(box);
     return status;
@@ -172,7 +189,7 @@ static bool find_points(side_work *work, const uz_contact_input *in, const uz_mo
                         const uz_mortar_surface *master)
 {
     const int dim = in->model->mesh.dim;
-    const uz_mortar_geometry *geometry = dim == 2 ? &uz_mortar_plane : &uz_mortar_space;
+    const uz_mortar_geometry *geometry = geometry_of(dim);
     double box[6], covered = 0;
     const double size = enclose(box, &slave->side[i], dim);
     int64_t before = -1;
@@ -258,13 +275,7 @@ static bool add_master(integrals *to, int64_t place, int64_t node, double value)
 {
     if (to->entries == to->room) {
         const int64_t room = 2 * to->room + 1024;
-        int64_t *places = uz_realloc(to->place, room, sizeof *places);
-        to->place = places ? places : to->place;
-        int64_t *nodes = uz_realloc(to->node, room, sizeof *nodes);
-        to->node = nodes ? nodes : to->node;
-        double *values = uz_realloc(to->value, room, sizeof *values);
-        to->value = values ? values : to->value;
-        if (!places || !nodes || !values)
+        if (!uz_triplets_grow(&to->place, &to->node, &to->value, room))
             return false;
         to->room = room;
     }

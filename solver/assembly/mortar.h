@@ -10,9 +10,6 @@
 #include "obstacle/box_tree.h"
 #include "obstacle/smooth_shape.h"
 
-/* Where a contact names no feature angle: degrees. */
-#define UZ_FEATURE_ANGLE 40
-
 /* An edge or a face of a surface. A place is a node of the slave with a normal of its own: where the surface turns by
  * more than the feature angle, a node has one for each side. */
 typedef struct {
@@ -59,6 +56,9 @@ typedef struct {
                    const uz_mortar_surface *master, const int64_t *near, int64_t n_near);
 } uz_mortar_geometry;
 extern const uz_mortar_geometry uz_mortar_plane, uz_mortar_space;
+
+/* Cosine of the feature angle: sides that turn by more make a corner. */
+double uz_mortar_least_cosine(const uz_contact_input *in);
 
 /* By node, then by the second number: pairs of numbers, for qsort. */
 int uz_mortar_by_node(const void *a, const void *b);

@@ -155,7 +155,6 @@ static void find_tangents(uz_mortar_surface *surface, const int64_t *at, double 
 /* Places in the order of their nodes: one for each end of an edge, but where it goes on into the next. */
 static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
 {
-    const double feature = in->contact->feature_angle > 0 ? in->contact->feature_angle : UZ_FEATURE_ANGLE;
     int64_t(*key)[2] = uz_alloc(3 * surface->n, sizeof *key), n = 0; /* node; 3 * edge + which of its nodes */
     int64_t *at = uz_alloc_zero(2 * in->model->mesh.n_nodes, sizeof *at);
     surface->node = uz_alloc(3 * surface->n, sizeof *surface->node);
@@ -164,7 +163,7 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
     if (!room)
         goto done;
     list_ends(at, surface);
-    find_tangents(surface, at, cos(feature * PI / 180));
+    find_tangents(surface, at, uz_mortar_least_cosine(in));
     for (int64_t i = 0; i < surface->n; i++)
         for (int a = 0; a < surface->side[i].nodes; a++)
             if (a != 0 || !surface->side[i].joined[0]) {

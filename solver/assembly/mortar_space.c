@@ -11,12 +11,11 @@
 #include "assembly/mortar.h"
 
 #include "core/alloc.h"
+#include "core/vector3.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define PI 3.14159265358979323846
 
 enum { MOST_CORNERS = 12, MOST_PIECES = 5 };
 
@@ -32,25 +31,6 @@ typedef struct {
 typedef struct {
     double x[3], t[2][3], n[3];
 } plane;
-
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(double out[3], const double a[3], const double b[3])
-{
-    for (int c = 0; c < 3; c++)
-        out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
-}
-
-static double unit(double v[3])
-{
-    const double length = sqrt(dot(v, v));
-    for (int c = 0; c < 3 && length > 0; c++)
-        v[c] /= length;
-    return length;
-}
 
 static int corners_of(const uz_mortar_side *side)
 {
@@ -113,8 +93,7 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
 /* A face joins a place of its node whose normal so far is within the feature angle, else it begins one. */
 static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
 {
-    const double feature = in->contact->feature_angle > 0 ? in->contact->feature_angle : UZ_FEATURE_ANGLE;
-    const double least = cos(feature * PI / 180);
+    const double least = uz_mortar_least_cosine(in);
     int64_t most = 0, n = 0;
     for (int64_t i = 0; i < surface->n; i++)
         most += surface->side[i].nodes;
@@ -137,14 +116,14 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
         double normal[3];
         int64_t place = surface->n_places;
         uz_side_area_vector(normal, &shape, uz_side_local_nodes(&shape)[a]);
-        unit(normal);
+        uz_unit3(normal);
         if (k > 0 && key[k][0] != key[k - 1][0])
             first = surface->n_places;
         for (int64_t p = surface->n_places - 1; p >= first; p--) {
             double mean[3];
             memcpy(mean, surface->normal + 3 * p, sizeof mean);
-            unit(mean);
-            if (dot(mean, normal) > least)
+            uz_unit3(mean);
+            if (uz_dot3(mean, normal) > least)
                 place = p;
         }
         if (place == surface->n_places) {
@@ -156,7 +135,7 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
         side->place[a] = place;
     }
     for (int64_t p = 0; p < surface->n_places; p++)
-        unit(surface->normal + 3 * p);
+        uz_unit3(surface->normal + 3 * p);
     free(key);
     return room && (in->contact->faceted || recognise(surface, &in->model->mesh));
 }
@@ -212,8 +191,8 @@ static int project(polygon piece[MOST_PIECES], const uz_mortar_side *side, const
         for (int a = 0; a < 4 && nodes[k][a] >= 0 && nodes[k][a] < side->nodes; a++) {
             const double *x = side->xyz + 3 * nodes[k][a];
             const double off[3] = {x[0] - on->x[0], x[1] - on->x[1], x[2] - on->x[2]};
-            piece[k].x[piece[k].n][0] = dot(off, on->t[0]);
-            piece[k].x[piece[k].n++][1] = dot(off, on->t[1]);
+            piece[k].x[piece[k].n][0] = uz_dot3(off, on->t[0]);
+            piece[k].x[piece[k].n++][1] = uz_dot3(off, on->t[1]);
         }
     }
     return count;
@@ -246,12 +225,13 @@ static bool lift(double *N, double area[3], double *height, double local[2], con
                 for (int i = 0; i < 2; i++)
                     T[i][c] += slope[a][i] * (side->xyz[3 * a + c] - side->xyz[c]);
         }
-        const double f[2] = {dot(x, on->t[0]) - y[0], dot(x, on->t[1]) - y[1]};
-        const double J[2][2] = {{dot(T[0], on->t[0]), dot(T[1], on->t[0])}, {dot(T[0], on->t[1]), dot(T[1], on->t[1])}};
+        const double f[2] = {uz_dot3(x, on->t[0]) - y[0], uz_dot3(x, on->t[1]) - y[1]};
+        const double J[2][2] = {{uz_dot3(T[0], on->t[0]), uz_dot3(T[1], on->t[0])},
+                                {uz_dot3(T[0], on->t[1]), uz_dot3(T[1], on->t[1])}};
         const double det = J[0][0] * J[1][1] - J[0][1] * J[1][0];
         const double step[2] = {(J[1][1] * f[0] - J[0][1] * f[1]) / det, (J[0][0] * f[1] - J[1][0] * f[0]) / det};
-        *height = dot(x, on->n);
-        cross(area, T[0], T[1]);
+        *height = uz_dot3(x, on->n);
+        uz_cross3(area, T[0], T[1]);
         if (!isfinite(step[0] + step[1]))
             return false;
         if (fabs(step[0]) + fabs(step[1]) < 1e-14)
@@ -325,16 +305,16 @@ static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_m
             for (int a = 0; a < side->nodes; a++)
                 for (int c = 0; c < 3; c++)
                     normal[c] += p.N[a] * slave->normal[3 * side->place[a] + c];
-            unit(normal);
-            p.weight *= sqrt(dot(area, area)) / dot(area, on->n);
-            p.gap = (height[1] - height[0]) * dot(normal, on->n);
+            uz_unit3(normal);
+            p.weight *= sqrt(uz_dot3(area, area)) / uz_dot3(area, on->n);
+            p.gap = (height[1] - height[0]) * uz_dot3(normal, on->n);
             for (int k = 0; k < 2; k++) { /* from the plane's point to either face, and from there to its shape */
                 const uz_smooth_shape *smooth = k == 0 ? &side->shape : &other->shape;
                 double x[3], off[3];
                 for (int c = 0; c < 3; c++)
                     x[c] = on->x[c] + y[0] * on->t[0][c] + y[1] * on->t[1][c] + height[k] * on->n[c];
                 uz_smooth_offset(off, smooth, x);
-                p.gap += (k == 0 ? -1 : 1) * dot(off, normal);
+                p.gap += (k == 0 ? -1 : 1) * uz_dot3(off, normal);
             }
             if (isfinite(p.gap) && p.weight > 0)
                 room = uz_mortar_add_point(points, &p);
@@ -352,17 +332,17 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
     polygon mine[MOST_PIECES], its[MOST_PIECES];
     bool room = true;
     uz_side_area_vector(on.n, &shape, centre_of(side));
-    unit(on.n);
+    uz_unit3(on.n);
     for (int c = 0; c < 3; c++) {
         for (int a = 0; a < corners_of(side); a++)
             on.x[c] += side->xyz[3 * a + c] / corners_of(side);
         on.t[0][c] = side->xyz[3 + c] - side->xyz[c];
     }
-    const double along = dot(on.t[0], on.n);
+    const double along = uz_dot3(on.t[0], on.n);
     for (int c = 0; c < 3; c++)
         on.t[0][c] -= along * on.n[c];
-    unit(on.t[0]);
-    cross(on.t[1], on.n, on.t[0]);
+    uz_unit3(on.t[0]);
+    uz_cross3(on.t[1], on.n, on.t[0]);
     const int n_mine = project(mine, side, &on);
     for (int64_t k = 0; k < n_near && room; k++) {
         const uz_mortar_side *other = &master->side[near[k]];

@@ -211,3 +211,14 @@ void uz_csc_symv(double *y, const uz_csc *A, double alpha, const double *x)
         y[j] += alpha * sum;
     }
 }
+
+bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room)
+{
+    int64_t *rows = uz_realloc(*row, room, sizeof *rows);
+    *row = rows ? rows : *row;
+    int64_t *cols = uz_realloc(*col, room, sizeof *cols);
+    *col = cols ? cols : *col;
+    double *vals = uz_realloc(*val, room, sizeof *vals);
+    *val = vals ? vals : *val;
+    return rows && cols && vals;
+}

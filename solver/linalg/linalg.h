@@ -10,4 +10,7 @@ uz_status uz_check_finite(const double *x, int64_t n, const char *name, uz_error
 /* What the arrays of A take; 0 for a zeroed struct. */
 size_t uz_csc_bytes(const uz_csc *A);
 
+/* Room for so many triplets in each of three arrays. False: no memory, and all that is there stays. */
+bool uz_triplets_grow(int64_t **row, int64_t **col, double **val, int64_t room);
+
 #endif

@@ -1,16 +1,13 @@
 #include "obstacle/face_point.h"
 
+#include "core/vector3.h"
+
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
 /* A foot closer to the border than this part of the face's size is on it. */
 #define SNAP 1e-9
-
-static double dot(const double *a, const double *b)
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
 
 /* ------------------------------------------------------------------ edges */
 
@@ -41,7 +38,7 @@ static double curve_distance(const curve *k, double s)
 {
     double x[3];
     curve_at(x, k, s);
-    return dot(x, x);
+    return uz_dot3(x, x);
 }
 
 /* Half the derivative of the squared distance, and half the second one. */
@@ -51,8 +48,8 @@ static double curve_slope(double *second, const curve *k, double s)
     curve_at(x, k, s);
     for (int i = 0; i < 3; i++)
         t[i] = k->b[i] + 2 * s * k->c[i];
-    *second = dot(t, t) + 2 * dot(x, k->c);
-    return dot(x, t);
+    *second = uz_dot3(t, t) + 2 * uz_dot3(x, k->c);
+    return uz_dot3(x, t);
 }
 
 /* Newton within a bracket, halved where a step leaves it. */
@@ -78,8 +75,8 @@ static double closest_on_curve(const curve *k)
 {
     enum { SAMPLES = 8 };
     double second, best = INFINITY, at = 0;
-    if (dot(k->c, k->c) <= DBL_EPSILON * DBL_EPSILON * dot(k->b, k->b))
-        return fmin(fmax(-dot(k->a, k->b) / dot(k->b, k->b), -1), 1);
+    if (uz_dot3(k->c, k->c) <= DBL_EPSILON * DBL_EPSILON * uz_dot3(k->b, k->b))
+        return fmin(fmax(-uz_dot3(k->a, k->b) / uz_dot3(k->b, k->b), -1), 1);
     for (int i = 0; i <= SAMPLES; i++) {
         const double s = 2.0 * i / SAMPLES - 1, d = curve_distance(k, s);
         if (d < best) {
@@ -198,7 +195,7 @@ static double distance_at(const surface *f, const double at[2])
     double w[UZ_FACE_NODES], da[UZ_FACE_NODES], db[UZ_FACE_NODES], x[3];
     shape(w, da, db, f->count, at);
     combine(x, f, w);
-    return dot(x, x);
+    return uz_dot3(x, x);
 }
 
 /* How far outside the face's own coordinates; < 0 within. */
@@ -218,12 +215,13 @@ static void newton_step(double step[2], const surface *f, const double at[2])
     combine(ta, f, da);
     combine(tb, f, db);
     second_derivatives(aa, ab, bb, f, at);
-    const double ga = dot(x, ta), gb = dot(x, tb);
-    double haa = dot(ta, ta) + dot(x, aa), hab = dot(ta, tb) + dot(x, ab), hbb = dot(tb, tb) + dot(x, bb);
+    const double ga = uz_dot3(x, ta), gb = uz_dot3(x, tb);
+    double haa = uz_dot3(ta, ta) + uz_dot3(x, aa), hab = uz_dot3(ta, tb) + uz_dot3(x, ab),
+           hbb = uz_dot3(tb, tb) + uz_dot3(x, bb);
     if (!(haa > 0 && haa * hbb - hab * hab > 1e-6 * haa * hbb)) {
-        haa = dot(ta, ta);
-        hab = dot(ta, tb);
-        hbb = dot(tb, tb);
+        haa = uz_dot3(ta, ta);
+        hab = uz_dot3(ta, tb);
+        hbb = uz_dot3(tb, tb);
     }
     const double determinant = haa * hbb - hab * hab;
     step[0] = -(hbb * ga - hab * gb) / determinant;
@@ -287,7 +285,7 @@ int uz_face_corners(int dim, int count)
 
 static void set_normal(uz_foot *out, const double normal[3])
 {
-    const double length = sqrt(dot(normal, normal));
+    const double length = sqrt(uz_dot3(normal, normal));
     for (int c = 0; c < 3; c++)
         out->normal[c] = normal[c] / length;
 }
@@ -352,7 +350,7 @@ static bool truly_within(const surface *f, const double at[2], double border, co
         off[c] = x[c] - on_border[c];
         size = fmax(size, fabs(f->x[1][c] - f->x[0][c]));
     }
-    return dot(x, x) < border && dot(off, off) > SNAP * SNAP * size * size;
+    return uz_dot3(x, x) < border && uz_dot3(off, off) > SNAP * SNAP * size * size;
 }
 
 static void closest_in_space(uz_foot *out, int count, const double *xyz)
@@ -382,5 +380,5 @@ void uz_face_closest(uz_foot *out, int dim, int count, const double *xyz)
         closest_in_plane(out, count, xyz);
     else
         closest_in_space(out, count, xyz);
-    out->distance2 = dot(out->point, out->point);
+    out->distance2 = uz_dot3(out->point, out->point);
 }

@@ -1,6 +1,8 @@
 /* smooth_shape.c: spheres, cylinders and cones through the nodes of a surface. */
 #include "obstacle/smooth_shape.h"
 
+#include "core/vector3.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -12,25 +14,6 @@
 
 enum { MOST_PARAMETERS = 6 };
 
-static double dot(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static void cross(double out[3], const double a[3], const double b[3])
-{
-    for (int c = 0; c < 3; c++)
-        out[c] = a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3];
-}
-
-static double unit(double v[3])
-{
-    const double length = sqrt(dot(v, v));
-    for (int c = 0; c < 3 && length > 0; c++)
-        v[c] /= length;
-    return length;
-}
-
 /* ---- distances */
 
 /* Along and across the axis; radial: unit, away from it. */
@@ -38,10 +21,10 @@ static void about_axis(double *along, double *across, double radial[3], const uz
 {
     for (int c = 0; c < 3; c++)
         radial[c] = x[c] - s->point[c];
-    *along = dot(radial, s->axis);
+    *along = uz_dot3(radial, s->axis);
     for (int c = 0; c < 3 && s->kind != UZ_SMOOTH_SPHERE; c++)
         radial[c] -= *along * s->axis[c];
-    *across = unit(radial);
+    *across = uz_unit3(radial);
 }
 
 void uz_smooth_offset(double offset[3], const uz_smooth_shape *shape, const double x[3])
@@ -63,7 +46,7 @@ static double farthest(const uz_smooth_shape *shape, const double *xyz, int64_t 
     for (int64_t i = 0; i < n; i++) {
         double offset[3];
         uz_smooth_offset(offset, shape, xyz + 3 * i);
-        most = fmax(most, sqrt(dot(offset, offset)));
+        most = fmax(most, sqrt(uz_dot3(offset, offset)));
     }
     return most;
 }
@@ -107,9 +90,9 @@ static void step_towards(uz_smooth_shape *s, const double *xyz, int64_t n)
     double e[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
     if (!sphere) { /* two directions across the axis */
         const int least = fabs(s->axis[0]) < 0.6 ? 0 : 1;
-        cross(e[1], s->axis, e[least]);
-        unit(e[1]);
-        cross(e[0], e[1], s->axis);
+        uz_cross3(e[1], s->axis, e[least]);
+        uz_unit3(e[1]);
+        uz_cross3(e[0], e[1], s->axis);
     }
     for (int64_t i = 0; i < n; i++) {
         double along, across, radial[3], J[MOST_PARAMETERS];
@@ -121,8 +104,8 @@ static void step_towards(uz_smooth_shape *s, const double *xyz, int64_t n)
             J[3] = -1;
         } else {
             for (int c = 0; c < 2; c++) {
-                J[c] = -dot(radial, e[c]);
-                J[2 + c] = -(along + k * across) * dot(radial, e[c]);
+                J[c] = -uz_dot3(radial, e[c]);
+                J[2 + c] = -(along + k * across) * uz_dot3(radial, e[c]);
             }
             J[4] = -1;
             J[5] = -along;
@@ -138,7 +121,7 @@ static void step_towards(uz_smooth_shape *s, const double *xyz, int64_t n)
         s->point[c] += sphere ? b[c] : b[0] * e[0][c] + b[1] * e[1][c];
     for (int c = 0; c < 3 && !sphere; c++)
         s->axis[c] += b[2] * e[0][c] + b[3] * e[1][c];
-    unit(s->axis);
+    uz_unit3(s->axis);
     s->radius += b[sphere ? 3 : 4];
     s->slope += s->kind == UZ_SMOOTH_CONE ? b[5] : 0;
 }
@@ -164,9 +147,9 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
             d[c] = xyz[3 * i + c] - xyz[c];
             t[c] = normal[3 * i + c] - normal[c];
         }
-        size = fmax(size, sqrt(dot(d, d)));
-        if (sqrt(dot(t, t)) > turn) {
-            turn = sqrt(dot(t, t));
+        size = fmax(size, sqrt(uz_dot3(d, d)));
+        if (sqrt(uz_dot3(t, t)) > turn) {
+            turn = sqrt(uz_dot3(t, t));
             far = i;
         }
     }
@@ -178,7 +161,7 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
         d[c] = xyz[3 * far + c] - xyz[c];
         t[c] = normal[3 * far + c] - normal[c];
     }
-    const double radius = dot(d, t) / dot(t, t);
+    const double radius = uz_dot3(d, t) / uz_dot3(t, t);
     uz_smooth_shape sphere = {.kind = UZ_SMOOTH_SPHERE, .radius = fabs(radius)};
     for (int c = 0; c < 3; c++)
         sphere.point[c] = xyz[c] - radius * normal[c];
@@ -191,15 +174,15 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
             double other[3], at[3];
             for (int c = 0; c < 3; c++)
                 other[c] = k == 0 ? normal[3 * i + c] : normal[3 * i + c] - normal[c];
-            cross(at, k == 0 ? normal : t, other);
-            const double length = sqrt(dot(at, at));
+            uz_cross3(at, k == 0 ? normal : t, other);
+            const double length = sqrt(uz_dot3(at, at));
             if (length > best) {
                 best = length;
                 memcpy(axis[k], at, sizeof at);
             }
         }
         uz_smooth_shape round = {.kind = k == 0 ? UZ_SMOOTH_CYLINDER : UZ_SMOOTH_CONE, .radius = fabs(radius)};
-        if (!(unit(axis[k]) > 0))
+        if (!(uz_unit3(axis[k]) > 0))
             continue;
         memcpy(round.axis, axis[k], sizeof round.axis);
         for (int c = 0; c < 3; c++) /* opposite the normal, at the height of the points' mean */
