@@ -80,6 +80,14 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
     }
     for (int64_t i = 0; i < surface->n && room; i++)
         surface->side[i].shape = shape[root_of(parent, surface->side[i].place[0])];
+    for (int64_t p = 0; p < n && room; p++) { /* normals of the shape itself, out of the body */
+        double *mine = surface->normal + 3 * p, exact[3], off[3];
+        memcpy(exact, mine, sizeof exact);
+        uz_smooth_nearest(off, exact, &shape[root_of(parent, p)], mesh->xyz + 3 * surface->node[p]);
+        const double side = uz_dot3(exact, mine) < 0 ? -1 : 1;
+        for (int c = 0; c < 3; c++)
+            mine[c] = side * exact[c];
+    }
     free(parent);
     free(key);
     free(shape);
@@ -313,7 +321,7 @@ static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_m
                 double x[3], off[3];
                 for (int c = 0; c < 3; c++)
                     x[c] = on->x[c] + y[0] * on->t[0][c] + y[1] * on->t[1][c] + height[k] * on->n[c];
-                uz_smooth_offset(off, smooth, x);
+                uz_smooth_nearest(off, NULL, smooth, x);
                 p.gap += (k == 0 ? -1 : 1) * uz_dot3(off, normal);
             }
             if (isfinite(p.gap) && p.weight > 0)

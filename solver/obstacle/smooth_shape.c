@@ -27,7 +27,7 @@ static void about_axis(double *along, double *across, double radial[3], const uz
     *across = uz_unit3(radial);
 }
 
-void uz_smooth_offset(double offset[3], const uz_smooth_shape *shape, const double x[3])
+void uz_smooth_nearest(double offset[3], double normal[3], const uz_smooth_shape *shape, const double x[3])
 {
     double along, across, radial[3];
     memset(offset, 0, 3 * sizeof *offset);
@@ -36,8 +36,11 @@ void uz_smooth_offset(double offset[3], const uz_smooth_shape *shape, const doub
     about_axis(&along, &across, radial, shape, x);
     const double k = shape->kind == UZ_SMOOTH_CONE ? shape->slope : 0;
     const double out = (shape->radius + k * along - across) / (1 + k * k); /* of a cone across its side */
-    for (int c = 0; c < 3; c++)
+    for (int c = 0; c < 3; c++) {
         offset[c] = out * (radial[c] - k * shape->axis[c]);
+        if (normal)
+            normal[c] = (radial[c] - k * shape->axis[c]) / sqrt(1 + k * k);
+    }
 }
 
 static double farthest(const uz_smooth_shape *shape, const double *xyz, int64_t n)
@@ -45,7 +48,7 @@ static double farthest(const uz_smooth_shape *shape, const double *xyz, int64_t 
     double most = 0;
     for (int64_t i = 0; i < n; i++) {
         double offset[3];
-        uz_smooth_offset(offset, shape, xyz + 3 * i);
+        uz_smooth_nearest(offset, NULL, shape, xyz + 3 * i);
         most = fmax(most, sqrt(uz_dot3(offset, offset)));
     }
     return most;

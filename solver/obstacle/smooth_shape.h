@@ -19,7 +19,8 @@ typedef struct {
  * roughly those of the surface there. By Gauss and Newton's method from what the normals say. */
 uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int64_t n);
 
-/* From x to the nearest point of the shape; zero of UZ_SMOOTH_NONE. */
-void uz_smooth_offset(double offset[3], const uz_smooth_shape *shape, const double x[3]);
+/* From x to the nearest point of the shape, and the unit normal there (NULL: not wanted), away from its centre or
+ * axis. UZ_SMOOTH_NONE: zero, and `normal` stays as it is. */
+void uz_smooth_nearest(double offset[3], double normal[3], const uz_smooth_shape *shape, const double x[3]);
 
 #endif

@@ -71,7 +71,7 @@ TEST(shapes_are_found)
                 double off[3], x[3], size = 0;
                 for (int c = 0; c < 3; c++)
                     x[c] = of.xyz[3 * j + c];
-                uz_smooth_offset(off, &s, x);
+                uz_smooth_nearest(off, NULL, &s, x);
                 for (int c = 0; c < 3; c++)
                     size = fmax(size, fabs(off[c]));
                 CHECK_MSG(size < 1e-9 * radius, "%d %d: node %d is off by %g", k, i, j, size);
@@ -83,11 +83,13 @@ TEST(offsets_lead_to_the_nearest_point)
 {
     const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75};
     const uz_smooth_shape ball = {.kind = UZ_SMOOTH_SPHERE, .point = {1, 0, 0}, .radius = 2};
-    double off[3];
-    uz_smooth_offset(off, &cone, (double[3]){2 + 0.8, 0, -0.6}); /* by 1 along (0.8, -0.6) from (2, 0) */
+    double off[3], normal[3];
+    uz_smooth_nearest(off, normal, &cone, (double[3]){2 + 0.8, 0, -0.6}); /* by 1 along (0.8, -0.6) from (2, 0) */
     CHECK(fabs(off[0] + 0.8) < 1e-14 && fabs(off[1]) < 1e-14 && fabs(off[2] - 0.6) < 1e-14);
-    uz_smooth_offset(off, &ball, (double[3]){1, 3, 0});
+    CHECK(fabs(normal[0] - 0.8) < 1e-14 && fabs(normal[1]) < 1e-14 && fabs(normal[2] + 0.6) < 1e-14);
+    uz_smooth_nearest(off, normal, &ball, (double[3]){1, 3, 0});
     CHECK(fabs(off[0]) < 1e-14 && fabs(off[1] + 1) < 1e-14 && fabs(off[2]) < 1e-14);
+    CHECK(fabs(normal[0]) < 1e-14 && fabs(normal[1] - 1) < 1e-14 && fabs(normal[2]) < 1e-14);
 }
 
 TEST(other_surfaces_are_none)
