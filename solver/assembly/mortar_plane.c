@@ -74,21 +74,32 @@ static void edge_at(double x[2], double slope[2], const uz_mortar_side *e, doubl
     }
 }
 
-/* The smooth curve less the edge at s. */
-static void offset_at(double offset[2], const uz_mortar_side *e, double s)
+/* Tangent at a node between two edges, from the directions and lengths to and from it: that of the circle through the
+ * three to second order. */
+static void tangent_between(double out[2], const double before[2], double first, const double after[2], double second)
 {
-    const bool halves = e->nodes == 3;
+    static const double ORIGIN[2] = {0};
+    const double t[2] = {before[0] / first + after[0] / second, before[1] / first + after[1] / second};
+    direction(out, ORIGIN, t);
+}
+
+/* The smooth curve less the edge at s, along n, which need not be quite normal to either: where the line through the
+ * edge's point meets the curve. Nodes amid an edge may be off its middle, and then s runs along both at other speeds.
+ */
+static double offset_along(const double n[2], const uz_mortar_side *e, double s)
+{
     const double *A = e->xyz, *B = e->xyz + 2, *middle = e->xyz + 4;
-    double t = 0.5 * (1 + s), T[2][2], x[2], chord[2], along[2];
+    double t = 0.5 * (1 + s), T[2][2], x[2], chord[2], along[2], off[2] = {0, 0};
     memcpy(T, e->tangent, sizeof T);
-    if (halves) { /* of a parabola the tangent in the middle is along the chord of its ends */
+    if (e->nodes == 3) {
         const int first = s < 0;
-        double inner[2];
-        direction(inner, A, B);
+        double halves[2][2], inner[2];
+        const double before = direction(halves[0], A, middle), after = direction(halves[1], middle, B);
+        tangent_between(inner, halves[0], before, halves[1], after);
         memcpy(T[first], inner, sizeof inner);
         t = first ? 1 + s : s;
         *(first ? &B : &A) = middle;
-        direction(chord, A, B);
+        memcpy(chord, halves[!first], sizeof chord);
         for (int c = 0; c < 2 && !e->joined[!first]; c++)
             T[!first][c] = 2 * dot(inner, chord) * chord[c] - inner[c];
     }
@@ -96,9 +107,21 @@ static void offset_at(double offset[2], const uz_mortar_side *e, double s)
     for (int k = 0; k < 2; k++)
         along[k] = 2 * length / (3 * (1 + dot(T[k], chord)));
     edge_at(x, NULL, e, s);
-    for (int c = 0; c < 2; c++)
-        offset[c] = A[c] * (1 - t) * (1 - t) * (1 + 2 * t) + B[c] * t * t * (3 - 2 * t) +
-                    3 * t * (1 - t) * ((1 - t) * along[0] * T[0][c] - t * along[1] * T[1][c]) - x[c];
+    for (int k = 0; k < 8; k++) {
+        double slope[2];
+        for (int c = 0; c < 2; c++) {
+            const double P[2] = {A[c] + along[0] * T[0][c], B[c] - along[1] * T[1][c]};
+            off[c] =
+                (1 - t) * (1 - t) * ((1 - t) * A[c] + 3 * t * P[0]) + t * t * (3 * (1 - t) * P[1] + t * B[c]) - x[c];
+            slope[c] =
+                3 * ((1 - t) * (1 - t) * (P[0] - A[c]) + 2 * t * (1 - t) * (P[1] - P[0]) + t * t * (B[c] - P[1]));
+        }
+        const double change = cross(off, n) / cross(slope, n);
+        if (!(fabs(change) > 1e-13))
+            break;
+        t = fmin(fmax(t - change, -0.5), 1.5);
+    }
+    return dot(off, n);
 }
 
 /* ---- a surface */
@@ -129,16 +152,12 @@ static void find_tangents(uz_mortar_surface *surface, const int64_t *at, double 
         if (at[2 * e->node[1] + 1] != 1 + i || next < 0)
             continue;
         uz_mortar_side *f = &surface->side[next];
-        double t[2], chord[2];
-        static const double ORIGIN[2] = {0};
+        double t[2][2];
         if (dot(e->tangent[1], f->tangent[0]) <= least_cosine)
             continue;
-        const bool linear = e->nodes == 2 && f->nodes == 2;
-        const double first = linear ? 1 / direction(chord, e->xyz, e->xyz + 2) : 1;
-        const double second = linear ? 1 / direction(chord, f->xyz, f->xyz + 2) : 1;
-        for (int c = 0; c < 2; c++)
-            t[c] = first * e->tangent[1][c] + second * f->tangent[0][c];
-        direction(e->tangent[1], ORIGIN, t);
+        const double *last = e->xyz + (e->nodes == 3 ? 4 : 0), *following = f->xyz + (f->nodes == 3 ? 4 : 2);
+        const double first = direction(t[0], last, e->xyz + 2), second = direction(t[1], f->xyz, following);
+        tangent_between(e->tangent[1], t[0], first, t[1], second);
         memcpy(f->tangent[0], e->tangent[1], sizeof f->tangent[0]);
         e->joined[1] = f->joined[0] = true;
     }
@@ -231,7 +250,8 @@ static double project_on_slave(const uz_mortar_surface *slave, const uz_mortar_s
     return s;
 }
 
-/* Where the line from x along n meets an edge; returns the distance along n. */
+/* Where the line from x along n meets an edge; returns the distance along n, INFINITY where it does not meet the curve
+ * that the edge is a part of: a parabola ends, and Newton's method then stops anywhere. */
 static double project_on_master(double *s, const uz_mortar_side *e, const double x[2], const double n[2])
 {
     double at[2], slope[2];
@@ -247,7 +267,8 @@ static double project_on_master(double *s, const uz_mortar_side *e, const double
     }
     edge_at(at, slope, e, *s);
     const double off[2] = {at[0] - x[0], at[1] - x[1]};
-    return dot(off, n);
+    return fabs(cross(off, n)) <= 1e-9 * (fabs(slope[0]) + fabs(slope[1]) + hypot(off[0], off[1])) ? dot(off, n)
+                                                                                                   : INFINITY;
 }
 
 /* The nearest of some master edges that the line through x along n meets from outside; -1: none. */
@@ -284,7 +305,7 @@ static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, co
     bool room = true;
     for (int g = 0; g < 4 && room; g++) {
         uz_mortar_point p = {.master = k};
-        double x[2], slope[2], n[2], mine[2], other[2], t = 0;
+        double x[2], slope[2], n[2], t = 0;
         const double s = 0.5 * (a + b) + 0.5 * (b - a) * AT[g];
         edge_at(x, slope, e, s);
         normal_at(n, slave, e, s);
@@ -293,12 +314,8 @@ static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, co
         p.weight *= in->model->kind == UZ_AXISYMMETRIC ? 2 * PI * x[0] : in->model->thickness;
         shape_at(p.N, e->nodes, s);
         shape_at(p.M, f->nodes, t);
-        if (!in->contact->faceted) {
-            offset_at(mine, e, s);
-            offset_at(other, f, t);
-            for (int c = 0; c < 2; c++)
-                p.gap += (other[c] - mine[c]) * n[c];
-        }
+        if (!in->contact->faceted)
+            p.gap += offset_along(n, f, t) - offset_along(n, e, s);
         room = !isfinite(p.gap) || uz_mortar_add_point(points, &p);
     }
     return room;
