@@ -77,6 +77,7 @@ static void clear_surface(uz_mortar_surface *surface)
     free(surface->side);
     free(surface->node);
     free(surface->normal);
+    free(surface->patch);
 }
 
 static uz_status no_memory(uz_error *err)

@@ -21,14 +21,16 @@ typedef struct {
     double tangent[2][2];  /* of an edge, at its ends: unit, of the smooth curve that the edges stand for */
     bool joined[2];        /* does that curve go on into a neighbour? */
     uz_smooth_shape shape; /* of a face: what its nodes and those of the faces that it goes on into lie on */
+    bool fitted;           /* of a face: its places have patches */
 } uz_mortar_side;
 
 typedef struct {
     int64_t n, n_places;
     uz_mortar_side *side;
-    uz_box_tree tree; /* of the sides */
-    int64_t *node;    /* n_places, ascending */
-    double *normal;   /* n_places x dim: out of the body */
+    uz_box_tree tree;       /* of the sides */
+    int64_t *node;          /* n_places, ascending */
+    double *normal;         /* n_places x dim: out of the body */
+    uz_smooth_patch *patch; /* n_places, of faces that lie on no known shape; NULL: there are none */
 } uz_mortar_surface;
 
 typedef struct {

@@ -6,8 +6,9 @@
  * solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629). Faces with nodes amid their edges are cut
  * as the pieces between these nodes.
  *
- * Faces that go on into each other make a patch; where its nodes lie on a sphere, a cylinder or a cone, the gap is that
- * of the facets plus what the shape is off them, as in the plane. Other facets are taken as they are. */
+ * Faces that go on into each other make a patch; where its nodes lie on a sphere, a cylinder, a cone or a torus, the
+ * gap is that of the facets plus what the shape is off them, as in the plane. Other linear facets stand for a surface
+ * that is a quadric about each of their nodes; faces with middles have a shape of their own. */
 #include "assembly/mortar.h"
 
 #include "core/alloc.h"
@@ -17,7 +18,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_CORNERS = 12, MOST_PIECES = 5 };
+enum { MOST_CORNERS = 12, MOST_PIECES = 5, ENOUGH_ABOUT = 25, MOST_ABOUT = 60 };
 
 /* A piece smaller than this part of the slave face is what rounding leaves. */
 #define LEAST_PIECE 1e-12
@@ -96,6 +97,94 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
     return room;
 }
 
+/* The places about place p by rings of faces until there are enough for a quadric; returns how many. */
+static int list_about(int64_t about[MOST_ABOUT], const uz_mortar_surface *surface, int64_t p, const int64_t *first,
+                      const int64_t *face, int64_t *seen)
+{
+    int n = 0, ring = 0;
+    about[n++] = p;
+    seen[p] = p + 1;
+    while (ring < n && n < ENOUGH_ABOUT) {
+        const int end = n;
+        for (; ring < end; ring++)
+            for (int64_t k = first[about[ring]]; k < first[about[ring] + 1]; k++)
+                for (int a = 0; a < surface->side[face[k]].nodes && n < MOST_ABOUT; a++) {
+                    const int64_t other = surface->side[face[k]].place[a];
+                    if (seen[other] == p + 1)
+                        continue;
+                    seen[other] = p + 1;
+                    about[n++] = other;
+                }
+    }
+    return n;
+}
+
+/* Linear faces that lie on no known shape get the quadrics about their places, and these the quadrics' normals. Faces
+ * with middles have a shape of their own. */
+static bool fit_patches(uz_mortar_surface *surface, const uz_mesh *mesh)
+{
+    const int64_t n = surface->n_places;
+    int64_t entries = 0, fitted = 0;
+    for (int64_t i = 0; i < surface->n; i++) {
+        uz_mortar_side *side = &surface->side[i];
+        side->fitted = side->shape.kind == UZ_SMOOTH_NONE && side->nodes <= 4;
+        entries += side->nodes;
+        fitted += side->fitted;
+    }
+    if (fitted == 0)
+        return true;
+    int64_t *first = uz_alloc_zero(n + 2, sizeof *first), *face = uz_alloc(entries, sizeof *face);
+    int64_t *seen = uz_alloc_zero(n, sizeof *seen);
+    bool *known = uz_alloc_zero(n, sizeof *known);
+    surface->patch = uz_alloc_zero(n, sizeof *surface->patch);
+    const bool room = first && face && seen && known && surface->patch;
+    for (int64_t i = 0; i < surface->n && room; i++)
+        for (int a = 0; a < surface->side[i].nodes; a++)
+            first[surface->side[i].place[a] + 2]++;
+    for (int64_t p = 0; p < n && room; p++)
+        first[p + 2] += first[p + 1];
+    for (int64_t i = 0; i < surface->n && room; i++)
+        for (int a = 0; a < surface->side[i].nodes; a++)
+            face[first[surface->side[i].place[a] + 1]++] = i;
+    for (int64_t p = 0; p < n && room; p++) {
+        int64_t about[MOST_ABOUT];
+        double xyz[3 * MOST_ABOUT];
+        bool wanted = false;
+        for (int64_t k = first[p]; k < first[p + 1]; k++)
+            wanted = wanted || surface->side[face[k]].fitted;
+        const int count = wanted ? list_about(about, surface, p, first, face, seen) : 0;
+        for (int k = 0; k < count; k++)
+            memcpy(xyz + 3 * k, mesh->xyz + 3 * surface->node[about[k]], 3 * sizeof *xyz);
+        known[p] = wanted && uz_smooth_patch_fit(&surface->patch[p], xyz, surface->normal + 3 * p, xyz + 3, count - 1);
+    }
+    for (int64_t i = 0; i < surface->n && room; i++)
+        for (int a = 0; a < surface->side[i].nodes; a++)
+            surface->side[i].fitted = surface->side[i].fitted && known[surface->side[i].place[a]];
+    for (int64_t p = 0; p < n && room; p++)
+        if (known[p])
+            uz_smooth_patch_height(surface->normal + 3 * p, &surface->patch[p], surface->patch[p].at);
+    free(first);
+    free(face);
+    free(seen);
+    free(known);
+    return room;
+}
+
+/* From x, where the side's shape functions are N, to the smooth surface that it stands for. Between the places of a
+ * side the quadrics about them are blended: through all nodes and without a step from face to face. */
+static void smooth_offset(double offset[3], const uz_mortar_surface *surface, const uz_mortar_side *side,
+                          const double *N, const double x[3])
+{
+    uz_smooth_nearest(offset, NULL, &side->shape, x);
+    for (int a = 0; a < side->nodes && side->fitted; a++) {
+        const uz_smooth_patch *patch = &surface->patch[side->place[a]];
+        double normal[3];
+        const double height = uz_smooth_patch_height(normal, patch, x);
+        for (int c = 0; c < 3; c++)
+            offset[c] += N[a] * height * patch->n[c];
+    }
+}
+
 /* ---- places */
 
 /* A face joins a place of its node whose normal so far is within the feature angle, else it begins one. */
@@ -145,7 +234,8 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
     for (int64_t p = 0; p < surface->n_places; p++)
         uz_unit3(surface->normal + 3 * p);
     free(key);
-    return room && (in->contact->faceted || recognise(surface, &in->model->mesh));
+    return room &&
+           (in->contact->faceted || (recognise(surface, &in->model->mesh) && fit_patches(surface, &in->model->mesh)));
 }
 
 /* ---- polygons */
@@ -286,9 +376,10 @@ static bool is_affine(const uz_mortar_side *side)
 /* One convex piece that both faces cover, as a fan of triangles with n x n points each: those of a square, one side of
  * which falls together in a corner, exact to degree 2 n - 2. */
 static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_mortar_surface *slave,
-                      const uz_mortar_side *side, const uz_mortar_side *other, int64_t master,
+                      const uz_mortar_side *side, const uz_mortar_surface *surface, int64_t master,
                       const uz_contact_input *in, const plane *on, int n)
 {
+    const uz_mortar_side *other = &surface->side[master];
     const uz_side mine = uz_mortar_side_of(side, in->model), its = uz_mortar_side_of(other, in->model);
     double at[5], weight[5], local[2][2];
     bool room = true;
@@ -317,11 +408,13 @@ static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_m
             p.weight *= sqrt(uz_dot3(area, area)) / uz_dot3(area, on->n);
             p.gap = (height[1] - height[0]) * uz_dot3(normal, on->n);
             for (int k = 0; k < 2; k++) { /* from the plane's point to either face, and from there to its shape */
-                const uz_smooth_shape *smooth = k == 0 ? &side->shape : &other->shape;
                 double x[3], off[3];
                 for (int c = 0; c < 3; c++)
                     x[c] = on->x[c] + y[0] * on->t[0][c] + y[1] * on->t[1][c] + height[k] * on->n[c];
-                uz_smooth_nearest(off, NULL, smooth, x);
+                if (k == 0)
+                    smooth_offset(off, slave, side, p.N, x);
+                else
+                    smooth_offset(off, surface, other, p.M, x);
                 p.gap += (k == 0 ? -1 : 1) * uz_dot3(off, normal);
             }
             if (isfinite(p.gap) && p.weight > 0)
@@ -364,7 +457,7 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
                 polygon piece = mine[p];
                 clip(&piece, &its[q]);
                 if (piece.n >= 3 && twice_area(&piece) > LEAST_PIECE * side->area)
-                    room = add_piece(points, &piece, slave, side, other, near[k], in, &on, rule);
+                    room = add_piece(points, &piece, slave, side, master, near[k], in, &on, rule);
             }
         }
     }

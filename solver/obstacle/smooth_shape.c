@@ -1,4 +1,4 @@
-/* smooth_shape.c: spheres, cylinders and cones through the nodes of a surface. */
+/* smooth_shape.c: planes, spheres, cylinders, cones and tori through the nodes of a surface. */
 #include "obstacle/smooth_shape.h"
 
 #include "core/vector3.h"
@@ -9,138 +9,262 @@
 /* Points are on a shape when they are no farther from it than this part of its radius. */
 #define ON_SHAPE 1e-6
 
-/* A radius of more than so many times the size of the surface is a plane. */
+/* A radius of more than so many times the size of the surface says nothing. */
 #define FLAT 1e4
 
-enum { MOST_PARAMETERS = 6 };
+/* What tells shapes of one kind apart: the place by two directions across the axis and the one along it, the axis by
+ * its tilt towards the first two, radius, slope, tube. */
+enum { TILT = 3, RADIUS = 5, SLOPE, TUBE, PARAMETERS };
+
+static const unsigned char VARIES[][PARAMETERS] = {
+    [UZ_SMOOTH_PLANE] = {0, 0, 1, 1, 1, 0, 0, 0},    [UZ_SMOOTH_SPHERE] = {1, 1, 1, 0, 0, 1, 0, 0},
+    [UZ_SMOOTH_CYLINDER] = {1, 1, 0, 1, 1, 1, 0, 0}, [UZ_SMOOTH_CONE] = {1, 1, 0, 1, 1, 1, 1, 0},
+    [UZ_SMOOTH_TORUS] = {1, 1, 1, 1, 1, 1, 0, 1},
+};
 
 /* ---- distances */
 
-/* Along and across the axis; radial: unit, away from it. */
-static void about_axis(double *along, double *across, double radial[3], const uz_smooth_shape *s, const double x[3])
+/* How far x is outside the shape; out: unit normal of the shape at its nearest point; radial: unit, away from the axis
+ * or centre; off: x less `point`; along: the axis. */
+static double distance_from(double out[3], double radial[3], double off[3], double *along, const uz_smooth_shape *s,
+                            const double x[3])
 {
+    const double k = s->slope;
     for (int c = 0; c < 3; c++)
-        radial[c] = x[c] - s->point[c];
-    *along = uz_dot3(radial, s->axis);
-    for (int c = 0; c < 3 && s->kind != UZ_SMOOTH_SPHERE; c++)
+        radial[c] = off[c] = x[c] - s->point[c];
+    *along = s->kind == UZ_SMOOTH_SPHERE ? 0 : uz_dot3(off, s->axis);
+    for (int c = 0; c < 3; c++)
         radial[c] -= *along * s->axis[c];
-    *across = uz_unit3(radial);
+    const double across = uz_unit3(radial);
+    memcpy(out, s->kind == UZ_SMOOTH_PLANE ? s->axis : radial, 3 * sizeof *out);
+    switch (s->kind) {
+    case UZ_SMOOTH_PLANE:
+        return *along;
+    case UZ_SMOOTH_CONE:
+        for (int c = 0; c < 3; c++)
+            out[c] = (radial[c] - k * s->axis[c]) / sqrt(1 + k * k);
+        return (across - s->radius - k * *along) / sqrt(1 + k * k);
+    case UZ_SMOOTH_TORUS:
+        for (int c = 0; c < 3; c++)
+            out[c] = (across - s->radius) * radial[c] + *along * s->axis[c];
+        return uz_unit3(out) - s->tube;
+    default:
+        return across - s->radius;
+    }
 }
 
 void uz_smooth_nearest(double offset[3], double normal[3], const uz_smooth_shape *shape, const double x[3])
 {
-    double along, across, radial[3];
+    double out[3], radial[3], off[3], along;
     memset(offset, 0, 3 * sizeof *offset);
     if (shape->kind == UZ_SMOOTH_NONE)
         return;
-    about_axis(&along, &across, radial, shape, x);
-    const double k = shape->kind == UZ_SMOOTH_CONE ? shape->slope : 0;
-    const double out = (shape->radius + k * along - across) / (1 + k * k); /* of a cone across its side */
-    for (int c = 0; c < 3; c++) {
-        offset[c] = out * (radial[c] - k * shape->axis[c]);
-        if (normal)
-            normal[c] = (radial[c] - k * shape->axis[c]) / sqrt(1 + k * k);
-    }
-}
-
-static double farthest(const uz_smooth_shape *shape, const double *xyz, int64_t n)
-{
-    double most = 0;
-    for (int64_t i = 0; i < n; i++) {
-        double offset[3];
-        uz_smooth_nearest(offset, NULL, shape, xyz + 3 * i);
-        most = fmax(most, sqrt(uz_dot3(offset, offset)));
-    }
-    return most;
+    const double distance = distance_from(out, radial, off, &along, shape, x);
+    for (int c = 0; c < 3; c++)
+        offset[c] = -distance * out[c];
+    if (normal)
+        memcpy(normal, out, sizeof out);
 }
 
 /* ---- Gauss and Newton's method */
 
-/* Solves the p x p system A x = b, A positive semidefinite, b becomes x; columns that are nothing new get 0. */
-static void solve(double A[MOST_PARAMETERS][MOST_PARAMETERS], double *b, int p)
+/* Solves A x = b, A positive semidefinite, b becomes x; columns that are nothing new get 0. */
+static void solve(double A[PARAMETERS][PARAMETERS], double b[PARAMETERS])
 {
-    double scale[MOST_PARAMETERS];
-    for (int j = 0; j < p; j++)
+    double scale[PARAMETERS];
+    for (int j = 0; j < PARAMETERS; j++)
         scale[j] = A[j][j];
-    for (int j = 0; j < p; j++) {
+    for (int j = 0; j < PARAMETERS; j++) {
         if (!(A[j][j] > 1e-13 * scale[j])) {
-            for (int i = 0; i < p; i++)
+            for (int i = 0; i < PARAMETERS; i++)
                 A[j][i] = A[i][j] = 0;
             A[j][j] = 1;
             b[j] = 0;
         }
-        for (int i = j + 1; i < p; i++) {
+        for (int i = j + 1; i < PARAMETERS; i++) {
             const double f = A[i][j] / A[j][j];
-            for (int k = j; k < p; k++)
+            for (int k = j; k < PARAMETERS; k++)
                 A[i][k] -= f * A[j][k];
             b[i] -= f * b[j];
         }
     }
-    for (int j = p - 1; j >= 0; j--) {
-        for (int k = j + 1; k < p; k++)
+    for (int j = PARAMETERS - 1; j >= 0; j--) {
+        for (int k = j + 1; k < PARAMETERS; k++)
             b[j] -= A[j][k] * b[k];
         b[j] /= A[j][j];
     }
 }
 
-/* One step towards the least squares of the distances across the axis (from the centre). Parameters: two or three of
- * the point, two of the axis, radius, slope. */
-static void step_towards(uz_smooth_shape *s, const double *xyz, int64_t n)
+/* One damped step towards the least squares of the distances: a point's changes by -out . (what the shape moves there).
+ * Of the points `some` are looked at; returns the sum of their squares before. */
+static double step_towards(uz_smooth_shape *s, const double *xyz, int64_t n, int64_t some, double damping)
 {
-    const bool sphere = s->kind == UZ_SMOOTH_SPHERE;
-    const int p = sphere ? 4 : s->kind == UZ_SMOOTH_CYLINDER ? 5 : 6;
-    double A[MOST_PARAMETERS][MOST_PARAMETERS] = {{0}}, b[MOST_PARAMETERS] = {0};
-    double e[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    if (!sphere) { /* two directions across the axis */
+    double squares = 0;
+    double A[PARAMETERS][PARAMETERS] = {{0}}, b[PARAMETERS] = {0};
+    double e[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, turn[2][3];
+    if (s->kind != UZ_SMOOTH_SPHERE) { /* two directions across the axis, and the axis */
         const int least = fabs(s->axis[0]) < 0.6 ? 0 : 1;
         uz_cross3(e[1], s->axis, e[least]);
         uz_unit3(e[1]);
         uz_cross3(e[0], e[1], s->axis);
+        memcpy(e[2], s->axis, sizeof e[2]);
     }
-    for (int64_t i = 0; i < n; i++) {
-        double along, across, radial[3], J[MOST_PARAMETERS];
-        about_axis(&along, &across, radial, s, xyz + 3 * i);
-        const double k = s->kind == UZ_SMOOTH_CONE ? s->slope : 0, off = across - s->radius - k * along;
-        if (!(across > 0) || sphere) {
-            for (int c = 0; c < 3; c++)
-                J[c] = -radial[c];
-            J[3] = -1;
-        } else {
-            for (int c = 0; c < 2; c++) {
-                J[c] = -uz_dot3(radial, e[c]);
-                J[2 + c] = -(along + k * across) * uz_dot3(radial, e[c]);
-            }
-            J[4] = -1;
-            J[5] = -along;
+    for (int k = 0; k < 2; k++)
+        uz_cross3(turn[k], e[2], e[k]);
+    for (int64_t k = 0; k < some; k++) {
+        const int64_t i = some < n ? (int64_t)((uint64_t)k * 2654435761U % (uint64_t)n) : k; /* no grid's rhythm */
+        double out[3], radial[3], off[3], along, J[PARAMETERS], moved[3];
+        const double distance = distance_from(out, radial, off, &along, s, xyz + 3 * i);
+        for (int c = 0; c < 3; c++)
+            J[c] = -uz_dot3(out, e[c]);
+        for (int c = 0; c < 2; c++) {
+            uz_cross3(moved, turn[c], off);
+            J[TILT + c] = -uz_dot3(out, moved);
         }
-        for (int j = 0; j < p; j++) {
-            for (int q = 0; q < p; q++)
-                A[j][q] += J[j] * J[q];
-            b[j] -= J[j] * off;
+        J[RADIUS] = -uz_dot3(out, radial);
+        J[SLOPE] = along * J[RADIUS];
+        J[TUBE] = -1;
+        for (int j = 0; j < PARAMETERS; j++) {
+            J[j] *= VARIES[s->kind][j];
+            for (int q = 0; q <= j; q++)
+                A[j][q] = A[q][j] += J[j] * J[q];
+            b[j] -= J[j] * distance;
         }
+        squares += distance * distance;
     }
-    solve(A, b, p);
-    for (int c = 0; c < 3; c++)
-        s->point[c] += sphere ? b[c] : b[0] * e[0][c] + b[1] * e[1][c];
-    for (int c = 0; c < 3 && !sphere; c++)
-        s->axis[c] += b[2] * e[0][c] + b[3] * e[1][c];
+    for (int j = 0; j < PARAMETERS; j++)
+        A[j][j] *= 1 + damping;
+    solve(A, b);
+    for (int c = 0; c < 3; c++) {
+        s->point[c] += b[0] * e[0][c] + b[1] * e[1][c] + b[2] * e[2][c];
+        s->axis[c] += b[TILT] * e[0][c] + b[TILT + 1] * e[1][c];
+    }
     uz_unit3(s->axis);
-    s->radius += b[sphere ? 3 : 4];
-    s->slope += s->kind == UZ_SMOOTH_CONE ? b[5] : 0;
+    s->radius += b[RADIUS];
+    s->slope += b[SLOPE];
+    s->tube += b[TUBE];
+    return squares;
 }
 
-/* Do all points lie on the shape that steps lead to from here? size: of the surface. */
+/* Do all points lie on the shape that steps lead to from here (K. Levenberg, Quart. Appl. Math. 2 (1944) 164-168; D.
+ * Marquardt, J. SIAM 11 (1963) 431-441)? size: of the surface. Of many points some are stepped with, all looked at. */
 static bool fits(uz_smooth_shape *s, const double *xyz, int64_t n, double size)
 {
-    for (int k = 0; k < 30; k++)
-        step_towards(s, xyz, n);
-    const double off = farthest(s, xyz, n), largest = fabs(s->radius) + fabs(s->slope) * size;
-    return isfinite(off) && isfinite(s->radius) && off <= ON_SHAPE * fmin(largest, size) && largest < FLAT * size;
+    enum { STEPS = 100, SOME = 300 };
+    double most = 0, least = INFINITY, damping = 1e-3;
+    uz_smooth_shape next = *s;
+    const int64_t some = n < SOME ? n : SOME;
+    for (int k = 0; k < STEPS && damping < 1e12; k++) {
+        const uz_smooth_shape here = next;
+        const double squares = step_towards(&next, xyz, n, some, damping);
+        if (squares < least) {
+            damping *= 0.1;
+            least = squares;
+            *s = here;
+        } else {
+            damping *= 10;
+            next = *s;
+            step_towards(&next, xyz, n, some, damping);
+        }
+    }
+    step_towards(s, xyz, n, n, 0);
+    for (int64_t i = 0; i < n; i++) {
+        double offset[3];
+        uz_smooth_nearest(offset, NULL, s, xyz + 3 * i);
+        const double off = sqrt(uz_dot3(offset, offset));
+        most = off <= most ? most : off; /* not a number stays */
+    }
+    const double largest = s->kind == UZ_SMOOTH_TORUS   ? fabs(s->tube)
+                           : s->kind == UZ_SMOOTH_PLANE ? size
+                                                        : fabs(s->radius) + fabs(s->slope) * size;
+    return isfinite(s->radius) && most <= ON_SHAPE * fmin(largest, size) && fabs(s->radius) < FLAT * size &&
+           largest < FLAT * size;
+}
+
+/* ---- what normals say */
+
+/* All normals of a surface of revolution meet its axis, the line of direction a and moment m: n . m + (x x n) . a = 0.
+ * Those of a torus all but meet a second line, too, along its tube. So from the two smallest eigenvectors (a, m) of the
+ * least squares, by inverse iteration, those two mixtures are tried that are lines, a . m = 0; then the section's
+ * circle through the points turned into one half-plane, by linear least squares (H. Pottmann, J. Wallner,
+ * "Computational line geometry", 2001, sections 2.1 and 4.3). */
+static bool find_torus(uz_smooth_shape *s, const double *xyz, const double *normal, int64_t n, const double mean[3],
+                       double size)
+{
+    double M[PARAMETERS][PARAMETERS] = {{0}}, A[PARAMETERS][PARAMETERS], v[2][PARAMETERS], trace = 0, q[3] = {0};
+    for (int64_t i = 0; i < n; i++) {
+        double at[3], row[6];
+        for (int c = 0; c < 3; c++) {
+            at[c] = (xyz[3 * i + c] - mean[c]) / size;
+            row[c] = normal[3 * i + c];
+        }
+        uz_cross3(row + 3, at, row);
+        for (int j = 0; j < 6; j++)
+            for (int k = 0; k < 6; k++)
+                M[j][k] += row[j] * row[k];
+    }
+    for (int j = 0; j < 6; j++)
+        trace += M[j][j];
+    for (int j = 0; j < PARAMETERS; j++) {
+        v[0][j] = j < 6;
+        v[1][j] = j < 6 ? j - 2 : 0;
+    }
+    for (int k = 0; k < 40; k++) {
+        double along = 0, length = 0;
+        memcpy(A, M, sizeof A);
+        for (int j = 0; j < 6; j++)
+            A[j][j] += 1e-10 * trace;
+        solve(A, v[k % 2]);
+        for (int j = 0; j < 6; j++)
+            along += k % 2 ? v[0][j] * v[1][j] : 0;
+        for (int j = 0; j < 6; j++)
+            v[k % 2][j] -= along * v[0][j];
+        for (int j = 0; j < 6; j++)
+            length = hypot(length, v[k % 2][j]);
+        for (int j = 0; j < 6; j++)
+            v[k % 2][j] /= length;
+    }
+    for (int c = 0; c < 3; c++) { /* a . m of v0 cos + v1 sin: q0 cos^2 + 2 q1 cos sin + q2 sin^2 */
+        q[0] += v[0][c] * v[0][3 + c];
+        q[1] += 0.5 * (v[0][c] * v[1][3 + c] + v[1][c] * v[0][3 + c]);
+        q[2] += v[1][c] * v[1][3 + c];
+    }
+    const double middle = atan2(2 * q[1], q[0] - q[2]), most = hypot(q[1], 0.5 * (q[0] - q[2]));
+    const double aside = acos(fmin(fmax(-0.5 * (q[0] + q[2]) / most, -1), 1));
+    for (int k = 0; k < 2; k++) {
+        const double angle = 0.5 * (k == 0 ? middle + aside : middle - aside);
+        double line[6], b[PARAMETERS] = {0};
+        for (int j = 0; j < 6; j++)
+            line[j] = cos(angle) * v[0][j] + sin(angle) * v[1][j];
+        *s = (uz_smooth_shape){.kind = UZ_SMOOTH_TORUS, .axis = {line[3], line[4], line[5]}};
+        const double share = uz_unit3(s->axis);
+        uz_cross3(s->point, s->axis, line);
+        for (int c = 0; c < 3; c++)
+            s->point[c] = mean[c] + size * s->point[c] / share;
+        memset(A, 0, sizeof A);
+        for (int64_t i = 0; i < n; i++) { /* across^2 + along^2 = 2 R across + 2 h along + (r^2 - R^2 - h^2) */
+            double out[3], radial[3], off[3], along;
+            distance_from(out, radial, off, &along, s, xyz + 3 * i);
+            const double across = uz_dot3(radial, off), row[3] = {2 * across, 2 * along, 1};
+            for (int j = 0; j < 9; j++)
+                A[j / 3][j % 3] += row[j / 3] * row[j % 3];
+            for (int j = 0; j < 3; j++)
+                b[j] += row[j] * (across * across + along * along);
+        }
+        solve(A, b);
+        s->radius = b[0];
+        s->tube = sqrt(b[2] + b[0] * b[0] + b[1] * b[1]);
+        for (int c = 0; c < 3; c++)
+            s->point[c] += b[1] * s->axis[c];
+        if (isfinite(s->tube) && fits(s, xyz, n, size) && s->radius > 0)
+            return true;
+    }
+    return false;
 }
 
 uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int64_t n)
 {
-    uz_smooth_shape s = {.kind = UZ_SMOOTH_NONE};
+    enum { FEW = 6, ENOUGH_FOR_A_TORUS = 12 };
     double size = 0, turn = 0, best = 0, mean[3] = {0}, axis[2][3] = {{0}};
     int64_t far = 0;
     for (int64_t i = 0; i < n; i++) {
@@ -156,8 +280,12 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
             far = i;
         }
     }
-    if (n < 6 || turn < 1e-3)
+    uz_smooth_shape s = {.kind = UZ_SMOOTH_PLANE, .axis = {normal[0], normal[1], normal[2]}};
+    memcpy(s.point, mean, sizeof mean);
+    if (turn < 1e-3 && fits(&s, xyz, n, size))
         return s;
+    if (n < FEW || turn < 1e-3)
+        return (uz_smooth_shape){.kind = UZ_SMOOTH_NONE};
     /* A sphere: normals differ as points do. */
     double d[3], t[3];
     for (int c = 0; c < 3; c++) {
@@ -165,11 +293,11 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
         t[c] = normal[3 * far + c] - normal[c];
     }
     const double radius = uz_dot3(d, t) / uz_dot3(t, t);
-    uz_smooth_shape sphere = {.kind = UZ_SMOOTH_SPHERE, .radius = fabs(radius)};
+    s = (uz_smooth_shape){.kind = UZ_SMOOTH_SPHERE, .radius = fabs(radius)};
     for (int c = 0; c < 3; c++)
-        sphere.point[c] = xyz[c] - radius * normal[c];
-    if (fits(&sphere, xyz, n, size))
-        return sphere;
+        s.point[c] = xyz[c] - radius * normal[c];
+    if (fits(&s, xyz, n, size))
+        return s;
     /* The axis is across all normals of a cylinder, and across the differences of those of a cone. */
     for (int k = 0; k < 2; k++) {
         best = 0;
@@ -184,19 +312,94 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
                 memcpy(axis[k], at, sizeof at);
             }
         }
-        uz_smooth_shape round = {.kind = k == 0 ? UZ_SMOOTH_CYLINDER : UZ_SMOOTH_CONE, .radius = fabs(radius)};
+        s = (uz_smooth_shape){.kind = k == 0 ? UZ_SMOOTH_CYLINDER : UZ_SMOOTH_CONE, .radius = fabs(radius)};
         if (!(uz_unit3(axis[k]) > 0))
             continue;
-        memcpy(round.axis, axis[k], sizeof round.axis);
+        memcpy(s.axis, axis[k], sizeof s.axis);
         for (int c = 0; c < 3; c++) /* opposite the normal, at the height of the points' mean */
-            round.point[c] = xyz[c] - radius * normal[c];
+            s.point[c] = xyz[c] - radius * normal[c];
         double up = 0;
         for (int c = 0; c < 3; c++)
-            up += (mean[c] - round.point[c]) * round.axis[c];
+            up += (mean[c] - s.point[c]) * s.axis[c];
         for (int c = 0; c < 3; c++)
-            round.point[c] += up * round.axis[c];
-        if (fits(&round, xyz, n, size))
-            return round;
+            s.point[c] += up * s.axis[c];
+        if (fits(&s, xyz, n, size))
+            return s;
     }
-    return s;
+    if (n >= ENOUGH_FOR_A_TORUS && find_torus(&s, xyz, normal, n, mean, size))
+        return s;
+    return (uz_smooth_shape){.kind = UZ_SMOOTH_NONE};
+}
+
+/* ---- a quadric near a node */
+
+/* The eight terms that are not the height itself, in a patch's coordinates. */
+static void terms_at(double term[PARAMETERS], double x, double y, double z)
+{
+    const double at[PARAMETERS] = {x, y, x * x, x * y, y * y, x * z, y * z, z * z};
+    memcpy(term, at, sizeof at);
+}
+
+bool uz_smooth_patch_fit(uz_smooth_patch *out, const double at[3], const double normal[3], const double *xyz, int n)
+{
+    enum { TURNS = 2, FEWEST = 5, CURVED = 5 };
+    uz_smooth_patch p = {.size = 0};
+    memcpy(p.at, at, sizeof p.at);
+    memcpy(p.n, normal, sizeof p.n);
+    for (int i = 0; i < n; i++)
+        for (int c = 0; c < 3; c++)
+            p.size += (xyz[3 * i + c] - at[c]) * (xyz[3 * i + c] - at[c]) / n;
+    p.size = sqrt(p.size);
+    for (int turn = 0; turn < TURNS && n >= FEWEST && p.size > 0; turn++) {
+        const double e[3] = {fabs(p.n[0]) < 0.6, fabs(p.n[0]) >= 0.6, 0};
+        double A[PARAMETERS][PARAMETERS] = {{0}}, weights = 0;
+        uz_cross3(p.t[1], p.n, e);
+        uz_unit3(p.t[1]);
+        uz_cross3(p.t[0], p.t[1], p.n);
+        memset(p.c, 0, sizeof p.c);
+        for (int i = 0; i < n; i++) {
+            double off[3], term[PARAMETERS];
+            for (int c = 0; c < 3; c++)
+                off[c] = (xyz[3 * i + c] - at[c]) / p.size;
+            const double z = uz_dot3(off, p.n), weight = 1 / pow(uz_dot3(off, off), 2);
+            terms_at(term, uz_dot3(off, p.t[0]), uz_dot3(off, p.t[1]), z);
+            for (int j = 0; j < PARAMETERS; j++) {
+                for (int k = 0; k < PARAMETERS; k++)
+                    A[j][k] += weight * term[j] * term[k];
+                p.c[j] += weight * term[j] * z;
+            }
+            weights += weight;
+        }
+        for (int j = 0; j < PARAMETERS; j++) /* what few or flat nodes do not tell is 0 */
+            A[j][j] += (j < CURVED ? 1e-14 : 1e-10) * weights;
+        solve(A, p.c);
+        for (int c = 0; c < 3 && turn + 1 < TURNS; c++)
+            p.n[c] -= p.c[0] * p.t[0][c] + p.c[1] * p.t[1][c];
+        uz_unit3(p.n);
+    }
+    *out = p;
+    return n >= FEWEST && p.size > 0 && isfinite(p.c[0] + p.c[2] + p.c[7]);
+}
+
+double uz_smooth_patch_height(double normal[3], const uz_smooth_patch *p, const double x[3])
+{
+    double off[3], term[PARAMETERS], slope[2] = {p->c[0], p->c[1]}, steep = 1;
+    for (int c = 0; c < 3; c++)
+        off[c] = (x[c] - p->at[c]) / p->size;
+    const double along[2] = {uz_dot3(off, p->t[0]), uz_dot3(off, p->t[1])}, from = uz_dot3(off, p->n);
+    double z = from;
+    for (int k = 0; k < 4; k++) { /* Newton's method for the height over the patch's plane */
+        double f = -z;
+        terms_at(term, along[0], along[1], z);
+        for (int j = 0; j < PARAMETERS; j++)
+            f += p->c[j] * term[j];
+        steep = 1 - p->c[5] * along[0] - p->c[6] * along[1] - 2 * p->c[7] * z;
+        z += f / steep;
+    }
+    slope[0] += 2 * p->c[2] * along[0] + p->c[3] * along[1] + p->c[5] * z;
+    slope[1] += p->c[3] * along[0] + 2 * p->c[4] * along[1] + p->c[6] * z;
+    for (int c = 0; c < 3; c++)
+        normal[c] = p->n[c] - (slope[0] * p->t[0][c] + slope[1] * p->t[1][c]) / steep;
+    uz_unit3(normal);
+    return p->size * (z - from);
 }

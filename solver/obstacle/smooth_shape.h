@@ -5,14 +5,21 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* UZ_SMOOTH_NONE stands for a plane, too: facets of a plane are it. */
-typedef enum { UZ_SMOOTH_NONE, UZ_SMOOTH_SPHERE, UZ_SMOOTH_CYLINDER, UZ_SMOOTH_CONE } uz_smooth_kind;
+typedef enum {
+    UZ_SMOOTH_NONE,
+    UZ_SMOOTH_PLANE,
+    UZ_SMOOTH_SPHERE,
+    UZ_SMOOTH_CYLINDER,
+    UZ_SMOOTH_CONE,
+    UZ_SMOOTH_TORUS
+} uz_smooth_kind;
 
 typedef struct {
     uz_smooth_kind kind;
-    double point[3];      /* the centre; a point of the axis */
-    double axis[3];       /* unit */
+    double point[3];      /* the centre; a point of the axis or plane */
+    double axis[3];       /* unit, not of a sphere; of a plane its normal */
     double radius, slope; /* of a cone radius + slope * (distance from `point` along the axis) */
+    double tube;          /* of a torus the radius of its section, whose centre is `radius` off the axis */
 } uz_smooth_shape;
 
 /* The simplest of these shapes on which all n points lie (n x 3), to a millionth of its radius; normals (n x 3, unit):
@@ -22,5 +29,18 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
 /* From x to the nearest point of the shape, and the unit normal there (NULL: not wanted), away from its centre or
  * axis. UZ_SMOOTH_NONE: zero, and `normal` stays as it is. */
 void uz_smooth_nearest(double offset[3], double normal[3], const uz_smooth_shape *shape, const double x[3]);
+
+/* What of a surface of no such shape lies about a node: the quadric z = c . (x, y, xx, xy, yy, xz, yz, zz) through it,
+ * in coordinates along t and n from `at`, in units of `size`. Every sphere, cylinder, cone, ellipsoid is one. */
+typedef struct {
+    double at[3], t[2][3], n[3], size, c[8];
+} uz_smooth_patch;
+
+/* By least squares from n nodes about it, xyz (n x 3), near ones weighing more; normal: roughly that of the surface at
+ * the node. False: too few nodes. */
+bool uz_smooth_patch_fit(uz_smooth_patch *out, const double at[3], const double normal[3], const double *xyz, int n);
+
+/* From x along the patch's n to the quadric, and the quadric's unit normal there, on the side of n. */
+double uz_smooth_patch_height(double normal[3], const uz_smooth_patch *patch, const double x[3]);
 
 #endif

@@ -162,6 +162,25 @@ def test_cylinders_and_cones_are_recognised(s):
     check(-sum(answer_of(s, request)["reactions"]) > 3 * lame(0.005) * 20 * math.pi / 2 * 2)
 
 
+def test_free_forms_are_fitted(s):
+    """No cylinder: its radius varies by 4 or by 80 interferences around it; the meshes are irregular. As thick rings
+    press alike wherever they are, the mean is Lame's to the hundredth."""
+    def ring(inner, outer, cells, swing, free):
+        def place(x, y, z):
+            def shift(i, j):
+                return 0.2 * math.sin(12.9898 * i + 78.233 * j + cells[0])  # the same all through the ring
+            i, j = y * cells[0], z * cells[1]
+            y, z = ((i + shift(i, j)) / cells[0] if 0 < y < 1 else y), ((j + shift(j, i)) / cells[1] if 0 < z < 1 else z)
+            r = inner + (outer - inner) * x + swing * math.cos(2 * math.pi * y) * (x if free == "out" else 1 - x)
+            return r * math.cos(math.pi / 2 * y), r * math.sin(math.pi / 2 * y), 10 * z
+        return place
+    for kind in ("hex8", "tet4"):
+        for swing in (0.02, 0.4):
+            request = fit_in_space(kind, ring(10, 20.005, (15, 2), swing, "out"), ring(20, 40, (11, 3), swing, "in"))
+            mean = -sum(answer_of(s, request)["reactions"]) / (20 * math.pi / 2 * 10) / lame(0.005)
+            check(abs(mean - 1) < 2e-2, kind, swing, mean)
+
+
 def test_facets_as_they_are_press_more(s):
     """What `smooth` corrects, and what a feature angle below the turn of the facets, 6 degrees, gives up."""
     for contact in ({"smooth": False}, {"feature_angle": 3}):

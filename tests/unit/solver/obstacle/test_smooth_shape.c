@@ -1,4 +1,4 @@
-/* Spheres, cylinders and cones are found by nodes on them and rough normals, and nothing else is. */
+/* Planes, spheres, cylinders, cones and tori are found by nodes on them and rough normals, and nothing else is. */
 #include "harness.h"
 #include "obstacle/smooth_shape.h"
 
@@ -35,6 +35,14 @@ static cloud points_of(uz_smooth_kind kind, double radius, double slope, double 
                 x[c] = radius * at[c];
                 n[c] = at[c];
             }
+        } else if (kind == UZ_SMOOTH_TORUS) { /* its tube has half the radius */
+            const double up = 0.8 * z / radius - 0.3;
+            const double at[3] = {cos(phi) * cos(up), sin(phi) * cos(up), sin(up)};
+            memcpy(
+                x,
+                (double[3]){radius * (cos(phi) + 0.5 * at[0]), radius * (sin(phi) + 0.5 * at[1]), 0.5 * radius * at[2]},
+                sizeof x);
+            memcpy(n, at, sizeof n);
         } else {
             const double r = radius + slope * z, k = kind == UZ_SMOOTH_CONE ? slope : 0;
             const double at[3] = {cos(phi), sin(phi), -k};
@@ -58,8 +66,8 @@ static cloud points_of(uz_smooth_kind kind, double radius, double slope, double 
 
 TEST(shapes_are_found)
 {
-    static const uz_smooth_kind kinds[] = {UZ_SMOOTH_SPHERE, UZ_SMOOTH_CYLINDER, UZ_SMOOTH_CONE};
-    for (int k = 0; k < 3; k++)
+    static const uz_smooth_kind kinds[] = {UZ_SMOOTH_SPHERE, UZ_SMOOTH_CYLINDER, UZ_SMOOTH_CONE, UZ_SMOOTH_TORUS};
+    for (int k = 0; k < 4; k++)
         for (int i = 0; i < 24; i++) {
             const double radius = pow(10, i % 4 - 1), arc = i % 3 == 0 ? 6 : i % 3 == 1 ? 1.5 : 0.7;
             const double far = i % 2 ? 0 : 30 * radius, side = i % 5 ? 1 : -1;
@@ -81,15 +89,59 @@ TEST(shapes_are_found)
 
 TEST(offsets_lead_to_the_nearest_point)
 {
-    const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75};
+    const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75, 0};
+    const uz_smooth_shape torus = {UZ_SMOOTH_TORUS, {0, 0, 0}, {0, 0, 1}, 5, 0, 2};
     const uz_smooth_shape ball = {.kind = UZ_SMOOTH_SPHERE, .point = {1, 0, 0}, .radius = 2};
     double off[3], normal[3];
     uz_smooth_nearest(off, normal, &cone, (double[3]){2 + 0.8, 0, -0.6}); /* by 1 along (0.8, -0.6) from (2, 0) */
     CHECK(fabs(off[0] + 0.8) < 1e-14 && fabs(off[1]) < 1e-14 && fabs(off[2] - 0.6) < 1e-14);
     CHECK(fabs(normal[0] - 0.8) < 1e-14 && fabs(normal[1]) < 1e-14 && fabs(normal[2] + 0.6) < 1e-14);
+    uz_smooth_nearest(off, normal, &torus, (double[3]){0, 5 + 3, 4}); /* 5 from the section's centre */
+    CHECK(fabs(off[0]) < 1e-14 && fabs(off[1] + 1.8) < 1e-14 && fabs(off[2] + 2.4) < 1e-14);
+    CHECK(fabs(normal[0]) < 1e-14 && fabs(normal[1] - 0.6) < 1e-14 && fabs(normal[2] - 0.8) < 1e-14);
     uz_smooth_nearest(off, normal, &ball, (double[3]){1, 3, 0});
     CHECK(fabs(off[0]) < 1e-14 && fabs(off[1] + 1) < 1e-14 && fabs(off[2]) < 1e-14);
     CHECK(fabs(normal[0]) < 1e-14 && fabs(normal[1] - 1) < 1e-14 && fabs(normal[2]) < 1e-14);
+}
+
+/* A quadric is found as such, also at the end of the surface, and whatever rough normal it begins with. */
+TEST(patches_lie_on_an_ellipsoid)
+{
+    static const double R[3] = {3, 4, 5};
+    double xyz[3 * N], at[3], normal[3], exact[3], rough[3], x[3];
+    for (int i = 0; i < N; i++) {
+        const double a = 0.1 * (i % AROUND) + 0.02 * sin(3.0 * i), b = 0.1 * (i / AROUND) + 0.02 * cos(5.0 * i);
+        const double from[3] = {R[0] * cos(a) * cos(b), R[1] * sin(a) * cos(b), R[2] * sin(b)};
+        place(xyz + 3 * i, from, 7);
+    }
+    for (int i = 0; i < N; i += 11) {
+        const double a = 0.1 * (i % AROUND) + 0.02 * sin(3.0 * i), b = 0.1 * (i / AROUND) + 0.02 * cos(5.0 * i);
+        const double n[3] = {cos(a) * cos(b) / R[0], sin(a) * cos(b) / R[1], sin(b) / R[2]};
+        double others[3 * N];
+        uz_smooth_patch patch;
+        memcpy(at, xyz + 3 * i, sizeof at);
+        memcpy(others, xyz, sizeof others);
+        memcpy(others + 3 * i, xyz + 3 * (N - 1), sizeof at); /* all but itself */
+        place(exact, n, 0);
+        for (int c = 0; c < 3; c++)
+            rough[c] = exact[c] + 0.01 * sin(2.0 * c);
+        const double length = sqrt(exact[0] * exact[0] + exact[1] * exact[1] + exact[2] * exact[2]);
+        const double off = sqrt(rough[0] * rough[0] + rough[1] * rough[1] + rough[2] * rough[2]);
+        for (int c = 0; c < 3; c++)
+            rough[c] /= off;
+        CHECK(uz_smooth_patch_fit(&patch, at, rough, others, N - 1));
+        CHECK(fabs(uz_smooth_patch_height(normal, &patch, at)) < 1e-14);
+        for (int c = 0; c < 3; c++)
+            CHECK_MSG(fabs(normal[c] - exact[c] / length) < 1e-5, "node %d: %g", i, normal[c] - exact[c] / length);
+        const double from[3] = {R[0] * cos(a + 0.1) * cos(b), R[1] * sin(a + 0.1) * cos(b), R[2] * sin(b)};
+        place(x, from, 7);
+        for (int c = 0; c < 3; c++)
+            x[c] -= 0.02 * patch.n[c]; /* as far off as a facet is */
+        const double height = uz_smooth_patch_height(normal, &patch, x);
+        CHECK_MSG(fabs(height - 0.02) < 2e-6, "node %d: %g", i, height - 0.02);
+    }
+    uz_smooth_patch patch;
+    CHECK(!uz_smooth_patch_fit(&patch, xyz, exact, xyz + 3, 4));
 }
 
 TEST(other_surfaces_are_none)
@@ -105,7 +157,7 @@ TEST(other_surfaces_are_none)
         memcpy(saddle.normal + 3 * i, (double[3]){-y / length, -x / length, 1 / length}, 3 * sizeof x);
     }
     bent.xyz[3 * 20] += 1e-4; /* one node is not on it */
-    CHECK_INT(uz_smooth_shape_of(plane.xyz, plane.normal, N).kind, UZ_SMOOTH_NONE);
+    CHECK_INT(uz_smooth_shape_of(plane.xyz, plane.normal, N).kind, UZ_SMOOTH_PLANE);
     CHECK_INT(uz_smooth_shape_of(saddle.xyz, saddle.normal, N).kind, UZ_SMOOTH_NONE);
     CHECK_INT(uz_smooth_shape_of(bent.xyz, bent.normal, N).kind, UZ_SMOOTH_NONE);
     CHECK_INT(uz_smooth_shape_of(bent.xyz, bent.normal, 3).kind, UZ_SMOOTH_NONE);
