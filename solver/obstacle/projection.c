@@ -21,7 +21,7 @@
 
 /* The faces of a group, where they are, and which of them meet at a node. Coordinates are the mesh's times a power of
  * two near one over its extent. */
-typedef struct {
+typedef struct uz_faces {
     const uz_mesh *mesh;
     const uz_group *group;
     double scale;
@@ -277,16 +277,6 @@ static bool normal_between(double normal[3], const master *m, const uz_contact_p
     return true;
 }
 
-static uz_status refuse_flat(const master *m, int64_t face, int64_t index, uz_error *err)
-{
-    char where[96];
-    int64_t of[UZ_FACE_NODES];
-    uz_mesh_face(of, m->mesh, m->group->face[face]);
-    snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
-    return uz_fail(err, UZ_ERR_SCENE, where, "the face at node %lld of \"%.63s\" has no area, and so no normal",
-                   (long long)of[0], m->group->name);
-}
-
 /* Do all faces of the slave around its node (at x, scaled) look the way the master does? Then what is behind the master
  * there is the far side of the slave, as of a clamp around a plate, and did not come through it. */
 static bool looks_away(const master *slave, int64_t node, const double *x, const double normal[3])
@@ -303,40 +293,57 @@ static bool looks_away(const master *slave, int64_t node, const double *x, const
     return slave->first[node + 1] > slave->first[node];
 }
 
-/* Fills the row of one node; *found false: it faces no part of the master. */
-static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, const master *slave, int64_t node,
-                          int64_t index, uz_error *err)
+/* Fills all of a row but its node for a point x, scaled; *found false: it faces no part of the master. Returns false
+ * where the face has no normal: *row tells which. */
+static bool place_on(bool *found, uz_contact_pair *row, const master *m, const double x[3])
 {
     const int dim = m->mesh->dim;
-    double x[3] = {0}, off[3], normal[3], xyz[3 * UZ_FACE_NODES], along = 0;
+    double off[3], normal[3], xyz[3 * UZ_FACE_NODES], along = 0;
     uz_foot foot;
     *found = false;
     memset(row, 0, sizeof *row);
-    for (int c = 0; c < dim; c++)
-        x[c] = m->mesh->xyz[node * dim + c] * m->scale;
-    const int64_t nearest = uz_box_tree_nearest(&m->tree, x, distance_to, m), face = nearest < 0 ? 0 : nearest;
-    row->count = gather(xyz, row->master, m, face, x);
+    const int64_t nearest = uz_box_tree_nearest(&m->tree, x, distance_to, m);
+    row->number = nearest < 0 ? 0 : nearest;
+    row->face = m->group->face[row->number];
+    row->count = gather(xyz, row->master, m, row->number, x);
     uz_face_closest(&foot, dim, row->count, xyz);
     if (!isfinite(foot.normal[0] + foot.normal[1] + foot.normal[2]))
-        return refuse_flat(m, face, index, err);
+        return false;
     for (int c = 0; c < 3; c++)
         off[c] = -foot.point[c];
     memcpy(normal, foot.normal, sizeof normal);
     const double size = face_size(xyz, dim, uz_face_corners(dim, row->count));
+    row->gap = sqrt(foot.distance2) / m->scale;
     if (foot.place != UZ_FACE_WITHIN && !normal_between(normal, m, row, &foot, size, x, off))
-        return UZ_OK;
+        return true;
     if (!uz_unit_normal(row->normal, normal, dim))
-        return refuse_flat(m, face, index, err);
+        return false;
     for (int c = 0; c < dim; c++)
         along += off[c] * row->normal[c];
-    if (along < -ON_BORDER * size && looks_away(slave, node, x, row->normal))
-        return UZ_OK;
-    row->node = node;
-    row->face = m->group->face[face];
     row->gap = along / m->scale;
     memcpy(row->local, foot.local, sizeof row->local);
     memcpy(row->weight, foot.weight, sizeof row->weight);
+    row->size = size / m->scale;
     *found = true;
+    return true;
+}
+
+/* Fills the row of one node; *found false: it faces no part of the master. */
+static uz_status make_row(bool *found, uz_contact_pair *row, const master *m, const master *slave, int64_t node,
+                          int64_t index, uz_error *err)
+{
+    double x[3] = {0};
+    char where[96];
+    for (int c = 0; c < m->mesh->dim; c++)
+        x[c] = m->mesh->xyz[node * m->mesh->dim + c] * m->scale;
+    if (!place_on(found, row, m, x)) {
+        snprintf(where, sizeof where, "/contacts/%lld/with", (long long)index);
+        return uz_fail(err, UZ_ERR_SCENE, where, "the face at node %lld of \"%.63s\" has no area, and so no normal",
+                       (long long)row->master[0], m->group->name);
+    }
+    row->node = node;
+    if (*found && row->gap < -ON_BORDER * row->size && looks_away(slave, node, x, row->normal))
+        *found = false;
     return UZ_OK;
 }
 
@@ -392,26 +399,34 @@ static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m
                    on->name, m->group->name);
 }
 
+/* middles: as of list_around; tree: of a master. */
+static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, bool middles, bool tree, uz_error *err)
+{
+    int exponent;
+    frexp(mesh->extent, &exponent);
+    *m = (master){.mesh = mesh,
+                  .group = group,
+                  .scale = ldexp(1, exponent < -1000  ? 1000
+                                    : exponent > 1000 ? -1000
+                                                      : -exponent)};
+    const uz_status status = tree ? build_tree(m, err) : UZ_OK;
+    return status == UZ_OK ? list_around(m, middles, err) : status;
+}
+
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
                            const uz_group *with, int64_t index, uz_error *err)
 {
-    master m = {.mesh = mesh, .group = with}, slave = {.mesh = mesh, .group = on};
+    master m = {.mesh = NULL}, slave = {.mesh = NULL};
     uz_contact_pair *row = NULL;
-    int exponent;
     *out = NULL;
     *count = 0;
     uz_status status = uz_contact_pair_check(mesh, on, with, index, err);
     if (status != UZ_OK)
         return status;
-    frexp(mesh->extent, &exponent);
-    m.scale = ldexp(1, exponent < -1000 ? 1000 : exponent > 1000 ? -1000 : -exponent);
-    slave.scale = m.scale;
     row = uz_alloc(uz_group_node_count(mesh, on), sizeof *row);
-    status = row ? build_tree(&m, err) : out_of_memory(err);
+    status = row ? prepare(&m, mesh, with, false, true, err) : out_of_memory(err);
     if (status == UZ_OK)
-        status = list_around(&m, false, err);
-    if (status == UZ_OK)
-        status = list_around(&slave, true, err);
+        status = prepare(&slave, mesh, on, true, false, err);
     if (status == UZ_OK)
         status = make_rows(row, count, &m, &slave, index, err);
     if (status == UZ_OK)
@@ -423,4 +438,34 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
     master_clear(&m);
     master_clear(&slave);
     return status;
+}
+
+/* ---------------------------------------------------------------- any point */
+
+uz_status uz_faces_new(uz_faces **out, const uz_mesh *mesh, const uz_group *group, uz_error *err)
+{
+    uz_faces *faces = uz_alloc_zero(1, sizeof *faces);
+    *out = NULL;
+    const uz_status status = faces ? prepare(faces, mesh, group, false, true, err) : out_of_memory(err);
+    if (status == UZ_OK)
+        *out = faces;
+    else
+        uz_faces_free(faces);
+    return status;
+}
+
+void uz_faces_free(uz_faces *faces)
+{
+    if (faces)
+        master_clear(faces);
+    free(faces);
+}
+
+bool uz_faces_closest(uz_contact_pair *row, const uz_faces *faces, const double *x)
+{
+    bool found;
+    double at[3] = {0};
+    for (int c = 0; c < faces->mesh->dim; c++)
+        at[c] = x[c] * faces->scale;
+    return place_on(&found, row, faces, at) && found;
 }

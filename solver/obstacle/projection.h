@@ -22,14 +22,16 @@
 
 /* One contact row. */
 typedef struct {
-    int64_t node; /* of the slave */
-    uz_face face; /* of the master */
-    int count;    /* nodes of the face, in the order of uz_mesh_face */
+    int64_t node;   /* of the slave */
+    uz_face face;   /* of the master */
+    int64_t number; /* of the face in its group */
+    int count;      /* nodes of the face, in the order of uz_mesh_face */
     int64_t master[UZ_FACE_NODES];
     double weight[UZ_FACE_NODES];
     double local[2];  /* of the foot: edges in [-1, 1]; triangles x, y >= 0, x + y <= 1; quadrilaterals in [-1, 1]^2 */
     double normal[3]; /* unit, out of the master; the third is 0 in 2D */
     double gap;       /* (x_s - x_m) . normal; < 0: the bodies overlap */
+    double size;      /* of the face: its longest edge */
 } uz_contact_pair;
 
 /* May the two touch? UZ_ERR_SCENE: `with` has no faces, is `on`, or the two have a node in common. */
@@ -42,5 +44,15 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
  * "/contacts/i/on": a node of the master itself, or no node that faces it), UZ_ERR_MEMORY. */
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
                            const uz_group *with, int64_t index, uz_error *err);
+
+/* The faces of a group, made ready for points from anywhere. */
+typedef struct uz_faces uz_faces;
+
+/* O(f log f). mesh and group are kept: they outlive it. The caller frees *out. Error: UZ_ERR_MEMORY. */
+uz_status uz_faces_new(uz_faces **out, const uz_mesh *mesh, const uz_group *group, uz_error *err);
+void uz_faces_free(uz_faces *faces);
+/* The closest place to x (dim) as the row of a node there, whose number stays 0. False: x lies beyond the faces'
+ * border, or the face there has no normal. Allocates nothing. */
+bool uz_faces_closest(uz_contact_pair *row, const uz_faces *faces, const double *x);
 
 #endif
