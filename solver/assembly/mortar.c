@@ -51,7 +51,7 @@ int uz_mortar_by_node(const void *a, const void *b)
 
 /* ---- surfaces */
 
-static const uz_mortar_geometry *geometry_of(int dim)
+const uz_mortar_geometry *uz_mortar_geometry_of(int dim)
 {
     return dim == 2 ? &uz_mortar_plane : &uz_mortar_space;
 }
@@ -71,7 +71,7 @@ uz_side uz_mortar_side_of(const uz_mortar_side *side, const uz_body_model *model
                      .xyz = side->xyz};
 }
 
-static void clear_surface(uz_mortar_surface *surface)
+void uz_mortar_surface_clear(uz_mortar_surface *surface)
 {
     uz_box_tree_clear(&surface->tree);
     free(surface->side);
@@ -101,7 +101,8 @@ static double enclose(double *box, const uz_mortar_side *side, int dim)
     return size;
 }
 
-static uz_status make_surface(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group, uz_error *err)
+uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
+                                 uz_error *err)
 {
     const int dim = in->model->mesh.dim;
     char where[96];
@@ -124,7 +125,7 @@ static uz_status make_surface(uz_mortar_surface *out, const uz_contact_input *in
     }
     if (status == UZ_OK)
         status = uz_box_tree_init(&out->tree, out->n, dim, box, err);
-    if (status == UZ_OK && !geometry_of(dim)->places(out, in))
+    if (status == UZ_OK && !uz_mortar_geometry_of(dim)->places(out, in))
         status = no_memory(err);
     free(box);
     return status;
@@ -190,7 +191,7 @@ static bool find_points(side_work *work, const uz_contact_input *in, const uz_mo
                         const uz_mortar_surface *master)
 {
     const int dim = in->model->mesh.dim;
-    const uz_mortar_geometry *geometry = geometry_of(dim);
+    const uz_mortar_geometry *geometry = uz_mortar_geometry_of(dim);
     double box[6], covered = 0;
     const double size = enclose(box, &slave->side[i], dim);
     int64_t before = -1;
@@ -517,9 +518,9 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
     if (status != UZ_OK)
         return status;
     sites->swapped = in->on->node[0] > in->with->node[0];
-    status = make_surface(&surface[0], in, sites->swapped ? in->with : in->on, err);
+    status = uz_mortar_surface_make(&surface[0], in, sites->swapped ? in->with : in->on, err);
     if (status == UZ_OK)
-        status = make_surface(&surface[1], in, sites->swapped ? in->on : in->with, err);
+        status = uz_mortar_surface_make(&surface[1], in, sites->swapped ? in->on : in->with, err);
     if (status != UZ_OK)
         goto done;
     const int64_t most = surface[0].n > surface[1].n ? surface[0].n : surface[1].n;
@@ -536,8 +537,8 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
             uz_fail(err, UZ_ERR_SCENE, where, "no part of \"%.63s\" faces \"%.63s\"", in->on->name, in->with->name);
     }
 done:
-    clear_surface(&surface[0]);
-    clear_surface(&surface[1]);
+    uz_mortar_surface_clear(&surface[0]);
+    uz_mortar_surface_clear(&surface[1]);
     free(work.points.point);
     free(work.near);
     free(work.A);

@@ -51,13 +51,23 @@ uz_side uz_mortar_side_of(const uz_mortar_side *side, const uz_body_model *model
 
 /* The geometry of surfaces of one dimension. False: no memory.
  *   places  tangents, places, node and normal of a surface whose sides are there
- *   points  adds those of slave side i against some sides of the master, ascending */
+ *   points  adds those of slave side i against some sides of the master, ascending
+ *   offset  from the point of a side at `local`, which is x before anything moves, to the smooth surface that the side
+ *           stands for; zero where it stands for none */
 typedef struct {
     bool (*places)(uz_mortar_surface *surface, const uz_contact_input *in);
     bool (*points)(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
                    const uz_mortar_surface *master, const int64_t *near, int64_t n_near);
+    void (*offset)(double offset[3], const uz_mortar_side *side, const double *local, const double x[3]);
 } uz_mortar_geometry;
 extern const uz_mortar_geometry uz_mortar_plane, uz_mortar_space;
+const uz_mortar_geometry *uz_mortar_geometry_of(int dim);
+
+/* The sides of a group, in its order, with tree and places; the caller clears *out in every case. Errors: UZ_ERR_SCENE
+ * (a side without area), UZ_ERR_MEMORY. */
+uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
+                                 uz_error *err);
+void uz_mortar_surface_clear(uz_mortar_surface *surface);
 
 /* Cosine of the feature angle: sides that turn by more make a corner. */
 double uz_mortar_least_cosine(const uz_contact_input *in);

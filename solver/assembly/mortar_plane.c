@@ -363,4 +363,17 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
     return room;
 }
 
-const uz_mortar_geometry uz_mortar_plane = {places, points};
+static void offset(double offset[3], const uz_mortar_side *side, const double *local, const double x[3])
+{
+    static const double ORIGIN[2] = {0};
+    double at[2], slope[2], n[2];
+    (void)x;
+    edge_at(at, slope, side, local[0]);
+    direction(slope, ORIGIN, slope);
+    turn_outward(n, slope);
+    const double along = offset_along(n, side, local[0]);
+    for (int c = 0; c < 3; c++)
+        offset[c] = c < 2 ? along * n[c] : 0;
+}
+
+const uz_mortar_geometry uz_mortar_plane = {places, points, offset};

@@ -464,4 +464,10 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
     return room;
 }
 
-const uz_mortar_geometry uz_mortar_space = {places, points};
+static void offset(double offset[3], const uz_mortar_side *side, const double *local, const double x[3])
+{
+    (void)local;
+    uz_smooth_nearest(offset, NULL, &side->shape, x);
+}
+
+const uz_mortar_geometry uz_mortar_space = {places, points, offset};
