@@ -61,6 +61,25 @@ static void put_evaluation(text *t, const uz_evaluation *e, int dim)
     text_close(t, ']');
 }
 
+/* How deep the deformed surfaces stand in each other: of all contacts, and of each. */
+static void put_overlap(text *t, const uz_evaluation *e, int dim)
+{
+    double depth = 0;
+    for (int64_t k = 0; k < e->n_contacts; k++)
+        depth = e->overlap[k].depth > depth ? e->overlap[k].depth : depth; /* not those that are no number */
+    put_named(t, (named[]){{"geometric_penetration", depth}, {"approach", e->approach}}, 2);
+    text_open(t, "penetrations", '[');
+    for (int64_t k = 0; k < e->n_contacts; k++) {
+        const uz_overlap *o = &e->overlap[k];
+        text_open(t, NULL, '{');
+        put_named(t, (named[]){{"geometric_penetration", o->depth}, {"sagitta", o->facets}}, 2);
+        if (o->depth > 0)
+            text_numbers(t, "at", o->at, dim);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
 static void put_contact(text *t, const uz_summary *s, bool scene)
 {
     const uz_evaluation *e = s->evaluation;
@@ -74,8 +93,10 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
     if (scene) {
         text_numbers(t, "force", s->force, s->dim);
         text_number(t, "max_pressure", s->max_pressure);
-        if (e)
+        if (e) {
             text_number(t, "area", e->contact_area);
+            put_overlap(t, e, s->dim);
+        }
         if (e && e->peak_node < 0) {
             text_raw(t, "max_pressure_at", NULL);
         } else if (e) {

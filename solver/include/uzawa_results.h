@@ -115,6 +115,16 @@ typedef struct {
     char message[160]; /* one sentence */
 } uz_warning;
 
+/* How the deformed surfaces of one contact stand to each other, measured at points that no row stands at. Lengths. */
+typedef struct {
+    double depth;  /* the largest overlap; 0: none, NaN: the contact has no sides to look at */
+    double at[3];  /* where, on the deformed surface; 0 where there is none */
+    double side;   /* size of the side there */
+    double motion; /* the largest sum of the displacements of two points that face each other */
+    double facets; /* the largest distance, near the contact, of facets from the smooth surface that they stand for */
+    double facets_left; /* the same where the contact does not make up for it */
+} uz_overlap;
+
 /* Scenes: what the answer comes to. */
 typedef struct {
     double strain_energy; /* with that of springs */
@@ -128,6 +138,8 @@ typedef struct {
     /* What the forces and moments (about the first node, by the body's extent) leave over, relative to the sum of the
      * forces' sizes. */
     double imbalance;
+    uz_overlap *overlap; /* n_contacts */
+    double approach;     /* see uz_contact_approach in post/overlap.h; a length, 0: nothing is pressed */
     int n_warnings;
     uz_warning warnings[8];
 } uz_evaluation;

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/hooks.h"
 #include "post/balance.h"
+#include "post/overlap.h"
 #include "post/parts.h"
 
 #include <math.h>
@@ -16,6 +17,7 @@ void uz_evaluation_free(uz_evaluation *evaluation)
         return;
     free(evaluation->contacts);
     free(evaluation->supports);
+    free(evaluation->overlap);
     free(evaluation);
 }
 
@@ -32,7 +34,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     e->peak_node = -1;
     e->contacts = uz_alloc_zero(e->n_contacts, sizeof *e->contacts);
     e->supports = uz_alloc_zero(e->n_supports, sizeof *e->supports);
-    if (!e->contacts || !e->supports)
+    e->overlap = uz_alloc_zero(e->n_contacts, sizeof *e->overlap);
+    if (!e->contacts || !e->supports || !e->overlap)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld resultants",
                        (long long)(e->n_contacts + e->n_supports));
     for (int64_t i = 0; i < e->n_contacts; i++)
@@ -54,11 +57,13 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     uz_row_forces(push, model, result->r);
     summary->dim = mesh->dim;
     summary->max_pressure = 0.0;
+    double pressed = 0; /* the sum of the forces of all rows */
     for (int64_t i = 0; i < result->m; i++) {
         const int64_t node = mesh->contact_node[i];
         const bool swapped = model->sites && model->sites[mesh->contact_of[i]].swapped;
         for (int axis = model->kind == UZ_AXISYMMETRIC ? 1 : 0; axis < mesh->dim; axis++)
             summary->force[axis] -= (swapped ? -push[i] : push[i]) * mesh->contact_normal[i * mesh->dim + axis];
+        pressed += fabs(push[i]);
         if (model->law->kind->active(model->law, NULL, &result->r[i], 1) > 0)
             e->contact_area += mesh->contact_area[i];
         if (!(result->pressure[i] > summary->max_pressure))
@@ -69,8 +74,13 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
             e->peak_at[axis] = mesh->xyz[node * mesh->dim + axis];
     }
     free(push);
-    status = uz_find_doubts(e, model, scene, result->u, result->r, err);
-    return status == UZ_OK ? uz_balance_forces(e, model, scene, result->u, result->r, err) : status;
+    status = uz_balance_forces(e, model, scene, result->u, result->r, err);
+    if (status == UZ_OK)
+        status = uz_measure_overlap(e->overlap, model, scene, result->u, err);
+    if (status != UZ_OK)
+        return status;
+    e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);
+    return uz_find_doubts(e, model, scene, result->u, result->r, err);
 }
 
 /* ---- what the mesh loses, of an answer that is there */
