@@ -10,6 +10,7 @@
 #ifndef SERVER_STORE_ENGINE_H
 #define SERVER_STORE_ENGINE_H
 
+#include "base/clock.h"
 #include "store/uploads.h"
 
 #include <pthread.h>
@@ -70,8 +71,6 @@ void store_base_begin(store *s, const store_engine *engine);
 void store_base_end(store *s);
 void store_set_message(store *s, const char *cause);
 void store_tell(const store *s, const char *id, bool waits);
-double store_now(void);   /* Unix seconds */
-double store_clock(void); /* seconds, CLOCK_MONOTONIC */
 
 /* The next id of a job: 12 hex digits of milliseconds, 4 of a counter within them, 16 random. Under the engine's lock.
  * last_ms and sequence are those of the newest id, so that ids ascend when the clock does not. */

@@ -98,28 +98,11 @@ void store_message(store *s, char *buffer, size_t size)
     pthread_mutex_unlock(&s->message_lock);
 }
 
-/* ---- time and ids */
-
-static double read_clock(clockid_t clock)
-{
-    struct timespec t;
-    clock_gettime(clock, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-double store_clock(void)
-{
-    return read_clock(CLOCK_MONOTONIC);
-}
-
-double store_now(void)
-{
-    return read_clock(CLOCK_REALTIME);
-}
+/* ---- ids */
 
 void store_next_id(uint64_t *last_ms, unsigned *sequence, char id[33])
 {
-    uint64_t random = 0, ms = (uint64_t)(store_now() * 1e3) & 0xffffffffffffu;
+    uint64_t random = 0, ms = (uint64_t)(clock_seconds(CLOCK_REALTIME) * 1e3) & 0xffffffffffffu;
     if (ms > *last_ms) {
         *last_ms = ms;
         *sequence = 0;

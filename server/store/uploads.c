@@ -127,7 +127,7 @@ store_status store_collect_uploads(store *s, int64_t *count)
     int64_t n = 0;
     for (bool more = true; more; n += more) { /* the lock is let go between two, for those who send */
         pthread_mutex_lock(&s->uploads->lock);
-        more = keep_s > 0 && s->uploads->bytes > 0 && collect_one(s, store_now() - keep_s);
+        more = keep_s > 0 && s->uploads->bytes > 0 && collect_one(s, clock_seconds(CLOCK_REALTIME) - keep_s);
         pthread_mutex_unlock(&s->uploads->lock);
     }
     if (count)
@@ -178,94 +178,71 @@ upload_writer *store_upload_begin(store *s, bool gzip, upload_status *status)
     return NULL;
 }
 
-/* Room for so many more bytes of one writer, within both limits. */
-static upload_status reserve(upload_writer *w, int64_t more)
+/* Adds bytes as they are to be kept, where there is room for them within both limits. */
+static upload_status put(upload_writer *w, const unsigned char *data, size_t size, char cause[BLOB_CAUSE])
 {
     store_uploads *u = w->s->uploads;
     const upload_limits *limits = &w->s->settings.uploads;
+    const int64_t more = (int64_t)size;
     upload_status status = UPLOAD_OK;
+    if (size == 0)
+        return UPLOAD_OK;
     pthread_mutex_lock(&u->lock);
     if (limits->one > 0 && more > limits->one - w->reserved)
         status = UPLOAD_TOO_LARGE;
     while (status == UPLOAD_OK && limits->all > 0 && u->bytes + u->pending + more > limits->all)
-        if (!collect_one(w->s, store_now() - UPLOAD_GRACE_S))
+        if (!collect_one(w->s, clock_seconds(CLOCK_REALTIME) - UPLOAD_GRACE_S))
             status = UPLOAD_NO_ROOM;
     if (status == UPLOAD_OK) {
         w->reserved += more;
         u->pending += more;
     }
     pthread_mutex_unlock(&u->lock);
-    return status;
-}
-
-static upload_status put(upload_writer *w, const unsigned char *data, size_t size, char cause[BLOB_CAUSE])
-{
-    upload_status status = size > 0 ? reserve(w, (int64_t)size) : UPLOAD_OK;
-    if (status != UPLOAD_OK || size == 0)
+    if (status != UPLOAD_OK)
         return status;
     if (gnutls_hash(w->hash, data, size) != 0) {
         snprintf(cause, BLOB_CAUSE, "cannot write an upload: its digest failed");
         return UPLOAD_FAILED;
     }
-    w->bytes += (int64_t)size;
+    w->bytes += more;
     return status_of(w->blob->blobs->does->write(w->blob, data, size, cause));
-}
-
-/* Inflates what z.next_in has. A stream may have several members, one after another (RFC 1952, section 2.2). */
-static upload_status put_inflated(upload_writer *w, char cause[BLOB_CAUSE])
-{
-    upload_status status = UPLOAD_OK;
-    do {
-        if (w->between && w->z.avail_in > 0 && w->z.total_in > 0 && inflateReset(&w->z) != Z_OK)
-            return UPLOAD_BAD_GZIP;
-        w->between = w->between && w->z.avail_in == 0;
-        if (w->between)
-            break;
-        w->z.next_out = w->piece;
-        w->z.avail_out = PIECE;
-        int rc = inflate(&w->z, Z_NO_FLUSH);
-        if (rc != Z_OK && rc != Z_STREAM_END && rc != Z_BUF_ERROR)
-            return UPLOAD_BAD_GZIP;
-        w->between = rc == Z_STREAM_END;
-        status = put(w, w->piece, PIECE - w->z.avail_out, cause);
-    } while (status == UPLOAD_OK && (w->z.avail_in > 0 || w->z.avail_out == 0));
-    return status;
 }
 
 upload_status store_upload_write(upload_writer *w, const void *data, size_t size)
 {
     char cause[BLOB_CAUSE] = "";
-    if (w->failed == UPLOAD_OK && w->gzip) {
-        w->z.next_in = (unsigned char *)(uintptr_t)data; /* zlib only reads there */
-        w->z.avail_in = (unsigned)size;
-        w->failed = put_inflated(w, cause);
-    } else if (w->failed == UPLOAD_OK) {
+    w->z.next_in = (unsigned char *)(uintptr_t)data; /* zlib only reads there */
+    w->z.avail_in = w->gzip ? (unsigned)size : 0;
+    if (w->failed == UPLOAD_OK && !w->gzip)
         w->failed = put(w, data, size, cause);
+    for (bool more = w->gzip; more && w->failed == UPLOAD_OK; more = w->z.avail_in > 0 || w->z.avail_out == 0) {
+        /* A stream may have several members, one after another (RFC 1952, section 2.2). */
+        if (w->between && w->z.avail_in == 0)
+            break;
+        if (w->between && w->z.total_in > 0 && inflateReset(&w->z) != Z_OK) {
+            w->failed = UPLOAD_BAD_GZIP;
+            break;
+        }
+        w->z.next_out = w->piece;
+        w->z.avail_out = PIECE;
+        const int rc = inflate(&w->z, Z_NO_FLUSH);
+        w->between = rc == Z_STREAM_END;
+        w->failed = rc == Z_OK || rc == Z_STREAM_END || rc == Z_BUF_ERROR
+                        ? put(w, w->piece, PIECE - w->z.avail_out, cause)
+                        : UPLOAD_BAD_GZIP;
     }
     if (cause[0])
         store_set_message(w->s, cause);
     return w->failed;
 }
 
-/* The digest so far; ends the hash. */
+/* The digest so far as an id; ends the hash. */
 static void write_id(char id[UPLOAD_ID_LEN + 1], gnutls_hash_hd_t hash)
 {
     unsigned char digest[32];
     gnutls_hash_output(hash, digest);
     for (int i = 0; i < 32; i++)
         snprintf(id + 2 * i, 3, "%02x", digest[i]);
-}
-
-/* Under the lock: the blob first, then the row that makes it count. */
-static upload_status publish(upload_writer *w, const char *id, upload_info *out, bool *known, char cause[BLOB_CAUSE])
-{
-    upload_status status = status_of(w->blob->blobs->does->publish(w->blob, id, cause));
-    if (status != UPLOAD_OK)
-        return status;
-    store_status stored = w->s->engine->upload_add(w->s, id, w->bytes, out, known);
-    if (stored == STORE_OK && !*known)
-        w->s->uploads->bytes += w->bytes;
-    return status_of(stored);
 }
 
 upload_status store_upload_end(upload_writer *w, upload_info *out, bool *known)
@@ -279,8 +256,12 @@ upload_status store_upload_end(upload_writer *w, upload_info *out, bool *known)
         status = status_of(w->blob->blobs->does->seal(w->blob, cause));
     if (status == UPLOAD_OK) {
         write_id(id, w->hash);
-        pthread_mutex_lock(&w->s->uploads->lock);
-        status = publish(w, id, out, known, cause);
+        pthread_mutex_lock(&w->s->uploads->lock); /* the blob first, then the row that makes it count */
+        status = status_of(w->blob->blobs->does->publish(w->blob, id, cause));
+        if (status == UPLOAD_OK)
+            status = status_of(w->s->engine->upload_add(w->s, id, w->bytes, out, known));
+        if (status == UPLOAD_OK && !*known)
+            w->s->uploads->bytes += w->bytes;
         pthread_mutex_unlock(&w->s->uploads->lock);
     }
     if (cause[0])

@@ -1,5 +1,6 @@
 #include "store/sqlite/backup_uploads.h"
 #include "store/blobs.h"
+#include "store/sqlite/file_format.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -74,45 +75,14 @@ bool backup_has_upload(sqlite3 *db, const char *id)
     return found;
 }
 
-/* A file that is missing may have been deleted after its row had been read: of the original the copy's turn will tell,
- * of the copy the original does. */
-static bool put_or_forget(sqlite3 *db, sqlite3 *original, const folders *f, const char *id)
-{
-    if (put_file(f, id))
-        return true;
-    int cause = errno;
-    if (cause == ENOENT && (db == original || (!backup_has_upload(original, id) && forget(db, id))))
-        return true;
-    errno = cause;
-    return false;
-}
-
-/* 1, 0; -1: can't be read. Files of formats before 3 have no such table. */
-static int has_uploads(sqlite3 *db)
-{
-    sqlite3_stmt *stmt = NULL;
-    int any = -1;
-    if (sqlite3_prepare_v2(db, "SELECT count(*) FROM sqlite_schema WHERE name = 'upload'", -1, &stmt, NULL) ==
-            SQLITE_OK &&
-        sqlite3_step(stmt) == SQLITE_ROW)
-        any = sqlite3_column_int(stmt, 0);
-    sqlite3_finalize(stmt);
-    if (any <= 0)
-        return any;
-    any = -1;
-    if (sqlite3_prepare_v2(db, "SELECT EXISTS (SELECT 1 FROM upload)", -1, &stmt, NULL) == SQLITE_OK &&
-        sqlite3_step(stmt) == SQLITE_ROW)
-        any = sqlite3_column_int(stmt, 0);
-    sqlite3_finalize(stmt);
-    return any;
-}
-
 bool backup_uploads(sqlite3 *db, sqlite3 *original, const char *from, const char *to, char *message, size_t size)
 {
     folders f = {-1, -1};
-    int any = has_uploads(db);
-    bool ok = any == 0;
-    if (any < 0)
+    int64_t any = 0; /* files of formats before 3 have no such table */
+    const bool read = file_format_integer(db, "SELECT count(*) FROM sqlite_schema WHERE name = 'upload'", &any) &&
+                      (any == 0 || file_format_integer(db, "SELECT EXISTS (SELECT 1 FROM upload)", &any));
+    bool ok = read && any == 0;
+    if (!read)
         snprintf(message, size, "cannot read the uploads: %s", sqlite3_errmsg(db));
     else if (any > 0 && ((f.from = open_folder(from, false)) < 0 || (f.to = open_folder(to, true)) < 0))
         snprintf(message, size, "cannot open the folder of uploads beside %s: %s", f.from < 0 ? from : to,
@@ -123,7 +93,14 @@ bool backup_uploads(sqlite3 *db, sqlite3 *original, const char *from, const char
         ok = rc == SQLITE_OK;
         while (ok && (rc = sqlite3_step(stmt)) == SQLITE_ROW) {
             const char *id = (const char *)sqlite3_column_text(stmt, 0);
-            ok = id && !strchr(id, '/') && put_or_forget(db, original, &f, id);
+            ok = id && !strchr(id, '/');
+            if (ok && !put_file(&f, id)) {
+                /* A file that is missing may have been deleted after its row had been read: of the original the copy's
+                 * turn will tell, of the copy the original does. */
+                const int cause = errno;
+                ok = cause == ENOENT && (db == original || (!backup_has_upload(original, id) && forget(db, id)));
+                errno = cause;
+            }
             if (!ok)
                 snprintf(message, size, "cannot copy upload %s: %s", id ? id : "", strerror(errno));
         }

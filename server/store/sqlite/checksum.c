@@ -11,12 +11,6 @@ static uLong add_number(uLong sum, uint64_t bits)
     return crc32_z(sum, (const unsigned char *)&bits, sizeof bits);
 }
 
-static uLong add_bytes(uLong sum, const void *data, int size)
-{
-    sum = add_number(sum, (uint64_t)size);
-    return size > 0 ? crc32_z(sum, data, (size_t)size) : sum;
-}
-
 /* False: no memory. */
 static bool add_value(uLong *sum, sqlite3_value *value)
 {
@@ -34,7 +28,8 @@ static bool add_value(uLong *sum, sqlite3_value *value)
         int size = sqlite3_value_bytes(value);
         if (!data && size > 0)
             return false;
-        *sum = add_bytes(*sum, data, size);
+        *sum = add_number(*sum, (uint64_t)size);
+        *sum = size > 0 ? crc32_z(*sum, data, (size_t)size) : *sum;
     }
     return true;
 }

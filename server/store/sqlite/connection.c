@@ -53,8 +53,8 @@ static const char *const SQL[QUERY_COUNT] = {
                             " " SUM_OF("?1, ?2, ?3, ?4") ")",
     [QUERY_INSERT_VECTOR] = "INSERT INTO vector(job, name, part, version, count, data, answer, sum)"
                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?2, ?3, ?4, ?5, ?6") ")",
-    [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, part, version, columns, last, data, answer, sum)"
-                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?2, ?3, ?4, ?5, ?6") ")",
+    [QUERY_INSERT_HISTORY] = "INSERT INTO history(job, last, part, version, columns, data, answer, sum)"
+                             " VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, " SUM_OF("?1, ?7, ?3, ?4, ?5, ?2, ?6") ")",
     [QUERY_RELEASE] = "UPDATE job SET status = 0, attempts = attempts - 1, progress = 0, started = 0, owner = NULL,"
                       " lease = 0, queue_until = 0 WHERE id = ?1 AND status = 1 AND owner = ?2",
     [QUERY_RECOVER_FAIL] = "UPDATE job SET status = 3, finished = ?2, error = ?3, owner = NULL, lease = 0"
@@ -79,8 +79,8 @@ static const char *const SQL[QUERY_COUNT] = {
     [QUERY_WEBHOOK_NEXT] =
         "SELECT job, url, attempts FROM webhook WHERE state = 1 AND next <= ?1 ORDER BY next LIMIT 1",
     [QUERY_WEBHOOKS_OPEN] = "SELECT 1 FROM webhook WHERE state < 2 LIMIT 1",
-    [QUERY_WEBHOOK_POSTPONE] = "UPDATE webhook SET next = max(next, ?2) WHERE state = 1 AND url = ?1",
-    [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?2, next = ?3, attempts = attempts + 1 WHERE job = ?1",
+    [QUERY_WEBHOOK_POSTPONE] = "UPDATE webhook SET next = max(next, ?2) WHERE state = ?3 AND url = ?1",
+    [QUERY_WEBHOOK_ATTEMPTED] = "UPDATE webhook SET state = ?3, next = ?2, attempts = attempts + 1 WHERE job = ?1",
     [QUERY_WAITING] = "SELECT jobs FROM tally WHERE status = 0",
     [QUERY_ANY_EXPIRED] = "SELECT 1 FROM job INDEXED BY job_by_queue_until WHERE status = 0 AND queue_until > 0 AND "
                           "queue_until < ?1 LIMIT 1",
@@ -196,25 +196,16 @@ bool statement_row(statement *st)
     return st->rc == SQLITE_ROW;
 }
 
-static bool is_full(int cause)
+store_status statement_end(statement *st, store_status status)
 {
-    return cause == ENOSPC || cause == EDQUOT || cause == EFBIG;
-}
-
-/* A full disk shows as SQLITE_FULL, or as an I/O error whose cause is the quota or the largest file allowed. SQLite
- * does not keep the cause of a COMMIT that fails: then it is what the call left in errno. */
-static bool means_full(const statement *st)
-{
-    const int rc = st->rc & 0xff;
-    return rc == SQLITE_FULL ||
-           (rc == SQLITE_IOERR && (is_full(st->cause) || is_full(sqlite3_system_errno(st->c->db))));
-}
-
-store_status statement_end(statement *st)
-{
-    store_status status = STORE_OK;
     if (st->rc != SQLITE_OK && st->rc != SQLITE_ROW && st->rc != SQLITE_DONE) {
-        status = means_full(st) ? STORE_FULL : (st->rc & 0xff) == SQLITE_BUSY ? STORE_LOCKED : STORE_ERROR;
+        /* A full disk shows as SQLITE_FULL, or as an I/O error whose cause is the quota or the largest file allowed.
+         * SQLite does not keep the cause of a COMMIT that fails: then it is what the call left in errno. */
+        const int rc = st->rc & 0xff, causes[] = {st->cause, sqlite3_system_errno(st->c->db)};
+        bool full = rc == SQLITE_FULL;
+        for (int i = 0; i < 2 && rc == SQLITE_IOERR; i++)
+            full = full || causes[i] == ENOSPC || causes[i] == EDQUOT || causes[i] == EFBIG;
+        status = full ? STORE_FULL : rc == SQLITE_BUSY ? STORE_LOCKED : STORE_ERROR;
         snprintf(st->c->message, sizeof st->c->message, "%s (SQLite code %d)", sqlite3_errmsg(st->c->db),
                  sqlite3_extended_errcode(st->c->db));
     }
@@ -228,15 +219,5 @@ store_status statement_end(statement *st)
 store_status statement_run(statement *st)
 {
     statement_row(st);
-    return statement_end(st);
-}
-
-int64_t connection_changes(const connection *c)
-{
-    return sqlite3_changes64(c->db);
-}
-
-void connection_checkpoint(connection *c)
-{
-    sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+    return statement_end(st, STORE_OK);
 }

@@ -97,15 +97,10 @@ void bind_real(statement *st, int at, double value);
 void bind_text(statement *st, int at, const char *text); /* NULL binds NULL */
 void bind_blob(statement *st, int at, const void *data, size_t size);
 bool statement_row(statement *st); /* true while there is a row; then columns may be read */
-/* Ends it: STORE_OK, STORE_FULL or STORE_ERROR, and the cause in c->message. */
-store_status statement_end(statement *st);
+/* Ends it: `status`, what the rows said, unless the statement failed: then STORE_FULL, STORE_LOCKED or STORE_ERROR, and
+ * the cause in c->message. */
+store_status statement_end(statement *st, store_status status);
 /* Steps a statement that yields nothing and ends it. */
 store_status statement_run(statement *st);
-
-/* Rows that the last write of this connection changed. */
-int64_t connection_changes(const connection *c);
-
-/* Moves the journal into the database and cuts it to nothing. */
-void connection_checkpoint(connection *c);
 
 #endif

@@ -151,8 +151,7 @@ static const char *const STEPS[FILE_FORMAT_VERSION] = {
     [4] = COLUMNS_5,
 };
 
-/* The single integer that `sql` yields; false on any error. */
-static bool read_integer(sqlite3 *db, const char *sql, int64_t *value)
+bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value)
 {
     sqlite3_stmt *stmt = NULL;
     bool ok = sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW;
@@ -166,8 +165,9 @@ bool file_format_check(sqlite3 *db, int *version, char *message, size_t size)
 {
     int64_t application = 0, found = 0, objects = 0;
     *version = 0;
-    if (!read_integer(db, "SELECT count(*) FROM sqlite_schema", &objects) ||
-        !read_integer(db, "PRAGMA application_id", &application) || !read_integer(db, "PRAGMA user_version", &found)) {
+    if (!file_format_integer(db, "SELECT count(*) FROM sqlite_schema", &objects) ||
+        !file_format_integer(db, "PRAGMA application_id", &application) ||
+        !file_format_integer(db, "PRAGMA user_version", &found)) {
         snprintf(message, size, "%s", file_format_why_unreadable(db));
         return false;
     }

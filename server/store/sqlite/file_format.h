@@ -5,6 +5,7 @@
 #include <sqlite3.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #define FILE_FORMAT_APPLICATION_ID 0x757a6177 /* "uzaw" */
 #define FILE_FORMAT_VERSION        5          /* PRAGMA user_version */
@@ -21,5 +22,8 @@ bool file_format_check(sqlite3 *db, int *version, char *message, size_t size);
  * missing steps. Each step is one transaction that also sets the version: a crash leaves the file as it was before the
  * step, and the next start goes on from there. On failure nothing of the failed step remains. */
 bool file_format_upgrade(sqlite3 *db, int version, char *message, size_t size);
+
+/* The single integer that `sql` yields; false on any error, and *value stays. */
+bool file_format_integer(sqlite3 *db, const char *sql, int64_t *value);
 
 #endif

@@ -64,17 +64,16 @@ typedef enum {
     WRITE_LAZY  /* when it is committed; it reaches the disk with whatever comes next. Right for what the start
                    after a crash undoes by itself: claims and leases */
 } write_durability;
-store_status sqlite_write_as(sqlite_store *s, write_durability durability, store_change change, void *args);
-store_status sqlite_write(sqlite_store *s, store_change change, void *args); /* WRITE_DURABLE */
+store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args);
 
 /* ---- sync.c */
 bool sqlite_sync_begin(sqlite_store *s); /* once the writer has read the file; false: no thread, or no log */
 void sqlite_sync_end(sqlite_store *s);
-/* Around a COMMIT, however it ends; under writer_lock. The second returns its number. */
-void sqlite_begin_commit(sqlite_store *s);
-uint64_t sqlite_note_commit(sqlite_store *s);
-void sqlite_want_sync(sqlite_store *s, uint64_t number);
-store_status sqlite_await_sync(sqlite_store *s, uint64_t number);
+/* COMMIT of the writer, under its lock; its number, however it ends. */
+store_status sqlite_commit(sqlite_store *s, uint64_t *number);
+/* Asks for the commits up to this number to be brought to the disk; wait: returns when they are there. STORE_ERROR:
+ * that failed. */
+store_status sqlite_sync(sqlite_store *s, uint64_t number, bool wait);
 store_status sqlite_settle(sqlite_store *s); /* returns when all that anybody may have read is on disk */
 
 /* Before jobs are told that were read: returns when the end of each is on disk. */
@@ -90,12 +89,6 @@ store_status sqlite_check_place(const sqlite_store *s, connection *c);
 
 /* The job in the current row, whose first columns are the job's. Failure leaves *out zero. */
 store_status sqlite_read_job(statement *st, job *out);
-
-/* STORE_CONFLICT if the job exists, else STORE_NOT_FOUND: why an update found nothing to change. */
-store_status sqlite_why_unchanged(connection *c, const char *id);
-
-/* A copy of the blob in column `at`, NUL-terminated; NULL: no memory. */
-char *sqlite_copy_blob(statement *st, int at, size_t *len);
 
 /* A copy of a text column; NULL for SQL NULL, and *ok false when there is no memory. */
 char *sqlite_copy_text(statement *st, int at, bool *ok);

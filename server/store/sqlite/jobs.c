@@ -6,23 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-store_status sqlite_why_unchanged(connection *c, const char *id)
-{
-    statement st = statement_begin(c, QUERY_JOB);
-    bind_text(&st, 1, id);
-    bool exists = statement_row(&st);
-    store_status status = statement_end(&st);
-    return status != STORE_OK ? status : exists ? STORE_CONFLICT : STORE_NOT_FOUND;
-}
-
-/* Runs an update that must change the job `id`. */
-static store_status run_update(statement *st, const char *id)
-{
-    connection *c = st->c;
-    store_status status = statement_run(st);
-    return status == STORE_OK && connection_changes(c) == 0 ? sqlite_why_unchanged(c, id) : status;
-}
-
 /* ---- submit */
 
 typedef struct {
@@ -42,14 +25,14 @@ static store_status find_key(connection *c, submit_args *a)
     bind_blob(&st, 3, a->request->body, a->request->body_len);
     if (statement_row(&st))
         status = sqlite3_column_int(st.stmt, 13) ? sqlite_read_job(&st, a->out) : STORE_CONFLICT;
-    store_status ended = statement_end(&st);
-    return ended == STORE_OK ? status : ended;
+    return statement_end(&st, status);
 }
 
+/* The job and all that refers to it. STORE_NOT_FOUND where an upload is not there. */
 static store_status insert_job(connection *c, const store_request *r, const char *id)
 {
     const char *tags = r->tags ? r->tags : "[]";
-    double now = store_now();
+    const double now = clock_seconds(CLOCK_REALTIME);
     statement st = statement_begin(c, QUERY_INSERT_JOB);
     bind_text(&st, 1, id);
     bind_real(&st, 2, now);
@@ -71,27 +54,26 @@ static store_status insert_job(connection *c, const store_request *r, const char
     st = statement_begin(c, QUERY_INSERT_TAGS);
     bind_text(&st, 1, id);
     bind_text(&st, 2, tags);
-    return statement_run(&st);
-}
-
-/* STORE_NOT_FOUND where one is not there. */
-static store_status use_uploads(connection *c, const store_request *r, const char *id)
-{
-    store_status status = STORE_OK;
+    status = statement_run(&st);
     for (size_t i = 0; i < r->n_uploads && status == STORE_OK; i++) {
-        statement st = statement_begin(c, QUERY_TOUCH_UPLOAD);
+        st = statement_begin(c, QUERY_TOUCH_UPLOAD);
         bind_text(&st, 1, r->uploads[i]);
-        bind_real(&st, 2, store_now());
+        bind_real(&st, 2, now);
         status = statement_run(&st);
-        if (status == STORE_OK && connection_changes(c) == 0)
+        if (status != STORE_OK)
+            return status;
+        if (sqlite3_changes64(c->db) == 0)
             return STORE_NOT_FOUND;
         st = statement_begin(c, QUERY_USE_UPLOAD);
         bind_text(&st, 1, r->uploads[i]);
         bind_text(&st, 2, id);
-        if (status == STORE_OK)
-            status = statement_run(&st);
-        else
-            statement_end(&st);
+        status = statement_run(&st);
+    }
+    if (status == STORE_OK && r->webhook) {
+        st = statement_begin(c, QUERY_INSERT_WEBHOOK);
+        bind_text(&st, 1, id);
+        bind_text(&st, 2, r->webhook);
+        status = statement_run(&st);
     }
     return status;
 }
@@ -103,8 +85,7 @@ static store_status read_by_id(connection *c, const char *id, job *out)
     bind_text(&st, 1, id);
     if (statement_row(&st))
         status = sqlite_read_job(&st, out);
-    store_status ended = statement_end(&st);
-    return ended == STORE_OK ? status : ended;
+    return statement_end(&st, status);
 }
 
 static store_status submit(sqlite_store *s, connection *c, void *args)
@@ -125,29 +106,19 @@ static store_status submit(sqlite_store *s, connection *c, void *args)
         statement st = statement_begin(c, QUERY_WAITING);
         if (statement_row(&st))
             waiting = sqlite3_column_int64(st.stmt, 0);
-        status = statement_end(&st);
-        if (status == STORE_OK && waiting >= s->base.settings.max_queue)
-            status = STORE_BUSY;
+        status = statement_end(&st, waiting < s->base.settings.max_queue ? STORE_OK : STORE_BUSY);
     }
     if (status != STORE_OK)
         return status;
     store_next_id(&s->last_ms, &s->sequence, id);
     status = insert_job(c, a->request, id);
-    if (status == STORE_OK)
-        status = use_uploads(c, a->request, id);
-    if (status == STORE_OK && a->request->webhook) {
-        statement st = statement_begin(c, QUERY_INSERT_WEBHOOK);
-        bind_text(&st, 1, id);
-        bind_text(&st, 2, a->request->webhook);
-        status = statement_run(&st);
-    }
     return status == STORE_OK ? read_by_id(c, id, a->out) : status;
 }
 
 store_status sqlite_submit(store *base, const store_request *request, job *out, bool *repeated)
 {
     submit_args a = {request, out, false};
-    store_status status = sqlite_write(sqlite_of(base), submit, &a);
+    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, submit, &a);
     *repeated = a.repeated;
     if (status == STORE_OK && !a.repeated)
         store_tell(base, out->id, true);
@@ -165,29 +136,23 @@ store_status sqlite_find_repeat(store *base, const store_request *request, job *
 
 /* ---- the request as submitted */
 
-char *sqlite_copy_blob(statement *st, int at, size_t *len)
-{
-    size_t size = (size_t)sqlite3_column_bytes(st->stmt, at);
-    const void *data = sqlite3_column_blob(st->stmt, at);
-    char *copy = data || size == 0 ? malloc(size + 1) : NULL;
-    if (!copy)
-        return NULL;
-    if (size > 0)
-        memcpy(copy, data, size);
-    copy[size] = '\0';
-    *len = size;
-    return copy;
-}
-
 /* *body stays NULL where this fails. */
 static store_status read_body(connection *c, const char *id, char **body, size_t *len)
 {
     statement st = statement_begin(c, QUERY_BODY);
     bind_text(&st, 1, id);
     bool found = statement_row(&st), good = found && sqlite3_column_int(st.stmt, 1);
-    if (good)
-        *body = sqlite_copy_blob(&st, 0, len);
-    store_status ended = statement_end(&st);
+    if (good) {
+        const size_t size = (size_t)sqlite3_column_bytes(st.stmt, 0);
+        const void *data = sqlite3_column_blob(st.stmt, 0);
+        *body = data || size == 0 ? malloc(size + 1) : NULL;
+        if (*body && size > 0)
+            memcpy(*body, data, size);
+        if (*body)
+            (*body)[size] = '\0';
+        *len = *body ? size : 0;
+    }
+    store_status ended = statement_end(&st, STORE_OK);
     if (ended != STORE_OK || *body)
         return ended;
     if (found && !good) {
@@ -237,14 +202,12 @@ static store_status claim(sqlite_store *s, connection *c, void *args)
     a->body = NULL;
     store_status status = STORE_NOT_FOUND;
     statement st = statement_begin(c, QUERY_CLAIM);
-    bind_real(&st, 1, store_now());
+    bind_real(&st, 1, clock_seconds(CLOCK_REALTIME));
     bind_text(&st, 2, owner.text);
     bind_real(&st, 3, a->lease_s);
     if (statement_row(&st))
         status = sqlite_read_job(&st, a->out);
-    store_status ended = statement_end(&st);
-    if (ended != STORE_OK)
-        status = ended;
+    status = statement_end(&st, status);
     if (status != STORE_OK)
         return status;
     status = read_body(c, a->out->id, &a->body, &a->body_len);
@@ -256,68 +219,13 @@ static store_status claim(sqlite_store *s, connection *c, void *args)
 store_status sqlite_claim(store *base, store_lease *lease, double lease_s, job *out, char **body, size_t *len)
 {
     claim_args a = {lease, lease_s, out, NULL, 0};
-    store_status status = sqlite_write_as(sqlite_of(base), WRITE_LAZY, claim, &a);
+    store_status status = sqlite_write(sqlite_of(base), WRITE_LAZY, claim, &a);
     *body = a.body;
     *len = a.body_len;
     return status;
 }
 
 /* ---- while it runs and when it ends */
-
-typedef struct {
-    const char *id;
-    holder owner;
-    double lease_s;
-    int progress;
-    const store_outcome *outcome;
-} owner_args;
-
-static store_status renew(sqlite_store *s, connection *c, void *args)
-{
-    (void)s;
-    const owner_args *a = args;
-    statement st = statement_begin(c, QUERY_RENEW);
-    bind_text(&st, 1, a->id);
-    bind_text(&st, 2, a->owner.text);
-    bind_real(&st, 3, store_now() + a->lease_s);
-    bind_integer(&st, 4, a->progress);
-    return run_update(&st, a->id);
-}
-
-store_status sqlite_renew(store *base, const store_lease *lease, double lease_s, int progress)
-{
-    sqlite_store *s = sqlite_of(base);
-    owner_args a = {lease->job, holder_of(lease), lease_s, progress, NULL};
-    return sqlite_write_as(s, WRITE_LAZY, renew, &a);
-}
-
-static store_status finish(sqlite_store *s, connection *c, void *args)
-{
-    (void)s;
-    const owner_args *a = args;
-    statement st = statement_begin(c, QUERY_FINISH);
-    bind_text(&st, 1, a->id);
-    bind_text(&st, 2, a->owner.text);
-    bind_integer(&st, 3, a->outcome->status);
-    bind_real(&st, 4, store_now());
-    bind_text(&st, 5, a->outcome->whole.summary);
-    bind_text(&st, 6, a->outcome->error);
-    store_status status = run_update(&st, a->id);
-    if (status == STORE_OK)
-        status = sqlite_insert_results(c, a->id, a->outcome);
-    if (status != STORE_OK)
-        return status;
-    st = statement_begin(c, QUERY_ADD_BYTES);
-    bind_text(&st, 1, a->id);
-    return statement_run(&st);
-}
-
-store_status sqlite_finish(store *base, const store_lease *lease, const store_outcome *outcome)
-{
-    sqlite_store *s = sqlite_of(base);
-    owner_args a = {lease->job, holder_of(lease), 0.0, 0, outcome};
-    return sqlite_write_as(s, WRITE_SOON, finish, &a);
-}
 
 /* Of the running jobs those that were told to end, or the one of them with this id and owner: no run comes any more
  * that could end them. */
@@ -327,29 +235,74 @@ static store_status end_dismissed(connection *c, const char *id, const char *own
     bind_text(&st, 1, id);
     bind_text(&st, 2, owner);
     store_status status = statement_run(&st);
-    *count = status == STORE_OK ? connection_changes(c) : 0;
+    *count = status == STORE_OK ? sqlite3_changes64(c->db) : 0;
     return status;
 }
 
-static store_status release(sqlite_store *s, connection *c, void *args)
+/* What only the owner of a running job may do: QUERY_RENEW, QUERY_FINISH or QUERY_RELEASE. */
+typedef struct {
+    query_id query;
+    const store_lease *lease;
+    double lease_s;
+    int progress;
+    const store_outcome *outcome;
+} owner_args;
+
+static store_status change_own(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     const owner_args *a = args;
-    int64_t ended;
-    store_status status = end_dismissed(c, a->id, a->owner.text, &ended);
-    if (status != STORE_OK || ended > 0)
+    const char *id = a->lease->job;
+    const holder owner = holder_of(a->lease);
+    int64_t dismissed = 0;
+    store_status status = a->query == QUERY_RELEASE ? end_dismissed(c, id, owner.text, &dismissed) : STORE_OK;
+    if (status != STORE_OK || dismissed > 0)
         return status;
-    statement st = statement_begin(c, QUERY_RELEASE);
-    bind_text(&st, 1, a->id);
-    bind_text(&st, 2, a->owner.text);
-    return run_update(&st, a->id);
+    statement st = statement_begin(c, a->query);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, owner.text);
+    if (a->query == QUERY_RENEW) {
+        bind_real(&st, 3, clock_seconds(CLOCK_REALTIME) + a->lease_s);
+        bind_integer(&st, 4, a->progress);
+    } else if (a->query == QUERY_FINISH) {
+        bind_integer(&st, 3, a->outcome->status);
+        bind_real(&st, 4, clock_seconds(CLOCK_REALTIME));
+        bind_text(&st, 5, a->outcome->whole.summary);
+        bind_text(&st, 6, a->outcome->error);
+    }
+    status = statement_run(&st);
+    if (status == STORE_OK && sqlite3_changes64(c->db) == 0) {
+        st = statement_begin(c, QUERY_JOB);
+        bind_text(&st, 1, id);
+        const bool exists = statement_row(&st);
+        return statement_end(&st, exists ? STORE_CONFLICT : STORE_NOT_FOUND);
+    }
+    if (status != STORE_OK || a->query != QUERY_FINISH)
+        return status;
+    status = sqlite_insert_results(c, id, a->outcome);
+    if (status != STORE_OK)
+        return status;
+    st = statement_begin(c, QUERY_ADD_BYTES);
+    bind_text(&st, 1, id);
+    return statement_run(&st);
+}
+
+store_status sqlite_renew(store *base, const store_lease *lease, double lease_s, int progress)
+{
+    owner_args a = {QUERY_RENEW, lease, lease_s, progress, NULL};
+    return sqlite_write(sqlite_of(base), WRITE_LAZY, change_own, &a);
+}
+
+store_status sqlite_finish(store *base, const store_lease *lease, const store_outcome *outcome)
+{
+    owner_args a = {.query = QUERY_FINISH, .lease = lease, .outcome = outcome};
+    return sqlite_write(sqlite_of(base), WRITE_SOON, change_own, &a);
 }
 
 store_status sqlite_release(store *base, const store_lease *lease)
 {
-    sqlite_store *s = sqlite_of(base);
-    owner_args a = {lease->job, holder_of(lease), 0.0, 0, NULL};
-    return sqlite_write_as(s, WRITE_SOON, release, &a);
+    owner_args a = {.query = QUERY_RELEASE, .lease = lease};
+    return sqlite_write(sqlite_of(base), WRITE_SOON, change_own, &a);
 }
 
 /* ---- recover */
@@ -370,15 +323,15 @@ static store_status recover(sqlite_store *s, connection *c, void *args)
         return status;
     statement st = statement_begin(c, QUERY_RECOVER_FAIL);
     bind_integer(&st, 1, a->max_attempts);
-    bind_real(&st, 2, store_now());
+    bind_real(&st, 2, clock_seconds(CLOCK_REALTIME));
     bind_text(&st, 3, a->error_json);
     status = statement_run(&st);
     if (status != STORE_OK)
         return status;
-    a->failed = connection_changes(c);
+    a->failed = sqlite3_changes64(c->db);
     st = statement_begin(c, QUERY_RECOVER_REQUEUE);
     status = statement_run(&st);
-    a->requeued = connection_changes(c);
+    a->requeued = sqlite3_changes64(c->db);
     return status;
 }
 
@@ -386,7 +339,7 @@ static store_status recover(sqlite_store *s, connection *c, void *args)
 store_status sqlite_recover(store *base, int max_attempts, const char *error_json, int64_t *requeued, int64_t *failed)
 {
     recover_args a = {max_attempts, error_json, 0, 0};
-    store_status status = sqlite_write(sqlite_of(base), recover, &a);
+    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, recover, &a);
     *requeued = a.requeued;
     *failed = a.failed;
     return status;
@@ -414,15 +367,14 @@ static store_status dismiss(sqlite_store *s, connection *c, void *args)
                                                               : QUERY_DELETE);
     bind_text(&st, 1, a->id);
     if (a->was == JOB_ACCEPTED || a->was == JOB_RUNNING)
-        bind_real(&st, 2, store_now());
+        bind_real(&st, 2, clock_seconds(CLOCK_REALTIME));
     return statement_run(&st);
 }
 
 store_status sqlite_dismiss(store *base, const char *id, job_status *was)
 {
-    sqlite_store *s = sqlite_of(base);
     dismiss_args a = {id, JOB_ACCEPTED};
-    store_status status = sqlite_write(s, dismiss, &a);
+    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, dismiss, &a);
     *was = a.was;
     if (status == STORE_OK && a.was != JOB_RUNNING)
         store_tell(base, id, false);
@@ -439,7 +391,7 @@ store_status sqlite_settle_jobs(sqlite_store *s, const job *jobs, size_t count)
     bool fresh = false;
     for (size_t i = 0; i < count; i++)
         fresh = fresh || (jobs[i].status != JOB_ACCEPTED && jobs[i].status != JOB_RUNNING &&
-                          fabs(store_now() - jobs[i].finished) < UNSETTLED_S);
+                          fabs(clock_seconds(CLOCK_REALTIME) - jobs[i].finished) < UNSETTLED_S);
     return fresh ? sqlite_settle(s) : STORE_OK;
 }
 

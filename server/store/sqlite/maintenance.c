@@ -31,33 +31,6 @@ static int collect(sqlite3 *db, const char *sql, const char *finding, FILE *out)
     return rc == SQLITE_DONE ? SQLITE_OK : rc;
 }
 
-static int64_t read_integer(sqlite3 *db, const char *sql)
-{
-    sqlite3_stmt *stmt = NULL;
-    int64_t value = 0;
-    if (sqlite3_prepare_v2(db, sql, -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW)
-        value = sqlite3_column_int64(stmt, 0);
-    sqlite3_finalize(stmt);
-    return value;
-}
-
-/* The file of one upload. One that a daemon deletes meanwhile is none to complain about. */
-static void check_upload(sqlite3 *db, const char *folder, const char *id, FILE *text)
-{
-    char path[4096];
-    if ((size_t)snprintf(path, sizeof path, "%s/%s", folder, id) >= sizeof path)
-        return;
-    int fd = open(path, O_RDONLY | O_CLOEXEC);
-    store_status status = fd >= 0 ? blob_check(fd, id) : STORE_ERROR;
-    int cause = errno;
-    if (fd >= 0)
-        close(fd);
-    if (status == STORE_DAMAGED)
-        fprintf(text, "the file of upload %s is not what was sent\n", id);
-    else if (status != STORE_OK && backup_has_upload(db, id))
-        fprintf(text, "the file of upload %s cannot be read: %s\n", id, strerror(cause));
-}
-
 /* Queries whose rows are findings, and the format that they need. What has a checksum is read whole. */
 static const struct {
     int version;
@@ -87,12 +60,13 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
 {
     size_t len = 0;
     *out = (store_findings){0};
-    double begun = store_clock();
+    double begun = clock_seconds(CLOCK_MONOTONIC);
     FILE *text = open_memstream(&out->findings, &len);
     if (!text)
         return false;
     int rc = SQLITE_OK;
-    const int64_t version = read_integer(db, "PRAGMA user_version");
+    int64_t version = 0;
+    file_format_integer(db, "PRAGMA user_version", &version);
     for (size_t i = 0; i < sizeof CHECKS / sizeof CHECKS[0] && rc == SQLITE_OK; i++)
         if (version >= CHECKS[i].version)
             rc = collect(db, CHECKS[i].sql, CHECKS[i].finding, text);
@@ -113,16 +87,27 @@ static bool check(sqlite3 *db, const char *file, store_findings *out)
                 snprintf(ids[n++], sizeof ids[0], "%s", (const char *)sqlite3_column_text(stmt, 0));
             int ended = sqlite3_finalize(stmt);
             rc = rc == SQLITE_OK ? ended : rc;
-            for (int i = 0; i < n; i++)
-                check_upload(db, folder, ids[i], text);
+            for (int i = 0; i < n; i++) {
+                char path[sizeof folder + UPLOAD_ID_LEN + 2];
+                snprintf(path, sizeof path, "%s/%.64s", folder, ids[i]);
+                int fd = open(path, O_RDONLY | O_CLOEXEC);
+                const store_status status = fd >= 0 ? blob_check(fd, ids[i]) : STORE_ERROR;
+                const int cause = errno;
+                if (fd >= 0)
+                    close(fd);
+                if (status == STORE_DAMAGED)
+                    fprintf(text, "the file of upload %s is not what was sent\n", ids[i]);
+                else if (status != STORE_OK && backup_has_upload(db, ids[i])) /* else it was deleted meanwhile */
+                    fprintf(text, "the file of upload %s cannot be read: %s\n", ids[i], strerror(cause));
+            }
             if (n > 0)
                 memcpy(last, ids[n - 1], sizeof last);
         }
     }
     if (rc != SQLITE_OK)
         fprintf(text, "the check ended early: %s\n", sqlite3_errmsg(db));
-    out->jobs = read_integer(db, "SELECT count(*) FROM job");
-    out->seconds = store_clock() - begun;
+    file_format_integer(db, "SELECT count(*) FROM job", &out->jobs);
+    out->seconds = clock_seconds(CLOCK_MONOTONIC) - begun;
     if (fclose(text) == 0)
         return true;
     free(out->findings);
@@ -179,19 +164,6 @@ bool sqlite_check_file(const char *path, store_findings *out, char *message, siz
 
 /* ------------------------------------------------------------------ backup */
 
-/* One step copies all pages within one read transaction: the copy is of one moment, and a writer goes on beside it. */
-static bool copy_pages(sqlite3 *from, sqlite3 *to, char *message, size_t size)
-{
-    sqlite3_backup *backup = sqlite3_backup_init(to, "main", from, "main");
-    int rc = backup ? sqlite3_backup_step(backup, -1) : SQLITE_ERROR;
-    if (backup)
-        sqlite3_backup_finish(backup);
-    if (rc == SQLITE_DONE)
-        return true;
-    snprintf(message, size, "cannot copy the database: %s", backup ? sqlite3_errstr(rc) : sqlite3_errmsg(to));
-    return false;
-}
-
 /* path: of the database that is copied; to: what the copy at `part` will be called. The files of uploads are taken
  * before the pages, so that those are there that are deleted meanwhile, and after them, for those that came meanwhile.
  * What no row of the copy names goes when the copy is opened. */
@@ -202,8 +174,17 @@ static bool copy_to(const char *part, const char *to, sqlite3 *from, const char 
     bool ok = absolute && sqlite3_open_v2(part, &copy, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX, NULL) == SQLITE_OK;
     if (!ok)
         snprintf(message, size, "cannot write %s: %s", part, copy ? sqlite3_errmsg(copy) : "no memory");
-    ok = ok && backup_uploads(from, from, absolute, to, message, size) && copy_pages(from, copy, message, size) &&
-         backup_uploads(copy, from, absolute, to, message, size);
+    ok = ok && backup_uploads(from, from, absolute, to, message, size);
+    if (ok) { /* one step copies all within one read transaction: it is of one moment, and a writer goes on beside it */
+        sqlite3_backup *backup = sqlite3_backup_init(copy, "main", from, "main");
+        const int rc = backup ? sqlite3_backup_step(backup, -1) : SQLITE_ERROR;
+        if (backup)
+            sqlite3_backup_finish(backup);
+        ok = rc == SQLITE_DONE;
+        if (!ok)
+            snprintf(message, size, "cannot copy the database: %s", backup ? sqlite3_errstr(rc) : sqlite3_errmsg(copy));
+    }
+    ok = ok && backup_uploads(copy, from, absolute, to, message, size);
     free(absolute);
     if (sqlite3_close(copy) != SQLITE_OK && ok) {
         snprintf(message, size, "cannot finish %s", part);
@@ -237,19 +218,13 @@ static bool publish(const char *part, const char *to, char *message, size_t size
     return false;
 }
 
-static bool is_taken(const char *to)
-{
-    char folder[4096];
-    struct stat st;
-    return (size_t)snprintf(folder, sizeof folder, "%s-uploads", to) >= sizeof folder || stat(to, &st) == 0 ||
-           lstat(folder, &st) == 0;
-}
-
 bool sqlite_backup_file(const char *path, const char *to, int64_t *bytes, char *message, size_t size)
 {
-    char part[4096];
+    char part[4096], folder[4096];
     struct stat st;
-    if ((size_t)snprintf(part, sizeof part, "%s.part", to) >= sizeof part || is_taken(to)) {
+    if ((size_t)snprintf(part, sizeof part, "%s.part", to) >= sizeof part ||
+        (size_t)snprintf(folder, sizeof folder, "%s-uploads", to) >= sizeof folder || stat(to, &st) == 0 ||
+        lstat(folder, &st) == 0) {
         snprintf(message, size,
                  "%s or its uploads are there already, or its name is too long: give the name of a new file", to);
         return false;

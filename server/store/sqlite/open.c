@@ -40,18 +40,6 @@ static int lock_file(const char *path, char *message, size_t size)
     return -1;
 }
 
-/* The journal must be WAL: readers then never wait for the writer. */
-static bool set_wal(sqlite3 *db, char *message, size_t size)
-{
-    sqlite3_stmt *stmt = NULL;
-    bool ok = sqlite3_prepare_v2(db, "PRAGMA journal_mode = WAL", -1, &stmt, NULL) == SQLITE_OK &&
-              sqlite3_step(stmt) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(stmt, 0), "wal") == 0;
-    sqlite3_finalize(stmt);
-    if (!ok)
-        snprintf(message, size, "cannot use a write-ahead log beside the file: %s", sqlite3_errmsg(db));
-    return ok;
-}
-
 /* Continues the ids where the file's newest one stands. */
 static bool read_newest_id(sqlite_store *s, char *message, size_t size)
 {
@@ -63,7 +51,7 @@ static bool read_newest_id(sqlite_store *s, char *message, size_t size)
         s->last_ms = ms;
         s->sequence = sequence;
     }
-    if (statement_end(&st) == STORE_OK)
+    if (statement_end(&st, STORE_OK) == STORE_OK)
         return true;
     snprintf(message, size, "cannot read the jobs: %s", s->writer.message);
     return false;
@@ -71,16 +59,24 @@ static bool read_newest_id(sqlite_store *s, char *message, size_t size)
 
 static bool open_connections(sqlite_store *s, const char *path, char *message, size_t size)
 {
-    int version;
+    int version = 0;
     char *folder = NULL;
+    sqlite3_stmt *stmt = NULL;
     s->path = realpath(path, NULL); /* absolute: SQLite would take "file:..." for a URI */
     if (!s->path) {
         snprintf(message, size, "cannot resolve the path: %s", strerror(errno));
         return false;
     }
     bool ok = connection_open(&s->writer, s->path, true, message, size) &&
-              file_format_check(s->writer.db, &version, message, size) && set_wal(s->writer.db, message, size) &&
-              file_format_upgrade(s->writer.db, version, message, size) && read_newest_id(s, message, size);
+              file_format_check(s->writer.db, &version, message, size);
+    if (ok) { /* the journal must be WAL: readers then never wait for the writer */
+        ok = sqlite3_prepare_v2(s->writer.db, "PRAGMA journal_mode = WAL", -1, &stmt, NULL) == SQLITE_OK &&
+             sqlite3_step(stmt) == SQLITE_ROW && strcmp((const char *)sqlite3_column_text(stmt, 0), "wal") == 0;
+        sqlite3_finalize(stmt);
+        if (!ok)
+            snprintf(message, size, "cannot use a write-ahead log beside the file: %s", sqlite3_errmsg(s->writer.db));
+    }
+    ok = ok && file_format_upgrade(s->writer.db, version, message, size) && read_newest_id(s, message, size);
     for (int i = 0; ok && i < STORE_READERS; i++) {
         ok = connection_open(&s->readers[i], s->path, false, message, size);
         s->readers_free[s->n_readers_free] = &s->readers[i];
@@ -122,7 +118,7 @@ store *sqlite_open(const char *path, char *message, size_t size)
     pthread_cond_init(&s->sync_asked, NULL);
     pthread_cond_init(&s->sync_ended, NULL);
     s->queue_end = &s->queue;
-    s->claims = (uint64_t)(store_now() * 1e6);
+    s->claims = (uint64_t)(clock_seconds(CLOCK_REALTIME) * 1e6);
     s->file = lock_file(path, message, size);
     bool ok = s->file >= 0 && open_connections(s, path, message, size);
     if (ok && !sqlite_sync_begin(s)) {
@@ -221,13 +217,10 @@ store_status sqlite_limit_bytes(store *base, int64_t bytes)
 {
     sqlite_store *s = sqlite_of(base);
     char sql[96];
-    sqlite3_stmt *stmt = NULL;
     pthread_mutex_lock(&s->writer_lock);
     connection *c = &s->writer;
     int64_t page = 4096;
-    if (sqlite3_prepare_v2(c->db, "PRAGMA page_size", -1, &stmt, NULL) == SQLITE_OK && sqlite3_step(stmt) == SQLITE_ROW)
-        page = sqlite3_column_int64(stmt, 0);
-    sqlite3_finalize(stmt);
+    file_format_integer(c->db, "PRAGMA page_size", &page);
     /* 2^32 - 2 pages is SQLite's own limit; 0 would ask for the limit instead of setting it. */
     long long pages = bytes <= 0 ? 4294967294LL : bytes < page ? 1 : (long long)(bytes / page);
     snprintf(sql, sizeof sql, "PRAGMA max_page_count = %lld", pages);

@@ -50,12 +50,14 @@ store_status sqlite_read_job(statement *st, job *out)
 }
 
 /* Reads up to limit + 1 rows: one more says whether there are older ones. */
-static store_status read_list(connection *c, const store_query *q, job *jobs, size_t *count)
+store_status sqlite_list(store *base, const store_query *q, job *jobs, size_t *count)
 {
     static const query_id QUERIES[2][2][2] = {
         {{QUERY_LIST, QUERY_LIST_STATUS}, {QUERY_LIST_TAG, QUERY_LIST_TAG_STATUS}},
         {{QUERY_OLDEST, QUERY_OLDEST_STATUS}, {QUERY_OLDEST_TAG, QUERY_OLDEST_TAG_STATUS}}};
+    sqlite_store *s = sqlite_of(base);
     store_status status = STORE_OK;
+    connection *c = sqlite_take_reader(s);
     statement st = statement_begin(c, QUERIES[q->ascending][q->tag != NULL][q->by_status]);
     bind_text(&st, 1, q->before ? q->before : q->ascending ? "" : "~"); /* after every hex digit */
     bind_integer(&st, 2, q->limit + 1);
@@ -76,29 +78,20 @@ static store_status read_list(connection *c, const store_query *q, job *jobs, si
         status = sqlite_read_job(&st, &jobs[*count]);
         *count += status == STORE_OK;
     }
-    store_status ended = statement_end(&st);
-    return ended == STORE_OK ? status : ended;
-}
-
-store_status sqlite_list(store *base, const store_query *query, job *jobs, size_t *count)
-{
-    sqlite_store *s = sqlite_of(base);
-    connection *c = sqlite_take_reader(s);
-    store_status status = sqlite_give_reader(s, c, read_list(c, query, jobs, count));
+    status = sqlite_give_reader(s, c, statement_end(&st, status));
     return status == STORE_OK ? sqlite_settle_jobs(s, jobs, *count) : status;
 }
 
-/* ---- the cases of a job */
-
-/* *count grows with each case that is there to be freed. */
-static store_status read_cases(statement *st, const char *id, store_case **cases, size_t *count)
+store_status sqlite_get_cases(store *base, const char *id, const char *name, store_case **cases, size_t *count)
 {
+    sqlite_store *s = sqlite_of(base);
+    store_status status = STORE_OK;
     size_t capacity = 0;
-    while (statement_row(st)) {
-        if (!sqlite3_column_int(st->stmt, 3)) {
-            snprintf(st->c->message, sizeof st->c->message, "a summary of job %.32s is not what was written", id);
-            return STORE_DAMAGED;
-        }
+    connection *c = sqlite_take_reader(s);
+    statement st = statement_begin(c, QUERY_ANSWERS);
+    bind_text(&st, 1, id);
+    bind_text(&st, 2, name);
+    while (status == STORE_OK && statement_row(&st)) {
         bool ok = true;
         if (*count == capacity) {
             capacity = capacity ? 2 * capacity : 16;
@@ -106,30 +99,21 @@ static store_status read_cases(statement *st, const char *id, store_case **cases
             *cases = grown ? grown : *cases;
             ok = grown != NULL;
         }
-        if (ok) {
+        if (ok) { /* counted as soon as it has something to be freed */
             store_case *one = &(*cases)[(*count)++];
-            *one = (store_case){.number = sqlite3_column_int64(st->stmt, 0)};
-            one->name = sqlite_copy_text(st, 1, &ok);
-            one->summary = sqlite_copy_text(st, 2, &ok);
+            *one = (store_case){.number = sqlite3_column_int64(st.stmt, 0)};
+            one->name = sqlite_copy_text(&st, 1, &ok);
+            one->summary = sqlite_copy_text(&st, 2, &ok);
         }
         if (!ok) {
-            strcpy(st->c->message, "no memory for the cases of a job");
-            return STORE_ERROR;
+            strcpy(c->message, "no memory for the cases of a job");
+            status = STORE_ERROR;
+        } else if (!sqlite3_column_int(st.stmt, 3)) {
+            snprintf(c->message, sizeof c->message, "a summary of job %.32s is not what was written", id);
+            status = STORE_DAMAGED;
         }
     }
-    return STORE_OK;
-}
-
-store_status sqlite_get_cases(store *base, const char *id, const char *name, store_case **cases, size_t *count)
-{
-    sqlite_store *s = sqlite_of(base);
-    connection *c = sqlite_take_reader(s);
-    statement st = statement_begin(c, QUERY_ANSWERS);
-    bind_text(&st, 1, id);
-    bind_text(&st, 2, name);
-    store_status status = read_cases(&st, id, cases, count);
-    store_status ended = statement_end(&st);
-    return sqlite_give_reader(s, c, ended == STORE_OK ? status : ended);
+    return sqlite_give_reader(s, c, statement_end(&st, status));
 }
 
 store_status sqlite_counts(store *base, int64_t counts[5])
@@ -142,5 +126,5 @@ store_status sqlite_counts(store *base, int64_t counts[5])
         if (status >= 0 && status < 5)
             counts[status] = sqlite3_column_int64(st.stmt, 1);
     }
-    return sqlite_give_reader(s, c, statement_end(&st));
+    return sqlite_give_reader(s, c, statement_end(&st, STORE_OK));
 }

@@ -16,34 +16,27 @@ typedef struct {
     size_t n_ids, capacity;
 } expire_args;
 
-/* Without memory for it nobody is told of this one; who looks sees it all the same. */
-static void keep_id(expire_args *a, const char *id)
-{
-    if (a->n_ids == a->capacity) {
-        size_t capacity = a->capacity ? 2 * a->capacity : 64;
-        char(*grown)[33] = realloc(a->ids, capacity * sizeof *grown);
-        if (!grown)
-            return;
-        a->ids = grown;
-        a->capacity = capacity;
-    }
-    snprintf(a->ids[a->n_ids++], sizeof *a->ids, "%s", id);
-}
-
 static store_status expire(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
     expire_args *a = args;
     statement st = statement_begin(c, QUERY_EXPIRE);
-    bind_real(&st, 1, store_now());
+    bind_real(&st, 1, clock_seconds(CLOCK_REALTIME));
     bind_text(&st, 2, a->error_json);
     a->count = 0;
     a->n_ids = 0;
-    while (statement_row(&st)) {
-        keep_id(a, (const char *)sqlite3_column_text(st.stmt, 0));
-        a->count++;
+    for (; statement_row(&st); a->count++) {
+        if (a->n_ids == a->capacity) {
+            size_t capacity = a->capacity ? 2 * a->capacity : 64;
+            char(*grown)[33] = realloc(a->ids, capacity * sizeof *grown);
+            if (!grown) /* nobody is told of this one; who looks sees it all the same */
+                continue;
+            a->ids = grown;
+            a->capacity = capacity;
+        }
+        snprintf(a->ids[a->n_ids++], sizeof *a->ids, "%s", (const char *)sqlite3_column_text(st.stmt, 0));
     }
-    return statement_end(&st);
+    return statement_end(&st, STORE_OK);
 }
 
 store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
@@ -51,12 +44,12 @@ store_status sqlite_expire(store *base, const char *error_json, int64_t *count)
     sqlite_store *s = sqlite_of(base);
     expire_args a = {.error_json = error_json};
     connection *c = sqlite_take_reader(s);
-    statement st =
-        statement_begin(c, QUERY_ANY_EXPIRED); /* looks before it writes: most of the time there is nothing */
-    bind_real(&st, 1, store_now());
+    /* Looks before it writes: most of the time there is nothing. */
+    statement st = statement_begin(c, QUERY_ANY_EXPIRED);
+    bind_real(&st, 1, clock_seconds(CLOCK_REALTIME));
     bool any = statement_row(&st);
-    sqlite_give_reader(s, c, statement_end(&st));
-    store_status status = any ? sqlite_write(s, expire, &a) : STORE_OK;
+    sqlite_give_reader(s, c, statement_end(&st, STORE_OK));
+    store_status status = any ? sqlite_write(s, WRITE_DURABLE, expire, &a) : STORE_OK;
     *count = status == STORE_OK ? a.count : 0;
     for (size_t i = 0; status == STORE_OK && i < a.n_ids; i++)
         store_tell(base, a.ids[i], false);
@@ -78,14 +71,14 @@ typedef struct {
 static store_status choose(connection *c, retain_args *a)
 {
     const store_retention *limits = a->limits;
-    double now = store_now();
+    double now = clock_seconds(CLOCK_REALTIME);
     int64_t chosen_bytes = 0;
     statement st = statement_begin(c, QUERY_ENDED);
     if (statement_row(&st)) {
         a->jobs = sqlite3_column_int64(st.stmt, 0);
         a->bytes = sqlite3_column_int64(st.stmt, 1);
     }
-    store_status status = statement_end(&st);
+    store_status status = statement_end(&st, STORE_OK);
     if (status != STORE_OK)
         return status;
     st = statement_begin(c, QUERY_OLD_JOBS);
@@ -99,7 +92,7 @@ static store_status choose(connection *c, retain_args *a)
         a->bytes -= sqlite3_column_int64(st.stmt, 2);
         chosen_bytes += sqlite3_column_int64(st.stmt, 2);
     }
-    return statement_end(&st);
+    return statement_end(&st, STORE_OK);
 }
 
 static store_status delete_chosen(sqlite_store *s, connection *c, void *args)
@@ -112,7 +105,7 @@ static store_status delete_chosen(sqlite_store *s, connection *c, void *args)
         statement st = statement_begin(c, QUERY_DELETE);
         bind_text(&st, 1, a->ids[i]);
         status = statement_run(&st);
-        a->count += status == STORE_OK ? connection_changes(c) : 0;
+        a->count += status == STORE_OK ? sqlite3_changes64(c->db) : 0;
     }
     return status;
 }
@@ -124,7 +117,7 @@ store_status sqlite_retain(store *base, const store_retention *limits, int64_t *
     connection *c = sqlite_take_reader(s);
     store_status status = sqlite_give_reader(s, c, choose(c, &a));
     if (status == STORE_OK && a.n_ids > 0) /* an ended job does not change any more: it may only be gone already */
-        status = sqlite_write(s, delete_chosen, &a);
+        status = sqlite_write(s, WRITE_DURABLE, delete_chosen, &a);
     *count = status == STORE_OK ? a.count : 0;
     for (int i = 0; status == STORE_OK && i < a.n_ids; i++)
         store_tell(base, a.ids[i], false);

@@ -38,12 +38,12 @@ static void *sync_loop(void *argument)
         }
         uint64_t upto = s->committed;
         pthread_mutex_unlock(&s->sync_lock);
-        double begun = store_clock();
+        double begun = clock_seconds(CLOCK_MONOTONIC);
         /* xSync touches nothing of the log, which is open as long as the writer, but its descriptor. */
         suspect = suspect || s->log->pMethods->xSync(s->log, SQLITE_SYNC_NORMAL | SQLITE_SYNC_DATAONLY) != SQLITE_OK;
         bool ok = !suspect || save_by_checkpoint(s);
         suspect = !ok; /* until a checkpoint succeeds a sync's word counts for nothing */
-        metrics_seconds(s->base.settings.metrics, METRIC_COMMIT, store_clock() - begun);
+        metrics_seconds(s->base.settings.metrics, METRIC_COMMIT, clock_seconds(CLOCK_MONOTONIC) - begun);
         pthread_mutex_lock(&s->sync_lock);
         if (ok) {
             s->synced = upto;
@@ -76,48 +76,35 @@ void sqlite_sync_end(sqlite_store *s)
     pthread_join(s->syncer, NULL);
 }
 
-void sqlite_begin_commit(sqlite_store *s)
+store_status sqlite_commit(sqlite_store *s, uint64_t *number)
 {
     pthread_mutex_lock(&s->sync_lock);
     s->begun++;
     pthread_mutex_unlock(&s->sync_lock);
-}
-
-uint64_t sqlite_note_commit(sqlite_store *s)
-{
+    statement st = statement_begin(&s->writer, QUERY_COMMIT);
+    store_status status = statement_run(&st);
     pthread_mutex_lock(&s->sync_lock);
-    uint64_t number = s->committed = s->begun;
+    *number = s->committed = s->begun;
     if (s->wanted > s->synced)
         pthread_cond_signal(&s->sync_asked);
     pthread_mutex_unlock(&s->sync_lock);
-    return number;
+    return status;
 }
 
-/* Under sync_lock. */
-static void want(sqlite_store *s, uint64_t number)
-{
-    if (number <= s->wanted)
-        return;
-    s->wanted = number;
-    pthread_cond_signal(&s->sync_asked);
-}
-
-void sqlite_want_sync(sqlite_store *s, uint64_t number)
+store_status sqlite_sync(sqlite_store *s, uint64_t number, bool wait)
 {
     pthread_mutex_lock(&s->sync_lock);
-    want(s, number);
-    pthread_mutex_unlock(&s->sync_lock);
-}
-
-store_status sqlite_await_sync(sqlite_store *s, uint64_t number)
-{
-    pthread_mutex_lock(&s->sync_lock);
-    uint64_t failures = s->failures;
+    const uint64_t failures = s->failures;
     while (s->synced < number && !s->sync_stop && (s->failures == failures || s->failed < number)) {
-        want(s, number);
+        if (number > s->wanted) {
+            s->wanted = number;
+            pthread_cond_signal(&s->sync_asked);
+        }
+        if (!wait)
+            break;
         pthread_cond_wait(&s->sync_ended, &s->sync_lock);
     }
-    bool ok = s->synced >= number;
+    const bool ok = !wait || s->synced >= number;
     pthread_mutex_unlock(&s->sync_lock);
     return ok ? STORE_OK : STORE_ERROR;
 }
@@ -125,8 +112,7 @@ store_status sqlite_await_sync(sqlite_store *s, uint64_t number)
 store_status sqlite_settle(sqlite_store *s)
 {
     pthread_mutex_lock(&s->sync_lock);
-    uint64_t number = s->begun; /* readers see a commit a moment before its COMMIT returns */
-    bool settled = s->synced >= number;
+    const uint64_t number = s->begun; /* readers see a commit a moment before its COMMIT returns */
     pthread_mutex_unlock(&s->sync_lock);
-    return settled ? STORE_OK : sqlite_await_sync(s, number);
+    return sqlite_sync(s, number, true);
 }

@@ -17,8 +17,7 @@ static store_status read_info(connection *c, const char *id, upload_info *out)
         out->jobs = sqlite3_column_int64(st.stmt, 3);
         status = STORE_OK;
     }
-    store_status ended = statement_end(&st);
-    return ended == STORE_OK ? status : ended;
+    return statement_end(&st, status);
 }
 
 store_status sqlite_upload_get(store *base, const char *id, upload_info *out)
@@ -42,13 +41,13 @@ static store_status add_row(sqlite_store *s, connection *c, void *args)
     statement st = statement_begin(c, QUERY_INSERT_UPLOAD);
     bind_text(&st, 1, a->id);
     bind_integer(&st, 2, a->bytes);
-    bind_real(&st, 3, store_now());
+    bind_real(&st, 3, clock_seconds(CLOCK_REALTIME));
     store_status status = statement_run(&st);
-    a->known = status == STORE_OK && connection_changes(c) == 0;
+    a->known = status == STORE_OK && sqlite3_changes64(c->db) == 0;
     if (a->known) {
         st = statement_begin(c, QUERY_TOUCH_UPLOAD);
         bind_text(&st, 1, a->id);
-        bind_real(&st, 2, store_now());
+        bind_real(&st, 2, clock_seconds(CLOCK_REALTIME));
         status = statement_run(&st);
     }
     return status == STORE_OK ? read_info(c, a->id, a->out) : status;
@@ -57,7 +56,7 @@ static store_status add_row(sqlite_store *s, connection *c, void *args)
 store_status sqlite_upload_add(store *base, const char *id, int64_t bytes, upload_info *out, bool *known)
 {
     add_args a = {id, bytes, out, false};
-    store_status status = sqlite_write(sqlite_of(base), add_row, &a);
+    store_status status = sqlite_write(sqlite_of(base), WRITE_DURABLE, add_row, &a);
     *known = a.known;
     return status;
 }
@@ -70,7 +69,7 @@ static store_status delete_row(sqlite_store *s, connection *c, void *args)
     statement st = statement_begin(c, QUERY_DELETE_UPLOAD);
     bind_text(&st, 1, id);
     store_status status = statement_run(&st);
-    if (status != STORE_OK || connection_changes(c) > 0)
+    if (status != STORE_OK || sqlite3_changes64(c->db) > 0)
         return status;
     status = read_info(c, id, &found);
     return status == STORE_OK ? STORE_CONFLICT : status;
@@ -78,7 +77,7 @@ static store_status delete_row(sqlite_store *s, connection *c, void *args)
 
 store_status sqlite_upload_forget(store *base, const char *id)
 {
-    return sqlite_write(sqlite_of(base), delete_row, (void *)(uintptr_t)id);
+    return sqlite_write(sqlite_of(base), WRITE_DURABLE, delete_row, (void *)(uintptr_t)id);
 }
 
 store_status sqlite_upload_idle(store *base, double before, upload_info *out)
@@ -93,8 +92,7 @@ store_status sqlite_upload_idle(store *base, double before, upload_info *out)
         snprintf(out->id, sizeof out->id, "%s", (const char *)sqlite3_column_text(st.stmt, 0));
         status = STORE_OK;
     }
-    store_status ended = statement_end(&st);
-    return sqlite_give_reader(s, c, ended == STORE_OK ? status : ended);
+    return sqlite_give_reader(s, c, statement_end(&st, status));
 }
 
 store_status sqlite_upload_total(store *base, int64_t *bytes)
@@ -104,5 +102,5 @@ store_status sqlite_upload_total(store *base, int64_t *bytes)
     statement st = statement_begin(c, QUERY_UPLOAD_BYTES);
     if (statement_row(&st))
         *bytes = sqlite3_column_int64(st.stmt, 0);
-    return sqlite_give_reader(s, c, statement_end(&st));
+    return sqlite_give_reader(s, c, statement_end(&st, STORE_OK));
 }

@@ -37,27 +37,6 @@ static void roll_back(connection *c)
     memcpy(c->message, cause, sizeof cause);
 }
 
-static store_status commit(sqlite_store *s, uint64_t *number)
-{
-    sqlite_begin_commit(s);
-    store_status status = run_query(&s->writer, QUERY_COMMIT);
-    *number = sqlite_note_commit(s);
-    return status;
-}
-
-static store_status attempt(sqlite_store *s, store_change change, void *args, uint64_t *number)
-{
-    connection *c = &s->writer;
-    store_status status = run_query(c, QUERY_BEGIN);
-    if (status != STORE_OK)
-        return status;
-    status = change(s, c, args);
-    if (status == STORE_OK)
-        status = commit(s, number);
-    roll_back(c);
-    return status;
-}
-
 /* The change could not be made, whatever it is. */
 static bool is_failure(store_status status)
 {
@@ -67,13 +46,22 @@ static bool is_failure(store_status status)
 /* The change by itself; on a full disk once more when the journal is moved into the database. */
 static void run_alone(sqlite_store *s, pending *p)
 {
-    p->status = attempt(s, p->change, p->args, &p->number);
-    if (p->status == STORE_FULL) {
-        connection_checkpoint(&s->writer);
-        p->status = attempt(s, p->change, p->args, &p->number);
+    connection *c = &s->writer;
+    for (int tries = 0; tries < 2; tries++) {
+        if (tries > 0)
+            sqlite3_wal_checkpoint_v2(c->db, NULL, SQLITE_CHECKPOINT_TRUNCATE, NULL, NULL);
+        p->status = run_query(c, QUERY_BEGIN);
+        if (p->status == STORE_OK) {
+            p->status = p->change(s, c, p->args);
+            if (p->status == STORE_OK)
+                p->status = sqlite_commit(s, &p->number);
+            roll_back(c);
+        }
+        if (p->status != STORE_FULL)
+            break;
     }
     if (is_failure(p->status))
-        store_set_message(&s->base, s->writer.message);
+        store_set_message(&s->base, c->message);
 }
 
 /* False with nothing changed: each must then be tried alone, so that the failure is told to whom it belongs. */
@@ -91,7 +79,7 @@ static bool run_together(sqlite_store *s, pending *list)
                (p->status == STORE_OK || run_query(c, QUERY_ROLLBACK_TO) == STORE_OK) &&
                run_query(c, QUERY_RELEASE_SAVEPOINT) == STORE_OK;
     }
-    good = good && commit(s, &number) == STORE_OK;
+    good = good && sqlite_commit(s, &number) == STORE_OK;
     roll_back(c);
     for (pending *p = list; p && good; p = p->next)
         p->number = number;
@@ -144,37 +132,24 @@ static void lead(sqlite_store *s)
         pthread_cond_signal(&s->queue->turn);
 }
 
-static void wait_turn(sqlite_store *s, pending *me)
-{
-    pthread_mutex_lock(&s->queue_lock);
-    *s->queue_end = me;
-    s->queue_end = &me->next;
-    while (!me->done) {
-        if (!s->leading && s->queue == me)
-            lead(s);
-        else
-            pthread_cond_wait(&me->turn, &s->queue_lock);
-    }
-    pthread_mutex_unlock(&s->queue_lock);
-}
-
-store_status sqlite_write_as(sqlite_store *s, write_durability durability, store_change change, void *args)
+store_status sqlite_write(sqlite_store *s, write_durability durability, store_change change, void *args)
 {
     pending me = {.change = change, .args = args};
     pthread_cond_init(&me.turn, NULL);
-    wait_turn(s, &me);
+    pthread_mutex_lock(&s->queue_lock);
+    *s->queue_end = &me;
+    s->queue_end = &me.next; /* cppcheck-suppress autoVariables ; it leaves the queue before this returns */
+    while (!me.done) {
+        if (!s->leading && s->queue == &me)
+            lead(s);
+        else
+            pthread_cond_wait(&me.turn, &s->queue_lock);
+    }
+    pthread_mutex_unlock(&s->queue_lock);
     pthread_cond_destroy(&me.turn);
     if (me.status != STORE_OK || durability == WRITE_LAZY)
         return me.status;
-    if (durability == WRITE_DURABLE)
-        return sqlite_await_sync(s, me.number);
-    sqlite_want_sync(s, me.number);
-    return STORE_OK;
-}
-
-store_status sqlite_write(sqlite_store *s, store_change change, void *args)
-{
-    return sqlite_write_as(s, WRITE_DURABLE, change, args);
+    return sqlite_sync(s, me.number, durability == WRITE_DURABLE);
 }
 
 /* There and back: a row that is given the value that it has is not written (SQLite, btreeOverwriteContent). */
@@ -189,6 +164,5 @@ static store_status write_nothing(sqlite_store *s, connection *c, void *args)
 
 store_status sqlite_try_write(store *base)
 {
-    sqlite_store *s = sqlite_of(base);
-    return sqlite_write(s, write_nothing, NULL);
+    return sqlite_write(sqlite_of(base), WRITE_DURABLE, write_nothing, NULL);
 }
