@@ -103,7 +103,7 @@ static bool check_request(const api *context, http_request *rq, problem_details 
 /* A known token counts by its name, everybody else by address: guesses too. */
 static bool check_rate(api *context, http_request *rq, problem_details *problem)
 {
-    double now = http_now(), wait = 0.0;
+    double now = clock_seconds(CLOCK_MONOTONIC), wait = 0.0;
     if (!context->rate || (rq->route && strcmp(rq->route->pattern, "/healthz") == 0))
         return true;
     if (rq->token[0])

@@ -30,7 +30,7 @@ typedef struct {
     char run[17];                 /* a random name of this run of the daemon */
     pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */
     pthread_mutex_t ready_lock;   /* the next two */
-    double ready_until;           /* on http_now's clock: until then ready_why is what /readyz says */
+    double ready_until;           /* on CLOCK_MONOTONIC: until then ready_why is what /readyz says */
     char ready_why[64];           /* "": ready */
 } api;
 

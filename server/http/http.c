@@ -53,7 +53,7 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
                               LOG_S("request", rq->id),
                               LOG_I("status", rq->status),
                               LOG_I("bytes", rq->reply_len),
-                              LOG_N("seconds", http_now() - rq->started),
+                              LOG_N("seconds", clock_seconds(CLOCK_MONOTONIC) - rq->started),
                               LOG_S("job", rq->job_id),
                               LOG_S("token", rq->token),
                               LOG_S("end", end),
@@ -61,7 +61,7 @@ static void on_account(void *ctx, const http_request *rq, bool completed, bool e
         log_write(context->log, LOG_INFO, "request", fields);
     }
     metrics_request(context->metrics, found ? found->method : NULL, found ? found->pattern : NULL, rq->status,
-                    http_now() - rq->started);
+                    clock_seconds(CLOCK_MONOTONIC) - rq->started);
 }
 
 /* ---- start to stop */
@@ -96,11 +96,11 @@ http_server *http_start(int listen_fd, const http_parts *parts, const http_optio
     pthread_mutex_init(&context->predict_lock, NULL);
     pthread_mutex_init(&context->ready_lock, NULL);
     if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
-        random = (uint64_t)(http_now() * 1e9);
+        random = (uint64_t)(clock_seconds(CLOCK_MONOTONIC) * 1e9);
     snprintf(context->run, sizeof context->run, "%016llx", (unsigned long long)random);
     if (options->max_client_rate > 0)
         context->rate = rate_new(options->max_client_rate);
-    context->fields = field_slots_new(work_workers(parts->work));
+    context->fields = field_slots_new(work_settings(parts->work)->workers);
     context->told = told_changes_new();
     if (!context->fields || !context->told || (options->max_client_rate > 0 && !context->rate)) {
         snprintf(message, size, "cannot start the HTTP server: out of memory");

@@ -144,8 +144,10 @@ static bool delay(api *context, http_request *rq, const char *id, double seconds
     waiting *w = calloc(1, sizeof *w);
     if (!w)
         return false;
-    w->base = (delayed_reply){
-        .ready = waiting_ready, .make = waiting_make, .free = waiting_free, .until = http_now() + seconds};
+    w->base = (delayed_reply){.ready = waiting_ready,
+                              .make = waiting_make,
+                              .free = waiting_free,
+                              .until = clock_seconds(CLOCK_MONOTONIC) + seconds};
     w->context = context;
     w->then = then;
     memcpy(w->id, id, sizeof w->id);

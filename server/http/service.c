@@ -19,7 +19,7 @@ void service_factors(api *context, http_request *rq, http_reply *reply)
     if (uz_cache_list(work_cache(context->work), &entries, &count, NULL) != UZ_OK)
         reply_no_memory(reply);
     else
-        reply_json(reply, 200, codec_encode_factors(entries, count, work_cache_bytes(context->work)));
+        reply_json(reply, 200, codec_encode_factors(entries, count, work_settings(context->work)->cache_bytes));
     free(entries);
 }
 
@@ -50,7 +50,7 @@ void service_limits(api *context, http_request *rq, http_reply *reply)
 void service_metrics(api *context, http_request *rq, http_reply *reply)
 {
     const transport_counts counts = transport_count(context->server);
-    metrics_now now = {.workers = work_workers(context->work),
+    metrics_now now = {.workers = work_settings(context->work)->workers,
                        .workers_busy = work_busy(context->work),
                        .connections = counts.connections,
                        .streams = counts.streams,
@@ -73,7 +73,7 @@ void service_metrics(api *context, http_request *rq, http_reply *reply)
         for (size_t i = 0; i < count; i++)
             now.cache_bytes += entries[i].bytes;
     now.cache_entries = count;
-    now.cache_max_bytes = work_cache_bytes(context->work);
+    now.cache_max_bytes = work_settings(context->work)->cache_bytes;
     free(entries);
     char *text = metrics_text(context->metrics, &now, &len);
     reply_text(reply, 200, "text/plain; version=0.0.4; charset=utf-8", text, len);
@@ -86,8 +86,9 @@ void service_health(api *context, http_request *rq, http_reply *reply)
     int64_t counts[5] = {0};
     (void)rq;
     bool answered = store_counts(context->store, counts) == STORE_OK;
-    reply_json(reply, 200,
-               codec_encode_health(answered ? "ok" : "store_unavailable", counts, work_workers(context->work)));
+    reply_json(
+        reply, 200,
+        codec_encode_health(answered ? "ok" : "store_unavailable", counts, work_settings(context->work)->workers));
 }
 
 /* ---- ready: what a job needs, tried */
@@ -134,9 +135,9 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
         return;
     }
     pthread_mutex_lock(&context->ready_lock);
-    if (http_now() >= context->ready_until) {
+    if (clock_seconds(CLOCK_MONOTONIC) >= context->ready_until) {
         snprintf(context->ready_why, sizeof context->ready_why, "%s", why_not_ready(context));
-        context->ready_until = http_now() + READY_FOR_S;
+        context->ready_until = clock_seconds(CLOCK_MONOTONIC) + READY_FOR_S;
     }
     memcpy(why, context->ready_why, sizeof context->ready_why);
     pthread_mutex_unlock(&context->ready_lock);
@@ -151,7 +152,7 @@ void service_ready(api *context, http_request *rq, http_reply *reply)
         reply_refuse(reply, 503, why, "The store does not answer", "the server's log has the cause");
     } else {
         reply->retry_after_s = 0;
-        reply_json(reply, 200, codec_encode_health("ready", counts, work_workers(context->work)));
+        reply_json(reply, 200, codec_encode_health("ready", counts, work_settings(context->work)->workers));
     }
 }
 

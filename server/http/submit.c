@@ -3,8 +3,8 @@
 #include "http/results.h"
 #include "codec/codec.h"
 #include "http/api.h"
+#include "work/starts.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -171,10 +171,8 @@ static bool check_reactions(api *context, const codec_request *request, problem_
     double *r = NULL;
     int64_t count = 0, m, n_u;
     char text[160];
-    status = store_get_vector(context->store, start->job, number, "reactions", &r, &count);
-    bool finite = status == STORE_OK;
-    for (int64_t k = 0; finite && k < count; k++)
-        finite = isfinite(r[k]);
+    status = starts_reactions(context->store, start->job, number, &r, &count);
+    const bool finite = r != NULL;
     free(r);
     if (status != STORE_OK && status != STORE_NOT_FOUND)
         return refuse_store(context, start, status, problem);
@@ -253,7 +251,7 @@ void jobs_submit(api *context, http_request *rq, http_reply *reply)
         uz_error err = {.status = UZ_OK};
         api_asker asker = {context, rq};
         const uz_hooks hooks = {.ctx = &asker, .cancelled = api_is_over};
-        const size_t limit = request.settings.memory_limit = work_solve_bytes(context->work);
+        const size_t limit = request.settings.memory_limit = work_settings(context->work)->solve_bytes;
         int64_t m, n_u;
         bool known = false;
         if (!request.settings.semidefinite && codec_request_sizes(&request, &m, &n_u, &ignored) &&
@@ -324,10 +322,8 @@ static bool has_reactions(api *context, const job *j, http_reply *reply)
 {
     double *r = NULL;
     int64_t count = 0;
-    bool finite = true;
-    store_status status = store_get_vector(context->store, j->id, 0, "reactions", &r, &count);
-    for (int64_t i = 0; status == STORE_OK && finite && i < count; i++)
-        finite = isfinite(r[i]);
+    const store_status status = starts_reactions(context->store, j->id, 0, &r, &count);
+    const bool finite = status != STORE_OK || r != NULL;
     free(r);
     if (status != STORE_OK && status != STORE_NOT_FOUND) /* with cases the job itself has none */
         reply_store_failure(context, status, reply);

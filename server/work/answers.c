@@ -42,26 +42,6 @@ static bool add_places(answers *a, answer_parts *to, const uz_result *result, bo
     return true;
 }
 
-/* Without memory for it the run can't be continued, and that is all. */
-static void add_state(answer_parts *to, const uz_result *result)
-{
-    int64_t count = 0;
-    if (result->state)
-        to->state = state_pack(result->state, &count);
-    add_vector(to, STATE_VECTOR, to->state, count);
-}
-
-/* earlier: of the run that was continued, NULL: none was. */
-static void add_trade(answer_parts *to, const uz_result *result, const uz_trade *earlier)
-{
-    uz_trade trade = result->trade;
-    if (earlier && !(earlier->total_s > 0.0))
-        return; /* what went before is not known: nothing can be told of the whole */
-    if (earlier)
-        trade_join(&trade, earlier);
-    add_vector(to, TRADE_VECTOR, to->trade, trade_pack(to->trade, &trade));
-}
-
 /* ---- history */
 
 /* Seconds count from the first iteration of the first run; the time between the runs is left out. */
@@ -107,10 +87,19 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     add_vector(parts, "ray", result->ray, result->m);
     add_vector(parts, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
     add_vector(parts, "pressure", result->pressure, result->m);
-    add_state(parts, result);
+    if (result->state) { /* without memory for it the run can't be continued, and that is all */
+        int64_t count = 0;
+        parts->state = state_pack(result->state, &count);
+        add_vector(parts, STATE_VECTOR, parts->state, count);
+    }
+    if (!has_earlier || from->trades[i].total_s > 0.0) { /* else nothing can be told of the whole */
+        uz_trade trade = result->trade;
+        if (has_earlier)
+            trade_join(&trade, &from->trades[i]);
+        add_vector(parts, TRADE_VECTOR, parts->trade, trade_pack(parts->trade, &trade));
+    }
     const char *name = request->problem.n_cases > 0 ? request->problem.cases[i].name : NULL;
-    add_trade(parts, result, has_earlier ? &from->trades[i] : NULL);
-    return parts->summary && judge_summary(&parts->summary, request, name, a->findings) &&
+    return parts->summary && judge(&parts->summary, request, name, false, a->findings) &&
            add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
                        has_earlier ? from->rows[i] : 0);
 }
@@ -147,7 +136,7 @@ static bool build_whole(answers *a, store_outcome *outcome, uz_result *const *re
     codec_run run = {.started_from = origin_name(results[first]->summary.origin), .cases = &counts};
     a->shared.summary = codec_encode_summary(&overall, request->problem.kind, &run);
     a->cases = calloc((size_t)a->n, sizeof *a->cases);
-    if (!a->cases || !a->shared.summary || !judge_whole(&a->shared.summary, request, a->findings) ||
+    if (!a->cases || !a->shared.summary || !judge(&a->shared.summary, request, NULL, true, a->findings) ||
         !add_places(a, &a->shared, results[0], request->problem.kind == UZ_PROBLEM_SCENE))
         return false;
     for (int64_t i = 0; i < a->n; i++)

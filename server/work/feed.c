@@ -78,8 +78,9 @@ static void wake_those_of(listener *first, const char *id)
             wake(l);
 }
 
-static void keep(feed *f, const char *id)
+void feed_changed(feed *f, const char *id)
 {
+    pthread_mutex_lock(&f->lock);
     uint64_t *newest = &f->newest[bucket(id)];
     kept_change *before = &f->kept[*newest % FEED_KEPT], *now = &f->kept[++f->last % FEED_KEPT];
     if (*newest > 0 && before->change.number == *newest && strcmp(before->change.id, id) == 0)
@@ -87,12 +88,6 @@ static void keep(feed *f, const char *id)
     *newest = now->change.number = f->last;
     now->is_past = false;
     snprintf(now->change.id, sizeof now->change.id, "%s", id);
-}
-
-void feed_changed(feed *f, const char *id)
-{
-    pthread_mutex_lock(&f->lock);
-    keep(f, id);
     wake_those_of(f->listeners[bucket(id)], id);
     wake_those_of(f->all, "");
     pthread_mutex_unlock(&f->lock);

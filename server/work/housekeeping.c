@@ -19,7 +19,7 @@
 
 typedef struct {
     long long jobs; /* ended, when memory was made ready last */
-    double since;   /* work_clock() */
+    double since;   /* on CLOCK_MONOTONIC */
 } idle_watch;
 
 static void expire(work *w)
@@ -46,29 +46,13 @@ static void retain(work *w)
         log_write(w->log, LOG_INFO, "jobs_deleted", (log_field[]){LOG_I("jobs", total), {0}});
 }
 
-/* What is freed stays in the heap (main). Where more than `most` lies free there, all of it goes back to the system;
- * where less than `least`, so much is touched now, in huge pages. */
-static void keep_heap(size_t least, size_t most)
-{
-    const struct mallinfo2 heap = mallinfo2();
-    void *block = NULL;
-    if (heap.uordblks == 0)
-        return; /* another allocator, which tells nothing */
-    if (heap.fordblks > most)
-        malloc_trim(0);
-    else if (heap.fordblks < least && posix_memalign(&block, HUGE_PAGE, least) == 0) {
-        madvise(block, least, MADV_HUGEPAGE);
-        for (size_t at = 0; at < least; at += SMALL_PAGE)
-            ((volatile char *)block)[at] = 0;
-        free(block);
-    }
-}
-
-/* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. */
+/* Memory for the next body is touched while nobody waits for it, and given back when no job has run for long. What is
+ * freed stays in the heap (main): where much lies free there, all of it goes back to the system; where little and a
+ * body may come, so much is touched now, in huge pages. */
 static void keep_reserve(work *w, idle_watch *idle)
 {
     const long long jobs = atomic_load(&w->ended);
-    const double now = work_clock();
+    const double now = clock_seconds(CLOCK_MONOTONIC);
     uz_reserve *reserve = w->options.reserve;
     if (!reserve)
         return;
@@ -80,8 +64,18 @@ static void keep_reserve(work *w, idle_watch *idle)
     while (news && work_busy(w) == 0 && !work_is_stopping(w) && uz_reserve_fill(reserve))
         ;
     const bool large = uz_reserve_bytes(reserve) > 0; /* bodies are solved here */
-    const size_t share = w->options.cache_bytes / 8;
-    keep_heap(large && news ? share : 0, HEAP_FREE + (large ? 4 * share : 0));
+    const size_t share = w->options.cache_bytes / 8, least = large && news ? share : 0;
+    const struct mallinfo2 heap = mallinfo2();
+    const bool known = heap.uordblks > 0; /* else it is another allocator, which tells nothing */
+    void *block = NULL;
+    if (known && heap.fordblks > HEAP_FREE + (large ? 4 * share : 0))
+        malloc_trim(0);
+    else if (known && heap.fordblks < least && posix_memalign(&block, HUGE_PAGE, least) == 0) {
+        madvise(block, least, MADV_HUGEPAGE);
+        for (size_t at = 0; at < least; at += SMALL_PAGE)
+            ((volatile char *)block)[at] = 0;
+        free(block);
+    }
     if (news)
         idle->jobs = jobs;
 }
@@ -89,7 +83,7 @@ static void keep_reserve(work *w, idle_watch *idle)
 void *housekeeping_loop(void *arg)
 {
     work *w = arg;
-    idle_watch idle = {.since = work_clock()};
+    idle_watch idle = {.since = clock_seconds(CLOCK_MONOTONIC)};
     struct timespec deadline;
     pthread_mutex_lock(&w->lock);
     while (!w->finished) {

@@ -2,6 +2,7 @@
 #ifndef SERVER_WORK_INTERNAL_H
 #define SERVER_WORK_INTERNAL_H
 
+#include "base/clock.h"
 #include "work/feed.h"
 #include "work/live.h"
 #include "work/work.h"
@@ -50,7 +51,7 @@ struct work {
     bool stopping; /* no more claims */
     bool finished; /* the keeper shall stop */
     bool stopped;  /* every thread was joined */
-    double drain_until; /* work_clock() */
+    double drain_until; /* on CLOCK_MONOTONIC */
 
     atomic_llong ended;    /* jobs that have run, whatever became of them */
     atomic_bool interrupt; /* the time to drain is over */
@@ -65,7 +66,6 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len);
 
 /* Fills `deadline` with now + seconds on CLOCK_MONOTONIC, which every condition here uses. */
 void work_deadline(struct timespec *deadline, double seconds);
-double work_clock(void); /* seconds, CLOCK_MONOTONIC */
 bool work_is_stopping(work *w);
 void work_init_condition(pthread_cond_t *condition);
 

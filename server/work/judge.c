@@ -25,18 +25,6 @@ typedef struct {
 
 static const bound UNKNOWN = {{NAN, NAN}, NAN};
 
-static double tolerance_of(const codec_assertion *a)
-{
-    return fmax(a->absolute, a->relative * fabs(a->near)); /* fmax leaves out what is not given, a NaN */
-}
-
-static range limits_of(const codec_assertion *a)
-{
-    if (!isnan(a->near))
-        return (range){a->near - tolerance_of(a), a->near + tolerance_of(a)};
-    return (range){isnan(a->least) ? -INFINITY : a->least, isnan(a->most) ? INFINITY : a->most};
-}
-
 /* ---- how far a number may be from that of the exact answer */
 
 static double number_at(const codec_summary *summary, const char *name)
@@ -45,27 +33,21 @@ static double number_at(const codec_summary *summary, const char *name)
     return codec_summary_number(&value, summary, name) ? value : (double)NAN;
 }
 
-/* Numbers of the answer, which a finer one would have otherwise; the others are what they are. */
-static bool is_estimate(const char *quantity)
-{
-    static const char *const FACTS[] = {"contact.candidates", "contact.kept", "contact.added", "contact.rounds"};
-    static const char *const ESTIMATES[] = {"contact.", "energy.", "resultants.", "warnings"};
-    for (size_t i = 0; i < sizeof FACTS / sizeof FACTS[0]; i++)
-        if (strcmp(quantity, FACTS[i]) == 0)
-            return false;
-    for (size_t i = 0; i < sizeof ESTIMATES / sizeof ESTIMATES[0]; i++)
-        if (strncmp(quantity, ESTIMATES[i], strlen(ESTIMATES[i])) == 0)
-            return true;
-    return false;
-}
-
 /* The minimum of the energy is between the dual and the primal value. The strain energy W is half the square of a
  * seminorm of the strain without its thermal part, and by the triangle inequality sqrt(2 W) differs from the exact one
  * by at most the energy norm of the displacement's error. */
 static bound exact_bound(const codec_summary *summary, const char *quantity, double value)
 {
+    /* Numbers of the answer, which a finer one would have otherwise; the others are what they are. */
+    static const char *const FACTS[] = {"contact.candidates", "contact.kept", "contact.added", "contact.rounds"};
+    static const char *const ESTIMATES[] = {"contact.", "energy.", "resultants.", "warnings"};
     const double gap = number_at(summary, "certificate.gap"), e = number_at(summary, "certificate.absolute_error");
-    if (!is_estimate(quantity))
+    bool estimate = false;
+    for (size_t i = 0; i < sizeof ESTIMATES / sizeof ESTIMATES[0]; i++)
+        estimate = estimate || strncmp(quantity, ESTIMATES[i], strlen(ESTIMATES[i])) == 0;
+    for (size_t i = 0; i < sizeof FACTS / sizeof FACTS[0]; i++)
+        estimate = estimate && strcmp(quantity, FACTS[i]) != 0;
+    if (!estimate)
         return (bound){{value, value}, 0.0};
     if (strcmp(quantity, "energy.primal") == 0 && !isnan(gap))
         return (bound){{value - gap, value}, gap};
@@ -92,61 +74,50 @@ static const char *shown(char out[DIGITS], double x)
     return out;
 }
 
-static void say_missed(codec_finding *out, const codec_assertion *a, range limits)
-{
-    char value[DIGITS], limit[DIGITS], near[DIGITS];
-    shown(value, out->value);
-    if (!isnan(a->near))
-        snprintf(out->reason, sizeof out->reason, "%s is not within %s of %s", value, shown(limit, tolerance_of(a)),
-                 shown(near, a->near));
-    else if (out->value < limits.lo)
-        snprintf(out->reason, sizeof out->reason, "%s is below %s", value, shown(limit, limits.lo));
-    else
-        snprintf(out->reason, sizeof out->reason, "%s is above %s", value, shown(limit, limits.hi));
-}
-
 /* A finding without a reason passes. */
-static void judge_value(codec_finding *out, const codec_assertion *a, const codec_summary *summary)
-{
-    const char *outcome = codec_summary_outcome(summary);
-    const bool met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0;
-    const range limits = limits_of(a);
-    const bound known = exact_bound(summary, a->quantity, out->value);
-    const bool bounded = !isnan(known.error) && !isnan(out->value);
-    const range exact = bounded ? known.in : (range){out->value, out->value};
-    out->error = bounded ? known.error : (double)NAN;
-    out->margin = isnan(out->value) ? -INFINITY : fmin(out->value - limits.lo, limits.hi - out->value);
-    const bool misses = exact.hi < limits.lo || exact.lo > limits.hi;
-    if (misses && (met || bounded)) {
-        out->verdict = CODEC_FAIL;
-        say_missed(out, a, limits);
-    } else if (!met || isnan(out->value)) {
-        out->verdict = CODEC_UNCERTAIN;
-        snprintf(out->reason, sizeof out->reason, "%s%.40s", met ? "the value is not known" : "the job ended with ",
-                 met ? "" : outcome);
-    } else if (exact.lo < limits.lo || exact.hi > limits.hi) {
-        out->verdict = CODEC_UNCERTAIN;
-        char lo[DIGITS], hi[DIGITS];
-        snprintf(out->reason, sizeof out->reason,
-                 "the exact value is between %s and %s, so that it may or may not meet the limit", shown(lo, exact.lo),
-                 shown(hi, exact.hi));
-    } else {
-        out->verdict = CODEC_PASS;
-    }
-}
-
 static codec_finding judge_one(const codec_assertion *a, const codec_summary *summary)
 {
     codec_finding out = {.verdict = CODEC_FAIL, .value = NAN, .error = NAN, .margin = -INFINITY};
-    bool there = codec_summary_number(&out.value, summary, a->quantity);
-    if (!there && strncmp(a->quantity, "cases.", 6) == 0 && !isnan(number_at(summary, "cases.count"))) {
+    char first[DIGITS], second[DIGITS], third[DIGITS];
+    if (!codec_summary_number(&out.value, summary, a->quantity)) {
+        if (strncmp(a->quantity, "cases.", 6) != 0 || isnan(number_at(summary, "cases.count"))) {
+            snprintf(out.reason, sizeof out.reason, "the summary of this job has no such number");
+            return out;
+        }
         out.value = 0.0; /* outcomes that no case had are not in a summary */
-        there = true;
     }
-    if (there)
-        judge_value(&out, a, summary);
-    else
-        snprintf(out.reason, sizeof out.reason, "the summary of this job has no such number");
+    const char *outcome = codec_summary_outcome(summary);
+    const bool met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0;
+    const double tolerance = fmax(a->absolute, a->relative * fabs(a->near)); /* fmax leaves out what is not given */
+    const range limits = !isnan(a->near)
+                             ? (range){a->near - tolerance, a->near + tolerance}
+                             : (range){isnan(a->least) ? -INFINITY : a->least, isnan(a->most) ? INFINITY : a->most};
+    const bound known = exact_bound(summary, a->quantity, out.value);
+    const bool bounded = !isnan(known.error) && !isnan(out.value);
+    const range exact = bounded ? known.in : (range){out.value, out.value};
+    out.error = bounded ? known.error : (double)NAN;
+    out.margin = isnan(out.value) ? -INFINITY : fmin(out.value - limits.lo, limits.hi - out.value);
+    const bool misses = exact.hi < limits.lo || exact.lo > limits.hi;
+    if (misses && (met || bounded)) {
+        const bool below = out.value < limits.lo;
+        if (!isnan(a->near))
+            snprintf(out.reason, sizeof out.reason, "%s is not within %s of %s", shown(first, out.value),
+                     shown(second, tolerance), shown(third, a->near));
+        else
+            snprintf(out.reason, sizeof out.reason, "%s is %s %s", shown(first, out.value), below ? "below" : "above",
+                     shown(second, below ? limits.lo : limits.hi));
+    } else if (!met || isnan(out.value)) {
+        out.verdict = CODEC_UNCERTAIN;
+        snprintf(out.reason, sizeof out.reason, "%s%.40s", met ? "the value is not known" : "the job ended with ",
+                 met ? "" : outcome);
+    } else if (exact.lo < limits.lo || exact.hi > limits.hi) {
+        out.verdict = CODEC_UNCERTAIN;
+        snprintf(out.reason, sizeof out.reason,
+                 "the exact value is between %s and %s, so that it may or may not meet the limit",
+                 shown(first, exact.lo), shown(second, exact.hi));
+    } else {
+        out.verdict = CODEC_PASS;
+    }
     return out;
 }
 
@@ -173,13 +144,7 @@ static bool is_of_the_whole(const codec_assertion *a)
     return !a->case_name[0] && (strncmp(a->quantity, "cases.", 6) == 0 || strncmp(a->quantity, "timings_s.", 10) == 0);
 }
 
-static bool concerns(const codec_assertion *a, const char *name)
-{
-    return !name || (a->case_name[0] ? strcmp(a->case_name, name) == 0 : !is_of_the_whole(a));
-}
-
-/* whole: the summary is of all cases together. */
-static bool judge_list(char **summary, const codec_request *request, const char *name, bool whole, codec_finding *all)
+bool judge(char **summary, const codec_request *request, const char *name, bool whole, codec_finding *all)
 {
     const int64_t n = request->n_assertions;
     int64_t told = 0;
@@ -191,7 +156,8 @@ static bool judge_list(char **summary, const codec_request *request, const char 
     for (int64_t i = 0; list && read && i < n; i++) {
         const codec_assertion *a = &request->assertions[i];
         const bool gathered = whole && !is_of_the_whole(a);
-        if (!whole && !concerns(a, name))
+        const bool of_another = name && (a->case_name[0] ? strcmp(a->case_name, name) != 0 : is_of_the_whole(a));
+        if (!whole && of_another)
             continue;
         codec_judged *one = &list[told++];
         *one = (codec_judged){a, gathered ? all[i] : judge_one(a, read), gathered};
@@ -203,14 +169,4 @@ static bool judge_list(char **summary, const codec_request *request, const char 
     codec_summary_free(read);
     free(list);
     return good;
-}
-
-bool judge_summary(char **summary, const codec_request *request, const char *name, codec_finding *all)
-{
-    return judge_list(summary, request, name, false, all);
-}
-
-bool judge_whole(char **summary, const codec_request *request, codec_finding *all)
-{
-    return judge_list(summary, request, NULL, true, all);
 }

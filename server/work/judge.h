@@ -7,9 +7,7 @@
 /* Adds to a summary of this service (malloc'ed, replaced) what became of the request's assertions, as `assertions` and
  * `assertions_passed`; without assertions it stays as it is. name: of the case that the summary is of, NULL: the job
  * has none. all: n_assertions findings that begin zeroed, which gather those of every case; NULL where there are none.
- * False: no memory. */
-bool judge_summary(char **summary, const codec_request *request, const char *name, codec_finding *all);
-/* The same for the summary of a job with cases, once all of them were judged. */
-bool judge_whole(char **summary, const codec_request *request, codec_finding *all);
+ * whole: the summary is that of all cases together, once each of them was judged. False: no memory. */
+bool judge(char **summary, const codec_request *request, const char *name, bool whole, codec_finding *all);
 
 #endif

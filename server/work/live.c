@@ -52,11 +52,6 @@ void live_part(live *l, double from, double to)
     l->to = to;
 }
 
-void live_forget_problem(live *l)
-{
-    l->problem = NULL;
-}
-
 /* ||u||_K is near sqrt(2 |psi|): equal where every gap that closes was 0. */
 static double measure(const live *l, const uz_history_row *row)
 {
@@ -85,22 +80,21 @@ void live_add(live *l, const uz_history_row *row)
     codec_history_row(l->rows[l->count++], row);
 }
 
-/* The share of the iterations that is done, 0..1. */
-static double share_done(const live *l)
-{
-    double by_count = l->max_iterations > 0 ? (double)l->latest.iteration / (double)l->max_iterations : 0.0;
-    double value = measure(l, &l->latest), by_error = 0.0;
-    if (l->first > 0.0 && value > 0.0 && isfinite(value) && l->target > 0.0 && l->first > l->target)
-        by_error = log(l->first / value) / log(l->first / l->target);
-    return fmin(1.0, fmax(0.0, fmax(by_count, by_error)));
-}
-
 int live_progress(live *l)
 {
     const bool whole = !(l->to > 0.0);
     if (l->any || l->current > 0 || !whole) {
-        double n = l->problem && l->problem->n_cases > 0 ? (double)l->problem->n_cases : 1.0;
-        double share = fmin(1.0, ((double)l->current + (l->any ? share_done(l) : 0.0)) / n);
+        double done = 0.0; /* share of this case's iterations, by their number and by the error, whichever is more */
+        if (l->any) {
+            const double by_count = l->max_iterations > 0 ? (double)l->latest.iteration / (double)l->max_iterations : 0;
+            const double value = measure(l, &l->latest);
+            double by_error = 0.0;
+            if (l->first > 0.0 && value > 0.0 && isfinite(value) && l->target > 0.0 && l->first > l->target)
+                by_error = log(l->first / value) / log(l->first / l->target);
+            done = fmin(1.0, fmax(0.0, fmax(by_count, by_error)));
+        }
+        const double n = l->problem && l->problem->n_cases > 0 ? (double)l->problem->n_cases : 1.0;
+        double share = fmin(1.0, ((double)l->current + done) / n);
         if (!whole)
             share = l->from + (l->to - l->from) * share;
         int now = PROGRESS_FIRST_ROW + (int)((PROGRESS_LAST_ROW - PROGRESS_FIRST_ROW) * share);

@@ -29,13 +29,11 @@ typedef struct {
 
 void live_reset(live *l); /* keeps the room; {0} at first */
 void live_clear(live *l);
-/* What is asked for is known: the solve begins. The problem must live until live_forget_problem or live_reset. */
 void live_begin(live *l, const uz_settings *settings, const uz_problem *problem);
 /* The next load case begins: rows are its own from here on. */
 void live_case(live *l, int64_t i);
 /* What comes next is this part of the whole, all its load cases over again. */
 void live_part(live *l, double from, double to);
-void live_forget_problem(live *l);
 void live_add(live *l, const uz_history_row *row);
 
 /* 0..100, never less than before: 1 claimed, 5 read, 10 to 95 the iterations on a logarithmic scale of the error, from

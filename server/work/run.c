@@ -21,7 +21,7 @@ typedef enum {
 typedef struct {
     worker *me;
     job *job;
-    double began, queue_s, parse_s; /* began on work_clock */
+    double began, queue_s, parse_s; /* began on CLOCK_MONOTONIC */
     codec_request request;
     starts starts;
     uz_result **results; /* n of them */
@@ -122,12 +122,12 @@ static void log_store_failure(const run *r, log_level level, const char *event)
 static bool decode_body(run *r, char *body, size_t body_len)
 {
     problem_details problem = {0};
-    double start = work_clock();
+    double start = clock_seconds(CLOCK_MONOTONIC);
     bool ok = body && codec_decode(&r->request, CODEC_STORED, body, body_len, r->me->w->store, &problem);
     if (!body)
         codec_problem_damaged(&problem, r->job->id);
     free(body);
-    r->parse_s = work_clock() - start;
+    r->parse_s = clock_seconds(CLOCK_MONOTONIC) - start;
     if (!ok) {
         fail_from_problem(r, &problem);
         return false;
@@ -236,7 +236,7 @@ static bool is_settled(store_status status)
 static store_status try_to_store(const run *r, bool for_ever)
 {
     work *w = r->me->w;
-    double begun = work_clock();
+    double begun = clock_seconds(CLOCK_MONOTONIC);
     for (int attempt = 0;; attempt++) {
         store_status status = store_finish(w->store, &r->me->lease, &r->outcome);
         if (is_settled(status))
@@ -244,7 +244,7 @@ static store_status try_to_store(const run *r, bool for_ever)
         if (attempt < FINISH_ATTEMPTS)
             log_store_failure(r, LOG_WARN, "store_failed");
         bool may_pass = (status == STORE_FULL || status == STORE_LOCKED) && !atomic_load(&r->me->cancel) &&
-                        work_clock() - begun < w->options.room_wait_s;
+                        clock_seconds(CLOCK_MONOTONIC) - begun < w->options.room_wait_s;
         if (atomic_load(&w->interrupt) || !(for_ever || may_pass || attempt + 1 < FINISH_ATTEMPTS))
             return status;
         /* Longer each time, 0.05 s to 3.2 s, but not at all once the service must end. */
@@ -302,7 +302,7 @@ static void count_job(const run *r, const char *outcome)
     metrics_job(m, job_status_name(r->outcome.status), outcome, 1);
     metrics_seconds(m, METRIC_QUEUE, r->queue_s);
     metrics_seconds(m, METRIC_PARSE, r->parse_s);
-    metrics_seconds(m, METRIC_TOTAL, work_clock() - r->began + r->queue_s);
+    metrics_seconds(m, METRIC_TOTAL, clock_seconds(CLOCK_MONOTONIC) - r->began + r->queue_s);
     if (!r->results || !r->results[0])
         return;
     const uz_summary *first = &r->results[0]->summary;
@@ -345,13 +345,13 @@ static void store_end(run *r, run_end end)
                             LOG_I("iterations", count_iterations(r)),
                             LOG_N("queue_s", r->queue_s),
                             LOG_N("parse_s", r->parse_s),
-                            LOG_N("total_s", work_clock() - r->began + r->queue_s),
+                            LOG_N("total_s", clock_seconds(CLOCK_MONOTONIC) - r->began + r->queue_s),
                             {0}});
 }
 
 void work_run(worker *me, job *claimed, char *body, size_t body_len)
 {
-    run r = {.me = me, .job = claimed, .began = work_clock()};
+    run r = {.me = me, .job = claimed, .began = clock_seconds(CLOCK_MONOTONIC)};
     run_end end = END_FINISH;
     me->told = -1;                                       /* of the job before */
     double waited = claimed->started - claimed->created; /* by the clock on the wall, which may be set back */
@@ -362,7 +362,7 @@ void work_run(worker *me, job *claimed, char *body, size_t body_len)
         end = solve(&r);
     store_end(&r, end);
     pthread_mutex_lock(&me->lock);
-    live_forget_problem(&me->live); /* the live view points into the problem */
+    me->live.problem = NULL; /* it goes now */
     pthread_mutex_unlock(&me->lock);
     codec_request_clear(&r.request);
     uz_results_free(r.results, r.n);

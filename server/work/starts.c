@@ -7,12 +7,17 @@
 
 /* ---- reading */
 
-static bool all_finite(const double *x, int64_t n)
+store_status starts_reactions(store *s, const char *id, int64_t number, double **r, int64_t *count)
 {
-    for (int64_t i = 0; i < n; i++)
-        if (!isfinite(x[i]))
-            return false;
-    return true;
+    store_status status = store_get_vector(s, id, number, "reactions", r, count);
+    bool finite = true;
+    for (int64_t i = 0; i < *count && finite; i++)
+        finite = isfinite((*r)[i]);
+    if (!finite) {
+        free(*r);
+        *r = NULL;
+    }
+    return status;
 }
 
 /* The state that the job left, or its reactions; *out NULL: neither. */
@@ -29,48 +34,39 @@ static store_status load_state(uz_state **out, store *s, const char *id, int64_t
     free(x);
     if (*out || (status != STORE_OK && status != STORE_NOT_FOUND))
         return status;
-    status = store_get_vector(s, id, number, "reactions", &x, &count);
-    if (status == STORE_OK && all_finite(x, count)) /* an infeasible problem has none */
+    status = starts_reactions(s, id, number, &x, &count);
+    if (x)
         *out = state_from_reactions(x, count);
     free(x);
     return status == STORE_NOT_FOUND ? STORE_OK : status;
-}
-
-/* Rows that belong to another number of columns are left out: they were written by another version. */
-static store_status load_history(double **rows, int64_t *count, store *s, const char *id, int64_t number)
-{
-    int64_t columns = 0;
-    store_status status = store_get_history(s, id, number, -1, rows, count, &columns);
-    if (status == STORE_OK && columns != CODEC_HISTORY_COLUMNS)
-        *count = 0;
-    return status == STORE_NOT_FOUND ? STORE_OK : status;
-}
-
-/* What accuracy took that run; nothing where it was not recorded, or is damaged: an answer does not need it. */
-static store_status load_trade(uz_trade *out, store *s, const char *id, int64_t number)
-{
-    double *x = NULL;
-    int64_t count = 0;
-    store_status status = store_get_vector(s, id, number, TRADE_VECTOR, &x, &count);
-    trade_unpack(out, x, status == STORE_OK ? count : 0);
-    free(x);
-    return status == STORE_NOT_FOUND || status == STORE_DAMAGED ? STORE_OK : status;
 }
 
 /* ---- all of them */
 
 static store_status load_continued(starts *out, store *s, const codec_request *request)
 {
-    store_status status = STORE_OK;
-    for (int64_t i = 0; i < out->n && status == STORE_OK; i++) {
-        int64_t number = request->problem.n_cases > 0 ? i + 1 : 0;
-        status = load_state(&out->states[i], s, request->start.job, number, true);
-        if (status == STORE_OK && out->states[i] && out->states[i]->rho)
-            status = load_history(&out->histories[i], &out->rows[i], s, request->start.job, number);
-        if (status == STORE_OK && out->states[i] && out->states[i]->rho)
-            status = load_trade(&out->trades[i], s, request->start.job, number);
+    const char *id = request->start.job;
+    for (int64_t i = 0; i < out->n; i++) {
+        const int64_t number = request->problem.n_cases > 0 ? i + 1 : 0;
+        int64_t columns = 0, count = 0;
+        double *trade = NULL;
+        store_status status = load_state(&out->states[i], s, id, number, true);
+        if (status == STORE_OK && (!out->states[i] || !out->states[i]->rho))
+            continue; /* reactions alone: nothing goes on from there */
+        if (status == STORE_OK)
+            status = store_get_history(s, id, number, -1, &out->histories[i], &out->rows[i], &columns);
+        if (status != STORE_OK && status != STORE_NOT_FOUND)
+            return status;
+        if (status == STORE_OK && columns != CODEC_HISTORY_COLUMNS)
+            out->rows[i] = 0; /* written by another version: left out */
+        /* What accuracy took that run; nothing where it was not recorded, or is damaged: an answer does not need it. */
+        status = store_get_vector(s, id, number, TRADE_VECTOR, &trade, &count);
+        trade_unpack(&out->trades[i], trade, status == STORE_OK ? count : 0);
+        free(trade);
+        if (status != STORE_OK && status != STORE_NOT_FOUND && status != STORE_DAMAGED)
+            return status;
     }
-    return status;
+    return STORE_OK;
 }
 
 /* Every case from the same reactions. */

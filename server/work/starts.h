@@ -19,4 +19,8 @@ typedef struct {
 store_status starts_load(starts *out, store *s, const codec_request *request);
 void starts_clear(starts *s);
 
+/* The reactions that a job, or one case of it, ended with: *count of them, freed by the caller. STORE_OK and *r NULL:
+ * the problem was infeasible, so that they are no numbers. */
+store_status starts_reactions(store *s, const char *id, int64_t number, double **r, int64_t *count);
+
 #endif

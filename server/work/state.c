@@ -84,9 +84,17 @@ static bool take_count(int64_t *out, double x)
     return true;
 }
 
-static bool take_numbers(uz_state *s, const double *x)
+uz_state *state_unpack(const double *x, int64_t count)
 {
-    int64_t phase = 0;
+    double **vectors[STATE_VECTORS];
+    int64_t m = 0, phase = 0;
+    if (count < STATE_NUMBERS || !take_count(&m, x[1]) || m > (count - STATE_NUMBERS) / STATE_VECTORS ||
+        STATE_NUMBERS + STATE_VECTORS * m != count)
+        return NULL;
+    uz_state *s = calloc(1, sizeof *s);
+    if (!s)
+        return NULL;
+    s->m = m;
     bool ok = x[0] == STATE_VERSION && find_method(&s->method, x[2]) && find_method(&s->made_by, x[3]) &&
               take_count(&phase, x[4]) && take_count(&s->phase_end, x[5]) && take_count(&s->iteration, x[6]) &&
               take_count(&s->restarts, x[7]) && take_count(&s->next_check, x[8]) &&
@@ -98,34 +106,15 @@ static bool take_numbers(uz_state *s, const double *x)
     s->best_bound = x[13];
     s->best_relative = x[14];
     s->as_given = x[15] == 1.0;
-    return ok;
-}
-
-static bool take_vectors(uz_state *s, const double *x)
-{
-    double **vectors[STATE_VECTORS];
     list_vectors(s, vectors);
-    for (int k = 0; k < STATE_VECTORS; k++) {
-        *vectors[k] = malloc(s->m > 0 ? (size_t)s->m * sizeof(double) : 1);
-        if (!*vectors[k])
-            return false;
-        if (s->m > 0)
-            memcpy(*vectors[k], x + k * s->m, (size_t)s->m * sizeof(double));
+    x += STATE_NUMBERS;
+    for (int k = 0; ok && k < STATE_VECTORS; k++, x += m) {
+        *vectors[k] = malloc(m > 0 ? (size_t)m * sizeof *x : 1);
+        ok = *vectors[k] != NULL;
+        if (ok && m > 0)
+            memcpy(*vectors[k], x, (size_t)m * sizeof *x);
     }
-    return true;
-}
-
-uz_state *state_unpack(const double *x, int64_t count)
-{
-    int64_t m = 0;
-    if (count < STATE_NUMBERS || !take_count(&m, x[1]) || m > (count - STATE_NUMBERS) / STATE_VECTORS ||
-        STATE_NUMBERS + STATE_VECTORS * m != count)
-        return NULL;
-    uz_state *s = calloc(1, sizeof *s);
-    if (!s)
-        return NULL;
-    s->m = m;
-    if (take_numbers(s, x) && take_vectors(s, x + STATE_NUMBERS))
+    if (ok)
         return s;
     uz_state_free(s);
     return NULL;

@@ -9,13 +9,6 @@
 
 /* ---- time */
 
-double work_clock(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 void work_deadline(struct timespec *deadline, double seconds)
 {
     double s = seconds > 0.0 ? seconds : 0.0; /* NaN: now */
@@ -59,14 +52,14 @@ bool work_is_stopping(work *w)
 bool work_wait_for(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more)
 {
     struct pollfd client = {.fd = fd, .events = POLLRDHUP}; /* poll passes over a negative one */
-    double until = work_clock() + seconds, left = seconds;
+    double until = clock_seconds(CLOCK_MONOTONIC) + seconds, left = seconds;
     listener *l = feed_listen(w->feed, id); /* before the first look, so that no end is missed */
     bool ended = has_ended(w, id);
     while (l && !ended && left > 0.0 && !work_is_stopping(w) && poll(&client, 1, 0) <= 0 &&
            !(no_more && atomic_load(no_more))) {
         feed_wait(l, fd, left < LOOK_AGAIN_S ? left : LOOK_AGAIN_S);
         ended = has_ended(w, id);
-        left = until - work_clock();
+        left = until - clock_seconds(CLOCK_MONOTONIC);
     }
     feed_unlisten(l);
     return ended;

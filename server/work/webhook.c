@@ -40,50 +40,40 @@ static char *part_of(CURLU *url, CURLUPart part, unsigned flags)
     return curl_url_get(url, part, &text, flags) == CURLUE_OK ? text : NULL;
 }
 
-static bool is_listed(const webhooks *all, const char *scheme, const char *host, const char *port)
+bool webhooks_allow(const webhooks *all, const char *text, const char **why)
 {
-    bool own_port = strcmp(port, strcmp(scheme, "https") == 0 ? "443" : "80") == 0;
-    for (size_t i = 0; i < all->options.n_allow; i++) {
-        const char *entry = all->options.allow[i];
-        size_t len = strlen(host);
-        if (strncasecmp(entry, host, len) != 0)
-            continue;
-        if ((entry[len] == '\0' && own_port) || (entry[len] == ':' && strcmp(entry + len + 1, port) == 0))
-            return true;
-    }
-    return false;
-}
-
-static const char *why_not(const webhooks *all, CURLU *url, const char *text)
-{
-    const char *why = NULL;
-    bool parsed = curl_url_set(url, CURLUPART_URL, text, 0) == CURLUE_OK;
+    *why = "this service calls nobody (its option --webhook-allow)";
+    if (!all || all->options.n_allow == 0)
+        return false;
+    CURLU *url = curl_url();
+    *why = "there is no memory to look at it";
+    if (!url)
+        return false;
+    const bool parsed = curl_url_set(url, CURLUPART_URL, text, 0) == CURLUE_OK;
     char *scheme = parsed ? part_of(url, CURLUPART_SCHEME, 0) : NULL;
     char *host = parsed ? part_of(url, CURLUPART_HOST, 0) : NULL;
     char *port = parsed ? part_of(url, CURLUPART_PORT, CURLU_DEFAULT_PORT) : NULL;
     char *user = parsed ? part_of(url, CURLUPART_USER, 0) : NULL;
     if (!scheme || !host || !port || (strcmp(scheme, "http") != 0 && strcmp(scheme, "https") != 0))
-        why = "it is no address that begins with http:// or https://";
+        *why = "it is no address that begins with http:// or https://";
     else if (user)
-        why = "it must not have a user or a password";
-    else if (!is_listed(all, scheme, host, port))
-        why = "this service does not call that host and port (its option --webhook-allow)";
+        *why = "it must not have a user or a password";
+    else {
+        const bool own_port = strcmp(port, strcmp(scheme, "https") == 0 ? "443" : "80") == 0;
+        const size_t len = strlen(host);
+        *why = "this service does not call that host and port (its option --webhook-allow)";
+        for (size_t i = 0; i < all->options.n_allow; i++) {
+            const char *entry = all->options.allow[i];
+            if (strncasecmp(entry, host, len) == 0 &&
+                ((entry[len] == '\0' && own_port) || (entry[len] == ':' && strcmp(entry + len + 1, port) == 0)))
+                *why = NULL;
+        }
+    }
     curl_free(scheme);
     curl_free(host);
     curl_free(port);
     curl_free(user);
-    return why;
-}
-
-bool webhooks_allow(const webhooks *all, const char *url, const char **why)
-{
-    CURLU *parsed = NULL;
-    *why = "this service calls nobody (its option --webhook-allow)";
-    if (!all || all->options.n_allow == 0)
-        return false;
-    parsed = curl_url();
-    *why = parsed ? why_not(all, parsed, url) : "there is no memory to look at it";
-    curl_url_cleanup(parsed);
+    curl_url_cleanup(url);
     return !*why;
 }
 

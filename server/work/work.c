@@ -261,7 +261,7 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
 void work_stop(work *w, double drain_s)
 {
     struct timespec deadline;
-    double until = work_clock() + (drain_s > 0.0 ? drain_s : 0.0);
+    double until = clock_seconds(CLOCK_MONOTONIC) + (drain_s > 0.0 ? drain_s : 0.0);
     pthread_mutex_lock(&w->lock);
     bool first = !w->stopping;
     w->drain_until = first || until < w->drain_until ? until : w->drain_until;
@@ -271,8 +271,9 @@ void work_stop(work *w, double drain_s)
     pthread_mutex_unlock(&w->lock);
     feed_wake_all(w->feed);
     pthread_mutex_lock(&w->lock);
-    while (first && w->alive > 0 && work_clock() < w->drain_until) { /* another call may bring that time nearer */
-        work_deadline(&deadline, w->drain_until - work_clock());
+    while (first && w->alive > 0 &&
+           clock_seconds(CLOCK_MONOTONIC) < w->drain_until) { /* another call may bring that time nearer */
+        work_deadline(&deadline, w->drain_until - clock_seconds(CLOCK_MONOTONIC));
         pthread_cond_timedwait(&w->idle, &w->lock, &deadline);
     }
     while (!first && !w->stopped)
@@ -391,19 +392,9 @@ uz_cache *work_cache(work *w)
     return w->cache;
 }
 
-size_t work_cache_bytes(const work *w)
+const work_options *work_settings(const work *w)
 {
-    return w->options.cache_bytes;
-}
-
-size_t work_solve_bytes(const work *w)
-{
-    return w->options.solve_bytes;
-}
-
-int work_workers(const work *w)
-{
-    return w->options.workers;
+    return &w->options;
 }
 
 int work_busy(work *w)

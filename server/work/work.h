@@ -78,10 +78,8 @@ typedef struct {
 bool work_live_history(work *w, const char *id, const char *case_name, int64_t after, work_history *out);
 
 uz_cache *work_cache(work *w);
-size_t work_cache_bytes(const work *w);
-size_t work_solve_bytes(const work *w); /* of one solve; 0: no limit */
-int work_workers(const work *w);
-int work_busy(work *w); /* workers that run a job */
+const work_options *work_settings(const work *w); /* as they are in force */
+int work_busy(work *w);                           /* workers that run a job */
 
 /* Stops: no more claims; running jobs get drain_s seconds to end, then they are interrupted and released back to
  * accepted. Waiters wake at once. Returns when every worker has ended; a factorization cannot be interrupted and is

@@ -21,7 +21,8 @@ connection *connection_new(transport *server, int fd, const struct sockaddr *add
     c->server = server;
     c->fd = fd;
     c->place = peer_begin(server->peers, address);
-    c->deadline = deadlines_add(server->deadlines, fd, http_now() + server->options.request_deadline_s);
+    c->deadline =
+        deadlines_add(server->deadlines, fd, clock_seconds(CLOCK_MONOTONIC) + server->options.request_deadline_s);
     if (!c->deadline || !c->place) {
         deadline_remove(c->deadline);
         peer_end(c->place);
@@ -81,7 +82,7 @@ void connection_begin_request(connection *c, const char *raw_target)
     rq->server = c->server;
     rq->fd = c->fd;
     rq->address_len = peer_address(c->place, rq->address);
-    rq->started = http_now();
+    rq->started = clock_seconds(CLOCK_MONOTONIC);
     c->request = rq;
     c->layout = (framing_layout){.target = raw_target, .target_len = strlen(raw_target)};
     deadline_set(c->deadline, rq->started + c->server->options.request_deadline_s, !c->server->tls);
@@ -94,9 +95,9 @@ void connection_begin_request(connection *c, const char *raw_target)
 static void linger(const connection *c)
 {
     char dropped[16384];
-    double end = http_now() + LINGER_S;
+    double end = clock_seconds(CLOCK_MONOTONIC) + LINGER_S;
     shutdown(c->fd, SHUT_WR);
-    while (http_now() < end && !atomic_load(&c->server->stopping)) {
+    while (clock_seconds(CLOCK_MONOTONIC) < end && !atomic_load(&c->server->stopping)) {
         struct pollfd p = {.fd = c->fd, .events = POLLIN};
         int ready = poll(&p, 1, LOOK_MS);
         if (ready < 0 || (ready > 0 && recv(c->fd, dropped, sizeof dropped, MSG_DONTWAIT) <= 0))
@@ -109,7 +110,7 @@ static bool send_reply(connection *c, struct MHD_Connection *mhd)
     http_reply *reply = &c->request->reply;
     request_note_reply(c->request);
     double allowed = c->server->options.request_deadline_s + (double)reply->len / SLOWEST_RATE;
-    deadline_set(c->deadline, reply->source.read ? INFINITY : http_now() + allowed, false);
+    deadline_set(c->deadline, reply->source.read ? INFINITY : clock_seconds(CLOCK_MONOTONIC) + allowed, false);
     return reply_send(mhd, reply);
 }
 
@@ -375,5 +376,5 @@ void connection_end_request(connection *c, unsigned status, bool completed)
         linger(c);
     c->server->handlers.account(c->server->handlers.ctx, c->request, completed, deadline_expired(c->deadline));
     request_free(c->server, &c->request);
-    deadline_set(c->deadline, http_now() + c->server->options.request_deadline_s, false);
+    deadline_set(c->deadline, clock_seconds(CLOCK_MONOTONIC) + c->server->options.request_deadline_s, false);
 }

@@ -27,20 +27,13 @@ struct deadlines {
     char *last_words;
 };
 
-double http_now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static void *watch(void *argument)
 {
     deadlines *all = argument;
     pthread_mutex_lock(&all->mutex);
     while (!all->stop) {
         /* what is overdue is cut */
-        const double now = http_now();
+        const double now = clock_seconds(CLOCK_MONOTONIC);
         double earliest = INFINITY;
         for (deadline *d = all->first; d; d = d->next) {
             if (d->at <= now) {

@@ -30,7 +30,7 @@ typedef struct held {
     int fd;
     char *out; /* what the socket has not taken yet, from `at` to len */
     size_t at, len;
-    double due; /* on http_now's clock: when it must be served, whatever happens */
+    double due; /* on CLOCK_MONOTONIC: when it must be served, whatever happens */
     uint32_t watched;
     bool chunked, last, ending, over, is_ready;
     /* last: nothing follows `out`; ending: all was sent, the client closes */
@@ -124,10 +124,10 @@ static bool flush(const holder *h, held *one)
 {
     ssize_t n = one->out ? send(one->fd, one->out + one->at, one->len - one->at, MSG_NOSIGNAL | MSG_DONTWAIT) : 0;
     if (n < 0)
-        return (errno == EAGAIN || errno == EINTR) && http_now() < one->due;
+        return (errno == EAGAIN || errno == EINTR) && clock_seconds(CLOCK_MONOTONIC) < one->due;
     one->at += (size_t)n;
     if (n > 0)
-        one->due = http_now() + h->patience_s;
+        one->due = clock_seconds(CLOCK_MONOTONIC) + h->patience_s;
     if (one->at == one->len) {
         free(one->out);
         one->out = NULL;
@@ -169,9 +169,9 @@ static bool serve(holder *h, held *one)
         for (int i = 0; n > 0 && i < PIECES; i++)
             n = recv(one->fd, h->buffer, PIECE, MSG_DONTWAIT);
         const bool open = n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
-        return open && http_now() < one->due;
+        return open && clock_seconds(CLOCK_MONOTONIC) < one->due;
     }
-    bool waits = !one->out && !one->last && http_now() < one->due;
+    bool waits = !one->out && !one->last && clock_seconds(CLOCK_MONOTONIC) < one->due;
     for (int i = 0; !waits && more && !one->last && i < PIECES; i++) {
         if (!flush(h, one))
             return false;
@@ -180,13 +180,13 @@ static bool serve(holder *h, held *one)
         if (!say(h, one, &more))
             return false;
         if (one->out)
-            one->due = http_now() + h->patience_s;
+            one->due = clock_seconds(CLOCK_MONOTONIC) + h->patience_s;
     }
     if (!flush(h, one))
         return false;
     if (one->last && !one->out) {
         one->ending = true;
-        one->due = http_now() + LINGER_S;
+        one->due = clock_seconds(CLOCK_MONOTONIC) + LINGER_S;
         shutdown(one->fd, SHUT_WR);
     } else if (more && !waits && !one->out)
         one->due = 0.0; /* it has more to say, after the others */
@@ -267,7 +267,7 @@ static void *hold(void *argument)
             one->is_ready = false;
             attend(h, one);
         }
-        const double now = http_now();
+        const double now = clock_seconds(CLOCK_MONOTONIC);
         const bool due = now >= h->soonest;
         if (due)
             h->soonest = INFINITY;
@@ -279,7 +279,7 @@ static void *hold(void *argument)
                 h->soonest = fmin(h->soonest, at->due);
         }
         free_buried(h);
-        const double left = h->soonest - http_now();
+        const double left = h->soonest - clock_seconds(CLOCK_MONOTONIC);
         int n = epoll_wait(h->epoll, events, EVENTS, left <= 0.0 ? 0 : (int)fmin(ceil(left * 1e3), 1e6));
         for (int i = 0; i < n; i++)
             notice(h, &events[i]);
@@ -367,7 +367,7 @@ bool holder_take(holder *h, int fd, http_request *rq, char *head, bool chunked, 
     *source->held = true;
     one->out = head;
     one->len = head ? strlen(head) : 0;
-    one->due = head ? http_now() + h->patience_s : 0.0;
+    one->due = head ? clock_seconds(CLOCK_MONOTONIC) + h->patience_s : 0.0;
     pthread_mutex_lock(&h->lock);
     one->next = h->arriving;
     h->arriving = one;

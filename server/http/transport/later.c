@@ -39,7 +39,7 @@ bool stream_say(event_stream *s, const char *event, const char *id, const char *
         return false;
     s->text = grown;
     s->len += (size_t)snprintf(s->text + s->len, more, FORM, event, id, data);
-    s->told = s->spoke = http_now();
+    s->told = s->spoke = clock_seconds(CLOCK_MONOTONIC);
     return true;
 }
 
@@ -67,21 +67,22 @@ static ptrdiff_t stream_read(void *ctx, char *out, size_t size)
             return REPLY_STREAM_BREAKS;
         if (s->text)
             continue;
-        if (http_now() - s->spoke >= HEARTBEAT_S) {
+        if (clock_seconds(CLOCK_MONOTONIC) - s->spoke >= HEARTBEAT_S) {
             static const char COMMENT[] = ":\n\n";
             if (size < sizeof COMMENT)
                 return REPLY_STREAM_ENDS;
-            s->spoke = http_now();
+            s->spoke = clock_seconds(CLOCK_MONOTONIC);
             memcpy(out, COMMENT, sizeof COMMENT - 1);
             return sizeof COMMENT - 1;
         }
         if (s->held)
             return 0;
         /* Until there may be something to tell; what comes in quick succession is told together. */
-        double due = s->spoke + HEARTBEAT_S - http_now(), pause = s->told + s->every_s - http_now();
+        double due = s->spoke + HEARTBEAT_S - clock_seconds(CLOCK_MONOTONIC),
+               pause = s->told + s->every_s - clock_seconds(CLOCK_MONOTONIC);
         if (feed_wait(s->listener, s->rq->fd, fmax(due, 0.001)))
             for (; pause > 0.0 && !request_client_gone(s->rq) && !atomic_load(&s->server->draining);
-                 pause = s->told + s->every_s - http_now())
+                 pause = s->told + s->every_s - clock_seconds(CLOCK_MONOTONIC))
                 feed_wait(s->listener, s->rq->fd, pause);
     }
 }
@@ -116,7 +117,7 @@ void stream_reply(http_request *rq, event_stream *s, const char *id, http_reply 
     }
     s->server = server;
     s->rq = rq;
-    s->spoke = http_now();
+    s->spoke = clock_seconds(CLOCK_MONOTONIC);
     s->listener = feed_listen(server->options.feed, id);
     if (s->listener) {
         reply_drop_body(reply);
@@ -144,7 +145,7 @@ static void delayed_free(void *ctx)
 
 static bool is_over(delayed_reply *d)
 {
-    return d->ready(d) || http_now() >= d->until || atomic_load(&d->server->draining);
+    return d->ready(d) || clock_seconds(CLOCK_MONOTONIC) >= d->until || atomic_load(&d->server->draining);
 }
 
 /* ---- without a thread */
@@ -152,7 +153,7 @@ static bool is_over(delayed_reply *d)
 static double delayed_due(void *ctx, bool told)
 {
     const delayed_reply *d = ctx;
-    return told ? 0.0 : fmin(d->until, http_now() + LOOK_AGAIN_S);
+    return told ? 0.0 : fmin(d->until, clock_seconds(CLOCK_MONOTONIC) + LOOK_AGAIN_S);
 }
 
 static ptrdiff_t delayed_read(void *ctx, char *out, size_t size)
@@ -183,7 +184,7 @@ static void delayed_answer(void *ctx)
 {
     delayed_reply *d = ctx;
     while (!is_over(d) && !request_client_gone(d->rq))
-        feed_wait(d->listener, d->rq->fd, fmax(delayed_due(d, false) - http_now(), 0.001));
+        feed_wait(d->listener, d->rq->fd, fmax(delayed_due(d, false) - clock_seconds(CLOCK_MONOTONIC), 0.001));
     d->make(d, &d->rq->reply);
 }
 

@@ -165,7 +165,7 @@ bool transport_start(transport **out, int listen_fd, const transport_handlers *h
     atomic_init(&server->stopping, false);
     uint64_t random = 0;
     if (getrandom(&random, sizeof random, 0) != (ssize_t)sizeof random)
-        random = (uint64_t)(http_now() * 1e9);
+        random = (uint64_t)(clock_seconds(CLOCK_MONOTONIC) * 1e9);
     snprintf(server->id_prefix, sizeof server->id_prefix, "%016llx", (unsigned long long)random);
     /* The tiling of a header block is how 0.9.x parses; later versions refuse by themselves what it finds. */
     server->check_layout = strncmp(MHD_get_version(), "0.9.", 4) == 0;
@@ -230,12 +230,12 @@ void transport_stop(transport *server)
     /* Nothing more is heard, and what is being said gets a moment. libmicrohttpd 0.9.75 must not be stopped while it
      * refuses a request by itself: MHD_queue_response then takes no reply but says that it did, and the reply that is
      * not there is read (transmit_error_response_len). */
-    double begun = http_now(), spent = 0.0;
+    double begun = clock_seconds(CLOCK_MONOTONIC), spent = 0.0;
     deadlines_hear_no_more(server->deadlines);
     while (atomic_load(&server->connections) > 0 &&
            (spent < REPLY_S || (atomic_load(&server->refusing) > 0 && spent < REFUSE_S))) {
         nanosleep(&(struct timespec){.tv_nsec = 2000000}, NULL);
-        spent = http_now() - begun;
+        spent = clock_seconds(CLOCK_MONOTONIC) - begun;
     }
     MHD_stop_daemon(server->daemon);
     if (listening != MHD_INVALID_SOCKET)

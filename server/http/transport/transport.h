@@ -9,6 +9,7 @@
 #ifndef SERVER_HTTP_TRANSPORT_H
 #define SERVER_HTTP_TRANSPORT_H
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "base/problem_details.h"
 #include "work/feed.h"
@@ -20,9 +21,6 @@
 
 typedef struct transport transport;
 struct sockaddr;
-
-/* Seconds on the clock of every time in this folder (CLOCK_MONOTONIC). */
-double http_now(void);
 
 /* ---- header fields */
 
@@ -83,7 +81,7 @@ typedef struct {
     void *ctx;
     listener *listener; /* ctx's own: wakes whoever has to read */
     bool *held;         /* ctx's own; set: from now on read returns 0 instead of blocking; NULL: it can't */
-    /* When to read again at the latest, on http_now's clock; told: the listener was. */
+    /* When to read again at the latest, on CLOCK_MONOTONIC; told: the listener was. */
     double (*due)(void *ctx, bool told);
     bool is_message; /* what read gives is the whole message, header fields included */
     /* Of such a source whose connection keeps its thread: waits here and puts the reply. */
@@ -150,7 +148,7 @@ typedef struct http_request {
     unsigned char address[16]; /* what tells its client from others (peer.h), address_len bytes; 0: unknown */
     size_t address_len;
     char method[16];
-    double started; /* on http_now's clock */
+    double started; /* on CLOCK_MONOTONIC */
     /* Set by `admit`. */
     bool streamed;                /* the body goes to `take` as it comes */
     size_t body_limit;            /* bytes */
@@ -208,7 +206,7 @@ typedef struct event_stream {
     bool held;  /* a read without anything to tell returns */
     char *text; /* what is being sent */
     size_t len, at;
-    double told, spoke; /* on http_now's clock: the last event, the last byte */
+    double told, spoke; /* on CLOCK_MONOTONIC: the last event, the last byte */
 } event_stream;
 
 /* Copies what the client says that it has seen, "" if it says nothing. */
@@ -229,7 +227,7 @@ typedef struct delayed_reply {
     void (*make)(struct delayed_reply *d, http_reply *reply);
     /* Frees what d has, and d. */
     void (*free)(struct delayed_reply *d);
-    double until; /* on http_now's clock: then it is made in any case */
+    double until; /* on CLOCK_MONOTONIC: then it is made in any case */
     /* Private to later.c. */
     transport *server;
     http_request *rq; /* gone before the reply is freed */

@@ -234,7 +234,7 @@ TEST(a_deadline_cuts_a_connection)
     char text[64] = "";
     CHECK(socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0);
     deadlines *all = deadlines_new("too late");
-    double start = http_now();
+    double start = clock_seconds(CLOCK_MONOTONIC);
     deadline *never = deadlines_add(all, -1, INFINITY);
     deadline *d = deadlines_add(all, ends[0], start + 100);
     deadline_set(d, start + 0.05, true);
@@ -242,7 +242,7 @@ TEST(a_deadline_cuts_a_connection)
     CHECK_INT(read(ends[1], text, sizeof text - 1), 8);
     CHECK_STR(text, "too late");
     CHECK_INT(read(ends[1], text, sizeof text), 0);
-    double took = http_now() - start;
+    double took = clock_seconds(CLOCK_MONOTONIC) - start;
     CHECK_MSG(took > 0.04 && took < 5, "%g", took);
     CHECK(deadline_expired(d) && !deadline_expired(never));
     deadline_remove(d);

@@ -168,7 +168,7 @@ static void check_verdict(const char *outcome, codec_assertion a, const char *wa
     char *text = summary_of(outcome);
     const codec_request request = {.assertions = &a, .n_assertions = 1};
     snprintf(result, sizeof result, "\"result\":\"%s\"", wanted);
-    CHECK(judge_summary(&text, &request, NULL, NULL));
+    CHECK(judge(&text, &request, NULL, false, NULL));
     CHECK_MSG(strstr(text, result), "%s: wanted %s in %s", a.quantity, wanted, text);
     CHECK_MSG(!strstr(text, "\"reason\"") == (strcmp(wanted, "pass") == 0), "%s", text);
     CHECK_MSG(
@@ -228,14 +228,14 @@ TEST(a_line_says_what_was_found)
     const codec_request request = {.assertions = &a, .n_assertions = 1};
     snprintf(a.name, sizeof a.name, "the \"energy\"");
     char *text = strdup("{\"outcome\":\"converged\",\"energy\":{\"primal\":-1.625},\"certificate\":{\"gap\":0}}");
-    CHECK(judge_summary(&text, &request, NULL, NULL));
+    CHECK(judge(&text, &request, NULL, false, NULL));
     CHECK_STR(text, "{\"outcome\":\"converged\",\"energy\":{\"primal\":-1.625},\"certificate\":{\"gap\":0},"
                     "\"assertions\":[{\"name\":\"the \\\"energy\\\"\",\"quantity\":\"energy.primal\",\"near\":-1.25,"
                     "\"absolute\":0.25,\"value\":-1.625,\"error\":0,\"result\":\"fail\","
                     "\"reason\":\"-1.625 is not within 0.25 of -1.25\"}],\"assertions_passed\":false}");
     free(text);
     text = strdup("{}");
-    CHECK(judge_summary(&text, &(codec_request){.tags = NULL}, NULL, NULL));
+    CHECK(judge(&text, &(codec_request){.tags = NULL}, NULL, false, NULL));
     CHECK_STR(text, "{}");
     free(text);
 }
@@ -250,7 +250,7 @@ static void judge_case(const codec_request *request, const char *name, double pr
     snprintf(made, sizeof made,
              "{\"outcome\":\"converged\",\"contact\":{\"max_pressure\":%.17g},\"timings_s\":{\"total\":9}}", pressure);
     char *text = strdup(made);
-    CHECK(judge_summary(&text, request, name, all));
+    CHECK(judge(&text, request, name, false, all));
     for (const char *at = text; (at = strstr(at, "\"quantity\"")); at++)
         found++;
     CHECK_INT(found, lines);
@@ -275,7 +275,7 @@ TEST(cases_are_judged_each_and_together)
     CHECK_STR(all[1].case_name, "c"); /* nearest to it */
     CHECK_STR(all[4].case_name, "b");
     char *text = strdup("{\"outcome\":\"converged\",\"cases\":{\"converged\":3},\"timings_s\":{\"total\":0.5}}");
-    CHECK(judge_whole(&text, &request, all));
+    CHECK(judge(&text, &request, NULL, true, all));
     CHECK_MSG(strstr(text,
                      "\"quantity\":\"contact.max_pressure\",\"case\":\"c\",\"max\":10,\"value\":13,\"error\":null,"
                      "\"result\":\"fail\",\"reason\":\"13 is above 10\","

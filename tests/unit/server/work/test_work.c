@@ -228,8 +228,8 @@ TEST(every_job_of_many_ends)
         submit(&v, SMALL, id[i]);
     for (int i = 0; i < JOBS; i++)
         CHECK(work_wait(v.w, id[i], 30.0));
-    CHECK_INT(work_workers(v.w), 4);
-    CHECK(work_cache(v.w) && work_cache_bytes(v.w) == 1 << 24);
+    CHECK_INT(work_settings(v.w)->workers, 4);
+    CHECK(work_cache(v.w) && work_settings(v.w)->cache_bytes == 1 << 24);
     CHECK_INT(store_counts(v.place.s, counts), STORE_OK);
     CHECK_INT(counts[JOB_SUCCESSFUL], JOBS);
     service_end(&v);

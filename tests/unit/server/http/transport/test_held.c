@@ -47,7 +47,7 @@ static ptrdiff_t speak(void *ctx, char *out, size_t size)
 static double speak_due(void *ctx, bool told)
 {
     const speaker *s = ctx;
-    return told ? 0.0 : http_now() + s->every_s;
+    return told ? 0.0 : clock_seconds(CLOCK_MONOTONIC) + s->every_s;
 }
 
 static void speaker_end(void *ctx)
@@ -99,7 +99,8 @@ static size_t read_all(int fd, char *out, size_t size)
 
 static void wait_for(atomic_int *number, int value)
 {
-    for (double end = http_now() + 20; atomic_load(number) != value && http_now() < end;)
+    for (double end = clock_seconds(CLOCK_MONOTONIC) + 20;
+         atomic_load(number) != value && clock_seconds(CLOCK_MONOTONIC) < end;)
         poll(NULL, 0, 5);
 }
 
