@@ -29,9 +29,9 @@ typedef struct {
     const double *p, *h;
     uz_inverse_norm inverse_norm;
     uz_measure_doubt
-        measure_doubt;    /* asked where rcond says that it may matter; NULL: inverse_norm is an upper bound */
-    void *ctx;            /* of both */
-    double rcond;         /* an estimate of the least eigenvalue of K, scaled by its diagonal */
+        measure_doubt; /* asked where rcond says that it may matter to what is sharp; NULL: inverse_norm is a bound */
+    void *ctx;         /* of both */
+    double rcond;      /* an estimate of the least eigenvalue of K, scaled by its diagonal */
     double inverse_bound; /* e'K^-1 e <= inverse_bound sum e_j^2 / K_jj; INFINITY: unknown. Spares inverse_norm where it
                              is sharp enough: */
     bool precise_energies; /* u'Ku and u'p in double-double precision too: what is shown, not what is bounded, needs it

@@ -12,12 +12,13 @@ typedef struct {
     int64_t d;
     double *L;
     double rcond; /* of its pivots, which is no estimate: what is measured has to make up for it */
+    int measured; /* how often the doubt was asked for */
 } inverse;
 
 static inverse make_inverse(const uz_csc *K)
 {
     int64_t d = K->cols;
-    inverse f = {K, d, vector(d * d), 0};
+    inverse f = {K, d, vector(d * d), 0, 0};
     double least = INFINITY, largest = 0;
     for (int64_t j = 0; j < d; j++)
         for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
@@ -71,7 +72,8 @@ static uz_status inverse_norm(void *ctx, double *value, double *e, uz_error *err
 
 static uz_status measure_doubt(void *ctx, double *doubt, uz_error *err)
 {
-    const inverse *f = ctx;
+    inverse *f = ctx;
+    f->measured++;
     return uz_distrust(doubt, f->K, half_solve, ctx, NULL, err);
 }
 
@@ -474,4 +476,34 @@ TEST(distrust_finds_that_a_matrix_is_not_definite)
     free_inverse(&f);
     uz_csc_clear(&K);
     uz_csc_clear(&L);
+}
+
+/* A doubt that is assumed stays in the bound; it is measured only where the bound would be duller than was asked for,
+ * or where little is left of the factor. */
+TEST(doubt_is_measured_where_it_matters_to_what_was_asked)
+{
+    const struct {
+        double doubt, sharp;
+        int measured;
+    } cases[] = {{5e-3, 0.0, 0}, {0.1, 1e-3, 0}, {0.45, 1e-3, 0}, {0.1, 1e-9, 1}, {0.1, 0.0, 1}, {0.7, 1e-3, 1}};
+    const double dense[] = {2, 1, 1, 2}, p[] = {1, 1};
+    uz_qp qp = {.K = csc_from_dense(dense, 2, 2, true), .p = vector(2), .h = vector(0)};
+    CHECK_INT(uz_csc_init(&qp.N, 0, 2, 0, NULL), UZ_OK);
+    memcpy(qp.p, p, sizeof p);
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        bench b = make_bench(qp);
+        uz_certify_input in = input_of(&b);
+        uz_certificate c;
+        in.sharp = cases[k].sharp;
+        in.rcond = 1e3 * uz_bound_doubt(1.0, 2) / cases[k].doubt;
+        b.u[0] = b.u[1] = (1 + 1e-6) / 3; /* u* = (1, 1) / 3: wrong by 1e-6 in the energy norm */
+        CHECK_INT(uz_certify(&c, b.r, b.g, b.u, &in, NULL), UZ_OK);
+        CHECK_INT(b.inv.measured, cases[k].measured);
+        CHECK_REL(c.relative_error, cases[k].measured ? 1e-6 : 1e-6 / sqrt(1 - cases[k].doubt), 1e-2);
+        free_inverse(&b.inv);
+        free(b.u);
+        free(b.r);
+        free(b.g);
+    }
+    uz_qp_clear(&qp);
 }
