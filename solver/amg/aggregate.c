@@ -21,24 +21,16 @@ typedef struct {
     int32_t *dof; /* n */
 } members;
 
-static void sum_up(int64_t *ptr, int64_t n)
+void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t n, int64_t groups)
 {
     for (int64_t i = 0; i < n; i++)
-        ptr[i + 1] += ptr[i];
-}
-
-static bool list_members(members *list, const int32_t *node, int64_t n, int64_t n_nodes)
-{
-    list->ptr = uz_alloc_zero(n_nodes + 2, sizeof *list->ptr);
-    list->dof = uz_alloc(n, sizeof *list->dof);
-    if (!list->ptr || !list->dof)
-        return false;
+        if (of[i] >= 0)
+            start[of[i] + 2]++;
+    for (int64_t a = 0; a <= groups; a++)
+        start[a + 1] += start[a];
     for (int64_t i = 0; i < n; i++)
-        list->ptr[node[i] + 2]++;
-    sum_up(list->ptr, n_nodes + 1);
-    for (int64_t i = 0; i < n; i++)
-        list->dof[list->ptr[node[i] + 1]++] = (int32_t)i;
-    return true;
+        if (of[i] >= 0)
+            member[start[of[i] + 1]++] = (int32_t)i;
 }
 
 /* What is needed to visit the strong neighbours of a node in the lower triangle once each. */
@@ -82,7 +74,8 @@ static bool build_graph(graph *g, visit *v, int32_t *found, int64_t n_nodes)
         for (int64_t k = 0; k < count; k++)
             g->ptr[found[k] + 2]++;
     }
-    sum_up(g->ptr, n_nodes + 1);
+    for (int64_t a = 0; a <= n_nodes; a++)
+        g->ptr[a + 1] += g->ptr[a];
     g->node = uz_alloc(g->ptr[n_nodes + 1], sizeof *g->node);
     if (!g->node)
         return false;
@@ -99,14 +92,6 @@ static bool build_graph(graph *g, visit *v, int32_t *found, int64_t n_nodes)
 
 enum { NONE = -1, ALONE = -2 };
 
-static bool whole_neighbourhood_is_free(const graph *g, const int32_t *aggregate, int64_t a)
-{
-    for (int64_t k = g->ptr[a]; k < g->ptr[a + 1]; k++)
-        if (aggregate[g->node[k]] >= 0)
-            return false;
-    return true;
-}
-
 static void take_free_neighbours(const graph *g, int32_t *aggregate, int64_t a, int32_t number)
 {
     aggregate[a] = number;
@@ -121,9 +106,13 @@ static int64_t collect(const graph *g, int32_t *aggregate, int64_t n_nodes)
     int32_t count = 0;
     for (int64_t a = 0; a < n_nodes; a++)
         aggregate[a] = g->ptr[a] == g->ptr[a + 1] ? ALONE : NONE;
-    for (int64_t a = 0; a < n_nodes; a++)
-        if (aggregate[a] == NONE && whole_neighbourhood_is_free(g, aggregate, a))
+    for (int64_t a = 0; a < n_nodes; a++) {
+        bool free_around = aggregate[a] == NONE;
+        for (int64_t k = g->ptr[a]; free_around && k < g->ptr[a + 1]; k++)
+            free_around = aggregate[g->node[k]] < 0;
+        if (free_around)
             take_free_neighbours(g, aggregate, a, count++);
+    }
     int32_t kept = count;
     for (int64_t a = 0; a < n_nodes; a++)
         for (int64_t k = g->ptr[a]; aggregate[a] == NONE && k < g->ptr[a + 1]; k++) {
@@ -144,11 +133,14 @@ static int64_t collect(const graph *g, int32_t *aggregate, int64_t n_nodes)
 uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_csc *A, const double *inverse, const int32_t *node,
                        int64_t n_nodes, double threshold, uz_error *err)
 {
-    members list = {0};
+    members list = {uz_alloc_zero(n_nodes + 2, sizeof *list.ptr), uz_alloc(A->cols, sizeof *list.dof)};
     graph g = {0};
     int32_t *found = uz_alloc(n_nodes, sizeof *found), *seen = uz_alloc_zero(n_nodes, sizeof *seen);
     visit v = {A, inverse, node, &list, seen, threshold * threshold};
-    bool ok = found && seen && list_members(&list, node, A->cols, n_nodes) && build_graph(&g, &v, found, n_nodes);
+    bool ok = found && seen && list.ptr && list.dof;
+    if (ok)
+        uz_list_members(list.ptr, list.dof, node, A->cols, n_nodes);
+    ok = ok && build_graph(&g, &v, found, n_nodes);
     *count = ok ? collect(&g, aggregate, n_nodes) : 0;
     free(found);
     free(seen);

@@ -51,15 +51,17 @@ typedef struct uz_multigrid_room uz_multigrid_room; /* one per thread */
 uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_modes *modes, const bool *held,
                               size_t memory_limit, const uz_stop *stop, uz_error *err);
 void uz_multigrid_free(uz_multigrid *mg);
-size_t uz_multigrid_bytes(const uz_multigrid *mg);
-int uz_multigrid_levels(const uz_multigrid *mg);
+typedef struct {
+    int levels;
+    size_t bytes;
+    double most; /* a bound on lambda_max(diag(K)^-1 M) */
+} uz_multigrid_info;
+uz_multigrid_info uz_multigrid_describe(const uz_multigrid *mg);
 uz_multigrid_room *uz_multigrid_room_new(const uz_multigrid *mg); /* NULL: no memory */
 void uz_multigrid_room_free(uz_multigrid_room *room);
 /* z = M^-1 r (n); z and r do not overlap. */
 uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigrid_room *room, double *z,
                              const double *r, uz_error *err);
-/* A bound on lambda_max(diag(K)^-1 M). */
-double uz_multigrid_most(const uz_multigrid *mg);
 
 /* ------------------------------------------------------- conjugate gradients */
 

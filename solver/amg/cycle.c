@@ -38,70 +38,59 @@ void uz_multigrid_room_free(uz_multigrid_room *room)
     free(room);
 }
 
-/* x = (D + L)^-1 b; t is used up. A dof whose inverse is 0 stays at 0. */
-static void sweep_forward(double *x, double *t, const uz_csc *A, const double *inverse, const double *b)
+/* Downwards: one sweep from 0, x = (D + L)^-1 b, then the residual to the next level, coarse = P'(b - A x). All of the
+ * residual but -L'x is 0. A dof whose inverse is 0 stays at 0. t: room. */
+static void descend(double *x, double *coarse, double *t, const uz_level *level, const uz_csc *A, const double *b,
+                    int k)
 {
+    const double *inverse = level->inverse;
     memcpy(t, b, (size_t)A->cols * sizeof *t);
     for (int64_t j = 0; j < A->cols; j++) {
         double value = x[j] = inverse[j] * t[j];
-        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
-            t[A->idx[k]] -= A->val[k] * value;
+        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
+            t[A->idx[q]] -= A->val[q] * value;
     }
-}
-
-/* t = b - A x after a forward sweep from 0: all of it but -L'x is 0. */
-static void residual_after_sweep(double *t, const uz_csc *A, const double *x)
-{
     for (int64_t j = 0; j < A->cols; j++) {
         double sum = 0.0;
-        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
-            sum += A->val[k] * x[A->idx[k]];
+        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
+            sum += A->val[q] * x[A->idx[q]];
         t[j] = -sum;
     }
-}
-
-/* x = (D + L')^-1 (b - L x), through t. */
-static void sweep_backward(double *x, double *t, const uz_csc *A, const double *inverse, const double *b)
-{
-    memcpy(t, b, (size_t)A->cols * sizeof *t);
-    for (int64_t j = 0; j < A->cols; j++) {
-        double value = x[j];
-        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
-            t[A->idx[k]] -= A->val[k] * value;
-    }
-    for (int64_t j = A->cols - 1; j >= 0; j--) {
-        double sum = t[j];
-        for (int64_t k = A->ptr[j] + 1; k < A->ptr[j + 1]; k++)
-            sum -= A->val[k] * x[A->idx[k]];
-        x[j] = inverse[j] * sum;
-    }
-}
-
-/* b = P't */
-static void restrict_to(double *b, const uz_level *level, const double *t, int k)
-{
-    memset(b, 0, (size_t)(level->aggregates * k) * sizeof *b);
+    memset(coarse, 0, (size_t)(level->aggregates * k) * sizeof *coarse);
     for (int64_t i = 0; i < level->n; i++)
         for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
-            double *to = b + (int64_t)level->block[e] * k;
+            double *to = coarse + (int64_t)level->block[e] * k;
             const float *value = level->value + e * k;
             for (int c = 0; c < k; c++)
                 to[c] += t[i] * (double)value[c];
         }
 }
 
-/* x += P y */
-static void prolong(double *x, const uz_level *level, const double *y, int k)
+/* Upwards: x += P coarse, then a sweep backwards, x = (D + L')^-1 (b - L x). t: room. */
+static void ascend(double *x, const double *coarse, double *t, const uz_level *level, const uz_csc *A, const double *b,
+                   int k)
 {
     for (int64_t i = 0; i < level->n; i++) {
         double sum = 0.0;
         for (int64_t e = level->ptr[i]; e < level->ptr[i + 1]; e++) {
-            const double *from = y + (int64_t)level->block[e] * k;
+            const double *from = coarse + (int64_t)level->block[e] * k;
             const float *value = level->value + e * k;
             for (int c = 0; c < k; c++)
                 sum += from[c] * (double)value[c];
         }
         x[i] += sum;
+    }
+    memcpy(t, b, (size_t)A->cols * sizeof *t);
+    for (int64_t j = 0; j < A->cols; j++) {
+        double value = x[j];
+        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
+            t[A->idx[q]] -= A->val[q] * value;
+    }
+    for (int64_t j = A->cols - 1; j >= 0; j--) {
+        double sum = t[j];
+        for (int64_t q = A->ptr[j] + 1; q < A->ptr[j + 1]; q++)
+            sum -= A->val[q] * x[A->idx[q]];
+        x[j] = level->inverse[j] * sum;
     }
 }
 
@@ -125,9 +114,7 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
         const uz_level *level = &mg->level[l];
         const uz_csc *A = l == 0 ? K : &level->A;
         double *x = l == 0 ? z : room->x[l];
-        sweep_forward(x, room->t[l], A, level->inverse, l == 0 ? r : room->b[l]);
-        residual_after_sweep(room->t[l], A, x);
-        restrict_to(room->b[l + 1], level, room->t[l], mg->k);
+        descend(x, room->b[l + 1], room->t[l], level, A, l == 0 ? r : room->b[l], mg->k);
     }
     uz_status status =
         last == 0 ? solve_coarsest(mg, room, z, r, err) : solve_coarsest(mg, room, room->x[last], room->b[last], err);
@@ -140,8 +127,7 @@ uz_status uz_multigrid_apply(const uz_multigrid *mg, const uz_csc *K, uz_multigr
     for (int l = last - 1; l >= 0; l--) {
         const uz_level *level = &mg->level[l];
         double *x = l == 0 ? z : room->x[l];
-        prolong(x, level, room->x[l + 1], mg->k);
-        sweep_backward(x, room->t[l], l == 0 ? K : &level->A, level->inverse, l == 0 ? r : room->b[l]);
+        ascend(x, room->x[l + 1], room->t[l], level, l == 0 ? K : &level->A, l == 0 ? r : room->b[l], mg->k);
     }
     return status;
 }

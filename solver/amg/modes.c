@@ -31,26 +31,6 @@ static uz_status allocate(uz_modes *modes, int64_t n, int count, uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for the modes of %lld dofs", (long long)n);
 }
 
-/* node[i]: the number of i's group; *most: the largest group. place (n): how many of its group come before i. */
-static int64_t number_groups(int32_t *node, int64_t *place, int64_t *most, const int64_t *head, int64_t n)
-{
-    int64_t count = 0;
-    *most = 0;
-    for (int64_t i = 0; i < n; i++) {
-        bool first = head[i] == i;
-        node[i] = first ? (int32_t)count++ : node[head[i]];
-        place[i] = first ? 0 : place[head[i]]++;
-        if (first)
-            place[i] = 1; /* while it counts: the next place in its group */
-    }
-    for (int64_t i = 0; i < n; i++) {
-        if (head[i] == i)
-            place[i] = 0;
-        *most = place[i] + 1 > *most ? place[i] + 1 : *most;
-    }
-    return count;
-}
-
 uz_status uz_modes_of_matrix(uz_modes *out, const uz_csc *K, uz_error *err)
 {
     int64_t n = K->cols, most = 0, *head = uz_alloc(n, sizeof *head), *place = uz_alloc(n, sizeof *place);
@@ -58,7 +38,18 @@ uz_status uz_modes_of_matrix(uz_modes *out, const uz_csc *K, uz_error *err)
     uz_status status = UZ_ERR_MEMORY;
     memset(out, 0, sizeof *out);
     if (head && place && node && uz_group_dofs(head, K)) {
-        int64_t groups = number_groups(node, place, &most, head, n);
+        /* node[i]: the number of i's group; place[i]: how many of its group come before i, and while it counts, of the
+         * first of a group the next place; most: the largest group. */
+        int64_t groups = 0;
+        for (int64_t i = 0; i < n; i++) {
+            const bool first = head[i] == i;
+            node[i] = first ? (int32_t)groups++ : node[head[i]];
+            place[i] = first ? 1 : place[head[i]]++;
+        }
+        for (int64_t i = 0; i < n; i++) {
+            place[i] = head[i] == i ? 0 : place[i];
+            most = place[i] + 1 > most ? place[i] + 1 : most;
+        }
         int count = most <= 3 ? (int)most : 1; /* larger groups are dense blocks, not nodes */
         status = allocate(out, n, count, err);
         out->n_nodes = groups;
@@ -73,20 +64,6 @@ uz_status uz_modes_of_matrix(uz_modes *out, const uz_csc *K, uz_error *err)
     free(place);
     free(node);
     return status == UZ_ERR_MEMORY ? uz_fail(err, status, "K", "no memory for %lld dofs", (long long)n) : status;
-}
-
-/* The displacement along `axis` of a node at x (from the centre) in each rigid-body mode. */
-static void rigid_modes(float *value, const double *x, int axis, int dim)
-{
-    value[axis] = 1.0F;
-    if (dim == 2) {
-        value[2] = (float)(axis == 0 ? -x[1] : x[0]);
-        return;
-    }
-    for (int turn = 0; turn < 3; turn++) { /* e_turn x x */
-        int a = (turn + 1) % 3, b = (turn + 2) % 3;
-        value[3 + turn] = (float)(axis == a ? -x[b] : axis == b ? x[a] : 0.0);
-    }
 }
 
 uz_status uz_modes_of_body(uz_modes *out, const double *xyz, const int64_t *dof, int64_t n_nodes, int dim, int64_t n,
@@ -112,7 +89,16 @@ uz_status uz_modes_of_body(uz_modes *out, const double *xyz, const int64_t *dof,
         for (int axis = 0; axis < dim; axis++)
             x[axis] = (xyz[i / dim * dim + axis] - 0.5 * (low[axis] + high[axis])) / (size > 0.0 ? size : 1.0);
         out->node[dof[i]] = (int32_t)(i / dim);
-        rigid_modes(out->value + dof[i] * count, x, (int)(i % dim), dim);
+        /* The displacement along this axis of a node at x in each rigid-body mode. */
+        const int axis = (int)(i % dim);
+        float *value = out->value + dof[i] * count;
+        value[axis] = 1.0F;
+        if (dim == 2)
+            value[2] = (float)(axis == 0 ? -x[1] : x[0]);
+        for (int turn = 0; turn < 3 && dim == 3; turn++) { /* e_turn x x */
+            const int a = (turn + 1) % 3, b = (turn + 2) % 3;
+            value[3 + turn] = (float)(axis == a ? -x[b] : axis == b ? x[a] : 0.0);
+        }
     }
     return UZ_OK;
 }

@@ -61,14 +61,6 @@ static double smoothing_range(const uz_level *level, const uz_csc *A, double *x,
     return 1.1 * value;
 }
 
-/* Dofs of nodes in aggregates, but for those that are held. */
-static void spread_aggregates(int32_t *of, const int32_t *aggregate, const int32_t *node, const double *inverse,
-                              int64_t n)
-{
-    for (int64_t i = 0; i < n; i++)
-        of[i] = inverse[i] > 0.0 ? aggregate[node[i]] : -1;
-}
-
 /* What a level is made of; the modes and nodes of level 0 are the caller's. */
 typedef struct {
     int32_t *node;
@@ -95,7 +87,8 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
     bool gain = status == UZ_OK && level->aggregates > 0 && (double)(level->aggregates * k) < LEAST_GAIN * (double)n;
     if (gain) {
         *coarse = uz_alloc(level->aggregates * k * k, sizeof **coarse);
-        spread_aggregates(of, aggregate, from->node, level->inverse, n);
+        for (int64_t i = 0; i < n; i++) /* dofs that are held are in none */
+            of[i] = level->inverse[i] > 0.0 ? aggregate[from->node[i]] : -1;
         if (uz_stop_is_due(stop))
             status = uz_fail_stopped(err);
         else if (!*coarse)
@@ -114,38 +107,18 @@ static uz_status build_prolongation(uz_level *level, float **coarse, const uz_cs
     return status;
 }
 
-static uz_status next_sources(sources *s, float *modes, int64_t aggregates, int k, uz_error *err)
-{
-    free(s->node);
-    free(s->modes);
-    s->modes = modes;
-    s->n_nodes = aggregates;
-    s->node = uz_alloc(aggregates * k, sizeof *s->node);
-    if (!s->node)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld aggregates", (long long)aggregates);
-    for (int64_t i = 0; i < aggregates * k; i++)
-        s->node[i] = (int32_t)(i / k);
-    return UZ_OK;
-}
-
-/* Held dofs of a matrix that is small enough to be the coarsest: their rows become those of the unit matrix. */
-static uz_status isolate_held(uz_csc *out, const uz_csc *K, const bool *held, uz_error *err)
-{
-    uz_status status = uz_csc_copy(out, K, err);
-    for (int64_t j = 0; status == UZ_OK && j < K->cols; j++)
-        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
-            if (held && (held[j] || held[K->idx[k]]))
-                out->val[k] = K->idx[k] == j ? 1.0 : 0.0;
-    return status;
-}
-
 static uz_status factor_coarsest(uz_multigrid *mg, const uz_csc *K, const bool *held, size_t memory_limit,
                                  const uz_stop *stop, uz_error *err)
 {
     int last = mg->levels - 1;
     uz_csc alone = {0};
     uz_error inner = {0};
-    uz_status status = last == 0 ? isolate_held(&alone, K, held, err) : UZ_OK;
+    uz_status status = last == 0 ? uz_csc_copy(&alone, K, err) : UZ_OK;
+    /* A matrix that is small enough to be the coarsest: rows of held dofs become those of the unit matrix. */
+    for (int64_t j = 0; status == UZ_OK && last == 0 && held && j < K->cols; j++)
+        for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++)
+            if (held[j] || held[K->idx[k]])
+                alone.val[k] = K->idx[k] == j ? 1.0 : 0.0;
     if (status == UZ_OK)
         status = uz_factor_plain(&mg->coarsest, last == 0 ? &alone : &mg->level[last].A, UZ_ORDERING_AMD, memory_limit,
                                  stop ? stop->hooks : NULL, last == 0 ? err : &inner);
@@ -159,20 +132,19 @@ static uz_status factor_coarsest(uz_multigrid *mg, const uz_csc *K, const bool *
     return uz_fail(err, status, inner.where, "%s", inner.message);
 }
 
-static size_t level_bytes(const uz_level *level, int k)
-{
-    size_t n = (size_t)level->n, bytes = 8 * n, blocks = level->ptr ? (size_t)level->ptr[n] : 0;
-    if (level->A.ptr)
-        bytes += 8 * n + 16 * (size_t)level->A.ptr[n];
-    return bytes + (level->ptr ? 8 * n + blocks * (4 + 4 * (size_t)k) : 0);
-}
-
 /* All so far; what the limit is compared with on the way. */
 static size_t count_bytes(const uz_multigrid *mg)
 {
     size_t bytes = sizeof *mg;
-    for (int l = 0; l < mg->levels; l++)
-        bytes += level_bytes(&mg->level[l], mg->k);
+    for (int l = 0; l < mg->levels; l++) {
+        const uz_level *level = &mg->level[l];
+        const size_t n = (size_t)level->n;
+        bytes += 8 * n;
+        if (level->A.ptr)
+            bytes += 8 * n + 16 * (size_t)level->A.ptr[n];
+        if (level->ptr)
+            bytes += 8 * n + (size_t)level->ptr[n] * (4 + 4 * (size_t)mg->k);
+    }
     return bytes + (mg->coarsest ? uz_factor_describe(mg->coarsest).bytes : 0);
 }
 
@@ -222,27 +194,22 @@ static uz_status coarsen(uz_multigrid *mg, bool *done, sources *from, const uz_c
     if (status == UZ_OK && memory_limit > 0 && count_bytes(mg) > memory_limit)
         status =
             uz_fail(err, UZ_ERR_LIMIT, "K", "the coarse levels take more than the %zu bytes allowed", memory_limit);
-    uz_status taken = next_sources(from, modes, level->aggregates, mg->k, err);
-    return status == UZ_OK ? taken : status;
-}
-
-static uz_status copy_sources(sources *s, const uz_modes *modes, int64_t n, uz_error *err)
-{
-    s->n_nodes = modes->n_nodes;
-    s->strong = modes->strong;
-    s->node = uz_alloc(n, sizeof *s->node);
-    s->modes = uz_alloc(n * modes->count, sizeof *s->modes);
-    if (!s->node || !s->modes)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)n);
-    memcpy(s->node, modes->node, (size_t)n * sizeof *s->node);
-    memcpy(s->modes, modes->value, (size_t)(n * modes->count) * sizeof *s->modes);
-    return UZ_OK;
+    const int64_t count = level->aggregates * mg->k;
+    free(from->node);
+    free(from->modes);
+    *from = (sources){uz_alloc(count, sizeof *from->node), level->aggregates, modes, from->strong};
+    for (int64_t i = 0; from->node && i < count; i++)
+        from->node[i] = (int32_t)(i / mg->k);
+    if (status == UZ_OK && !from->node)
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld aggregates", (long long)level->aggregates);
+    return status;
 }
 
 static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes, const bool *held, size_t memory_limit,
                        const uz_stop *stop, uz_error *err)
 {
-    sources from = {0};
+    const int64_t n = K->cols;
+    sources from = {.n_nodes = modes->n_nodes, .strong = modes->strong};
     bool done = false;
     mg->k = modes->count;
     mg->levels = 1;
@@ -252,14 +219,20 @@ static uz_status build(uz_multigrid *mg, const uz_csc *K, const uz_modes *modes,
                                      "matrix_free holds up to 2^31 - 2 dofs, these are %lld", (long long)K->cols);
     if (status == UZ_OK)
         status = invert_diagonal(&mg->level[0], K, held, err);
-    if (status == UZ_OK)
-        status = copy_sources(&from, modes, K->cols, err);
-    while (status == UZ_OK && !done) {
-        status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
+    if (status == UZ_OK) {
+        from.node = uz_alloc(n, sizeof *from.node);
+        from.modes = uz_alloc(n * mg->k, sizeof *from.modes);
+        if (from.node && from.modes) {
+            memcpy(from.node, modes->node, (size_t)n * sizeof *from.node);
+            memcpy(from.modes, modes->value, (size_t)(n * mg->k) * sizeof *from.modes);
+        } else {
+            status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)n);
+        }
     }
+    while (status == UZ_OK && !done)
+        status = uz_stop_is_due(stop) ? uz_fail_stopped(err) : coarsen(mg, &done, &from, K, memory_limit, stop, err);
     free(from.node);
     free(from.modes);
-    memset(&from, 0, sizeof from);
     double *row = status == UZ_OK ? uz_alloc(K->cols, sizeof *row) : NULL;
     if (status == UZ_OK && !row)
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld dofs", (long long)K->cols);
@@ -286,6 +259,11 @@ uz_status uz_multigrid_create(uz_multigrid **out, const uz_csc *K, const uz_mode
     return status;
 }
 
+uz_multigrid_info uz_multigrid_describe(const uz_multigrid *mg)
+{
+    return (uz_multigrid_info){mg->levels, mg->bytes, mg->most};
+}
+
 void uz_multigrid_free(uz_multigrid *mg)
 {
     if (!mg)
@@ -299,19 +277,4 @@ void uz_multigrid_free(uz_multigrid *mg)
     }
     uz_factor_free(mg->coarsest);
     free(mg);
-}
-
-size_t uz_multigrid_bytes(const uz_multigrid *mg)
-{
-    return mg->bytes;
-}
-
-int uz_multigrid_levels(const uz_multigrid *mg)
-{
-    return mg->levels;
-}
-
-double uz_multigrid_most(const uz_multigrid *mg)
-{
-    return mg->most;
 }

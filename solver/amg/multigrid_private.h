@@ -47,6 +47,10 @@ bool uz_row_walk_init(uz_row_walk *walk, const uz_csc *A); /* false: no memory; 
 void uz_row_walk_clear(uz_row_walk *walk);
 void uz_row_walk_read(uz_row_walk *walk, int64_t i); /* i = 0, 1, 2, ... */
 
+/* start (groups + 2, zero), member (n): those of 0..n-1 that are in each group, by of (n; -1: in none). Afterwards
+ * start[g]..start[g + 1] are group g's. */
+void uz_list_members(int64_t *start, int32_t *member, const int32_t *of, int64_t n, int64_t groups);
+
 /* aggregate (n_nodes): the aggregate of each node, -1 for nodes that hang on no other strongly. node (n): the node of
  * each dof; inverse (n): as in uz_level. *count: aggregates. */
 uz_status uz_aggregate(int32_t *aggregate, int64_t *count, const uz_csc *A, const double *inverse, const int32_t *node,

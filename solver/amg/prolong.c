@@ -38,19 +38,6 @@ static void orthonormalise(double *Q, float *R, int64_t rows, int k)
     }
 }
 
-/* start (aggregates + 1), dof: the dofs of each aggregate. */
-static void list_dofs(int64_t *start, int32_t *dof, const int32_t *of, int64_t n, int64_t aggregates)
-{
-    for (int64_t i = 0; i < n; i++)
-        if (of[i] >= 0)
-            start[of[i] + 2]++;
-    for (int64_t a = 0; a <= aggregates; a++)
-        start[a + 1] += start[a];
-    for (int64_t i = 0; i < n; i++)
-        if (of[i] >= 0)
-            dof[start[of[i] + 1]++] = (int32_t)i;
-}
-
 uz_status uz_tentative(float *basis, float *coarse, const float *modes, const int32_t *of, int64_t n,
                        int64_t aggregates, int k, uz_error *err)
 {
@@ -58,7 +45,7 @@ uz_status uz_tentative(float *basis, float *coarse, const float *modes, const in
     int32_t *dof = uz_alloc(n, sizeof *dof);
     double *Q = NULL;
     if (start && dof) {
-        list_dofs(start, dof, of, n, aggregates);
+        uz_list_members(start, dof, of, n, aggregates);
         for (int64_t a = 0; a < aggregates; a++)
             longest = start[a + 1] - start[a] > longest ? start[a + 1] - start[a] : longest;
         Q = uz_alloc(longest * k, sizeof *Q);
@@ -116,27 +103,21 @@ static void block_row_empty(block_row *row)
     row->count = 0;
 }
 
-static bool grow_row(block_row *row)
-{
-    int64_t room = row->room ? 2 * row->room : 64;
-    int32_t *met = uz_realloc(row->met, room, sizeof *met);
-    if (met)
-        row->met = met;
-    double *block = met ? uz_realloc(row->block, room * row->k, sizeof *block) : NULL;
-    if (!block)
-        return false;
-    row->block = block;
-    row->room = room;
-    return true;
-}
-
 /* The block of an aggregate, 0 when it is new; NULL: no memory. */
 static double *block_of(block_row *row, int32_t aggregate)
 {
     int32_t slot = row->slot[aggregate];
     if (slot < 0) {
-        if (row->count == row->room && !grow_row(row))
-            return NULL;
+        if (row->count == row->room) {
+            const int64_t room = row->room ? 2 * row->room : 64;
+            int32_t *met = uz_realloc(row->met, room, sizeof *met);
+            row->met = met ? met : row->met;
+            double *block = met ? uz_realloc(row->block, room * row->k, sizeof *block) : NULL;
+            if (!block)
+                return NULL;
+            row->block = block;
+            row->room = room;
+        }
         slot = row->slot[aggregate] = (int32_t)row->count;
         row->met[row->count++] = aggregate;
         memset(row->block + (int64_t)slot * row->k, 0, (size_t)row->k * sizeof *row->block);
@@ -253,15 +234,6 @@ static uint64_t hash_place(uint64_t key)
     return key ^ (key >> 29);
 }
 
-static void insert(block_table *table, uint64_t key, int32_t at)
-{
-    uint64_t mask = (uint64_t)table->room - 1, h = hash_place(key) & mask;
-    while (table->key[h])
-        h = (h + 1) & mask;
-    table->key[h] = key;
-    table->at[h] = at;
-}
-
 static bool grow_table(block_table *table)
 {
     int64_t room = table->room ? 2 * table->room : 1024;
@@ -277,22 +249,13 @@ static bool grow_table(block_table *table)
     table->key = key;
     table->at = at;
     table->room = room;
-    for (int64_t b = 0; b < table->count; b++)
-        insert(table, table->place[b], (int32_t)b);
-    return true;
-}
-
-static bool grow_blocks(block_table *table)
-{
-    int64_t room = table->blocks_room ? table->blocks_room + table->blocks_room / 2 : 512;
-    uint64_t *place = uz_realloc(table->place, room, sizeof *place);
-    if (place)
-        table->place = place;
-    double *block = place ? uz_realloc(table->block, room * table->k * table->k, sizeof *block) : NULL;
-    if (!block)
-        return false;
-    table->block = block;
-    table->blocks_room = room;
+    for (int64_t b = 0; b < table->count; b++) {
+        uint64_t mask = (uint64_t)room - 1, h = hash_place(table->place[b]) & mask;
+        while (key[h])
+            h = (h + 1) & mask;
+        key[h] = table->place[b];
+        at[h] = (int32_t)b;
+    }
     return true;
 }
 
@@ -306,8 +269,16 @@ static double *coarse_block(block_table *table, int32_t row, int32_t column)
     for (; table->key[h]; h = (h + 1) & mask)
         if (table->key[h] == key)
             return table->block + table->at[h] * size;
-    if (table->count == table->blocks_room && !grow_blocks(table))
-        return NULL;
+    if (table->count == table->blocks_room) {
+        const int64_t room = table->blocks_room ? table->blocks_room + table->blocks_room / 2 : 512;
+        uint64_t *place = uz_realloc(table->place, room, sizeof *place);
+        table->place = place ? place : table->place;
+        double *block = place ? uz_realloc(table->block, room * size, sizeof *block) : NULL;
+        if (!block)
+            return NULL;
+        table->block = block;
+        table->blocks_room = room;
+    }
     table->key[h] = key;
     table->at[h] = (int32_t)table->count;
     table->place[table->count] = key;
@@ -361,35 +332,11 @@ static int compare_placed(const void *a, const void *b)
     return (x->by_column > y->by_column) - (x->by_column < y->by_column);
 }
 
-/* Column by column: the blocks of one block column stand together, rows ascending. */
-static void fill_columns(uz_csc *A, const placed *order, const block_table *table)
-{
-    int k = table->k;
-    int64_t at = 0, from = 0;
-    for (int64_t J = 0; J * k < A->cols; J++) {
-        int64_t to = from;
-        while (to < table->count && (int64_t)(order[to].by_column >> 32) == J)
-            to++;
-        for (int b = 0; b < k; b++) {
-            A->ptr[J * k + b] = at;
-            for (int64_t s = from; s < to; s++) {
-                int64_t I = (int64_t)(order[s].by_column & 0xffffffffu);
-                const double *block = table->block + order[s].block * k * k;
-                for (int a = I == J ? b : 0; a < k; a++) {
-                    bool unused = I == J && a == b && block[a * k + b] == 0.0; /* no mode: see uz_level */
-                    A->idx[at] = I * k + a;
-                    A->val[at++] = unused ? 1.0 : block[a * k + b];
-                }
-            }
-        }
-        from = to;
-    }
-    A->ptr[A->cols] = at;
-}
-
+/* The matrix column by column: the blocks of one block column stand together, rows ascending. */
 static uz_status convert(uz_csc *coarse, block_table *table, int64_t aggregates, uz_error *err)
 {
-    int64_t k = table->k, entries = 0;
+    const int64_t k = table->k;
+    int64_t entries = 0, at = 0, from = 0, to = 0;
     for (int32_t J = 0; J < aggregates; J++) /* each has its diagonal block, be it empty */
         if (!coarse_block(table, J, J))
             return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a coarse matrix");
@@ -403,8 +350,22 @@ static uz_status convert(uz_csc *coarse, block_table *table, int64_t aggregates,
     }
     qsort(order, (size_t)table->count, sizeof *order, compare_placed);
     uz_status status = uz_csc_init(coarse, aggregates * k, aggregates * k, entries, err);
-    if (status == UZ_OK)
-        fill_columns(coarse, order, table);
+    for (int64_t J = 0; status == UZ_OK && J < aggregates; J++, from = to) {
+        while (to < table->count && (int64_t)(order[to].by_column >> 32) == J)
+            to++;
+        for (int64_t b = 0; b < k; b++) {
+            for (int64_t s = from; s < to; s++) {
+                const int64_t I = (int64_t)(order[s].by_column & 0xffffffffu);
+                const double *block = table->block + order[s].block * k * k;
+                for (int64_t a = I == J ? b : 0; a < k; a++) {
+                    const bool unused = I == J && a == b && block[a * k + b] == 0.0; /* no mode: see uz_level */
+                    coarse->idx[at] = I * k + a;
+                    coarse->val[at++] = unused ? 1.0 : block[a * k + b];
+                }
+            }
+            coarse->ptr[J * k + b + 1] = at;
+        }
+    }
     free(order);
     return status;
 }

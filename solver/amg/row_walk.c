@@ -6,8 +6,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-static int64_t longest_row(int32_t *count, const uz_csc *A)
+bool uz_row_walk_init(uz_row_walk *walk, const uz_csc *A)
 {
+    memset(walk, 0, sizeof *walk);
+    walk->A = A;
+    walk->first = uz_alloc(A->cols, sizeof *walk->first);
+    walk->next = uz_alloc(A->cols, sizeof *walk->next);
+    walk->at = uz_alloc(A->cols, sizeof *walk->at);
+    if (!walk->first || !walk->next || !walk->at)
+        return false;
+    int32_t *count = walk->first; /* entries of each row, for now */
     int64_t longest = 1;
     memset(count, 0, (size_t)A->cols * sizeof *count);
     for (int64_t j = 0; j < A->cols; j++) {
@@ -18,19 +26,6 @@ static int64_t longest_row(int32_t *count, const uz_csc *A)
     }
     for (int64_t j = 0; j < A->cols; j++)
         longest = count[j] > longest ? count[j] : longest;
-    return longest;
-}
-
-bool uz_row_walk_init(uz_row_walk *walk, const uz_csc *A)
-{
-    memset(walk, 0, sizeof *walk);
-    walk->A = A;
-    walk->first = uz_alloc(A->cols, sizeof *walk->first);
-    walk->next = uz_alloc(A->cols, sizeof *walk->next);
-    walk->at = uz_alloc(A->cols, sizeof *walk->at);
-    if (!walk->first || !walk->next || !walk->at)
-        return false;
-    int64_t longest = longest_row(walk->first, A);
     walk->column = uz_alloc(longest, sizeof *walk->column);
     walk->value = uz_alloc(longest, sizeof *walk->value);
     for (int64_t i = 0; i < A->cols; i++)

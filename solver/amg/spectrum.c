@@ -107,7 +107,7 @@ static uz_status step(coefficients *c, double *square, uz_cg *cg, const uz_csc *
 static uz_status bound_below(double *lambda, coefficients *c, uz_cg *cg, const uz_csc *K, const uz_hooks *hooks,
                              uz_error *err)
 {
-    double share = LEAST_SHARE / sqrt(uz_multigrid_most(cg->mg)), before = 0.0;
+    double share = LEAST_SHARE / sqrt(uz_multigrid_describe(cg->mg).most), before = 0.0;
     random_residual(cg, K);
     uz_status status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
     double square = uz_dot(cg->n, cg->r, cg->z);
@@ -128,25 +128,6 @@ static uz_status bound_below(double *lambda, coefficients *c, uz_cg *cg, const u
     return status;
 }
 
-/* lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), by powers: some per cent too small. */
-static uz_status estimate_inverse(double *most, uz_cg *cg, const uz_csc *K, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    random_residual(cg, K);
-    for (int power = 0; status == UZ_OK && power < POWERS; power++) {
-        status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
-        double square = 0.0;
-        for (int64_t j = 0; j < cg->n; j++) {
-            double scaled = sqrt(K->val[K->ptr[j]]) * cg->z[j];
-            square += scaled * scaled;
-        }
-        *most = sqrt(square);
-        for (int64_t j = 0; j < cg->n; j++)
-            cg->r[j] = K->val[K->ptr[j]] * cg->z[j] / *most;
-    }
-    return status;
-}
-
 /* Below this rounding of the entries of K alone makes or unmakes a digit of lambda_min(D^-1 K). */
 #define RCOND_LEAST DBL_EPSILON
 
@@ -157,13 +138,24 @@ static uz_status bound_spectrum(uz_amg *amg, uz_cg *cg, const uz_csc *K, const u
     double most = INFINITY;
     if (!c)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a spectrum");
-    uz_status status = UZ_OK;
     info->lambda = 0.0;
-    status = bound_below(&info->lambda, c, cg, K, hooks, err);
+    uz_status status = bound_below(&info->lambda, c, cg, K, hooks, err);
     info->iterations = c->count;
     free(c);
+    /* lambda_max(D^1/2 M^-1 D^1/2), D = diag(K), by powers: some per cent too small. */
     if (status == UZ_OK)
-        status = estimate_inverse(&most, cg, K, err);
+        random_residual(cg, K);
+    for (int power = 0; status == UZ_OK && power < POWERS; power++) {
+        status = uz_multigrid_apply(cg->mg, K, cg->room, cg->z, cg->r, err);
+        double square = 0.0;
+        for (int64_t j = 0; j < cg->n; j++) {
+            double scaled = sqrt(K->val[K->ptr[j]]) * cg->z[j];
+            square += scaled * scaled;
+        }
+        most = sqrt(square);
+        for (int64_t j = 0; j < cg->n; j++)
+            cg->r[j] = K->val[K->ptr[j]] * cg->z[j] / most;
+    }
     if (status != UZ_OK)
         return status;
     info->rcond = info->lambda / most;
@@ -189,8 +181,9 @@ static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size
     info->create_s += uz_seconds() - start;
     if (status != UZ_OK)
         return status;
-    info->levels = uz_multigrid_levels(amg->mg);
-    info->bytes = uz_multigrid_bytes(amg->mg) + n * (4 + 4 * (size_t)amg->modes.count);
+    const uz_multigrid_info made = uz_multigrid_describe(amg->mg);
+    info->levels = made.levels;
+    info->bytes = made.bytes + n * (4 + 4 * (size_t)amg->modes.count);
     start = uz_seconds();
     status = uz_cg_init(&cg, amg->mg, NULL, K->cols, err);
     if (status == UZ_OK)
@@ -207,19 +200,14 @@ static uz_status try_threshold(uz_amg *amg, const uz_csc *K, double strong, size
 #define BAD_LAMBDA    0.02
 #define WORTH_LAMBDA  3.0
 
-static bool may_improve(const uz_amg *amg, uz_status status)
-{
-    if (status != UZ_OK)
-        return status == UZ_ERR_NOT_SPD && amg->mg && amg->info.iterations > 0;
-    return amg->info.levels > 1 && amg->info.lambda < BAD_LAMBDA;
-}
-
 /* The better of two thresholds; the first one's failure stands where the second fails too. */
 static uz_status build(uz_amg *amg, const uz_csc *K, size_t memory_limit, const uz_hooks *hooks, uz_error *err)
 {
     uz_error ignored = {0}, *into = err ? err : &ignored;
     uz_status status = try_threshold(amg, K, amg->modes.strong, memory_limit, hooks, into);
-    if (!may_improve(amg, status))
+    const bool may_improve = status == UZ_OK ? amg->info.levels > 1 && amg->info.lambda < BAD_LAMBDA
+                                             : status == UZ_ERR_NOT_SPD && amg->mg && amg->info.iterations > 0;
+    if (!may_improve)
         return status;
     uz_amg second = {.modes = amg->modes, .info = amg->info};
     uz_error failure = {0};
@@ -286,24 +274,11 @@ const uz_modes *uz_amg_modes(const uz_amg *amg)
 #define SHARP 0.1
 enum { NORM_STEPS_MOST = 400 };
 
-/* The power of two below the largest entry; 1 where all are zero, or not all are numbers. */
-static double largest_power(const double *x, int64_t n)
-{
-    double largest = 0.0;
-    int exponent;
-    for (int64_t j = 0; j < n; j++)
-        largest = fmax(largest, fabs(x[j]));
-    if (!(largest > 0.0) || isinf(largest))
-        return 1.0;
-    frexp(largest, &exponent);
-    return ldexp(1.0, exponent - 1);
-}
-
 uz_status uz_amg_inverse_norm(double *value, double *e, const uz_amg *amg, uz_cg *cg, const uz_csc *K,
                               const uz_hooks *hooks, double deadline, uz_error *err)
 {
     int64_t n = cg->n;
-    double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0, unit = largest_power(e, n);
+    double *w = uz_alloc_zero(n, sizeof *w), sum = 0.0, largest = 0.0;
     uz_cg_stop stop = {.relative = SHARP * sqrt(amg->info.lambda),
                        .max_iterations = NORM_STEPS_MOST,
                        .hooks = hooks,
@@ -312,7 +287,11 @@ uz_status uz_amg_inverse_norm(double *value, double *e, const uz_amg *amg, uz_cg
     *value = INFINITY;
     if (!w)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to certify %lld dofs", (long long)n);
-    for (int64_t j = 0; j < n; j++) /* squares of forces stay in range; what is left is exact */
+    for (int64_t j = 0; j < n; j++)
+        largest = fmax(largest, fabs(e[j]));
+    /* By the power of two below the largest: squares of forces stay in range; what is left is exact. */
+    const double unit = largest > 0.0 && !isinf(largest) ? ldexp(1.0, ilogb(largest)) : 1.0;
+    for (int64_t j = 0; j < n; j++)
         e[j] /= unit;
     uz_status status = uz_cg_solve(&info, w, cg, K, e, &stop, err);
     for (int64_t j = 0; j < n; j++)

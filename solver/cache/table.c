@@ -121,59 +121,44 @@ void uz_cache_free(uz_cache *cache)
     free(cache);
 }
 
-static uz_item *find(uz_cache *cache, uz_item_kind kind, const char *digest)
-{
-    for (uz_item *item = cache->newest; item; item = item->older)
-        if (item->kind == kind && strcmp(item->digest, digest) == 0)
-            return item;
-    return NULL;
-}
-
-/* Sleeps until the table changes, at most 20 ms so that a cancel is seen. */
-static void wait_for_change(uz_cache *cache)
-{
-    struct timespec until;
-    clock_gettime(CLOCK_MONOTONIC, &until);
-    until.tv_nsec += 20000000;
-    if (until.tv_nsec >= 1000000000) {
-        until.tv_nsec -= 1000000000;
-        until.tv_sec++;
-    }
-    pthread_cond_timedwait(&cache->changed, &cache->mutex, &until);
-}
-
-static uz_status reserve(uz_item **out, bool *create, uz_cache *cache, uz_item_kind kind, const char *digest,
-                         const uz_hooks *hooks, uz_error *err)
-{
-    uz_item *item;
-    while ((item = find(cache, kind, digest)) && !item->object) {
-        if (uz_cancelled(hooks))
-            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while another job factors the same body");
-        wait_for_change(cache);
-    }
-    if (item) {
-        use(cache, item);
-    } else {
-        item = uz_alloc_zero(1, sizeof *item);
-        if (!item)
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache entry");
-        item->kind = kind;
-        memcpy(item->digest, digest, sizeof item->digest);
-        item->users = 1;
-        push_newest(cache, item);
-        *create = true;
-    }
-    *out = item;
-    return UZ_OK;
-}
-
 uz_status uz_table_acquire(uz_item **item, bool *create, uz_cache *cache, uz_item_kind kind, const char digest[65],
                            const uz_hooks *hooks, uz_error *err)
 {
+    uz_status status = UZ_OK;
+    uz_item *found;
     *item = NULL;
     *create = false;
     pthread_mutex_lock(&cache->mutex);
-    uz_status status = reserve(item, create, cache, kind, digest, hooks, err);
+    for (;;) {
+        found = cache->newest;
+        while (found && !(found->kind == kind && strcmp(found->digest, digest) == 0))
+            found = found->older;
+        if (!found || found->object)
+            break;
+        if (uz_cancelled(hooks)) {
+            status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while another job factors the same body");
+            goto done;
+        }
+        struct timespec until; /* its creator works; 20 ms at most, so that a cancel is seen */
+        clock_gettime(CLOCK_MONOTONIC, &until);
+        until.tv_nsec += 20000000;
+        until.tv_sec += until.tv_nsec / 1000000000;
+        until.tv_nsec %= 1000000000;
+        pthread_cond_timedwait(&cache->changed, &cache->mutex, &until);
+    }
+    if (found) {
+        use(cache, found);
+    } else if (!(found = uz_alloc_zero(1, sizeof *found))) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a cache entry");
+    } else {
+        found->kind = kind;
+        memcpy(found->digest, digest, sizeof found->digest);
+        found->users = 1;
+        push_newest(cache, found);
+        *create = true;
+    }
+    *item = found;
+done:
     pthread_mutex_unlock(&cache->mutex);
     return status;
 }

@@ -227,7 +227,7 @@ static uz_status find_gaps(uz_condensed_load *x, const double *y, int64_t stride
     for (int64_t k = 0; k < dense->n_b; k++)
         u_b[k] = dense->reach ? room[dense->position[k]] : y[dense->position[k] * stride];
     if (!dense->reach)
-        uz_trsv_lower_t(dense->n_b, dense->L_bb, u_b);
+        uz_trsv_lower(dense->n_b, dense->L_bb, dense->n_b, u_b, true);
     memcpy(x->load.g0, x->load.h, (size_t)dense->dual.m * sizeof *x->load.g0);
     uz_csc_gaxpy(x->load.g0, &dense->N_b, -1.0, u_b);
     return status;
@@ -277,7 +277,7 @@ void uz_condensed_response(double *z, const uz_condensed *dense, const double *w
 {
     memset(z, 0, (size_t)dense->n_b * sizeof *z);
     uz_csc_gaxpy_t(z, &dense->N_b, 1.0, w);
-    uz_trsv_lower(dense->n_b, dense->L_bb, z);
+    uz_trsv_lower(dense->n_b, dense->L_bb, dense->n_b, z, false);
 }
 
 /* Without D two triangular solves do: slower each, but there is nothing to form. */
@@ -292,7 +292,7 @@ uz_status uz_condensed_apply(uz_dual_load *load, double *Dr, const double *r, uz
         return UZ_OK;
     }
     uz_condensed_response(x->apply_room, dense, r);
-    uz_trsv_lower_t(dense->n_b, dense->L_bb, x->apply_room);
+    uz_trsv_lower(dense->n_b, dense->L_bb, dense->n_b, x->apply_room, true);
     memset(Dr, 0, (size_t)m * sizeof *Dr);
     uz_csc_gaxpy(Dr, &dense->N_b, 1.0, x->apply_room);
     return UZ_OK;

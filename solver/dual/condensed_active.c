@@ -210,7 +210,7 @@ uz_status uz_condensed_solve_active(uz_dual_load *load, uz_active_end *end, doub
         }
         for (int64_t k = 0; k < count; k++)
             part[k] = scaled ? change[rows[k]] : g[rows[k]]; /* rows ascend: none is written before it is read */
-        uz_potrs_lower(count, block, part);
+        uz_potrs_lower(count, block, count, part);
         if (!(ok = !uz_stop_is_due(stop)))
             break;
         for (int64_t k = 0; k < count; k++)
@@ -266,7 +266,7 @@ static bool solve_rows(double *w, double *Dw, double *D_AA, uz_condensed_load *x
         for (int pass = 0; ok && pass <= REFINEMENTS && !uz_stop_is_due(&x->load.stop); pass++) {
             for (int64_t k = 0; k < rank; k++)
                 part[k] = target[rows[pivot[k]]] - Dw[rows[pivot[k]]];
-            uz_potrs_leading(rank, count, D_AA, part);
+            uz_potrs_lower(rank, D_AA, count, part);
             for (int64_t k = 0; k < rank; k++)
                 w[rows[pivot[k]]] += part[k];
             (void)uz_condensed_apply(&x->load, Dw, w, NULL);
@@ -338,7 +338,7 @@ uz_status uz_condensed_correct(uz_dual_load *load, double *bound2, const double 
         square = uz_dot(m, z, z);
     } else if (dense->D_chol) {
         memcpy(x->work2, target, (size_t)m * sizeof *target);
-        uz_potrs_lower(m, dense->D_chol, x->work2);
+        uz_potrs_lower(m, dense->D_chol, m, x->work2);
         square = keep_weights(x, x->work2, target);
     } else if (correct_rows(x, x->work2, target, g, close)) {
         square = keep_weights(x, x->work2, target);

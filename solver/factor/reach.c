@@ -151,7 +151,7 @@ uz_status uz_reach_forward(const uz_reach *reach, uz_factor_workspace *ws, doubl
         supernode s = at(L, reach->node[k]);
         int64_t below = s.rows - s.columns;
         memset(ws->panel, 0, (size_t)below * sizeof *ws->panel);
-        uz_block_trsv(s.columns, s.value, s.rows, x + s.first, false);
+        uz_trsv_lower(s.columns, s.value, s.rows, x + s.first, false);
         uz_block_gemv(below, s.columns, s.value + s.columns, s.rows, x + s.first, ws->panel, false);
         for (int64_t i = 0; i < below; i++)
             x[s.row[s.columns + i]] += ws->panel[i];
@@ -169,7 +169,7 @@ uz_status uz_reach_backward(const uz_reach *reach, uz_factor_workspace *ws, doub
         for (int64_t i = 0; i < below; i++)
             ws->panel[i] = x[s.row[s.columns + i]];
         uz_block_gemv(below, s.columns, s.value + s.columns, s.rows, ws->panel, x + s.first, true);
-        uz_block_trsv(s.columns, s.value, s.rows, x + s.first, true);
+        uz_trsv_lower(s.columns, s.value, s.rows, x + s.first, true);
     }
     return status;
 }

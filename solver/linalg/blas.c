@@ -35,16 +35,11 @@ void uz_symv_lower(int64_t n, const double *A, const double *x, double *y)
         cblas_dsymv(CblasColMajor, CblasLower, narrow(n), 1.0, A, narrow(n), x, 1, 0.0, y, 1);
 }
 
-void uz_trsv_lower(int64_t n, const double *L, double *x)
+void uz_trsv_lower(int64_t n, const double *L, int64_t ld, double *x, bool transposed)
 {
     if (n > 0)
-        cblas_dtrsv(CblasColMajor, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
-}
-
-void uz_trsv_lower_t(int64_t n, const double *L, double *x)
-{
-    if (n > 0)
-        cblas_dtrsv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
+        cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
+                    narrow(ld), x, 1);
 }
 
 void uz_trmv_lower_t(int64_t n, const double *L, double *x)
@@ -58,29 +53,10 @@ bool uz_potrf_lower(int64_t n, double *A)
     return n == 0 || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(n), A, narrow(n)) == 0;
 }
 
-void uz_potrs_lower(int64_t n, const double *L, double *x)
+void uz_potrs_lower(int64_t n, const double *L, int64_t ld, double *x)
 {
-    uz_trsv_lower(n, L, x);
-    uz_trsv_lower_t(n, L, x);
-}
-
-void uz_trsv_leading(int64_t n, int64_t stride, const double *L, double *x, bool transposed)
-{
-    if (n > 0)
-        cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
-                    narrow(stride), x, 1);
-}
-
-void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x)
-{
-    uz_trsv_leading(n, stride, L, x, false);
-    uz_trsv_leading(n, stride, L, x, true);
-}
-
-void uz_block_trsv(int64_t n, const double *L, int64_t ld, double *x, bool transposed)
-{
-    cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
-                narrow(ld), x, 1);
+    uz_trsv_lower(n, L, ld, x, false);
+    uz_trsv_lower(n, L, ld, x, true);
 }
 
 void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, const double *x, double *y,
@@ -178,17 +154,6 @@ static bool forward_while(int64_t n, int64_t columns, const double *L, int64_t l
     return true;
 }
 
-/* Rows and columns i < k change places in the lower triangle. */
-static void swap_rows(int64_t n, double *A, int64_t i, int64_t k)
-{
-    double diagonal = A[i + i * n];
-    A[i + i * n] = A[k + k * n];
-    A[k + k * n] = diagonal;
-    cblas_dswap(narrow(i), A + i, narrow(n), A + k, narrow(n));
-    cblas_dswap(narrow(k - i - 1), A + i + 1 + i * n, 1, A + k + (i + 1) * n, narrow(n));
-    cblas_dswap(narrow(n - k - 1), A + k + 1 + i * n, 1, A + k + 1 + k * n, 1);
-}
-
 /* Column j of L, of a panel that begins with column k: what is right of it has not seen the panel's columns yet,
  * squares has those of each row added up. false: the largest pivot left is not above `stop`. */
 static bool pivot_column(int64_t n, double *A, int64_t *pivot, double *squares, int64_t k, int64_t j, double stop)
@@ -203,9 +168,14 @@ static bool pivot_column(int64_t n, double *A, int64_t *pivot, double *squares, 
     double left = A[best + best * n] - squares[best];
     if (!(left > stop))
         return false;
-    if (best != j) {
-        int64_t index = pivot[j];
-        swap_rows(n, A, j, best);
+    if (best != j) { /* rows and columns change places in the lower triangle */
+        const int64_t index = pivot[j];
+        const double diagonal = A[j + j * n];
+        A[j + j * n] = A[best + best * n];
+        A[best + best * n] = diagonal;
+        cblas_dswap(narrow(j), A + j, narrow(n), A + best, narrow(n));
+        cblas_dswap(narrow(best - j - 1), A + j + 1 + j * n, 1, A + best + (j + 1) * n, narrow(n));
+        cblas_dswap(narrow(n - best - 1), A + best + 1 + j * n, 1, A + best + 1 + best * n, 1);
         squares[best] = squares[j];
         pivot[j] = pivot[best];
         pivot[best] = index;

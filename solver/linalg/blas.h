@@ -13,25 +13,21 @@ double uz_norm(int64_t n, const double *x); /* 2-norm, without overflow */
 void uz_axpy(int64_t n, double alpha, const double *x, double *y);
 
 void uz_symv_lower(int64_t n, const double *A, const double *x, double *y); /* y = A x */
-void uz_trsv_lower(int64_t n, const double *L, double *x);                  /* x = L^-1 x */
-void uz_trsv_lower_t(int64_t n, const double *L, double *x);                /* x = L'^-1 x */
-void uz_trmv_lower_t(int64_t n, const double *L, double *x);                /* x = L'x */
-bool uz_potrf_lower(int64_t n, double *A); /* A = LL'; false: a pivot is not positive */
+/* L: the leading n x n block of an array with `ld` rows. x = L^-1 x, or L'^-1 x where transposed; x = (LL')^-1 x. */
+void uz_trsv_lower(int64_t n, const double *L, int64_t ld, double *x, bool transposed);
+void uz_potrs_lower(int64_t n, const double *L, int64_t ld, double *x);
+void uz_trmv_lower_t(int64_t n, const double *L, double *x); /* x = L'x */
+bool uz_potrf_lower(int64_t n, double *A);                   /* A = LL'; false: a pivot is not positive */
 /* x (n) = 0 by pieces of a megabyte, with cancellation points between them; false: it had to stop. For rooms that
  * nobody has written to before: the kernel makes their pages at the first touch. */
 bool uz_clear_while(int64_t n, double *x, const uz_stop *stop);
 /* The same by panels of some 5e7 flops (a few milliseconds), with cancellation points between them: false also where it
  * had to stop. */
 bool uz_potrf_lower_while(int64_t n, double *A, const uz_stop *stop);
-void uz_potrs_lower(int64_t n, const double *L, double *x); /* x = (LL')^-1 x */
 /* Cholesky with complete pivoting of a semidefinite A, P'AP = LL', by panels; pivot[k] is the original index of row k.
  * Returns the rank: pivots below `least` times the largest count as zero (Higham 1990; Lucas, LAPACK Working Note 161
  * (2004)). Where it had to stop, as far as it came: that many rows of L are as good. -1: no memory. */
 int64_t uz_pstrf_lower_while(int64_t n, double *A, int64_t *pivot, double least, const uz_stop *stop);
-/* x (n) = (LL')^-1 x with the leading n x n block of an array with `stride` rows. */
-void uz_potrs_leading(int64_t n, int64_t stride, const double *L, double *x);
-/* x (n) = L^-1 x, or L'^-1 x, with the leading n x n block of an array with `stride` rows. */
-void uz_trsv_leading(int64_t n, int64_t stride, const double *L, double *x, bool transposed);
 /* X (n x k) = L^-1 X, and C (lower, n x n) = Z'Z for Z k x n, by panels; false: it had to stop. */
 bool uz_trsm_lower_while(int64_t n, int64_t k, const double *L, double *X, const uz_stop *stop);
 bool uz_syrk_lower_t_while(int64_t n, int64_t k, const double *Z, double *C, const uz_stop *stop);
@@ -41,7 +37,6 @@ bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const
 /* A (lower) = L L' by panels, likewise. n^3/3 flops. panel: room for n x n. false: it had to stop. */
 bool uz_multiply_llt_while(int64_t n, const double *L, double *A, double *panel, const uz_stop *stop);
 /* Pieces of larger arrays, whose columns are `ld` entries apart: L is n x n lower, A is rows x columns. */
-void uz_block_trsv(int64_t n, const double *L, int64_t ld, double *x, bool transposed); /* x = L^-1 x or L'^-1 x */
 /* y -= A x, or y -= A'x where transposed. */
 void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, const double *x, double *y,
                    bool transposed);

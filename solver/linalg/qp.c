@@ -19,33 +19,27 @@ void uz_qp_clear(uz_qp *qp)
     memset(qp, 0, sizeof *qp);
 }
 
-/* One column: starts in order, rows ascending within [first_row, rows), values finite. */
-static uz_status check_column(const uz_csc *A, int64_t j, int64_t first_row, const char *name, uz_error *err)
-{
-    int64_t above = first_row - 1;
-    if (A->ptr[j + 1] < A->ptr[j])
-        return uz_fail(err, UZ_ERR_ARGUMENT, name, "the column starts of %s do not ascend", name);
-    for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
-        if (A->idx[k] <= above || A->idx[k] >= A->rows)
-            return uz_fail(err, UZ_ERR_ARGUMENT, name,
-                           "%s, column %lld: row indices must ascend and stay within the stored part", name,
-                           (long long)j + 1);
-        above = A->idx[k];
-        if (!isfinite(A->val[k]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld, %lld) is not a finite number (counted from 1)", name,
-                           (long long)above + 1, (long long)j + 1);
-    }
-    return UZ_OK;
-}
-
+/* Column starts in order; in a column rows that ascend within the stored part, and finite values. */
 static uz_status check_matrix(const uz_csc *A, bool lower, const char *name, uz_error *err)
 {
-    uz_status status = UZ_OK;
     if (!A->ptr || A->ptr[0] != 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, name, "%s has no column starts", name);
-    for (int64_t j = 0; status == UZ_OK && j < A->cols; j++)
-        status = check_column(A, j, lower ? j : 0, name, err);
-    return status;
+    for (int64_t j = 0; j < A->cols; j++) {
+        int64_t above = lower ? j - 1 : -1;
+        if (A->ptr[j + 1] < A->ptr[j])
+            return uz_fail(err, UZ_ERR_ARGUMENT, name, "the column starts of %s do not ascend", name);
+        for (int64_t k = A->ptr[j]; k < A->ptr[j + 1]; k++) {
+            if (A->idx[k] <= above || A->idx[k] >= A->rows)
+                return uz_fail(err, UZ_ERR_ARGUMENT, name,
+                               "%s, column %lld: row indices must ascend and stay within the stored part", name,
+                               (long long)j + 1);
+            above = A->idx[k];
+            if (!isfinite(A->val[k]))
+                return uz_fail(err, UZ_ERR_NOT_FINITE, name, "%s(%lld, %lld) is not a finite number (counted from 1)",
+                               name, (long long)above + 1, (long long)j + 1);
+        }
+    }
+    return UZ_OK;
 }
 
 uz_status uz_check_finite(const double *x, int64_t n, const char *name, uz_error *err)
@@ -64,9 +58,14 @@ static uz_status check_vector(const double *x, int64_t n, const char *name, uz_e
     return uz_check_finite(x, n, name, err);
 }
 
-static uz_status check_shapes(const uz_qp *qp, uz_error *err)
+/* Below it the errors of products with it leave the range of normal numbers, and its own digits are gone soon after. */
+#define STIFFNESS_LEAST 0x1p-960
+
+/* N may be a zeroed struct when there are no contacts. */
+uz_status uz_qp_check(const uz_qp *qp, uz_error *err)
 {
     const uz_csc *K = &qp->K, *N = &qp->N;
+    uz_error_reset(err);
     if (K->rows != K->cols)
         return uz_fail(err, UZ_ERR_SIZE, "K", "K is %lld x %lld; a stiffness matrix is square", (long long)K->rows,
                        (long long)K->cols);
@@ -76,15 +75,8 @@ static uz_status check_shapes(const uz_qp *qp, uz_error *err)
         return uz_fail(err, UZ_ERR_SIZE, "N", "N is %lld x %lld but K is %lld x %lld; N needs %lld columns",
                        (long long)N->rows, (long long)N->cols, (long long)K->rows, (long long)K->cols,
                        (long long)K->cols);
-    return UZ_OK;
-}
-
-/* Below it the errors of products with it leave the range of normal numbers, and its own digits are gone soon after. */
-#define STIFFNESS_LEAST 0x1p-960
-
-static uz_status check_diagonal(const uz_csc *K, uz_error *err)
-{
-    for (int64_t j = 0; j < K->cols; j++) {
+    uz_status status = check_matrix(K, true, "K", err);
+    for (int64_t j = 0; j < K->cols && status == UZ_OK; j++) {
         const int64_t k = K->ptr[j];
         if (k < K->ptr[j + 1] && K->idx[k] == j && K->val[k] > 0.0 && K->val[k] < STIFFNESS_LEAST)
             return uz_fail(err, UZ_ERR_RANGE, "K",
@@ -92,20 +84,8 @@ static uz_status check_diagonal(const uz_csc *K, uz_error *err)
                            "choose other units of force or length",
                            (long long)j + 1, (long long)j + 1, K->val[k]);
     }
-    return UZ_OK;
-}
-
-/* N may be a zeroed struct when there are no contacts. */
-uz_status uz_qp_check(const uz_qp *qp, uz_error *err)
-{
-    uz_error_reset(err);
-    uz_status status = check_shapes(qp, err);
-    if (status == UZ_OK)
-        status = check_matrix(&qp->K, true, "K", err);
-    if (status == UZ_OK)
-        status = check_diagonal(&qp->K, err);
-    if (status == UZ_OK && qp->N.cols > 0)
-        status = check_matrix(&qp->N, false, "N", err);
+    if (status == UZ_OK && N->cols > 0)
+        status = check_matrix(N, false, "N", err);
     if (status == UZ_OK)
         status = check_vector(qp->h, qp->N.rows, "h", err);
     if (status == UZ_OK)

@@ -59,17 +59,8 @@ static double diagonal(const uz_csc *A, int64_t j)
     return k < A->ptr[j + 1] && A->idx[k] == j ? A->val[k] : 0.0;
 }
 
-/* |a - b| over the larger of the two diagonal entries; infinite where those are zero and a, b differ. */
-static double asymmetry(const uz_csc *K, const pair *p)
-{
-    double scale = fmax(fabs(diagonal(K, p->i)), fabs(diagonal(K, p->j)));
-    double difference = fabs(p->a - p->b);
-    if (difference == 0.0)
-        return 0.0;
-    return scale > 0.0 ? difference / scale : INFINITY;
-}
-
-/* Counts the places of the lower triangle that either half fills, and finds the worst pair. */
+/* Counts the places of the lower triangle that either half fills, and finds the worst pair: by |a - b| over the larger
+ * of the two diagonal entries, infinite where those are zero and a, b differ. */
 static int64_t inspect(const uz_csc *K, const uz_csc *T, pair *worst, double *worst_asymmetry)
 {
     int64_t count = 0;
@@ -77,7 +68,11 @@ static int64_t inspect(const uz_csc *K, const uz_csc *T, pair *worst, double *wo
     for (int64_t j = 0; j < K->cols; j++) {
         pair_walk walk = walk_column(K, T, j);
         for (pair p; walk_next(&walk, &p); count++) {
-            double ratio = p.a == p.b ? 0.0 : asymmetry(K, &p);
+            const double difference = fabs(p.a - p.b);
+            if (difference == 0.0)
+                continue;
+            const double scale = fmax(fabs(diagonal(K, p.i)), fabs(diagonal(K, p.j)));
+            const double ratio = scale > 0.0 ? difference / scale : INFINITY;
             if (ratio > *worst_asymmetry) {
                 *worst_asymmetry = ratio;
                 *worst = p;

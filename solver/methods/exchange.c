@@ -130,9 +130,9 @@ static void yield_to(uz_exchange *x, int64_t q)
 {
     for (int64_t k = 0; k < x->count; k++)
         x->l[k] = x->incoming[x->rows[k]];
-    uz_trsv_leading(x->count, x->room, x->L, x->l, false);
+    uz_trsv_lower(x->count, x->L, x->room, x->l, false);
     memcpy(x->w, x->l, (size_t)x->count * sizeof *x->w);
-    uz_trsv_leading(x->count, x->room, x->L, x->w, true);
+    uz_trsv_lower(x->count, x->L, x->room, x->w, true);
     x->compliance = x->incoming[q] - uz_dot(x->count, x->l, x->l);
     x->work += (double)x->count * (double)x->count;
 }
@@ -277,7 +277,7 @@ static void close_gaps(uz_exchange *x)
 {
     for (int64_t k = 0; k < x->count; k++)
         x->w[k] = x->g[x->rows[k]];
-    uz_potrs_leading(x->count, x->room, x->L, x->w);
+    uz_potrs_lower(x->count, x->L, x->room, x->w);
     for (int64_t k = 0; k < x->count; k++)
         x->s[x->rows[k]] += x->w[k];
     measure(x);

@@ -45,17 +45,6 @@ static void add(triplets *t, int64_t a, int64_t b, double value)
     t->val[t->count++] = value;
 }
 
-static void fill(triplets *t, const uz_csc *K, const uz_csc *Nt, const double *weight)
-{
-    for (int64_t j = 0; j < K->cols; j++)
-        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
-            add(t, K->idx[q], j, K->val[q]);
-    for (int64_t i = 0; i < Nt->cols; i++)
-        for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
-            for (int64_t b = Nt->ptr[i]; b <= a; b++)
-                add(t, Nt->idx[a], Nt->idx[b], weight[i] * Nt->val[a] * Nt->val[b]);
-}
-
 static uz_status augment_stiffness(uz_csc *out, const uz_csc *K, const uz_csc *Nt, const double *weight, uz_error *err)
 {
     int64_t most = K->ptr[K->cols];
@@ -68,7 +57,13 @@ static uz_status augment_stiffness(uz_csc *out, const uz_csc *K, const uz_csc *N
     if (!t.row || !t.col || !t.val) {
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for %lld entries", (long long)most);
     } else {
-        fill(&t, K, Nt, weight);
+        for (int64_t j = 0; j < K->cols; j++)
+            for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+                add(&t, K->idx[q], j, K->val[q]);
+        for (int64_t i = 0; i < Nt->cols; i++)
+            for (int64_t a = Nt->ptr[i]; weight[i] > 0.0 && a < Nt->ptr[i + 1]; a++)
+                for (int64_t b = Nt->ptr[i]; b <= a; b++)
+                    add(&t, Nt->idx[a], Nt->idx[b], weight[i] * Nt->val[a] * Nt->val[b]);
         status = uz_csc_from_triplets(out, K->rows, K->cols, t.count, t.row, t.col, t.val, err);
     }
     free(t.row);

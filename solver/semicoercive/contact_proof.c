@@ -25,16 +25,6 @@ typedef struct {
     uz_row_move move;
 } prover;
 
-static void find_open_rows(prover *x)
-{
-    const uz_contact_claim *claim = x->claim;
-    for (int64_t i = 0; i < x->m && isfinite(claim->inverse_bound); i++) {
-        double gap = uz_gap_of_row(claim->Nt, i, claim->of->h, claim->u, NULL);
-        double reach = claim->error * sqrt(claim->inverse_bound * uz_row_compliance(claim->Nt, i, claim->inverse));
-        x->open[i] = gap > 2.0 * reach;
-    }
-}
-
 /* 1: row k says no more than row i; -1: it points the other way; 0: neither, as far as doubles can tell. */
 static int side_of(const prover *x, int64_t k, int64_t i)
 {
@@ -59,20 +49,6 @@ static bool is_harmless(const prover *x, int64_t k, int64_t i)
     return k != i && (x->open[k] || side_of(x, k, i) != 0);
 }
 
-/* Is moving dof j, which row i pushes by `value`, no matter of other rows? A row that is moved the other way does no
- * harm but may spoil the proof by its reaction. */
-static bool is_own_dof(const prover *x, int64_t j, int64_t i, double value)
-{
-    const uz_csc *N = x->claim->of->N;
-    for (int64_t q = N->ptr[j]; q < N->ptr[j + 1]; q++) {
-        const int64_t k = N->idx[q];
-        bool away = N->val[q] * value <= 0.0 && !uz_row_presses(x->claim->r[k]);
-        if (k != i && !away && !is_harmless(x, k, i))
-            return false;
-    }
-    return value != 0.0;
-}
-
 static uz_status prepare(prover *x, const uz_contact_claim *claim, uz_error *err)
 {
     const uz_csc *N = claim->of->N;
@@ -92,29 +68,33 @@ static uz_status prepare(prover *x, const uz_contact_claim *claim, uz_error *err
     } else {
         uz_residuals res = {.e = spare, .e_u = x->force, .Ku = spare + x->d, .Kc = spare + 2 * x->d};
         status = uz_equilibrium_residual(&res, claim->of->K, N, claim->of->p, claim->u, zero, claim->r, err);
-        find_open_rows(x);
+        for (int64_t i = 0; i < x->m && isfinite(claim->inverse_bound); i++) {
+            const double gap = uz_gap_of_row(claim->Nt, i, claim->of->h, claim->u, NULL);
+            const double reach =
+                claim->error * sqrt(claim->inverse_bound * uz_row_compliance(claim->Nt, i, claim->inverse));
+            x->open[i] = gap > 2.0 * reach;
+        }
     }
     free(zero);
     free(spare);
     return status;
 }
 
-static void release(prover *x)
-{
-    void *room[] = {x->open, x->dof, x->row, x->z, x->Kz, x->image, x->force};
-    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-        free(room[i]);
-    uz_row_move_clear(&x->move);
-}
-
-/* z on the dofs that row i need not share. */
+/* z on the dofs that row i need not share: moving them is no matter of other rows. A row that is moved the other way
+ * does no harm but may spoil the proof by its reaction. */
 static bool witness_by_own_dofs(prover *x, int64_t i)
 {
-    const uz_csc *Nt = x->claim->Nt;
+    const uz_csc *Nt = x->claim->Nt, *N = x->claim->of->N;
     double sum = 0.0;
     for (int64_t q = Nt->ptr[i]; q < Nt->ptr[i + 1]; q++) {
         const int64_t j = Nt->idx[q];
-        if (!is_own_dof(x, j, i, Nt->val[q]))
+        bool own = Nt->val[q] != 0.0;
+        for (int64_t e = N->ptr[j]; e < N->ptr[j + 1] && own; e++) {
+            const int64_t k = N->idx[e];
+            const bool away = N->val[e] * Nt->val[q] <= 0.0 && !uz_row_presses(x->claim->r[k]);
+            own = k == i || away || is_harmless(x, k, i);
+        }
+        if (!own)
             continue;
         x->dof[x->n_dof++] = j;
         x->z[j] = x->claim->inverse[j] * Nt->val[q];
@@ -141,36 +121,6 @@ static void witness_by_equations(prover *x, int64_t i)
             x->dof[x->n_dof++] = j;
 }
 
-/* image = N z, and the rows where it is not zero. */
-static void apply_rows(prover *x)
-{
-    const uz_csc *N = x->claim->of->N;
-    x->n_row = 0;
-    for (int64_t k = 0; k < x->n_dof; k++)
-        for (int64_t q = N->ptr[x->dof[k]]; q < N->ptr[x->dof[k] + 1]; q++) {
-            if (x->image[N->idx[q]] == 0.0)
-                x->row[x->n_row++] = N->idx[q];
-            x->image[N->idx[q]] += N->val[q] * x->z[x->dof[k]];
-            if (x->image[N->idx[q]] == 0.0)
-                x->image[N->idx[q]] = DBL_MIN; /* stays listed, once */
-        }
-}
-
-/* z'K z + sum of R (N z)^2 */
-static double energy(prover *x)
-{
-    const uz_csc *K = x->claim->of->K;
-    double sum = 0.0;
-    for (int64_t k = 0; k < x->n_dof; k++) {
-        const int64_t j = x->dof[k];
-        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
-            sum += (K->idx[q] == j ? 1.0 : 2.0) * K->val[q] * x->z[j] * x->z[K->idx[q]];
-    }
-    for (int64_t k = 0; k < x->n_row; k++)
-        sum += x->claim->weight[x->row[k]] * x->image[x->row[k]] * x->image[x->row[k]];
-    return fmax(sum, 0.0);
-}
-
 /* How far z is from what row k wants of it. */
 static double miss_of(const prover *x, int64_t k, int64_t i)
 {
@@ -186,12 +136,19 @@ static double miss_of(const prover *x, int64_t k, int64_t i)
 static uz_contact_verdict judge(prover *x, int64_t i)
 {
     const uz_contact_claim *claim = x->claim;
-    double value = 0.0, slack = 0.0, size = sqrt(energy(x));
+    const uz_csc *K = claim->of->K;
+    double value = 0.0, slack = 0.0, energy = 0.0; /* z'K z + sum of R (N z)^2 */
     for (int64_t k = 0; k < x->n_dof; k++) {
-        double share = x->z[x->dof[k]] * x->force[x->dof[k]];
+        const int64_t j = x->dof[k];
+        const double share = x->z[j] * x->force[j];
         value += share;
         slack += fabs(share);
+        for (int64_t q = K->ptr[j]; q < K->ptr[j + 1]; q++)
+            energy += (K->idx[q] == j ? 1.0 : 2.0) * K->val[q] * x->z[j] * x->z[K->idx[q]];
     }
+    for (int64_t k = 0; k < x->n_row; k++)
+        energy += claim->weight[x->row[k]] * x->image[x->row[k]] * x->image[x->row[k]];
+    const double size = sqrt(fmax(energy, 0.0));
     for (int64_t k = 0; k < x->n_row; k++) {
         const int64_t j = x->row[k];
         double gap = claim->weight[j] > 0.0 ? uz_gap_of_row(claim->Nt, j, claim->of->h, claim->u, NULL) : 0.0;
@@ -208,11 +165,20 @@ static uz_contact_verdict judge(prover *x, int64_t i)
 /* Leaves z and image zero again. */
 static uz_contact_verdict prove_row(prover *x, bool *provable, int64_t i)
 {
+    const uz_csc *N = x->claim->of->N;
     double miss = 0.0;
-    x->n_dof = 0;
+    x->n_dof = x->n_row = 0;
     if (!witness_by_own_dofs(x, i))
         witness_by_equations(x, i);
-    apply_rows(x);
+    for (int64_t k = 0; k < x->n_dof; k++) /* image = N z, and the rows where it is not zero */
+        for (int64_t q = N->ptr[x->dof[k]]; q < N->ptr[x->dof[k] + 1]; q++) {
+            double *image = &x->image[N->idx[q]];
+            if (*image == 0.0)
+                x->row[x->n_row++] = N->idx[q];
+            *image += N->val[q] * x->z[x->dof[k]];
+            if (*image == 0.0)
+                *image = DBL_MIN; /* stays listed, once */
+        }
     for (int64_t k = 0; k < x->n_row; k++)
         miss = fmax(miss, miss_of(x, x->row[k], i));
     *provable = x->image[i] != 0.0 && miss <= WITNESS_ROUNDING;
@@ -235,6 +201,9 @@ uz_status uz_prove_contact(uz_contact_verdict *verdict, bool *provable, const uz
         uz_contact_verdict of_row = prove_row(&x, &provable[i], i);
         *verdict = of_row > *verdict ? of_row : *verdict;
     }
-    release(&x);
+    void *room[] = {x.open, x.dof, x.row, x.z, x.Kz, x.image, x.force};
+    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+        free(room[i]);
+    uz_row_move_clear(&x.move);
     return status;
 }

@@ -18,18 +18,6 @@ static const double NULL_SHARE = 1e-9;
 
 enum { FIRST_BLOCK = 8, ITERATIONS = 6 };
 
-/* Adds delta diag(K) in place. False: a diagonal entry is negative, or zero beside others in its column. */
-static bool shift_diagonal(uz_csc *K, double delta)
-{
-    for (int64_t j = 0; j < K->cols; j++) {
-        int64_t first = K->ptr[j];
-        if (first == K->ptr[j + 1] || K->idx[first] != j || !(K->val[first] > 0.0))
-            return false;
-        K->val[first] *= 1.0 + delta;
-    }
-    return true;
-}
-
 /* K without the dofs that have no stiffness at all: rows and columns of zeros, which a semidefinite K may have. */
 static uz_status without_empty(uz_csc *out, const uz_csc *K, uz_error *err)
 {
@@ -69,12 +57,16 @@ uz_status uz_check_semidefinite(const uz_csc *K, const uz_settings *settings, co
     uz_csc shifted = {0};
     uz_factor *factor = NULL;
     uz_status status = without_empty(&shifted, K, err);
-    if (status == UZ_OK && shifted.cols > 0) {
-        if (shift_diagonal(&shifted, SHIFTS * DBL_EPSILON * (double)shifted.cols))
-            status = uz_factor_plain(&factor, &shifted, settings->ordering, settings->memory_limit, hooks, err);
-        else
+    const double delta = SHIFTS * DBL_EPSILON * (double)shifted.cols;
+    for (int64_t j = 0; status == UZ_OK && j < shifted.cols; j++) {
+        const int64_t first = shifted.ptr[j];
+        if (first == shifted.ptr[j + 1] || shifted.idx[first] != j || !(shifted.val[first] > 0.0))
             status = uz_fail(err, UZ_ERR_NOT_SPD, "K", "K is not positive semidefinite: see its diagonal");
+        else
+            shifted.val[first] *= 1.0 + delta;
     }
+    if (status == UZ_OK && shifted.cols > 0)
+        status = uz_factor_plain(&factor, &shifted, settings->ordering, settings->memory_limit, hooks, err);
     uz_factor_free(factor);
     uz_csc_clear(&shifted);
     return status;
@@ -94,33 +86,6 @@ typedef struct {
     double *row, *dof; /* m, d */
 } block;
 
-static uint64_t next_random(uint64_t *state)
-{
-    *state = *state * 6364136223846793005u + 1442695040888963407u; /* Knuth's MMIX generator */
-    return *state >> 11;
-}
-
-static bool allocate(block *x, int64_t b)
-{
-    x->b = b;
-    x->X = uz_alloc_zero(x->d * b, sizeof(double));
-    x->Y = uz_alloc_zero(x->d * b, sizeof(double));
-    x->B = uz_alloc_zero(b * b, sizeof(double));
-    x->pivot = uz_alloc_zero(b, sizeof(int64_t));
-    x->row = uz_alloc_zero(x->m, sizeof(double));
-    x->dof = uz_alloc_zero(x->d, sizeof(double));
-    return x->X && x->Y && x->B && x->pivot && x->row && x->dof;
-}
-
-static void release(block *x)
-{
-    void *room[] = {x->X, x->Y, x->B, x->pivot, x->row, x->dof};
-    for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
-        free(room[i]);
-    x->X = x->Y = x->B = x->row = x->dof = NULL;
-    x->pivot = NULL;
-}
-
 /* x (d) = K_R^-1 N'row. */
 static uz_status solve_rows(block *s, double *x, uz_error *err)
 {
@@ -136,13 +101,22 @@ static uz_status solve_rows(block *s, double *x, uz_error *err)
     return status;
 }
 
-static uz_status start(block *s, uz_error *err)
+/* X = K_R^-1 N'R N X, or K_R^-1 N'R^1/2 times random numbers to begin with. */
+static uz_status iterate(block *s, bool first, uz_error *err)
 {
-    uint64_t seed = 1;
+    uint64_t random = 1;
     uz_status status = UZ_OK;
     for (int64_t c = 0; c < s->b && status == UZ_OK; c++) {
-        for (int64_t i = 0; i < s->m; i++)
-            s->row[i] = s->weight[i] > 0.0 ? ((double)next_random(&seed) * 0x1p-53 - 0.5) * sqrt(s->weight[i]) : 0.0;
+        memset(s->row, 0, (size_t)s->m * sizeof *s->row);
+        if (!first)
+            uz_csc_gaxpy(s->row, s->N, 1.0, s->X + c * s->d);
+        for (int64_t i = 0; i < s->m; i++) {
+            s->row[i] *= s->weight[i];
+            if (first && s->weight[i] > 0.0) {
+                random = random * 6364136223846793005u + 1442695040888963407u; /* Knuth's MMIX generator */
+                s->row[i] = ((double)(random >> 11) * 0x1p-53 - 0.5) * sqrt(s->weight[i]);
+            }
+        }
         status = solve_rows(s, s->X + c * s->d, err);
     }
     return status;
@@ -179,22 +153,9 @@ static void orthonormalise(block *s)
     s->b = kept;
 }
 
-/* X = K_R^-1 N'R N X */
-static uz_status iterate(block *s, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    for (int64_t c = 0; c < s->b && status == UZ_OK; c++) {
-        memset(s->row, 0, (size_t)s->m * sizeof *s->row);
-        uz_csc_gaxpy(s->row, s->N, 1.0, s->X + c * s->d);
-        for (int64_t i = 0; i < s->m; i++)
-            s->row[i] *= s->weight[i];
-        status = solve_rows(s, s->X + c * s->d, err);
-    }
-    return status;
-}
-
-/* B = X'K X, b x b, row by row. */
-static void project(block *s)
+/* B = X'K X, b x b, row by row, and its Cholesky factorization with complete pivoting (Higham 2002, section 10.3), L in
+ * the lower triangle. The rank: pivots below NULL_SHARE count as zero, as X is orthonormal in the norm of K_R. */
+static int64_t factor_projection(block *s)
 {
     const int64_t n = s->b, d = s->d;
     for (int64_t c = 0; c < n; c++) {
@@ -202,40 +163,27 @@ static void project(block *s)
         uz_csc_symv(s->Y + c * d, s->K, 1.0, s->X + c * d);
         for (int64_t i = 0; i <= c; i++)
             s->B[i * n + c] = s->B[c * n + i] = uz_dot(d, s->X + i * d, s->Y + c * d);
+        s->pivot[c] = c;
     }
-}
-
-static void swap_rows(block *s, int64_t a, int64_t b)
-{
-    const int64_t n = s->b, row = s->pivot[a];
-    s->pivot[a] = s->pivot[b];
-    s->pivot[b] = row;
-    for (int64_t i = 0; i < n && a != b; i++) {
-        double t = s->B[a * n + i];
-        s->B[a * n + i] = s->B[b * n + i];
-        s->B[b * n + i] = t;
-    }
-    for (int64_t i = 0; i < n && a != b; i++) {
-        double t = s->B[i * n + a];
-        s->B[i * n + a] = s->B[i * n + b];
-        s->B[i * n + b] = t;
-    }
-}
-
-/* Cholesky factorization of B with complete pivoting (Higham 2002, section 10.3), L in the lower triangle. The rank:
- * pivots below NULL_SHARE count as zero, as X is orthonormal in the norm of K_R. */
-static int64_t factor_projection(block *s)
-{
-    const int64_t n = s->b;
-    for (int64_t i = 0; i < n; i++)
-        s->pivot[i] = i;
     for (int64_t j = 0; j < n; j++) {
         int64_t best = j;
         for (int64_t i = j + 1; i < n; i++)
             best = s->B[i * n + i] > s->B[best * n + best] ? i : best;
         if (!(s->B[best * n + best] > NULL_SHARE))
             return j;
-        swap_rows(s, j, best);
+        const int64_t row = s->pivot[j];
+        s->pivot[j] = s->pivot[best];
+        s->pivot[best] = row;
+        for (int64_t i = 0; i < n && best != j; i++) {
+            const double t = s->B[j * n + i];
+            s->B[j * n + i] = s->B[best * n + i];
+            s->B[best * n + i] = t;
+        }
+        for (int64_t i = 0; i < n && best != j; i++) {
+            const double t = s->B[i * n + j];
+            s->B[i * n + j] = s->B[i * n + best];
+            s->B[i * n + best] = t;
+        }
         const double root = sqrt(s->B[j * n + j]);
         s->B[j * n + j] = root;
         for (int64_t i = j + 1; i < n; i++)
@@ -274,19 +222,24 @@ static void null_vector(double *z, const block *s, int64_t rank, int64_t free_co
 /* The null vectors in a block of b; *k may be all of them. */
 static uz_status search(block *s, double **Z, int64_t *k, int64_t b, uz_error *err)
 {
-    uz_status status = UZ_OK;
-    if (!allocate(s, b))
+    s->b = b;
+    s->X = uz_alloc_zero(s->d * b, sizeof(double));
+    s->Y = uz_alloc_zero(s->d * b, sizeof(double));
+    s->B = uz_alloc_zero(b * b, sizeof(double));
+    s->pivot = uz_alloc_zero(b, sizeof(int64_t));
+    s->row = uz_alloc_zero(s->m, sizeof(double));
+    s->dof = uz_alloc_zero(s->d, sizeof(double));
+    if (!s->X || !s->Y || !s->B || !s->pivot || !s->row || !s->dof)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for the null space of %lld dofs", (long long)s->d);
-    status = start(s, err);
+    uz_status status = iterate(s, true, err);
     for (int i = 0; i < ITERATIONS && status == UZ_OK; i++) {
         orthonormalise(s);
-        status = iterate(s, err);
+        status = iterate(s, false, err);
     }
     if (status != UZ_OK)
         return status;
     orthonormalise(s);
-    project(s);
-    int64_t rank = factor_projection(s);
+    const int64_t rank = factor_projection(s);
     *k = s->b - rank;
     *Z = uz_alloc_zero(*k * s->d, sizeof **Z);
     if (!*Z)
@@ -317,7 +270,11 @@ uz_status uz_null_space(double **Z, int64_t *k, const uz_csc *K, const uz_csc *K
         *Z = NULL;
         b = b < s.m ? b : s.m; /* N'R N has no larger rank */
         status = search(&s, Z, k, b, err);
-        release(&s);
+        void *room[] = {s.X, s.Y, s.B, s.pivot, s.row, s.dof};
+        for (size_t i = 0; i < sizeof room / sizeof room[0]; i++)
+            free(room[i]);
+        s.X = s.Y = s.B = s.row = s.dof = NULL;
+        s.pivot = NULL;
         if (*k < b || b == s.m || b > UZ_NULL_MOST)
             break;
     }

@@ -291,7 +291,7 @@ TEST(panels_do_what_whole_kernels_do)
         for (int64_t i = 0; i < n; i++)
             room[i] = (double)(i % 7) - 3;
         uz_symv_lower(n, M, room, x);
-        uz_potrs_lower(n, L, room);
+        uz_potrs_lower(n, L, n, room);
         for (int64_t i = 0; i < n; i++)
             CHECK(fabs(x[i] - room[i]) < 1e-12);
         free(A);
