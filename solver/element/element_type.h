@@ -43,8 +43,8 @@ typedef struct {
 
     const double (*local)[3]; /* nodes: local coordinates */
     double centre[3];
-    void (*shape)(double *N, const double point[3]);              /* N[node]: values of the shape functions */
-    void (*gradients)(double (*local)[3], const double point[3]); /* local[node][axis]: their derivatives */
+    /* Shape functions at a point: N[node] their values, slope[node][axis] their derivatives; each may be NULL. */
+    void (*shape)(double *N, double (*slope)[3], const double point[3]);
     uz_gauss_rule rule, ring; /* of the stiffness: the fewest points that leave no deformation without stiffness; `ring`
                                * is that of axisymmetric bodies, count 0: the same */
     enum {

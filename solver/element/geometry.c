@@ -18,7 +18,7 @@ const double (*uz_element_local_nodes(uz_element_kind kind))[3]
 
 void uz_element_shape(double *N, uz_element_kind kind, const double point[3])
 {
-    uz_element_type_of(kind)->shape(N, point);
+    uz_element_type_of(kind)->shape(N, NULL, point);
 }
 
 static const uz_gauss_rule *rule_of(uz_element_kind kind, uz_model model)
@@ -90,7 +90,7 @@ double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *
 {
     double local[UZ_ELEMENT_NODES][3], J[3][3], inverse[3][3];
     const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
-    uz_element_type_of(element->kind)->gradients(local, point);
+    uz_element_type_of(element->kind)->shape(NULL, local, point);
     uz_jacobian(J, element, local);
     const double det = uz_invert_jacobian(inverse, J, dim);
     for (int a = 0; a < nodes; a++)
@@ -180,7 +180,7 @@ double uz_centre_jacobian(double inverse[3][3], const uz_element *element)
 {
     static const double CENTRE[3] = {0, 0, 0};
     double local[UZ_ELEMENT_NODES][3], J[3][3];
-    uz_element_type_of(element->kind)->gradients(local, CENTRE);
+    uz_element_type_of(element->kind)->shape(NULL, local, CENTRE);
     uz_jacobian(J, element, local);
     return uz_invert_jacobian(inverse, J, uz_element_dim(element->kind));
 }
@@ -209,36 +209,29 @@ void uz_element_add_body_force(double *f, const uz_element *element, const doubl
     }
 }
 
-/* What node a feels of a stress: its three (two) forces per volume, B_a' stress. */
-static void node_force(double force[3], const uz_gauss_state *state, int a, uz_model model, const double *s)
-{
-    const double *g = state->grad[a];
-    if (model == UZ_SOLID) {
-        force[0] = g[0] * s[0] + g[1] * s[3] + g[2] * s[5];
-        force[1] = g[1] * s[1] + g[0] * s[3] + g[2] * s[4];
-        force[2] = g[2] * s[2] + g[1] * s[4] + g[0] * s[5];
-        return;
-    }
-    const double shear = model == UZ_AXISYMMETRIC ? s[3] : s[2];
-    force[0] = g[0] * s[0] + g[1] * shear;
-    force[1] = g[1] * s[1] + g[0] * shear;
-    if (model == UZ_AXISYMMETRIC)
-        force[0] += state->N[a] / state->radius * s[2];
-}
-
 /* A constant stress does the same work on the mean dilatation as on the strain itself, and none on incompatible modes:
  * so the plain B serves every formulation. */
 void uz_element_add_thermal_load(double *f, const uz_element *element, const double *thermal_strain)
 {
-    double stress[UZ_ELEMENT_STRESSES], force[3];
+    double s[UZ_ELEMENT_STRESSES];
     const int dim = uz_element_dim(element->kind), nodes = uz_element_node_count(element->kind);
     const int count = uz_element_gauss_count(element->kind, element->model);
-    uz_elastic_stress(stress, element->model, element->lame, thermal_strain);
+    uz_elastic_stress(s, element->model, element->lame, thermal_strain);
+    const bool ring = element->model == UZ_AXISYMMETRIC;
+    const double shear = ring ? s[3] : s[2];
     for (int g = 0; g < count; g++) {
         uz_gauss_state state;
         uz_gauss_state_at(&state, element, g);
-        for (int a = 0; a < nodes; a++) {
-            node_force(force, &state, a, element->model, stress);
+        for (int a = 0; a < nodes; a++) { /* what the node feels of it: its forces per volume, B_a' stress */
+            const double *d = state.grad[a];
+            double force[3] = {d[0] * s[0] + d[1] * shear, d[1] * s[1] + d[0] * shear};
+            if (ring)
+                force[0] += state.N[a] / state.radius * s[2];
+            if (dim == 3) {
+                force[0] = d[0] * s[0] + d[1] * s[3] + d[2] * s[5];
+                force[1] = d[1] * s[1] + d[0] * s[3] + d[2] * s[4];
+                force[2] = d[2] * s[2] + d[1] * s[4] + d[0] * s[5];
+            }
             for (int c = 0; c < dim; c++)
                 f[a * dim + c] += state.volume * force[c];
         }
@@ -252,7 +245,7 @@ static uz_shape_fault check_point(const uz_element *element, const double point[
 {
     double local[UZ_ELEMENT_NODES][3], J[3][3], lengths = 1;
     const int dim = uz_element_dim(element->kind);
-    uz_element_type_of(element->kind)->gradients(local, point);
+    uz_element_type_of(element->kind)->shape(NULL, local, point);
     uz_jacobian(J, element, local);
     for (int i = 0; i < dim; i++)
         lengths *= sqrt(J[i][0] * J[i][0] + J[i][1] * J[i][1] + (dim == 3 ? J[i][2] * J[i][2] : 0));

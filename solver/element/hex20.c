@@ -15,34 +15,21 @@ static const int GMSH[20] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 1
 
 /* Corners: product of (1 + p_i x_i) / 8 times (sum of p_i x_i - 2); middles: (1 - x_k^2) / 4 times that of the other
  * two axes, k being the one along which p_k = 0. */
-static void shape(double *N, const double point[3])
+static void shape(double *N, double (*slope)[3], const double point[3])
 {
     for (int a = 0; a < 20; a++) {
-        double product = a < 8 ? 0.125 : 0.25, sum = -2;
-        for (int i = 0; i < 3; i++) {
-            const double p = LOCAL[a][i], x = point[i];
-            product *= p == 0 ? (1 - x) * (1 + x) : 1 + p * x;
-            sum += p * x;
-        }
-        N[a] = a < 8 ? product * sum : product;
-    }
-}
-
-static void gradients(double (*local)[3], const double point[3])
-{
-    for (int a = 0; a < 20; a++) {
-        double factor[3], sum = -2;
+        double factor[3], product = a < 8 ? 0.125 : 0.25, sum = -2;
         for (int i = 0; i < 3; i++) {
             const double p = LOCAL[a][i], x = point[i];
             factor[i] = p == 0 ? (1 - x) * (1 + x) : 1 + p * x;
+            product *= factor[i];
             sum += p * x;
         }
-        for (int i = 0; i < 3; i++) {
+        if (N)
+            N[a] = a < 8 ? product * sum : product;
+        for (int i = 0; slope && i < 3; i++) {
             const double p = LOCAL[a][i], others = factor[(i + 1) % 3] * factor[(i + 2) % 3];
-            if (a < 8)
-                local[a][i] = 0.125 * p * others * (sum + factor[i]);
-            else
-                local[a][i] = 0.25 * others * (p == 0 ? -2 * point[i] : p);
+            slope[a][i] = a < 8 ? 0.125 * p * others * (sum + factor[i]) : 0.25 * others * (p == 0 ? -2 * point[i] : p);
         }
     }
 }
@@ -68,7 +55,6 @@ const uz_element_type uz_type_hex20 = {
     .linear = UZ_HEX8,
     .local = LOCAL,
     .shape = shape,
-    .gradients = gradients,
     .rule = {27, gauss},
     .recover = uz_recover_box,
     .vtk = 25,

@@ -6,23 +6,18 @@ static const double LOCAL[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1
 static const int NEXT[8][3] = {{1, 3, 4}, {2, 0, 5}, {3, 1, 6}, {0, 2, 7}, {7, 5, 0}, {4, 6, 1}, {5, 7, 2}, {6, 4, 3}};
 static const int PART[1][UZ_ELEMENT_CORNERS] = {{0, 1, 2, 3, 4, 5, 6, 7}};
 
-static void shape(double *N, const double point[3])
-{
-    for (int a = 0; a < 8; a++) {
-        N[a] = 1;
-        for (int i = 0; i < 3; i++)
-            N[a] *= 0.5 * (1 + LOCAL[a][i] * point[i]);
-    }
-}
-
-static void gradients(double (*local)[3], const double point[3])
+static void shape(double *N, double (*slope)[3], const double point[3])
 {
     for (int a = 0; a < 8; a++) {
         const double *at = LOCAL[a];
         const double x = 1 + at[0] * point[0], y = 1 + at[1] * point[1], z = 1 + at[2] * point[2];
-        local[a][0] = 0.125 * at[0] * y * z;
-        local[a][1] = 0.125 * at[1] * x * z;
-        local[a][2] = 0.125 * at[2] * x * y;
+        if (N)
+            N[a] = 0.5 * x * (0.5 * y) * (0.5 * z);
+        if (slope) {
+            slope[a][0] = 0.125 * at[0] * y * z;
+            slope[a][1] = 0.125 * at[1] * x * z;
+            slope[a][2] = 0.125 * at[2] * x * y;
+        }
     }
 }
 
@@ -48,7 +43,6 @@ const uz_element_type uz_type_hex8 = {
     .linear = UZ_HEX8,
     .local = LOCAL,
     .shape = shape,
-    .gradients = gradients,
     .rule = {8, gauss},
     .bbar = true,
     .incompatible = true,

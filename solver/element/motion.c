@@ -30,28 +30,6 @@ static void add_gradient(double H[3][3], double grad[][3], const double *value, 
                 H[c][j] += value[a * dim + c] * grad[a][j];
 }
 
-/* u_r / r; at the axis, where it tends to that, the radial strain. */
-static double hoop_strain(const uz_element *element, const double *u, const double point[3], double radial)
-{
-    double N[UZ_ELEMENT_NODES], largest, displacement = 0;
-    const int nodes = uz_element_node_count(element->kind);
-    uz_element_shape(N, element->kind, point);
-    const double radius = uz_ring_radius(&largest, element, N);
-    for (int a = 0; a < nodes; a++)
-        displacement += N[a] * u[2 * a];
-    return radius > UZ_AXIS * largest ? displacement / radius : radial;
-}
-
-/* An n-th of what the dilatation lacks of its mean goes to each of n direct strains, n as in stiffness.c. */
-static void set_dilatation(double *strain, int n, double dilatation)
-{
-    double own = 0;
-    for (int i = 0; i < n; i++)
-        own += strain[i];
-    for (int i = 0; i < n; i++)
-        strain[i] += (dilatation - own) / n;
-}
-
 void uz_element_strain(double *strain, const uz_element_motion *motion, const double point[3])
 {
     double grad[UZ_ELEMENT_NODES][3], H[3][3] = {{0}};
@@ -73,11 +51,21 @@ void uz_element_strain(double *strain, const uz_element_motion *motion, const do
         strain[4] = H[1][2] + H[2][1];
         strain[5] = H[2][0] + H[0][2];
     } else if (element->model == UZ_AXISYMMETRIC) {
-        strain[2] = hoop_strain(element, motion->u, point, H[0][0]);
+        double N[UZ_ELEMENT_NODES], largest, displacement = 0;
+        uz_element_shape(N, element->kind, point);
+        const double radius = uz_ring_radius(&largest, element, N);
+        for (int a = 0; a < nodes; a++)
+            displacement += N[a] * motion->u[2 * a];
+        strain[2] = radius > UZ_AXIS * largest ? displacement / radius : H[0][0]; /* what it tends to at the axis */
         strain[3] = H[0][1] + H[1][0];
     } else {
         strain[2] = H[0][1] + H[1][0];
     }
-    if (element->formulation == UZ_FORMULATION_BBAR)
-        set_dilatation(strain, element->model == UZ_PLANE_STRAIN ? 2 : 3, motion->dilatation);
+    /* An n-th of what the dilatation lacks of its mean goes to each of n direct strains, n as in stiffness.c. */
+    const int n = element->formulation != UZ_FORMULATION_BBAR ? 0 : element->model == UZ_PLANE_STRAIN ? 2 : 3;
+    double own = 0;
+    for (int i = 0; i < n; i++)
+        own += strain[i];
+    for (int i = 0; i < n; i++)
+        strain[i] += (motion->dilatation - own) / n;
 }

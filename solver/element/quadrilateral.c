@@ -6,18 +6,17 @@ static const int EDGE[4][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}};
 static const int NEXT[4][3] = {{1, 3}, {2, 0}, {3, 1}, {0, 2}};
 static const int PART[1][UZ_ELEMENT_CORNERS] = {{0, 1, 2, 3}};
 
-static void shape4(double *N, const double point[3])
-{
-    for (int a = 0; a < 4; a++)
-        N[a] = 0.5 * (1 + LOCAL[a][0] * point[0]) * (0.5 * (1 + LOCAL[a][1] * point[1]));
-}
-
-static void gradients4(double (*local)[3], const double point[3])
+static void shape4(double *N, double (*slope)[3], const double point[3])
 {
     const double x = point[0], y = point[1];
     for (int a = 0; a < 4; a++) {
-        local[a][0] = 0.25 * LOCAL[a][0] * (1 + LOCAL[a][1] * y);
-        local[a][1] = 0.25 * LOCAL[a][1] * (1 + LOCAL[a][0] * x);
+        const double p = LOCAL[a][0], q = LOCAL[a][1];
+        if (N)
+            N[a] = 0.5 * (1 + p * x) * (0.5 * (1 + q * y));
+        if (slope) {
+            slope[a][0] = 0.25 * p * (1 + q * y);
+            slope[a][1] = 0.25 * q * (1 + p * x);
+        }
     }
 }
 
@@ -29,31 +28,24 @@ static double gauss4(double point[3], int g)
     return 1;
 }
 
-static void shape8(double *N, const double point[3])
+static void shape8(double *N, double (*slope)[3], const double point[3])
 {
     const double x = point[0], y = point[1];
     for (int a = 0; a < 8; a++) {
         const double p = LOCAL[a][0], q = LOCAL[a][1];
-        N[a] = p == 0   ? 0.5 * (1 - x * x) * (1 + q * y)
-               : q == 0 ? 0.5 * (1 - y * y) * (1 + p * x)
-                        : 0.25 * (1 + p * x) * (1 + q * y) * (p * x + q * y - 1);
-    }
-}
-
-static void gradients8(double (*local)[3], const double point[3])
-{
-    const double x = point[0], y = point[1];
-    for (int a = 0; a < 8; a++) {
-        const double p = LOCAL[a][0], q = LOCAL[a][1];
-        if (p == 0) {
-            local[a][0] = -x * (1 + q * y);
-            local[a][1] = 0.5 * q * (1 - x * x);
-        } else if (q == 0) {
-            local[a][0] = 0.5 * p * (1 - y * y);
-            local[a][1] = -y * (1 + p * x);
-        } else {
-            local[a][0] = 0.25 * p * (1 + q * y) * (2 * p * x + q * y);
-            local[a][1] = 0.25 * q * (1 + p * x) * (2 * q * y + p * x);
+        if (N)
+            N[a] = p == 0   ? 0.5 * (1 - x * x) * (1 + q * y)
+                   : q == 0 ? 0.5 * (1 - y * y) * (1 + p * x)
+                            : 0.25 * (1 + p * x) * (1 + q * y) * (p * x + q * y - 1);
+        if (slope && p == 0) {
+            slope[a][0] = -x * (1 + q * y);
+            slope[a][1] = 0.5 * q * (1 - x * x);
+        } else if (slope && q == 0) {
+            slope[a][0] = 0.5 * p * (1 - y * y);
+            slope[a][1] = -y * (1 + p * x);
+        } else if (slope) {
+            slope[a][0] = 0.25 * p * (1 + q * y) * (2 * p * x + q * y);
+            slope[a][1] = 0.25 * q * (1 + p * x) * (2 * q * y + p * x);
         }
     }
 }
@@ -74,7 +66,6 @@ const uz_element_type uz_type_quad4 = {
     .linear = UZ_QUAD4,
     .local = LOCAL,
     .shape = shape4,
-    .gradients = gradients4,
     .rule = {4, gauss4},
     .jacobian = UZ_JACOBIAN_LINEAR,
     .bbar = true,
@@ -100,7 +91,6 @@ const uz_element_type uz_type_quad8 = {
     .linear = UZ_QUAD4,
     .local = LOCAL,
     .shape = shape8,
-    .gradients = gradients8,
     .rule = {9, gauss9},
     .recover = uz_recover_box,
     .vtk = 23,

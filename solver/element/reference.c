@@ -20,29 +20,23 @@ double uz_barycentric_slope(int a, int i)
     return a == 0 ? -1 : a == i + 1;
 }
 
-void uz_simplex_shape(double *N, int dim, int nodes, const double point[3])
+void uz_simplex_shape(double *N, double (*slope)[3], int dim, int nodes, const double point[3])
 {
     double L[4];
     const int corners = dim + 1;
     uz_barycentric(L, dim, point);
-    for (int a = 0; a < corners; a++)
-        N[a] = nodes == corners ? L[a] : L[a] * (2 * L[a] - 1);
-    for (int a = corners; a < nodes; a++)
-        N[a] = 4 * L[MIDDLE[a - corners][0]] * L[MIDDLE[a - corners][1]];
-}
-
-void uz_simplex_gradients(double (*local)[3], int dim, int nodes, const double point[3])
-{
-    double L[4];
-    const int corners = dim + 1;
-    uz_barycentric(L, dim, point);
-    for (int a = 0; a < corners; a++)
-        for (int i = 0; i < dim; i++)
-            local[a][i] = (nodes == corners ? 1 : 4 * L[a] - 1) * uz_barycentric_slope(a, i);
+    for (int a = 0; a < corners; a++) {
+        if (N)
+            N[a] = nodes == corners ? L[a] : L[a] * (2 * L[a] - 1);
+        for (int i = 0; slope && i < dim; i++)
+            slope[a][i] = (nodes == corners ? 1 : 4 * L[a] - 1) * uz_barycentric_slope(a, i);
+    }
     for (int m = corners; m < nodes; m++) {
         const int a = MIDDLE[m - corners][0], b = MIDDLE[m - corners][1];
-        for (int i = 0; i < dim; i++)
-            local[m][i] = 4 * (uz_barycentric_slope(a, i) * L[b] + L[a] * uz_barycentric_slope(b, i));
+        if (N)
+            N[m] = 4 * L[a] * L[b];
+        for (int i = 0; slope && i < dim; i++)
+            slope[m][i] = 4 * (uz_barycentric_slope(a, i) * L[b] + L[a] * uz_barycentric_slope(b, i));
     }
 }
 

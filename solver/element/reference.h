@@ -15,9 +15,9 @@
 /* Barycentric coordinates of a local point, dim + 1 of them; the derivative of the a-th along axis i. */
 void uz_barycentric(double L[4], int dim, const double point[3]);
 double uz_barycentric_slope(int a, int i);
-/* Of nodes == dim + 1: L_a. Else with middles of the edges: L_a (2 L_a - 1) at corners, 4 L_a L_b between a and b. */
-void uz_simplex_shape(double *N, int dim, int nodes, const double point[3]);
-void uz_simplex_gradients(double (*local)[3], int dim, int nodes, const double point[3]);
+/* As `shape` of a type. Of nodes == dim + 1: L_a. Else with middles of the edges: L_a (2 L_a - 1) at corners, 4 L_a L_b
+ * between a and b. */
+void uz_simplex_shape(double *N, double (*slope)[3], int dim, int nodes, const double point[3]);
 
 /* The g-th of three points of a line: its weight. */
 double uz_gauss_line3(double *at, int g);

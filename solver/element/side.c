@@ -31,27 +31,24 @@ const double (*uz_side_local_nodes(const uz_side *side))[3]
 
 /* ---------------------------------------------------------- shape functions */
 
-/* Values, and derivatives by the one reference coordinate. */
-static void edge_shape(double *N, double slope[][3], int nodes, double s)
-{
-    N[0] = nodes == 2 ? 0.5 * (1 - s) : -0.5 * s * (1 - s);
-    N[1] = nodes == 2 ? 0.5 * (1 + s) : 0.5 * s * (1 + s);
-    slope[0][0] = nodes == 2 ? -0.5 : s - 0.5;
-    slope[1][0] = nodes == 2 ? 0.5 : s + 0.5;
-    if (nodes == 3) {
-        N[2] = (1 - s) * (1 + s);
-        slope[2][0] = -2 * s;
-    }
-}
-
 void uz_side_gradients(double *N, double slope[][3], const uz_side *side, const double point[2])
 {
-    if (side->dim == 2) {
-        edge_shape(N, slope, side->nodes, point[0]);
+    const double s = point[0];
+    if (side->dim == 3) {
+        const double at[3] = {point[0], point[1]};
+        face_type(side)->shape(N, slope, at);
+    } else if (side->nodes == 2) {
+        N[0] = 0.5 * (1 - s);
+        N[1] = 0.5 * (1 + s);
+        slope[0][0] = -0.5;
+        slope[1][0] = 0.5;
     } else {
-        const uz_element_type *type = face_type(side);
-        type->shape(N, point);
-        type->gradients(slope, point);
+        N[0] = -0.5 * s * (1 - s);
+        N[1] = 0.5 * s * (1 + s);
+        N[2] = (1 - s) * (1 + s);
+        slope[0][0] = s - 0.5;
+        slope[1][0] = s + 0.5;
+        slope[2][0] = -2 * s;
     }
 }
 
@@ -94,19 +91,6 @@ double uz_side_gauss(double point[2], const uz_side *side, int g)
 
 /* ------------------------------------------------------------------- areas */
 
-/* Thickness, 2 pi r, or 1. */
-static double depth(const uz_side *side, const double *N)
-{
-    double radius = 0;
-    if (side->model == UZ_SOLID)
-        return 1;
-    if (side->model != UZ_AXISYMMETRIC)
-        return side->thickness;
-    for (int a = 0; a < side->nodes; a++)
-        radius += N[a] * side->xyz[2 * a];
-    return 2 * PI * radius;
-}
-
 /* The values of the shape functions come along. */
 static void area_vector(double *area, double *N, const uz_side *side, const double point[2])
 {
@@ -118,10 +102,14 @@ static void area_vector(double *area, double *N, const uz_side *side, const doub
         for (int i = 0; i < side->dim - 1; i++)
             for (int j = 0; j < side->dim; j++)
                 T[i][j] += slope[a][i] * (side->xyz[a * side->dim + j] - side->xyz[j]);
-    const double *s = T[0], *t = T[1], times = depth(side, N);
+    const double *s = T[0], *t = T[1];
     if (side->dim == 2) { /* the element on the left: outward is the tangent turned clockwise */
-        area[0] = times * s[1];
-        area[1] = -times * s[0];
+        double radius = 0;
+        for (int a = 0; a < side->nodes; a++)
+            radius += N[a] * side->xyz[2 * a];
+        const double depth = side->model == UZ_AXISYMMETRIC ? 2 * PI * radius : side->thickness;
+        area[0] = depth * s[1];
+        area[1] = -depth * s[0];
         return;
     }
     for (int i = 0; i < 3; i++)

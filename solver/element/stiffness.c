@@ -93,20 +93,6 @@ static int flatten(double *v, double grad[][3], int count, int dim)
     return size;
 }
 
-static double mean_direction_count(uz_model model)
-{
-    return model == UZ_PLANE_STRAIN ? 2 : 3;
-}
-
-/* The mean dilatation's share of the energy. */
-static void add_mean(double *K, const uz_element *element, double modulus)
-{
-    double mean[UZ_ELEMENT_NODES][3], v[UZ_ELEMENT_DOFS];
-    const double volume = uz_mean_gradients(mean, element);
-    const int size = flatten(v, mean, uz_element_node_count(element->kind), uz_element_dim(element->kind));
-    add_product(K, size, modulus * volume, v);
-}
-
 /* Lower triangle, with the internal parameters last; rows MOST apart. Returns the size. */
 static int integrate(double *K, const uz_element *element)
 {
@@ -116,7 +102,7 @@ static int integrate(double *K, const uz_element *element)
     const bool modes = element->formulation == UZ_FORMULATION_INCOMPATIBLE;
     const bool mean = element->formulation == UZ_FORMULATION_BBAR, ring = element->model == UZ_AXISYMMETRIC;
     const int size = dofs + (modes ? dim * dim : 0);
-    const double share = 2 * element->lame.mu / mean_direction_count(element->model);
+    const double share = 2 * element->lame.mu / (element->model == UZ_PLANE_STRAIN ? 2 : 3);
     const double lambda = mean ? -share : element->lame.lambda;
     clear_lower(S, size);
     clear_lower(K, size);
@@ -146,8 +132,12 @@ static int integrate(double *K, const uz_element *element)
     for (int i = 0; i < size; i++)
         for (int j = 0; j <= i; j++)
             K[i * MOST + j] += S[i * MOST + j];
-    if (mean)
-        add_mean(K, element, element->lame.lambda + share);
+    if (mean) { /* the mean dilatation's share of the energy */
+        double means[UZ_ELEMENT_NODES][3];
+        const double volume = uz_mean_gradients(means, element);
+        flatten(v, means, nodes, dim);
+        add_product(K, dofs, (element->lame.lambda + share) * volume, v);
+    }
     return size;
 }
 
@@ -161,24 +151,6 @@ static void factor_internal(double *K, int dofs, int size)
                 sum -= K[i * MOST + k] * K[j * MOST + k];
             K[i * MOST + j] = i == j ? sqrt(sum) : sum / K[j * MOST + j];
         }
-}
-
-/* The internal parameters are those of least energy: K_uu - K_ua A^-1 K_au. */
-static void condense(double *K, int dofs, int size)
-{
-    factor_internal(K, dofs, size);
-    /* L^-1 times the coupling, in its place. */
-    for (int i = dofs; i < size; i++)
-        for (int j = 0; j < dofs; j++) {
-            double sum = K[i * MOST + j];
-            for (int k = dofs; k < i; k++)
-                sum -= K[i * MOST + k] * K[k * MOST + j];
-            K[i * MOST + j] = sum / K[i * MOST + i];
-        }
-    for (int k = dofs; k < size; k++)
-        for (int i = 0; i < dofs; i++)
-            for (int j = 0; j <= i; j++)
-                K[i * MOST + j] -= K[k * MOST + i] * K[k * MOST + j];
 }
 
 void uz_internal_parameters(double internal[UZ_ELEMENT_INTERNAL], const uz_element *element, const double *u)
@@ -212,7 +184,19 @@ uz_shape_fault uz_element_stiffness(double *ke, const uz_element *element)
     if (fault != UZ_SHAPE_GOOD)
         return fault;
     const int size = integrate(K, element);
-    condense(K, dofs, size);
+    factor_internal(K, dofs, size);
+    /* The internal parameters are those of least energy: K_uu - K_ua A^-1 K_au, first L^-1 times the coupling. */
+    for (int i = dofs; i < size; i++)
+        for (int j = 0; j < dofs; j++) {
+            double sum = K[i * MOST + j];
+            for (int k = dofs; k < i; k++)
+                sum -= K[i * MOST + k] * K[k * MOST + j];
+            K[i * MOST + j] = sum / K[i * MOST + i];
+        }
+    for (int k = dofs; k < size; k++)
+        for (int i = 0; i < dofs; i++)
+            for (int j = 0; j <= i; j++)
+                K[i * MOST + j] -= K[k * MOST + i] * K[k * MOST + j];
     for (int i = 0; i < dofs; i++)
         for (int j = 0; j <= i; j++)
             ke[dofs * i + j] = ke[dofs * j + i] = K[i * MOST + j];

@@ -19,8 +19,7 @@ static void add_point(uz_strain_rule *rule, const double point[3], double weight
     const int g = rule->points++;
     memcpy(rule->point[g], point, sizeof rule->point[g]);
     rule->weight[g] = weight;
-    uz_element_shape(rule->N[g], rule->kind, rule->point[g]);
-    uz_element_type_of(rule->kind)->gradients(rule->slope[g], rule->point[g]);
+    uz_element_type_of(rule->kind)->shape(rule->N[g], rule->slope[g], rule->point[g]);
 }
 
 static void add_gauss_points(uz_strain_rule *rule)
@@ -44,7 +43,7 @@ static void begin_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model mode
     rule->quadratic = rule->nodes > uz_element_type_of(kind)->corners;
     rule->stresses = uz_stress_count(model);
     rule->direct = rule->stresses == 3 ? 2 : 3;
-    uz_element_type_of(kind)->gradients(rule->centre, ORIGIN);
+    uz_element_type_of(kind)->shape(NULL, rule->centre, ORIGIN);
 }
 
 void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)

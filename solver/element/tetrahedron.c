@@ -15,14 +15,9 @@ static const int PART[6][UZ_ELEMENT_CORNERS] = {{0, 1, 2, 6}, {0, 5, 1, 6}, {0, 
                                                 {0, 2, 3, 6}, {0, 4, 5, 6}, {0, 7, 4, 6}};
 static const int GMSH10[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};
 
-static void shape4(double *N, const double point[3])
+static void shape4(double *N, double (*slope)[3], const double point[3])
 {
-    uz_simplex_shape(N, 3, 4, point);
-}
-
-static void gradients4(double (*local)[3], const double point[3])
-{
-    uz_simplex_gradients(local, 3, 4, point);
+    uz_simplex_shape(N, slope, 3, 4, point);
 }
 
 static double gauss1(double point[3], int g)
@@ -32,14 +27,9 @@ static double gauss1(double point[3], int g)
     return 1. / 6;
 }
 
-static void shape10(double *N, const double point[3])
+static void shape10(double *N, double (*slope)[3], const double point[3])
 {
-    uz_simplex_shape(N, 3, 10, point);
-}
-
-static void gradients10(double (*local)[3], const double point[3])
-{
-    uz_simplex_gradients(local, 3, 10, point);
+    uz_simplex_shape(N, slope, 3, 10, point);
 }
 
 /* Degree 2: Keast, Comput. Methods Appl. Mech. Engrg 55 (1986). */
@@ -65,7 +55,6 @@ const uz_element_type uz_type_tet4 = {
     .local = LOCAL,
     .centre = {0.25, 0.25, 0.25},
     .shape = shape4,
-    .gradients = gradients4,
     .rule = {1, gauss1},
     .jacobian = UZ_JACOBIAN_CONSTANT,
     .recover = uz_recover_centre,
@@ -94,7 +83,6 @@ const uz_element_type uz_type_tet10 = {
     .local = LOCAL,
     .centre = {0.25, 0.25, 0.25},
     .shape = shape10,
-    .gradients = gradients10,
     .rule = {4, gauss4},
     .recover = uz_recover_simplex,
     .vtk = 24,

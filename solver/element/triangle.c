@@ -6,24 +6,14 @@ static const int EDGE[3][2] = {{0, 1}, {1, 2}, {2, 0}};
 static const int NEXT[3][3] = {{1, 2}, {2, 0}, {0, 1}};
 static const int PART[2][UZ_ELEMENT_CORNERS] = {{0, 1, 2}, {0, 2, 3}};
 
-static void shape3(double *N, const double point[3])
+static void shape3(double *N, double (*slope)[3], const double point[3])
 {
-    uz_simplex_shape(N, 2, 3, point);
+    uz_simplex_shape(N, slope, 2, 3, point);
 }
 
-static void gradients3(double (*local)[3], const double point[3])
+static void shape6(double *N, double (*slope)[3], const double point[3])
 {
-    uz_simplex_gradients(local, 2, 3, point);
-}
-
-static void shape6(double *N, const double point[3])
-{
-    uz_simplex_shape(N, 2, 6, point);
-}
-
-static void gradients6(double (*local)[3], const double point[3])
-{
-    uz_simplex_gradients(local, 2, 6, point);
+    uz_simplex_shape(N, slope, 2, 6, point);
 }
 
 /* A ring needs three points where a plane needs one: N / r is not constant. */
@@ -38,7 +28,6 @@ const uz_element_type uz_type_tri3 = {
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3},
     .shape = shape3,
-    .gradients = gradients3,
     .rule = {1, uz_gauss_triangle1},
     .ring = {3, uz_gauss_triangle3},
     .jacobian = UZ_JACOBIAN_CONSTANT,
@@ -64,7 +53,6 @@ const uz_element_type uz_type_tri6 = {
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3},
     .shape = shape6,
-    .gradients = gradients6,
     .rule = {3, uz_gauss_triangle3},
     .recover = uz_recover_simplex,
     .vtk = 22,

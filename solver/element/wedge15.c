@@ -16,43 +16,38 @@ static const int ABAQUS[15] = {0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13}
 
 /* With z along the line: corners L_a ((2 L_a - 1)(1 + z_a z) - (1 - z^2)) / 2, middles of the triangles' edges
  * 2 L_a L_b (1 + z_a z), those between the triangles L_a (1 - z^2). */
-static void shape(double *N, const double point[3])
-{
-    double L[4];
-    const double z = point[2], bubble = (1 - z) * (1 + z);
-    uz_barycentric(L, 2, point);
-    for (int a = 0; a < 6; a++) {
-        const double l = L[CORNER[a]];
-        N[a] = 0.5 * l * ((2 * l - 1) * (1 + LOCAL[a][2] * z) - bubble);
-    }
-    for (int a = 6; a < 12; a++)
-        N[a] = 2 * L[CORNER[EDGE[a - 6][0]]] * L[CORNER[EDGE[a - 6][1]]] * (1 + LOCAL[a][2] * z);
-    for (int a = 12; a < 15; a++)
-        N[a] = L[CORNER[a - 12]] * bubble;
-}
-
-static void gradients(double (*local)[3], const double point[3])
+static void shape(double *N, double (*slope)[3], const double point[3])
 {
     double L[4];
     const double z = point[2], bubble = (1 - z) * (1 + z);
     uz_barycentric(L, 2, point);
     for (int a = 0; a < 6; a++) {
         const double l = L[CORNER[a]], side = LOCAL[a][2];
-        for (int i = 0; i < 2; i++)
-            local[a][i] = 0.5 * uz_barycentric_slope(CORNER[a], i) * ((4 * l - 1) * (1 + side * z) - bubble);
-        local[a][2] = 0.5 * l * ((2 * l - 1) * side + 2 * z);
+        if (N)
+            N[a] = 0.5 * l * ((2 * l - 1) * (1 + side * z) - bubble);
+        for (int i = 0; slope && i < 2; i++)
+            slope[a][i] = 0.5 * uz_barycentric_slope(CORNER[a], i) * ((4 * l - 1) * (1 + side * z) - bubble);
+        if (slope)
+            slope[a][2] = 0.5 * l * ((2 * l - 1) * side + 2 * z);
     }
     for (int a = 6; a < 12; a++) {
         const int p = CORNER[EDGE[a - 6][0]], q = CORNER[EDGE[a - 6][1]];
-        for (int i = 0; i < 2; i++)
-            local[a][i] =
-                2 * (uz_barycentric_slope(p, i) * L[q] + L[p] * uz_barycentric_slope(q, i)) * (1 + LOCAL[a][2] * z);
-        local[a][2] = 2 * L[p] * L[q] * LOCAL[a][2];
+        const double side = LOCAL[a][2];
+        if (N)
+            N[a] = 2 * L[p] * L[q] * (1 + side * z);
+        for (int i = 0; slope && i < 2; i++)
+            slope[a][i] = 2 * (uz_barycentric_slope(p, i) * L[q] + L[p] * uz_barycentric_slope(q, i)) * (1 + side * z);
+        if (slope)
+            slope[a][2] = 2 * L[p] * L[q] * side;
     }
     for (int a = 12; a < 15; a++) {
-        for (int i = 0; i < 2; i++)
-            local[a][i] = uz_barycentric_slope(CORNER[a - 12], i) * bubble;
-        local[a][2] = -2 * z * L[CORNER[a - 12]];
+        const double l = L[CORNER[a - 12]];
+        if (N)
+            N[a] = l * bubble;
+        for (int i = 0; slope && i < 2; i++)
+            slope[a][i] = uz_barycentric_slope(CORNER[a - 12], i) * bubble;
+        if (slope)
+            slope[a][2] = -2 * z * l;
     }
 }
 
@@ -96,7 +91,6 @@ const uz_element_type uz_type_wedge15 = {
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3, 0},
     .shape = shape,
-    .gradients = gradients,
     .rule = {9, gauss},
     .recover = recover,
     .vtk = 26,

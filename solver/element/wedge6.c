@@ -12,23 +12,19 @@ static const int NEXT[6][3] = {{2, 1, 3}, {0, 2, 4}, {1, 0, 5}, {4, 5, 0}, {5, 3
 static const int PART[2][UZ_ELEMENT_CORNERS] = {{0, 2, 1, 4, 6, 5}, {0, 3, 2, 4, 7, 6}};
 static const int GMSH[6] = {0, 2, 1, 3, 5, 4};
 
-static void shape(double *N, const double point[3])
-{
-    double L[4];
-    uz_barycentric(L, 2, point);
-    for (int a = 0; a < 6; a++)
-        N[a] = L[CORNER[a]] * (0.5 * (1 + LOCAL[a][2] * point[2]));
-}
-
-static void gradients(double (*local)[3], const double point[3])
+static void shape(double *N, double (*slope)[3], const double point[3])
 {
     double L[4];
     uz_barycentric(L, 2, point);
     for (int a = 0; a < 6; a++) {
         const double along = 0.5 * (1 + LOCAL[a][2] * point[2]);
-        local[a][0] = uz_barycentric_slope(CORNER[a], 0) * along;
-        local[a][1] = uz_barycentric_slope(CORNER[a], 1) * along;
-        local[a][2] = 0.5 * LOCAL[a][2] * L[CORNER[a]];
+        if (N)
+            N[a] = L[CORNER[a]] * along;
+        if (slope) {
+            slope[a][0] = uz_barycentric_slope(CORNER[a], 0) * along;
+            slope[a][1] = uz_barycentric_slope(CORNER[a], 1) * along;
+            slope[a][2] = 0.5 * LOCAL[a][2] * L[CORNER[a]];
+        }
     }
 }
 
@@ -50,7 +46,6 @@ const uz_element_type uz_type_wedge6 = {
     .local = LOCAL,
     .centre = {1.0 / 3, 1.0 / 3, 0},
     .shape = shape,
-    .gradients = gradients,
     .rule = {6, gauss},
     .recover = uz_recover_centre,
     .next = NEXT,

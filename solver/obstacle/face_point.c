@@ -125,8 +125,7 @@ static void shape(double *w, double *da, double *db, int count, const double at[
         double gradient[UZ_FACE_NODES][3];
         const uz_element_type *type = uz_element_type_of(UZ_QUAD8);
         const double point[3] = {at[0], at[1], 0};
-        type->shape(w, point);
-        type->gradients(gradient, point);
+        type->shape(w, gradient, point);
         for (int i = 0; i < 8; i++) {
             da[i] = gradient[i][0];
             db[i] = gradient[i][1];
