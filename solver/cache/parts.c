@@ -65,11 +65,6 @@ static void destroy_analysis(void *object)
     uz_analysis_free(object);
 }
 
-static uz_status analyze(uz_analysis **out, const wanted *w, uz_error *err)
-{
-    return uz_analysis_choose(out, w->K, w->dofs, w->n_dofs, w->rows, w->ordering, w->hooks, err);
-}
-
 /* The analysis of this pattern: from the table, or made and kept there. */
 static uz_status get_analysis(uz_item **item, bool *reused, uz_cache *cache, const wanted *w, uz_error *err)
 {
@@ -82,7 +77,7 @@ static uz_status get_analysis(uz_item **item, bool *reused, uz_cache *cache, con
     *reused = status == UZ_OK && !create;
     if (status != UZ_OK || !create)
         return status;
-    status = analyze(&analysis, w, err);
+    status = uz_analysis_create(&analysis, w->K, w->dofs, w->n_dofs, w->rows, w->ordering, w->hooks, err);
     if (status == UZ_OK) {
         uz_table_publish(cache, *item, analysis, uz_analysis_bytes(analysis), destroy_analysis);
     } else {
@@ -168,7 +163,7 @@ uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_
         return status;
     if (create) {
         status = cache ? get_analysis(&kept_analysis, &out->analysis_reused, cache, &w, err)
-                       : analyze(&own_analysis, &w, err);
+                       : uz_analysis_create(&own_analysis, K, dofs, n_dofs, rows, ordering, hooks, err);
         const uz_analysis *analysis = kept_analysis ? uz_item_object(kept_analysis) : own_analysis;
         if (status == UZ_OK) {
             uz_factor_info predicted = uz_analysis_describe(analysis);

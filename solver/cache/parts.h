@@ -25,7 +25,7 @@ typedef struct {
 typedef uz_status (*uz_factor_accept)(void *ctx, const uz_factor_info *predicted, uz_error *err);
 
 /* Finds a factor of K, one that ends with the contact's dofs (ascending) if it can, or makes one that does or that
- * serves `rows` rows on them as well (uz_analysis_choose), with an analysis of the same pattern where there is one.
+ * serves `rows` rows on them as well (uz_analysis_create), with an analysis of the same pattern where there is one.
  * Where K is ill-conditioned only the factor is found that would be made. cache NULL: made, and freed on release; key
  * is then not read. Errors: uz_factor_create's. */
 uz_status uz_shared_factor_get(uz_shared_factor *out, uz_cache *cache, const uz_matrix_key *key, const uz_csc *K,

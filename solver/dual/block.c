@@ -48,7 +48,7 @@ uz_status uz_dual_block_forward(uz_dual_block *block, uz_error *err)
     const int64_t size = block->dual->d * UZ_LANES;
     for (int64_t b = 0; b < block->blocks; b++)
         uz_factor_permute_lanes(factor, block->Y + b * size, block->P + b * size);
-    return uz_factor_forward_lanes(factor, block->Y, block->blocks, err);
+    return uz_factor_solve_lanes(factor, block->Y, block->blocks, true, err);
 }
 
 /* Where a lane's entry 0 stands. */
@@ -83,7 +83,7 @@ uz_status uz_dual_block_recover(uz_dual_block *block, uz_dual_load *const *loads
         status = dual->form->add_reactions(loads[lane], block->X + lane_start(block, lane), UZ_LANES, block->room,
                                            r[lane], corrected[lane] && loads[lane]->has_kept, err);
     if (status == UZ_OK)
-        status = uz_factor_backward_lanes(dual->factor, block->X, block->blocks, err);
+        status = uz_factor_solve_lanes(dual->factor, block->X, block->blocks, false, err);
     for (int64_t b = 0; status == UZ_OK && b < block->blocks; b++)
         uz_factor_unpermute_lanes(dual->factor, block->U + b * size, block->X + b * size);
     return status;

@@ -58,9 +58,8 @@ static uz_status begin(uz_analysis *analysis, const uz_csc *K, const int64_t *la
     return UZ_OK;
 }
 
-/* rows: of N where the contact dofs need not be last, else 0. */
-static uz_status create(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
-                        uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
+uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
+                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
 {
     *out = NULL;
     if (K->rows != K->cols || K->rows < 1)
@@ -99,18 +98,6 @@ static uz_status create(uz_analysis **out, const uz_csc *K, const int64_t *dofs,
     else
         uz_analysis_free(analysis);
     return status;
-}
-
-uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *last, int64_t n_last,
-                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
-{
-    return create(out, K, last, n_last, 0, ordering, hooks, err);
-}
-
-uz_status uz_analysis_choose(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
-                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
-{
-    return create(out, K, dofs, n_dofs, rows, ordering, hooks, err);
 }
 
 uz_analysis *uz_analysis_hold(const uz_analysis *analysis)

@@ -137,13 +137,6 @@ UZ_AVX2_FMA static void substitute_back_fused(const panel_of *s)
 
 typedef void (*panel_step)(const panel_of *s);
 
-static panel_step best_step(bool forward)
-{
-    if (uz_cpu_has_avx2_fma())
-        return forward ? eliminate_fused : substitute_back_fused;
-    return forward ? eliminate : substitute_back;
-}
-
 /* Rows of the block to and from room. */
 static void gather_rows(double *to, const double *from, const SuiteSparse_long *rows, int64_t count)
 {
@@ -157,12 +150,14 @@ static void scatter_rows(double *to, const double *from, const SuiteSparse_long 
         memcpy(to + rows[i] * UZ_LANES, from + i * UZ_LANES, UZ_LANES * sizeof *to);
 }
 
-static uz_status substitute(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err)
+uz_status uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
     int64_t most = 0, count = (int64_t)L->nsuper;
-    panel_step step = best_step(forward);
+    const bool fused = uz_cpu_has_avx2_fma();
+    const panel_step step =
+        forward ? (fused ? eliminate_fused : eliminate) : (fused ? substitute_back_fused : substitute_back);
     for (int64_t k = 0; k < count; k++)
         most = pi[k + 1] - pi[k] > most ? pi[k + 1] - pi[k] : most;
     double *room = uz_alloc(most, UZ_LANES * sizeof *room);
@@ -181,16 +176,6 @@ static uz_status substitute(const uz_factor *factor, double *X, int64_t blocks, 
     }
     free(room);
     return UZ_OK;
-}
-
-uz_status uz_factor_forward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err)
-{
-    return substitute(factor, X, blocks, true, err);
-}
-
-uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err)
-{
-    return substitute(factor, X, blocks, false, err);
 }
 
 void uz_factor_permute_lanes(const uz_factor *factor, double *permuted, const double *X)

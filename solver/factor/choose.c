@@ -20,31 +20,6 @@ typedef struct {
     cholmod_common *common;
 } chooser;
 
-/* Additions and multiplications of the supernodal factorization, filled-in zeros included. */
-static double count_flops(const cholmod_factor *L)
-{
-    const SuiteSparse_long *count = L->ColCount;
-    double flops = 0.0;
-    for (size_t j = 0; j < L->n; j++)
-        flops += (double)count[j] * (double)count[j];
-    return flops;
-}
-
-/* Numbers of the groups of the contact dofs, each once. */
-static bool list_groups(chooser *c)
-{
-    const uz_analysis *analysis = c->analysis;
-    bool *seen = uz_alloc_zero(c->groups, sizeof *seen);
-    for (int64_t k = 0; seen && k < analysis->n_last; k++) {
-        int64_t group = c->group[analysis->last[k]];
-        if (!seen[group])
-            c->last[c->n_last++] = group;
-        seen[group] = true;
-    }
-    free(seen);
-    return seen != NULL;
-}
-
 static uz_status order(chooser *c, uz_ordering ordering, bool contact_last, uz_error *err)
 {
     int64_t n_last = contact_last ? c->n_last : 0;
@@ -60,34 +35,35 @@ static uz_status order(chooser *c, uz_ordering ordering, bool contact_last, uz_e
     return uz_move_last(c->perm, c->groups, c->last, n_last, err);
 }
 
-/* What condensing adds to the factorization: nothing where a trailing block does and the operator can wait, else Z and
- * Z'Z, either dense on the contact or along the reach. Below 0: no memory. */
-static double condensing_flops(const chooser *c, const cholmod_factor *L, bool contact_last)
-{
-    const uz_analysis *analysis = c->analysis;
-    double m = (double)c->rows, n_b = (double)analysis->n_last;
-    if (c->rows == 0 || analysis->n_last == 0)
-        return 0.0;
-    return contact_last ? m * n_b * (m + n_b) : uz_reach_flops(L, analysis->last, analysis->n_last, c->rows);
-}
-
-/* Analyses one ordering, notes what it costs and keeps it if it is the cheapest so far. */
+/* Analyses one ordering, notes what it costs and keeps it if it is the cheapest so far. The cost: additions and
+ * multiplications of the supernodal factorization, filled-in zeros included, and what condensing adds: nothing where a
+ * trailing block does and the operator can wait, else Z and Z'Z, either dense on the contact or along the reach. */
 static uz_status consider(chooser *c, uz_ordering ordering, bool contact_last, uz_error *err)
 {
     uz_analysis *analysis = c->analysis;
+    const double m = (double)c->rows, n_b = (double)analysis->n_last;
+    double flops = 0.0;
     uz_status status = order(c, ordering, contact_last, err);
     if (status != UZ_OK)
         return status;
     cholmod_factor *G = cholmod_l_analyze_p(c->graph, (SuiteSparse_long *)c->perm, NULL, 0, c->common);
     cholmod_factor *L = G ? uz_expand(G, c->group, analysis->n, c->common) : NULL;
     cholmod_l_free_factor(&G, c->common);
-    double condensing = L ? condensing_flops(c, L, contact_last) : -1.0;
-    if (condensing < 0.0)
-        cholmod_l_free_factor(&L, c->common);
+    for (size_t j = 0; L && j < L->n; j++) {
+        const double count = (double)((const SuiteSparse_long *)L->ColCount)[j];
+        flops += count * count;
+    }
+    if (L && c->rows > 0 && analysis->n_last > 0) {
+        const double condensing =
+            contact_last ? m * n_b * (m + n_b) : uz_reach_flops(L, analysis->last, analysis->n_last, c->rows);
+        flops += condensing;
+        if (condensing < 0.0) /* no memory */
+            cholmod_l_free_factor(&L, c->common);
+    }
     if (!L)
         return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to analyse a matrix of %lld dofs (CHOLMOD status %d)",
                        (long long)analysis->n, c->common->status);
-    uz_order_choice choice = {ordering, contact_last, (int64_t)L->xsize, count_flops(L) + condensing};
+    uz_order_choice choice = {ordering, contact_last, (int64_t)L->xsize, flops};
     analysis->considered[analysis->n_considered++] = choice;
     if (!analysis->L || choice.flops < analysis->chosen.flops) {
         cholmod_factor *swap = analysis->L;
@@ -105,13 +81,6 @@ static uz_status consider(chooser *c, uz_ordering ordering, bool contact_last, u
 #define FLOPS_PER_EDGE 6e4
 #define NOT_PLANAR     300.0
 
-static bool dissection_may_pay(const chooser *c)
-{
-    const SuiteSparse_long *ptr = c->graph->p;
-    double per_edge = c->analysis->chosen.flops / (double)ptr[c->groups];
-    return per_edge > FLOPS_PER_EDGE && per_edge > NOT_PLANAR * sqrt((double)c->groups);
-}
-
 /* One ordering in the forms that may pay: with the contact last where rows are no fewer than dofs, or nearly; among the
  * others where they are fewer. (The paper's body with oblique normals, n_b = 2m, d = 241,200: 15.6 and 8.5 Gflop. The
  * cube with n_b = 3m, d = 43,125: 66 and 45.) */
@@ -122,16 +91,6 @@ static uz_status consider_forms(chooser *c, uz_ordering contact_last, uz_orderin
     bool among = n_b == 0 || (c->rows > 0 && c->rows < n_b);
     uz_status status = last ? consider(c, contact_last, true, err) : UZ_OK;
     return status == UZ_OK && among ? consider(c, free_of_it, false, err) : status;
-}
-
-static uz_status try_all(chooser *c, uz_ordering ordering, uz_error *err)
-{
-    if (ordering != UZ_ORDERING_AUTO)
-        return consider_forms(c, ordering, ordering, err);
-    uz_status status = consider_forms(c, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, err);
-    if (status == UZ_OK && dissection_may_pay(c))
-        status = consider_forms(c, UZ_ORDERING_METIS, UZ_ORDERING_METIS, err);
-    return status;
 }
 
 uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t *group, int64_t rows,
@@ -156,10 +115,24 @@ uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t 
         common->nrelax[k] = (columns[k] * (size_t)c.groups + (size_t)analysis->n / 2) / (size_t)analysis->n;
         common->zrelax[k] = zeros[k];
     }
-    if (c.perm && c.metis && c.last && list_groups(&c))
-        status = try_all(&c, ordering, err);
-    else
+    bool *seen = uz_alloc_zero(c.groups, sizeof *seen);
+    if (!c.perm || !c.metis || !c.last || !seen)
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld nodes", (long long)c.groups);
+    for (int64_t k = 0; status == UZ_OK && k < analysis->n_last; k++) { /* groups of the contact dofs, each once */
+        const int64_t of = group[analysis->last[k]];
+        if (!seen[of])
+            c.last[c.n_last++] = of;
+        seen[of] = true;
+    }
+    if (status == UZ_OK && ordering != UZ_ORDERING_AUTO) {
+        status = consider_forms(&c, ordering, ordering, err);
+    } else if (status == UZ_OK) {
+        status = consider_forms(&c, UZ_ORDERING_CAMD, UZ_ORDERING_AMD, err);
+        const double per_edge = analysis->chosen.flops / (double)((const SuiteSparse_long *)graph->p)[c.groups];
+        if (status == UZ_OK && per_edge > FLOPS_PER_EDGE && per_edge > NOT_PLANAR * sqrt((double)c.groups))
+            status = consider_forms(&c, UZ_ORDERING_METIS, UZ_ORDERING_METIS, err);
+    }
+    free(seen);
     free(c.perm);
     free(c.metis);
     free(c.last);

@@ -52,15 +52,6 @@ static void find_heads(int64_t *head, const uint64_t *sum, const int64_t *ptr, c
                 head[idx[k]] = j;
 }
 
-/* From heads to numbers, in the order of the heads. */
-static int64_t number_groups(int64_t *group, int64_t n)
-{
-    int64_t count = 0;
-    for (int64_t j = 0; j < n; j++)
-        group[j] = group[j] == j ? count++ : group[group[j]];
-    return count;
-}
-
 /* Counts the edges between groups by the column they belong to, or places them (rows not NULL) at next[column]. An edge
  * met before in the same group's columns, mostly neighbours, is left out; some come twice all the same. mark: a place
  * for each group. */
@@ -112,7 +103,9 @@ cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64
     if (sum) {
         sum_neighbourhoods(sum, A->p, A->i, n, last, n_last);
         find_heads(group, sum, A->p, A->i, n);
-        int64_t groups = number_groups(group, n);
+        int64_t groups = 0; /* from heads to numbers, in the order of the heads */
+        for (int64_t j = 0; j < n; j++)
+            group[j] = group[j] == j ? groups++ : group[group[j]];
         SuiteSparse_long *next = uz_alloc_zero(groups + 1, sizeof *next), *mark = uz_alloc(groups, sizeof *mark);
         graph = NULL;
         int64_t edges = 0;

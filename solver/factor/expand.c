@@ -27,22 +27,16 @@ static void size_supernodes(cholmod_factor *L, const cholmod_factor *G, const in
     }
 }
 
-static void write_rows(cholmod_factor *L, const cholmod_factor *G, const int64_t *start)
+/* The rows of the supernodes, the counts of their columns, and the largest block with which one supernode updates
+ * another: its rows from the first in that supernode on, by its rows within it. owner (n) is room. */
+static void write_rows(cholmod_factor *L, const cholmod_factor *G, const int64_t *start, int64_t *owner)
 {
-    const SuiteSparse_long *s = G->s;
-    SuiteSparse_long *rows = L->s;
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *group = G->s;
+    SuiteSparse_long *count = L->ColCount, *s = L->s;
     size_t at = 0;
     for (size_t e = 0; e < G->ssize; e++)
-        for (int64_t i = start[s[e]]; i < start[s[e] + 1]; i++)
-            rows[at++] = i;
-}
-
-/* Counts of the supernodal columns, and the largest block with which one supernode updates another: its rows from the
- * first in that supernode on, by its rows within it. owner (n) is room. */
-static void count_columns(cholmod_factor *L, int64_t *owner)
-{
-    const SuiteSparse_long *super = L->super, *pi = L->pi, *s = L->s;
-    SuiteSparse_long *count = L->ColCount;
+        for (int64_t i = start[group[e]]; i < start[group[e] + 1]; i++)
+            s[at++] = i;
     L->maxcsize = 1;
     for (size_t k = 0; k < L->nsuper; k++)
         for (int64_t j = super[k]; j < super[k + 1]; j++) {
@@ -60,23 +54,21 @@ static void count_columns(cholmod_factor *L, int64_t *owner)
     }
 }
 
-static bool allocate(cholmod_factor *L, const cholmod_factor *G, cholmod_common *common)
-{
-    L->nsuper = G->nsuper;
-    L->super = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
-    L->pi = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
-    L->px = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
-    L->is_super = L->is_ll = 1;
-    return L->super && L->pi && L->px;
-}
-
 cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t n, cholmod_common *common)
 {
     int64_t groups = (int64_t)G->n;
     int64_t *first = uz_alloc(groups + 1, sizeof *first), *start = uz_alloc(groups + 1, sizeof *start);
     int64_t *room = uz_alloc(n, sizeof *room);
     cholmod_factor *L = first && start && room ? cholmod_l_allocate_factor((size_t)n, common) : NULL;
-    bool ok = L && allocate(L, G, common);
+    bool ok = L != NULL;
+    if (ok) {
+        L->nsuper = G->nsuper;
+        L->super = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
+        L->pi = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
+        L->px = cholmod_l_malloc(L->nsuper + 1, sizeof(SuiteSparse_long), common);
+        L->is_super = L->is_ll = 1;
+        ok = L->super && L->pi && L->px;
+    }
     if (ok) {
         /* first[g] (groups + 1): where group g's dofs begin in `member` (n), ascending within a group. */
         for (int64_t g = 0; g <= groups; g++)
@@ -105,11 +97,9 @@ cholmod_factor *uz_expand(const cholmod_factor *G, const int64_t *group, int64_t
         L->ordering = G->ordering;
         ok = L->s != NULL;
     }
-    if (ok) {
-        write_rows(L, G, start);
-        count_columns(L, room);
-    }
-    if (!ok)
+    if (ok)
+        write_rows(L, G, start, room);
+    else
         cholmod_l_free_factor(&L, common);
     free(first);
     free(start);

@@ -13,16 +13,6 @@
 #include <string.h>
 #include <suitesparse/SuiteSparse_config.h>
 
-/* The supernodal factor's numbers, before they are allocated. */
-static uz_status check_memory(const uz_factor *factor, size_t memory_limit, uz_error *err)
-{
-    double bytes = 8.0 * (double)factor->L.xsize + 8.0 * (double)factor->L.ssize + 24.0 * (double)factor->n;
-    if (memory_limit == 0 || bytes <= (double)memory_limit)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_LIMIT, "K", "the factor would take %.0f bytes and the limit is %zu: raise the limit",
-                   bytes, memory_limit);
-}
-
 /* P K P' (lower triangle, columns unsorted), as cholmod_factorize makes it by two transpositions with five passes over
  * the entries: of a body in two dimensions they take a tenth of the factorization. NULL: no memory. */
 static cholmod_sparse *permute(const uz_csc *K, const int64_t *position, cholmod_common *common)
@@ -175,7 +165,11 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     factor->analysis = uz_analysis_hold(analysis);
     factor->L = *analysis->L;
     double start = uz_seconds();
-    uz_status status = check_memory(factor, memory_limit, err);
+    uz_status status = UZ_OK;
+    const double bytes = 8.0 * (double)factor->L.xsize + 8.0 * (double)factor->L.ssize + 24.0 * (double)factor->n;
+    if (memory_limit > 0 && bytes > (double)memory_limit)
+        status = uz_fail(err, UZ_ERR_LIMIT, "K",
+                         "the factor would take %.0f bytes and the limit is %zu: raise the limit", bytes, memory_limit);
     if (status == UZ_OK && uz_cancelled(hooks))
         status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the factorization");
     if (status == UZ_OK)
@@ -196,7 +190,7 @@ uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering
 {
     uz_analysis *analysis = NULL;
     *out = NULL;
-    uz_status status = uz_analysis_create(&analysis, K, NULL, 0, ordering, hooks, err);
+    uz_status status = uz_analysis_create(&analysis, K, NULL, 0, 0, ordering, hooks, err);
     if (status == UZ_OK)
         status = uz_factor_create(out, K, analysis, memory_limit, hooks, err);
     uz_analysis_free(analysis);

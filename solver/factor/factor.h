@@ -36,12 +36,10 @@ typedef struct {
 /* What the pattern of K (lower triangle, n x n) alone decides: the order of elimination and the supernodes; values are
  * not read. last: the n_last dofs, ascending, that come after all others in the elimination (Schur complement
  * ordering). Equal patterns give equal factors, bit for bit, whether an analysis is their own or shared. `cancelled` is
- * asked once it is there. It may be freed before the factors made from it. */
-uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *last, int64_t n_last,
-                             uz_ordering ordering, const uz_hooks *hooks, uz_error *err);
-/* The same where N has `rows` rows on the dofs, or combinations of them, that may also be eliminated among the others:
- * by the flops of both (uz_reach_gram takes the place of uz_factor_last_block). */
-uz_status uz_analysis_choose(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
+ * asked once it is there. It may be freed before the factors made from it.
+ * rows: 0, or of N on these dofs, or combinations of them, that may also be eliminated among the others: by the flops
+ * of both (uz_reach_gram takes the place of uz_factor_last_block). */
+uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *last, int64_t n_last, int64_t rows,
                              uz_ordering ordering, const uz_hooks *hooks, uz_error *err);
 void uz_analysis_free(uz_analysis *analysis);
 size_t uz_analysis_bytes(const uz_analysis *analysis);
@@ -81,8 +79,7 @@ uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, d
 enum { UZ_LANES = 8 };
 void uz_factor_permute_lanes(const uz_factor *factor, double *permuted, const double *X);
 void uz_factor_unpermute_lanes(const uz_factor *factor, double *X, const double *permuted);
-uz_status uz_factor_forward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
-uz_status uz_factor_backward_lanes(const uz_factor *factor, double *X, int64_t blocks, uz_error *err);
+uz_status uz_factor_solve_lanes(const uz_factor *factor, double *X, int64_t blocks, bool forward, uz_error *err);
 
 /* Vectors from which the norm of K^-1 is bounded; NULL: no memory. */
 typedef struct uz_norm_estimate uz_norm_estimate;

@@ -54,7 +54,7 @@ uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *last, in
 /* Moves `last` behind all others in perm (n) and keeps the order within both. */
 uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_last, uz_error *err);
 
-/* Fills L, chosen and considered of `analysis`. group (n): from uz_compress. rows: see uz_analysis_choose, 0: the
+/* Fills L, chosen and considered of `analysis`. group (n): from uz_compress. rows: see uz_analysis_create, 0: the
  * contact has to be last. */
 uz_status uz_choose(uz_analysis *analysis, cholmod_sparse *graph, const int64_t *group, int64_t rows,
                     uz_ordering ordering, cholmod_common *common, uz_error *err);

@@ -62,25 +62,21 @@ uz_status uz_move_last(int64_t *perm, int64_t n, const int64_t *last, int64_t n_
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to order a matrix of %lld nodes", (long long)n);
 }
 
-static bool order_by(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering ordering,
-                     cholmod_common *common)
-{
-    if (graph->nrow < TINY) { /* nothing to reduce, and CAMD reads past the end at n = 1 */
-        for (int64_t k = 0; k < (int64_t)graph->nrow; k++)
-            perm[k] = k;
-        return true;
-    }
-    if (ordering == UZ_ORDERING_CAMD)
-        return order_camd(perm, graph, last, n_last, common);
-    return ordering == UZ_ORDERING_AMD ? cholmod_l_amd(graph, NULL, 0, (SuiteSparse_long *)perm, common)
-                                       : order_metis((SuiteSparse_long *)perm, graph, common);
-}
-
 uz_status uz_order(int64_t *perm, cholmod_sparse *graph, const int64_t *last, int64_t n_last, uz_ordering ordering,
                    cholmod_common *common, uz_error *err)
 {
     int64_t n = (int64_t)graph->nrow;
-    bool ok = order_by(perm, graph, last, n_last, ordering, common);
+    bool ok = true;
+    if (n < TINY) { /* nothing to reduce, and CAMD reads past the end at n = 1 */
+        for (int64_t k = 0; k < n; k++)
+            perm[k] = k;
+    } else if (ordering == UZ_ORDERING_CAMD) {
+        ok = order_camd(perm, graph, last, n_last, common);
+    } else if (ordering == UZ_ORDERING_AMD) {
+        ok = cholmod_l_amd(graph, NULL, 0, (SuiteSparse_long *)perm, common);
+    } else {
+        ok = order_metis((SuiteSparse_long *)perm, graph, common);
+    }
     if (ok && common->status >= CHOLMOD_OK)
         return uz_move_last(perm, n, last, n_last, err);
     if (common->status == CHOLMOD_OUT_OF_MEMORY || common->status == CHOLMOD_OK)

@@ -77,40 +77,6 @@ struct uz_reach {
     int64_t *parent; /* count: where in `node` its parent is, -1: none */
 };
 
-/* Marks the supernodes of the dofs and all that they lead to; place (nsuper): -1, or the place in `node`. */
-static void mark_paths(uz_reach *reach, int64_t *place, const int64_t *owner, const int64_t *dofs, int64_t n_dofs)
-{
-    const cholmod_factor *L = &reach->factor->L;
-    const int64_t *position = reach->factor->analysis->position;
-    for (size_t s = 0; s < L->nsuper; s++)
-        place[s] = -1;
-    for (int64_t k = 0; k < n_dofs; k++)
-        for (int64_t s = owner[position[dofs[k]]]; s >= 0 && place[s] < 0; s = parent_of(L, s, owner)) {
-            place[s] = 0;
-            reach->count++;
-        }
-}
-
-static bool list_nodes(uz_reach *reach, int64_t *place, const int64_t *owner)
-{
-    const cholmod_factor *L = &reach->factor->L;
-    int64_t count = 0;
-    reach->node = uz_alloc(reach->count, sizeof *reach->node);
-    reach->parent = uz_alloc(reach->count, sizeof *reach->parent);
-    if (!reach->node || !reach->parent)
-        return false;
-    for (int64_t s = 0; s < (int64_t)L->nsuper; s++)
-        if (place[s] == 0) {
-            place[s] = count;
-            reach->node[count++] = s;
-        }
-    for (int64_t k = 0; k < count; k++) {
-        int64_t parent = parent_of(L, reach->node[k], owner);
-        reach->parent[k] = parent < 0 ? -1 : place[parent];
-    }
-    return true;
-}
-
 uz_status uz_reach_create(uz_reach **out, const uz_factor *factor, const int64_t *dofs, int64_t n_dofs, uz_error *err)
 {
     *out = NULL;
@@ -119,10 +85,30 @@ uz_status uz_reach_create(uz_reach **out, const uz_factor *factor, const int64_t
     int64_t *place = uz_alloc((int64_t)factor->L.nsuper, sizeof *place);
     bool ok = reach && owner && place;
     if (ok) {
+        /* The supernodes of the dofs and all that they lead to; place: -1, or the place in `node`. */
+        const cholmod_factor *L = &factor->L;
         reach->factor = factor;
-        find_owners(owner, &factor->L);
-        mark_paths(reach, place, owner, dofs, n_dofs);
-        ok = list_nodes(reach, place, owner);
+        find_owners(owner, L);
+        for (size_t s = 0; s < L->nsuper; s++)
+            place[s] = -1;
+        for (int64_t k = 0; k < n_dofs; k++)
+            for (int64_t s = owner[factor->analysis->position[dofs[k]]]; s >= 0 && place[s] < 0;
+                 s = parent_of(L, s, owner)) {
+                place[s] = 0;
+                reach->count++;
+            }
+        reach->node = uz_alloc(reach->count, sizeof *reach->node);
+        reach->parent = uz_alloc(reach->count, sizeof *reach->parent);
+        ok = reach->node && reach->parent;
+    }
+    for (int64_t s = 0, count = 0; ok && s < (int64_t)factor->L.nsuper; s++)
+        if (place[s] == 0) {
+            place[s] = count;
+            reach->node[count++] = s;
+        }
+    for (int64_t k = 0; ok && k < reach->count; k++) {
+        const int64_t parent = parent_of(&factor->L, reach->node[k], owner);
+        reach->parent[k] = parent < 0 ? -1 : place[parent];
     }
     free(owner);
     free(place);
@@ -280,38 +266,35 @@ static bool visit(gathering *g, int64_t k)
     return true;
 }
 
-static bool gather(gathering *g)
-{
-    int64_t count = g->reach->count, m = g->N->rows;
-    g->shares = uz_alloc_zero(count, sizeof *g->shares);
-    g->child = uz_alloc(count, sizeof *g->child);
-    g->slot = uz_alloc(m, sizeof *g->slot);
-    g->local = uz_alloc(g->reach->factor->n, sizeof *g->local);
-    g->gram = uz_alloc(m * m, sizeof *g->gram);
-    bool ok = g->shares && g->child && g->slot && g->local && g->gram;
-    for (int64_t k = 0; ok && k < count; k++)
-        g->child[k] = -1;
-    for (int64_t i = 0; ok && i < m; i++)
-        g->slot[i] = -1;
-    for (int64_t k = 0; ok && k < count; k++)
-        ok = visit(g, k);
-    for (int64_t k = 0; g->shares && k < count; k++) {
-        free(g->shares[k].column);
-        free(g->shares[k].block);
-    }
-    free(g->shares);
-    free(g->child);
-    free(g->slot);
-    free(g->local);
-    free(g->gram);
-    return ok;
-}
-
 uz_status uz_reach_gram(double *D, const uz_reach *reach, const uz_csc *N, uz_error *err)
 {
-    gathering g = {.reach = reach, .N = N, .D = D};
-    memset(D, 0, (size_t)(N->rows * N->rows) * sizeof *D);
-    if (gather(&g))
+    const int64_t count = reach->count, m = N->rows;
+    gathering g = {.reach = reach,
+                   .N = N,
+                   .D = D,
+                   .gram = uz_alloc(m * m, sizeof *g.gram),
+                   .shares = uz_alloc_zero(count, sizeof *g.shares),
+                   .child = uz_alloc(count, sizeof *g.child),
+                   .slot = uz_alloc(m, sizeof *g.slot),
+                   .local = uz_alloc(reach->factor->n, sizeof *g.local)};
+    bool ok = g.shares && g.child && g.slot && g.local && g.gram;
+    memset(D, 0, (size_t)(m * m) * sizeof *D);
+    for (int64_t k = 0; ok && k < count; k++)
+        g.child[k] = -1;
+    for (int64_t i = 0; ok && i < m; i++)
+        g.slot[i] = -1;
+    for (int64_t k = 0; ok && k < count; k++)
+        ok = visit(&g, k);
+    for (int64_t k = 0; g.shares && k < count; k++) {
+        free(g.shares[k].column);
+        free(g.shares[k].block);
+    }
+    free(g.shares);
+    free(g.child);
+    free(g.slot);
+    free(g.local);
+    free(g.gram);
+    if (ok)
         return UZ_OK;
-    return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)N->rows);
+    return uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense operator of order %lld", (long long)m);
 }

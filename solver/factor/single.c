@@ -270,46 +270,29 @@ UZ_AVX2_FMA static void substitute_back_fused(const panel_of *s)
     substitute_back(s);
 }
 
-static panel_step best_step(bool forward)
-{
-    if (uz_cpu_has_avx2_fma())
-        return forward ? eliminate_fused : substitute_back_fused;
-    return forward ? eliminate : substitute_back;
-}
-
-/* Room for the rows of any supernode. */
-static uz_status need_room(const cholmod_factor *L, uz_factor_workspace *ws, uz_error *err)
-{
-    const SuiteSparse_long *pi = L->pi;
-    int64_t most = 1;
-    for (size_t k = 0; k < L->nsuper; k++)
-        most = pi[k + 1] - pi[k] > most ? pi[k + 1] - pi[k] : most;
-    return uz_need_panel(ws, (size_t)most, err);
-}
-
-/* Loads act on few dofs: what is eliminated before any of them has nothing to pass on (Gilbert and Peierls, SIAM J.
- * Sci. Stat. Comput. 9 (1988) 862: L^-1 b is nonzero on the reach of b only). */
-static bool all_zero(const double *x, int64_t n)
-{
-    for (int64_t i = 0; i < n; i++)
-        if (x[i] != 0.0)
-            return false;
-    return true;
-}
-
 uz_status uz_single_substitute(const uz_factor *factor, uz_factor_workspace *ws, double *x, bool forward, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
     const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
     int64_t count = (int64_t)L->nsuper;
-    panel_step step = best_step(forward);
-    uz_status status = need_room(L, ws, err);
+    const bool fused = uz_cpu_has_avx2_fma();
+    const panel_step step =
+        forward ? (fused ? eliminate_fused : eliminate) : (fused ? substitute_back_fused : substitute_back);
+    int64_t most = 1; /* rows of any supernode */
+    for (int64_t k = 0; k < count; k++)
+        most = pi[k + 1] - pi[k] > most ? pi[k + 1] - pi[k] : most;
+    uz_status status = uz_need_panel(ws, (size_t)most, err);
     for (int64_t at = 0; status == UZ_OK && at < count; at++) {
         int64_t k = forward ? at : count - 1 - at;
         const SuiteSparse_long *row = s + pi[k];
         panel_of panel = {(const double *)L->x + px[k], pi[k + 1] - pi[k], super[k + 1] - super[k], ws->panel};
         double *own = x + super[k]; /* the first rows of a supernode are its columns */
-        if (forward && all_zero(own, panel.cols))
+        /* Loads act on few dofs: what is eliminated before any of them has nothing to pass on (Gilbert and Peierls,
+         * SIAM J. Sci. Stat. Comput. 9 (1988) 862: L^-1 b is nonzero on the reach of b only). */
+        bool idle = forward;
+        for (int64_t i = 0; idle && i < panel.cols; i++)
+            idle = own[i] == 0.0;
+        if (idle)
             continue;
         memcpy(panel.b, own, (size_t)panel.cols * sizeof *own);
         for (int64_t i = panel.cols; i < panel.rows; i++)

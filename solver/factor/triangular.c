@@ -94,25 +94,6 @@ uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, d
     return substitute(cholmod_l_super_ltsolve, factor, ws, x, columns, err);
 }
 
-/* rank[k]: the place of position k among the last dofs, -1 for the others. */
-static void rank_last(const uz_factor *factor, const int64_t *last, int64_t n_last, int64_t *rank, int64_t *order,
-                      int64_t *where)
-{
-    const SuiteSparse_long *perm = factor->L.Perm;
-    int64_t count = 0;
-    for (int64_t k = 0; k < factor->n; k++)
-        rank[k] = -1;
-    for (int64_t i = 0; i < n_last; i++)
-        rank[factor->analysis->position[last[i]]] = 0;
-    for (int64_t k = 0; k < factor->n; k++) {
-        if (rank[k] < 0)
-            continue;
-        rank[k] = count;
-        order[count] = perm[k];
-        where[count++] = k;
-    }
-}
-
 /* One supernode: columns [first, first + ncols), nrows row indices, values column-major. */
 static bool copy_supernode(double *block, int64_t n_last, const int64_t *rank, const SuiteSparse_long *rows,
                            int64_t nrows, int64_t first, int64_t ncols, const double *values)
@@ -139,12 +120,22 @@ static bool copy_supernode(double *block, int64_t n_last, const int64_t *rank, c
 uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
-    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s;
-    int64_t n_last, *rank = uz_alloc(factor->n, sizeof *rank);
+    const SuiteSparse_long *super = L->super, *pi = L->pi, *px = L->px, *s = L->s, *perm = L->Perm;
+    int64_t n_last, count = 0, *rank = uz_alloc(factor->n, sizeof *rank);
     const int64_t *last = uz_factor_last_dofs(factor, &n_last); /* none of the analysis' where they are not last */
     if (!rank)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld dofs", (long long)factor->n);
-    rank_last(factor, last, n_last, rank, order, where);
+    for (int64_t k = 0; k < factor->n; k++) /* the place of position k among the last dofs, -1 for the others */
+        rank[k] = -1;
+    for (int64_t i = 0; i < n_last; i++)
+        rank[factor->analysis->position[last[i]]] = 0;
+    for (int64_t k = 0; k < factor->n; k++) {
+        if (rank[k] < 0)
+            continue;
+        rank[k] = count;
+        order[count] = perm[k];
+        where[count++] = k;
+    }
     memset(block, 0, (size_t)n_last * (size_t)n_last * sizeof *block);
     bool ok = true;
     for (size_t k = 0; ok && k < L->nsuper; k++)

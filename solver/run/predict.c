@@ -28,7 +28,7 @@ static uz_status predict(uz_prediction *out, const uz_csc *K, const uz_csc *N, u
     } else {
         int64_t last = uz_dual_abilities_of(form)->contact_last ? size->n_b : 0;
         int64_t rows = uz_cost_is_one_to_one(N, last) ? 0 : N->rows;
-        status = uz_analysis_choose(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
+        status = uz_analysis_create(&analysis, K, dofs, last, rows, settings->ordering, hooks, err);
         if (status == UZ_OK) {
             uz_factor_info info = uz_analysis_describe(analysis);
             out->factor_nnz = info.nnz;

@@ -11,7 +11,7 @@ static inline uz_status factor_by(uz_factor **out, const uz_csc *K, const int64_
 {
     uz_analysis *analysis;
     *out = NULL;
-    uz_status status = uz_analysis_create(&analysis, K, last, n_last, ordering, NULL, err);
+    uz_status status = uz_analysis_create(&analysis, K, last, n_last, 0, ordering, NULL, err);
     if (status == UZ_OK)
         status = uz_factor_create(out, K, analysis, limit, NULL, err);
     uz_analysis_free(analysis);

@@ -127,7 +127,7 @@ TEST(substitutions_in_lanes)
         for (int64_t lane = 0; lane < BLOCKS * UZ_LANES; lane++)
             for (int64_t j = 0; j < d; j++)
                 x[lane * d + j] = X[lane / UZ_LANES * size + j * UZ_LANES + lane % UZ_LANES];
-        CHECK_INT((forward ? uz_factor_forward_lanes : uz_factor_backward_lanes)(f.factor, X, BLOCKS, NULL), UZ_OK);
+        CHECK_INT(uz_factor_solve_lanes(f.factor, X, BLOCKS, forward, NULL), UZ_OK);
         double worst = 0, largest = 0;
         for (int64_t lane = 0; lane < BLOCKS * UZ_LANES; lane++) {
             double *one = x + lane * d;

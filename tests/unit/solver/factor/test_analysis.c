@@ -32,7 +32,7 @@ TEST(shared_analysis_gives_the_same_bits)
         uz_analysis *shared;
         uz_factor *early, *reused, *fresh;
         uz_error err;
-        CHECK_INT(uz_analysis_create(&shared, &first.K, dofs, n_last, orderings[k], NULL, &err), UZ_OK);
+        CHECK_INT(uz_analysis_create(&shared, &first.K, dofs, n_last, 0, orderings[k], NULL, &err), UZ_OK);
         CHECK(uz_analysis_bytes(shared) > 8 * (size_t)n);
         CHECK_INT(uz_factor_create(&early, &first.K, shared, 0, NULL, &err), UZ_OK);
         CHECK_INT(uz_factor_create(&reused, &second.K, shared, 0, NULL, &err), UZ_OK);
@@ -87,7 +87,7 @@ TEST(another_pattern_is_refused)
     uz_factor *factor = (uz_factor *)&one;
     uz_error err = {0};
     uz_thread_init();
-    CHECK_INT(uz_analysis_create(&analysis, &one.K, NULL, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
+    CHECK_INT(uz_analysis_create(&analysis, &one.K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
     CHECK_INT(uz_factor_create(&factor, &other.K, analysis, 0, NULL, &err), UZ_ERR_ARGUMENT);
     CHECK(factor == NULL);
     uz_analysis_free(analysis);
@@ -131,7 +131,7 @@ TEST(factors_of_one_analysis_in_threads)
     double *want = vector(qp.K.cols);
     uz_process_init(2);
     uz_thread_init();
-    CHECK_INT(uz_analysis_create(&analysis, &qp.K, NULL, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
+    CHECK_INT(uz_analysis_create(&analysis, &qp.K, NULL, 0, 0, UZ_ORDERING_AUTO, NULL, &err), UZ_OK);
     CHECK_INT(uz_factor_create(&factor, &qp.K, analysis, 0, NULL, &err), UZ_OK);
     solve(want, factor, qp.p, qp.K.cols);
     uz_factor_free(factor);

@@ -118,9 +118,9 @@ TEST(cancelled_before_the_factorization)
     uz_hooks hooks = {.ctx = &asked, .cancelled = always};
     uz_csc K = grid(10, 10);
     uz_analysis *analysis;
-    CHECK_INT(uz_analysis_create(&analysis, &K, NULL, 0, UZ_ORDERING_AMD, &hooks, &err), UZ_ERR_CANCELLED);
+    CHECK_INT(uz_analysis_create(&analysis, &K, NULL, 0, 0, UZ_ORDERING_AMD, &hooks, &err), UZ_ERR_CANCELLED);
     CHECK(analysis == NULL && asked == 1);
-    CHECK_INT(uz_analysis_create(&analysis, &K, NULL, 0, UZ_ORDERING_AMD, NULL, &err), UZ_OK);
+    CHECK_INT(uz_analysis_create(&analysis, &K, NULL, 0, 0, UZ_ORDERING_AMD, NULL, &err), UZ_OK);
     CHECK_INT(uz_factor_create(&factor, &K, analysis, 0, &hooks, &err), UZ_ERR_CANCELLED);
     CHECK(factor == NULL && asked == 2);
     uz_analysis_free(analysis);
