@@ -13,6 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A row of denormal entries would be scaled by more than doubles hold; so it is scaled by less. */
+enum { MOST_SCALE = 1020 };
+
 /* By 2^-k with 2^k nearest to the norm of the row (in the ratio's sense), 1 for a row of zeros, which weighs nothing.
  */
 static uz_status scale_rows(uz_dual *dual, uz_error *err)
@@ -28,7 +31,8 @@ static uz_status scale_rows(uz_dual *dual, uz_error *err)
     for (int64_t i = 0; i < N->rows; i++) {
         int exponent;
         double share = frexp(dual->row_scale[i], &exponent);
-        double scale = share > 0.0 ? ldexp(1.0, share < M_SQRT1_2 ? 1 - exponent : -exponent) : 1.0;
+        exponent = share < M_SQRT1_2 ? exponent - 1 : exponent;
+        double scale = share > 0.0 ? ldexp(1.0, exponent < -MOST_SCALE ? MOST_SCALE : -exponent) : 1.0;
         dual->row_scale[i] = scale;
         least = share > 0.0 ? fmin(least, scale) : least;
         most = share > 0.0 ? fmax(most, scale) : most;
