@@ -171,16 +171,21 @@ void uz_bound_conclude(uz_certificate *out, const uz_bound_terms *t, bool feasib
 {
     double correction_norm = INFINITY;
     if (feasible && !isnan(t->correction_energy))
-        correction_norm = sqrt(fmax(0.0, t->correction_energy));
+        correction_norm = sqrt(fmax(0.0, t->correction_energy)) + t->settled;
     out->energy_norm = sqrt(fmax(0.0, t->stiffness));
+    /* (K v - p)'delta = (e + N'r)'delta with the e of v, and r'N delta = r'g(v) - r'g(v + delta) */
+    const double farther = t->settled > 0.0 ? (sqrt(t->square) + 0.5 * t->settled) * t->settled : 0.0;
+    const double unsure = t->settled > 0.0 ? farther + t->pressed + t->complementarity : 0.0;
     out->energy_primal = 0.5 * t->stiffness - t->load + t->change;
-    out->gap = feasible && !has_underflown(out, t) ? 0.5 * t->square + t->complementarity : INFINITY;
+    out->gap =
+        feasible && !has_underflown(out, t) ? 0.5 * t->square + farther + t->complementarity + t->pressed : INFINITY;
     bool number = !isnan(t->stiffness) && !isnan(t->load) && !isnan(t->change) && !isnan(t->square);
     if (isnan(out->gap) || !number) /* overflow on the way; fmax would make 0 of it */
         out->gap = INFINITY;
     if (t->anything) /* whatever squares and products lose by underflow */
         out->gap = fmax(out->gap, DBL_MIN);
-    out->energy_dual = out->energy_primal - out->gap;
+    out->energy_dual = out->energy_primal - unsure - out->gap;
+    out->energy_primal += unsure;
     out->absolute_error = sqrt(2.0 * out->gap) + correction_norm;
     if (t->anything)
         out->absolute_error = (1.0 + SUMS) * out->absolute_error + sqrt(DBL_MIN);

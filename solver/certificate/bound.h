@@ -11,7 +11,8 @@ typedef struct {
     double square;            /* bound on e'K^-1 e, with all that rounding may hide; INFINITY: none */
     double e1, force;         /* ||K u - p - N'r||, ||p|| */
     double span;              /* the largest |N_ij| times the largest |u_j| */
-    double complementarity;   /* -r'g(v) */
+    double complementarity;   /* -r'g(v + delta) */
+    double settled, pressed;  /* ||delta||_K, -r'|g(v)|: it is v + delta that is feasible; 0 where delta is 0 */
     double positive_part;     /* of the reactions that were given */
     bool moved;               /* supports move the body: */
     double whole_norm;        /* ||u||_K with the supported dofs */

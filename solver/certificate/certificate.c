@@ -235,7 +235,9 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
         sharpen_energies(c, &terms, r, g);
     if (feasible)
         status = distance(c, &terms.square, err);
-    terms.complementarity = uz_feasible_complementarity(&c->feasible, r);
+    terms.complementarity = uz_feasible_complementarity(&c->feasible, r, true);
+    terms.settled = feasible ? c->feasible.exact.length : 0.0;
+    terms.pressed = terms.settled > 0.0 ? uz_feasible_complementarity(&c->feasible, r, false) : 0.0;
     uz_bound_conclude(out, &terms, feasible, r, g, c->in->h, c->m);
     return status;
 }
@@ -276,7 +278,7 @@ static uz_status measure(certifier *c, uz_certificate *out, double *r, double *g
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[c->dof[b]] = c->feasible.correction[b];
     uz_status status = conclude(c, out, r, g, positive_part, feasible, err);
-    const bool open = uz_feasible_complementarity(&c->feasible, r) > OPEN_SHARE * out->gap;
+    const bool open = uz_feasible_complementarity(&c->feasible, r, feasible) > OPEN_SHARE * out->gap;
     if (status != UZ_OK || !c->feasible.pushed || !open || c->in->low_r)
         return status;
     return share_reactions(c, out, r, g, positive_part, err);

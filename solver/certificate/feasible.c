@@ -59,7 +59,8 @@ bool uz_feasible_init(uz_feasible *c, const uz_csc *Nt, const double *weight)
     c->size = uz_alloc_zero(c->m, sizeof(double));
     c->correction = uz_alloc_zero(c->d, sizeof(double));
     c->push = uz_alloc_zero(c->m, sizeof(double));
-    return uz_row_move_init(&c->move, c->d, c->m) && c->size && c->correction && c->push;
+    c->gap = uz_alloc_zero(c->m, sizeof(double));
+    return uz_row_move_init(&c->move, c->d, c->m) && c->size && c->correction && c->push && c->gap;
 }
 
 void uz_feasible_clear(uz_feasible *c)
@@ -67,6 +68,7 @@ void uz_feasible_clear(uz_feasible *c)
     free(c->size);
     free(c->correction);
     free(c->push);
+    free(c->gap);
     uz_row_move_clear(&c->move);
 }
 
@@ -75,11 +77,12 @@ double uz_feasible_gap(const uz_feasible *c, int64_t i)
     return uz_gap_of_row(c->Nt, i, c->h, c->u, c->correction);
 }
 
-double uz_feasible_complementarity(const uz_feasible *c, const double *r)
+double uz_feasible_complementarity(const uz_feasible *c, const double *r, bool settled)
 {
+    const bool moved = settled && c->exact.length > 0.0;
     double sum = 0.0;
     for (int64_t i = 0; i < c->m; i++) {
-        const double gap = fabs(uz_feasible_gap(c, i)), product = -r[i] * gap;
+        const double gap = moved ? c->gap[i] : fabs(uz_feasible_gap(c, i)), product = -r[i] * gap;
         sum += r[i] != 0.0 && gap > 0.0 ? fmax(product, DBL_MIN) : product; /* never 0 by underflow */
     }
     return sum;
@@ -159,6 +162,14 @@ static double correction_size(const uz_feasible *c)
     return sum;
 }
 
+/* Does u + c, but for a delta that it bounds, have no penetration at all? */
+static bool settle(uz_feasible *c)
+{
+    c->exact =
+        (uz_row_settle){.Nt = c->Nt, .weight = c->weight, .h = c->h, .u = c->u, .c = c->correction, .gap = c->gap};
+    return uz_row_settle_solve(&c->exact);
+}
+
 /* Rows that depend on each other, or nearly so, can't all be closed as equations, or only by a correction far larger
  * than the gaps; and in long chains of rows conjugate gradients take a step for each. Then an active set chooses. */
 bool uz_make_feasible(uz_feasible *c, const double *r)
@@ -168,18 +179,18 @@ bool uz_make_feasible(uz_feasible *c, const double *r)
     size_rows(c, c->u);
     if (c->low) {
         memcpy(c->correction, c->low, (size_t)c->d * sizeof *c->correction);
-        if (choose_rows(c, r) <= NEGLIGIBLE)
+        if (choose_rows(c, r) <= NEGLIGIBLE && settle(c))
             return true;
     }
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
     choose_rows(c, r);
     double expected = STRETCH * sum_of_moves(c);
     bool feasible = move_rows(c, r);
-    if (feasible && correction_size(c) <= expected)
+    if (feasible && correction_size(c) <= expected && settle(c))
         return true;
-    c->pushed = uz_row_exact_solve(&exact);
+    c->pushed = uz_row_exact_solve(&exact) && settle(c);
     if (c->pushed)
         return true;
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
-    return feasible && move_rows(c, r);
+    return feasible && move_rows(c, r) && settle(c);
 }

@@ -3,6 +3,7 @@
 #define UZ_FEASIBLE_H
 
 #include "certificate/row_move.h"
+#include "certificate/row_settle.h"
 #include "uzawa.h"
 
 typedef struct {
@@ -14,7 +15,9 @@ typedef struct {
     double *size;         /* m: what the rounding of a gap is relative to */
     double *correction;   /* d: c */
     double *push;         /* m: see below */
+    double *gap;          /* m: of `exact` */
     bool pushed;          /* an active set chose the rows */
+    uz_row_settle exact;  /* what is left to be moved until no row penetrates, exactly */
     uz_row_move move;     /* m each */
     int64_t d, m;
 } uz_feasible;
@@ -28,13 +31,14 @@ bool uz_feasible_init(uz_feasible *f, const uz_csc *Nt, const double *weight);
 void uz_feasible_clear(uz_feasible *f);
 
 /* Fills the correction: it lifts the negative gaps of u and closes those of the rows where r (m) makes that worth
- * while. true: no gap of u + c is negative by more than the rounding of double-double arithmetic. Where an active set
+ * while. true: no gap of u + c + delta is negative, with a delta bounded in `exact`. Where an active set
  * chose the rows, r - push (<= 0) presses on closed rows only: -r'g is then nothing, where rows that r presses on can't
  * all be closed, and N'(r - push) differs from N'r by W^-1 c. */
 bool uz_make_feasible(uz_feasible *f, const double *r);
 /* g_i(u + c) */
 double uz_feasible_gap(const uz_feasible *f, int64_t i);
-/* -r'g(u + c), what the pair adds to the duality gap. A gap below 0 by rounding counts as one above. */
-double uz_feasible_complementarity(const uz_feasible *f, const double *r);
+/* -r'g, what the pair adds to the duality gap: at u + c, where a gap below 0 by rounding counts as one above, or at
+ * u + c + delta. */
+double uz_feasible_complementarity(const uz_feasible *f, const double *r, bool settled);
 
 #endif

@@ -294,9 +294,9 @@ static void couple(uz_lane_certifier *c, int lane)
             c->Kc[A->idx[k] * WIDTH + lane] += A->val[k] * c->c[b * WIDTH + lane];
 }
 
-/* What a lane's answer has to do with the contact: gaps, correction, reactions. *complementarity: -r'g(v). */
+/* What a lane's answer has to do with the contact: gaps, correction, reactions; their part of the terms. */
 static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a, const double *U,
-                         double *complementarity)
+                         uz_bound_terms *terms)
 {
     uz_feasible *f = &c->feasible;
     for (int64_t b = 0; b < c->n_b; b++)
@@ -311,7 +311,9 @@ static bool prepare_lane(uz_lane_certifier *c, int lane, const uz_lane_answer *a
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[b * WIDTH + lane] = f->correction[b];
     couple(c, lane);
-    *complementarity = uz_feasible_complementarity(f, a->r);
+    terms->complementarity = uz_feasible_complementarity(f, a->r, feasible);
+    terms->settled = feasible ? f->exact.length : 0.0;
+    terms->pressed = terms->settled > 0.0 ? uz_feasible_complementarity(f, a->r, false) : 0.0;
     return feasible;
 }
 
@@ -357,7 +359,7 @@ void uz_certify_lanes(uz_lane_certifier *c, uz_lane_answer *answers, int count, 
     for (int l = 0; l < count; l++) {
         terms[l].positive_part = uz_cut_reactions(answers[l].r, c->feasible.m);
         answers[l].certified = false;
-        feasible[l] = prepare_lane(c, l, &answers[l], U, &terms[l].complementarity);
+        feasible[l] = prepare_lane(c, l, &answers[l], U, &terms[l]);
     }
     run_pass(c, U, P);
     for (int l = 0; l < count; l++)

@@ -2,6 +2,7 @@
 #include "certificate/bound.h"
 #include "certificate/certificate.h"
 #include "certificate/distrust.h"
+#include "certificate/row_settle.h"
 #include "harness.h"
 #include "qp_fixture.h"
 #include "quad_exact.h"
@@ -437,6 +438,59 @@ TEST(contradictions_are_not_hidden_by_wide_gaps)
     CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
     CHECK(isinf(c.absolute_error));
     free_bench(&b);
+}
+
+/* u_1 <= -1 and u_1 >= -1 + far, where u_1 was found no nearer than the rounding of u_2 = 1e90 allows. */
+TEST(contradictions_are_not_hidden_by_displacements)
+{
+    for (int power = 0; power <= 60; power += 10) {
+        const double far = pow(2, -power);
+        double K[] = {2, 1, 1, 3}, N[] = {1, 0, -1, 0};
+        uz_qp qp = {csc_from_dense(K, 2, 2, true), csc_from_dense(N, 2, 2, false), vector(2), vector(2)};
+        for (int64_t k = 0; k < 3; k++)
+            qp.K.val[k] = ldexp(qp.K.val[k], -300);
+        qp.p[1] = 1;
+        qp.h[0] = -1;
+        qp.h[1] = power > 52 ? 1 : 1 - far;
+        bench b = make_bench(qp);
+        uz_certify_input in = input_of(&b);
+        uz_certificate c;
+        b.u[0] = 1e73;
+        b.u[1] = ldexp(1, 300) / 3;
+        CHECK(uz_certify(&c, b.r, b.g, b.u, &in, NULL) == UZ_OK);
+        CHECK_MSG(isinf(c.absolute_error) == (power <= 52), "2^-%d: %g", power, c.absolute_error);
+        free_bench(&b);
+    }
+}
+
+/* What rounding leaves of the gaps is moved in rational numbers: rows that depend on each other and leave no room, with
+ * entries that no double-double displacement can meet exactly; and a row that speaks of a penetration below 1e-100. */
+TEST(rows_are_settled_exactly)
+{
+    static const double N[4][3] = {{0.1, 0.3, 0.7}, {-0.1, -0.3, -0.7}, {0.3, 0.1, 0}, {0x1p200, 1, 0}};
+    double h[] = {1, -1, 0.7, 0}, weight[] = {0.5, 0.25, 1}, c[3] = {0}, gap[4];
+    double u[] = {1, 1, (1 - 0.4) / 0.7};
+    for (int deep = 0; deep < 2; deep++) {
+        uz_csc Nt = csc_from_dense((const double[]){N[0][0], N[1][0], N[2][0], N[3][0], N[0][1], N[1][1], N[2][1],
+                                                    N[3][1], N[0][2], N[1][2], N[2][2], N[3][2]},
+                                   3, 4, false);
+        uz_row_settle x = {.Nt = &Nt, .weight = weight, .h = h, .u = u, .c = c, .gap = gap};
+        h[3] = deep ? 0 : 0x1p201;
+        CHECK(uz_row_settle_solve(&x));
+        if (deep) /* 2^200 u_1 <= -u_2: u_1 has to move by 1, and others with it */
+            CHECK_MSG(x.length > 1 && x.length < 30 && gap[3] < 1e-30, "%g %g", x.length, gap[3]);
+        else
+            CHECK_MSG(x.length > 0 && x.length < 1e-14 && gap[0] + gap[1] < 1e-30, "%g %g", x.length, gap[0]);
+        h[1] = nextafter(-1, -2);
+        CHECK(!uz_row_settle_solve(&x));
+        h[1] = -1;
+        uz_csc_clear(&Nt);
+    }
+    u[0] = NAN;
+    uz_csc Nt = csc_from_dense((const double[]){1, 0, 0}, 3, 1, false);
+    uz_row_settle x = {.Nt = &Nt, .weight = weight, .h = h, .u = u, .c = c, .gap = gap};
+    CHECK(!uz_row_settle_solve(&x));
+    uz_csc_clear(&Nt);
 }
 
 /* S S' = (1 + t) K: then M = (1 - 1 / (1 + t)) I. */

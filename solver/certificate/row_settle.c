@@ -1,0 +1,346 @@
+#include "certificate/row_settle.h"
+
+#include "certificate/residual.h"
+#include "certificate/row_move.h"
+#include "core/alloc.h"
+
+#include <float.h>
+#include <gmp.h>
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Rows that are moved together, and words multiplied in all: about a second. */
+enum { MOST_TOGETHER = 32 };
+static const double MOST_WORK = 2e7;
+
+/* Upper bounds from sums of doubles. */
+#define SURELY (1.0 + 0x1p-40)
+
+typedef struct {
+    uz_row_settle *in;
+    int64_t d, m;
+    uz_csc N;       /* m x d */
+    double *sure;   /* m: u + c leaves at least this gap */
+    mpq_t *delta;   /* d */
+    double *moved;  /* d: >= |delta_j| */
+    bool *near;     /* m: shares a dof with a row that is moved now */
+    int64_t *list;  /* m: these */
+    int64_t n_near; /* how many */
+    /* the rows that are moved now, and how much each is pressed */
+    int64_t count, row[MOST_TOGETHER];
+    mpq_t y[MOST_TOGETHER], w[MOST_TOGETHER], A[MOST_TOGETHER][MOST_TOGETHER + 1];
+    mpq_t a, b, gap, step, part, own; /* work */
+    double work;                      /* left to spend */
+} settle;
+
+/* What is surely left of the gap of row i at u + c: Ogita, Rump and Oishi's bound on Dot2, and what underflow may take.
+ */
+static double sure_gap(const uz_row_settle *in, int64_t i)
+{
+    double size = fabs(in->h[i]), terms = 1.0;
+    for (int64_t k = in->Nt->ptr[i]; k < in->Nt->ptr[i + 1]; k++) {
+        const int64_t j = in->Nt->idx[k];
+        size += fabs(in->Nt->val[k] * in->u[j]) + fabs(in->Nt->val[k] * in->c[j]);
+        terms += 2.0;
+    }
+    const double gap = uz_gap_of_row(in->Nt, i, in->h, in->u, in->c);
+    return gap - (0x1p-51 * fabs(gap) + terms * (0x1p-104 * terms * size + 0x1p-1066));
+}
+
+/* sum += x y */
+static void add_product(settle *s, mpq_t sum, double x, double y)
+{
+    if (x == 0.0 || y == 0.0)
+        return;
+    mpq_set_d(s->a, x);
+    mpq_set_d(s->b, y);
+    mpq_mul(s->a, s->a, s->b);
+    mpq_add(sum, sum, s->a);
+}
+
+/* Is u + c, without delta, open at row i? The sum of integers times powers of two, exactly. */
+static bool is_open(const uz_row_settle *in, int64_t i)
+{
+    const uz_csc *Nt = in->Nt;
+    const int64_t first = Nt->ptr[i], n = 2 * (Nt->ptr[i + 1] - first) + 1;
+    int least = INT_MAX;
+    mpz_t sum, term;
+    mpz_inits(sum, term, NULL);
+    for (int pass = 0; pass < 2; pass++)
+        for (int64_t k = 0; k < n; k++) {
+            int of_x, of_y;
+            const double value = k == n - 1 ? -1.0 : Nt->val[first + k / 2];
+            const double at = k == n - 1 ? in->h[i] : (k % 2 ? in->c : in->u)[Nt->idx[first + k / 2]];
+            const double x = frexp(value, &of_x), y = frexp(at, &of_y);
+            if (x == 0.0 || y == 0.0)
+                continue;
+            if (pass == 0) {
+                least = of_x + of_y < least ? of_x + of_y : least;
+                continue;
+            }
+            mpz_set_d(term, ldexp(x, DBL_MANT_DIG));
+            mpz_mul_2exp(term, term, (mp_bitcnt_t)(of_x + of_y - least));
+            const double digits = ldexp(y, DBL_MANT_DIG);
+            if (digits < 0.0)
+                mpz_submul_ui(sum, term, (unsigned long)-digits);
+            else
+                mpz_addmul_ui(sum, term, (unsigned long)digits);
+        }
+    const bool open = mpz_sgn(sum) <= 0; /* of N (u + c) - h */
+    mpz_clears(sum, term, NULL);
+    return open;
+}
+
+/* s->gap: of row i at u + c + delta. */
+static void take_gap(settle *s, int64_t i)
+{
+    const uz_row_settle *in = s->in;
+    mpq_set_ui(s->gap, 0, 1);
+    add_product(s, s->gap, 1.0, in->h[i]);
+    for (int64_t k = in->Nt->ptr[i]; k < in->Nt->ptr[i + 1]; k++) {
+        const int64_t j = in->Nt->idx[k];
+        add_product(s, s->gap, -in->Nt->val[k], in->u[j]);
+        add_product(s, s->gap, -in->Nt->val[k], in->c[j]);
+        mpq_set_d(s->b, -in->Nt->val[k]);
+        mpq_mul(s->b, s->b, s->delta[j]);
+        mpq_add(s->gap, s->gap, s->b);
+        s->work -= 20.0 + (double)mpz_size(mpq_denref(s->gap));
+    }
+}
+
+/* sum = n_i'W n_k */
+static void couple(settle *s, mpq_t sum, int64_t i, int64_t k)
+{
+    const uz_csc *Nt = s->in->Nt;
+    mpq_set_ui(sum, 0, 1);
+    for (int64_t p = Nt->ptr[i], q = Nt->ptr[k]; p < Nt->ptr[i + 1] && q < Nt->ptr[k + 1];) {
+        const int64_t j = Nt->idx[p], l = Nt->idx[q];
+        if (j == l) {
+            mpq_set_d(s->a, Nt->val[p]);
+            mpq_set_d(s->b, Nt->val[q]);
+            mpq_mul(s->a, s->a, s->b);
+            mpq_set_d(s->b, s->in->weight[j]);
+            mpq_mul(s->a, s->a, s->b);
+            mpq_add(sum, sum, s->a);
+            s->work -= 30.0;
+        }
+        p += j <= l;
+        q += l <= j;
+    }
+}
+
+/* delta += step W n_i, and the rows that this may reach. */
+static void push(settle *s, int64_t i, const mpq_t step)
+{
+    const uz_csc *Nt = s->in->Nt;
+    for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++) {
+        const int64_t j = Nt->idx[k];
+        mpq_set_d(s->a, Nt->val[k]);
+        mpq_set_d(s->b, s->in->weight[j]);
+        mpq_mul(s->a, s->a, s->b);
+        mpq_mul(s->a, s->a, step);
+        mpq_sub(s->delta[j], s->delta[j], s->a);
+        s->moved[j] = SURELY * fabs(mpq_get_d(s->delta[j])) + DBL_MIN;
+        s->work -= 30.0 + (double)mpz_size(mpq_denref(s->delta[j]));
+        for (int64_t q = s->N.ptr[j]; q < s->N.ptr[j + 1]; q++)
+            if (!s->near[s->N.idx[q]]) {
+                s->near[s->N.idx[q]] = true;
+                s->list[s->n_near++] = s->N.idx[q];
+            }
+    }
+}
+
+/* w = (N_A W N_A')^-1 N_A W n_q for the rows A that are moved now, s->own = what q has left of its compliance. */
+static void press(settle *s, int64_t q)
+{
+    const int64_t n = s->count;
+    for (int64_t i = 0; i < n; i++) {
+        for (int64_t k = 0; k < n; k++)
+            couple(s, s->A[i][k], s->row[i], s->row[k]);
+        couple(s, s->A[i][n], s->row[i], q);
+    }
+    couple(s, s->own, q, q);
+    for (int64_t c = 0; c < n; c++) /* definite: the rows that are moved don't depend on each other */
+        for (int64_t i = c + 1; i < n; i++) {
+            mpq_div(s->part, s->A[i][c], s->A[c][c]);
+            for (int64_t k = c; k <= n && mpq_sgn(s->part) != 0; k++) {
+                mpq_mul(s->a, s->part, s->A[c][k]);
+                mpq_sub(s->A[i][k], s->A[i][k], s->a);
+                s->work -= 4.0 + 2.0 * (double)mpz_size(mpq_numref(s->A[i][k]));
+            }
+        }
+    for (int64_t i = n - 1; i >= 0; i--) {
+        for (int64_t k = i + 1; k < n; k++) {
+            mpq_mul(s->a, s->A[i][k], s->w[k]);
+            mpq_sub(s->A[i][n], s->A[i][n], s->a);
+        }
+        mpq_div(s->w[i], s->A[i][n], s->A[i][i]);
+    }
+    for (int64_t i = 0; i < n; i++) {
+        couple(s, s->part, s->row[i], q);
+        mpq_mul(s->part, s->part, s->w[i]);
+        mpq_sub(s->own, s->own, s->part);
+    }
+}
+
+/* Presses q until its gap is closed; rows whose push vanishes on the way are let go. false: for ever, or too long. */
+static bool admit(settle *s, int64_t q)
+{
+    mpq_t pressed;
+    bool closed = false, fails = false;
+    mpq_init(pressed);
+    while (!closed && !fails) {
+        int64_t gone = -1;
+        press(s, q);
+        take_gap(s, q);
+        closed = mpq_sgn(s->own) > 0;
+        if (closed) {
+            mpq_div(s->step, s->gap, s->own);
+            mpq_neg(s->step, s->step);
+        }
+        for (int64_t k = 0; k < s->count; k++) {
+            if (mpq_sgn(s->w[k]) <= 0)
+                continue;
+            mpq_div(s->part, s->y[k], s->w[k]);
+            if ((closed || gone >= 0) && mpq_cmp(s->part, s->step) >= 0)
+                continue;
+            mpq_set(s->step, s->part);
+            gone = k;
+            closed = false;
+        }
+        fails = (!closed && gone < 0) || s->count == MOST_TOGETHER || !(s->work > 0.0);
+        if (fails)
+            break;
+        mpq_add(pressed, pressed, s->step);
+        push(s, q, s->step);
+        for (int64_t k = 0; k < s->count; k++) {
+            mpq_mul(s->part, s->step, s->w[k]);
+            mpq_sub(s->y[k], s->y[k], s->part);
+            mpq_neg(s->part, s->part);
+            push(s, s->row[k], s->part);
+        }
+        if (gone >= 0) {
+            s->count--;
+            s->row[gone] = s->row[s->count];
+            mpq_swap(s->y[gone], s->y[s->count]);
+        }
+    }
+    if (closed) {
+        s->row[s->count] = q;
+        mpq_set(s->y[s->count++], pressed);
+    }
+    mpq_clear(pressed);
+    return closed;
+}
+
+/* Of the rows around those that are moved one that penetrates most, as far as doubles tell; -1: none. */
+static int64_t choose(settle *s)
+{
+    int64_t q = -1;
+    double deepest = 0.0;
+    for (int64_t n = 0; n < s->n_near; n++) {
+        const int64_t i = s->list[n];
+        double reach = DBL_MIN;
+        for (int64_t k = s->in->Nt->ptr[i]; k < s->in->Nt->ptr[i + 1]; k++)
+            reach += fabs(s->in->Nt->val[k]) * s->moved[s->in->Nt->idx[k]];
+        if (s->sure[i] >= SURELY * reach)
+            continue;
+        take_gap(s, i);
+        if (mpq_sgn(s->gap) >= 0)
+            continue;
+        const double depth = -mpq_get_d(s->gap) / sqrt(uz_row_compliance(s->in->Nt, i, s->in->weight));
+        if (q < 0 || depth > deepest) {
+            deepest = depth;
+            q = i;
+        }
+    }
+    return q;
+}
+
+/* Moves row q, which may penetrate, and what that takes along. The rows moved before are like any other. */
+static bool move_row(settle *s, int64_t q)
+{
+    s->count = s->n_near = 0;
+    take_gap(s, q);
+    bool settled = true;
+    for (q = mpq_sgn(s->gap) < 0 ? q : -1; q >= 0 && settled; q = settled ? choose(s) : -1)
+        settled = admit(s, q);
+    for (int64_t n = 0; n < s->n_near; n++)
+        s->near[s->list[n]] = false;
+    return settled;
+}
+
+/* The rows of the list (n) penetrate. */
+static bool move_rows(settle *s, const int64_t *wrong, int64_t n)
+{
+    bool settled = uz_csc_transpose(&s->N, s->in->Nt, NULL) == UZ_OK;
+    s->delta = uz_alloc(s->d, sizeof *s->delta);
+    s->moved = uz_alloc_zero(s->d, sizeof *s->moved);
+    s->near = uz_alloc_zero(s->m, sizeof *s->near);
+    s->list = uz_alloc(s->m, sizeof *s->list);
+    settled = settled && s->delta && s->moved && s->near && s->list;
+    for (int64_t j = 0; settled && j < s->d; j++)
+        mpq_init(s->delta[j]);
+    const bool made = settled;
+    for (int k = 0; k < MOST_TOGETHER; k++) {
+        mpq_inits(s->y[k], s->w[k], NULL);
+        for (int l = 0; l <= MOST_TOGETHER; l++)
+            mpq_init(s->A[k][l]);
+    }
+    mpq_inits(s->a, s->b, s->gap, s->step, s->part, s->own, NULL);
+    for (int64_t k = 0; settled && k < n; k++)
+        settled = move_row(s, wrong[k]);
+    double length = 0.0;
+    for (int64_t j = 0; settled && j < s->d; j++)
+        length += s->moved[j] / sqrt(s->in->weight[j]);
+    for (int64_t i = 0; settled && i < s->m; i++) {
+        take_gap(s, i);
+        s->in->gap[i] = mpq_sgn(s->gap) > 0 ? SURELY * mpq_get_d(s->gap) + DBL_MIN : 0.0;
+    }
+    s->in->length = SURELY * length;
+    for (int64_t j = 0; made && j < s->d; j++)
+        mpq_clear(s->delta[j]);
+    for (int k = 0; k < MOST_TOGETHER; k++) {
+        mpq_clears(s->y[k], s->w[k], NULL);
+        for (int l = 0; l <= MOST_TOGETHER; l++)
+            mpq_clear(s->A[k][l]);
+    }
+    mpq_clears(s->a, s->b, s->gap, s->step, s->part, s->own, NULL);
+    return settled;
+}
+
+static bool are_finite(const uz_row_settle *in, int64_t i)
+{
+    bool finite = isfinite(in->h[i]);
+    for (int64_t k = in->Nt->ptr[i]; finite && k < in->Nt->ptr[i + 1]; k++) {
+        const int64_t j = in->Nt->idx[k];
+        finite = isfinite(in->u[j]) && isfinite(in->c[j]) && isfinite(in->weight[j]) && in->weight[j] > 0.0;
+    }
+    return finite;
+}
+
+bool uz_row_settle_solve(uz_row_settle *problem)
+{
+    settle s = {.in = problem, .d = problem->Nt->rows, .m = problem->Nt->cols, .work = MOST_WORK};
+    int64_t *wrong = uz_alloc(s.m, sizeof *wrong), n = 0;
+    s.sure = uz_alloc(s.m, sizeof *s.sure);
+    bool settled = wrong && s.sure;
+    problem->length = 0.0;
+    for (int64_t i = 0; settled && i < s.m; i++) {
+        s.sure[i] = sure_gap(problem, i);
+        if (s.sure[i] >= 0.0)
+            continue;
+        settled = are_finite(problem, i);
+        if (settled && !is_open(problem, i))
+            wrong[n++] = i;
+    }
+    if (settled && n > 0)
+        settled = move_rows(&s, wrong, n);
+    void *room[] = {wrong, s.sure, s.delta, s.moved, s.near, s.list};
+    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
+        free(room[k]);
+    uz_csc_clear(&s.N);
+    return settled;
+}
