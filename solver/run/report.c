@@ -168,6 +168,10 @@ uz_status uz_report_answer(uz_run *run, uz_error *err)
     report_cost(run);
     /* in a rotated frame displacements have a larger bound, and a problem without an answer has none */
     uz_milestones_drop(&run->work.milestones, summary->certificate.relative_error);
+    /* the methods' own bounds leave out what their rounding may hide: no row claims more than the certificate */
+    for (int64_t k = 0; k < result->history.count && isfinite(summary->certificate.absolute_error); k++)
+        result->history.rows[k].error_bound =
+            fmax(result->history.rows[k].error_bound, summary->certificate.absolute_error);
     result->trade = run->work.milestones.trade;
     result->trade.total_s = uz_run_time(run);
     summary->timings.total = uz_run_time(run);

@@ -32,6 +32,7 @@ static void check_history(const uz_result *result, const quad_exact *exact)
         const uz_residual *e = &row->residual;
         CHECK_INT(row->iteration, k);
         CHECK(row->error_bound <= best);
+        CHECK(row->error_bound >= result->summary.certificate.absolute_error);
         best = row->error_bound;
         CHECK(row->dual_objective <= optimum + 1e-13 * size);
         CHECK(row->contacts >= 0 && row->contacts <= result->m);
