@@ -181,6 +181,25 @@ static bool fits(uz_smooth_shape *s, const double *xyz, int64_t n, double size)
            largest < FLAT * size;
 }
 
+/* Takes s where its normals are clearly nearer to those of the points than those of the shape found so far: two
+ * circles, as of one layer of elements, are on a sphere and on a cone as well. apart: mean square of the sines between
+ * them. */
+static void take_if_nearer(uz_smooth_shape *found, double *apart, const uz_smooth_shape *s, const double *xyz,
+                           const double *normal, int64_t n)
+{
+    double sum = 0;
+    for (int64_t i = 0; i < n; i++) {
+        double offset[3], there[3], across[3];
+        uz_smooth_nearest(offset, there, s, xyz + 3 * i);
+        uz_cross3(across, there, normal + 3 * i);
+        sum += uz_dot3(across, across) / (double)n;
+    }
+    if (!(sum < 0.5 * *apart))
+        return;
+    *found = *s;
+    *apart = sum;
+}
+
 /* ---- what normals say */
 
 /* All normals of a surface of revolution meet its axis, the line of direction a and moment m: n . m + (x x n) . a = 0.
@@ -265,7 +284,7 @@ static bool find_torus(uz_smooth_shape *s, const double *xyz, const double *norm
 uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int64_t n)
 {
     enum { FEW = 6, ENOUGH_FOR_A_TORUS = 12 };
-    double size = 0, turn = 0, best = 0, mean[3] = {0}, axis[2][3] = {{0}};
+    double size = 0, turn = 0, best = 0, apart = INFINITY, mean[3] = {0}, axis[2][3] = {{0}};
     int64_t far = 0;
     for (int64_t i = 0; i < n; i++) {
         double d[3], t[3];
@@ -293,11 +312,12 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
         t[c] = normal[3 * far + c] - normal[c];
     }
     const double radius = uz_dot3(d, t) / uz_dot3(t, t);
+    uz_smooth_shape found = {.kind = UZ_SMOOTH_NONE};
     s = (uz_smooth_shape){.kind = UZ_SMOOTH_SPHERE, .radius = fabs(radius)};
     for (int c = 0; c < 3; c++)
         s.point[c] = xyz[c] - radius * normal[c];
     if (fits(&s, xyz, n, size))
-        return s;
+        take_if_nearer(&found, &apart, &s, xyz, normal, n);
     /* The axis is across all normals of a cylinder, and across the differences of those of a cone. */
     for (int k = 0; k < 2; k++) {
         best = 0;
@@ -324,11 +344,11 @@ uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int6
         for (int c = 0; c < 3; c++)
             s.point[c] += up * s.axis[c];
         if (fits(&s, xyz, n, size))
-            return s;
+            take_if_nearer(&found, &apart, &s, xyz, normal, n);
     }
-    if (n >= ENOUGH_FOR_A_TORUS && find_torus(&s, xyz, normal, n, mean, size))
+    if (found.kind == UZ_SMOOTH_NONE && n >= ENOUGH_FOR_A_TORUS && find_torus(&s, xyz, normal, n, mean, size))
         return s;
-    return (uz_smooth_shape){.kind = UZ_SMOOTH_NONE};
+    return found;
 }
 
 /* ---- a quadric near a node */

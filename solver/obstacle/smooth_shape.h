@@ -22,8 +22,8 @@ typedef struct {
     double tube;          /* of a torus the radius of its section, whose centre is `radius` off the axis */
 } uz_smooth_shape;
 
-/* The simplest of these shapes on which all n points lie (n x 3), to a millionth of its radius; normals (n x 3, unit):
- * roughly those of the surface there. By Gauss and Newton's method from what the normals say. */
+/* The simplest of these shapes on which all n points lie (n x 3), to a millionth of its radius, and whose normals are
+ * the given ones (n x 3, unit), roughly. By Gauss and Newton's method from what the normals say. */
 uz_smooth_shape uz_smooth_shape_of(const double *xyz, const double *normal, int64_t n);
 
 /* From x to the nearest point of the shape, and the unit normal there (NULL: not wanted), away from its centre or

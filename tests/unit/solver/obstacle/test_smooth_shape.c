@@ -87,6 +87,18 @@ TEST(shapes_are_found)
         }
 }
 
+/* One layer of elements: two circles are on a sphere, on a cone and on cylinders. */
+TEST(two_circles_are_told_by_their_normals)
+{
+    static const uz_smooth_kind kinds[] = {UZ_SMOOTH_SPHERE, UZ_SMOOTH_CYLINDER, UZ_SMOOTH_CONE};
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 12; i++) {
+            const cloud of = points_of(kinds[k], pow(10, i % 4 - 1), 0.2, i < 6 ? 1.5 : 0.7, i < 4 ? 0.02 : 0, 1, 0);
+            const uz_smooth_shape s = uz_smooth_shape_of(of.xyz, of.normal, 2 * AROUND);
+            CHECK_MSG(s.kind == kinds[k], "shape %d case %d: found %d", k, i, (int)s.kind);
+        }
+}
+
 TEST(offsets_lead_to_the_nearest_point)
 {
     const uz_smooth_shape cone = {UZ_SMOOTH_CONE, {0, 0, 0}, {0, 0, 1}, 2, 0.75, 0};
