@@ -18,6 +18,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A corner that is no farther from a line than this part of the sizes is on it. */
+#define ON_LINE 1e-12
+
 enum { MOST_CORNERS = 12, MOST_PIECES = 5, ENOUGH_ABOUT = 25, MOST_ABOUT = 60 };
 
 /* A piece smaller than this part of the slave face is what rounding leaves. */
@@ -259,8 +262,12 @@ static void clip(polygon *a, const polygon *b)
         const double along[2] = {to[0] - from[0], to[1] - from[1]};
         double off[MOST_CORNERS];
         polygon out = {.n = 0};
-        for (int i = 0; i < a->n; i++)
-            off[i] = along[0] * (a->x[i][1] - from[1]) - along[1] * (a->x[i][0] - from[0]);
+        for (int i = 0; i < a->n; i++) { /* on the line but for rounding: where on it would it be cut? */
+            const double d[2] = {a->x[i][0] - from[0], a->x[i][1] - from[1]};
+            const double squares = along[0] * along[0] + along[1] * along[1] + d[0] * d[0] + d[1] * d[1];
+            off[i] = along[0] * d[1] - along[1] * d[0];
+            off[i] = fabs(off[i]) <= ON_LINE * squares ? 0 : off[i];
+        }
         for (int i = 0; i < a->n; i++) {
             const int j = (i + 1) % a->n;
             if (off[i] >= 0 && out.n < MOST_CORNERS)
