@@ -194,7 +194,7 @@ static void take_if_nearer(uz_smooth_shape *found, double *apart, const uz_smoot
         uz_cross3(across, there, normal + 3 * i);
         sum += uz_dot3(across, across) / (double)n;
     }
-    if (!(sum < 0.5 * *apart))
+    if (!(sum + 1e-9 < 0.5 * *apart))
         return;
     *found = *s;
     *apart = sum;
