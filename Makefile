@@ -325,9 +325,10 @@ peers: deps bench-deps ## the same problems by what Debian has, one certificate 
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
 
-extremes: deps-test ## claims at the extremes against exact solutions: a table and build/extremes.json; FILTER=name: some, into extremes-part.json
-	@$(MAKE) --no-print-directory -s $(BUILD)/extremes
-	@$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER)
+extremes: deps-test ## claims at the extremes, and 1,000 generated scenes of bodies that touch: tables, build/extremes.json, build/contacts.json; FILTER=name: some, FILTER=contacts: the scenes alone, SCENES=100: the first of them
+	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/uzawad
+	@$(if $(filter contacts,$(FILTER)),,$(call measured,extremes$(if $(FILTER),-part)) $(BUILD)/extremes $(BUILD)/extremes$(if $(FILTER),-part).json $(FILTER))
+	@$(if $(filter-out contacts,$(FILTER)),,$(PYTHON) -B tests/extremes/generated_contacts.py $(BUILD) $(BUILD)/contacts.json $(SCENES))
 
 theory: deps ## stress and contact pressure against theory on finer and finer meshes: a table and build/theory.json
 	@$(MAKE) --no-print-directory -s $(BUILD)/theory

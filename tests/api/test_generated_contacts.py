@@ -1,0 +1,19 @@
+"""Some generated scenes of bodies that touch, in all their variations but refined; `make extremes` looks at a thousand."""
+# not under ThreadSanitizer: about answers, not about threads
+import pathlib
+import sys
+
+import service
+from service import check
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "extremes"))
+import generated_contacts  # noqa: after its place is known
+
+
+def test_generated_contacts(s):
+    found = generated_contacts.run(s, range(20 if service.INSTRUMENTED else 40), lambda *said, **_: None, refine=False)
+    check(found["scenes"] >= 20 and not found["failures"], found["failures"])
+
+
+if __name__ == "__main__":
+    service.main(globals())
