@@ -62,6 +62,8 @@ typedef struct {
     double *spring;          /* n_nodes x dim: stiffness of the ground along the axes; NULL: no springs */
     uz_contact_sites *sites; /* n_sites: one per contact of the scene */
     int64_t n_sites;
+    double *place;       /* n_nodes x dim: the displacement at which the sites are found; NULL: before anything moves */
+    bool is_place;       /* of uz_body_model_move: all but sites, rows and `place` is another model's */
     const uz_law *law;   /* of the contacts */
     int64_t n_pair_rows; /* contact rows against another part of the body */
     int64_t *row_place;  /* m: the place of each row in the sites of its contact */
@@ -91,6 +93,11 @@ uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz
 /* Everything but the matrices: mesh, dofs and contact rows, for what is computed from an answer that is there. */
 uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err);
 void uz_body_model_clear(uz_body_model *model);
+/* The same body with its contacts found where it has been displaced by scene->place: gaps, normals and what faces what
+ * are those there, and rows and gaps are linear about it, so that they are exact for a body that stays there. K, dofs
+ * and frames are those of `model`, which has to outlive *out and must be at no place itself. Matrices of a model of
+ * _outline are not there. Errors: UZ_ERR_SCENE (the contact can't be found there), _MEMORY. */
+uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, const uz_scene *scene, uz_error *err);
 
 /* p (d), h (m) and the prescribed values of the supported dofs (n_fixed; NULL: not wanted) of a scene whose body is
  * `model` (same uz_scene_body_key). On failure the outputs are undefined. */

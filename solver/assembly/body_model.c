@@ -26,36 +26,48 @@ void uz_mesh_info_clear(uz_mesh_info *info)
     memset(info, 0, sizeof *info);
 }
 
+static void free_sites(uz_contact_sites *sites, int64_t n)
+{
+    for (int64_t k = 0; sites && k < n; k++) {
+        free(sites[k].gap);
+        free(sites[k].normal);
+        free(sites[k].first);
+        free(sites[k].node);
+        free(sites[k].weight);
+        free(sites[k].face);
+        free(sites[k].at);
+        free(sites[k].area);
+        free(sites[k].ends);
+    }
+    free(sites);
+}
+
 void uz_body_model_clear(uz_body_model *model)
 {
     if (!model)
         return;
     model->info.xyz = NULL; /* the mesh frees it */
+    if (model->is_place) {  /* and another model what is not of its rows */
+        model->info.rotated_node = NULL;
+        model->info.frame = NULL;
+    }
     uz_mesh_info_clear(&model->info);
-    uz_mesh_clear(&model->mesh);
-    uz_csc_clear(&model->K);
     uz_csc_clear(&model->N);
-    uz_csc_clear(&model->K_fixed);
-    free(model->dof);
-    free(model->frame_of);
-    free(model->modes);
-    free(model->materials);
-    free(model->material_of);
-    free(model->spring);
     free(model->row_place);
     free(model->row_ends);
-    for (int64_t k = 0; model->sites && k < model->n_sites; k++) {
-        free(model->sites[k].gap);
-        free(model->sites[k].normal);
-        free(model->sites[k].first);
-        free(model->sites[k].node);
-        free(model->sites[k].weight);
-        free(model->sites[k].face);
-        free(model->sites[k].at);
-        free(model->sites[k].area);
-        free(model->sites[k].ends);
+    free_sites(model->sites, model->n_sites);
+    free(model->place);
+    if (!model->is_place) {
+        uz_mesh_clear(&model->mesh);
+        uz_csc_clear(&model->K);
+        uz_csc_clear(&model->K_fixed);
+        free(model->dof);
+        free(model->frame_of);
+        free(model->modes);
+        free(model->materials);
+        free(model->material_of);
+        free(model->spring);
     }
-    free(model->sites);
     memset(model, 0, sizeof *model);
 }
 
@@ -64,17 +76,35 @@ size_t uz_body_model_bytes(const uz_body_model *model)
     const uz_mesh *mesh = &model->mesh;
     const size_t nodes = (size_t)mesh->n_nodes, elements = (size_t)mesh->n_elements, rows = (size_t)model->m;
     const size_t dim = (size_t)mesh->dim;
-    size_t bytes = uz_csc_bytes(&model->K) + uz_csc_bytes(&model->N) + uz_csc_bytes(&model->K_fixed);
-    bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
-    bytes +=
-        8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
-    bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim) + rows * 8 * (5 + dim + (model->row_ends ? 2 : 0));
+    size_t bytes = uz_csc_bytes(&model->N) + rows * 8 * (5 + dim + (model->row_ends ? 2 : 0));
+    bytes += model->place ? 8 * nodes * dim : 0;
+    if (!model->is_place) {
+        bytes += uz_csc_bytes(&model->K) + uz_csc_bytes(&model->K_fixed);
+        bytes += nodes * 8 * (2 * dim + (model->frame_of ? 1 : 0) + (model->spring ? dim : 0));
+        bytes +=
+            8 * (elements + 1) + elements + 8 * (size_t)mesh->first[elements] + (model->material_of ? 4 * elements : 0);
+        bytes += (size_t)model->info.n_rotated * 8 * (1 + dim * dim);
+        bytes += (size_t)model->d * (size_t)model->n_modes * 8;
+    }
     for (int64_t k = 0; k < model->n_sites; k++) {
         const uz_contact_sites *s = &model->sites[k];
         const size_t n = (size_t)s->n;
         bytes += n * 8 * (1 + dim) + (s->first ? 16 * n + 16 * (size_t)s->first[n] : 0) + (s->at ? 32 * n : 0);
     }
-    return bytes + (size_t)model->d * (size_t)model->n_modes * 8;
+    return bytes;
+}
+
+/* The sites at scene->place in place of those before anything moves. */
+static uz_status displace(uz_body_model *model, const uz_body_model *rest, const uz_scene *scene, uz_error *err)
+{
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    model->sites = NULL;
+    model->n_sites = 0;
+    model->place = uz_alloc(n, sizeof *model->place);
+    if (!model->place)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes", (long long)model->mesh.n_nodes);
+    memcpy(model->place, scene->place, (size_t)n * sizeof *model->place);
+    return uz_find_sites(model, rest, scene, err);
 }
 
 /* Everything but the stiffness. held: obstacles may hold the body where supports don't. */
@@ -97,9 +127,14 @@ static uz_status prepare(uz_body_model *model, const uz_scene *scene, bool held,
     if (status == UZ_OK && !held)
         status = uz_check_rigid_modes(model, err);
     if (status == UZ_OK)
-        status = uz_find_sites(model, scene, err);
+        status = uz_find_sites(model, NULL, scene, err);
     if (status == UZ_OK)
         status = uz_choose_frames(model, scene, err);
+    if (status == UZ_OK && scene->place) {
+        const uz_body_model rest = *model;
+        status = displace(model, &rest, scene, err);
+        free_sites(rest.sites, rest.n_sites);
+    }
     if (status == UZ_OK)
         status = uz_build_contact_rows(model, scene, err);
     if (status == UZ_OK && held)
@@ -131,6 +166,23 @@ uz_status uz_body_model_build_held(uz_body_model *out, const uz_scene *scene, uz
 uz_status uz_body_model_outline(uz_body_model *out, const uz_scene *scene, uz_error *err)
 {
     return build(out, scene, true, false, err);
+}
+
+uz_status uz_body_model_move(uz_body_model *out, const uz_body_model *model, const uz_scene *scene, uz_error *err)
+{
+    *out = *model;
+    out->is_place = true;
+    out->m = out->n_pair_rows = 0;
+    memset(&out->N, 0, sizeof out->N);
+    out->row_place = out->row_ends = NULL;
+    out->info.contact_node = out->info.contact_of = out->info.contact_face = NULL;
+    out->info.contact_area = out->info.contact_normal = NULL;
+    uz_status status = displace(out, model, scene, err);
+    if (status == UZ_OK)
+        status = uz_build_contact_rows(out, scene, err);
+    if (status != UZ_OK)
+        uz_body_model_clear(out);
+    return status;
 }
 
 static uz_status check_finite(const double *x, int64_t n, const char *where, uz_error *err)

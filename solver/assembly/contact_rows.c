@@ -307,8 +307,10 @@ done:
 
 /* ------------------------------------------------------------------ gaps */
 
-/* What supports give a node (dim), along the axes; free dofs are where they were. */
-static void prescribed_at(double u[3], const uz_body_model *model, int64_t node, const double *prescribed)
+/* What supports give a node (dim), along the axes, less the displacement at which the row is taken; free dofs are where
+ * they were. */
+static void prescribed_at(double u[3], const uz_body_model *model, const uz_contact_row *row, int64_t node,
+                          const double *prescribed)
 {
     const int dim = model->mesh.dim;
     for (int c = 0; c < dim; c++) {
@@ -316,6 +318,8 @@ static void prescribed_at(double u[3], const uz_body_model *model, int64_t node,
         u[c] = dof < 0 ? prescribed[-1 - dof] : 0;
     }
     uz_from_frame(u, model, node);
+    for (int c = 0; c < dim && row->place; c++)
+        u[c] -= row->place[node * dim + c];
 }
 
 /* The gap of a row with the prescribed displacements and zero for the free ones. The sum is also given in absolute
@@ -328,7 +332,7 @@ static double gap_at(double *scale, const uz_body_model *model, const uz_contact
     memcpy(along, row->offset, sizeof along);
     for (int j = 0; j < row->slaves; j++) {
         const double *x = model->mesh.xyz + row->slave[j] * dim;
-        prescribed_at(u, model, row->slave[j], prescribed);
+        prescribed_at(u, model, row, row->slave[j], prescribed);
         for (int c = 0; c < dim; c++) {
             const double from = j == 0 ? fabs(row->from[c]) : 0, share = row->slave_share[j];
             along[c] += share * u[c];
@@ -338,7 +342,7 @@ static double gap_at(double *scale, const uz_body_model *model, const uz_contact
     for (int c = 0; c < dim; c++)
         gap += along[c] * row->normal[c];
     for (int j = 0; j < row->masters; j++) {
-        prescribed_at(u, model, row->master[j], prescribed);
+        prescribed_at(u, model, row, row->master[j], prescribed);
         for (int c = 0; c < dim; c++) {
             gap -= row->master_share[j] * u[c] * row->normal[c];
             *scale += fabs(row->master_share[j] * u[c] * row->normal[c]);

@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 const uz_contact_discretization *uz_discretization_of(const uz_contact *contact)
@@ -40,22 +41,36 @@ uz_status uz_contact_input_of(uz_contact_input *in, const uz_body_model *model, 
 
 bool uz_contact_row_at(uz_contact_row *row, const uz_contact_input *in, int64_t place)
 {
-    return uz_discretization_of(in->contact)->row(row, in, &in->model->sites[in->index], place);
+    const uz_contact_sites *sites = &in->model->sites[in->index];
+    const bool found = uz_discretization_of(in->contact)->row(row, in, sites, place);
+    row->place = sites->n > 0 ? in->model->place : NULL; /* a plane's row is the same everywhere */
+    return found;
 }
 
-uz_status uz_find_sites(uz_body_model *model, const uz_scene *scene, uz_error *err)
+uz_status uz_find_sites(uz_body_model *model, const uz_body_model *rest, const uz_scene *scene, uz_error *err)
 {
+    const int64_t n = model->mesh.n_nodes * model->mesh.dim;
+    uz_body_model there = *model;
+    double *xyz = rest ? uz_alloc(n, sizeof *xyz) : NULL;
     uz_status status = UZ_OK;
     model->sites = uz_alloc_zero(scene->n_contacts, sizeof *model->sites);
-    if (!model->sites)
+    if (!model->sites || (rest && !xyz)) {
+        free(xyz);
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld contacts", (long long)scene->n_contacts);
+    }
     model->n_sites = scene->n_contacts;
+    for (int64_t i = 0; i < n && rest; i++)
+        xyz[i] = model->mesh.xyz[i] + model->place[i];
+    there.mesh.xyz = rest ? xyz : there.mesh.xyz;
+    there.sites = model->sites;
     for (int64_t k = 0; k < scene->n_contacts && status == UZ_OK; k++) {
         uz_contact_input in;
-        status = uz_contact_input_of(&in, model, scene, k, err);
+        status = uz_contact_input_of(&in, &there, scene, k, err);
+        in.rest = rest;
         if (status == UZ_OK)
             status = uz_discretization_of(in.contact)->find(&model->sites[k], &in, err);
     }
+    free(xyz);
     return status;
 }
 

@@ -20,6 +20,10 @@ typedef struct {
     const uz_group *on;   /* the surface that has the rows: once sites are found that of the slave */
     const uz_group *with; /* that of another body; NULL: an obstacle */
     double *room;         /* n_nodes, zero, and left zero */
+    /* Contact at a displaced place: `model` has the nodes there, and this is the body before anything moves, with its
+     * sites. What is chosen once (which side is the slave, what smooth surfaces are off their facets) is chosen there,
+     * and a contact may find nothing to touch any more. NULL: `model` is that body. */
+    const uz_body_model *rest;
 } uz_contact_input;
 
 typedef struct {
@@ -32,12 +36,14 @@ typedef struct {
     const int64_t *slave,
         *master; /* they live as long as the sites, or are the row's own `node`: rows are not copied */
     const double *slave_share, *master_share; /* D_j and M_k */
+    const double *place; /* n_nodes x dim: the displacement at which the gap is taken, along the axes; NULL: none */
 } uz_contact_row;
 
 typedef struct {
     const char *name;
     int64_t (*places)(const uz_contact_input *in);
-    /* Once per body: fills the sites (zeroed), from which rows follow. On failure they are cleared by the caller. */
+    /* Once per body and place: fills the sites (zeroed), from which rows follow. On failure they are cleared by the
+     * caller. */
     uz_status (*find)(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err);
     /* The row of a place, for the contact of this load; false: there is none. */
     bool (*row)(uz_contact_row *row, const uz_contact_input *in, const uz_contact_sites *sites, int64_t place);

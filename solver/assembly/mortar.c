@@ -20,6 +20,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "core/vector3.h"
 #include "linalg/linalg.h"
 #include "obstacle/projection.h"
 
@@ -69,6 +70,11 @@ uz_side uz_mortar_side_of(const uz_mortar_side *side, const uz_body_model *model
                      .model = model->kind,
                      .thickness = model->thickness,
                      .xyz = side->xyz};
+}
+
+const uz_mortar_side *uz_mortar_rest(const uz_mortar_surface *surface, const uz_mortar_side *side)
+{
+    return surface->rest ? &surface->rest->side[side - surface->side] : side;
 }
 
 void uz_mortar_surface_clear(uz_mortar_surface *surface)
@@ -507,38 +513,77 @@ static uz_status make_rows(uz_contact_sites *sites, side_work *work, const uz_co
     return status;
 }
 
-/* The surface that has the lowest node is looked at first, whatever the two are called. */
+/* Which of the two is the slave: the finer one, or what it was before anything moved. The surface that has the lowest
+ * node is looked at first, whatever the two are called. first: what it is; false: no memory. */
+static bool choose_slave(bool *swapped, side_work *work, const uz_contact_input *in, const uz_mortar_surface *on,
+                         const uz_mortar_surface *with)
+{
+    const bool turned = in->on->node[0] > in->with->node[0];
+    bool finer = false;
+    *swapped = in->rest && in->rest->sites[in->index].swapped;
+    if (in->rest)
+        return true;
+    if (!is_master_finer(&finer, work, in, turned ? with : on, turned ? on : with))
+        return false;
+    *swapped = turned != finer;
+    return true;
+}
+
+/* The normals that smooth shapes give a surface in space at rest differ from those of its facets: so they do where it
+ * has moved. */
+static uz_status turn_with_rest(uz_mortar_surface *surface, const uz_contact_input *in, const uz_group *group,
+                                uz_error *err)
+{
+    uz_contact_input before = *in; /* at rest, by its facets alone */
+    uz_mortar_surface facets = {0};
+    before.model = in->rest;
+    uz_status status = uz_mortar_surface_make(&facets, &before, group, err);
+    const bool same = status == UZ_OK && facets.n_places == surface->n_places;
+    for (int64_t p = 0; p < surface->n_places && same; p++) {
+        for (int c = 0; c < 3; c++)
+            surface->normal[3 * p + c] += surface->rest->normal[3 * p + c] - facets.normal[3 * p + c];
+        uz_unit3(surface->normal + 3 * p);
+    }
+    uz_mortar_surface_clear(&facets);
+    return status;
+}
+
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
-    uz_mortar_surface surface[2] = {{0}, {0}};
+    uz_mortar_surface surface[2] = {{0}, {0}}, rest[2] = {{0}, {0}}; /* of `on` and `with` */
+    uz_contact_input before = *in;
     side_work work = {.near = NULL};
     char where[96];
-    bool finer = false;
     uz_status status = uz_contact_pair_check(&in->model->mesh, in->on, in->with, in->index, err);
-    if (status != UZ_OK)
-        return status;
-    sites->swapped = in->on->node[0] > in->with->node[0];
-    status = uz_mortar_surface_make(&surface[0], in, sites->swapped ? in->with : in->on, err);
-    if (status == UZ_OK)
-        status = uz_mortar_surface_make(&surface[1], in, sites->swapped ? in->on : in->with, err);
+    before.model = in->rest;
+    before.rest = NULL;
+    for (int k = 0; k < 2 && status == UZ_OK; k++)
+        status = uz_mortar_surface_make(&surface[k], in, k == 0 ? in->on : in->with, err);
+    for (int k = 0; k < 2 && status == UZ_OK && in->rest && !in->contact->faceted; k++) {
+        status = uz_mortar_surface_make(&rest[k], &before, k == 0 ? in->on : in->with, err);
+        surface[k].rest = &rest[k];
+        if (status == UZ_OK && in->model->mesh.dim == 3)
+            status = turn_with_rest(&surface[k], in, k == 0 ? in->on : in->with, err);
+    }
     if (status != UZ_OK)
         goto done;
     const int64_t most = surface[0].n > surface[1].n ? surface[0].n : surface[1].n;
     work.near = uz_alloc(most, sizeof *work.near);
-    if (!work.near || !is_master_finer(&finer, &work, in, &surface[0], &surface[1])) {
+    if (!work.near || !choose_slave(&sites->swapped, &work, in, &surface[0], &surface[1])) {
         status = no_memory(err);
         goto done;
     }
-    sites->swapped = sites->swapped != finer;
-    status = make_rows(sites, &work, in, &surface[finer], &surface[!finer], err);
-    if (status == UZ_OK && sites->first[sites->n] == 0) {
+    status = make_rows(sites, &work, in, &surface[sites->swapped], &surface[!sites->swapped], err);
+    if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest) {
         snprintf(where, sizeof where, "/contacts/%lld/on", (long long)in->index);
         status =
             uz_fail(err, UZ_ERR_SCENE, where, "no part of \"%.63s\" faces \"%.63s\"", in->on->name, in->with->name);
     }
 done:
-    uz_mortar_surface_clear(&surface[0]);
-    uz_mortar_surface_clear(&surface[1]);
+    for (int k = 0; k < 2; k++) {
+        uz_mortar_surface_clear(&surface[k]);
+        uz_mortar_surface_clear(&rest[k]);
+    }
     free(work.points.point);
     free(work.near);
     free(work.A);

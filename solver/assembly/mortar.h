@@ -24,14 +24,17 @@ typedef struct {
     bool fitted;           /* of a face: its places have patches */
 } uz_mortar_side;
 
-typedef struct {
+typedef struct uz_mortar_surface {
     int64_t n, n_places;
     uz_mortar_side *side;
-    uz_box_tree tree;       /* of the sides */
-    int64_t *node;          /* n_places, ascending */
-    double *normal;         /* n_places x dim: out of the body */
-    uz_smooth_patch *patch; /* n_places, of faces that lie on no known shape; NULL: there are none */
+    uz_box_tree tree;                     /* of the sides */
+    int64_t *node;                        /* n_places, ascending */
+    double *normal;                       /* n_places x dim: out of the body */
+    uz_smooth_patch *patch;               /* n_places, of faces that lie on no known shape; NULL: there are none */
+    const struct uz_mortar_surface *rest; /* the same sides before anything moves; NULL: they have not moved */
 } uz_mortar_surface;
+/* A side of it before anything moves. */
+const uz_mortar_side *uz_mortar_rest(const uz_mortar_surface *surface, const uz_mortar_side *side);
 
 typedef struct {
     int64_t master; /* side */

@@ -315,7 +315,7 @@ static bool add_segment(uz_mortar_points *points, const uz_contact_input *in, co
         shape_at(p.N, e->nodes, s);
         shape_at(p.M, f->nodes, t);
         if (!in->contact->faceted)
-            p.gap += offset_along(n, f, t) - offset_along(n, e, s);
+            p.gap += offset_along(n, uz_mortar_rest(master, f), t) - offset_along(n, uz_mortar_rest(slave, e), s);
         room = !isfinite(p.gap) || uz_mortar_add_point(points, &p);
     }
     return room;

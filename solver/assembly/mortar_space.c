@@ -237,8 +237,8 @@ static bool places(uz_mortar_surface *surface, const uz_contact_input *in)
     for (int64_t p = 0; p < surface->n_places; p++)
         uz_unit3(surface->normal + 3 * p);
     free(key);
-    return room &&
-           (in->contact->faceted || (recognise(surface, &in->model->mesh) && fit_patches(surface, &in->model->mesh)));
+    return room && (in->contact->faceted || in->rest ||
+                    (recognise(surface, &in->model->mesh) && fit_patches(surface, &in->model->mesh)));
 }
 
 /* ---- polygons */
@@ -414,14 +414,16 @@ static bool add_piece(uz_mortar_points *points, const polygon *piece, const uz_m
             uz_unit3(normal);
             p.weight *= sqrt(uz_dot3(area, area)) / uz_dot3(area, on->n);
             p.gap = (height[1] - height[0]) * uz_dot3(normal, on->n);
-            for (int k = 0; k < 2; k++) { /* from the plane's point to either face, and from there to its shape */
+            for (int k = 0; k < 2; k++) { /* from either face, as it was before anything moved, to its shape */
+                const uz_mortar_surface *of = k == 0 ? slave : surface;
+                const uz_mortar_side *rest = uz_mortar_rest(of, k == 0 ? side : other);
                 double x[3], off[3];
-                for (int c = 0; c < 3; c++)
+                for (int c = 0; c < 3; c++) {
                     x[c] = on->x[c] + y[0] * on->t[0][c] + y[1] * on->t[1][c] + height[k] * on->n[c];
-                if (k == 0)
-                    smooth_offset(off, slave, side, p.N, x);
-                else
-                    smooth_offset(off, surface, other, p.M, x);
+                    for (int a = 0; a < rest->nodes && in->rest; a++)
+                        x[c] = (a == 0 ? 0 : x[c]) + (k == 0 ? p.N : p.M)[a] * rest->xyz[3 * a + c];
+                }
+                smooth_offset(off, of->rest ? of->rest : of, rest, k == 0 ? p.N : p.M, x);
                 p.gap += (k == 0 ? -1 : 1) * uz_dot3(off, normal);
             }
             if (isfinite(p.gap) && p.weight > 0)

@@ -44,7 +44,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
     int64_t count = 0;
     uz_status status = uz_sites_of_nodes(sites, in, err);
     if (status == UZ_OK)
-        status = uz_contact_pairs(&pair, &count, &in->model->mesh, in->on, in->with, in->index, err);
+        status = uz_contact_pairs(&pair, &count, &in->model->mesh, in->on, in->with, in->index, in->rest != NULL, err);
     if (status == UZ_OK)
         status = copy_pairs(sites, in, pair, count, err);
     free(pair);

@@ -54,8 +54,9 @@ void uz_free_shares(double share[3], const uz_body_model *model, int64_t node, c
 bool uz_is_rotated_element(const uz_body_model *model, int64_t element);
 void uz_turn_element(double *ke, const uz_body_model *model, int64_t element);
 
-/* mesh -> sites, by each contact's discretization (discretization.h). */
-uz_status uz_find_sites(uz_body_model *model, const uz_scene *scene, uz_error *err);
+/* mesh -> sites, by each contact's discretization (discretization.h). rest: not NULL for those at model->place: the
+ * same body with its sites before anything moves. */
+uz_status uz_find_sites(uz_body_model *model, const uz_body_model *rest, const uz_scene *scene, uz_error *err);
 /* mesh, dof, frames, sites -> N, m, n_pair_rows, info.contact_*. */
 uz_status uz_build_contact_rows(uz_body_model *model, const uz_scene *scene, uz_error *err);
 /* Does `node` get a row from an obstacle with this unit normal? Only where some free dof of it has a share in the

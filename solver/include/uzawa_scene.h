@@ -154,6 +154,14 @@ typedef struct {
 
 typedef enum { UZ_MESH_BOX, UZ_MESH_GIVEN } uz_mesh_source;
 
+/* Where gaps, normals and what faces what are taken. */
+typedef enum {
+    UZ_KINEMATICS_AUTO,  /* before anything moves, unless that changes the answer by more than is tolerable */
+    UZ_KINEMATICS_FIXED, /* before anything moves */
+    UZ_KINEMATICS_MOVING /* where the answer itself has moved the surfaces to */
+} uz_kinematics;
+const char *uz_kinematics_name(uz_kinematics);
+
 typedef struct {
     uz_model model;
     uz_formulation formulation;
@@ -170,6 +178,10 @@ typedef struct {
     uz_contact *contacts;
     int64_t n_contacts;
     bool all_candidates; /* solve with every contact row, also those far from any obstacle */
+    uz_kinematics kinematics;
+    /* n_nodes x dim, borrowed: contacts are found where the body has been displaced by this, and linear about it: a
+     * uz_result's place. NULL: before anything moves. uz_solve finds places itself (kinematics) and takes none. */
+    const double *place;
 } uz_scene;
 void uz_scene_clear(uz_scene *scene);
 /* Dimensions of the bodies that its model is for: 2 or 3. */

@@ -380,7 +380,7 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
 }
 
 static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m, const master *slave, int64_t index,
-                           uz_error *err)
+                           bool may_miss, uz_error *err)
 {
     const uz_group *on = slave->group;
     char where[96];
@@ -392,7 +392,7 @@ static uz_status make_rows(uz_contact_pair *row, int64_t *count, const master *m
             return status;
         *count += found;
     }
-    if (*count > 0)
+    if (*count > 0 || may_miss)
         return UZ_OK;
     snprintf(where, sizeof where, "/contacts/%lld/on", (long long)index);
     return uz_fail(err, UZ_ERR_SCENE, where, "no node of \"%.63s\" faces \"%.63s\": all of them lie beyond its border",
@@ -414,7 +414,7 @@ static uz_status prepare(master *m, const uz_mesh *mesh, const uz_group *group, 
 }
 
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
-                           const uz_group *with, int64_t index, uz_error *err)
+                           const uz_group *with, int64_t index, bool may_miss, uz_error *err)
 {
     master m = {.mesh = NULL}, slave = {.mesh = NULL};
     uz_contact_pair *row = NULL;
@@ -428,7 +428,7 @@ uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh 
     if (status == UZ_OK)
         status = prepare(&slave, mesh, on, true, false, err);
     if (status == UZ_OK)
-        status = make_rows(row, count, &m, &slave, index, err);
+        status = make_rows(row, count, &m, &slave, index, may_miss, err);
     if (status == UZ_OK)
         *out = row;
     else

@@ -40,10 +40,11 @@ uz_status uz_contact_pair_check(const uz_mesh *mesh, const uz_group *on, const u
 
 /* The rows of all nodes of `on` that face `with` (behind it, only those that look at it), in the order of the nodes
  * (ascending). O((n + f) log f) for n nodes within a few faces' size of f faces. `index` is the contact's place in the
- * scene, for pointers. The caller frees *out with free(). Errors: UZ_ERR_SCENE ("/contacts/i/with": not faces;
- * "/contacts/i/on": a node of the master itself, or no node that faces it), UZ_ERR_MEMORY. */
+ * scene, for pointers. may_miss: it is no error that no node faces `with`. The caller frees *out with free(). Errors:
+ * UZ_ERR_SCENE ("/contacts/i/with": not faces; "/contacts/i/on": a node of the master itself, or no node that faces
+ * it), UZ_ERR_MEMORY. */
 uz_status uz_contact_pairs(uz_contact_pair **out, int64_t *count, const uz_mesh *mesh, const uz_group *on,
-                           const uz_group *with, int64_t index, uz_error *err);
+                           const uz_group *with, int64_t index, bool may_miss, uz_error *err);
 
 /* The faces of a group, made ready for points from anywhere. */
 typedef struct uz_faces uz_faces;

@@ -320,7 +320,7 @@ TEST(frames_in_space)
         uz_contact contact = {.on = "all", .normal = {n[0], n[1], n[2]}};
         uz_scene scene = {.contacts = &contact, .n_contacts = 1};
         uz_body_model model = brick(element, dof, held);
-        CHECK(uz_find_sites(&model, &scene, NULL) == UZ_OK); /* a plane has none but their list */
+        CHECK(uz_find_sites(&model, NULL, &scene, NULL) == UZ_OK); /* a plane has none but their list */
         CHECK(uz_choose_frames(&model, &scene, NULL) == UZ_OK);
         for (int64_t a = 0; a < 8; a++) {
             int axes = 0;
