@@ -67,6 +67,8 @@ static void print_outcome(FILE *to, const json_t *summary)
         {"paper_rule", "the paper's stopping rule ended it before the certificate met what was asked for"},
         {"infeasible", "no displacement satisfies all contact conditions"},
         {"out_of_reach", "a displacement that satisfies all contact conditions, if there is one, is far away"},
+        {"moving_geometry",
+         "the surfaces move so far that the contact's geometry did not settle; this is the last answer"},
         {"loose", "nothing says where the body lies; this is one place of many"},
         {"dismissed", "it was dismissed; this is the best answer so far"},
         {"verified", "the certificate of the given answer meets what was asked for"},

@@ -115,7 +115,7 @@ bool codec_summary_number(double *value, const codec_summary *summary, const cha
 const char *codec_summary_outcome(const codec_summary *summary); /* "": it has none */
 
 /* How many cases of a job ended in each way. */
-#define CODEC_OUTCOMES (UZ_LOOSE + 1)
+#define CODEC_OUTCOMES (UZ_MOVING_GEOMETRY + 1)
 typedef struct {
     int64_t count, outcomes[CODEC_OUTCOMES];
     const char *worst; /* name */

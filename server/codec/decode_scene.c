@@ -218,10 +218,12 @@ bool decode_scene(uz_scene *out, decoding *d, const json_value *object)
 {
     static const char *const MODELS[] = {"plane_stress", "plane_strain", "axisymmetric", "solid"};
     static const char *const FORMULATIONS[] = {"auto", "standard", "bbar", "incompatible_modes"};
+    static const char *const KINEMATICS[] = {"auto", "fixed", "moving"};
     const json_value *mesh = json_get(object, "mesh"), *box = json_get(mesh, "box");
     const json_value *materials = json_get(object, "materials");
     out->model = (uz_model)word_of(object, "model", MODELS, 4);
     out->formulation = (uz_formulation)word_of(object, "formulation", FORMULATIONS, 4);
+    out->kinematics = (uz_kinematics)word_of(object, "kinematics", KINEMATICS, 3);
     out->thickness = decode_number(object, "thickness", 1);
     out->all_candidates = json_text_is(json_get(object, "candidates"), "all");
     if (box ? !decode_box(out, d, box) : !decode_mesh(out, d, mesh))

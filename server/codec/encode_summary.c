@@ -105,6 +105,17 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
             text_numbers(t, "x", e->peak_at, s->dim);
             text_close(t, '}');
         }
+        if (e && e->n_contacts > 0) {
+            const uz_geometry *g = &s->geometry;
+            const bool moving = g->kind == UZ_KINEMATICS_MOVING;
+            text_open(t, "geometry", '{');
+            text_string(t, "kinematics", uz_kinematics_name(g->kind));
+            text_integer(t, "passes", g->passes);
+            put_named(
+                t, (named[]){{"change", g->change}, moving ? (named){"left", g->left} : (named){"sliding", g->sliding}},
+                2);
+            text_close(t, '}');
+        }
     }
     text_close(t, '}');
 }

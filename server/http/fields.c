@@ -115,8 +115,8 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     uz_field_source answer = {.u = NULL};
     uz_error err = {0};
     uz_status status = UZ_ERR_ARGUMENT;
-    double *u = NULL, *r = NULL, *g = NULL, *cells = NULL;
-    int64_t n_gaps = 0, n_cells = 0;
+    double *u = NULL, *r = NULL, *g = NULL, *cells = NULL, *place = NULL;
+    int64_t n_gaps = 0, n_cells = 0, n_place = 0;
     store_status found = store_get_vector(s, id, number, "displacements", &u, &answer.n_u);
     if (found == STORE_OK)
         found = store_get_vector(s, id, number, "reactions", &r, &answer.m);
@@ -128,6 +128,11 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
             scene.box.cells[i] = (int64_t)cells[i];
         scene.box.automatic = false;
     }
+    if (found == STORE_OK) { /* where its contacts were found */
+        found = store_get_vector(s, id, number, "place", &place, &n_place);
+        found = found == STORE_NOT_FOUND ? STORE_OK : found;
+        scene.place = n_place == answer.n_u ? place : NULL;
+    }
     answer.u = u;
     answer.r = r;
     answer.g = n_gaps == answer.m ? g : NULL;
@@ -137,6 +142,7 @@ bool fields_compute(void *out, field_computation run, const field_reader *reader
     free(r);
     free(g);
     free(cells);
+    free(place);
     if (found != STORE_OK)
         reply_store_failure(context, found, reply);
     else if (status != UZ_OK)

@@ -86,6 +86,7 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
     add_vector(parts, "gaps", result->g, result->m);
     add_vector(parts, "ray", result->ray, result->m);
     add_vector(parts, "displacements", result->u, is_scene ? result->mesh.n_nodes * result->mesh.dim : result->d);
+    add_vector(parts, "place", result->place, result->mesh.n_nodes * result->mesh.dim);
     add_vector(parts, "pressure", result->pressure, result->m);
     if (result->state) { /* without memory for it the run can't be continued, and that is all */
         int64_t count = 0;

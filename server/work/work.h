@@ -9,6 +9,7 @@
  *   "reactions"      m  r
  *   "gaps"           m  g
  *   "displacements"  d for matrices; nodes x dim, node by node, for a scene
+ *   "place"          nodes x dim, the displacement at which the contacts were found; only where kinematics moved them
  *   "nodes"          nodes x dim, coordinates; scenes only
  *   "contact_nodes"  m, the node of each reaction; scenes only
  *   "pressure"       m, reaction over tributary area; scenes only

@@ -25,7 +25,9 @@ typedef enum {
     UZ_NOT_VERIFIED, /* uz_verify: it does not; the bound says how far it reaches */
     UZ_MESH_LIMIT,   /* cells chosen here: the grid that would meet the request is larger than allowed */
     UZ_OUT_OF_REACH, /* every feasible u, if there is one, is at least infeasible_radius away, and none was certified */
-    UZ_LOOSE         /* semicoercive: no load presses the body on what would hold it; u is one place of many */
+    UZ_LOOSE,        /* semicoercive: no load presses the body on what would hold it; u is one place of many */
+    UZ_MOVING_GEOMETRY /* gaps and normals taken where the answer moves the surfaces to did not settle; the last answer
+                        */
 } uz_outcome;
 const char *uz_outcome_name(uz_outcome);
 
@@ -125,6 +127,17 @@ typedef struct {
     double facets_left; /* the same where the contact does not make up for it */
 } uz_overlap;
 
+/* Scenes: where the contact's geometry was taken, and what that leaves. Errors are in the energy norm, relative to the
+ * certificate's. */
+typedef struct {
+    uz_kinematics kind; /* FIXED, or MOVING: where the answer is, in `passes` solves */
+    int64_t passes;
+    double change;  /* MOVING: what the last pass changed. FIXED: what another would, where AUTO tried it, else NaN */
+    double left;    /* MOVING: what further passes would change, by the rate at which they get smaller */
+    double sliding; /* FIXED: how far gaps and normals are off where the answer has moved the surfaces to
+                     * (post/sliding.c); NaN: not known */
+} uz_geometry;
+
 /* Scenes: what the answer comes to. */
 typedef struct {
     double strain_energy; /* with that of springs */
@@ -187,6 +200,7 @@ typedef struct {
     double requested_error;   /* the relative error that `converged` had to meet */
     uz_certificate certificate;
     uz_semicoercive semicoercive;
+    uz_geometry geometry;
     bool factor_cached; /* everything about the body was */
     uz_reuse reused;
     bool contact_last; /* the dofs that N touches are eliminated after all others */
@@ -222,12 +236,14 @@ void uz_state_free(uz_state *state);
 typedef struct {
     uz_summary summary;
     int64_t d, m, n_nodes;
-    double *u;         /* d; a scene's is n_nodes x dim by node, with the supported dofs, which d does not count */
-    double *r;         /* m */
-    double *g;         /* m */
-    double *pressure;  /* scene: m, as UZ_FIELD_PRESSURE; else NULL */
-    double *ray;       /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof, rounded; out of reach: what bounds
-                          infeasible_radius, h'y / ||N'y||_1. u, r, g are then NaN. Else NULL */
+    double *u;        /* d; a scene's is n_nodes x dim by node, with the supported dofs, which d does not count */
+    double *r;        /* m */
+    double *g;        /* m */
+    double *pressure; /* scene: m, as UZ_FIELD_PRESSURE; else NULL */
+    double *place; /* scene: n_nodes x dim, the displacement at which its contacts were found, and with uz_scene.place
+                      are found again; NULL: before anything moved */
+    double *ray;   /* infeasible: m, y <= 0 with N'y = 0, h'y > 0, the proof, rounded; out of reach: what bounds
+                      infeasible_radius, h'y / ||N'y||_1. u, r, g are then NaN. Else NULL */
     uz_mesh_info mesh; /* scene only */
     uz_evaluation *evaluation;
     uz_grid_sequence *grids; /* box whose cells were chosen here */

@@ -10,8 +10,19 @@
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                             const double *r, uz_error *err);
 
-/* Adds to out->warnings what makes the answer doubtful. */
+/* Adds to out->warnings what makes the answer doubtful. sliding: of uz_measure_sliding. */
 uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                         const double *r, uz_error *err);
+                         double sliding, uz_error *err);
+/* Takes one back that turned out to be without ground. */
+void uz_drop_warning(uz_evaluation *out, const char *code);
+
+/* Beyond the first, answers with their contacts as they are before anything moves have the second. */
+#define UZ_MOST_SLIDING 0.05
+#define UZ_WARN_SLIDING "sliding"
+
+/* *sliding: uz_geometry.sliding of an answer with its contacts as they are before anything moves; approach: of
+ * overlap.h. NaN of a model at a place. */
+uz_status uz_measure_sliding(double *sliding, const uz_body_model *model, const uz_scene *scene, const double *u,
+                             const double *r, double approach, uz_error *err);
 
 #endif

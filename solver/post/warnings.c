@@ -12,10 +12,8 @@
 
 /* A rotation by w makes strains of w^2 / 2 that are not there: at 0.1 half a per cent. */
 static const double MOST_ROTATION = 0.1, MOST_STRAIN = 0.05;
-/* Of the obstacle's normal, from where the node was to where it is: the row kept the first. */
-static const double MOST_TURN = 0.1;
-/* Of a face of the other body, in parts of its size. */
-static const double MOST_FACE = 0.5;
+/* The least cosine between normals that point the same way: not those of faces along the obstacle. */
+static const double AWAY = 0.1;
 
 /* Poisson's ratio from which on plain linear elements are much too stiff: on Cook's membrane in plane strain quad4 has
  * 17 % too little energy there (element/stiffness.c). */
@@ -24,7 +22,8 @@ static const double LOCKS = 0.45;
 typedef struct {
     const uz_body_model *model;
     const uz_scene *scene;
-    const double *u, *r;
+    const double *u;
+    double sliding;
     uz_evaluation *out;
 } doubts;
 
@@ -150,7 +149,7 @@ static void look_at_elements(const doubts *d)
              (long long)strained, strain, MOST_STRAIN);
 }
 
-/* ---- sliding */
+/* ---- contact */
 
 static double length(const double v[3])
 {
@@ -170,56 +169,20 @@ static double size_of_face(const uz_mesh *mesh, uz_face face)
     return sqrt(largest);
 }
 
-/* The most of each that was seen. */
-typedef struct {
-    double turn;  /* of the normal */
-    double part;  /* slid, of a face */
-    double depth; /* at which a node begins in the other body, in lengths of the face */
-    int64_t deepest;
-} findings;
-
-/* The rows of contact k from *row on. */
-static void look_at_rows(findings *most, const doubts *d, const uz_obstacle *obstacle, int64_t k, int64_t *row)
+/* The deepest that a node begins in the other body, in lengths of the face that it meets. */
+static double deepest_overlap(int64_t *node, const uz_body_model *model)
 {
-    const uz_mesh_info *info = &d->model->info;
-    const uz_law *law = d->model->law;
-    const int dim = d->model->mesh.dim;
-    const uz_contact_sites *sites = d->model->sites ? &d->model->sites[k] : NULL;
-    for (; *row < d->model->m && info->contact_of[*row] == k; ++*row) {
-        const int64_t i = d->model->row_place[*row];
-        const int64_t node = info->contact_node[*row] * dim;
-        const double *normal = info->contact_normal + *row * dim;
-        const double face = sites && sites->first ? size_of_face(&d->model->mesh, sites->face[i]) : 0;
-        const bool active = law->kind->active(law, NULL, &d->r[*row], 1) > 0;
-        if (active && obstacle) {
-            /* By how much the obstacle's normal where the node has come to differs from the one that was kept. */
-            double x[3] = {0}, chord = 0;
-            uz_gap there;
-            for (int c = 0; c < dim; c++)
-                x[c] = d->model->mesh.xyz[node + c] + d->u[node + c];
-            const bool known = uz_obstacle_gap(&there, obstacle, x, NULL) == UZ_OK;
-            for (int c = 0; known && c < dim; c++)
-                chord = hypot(chord, there.normal[c] - normal[c]);
-            most->turn = fmax(most->turn, 2 * asin(fmin(1, 0.5 * chord)));
-        }
-        if (active && face > 0) {
-            /* Across the normal, of a node against the point of the face that it meets. */
-            double v[3] = {0}, along = 0;
-            for (int c = 0; c < dim; c++) {
-                v[c] = d->u[node + c];
-                for (int64_t j = sites->first[i]; j < sites->first[i + 1]; j++)
-                    v[c] -= sites->weight[j] * d->u[sites->node[j] * dim + c];
-                along += v[c] * normal[c];
-            }
-            for (int c = 0; c < dim; c++)
-                v[c] -= along * normal[c];
-            most->part = fmax(most->part, length(v) / face);
-        }
-        if (face > 0 && -sites->gap[i] > most->depth * face) {
-            most->depth = -sites->gap[i] / face;
-            most->deepest = info->contact_node[*row];
+    double most = 0;
+    for (int64_t row = 0; row < model->m; row++) {
+        const uz_contact_sites *sites = &model->sites[model->info.contact_of[row]];
+        const int64_t i = model->row_place[row];
+        const double face = sites->first ? size_of_face(&model->mesh, sites->face[i]) : 0;
+        if (face > 0 && -sites->gap[i] > most * face) {
+            most = -sites->gap[i] / face;
+            *node = model->info.contact_node[row];
         }
     }
+    return most;
 }
 
 /* The least cosine between the faces' normals and the obstacle's, which points to where the body may be: where none is
@@ -232,7 +195,7 @@ static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz
     const bool faces = group && group->kind == UZ_GROUP_FACES && group->n_faces > 0;
     const double size = length(contact->normal);
     double least = faces ? 1 : -1;
-    for (int64_t i = 0; faces && i < group->n_faces && least > MOST_TURN; i++) {
+    for (int64_t i = 0; faces && i < group->n_faces && least > AWAY; i++) {
         /* Out of the body, in the middle of a face, and that place. */
         const uz_face face = group->face[i];
         const uz_element_type *type = uz_element_type_of((uz_element_kind)mesh->kind[face.element]);
@@ -266,19 +229,18 @@ static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz
 
 static uz_status look_at_contact(const doubts *d, uz_error *err)
 {
-    findings most = {0};
-    int64_t row = 0, behind = -1;
+    int64_t behind = -1, node = 0;
     double away = 0;
     uz_status status = UZ_OK;
-    for (int64_t k = 0; k < d->scene->n_contacts && status == UZ_OK; k++) {
+    for (int64_t k = 0; k < d->scene->n_contacts && behind < 0 && status == UZ_OK; k++) {
         const uz_contact *contact = &d->scene->contacts[k];
         uz_obstacle *obstacle = NULL;
-        if (contact->kind != UZ_OBSTACLE_PLANE && contact->kind != UZ_OBSTACLE_BODY)
+        if (contact->kind == UZ_OBSTACLE_BODY)
+            continue;
+        if (contact->kind != UZ_OBSTACLE_PLANE)
             status = uz_obstacle_new(&obstacle, contact, k, d->scene->model, err);
-        look_at_rows(&most, d, obstacle, k, &row);
-        const double least =
-            status == UZ_OK && contact->kind != UZ_OBSTACLE_BODY && behind < 0 ? turned_away(d, obstacle, contact) : -1;
-        if (least > MOST_TURN) {
+        const double least = status == UZ_OK ? turned_away(d, obstacle, contact) : -1;
+        if (least > AWAY) {
             behind = k;
             away = least;
         }
@@ -289,20 +251,18 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
              "all faces of contact %lld look away from its obstacle and never meet it; its normal must point to the "
              "body",
              (long long)behind);
-    if (most.turn > MOST_TURN)
-        warn(d->out, "large_sliding", most.turn,
-             "a node slides so far on an obstacle that the normal there is turned by %.2g rad from the one that was "
-             "kept",
-             most.turn);
-    if (most.part > MOST_FACE)
-        warn(d->out, "sliding_off_face", most.part,
-             "a node slides by %.2g of the face of the other body that it was set against", most.part);
-    if (most.depth > 1)
-        warn(d->out, "deep_overlap", most.depth,
+    if (d->sliding > UZ_MOST_SLIDING)
+        warn(d->out, UZ_WARN_SLIDING, d->sliding,
+             "where the surfaces have moved to, gaps and normals are off by %.2g of the approach or radians; "
+             "\"kinematics\": \"moving\" takes them there",
+             d->sliding);
+    const double depth = deepest_overlap(&node, d->model);
+    if (depth > 1)
+        warn(d->out, "deep_overlap", depth,
              "node %lld begins %.2g lengths of the face that it meets deep in the other body: another face may be the "
              "one "
              "that it should meet",
-             (long long)most.deepest, most.depth);
+             (long long)node, depth);
     return status;
 }
 
@@ -336,10 +296,19 @@ static void look_at_mesh(const doubts *d)
             (long long)mesh->n_unused);
 }
 
-uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                         const double *r, uz_error *err)
+void uz_drop_warning(uz_evaluation *out, const char *code)
 {
-    const doubts d = {model, scene, u, r, out};
+    int kept = 0;
+    for (int i = 0; i < out->n_warnings; i++)
+        if (strcmp(out->warnings[i].code, code) != 0)
+            out->warnings[kept++] = out->warnings[i];
+    out->n_warnings = kept;
+}
+
+uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
+                         double sliding, uz_error *err)
+{
+    const doubts d = {model, scene, u, sliding, out};
     const double noticed = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
     if (!(slope_by_range(&d) < 0.99 * noticed) && largest_slope(&d) > noticed)
         look_at_elements(&d);

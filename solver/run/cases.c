@@ -6,6 +6,7 @@
 #include "core/clock.h"
 #include "core/error.h"
 #include "methods/iterate.h"
+#include "run/moving.h"
 #include "run/problem.h"
 #include "run/semicoercive.h"
 
@@ -50,6 +51,13 @@ uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz
         uz_problem one = uz_problem_of_case(problem, i);
         if (!uz_may_be_semicoercive(regular, results[i], &one, settings))
             continue;
+        if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_MOVING) {
+            uz_error_reset(err); /* in place of the refusal */
+            status = uz_fail(err, UZ_ERR_SCENE, "/kinematics",
+                             "\"moving\" is for bodies that their supports hold, and this one only obstacles do: add "
+                             "supports or springs, or ask for \"fixed\"");
+            break;
+        }
         if (hooks && hooks->begins)
             hooks->begins(hooks->ctx, i);
         status = starts && starts[i] ? check_start(starts[i], &one, err) : UZ_OK;
@@ -60,6 +68,12 @@ uz_status uz_solve_on_mesh(uz_result ***out, const uz_problem *problem, const uz
         if (problem->n_cases > 0 && err && is_about_case(err))
             uz_error_name_case(err, i);
         break;
+    }
+    for (int64_t i = 0; i < n && status == UZ_OK; i++) {
+        const uz_problem one = uz_problem_of_case(problem, i);
+        status = uz_solve_moving(&results[i], &one, settings, cache, hooks, started, err);
+        if (status != UZ_OK && problem->n_cases > 0 && err && is_about_case(err))
+            uz_error_name_case(err, i);
     }
     if (status == UZ_OK)
         *out = results;

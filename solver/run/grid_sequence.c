@@ -211,7 +211,7 @@ static uz_status estimate_case(uz_result *result, const uz_body_model *outline, 
     if (isnan(mesh))
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to estimate the error of the mesh");
     s->discretization_error = mesh;
-    s->total_error = hypot(mesh, s->certificate.relative_error);
+    s->total_error = hypot(hypot(mesh, s->certificate.relative_error), s->geometry.left);
     if (isnan(s->total_error))
         s->total_error = INFINITY;
     return UZ_OK;
@@ -344,7 +344,7 @@ static uz_status try_grid(search *g, int64_t n, uz_error *err)
 static void conclude(const search *g, uz_summary *s)
 {
     s->requested_error = g->requested;
-    if (uz_has_no_answer(s) || s->outcome == UZ_LOOSE)
+    if (uz_has_no_answer(s) || s->outcome == UZ_LOOSE || s->outcome == UZ_MOVING_GEOMETRY)
         return;
     if (s->total_error <= g->requested) {
         s->outcome = UZ_CONVERGED;

@@ -144,6 +144,39 @@ static void undo_precondition(making *m, uz_error *err)
 
 enum { TRIES = 4 };
 
+uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, const uz_settings *settings,
+                                  const uz_hooks *hooks, uz_error *err)
+{
+    const uz_setup *base = setup->base;
+    making m = {.setup = setup, .K = uz_setup_K(setup, problem), .N = uz_setup_N(setup, problem), .hooks = hooks};
+    int64_t *dofs = NULL, n_b = 0;
+    uz_status status = uz_dual_contact_dofs(&dofs, &n_b, m.N, err);
+    free(dofs);
+    setup->factor = base->factor;
+    setup->amg = base->amg;
+    setup->plan = base->plan;
+    if (status != UZ_OK)
+        return status;
+    if (!base->factor)
+        return make_dual(&m, base->dual->can->op, err);
+    m.size = (uz_cost_size){.d = m.K->cols,
+                            .m = m.N->rows,
+                            .n_b = n_b,
+                            .k_entries = m.K->ptr[m.K->cols],
+                            .n_entries = m.N->ptr[m.N->cols],
+                            .modes = setup->model.mesh.dim == 3 ? 6 : 3,
+                            .bounds = uz_cost_bounds(m.N, settings)};
+    const uz_factor_info there = uz_factor_describe(base->factor);
+    const uz_operator direct = uz_dual_choose(m.N, n_b, settings->op);
+    uz_cost_decide(&setup->plan, &m.size, &there, direct, settings->op, settings->memory_limit);
+    const int chosen = setup->plan.chosen;
+    if (chosen < 0)
+        return uz_cost_refuse(&setup->plan, settings->op, settings->memory_limit, err);
+    /* the factor is there: where only a form without one seems to fit, the one that needs least beside it does */
+    const uz_operator op = setup->plan.form[chosen].op;
+    return make_dual(&m, uz_dual_abilities_of(op)->needs_factor ? op : UZ_OPERATOR_FACTORED, err);
+}
+
 /* The form that was asked for, or the one that the plan chooses once the analysis of a factor has shown its size. */
 uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
                                  const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err)

@@ -148,6 +148,7 @@ uz_status uz_report_answer(uz_run *run, uz_error *err)
     uz_result *result = run->result;
     uz_summary *summary = &result->summary;
     summary->requested_error = run->work.requested;
+    summary->geometry = (uz_geometry){.kind = UZ_KINEMATICS_FIXED, .passes = 1, .change = NAN, .sliding = NAN};
     result->r = run->answer.r;
     result->g = run->answer.g;
     run->answer.r = run->answer.g = NULL;

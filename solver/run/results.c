@@ -125,6 +125,7 @@ void uz_result_free(uz_result *result)
     free(result->r);
     free(result->g);
     free(result->pressure);
+    free(result->place);
     uz_evaluation_free(result->evaluation);
     free(result->history.rows);
     uz_state_free(result->state);

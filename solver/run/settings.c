@@ -28,12 +28,24 @@ static const char *const ROW_SCALINGS[] = {
     [UZ_ROW_SCALING_UNIT] = "unit",
 };
 static const char *const OUTCOMES[] = {
-    [UZ_CONVERGED] = "converged",       [UZ_ITERATION_LIMIT] = "iteration_limit",
-    [UZ_TIME_LIMIT] = "time_limit",     [UZ_PRECISION_LIMIT] = "precision_limit",
-    [UZ_PAPER_RULE] = "paper_rule",     [UZ_INFEASIBLE] = "infeasible",
-    [UZ_DISMISSED] = "dismissed",       [UZ_VERIFIED] = "verified",
-    [UZ_NOT_VERIFIED] = "not_verified", [UZ_MESH_LIMIT] = "mesh_limit",
-    [UZ_OUT_OF_REACH] = "out_of_reach", [UZ_LOOSE] = "loose",
+    [UZ_CONVERGED] = "converged",
+    [UZ_ITERATION_LIMIT] = "iteration_limit",
+    [UZ_TIME_LIMIT] = "time_limit",
+    [UZ_PRECISION_LIMIT] = "precision_limit",
+    [UZ_PAPER_RULE] = "paper_rule",
+    [UZ_INFEASIBLE] = "infeasible",
+    [UZ_DISMISSED] = "dismissed",
+    [UZ_VERIFIED] = "verified",
+    [UZ_NOT_VERIFIED] = "not_verified",
+    [UZ_MESH_LIMIT] = "mesh_limit",
+    [UZ_OUT_OF_REACH] = "out_of_reach",
+    [UZ_LOOSE] = "loose",
+    [UZ_MOVING_GEOMETRY] = "moving_geometry",
+};
+static const char *const KINEMATICS[] = {
+    [UZ_KINEMATICS_AUTO] = "auto",
+    [UZ_KINEMATICS_FIXED] = "fixed",
+    [UZ_KINEMATICS_MOVING] = "moving",
 };
 
 #define COUNT(table) (sizeof(table) / sizeof((table)[0]))
@@ -55,6 +67,11 @@ static int find_name(const char *const *table, size_t count, const char *name)
 const char *uz_operator_name(uz_operator value)
 {
     return name_at(OPERATORS, COUNT(OPERATORS), (unsigned)value);
+}
+
+const char *uz_kinematics_name(uz_kinematics value)
+{
+    return name_at(KINEMATICS, COUNT(KINEMATICS), (unsigned)value);
 }
 
 const char *uz_ordering_name(uz_ordering value)

@@ -133,6 +133,10 @@ static uz_status choose_rows(uz_setup *setup, const uz_scene *scene, const uz_ca
     uz_status status = UZ_ERR_MEMORY;
     if (p && h)
         status = uz_body_model_load(p, h, NULL, model, &unloaded, &refusal);
+    if (status == UZ_OK && model->place) { /* the gaps there */
+        uz_restrict_nodal(p, model, model->place);
+        uz_csc_gaxpy(h, &model->N, -1, p);
+    }
     if (status == UZ_OK)
         status = uz_choose_rows(&setup->rows, h, model->m, &model->info, scene, wanted, err);
     else if (status == UZ_ERR_MEMORY)
@@ -188,6 +192,41 @@ uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_ca
         setup->bytes += (size_t)setup->rows.m + uz_csc_bytes(&setup->N_in);
     setup->reused.ordering = setup->shared.analysis_reused;
     setup->reused.factor = setup->shared.factor_reused;
+    *out = setup;
+    return UZ_OK;
+}
+
+uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *problem, const uz_candidates *wanted,
+                        const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
+{
+    const double start = uz_seconds();
+    *out = NULL;
+    uz_setup *setup = uz_alloc_zero(1, sizeof *setup);
+    if (!setup)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a body");
+    pthread_mutex_init(&setup->mutex, NULL);
+    setup->base = base;
+    setup->is_scene = true;
+    pthread_mutex_lock(&base->mutex); /* what is known of K */
+    setup->inverse_bound = base->inverse_bound;
+    setup->bound_known = base->bound_known;
+    setup->doubt = base->doubt;
+    pthread_mutex_unlock(&base->mutex);
+    uz_status status = uz_body_model_move(&setup->model, &base->model, &problem->scene, err);
+    setup->assemble_s = uz_seconds() - start;
+    if (status == UZ_OK && uz_may_omit_rows(problem))
+        status = choose_rows(setup, &problem->scene, wanted, err);
+    if (status == UZ_OK)
+        status = uz_setup_share_operator(setup, problem, settings, hooks, err);
+    if (status != UZ_OK) {
+        uz_setup_free(setup);
+        return status;
+    }
+    setup->bytes = sizeof *setup + base->bytes + setup->dual->bytes + uz_body_model_bytes(&setup->model);
+    setup->bytes += base->shared.item ? uz_factor_describe(base->factor).bytes : 0;
+    if (setup->rows.in)
+        setup->bytes += (size_t)setup->rows.m + uz_csc_bytes(&setup->N_in);
+    setup->reused = (uz_reuse){.assembly = true, .ordering = true, .factor = true};
     *out = setup;
     return UZ_OK;
 }
@@ -294,7 +333,8 @@ void uz_setup_free(uz_setup *setup)
     uz_norm_estimate_free(setup->norm);
     uz_dual_free(setup->dual);
     uz_shared_factor_release(&setup->shared);
-    uz_amg_free(setup->amg);
+    if (!setup->base)
+        uz_amg_free(setup->amg);
     if (setup->is_scene)
         uz_body_model_clear(&setup->model);
     uz_csc_clear(&setup->no_rows);

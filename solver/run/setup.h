@@ -14,12 +14,13 @@
 #include <pthread.h>
 
 /* Immutable once built, but for what is under the mutex; shared by threads. */
-typedef struct {
+typedef struct uz_setup {
     bool is_scene;
-    uz_body_model model; /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
-    uz_csc no_rows;      /* matrices without contacts: 0 x d, as the problem's N may be a zeroed struct */
-    uz_candidates rows;  /* which of the model's rows it is solved with (rows.h); in NULL: all */
-    uz_csc N_in;         /* these, where some are left out */
+    struct uz_setup *base; /* at a place (uz_scene.place): the same body at none, which has K, factor and multigrid */
+    uz_body_model model;   /* scenes: K, N and the mesh. Matrices: the problem itself has K and N */
+    uz_csc no_rows;        /* matrices without contacts: 0 x d, as the problem's N may be a zeroed struct */
+    uz_candidates rows;    /* which of the model's rows it is solved with (rows.h); in NULL: all */
+    uz_csc N_in;           /* these, where some are left out */
     uz_shared_factor shared;
     const uz_factor *factor; /* shared.factor; NULL: matrix_free */
     uz_amg *amg;             /* matrix_free, else NULL */
@@ -50,10 +51,18 @@ uz_status uz_setup_digest(uz_setup_key *key, const uz_problem *problem, const uz
 uz_status uz_setup_create(uz_setup **out, const uz_problem *problem, const uz_candidates *wanted,
                           const uz_setup_key *key, const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks,
                           uz_error *err);
-/* The part of it that follows the assembly: the form of the operator by predicted cost and memory, and what it needs.
- * key: of K; read only where there is a cache. UZ_ERR_LIMIT with the predicted bytes where no form fits. */
+/* The same for a scene at a place: contact rows and dual operator are new, all else is that of `base`, the setup of the
+ * scene at no place, which has to outlive *out. Neither has a key: nobody asks for a place again. */
+uz_status uz_setup_move(uz_setup **out, uz_setup *base, const uz_problem *problem, const uz_candidates *wanted,
+                        const uz_settings *settings, const uz_hooks *hooks, uz_error *err);
+/* The part of uz_setup_create that follows the assembly: the form of the operator by predicted cost and memory, and
+ * what it needs. key: of K; read only where there is a cache. UZ_ERR_LIMIT with the predicted bytes where no form fits.
+ */
 uz_status uz_setup_make_operator(uz_setup *setup, const uz_problem *problem, const uz_matrix_key *key,
                                  const uz_settings *settings, uz_cache *cache, const uz_hooks *hooks, uz_error *err);
+/* The same on the factor or the multigrid of setup->base. */
+uz_status uz_setup_share_operator(uz_setup *setup, const uz_problem *problem, const uz_settings *settings,
+                                  const uz_hooks *hooks, uz_error *err);
 void uz_setup_free(uz_setup *setup);
 
 /* What certificates of a setup that serves many loads save by: the bound of uz_norm_estimate_step. `steps` of those

@@ -13,6 +13,25 @@ static void destroy_setup(void *object)
     uz_setup_free(object);
 }
 
+/* A setup at a place is made on that of the scene at none, which it keeps. */
+static uz_status acquire_at_place(uz_setup **setup, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
+                                  const uz_candidates *wanted, const uz_settings *settings, const uz_hooks *hooks,
+                                  uz_error *err)
+{
+    uz_problem rest = *problem;
+    uz_setup *base;
+    rest.scene.place = NULL;
+    uz_status status = uz_setup_acquire(&base, reused, cache, &rest, NULL, settings, hooks, err);
+    if (status != UZ_OK)
+        return status;
+    status = uz_setup_move(setup, base, problem, wanted, settings, hooks, err);
+    if (status == UZ_OK)
+        *reused = (*setup)->reused;
+    else
+        uz_setup_release(cache, base);
+    return status;
+}
+
 uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, const uz_problem *problem,
                            const uz_candidates *wanted, const uz_settings *settings, const uz_hooks *hooks,
                            uz_error *err)
@@ -23,6 +42,8 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
     bool create = true;
     *setup = NULL;
     *reused = nothing;
+    if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.place)
+        return acquire_at_place(setup, reused, cache, problem, wanted, settings, hooks, err);
     if (!cache)
         return uz_setup_create(setup, problem, wanted, NULL, settings, NULL, hooks, err);
     uz_status status = uz_setup_digest(&key, problem, wanted, settings, err);
@@ -46,10 +67,13 @@ uz_status uz_setup_acquire(uz_setup **setup, uz_reuse *reused, uz_cache *cache, 
 
 void uz_setup_release(uz_cache *cache, uz_setup *setup)
 {
-    if (!cache)
+    uz_setup *base = setup ? setup->base : NULL;
+    if (!cache || base)
         uz_setup_free(setup);
     else if (setup)
         uz_table_release(cache, setup->item);
+    if (base)
+        uz_setup_release(cache, base);
 }
 
 /* ---- what is cached, for people */

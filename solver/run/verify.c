@@ -92,6 +92,9 @@ static uz_status verify(uz_run *run, const double *u, const double *r, uz_error 
 
 static uz_status check(const uz_problem *problem, const uz_settings *settings, const uz_hooks *hooks, uz_error *err)
 {
+    if (problem->kind == UZ_PROBLEM_SCENE && problem->scene.kinematics == UZ_KINEMATICS_MOVING)
+        return uz_fail(err, UZ_ERR_SCENE, "/kinematics",
+                       "an answer is verified with its contacts as they are before anything moves: ask for \"fixed\"");
     if (problem->n_cases > 0)
         return uz_fail(err, UZ_ERR_ARGUMENT, "/cases", "an answer to one load is verified, not to load cases");
     uz_status status = uz_check_settings(settings, err);

@@ -270,19 +270,21 @@ TEST(large_deformation_is_doubted)
 TEST(sliding_on_a_curved_obstacle_is_doubted)
 {
     for (int i = 0; i < 2; i++) {
-        const double aside = i == 0 ? 0.05 : 0.2;
+        const double aside = i == 0 ? 0.002 : 0.2;
         uz_scene s = body_scene(UZ_PLANE_STRESS, "quad4", (double[3]){0.2, 0.2, 0}, (int64_t[3]){4, 4, 0});
         s.box.origin[0] = -0.1;
+        s.kinematics = UZ_KINEMATICS_FIXED;
         body_hold(&s, "top", aside, -0.02, NAN);
         uz_contact *bowl = body_plane(&s, "bottom", (double[3]){0, 1, 0}, (double[3]){0, 1, 0});
         bowl->kind = UZ_OBSTACLE_ROUND;
         bowl->radius = 1;
         bowl->inside = true;
         uz_result *result = body_solve(&s, 1e-8);
-        const uz_warning *w = warning(result, "large_sliding");
+        const uz_warning *w = warning(result, "sliding");
         CHECK_INT(w != NULL, i);
-        if (w)
-            CHECK_MSG(w->value > 0.15 && w->value < 0.25, "%g", w->value);
+        if (w) /* the gap closes by 0.2^2 / 2, and as much again by what the surface rises towards the side */
+            CHECK_MSG(w->value > 0.7 && w->value < 2.5, "%g", w->value);
+        CHECK(w == NULL || w->value == result->summary.geometry.sliding);
         CHECK(result->evaluation->imbalance < 1e-8);
         clear(&s, result);
     }
@@ -327,15 +329,15 @@ TEST(two_bodies_balance)
     clear(&s, result);
 }
 
-TEST(sliding_off_a_face_is_doubted)
+TEST(sliding_on_a_flat_body_is_doubted)
 {
     for (int i = 0; i < 2; i++) {
-        uz_scene s = stacked(i == 0 ? 0.1 : 0.3); /* faces are 0.5 long */
+        uz_scene s = stacked(i == 0 ? 0.05 : 0.3); /* 1.6 long */
         uz_result *result = body_solve(&s, 1e-8);
-        const uz_warning *w = warning(result, "sliding_off_face");
+        const uz_warning *w = warning(result, "sliding");
         CHECK_INT(w != NULL, i);
         if (w)
-            CHECK_REL(w->value, 0.6, 0.01);
+            CHECK_REL(w->value, 0.3 / 1.6, 0.02);
         clear(&s, result);
     }
 }

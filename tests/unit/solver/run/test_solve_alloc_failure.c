@@ -89,6 +89,18 @@ static uz_problem scene_problem(void)
     return (uz_problem){.kind = UZ_PROBLEM_SCENE, .scene = paper_scene(6, 2)};
 }
 
+/* On a ball that is pushed aside, followed for some passes. */
+static uz_problem moving_problem(void)
+{
+    uz_problem problem = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(4, 2, 4, 2)};
+    add_support(&problem.scene, "top", 0.5, -0.05);
+    add_plane(&problem.scene, "bottom", 2, -5, 0, 1);
+    problem.scene.contacts[0].kind = UZ_OBSTACLE_ROUND;
+    problem.scene.contacts[0].radius = 5;
+    problem.scene.kinematics = UZ_KINEMATICS_MOVING;
+    return problem;
+}
+
 static uz_problem obstacle_problem(void)
 {
     qp_random rng = {3};
@@ -147,6 +159,11 @@ TEST(scenes)
 }
 
 /* A slender cantilever between two walls, whose end reaches the one that its rows were left out of. */
+TEST(moving_contact)
+{
+    check_scenario("moving contact", moving_problem(), UZ_METHOD_AUTO, UZ_OPERATOR_AUTO, UZ_ORDERING_AUTO, false);
+}
+
 TEST(rows_left_out)
 {
     uz_problem slender = {.kind = UZ_PROBLEM_SCENE, .scene = box_scene(60, 2, 260, 1)};
