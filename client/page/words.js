@@ -22,6 +22,7 @@ const OUTCOMES = {
   infeasible: ["bad", "Infeasible", "No displacement satisfies all contact conditions: supports and obstacles contradict each other."],
   out_of_reach: ["bad", "Out of reach", "Contact conditions contradict each other but for rounding: a displacement that meets them all, if there is one, is far away."],
   loose: ["warn", "Loose", "No load presses the body on what would hold it: where the obstacles leave it room it may lie anywhere, and this is one such place."],
+  moving_geometry: ["warn", "Geometry not settled", "The surfaces move so far that gaps and normals, taken where the answer moves them to, did not settle. This is the last answer."],
   dismissed: ["warn", "Dismissed", "It was stopped. This is the best answer so far, with its own certificate."],
   mesh_limit: ["warn", "Mesh limit", "A grid fine enough would be larger than allowed. The answer is on the finest one that is."],
 };

@@ -233,7 +233,8 @@ static void print_certificate(FILE *to, const json_t *summary)
         return;
     label(to, "certificate");
     /* What the bound says to somebody who never heard of an energy norm: how many digits it leaves. */
-    const double digits = floor(-log10(relative));
+    const double left = client_json_number(summary, "contact.geometry.left");
+    const double digits = floor(-log10(left > relative ? left : relative));
     if (!isfinite(relative))
         fputs("nothing could be certified", to);
     else
@@ -254,6 +255,11 @@ static void print_certificate(FILE *to, const json_t *summary)
     fprintf(to, "absolute %s, duality gap %s, relative KKT residual %s\n",
             bound_in_words(absolute, certificate, "absolute_error"), bound_in_words(gap, certificate, "gap"),
             number_in_words(residual, certificate, "relative_residual.total", 3));
+    if (isfinite(left)) {
+        label(to, "");
+        fprintf(to, "contact where the answer moves it, in %.0f passes; others would change it by about %.2g\n",
+                client_json_number(summary, "contact.geometry.passes"), left);
+    }
     if (isfinite(mesh)) {
         label(to, "");
         fprintf(to, "the mesh itself is off by about %.2g\n", mesh);

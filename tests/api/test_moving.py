@@ -1,0 +1,57 @@
+"""Contact that moves, through the service: what is asked for, what is told, and all that is computed from an answer."""
+import copy
+
+import service
+from service import check, expect
+
+BUMP = {"problem": {"kind": "scene", "model": "plane_strain",
+                    "mesh": {"box": {"origin": [-5, 0], "size": [10, 5], "cells": [20, 10]}},
+                    "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                    "supports": [{"on": "top", "ux": 1, "uy": -0.1}],
+                    "contacts": [{"on": "bottom", "obstacle": {"circle": {"center": [0, -20], "radius": 20}}}]}}
+
+
+def bump(kinematics, **solver):
+    body = copy.deepcopy(BUMP)
+    body["problem"]["kinematics"] = kinematics
+    if solver:
+        body["solver"] = solver
+    return body
+
+
+def answer(s, body):
+    job = s.post(body)
+    expect(job, 202)
+    check(s.wait_status(job.json["id"], "successful", "failed", seconds=60)["status"] == "successful", job)
+    return job.json["id"], s.get(f"/v1/jobs/{job.json['id']}/result").json
+
+
+def test_a_block_slid_along_a_bump(s):
+    _, fixed = answer(s, bump("fixed"))
+    geometry = fixed["summary"]["contact"]["geometry"]
+    check(fixed["summary"]["contact"]["force"][1] > 112 and geometry["kinematics"] == "fixed", geometry)
+    check(geometry["sliding"] > 0.1 and [w["code"] for w in fixed["summary"]["warnings"]] == ["sliding"], fixed["summary"]["warnings"])
+    for kinematics in ("moving", "auto"):
+        name, moving = answer(s, bump(kinematics))
+        contact = moving["summary"]["contact"]
+        check(abs(contact["force"][1] - 84.1659) < 1e-3 and abs(contact["force"][0] - 0.0607) < 1e-3, contact)
+        check(contact["geometry"]["kinematics"] == "moving" and 3 < contact["geometry"]["passes"] < 10, contact)
+        check(contact["geometry"]["left"] <= 1e-8 and not moving["summary"]["warnings"], contact)
+        check(moving["summary"]["factor"]["reused"]["factor"], moving["summary"]["factor"])
+        # what is computed from the answer finds the rows again
+        for of in ("result.vtu", "deformed.svg", "surface", "result?fields=contact_status,von_mises"):
+            expect(s.get(f"/v1/jobs/{name}/{of}"), 200)
+
+
+def test_what_moves_is_not_verified(s):
+    name, moving = answer(s, bump("moving"))
+    vectors = s.get(f"/v1/jobs/{name}/result?fields=displacements,reactions").json
+    body = bump("moving")
+    body["answer"] = {"displacements": vectors["displacements"], "reactions": vectors["reactions"]}
+    refused = s.request("POST", "/v1/verify", body)
+    expect(refused, 422)
+    check(refused.json["pointer"] == "/problem/kinematics", refused)
+
+
+if __name__ == "__main__":
+    service.main(globals())
