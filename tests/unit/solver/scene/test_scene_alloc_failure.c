@@ -1,72 +1,29 @@
 /* Each allocation on the way from a scene to matrices fails once: the call must say so, publish nothing and keep
- * nothing. Linked with malloc, calloc and realloc wrapped. */
+ * nothing. Linked with malloc, calloc, realloc and free wrapped. */
 #include "assembly/assembly.h"
 #include "body_fixture.h"
+#include "failing_heap.h"
 #include "harness.h"
 #include "scene_fixture.h"
 
-#include <malloc.h>
-
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *block, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *block, size_t size);
-
-static long countdown = -1; /* allocations until the one that fails; negative: none does */
-
-static bool fails_now(void)
-{
-    return countdown >= 0 && countdown-- == 0;
-}
-
-void *__wrap_malloc(size_t size)
-{
-    return fails_now() ? NULL : __real_malloc(size);
-}
-
-void *__wrap_calloc(size_t count, size_t size)
-{
-    return fails_now() ? NULL : __real_calloc(count, size);
-}
-
-void *__wrap_realloc(void *block, size_t size)
-{
-    return fails_now() ? NULL : __real_realloc(block, size);
-}
-
 typedef uz_status (*attempt)(const uz_scene *scene, uz_error *err);
 
-/* One run whose n-th allocation (from 0) fails. Returns whether it came that far. */
-static bool fail_at(attempt run, const uz_scene *scene, long n)
-{
-    uz_error err = {0};
-    countdown = n;
-    const uz_status status = run(scene, &err);
-    const bool failed = countdown < 0;
-    countdown = -1;
-    CHECK_INT(status, failed ? UZ_ERR_MEMORY : UZ_OK);
-    CHECK_INT(err.status, status);
-    CHECK(!failed || err.message[0] != '\0');
-    return failed;
-}
-
-/* Runs with the 1st, 2nd, ... allocation failing until it succeeds. Returns how many could fail. The allocator keeps
- * some freed blocks for itself (up to 5 kB, whatever the number of runs), so a leak is growth with the number of runs:
- * the least block takes 32 bytes. */
+/* Runs with the 1st, 2nd, ... allocation failing until it succeeds. Returns how many could fail. */
 static long fail_each(attempt run, const uz_scene *scene)
 {
-    enum { SETTLE = 64, MEASURED = 512 };
     for (long n = 0; n < 1000; n++) {
-        bool failed = true;
-        size_t before = 0;
-        for (int i = 0; i < SETTLE + MEASURED; i++) {
-            before = i == SETTLE ? mallinfo2().uordblks : before;
-            failed = fail_at(run, scene, n);
-        }
-        CHECK_MSG(mallinfo2().uordblks < before + 16 * MEASURED, "a leak where allocation %ld fails", n);
-        if (!failed)
+        uz_error err = {0};
+        heap.live = 0;
+        heap.until_failure = n;
+        heap.failed = false;
+        heap.watching = true;
+        const uz_status status = run(scene, &err);
+        heap.watching = false;
+        CHECK_INT(status, heap.failed ? UZ_ERR_MEMORY : UZ_OK);
+        CHECK_INT(err.status, status);
+        CHECK(!heap.failed || err.message[0] != '\0');
+        CHECK_MSG(heap.live == 0, "allocation %ld fails and %d blocks leak", n, heap.live);
+        if (!heap.failed)
             return n;
     }
     return -1;
@@ -109,12 +66,12 @@ static uz_status copy_info(const uz_scene *scene, uz_error *err)
 
 static uz_status estimate(const uz_scene *scene, uz_error *err)
 {
-    const long asked = countdown;
-    countdown = -1;
+    const long asked = heap.until_failure;
+    heap.until_failure = -1;
     uz_body_model model = build_body(scene);
     double *u = zeros(3 * model.mesh.n_nodes), *f = zeros(3 * model.mesh.n_nodes);
     u[5] = 1;
-    countdown = asked;
+    heap.until_failure = asked;
     uz_status status = isnan(uz_estimate_mesh_error(&model, scene, u)) ? UZ_ERR_MEMORY : UZ_OK;
     if (status != UZ_OK)
         snprintf(err->message, sizeof err->message, "no estimate");
@@ -240,9 +197,11 @@ TEST(error_estimate_without_memory_is_nan)
     uz_body_model model = build_body(&scene);
     double *u = solve_linear(&model, &scene);
     for (long n = 0; n < 2; n++) {
-        countdown = n;
+        heap.until_failure = n;
+        heap.failed = false;
+        heap.watching = true;
         CHECK(isnan(uz_estimate_discretization_error(&model, u)));
-        countdown = -1;
+        heap.watching = false;
     }
     CHECK(uz_estimate_discretization_error(&model, u) > 0);
     free(u);
