@@ -299,13 +299,13 @@ static uz_status refusal(brick *b, bool with_mesh, uz_error *err)
 TEST(free_and_indefinite_bodies_are_refused)
 {
     for (int with_mesh = 0; with_mesh < 2; with_mesh++) {
-        brick b = brick_make((int64_t[]){8, 8, 8}, (double[]){1, 1, 1}, 0.3, false);
+        brick b = brick_make((int64_t[]){6, 6, 6}, (double[]){1, 1, 1}, 0.3, false);
         uz_error err = {0};
         CHECK_INT(refusal(&b, with_mesh, &err), UZ_ERR_NOT_SPD);
         CHECK(err.status == UZ_ERR_NOT_SPD && err.message[0] != '\0');
         brick_free(&b);
     }
-    brick b = brick_make((int64_t[]){8, 8, 8}, (double[]){1, 1, 1}, 0.3, true);
+    brick b = brick_make((int64_t[]){6, 6, 6}, (double[]){1, 1, 1}, 0.3, true);
     uz_error err = {0};
     for (int64_t k = b.K.ptr[400]; k < b.K.ptr[401]; k++)
         b.K.val[k] *= k == b.K.ptr[400] ? 0.1 : 1.0; /* a diagonal entry that its neighbours outweigh */
