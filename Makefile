@@ -255,14 +255,15 @@ test-hygiene: ## formatting, static analysis, both compilers
 # Each sanitizer has a build of its own inside BUILD.
 sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
-# "not under ThreadSanitizer".
-without_tsan = $(shell grep -L 'not under ThreadSanitizer' $(1))
+# "not under ThreadSanitizer", or "not under sanitizers" at all.
+without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))
 TSAN_UNIT = $(notdir $(basename $(call without_tsan,$(shell grep -lE 'pthread_create|"(http|base/log|store|work)' $(UNIT_SRC)))))
 TSAN_API  = $(notdir $(basename $(call without_tsan,$(wildcard tests/api/test_*.py))))
+ASAN_RUNS = $(UNIT_SRC) $(shell grep -L 'not under sanitizers' tests/api/test_*.py)
 
 asan: deps-test ## every test under AddressSanitizer and UndefinedBehaviorSanitizer
 	$(call sanitized,asan,-fsanitize=address$(comma)undefined -fno-sanitize-recover=all) all unit-bins
-	@tests/run.sh $(BUILD)/asan "unit api" "$(FILTER)"
+	@tests/run.sh $(BUILD)/asan "unit api" "$(FILTER)" "$(foreach test,$(ASAN_RUNS),$(word 2,$(subst /, ,$(test)))/$(notdir $(basename $(test))))"
 
 ubsan: deps-test ## the C tests under UndefinedBehaviorSanitizer alone
 	$(call sanitized,ubsan,-fsanitize=undefined -fno-sanitize-recover=all) all unit-bins

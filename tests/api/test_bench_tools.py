@@ -1,5 +1,5 @@
 """What compares benchmarks and counts instructions. usage: test_bench_tools.py BUILD_DIR [FILTER]"""
-# not under ThreadSanitizer: about answers, not about threads
+# not under sanitizers: about tools and tables, with no memory of ours
 import json
 import os
 import pathlib

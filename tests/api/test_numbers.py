@@ -1,7 +1,7 @@
 """Every measured number of docs/numbers.md, and those that README.md and the other pages of docs cite, are those of their data files, and
 the tables say what the data does.
 usage: test_numbers.py BUILD_DIR [FILTER]"""
-# not under ThreadSanitizer: about answers, not about threads
+# not under sanitizers: about tools and tables, with no memory of ours
 import json
 import pathlib
 import re

@@ -1,5 +1,5 @@
 """The comparison with other solvers: what it makes of runs, and a run of our solver alone. usage: test_peers.py BUILD_DIR [FILTER]"""
-# not under ThreadSanitizer: about answers, not about threads
+# not under sanitizers: about tables, of solves that other tests make
 import csv
 import json
 import math
