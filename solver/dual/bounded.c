@@ -11,31 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The tightest row of each dof on either side. A bound that overflows holds nothing, or nothing can meet it. */
-static void find_tightest(uz_bounded *box, const double *h, int64_t d, int64_t m)
-{
-    const uz_bounds *bounds = box->bounds;
-    for (int64_t j = 0; j < d; j++) {
-        box->upper[j] = box->lower[j] = -1;
-        box->top[j] = INFINITY;
-        box->bottom[j] = -INFINITY;
-    }
-    for (int64_t i = 0; i < m; i++) {
-        int64_t j = bounds->dof[i];
-        double value = h[i] / bounds->scale[i];
-        if (bounds->scale[i] > 0.0 && value < box->top[j]) {
-            box->top[j] = value;
-            box->upper[j] = i;
-        } else if (bounds->scale[i] < 0.0 && value > box->bottom[j]) {
-            box->bottom[j] = value;
-            box->lower[j] = i;
-        }
-    }
-    for (int64_t j = 0; j < d; j++)
-        box->contradictory =
-            box->contradictory || box->bottom[j] > box->top[j] || isinf(box->top[j]) < 0 || isinf(box->bottom[j]) > 0;
-}
-
 uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const double *p, uz_error *err)
 {
     int64_t d = x->load.dual->d, m = x->load.dual->m;
@@ -56,7 +31,26 @@ uz_status uz_bounded_create(uz_sparse_load *x, const uz_bounds *bounds, const do
     memcpy(box->p, p, (size_t)d * sizeof *p);
     box->point_energy = INFINITY;
     box->bounds = bounds;
-    find_tightest(box, x->load.h, d, m);
+    /* The tightest row of each dof on either side. A bound that overflows holds nothing, or nothing can meet it. */
+    for (int64_t j = 0; j < d; j++) {
+        box->upper[j] = box->lower[j] = -1;
+        box->top[j] = INFINITY;
+        box->bottom[j] = -INFINITY;
+    }
+    for (int64_t i = 0; i < m; i++) {
+        const int64_t j = bounds->dof[i];
+        const double value = x->load.h[i] / bounds->scale[i];
+        if (bounds->scale[i] > 0.0 && value < box->top[j]) {
+            box->top[j] = value;
+            box->upper[j] = i;
+        } else if (bounds->scale[i] < 0.0 && value > box->bottom[j]) {
+            box->bottom[j] = value;
+            box->lower[j] = i;
+        }
+    }
+    for (int64_t j = 0; j < d; j++)
+        box->contradictory =
+            box->contradictory || box->bottom[j] > box->top[j] || isinf(box->top[j]) < 0 || isinf(box->bottom[j]) > 0;
     memcpy(box->u, x->base, (size_t)d * sizeof *box->u);
     x->load.bytes += 8 * (10 * (size_t)d + (size_t)m);
     return UZ_OK;

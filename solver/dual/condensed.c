@@ -14,23 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Columns `order` of N, as an m x n_b matrix. */
-static uz_status restrict_columns(uz_csc *N_b, const uz_csc *N, const int64_t *order, int64_t n_b, uz_error *err)
-{
-    int64_t nnz = N->ptr[N->cols], at = 0;
-    uz_status status = uz_csc_init(N_b, N->rows, n_b, nnz, err);
-    if (status != UZ_OK)
-        return status;
-    for (int64_t k = 0; k < n_b; k++) {
-        for (int64_t e = N->ptr[order[k]]; e < N->ptr[order[k] + 1]; e++, at++) {
-            N_b->idx[at] = N->idx[e];
-            N_b->val[at] = N->val[e];
-        }
-        N_b->ptr[k + 1] = at;
-    }
-    return UZ_OK;
-}
-
 /* Is there one nonzero in each row and each column? Rigid obstacles along an axis, bounds on single dofs. */
 static bool find_scaled(uz_condensed *dense, int64_t m)
 {
@@ -123,17 +106,6 @@ static uz_status make_operator(uz_condensed *dense, const uz_stop *stop, uz_erro
     return status;
 }
 
-/* The trailing block of the factor, or the paths that take its place. order (n_b): the contact dofs, in the factor's
- * order on return where they are last. */
-static uz_status find_contact(uz_condensed *dense, const uz_factor *factor, int64_t *order, uz_error *err)
-{
-    if (dense->L_bb)
-        return uz_factor_last_block(factor, dense->L_bb, order, dense->position, err);
-    for (int64_t k = 0; k < dense->n_b; k++)
-        dense->position[k] = uz_factor_position(factor)[order[k]];
-    return uz_reach_create(&dense->reach, factor, order, dense->n_b, err);
-}
-
 /* order: the dofs at the end of the factor where they include all that N touches: more of them when another body's
  * factor is used. Otherwise those that N touches. */
 static uz_status list_contact(int64_t **order, int64_t *n_b, bool *last, const uz_dual *dual, uz_error *err)
@@ -159,15 +131,29 @@ static uz_status list_contact(int64_t **order, int64_t *n_b, bool *last, const u
 static uz_status create(uz_dual *dual, const uz_stop *stop, uz_error *err)
 {
     uz_condensed *dense = (uz_condensed *)dual;
+    const uz_csc *N = &dual->N;
     int64_t m = dual->m, n_b = 0, *order = NULL;
     bool last = false;
     uz_status status = list_contact(&order, &n_b, &last, dual, err);
     if (status == UZ_OK && !allocate(dense, n_b, last))
         status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for a dense block of order %lld", (long long)n_b);
+    /* The trailing block of the factor, which puts the dofs in its own order, or the paths that take its place. */
+    if (status == UZ_OK && dense->L_bb) {
+        status = uz_factor_last_block(dual->factor, dense->L_bb, order, dense->position, err);
+    } else if (status == UZ_OK) {
+        for (int64_t k = 0; k < n_b; k++)
+            dense->position[k] = uz_factor_position(dual->factor)[order[k]];
+        status = uz_reach_create(&dense->reach, dual->factor, order, n_b, err);
+    }
     if (status == UZ_OK)
-        status = find_contact(dense, dual->factor, order, err);
-    if (status == UZ_OK)
-        status = restrict_columns(&dense->N_b, &dual->N, order, n_b, err);
+        status = uz_csc_init(&dense->N_b, m, n_b, N->ptr[N->cols], err);
+    for (int64_t k = 0, at = 0; status == UZ_OK && k < n_b; k++) { /* columns `order` of N */
+        for (int64_t e = N->ptr[order[k]]; e < N->ptr[order[k] + 1]; e++, at++) {
+            dense->N_b.idx[at] = N->idx[e];
+            dense->N_b.val[at] = N->val[e];
+        }
+        dense->N_b.ptr[k + 1] = at;
+    }
     if (status == UZ_OK)
         status = make_operator(dense, stop, err);
     dual->bytes += 8 * (size_t)((last ? n_b * n_b : 0) + 2 * m * m);

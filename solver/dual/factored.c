@@ -83,37 +83,28 @@ static uz_status correct(uz_dual_load *load, double *bound2, const double *r, co
 
 enum { PASSES = 2 }; /* solve, and once more for the residual */
 
-/* box->u on the dofs that are not held. */
-static uz_status solve_free(factored_load *x, bool *solved, uz_error *err)
-{
-    uz_dual_load *load = &x->sparse.load;
-    uz_bounded *box = x->sparse.box;
-    uz_principal *part = NULL;
-    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, x->ws, &load->stop, err);
-    *solved = part && !uz_stop_is_due(&load->stop);
-    for (int pass = 0; status == UZ_OK && *solved && pass < PASSES; pass++) {
-        uz_bounded_balance(box, load->K);
-        status = uz_principal_solve(box->force, part, err);
-        for (int64_t j = 0; status == UZ_OK && j < load->K->cols; j++)
-            box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
-        *solved = !uz_stop_is_due(&load->stop);
-    }
-    uz_principal_free(part);
-    return status;
-}
-
 static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)
 {
     factored_load *x = (factored_load *)load;
     uz_bounded *box = x->sparse.box;
-    bool solved = false;
+    uz_principal *part = NULL;
     if (!box)
         return uz_multipliers_solve(&x->sparse, x->ws, end, r, g, active, err);
     if (!uz_bounded_hold(&x->sparse, active, false)) {
         *end = uz_bounded_crossed(&x->sparse, r) ? UZ_ACTIVE_RAY : UZ_ACTIVE_UNSOLVED;
         return UZ_OK;
     }
-    uz_status status = solve_free(x, &solved, err);
+    /* The displacement of the dofs that are not held. */
+    uz_status status = uz_principal_create(&part, load->K, box->fixed, load->dual->factor, x->ws, &load->stop, err);
+    bool solved = part && !uz_stop_is_due(&load->stop);
+    for (int pass = 0; status == UZ_OK && solved && pass < PASSES; pass++) {
+        uz_bounded_balance(box, load->K);
+        status = uz_principal_solve(box->force, part, err);
+        for (int64_t j = 0; status == UZ_OK && j < load->K->cols; j++)
+            box->u[j] -= box->fixed[j] ? 0.0 : box->force[j];
+        solved = !uz_stop_is_due(&load->stop);
+    }
+    uz_principal_free(part);
     if (status != UZ_OK || !solved)
         return status;
     uz_bounded_balance(box, load->K);

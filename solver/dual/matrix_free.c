@@ -127,17 +127,6 @@ static uz_status aim_at(uz_dual_load *load, double relative_error, uz_error *err
     return finer ? solve_base(x, BASE_FLOOR * x->aim, err) : UZ_OK;
 }
 
-/* ||u(r)||_K about, with the response as it stands; Dr is room. */
-static double expected_norm(const free_load *x, const double *r, double *Dr)
-{
-    const uz_dual_load *load = &x->sparse.load;
-    double base = uz_root(-2.0 * load->psi0), psi, norm2;
-    memset(Dr, 0, (size_t)load->dual->m * sizeof *Dr);
-    uz_csc_gaxpy(Dr, &load->dual->N, 1.0, x->sparse.response);
-    uz_dual_load_energies(load, &psi, &norm2, r, Dr);
-    return fmax(1e-3 * base, fmin(base, sqrt(norm2)));
-}
-
 static void probe(uz_dual_load *load, bool begin, double accuracy)
 {
     free_load *x = (free_load *)load;
@@ -151,9 +140,14 @@ static uz_status apply(uz_dual_load *load, double *Dr, const double *r, uz_error
 {
     free_load *x = (free_load *)load;
     const uz_dual *dual = load->dual;
-    double root = root_of_lambda(load), norm = expected_norm(x, r, Dr);
-    uz_cg_stop stop = x->probing ? stop_at(x, x->probed, 0.0) : stop_at(x, x->tight, FLOOR * x->aim * norm * root);
+    const double root = root_of_lambda(load), base = uz_root(-2.0 * load->psi0);
+    double psi, norm2;
     uz_cg_info info;
+    memset(Dr, 0, (size_t)dual->m * sizeof *Dr);
+    uz_csc_gaxpy(Dr, &dual->N, 1.0, x->sparse.response);
+    uz_dual_load_energies(load, &psi, &norm2, r, Dr);
+    const double norm = fmax(1e-3 * base, fmin(base, sqrt(norm2))); /* ||u(r)||_K about, with the last response */
+    uz_cg_stop stop = x->probing ? stop_at(x, x->probed, 0.0) : stop_at(x, x->tight, FLOOR * x->aim * norm * root);
     memset(x->right, 0, (size_t)dual->d * sizeof *x->right);
     uz_csc_gaxpy_t(x->right, &dual->N, 1.0, r);
     uz_status status = uz_cg_solve(&info, x->sparse.response, &x->cg, load->K, x->right, &stop, err);
@@ -187,22 +181,6 @@ static uz_status inverse_norm(uz_dual_load *load, double *value, double *e, uz_e
 /* Of the aim: below this a solve is as good as exact. */
 #define ACTIVE_FLOOR 0.02
 
-/* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears. */
-static uz_status measure_slack(free_load *x, uz_error *err)
-{
-    const uz_dual_load *load = &x->sparse.load;
-    const uz_bounded *box = x->sparse.box;
-    const uz_bounds *bounds = box->bounds;
-    double *e = x->cg.r;
-    memcpy(e, box->force, (size_t)load->K->cols * sizeof *e);
-    for (int64_t i = 0; i < load->dual->m; i++)
-        e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
-    uz_status status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
-    double square = uz_dot(load->K->cols, e, x->cg.z);
-    x->slack = uz_root(square / uz_amg_describe(load->dual->amg).lambda);
-    return status;
-}
-
 /* u, r, g and active at this tolerance of the energy norm. *go_on: it was reached, and the guess still looks right. */
 static uz_status solve_to(free_load *x, uz_cg *cg, double tolerance, double *g, bool *active, bool *go_on,
                           uz_error *err)
@@ -232,7 +210,8 @@ static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, b
 {
     const uz_dual_load *load = &x->sparse.load;
     const uz_bounded *box = x->sparse.box;
-    double least = ACTIVE_FLOOR * x->aim, tolerance = fmax(least, x->coarse), *held = x->cg.p;
+    const uz_bounds *bounds = box->bounds;
+    double least = ACTIVE_FLOOR * x->aim, tolerance = fmax(least, x->coarse), *held = x->cg.p, *e = x->cg.r;
     bool go_on = true;
     for (int64_t j = 0; j < load->K->cols; j++)
         held[j] = box->fixed[j] ? box->u[j] : 0.0;
@@ -243,7 +222,17 @@ static uz_status solve_stepwise(free_load *x, uz_cg *cg, double *r, double *g, b
         status = solve_to(x, cg, least, g, active, &go_on, err);
     memcpy(r, box->r, (size_t)load->dual->m * sizeof *r);
     x->coarse = fmax(least, NEXT_TOLERANCE * x->coarse);
-    return status == UZ_OK ? measure_slack(x, err) : status;
+    if (status != UZ_OK)
+        return status;
+    /* What u misses of K u = p + N'r, in the norm of K^-1: the forces on free dofs, and on held ones what no row bears.
+     */
+    memcpy(e, box->force, (size_t)load->K->cols * sizeof *e);
+    for (int64_t i = 0; i < load->dual->m; i++)
+        e[bounds->dof[i]] -= bounds->scale[i] * box->r[i];
+    status = uz_multigrid_apply(x->cg.mg, load->K, x->cg.room, x->cg.z, e, err);
+    const double square = uz_dot(load->K->cols, e, x->cg.z);
+    x->slack = uz_root(square / uz_amg_describe(load->dual->amg).lambda);
+    return status;
 }
 
 static uz_status solve_active(uz_dual_load *load, uz_active_end *end, double *r, double *g, bool *active, uz_error *err)

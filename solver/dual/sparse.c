@@ -125,35 +125,27 @@ static double sweep(double *c, const uz_csc *Nt, const double *weight, const dou
 }
 
 /* Finds c with (N c)_i = g_i on rows to close and (N c)_i <= g_i on the others, by sweeps over the rows that move along
- * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957). Nt: columns are the rows of N. weight: diagonal of W > 0.
- * True when no row is left penetrating by more than rounding; c (rows of Nt) and Nc (m) are outputs. */
-static bool correct_by_sweeps(double *c, double *Nc, const uz_csc *Nt, const double *weight, const double *g,
-                              const bool *close)
-{
-    double scale = 0.0;
-    memset(c, 0, (size_t)Nt->rows * sizeof *c);
-    for (int64_t i = 0; i < Nt->cols; i++)
-        if (close[i] || uz_gap_penetrates(g[i]))
-            scale = fmax(scale, fabs(g[i]));
-    double small = 8.0 * DBL_EPSILON * scale, moved = scale;
-    for (int k = 0; k < MAX_SWEEPS && moved > small; k++)
-        moved = sweep(c, Nt, weight, g, close, k >= MAX_SWEEPS / 2);
-    bool feasible = true;
-    for (int64_t i = 0; i < Nt->cols; i++) {
-        Nc[i] = column_dot(Nt, i, c);
-        if (uz_gap_penetration(g[i] - Nc[i]) > 4.0 * small)
-            feasible = false;
-    }
-    return feasible;
-}
-
+ * W n_i (Kaczmarz 1937, with inequalities as Hildreth 1957); no bound where rows are left that penetrate by more than
+ * rounding. */
 uz_status uz_sparse_correct(uz_sparse_load *x, double *bound2, double slack, const double *r, const double *g,
                             const bool *close)
 {
     const uz_dual *dual = x->load.dual;
-    double *c = x->load.correction, *Nc = x->work, *Kc = x->work2, square = 0.0, complementarity = 0.0;
-    if (!correct_by_sweeps(c, Nc, &dual->Nt, x->weight, g, close))
-        return UZ_OK;
+    const uz_csc *Nt = &dual->Nt;
+    double *c = x->load.correction, *Nc = x->work, *Kc = x->work2, square = 0.0, complementarity = 0.0, scale = 0.0;
+    memset(c, 0, (size_t)dual->d * sizeof *c);
+    for (int64_t i = 0; i < dual->m; i++)
+        if (close[i] || uz_gap_penetrates(g[i]))
+            scale = fmax(scale, fabs(g[i]));
+    const double small = 8.0 * DBL_EPSILON * scale;
+    double moved = scale;
+    for (int k = 0; k < MAX_SWEEPS && moved > small; k++)
+        moved = sweep(c, Nt, x->weight, g, close, k >= MAX_SWEEPS / 2);
+    for (int64_t i = 0; i < dual->m; i++) {
+        Nc[i] = column_dot(Nt, i, c);
+        if (uz_gap_penetration(g[i] - Nc[i]) > 4.0 * small)
+            return UZ_OK;
+    }
     for (int64_t i = 0; i < dual->m; i++)
         complementarity -= r[i] * fmax(0.0, g[i] - Nc[i]);
     memset(Kc, 0, (size_t)dual->d * sizeof *Kc);

@@ -38,27 +38,6 @@ typedef struct {
     int64_t before;                        /* wrong rows before it, 0: there was none */
 } pivoting;
 
-static bool allocate(pivoting *p, int64_t m)
-{
-    memset(p, 0, sizeof *p);
-    p->active = uz_alloc_zero(m, sizeof(bool));
-    p->refuted = uz_alloc_zero(m, sizeof(bool));
-    p->r = uz_alloc_zero(m, sizeof(double));
-    p->g = uz_alloc_zero(m, sizeof(double));
-    p->fewest = m + 1;
-    p->patience = PATIENCE;
-    p->rate[EXCHANGE] = FAIR_RATE;
-    return p->active && p->refuted && p->r && p->g;
-}
-
-static void release(pivoting *p)
-{
-    free(p->active);
-    free(p->refuted);
-    free(p->r);
-    free(p->g);
-}
-
 /* From the start: the operator's own guess, where it has one. Else the rows that a projected gradient step would leave
  * in contact; of those without a reaction all that penetrate, as there may be no step size yet. */
 static void guess(pivoting *p, const uz_iterate *it, uz_dual_load *load)
@@ -76,14 +55,6 @@ static void guess(pivoting *p, const uz_iterate *it, uz_dual_load *load)
         p->active[i] = p->active[i] ? it->close[i] : p->r[i] > 0.0;
 }
 
-/* How far the last move brought the number of wrong rows down. */
-static void judge_move(pivoting *p)
-{
-    if (p->before > 0)
-        p->rate[p->move] = (double)p->wrong / (double)p->before;
-    p->before = p->wrong;
-}
-
 /* The next guess: all wrong rows change places, or the operator makes a guess of its own, whichever has done better.
  * Where only single exchanges are left, the operator's guesses come first, and one exchange after each that was in
  * vain.
@@ -91,7 +62,9 @@ static void judge_move(pivoting *p)
 static void exchange(pivoting *p, uz_dual_load *load, int64_t m)
 {
     bool better = p->wrong < p->fewest, all = better || p->patience > 0;
-    judge_move(p);
+    if (p->before > 0) /* how far the last move brought the number of wrong rows down */
+        p->rate[p->move] = (double)p->wrong / (double)p->before;
+    p->before = p->wrong;
     p->patience = better ? PATIENCE : p->patience - 1;
     p->idle = better ? 0 : p->idle + 1;
     const bool ask = all ? p->rate[GUESS] <= p->rate[EXCHANGE] : p->move != GUESS || p->rate[GUESS] < 1.0;
@@ -152,12 +125,19 @@ static uz_status solve_by_exchange(pivoting *p, uz_end *end, uz_iterate *it, uz_
 static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                      uz_history *history, uz_error *err)
 {
-    pivoting p;
+    const int64_t m = it->m;
+    pivoting p = {.active = uz_alloc_zero(m, sizeof(bool)),
+                  .refuted = uz_alloc_zero(m, sizeof(bool)),
+                  .r = uz_alloc_zero(m, sizeof(double)),
+                  .g = uz_alloc_zero(m, sizeof(double)),
+                  .fewest = m + 1,
+                  .patience = PATIENCE,
+                  .rate[EXCHANGE] = FAIR_RATE};
     int extra = load->dual->can->cheap_steps ? EXTRA_STEPS : 0;
     bool over = false; /* no guess can be solved; too little time is found by whoever goes on */
     uz_status status = it->begun ? UZ_OK : uz_iterate_begin(it, load, options, history, err);
-    if (!allocate(&p, it->m))
-        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)it->m);
+    if (!p.active || !p.refuted || !p.r || !p.g)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for an active set of %lld rows", (long long)m);
     if (status != UZ_OK)
         goto done;
     guess(&p, it, load);
@@ -203,7 +183,10 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
         *end = over ? UZ_END_UNSOLVED : UZ_END_STALLED;
     }
 done:
-    release(&p);
+    free(p.active);
+    free(p.refuted);
+    free(p.r);
+    free(p.g);
     return status;
 }
 

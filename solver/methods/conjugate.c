@@ -122,28 +122,20 @@ static double best_length(double *bound, uz_iterate *it, double rise)
     return curvature > 0.0 ? fmin(rise / curvature, 2.0 * *bound) : 2.0 * *bound;
 }
 
-/* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near r,
- * a plain step's length away. Where D is exact the difference of two points would only lose digits. Overwrites gamma.
- */
-static uz_status apply_to_direction(uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    if (load->dual->can->exact)
-        return uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
-    for (int64_t i = 0; i < it->m; i++)
-        it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
-    uz_status status = uz_dual_load_apply(load, it->Dr_next, it->gamma, err);
-    for (int64_t i = 0; i < it->m; i++)
-        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
-    return status;
-}
-
 static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
     const double *d = it->r_next, *Dd = it->Dr_next;
     double rise = make_direction(it), bound;
-    uz_status status = apply_to_direction(it, load, err);
+    /* D d. Inner iterations start from the last response and see to the size of the change: they are given a point near
+     * r, a plain step's length away. Where D is exact the difference of two points would only lose digits. */
+    const bool exact = load->dual->can->exact;
+    for (int64_t i = 0; !exact && i < it->m; i++)
+        it->gamma[i] = it->r[i] + it->alpha * it->r_next[i];
+    uz_status status = uz_dual_load_apply(load, it->Dr_next, exact ? it->r_next : it->gamma, err);
     if (status != UZ_OK)
         return status;
+    for (int64_t i = 0; !exact && i < it->m; i++)
+        it->Dr_next[i] = (it->Dr_next[i] - it->Dr[i]) / it->alpha;
     double length = best_length(&bound, it, rise), taken = fmin(length, bound);
     *restart = length > bound;
     for (int64_t i = 0; i < it->m; i++) {
@@ -159,19 +151,11 @@ static uz_status conjugate_step(bool *restart, uz_iterate *it, uz_dual_load *loa
     return UZ_OK;
 }
 
-/* psi(r_next) - psi(r) */
-static double gain(const uz_iterate *it, const uz_dual_load *load)
-{
-    const double *g0 = load->g0;
-    double sum = 0.0;
-    for (int64_t i = 0; i < it->m; i++)
-        sum += (it->r_next[i] - it->r[i]) * (g0[i] - 0.5 * (it->Dr_next[i] + it->Dr[i]));
-    return sum;
-}
-
 /* Not taken where it is too long, or where it led down. */
 static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
+    const double *g0 = load->g0;
+    double gain = 0.0; /* psi(r_next) - psi(r) */
     bool plain = memcmp(it->rho, it->r, (size_t)it->m * sizeof *it->r) == 0;
     for (int64_t i = 0; i < it->m; i++)
         it->r_next[i] = it->rho[i] + (plain ? it->step[i] * it->gamma[i] : 0.0);
@@ -179,7 +163,9 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r_next, err);
     if (status != UZ_OK)
         return status;
-    bool taken = plain ? !uz_iterate_shorten(it, load) : gain(it, load) >= 0.0;
+    for (int64_t i = 0; i < it->m; i++)
+        gain += (it->r_next[i] - it->r[i]) * (g0[i] - 0.5 * (it->Dr_next[i] + it->Dr[i]));
+    bool taken = plain ? !uz_iterate_shorten(it, load) : gain >= 0.0;
     if (taken) {
         uz_iterate_swap(&it->r, &it->r_next);
         uz_iterate_swap(&it->Dr, &it->Dr_next);
@@ -188,12 +174,6 @@ static uz_status projected_step(bool *restart, uz_iterate *it, uz_dual_load *loa
     it->tau = taken ? 2.0 : 1.0;
     *restart = *restart || !taken;
     return UZ_OK;
-}
-
-static double remaining(uz_iterate *it, const uz_dual_load *load)
-{
-    make_gaps(it, load);
-    return it->law->kind->residual(it->law, it->r, it->gamma, it->step, load->dual->row_scale, it->m);
 }
 
 /* *step_norm: ||r - P(r + alpha g)|| at the new r, in the caller's forces: the paper's ||rho - r|| where rho is r.
@@ -209,7 +189,8 @@ static uz_status step(const uz_steps *steps, uz_iterate *it, uz_dual_load *load,
     uz_status status = it->tau > 1.0 ? conjugate_step(restart, it, load, err) : projected_step(restart, it, load, err);
     it->iteration++;
     it->restarts += *restart;
-    *step_norm = remaining(it, load);
+    make_gaps(it, load);
+    *step_norm = it->law->kind->residual(it->law, it->r, it->gamma, it->step, load->dual->row_scale, it->m);
     return status;
 }
 

@@ -215,11 +215,6 @@ static double reaction(const uz_exchange *x, int64_t k)
     return x->base[x->rows[k]] + x->s[x->rows[k]];
 }
 
-static bool is_admissible(const uz_exchange *x, double reaction_of_row)
-{
-    return x->law->kind->admissible(x->law, &reaction_of_row, 1);
-}
-
 /* How far row q penetrates. */
 static double penetration(const uz_exchange *x, int64_t q)
 {
@@ -272,30 +267,28 @@ static void measure(uz_exchange *x)
     subtract_columns(x, x->g, x->size, x->by_place);
 }
 
-/* s_A += M_AA^-1 g_A, which closes the gaps of the rows in contact. */
-static void close_gaps(uz_exchange *x)
-{
-    for (int64_t k = 0; k < x->count; k++)
-        x->w[k] = x->g[x->rows[k]];
-    uz_potrs_lower(x->count, x->L, x->room, x->w);
-    for (int64_t k = 0; k < x->count; k++)
-        x->s[x->rows[k]] += x->w[k];
-    measure(x);
-}
-
 /* s for the rows in contact, without those that pull. */
 static void settle(uz_exchange *x)
 {
     for (bool pulls = true; pulls && !uz_stop_is_due(x->stop);) {
         pulls = false;
         measure(x);
-        for (int pass = 0; pass < PASSES && !uz_stop_is_due(x->stop); pass++)
-            close_gaps(x);
-        for (int64_t k = x->count - 1; k >= 0 && !uz_stop_is_due(x->stop); k--)
-            if (!is_admissible(x, reaction(x, k))) {
+        for (int pass = 0; pass < PASSES && !uz_stop_is_due(x->stop); pass++) {
+            /* s_A += M_AA^-1 g_A closes the gaps of the rows in contact. */
+            for (int64_t k = 0; k < x->count; k++)
+                x->w[k] = x->g[x->rows[k]];
+            uz_potrs_lower(x->count, x->L, x->room, x->w);
+            for (int64_t k = 0; k < x->count; k++)
+                x->s[x->rows[k]] += x->w[k];
+            measure(x);
+        }
+        for (int64_t k = x->count - 1; k >= 0 && !uz_stop_is_due(x->stop); k--) {
+            const double of_row = reaction(x, k);
+            if (!x->law->kind->admissible(x->law, &of_row, 1)) {
                 let_go(x, k);
                 pulls = true;
             }
+        }
     }
 }
 

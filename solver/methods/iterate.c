@@ -123,26 +123,13 @@ uz_status uz_iterate_take(uz_iterate *it, const double *r, const double *g, uz_d
     return status == UZ_OK ? uz_iterate_bound(it, load, by, err) : status;
 }
 
-/* ||N'x|| for x (m): a force of the rows as a force on the dofs. */
-static double force_norm(const uz_dual *dual, const double *x)
-{
-    const uz_csc *N = dual->touched;
-    double sum = 0.0;
-    for (int64_t j = 0; j < N->cols; j++) {
-        double force = 0.0;
-        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
-            force += N->val[k] * x[N->idx[k]];
-        sum += force * force;
-    }
-    return sqrt(sum);
-}
-
 /* The paper's residual of the pair (u(rho(k)), r(k)): e1 = N'(rho - r), e3 = 0. */
 static uz_residual residual(uz_iterate *it, uz_dual_load *load)
 {
     const double *g0 = load->g0, *scale = load->dual->row_scale;
+    const uz_csc *N = load->dual->touched;
     uz_residual e = {0};
-    double e2 = 0.0, e4 = 0.0, *difference = it->r_next, *penetration = it->gamma;
+    double e1 = 0.0, e2 = 0.0, e4 = 0.0, *difference = it->r_next, *penetration = it->gamma;
     for (int64_t i = 0; i < it->m; i++) {
         double gap = g0[i] - it->Drho[i], complementarity = gap * it->r[i];
         difference[i] = it->rho[i] - it->r[i];
@@ -152,7 +139,13 @@ static uz_residual residual(uz_iterate *it, uz_dual_load *load)
     it->law->kind->penetration(it->law, penetration, penetration, it->m);
     for (int64_t i = 0; i < it->m; i++)
         e2 += (penetration[i] / scale[i]) * (penetration[i] / scale[i]);
-    e.e1 = force_norm(load->dual, difference);
+    for (int64_t j = 0; j < N->cols; j++) { /* as a force on the dofs */
+        double force = 0.0;
+        for (int64_t k = N->ptr[j]; k < N->ptr[j + 1]; k++)
+            force += N->val[k] * difference[N->idx[k]];
+        e1 += force * force;
+    }
+    e.e1 = sqrt(e1);
     e.e2 = sqrt(e2);
     e.e4 = sqrt(e4);
     e.total = sqrt(e.e1 * e.e1 + e2 + e4);

@@ -68,27 +68,18 @@ void uz_milestones_drop(uz_milestones *d, double bound)
         d->trade.step[--d->reached] = (uz_trade_step){.seconds = NAN};
 }
 
-static uz_trade_step by_certificate(int64_t iterations, int64_t applications)
-{
-    return (uz_trade_step){.iterations = iterations, .applications = applications, .by_certificate = true};
-}
-
 void uz_milestones_certify(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
 {
-    uz_trade_step step = by_certificate(iterations, applications);
     uz_milestones_drop(d, bound);
-    if (d->partial) /* about the rows kept, as the bounds of the iterations are */
-        uz_milestones_note(d, bound, iterations, applications);
-    else
-        note(d, bound, &step);
+    note(d, d->partial ? bound / KEPT : bound, /* about the rows kept, as the bounds of the iterations are */
+         &(uz_trade_step){.iterations = iterations, .applications = applications, .by_certificate = !d->partial});
 }
 
 void uz_milestones_extend(uz_milestones *d, double bound, int64_t iterations, int64_t applications)
 {
-    uz_trade_step step = by_certificate(iterations, applications);
     uz_milestones_drop(d, bound / ALL);
     d->partial = false;
-    note(d, bound, &step);
+    note(d, bound, &(uz_trade_step){.iterations = iterations, .applications = applications, .by_certificate = true});
 }
 
 void uz_trade_shift(uz_trade *trade, double seconds)

@@ -39,26 +39,6 @@ static void times_scale(double *to, const double *from, const double *scale, int
         to[i] = scale[i] * from[i];
 }
 
-static uz_status check_finite(const double *x, int64_t m, const char *name, uz_error *err)
-{
-    for (int64_t i = 0; i < m; i++)
-        if (!isfinite(x[i]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, "start", "the start's %s(%lld) is not a finite number (from 1)",
-                           name, (long long)i + 1);
-    return UZ_OK;
-}
-
-static uz_status check_numbers(const uz_state *s, uz_error *err)
-{
-    bool counts = s->iteration >= 0 && s->restarts >= 0 && s->next_check >= 0 && s->best_iteration >= 0 &&
-                  s->phase_end >= 0 && s->phase >= 0;
-    bool sizes = s->alpha >= 0.0 && isfinite(s->alpha) && s->tau >= 1.0 && isfinite(s->tau) && s->best_bound >= 0.0 &&
-                 s->best_relative >= 0.0;
-    if (counts && sizes)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_ARGUMENT, "start", "the start's counts, alpha, tau or bounds can't be those of a run");
-}
-
 uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err)
 {
     if (s->m != m)
@@ -68,10 +48,19 @@ uz_status uz_state_check(const uz_state *s, int64_t m, uz_error *err)
         return uz_fail(err, UZ_ERR_ARGUMENT, "start", "the start lacks some of its vectors");
     const double *vectors[] = {s->r, s->rho, s->Dr, s->Drho, s->best_r, s->anchor};
     const char *const names[] = {"r", "rho", "D r", "D rho", "best r", "anchor"};
-    uz_status status = UZ_OK;
-    for (int k = 0; status == UZ_OK && k < (s->rho ? 6 : 1); k++)
-        status = check_finite(vectors[k], m, names[k], err);
-    return status == UZ_OK && s->rho ? check_numbers(s, err) : status;
+    for (int k = 0; k < (s->rho ? 6 : 1); k++)
+        for (int64_t i = 0; i < m; i++)
+            if (!isfinite(vectors[k][i]))
+                return uz_fail(err, UZ_ERR_NOT_FINITE, "start", "the start's %s(%lld) is not a finite number (from 1)",
+                               names[k], (long long)i + 1);
+    const bool counts = s->iteration >= 0 && s->restarts >= 0 && s->next_check >= 0 && s->best_iteration >= 0 &&
+                        s->phase_end >= 0 && s->phase >= 0;
+    const bool sizes = s->alpha >= 0.0 && isfinite(s->alpha) && s->tau >= 1.0 && isfinite(s->tau) &&
+                       s->best_bound >= 0.0 && s->best_relative >= 0.0;
+    if (s->rho && !(counts && sizes))
+        return uz_fail(err, UZ_ERR_ARGUMENT, "start",
+                       "the start's counts, alpha, tau or bounds can't be those of a run");
+    return UZ_OK;
 }
 
 /* How far what another problem's state says may be from what this problem gives: far above rounding, as D r made by the
@@ -86,30 +75,6 @@ static bool alike(const double *x, const double *y, int64_t m)
         difference = fmax(difference, fabs(x[i] - y[i]));
     }
     return difference <= SAME * size;
-}
-
-static void take_vectors(uz_iterate *it, const uz_state *s, const double *scale)
-{
-    to_scaled_forces(it->r, s->r, scale, it->m);
-    to_scaled_forces(it->rho, s->rho, scale, it->m);
-    to_scaled_forces(it->best_r, s->best_r, scale, it->m);
-    to_scaled_forces(it->anchor, s->anchor, scale, it->m);
-    times_scale(it->Dr, s->Dr, scale, it->m);
-    times_scale(it->Drho, s->Drho, scale, it->m);
-}
-
-static void take_numbers(uz_iterate *it, const uz_state *s, const uz_dual *dual)
-{
-    /* of a state whose steps were those of other rows, it is no step size */
-    if (s->alpha > 0.0 && s->as_given == (it->weight || !dual->row_weight))
-        uz_iterate_set_alpha(it, fmin(DBL_MAX, fmax(DBL_MIN, s->alpha / it->unit / it->unit)));
-    it->tau = s->tau;
-    it->step_norm = s->step_norm;
-    it->iteration = s->iteration;
-    it->restarts = s->restarts;
-    it->next_check = s->next_check;
-    it->phase = s->phase;
-    it->phase_end = s->phase_end;
 }
 
 /* Makes the correction of the best answer, which a state does not have, and its bound with it. *same false: the bound
@@ -129,8 +94,23 @@ static uz_status bound_best_again(bool *same, uz_iterate *it, uz_dual_load *load
 
 static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const uz_state *s, uz_error *err)
 {
-    take_vectors(it, s, load->dual->row_scale);
-    take_numbers(it, s, load->dual);
+    const double *scale = load->dual->row_scale;
+    to_scaled_forces(it->r, s->r, scale, it->m);
+    to_scaled_forces(it->rho, s->rho, scale, it->m);
+    to_scaled_forces(it->best_r, s->best_r, scale, it->m);
+    to_scaled_forces(it->anchor, s->anchor, scale, it->m);
+    times_scale(it->Dr, s->Dr, scale, it->m);
+    times_scale(it->Drho, s->Drho, scale, it->m);
+    /* of a state whose steps were those of other rows, it is no step size */
+    if (s->alpha > 0.0 && s->as_given == (it->weight || !load->dual->row_weight))
+        uz_iterate_set_alpha(it, fmin(DBL_MAX, fmax(DBL_MIN, s->alpha / it->unit / it->unit)));
+    it->tau = s->tau;
+    it->step_norm = s->step_norm;
+    it->iteration = s->iteration;
+    it->restarts = s->restarts;
+    it->next_check = s->next_check;
+    it->phase = s->phase;
+    it->phase_end = s->phase_end;
     uz_status status = uz_dual_load_apply(load, it->Dr_next, it->r, err);
     *same = status == UZ_OK && alike(it->Dr, it->Dr_next, it->m);
     if (*same)
@@ -145,24 +125,6 @@ static uz_status restore(bool *same, uz_iterate *it, uz_dual_load *load, const u
     return UZ_OK;
 }
 
-/* Nothing but the reactions. */
-static void take_reactions(uz_iterate *it, const uz_state *s, const double *scale, double alpha)
-{
-    for (int64_t i = 0; i < it->m; i++)
-        it->r[i] = s->r[i] / scale[i];
-    it->law->kind->project(it->law, it->r, it->m);
-    if (it->law->kind->active(it->law, NULL, it->r, it->m) > 0)
-        it->warm = true;
-    memset(it->anchor, 0, (size_t)it->m * sizeof *it->anchor);
-    memset(it->best_r, 0, (size_t)it->m * sizeof *it->best_r);
-    uz_iterate_set_alpha(it, alpha);
-    it->tau = 1.0;
-    it->step_norm = NAN;
-    it->best_bound = it->best_relative = INFINITY;
-    it->iteration = it->restarts = it->next_check = it->best_iteration = it->phase_end = 0;
-    it->phase = 0;
-}
-
 uz_status uz_iterate_start(uz_iterate *it, uz_dual_load *load, const uz_state *start, uz_error *err)
 {
     double alpha = it->alpha;
@@ -171,37 +133,49 @@ uz_status uz_iterate_start(uz_iterate *it, uz_dual_load *load, const uz_state *s
     it->started = uz_seconds();
     if (status == UZ_OK && start->rho)
         status = restore(&same, it, load, start, err);
-    if (status == UZ_OK && !same)
-        take_reactions(it, start, load->dual->row_scale, alpha);
+    if (status == UZ_OK && !same) { /* nothing but the reactions */
+        for (int64_t i = 0; i < it->m; i++)
+            it->r[i] = start->r[i] / load->dual->row_scale[i];
+        it->law->kind->project(it->law, it->r, it->m);
+        if (it->law->kind->active(it->law, NULL, it->r, it->m) > 0)
+            it->warm = true;
+        memset(it->anchor, 0, (size_t)it->m * sizeof *it->anchor);
+        memset(it->best_r, 0, (size_t)it->m * sizeof *it->best_r);
+        uz_iterate_set_alpha(it, alpha);
+        it->tau = 1.0;
+        it->step_norm = NAN;
+        it->best_bound = it->best_relative = INFINITY;
+        it->iteration = it->restarts = it->next_check = it->best_iteration = it->phase_end = 0;
+        it->phase = 0;
+    }
     it->origin = same ? UZ_FROM_STATE : UZ_FROM_REACTIONS;
     return status;
 }
 
-static bool allocate(uz_state *s, int64_t m)
+uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_load *load, uz_method method,
+                           uz_error *err)
 {
+    *out = NULL;
+    const uz_best *before = &it->before;
+    const double *scale = load->dual->row_scale;
+    uz_state *s = uz_alloc_zero(1, sizeof *s);
+    bool ok = s != NULL;
     double **room[] = {&s->r, &s->rho, &s->Dr, &s->Drho, &s->best_r, &s->anchor};
-    bool ok = true;
-    for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        ok = (*room[k] = uz_alloc(m, sizeof(double))) && ok;
-    return ok;
-}
-
-static void give_vectors(uz_state *s, const uz_iterate *it, const double *scale)
-{
+    for (size_t k = 0; ok && k < sizeof room / sizeof room[0]; k++)
+        ok = (*room[k] = uz_alloc(it->m, sizeof(double))) != NULL;
+    if (!ok) {
+        uz_state_free(s);
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
+    }
     times_scale(s->r, it->r, scale, it->m);
     times_scale(s->rho, it->rho, scale, it->m);
-    times_scale(s->best_r, it->before.kept ? it->before.r : it->best_r, scale, it->m);
+    times_scale(s->best_r, before->kept ? before->r : it->best_r, scale, it->m);
     times_scale(s->anchor, it->anchor, scale, it->m);
     to_scaled_forces(s->Dr, it->Dr, scale, it->m);
     to_scaled_forces(s->Drho, it->Drho, scale, it->m);
-}
-
-static void give_numbers(uz_state *s, const uz_iterate *it, const uz_dual *dual)
-{
-    const uz_best *before = &it->before;
     s->m = it->m;
     s->alpha = uz_iterate_alpha(it);
-    s->as_given = it->weight || !dual->row_weight;
+    s->as_given = it->weight || !load->dual->row_weight;
     s->tau = it->tau;
     s->step_norm = it->step_norm;
     s->iteration = it->iteration;
@@ -213,19 +187,6 @@ static void give_numbers(uz_state *s, const uz_iterate *it, const uz_dual *dual)
     s->best_relative = before->kept ? before->relative : it->best_relative;
     s->best_iteration = before->kept ? before->iteration : it->best_iteration;
     s->made_by = before->kept ? before->made_by : it->made_by;
-}
-
-uz_status uz_iterate_state(uz_state **out, const uz_iterate *it, const uz_dual_load *load, uz_method method,
-                           uz_error *err)
-{
-    *out = NULL;
-    uz_state *s = uz_alloc_zero(1, sizeof *s);
-    if (!s || !allocate(s, it->m)) {
-        uz_state_free(s);
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the state of %lld contacts", (long long)it->m);
-    }
-    give_vectors(s, it, load->dual->row_scale);
-    give_numbers(s, it, load->dual);
     s->method = method;
     *out = s;
     return UZ_OK;

@@ -9,33 +9,33 @@
 #include <math.h>
 #include <string.h>
 
-/* step_norm is in the units of the problem's own rows, r in those of the scaled ones. */
-static bool stalled(const uz_iterate *it, const uz_dual_load *load, double step_norm)
-{
-    const double *scale = load->dual->row_scale;
-    double size = 0.0;
-    for (int64_t i = 0; i < it->m; i++)
-        size += scale[i] * it->r[i] * (scale[i] * it->r[i]);
-    int64_t patience = it->best_iteration / 2 + 4000;
-    return step_norm <= 4.0 * DBL_EPSILON * sqrt(size) ||
-           (isfinite(it->best_bound) && it->iteration - it->best_iteration > patience);
-}
-
 static bool should_end(uz_end *end, const uz_iterate *it, const uz_dual_load *load, const uz_method_options *options,
                        double step_norm)
 {
-    bool started = it->iteration > 0, paper = options->stopping == UZ_STOP_PAPER;
-    if (paper && started && step_norm <= options->epsilon)
+    const bool started = it->iteration > 0, paper = options->stopping == UZ_STOP_PAPER;
+    const double *scale = load->dual->row_scale;
+    if (paper && started && step_norm <= options->epsilon) {
         *end = UZ_END_PAPER;
-    else if (!paper && it->best_relative <= options->target)
-        *end = UZ_END_TARGET;
-    else if (uz_should_stop(end, it, options))
         return true;
-    else if (!paper && started && stalled(it, load, step_norm))
-        *end = UZ_END_STALLED;
-    else
+    }
+    if (!paper && it->best_relative <= options->target) {
+        *end = UZ_END_TARGET;
+        return true;
+    }
+    if (uz_should_stop(end, it, options))
+        return true;
+    if (paper || !started)
         return false;
-    return true;
+    /* step_norm is in the units of the problem's own rows, r in those of the scaled ones. */
+    double size = 0.0;
+    for (int64_t i = 0; i < it->m; i++)
+        size += scale[i] * it->r[i] * (scale[i] * it->r[i]);
+    const int64_t patience = it->best_iteration / 2 + 4000;
+    const bool stalled = step_norm <= 4.0 * DBL_EPSILON * sqrt(size) ||
+                         (isfinite(it->best_bound) && it->iteration - it->best_iteration > patience);
+    if (stalled)
+        *end = UZ_END_STALLED;
+    return stalled;
 }
 
 static uz_status try_ray(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
@@ -59,14 +59,6 @@ static uz_status look_for_ray(bool *found, uz_iterate *it, uz_dual_load *load, u
         it->ray[i] = it->r[i] - it->anchor[i];
     memcpy(it->anchor, it->r, (size_t)it->m * sizeof *it->r);
     return try_ray(found, it, load, err);
-}
-
-/* And at once where a conjugate step went along one: so far that what is bounded afterwards is rounding. */
-static uz_status look_along(bool *found, uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    bool wanted = it->along_ray && isinf(it->best_bound);
-    it->along_ray = false;
-    return wanted ? try_ray(found, it, load, err) : UZ_OK;
 }
 
 /* Where D r is carried along the bound is with the one that an apply gives, and the run goes on with its own. */
@@ -107,32 +99,29 @@ static uz_status finish(uz_iterate *it, uz_dual_load *load, const uz_method_opti
     return status;
 }
 
-/* r may have been changed by another engine, and preparing overwrites what the last apply left. */
+/* Goes on with a state: r may have been changed by another engine, and preparing overwrites what the last apply left.
+ * Before D was prepared it was applied by its factors, which rounds otherwise: the state's best answer gets the
+ * correction that it had in the run that found it. Its numbers stay those of the state. */
 static uz_status resume(uz_iterate *it, uz_dual_load *load, uz_error *err)
 {
-    uz_status status = uz_dual_load_apply(load, it->Dr, it->r, err);
+    const double bound = it->best_bound, relative = it->best_relative;
+    const int64_t iteration = it->best_iteration;
+    uz_status status = UZ_OK;
+    if (it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET &&
+        it->made_by != UZ_METHOD_DUAL_ACTIVE_SET) {
+        status = uz_iterate_bound_best(it, load, err);
+        it->best_bound = bound;
+        it->best_relative = relative;
+        it->best_iteration = iteration;
+    }
+    it->resumed = false;
+    if (status != UZ_OK || it->fresh)
+        return status;
+    status = uz_dual_load_apply(load, it->Dr, it->r, err);
     if (it->tau == 1.0) {
         memcpy(it->rho, it->r, (size_t)it->m * sizeof *it->r);
         memcpy(it->Drho, it->Dr, (size_t)it->m * sizeof *it->Dr);
     }
-    return status;
-}
-
-/* Before D was prepared it was applied by its factors, which rounds otherwise: a state's best answer gets the
- * correction that it had in the run that found it. Its numbers stay those of the state. */
-static uz_status correct_again(uz_iterate *it, uz_dual_load *load, uz_error *err)
-{
-    double bound = it->best_bound, relative = it->best_relative;
-    int64_t iteration = it->best_iteration;
-    bool wanted = it->resumed && isfinite(bound) && it->made_by != UZ_METHOD_ACTIVE_SET &&
-                  it->made_by != UZ_METHOD_DUAL_ACTIVE_SET;
-    it->resumed = false;
-    if (!wanted)
-        return UZ_OK;
-    uz_status status = uz_iterate_bound_best(it, load, err);
-    it->best_bound = bound;
-    it->best_relative = relative;
-    it->best_iteration = iteration;
     return status;
 }
 
@@ -157,8 +146,6 @@ static uz_status begin(uz_iterate *it, uz_dual_load *load, const uz_method_optio
     if (status == UZ_OK && !it->begun)
         return uz_iterate_begin(it, load, options, history, err);
     if (status == UZ_OK)
-        status = correct_again(it, load, err);
-    if (status == UZ_OK && !it->fresh)
         status = resume(it, load, err);
     if (status == UZ_OK && it->warm && it->iteration == 0) /* with the step size it may be bounded better */
         status = uz_iterate_bound(it, load, options->method, err);
@@ -181,39 +168,35 @@ static uz_status check(uz_iterate *it, uz_dual_load *load, const uz_method_optio
     return status;
 }
 
-/* rho_is_r: the row is that of (u(r), r). */
-static uz_status record(uz_iterate *it, uz_dual_load *load, const uz_method_options *options, uz_history *history,
-                        bool rho_is_r, bool restart, uz_error *err)
-{
-    double *rho = it->rho, *Drho = it->Drho;
-    if (rho_is_r) {
-        it->rho = it->r;
-        it->Drho = it->Dr;
-    }
-    uz_status status = uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
-    it->rho = rho;
-    it->Drho = Drho;
-    return status;
-}
-
 uz_status uz_steps_run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_method_options *options,
                        uz_history *history, uz_error *err)
 {
     const uz_steps *steps = uz_method_kind_of(options->method)->steps;
     bool restart = false, ray = false;
+    double *rho, *Drho;
     uz_status status = begin(it, load, options, history, err);
     it->before.kept = false;
     while (status == UZ_OK && !ray && !should_end(end, it, load, options, it->step_norm)) {
         it->fresh = false;
         status = steps->step(steps, it, load, &it->step_norm, &restart, err);
-        if (status == UZ_OK)
-            status = look_along(&ray, it, load, err);
+        /* A conjugate step may have gone along a ray: so far that what is bounded afterwards is rounding. */
+        if (status == UZ_OK && it->along_ray && isinf(it->best_bound))
+            status = try_ray(&ray, it, load, err);
+        it->along_ray = false;
         if (status == UZ_OK)
             status = check(it, load, options, steps, err);
         if (status == UZ_OK && !ray)
             status = look_for_ray(&ray, it, load, err);
+        rho = it->rho;
+        Drho = it->Drho;
+        if (steps->rho_is_r) { /* the row is that of (u(r), r) */
+            it->rho = it->r;
+            it->Drho = it->Dr;
+        }
         if (status == UZ_OK)
-            status = record(it, load, options, history, steps->rho_is_r, restart, err);
+            status = uz_iterate_record(it, load, options, history, it->step_norm, restart, err);
+        it->rho = rho;
+        it->Drho = Drho;
     }
     if (ray)
         *end = UZ_END_RAY;
