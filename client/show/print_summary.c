@@ -192,6 +192,24 @@ static void print_contact(FILE *to, const json_t *summary)
     fprintf(to, "%s at most\n", number_in_words(text, summary, "contact.max_penetration", 3));
 }
 
+/* What facets are taken for: "shaft: cylinder of radius 20, 0.027 off the facets, which turn by 6 degrees". */
+static void print_surfaces(FILE *to, const json_t *summary)
+{
+    const json_t *list = client_json_at(summary, "contact.surfaces");
+    char text[32];
+    for (size_t i = 0; i < json_array_size(list); i++) {
+        const json_t *one = json_array_get(list, i);
+        label(to, i == 0 ? "surfaces" : "");
+        client_print_safe(to, client_json_text(one, "group"));
+        fprintf(to, ": %s", client_json_text(one, "shape"));
+        if (json_is_number(json_object_get(one, "radius")))
+            fprintf(to, " of radius %s", number_in_words(text, one, "radius", 6));
+        if (client_json_number(one, "largest_offset") > 0)
+            fprintf(to, ", %s off the facets", number_in_words(text, one, "largest_offset", 2));
+        fprintf(to, ", turning by %s degrees\n", number_in_words(text, one, "largest_turn", 2));
+    }
+}
+
 /* What acts on the body, without moments: "contact bottom (0, 10.5)". */
 static void print_resultants(FILE *to, const json_t *summary)
 {
@@ -351,6 +369,7 @@ void client_print_summary(FILE *to, const json_t *job)
     print_method(to, summary);
     if (json_is_object(json_object_get(summary, "contact")))
         print_contact(to, summary);
+    print_surfaces(to, summary);
     print_resultants(to, summary);
     json_array_foreach(json_object_get(summary, "warnings"), i, warning)
     {

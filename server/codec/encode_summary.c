@@ -35,6 +35,32 @@ static void put_resultant(text *t, const char *key, const uz_resultant *r, int d
     text_close(t, '}');
 }
 
+/* What the sides of contacts are taken for. */
+static void put_surfaces(text *t, const uz_evaluation *e)
+{
+    text_open(t, "surfaces", '[');
+    for (int64_t i = 0; i < e->n_surfaces; i++) {
+        const uz_contact_surface *s = &e->surfaces[i];
+        const bool cone = strcmp(s->shape, "cone") == 0;
+        text_open(t, NULL, '{');
+        text_integer(t, "contact", s->contact);
+        text_string(t, "group", s->group);
+        text_bool(t, "slave", s->slave);
+        text_string(t, "shape", s->shape);
+        text_integer(t, "parts", s->parts);
+        if (s->dim > 0)
+            text_numbers(t, "point", s->point, s->dim);
+        if (s->dim > 0 && strcmp(s->shape, "sphere") != 0)
+            text_numbers(t, "axis", s->axis, s->dim);
+        put_named(t, (named[]){{"radius", s->radius}}, s->radius > 0);
+        put_named(t, (named[]){{"tube", s->tube}}, s->tube > 0);
+        put_named(t, (named[]){{"slope", s->slope}}, cone);
+        put_named(t, (named[]){{"largest_offset", s->largest_offset}, {"largest_turn", s->largest_turn}}, 2);
+        text_close(t, '}');
+    }
+    text_close(t, ']');
+}
+
 /* Scenes: what acts on the body, and what makes the answer doubtful. */
 static void put_evaluation(text *t, const uz_evaluation *e, int dim)
 {
@@ -96,6 +122,8 @@ static void put_contact(text *t, const uz_summary *s, bool scene)
         if (e) {
             text_number(t, "area", e->contact_area);
             put_overlap(t, e, s->dim);
+            if (e->n_surfaces > 0)
+                put_surfaces(t, e);
         }
         if (e && e->peak_node < 0) {
             text_raw(t, "max_pressure_at", NULL);

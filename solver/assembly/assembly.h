@@ -42,6 +42,7 @@ typedef struct {
     double *area;
     int64_t *ends; /* n x 2: of a middle of a face's edge the places of the edge's ends, as for row_ends; else -1 */
     bool swapped;
+    uz_contact_surface surface[2]; /* what `on` and `with` are taken for */
 } uz_contact_sites;
 
 typedef struct {

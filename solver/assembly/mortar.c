@@ -574,6 +574,13 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         goto done;
     }
     status = make_rows(sites, &work, in, &surface[sites->swapped], &surface[!sites->swapped], err);
+    for (int k = 0; k < 2 && status == UZ_OK; k++) {
+        if (!uz_mortar_describe(&sites->surface[k], rest[k].n > 0 ? &rest[k] : &surface[k], in,
+                                k == 0 ? in->on : in->with))
+            status = no_memory(err);
+        sites->surface[k].contact = in->index;
+        sites->surface[k].slave = sites->swapped == (k == 1);
+    }
     if (status == UZ_OK && sites->first[sites->n] == 0 && !in->rest) {
         snprintf(where, sizeof where, "/contacts/%lld/on", (long long)in->index);
         status =

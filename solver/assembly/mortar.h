@@ -61,7 +61,8 @@ typedef struct {
     bool (*places)(uz_mortar_surface *surface, const uz_contact_input *in);
     bool (*points)(uz_mortar_points *points, const uz_contact_input *in, const uz_mortar_surface *slave, int64_t i,
                    const uz_mortar_surface *master, const int64_t *near, int64_t n_near);
-    void (*offset)(double offset[3], const uz_mortar_side *side, const double *local, const double x[3]);
+    void (*offset)(double offset[3], const uz_mortar_surface *surface, const uz_mortar_side *side, const double *local,
+                   const double x[3]);
 } uz_mortar_geometry;
 extern const uz_mortar_geometry uz_mortar_plane, uz_mortar_space;
 const uz_mortar_geometry *uz_mortar_geometry_of(int dim);
@@ -71,6 +72,13 @@ const uz_mortar_geometry *uz_mortar_geometry_of(int dim);
 uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
                                  uz_error *err);
 void uz_mortar_surface_clear(uz_mortar_surface *surface);
+
+/* part (n_places): the same number for all places that sides join, one of theirs. */
+void uz_mortar_find_parts(int64_t *part, const uz_mortar_surface *surface);
+
+/* What a surface is taken for, but for `contact` and `slave`. False: no memory. */
+bool uz_mortar_describe(uz_contact_surface *out, const uz_mortar_surface *surface, const uz_contact_input *in,
+                        const uz_group *group);
 
 /* Cosine of the feature angle: sides that turn by more make a corner. */
 double uz_mortar_least_cosine(const uz_contact_input *in);

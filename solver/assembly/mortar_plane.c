@@ -363,8 +363,10 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
     return room;
 }
 
-static void offset(double offset[3], const uz_mortar_side *side, const double *local, const double x[3])
+static void offset(double offset[3], const uz_mortar_surface *surface, const uz_mortar_side *side, const double *local,
+                   const double x[3])
 {
+    (void)surface;
     static const double ORIGIN[2] = {0};
     double at[2], slope[2], n[2];
     (void)x;

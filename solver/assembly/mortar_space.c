@@ -49,28 +49,18 @@ static const double *centre_of(const uz_mortar_side *side)
 
 /* ---- patches */
 
-static int64_t root_of(int64_t *parent, int64_t i)
-{
-    while (parent[i] != i)
-        i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 /* Places of one patch are joined by their faces; each patch is looked at by itself. */
 static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
 {
     const int64_t n = surface->n_places;
-    int64_t *parent = uz_alloc(n, sizeof *parent), (*key)[2] = uz_alloc(n, sizeof *key);
+    int64_t *part = uz_alloc(n, sizeof *part), (*key)[2] = uz_alloc(n, sizeof *key);
     uz_smooth_shape *shape = uz_alloc_zero(n, sizeof *shape);
     double *xyz = uz_alloc(n, 3 * sizeof *xyz), *normal = uz_alloc(n, 3 * sizeof *normal);
-    const bool room = parent && key && shape && xyz && normal;
-    for (int64_t p = 0; p < n && room; p++)
-        parent[p] = p;
-    for (int64_t i = 0; i < surface->n && room; i++)
-        for (int a = 1; a < surface->side[i].nodes; a++)
-            parent[root_of(parent, surface->side[i].place[a])] = root_of(parent, surface->side[i].place[0]);
+    const bool room = part && key && shape && xyz && normal;
+    if (room)
+        uz_mortar_find_parts(part, surface);
     for (int64_t p = 0; p < n && room; p++) {
-        key[p][0] = root_of(parent, p);
+        key[p][0] = part[p];
         key[p][1] = p;
     }
     if (room)
@@ -83,16 +73,16 @@ static bool recognise(uz_mortar_surface *surface, const uz_mesh *mesh)
         shape[key[first][0]] = uz_smooth_shape_of(xyz, normal, end - first);
     }
     for (int64_t i = 0; i < surface->n && room; i++)
-        surface->side[i].shape = shape[root_of(parent, surface->side[i].place[0])];
+        surface->side[i].shape = shape[part[surface->side[i].place[0]]];
     for (int64_t p = 0; p < n && room; p++) { /* normals of the shape itself, out of the body */
         double *mine = surface->normal + 3 * p, exact[3], off[3];
         memcpy(exact, mine, sizeof exact);
-        uz_smooth_nearest(off, exact, &shape[root_of(parent, p)], mesh->xyz + 3 * surface->node[p]);
+        uz_smooth_nearest(off, exact, &shape[part[p]], mesh->xyz + 3 * surface->node[p]);
         const double side = uz_dot3(exact, mine) < 0 ? -1 : 1;
         for (int c = 0; c < 3; c++)
             mine[c] = side * exact[c];
     }
-    free(parent);
+    free(part);
     free(key);
     free(shape);
     free(xyz);
@@ -473,10 +463,13 @@ static bool points(uz_mortar_points *points, const uz_contact_input *in, const u
     return room;
 }
 
-static void offset(double offset[3], const uz_mortar_side *side, const double *local, const double x[3])
+static void offset(double offset[3], const uz_mortar_surface *surface, const uz_mortar_side *side, const double *local,
+                   const double x[3])
 {
-    (void)local;
-    uz_smooth_nearest(offset, NULL, &side->shape, x);
+    const uz_side shape = {.dim = 3, .nodes = side->nodes, .xyz = side->xyz};
+    double N[UZ_FACE_NODES];
+    uz_side_shape(N, &shape, local);
+    smooth_offset(offset, surface, side, N, x);
 }
 
 const uz_mortar_geometry uz_mortar_space = {places, points, offset};

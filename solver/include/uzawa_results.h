@@ -110,6 +110,24 @@ typedef struct {
     double force[3], moment[3];
 } uz_resultant;
 
+/* What the sides of one surface of a contact between two are taken for: in words, as the result has it. */
+typedef struct {
+    char group[64], shape[12];
+    int64_t contact;
+    bool slave;            /* its nodes have the rows */
+    int64_t parts;         /* what corners divide it into; the shape is that of the largest */
+    int dim;               /* of point and axis: 3, or 0 where the shape has none */
+    double point[3];       /* centre, or a point of the axis */
+    double axis[3];        /* unit; of a plane its normal; 0 of a sphere */
+    double radius, tube;   /* 0: has none. Of a cone at `point`; of a torus of its middle circle and of its section */
+    double slope;          /* of a cone: the radius grows by it along the axis */
+    double largest_offset; /* length from the sides to the smooth surface */
+    double largest_turn;   /* degrees from side to side where the surface is taken to be smooth */
+    int64_t corners;       /* nodes at which sides turn by more than the feature angle, but as those of a curve may */
+    double corner_turn;    /* degrees: the most that they do */
+    bool free_form;        /* in space: some curved part is on no known shape */
+} uz_contact_surface;
+
 /* Something that makes the answer doubtful: as one of small deformation on a fixed contact geometry, or by its mesh. */
 typedef struct {
     char code[24];     /* "large_rotation", ... */
@@ -148,6 +166,8 @@ typedef struct {
     uz_resultant *contacts,
         *supports;      /* in the scene's order. Where several supports hold a node, each has its share */
     uz_resultant loads; /* all of them; on is "" */
+    int64_t n_surfaces; /* of contacts between two surfaces, `on` and `with` of each */
+    uz_contact_surface *surfaces;
     /* What the forces and moments (about the first node, by the body's extent) leave over, relative to the sum of the
      * forces' sizes. */
     double imbalance;

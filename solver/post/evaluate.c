@@ -18,6 +18,7 @@ void uz_evaluation_free(uz_evaluation *evaluation)
     free(evaluation->contacts);
     free(evaluation->supports);
     free(evaluation->overlap);
+    free(evaluation->surfaces);
     free(evaluation);
 }
 
@@ -35,9 +36,13 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
     e->contacts = uz_alloc_zero(e->n_contacts, sizeof *e->contacts);
     e->supports = uz_alloc_zero(e->n_supports, sizeof *e->supports);
     e->overlap = uz_alloc_zero(e->n_contacts, sizeof *e->overlap);
-    if (!e->contacts || !e->supports || !e->overlap)
+    e->surfaces = uz_alloc_zero(2 * e->n_contacts, sizeof *e->surfaces);
+    if (!e->contacts || !e->supports || !e->overlap || !e->surfaces)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld resultants",
                        (long long)(e->n_contacts + e->n_supports));
+    for (int64_t i = 0; i < e->n_contacts && model->sites; i++)
+        for (int k = 0; k < 2 && model->sites[i].surface[0].parts > 0; k++)
+            e->surfaces[e->n_surfaces++] = model->sites[i].surface[k];
     for (int64_t i = 0; i < e->n_contacts; i++)
         memcpy(e->contacts[i].on, scene->contacts[i].on, sizeof e->contacts[i].on);
     for (int64_t i = 0; i < e->n_supports; i++)

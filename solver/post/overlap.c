@@ -67,12 +67,13 @@ static double smooth_gap(const work *w, const place *p, const uz_contact_pair *f
                          const double off[3], const double normal[3], double gap)
 {
     const int dim = w->model->mesh.dim;
-    const uz_mortar_side *other = &w->flank[!p->k].still.side[foot->number];
+    const uz_mortar_surface *across = &w->flank[!p->k].still;
+    const uz_mortar_side *other = &across->side[foot->number];
     double X[3] = {0}, other_off[3], along = 0, any = 0;
     for (int a = 0; a < foot->count; a++)
         for (int c = 0; c < dim; c++)
             X[c] += foot->weight[a] * other->xyz[dim * a + c];
-    w->geometry->offset(other_off, other, foot->local, X);
+    w->geometry->offset(other_off, across, other, foot->local, X);
     for (int c = 0; c < dim; c++) {
         any += fabs(off[c]) + fabs(other_off[c]);
         along -= (d[c] + off[c] - other_off[c]) * normal[c];
@@ -101,7 +102,7 @@ static void look(work *w, place *p, const double *local)
         }
     uz_unit3(out);
     if (w->smooth)
-        w->geometry->offset(off, side, local, X);
+        w->geometry->offset(off, &mine->still, side, local, X);
     for (int c = 0; c < dim; c++)
         x[c] = X[c] + u[c] + (w->obstacle ? off[c] : 0);
     if (w->obstacle) {
@@ -168,7 +169,7 @@ static double sagitta(bool *known, const work *w, const place *p)
         for (int a = 0; a < side->nodes; a++)
             for (int c = 0; c < dim; c++)
                 X[c] += N[a] * side->xyz[dim * a + c];
-        w->geometry->offset(off, side, AT[kind][q], X);
+        w->geometry->offset(off, surface, side, AT[kind][q], X);
         most = fmax(most, sqrt(uz_dot3(off, off)));
     }
     *known = dim == 2 || most > 0;

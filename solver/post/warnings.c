@@ -19,6 +19,8 @@ static const double AWAY = 0.1;
  * 17 % too little energy there (element/stiffness.c). */
 static const double LOCKS = 0.45;
 
+#define DEGREES (180 / 3.14159265358979323846)
+
 typedef struct {
     const uz_body_model *model;
     const uz_scene *scene;
@@ -227,6 +229,24 @@ static double turned_away(const doubts *d, const uz_obstacle *obstacle, const uz
     return least;
 }
 
+/* Facets that stand for a curve which is not quite known, or that were taken for corners. */
+static void look_at_surfaces(const doubts *d)
+{
+    for (int64_t i = 0; i < d->out->n_surfaces; i++) {
+        const uz_contact_surface *s = &d->out->surfaces[i];
+        if (s->free_form)
+            warn(d->out, "free_form", s->largest_turn / DEGREES,
+                 "\"%.30s\" is on no plane, sphere, cylinder, cone or torus: peaks of the pressure there are not to be "
+                 "trusted",
+                 s->group);
+        if (s->corners > 0)
+            warn(d->out, "feature_angle", s->corner_turn / DEGREES,
+                 "sides of \"%.30s\" turn by up to %.3g degrees (nodes: %lld), taken for corners: of a curve, raise "
+                 "feature_angle",
+                 s->group, s->corner_turn, (long long)s->corners);
+    }
+}
+
 static uz_status look_at_contact(const doubts *d, uz_error *err)
 {
     int64_t behind = -1, node = 0;
@@ -313,5 +333,6 @@ uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const u
     if (!(slope_by_range(&d) < 0.99 * noticed) && largest_slope(&d) > noticed)
         look_at_elements(&d);
     look_at_mesh(&d);
+    look_at_surfaces(&d);
     return look_at_contact(&d, err);
 }

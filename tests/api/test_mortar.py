@@ -181,6 +181,38 @@ def test_free_forms_are_fitted(s):
             check(abs(mean - 1) < 2e-2, kind, swing, mean)
 
 
+def test_surfaces_are_told(s):
+    """What facets are taken for, how far that is off them, and facets that look like those of a curve but are not."""
+    def surfaces_and_warnings(request):
+        summary = answer_of(s, request)["summary"]
+        return summary["contact"]["surfaces"], {w["code"]: w["value"] for w in summary["warnings"]}
+
+    def ring(inner, outer, swing=0.0):
+        def place(x, y, z):
+            r = inner + (outer - inner) * x + swing * math.cos(2 * math.pi * y) * (x if outer < 21 else 1 - x)
+            return r * math.cos(math.pi / 2 * y), r * math.sin(math.pi / 2 * y), 2 * z
+        return place
+
+    (shaft, hub), warnings = surfaces_and_warnings(press_fit("quad4", (15, 11), 0.005))
+    check(shaft["group"] == "shaft" and shaft["slave"] and not hub["slave"] and not warnings, shaft, hub, warnings)
+    for one, facets in ((shaft, 15), (hub, 11)):
+        sagitta = 20 * (1 - math.cos(math.pi / 4 / facets))
+        check(one["shape"] == "curve" and abs(one["largest_turn"] - 90 / facets) < 1e-6, one)
+        check(abs(one["largest_offset"] / sagitta - 1) < 1e-2, one, sagitta)
+    surfaces, warnings = surfaces_and_warnings(press_fit("quad4", (15, 11), 0.005, feature_angle=3))
+    check(surfaces[0]["parts"] == 15 and surfaces[0]["largest_offset"] < 1e-9, surfaces)
+    check(abs(warnings["feature_angle"] - math.radians(90 / 11)) < 1e-9, warnings)
+    surfaces, warnings = surfaces_and_warnings(stacked(("quad4", "quad8"), 0.3, "low"))
+    check([one["shape"] for one in surfaces] == ["straight"] * 2 and not warnings, surfaces, warnings)
+    (shaft, hub), warnings = surfaces_and_warnings(fit_in_space("hex8", ring(10, 20.005), ring(20, 40)))
+    check(shaft["shape"] == hub["shape"] == "cylinder" and abs(shaft["radius"] - 20.005) < 1e-9 and not warnings, shaft)
+    check(abs(abs(hub["axis"][2]) - 1) < 1e-12 and abs(hub["radius"] - 20) < 1e-9, hub)
+    _, warnings = surfaces_and_warnings(fit_in_space("hex8", ring(10, 20.005), ring(20, 40), feature_angle=3))
+    check(warnings["feature_angle"] > math.radians(5.99), warnings)
+    surfaces, warnings = surfaces_and_warnings(fit_in_space("hex8", ring(10, 20.005, 0.1), ring(20, 40, 0.1)))
+    check({one["shape"] for one in surfaces} == {"free_form"} and 0.1 < warnings["free_form"] < 0.2, surfaces, warnings)
+
+
 def test_facets_as_they_are_press_more(s):
     """What `smooth` corrects, and what a feature angle below the turn of the facets, 6 degrees, gives up."""
     for contact in ({"smooth": False}, {"feature_angle": 3}):
