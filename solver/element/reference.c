@@ -65,6 +65,17 @@ double uz_gauss_triangle3(double point[3], int g)
     return 1. / 2 / 3;
 }
 
+/* Degree 4 (G. Cowper, "Gaussian quadrature formulas for triangles", Int. J. Numer. Meth. Engng 7 (1973) 405-408). */
+double uz_gauss_triangle6(double point[3], int g)
+{
+    const double sign = g < 3 ? 1 : -1, off = sqrt(38 - 44 * sqrt(0.4));
+    const double near = (8 - sqrt(10) + sign * off) / 18;
+    point[0] = g % 3 == 1 ? 1 - 2 * near : near;
+    point[1] = g % 3 == 2 ? 1 - 2 * near : near;
+    point[2] = 0;
+    return (620 + sign * sqrt(213125 - 53320 * sqrt(10))) / 3720 / 2;
+}
+
 /* ---------------------------------------------------------------- recovery */
 
 int uz_recover_centre(double point[][3], double share[][UZ_ELEMENT_SAMPLES], uz_element_kind kind)

@@ -24,6 +24,7 @@ double uz_gauss_line3(double *at, int g);
 /* Interior rules of simplices, of degree 1 and 2. */
 double uz_gauss_triangle1(double point[3], int g);
 double uz_gauss_triangle3(double point[3], int g);
+double uz_gauss_triangle6(double point[3], int g);
 
 /* One point in the centre; the dim + 1 Gauss points of a simplex; the 2^dim of a box. */
 int uz_recover_centre(double point[][3], double share[][UZ_ELEMENT_SAMPLES], uz_element_kind kind);

@@ -1,6 +1,9 @@
 """Axisymmetric bodies: what is summed around the ring."""
+import math
+
 import service
 from service import check
+from two_bodies import plate
 
 
 def test_contact_force_is_axial(s):
@@ -21,6 +24,26 @@ def test_contact_force_is_axial(s):
     check(summary["contact"]["force"][0] == 0, summary["contact"])
     check(abs(summary["contact"]["force"][1] - ground["force"][1]) < 1e-9 * ground["force"][1], summary)
     check(summary["resultants"]["imbalance"] < 1e-9, summary["resultants"])
+
+
+def test_curved_rings_pass_the_patch_test(s):
+    """A pressure of 1 from all sides: the stress is -1 everywhere, whatever the shape of the edges."""
+    def bowed(x, y):
+        return 4 + 10 * x + 1.2 * math.sin(math.pi * y) * (1 - x) * x, 5 * y + 0.3 * math.sin(math.pi * x) * y
+
+    for kind in ("tri6", "quad8"):
+        nodes, elements, sides = plate(kind, (5, 3), 0, bowed)
+        mesh = {"nodes": nodes, "elements": {kind: elements},
+                "groups": {side: {"edges": edges} for side, edges in sides.items()}}
+        scene = {"kind": "scene", "model": "axisymmetric", "mesh": mesh,
+                 "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                 "supports": [{"on": "bottom", "uy": 0}],
+                 "loads": [{"on": side, "pressure": 1} for side in ("top", "left", "right")],
+                 "contacts": [{"on": "top", "obstacle": {"plane": {"point": [0, 100], "normal": [0, -1]}}}]}
+        job = s.solve({"problem": scene})
+        answer = s.get(f"/v1/jobs/{job['id']}/result?fields=stress").json
+        for stress in answer["stress"]:
+            check(all(abs(stress[c] + 1) < 1e-10 for c in range(3)) and abs(stress[3]) < 1e-10, kind, stress)
 
 
 if __name__ == "__main__":
