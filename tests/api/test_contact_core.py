@@ -1,0 +1,158 @@
+"""Contact between surfaces through every method, form of the dual operator and way to ask: each answer is certified and is the
+default's within its bound. usage: test_contact_core.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
+import itertools
+import math
+
+import service
+from service import check, expect
+from two_bodies import body
+
+WAIT = {"Prefer": "wait=120"}
+METHODS = ["uzawa", "accelerated", "accelerated_restart", "conjugate", "active_set", "dual_active_set"]
+OPERATORS = ["condensed", "factored", "matrix_free"]
+EXACT = ["auto", "active_set", "dual_active_set"]
+
+
+def blocks(kinds, pushed, model="plane_strain"):
+    """A narrow block on a wide one: pressed by a load that only the contact carries, or pushed down with an open part."""
+    solid = model == "solid"
+    names = ("x0", "z0", "z1") if solid else ("left", "bottom", "top")
+
+    def low(x, *y):
+        return (4 * x, *y[:-1], y[-1] - 1)
+
+    def high(x, *y):
+        return (0.5 + 2.5 * x, *y[:-1], (0.02 * x if pushed else 0) + y[-1] * (1 - 0.02 * x * pushed))
+    groups = {"low": [(0, names[2])], "high": [(1, names[1])], "left": [(0, names[0]), (1, names[0])],
+              "base": [(0, names[1])], "head": [(1, names[2])]}
+    up = "uz" if solid else "uy"
+    supports = [{"on": "left", "ux": 0}, {"on": "base", up: 0}]
+    if solid:
+        groups["front"] = [(0, "y0"), (1, "y0")]
+        supports.append({"on": "front", "uy": 0})
+    loads = [] if pushed else [{"on": "head", "pressure": 1}]
+    if pushed:
+        supports.append({"on": "head", up: -0.015})
+    cells = [(4, 2, 1), (3, 2, 1)] if solid else [(8, 2), (5, 2)]
+    return body(kinds, cells, [low, high], groups, model=model, materials=[{"on": "all", "young": 100, "poisson": 0.3}],
+                supports=supports, loads=loads, contacts=[{"on": "low", "with": "high"}])
+
+
+def fit(kinds):
+    """A press fit, all of which touches."""
+    def ring(inner, outer):
+        return lambda x, y: ((inner + (outer - inner) * x) * math.cos(math.pi / 2 * y),
+                             (inner + (outer - inner) * x) * math.sin(math.pi / 2 * y))
+    return body(kinds, [(2, 11), (2, 9)], [ring(10, 20.02), ring(20, 40)],
+                {"low": [(0, "right")], "high": [(1, "left")], "x": [(0, "bottom"), (1, "bottom")],
+                 "y": [(0, "top"), (1, "top")]}, model="plane_stress",
+                materials=[{"on": "all", "young": 1000, "poisson": 0.3}],
+                supports=[{"on": "x", "uy": 0}, {"on": "y", "ux": 0}], contacts=[{"on": "low", "with": "high"}])
+
+
+SCENES = {"open part": blocks(["quad4", "tri6"], True), "press fit": fit(["quad8", "quad4"]),
+          "rings": blocks(["tri3", "quad8"], True, "axisymmetric"), "space": blocks(["hex20", "tet10"], True, "solid"),
+          "loose": blocks(["quad8", "tri3"], False), "loose in space": blocks(["tet4", "hex8"], False, "solid")}
+
+
+def answer_of(s, request, outcome="converged"):
+    job = expect(s.post(request, WAIT), 200).json
+    check(job["status"] == "successful" and job["summary"]["outcome"] == outcome, job)
+    return job, expect(s.get(f"/v1/jobs/{job['id']}/result?fields=reactions,displacements,pressure"), 200).json
+
+
+def near(answer, known, *context):
+    """Energies within what both certify, and forces alike."""
+    for one in (answer["summary"], known["summary"]):
+        check(one["certificate"]["absolute_error"] is not None, *context)
+    bound = sum(x["summary"]["certificate"]["absolute_error"] ** 2 for x in (answer, known)) / 2
+    energies = [x["summary"]["energy"]["primal"] for x in (answer, known)]
+    check(abs(energies[0] - energies[1]) <= bound + 1e-10 * abs(known["summary"]["energy"]["strain"]), energies, bound, *context)
+    sums = [sum(x["reactions"]) for x in (answer, known)]
+    error = answer["summary"]["certificate"]["relative_error"]
+    check(abs(sums[0] - sums[1]) <= (100 * error + 1e-7) * abs(sums[1]), sums, error, *context)
+
+
+def test_all_methods_on_all_forms(s):
+    for name, request in SCENES.items():
+        _, known = answer_of(s, request)
+        part = known["summary"]["contact"]["active"] < known["summary"]["contact"]["candidates"]
+        check(part or name == "press fit" or "loose" in name, name)
+        for method, operator in itertools.product(METHODS, OPERATORS):
+            solver = {"method": method, "operator": operator,
+                      "accuracy": {"relative_error": 1e-6 if method in EXACT else 1e-3}}
+            if (method, operator) == ("active_set", "matrix_free") and "loose" not in name:  # refuses wide rows, and says so
+                job, _ = answer_of(s, {**request, "solver": solver}, "precision_limit")
+                check("few rows" in job["summary"]["message"], job["summary"])
+                continue
+            _, answer = answer_of(s, {**request, "solver": solver})
+            near(answer, known, name, method, operator)
+
+
+def test_all_row_scalings(s):
+    for name, request in SCENES.items():
+        _, known = answer_of(s, request)
+        for scaling, method in itertools.product(("auto", "none", "unit"), ("auto", "accelerated_restart")):
+            _, answer = answer_of(s, {**request, "solver": {"row_scaling": scaling, "method": method}})
+            near(answer, known, name, scaling, method)
+
+
+def test_levels_and_candidates(s):
+    for name, request in SCENES.items():
+        _, known = answer_of(s, request)
+        for accuracy in ("quick", "balanced", "precise"):
+            _, answer = answer_of(s, {**request, "solver": {"accuracy": accuracy}})
+            near(answer, known, name, accuracy)
+        _, answer = answer_of(s, {"problem": {**request["problem"], "candidates": "all"}})
+        near(answer, known, name, "all candidates")
+
+
+def test_load_cases(s):
+    """Each case is what a job of its own would be; the body's factor serves all."""
+    for name, request in SCENES.items():
+        problem = request["problem"]
+        if not problem.get("loads"):
+            continue
+        heavy = [{**problem["loads"][0], "pressure": 3}]
+        job = expect(s.post({**request, "cases": [{"name": "given", "loads": problem["loads"]}, {"name": "heavy", "loads": heavy}]}, WAIT), 200).json
+        check(job["status"] == "successful", name, job)
+        for case, loads in (("given", problem["loads"]), ("heavy", heavy)):
+            answer = expect(s.get(f"/v1/jobs/{job['id']}/result?case={case}&fields=reactions,displacements,pressure"), 200).json
+            near(answer, answer_of(s, {"problem": {**problem, "loads": loads}})[1], name, case)
+
+
+def test_refined_and_verified(s):
+    for name, request in SCENES.items():
+        _, known = answer_of(s, request)
+        job, rough = answer_of(s, {**request, "solver": {"accuracy": "quick"}})
+        reply = s.request("POST", f"/v1/jobs/{job['id']}/refine", {"accuracy": {"relative_error": 1e-7}},
+                          {**WAIT, "Content-Type": "application/json"})
+        better = expect(reply, 200).json
+        check(better["summary"]["outcome"] == "converged", name, better)
+        near(expect(s.get(f"/v1/jobs/{better['id']}/result?fields=reactions"), 200).json, known, name, "refined")
+        given = {"problem": request["problem"], "solver": {"accuracy": {"relative_error": 1e-6}},
+                 "answer": {key: known[key] for key in ("displacements", "reactions")}}
+        verdict = s.request("POST", "/v1/verify", given, {**WAIT, "Content-Type": "application/json"})
+        if "loose" in name:  # an answer from elsewhere is looked at only where supports hold the body
+            expect(verdict, 422, "free_body")
+            continue
+        check(expect(verdict, 200).json["summary"]["outcome"] == "verified", name, verdict)
+        given["answer"]["reactions"] = [1.01 * r for r in known["reactions"]]
+        verdict = s.request("POST", "/v1/verify", given, {**WAIT, "Content-Type": "application/json"})
+        check(expect(verdict, 200).json["summary"]["outcome"] == "not_verified", name, verdict)
+
+
+def test_pictures_and_fields(s):
+    for name, request in SCENES.items():
+        job, answer = answer_of(s, request)
+        result = expect(s.get(f"/v1/jobs/{job['id']}/result?fields=displacements,reactions,gaps,pressure,stress"), 200).json
+        check(len(result["pressure"]) == len(result["gaps"]) == len(result["contact_nodes"]), name)
+        check(max(result["pressure"]) == answer["summary"]["contact"]["max_pressure"], name)
+        for path in ("deformed.svg", "convergence.svg", "result.vtu"):
+            reply = expect(s.get(f"/v1/jobs/{job['id']}/{path}"), 200)
+            check(len(reply.body) > 500 and b">nan" not in reply.body and b'"nan' not in reply.body and b" nan" not in reply.body, name, path)
+
+
+if __name__ == "__main__":
+    service.main(globals())
