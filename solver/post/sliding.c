@@ -18,7 +18,9 @@
 static int64_t place_now(const uz_contact_sites *now, const uz_contact_sites *before, int64_t place)
 {
     int64_t low = 0, high = now->n;
-    if (!before->at || (place < now->n && now->at[place] == before->at[place]))
+    if (!before->at)
+        return place < now->n ? place : -1;
+    if (place < now->n && now->at[place] == before->at[place])
         return place;
     while (low < high) {
         const int64_t middle = (low + high) / 2;
