@@ -170,6 +170,7 @@ typedef struct {
     const char *job_id, *summary; /* summary: JSON text, embedded as it is */
     const char *case_name;        /* NULL: none */
     int dim;
+    bool own_rows;           /* contact_nodes are of this case, not of all */
     bool part;               /* only a part of the vectors was asked for: */
     int64_t from;            /* the entry that it begins with */
     int64_t m, n_u, n_nodes; /* lengths of reactions and gaps, displacements, nodes (in doubles) */

@@ -101,6 +101,8 @@ void codec_results_add(codec_results *all, const codec_result *one)
     text_string(&all->t, "name", one->case_name);
     text_raw(&all->t, "summary", one->summary);
     put_fields(&all->t, one);
+    if (one->own_rows)
+        put_vector(&all->t, "contact_nodes", one->contact_nodes, one->m, 0);
     text_close(&all->t, '}');
 }
 

@@ -48,7 +48,7 @@ bool results_exist(const job *j, http_reply *reply)
 }
 
 /* Vectors of the store and the fields that need them: what each case has of its own, then what the job has once. */
-enum { REACTIONS, GAPS, RAY, PRESSURE, DISPLACEMENTS, DIM, CONTACT_NODES, NODES, VECTORS };
+enum { REACTIONS, GAPS, RAY, PRESSURE, DISPLACEMENTS, OWN_NODES, DIM, CONTACT_NODES, NODES, VECTORS };
 static const struct {
     const char *name;
     unsigned fields; /* 0: all */
@@ -57,6 +57,7 @@ static const struct {
                      {"ray", UZ_FIELD_REACTIONS},
                      {"pressure", UZ_FIELD_PRESSURE},
                      {"displacements", UZ_FIELD_DISPLACEMENTS},
+                     {"contact_nodes", BY_ROW}, /* of a case with rows of its own */
                      {"dim", 0},
                      {"contact_nodes", BY_ROW},
                      {"nodes", BY_NODE}};
@@ -137,10 +138,11 @@ static codec_result as_encoded(const place *at, const vectors *own, const vector
                       .summary = at->summary,
                       .case_name = at->name,
                       .dim = shared->x[DIM] && shared->n[DIM] == 1 ? (int)shared->x[DIM][0] : 0,
-                      .m = own->x[REACTIONS]  ? own->n[REACTIONS]
-                           : own->x[GAPS]     ? own->n[GAPS]
-                           : own->x[PRESSURE] ? own->n[PRESSURE]
-                                              : shared->n[CONTACT_NODES],
+                      .m = own->x[REACTIONS]   ? own->n[REACTIONS]
+                           : own->x[GAPS]      ? own->n[GAPS]
+                           : own->x[PRESSURE]  ? own->n[PRESSURE]
+                           : own->x[OWN_NODES] ? own->n[OWN_NODES]
+                                               : shared->n[CONTACT_NODES],
                       .n_u = own->n[DISPLACEMENTS],
                       .n_nodes = shared->n[NODES],
                       .reactions = own->x[REACTIONS],
@@ -150,7 +152,10 @@ static codec_result as_encoded(const place *at, const vectors *own, const vector
                       .fields = computed,
                       .displacements = own->x[DISPLACEMENTS],
                       .nodes = shared->x[NODES],
-                      .contact_nodes = shared->x[CONTACT_NODES]};
+                      .contact_nodes = own->x[OWN_NODES] ? own->x[OWN_NODES] : shared->x[CONTACT_NODES],
+                      .own_rows = own->x[OWN_NODES] != NULL};
+    if (r.m != (own->x[OWN_NODES] ? own->n[OWN_NODES] : shared->n[CONTACT_NODES]))
+        r.contact_nodes = NULL;
     if (fields->part) {
         const double **rows[] = {&r.gaps, &r.pressure, &r.ray, &r.contact_nodes, &r.reactions};
         int64_t size = r.dim > 0 ? r.dim : 1, m = r.m;
@@ -186,7 +191,7 @@ static void reply_one(api *context, const http_request *rq, const place *at, con
     }
     store_status status = fetch(context, at, fields, &shared, DIM, NODES);
     if (status == STORE_OK)
-        status = fetch(context, at, fields, &own, REACTIONS, DISPLACEMENTS);
+        status = fetch(context, at, fields, &own, REACTIONS, OWN_NODES);
     if (status == STORE_OK) {
         const uz_fields part = cut_computed(&computed, fields);
         codec_result result = as_encoded(at, &own, &shared, which ? &part : NULL, fields);
@@ -260,7 +265,7 @@ static bool add_case(many *of, size_t i, http_reply *reply)
         const int64_t numbers = (f->contact_status ? f->m : 0) + f->n_nodes * of_node + f->n_points * (1 + f->dim + k);
         done = check_room(of->context, of->j, of->count, of->fields, (int64_t)of->count * numbers, reply);
     }
-    store_status status = done ? fetch(of->context, &at, of->fields, &own, REACTIONS, DISPLACEMENTS) : STORE_OK;
+    store_status status = done ? fetch(of->context, &at, of->fields, &own, REACTIONS, OWN_NODES) : STORE_OK;
     if (status != STORE_OK) {
         reply_store_failure(of->context, status, reply);
         done = false;

@@ -19,6 +19,15 @@ static void add_vector(answer_parts *to, const char *name, const double *data, i
     v->count = count;
 }
 
+static bool add_contact_nodes(answer_parts *to, const uz_result *result)
+{
+    to->contact_nodes = calloc((size_t)result->m + 1, sizeof *to->contact_nodes);
+    for (int64_t i = 0; i < result->m && to->contact_nodes; i++)
+        to->contact_nodes[i] = (double)result->mesh.contact_node[i];
+    add_vector(to, "contact_nodes", to->contact_nodes, result->m);
+    return to->contact_nodes != NULL;
+}
+
 /* The mesh is the same for all cases: dim, nodes, contact_nodes; cells where they were chosen, which the request does
  * not say. */
 static bool add_places(answers *a, answer_parts *to, const uz_result *result, bool is_scene)
@@ -31,15 +40,15 @@ static bool add_places(answers *a, answer_parts *to, const uz_result *result, bo
     for (int i = 0; result->grids && i < 3; i++)
         a->cells[i] = (double)result->grids->cells[i];
     add_vector(to, "cells", result->grids ? a->cells : NULL, 3);
-    if (!result->mesh.contact_node)
-        return true;
-    a->contact_nodes = calloc((size_t)result->m + 1, sizeof *a->contact_nodes);
-    if (!a->contact_nodes)
-        return false;
-    for (int64_t i = 0; i < result->m; i++)
-        a->contact_nodes[i] = (double)result->mesh.contact_node[i];
-    add_vector(to, "contact_nodes", a->contact_nodes, result->m);
-    return true;
+    return !result->mesh.contact_node || add_contact_nodes(to, result);
+}
+
+/* Of cases whose contacts move, each may have rows of its own. */
+static bool has_own_rows(const uz_result *result, const uz_result *first)
+{
+    const size_t size = (size_t)first->m * sizeof *first->mesh.contact_node;
+    return result->place && (result->m != first->m ||
+                             (size > 0 && memcmp(result->mesh.contact_node, first->mesh.contact_node, size) != 0));
 }
 
 /* ---- history */
@@ -75,8 +84,10 @@ static const char *origin_name(uz_origin origin)
     return origin == UZ_FROM_STATE ? "continued" : origin == UZ_FROM_REACTIONS ? "warm" : "zero";
 }
 
-static bool build_one(answers *a, int64_t i, const uz_result *result, const codec_request *request, const starts *from)
+static bool build_one(answers *a, int64_t i, uz_result *const *results, const codec_request *request,
+                      const starts *from)
 {
+    const uz_result *result = results[i];
     bool is_scene = request->problem.kind == UZ_PROBLEM_SCENE;
     bool has_earlier = from->histories != NULL && result->summary.origin == UZ_FROM_STATE;
     answer_parts *parts = &a->parts[i];
@@ -99,6 +110,8 @@ static bool build_one(answers *a, int64_t i, const uz_result *result, const code
             trade_join(&trade, &from->trades[i]);
         add_vector(parts, TRADE_VECTOR, parts->trade, trade_pack(parts->trade, &trade));
     }
+    if (has_own_rows(result, results[0]) && !add_contact_nodes(parts, result))
+        return false;
     const char *name = request->problem.n_cases > 0 ? request->problem.cases[i].name : NULL;
     return parts->summary && judge(&parts->summary, request, name, false, a->findings) &&
            add_history(parts, &result->history, has_earlier ? from->histories[i] : NULL,
@@ -160,7 +173,7 @@ bool answers_build(answers *out, store_outcome *outcome, uz_result *const *resul
     if (!has_cases)
         add_waiting(&results[0]->summary.timings, queue_s, parse_s);
     for (int64_t i = 0; ok && i < out->n; i++)
-        ok = build_one(out, i, results[i], request, from);
+        ok = build_one(out, i, results, request, from);
     if (ok && has_cases)
         return build_whole(out, outcome, results, request, queue_s, parse_s);
     ok = ok && add_places(out, &out->parts[0], results[0], request->problem.kind == UZ_PROBLEM_SCENE);
@@ -173,6 +186,7 @@ static void clear_parts(answer_parts *parts)
     free(parts->summary);
     free(parts->history);
     free(parts->state);
+    free(parts->contact_nodes);
 }
 
 void answers_clear(answers *a)
@@ -183,6 +197,5 @@ void answers_clear(answers *a)
     free(a->parts);
     free(a->cases);
     free(a->findings);
-    free(a->contact_nodes);
     *a = (answers){.n = 0};
 }

@@ -13,7 +13,7 @@
 /* What one case, or the job, leaves; owns everything but the vectors that are the result's own. */
 typedef struct {
     char *summary;
-    double *history, *state;
+    double *history, *state, *contact_nodes; /* the last: of a case with rows of its own */
     double trade[TRADE_NUMBERS];
     store_vector vectors[ANSWER_VECTORS];
     size_t n_vectors;
@@ -26,7 +26,7 @@ typedef struct {
     answer_parts shared;     /* with cases: the job's own summary, and what all cases have in common */
     store_answer *cases;     /* n_cases */
     codec_finding *findings; /* of the request's assertions, over all cases */
-    double dim, cells[3], *contact_nodes;
+    double dim, cells[3];
 } answers;
 
 /* Fills outcome->whole and outcome->cases from the results, which must outlive them. False: no memory. The caller

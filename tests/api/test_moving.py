@@ -43,6 +43,29 @@ def test_a_block_slid_along_a_bump(s):
             expect(s.get(f"/v1/jobs/{name}/{of}"), 200)
 
 
+def test_cases_have_rows_of_their_own(s):
+    """A block of 4 cells hangs by springs over a bar; one load leaves it, the other pushes it along, to other nodes."""
+    nodes = [[x, y] for y in (0, 1) for x in range(13)] + [[1.1 + 1.3 * x, 1 + y] for y in (0, 1) for x in range(5)]
+    quads = [[x, x + 1, x + 14, x + 13] for x in range(12)] + [[26 + x, 27 + x, 32 + x, 31 + x] for x in range(4)]
+    groups = {"floor": {"nodes": list(range(13))}, "bar": {"edges": [[x, x + 1] for x in range(13, 25)]},
+              "under": {"edges": [[x, x + 1] for x in range(26, 30)]}, "lid": {"edges": [[x, x + 1] for x in range(31, 35)]},
+              "block": {"elements": list(range(12, 16))}}
+    push = [{"on": "lid", "pressure": 1}]
+    aside = [{"on": "block", "body_force": [2, 0]}]
+    body = {"problem": {"kind": "scene", "model": "plane_strain", "mesh": {"nodes": nodes, "elements": {"quad4": quads}, "groups": groups},
+                        "materials": [{"on": "all", "young": 1000, "poisson": 0.3}], "kinematics": "moving",
+                        "supports": [{"on": "floor", "ux": 0, "uy": 0}, {"on": "lid", "spring": [0.9, 0.01]}],
+                        "contacts": [{"on": "bar", "with": "under"}]},
+            "cases": [{"name": "pushed", "loads": push}, {"name": "aside", "loads": push + aside}]}
+    name, whole = answer(s, body)
+    rows = [len(case["reactions"]) for case in whole["cases"]]
+    check(len(whole["contact_nodes"]) == rows[0] and "contact_nodes" not in whole["cases"][0], rows)
+    check(whole["cases"][1]["summary"]["contact"]["geometry"]["kinematics"] == "moving", whole["cases"][1]["summary"])
+    check(len(whole["cases"][1]["contact_nodes"]) == rows[1] and whole["cases"][1]["contact_nodes"] != whole["contact_nodes"], rows)
+    one = s.get(f"/v1/jobs/{name}/result?case=aside").json
+    check(one["contact_nodes"] == whole["cases"][1]["contact_nodes"] and len(one["reactions"]) == rows[1], one)
+
+
 def test_what_moves_is_not_verified(s):
     name, moving = answer(s, bump("moving"))
     vectors = s.get(f"/v1/jobs/{name}/result?fields=displacements,reactions").json
