@@ -27,10 +27,24 @@ typedef struct {
     double poisson, density, expansion;
 } uz_body_material;
 
+/* A place inside a side of a group, where rows at its nodes alone would let a rigid obstacle in (node_to_obstacle.c).
+ */
+typedef struct {
+    uz_face face;
+    int nodes, corners;
+    int64_t node[UZ_FACE_NODES];
+    double share[UZ_FACE_NODES]; /* of each node in the place: its shape function there */
+    double linear[4];            /* the same of the corners alone, as if the side had no others */
+    double x[3], back;           /* it was looked for in the side set back by this: x is there, and ... */
+    double curve;                /* of a hole with straight sides: how far behind them x is, too */
+    double gap, normal[3];       /* ... `back` is taken off the gap; undeformed, also where there is no row */
+    double size;                 /* the longest distance between nodes of the side, halved on quadratic ones */
+} uz_inner_place;
+
 /* Where the nodes of one contact's group stand to its obstacle, before anything moves. A plane needs none of this. */
 typedef struct {
-    int64_t n;      /* nodes of the group; 0: a plane */
-    double *gap;    /* n; INFINITY: the node has no place on the obstacle, so no row */
+    int64_t n;      /* nodes of the group, and places inside its sides; 0: a plane */
+    double *gap;    /* n; INFINITY: the place has no row, as a node that meets no face */
     double *normal; /* n x dim: unit normals of the obstacle, towards the body */
     int64_t *first; /* another part of the body, else NULL: n + 1, into node and weight */
     int64_t *node;  /* the nodes of the face that each node meets ... */
@@ -40,6 +54,8 @@ typedef struct {
      * acts on; NULL: the nodes of the group. Is `with` the slave? */
     int64_t *at;
     double *area;
+    int64_t n_inner;       /* a rigid obstacle: so many of the n, the last ones, are inside sides */
+    uz_inner_place *inner; /* n_inner */
     int64_t *ends; /* n x 2: of a middle of a face's edge the places of the edge's ends, as for row_ends; else -1 */
     bool swapped;
     uz_contact_surface surface[2]; /* what `on` and `with` are taken for */
@@ -66,7 +82,7 @@ typedef struct {
     double *place;       /* n_nodes x dim: the displacement at which the sites are found; NULL: before anything moves */
     bool is_place;       /* of uz_body_model_move: all but sites, rows and `place` is another model's */
     const uz_law *law;   /* of the contacts */
-    int64_t n_pair_rows; /* contact rows against another part of the body */
+    int64_t n_pair_rows; /* contact rows on several nodes: against another part of the body, or inside a side */
     int64_t *row_place;  /* m: the place of each row in the sites of its contact */
     int64_t *row_ends; /* m x 2: of a row whose node is a middle of eight-node faces, the rows of the ends of its edge,
                         * else -1; NULL: there are no such rows. See contact_rows.c */
@@ -129,6 +145,10 @@ void uz_restrict_nodal(double *u, const uz_body_model *model, const double *noda
 double uz_along_dof(const uz_body_model *model, int64_t node, int c, const double *v);
 const char *uz_dof_name(const uz_body_model *model, int64_t node, int c);
 double uz_dof_rounding(const uz_body_model *model, int64_t node, const double *v);
+
+/* The place of a row that stands inside a side; NULL: it is at a node. Such a row is told by the node nearest to it in
+ * shares (info.contact_node), and its reaction is a force on all nodes of the side by their shares. */
+const uz_inner_place *uz_row_inner(const uz_body_model *model, int64_t row);
 
 /* Bytes of all that the model holds. */
 size_t uz_body_model_bytes(const uz_body_model *model);

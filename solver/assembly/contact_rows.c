@@ -60,7 +60,7 @@ static uz_status count_rows(int64_t *entries, int64_t *most_places, uz_body_mode
             if (!uz_contact_row_at(&row, &in, i) || !moves_something(model, &row))
                 continue;
             model->m++;
-            model->n_pair_rows += row.masters > 0;
+            model->n_pair_rows += row.masters > 0 || row.slaves > 1;
             *entries += (int64_t)model->mesh.dim * (row.slaves + row.masters);
         }
         if (model->m > UZ_SCENE_MAX_DOFS)
@@ -182,7 +182,8 @@ static void list_ends(uz_body_model *model, const uz_group *group, int64_t *row_
     for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++)
         row_of[uz_group_node_at(group, i)] = -1;
     for (int64_t row = first; row < end; row++)
-        row_of[model->info.contact_node[row]] = row;
+        if (!uz_row_inner(model, row))
+            row_of[model->info.contact_node[row]] = row;
     for (int64_t f = 0; f < group->n_faces; f++) {
         int64_t node[UZ_FACE_NODES];
         if (!has_eight_nodes(&model->mesh, group->face[f]))

@@ -47,6 +47,13 @@ bool uz_contact_row_at(uz_contact_row *row, const uz_contact_input *in, int64_t 
     return found;
 }
 
+const uz_inner_place *uz_row_inner(const uz_body_model *model, int64_t row)
+{
+    const uz_contact_sites *sites = model->sites ? &model->sites[model->info.contact_of[row]] : NULL;
+    const int64_t inner = sites ? model->row_place[row] - (sites->n - sites->n_inner) : -1;
+    return sites && sites->n_inner > 0 && inner >= 0 ? &sites->inner[inner] : NULL;
+}
+
 uz_status uz_find_sites(uz_body_model *model, const uz_body_model *rest, const uz_scene *scene, uz_error *err)
 {
     const int64_t n = model->mesh.n_nodes * model->mesh.dim;

@@ -230,7 +230,7 @@ uz_status uz_choose_frames(uz_body_model *model, const uz_scene *scene, uz_error
         status = uz_contact_input_of(&in, model, scene, k, err);
         for (int64_t i = 0; status == UZ_OK && i < uz_discretization_of(in.contact)->places(&in); i++) {
             uz_contact_row row;
-            if (uz_contact_row_at(&row, &in, i))
+            if (uz_contact_row_at(&row, &in, i) && row.slaves == 1) /* a row of several nodes has none of its own */
                 choose_frame(model, chosen, row.node, row.normal);
         }
     }

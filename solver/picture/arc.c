@@ -86,9 +86,12 @@ uz_status uz_contact_arc(double *arc, unsigned *part, const uz_body_model *model
             }
         /* Rows [first, last) are those of one contact. */
         for (int64_t i = first; i < last; i++) {
-            const int64_t node = w.model->info.contact_node[i];
+            const uz_inner_place *inner = uz_row_inner(model, i);
+            const int64_t node = inner ? inner->node[0] : w.model->info.contact_node[i];
             const bool reached = !isnan(w.at[node]);
             arc[i] = reached ? w.at[node] : w.length;
+            if (inner && reached) /* on its way from the first corner to the second */
+                arc[i] += inner->linear[1] * distance(&model->mesh, node, inner->node[1]);
             part[i] = reached ? w.part[node] : w.parts;
         }
     }

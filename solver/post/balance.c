@@ -67,12 +67,19 @@ static void add_contacts(balance *b)
         const int64_t k = info->contact_of[row], node = info->contact_node[row], place = model->row_place[row];
         const uz_contact_sites *sites = model->sites && model->sites[k].first ? &model->sites[k] : NULL;
         const bool swapped = model->sites && model->sites[k].swapped; /* `on` is pushed back */
+        const uz_inner_place *inner = uz_row_inner(model, row);
         double f[DIM] = {0};
-        for (int c = 0; c < b->dim; c++) {
+        for (int c = 0; c < b->dim; c++)
             f[c] = -b->r[row] * info->contact_normal[row * b->dim + c];
-            b->contact[node * b->dim + c] += f[c];
+        for (int a = 0; a < (inner ? inner->nodes : 1); a++) {
+            const int64_t at = inner ? inner->node[a] : node;
+            double part[DIM] = {0};
+            for (int c = 0; c < b->dim; c++) {
+                part[c] = (inner ? inner->share[a] : 1) * f[c];
+                b->contact[at * b->dim + c] += part[c];
+            }
+            add_force(b, swapped ? NULL : &b->out->contacts[k], at, part);
         }
-        add_force(b, swapped ? NULL : &b->out->contacts[k], node, f);
         for (int64_t j = sites ? sites->first[place] : 0; sites && j < sites->first[place + 1]; j++) {
             double back[DIM] = {0};
             for (int c = 0; c < b->dim; c++) {

@@ -10,9 +10,19 @@
 uz_status uz_balance_forces(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                             const double *r, uz_error *err);
 
+/* Contact with a rigid obstacle that is narrower than the mesh can tell (coarse.c), of the scene's contacts the worst.
+ */
+typedef struct {
+    int64_t contact, sides, node; /* sides: how many it touches; contact -1: there is none; node: one of a side there */
+    double depth;                 /* > 0: the obstacle stands so deep in a side that has no row inside */
+    double part;                  /* else the part of the contact's force that it carries */
+} uz_coarse_contact;
+uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *model, const uz_scene *scene,
+                                 const double *u, const double *r, uz_error *err);
+
 /* Adds to out->warnings what makes the answer doubtful. sliding: of uz_measure_sliding. */
 uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                         double sliding, uz_error *err);
+                         const double *r, double sliding, uz_error *err);
 /* Takes one back that turned out to be without ground. */
 void uz_drop_warning(uz_evaluation *out, const char *code);
 

@@ -7,7 +7,8 @@
  * the mean of p around the corner, weighted with psi_a. On linear sides this is reaction over tributary area; on
  * quadratic ones half of what a middle carries counts for each end of its edge, and the middle gets the mean of the two
  * ends. So a uniform pressure is found exactly, the total force is kept, reactions <= 0 give pressures >= 0, and
- * neither the corners of six-node triangles, which carry nothing, nor the 1 : 4 : 1 of a three-node edge make p jump.
+ * neither the corners of six-node triangles, which carry nothing, nor the 1 : 4 : 1 of a three-node edge make p jump. A
+ * reaction at a place x inside a side counts for its corners by psi_a(x), and the pressure there lies between theirs.
  */
 #include "post/parts.h"
 
@@ -62,6 +63,20 @@ static double pressure_at(const pressure_work *w, int64_t node)
     return 0.5 * (first + second);
 }
 
+/* Corners that a support holds have no row. */
+static double pressure_inside(const pressure_work *w, const uz_inner_place *inner)
+{
+    double sum = 0, shares = 0;
+    for (int a = 0; a < inner->corners; a++) {
+        const int64_t node = inner->node[a];
+        if (!w->has_row[node] || !(w->area[node] > 0))
+            continue;
+        sum += inner->linear[a] * w->force[node] / w->area[node];
+        shares += inner->linear[a];
+    }
+    return shares > 0 ? sum / shares : (double)NAN;
+}
+
 uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
                               uz_error *err)
 {
@@ -85,6 +100,11 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
         done = add_sides(&w, model, group);
         for (int64_t i = first; done && i < last; i++) {
             const int64_t node = model->info.contact_node[i], *end = w.end ? w.end + 2 * node : NULL;
+            const uz_inner_place *inner = uz_row_inner(model, i);
+            for (int a = 0; inner && a < inner->corners; a++)
+                w.force[inner->node[a]] -= inner->linear[a] * r[i];
+            if (inner)
+                continue;
             const bool middle = end && end[0] > 0;
             w.has_row[node] = true;
             for (int k = 0; k < 2 && middle; k++)
@@ -93,7 +113,8 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
                 w.force[node] -= r[i];
         }
         for (int64_t i = first; done && i < last; i++)
-            pressure[i] = pressure_at(&w, model->info.contact_node[i]);
+            pressure[i] = uz_row_inner(model, i) ? pressure_inside(&w, uz_row_inner(model, i))
+                                                 : pressure_at(&w, model->info.contact_node[i]);
         for (int64_t i = 0; i < uz_group_node_count(&model->mesh, group); i++) {
             const int64_t node = uz_group_node_at(group, i);
             w.area[node] = w.force[node] = 0;

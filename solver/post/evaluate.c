@@ -86,7 +86,8 @@ uz_status uz_evaluate(uz_result *result, const uz_body_model *model, const uz_sc
         return status;
     e->approach = uz_contact_approach(e->strain_energy, pressed, e->overlap, e->n_contacts);
     status = uz_measure_sliding(&summary->geometry.sliding, model, scene, result->u, result->r, e->approach, err);
-    return status == UZ_OK ? uz_find_doubts(e, model, scene, result->u, summary->geometry.sliding, err) : status;
+    return status == UZ_OK ? uz_find_doubts(e, model, scene, result->u, result->r, summary->geometry.sliding, err)
+                           : status;
 }
 
 /* ---- what the mesh loses, of an answer that is there */

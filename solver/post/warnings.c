@@ -24,7 +24,7 @@ static const double LOCKS = 0.45;
 typedef struct {
     const uz_body_model *model;
     const uz_scene *scene;
-    const double *u;
+    const double *u, *r;
     double sliding;
     uz_evaluation *out;
 } doubts;
@@ -266,6 +266,20 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
         }
         uz_obstacle_free(obstacle);
     }
+    uz_coarse_contact coarse = {.contact = -1};
+    if (status == UZ_OK)
+        status = uz_find_coarse_contact(&coarse, d->model, d->scene, d->u, d->r, err);
+    if (coarse.contact >= 0 && coarse.depth > 0)
+        warn(d->out, "coarse_contact", (double)coarse.sides,
+             "the obstacle of contact %lld stands %.3g deep in %lld sides between their nodes, as at node %lld, and "
+             "meets no resistance there; use finer sides, or rows inside them",
+             (long long)coarse.contact, coarse.depth, (long long)coarse.sides, (long long)coarse.node);
+    else if (coarse.contact >= 0)
+        warn(
+            d->out, "coarse_contact", (double)coarse.sides,
+            "%.0f %% of the force of contact %lld are carried where it is narrower than three sides (%lld sides touch, "
+            "as at node %lld): force and pressure there depend on the mesh; refine it there",
+            100 * coarse.part, (long long)coarse.contact, (long long)coarse.sides, (long long)coarse.node);
     if (behind >= 0)
         warn(d->out, "obstacle_behind", away,
              "all faces of contact %lld look away from its obstacle and never meet it; its normal must point to the "
@@ -326,9 +340,9 @@ void uz_drop_warning(uz_evaluation *out, const char *code)
 }
 
 uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
-                         double sliding, uz_error *err)
+                         const double *r, double sliding, uz_error *err)
 {
-    const doubts d = {model, scene, u, sliding, out};
+    const doubts d = {model, scene, u, r, sliding, out};
     const double noticed = 0.25 * fmin(MOST_STRAIN, MOST_ROTATION);
     if (!(slope_by_range(&d) < 0.99 * noticed) && largest_slope(&d) > noticed)
         look_at_elements(&d);

@@ -57,8 +57,9 @@ bool uz_may_omit_rows(const uz_problem *problem)
     if (problem->kind != UZ_PROBLEM_SCENE || scene->all_candidates)
         return false;
     for (int64_t k = 0; k < scene->n_contacts; k++)
-        rows += scene->source == UZ_MESH_GIVEN ? given_nodes(&scene->given, scene->contacts[k].on)
-                                               : box_nodes(&scene->box, scene->contacts[k].on);
+        rows += (scene->contacts[k].kind == UZ_OBSTACLE_PLANE ? 1 : 3) * /* sides may have one more each */
+                (scene->source == UZ_MESH_GIVEN ? given_nodes(&scene->given, scene->contacts[k].on)
+                                                : box_nodes(&scene->box, scene->contacts[k].on));
     return rows > FEW_ROWS;
 }
 

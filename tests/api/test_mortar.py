@@ -250,7 +250,7 @@ def test_refusals_name_the_place(s):
     refused(lambda p: p["contacts"][0].update({"feature_angle": 0}), "/contacts/0/feature_angle")
     refused(lambda p: p["contacts"][0].update({"obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}),
             "/contacts/0", "obstacle")
-    refused(lambda p: p["contacts"].append({"on": "high", "discretization": "surfaces",
+    refused(lambda p: p["contacts"].append({"on": "high", "smooth": False,
                                             "obstacle": {"plane": {"point": [0, 0], "normal": [0, 1]}}}),
             "/contacts/1", "with")
 

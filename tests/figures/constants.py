@@ -79,6 +79,8 @@ PHRASES = {
     "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None,
     # rules of the program
     "A node of which less than 5 % is covered": constant(0.05, r"LEAST_COVER ([\d.]+)"),
+    "by more than 1 % of its length": constant(0.01, r"#define SLACK ([\d.]+)"),
+    "to be 2 % of its length deep": constant(0.02, r"#define SINK +([\d.]+)"),
     "from Poisson's ratio 0.4 on, except in plane stress": constant(0.4, r"#define NEARLY_INCOMPRESSIBLE ([\d.]+)"),
     "the default there, is 5 %": constant(5e-2, r"UZ_BALANCED_TOTAL_ERROR ([\de.-]+)"), "the paper's body 5 % takes": None, "cells, and 2 % takes": None,  # asked for
     "start near an obstacle (2 % of the body's extent": constant(0.02, r"UZ_CANDIDATES_REACH ([\d.]+)"),

@@ -1,0 +1,211 @@
+/* coarse.c: is the contact with a rigid obstacle too narrow for the mesh?
+ *
+ * A row on one node, or on one place inside a side, stands for all of the contact around it: the force depends on the
+ * side's length then, and the pressure on nothing else. A side is covered where it is in contact (at a place or a
+ * middle inside, or at all corners) and so is what surrounds it: each of its corners touches, or all sides there are in
+ * contact. A row that no side around it is covered beside is on its own. Where the obstacle turns by little along the
+ * side it is none of the mesh's doing: a corner of the body stands on flat ground. */
+#include "post/balance.h"
+
+#include "core/alloc.h"
+#include "core/error.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Sides along which the obstacle's normal turns by less than this (rad) see it as flat: 12 of them to its radius. */
+#define LEAST_TURN 0.08
+/* Part of a contact's force that rows on their own may carry. */
+#define LONE_PART 0.1
+/* An obstacle stands in a side where it is deeper than this part of it. */
+#define STANDS_IN 0.01
+
+/* By node and by side of the contact at hand. */
+typedef struct {
+    const uz_body_model *model;
+    const uz_group *group;
+    const double *u, *r;
+    int64_t first, last;              /* rows */
+    int64_t *row_of;                  /* n_nodes: 1 + the row at a node */
+    int32_t *sides, *touching;        /* n_nodes: sides around it, and those in contact */
+    bool *active, *covered;           /* n_nodes: has its row a reaction? is a side around it covered? */
+    unsigned char *in_contact, *turn; /* by side */
+} contact_sides;
+
+/* The nodes of a side, its corners first. */
+static int nodes_of(int64_t node[UZ_FACE_NODES], int *corners, const contact_sides *on, int64_t face)
+{
+    const int count = uz_mesh_face(node, &on->model->mesh, on->group->face[face]);
+    *corners = on->model->mesh.dim == 2 ? 2 : count % 4 == 0 ? 4 : 3;
+    return count;
+}
+
+/* Does the obstacle's normal turn from one corner to another? */
+static bool turns(const contact_sides *on, const int64_t *node, int corners)
+{
+    const int dim = on->model->mesh.dim;
+    double most = 0;
+    for (int a = 0; a < corners; a++)
+        for (int b = 0; b < a; b++) {
+            const int64_t i = on->row_of[node[a]] - 1, j = on->row_of[node[b]] - 1;
+            double chord = 0;
+            for (int c = 0; c < dim && i >= 0 && j >= 0; c++)
+                chord = hypot(chord, on->model->info.contact_normal[i * dim + c] -
+                                         on->model->info.contact_normal[j * dim + c]);
+            most = fmax(most, chord);
+        }
+    return most > LEAST_TURN;
+}
+
+/* Fills what is by node and by side. */
+static void look_at_sides(contact_sides *on)
+{
+    const uz_body_model *model = on->model;
+    int64_t node[UZ_FACE_NODES], row = on->first;
+    int corners;
+    while (row < on->last && !uz_row_inner(model, row)) {
+        on->row_of[model->info.contact_node[row]] = row + 1;
+        on->active[model->info.contact_node[row]] = model->law->kind->active(model->law, NULL, &on->r[row], 1) > 0;
+        row++;
+    }
+    for (int64_t f = 0; f < on->group->n_faces; f++) {
+        const int count = nodes_of(node, &corners, on, f);
+        const uz_inner_place *inner = row < on->last ? uz_row_inner(model, row) : NULL;
+        bool all = true, inside = false;
+        for (int a = 0; a < corners; a++)
+            all = all && on->active[node[a]];
+        for (int a = corners; a < count; a++)
+            all = all || on->active[node[a]];
+        if (inner && inner->face.element == on->group->face[f].element && inner->face.side == on->group->face[f].side)
+            inside = model->law->kind->active(model->law, NULL, &on->r[row++], 1) > 0;
+        on->in_contact[f] = all || inside;
+        on->turn[f] = turns(on, node, corners);
+        for (int a = 0; a < count; a++) {
+            on->sides[node[a]]++;
+            on->touching[node[a]] += on->in_contact[f];
+        }
+    }
+    for (int64_t f = 0; f < on->group->n_faces; f++) {
+        const int count = nodes_of(node, &corners, on, f);
+        bool covered = on->in_contact[f];
+        for (int a = 0; a < corners; a++)
+            covered = covered && (on->active[node[a]] || on->touching[node[a]] == on->sides[node[a]]);
+        for (int a = 0; a < count && covered; a++)
+            on->covered[node[a]] = true;
+    }
+}
+
+/* Force, and sides, of rows on their own; and of all. */
+static void add_lone_rows(uz_coarse_contact *out, contact_sides *on, int64_t contact)
+{
+    const uz_body_model *model = on->model;
+    double force = 0, lone = 0, largest = 0;
+    int64_t node[UZ_FACE_NODES], sides = 0, at = -1, row = on->first;
+    int corners;
+    for (int64_t i = on->first; i < on->last; i++) {
+        force += fabs(on->r[i]);
+        row += !uz_row_inner(model, i);
+    }
+    for (int64_t f = 0; f < on->group->n_faces; f++) {
+        const int count = nodes_of(node, &corners, on, f);
+        const uz_inner_place *inner = row < on->last ? uz_row_inner(model, row) : NULL;
+        double here = 0, most = 0;
+        bool covered = false;
+        if (inner && inner->face.element == on->group->face[f].element && inner->face.side == on->group->face[f].side)
+            here = fabs(on->r[row++]);
+        for (int a = 0; a < count; a++) {
+            const int64_t own = on->row_of[node[a]] - 1;
+            covered = covered || on->covered[node[a]];
+            most = fmax(most, own >= 0 && !on->covered[node[a]] ? fabs(on->r[own]) : 0);
+        }
+        here = covered ? 0 : here;
+        if (!on->turn[f] || !(here + most > 0))
+            continue;
+        sides++;
+        lone += here;
+        for (int a = 0; a < count; a++) { /* of each node once */
+            const int64_t own = on->row_of[node[a]] - 1;
+            if (own < 0 || on->covered[node[a]] || on->sides[node[a]] == 0)
+                continue;
+            lone += fabs(on->r[own]);
+            on->sides[node[a]] = 0;
+        }
+        if (fmax(here, most) > largest) {
+            largest = fmax(here, most);
+            at = node[0];
+        }
+    }
+    if (!(lone > LONE_PART * force) || out->sides > sides)
+        return;
+    *out = (uz_coarse_contact){.contact = contact, .sides = sides, .node = at, .part = lone / force};
+}
+
+/* Places inside sides that have no row, where the obstacle stands in the side. */
+static void add_deep_sides(uz_coarse_contact *out, const contact_sides *on, int64_t contact)
+{
+    const uz_contact_sites *sites = &on->model->sites[contact];
+    const int dim = on->model->mesh.dim;
+    double deepest = 0;
+    int64_t sides = 0, at = -1;
+    for (int64_t i = 0; i < sites->n_inner; i++) {
+        const uz_inner_place *inner = &sites->inner[i];
+        double gap = inner->gap;
+        if (isfinite(sites->gap[sites->n - sites->n_inner + i]))
+            continue;
+        for (int a = 0; a < inner->nodes; a++)
+            for (int c = 0; c < dim; c++)
+                gap += inner->share[a] * inner->normal[c] *
+                       (on->u[inner->node[a] * dim + c] -
+                        (on->model->place ? on->model->place[inner->node[a] * dim + c] : 0));
+        if (!(-gap > STANDS_IN * inner->size))
+            continue;
+        sides++;
+        at = -gap > deepest ? inner->node[0] : at;
+        deepest = fmax(deepest, -gap);
+    }
+    if (deepest > out->depth)
+        *out = (uz_coarse_contact){.contact = contact, .sides = sides, .node = at, .depth = deepest};
+}
+
+uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *model, const uz_scene *scene,
+                                 const double *u, const double *r, uz_error *err)
+{
+    const int64_t n = model->mesh.n_nodes;
+    int64_t row = 0;
+    bool room = true;
+    *out = (uz_coarse_contact){.contact = -1, .node = -1};
+    for (int64_t k = 0; k < scene->n_contacts && room; k++) {
+        contact_sides on = {.model = model, .u = u, .r = r, .first = row};
+        while (row < model->m && model->info.contact_of[row] == k)
+            row++;
+        on.last = row;
+        on.group = uz_mesh_group(&model->mesh, scene->contacts[k].on, "", NULL);
+        if (scene->contacts[k].kind == UZ_OBSTACLE_PLANE || scene->contacts[k].kind == UZ_OBSTACLE_BODY || !on.group ||
+            on.group->n_faces == 0)
+            continue;
+        on.row_of = uz_alloc_zero(n, sizeof *on.row_of);
+        on.sides = uz_alloc_zero(n, sizeof *on.sides);
+        on.touching = uz_alloc_zero(n, sizeof *on.touching);
+        on.active = uz_alloc_zero(n, sizeof *on.active);
+        on.covered = uz_alloc_zero(n, sizeof *on.covered);
+        on.in_contact = uz_alloc_zero(on.group->n_faces, 1);
+        on.turn = uz_alloc_zero(on.group->n_faces, 1);
+        room = on.row_of && on.sides && on.touching && on.active && on.covered && on.in_contact && on.turn;
+        if (room) {
+            look_at_sides(&on);
+            add_deep_sides(out, &on, k);
+            if (!(out->depth > 0))
+                add_lone_rows(out, &on, k);
+        }
+        free(on.row_of);
+        free(on.sides);
+        free(on.touching);
+        free(on.active);
+        free(on.covered);
+        free(on.in_contact);
+        free(on.turn);
+    }
+    return room ? UZ_OK
+                : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the sides of %lld contacts",
+                          (long long)scene->n_contacts);
+}
