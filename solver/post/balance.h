@@ -20,7 +20,8 @@ typedef struct {
 uz_status uz_find_coarse_contact(uz_coarse_contact *out, const uz_body_model *model, const uz_scene *scene,
                                  const double *u, const double *r, uz_error *err);
 
-/* Adds to out->warnings what makes the answer doubtful. sliding: of uz_measure_sliding. */
+/* Adds to out->warnings what makes the answer doubtful. Reads out->overlap and ->approach; sliding: of
+ * uz_measure_sliding. */
 uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const uz_scene *scene, const double *u,
                          const double *r, double sliding, uz_error *err);
 /* Takes one back that turned out to be without ground. */

@@ -39,6 +39,7 @@ typedef struct {
     const double *u;
     const uz_mortar_geometry *geometry;
     bool smooth;           /* are offsets part of the contact? */
+    bool plane;            /* is the obstacle one? Then straight sides are deepest at their nodes */
     uz_obstacle *obstacle; /* NULL: two bodies */
     flank flank[2];
     uz_overlap *out;
@@ -209,14 +210,12 @@ static void search(work *w, place *p, double local[2])
 static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
 {
     static const double EDGE[7][2] = {{0}, {-0.25}, {0.25}, {-0.5}, {0.5}, {-0.75}, {0.75}};
-    static const double TRIANGLE[7][2] = {{1. / 3, 1. / 3}, {1. / 6, 1. / 6}, {2. / 3, 1. / 6}, {1. / 6, 2. / 3},
-                                          {0.5, 0},         {0.5, 0.5},       {0, 0.5}};
-    static const double QUAD[9][2] = {{0, 0},    {-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5},
-                                      {0, -0.9}, {0.9, 0},     {0, 0.9},    {-0.9, 0}};
+    static const double TRIANGLE[4][2] = {{1. / 3, 1. / 3}, {1. / 6, 1. / 6}, {2. / 3, 1. / 6}, {1. / 6, 2. / 3}};
+    static const double QUAD[5][2] = {{0, 0}, {-0.6, -0.6}, {0.6, -0.6}, {0.6, 0.6}, {-0.6, 0.6}};
     const int dim = w->model->mesh.dim;
     const uz_mortar_side *side = &w->flank[k].still.side[i];
     const uz_side shape = uz_mortar_side_of(side, w->model);
-    const int corners = uz_face_corners(dim, side->nodes), count = corners == 4 ? 9 : 7;
+    const int corners = uz_face_corners(dim, side->nodes), count = dim == 2 ? 7 : corners == 4 ? 5 : 4;
     const double(*at)[2] = dim == 2 ? EDGE : corners == 3 ? TRIANGLE : QUAD;
     place p = {.k = k, .i = i};
     double N[UZ_FACE_NODES], middle[3] = {0}, moved[3 * UZ_FACE_NODES], best, deepest[2];
@@ -240,7 +239,9 @@ static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
     }
     best = p.gap;
     memcpy(deepest, at[0], sizeof deepest);
-    if (w->obstacle) { /* the point of the side that is closest to where the obstacle is closest to its middle */
+    const bool nodes_only = w->plane && side->nodes == corners && !(w->smooth && off > 0);
+    if (w->obstacle &&
+        !nodes_only) { /* the point of the side that is closest to where the obstacle is closest to its middle */
         uz_foot foot;
         for (int a = 0; a < side->nodes; a++)
             for (int c = 0; c < dim; c++)
@@ -252,7 +253,7 @@ static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
             memcpy(deepest, foot.local, sizeof deepest);
         }
     }
-    for (int q = 1; q < count + side->nodes; q++) {
+    for (int q = nodes_only ? count : 1; q < count + side->nodes; q++) {
         const double *local = q < count ? at[q] : uz_side_local_nodes(&shape)[q - count];
         if (q >= count && seen[side->place[q - count]]++)
             continue;
@@ -263,7 +264,7 @@ static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
         }
     }
     p.gap = best;
-    if (w->obstacle && best < 0.25 * p.size)
+    if (w->obstacle && !nodes_only && best < 0.25 * p.size)
         search(w, &p, deepest);
 }
 
@@ -282,6 +283,7 @@ static uz_status look_at_contact(uz_overlap *out, const uz_body_model *moved, co
     uz_status status = UZ_OK;
     *out = (uz_overlap){.depth = NAN};
     whole.faceted = false; /* what facets stand for is wanted in every case, of the deformed ones in none */
+    w.plane = contact->kind == UZ_OBSTACLE_PLANE;
     w.smooth = !contact->faceted && (!pair || contact->between == UZ_CONTACT_SURFACES);
     uz_contact faceted = *contact;
     faceted.faceted = true;

@@ -15,6 +15,12 @@ static const double MOST_ROTATION = 0.1, MOST_STRAIN = 0.05;
 /* The least cosine between normals that point the same way: not those of faces along the obstacle. */
 static const double AWAY = 0.1;
 
+/* In parts of the approach: of facets (five sides across a contact of curves leave 2 %), and of an overlap. Answers
+ * that are right leave 1 % of overlap, wrong ones more than a quarter. */
+static const double MOST_FACETS = 0.05, MOST_OVERLAP = 0.1;
+/* Of the reaction at a node: what goes to other nodes than the one that it meets. */
+static const double MOST_MISMATCH = 0.05;
+
 /* Poisson's ratio from which on plain linear elements are much too stiff: on Cook's membrane in plane strain quad4 has
  * 17 % too little energy there (element/stiffness.c). */
 static const double LOCKS = 0.45;
@@ -300,6 +306,58 @@ static uz_status look_at_contact(const doubts *d, uz_error *err)
     return status;
 }
 
+/* ---- what the rows leave out */
+
+/* Nodes against faces do not pass the patch test where the meshes do not match: the pressure goes up and down by 5 to
+ * 30 per cent however fine they are. */
+static void look_at_mismatch(const doubts *d, int64_t k, int64_t *row)
+{
+    const uz_mesh_info *info = &d->model->info;
+    const uz_law *law = d->model->law;
+    const uz_contact_sites *sites = &d->model->sites[k];
+    const uz_contact *contact = &d->scene->contacts[k];
+    double most = 0;
+    for (; *row < d->model->m && info->contact_of[*row] == k; ++*row) {
+        const int64_t i = d->model->row_place[*row];
+        double largest = 0;
+        if (contact->kind != UZ_OBSTACLE_BODY || contact->between != UZ_CONTACT_NODES ||
+            law->kind->active(law, NULL, &d->r[*row], 1) == 0)
+            continue;
+        for (int64_t j = sites->first[i]; j < sites->first[i + 1]; j++)
+            largest = fmax(largest, sites->weight[j]);
+        most = fmax(most, 1 - largest);
+    }
+    if (most > MOST_MISMATCH)
+        warn(d->out, "nodes_against_faces", most,
+             "nodes of \"%.30s\" press between nodes of \"%.30s\": pressures go up and down by 5 to 30 %%, also on "
+             "finer meshes; use surfaces",
+             contact->on, contact->with);
+}
+
+/* Facets that stand for smooth surfaces, and overlap that nothing else explains. */
+static void look_at_overlap(const doubts *d, int64_t k)
+{
+    static const char *const REASONS[] = {"facets",        "coarse_contact", "free_form",
+                                          "feature_angle", UZ_WARN_SLIDING,  "deep_overlap"};
+    const uz_overlap *o = &d->out->overlap[k];
+    const double approach = d->out->approach, scale = fmax(approach, o->depth);
+    bool explained = false;
+    if (d->scene->contacts[k].kind == UZ_OBSTACLE_BODY && o->facets_left > MOST_FACETS * scale)
+        warn(d->out, "facets", o->facets_left / scale,
+             "facets of contact %lld are off their smooth surface by %.2g, with an approach of %.2g and an overlap of "
+             "%.2g; smooth, or refine",
+             (long long)k, o->facets_left, approach, o->depth);
+    for (int i = 0; i < d->out->n_warnings; i++)
+        for (size_t j = 0; j < sizeof REASONS / sizeof REASONS[0]; j++)
+            explained = explained || strcmp(d->out->warnings[i].code, REASONS[j]) == 0;
+    if (o->depth > fmax(MOST_OVERLAP * approach, 1e-9 * d->model->mesh.extent) && !explained)
+        warn(
+            d->out, "overlap", o->depth / (approach > 0 ? approach : o->side),
+            "the surfaces of contact %lld stand %.2g deep in each other, with an approach of %.2g: what is between the "
+            "rows is not resisted; refine there",
+            (long long)k, o->depth, approach);
+}
+
 /* ---- mesh */
 
 static void look_at_mesh(const doubts *d)
@@ -348,5 +406,10 @@ uz_status uz_find_doubts(uz_evaluation *out, const uz_body_model *model, const u
         look_at_elements(&d);
     look_at_mesh(&d);
     look_at_surfaces(&d);
-    return look_at_contact(&d, err);
+    const uz_status status = look_at_contact(&d, err);
+    for (int64_t k = 0, row = 0; k < scene->n_contacts && status == UZ_OK; k++) {
+        look_at_mismatch(&d, k, &row);
+        look_at_overlap(&d, k);
+    }
+    return status;
 }

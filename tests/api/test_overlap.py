@@ -1,0 +1,120 @@
+"""How deep deformed surfaces stand in each other, and that no contact is wrong in silence.
+usage: test_overlap.py BUILD_DIR [FILTER]"""
+# not under ThreadSanitizer: about answers, not about threads
+import copy
+import json
+import math
+import pathlib
+
+import service
+from service import check, expect
+from two_bodies import body
+
+WAIT = {"Prefer": "wait=120"}
+SCENES = pathlib.Path(__file__).resolve().parent.parent / "data" / "scenes"
+
+
+def scene(name, **contact):
+    """A request of tests/data/scenes, with other keys of its contacts."""
+    request = json.loads((SCENES / f"{name}.json").read_text(encoding="utf-8"))
+    for one in request["problem"]["contacts"]:
+        one.update(contact)
+    return request
+
+
+def stacked(**contact):
+    """A block on another whose mesh does not match, under a pressure of 1."""
+    return body(["quad4", "quad4"], [(5, 3), (7, 4)], [lambda x, y: (10 * x, 5 * y), lambda x, y: (10 * x, 5 + 5 * y)],
+                {"low": [(0, "top")], "high": [(1, "bottom")], "left": [(0, "left"), (1, "left")],
+                 "bottom": [(0, "bottom")], "top": [(1, "top")]},
+                model="plane_strain", materials=[{"on": "all", "young": 1000, "poisson": 0.3}],
+                supports=[{"on": "left", "ux": 0}, {"on": "bottom", "uy": 0}], loads=[{"on": "top", "pressure": 1}],
+                contacts=[{"on": "low", "with": "high", **contact}])
+
+
+def ellipse_in_hole(kind, **contact):
+    """A quarter of a shaft of elliptic section, too thick by 0.01, in a hole of that section: no shape that is known."""
+    def ring(inner, outer):
+        def place(x, y, z):
+            r, angle = inner + (outer - inner) * x, math.pi / 2 * y
+            return 1.3 * r * math.cos(angle), r * math.sin(angle), 2 * z
+        return place
+    return body([kind, kind], [(2, 7, 1), (2, 5, 1)], [ring(10, 20.01), ring(20, 30)],
+                {"shaft": [(0, "x1")], "hub": [(1, "x0")], "flat": [(0, "y0"), (1, "y0")],
+                 "side": [(0, "y1"), (1, "y1")], "ends": [(0, "z0"), (1, "z0"), (0, "z1"), (1, "z1")]},
+                model="solid", materials=[{"on": "all", "young": 210000, "poisson": 0.3}],
+                supports=[{"on": "flat", "uy": 0}, {"on": "side", "ux": 0}, {"on": "ends", "uz": 0}],
+                contacts=[{"on": "shaft", "with": "hub", **contact}])
+
+
+def summary_of(s, request):
+    job = expect(s.post(request, WAIT), 200).json
+    check(job["status"] == "successful", job.get("error"))
+    return job["summary"]
+
+
+def warned(summary):
+    return {one["code"]: one["value"] for one in summary["warnings"]}
+
+
+def test_no_wrong_contact_is_silent(s):
+    """The problems that answered `converged` wrongly, with the remedy switched off; each warning has its number."""
+    nodes = {"discretization": "nodes"}
+    for request, code, least in ((stacked(**nodes), "nodes_against_faces", 0.2),
+                                 (scene("faceted_press_fit", **nodes), "facets", 0.5),
+                                 (scene("faceted_press_fit", smooth=False), "facets", 1),
+                                 (scene("coarse_side_on", **nodes), "overlap", 0.3),
+                                 (ellipse_in_hole("tet4", smooth=False), "facets", 0.5)):
+        found = warned(summary_of(s, request))
+        check(found.get(code, 0) > least, code, found)
+    request = scene("slide_over_bump")
+    request["problem"]["kinematics"] = "fixed"
+    found = warned(summary_of(s, request))
+    check(found.get("sliding", 0) > 0.1, found)
+    found = warned(summary_of(s, scene("obstacle_between_nodes", **nodes)))
+    check(found.get("coarse_contact", 0) >= 1, found)
+
+
+def test_what_is_right_is_not_warned_of(s):
+    for request in (stacked(), stacked(smooth=False), scene("faceted_press_fit"), scene("coarse_side_on")):
+        summary = summary_of(s, request)
+        contact = summary["contact"]
+        check(contact["geometric_penetration"] < 0.01 * contact["approach"], contact)
+        check(not {"facets", "nodes_against_faces", "overlap"} & set(warned(summary)), summary["warnings"])
+
+
+def test_facets_are_told_apart_from_overlap(s):
+    """The hub's 11 facets on a quarter of R = 20 have a sagitta of R (1 - cos(pi / 44)), whether smoothed or not; only
+    where they are not do they stand in each other by a good part of it."""
+    sagitta = 20 * (1 - math.cos(math.pi / 44))
+    for smooth in (True, False):
+        contact = summary_of(s, scene("faceted_press_fit", smooth=smooth))["contact"]
+        one, = contact["penetrations"]
+        check(abs(one["sagitta"] / sagitta - 1) < 2e-3, one, sagitta)
+        check(contact["geometric_penetration"] == one["geometric_penetration"], contact)
+        check(abs(math.hypot(*one["at"]) - 20) < 0.1, one)
+        if smooth:
+            check(abs(contact["approach"] / 0.005 - 1) < 0.01, contact)
+            check(one["geometric_penetration"] < 0.01 * 0.005, one)
+        else:
+            check(one["geometric_penetration"] > 0.2 * sagitta, one)
+
+
+def test_both_sides_are_looked_at(s):
+    """A roller pushed 0.1 into a block whose few nodes are not near it: it is the roller's points that tell the depth."""
+    request = scene("coarse_side_on", discretization="nodes")
+    contact = summary_of(s, request)["contact"]
+    check(abs(contact["geometric_penetration"] - 0.1) < 1e-3, contact)
+    check(contact["approach"] == 0 and contact["active"] == 0, contact)
+
+
+def test_two_contacts_are_measured_each(s):
+    request = copy.deepcopy(scene("slide_over_bump"))
+    request["problem"]["contacts"] += [{"on": "left", "obstacle": {"plane": {"point": [-100, 0], "normal": [1, 0]}}}]
+    contact = summary_of(s, request)["contact"]
+    check(len(contact["penetrations"]) == 2, contact)
+    check(contact["penetrations"][1]["geometric_penetration"] == 0, contact)
+    check("at" not in contact["penetrations"][1], contact)
+
+
+service.main(globals())
