@@ -151,6 +151,25 @@ TEST(every_allocation_for_obstacles_may_fail)
     CHECK(fail_each(to_qp, &s) > 25);
     CHECK(fail_each(uz_scene_check, &s) > 25);
     contact->x = contact->y = NULL;
+    /* A circle between the two nodes: a row inside the side; and where the body has moved down on it. */
+    const double down[8] = {0, -0.02, 0, -0.02, 0, -0.02, 0, -0.02};
+    contact->kind = UZ_OBSTACLE_ROUND;
+    contact->point[0] = 0.5;
+    contact->point[1] = -0.1;
+    contact->radius = 0.11;
+    for (int k = 0; k < 2; k++) {
+        uz_body_model model = build_body(&s);
+        const uz_inner_place *inner = uz_row_inner(&model, model.m - 1);
+        CHECK(model.m == 3 && inner && !uz_row_inner(&model, 0));
+        CHECK_REL(inner->share[0] + inner->share[1], 1.0, 1e-15);
+        CHECK_REL(inner->share[0], 0.5, 1e-9);
+        CHECK_REL(inner->gap, k == 0 ? -0.01 : -0.03, 1e-9);
+        CHECK_REL(model.info.contact_area[2], model.info.contact_area[0] + model.info.contact_area[1], 1e-12);
+        uz_body_model_clear(&model);
+        CHECK(fail_each(to_qp, &s) > 25);
+        s.place = down;
+    }
+    s.place = NULL;
     uz_scene_clear(&s);
 }
 
