@@ -22,6 +22,7 @@
 #include "core/error.h"
 #include "core/vector3.h"
 #include "linalg/linalg.h"
+#include "obstacle/candidates.h"
 #include "obstacle/projection.h"
 
 #include <math.h>
@@ -240,20 +241,28 @@ static double spacing(const uz_mortar_side *side, int dim)
     return side->nodes > (dim == 2 ? 2 : triangle ? 3 : 4) ? length / 2 : length;
 }
 
-/* Is the master finer than the slave where they face each other? Looked at on some of the slave's sides. */
+/* Is the master finer than the slave where they face each other? Looked at on some of the slave's sides, and only where
+ * the two are hardly farther from each other than at their nearest: what is farther away touches late or never, however
+ * fine it is. */
 static bool is_master_finer(bool *finer, side_work *work, const uz_contact_input *in, const uz_mortar_surface *slave,
                             const uz_mortar_surface *master)
 {
     enum { LOOKED_AT = 500 };
     const int dim = in->model->mesh.dim;
-    double fine[2] = {0, 0};
-    for (int64_t i = 0; i < slave->n; i += 1 + slave->n / LOOKED_AT) {
-        if (!find_points(work, in, slave, i, master))
-            return false;
-        for (int64_t g = 0; g < work->points.n; g++) {
-            const uz_mortar_point *p = &work->points.point[g];
-            fine[0] += p->weight / spacing(&slave->side[i], dim);
-            fine[1] += p->weight / spacing(&master->side[p->master], dim);
+    double fine[2] = {0, 0}, least = INFINITY;
+    for (int pass = 0; pass < 2; pass++) {
+        const double most = fmax(least, 0) + UZ_CANDIDATES_REACH * in->model->mesh.extent;
+        for (int64_t i = 0; i < slave->n; i += 1 + slave->n / LOOKED_AT) {
+            if (!find_points(work, in, slave, i, master))
+                return false;
+            for (int64_t g = 0; g < work->points.n; g++) {
+                const uz_mortar_point *p = &work->points.point[g];
+                least = fmin(least, p->gap);
+                if (pass == 0 || p->gap > most)
+                    continue;
+                fine[0] += p->weight / spacing(&slave->side[i], dim);
+                fine[1] += p->weight / spacing(&master->side[p->master], dim);
+            }
         }
     }
     *finer = fine[1] > (1 + 1e-6) * fine[0];
