@@ -22,7 +22,8 @@ TEST_PACKAGES := python3 python3-jsonschema python3-meshio curl jq openssl local
 PACKAGES += esbuild libjs-three node-d3-scale node-d3-shape
 TEST_PACKAGES += chromium chromium-driver python3-selenium python3-pil
 
-PEER_PACKAGES := coinor-libipopt-dev coinor-libclp-dev python3-numpy python3-cvxopt octave python3-siconos python3-petsc4py
+PEER_PACKAGES := coinor-libipopt-dev coinor-libclp-dev python3-numpy python3-cvxopt octave python3-siconos python3-petsc4py \
+                 calculix-ccx
 
 WARN := -Wall -Wextra -Wconversion -Wshadow -Werror
 STD  := -std=c11 -D_GNU_SOURCE
@@ -223,7 +224,7 @@ $(BUILD)/%.so: tests/preload/%.c
 
 ##@ Test
 .PHONY: test test-unit test-api test-hygiene unit-bins asan ubsan tsan fuzz ci soak valgrind guard bench bench-compare \
-        bench-size bench-deps peers extremes theory figures numbers collect page-size
+        bench-size bench-deps peers peers-contact extremes theory figures numbers collect page-size
 test: deps-test ## build and pass every test
 	@$(MAKE) --no-print-directory -s -j$$(nproc) all unit-bins $(BUILD)/guard
 	@tests/run.sh $(BUILD)
@@ -325,6 +326,10 @@ bench-deps: ## install the Debian packages that only comparisons with other solv
 peers: deps bench-deps ## the same problems by what Debian has, one certificate for all: tables and build/peers.json; SIZES="30 60", TIME=20, ONLY=, PROBLEMS=
 	@$(MAKE) --no-print-directory -s $(PEER_LAB) $(PEER_BIN)
 	@$(PYTHON) -B tests/peers/peers.py $(BUILD) $(foreach v,SIZES TIME ONLY PROBLEMS MEMORY,$(if $($(v)),$(v)="$($(v))"))
+	@$(if $(SIZES)$(ONLY)$(PROBLEMS),,$(MAKE) --no-print-directory -s peers-contact)
+
+peers-contact: bench-deps $(BUILD)/uzawad ## two bodies in contact, by CalculiX and by the daemon: a table and build/peers-contact.json
+	@$(PYTHON) -B tests/peers/calculix.py $(BUILD) $(BUILD)/peers-contact.json
 
 extremes: deps-test ## claims at the extremes, and 1,000 generated scenes of bodies that touch: tables, build/extremes.json, build/contacts.json; FILTER=name: some, FILTER=contacts: the scenes alone, SCENES=100: the first of them
 	@$(MAKE) --no-print-directory -s $(BUILD)/extremes $(BUILD)/uzawad
