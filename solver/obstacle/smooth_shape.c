@@ -154,15 +154,18 @@ static bool fits(uz_smooth_shape *s, const double *xyz, int64_t n, double size)
     double most = 0, least = INFINITY, damping = 1e-3;
     uz_smooth_shape next = *s;
     const int64_t some = n < SOME ? n : SOME;
-    for (int k = 0; k < STEPS && damping < 1e12; k++) {
+    for (int k = 0; k < STEPS && damping < 1e3; k++) {
         const uz_smooth_shape here = next;
         const double squares = step_towards(&next, xyz, n, some, damping);
         if (squares < least) {
-            damping *= 0.1;
+            const bool still = squares > (1 - 1e-6) * least;
+            damping = fmax(0.1 * damping, 1e-12);
             least = squares;
             *s = here;
+            if (still)
+                break;
         } else {
-            damping *= 10;
+            damping *= 100;
             next = *s;
             step_towards(&next, xyz, n, some, damping);
         }
