@@ -504,9 +504,11 @@ def look(scene, daemon, rng, refine=True):
     claim(other and (other["displacements"] == u if len(scene.scene["contacts"]) == 1 else off_by(u, other["displacements"]) < 1e-6),
           "exchanged:", why or off_by(u, other["displacements"]))
     uneven = zigzag(answer) if scene.dim == 2 and scene.even else 0.0
+    free_form = any(w["code"] == "free_form" for w in answer["summary"].get("warnings", []))
     if not refine:
         claim(uneven < 0.3, "zigzag", uneven)
-    else:  # what a coarse mesh is off by, a finer one is off by less
+    elif not free_form:  # facets that stand for none of the known shapes are warned of
+        # what a coarse mesh is off by, a finer one is off by less
         fine, why = daemon.answer(scene.request(1))
         finer, more = daemon.answer(scene.request(2)) if fine and abs(pushed(fine) - push) > scene.tolerance * push else (None, "")
         claim(fine and (not finer or abs(pushed(finer) - pushed(fine)) < 0.5 * abs(pushed(fine) - push)) and not more,
