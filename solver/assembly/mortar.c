@@ -92,30 +92,12 @@ static uz_status no_memory(uz_error *err)
     return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for contact between two surfaces");
 }
 
-/* Between the corners of one side; box: 2 dim. */
-static double enclose(double *box, const uz_mortar_side *side, int dim)
-{
-    double size = 0;
-    for (int c = 0; c < dim; c++) {
-        box[c] = INFINITY;
-        box[dim + c] = -INFINITY;
-        for (int a = 0; a < side->nodes; a++) {
-            box[c] = fmin(box[c], side->xyz[dim * a + c]);
-            box[dim + c] = fmax(box[dim + c], side->xyz[dim * a + c]);
-        }
-        size = hypot(size, box[dim + c] - box[c]);
-    }
-    return size;
-}
-
 uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
                                  uz_error *err)
 {
-    const int dim = in->model->mesh.dim;
     char where[96];
-    double *box = uz_alloc(group->n_faces, 6 * sizeof *box);
     *out = (uz_mortar_surface){.n = group->n_faces, .side = uz_alloc_zero(group->n_faces, sizeof *out->side)};
-    uz_status status = box && out->side ? UZ_OK : no_memory(err);
+    uz_status status = out->side ? UZ_OK : no_memory(err);
     for (int64_t i = 0; i < out->n && status == UZ_OK; i++) {
         uz_mortar_side *side = &out->side[i];
         uz_side shape;
@@ -123,18 +105,14 @@ uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input 
         uz_body_side(&shape, side->xyz, side->node, in->model, side->face);
         side->nodes = shape.nodes;
         side->area = uz_side_area(&shape);
-        enclose(box + 2 * dim * i, side, dim);
         if (side->area > 0)
             continue;
         snprintf(where, sizeof where, "/contacts/%lld", (long long)in->index);
         status = uz_fail(err, UZ_ERR_SCENE, where, "the side at node %lld of \"%.63s\" has no area, and so no normal",
                          (long long)side->node[0], group->name);
     }
-    if (status == UZ_OK)
-        status = uz_box_tree_init(&out->tree, out->n, dim, box, err);
-    if (status == UZ_OK && !uz_mortar_geometry_of(dim)->places(out, in))
+    if (status == UZ_OK && !uz_mortar_geometry_of(in->model->mesh.dim)->places(out, in))
         status = no_memory(err);
-    free(box);
     return status;
 }
 
@@ -152,6 +130,35 @@ bool uz_mortar_add_point(uz_mortar_points *points, const uz_mortar_point *p)
     }
     points->point[points->n++] = *p;
     return true;
+}
+
+/* Between the corners of one side; box: 2 dim. */
+static double enclose(double *box, const uz_mortar_side *side, int dim)
+{
+    double size = 0;
+    for (int c = 0; c < dim; c++) {
+        box[c] = INFINITY;
+        box[dim + c] = -INFINITY;
+        for (int a = 0; a < side->nodes; a++) {
+            box[c] = fmin(box[c], side->xyz[dim * a + c]);
+            box[dim + c] = fmax(box[dim + c], side->xyz[dim * a + c]);
+        }
+        size = hypot(size, box[dim + c] - box[c]);
+    }
+    return size;
+}
+
+/* Of the sides, for a surface whose sides are looked for. */
+static uz_status plant_tree(uz_mortar_surface *surface, int dim, uz_error *err)
+{
+    double *box = uz_alloc(surface->n, 6 * sizeof *box);
+    if (!box)
+        return no_memory(err);
+    for (int64_t i = 0; i < surface->n; i++)
+        enclose(box + 2 * dim * i, &surface->side[i], dim);
+    const uz_status status = uz_box_tree_init(&surface->tree, surface->n, dim, box, err);
+    free(box);
+    return status;
 }
 
 /* Room that serves one slave side after the other. */
@@ -566,8 +573,11 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
     uz_status status = uz_contact_pair_check(&in->model->mesh, in->on, in->with, in->index, err);
     before.model = in->rest;
     before.rest = NULL;
-    for (int k = 0; k < 2 && status == UZ_OK; k++)
+    for (int k = 0; k < 2 && status == UZ_OK; k++) {
         status = uz_mortar_surface_make(&surface[k], in, k == 0 ? in->on : in->with, err);
+        if (status == UZ_OK)
+            status = plant_tree(&surface[k], in->model->mesh.dim, err);
+    }
     for (int k = 0; k < 2 && status == UZ_OK && in->rest && !in->contact->faceted; k++) {
         status = uz_mortar_surface_make(&rest[k], &before, k == 0 ? in->on : in->with, err);
         surface[k].rest = &rest[k];

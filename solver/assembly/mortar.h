@@ -67,8 +67,8 @@ typedef struct {
 extern const uz_mortar_geometry uz_mortar_plane, uz_mortar_space;
 const uz_mortar_geometry *uz_mortar_geometry_of(int dim);
 
-/* The sides of a group, in its order, with tree and places; the caller clears *out in every case. Errors: UZ_ERR_SCENE
- * (a side without area), UZ_ERR_MEMORY. */
+/* The sides of a group, in its order, with places and without a tree; the caller clears *out in every case. Errors:
+ * UZ_ERR_SCENE (a side without area), UZ_ERR_MEMORY. */
 uz_status uz_mortar_surface_make(uz_mortar_surface *out, const uz_contact_input *in, const uz_group *group,
                                  uz_error *err);
 void uz_mortar_surface_clear(uz_mortar_surface *surface);
