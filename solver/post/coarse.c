@@ -40,21 +40,33 @@ static int nodes_of(int64_t node[UZ_FACE_NODES], int *corners, const contact_sid
     return count;
 }
 
-/* Does the obstacle's normal turn from one corner to another? */
+/* Does the obstacle turn along the side? Its normals at two corners say so; or a corner's gap, which is not that of the
+ * plane in which the obstacle meets another: a tooth between flat grounds. */
 static bool turns(const contact_sides *on, const int64_t *node, int corners)
 {
-    const int dim = on->model->mesh.dim;
-    double most = 0;
+    const uz_body_model *model = on->model;
+    const uz_contact_sites *sites = &model->sites[model->info.contact_of[on->first]];
+    const int dim = model->mesh.dim;
     for (int a = 0; a < corners; a++)
-        for (int b = 0; b < a; b++) {
+        for (int b = 0; b < corners; b++) {
             const int64_t i = on->row_of[node[a]] - 1, j = on->row_of[node[b]] - 1;
-            double chord = 0;
-            for (int c = 0; c < dim && i >= 0 && j >= 0; c++)
-                chord = hypot(chord, on->model->info.contact_normal[i * dim + c] -
-                                         on->model->info.contact_normal[j * dim + c]);
-            most = fmax(most, chord);
+            double chord = 0, length = 0, along = 0;
+            if (a == b || i < 0 || j < 0)
+                continue;
+            const double *normal = model->info.contact_normal + i * dim;
+            for (int c = 0; c < dim; c++) {
+                const int64_t p = node[a] * dim + c, q = node[b] * dim + c;
+                const double d =
+                    model->mesh.xyz[q] - model->mesh.xyz[p] + (model->place ? model->place[q] - model->place[p] : 0);
+                chord = hypot(chord, normal[c] - model->info.contact_normal[j * dim + c]);
+                length = hypot(length, d);
+                along += normal[c] * d;
+            }
+            const double off = sites->gap[model->row_place[j]] - sites->gap[model->row_place[i]] - along;
+            if (chord > LEAST_TURN || fabs(off) > 0.5 * LEAST_TURN * length)
+                return true;
         }
-    return most > LEAST_TURN;
+    return false;
 }
 
 /* Fills what is by node and by side. */
@@ -79,7 +91,8 @@ static void look_at_sides(contact_sides *on)
         if (inner && inner->face.element == on->group->face[f].element && inner->face.side == on->group->face[f].side)
             inside = model->law->kind->active(model->law, NULL, &on->r[row++], 1) > 0;
         on->in_contact[f] = all || inside;
-        on->turn[f] = turns(on, node, corners);
+        /* a row inside is there because the obstacle does not follow the side */
+        on->turn[f] = inside || turns(on, node, corners);
         for (int a = 0; a < count; a++) {
             on->sides[node[a]]++;
             on->touching[node[a]] += on->in_contact[f];

@@ -1,5 +1,6 @@
 """Rigid obstacles that are smaller than the sides they meet. usage: test_between.py BUILD_DIR [FILTER]"""
 # not under ThreadSanitizer: about answers, not about threads
+import itertools
 import math
 
 import service
@@ -111,6 +112,19 @@ def test_corners_between_nodes(s):
             check(result["summary"]["contact"]["force"][1] > 100, (obstacle, element, result["summary"]["contact"]))
             check(overlap(result, distance, element == "quad8") <= 0.05, overlap(result, distance, element == "quad8"))
             check("coarse_contact" in warned(result), result["summary"]["warnings"])
+
+
+def test_a_tooth_between_flat_grounds_is_narrow(s):
+    """Normals are up at all nodes; still the force on its one row, at a node or inside a side, is the mesh's."""
+    forces = {}
+    for at, n in itertools.product((50, 52.5), (20, 40)):
+        x, y = [-50, at - 0.3, at, at + 0.3, 150], [-0.9, -0.9, 0, -0.9, -0.9]
+        for name, obstacle in (("line", {"polyline": {"points": [list(p) for p in zip(x, y)]}}), ("table", {"height": {"x": x, "z": y}})):
+            result = solve(s, block(n, obstacle, top=-0.4))
+            contact = result["summary"]["contact"]
+            check(contact["active"] == 1 and warned(result).get("coarse_contact", 0) >= 1, (at, n, name, result["summary"]["warnings"]))
+            forces[at, n, name] = contact["force"][1]
+    check(all(forces[at, 20, name] > 1.1 * forces[at, 40, name] for at, n, name in forces), forces)
 
 
 def test_a_body_that_comes_upon_it(s):
