@@ -9,9 +9,10 @@
  *     w(x) = d(x) - s + sum_a N_a(x) max(0, s - d(x_a))
  *
  * is least, if that is below -SLACK times the side's size. Nodes in the obstacle are pushed out to its surface, the
- * others stay; s is 0 where the side is in it by SINK times its size already, else what it has yet to approach for
- * that, as loads that bring it there are not known here. A side that follows the obstacle, a plane or one whose radius
- * is more than 12 sides, gets none: w is -L / 8R of its length L there. The place is one of the material and stays.
+ * others stay, as do those whose way out is along the side; s is 0 where the side is in it by SINK times its size
+ * already, else what it has yet to approach for that, as loads that bring it there are not known here. A side that
+ * follows the obstacle, a plane or one whose radius is more than 12 sides, gets none: w is -L / 8R of its length L
+ * there. The place is one of the material and stays.
  *
  * Amid a ridge the nearest way out is through a flank, whose normal says nothing of the crest that stands in the side:
  * there d is that of the side set back along its normal until it is clear of the obstacle, less the way.
@@ -145,6 +146,21 @@ static void refine(deepest *of, double step)
         }
 }
 
+/* Does the way out of the obstacle lead a node into the body? On the flank of a block it leads along the side: its row
+ * leaves the block where it stands. */
+static bool leads_in(const deepest *of, int a)
+{
+    double N[UZ_FACE_NODES], x[3], along = 0;
+    uz_gap gap;
+    uz_side_shape(N, &of->side, uz_side_local_nodes(&of->side)[a]);
+    place_of(x, of, N);
+    if (uz_obstacle_gap(&gap, of->obstacle, x, NULL) != UZ_OK)
+        return true;
+    for (int c = 0; c < of->side.dim; c++)
+        along -= gap.normal[c] * of->normal[c];
+    return along > LEAST_SHARE;
+}
+
 /* The place of the least w, where the nodes' gaps are `gap`. False: nothing is below the slack. */
 static bool find_below(deepest *of, const double *gap)
 {
@@ -164,8 +180,8 @@ static bool find_below(deepest *of, const double *gap)
     const double s = fmax(0, of->least + SINK * of->size);
     bool again = isnan(of->at[0]);
     for (int a = 0; a < of->side.nodes; a++) {
-        of->pushed[a] = fmax(0, s - gap[a]);
-        again = again || of->pushed[a] > 0;
+        again = again || s > gap[a];
+        of->pushed[a] = s > gap[a] && leads_in(of, a) ? s - gap[a] : 0;
     }
     if (again) {
         of->least = of->enough = s - SLACK * of->size;

@@ -127,6 +127,15 @@ def test_a_tooth_between_flat_grounds_is_narrow(s):
     check(all(forces[at, 20, name] > 1.1 * forces[at, 40, name] for at, n, name in forces), forces)
 
 
+def test_a_block_whose_flanks_are_at_nodes(s):
+    """The nearest way out of it leads sideways there: rows at these nodes let it in, however far."""
+    for element, n, deep in itertools.product(("quad4", "quad8", "tri3"), (20, 40), (0.01, 0.1)):
+        line = [[-50, -9], [50, -9], [50, deep], [55, deep], [55, -9], [150, -9]]
+        result = solve(s, block(n, {"polyline": {"points": line}}, element, top=-0.5))
+        force = result["summary"]["contact"]["force"]
+        check(force[1] > 50, (element, n, deep, force, result["summary"]["warnings"]))
+
+
 def test_a_body_that_comes_upon_it(s):
     """Moved down by its support, the block meets what it did not touch: as if the obstacle had come up."""
     still = solve(s, block(20, CIRCLE))["summary"]["contact"]["force"][1]
