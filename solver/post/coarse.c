@@ -3,8 +3,8 @@
  * A row on one node, or on one place inside a side, stands for all of the contact around it: the force depends on the
  * side's length then, and the pressure on nothing else. A side is covered where it is in contact (at a place or a
  * middle inside, or at all corners) and so is what surrounds it: each of its corners touches, or all sides there are in
- * contact. A row that no side around it is covered beside is on its own. Where the obstacle turns by little along the
- * side it is none of the mesh's doing: a corner of the body stands on flat ground. */
+ * contact and there are several. A row that no side around it is covered beside is on its own. Where the obstacle turns
+ * by little along the side it is none of the mesh's doing: a corner of the body stands on flat ground. */
 #include "post/balance.h"
 
 #include "core/alloc.h"
@@ -102,7 +102,8 @@ static void look_at_sides(contact_sides *on)
         const int count = nodes_of(node, &corners, on, f);
         bool covered = on->in_contact[f];
         for (int a = 0; a < corners; a++)
-            covered = covered && (on->active[node[a]] || on->touching[node[a]] == on->sides[node[a]]);
+            covered = covered &&
+                      (on->active[node[a]] || (on->sides[node[a]] > 1 && on->touching[node[a]] == on->sides[node[a]]));
         for (int a = 0; a < count && covered; a++)
             on->covered[node[a]] = true;
     }

@@ -136,6 +136,19 @@ def test_a_block_whose_flanks_are_at_nodes(s):
         check(force[1] > 50, (element, n, deep, force, result["summary"]["warnings"]))
 
 
+def test_a_ball_in_a_body_of_one_side_is_narrow(s):
+    """At the edge of a body one side is all that there is around a node: that it touches says nothing of its size."""
+    forces = []
+    for element, n in (("hex20", 1), ("hex8", 1), ("hex8", 2), ("hex8", 4)):
+        result = solve(s, {"kind": "scene", "model": "solid", "mesh": {"box": {"size": [2, 2, 1], "cells": [n, n, n], "element": element}},
+                           "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                           "supports": [{"on": "front", "ux": 0, "uy": 0, "uz": -0.05}],
+                           "contacts": [{"on": "back", "obstacle": {"sphere": {"center": [1, 1, -0.2], "radius": 0.2}}}]})
+        check(result["summary"]["contact"]["active"] == 1 and "coarse_contact" in warned(result), (element, n, result["summary"]["warnings"]))
+        forces.append(result["summary"]["contact"]["force"][2])
+    check(forces[1] > 1.5 * forces[3], forces)
+
+
 def test_a_body_that_comes_upon_it(s):
     """Moved down by its support, the block meets what it did not touch: as if the obstacle had come up."""
     still = solve(s, block(20, CIRCLE))["summary"]["contact"]["force"][1]
