@@ -184,8 +184,8 @@ static double sagitta(bool *known, const work *w, const place *p)
     return *known ? most : p->size * kink / (side->nodes > corners ? 4 : 2);
 }
 
-/* From the deepest of a side's points on, in steps along its coordinates, of faces also along the third edge of a
- * triangle: obstacles may be smaller than the distance of these points. */
+/* From a point of a side on, whose gap is p->gap, in steps along its coordinates, of faces also along the third edge of
+ * a triangle: obstacles may be smaller than the distance of the points that are looked at. */
 static void search(work *w, place *p, double local[2])
 {
     static const double WAY[6][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}};
@@ -263,9 +263,16 @@ static void look_at_side(work *w, int k, int64_t i, unsigned char *seen)
             memcpy(deepest, local, sizeof deepest);
         }
     }
+    if (!w->obstacle || nodes_only || !(best < 0.25 * p.size))
+        return;
     p.gap = best;
-    if (w->obstacle && !nodes_only && best < 0.25 * p.size)
+    search(w, &p, deepest);
+    /* Nodes in contact have all the same gap; what is deepest in a face need not be beside the first of them. */
+    for (int q = 0; q < count + side->nodes && dim == 3; q++) {
+        memcpy(deepest, q < count ? at[q] : uz_side_local_nodes(&shape)[q - count], sizeof deepest);
+        look(w, &p, deepest);
         search(w, &p, deepest);
+    }
 }
 
 /* ---- contacts */

@@ -117,4 +117,18 @@ def test_two_contacts_are_measured_each(s):
     check("at" not in contact["penetrations"][1], contact)
 
 
+def test_a_ridge_in_a_face_is_measured_from_every_side(s):
+    """Five nodes in contact have the gap 0: what stands in the face away from the first of them counts as much."""
+    x, y, z = [0.93, 1.44], [0.06, 0.34, 1.27], [[-0.062, 0.002], [-0.027, -0.06], [0.029, -0.026]]
+    depths = []
+    for table in ([x, y, z], [[2 - v for v in x[::-1]], y, [row[::-1] for row in z]], [y, x, [list(row) for row in zip(*z)]]):
+        problem = {"kind": "scene", "model": "solid",
+                   "mesh": {"box": {"size": [2, 2, 1], "cells": [1, 1, 1], "element": "hex20"}},
+                   "materials": [{"on": "all", "young": 1000, "poisson": 0.3}],
+                   "supports": [{"on": "front", "ux": 0, "uy": 0, "uz": -0.025}],
+                   "contacts": [{"on": "back", "obstacle": {"height": dict(zip("xyz", table))}}]}
+        depths.append(summary_of(s, {"problem": problem})["contact"]["geometric_penetration"])
+    check(min(depths) > 0.01 and max(depths) < 1.05 * min(depths), depths)
+
+
 service.main(globals())
