@@ -122,12 +122,14 @@ TEST(patches_lie_on_an_ellipsoid)
     static const double R[3] = {3, 4, 5};
     double xyz[3 * N], at[3], normal[3], exact[3], rough[3], x[3];
     for (int i = 0; i < N; i++) {
-        const double a = 0.1 * (i % AROUND) + 0.02 * sin(3.0 * i), b = 0.1 * (double)(i / AROUND) + 0.02 * cos(5.0 * i);
+        const int column = i % AROUND, row = i / AROUND;
+        const double a = 0.1 * column + 0.02 * sin(3.0 * i), b = 0.1 * row + 0.02 * cos(5.0 * i);
         const double from[3] = {R[0] * cos(a) * cos(b), R[1] * sin(a) * cos(b), R[2] * sin(b)};
         place(xyz + 3 * i, from, 7);
     }
     for (int i = 0; i < N; i += 11) {
-        const double a = 0.1 * (i % AROUND) + 0.02 * sin(3.0 * i), b = 0.1 * (double)(i / AROUND) + 0.02 * cos(5.0 * i);
+        const int column = i % AROUND, row = i / AROUND;
+        const double a = 0.1 * column + 0.02 * sin(3.0 * i), b = 0.1 * row + 0.02 * cos(5.0 * i);
         const double n[3] = {cos(a) * cos(b) / R[0], sin(a) * cos(b) / R[1], sin(b) / R[2]};
         double others[3 * N];
         uz_smooth_patch patch;
