@@ -10,6 +10,11 @@ from two_bodies import PLANE, SOLID, body
 WAIT = {"Prefer": "wait=120"}
 
 
+def mixtures(kinds):
+    """All pairs; with a sanitizer each kind on either side once, which runs the same code."""
+    return zip(kinds, kinds[1:] + kinds[:1]) if service.INSTRUMENTED else itertools.product(kinds, kinds)
+
+
 def stacked_bricks(kinds, on, slope=0.0, warp=0.0):
     """The same in space; warp: the interface is one plane of distorted faces, others on either side."""
     def bent(x, y, by, at):
@@ -84,7 +89,7 @@ def check_uniform(answer, tolerance, *context):
 
 
 def test_patch_test_of_all_mixtures(s):
-    for kinds in itertools.product(PLANE, PLANE):
+    for kinds in mixtures(PLANE):
         check_uniform(answer_of(s, stacked(kinds, 0, "low")), 1e-10, kinds)
         check_uniform(answer_of(s, stacked(kinds, 0.3, "high")), 1e-10, kinds, "slope")
 
@@ -92,7 +97,7 @@ def test_patch_test_of_all_mixtures(s):
 def test_patch_test_of_unequal_cells(s):
     """Nodes amid the edges are off their middles: the line of an edge is then a parabola, which ends somewhere; the
     other side's shape functions are no polynomials along it, which four points do not integrate exactly."""
-    for kinds in itertools.product(PLANE, PLANE):
+    for kinds in mixtures(PLANE):
         check_uniform(answer_of(s, stacked(kinds, 0, "low", uneven=0.8)), 1e-6, kinds)
         check_uniform(answer_of(s, stacked(kinds, 0, "high", uneven=-0.8)), 1e-6, kinds)
 
@@ -105,7 +110,7 @@ def test_patch_test_of_other_models(s):
 
 
 def test_patch_test_of_all_mixtures_in_space(s):
-    for kinds in itertools.product(SOLID, SOLID):
+    for kinds in mixtures(SOLID):
         check_uniform(answer_of(s, stacked_bricks(kinds, "low")), 1e-10, kinds)
     for kinds in (("hex8", "wedge6"), ("tet10", "hex20"), ("wedge15", "tet4")):
         check_uniform(answer_of(s, stacked_bricks(kinds, "high", slope=0.3)), 1e-10, kinds, "slope")
