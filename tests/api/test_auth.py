@@ -236,7 +236,7 @@ def make_certificate(folder):
 def test_tls(s):
     cert, key = make_certificate(s.folder)
     with subprocess.Popen(s.command("--listen", "127.0.0.1:0", "--db", s.db, "--tls-cert", cert, "--tls-key", key,
-                                    "--max-body", "10K", "--request-deadline-s", "1"),
+                                    "--max-body", "10K", "--request-deadline-s", "5"),
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         line = process.stdout.readline().decode()
         try:
@@ -269,7 +269,7 @@ def test_tls(s):
             # A slow client is cut off, without plain text in the encrypted stream.
             with socket_to(port) as raw, context.wrap_socket(raw, server_hostname="127.0.0.1") as slow:
                 slow.sendall(b"GET /healthz HT")
-                slow.settimeout(10)
+                slow.settimeout(20)
                 try:
                     check(slow.recv(100) == b"", "something was said")
                 except (ssl.SSLEOFError, ConnectionResetError):
