@@ -11,6 +11,7 @@
 #define SERVER_STORE_ENGINE_H
 
 #include "base/clock.h"
+#include "store/result_blobs.h"
 #include "store/uploads.h"
 
 #include <pthread.h>
@@ -33,10 +34,7 @@ typedef struct {
     store_status (*list)(store *s, const store_query *query, job *jobs, size_t *count); /* limit + 1 of them at most */
     store_status (*get_body)(store *s, const char *id, char **body, size_t *len);
     store_status (*get_cases)(store *s, const char *id, const char *name, store_case **cases, size_t *count);
-    store_status (*get_vector)(store *s, const char *id, int64_t number, const char *name, double **x, int64_t *count);
-    store_status (*count_vectors)(store *s, const char *id, const char *name, int64_t *total);
-    store_status (*get_history)(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
-                                int64_t *columns);
+    const result_blobs *results; /* vectors and histories */
     store_status (*counts)(store *s, int64_t counts[5]);
     store_status (*webhook_next)(store *s, webhook_due *out);
     store_status (*webhooks_open)(store *s, bool *any);

@@ -261,41 +261,6 @@ store_status store_get_cases(store *s, const char *id, const char *name, store_c
     return status;
 }
 
-/* What was read in part is not shown. */
-static store_status publish_doubles(store_status status, double **x, int64_t *count)
-{
-    if (status != STORE_OK) {
-        free(*x);
-        *x = NULL;
-        *count = 0;
-    }
-    return status;
-}
-
-store_status store_get_vector(store *s, const char *id, int64_t number, const char *name, double **data, int64_t *count)
-{
-    *data = NULL;
-    *count = 0;
-    return publish_doubles(s->engine->get_vector(s, id, number, name, data, count), data, count);
-}
-
-store_status store_count_vectors(store *s, const char *id, const char *name, int64_t *total)
-{
-    *total = 0;
-    return s->engine->count_vectors(s, id, name, total);
-}
-
-store_status store_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
-                               int64_t *columns)
-{
-    *rows = NULL;
-    *count = *columns = 0;
-    store_status status =
-        publish_doubles(s->engine->get_history(s, id, number, after, rows, count, columns), rows, count);
-    *columns = status == STORE_OK ? *columns : 0;
-    return status;
-}
-
 store_status store_counts(store *s, int64_t counts[5])
 {
     memset(counts, 0, 5 * sizeof counts[0]);

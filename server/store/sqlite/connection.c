@@ -86,25 +86,19 @@ static const char *const SQL[QUERY_COUNT] = {
                           "queue_until < ?1 LIMIT 1",
     [QUERY_EXPIRE] = "UPDATE job SET status = 3, finished = ?1, error = ?2"
                      " WHERE status = 0 AND queue_until > 0 AND queue_until < ?1 RETURNING id",
-    [QUERY_ADD_BYTES] = "UPDATE job SET bytes = bytes"
-                        " + coalesce((SELECT sum(length(data)) FROM vector WHERE job = id), 0)"
-                        " + coalesce((SELECT sum(length(data)) FROM history WHERE job = id), 0) WHERE id = ?1",
+    [QUERY_ADD_BYTES] = "UPDATE job SET bytes = bytes + ?2 WHERE id = ?1",
     [QUERY_ENDED] = "SELECT count(*), coalesce(sum(bytes), 0) FROM job INDEXED BY job_by_end WHERE status >= 2",
     [QUERY_OLD_JOBS] = "SELECT id, finished, bytes FROM job INDEXED BY job_by_end WHERE status >= 2"
                        " AND NOT EXISTS (SELECT 1 FROM webhook WHERE job = id AND state = 1)"
                        " ORDER BY finished, id LIMIT ?1",
-    [QUERY_VECTOR] =
-        "SELECT version, count, data, " SUM_IS("sum", SUM_VECTOR) " FROM vector"
-                                                                  " WHERE job = ?1 AND answer = ?3 AND name = ?2"
-                                                                  " ORDER BY part",
+    [QUERY_VECTOR] = "SELECT part, version, count, 0, data, " SUM_IS(
+        "sum", SUM_VECTOR) " FROM vector WHERE job = ?1 AND answer = ?3 AND name = ?2 ORDER BY part",
     [QUERY_COUNT_VECTORS] = "SELECT coalesce(sum(count), 0) FROM vector WHERE job = ?1 AND name = ?2 AND part = 0",
     [QUERY_ANSWERS] = "SELECT number, name, summary, " SUM_IS(
         "sum", SUM_ANSWER) " FROM answer WHERE job = ?1 AND (?2 IS NULL OR name = ?2)"
                            " ORDER BY number",
-    [QUERY_HISTORY] = "SELECT version, columns, CASE WHEN last > ?2 THEN data END,"
-                      " " SUM_IS("sum", SUM_HISTORY) " FROM history WHERE job = ?1"
-                                                     " AND answer = ?3"
-                                                     " ORDER BY part",
+    [QUERY_HISTORY] = "SELECT part, version, columns, last, CASE WHEN last > ?2 THEN data END, " SUM_IS(
+        "sum", SUM_HISTORY) " FROM history WHERE job = ?1 AND answer = ?3 ORDER BY part",
     [QUERY_UPLOAD] = "SELECT bytes, created, used, (SELECT count(*) FROM upload_use WHERE upload = id) FROM upload"
                      " WHERE id = ?1",
     [QUERY_INSERT_UPLOAD] = "INSERT OR IGNORE INTO upload(id, bytes, created, used) VALUES(?1, ?2, ?3, ?3)",

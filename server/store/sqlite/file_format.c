@@ -11,8 +11,8 @@
  *   - A newer file is refused by an older program, so a column never changes its meaning silently.
  *   - Numbers that stand in rows keep their meaning: job.status is the value of job_status, 0 accepted, 1 running,
  *     2 successful, 3 failed, 4 dismissed. New values are added at the end.
- *   - Rows of doubles carry their own version, FILE_FORMAT_VECTOR_VERSION: another encoding gets another number, and
- *     the reader keeps every number it ever wrote.
+ *   - Rows of doubles carry their own version, RESULT_ENCODING (store/result_blobs.h): the reader keeps every number it
+ *     ever wrote.
  *
  * job      what a listing needs, in small rows. Times are Unix seconds, 0: not yet. lease is when the owner's claim
  * ends. finished of a running job: when it was told to end. refines is the job whose run this one continues, which may

@@ -9,7 +9,6 @@
 
 #define FILE_FORMAT_APPLICATION_ID 0x757a6177 /* "uzaw" */
 #define FILE_FORMAT_VERSION        5          /* PRAGMA user_version */
-#define FILE_FORMAT_VECTOR_VERSION 1          /* of each row of doubles: 1 is little-endian IEEE 754 binary64 */
 
 /* Why the last read of the file failed, for the person who gave its path. Valid until the next call on db. */
 const char *file_format_why_unreadable(sqlite3 *db);

@@ -93,8 +93,8 @@ store_status sqlite_read_job(statement *st, job *out);
 /* A copy of a text column; NULL for SQL NULL, and *ok false when there is no memory. */
 char *sqlite_copy_text(statement *st, int at, bool *ok);
 
-/* Inserts the vectors, the histories and the cases' answers of a job that has none. */
-store_status sqlite_insert_results(connection *c, const char *id, const store_outcome *outcome);
+/* In a transaction's connection. */
+extern const result_blobs SQLITE_RESULTS;
 
 /* ---- the operations of the engine (engine.h), by the files that have them */
 store *sqlite_open(const char *address, char *message, size_t size);
@@ -113,10 +113,6 @@ store_status sqlite_get(store *s, const char *id, job *out);
 store_status sqlite_list(store *s, const store_query *query, job *jobs, size_t *count);
 store_status sqlite_get_body(store *s, const char *id, char **body, size_t *len);
 store_status sqlite_get_cases(store *s, const char *id, const char *name, store_case **cases, size_t *count);
-store_status sqlite_get_vector(store *s, const char *id, int64_t number, const char *name, double **x, int64_t *count);
-store_status sqlite_count_vectors(store *s, const char *id, const char *name, int64_t *total);
-store_status sqlite_get_history(store *s, const char *id, int64_t number, int64_t after, double **rows, int64_t *count,
-                                int64_t *columns);
 store_status sqlite_counts(store *s, int64_t counts[5]);
 store_status sqlite_webhook_next(store *s, webhook_due *out);
 store_status sqlite_webhooks_open(store *s, bool *any);

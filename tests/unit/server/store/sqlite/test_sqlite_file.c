@@ -160,15 +160,15 @@ static const char *const FORMAT_1_ROWS =
     "INSERT INTO job(id, status, created, tags) VALUES('00000000000000000000000000000002', 0, 13.5, '[]');"
     "INSERT INTO request VALUES('00000000000000000000000000000002', CAST('{\"c\": 3}' AS BLOB));";
 
-/* The place with a file of format 1 instead of a new one; the store is closed. */
-static bool begin_old(place *p, const char *rows)
+/* The place with a file of an older format instead of a new one; the store is closed. */
+static bool begin_old(place *p, const char *tables, const char *rows)
 {
     if (!place_begin(p))
         return false;
     store_close(p->s);
     p->s = NULL;
     unlink(p->path);
-    change_file(p->path, FORMAT_1);
+    change_file(p->path, tables);
     change_file(p->path, rows);
     return true;
 }
@@ -198,7 +198,7 @@ TEST(a_file_of_format_1_is_taken_over)
     char id[33];
     job j = {0};
     bool repeated = false;
-    if (!begin_old(&p, FORMAT_1_ROWS) || !place_open(&p))
+    if (!begin_old(&p, FORMAT_1, FORMAT_1_ROWS) || !place_open(&p))
         return;
     check_old_job(&p);
     CHECK_INT(rows_in(p.path, "job WHERE bytes = 64 AND status = 2"), 1); /* 8 of the body, 4 + 3 numbers */
@@ -224,7 +224,7 @@ TEST(a_file_that_cannot_be_taken_over_stays_as_it_was)
 {
     place p;
     char message[400] = "";
-    if (!begin_old(&p, FORMAT_1_ROWS))
+    if (!begin_old(&p, FORMAT_1, FORMAT_1_ROWS))
         return;
     change_file(p.path, "CREATE TABLE answer(mine TEXT)");
     p.s = store_open(p.path, message, sizeof message);
@@ -237,7 +237,7 @@ TEST(a_file_that_cannot_be_taken_over_stays_as_it_was)
     place_end(&p);
 }
 
-/* ---- formats 2 to 4 */
+/* ---- formats 2 to 5 */
 
 /* What a format added is taken away again: what is left is the format before it, as it was written then. */
 static const char *const TO_FORMAT[] = {
@@ -321,6 +321,58 @@ static void check_taken_over(int version)
         CHECK_INT(rows_in(p.path, "request WHERE sum > 0"), 1);
         check_answer_of(p.s, ended);
         CHECK_INT(claim_id(p.s, "me", id), STORE_OK);
+    }
+    place_end(&p);
+}
+
+static void check_numbers(place *p, const char *id, int64_t number, const char *name, const double *x, int64_t count)
+{
+    double *found = NULL;
+    int64_t n = -1, columns = 1;
+    CHECK_INT(name ? store_get_vector(p->s, id, number, name, &found, &n)
+                   : store_get_history(p->s, id, number, -1, &found, &n, &columns),
+              STORE_OK);
+    CHECK(n * columns == count && found && (count == 0 || memcmp(found, x, (size_t)count * 8) == 0));
+    free(found);
+}
+
+/* The file was dumped from a database that another build wrote: its checksums and bytes are not this one's. */
+TEST(results_in_a_file_of_format_5_are_read)
+{
+    static const char ID[] = "01a206072111000025598f8f840faed2";
+    static const double GAPS[] = {0, 2, 1, -1}, HISTORY[] = {0, 1, 2, 1, 0.5, 0.25}, REACTION = 0.1;
+    place p;
+    size_t len;
+    job j = {0};
+    double *x;
+    int64_t n, columns;
+    char *dump = test_read_file("tests/data/store_format_5.sql", &len);
+    CHECK(dump != NULL);
+    if (!dump || !begin_old(&p, dump, ""))
+        return;
+    free(dump);
+    check_findings(&p, "");
+    if (place_open(&p)) {
+        CHECK_INT(store_get(p.s, ID, &j), STORE_OK);
+        CHECK(j.status == JOB_SUCCESSFUL && !j.damaged);
+        CHECK_STR(j.summary, "{\"a\": 1}");
+        job_clear(&j);
+        check_numbers(&p, ID, 0, "gaps", GAPS, 4);
+        check_numbers(&p, ID, 0, "nodes", NULL, 0);
+        check_numbers(&p, ID, 1, "reactions", &REACTION, 1);
+        check_numbers(&p, ID, 0, NULL, HISTORY, 6);
+        check_numbers(&p, ID, 2, NULL, HISTORY, 6);
+        CHECK_INT(store_get_vector(p.s, ID, 2, "reactions", &x, &n), STORE_NOT_FOUND);
+        CHECK_INT(store_get_history(p.s, ID, 1, -1, &x, &n, &columns), STORE_NOT_FOUND);
+        CHECK_INT(store_count_vectors(p.s, ID, "gaps", &n), STORE_OK);
+        CHECK_INT(n, 4);
+        /* What this build writes of the same numbers takes as many bytes. */
+        char id[33];
+        CHECK_INT(claim_id(p.s, "me", id), STORE_OK);
+        CHECK_INT(finish_with_answer(p.s, id), STORE_OK);
+        CHECK_INT(rows_in(p.path, "job WHERE bytes = 144 AND status = 2"),
+                  1);                                                         /* 8 of the body, 4 + 1 + 6 + 6 numbers */
+        CHECK_INT(rows_in(p.path, "job WHERE bytes = 56 AND status = 2"), 1); /* 8, and 3 + 3 */
     }
     place_end(&p);
 }
