@@ -36,7 +36,9 @@ SOLVER_LIBS   = -lcholmod -lcamd -lopenblas -llapacke -lgomp -lsuitesparseconfig
 SERVER_LIBS   = $(call pkg,--libs libmicrohttpd sqlite3 libcurl) $(SOLVER_LIBS) -lpthread
 CLIENT_LIBS   = $(call pkg,--libs libcurl jansson gnutls) -lm
 CFLAGS_ALL    = $(STD) $(OPT) $(WARN) $(SAN) -fno-omit-frame-pointer -pthread -MMD -MP $(INC) $(SERVER_CFLAGS) $(CFLAGS)
-LDFLAGS_ALL   = $(SAN) -pthread $(LDFLAGS)
+# The gold linker, where it is: binutils has it, and it links the test programs in an eighth of the time.
+GOLD          := $(if $(shell command -v ld.gold 2>/dev/null),-fuse-ld=gold)
+LDFLAGS_ALL   = $(SAN) -pthread $(GOLD) $(LDFLAGS)
 
 SOLVER_SRC := $(sort $(wildcard solver/*/*.c))
 SERVER_SRC := $(sort $(wildcard server/*.c server/*/*.c server/*/*/*.c))
@@ -253,8 +255,9 @@ screenshots: deps-test ## the pictures of the web page in docs, from the running
 test-hygiene: ## formatting, static analysis, both compilers
 	@tests/run.sh $(BUILD) hygiene
 
-# Each sanitizer has a build of its own inside BUILD.
-sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g" SAN="$(2)"
+# Each sanitizer has a build of its own inside BUILD. Its reports need lines and no variables: with -g1 it compiles in
+# three quarters of the time.
+sanitized = @$(MAKE) --no-print-directory -s -j$$(nproc) BUILD=$(BUILD)/$(1) OPT="-O1 -g1" SAN="$(2)"
 # Where threads are: the C tests of the server's parts and the tests of the daemon, but for those that say
 # "not under ThreadSanitizer", or "not under sanitizers" at all.
 without_tsan = $(shell grep -L 'not under \(ThreadSanitizer\|sanitizers\)' $(1))

@@ -1,4 +1,5 @@
 """Rows that contradict each other, exactly or but for rounding: what is feasible is never called infeasible."""
+# not under ThreadSanitizer: about answers, not about threads
 import json
 
 import service

@@ -1,4 +1,5 @@
 """Contact that moves, through the service: what is asked for, what is told, and all that is computed from an answer."""
+# not under ThreadSanitizer: about answers, not about threads
 import copy
 
 import service

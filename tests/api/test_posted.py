@@ -1,5 +1,6 @@
 """Random small problems from all of the range of double, judged in rational numbers; and some that were once judged wrongly.
 `python3 tests/extremes/posted.py BUILD` posts thousands."""
+# not under ThreadSanitizer: about answers, not about threads
 import sys
 
 import service

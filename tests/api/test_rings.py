@@ -1,4 +1,5 @@
 """Axisymmetric bodies: what is summed around the ring."""
+# not under ThreadSanitizer: about answers, not about threads
 import math
 
 import service
