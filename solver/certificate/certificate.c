@@ -19,7 +19,7 @@ typedef struct {
     const double *u;      /* d: the answer */
     uz_csc Nt;            /* n_b x m: N' on the dofs that N touches */
     int64_t *dof;         /* n_b: these */
-    double *u_b, *low_b;  /* n_b: u there, and in.low */
+    double *u_b;          /* n_b: u there */
     double *weight_b;     /* n_b */
     double *weight;       /* d: W = diag(K)^-1 */
     double *c;            /* d: correction, zero elsewhere */
@@ -39,10 +39,9 @@ static bool allocate(certifier *c)
         ok = (*of_d[k] = uz_alloc(c->d, sizeof(double))) && ok;
     c->c = uz_alloc_zero(c->d, sizeof(double));
     c->u_b = uz_alloc(c->n_b, sizeof(double));
-    c->low_b = uz_alloc(c->n_b, sizeof(double));
     c->weight_b = uz_alloc(c->n_b, sizeof(double));
     c->res.weight = c->weight;
-    return ok && c->c && c->u_b && c->low_b && c->weight_b;
+    return ok && c->c && c->u_b && c->weight_b;
 }
 
 static uz_status prepare(certifier *c, const uz_certify_input *in, const double *u, uz_error *err)
@@ -61,7 +60,6 @@ static uz_status prepare(certifier *c, const uz_certify_input *in, const double 
     for (int64_t b = 0; b < c->n_b; b++) {
         c->weight_b[b] = uz_dof_weight(in->K, c->dof[b]);
         c->u_b[b] = u[c->dof[b]];
-        c->low_b[b] = in->low ? in->low[c->dof[b]] : 0.0;
     }
     return UZ_OK;
 }
@@ -74,19 +72,12 @@ void uz_certify_weights(double *weight, const uz_csc *K)
 
 static void release(certifier *c)
 {
-    double *room[] = {c->res.e, c->res.e_u, c->res.Ku, c->res.Kc, c->weight, c->weight_b, c->u_b, c->low_b, c->c};
+    double *room[] = {c->res.e, c->res.e_u, c->res.Ku, c->res.Kc, c->weight, c->weight_b, c->u_b, c->c};
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
         free(room[k]);
     uz_csc_clear(&c->Nt);
     free(c->dof);
     uz_feasible_clear(&c->feasible);
-}
-
-/* Does no harm to what was asked for. */
-static bool is_sharp(const certifier *c, double square)
-{
-    const double energy = c->in->moved ? c->in->whole_norm * c->in->whole_norm : c->energy;
-    return square <= c->in->sharp * c->in->sharp * energy;
 }
 
 /* How far estimates of the inverse's norm, from single vectors that rounding made, may be below it. */
@@ -97,26 +88,26 @@ static bool is_sharp(const certifier *c, double square)
  * dearer, and the bound that pays for it may be as sharp as was asked for nevertheless. */
 #define AFFORDABLE 0.5
 
-/* ||v - u_r||_K^2 = e'K^-1 e, enlarged by what rounding may hide. e is lost. */
-static uz_status distance(certifier *c, double *square, uz_error *err)
+uz_status uz_certify_distance(double *square, const uz_certify_input *in, double *e, int64_t d, double weighted,
+                              double energy, double noise, uz_error *err)
 {
-    double inverse = c->in->inverse_bound, doubt = 0.0;
+    const double harmless = in->sharp * in->sharp * (in->moved ? in->whole_norm * in->whole_norm : energy);
+    double inverse = in->inverse_bound, doubt = 0.0;
     uz_status status = UZ_OK;
-    *square = inverse * c->weighted; /* where the norm of K^-1 is known, and good enough */
-    if (!isfinite(inverse) || !is_sharp(c, *square)) {
-        status = c->in->inverse_norm(c->in->ctx, square, c->res.e, err);
+    *square = inverse * weighted; /* where the norm of K^-1 is known, and good enough */
+    if (!isfinite(inverse) || !(*square <= harmless)) {
+        status = in->inverse_norm(in->ctx, square, e, err);
         /* a residual is rounding, in all directions alike: e'K^-1 e / e'W e is the mean of d eigenvalues */
         const double seen =
-            fmax(1.0 / fmax(c->in->rcond, DBL_MIN), c->weighted > 0.0 ? (double)c->d * (*square / c->weighted) : 0.0);
+            fmax(1.0 / fmax(in->rcond, DBL_MIN), weighted > 0.0 ? (double)d * (*square / weighted) : 0.0);
         inverse = fmin(inverse, SURELY * seen);
         /* Without a factor the solve is one of conjugate gradients, whose rounding is that of products with K. */
-        doubt = uz_bound_doubt(c->in->measure_doubt ? inverse : seen, c->d);
-        const bool harmless =
-            doubt <= UZ_BOUND_HARMLESS || (doubt <= AFFORDABLE && is_sharp(c, *square / (1.0 - doubt)));
-        if (status == UZ_OK && c->in->measure_doubt && !harmless)
-            status = c->in->measure_doubt(c->in->ctx, &doubt, err);
+        doubt = uz_bound_doubt(in->measure_doubt ? inverse : seen, d);
+        const bool small = doubt <= UZ_BOUND_HARMLESS || (doubt <= AFFORDABLE && *square / (1.0 - doubt) <= harmless);
+        if (status == UZ_OK && in->measure_doubt && !small)
+            status = in->measure_doubt(in->ctx, &doubt, err);
     }
-    *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, c->noise));
+    *square = uz_bound_enlarge(*square, doubt, uz_bound_noise(inverse, noise));
     return status;
 }
 
@@ -222,10 +213,6 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
     uz_status status = uz_equilibrium_residual(&c->res, c->in->K, c->in->N, c->in->p, c->u, c->c, r, err);
     if (status != UZ_OK)
         return status;
-    if (c->in->low_r) /* e is small beside N'r, which it is the difference of */
-        for (int64_t j = 0; j < c->d; j++)
-            for (int64_t k = c->in->N->ptr[j]; k < c->in->N->ptr[j + 1]; k++)
-                c->res.e[j] -= c->in->N->val[k] * c->in->low_r[c->in->N->idx[k]];
     add_up(c, &terms);
     double size = 0.0; /* of the correction, in the norm of W^-1 */
     for (int64_t b = 0; b < c->n_b; b++)
@@ -234,7 +221,7 @@ static uz_status conclude(certifier *c, uz_certificate *out, const double *r, co
     if (c->in->precise_energies && isfinite(terms.stiffness) && isfinite(terms.load))
         sharpen_energies(c, &terms, r, g);
     if (feasible)
-        status = distance(c, &terms.square, err);
+        status = uz_certify_distance(&terms.square, c->in, c->res.e, c->d, c->weighted, c->energy, c->noise, err);
     terms.complementarity = uz_feasible_complementarity(&c->feasible, r, true);
     terms.settled = feasible ? c->feasible.exact.length : 0.0;
     terms.pressed = terms.settled > 0.0 ? uz_feasible_complementarity(&c->feasible, r, false) : 0.0;
@@ -273,13 +260,12 @@ static uz_status measure(certifier *c, uz_certificate *out, double *r, double *g
         g[i] = uz_gap_of_row(&c->Nt, i, c->in->h, c->u_b, NULL);
     c->feasible.u = c->u_b;
     c->feasible.h = c->in->h;
-    c->feasible.low = c->in->low ? c->low_b : NULL;
     bool feasible = uz_make_feasible(&c->feasible, r);
     for (int64_t b = 0; b < c->n_b; b++)
         c->c[c->dof[b]] = c->feasible.correction[b];
     uz_status status = conclude(c, out, r, g, positive_part, feasible, err);
     const bool open = uz_feasible_complementarity(&c->feasible, r, feasible) > OPEN_SHARE * out->gap;
-    if (status != UZ_OK || !c->feasible.pushed || !open || c->in->low_r)
+    if (status != UZ_OK || !c->feasible.pushed || !open)
         return status;
     return share_reactions(c, out, r, g, positive_part, err);
 }

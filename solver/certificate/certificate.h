@@ -38,16 +38,19 @@ typedef struct {
                             */
     bool moved;            /* supports move the body; relative errors are then beside */
     double whole_norm;     /* ||u||_K with the supported dofs */
-    const double *low, *low_r; /* d, m, or NULL: of an answer in twice the digits, what u and r rounded away */
-    double sharp; /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
+    double sharp;          /* an error of ||e|| in the norm of K^-1, relative to the energy norm, that does no harm */
 } uz_certify_input;
 
 /* u (d): the answer to certify. r (m): <= 0, else its positive part counts as e3 and r is cut at 0; where rows depend
  * on each other, reactions of rows that stay open go to rows that are closed. g (m): out, the gaps of u. absolute_error
- * bounds both ||u - u*||_K and ||u_r - u*||_K, with low_r the latter of r + low_r. When no feasible v was found near u
- * the errors are INFINITY. */
+ * bounds both ||u - u*||_K and ||u_r - u*||_K. When no feasible v was found near u the errors are INFINITY. */
 uz_status uz_certify(uz_certificate *out, double *r, double *g, const double *u, const uz_certify_input *input,
                      uz_error *err);
+
+/* *square >= e'K^-1 e = ||v - u_r||_K^2, with all that the rounding of the factor and of e may hide; INFINITY: none is
+ * known. e (d) is lost; weighted: e'W e; energy: u'Ku; noise: the sum of uz_bound_noise. */
+uz_status uz_certify_distance(double *square, const uz_certify_input *input, double *e, int64_t d, double weighted,
+                              double energy, double noise, uz_error *err);
 
 /* A part of it, for answers in lanes. weight (d): W = diag(K)^-1. */
 void uz_certify_weights(double *weight, const uz_csc *K);

@@ -177,11 +177,6 @@ bool uz_make_feasible(uz_feasible *c, const double *r)
     const uz_row_exact exact = {c->Nt, c->weight, r, c->h, c->u, c->size, NEGLIGIBLE, c->correction, c->push};
     c->pushed = false;
     size_rows(c, c->u);
-    if (c->low) {
-        memcpy(c->correction, c->low, (size_t)c->d * sizeof *c->correction);
-        if (choose_rows(c, r) <= NEGLIGIBLE && settle(c))
-            return true;
-    }
     memset(c->correction, 0, (size_t)c->d * sizeof *c->correction);
     choose_rows(c, r);
     double expected = STRETCH * sum_of_moves(c);

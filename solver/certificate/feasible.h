@@ -11,7 +11,6 @@ typedef struct {
     const double *weight; /* d: W = diag(K)^-1 */
     const double *h;      /* m */
     const double *u;      /* d: the answer; it and h are set before each use */
-    const double *low;    /* d, or NULL: u + low is nearer to the exact answer; tried as a correction first */
     double *size;         /* m: what the rounding of a gap is relative to */
     double *correction;   /* d: c */
     double *push;         /* m: see below */

@@ -39,6 +39,8 @@ typedef struct {
  */
 static double sure_gap(const uz_row_settle *in, int64_t i)
 {
+    if (in->at)
+        return -INFINITY;
     double size = fabs(in->h[i]), terms = 1.0;
     for (int64_t k = in->Nt->ptr[i]; k < in->Nt->ptr[i + 1]; k++) {
         const int64_t j = in->Nt->idx[k];
@@ -60,10 +62,29 @@ static void add_product(settle *s, mpq_t sum, double x, double y)
     mpq_add(sum, sum, s->a);
 }
 
+/* The gap of row i at the given point, without delta. */
+static void take_gap_at(mpq_t gap, mpq_t term, const uz_row_settle *in, int64_t i)
+{
+    mpq_set_d(gap, in->h[i]);
+    for (int64_t k = in->Nt->ptr[i]; k < in->Nt->ptr[i + 1]; k++) {
+        mpq_set_d(term, in->Nt->val[k]);
+        mpq_mul(term, term, in->at[in->Nt->idx[k]]);
+        mpq_sub(gap, gap, term);
+    }
+}
+
 /* Is u + c, without delta, open at row i? The sum of integers times powers of two, exactly. */
 static bool is_open(const uz_row_settle *in, int64_t i)
 {
     const uz_csc *Nt = in->Nt;
+    if (in->at) {
+        mpq_t gap, room;
+        mpq_inits(gap, room, NULL);
+        take_gap_at(gap, room, in, i);
+        const bool open = mpq_sgn(gap) >= 0;
+        mpq_clears(gap, room, NULL);
+        return open;
+    }
     const int64_t first = Nt->ptr[i], n = 2 * (Nt->ptr[i + 1] - first) + 1;
     int least = INT_MAX;
     mpz_t sum, term;
@@ -98,11 +119,16 @@ static void take_gap(settle *s, int64_t i)
 {
     const uz_row_settle *in = s->in;
     mpq_set_ui(s->gap, 0, 1);
-    add_product(s, s->gap, 1.0, in->h[i]);
+    if (in->at)
+        take_gap_at(s->gap, s->a, in, i);
+    else
+        add_product(s, s->gap, 1.0, in->h[i]);
     for (int64_t k = in->Nt->ptr[i]; k < in->Nt->ptr[i + 1]; k++) {
         const int64_t j = in->Nt->idx[k];
-        add_product(s, s->gap, -in->Nt->val[k], in->u[j]);
-        add_product(s, s->gap, -in->Nt->val[k], in->c[j]);
+        if (!in->at) {
+            add_product(s, s->gap, -in->Nt->val[k], in->u[j]);
+            add_product(s, s->gap, -in->Nt->val[k], in->c[j]);
+        }
         mpq_set_d(s->b, -in->Nt->val[k]);
         mpq_mul(s->b, s->b, s->delta[j]);
         mpq_add(s->gap, s->gap, s->b);
@@ -316,7 +342,8 @@ static bool are_finite(const uz_row_settle *in, int64_t i)
     bool finite = isfinite(in->h[i]);
     for (int64_t k = in->Nt->ptr[i]; finite && k < in->Nt->ptr[i + 1]; k++) {
         const int64_t j = in->Nt->idx[k];
-        finite = isfinite(in->u[j]) && isfinite(in->c[j]) && isfinite(in->weight[j]) && in->weight[j] > 0.0;
+        finite =
+            (in->at || (isfinite(in->u[j]) && isfinite(in->c[j]))) && isfinite(in->weight[j]) && in->weight[j] > 0.0;
     }
     return finite;
 }

@@ -10,11 +10,14 @@
 
 #include "uzawa.h"
 
+#include <gmp.h>
+
 typedef struct {
     const uz_csc *Nt;     /* d x m: column i is row i of N */
     const double *weight; /* d: W > 0, diagonal */
     const double *h;      /* m */
     const double *u, *c;  /* d: rows are to be open at u + c + delta */
+    const mpq_t *at;      /* d, or NULL: instead of u + c */
     double length;        /* out: a bound on ||delta||_K for every K with the diagonal W^-1; 0: u + c needs none */
     double *gap;          /* m: where length is not 0: at least the gaps of u + c + delta */
 } uz_row_settle;

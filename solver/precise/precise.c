@@ -3,43 +3,41 @@
 #include "core/alloc.h"
 #include "core/error.h"
 
-#include <gmp.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Bits, and how many of them rounding leaves alone: numbers that are 2^-SURE of what they are the difference of are
- * zero. */
-enum { BITS = 512, SURE = 300, STEPS_PER_ROW = 20 };
+enum { STEPS_PER_ROW = 20 };
 
-bool uz_precise_is_small(int64_t d, int64_t m, double seconds)
+bool uz_precise_is_small(int64_t d, int64_t m, int bits, double seconds)
 {
-    const double n = (double)d, k = (double)m;
-    return n * n * n / 6.0 + 0.5 * n * k * (n + k) + 4.0 * k * k * k <= 1e7 * seconds;
+    const double n = (double)d, k = (double)m, longer = (double)bits / UZ_PRECISE_BITS;
+    return (n * n * n / 6.0 + 0.5 * n * k * (n + k) + 4.0 * k * k * k) * pow(longer, 1.6) <= 1e7 * seconds;
 }
 
 typedef struct {
     int64_t d, m;
-    mpf_t *L;      /* d x d, by columns, lower triangle */
-    mpf_t *B;      /* d x m, by columns */
-    mpf_t *y0;     /* d: L^-1 p */
-    mpf_t *T;      /* m x m: basic = ... + T nonbasic, of the pairs (gap, -reaction); at first D */
-    mpf_t *value;  /* m: the basic variable of the pair: -reaction in contact, else the gap */
-    mpf_t *size;   /* m: sqrt(D_ii) */
-    bool *contact; /* m */
+    int bits;
+    mp_bitcnt_t sure; /* bits that rounding leaves alone: what is 2^-sure of what it is the difference of is zero */
+    mpf_t *L;         /* d x d, by columns, lower triangle */
+    mpf_t *B;         /* d x m, by columns */
+    mpf_t *y0;        /* d: L^-1 p */
+    mpf_t *T;         /* m x m: basic = ... + T nonbasic, of the pairs (gap, -reaction); at first D */
+    mpf_t *value;     /* m: the basic variable of the pair: -reaction in contact, else the gap */
+    mpf_t *size;      /* m: sqrt(D_ii) */
+    bool *contact;    /* m */
     mpf_t a, b, sum, length;
 } tableau;
 
-/* n numbers of zero, or NULL. */
-static mpf_t *zeros(int64_t n)
+mpf_t *uz_precise_numbers(int64_t n, int bits)
 {
     mpf_t *x = uz_alloc(n, sizeof *x);
     for (int64_t i = 0; x && i < n; i++)
-        mpf_init2(x[i], BITS);
+        mpf_init2(x[i], (mp_bitcnt_t)bits);
     return x;
 }
 
-static void clear(mpf_t *x, int64_t n)
+void uz_precise_free(mpf_t *x, int64_t n)
 {
     for (int64_t i = 0; x && i < n; i++)
         mpf_clear(x[i]);
@@ -118,7 +116,7 @@ static bool condense(tableau *t, const uz_csc *K, const uz_csc *N, const double 
 static int64_t choose(tableau *t)
 {
     int64_t q = -1;
-    mpf_div_2exp(t->sum, t->length, SURE);
+    mpf_div_2exp(t->sum, t->length, t->sure);
     for (int64_t i = 0; i < t->m; i++) {
         if (t->contact[i] || mpf_sgn(t->value[i]) >= 0)
             continue;
@@ -169,7 +167,7 @@ static int64_t first_to_go(tableau *t, mpf_t step, int64_t q)
         if (t->contact[k] && mpf_cmp(t->a, t->sum) > 0)
             mpf_set(t->sum, t->a);
     }
-    mpf_div_2exp(t->sum, t->sum, SURE);
+    mpf_div_2exp(t->sum, t->sum, t->sure);
     for (int64_t k = 0; k < m; k++) {
         mpf_mul(t->a, t->T[k + q * m], t->size[k]);
         mpf_neg(t->a, t->a);
@@ -191,12 +189,12 @@ static bool admit(tableau *t, int64_t q, int64_t *steps)
     const int64_t m = t->m;
     mpf_t step, pressed;
     bool closed = false, ray = false;
-    mpf_init2(step, BITS);
-    mpf_init2(pressed, BITS);
+    mpf_init2(step, (mp_bitcnt_t)t->bits);
+    mpf_init2(pressed, (mp_bitcnt_t)t->bits);
     while (!closed && !ray && (*steps)-- > 0) {
         int64_t gone = first_to_go(t, step, q);
         mpf_mul(t->a, t->size[q], t->size[q]);
-        mpf_div_2exp(t->a, t->a, SURE);
+        mpf_div_2exp(t->a, t->a, t->sure);
         const bool stiff = mpf_cmp(t->T[q + q * m], t->a) > 0;
         if (stiff) {
             mpf_div(t->b, t->value[q], t->T[q + q * m]);
@@ -224,32 +222,27 @@ static bool admit(tableau *t, int64_t q, int64_t *steps)
     return !ray;
 }
 
-/* x to the nearest double, or nearly so, and what that leaves. */
-static double split(tableau *t, double *low, const mpf_t x)
+double uz_precise_round(const mpf_t x)
 {
     double high = mpf_get_d(x); /* cut */
-    *low = 0.0;
-    if (!isfinite(high)) /* GMP takes no such double */
+    if (!isfinite(high))        /* GMP takes no such double */
         return high;
-    mpf_set_d(t->a, high);
-    mpf_sub(t->a, x, t->a);
-    high += mpf_get_d(t->a);
-    if (!isfinite(high))
-        return high;
-    mpf_set_d(t->a, high);
-    mpf_sub(t->a, x, t->a);
-    *low = mpf_get_d(t->a);
+    mpf_t rest;
+    mpf_init2(rest, mpf_get_prec(x));
+    mpf_set_d(rest, high);
+    mpf_sub(rest, x, rest);
+    high += mpf_get_d(rest);
+    mpf_clear(rest);
     return high;
 }
 
-/* u + low = L^-T (y0 - B lambda), r + low_r = -lambda. y0 is lost. */
-static void recover(tableau *t, double *u, double *low, double *r, double *low_r)
+/* u = L^-T (y0 - B lambda), r = -lambda. y0 is lost. */
+static void recover(tableau *t, mpf_t *u, mpf_t *r)
 {
     for (int64_t i = 0; i < t->m; i++) {
-        mpf_neg(t->sum, t->value[i]);
-        r[i] = low_r[i] = 0.0;
+        mpf_set_ui(r[i], 0);
         if (t->contact[i])
-            r[i] = split(t, &low_r[i], t->sum);
+            mpf_neg(r[i], t->value[i]);
         for (int64_t j = 0; t->contact[i] && j < t->d; j++) {
             mpf_mul(t->a, t->B[j + i * t->d], t->value[i]);
             mpf_sub(t->y0[j], t->y0[j], t->a);
@@ -258,28 +251,28 @@ static void recover(tableau *t, double *u, double *low, double *r, double *low_r
     for (int64_t j = t->d - 1; j >= 0; j--) {
         subtract_products(t, t->y0[j], t->L + j + 1 + j * t->d, 1, t->y0 + j + 1, 1, t->d - j - 1);
         mpf_div(t->y0[j], t->y0[j], t->L[j + j * t->d]);
-        u[j] = split(t, &low[j], t->y0[j]);
+        mpf_set(u[j], t->y0[j]);
     }
 }
 
-uz_status uz_precise_solve(uz_precise_end *end, double *u, double *low, double *r, double *low_r, const uz_csc *K,
-                           const uz_csc *N, const double *p, const double *h, const uz_stop *stop, uz_error *err)
+uz_status uz_precise_solve(uz_precise_end *end, mpf_t *u, mpf_t *r, const uz_csc *K, const uz_csc *N, const double *p,
+                           const double *h, int bits, const uz_stop *stop, uz_error *err)
 {
     const int64_t d = K->cols, m = N->rows;
-    tableau t = {.d = d, .m = m};
+    tableau t = {.d = d, .m = m, .bits = bits, .sure = (mp_bitcnt_t)(bits / 5 * 3)};
     uz_status status = UZ_OK;
     mpf_t **room[] = {&t.L, &t.B, &t.y0, &t.T, &t.value, &t.size};
     const int64_t count[] = {d * d, d * m, d, m * m, m, m};
     bool ok = (t.contact = uz_alloc_zero(m, sizeof *t.contact)) != NULL;
     *end = UZ_PRECISE_LEFT;
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        ok = ok && (*room[k] = zeros(count[k]));
-    mpf_init2(t.a, BITS);
-    mpf_init2(t.b, BITS);
-    mpf_init2(t.sum, BITS);
-    mpf_init2(t.length, BITS);
+        ok = ok && (*room[k] = uz_precise_numbers(count[k], bits));
+    mpf_init2(t.a, (mp_bitcnt_t)bits);
+    mpf_init2(t.b, (mp_bitcnt_t)bits);
+    mpf_init2(t.sum, (mp_bitcnt_t)bits);
+    mpf_init2(t.length, (mp_bitcnt_t)bits);
     if (!ok) {
-        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows in 512 bits", (long long)m);
+        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows in %d bits", (long long)m, bits);
     } else if (condense(&t, K, N, p, h, stop)) {
         int64_t steps = STEPS_PER_ROW * (m + 1), q = choose(&t);
         bool ray = false;
@@ -291,16 +284,18 @@ uz_status uz_precise_solve(uz_precise_end *end, double *u, double *low, double *
         }
         *end = ray ? UZ_PRECISE_RAY : q < 0 ? UZ_PRECISE_SOLVED : UZ_PRECISE_LEFT;
         if (q < 0)
-            recover(&t, u, low, r, low_r);
+            recover(&t, u, r);
         for (int64_t i = 0; ray && i < m; i++) {
             mpf_mul(t.sum, t.T[i + q * m], t.size[i]);
-            mpf_div_2exp(t.b, t.size[q], SURE);
+            mpf_div_2exp(t.b, t.size[q], t.sure);
             const bool shares = t.contact[i] && mpf_cmp(t.sum, t.b) > 0;
-            r[i] = i == q ? -1.0 : shares ? -mpf_get_d(t.T[i + q * m]) : 0.0;
+            mpf_set_si(r[i], i == q ? -1 : 0);
+            if (i != q && shares)
+                mpf_neg(r[i], t.T[i + q * m]);
         }
     }
     for (size_t k = 0; k < sizeof room / sizeof room[0]; k++)
-        clear(*room[k], *room[k] ? count[k] : 0);
+        uz_precise_free(*room[k], count[k]);
     mpf_clears(t.a, t.b, t.sum, t.length, NULL);
     free(t.contact);
     return status;

@@ -99,8 +99,6 @@ uz_status uz_run_certify_input(uz_certify_input *input, uz_run *run, const uz_an
         .inverse_bound = setup->factor ? uz_setup_inverse_bound(setup, steps, K, run->work.ws, &stop) : INFINITY,
         .moved = run->load.moved,
         .whole_norm = whole_norm,
-        .low = answer->low,
-        .low_r = answer->m == run->m ? answer->low_r : NULL,
         .sharp = 0.5 * run->work.requested,
     };
     return UZ_OK;
@@ -175,7 +173,5 @@ void uz_answer_clear(uz_answer *answer)
     free(answer->u);
     free(answer->r);
     free(answer->g);
-    free(answer->low);
-    free(answer->low_r);
     memset(answer, 0, sizeof *answer);
 }

@@ -6,6 +6,7 @@
  * while the condition of K leaves any (Higham, Accuracy and Stability of Numerical Algorithms, chapter 12). The rows in
  * contact are chosen anew at the size of the correction: of rows that repeat each other up to rounding it is the
  * tightest that has to bear the reaction. */
+#include "certificate/exact.h"
 #include "certificate/residual.h"
 #include "core/alloc.h"
 #include "core/clock.h"
@@ -192,56 +193,81 @@ uz_status uz_run_refine(uz_run *run, uz_error *err)
     return status;
 }
 
-uz_status uz_run_decide(uz_run *run, uz_error *err)
+/* The answer in numbers of so many bits, if there is one, and its certificate; or a proof that there is none. *solved:
+ * there is one. p: the load, or 0: that rows contradict each other has nothing to do with it. */
+static uz_status solve_precisely(uz_run *run, bool *solved, const double *p, int bits, uz_error *err)
 {
     const uz_stop stop = {run->asked->hooks, run->asked->deadline};
-    const uz_end end = run->work.end;
-    const double before = run->answer.certificate.relative_error;
-    const bool in_vain = end == UZ_END_ITERATIONS && run->work.it.iteration >= IN_VAIN && isinf(before),
-               gave_up = end == UZ_END_UNDECIDED || end == UZ_END_STALLED || end == UZ_END_SOLVED || in_vain,
-               near = end == UZ_END_UNDECIDED || isinf(before);
-    if (run->result->ray || !gave_up || before <= fmax(run->work.requested, ROUNDED) ||
-        !uz_precise_is_small(run->d, run->m, near ? 1.0 : 0.1) || uz_stop_is_due(&stop))
-        return UZ_OK;
-    double start = uz_seconds();
-    const uz_setup *setup = run->asked->setup;
-    const uz_problem *problem = run->asked->problem;
+    const uz_csc *K = uz_setup_K(run->asked->setup, run->asked->problem),
+                 *N = uz_setup_N(run->asked->setup, run->asked->problem);
     uz_precise_end ended = UZ_PRECISE_LEFT;
+    uz_certify_input input;
     uz_answer answer = {0};
+    mpf_t *u = uz_precise_numbers(run->d, bits), *r = uz_precise_numbers(run->m, bits);
     uz_status status = uz_answer_allocate(&answer, run->d, run->m, err);
-    if (status == UZ_OK && !((answer.low = uz_alloc_zero(run->d, sizeof *answer.low)) &&
-                             (answer.low_r = uz_alloc_zero(run->m, sizeof *answer.low_r))))
+    if (status == UZ_OK && !(u && r))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
     if (status == UZ_OK)
-        status = uz_precise_solve(&ended, answer.u, answer.low, answer.r, answer.low_r, uz_setup_K(setup, problem),
-                                  uz_setup_N(setup, problem), run->load.p, run->load.h, &stop, err);
+        status = uz_precise_solve(&ended, u, r, K, N, p, run->load.h, bits, &stop, err);
+    for (int64_t i = 0; status == UZ_OK && i < run->m; i++)
+        answer.r[i] = uz_precise_round(r[i]);
     if (status == UZ_OK && ended == UZ_PRECISE_RAY)
         status = uz_run_take_ray(run, answer.r, err);
-    /* the digits below those of r only where the request needs them: the bound is not that of r alone then */
-    double *low_r = answer.low_r;
-    answer.low_r = NULL;
-    if (status == UZ_OK && ended == UZ_PRECISE_SOLVED)
+    *solved = ended == UZ_PRECISE_SOLVED;
+    if (status == UZ_OK && *solved && p == run->load.p) {
+        for (int64_t j = 0; j < run->d; j++)
+            answer.u[j] = uz_precise_round(u[j]);
         status = uz_run_certify_answer(run, &answer, err);
-    answer.low_r = low_r;
-    if (status == UZ_OK && ended == UZ_PRECISE_SOLVED && answer.certificate.relative_error > run->work.requested)
-        status = uz_run_certify_answer(run, &answer, err);
-    if (status == UZ_OK && ended == UZ_PRECISE_SOLVED && answer.certificate.relative_error < before) {
-        uz_answer swap = run->answer;
+        const double by_doubles = answer.certificate.absolute_error;
+        if (status == UZ_OK && !(answer.certificate.relative_error <= run->work.requested))
+            status = uz_run_certify_input(&input, run, &answer, err);
+        if (status == UZ_OK && !(answer.certificate.relative_error <= run->work.requested))
+            status = uz_certify_exact(&answer.certificate, answer.u, (const mpf_t *)u, (const mpf_t *)r, &input, err);
+        for (int64_t i = 0; i < run->m && answer.certificate.absolute_error < by_doubles; i++)
+            answer.r[i] = uz_precise_round(r[i]);
+    }
+    const uz_certificate *now = &answer.certificate, *before = &run->answer.certificate;
+    const bool better = now->relative_error < before->relative_error ||
+                        (isinf(before->relative_error) && now->absolute_error < before->absolute_error);
+    if (status == UZ_OK && *solved && p == run->load.p && better) {
+        const uz_answer swap = run->answer;
         run->answer = answer;
         answer = swap;
         run->work.end = UZ_END_STALLED;
         run->result->summary.refinements++;
     }
-    /* Loads may move the body so much farther than the rows are apart that 512 bits don't see these contradict each
-     * other. That they do has nothing to do with the loads. */
-    if (status == UZ_OK && ended == UZ_PRECISE_SOLVED && isinf(run->answer.certificate.absolute_error)) {
-        memset(answer.u, 0, (size_t)run->d * sizeof *answer.u);
-        status = uz_precise_solve(&ended, answer.low, answer.low, answer.r, answer.low_r, uz_setup_K(setup, problem),
-                                  uz_setup_N(setup, problem), answer.u, run->load.h, &stop, err);
-        if (status == UZ_OK && ended == UZ_PRECISE_RAY)
-            status = uz_run_take_ray(run, answer.r, err);
-    }
     uz_answer_clear(&answer);
+    uz_precise_free(u, run->d);
+    uz_precise_free(r, run->m);
+    return status;
+}
+
+uz_status uz_run_decide(uz_run *run, uz_error *err)
+{
+    const uz_stop stop = {run->asked->hooks, run->asked->deadline};
+    const uz_end end = run->work.end;
+    const uz_certificate *c = &run->answer.certificate;
+    const bool in_vain = end == UZ_END_ITERATIONS && run->work.it.iteration >= IN_VAIN && isinf(c->relative_error),
+               gave_up = end == UZ_END_UNDECIDED || end == UZ_END_STALLED || end == UZ_END_SOLVED ||
+                         end == UZ_END_UNSOLVED || in_vain;
+    const double enough = fmax(run->work.requested, ROUNDED),
+                 seconds = end == UZ_END_UNDECIDED || isinf(c->relative_error) ? 1.0 : 0.1, start = uz_seconds();
+    bool solved = gave_up, tried = false;
+    uz_status status = UZ_OK;
+    for (int bits = UZ_PRECISE_BITS; gave_up && bits <= UZ_PRECISE_MORE_BITS;
+         bits *= UZ_PRECISE_MORE_BITS / UZ_PRECISE_BITS)
+        if (status == UZ_OK && solved && !run->result->ray && c->relative_error > enough &&
+            uz_precise_is_small(run->d, run->m, bits, seconds) && !uz_stop_is_due(&stop)) {
+            status = solve_precisely(run, &solved, run->load.p, bits, err);
+            tried = true;
+        }
+    /* Loads may move the body so much farther than the rows are apart that no bits see these contradict each other. */
+    if (status == UZ_OK && tried && solved && isinf(c->absolute_error)) {
+        double *zero = uz_alloc_zero(run->d, sizeof *zero);
+        status = zero ? solve_precisely(run, &solved, zero, UZ_PRECISE_BITS, err)
+                      : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the answer on %lld dofs", (long long)run->d);
+        free(zero);
+    }
     run->result->summary.timings.certify += uz_seconds() - start;
     return status;
 }

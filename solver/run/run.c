@@ -312,8 +312,11 @@ uz_status uz_run_finish(uz_run *run, uz_error *err)
     const double error = run->answer.certificate.relative_error;
     if (status == UZ_OK && run->asked->setup->factor && run->work.end != UZ_END_TIME &&
         run->work.end != UZ_END_CANCELLED && error > run->work.requested && isfinite(error)) {
+        const uz_certificate before_norm = run->answer.certificate;
         run->work.with_norm = true;
         status = uz_run_certify_answer(run, &run->answer, err);
+        if (run->answer.certificate.relative_error > before_norm.relative_error)
+            run->answer.certificate = before_norm;
     }
     run->result->summary.certificate = run->answer.certificate;
     if (status == UZ_OK)

@@ -54,9 +54,8 @@ typedef struct {
 
 /* What may become the result. */
 typedef struct {
-    int64_t m;           /* rows of the setup; after uz_run_certify_all_rows all of the problem's */
-    double *u, *r, *g;   /* d, m, m */
-    double *low, *low_r; /* d, m: what u and r rounded away; NULL: unknown */
+    int64_t m;         /* rows of the setup; after uz_run_certify_all_rows all of the problem's */
+    double *u, *r, *g; /* d, m, m */
     uz_certificate certificate;
 } uz_answer;
 uz_status uz_answer_allocate(uz_answer *answer, int64_t d, int64_t m, uz_error *err);
@@ -112,7 +111,7 @@ uz_status uz_run_take_ray(uz_run *run, double *y, uz_error *err);
 
 /* Iterative refinement of the answer while its certificate misses the request and gets better (refine.c). */
 uz_status uz_run_refine(uz_run *run, uz_error *err);
-/* A small problem whose rows may contradict each other, as far as doubles can tell: solved again in 512 bits. */
+/* A small problem whose rows may contradict each other, as far as doubles can tell: solved again in more bits. */
 uz_status uz_run_decide(uz_run *run, uz_error *err);
 /* The answer and its certificate become those of all rows, where the setup left some out; run->wants (all_rows.c). */
 uz_status uz_run_certify_all_rows(uz_run *run, uz_error *err);

@@ -26,6 +26,15 @@ def test_claims_that_were_once_false(s):
         check(not any("not judged" in end for end in tally), k, tally)
 
 
+def test_right_answers_that_were_once_left_uncertified(s):
+    """Loads that dwarf the forces of strain, slabs far narrower than the rounding of u; and rows so near to each other that
+    only more bits tell them apart."""
+    for k in [91, 228, 258, 283, 344, 560, 1357, 1663, 1868, 2084, 2142, 2320, 2643, 2819]:
+        tally, wrong = posted.run(s, [k], 1)
+        check(not wrong, *wrong)
+        check("feasible: converged" in tally, k, tally)
+
+
 def test_a_contradiction_far_below_the_displacements(s):
     """u_1 <= -1 and u_1 >= -1 + 1e-9 although the load moves the body by 1e90."""
     K = posted.text_of([[2 * 2.0 ** -300, 2.0 ** -300], [2.0 ** -300, 3 * 2.0 ** -300]], 2, True)
