@@ -1,5 +1,6 @@
 /* log.c: lines of the log. */
 #include "base/log.h"
+#include "text/utf8.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -33,37 +34,20 @@ void log_close(server_log *log)
     free(log);
 }
 
-/* The bytes of the UTF-8 sequence at s, 0 if there is none: no overlong forms, surrogates or values above U+10FFFF. */
-static size_t utf8_length(const unsigned char *s)
-{
-    size_t n = s[0] < 0x80                    ? 1
-               : s[0] >= 0xc2 && s[0] <= 0xdf ? 2
-               : (s[0] & 0xf0) == 0xe0        ? 3
-               : s[0] >= 0xf0 && s[0] <= 0xf4 ? 4
-                                              : 0;
-    for (size_t i = 1; i < n; i++)
-        if ((s[i] & 0xc0) != 0x80)
-            return 0;
-    bool overlong = (s[0] == 0xe0 && s[1] < 0xa0) || (s[0] == 0xf0 && s[1] < 0x90);
-    bool too_large = (s[0] == 0xed && s[1] > 0x9f) || (s[0] == 0xf4 && s[1] > 0x8f);
-    return n > 1 && (overlong || too_large) ? 0 : n;
-}
-
 static void write_string(FILE *out, const char *text)
 {
-    const unsigned char *s = (const unsigned char *)text;
     fputc('"', out);
-    while (*s) {
-        size_t n = utf8_length(s);
+    for (size_t len = strlen(text), at = 0, n; at < len; at += n ? n : 1) {
+        const char c = text[at];
+        n = uz_utf8_length(text + at, len - at);
         if (n == 0)
             fputs("\\ufffd", out);
-        else if (*s == '"' || *s == '\\')
-            fprintf(out, "\\%c", *s);
-        else if (*s < 0x20 || *s == 0x7f)
-            fprintf(out, "\\u%04x", *s);
+        else if (c == '"' || c == '\\')
+            fprintf(out, "\\%c", c);
+        else if ((unsigned char)c < 0x20 || c == 0x7f)
+            fprintf(out, "\\u%04x", (unsigned)c);
         else
-            fwrite(s, 1, n, out);
-        s += n ? n : 1;
+            fwrite(text + at, 1, n, out);
     }
     fputc('"', out);
 }

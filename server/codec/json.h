@@ -111,7 +111,5 @@ const char *json_text_check(const char *text, size_t len, size_t at, size_t *end
 size_t json_text_decode(char *out, const char *from, size_t bytes);
 /* Characters of a string, short or long. */
 size_t json_text_characters(const json_value *string);
-/* Length in bytes of the well-formed UTF-8 character at text[0..len), 0 if it is none (overlong, surrogate, ...). */
-size_t json_utf8_length(const char *text, size_t len);
 
 #endif

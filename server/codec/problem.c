@@ -1,5 +1,6 @@
 /* problem.c: what a refusal says. */
 #include "codec/problem.h"
+#include "text/utf8.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -45,7 +46,7 @@ static void mend_utf8(char *out)
         start--;
     if (start > 0 && (unsigned char)out[start - 1] >= 0x80)
         start--;
-    if (start < len && json_utf8_length(out + start, len - start) != len - start)
+    if (start < len && uz_utf8_length(out + start, len - start) != len - start)
         out[start] = '\0';
 }
 
@@ -86,7 +87,7 @@ void problem_quote(char *out, size_t size, const char *text, size_t len)
     size_t used = 0, i = 0;
     out[used++] = '"';
     while (i < len) {
-        size_t step = json_utf8_length(text + i, len - i);
+        size_t step = uz_utf8_length(text + i, len - i);
         bool odd = step == 0 || (unsigned char)text[i] < 0x20 || text[i] == 0x7f;
         if (used + step + sizeof "...\"" > size)
             break;

@@ -1,6 +1,6 @@
 /* text.c: a growing text; JSON values in it. */
 #include "codec/text.h"
-#include "codec/json.h"
+#include "text/utf8.h"
 #include "uzawa.h"
 
 #include <inttypes.h>
@@ -87,7 +87,7 @@ void text_string(text *t, const char *key, const char *string)
     text_key(t, key);
     text_put(t, string ? "\"" : "null");
     for (size_t i = 0; i < len;) {
-        const size_t step = json_utf8_length(string + i, len - i);
+        const size_t step = uz_utf8_length(string + i, len - i);
         const unsigned char c = (unsigned char)string[i];
         const char *named = strchr(NAMED, c);
         if (step == 0)

@@ -2,6 +2,7 @@
 #include "io/gmsh.h"
 
 #include "core/error.h"
+#include "text/utf8.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -92,26 +93,6 @@ uz_status gmsh_real_text(gmsh_text *text, double *value)
     return UZ_OK;
 }
 
-/* Length of the well-formed UTF-8 character at text[0..len), 0: none (The Unicode Standard, table 3-7). */
-static size_t utf8_length(const unsigned char *text, size_t len)
-{
-    const unsigned char c = text[0];
-    const size_t need = c < 0x80                ? 1
-                        : c >= 0xc2 && c < 0xe0 ? 2
-                        : c >= 0xe0 && c < 0xf0 ? 3
-                        : c >= 0xf0 && c < 0xf5 ? 4
-                                                : 0;
-    if (need == 0 || need > len)
-        return 0;
-    for (size_t i = 1; i < need; i++)
-        if ((text[i] & 0xc0) != 0x80)
-            return 0;
-    if ((c == 0xe0 && text[1] < 0xa0) || (c == 0xed && text[1] > 0x9f) || (c == 0xf0 && text[1] < 0x90) ||
-        (c == 0xf4 && text[1] > 0x8f))
-        return 0;
-    return need;
-}
-
 uz_status gmsh_quoted(gmsh_text *text, char out[64])
 {
     skip_space(text);
@@ -126,7 +107,7 @@ uz_status gmsh_quoted(gmsh_text *text, char out[64])
         return gmsh_fail(text, UZ_ERR_UNSUPPORTED, "the name of a physical group has %zu bytes; names have 1 to 63",
                          len);
     for (size_t i = 0, step; i < len; i += step) {
-        step = utf8_length((const unsigned char *)from + i, len - i);
+        step = uz_utf8_length(from + i, len - i);
         if (step == 0 || (unsigned char)from[i] < 0x20 || from[i] == 0x7f)
             return gmsh_fail(text, UZ_ERR_UNSUPPORTED,
                              "the name of a physical group has a control character or is not UTF-8");
