@@ -42,18 +42,17 @@ static bool look_at_job(event_stream *base)
     job_stream *s = (job_stream *)base;
     job j;
     int progress;
-    int64_t count = 0;
-    double *rows = NULL;
+    work_history live = {.rows = NULL};
     const double *row = NULL; /* the newest of a job that runs here */
     char state[64];
     bool ok = store_get(s->context->store, s->id, &j) == STORE_OK; /* deleted meanwhile: nothing more to tell */
     if (!ok)
         return false;
     if (j.status == JOB_RUNNING &&
-        work_live(s->context->work, j.id, (int64_t)fmax(s->iteration, -1.0), &progress, &rows, &count)) {
+        work_live(s->context->work, j.id, &progress, NULL, (int64_t)fmax(s->iteration, -1.0), &live)) {
         j.progress = progress;
-        if (count > 0)
-            row = rows + (count - 1) * CODEC_HISTORY_COLUMNS;
+        if (live.count > 0)
+            row = live.rows + (live.count - 1) * CODEC_HISTORY_COLUMNS;
     }
     s->iteration = row ? row[0] : s->iteration;
     name_state(state, sizeof state, &j, s->iteration);
@@ -72,7 +71,7 @@ static bool look_at_job(event_stream *base)
     }
     s->any = s->any || seen;
     s->status = j.status;
-    free(rows);
+    free(live.rows);
     job_clear(&j);
     return ok;
 }

@@ -18,7 +18,7 @@ bool history_rows(api *context, const job *j, const char *name, int64_t after, f
     work_history live;
     if (j->status == JOB_ACCEPTED)
         return true;
-    if (j->status == JOB_RUNNING && work_live_history(context->work, j->id, name, after, &live)) {
+    if (j->status == JOB_RUNNING && work_live(context->work, j->id, NULL, name, after, &live)) {
         problem_details problem;
         out->rows = live.rows;
         out->count = live.count;

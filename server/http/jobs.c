@@ -98,7 +98,7 @@ bool jobs_wait(api *context, http_request *rq, double otherwise, job *j, http_re
     double seconds = request_wait(rq, otherwise, context->options.max_wait_s);
     if (seconds <= 0 || jobs_ended(j))
         return true;
-    work_wait_for(context->work, j->id, seconds, rq->fd, transport_draining(context->server));
+    work_wait(context->work, j->id, seconds, rq->fd, transport_draining(context->server));
     note_preference(context, rq, seconds, reply);
     return load_again(context, j, reply);
 }
@@ -168,8 +168,8 @@ void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http
         return;
     }
     note_preference(context, rq, seconds, reply);
-    if (work_wait_for(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server)) ||
-        rest == 0.0 || !delay(context, rq, j->id, rest, then)) {
+    if (work_wait(context->work, j->id, seconds - rest, rq->fd, transport_draining(context->server)) || rest == 0.0 ||
+        !delay(context, rq, j->id, rest, then)) {
         if (load_again(context, j, reply))
             then(context, j, reply);
     }
@@ -178,7 +178,7 @@ void jobs_wait_then(api *context, http_request *rq, job *j, jobs_then then, http
 void jobs_freshen(api *context, job *j)
 {
     int progress;
-    if (j->status == JOB_RUNNING && work_live(context->work, j->id, -1, &progress, NULL, NULL))
+    if (j->status == JOB_RUNNING && work_live(context->work, j->id, &progress, NULL, -1, NULL))
         j->progress = progress;
 }
 
@@ -229,7 +229,7 @@ void jobs_delete(api *context, http_request *rq, http_reply *reply)
     if (was == JOB_ACCEPTED) /* the worker counts those that run */
         metrics_job(context->metrics, job_status_name(JOB_DISMISSED), NULL, 1);
     if (was == JOB_RUNNING && work_cancel(context->work, rq->job_id))
-        work_wait(context->work, rq->job_id, DISMISS_WAIT_S);
+        work_wait(context->work, rq->job_id, DISMISS_WAIT_S, -1, NULL);
     if (!jobs_load(context, rq, &j, reply))
         return;
     if (status != STORE_OK && !jobs_ended(&j))

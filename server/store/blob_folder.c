@@ -48,10 +48,9 @@ bool blob_write_all(int fd, const void *data, size_t size)
     return true;
 }
 
-/* Makes the folder's entries durable. */
-static bool sync_folder(const char *path)
+bool blob_sync(const char *path, int flags)
 {
-    int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    int fd = open(path, O_RDONLY | O_CLOEXEC | flags);
     bool ok = fd >= 0 && fsync(fd) == 0;
     if (fd >= 0)
         close(fd);
@@ -65,7 +64,7 @@ static bool make_folder(const char *path)
         return errno == EEXIST;
     const char *slash = strrchr(path, '/');
     char *parent = strndup(slash ? path : ".", slash ? (size_t)(slash - path) + 1 : 1);
-    bool ok = parent && sync_folder(parent);
+    bool ok = parent && blob_sync(parent, O_DIRECTORY);
     int cause = errno;
     free(parent);
     if (!ok)
@@ -131,7 +130,7 @@ static store_status folder_publish(blob_writer *writer, const char *id, char cau
     if (ok) {
         free(w->path);
         w->path = NULL;
-        ok = sync_folder(path_of(writer->blobs));
+        ok = blob_sync(path_of(writer->blobs), O_DIRECTORY);
     }
     store_status status = ok ? STORE_OK : fail("name", cause);
     free(name);

@@ -54,5 +54,7 @@ bool blob_is_id(const char *text);
 store_status blob_check(int fd, const char *id);
 /* All bytes, however often the system asks again; false: errno says why. */
 bool blob_write_all(int fd, const void *data, size_t size);
+/* Makes a file, or the entries of a folder (flags O_DIRECTORY), durable. */
+bool blob_sync(const char *path, int flags);
 
 #endif

@@ -13,36 +13,24 @@ static const int BADNESS[] = {
     [UZ_INFEASIBLE] = 11};
 _Static_assert(sizeof BADNESS / sizeof BADNESS[0] == CODEC_OUTCOMES, "each outcome has its place");
 
-/* A bound that is not known counts as the largest. */
-static double bound_of(const uz_result *result)
-{
-    double bound = result->summary.certificate.relative_error;
-    return isnan(bound) ? (double)INFINITY : bound;
-}
-
-/* Where the cells were chosen it is the total error that was asked for. */
-static double error_of(const uz_result *result)
-{
-    return result->summary.grids ? result->summary.total_error : bound_of(result);
-}
-
-static bool is_worse(const uz_result *a, const uz_result *b)
-{
-    int x = BADNESS[a->summary.outcome], y = BADNESS[b->summary.outcome];
-    return x != y ? x > y : error_of(a) > error_of(b);
-}
-
 void overall_summary(uz_summary *out, codec_cases *counts, uz_result *const *results, const uz_problem *problem)
 {
     int64_t worst = 0;
     uz_timings times = {0};
-    double bound = 0.0;
+    double bound = 0.0, worst_error = 0.0;
     *counts = (codec_cases){.count = problem->n_cases};
     for (int64_t i = 0; i < problem->n_cases; i++) {
-        counts->outcomes[results[i]->summary.outcome]++;
-        worst = is_worse(results[i], results[worst]) ? i : worst;
-        bound = fmax(bound, bound_of(results[i]));
-        uz_timings_add(&times, &results[i]->summary.timings);
+        const uz_summary *one = &results[i]->summary;
+        const double relative = one->certificate.relative_error, known = isnan(relative) ? (double)INFINITY : relative;
+        const double error = one->grids ? one->total_error : known; /* where the cells were chosen it was asked for */
+        const int badness = BADNESS[one->outcome], so_far = BADNESS[results[worst]->summary.outcome];
+        if (i == 0 || badness > so_far || (badness == so_far && error > worst_error)) {
+            worst = i;
+            worst_error = error;
+        }
+        counts->outcomes[one->outcome]++;
+        bound = fmax(bound, known); /* one that is not known counts as the largest */
+        uz_timings_add(&times, &one->timings);
     }
     *out = results[worst]->summary;
     counts->worst = problem->cases[worst].name;

@@ -105,11 +105,6 @@ static void set_failed(run *r, char *encoded)
     r->outcome = (store_outcome){.status = JOB_FAILED, .error = encoded ? encoded : NO_MEMORY_JSON};
 }
 
-static void fail_from_problem(run *r, const problem_details *problem)
-{
-    set_failed(r, codec_encode_problem(problem));
-}
-
 static void log_store_failure(const run *r, log_level level, const char *event)
 {
     char cause[256];
@@ -129,7 +124,7 @@ static bool decode_body(run *r, char *body, size_t body_len)
     free(body);
     r->parse_s = clock_seconds(CLOCK_MONOTONIC) - start;
     if (!ok) {
-        fail_from_problem(r, &problem);
+        set_failed(r, codec_encode_problem(&problem));
         return false;
     }
     pthread_mutex_lock(&r->me->lock);
@@ -219,7 +214,7 @@ static run_end solve(run *r)
     } else {
         problem_details problem = {0};
         codec_problem_from_error(&problem, &err, r->request.problem.kind);
-        fail_from_problem(r, &problem);
+        set_failed(r, codec_encode_problem(&problem));
     }
     return END_FINISH;
 }
@@ -272,7 +267,7 @@ static bool store_outcome_of(run *r)
             problem_fill(&problem, 500, "result_not_stored", TITLE, "%s",
                          "The store failed, and the service's log has the cause: submit the job again.");
         log_store_failure(r, LOG_ERROR, "result_given_up");
-        fail_from_problem(r, &problem);
+        set_failed(r, codec_encode_problem(&problem));
         if (atomic_load(&r->me->cancel))
             r->outcome = (store_outcome){.status = JOB_DISMISSED};
         status = try_to_store(r, true);

@@ -49,7 +49,7 @@ bool work_is_stopping(work *w)
     return stopping;
 }
 
-bool work_wait_for(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more)
+bool work_wait(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more)
 {
     struct pollfd client = {.fd = fd, .events = POLLRDHUP}; /* poll passes over a negative one */
     double until = clock_seconds(CLOCK_MONOTONIC) + seconds, left = seconds;
@@ -63,9 +63,4 @@ bool work_wait_for(work *w, const char *id, double seconds, int fd, const atomic
     }
     feed_unlisten(l);
     return ended;
-}
-
-bool work_wait(work *w, const char *id, double seconds)
-{
-    return work_wait_for(w, id, seconds, -1, NULL);
 }

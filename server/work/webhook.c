@@ -79,7 +79,8 @@ bool webhooks_allow(const webhooks *all, const char *text, const char **why)
 
 /* ---- one attempt */
 
-bool webhook_sign(char out[128], const char *secret, size_t secret_len, long long unix_s, const char *body, size_t len)
+/* "t=...,v1=...": an HMAC over the time and the body; false where it can't be made. */
+static bool sign(char out[128], const char *secret, size_t secret_len, long long unix_s, const char *body, size_t len)
 {
     gnutls_hmac_hd_t hmac;
     unsigned char digest[32];
@@ -114,12 +115,12 @@ static struct curl_slist *make_headers(const webhooks *all, const webhook_due *d
 {
     char delivery[96], signature[160] = "X-Uzawa-Signature: ";
     snprintf(delivery, sizeof delivery, "X-Uzawa-Delivery: %s.%d", due->job, due->attempts + 1);
-    bool sign = all->options.secret_len > 0;
-    if (sign && !webhook_sign(signature + strlen(signature), all->options.secret, all->options.secret_len,
-                              (long long)time(NULL), body, len))
+    const bool is_signed = all->options.secret_len > 0;
+    if (is_signed && !sign(signature + strlen(signature), all->options.secret, all->options.secret_len,
+                           (long long)time(NULL), body, len))
         return NULL;
     const char *const lines[] = {"Content-Type: application/json", "Expect:", "X-Uzawa-Event: job.ended", delivery,
-                                 sign ? signature : "X-Uzawa-Signature:"}; /* without a value: none is sent */
+                                 is_signed ? signature : "X-Uzawa-Signature:"}; /* without a value: none is sent */
     struct curl_slist *list = NULL;
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         struct curl_slist *longer = curl_slist_append(list, lines[i]);

@@ -41,7 +41,4 @@ void webhooks_stop(webhooks *all);
 /* False, and why for a person, if the address may not be called. */
 bool webhooks_allow(const webhooks *all, const char *url, const char **why);
 
-/* "t=...,v1=..." for a body; false where it can't be made. Exposed for tests. */
-bool webhook_sign(char out[128], const char *secret, size_t secret_len, long long unix_s, const char *body, size_t len);
-
 #endif

@@ -346,38 +346,26 @@ bool work_cancel(work *w, const char *id)
     return found != NULL;
 }
 
-bool work_live(work *w, const char *id, int64_t after, int *progress, double **rows, int64_t *count)
+bool work_live(work *w, const char *id, int *progress, const char *case_name, int64_t after, work_history *out)
 {
-    int64_t unused;
-    if (rows)
-        *rows = NULL;
-    if (count)
-        *count = 0;
+    bool ok = true;
     worker *found = find_worker(w, id);
+    if (out)
+        *out = (work_history){.rows = NULL};
     if (!found)
         return false;
     if (progress)
         *progress = live_progress(&found->live);
-    bool ok = !rows || live_rows(&found->live, after, rows, count ? count : &unused);
-    pthread_mutex_unlock(&found->lock);
-    return ok;
-}
-
-bool work_live_history(work *w, const char *id, const char *case_name, int64_t after, work_history *out)
-{
-    bool ok = true;
-    *out = (work_history){.rows = NULL};
-    worker *found = find_worker(w, id);
-    if (!found)
-        return false;
-    const live *l = &found->live;
-    if (l->problem && l->current < l->problem->n_cases)
-        snprintf(out->case_name, sizeof out->case_name, "%s", l->problem->cases[l->current].name);
-    out->is_case = case_name && !l->problem; /* not read yet */
-    for (int64_t i = 0; case_name && l->problem && i < l->problem->n_cases; i++)
-        out->is_case = out->is_case || strcmp(l->problem->cases[i].name, case_name) == 0;
-    if (!case_name || strcmp(case_name, out->case_name) == 0)
-        ok = live_rows(l, after, &out->rows, &out->count);
+    if (out) {
+        const live *l = &found->live;
+        if (l->problem && l->current < l->problem->n_cases)
+            snprintf(out->case_name, sizeof out->case_name, "%s", l->problem->cases[l->current].name);
+        out->is_case = case_name && !l->problem; /* not read yet */
+        for (int64_t i = 0; case_name && l->problem && i < l->problem->n_cases; i++)
+            out->is_case = out->is_case || strcmp(l->problem->cases[i].name, case_name) == 0;
+        if (!case_name || strcmp(case_name, out->case_name) == 0)
+            ok = live_rows(l, after, &out->rows, &out->count);
+    }
     pthread_mutex_unlock(&found->lock);
     return ok;
 }

@@ -55,28 +55,24 @@ work *work_start(store *s, const work_options *options, server_log *log, char *m
  * unless it ends of itself first. */
 bool work_cancel(work *w, const char *id);
 
-/* Blocks until the job has ended, `seconds` have passed or the service stops; true if it ended (or does not exist). */
-bool work_wait(work *w, const char *id, double seconds);
-/* The same for the client at the socket fd (-1: none): returns too when it has closed its end, or when *no_more (may be
- * NULL) is true, which whoever sets it tells by feed_wake_all. */
-bool work_wait_for(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more);
+/* Blocks until the job has ended, `seconds` have passed or the service stops; true if it ended (or does not exist). For
+ * the client at the socket fd (-1: none): returns too when it has closed its end, or when *no_more (may be NULL) is
+ * true, which whoever sets it tells by feed_wake_all. */
+bool work_wait(work *w, const char *id, double seconds, int fd, const atomic_bool *no_more);
 /* What changes jobs is told there: by the store what others than a job's owner do, by the workers the rest. */
 feed *work_feed(work *w);
 
-/* Progress and history of a job that runs now: *rows (freed by the caller) has *count rows of 12 doubles (codec's
- * columns) with iteration > after. Of a long run rows are left out, evenly; the newest is always there. False if it
- * does not run here. rows may be NULL when only progress is wanted. */
-bool work_live(work *w, const char *id, int64_t after, int *progress, double **rows, int64_t *count);
-
-/* The same for a job that may have load cases. */
+/* The history of a job that runs now: `count` rows of 12 doubles (codec's columns). Of a long run rows are left out,
+ * evenly; the newest is always there. */
 typedef struct {
     char case_name[64]; /* the case that runs now; "": the job has none */
     bool is_case;       /* the name that was asked for is a case of the job */
     double *rows;       /* of the case that runs now, if it is the one asked for; freed by the caller */
     int64_t count;
 } work_history;
-/* case_name NULL: whichever runs. */
-bool work_live_history(work *w, const char *id, const char *case_name, int64_t after, work_history *out);
+/* False if the job does not run here, or without memory. *progress in percent; *out the rows with iteration > after of
+ * the case that is named (NULL: whichever runs). Both may be NULL. */
+bool work_live(work *w, const char *id, int *progress, const char *case_name, int64_t after, work_history *out);
 
 uz_cache *work_cache(work *w);
 const work_options *work_settings(const work *w); /* as they are in force */

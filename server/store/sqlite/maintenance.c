@@ -193,15 +193,6 @@ static bool copy_to(const char *part, const char *to, sqlite3 *from, const char 
     return ok;
 }
 
-static bool sync_path(const char *path, int flags)
-{
-    int fd = open(path, flags | O_CLOEXEC);
-    bool ok = fd >= 0 && fsync(fd) == 0;
-    if (fd >= 0)
-        close(fd);
-    return ok;
-}
-
 /* Gives the copy its name, for good: never over a file that is there, and on disk before this returns. */
 static bool publish(const char *part, const char *to, char *message, size_t size)
 {
@@ -212,7 +203,7 @@ static bool publish(const char *part, const char *to, char *message, size_t size
         slash[slash == folder] = '\0';
     else
         strcpy(folder, ".");
-    if (sync_path(part, O_RDONLY) && link(part, to) == 0 && unlink(part) == 0 && sync_path(folder, O_RDONLY))
+    if (blob_sync(part, 0) && link(part, to) == 0 && unlink(part) == 0 && blob_sync(folder, O_DIRECTORY))
         return true;
     snprintf(message, size, "cannot put the copy at %s: %s", to, strerror(errno));
     return false;

@@ -211,25 +211,6 @@ store_status sqlite_give_reader(sqlite_store *s, connection *c, store_status sta
     return status;
 }
 
-store_status sqlite_limit_bytes(store *base, int64_t bytes)
-{
-    sqlite_store *s = sqlite_of(base);
-    char sql[96];
-    pthread_mutex_lock(&s->writer_lock);
-    connection *c = &s->writer;
-    int64_t page = 4096;
-    file_format_integer(c->db, "PRAGMA page_size", &page);
-    /* 2^32 - 2 pages is SQLite's own limit; 0 would ask for the limit instead of setting it. */
-    long long pages = bytes <= 0 ? 4294967294LL : bytes < page ? 1 : (long long)(bytes / page);
-    snprintf(sql, sizeof sql, "PRAGMA max_page_count = %lld", pages);
-    int rc = sqlite3_exec(c->db, sql, NULL, NULL, NULL);
-    snprintf(c->message, sizeof c->message, "%s", sqlite3_errmsg(c->db));
-    if (rc != SQLITE_OK)
-        store_set_message(&s->base, c->message);
-    pthread_mutex_unlock(&s->writer_lock);
-    return rc == SQLITE_OK ? STORE_OK : STORE_ERROR;
-}
-
 int64_t sqlite_free_bytes(store *base)
 {
     sqlite_store *s = sqlite_of(base);

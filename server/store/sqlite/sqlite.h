@@ -7,8 +7,4 @@
 
 extern const store_engine STORE_SQLITE;
 
-/* The largest size of the database file (never less than it has), without its journal; 0: no limit. More is STORE_FULL,
- * as a full disk is. Not kept in the file. */
-store_status sqlite_limit_bytes(store *s, int64_t bytes);
-
 #endif

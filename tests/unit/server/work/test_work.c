@@ -1,7 +1,6 @@
 /* Workers with real problems: how a job ends, cancelling, stopping, taking up what was left. */
 #include "codec/codec.h"
 #include "sqlite_file.h"
-#include "store/sqlite/sqlite.h"
 #include "store_place.h"
 #include "work/work.h"
 
@@ -107,12 +106,10 @@ static void short_sleep(void)
 static void wait_for_rows(service *v, const char *id)
 {
     for (int i = 0; i < 4000; i++) {
-        double *rows = NULL;
-        int64_t count = 0;
-        int progress;
-        bool lives = work_live(v->w, id, -1, &progress, &rows, &count);
-        free(rows);
-        if (lives && count > 2)
+        work_history live;
+        bool lives = work_live(v->w, id, NULL, NULL, -1, &live);
+        free(live.rows);
+        if (lives && live.count > 2)
             return;
         short_sleep();
     }
@@ -131,8 +128,8 @@ TEST(solves_matrices)
     if (!service_begin(&v) || !service_start(&v, &TWO_WORKERS))
         return;
     submit(&v, SMALL, id);
-    CHECK(work_wait(v.w, id, 20.0));
-    CHECK(!work_live(v.w, id, -1, NULL, NULL, NULL));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
+    CHECK(!work_live(v.w, id, NULL, NULL, -1, NULL));
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK_STR(job_status_name(j.status), "successful");
     CHECK(j.progress == 100 && j.attempts == 1 && !j.error);
@@ -168,7 +165,7 @@ TEST(solves_a_scene_and_keeps_its_nodes)
     if (!service_begin(&v) || !service_start(&v, &TWO_WORKERS))
         return;
     submit(&v, SCENE, id);
-    CHECK(work_wait(v.w, id, 20.0));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
     CHECK_INT(store_get_vector(v.place.s, id, 0, "dim", &x, &count), STORE_OK);
     CHECK(count == 1 && x[0] == 2.0);
@@ -199,14 +196,14 @@ TEST(what_cannot_be_solved_fails_with_its_reason)
     if (!service_begin(&v) || !service_start(&v, &TWO_WORKERS))
         return;
     submit(&v, NOT_SPD, id);
-    CHECK(work_wait(v.w, id, 20.0));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK_STR(job_status_name(j.status), "failed");
     CHECK(!j.summary);
     check_part(j.error, "not_positive_definite");
     job_clear(&j);
     submit(&v, "{\"problem\": ", id); /* as an older program may have left it */
-    CHECK(work_wait(v.w, id, 20.0));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK_STR(job_status_name(j.status), "failed");
     check_part(j.error, "json_syntax");
@@ -227,7 +224,7 @@ TEST(every_job_of_many_ends)
     for (int i = 0; i < JOBS; i++)
         submit(&v, SMALL, id[i]);
     for (int i = 0; i < JOBS; i++)
-        CHECK(work_wait(v.w, id[i], 30.0));
+        CHECK(work_wait(v.w, id[i], 30.0, -1, NULL));
     CHECK_INT(work_settings(v.w)->workers, 4);
     CHECK(work_cache(v.w) && work_settings(v.w)->cache_bytes == 1 << 24);
     CHECK_INT(store_counts(v.place.s, counts), STORE_OK);
@@ -249,12 +246,13 @@ TEST(a_running_job_shows_its_rows_and_can_be_cancelled)
         return;
     submit(&v, ENDLESS, id);
     wait_for_rows(&v, id);
-    CHECK(work_live(v.w, id, 1, &progress, &rows, &count));
-    CHECK(progress >= 10 && progress <= 95 && count >= 1 && rows && rows[0] > 1.0);
-    free(rows);
-    CHECK(!work_wait(v.w, id, 0.05)); /* it runs */
+    work_history live;
+    CHECK(work_live(v.w, id, &progress, NULL, 1, &live));
+    CHECK(progress >= 10 && progress <= 95 && live.count >= 1 && live.rows && live.rows[0] > 1.0);
+    free(live.rows);
+    CHECK(!work_wait(v.w, id, 0.05, -1, NULL)); /* it runs */
     CHECK(work_cancel(v.w, id));
-    CHECK(work_wait(v.w, id, 20.0));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK_STR(job_status_name(j.status), "dismissed");
     check_part(j.summary, "\"dismissed\"");
@@ -278,7 +276,7 @@ typedef struct {
 static void *wait_in_thread(void *arg)
 {
     waiting *a = arg;
-    a->ended = work_wait(a->w, a->id, 30.0);
+    a->ended = work_wait(a->w, a->id, 30.0, -1, NULL);
     return NULL;
 }
 
@@ -306,8 +304,8 @@ TEST(those_who_wait_learn_of_dismissal_and_of_the_end)
     CHECK(a[1].ended);
     work_stop(v.w, 0.0);
     pthread_join(threads[0], NULL);
-    CHECK(!a[0].ended);                                             /* it will run again */
-    CHECK(work_wait(v.w, "00000000000000000000000000000000", 0.0)); /* there is none */
+    CHECK(!a[0].ended);                                                       /* it will run again */
+    CHECK(work_wait(v.w, "00000000000000000000000000000000", 0.0, -1, NULL)); /* there is none */
     service_end(&v);
 }
 
@@ -326,7 +324,7 @@ TEST(stopping_releases_what_runs)
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_ACCEPTED && j.attempts == 0 && !j.summary);
     job_clear(&j);
-    CHECK(!work_wait(v.w, id, 10.0)); /* at once: the service has stopped */
+    CHECK(!work_wait(v.w, id, 10.0, -1, NULL)); /* at once: the service has stopped */
     submit(&v, SMALL, id);
     CHECK_INT(status_of(v.place.s, id), JOB_ACCEPTED); /* no more claims */
     work_stop(v.w, 0.0);                               /* again is fine */
@@ -388,7 +386,7 @@ TEST(jobs_left_running_are_taken_up)
     CHECK_INT(claim_id(v.place.s, "gone", other), STORE_OK);
     if (!service_start(&v, &TWO_WORKERS))
         return;
-    CHECK(work_wait(v.w, left, 20.0));
+    CHECK(work_wait(v.w, left, 20.0, -1, NULL));
     CHECK_INT(store_get(v.place.s, left, &j), STORE_OK);
     CHECK(j.status == JOB_SUCCESSFUL && j.attempts == 2);
     job_clear(&j);
@@ -407,7 +405,7 @@ TEST(a_result_that_cannot_be_stored_is_reported_and_run_again)
     if (!service_begin(&v))
         return;
     submit(&v, SCENE, id);
-    CHECK_INT(sqlite_limit_bytes(v.place.s, 1), STORE_OK); /* the file may not grow: the result has no room */
+    limit_bytes(v.place.s, 1); /* the file may not grow: the result has no room */
     if (!service_start(&v, &TWO_WORKERS))
         return;
     for (int i = 0; i < 1000 && count_in_log(&v, "store_failed") == 0; i++)
@@ -416,10 +414,10 @@ TEST(a_result_that_cannot_be_stored_is_reported_and_run_again)
     CHECK_INT(count_in_log(&v, "result_lost"), 1);
     CHECK_INT(status_of(v.place.s, id), JOB_RUNNING);
     work_free(v.w);
-    CHECK_INT(sqlite_limit_bytes(v.place.s, 0), STORE_OK);
+    limit_bytes(v.place.s, 0);
     if (!service_start(&v, &TWO_WORKERS))
         return;
-    CHECK(work_wait(v.w, id, 20.0));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK(j.status == JOB_SUCCESSFUL && j.attempts == 2);
     job_clear(&j);
@@ -442,20 +440,20 @@ TEST(a_result_without_room_is_given_up)
     submit(&v, body, padding); /* leaves pages that are free, for what is small */
     CHECK(store_dismiss(v.place.s, padding, &was) == STORE_OK && store_dismiss(v.place.s, padding, &was) == STORE_OK);
     submit(&v, LARGE, id);
-    CHECK_INT(sqlite_limit_bytes(v.place.s, 1), STORE_OK);
+    limit_bytes(v.place.s, 1);
     options.room_wait_s = 0.1;
     if (!service_start(&v, &options))
         return;
-    CHECK(work_wait(v.w, id, 60.0));
+    CHECK(work_wait(v.w, id, 60.0, -1, NULL));
     CHECK_INT(store_get(v.place.s, id, &j), STORE_OK);
     CHECK_STR(job_status_name(j.status), "failed");
     check_part(j.error, "\"storage_full\"");
     CHECK(!j.summary);
     job_clear(&j);
     CHECK_INT(count_in_log(&v, "result_given_up"), 1);
-    CHECK_INT(sqlite_limit_bytes(v.place.s, 0), STORE_OK);
+    limit_bytes(v.place.s, 0);
     submit(&v, SMALL, id);
-    CHECK(work_wait(v.w, id, 20.0));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
     service_end(&v);
 }
@@ -474,7 +472,7 @@ TEST(what_may_have_been_missed_is_looked_for)
     submit(&v, SMALL, id);
     v.place.s->changed = told;
     store_tell(v.place.s, NULL, false);
-    CHECK(work_wait(v.w, id, 20.0));
+    CHECK(work_wait(v.w, id, 20.0, -1, NULL));
     CHECK_INT(status_of(v.place.s, id), JOB_SUCCESSFUL);
     service_end(&v);
 }
@@ -490,9 +488,9 @@ TEST(a_job_that_another_owner_took_is_dropped)
     submit(&v, ENDLESS, id);
     wait_for_rows(&v, id);
     change_file(v.place.path, "UPDATE job SET owner = 'another'");
-    for (int i = 0; i < 2000 && work_live(v.w, id, -1, NULL, NULL, NULL); i++)
+    for (int i = 0; i < 2000 && work_live(v.w, id, NULL, NULL, -1, NULL); i++)
         short_sleep();
-    CHECK(!work_live(v.w, id, -1, NULL, NULL, NULL));
+    CHECK(!work_live(v.w, id, NULL, NULL, -1, NULL));
     CHECK_INT(status_of(v.place.s, id), JOB_RUNNING); /* the other's */
     service_end(&v);
 }

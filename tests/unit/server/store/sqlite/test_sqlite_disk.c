@@ -1,6 +1,5 @@
 /* The database file and its disk: kills, foreign files, a second daemon, a full disk, other programs. */
 #include "sqlite_file.h"
-#include "store/sqlite/sqlite.h"
 #include "store/engine.h"
 #include "store_place.h"
 
@@ -134,7 +133,7 @@ TEST(a_full_database_is_reported_and_changes_nothing)
         return;
     CHECK_INT(submit_text(p.s, "{}", "[]", NULL, id), STORE_OK);
     CHECK_INT(claim_id(p.s, "a", running), STORE_OK);
-    CHECK_INT(sqlite_limit_bytes(p.s, 4 << 20), STORE_OK);
+    limit_bytes(p.s, 4 << 20);
     store_status status = STORE_OK;
     while (status == STORE_OK && accepted < 10) {
         status =
@@ -159,7 +158,7 @@ TEST(a_full_database_is_reported_and_changes_nothing)
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
     CHECK_INT(store_dismiss(p.s, id, &was), STORE_OK);
     CHECK_INT(finish_as(p.s, running, "a", &outcome), STORE_OK);
-    CHECK_INT(sqlite_limit_bytes(p.s, 0), STORE_OK);
+    limit_bytes(p.s, 0);
     CHECK_INT(store_submit(p.s, &(store_request){.body = body, .body_len = sizeof body, .tags = "[]"}, &j, &repeated),
               STORE_OK);
     job_clear(&j);
