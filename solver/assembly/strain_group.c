@@ -1,7 +1,12 @@
 #include "assembly/strain_group.h"
 
+#include "core/alloc.h"
 #include "core/cpu.h"
+#include "core/error.h"
+#include "core/hooks.h"
 #include "scene/mesh.h"
+
+#include <stdlib.h>
 
 #define INLINE static inline __attribute__((always_inline))
 
@@ -14,10 +19,11 @@ INLINE void take_material(uz_strain_group *g, const uz_strain_source *from)
         lame[l] = &uz_element_material(from->model, g->element[l])->lame;
     g->material.lambda = (uz_lanes){lame[0]->lambda, lame[1]->lambda, lame[2]->lambda, lame[3]->lambda};
     g->material.mu = (uz_lanes){lame[0]->mu, lame[1]->mu, lame[2]->mu, lame[3]->mu};
-    g->thermal = (uz_lanes){0};
+    g->free_strain = g->thermal = (uz_lanes){0};
     for (int l = 0; l < LANES && from->free_strain; l++) {
         double strain[UZ_ELEMENT_STRESSES];
         uz_thermal_strain(strain, from->model->kind, *lame[l], from->free_strain[g->element[l]]);
+        g->free_strain[l] = from->free_strain[g->element[l]];
         g->thermal[l] = strain[0];
     }
 }
@@ -80,4 +86,49 @@ UZ_AVX2_FMA static void load_fused(uz_strain_group *g, const uz_strain_source *f
 void uz_strain_group_load(uz_strain_group *group, const uz_strain_source *from)
 {
     (uz_cpu_has_avx2_fma() ? load_fused : load_in_space)(group, from);
+}
+
+static void finish(uz_strain_group *g, const uz_strain_work *work, const uz_strain_source *from)
+{
+    if (g->count == 0)
+        return;
+    uz_strain_group_load(g, from);
+    work->take(work->ctx, g);
+    g->count = 0;
+}
+
+uz_status uz_strain_groups(const uz_strain_work *work, const uz_strain_source *from, const uz_hooks *hooks,
+                           uz_error *err)
+{
+    enum { BETWEEN_QUESTIONS = 1024 };
+    const uz_body_model *model = from->model;
+    const uz_mesh *mesh = &model->mesh;
+    uz_strain_group *groups = uz_alloc_zero(UZ_ELEMENT_KINDS, sizeof *groups); /* one for each kind */
+    if (!groups)
+        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the strains of %lld elements",
+                       (long long)mesh->n_elements);
+    for (int64_t e = 0; e < mesh->n_elements; e++) {
+        const uz_element_kind kind = (uz_element_kind)mesh->kind[e];
+        uz_strain_group *g = &groups[kind];
+        if (e % BETWEEN_QUESTIONS == 0 && uz_cancelled(hooks)) {
+            free(groups);
+            return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled while strains were computed");
+        }
+        if (!g->begun || model->material_of) {
+            const uz_formulation formulation = uz_element_formulation(model, e);
+            if (!g->begun || formulation != g->rule.formulation) {
+                finish(g, work, from);
+                work->rule(work->ctx, &g->rule, kind, formulation);
+                g->begun = true;
+                g->shaped = false;
+            }
+        }
+        g->element[g->count++] = e;
+        if (g->count == LANES)
+            finish(g, work, from);
+    }
+    for (int kind = 0; kind < UZ_ELEMENT_KINDS; kind++)
+        finish(&groups[kind], work, from);
+    free(groups);
+    return UZ_OK;
 }

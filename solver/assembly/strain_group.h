@@ -8,7 +8,7 @@
 
 /* One element in each lane; those from count on repeat the first, and what they give is dropped. */
 typedef struct {
-    bool begun;  /* rule is made */
+    bool begun;  /* rule is made: of one formulation, as materials may differ in it */
     bool shaped; /* shape is that of all elements of the mesh */
     int count;
     int64_t element[UZ_STRAIN_LANES];
@@ -16,7 +16,7 @@ typedef struct {
     uz_strain_rule rule;
     uz_lane_shape shape;
     uz_lane_material material;
-    uz_lanes thermal; /* in each direct strain */
+    uz_lanes free_strain, thermal; /* expansion times rise of temperature; what it is in each direct strain */
     uz_lanes x[3 * UZ_ELEMENT_NODES], u[UZ_ELEMENT_DOFS];
     uz_lanes strain[UZ_ELEMENT_GAUSS][UZ_ELEMENT_STRESSES];
 } uz_strain_group;
@@ -30,5 +30,17 @@ typedef struct {
 
 /* From element[0..count) and the rule to the strains. */
 void uz_strain_group_load(uz_strain_group *group, const uz_strain_source *from);
+
+/* What is done with all elements of a mesh, a few at a time. */
+typedef struct {
+    /* Makes the rule of the elements of a kind and formulation that are taken from now on. */
+    void (*rule)(void *ctx, uz_strain_rule *rule, uz_element_kind kind, uz_formulation formulation);
+    void (*take)(void *ctx, const uz_strain_group *group);
+    void *ctx;
+} uz_strain_work;
+/* Calls take with every element in some group; those of one kind come together, in whatever order that gives.
+ * UZ_ERR_CANCELLED, _MEMORY. */
+uz_status uz_strain_groups(const uz_strain_work *work, const uz_strain_source *from, const uz_hooks *hooks,
+                           uz_error *err);
 
 #endif

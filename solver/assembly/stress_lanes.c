@@ -10,11 +10,6 @@ enum { LANES = UZ_STRAIN_LANES, NODES = UZ_ELEMENT_NODES, MOST_ROW = 8, LINEAR =
 
 typedef int64_t lane_bits __attribute__((vector_size(8 * UZ_STRAIN_LANES), aligned(8)));
 
-int uz_stress_row_size(uz_model model)
-{
-    return uz_stress_count(model) < LANES ? LANES : MOST_ROW;
-}
-
 /* ---- sums at nodes */
 
 INLINE void transpose(uz_lanes out[LANES], const uz_lanes in[LANES])
@@ -27,17 +22,6 @@ INLINE void transpose(uz_lanes out[LANES], const uz_lanes in[LANES])
     out[1] = __builtin_shufflevector(high, high2, 0, 1, 4, 5);
     out[2] = __builtin_shufflevector(low, low2, 2, 3, 6, 7);
     out[3] = __builtin_shufflevector(high, high2, 2, 3, 6, 7);
-}
-
-/* Stress of the strains less the thermal strain. n: components, `direct` of them no shear. */
-INLINE void stress_of(uz_lanes *stress, const uz_strain_group *g, const uz_lanes *strain, int n, int direct)
-{
-    uz_lanes trace = {0};
-    for (int c = 0; c < direct; c++)
-        trace += strain[c] - g->thermal;
-    for (int c = 0; c < n; c++)
-        stress[c] = c < direct ? g->material.lambda * trace + 2 * g->material.mu * (strain[c] - g->thermal)
-                               : g->material.mu * strain[c];
 }
 
 /* Adds one row for each lane at node a, or at all nodes where a < 0. */
@@ -54,24 +38,20 @@ INLINE void add_rows(double *rows, const uz_strain_group *g, const int64_t *cons
     }
 }
 
-/* The element's mean stress with its volume as weight. The mean is the stress at the centre, where that of a linear
- * element is most accurate; stresses continued to the corners would bring the solution's own error back into the
- * average and hide a third of it. */
-INLINE void add_mean(double *rows, const uz_strain_group *g, const int64_t *const place[LANES], int n, int direct)
+/* What the samples give to each node, with the element's volume as weight. */
+INLINE void add_shares(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                       const double share[][UZ_ELEMENT_SAMPLES], uz_lanes value[MOST_ROW], int n, int size)
 {
-    uz_lanes mean[UZ_ELEMENT_STRESSES] = {{0}}, value[MOST_ROW] = {{0}}, volume = {0};
-    for (int p = 0; p < g->rule.points; p++) {
-        volume += g->shape.volume[p];
-        for (int c = 0; c < n; c++)
-            mean[c] += g->shape.volume[p] * g->strain[p][c];
+    const int samples = g->rule.asked, different = samples == 1 ? 1 : g->rule.nodes;
+    for (int a = 0; a < different; a++) {
+        for (int c = 0; c < n; c++) {
+            value[c] = share[a][0] * g->strain[0][c];
+            for (int k = 1; k < samples; k++)
+                value[c] += share[a][k] * g->strain[k][c];
+            value[c] *= value[n];
+        }
+        add_rows(rows, g, place, value, samples == 1 ? -1 : a, size);
     }
-    for (int c = 0; c < n; c++)
-        mean[c] /= volume;
-    stress_of(value, g, mean, n, direct);
-    for (int c = 0; c < n; c++)
-        value[c] *= volume;
-    value[n] = volume;
-    add_rows(rows, g, place, value, -1, n < LANES ? LANES : MOST_ROW);
 }
 
 /* A X = B by elimination with pivots on the diagonal: A is a Gram matrix. A: m x m, B: m x n. */
@@ -95,68 +75,73 @@ INLINE void solve_small(uz_lanes A[LINEAR][LINEAR], uz_lanes B[LINEAR][UZ_ELEMEN
     }
 }
 
-/* y[a * dim + c]: places of the nodes from the first one on, over the element's size. */
-INLINE void scale_places(uz_lanes *y, const uz_strain_group *g, int dim)
-{
-    const int count = g->rule.nodes * dim;
-    const lane_bits no_sign = (lane_bits){0} + INT64_MAX;
-    uz_lanes size = {0};
-    for (int i = 0; i < count; i++) {
-        y[i] = g->x[i] - g->x[i % dim];
-        size += (uz_lanes)((lane_bits)y[i] & no_sign);
-    }
-    for (int i = 0; i < count; i++)
-        y[i] /= size;
-}
-
-/* At each node, the linear function that fits the stresses of the Gauss points best: that of a quadratic element is
- * most accurate there. */
-INLINE void add_linear_fit(double *rows, const uz_strain_group *g, const int64_t *const place[LANES], int n, int direct,
-                           int dim)
+/* At each node, the linear function of the place that fits the samples best, with the element's volume as weight. */
+INLINE void add_linear_fit(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                           uz_lanes value[MOST_ROW], int n, int dim, int size)
 {
     const int m = dim + 1, nodes = g->rule.nodes;
+    const lane_bits no_sign = (lane_bits){0} + INT64_MAX;
     uz_lanes A[LINEAR][LINEAR] = {{{0}}}, B[LINEAR][UZ_ELEMENT_STRESSES] = {{{0}}}, y[3 * NODES], b[LINEAR];
-    uz_lanes stress[UZ_ELEMENT_STRESSES], value[MOST_ROW] = {{0}}, volume = {0};
-    scale_places(y, g, dim);
+    uz_lanes length = {0};
+    for (int i = 0; i < nodes * dim; i++) { /* places from the first node on, over the element's size */
+        y[i] = g->x[i] - g->x[i % dim];
+        length += (uz_lanes)((lane_bits)y[i] & no_sign);
+    }
+    for (int i = 0; i < nodes * dim; i++)
+        y[i] /= length;
     b[0] = 1 - (uz_lanes){0};
-    for (int p = 0; p < g->rule.points; p++) {
+    for (int p = 0; p < g->rule.asked; p++) {
         for (int i = 1; i < m; i++) {
             b[i] = (uz_lanes){0};
             for (int a = 1; a < nodes; a++)
                 b[i] += g->rule.N[p][a] * y[a * dim + i - 1];
         }
-        stress_of(stress, g, g->strain[p], n, direct);
-        volume += g->shape.volume[p];
         for (int i = 0; i < m; i++) {
             const uz_lanes weighted = g->shape.volume[p] * b[i];
             for (int j = 0; j < m; j++)
                 A[i][j] += weighted * b[j];
             for (int c = 0; c < n; c++)
-                B[i][c] += weighted * stress[c];
+                B[i][c] += weighted * g->strain[p][c];
         }
     }
     solve_small(A, B, m, n);
-    value[n] = volume;
     for (int a = 0; a < nodes; a++) {
         for (int c = 0; c < n; c++) {
             value[c] = B[0][c];
             for (int i = 1; i < m; i++)
                 value[c] += y[a * dim + i - 1] * B[i][c];
-            value[c] *= volume;
+            value[c] *= value[n];
         }
-        add_rows(rows, g, place, value, a, n < LANES ? LANES : MOST_ROW);
+        add_rows(rows, g, place, value, a, size);
     }
 }
 
-INLINE void add(double *rows, const uz_strain_group *g, const int64_t *const place[LANES], int n, int direct, int dim)
+INLINE void add(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                const double share[][UZ_ELEMENT_SAMPLES], int n, int dim, int size)
 {
-    if (g->rule.quadratic)
-        add_linear_fit(rows, g, place, n, direct, dim);
+    uz_lanes value[MOST_ROW] = {{0}};
+    for (int k = 0; k < g->rule.asked; k++)
+        value[n] += g->shape.volume[k];
+    if (n + 1 < size)
+        value[n + 1] = value[n] * g->free_strain;
+    if (share)
+        add_shares(rows, g, place, share, value, n, size);
     else
-        add_mean(rows, g, place, n, direct);
+        add_linear_fit(rows, g, place, value, n, dim, size);
 }
 
 /* ---- comparison */
+
+/* Stress of the strains less the thermal strain. n: components, `direct` of them no shear. */
+INLINE void stress_of(uz_lanes *stress, const uz_strain_group *g, const uz_lanes *strain, int n, int direct)
+{
+    uz_lanes trace = {0};
+    for (int c = 0; c < direct; c++)
+        trace += strain[c] - g->thermal;
+    for (int c = 0; c < n; c++)
+        stress[c] = c < direct ? g->material.lambda * trace + 2 * g->material.mu * (strain[c] - g->thermal)
+                               : g->material.mu * strain[c];
+}
 
 /* nodal[a][c]: the averages at the nodes. */
 INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, const uz_strain_group *g,
@@ -173,13 +158,13 @@ INLINE void gather_rows(uz_lanes nodal[NODES][MOST_ROW], const double *rows, con
 
 /* Deviator and trace apart, as in uz_complementary. */
 INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
-                    const int64_t *const place[LANES], int n, int direct)
+                    const int64_t *const place[LANES], int n, int direct, int size)
 {
     uz_lanes nodal[NODES][MOST_ROW], eta = {0}, energy = {0};
     const uz_lanes twice_mu = 2 * g->material.mu, per_twice_mu = 1 / twice_mu,
                    per_bulk = 1 / (direct * (direct * g->material.lambda + twice_mu));
-    gather_rows(nodal, rows, g, place, n < LANES ? LANES : MOST_ROW);
-    for (int p = 0; p < g->rule.points; p++) {
+    gather_rows(nodal, rows, g, place, size);
+    for (int p = 0; p < g->rule.asked; p++) {
         const uz_lanes *strain = g->strain[p];
         uz_lanes jump[UZ_ELEMENT_STRESSES], trace = {0}, sum = {0}, deviator = {0}, direct_work = {0}, shear_work = {0};
         stress_of(jump, g, strain, n, direct);
@@ -212,45 +197,52 @@ INLINE void compare(double *eta2, double *energy2, const double *rows, const uz_
 
 /* ---- for each model and kind of processor */
 
-INLINE void add_of_model(double *rows, const uz_strain_group *g, const int64_t *const place[LANES])
+INLINE void add_of_model(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                         const double share[][UZ_ELEMENT_SAMPLES], int size)
 {
-    if (g->rule.stresses == 3)
-        add(rows, g, place, 3, 2, 2);
+    if (size == LANES)
+        add(rows, g, place, share, 3, 2, LANES);
+    else if (g->rule.stresses == 3)
+        add(rows, g, place, share, 3, 2, MOST_ROW);
     else if (g->rule.stresses == 4)
-        add(rows, g, place, 4, 3, 2);
+        add(rows, g, place, share, 4, 2, MOST_ROW);
     else
-        add(rows, g, place, 6, 3, 3);
+        add(rows, g, place, share, 6, 3, MOST_ROW);
 }
 
 INLINE void compare_of_model(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
-                             const int64_t *const place[LANES])
+                             const int64_t *const place[LANES], int size)
 {
-    if (g->rule.stresses == 3)
-        compare(eta2, energy2, rows, g, place, 3, 2);
+    if (size == LANES)
+        compare(eta2, energy2, rows, g, place, 3, 2, LANES);
+    else if (g->rule.stresses == 3)
+        compare(eta2, energy2, rows, g, place, 3, 2, MOST_ROW);
     else if (g->rule.stresses == 4)
-        compare(eta2, energy2, rows, g, place, 4, 3);
+        compare(eta2, energy2, rows, g, place, 4, 3, MOST_ROW);
     else
-        compare(eta2, energy2, rows, g, place, 6, 3);
+        compare(eta2, energy2, rows, g, place, 6, 3, MOST_ROW);
 }
 
-UZ_AVX2_FMA static void add_fused(double *rows, const uz_strain_group *g, const int64_t *const place[LANES])
+UZ_AVX2_FMA static void add_fused(double *rows, const uz_strain_group *g, const int64_t *const place[LANES],
+                                  const double share[][UZ_ELEMENT_SAMPLES], int size)
 {
-    add_of_model(rows, g, place);
+    add_of_model(rows, g, place, share, size);
 }
 
 UZ_AVX2_FMA static void compare_fused(double *eta2, double *energy2, const double *rows, const uz_strain_group *g,
-                                      const int64_t *const place[LANES])
+                                      const int64_t *const place[LANES], int size)
 {
-    compare_of_model(eta2, energy2, rows, g, place);
+    compare_of_model(eta2, energy2, rows, g, place, size);
 }
 
-void uz_stress_rows_add(double *rows, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES])
+void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
+                        const int64_t *const place[UZ_STRAIN_LANES], const double share[][UZ_ELEMENT_SAMPLES])
 {
-    (uz_cpu_has_avx2_fma() ? add_fused : add_of_model)(rows, group, place);
+    (uz_cpu_has_avx2_fma() ? add_fused : add_of_model)(rows, group, place, share, size);
 }
 
-void uz_stress_rows_compare(double *eta2, double *energy2, const double *rows, const uz_strain_group *group,
+void uz_stress_rows_compare(double *eta2, double *energy2, const double *rows, int size, const uz_strain_group *group,
                             const int64_t *const place[UZ_STRAIN_LANES])
 {
-    (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(eta2, energy2, rows, group, place);
+    (uz_cpu_has_avx2_fma() ? compare_fused : compare_of_model)(eta2, energy2, rows, group, place, size);
 }

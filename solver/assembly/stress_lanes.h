@@ -1,16 +1,17 @@
-/* stress_lanes.h: what the error estimate does with the stresses of a few elements of one kind at once. */
+/* stress_lanes.h: sums at nodes and their comparison with the elements, for a few elements of one kind at once. */
 #ifndef UZ_ASSEMBLY_STRESS_LANES_H
 #define UZ_ASSEMBLY_STRESS_LANES_H
 
 #include "assembly/strain_group.h"
 
-/* Rows of sums, one for each place: the components of stress, each times volume, then the volume, then what fills the
- * row up. */
-int uz_stress_row_size(uz_model model);
-/* place[lane][node]: the row of each node of each element. */
-void uz_stress_rows_add(double *rows, const uz_strain_group *group, const int64_t *const place[UZ_STRAIN_LANES]);
-/* rows: divided by their volumes. Adds the integral of (s* - s)' C^-1 (s* - s) and of strain' C strain. */
-void uz_stress_rows_compare(double *eta2, double *energy2, const double *rows, const uz_strain_group *group,
+/* rows: `size` numbers for each place: the strains, each times volume, the volume, the free strain times volume where
+ * there is room, then what fills the row up. 4 is room for 3 strains and the volume, 8 for all.
+ * place[lane][node]: the row of each node of each element. share[node][sample]: what the group's points give to it;
+ * NULL: the linear function of the place that fits them best, which they must determine. */
+void uz_strain_rows_add(double *rows, int size, const uz_strain_group *group,
+                        const int64_t *const place[UZ_STRAIN_LANES], const double share[][UZ_ELEMENT_SAMPLES]);
+/* rows: stresses s*. Adds the integral of (s* - s)' C^-1 (s* - s) and of strain' C strain. */
+void uz_stress_rows_compare(double *eta2, double *energy2, const double *rows, int size, const uz_strain_group *group,
                             const int64_t *const place[UZ_STRAIN_LANES]);
 
 #endif

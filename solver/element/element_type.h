@@ -47,6 +47,8 @@ typedef struct {
     void (*shape)(double *N, double (*slope)[3], const double point[3]);
     uz_gauss_rule rule, ring; /* of the stiffness: the fewest points that leave no deformation without stiffness; `ring`
                                * is that of axisymmetric bodies, count 0: the same */
+    uz_gauss_rule energy;     /* of the error estimate, which squares what is linear (quadratic types: quadratic) in an
+                               * element; count 0: the rule of the stiffness can do that */
     enum {
         UZ_JACOBIAN_GENERAL,
         UZ_JACOBIAN_CONSTANT,
@@ -54,7 +56,7 @@ typedef struct {
     } jacobian;              /* where its sign must be checked */
     bool bbar, incompatible; /* formulations that it has beside the standard one */
 
-    /* Where its stress is most accurate, and what each of these points gives to each node; returns how many points. */
+    /* Where its strain is most accurate, and what each of these points gives to each node; returns how many points. */
     int (*recover)(double point[UZ_ELEMENT_SAMPLES][3], double share[UZ_ELEMENT_NODES][UZ_ELEMENT_SAMPLES],
                    uz_element_kind kind);
 

@@ -40,7 +40,6 @@ static void begin_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model mode
     rule->formulation = formulation;
     rule->dim = uz_element_dim(kind);
     rule->nodes = uz_element_node_count(kind);
-    rule->quadratic = rule->nodes > uz_element_type_of(kind)->corners;
     rule->stresses = uz_stress_count(model);
     rule->direct = rule->stresses == 3 ? 2 : 3;
     uz_element_type_of(kind)->shape(NULL, rule->centre, ORIGIN);
@@ -50,15 +49,19 @@ void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model mo
 {
     begin_rule(rule, kind, model, formulation);
     add_gauss_points(rule);
+    rule->asked = rule->points;
 }
 
 void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
-                       const double point[][3], int count)
+                       const double point[][3], const double *weight, int count)
 {
+    double unused[3], volume = 0;
     begin_rule(rule, kind, model, formulation);
-    rule->averaged = count;
+    rule->asked = rule->averaged = count;
+    for (int g = 0; g < uz_element_gauss_count(kind, model); g++)
+        volume += uz_element_gauss(unused, kind, model, g);
     for (int k = 0; k < count; k++)
-        add_point(rule, point[k], 0);
+        add_point(rule, point[k], weight ? weight[k] : volume / count);
     if (formulation != UZ_FORMULATION_STANDARD)
         add_gauss_points(rule);
 }

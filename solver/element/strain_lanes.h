@@ -17,8 +17,8 @@ typedef struct {
     uz_element_kind kind;
     uz_model model;
     uz_formulation formulation; /* as uz_resolve_formulation gave it */
-    bool quadratic;             /* has it middles of edges? */
     int dim, nodes, points, stresses;
+    int asked;    /* points that were asked for: the first ones */
     int averaged; /* averages over the element are over the points from this one on */
     int direct;   /* of the stresses, which come first: those that are no shear */
     double point[UZ_ELEMENT_GAUSS][3], weight[UZ_ELEMENT_GAUSS];
@@ -28,10 +28,11 @@ typedef struct {
 /* At the Gauss points. */
 void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation);
 
-/* At `count` other points, whose weights are 0. The Gauss points follow them where the formulation averages over the
- * element, as all but the standard one do: UZ_ELEMENT_GAUSS bounds both together. */
+/* At `count` other points of these weights; NULL: equal parts of the reference volume. The Gauss points follow them
+ * where the formulation averages over the element, as all but the standard one do: UZ_ELEMENT_GAUSS bounds both
+ * together. */
 void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
-                       const double point[][3], int count);
+                       const double point[][3], const double *weight, int count);
 
 /* Of the elements' shape. */
 typedef struct {

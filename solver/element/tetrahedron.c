@@ -56,6 +56,7 @@ const uz_element_type uz_type_tet4 = {
     .centre = {0.25, 0.25, 0.25},
     .shape = shape4,
     .rule = {1, gauss1},
+    .energy = {4, gauss4},
     .jacobian = UZ_JACOBIAN_CONSTANT,
     .recover = uz_recover_centre,
     .next = NEXT,

@@ -9,26 +9,8 @@
 
 uz_status uz_field_body_init(uz_field_body *out, const uz_scene *scene, const uz_body_model *model, uz_error *err)
 {
-    const uz_mesh *mesh = &model->mesh;
-    *out = (uz_field_body){.scene = scene, .model = model, .components = mesh->dim == 2 ? 4 : 6};
-    double *rise = NULL;
-    for (int64_t i = 0; i < scene->n_loads; i++) {
-        const uz_load *load = &scene->loads[i];
-        if (load->kind != UZ_LOAD_TEMPERATURE)
-            continue;
-        if (!rise && !(rise = uz_alloc_zero(mesh->n_elements, sizeof *rise)))
-            return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the temperature of %lld elements",
-                           (long long)mesh->n_elements);
-        /* Loads of temperature on one element add up, as loads do. */
-        const uz_group *group = uz_mesh_group(mesh, load->on, "", NULL);
-        const int64_t count = group ? uz_group_element_count(mesh, group) : 0;
-        for (int64_t k = 0; k < count; k++)
-            rise[uz_group_element_at(group, k)] += load->value;
-    }
-    for (int64_t e = 0; rise && e < mesh->n_elements; e++)
-        rise[e] *= uz_element_material(model, e)->expansion;
-    out->free_strain = rise;
-    return UZ_OK;
+    *out = (uz_field_body){.scene = scene, .model = model, .components = model->mesh.dim == 2 ? 4 : 6};
+    return uz_free_strains(&out->free_strain, model, scene, err);
 }
 
 void uz_field_body_clear(uz_field_body *body)
@@ -56,7 +38,7 @@ void uz_field_points_states(uz_field_state *state, uz_field_points *points, int6
         const uz_formulation formulation = uz_element_formulation(model, element);
         if (!group->begun || formulation != group->rule.formulation) {
             uz_strain_rule_at(&group->rule, (uz_element_kind)mesh->kind[element], model->kind, formulation,
-                              (const double(*)[3])points->point, points->count);
+                              (const double(*)[3])points->point, NULL, points->count);
             group->begun = true;
             group->shaped = false;
         }
@@ -70,11 +52,12 @@ void uz_field_points_states(uz_field_state *state, uz_field_points *points, int6
         uz_strain_group_load(group, &from);
     }
     const int lane = (int)(element - group->element[0]);
+    const uz_body_material *material = uz_element_material(points->body->model, element);
     for (int k = 0; k < points->count; k++) {
         double strain[UZ_ELEMENT_STRESSES] = {0};
         for (int c = 0; c < group->rule.stresses; c++)
             strain[c] = group->strain[k][c][lane];
-        uz_field_state_of_strain(&state[k], points->body, element, strain);
+        uz_field_state_of_strain(&state[k], points->body->model->kind, material, group->free_strain[lane], strain);
     }
 }
 
@@ -90,11 +73,9 @@ double uz_field_points_volume(uz_field_points *points, int64_t element)
 }
 
 /* Shear strains become tensor components. Axisymmetric: rr, zz, hoop, rz are xx, yy, zz, xy here. */
-void uz_field_state_of_strain(uz_field_state *out, const uz_field_body *body, int64_t element, double *strain)
+void uz_field_state_of_strain(uz_field_state *out, uz_model model, const uz_body_material *material, double free_strain,
+                              double *strain)
 {
-    const uz_model model = body->model->kind;
-    const uz_body_material *material = uz_element_material(body->model, element);
-    const double free_strain = body->free_strain ? body->free_strain[element] : 0;
     double thermal[UZ_ELEMENT_STRESSES], stress[UZ_ELEMENT_STRESSES];
     const int n = uz_stress_count(model), direct = n == 3 ? 2 : 3;
     memcpy(stress, strain, sizeof stress);

@@ -24,9 +24,10 @@ void uz_field_body_clear(uz_field_body *body);
 typedef struct {
     double stress[UZ_FIELD_COMPONENTS], strain[UZ_FIELD_COMPONENTS];
 } uz_field_state;
-/* From the strains of the model at a point of an element (see element.h; room for UZ_ELEMENT_STRESSES); shear strains
- * are halved in place. */
-void uz_field_state_of_strain(uz_field_state *out, const uz_field_body *body, int64_t element, double *strain);
+/* From the strains of the model (see element.h; room for UZ_ELEMENT_STRESSES), of which free_strain has no stress;
+ * shear strains are halved in place. */
+void uz_field_state_of_strain(uz_field_state *out, uz_model model, const uz_body_material *material, double free_strain,
+                              double *strain);
 
 /* The same local points of elements of one kind, a few elements at a time. count and point are the caller's. */
 typedef struct {

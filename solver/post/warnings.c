@@ -115,7 +115,8 @@ static void look_at_element(double *strained, double *turned, const uz_field_bod
         memcpy(ue + a * mesh->dim, u + node[a] * mesh->dim, (size_t)mesh->dim * sizeof *u);
     uz_element_move(&motion, &element, ue);
     uz_element_strain(strain, &motion, point);
-    uz_field_state_of_strain(&state, body, e, strain);
+    uz_field_state_of_strain(&state, body->model->kind, uz_element_material(body->model, e),
+                             body->free_strain ? body->free_strain[e] : 0, strain);
     uz_principal(principal, state.strain, body->components);
     *strained = fmax(fabs(principal[0]), fabs(principal[2]));
     /* |curl u| / 2 */

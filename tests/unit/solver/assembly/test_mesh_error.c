@@ -112,7 +112,7 @@ TEST(strains_in_lanes_at_other_points_are_those_of_single_elements)
             const int count = type->recover(at, share, (uz_element_kind)kind);
             memcpy(at[count], type->centre, sizeof at[count]);
             uz_strain_rule_at(&rule, f.element[0].kind, f.element[0].model, f.element[0].formulation,
-                              (const double(*)[3])at, count + 1);
+                              (const double(*)[3])at, NULL, count + 1);
             CHECK(rule.points <= UZ_ELEMENT_GAUSS);
             uz_lane_shape_of(&shape, &rule, f.x, f.element[0].thickness);
             uz_lane_strains(strain, &rule, &shape, &f.material, f.displacement);
@@ -146,12 +146,38 @@ typedef struct {
     double xyz[3 * NODES], u[UZ_ELEMENT_DOFS];
     const int64_t *node;
     int nodes, points, stresses;
-    double volume[POINTS], place[POINTS][3], N[POINTS][NODES], strain[POINTS][STRESSES], stress[POINTS][STRESSES];
+    double volume[POINTS], local[POINTS][3], N[POINTS][NODES], strain[POINTS][STRESSES], stress[POINTS][STRESSES];
 } plain_element;
 
-static void look_at(plain_element *s, const plain *x, int64_t e)
+typedef enum { GAUSS, ENERGY, SAMPLES } which_points;
+
+/* The points of one rule and their weights; returns how many. */
+static int list_points(double at[POINTS][3], double *weight, const uz_element *element, which_points which)
+{
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    const bool energy = which == ENERGY && type->energy.count > 0;
+    const int gauss = uz_element_gauss_count(element->kind, element->model);
+    const int count = energy ? type->energy.count : gauss;
+    double share[NODES][UZ_ELEMENT_SAMPLES], volume = 0;
+    for (int g = 0; g < count; g++) {
+        weight[g] = energy ? type->energy.point(at[g], g) : uz_element_gauss(at[g], element->kind, element->model, g);
+        volume += weight[g];
+    }
+    if (which != SAMPLES)
+        return count;
+    const bool middle = type->nodes == type->corners && element->formulation != UZ_FORMULATION_INCOMPATIBLE;
+    const int samples = middle ? 1 : type->recover(at, share, element->kind);
+    if (middle)
+        memcpy(at[0], type->centre, sizeof at[0]);
+    for (int k = 0; k < samples; k++)
+        weight[k] = volume / samples;
+    return samples;
+}
+
+static void look_at(plain_element *s, const plain *x, int64_t e, which_points which)
 {
     const int dim = x->model->mesh.dim;
+    double weight[POINTS];
     uz_element_motion motion;
     s->node = uz_mesh_element(&x->model->mesh, e, &s->nodes);
     uz_body_element(&s->element, s->xyz, x->model, e);
@@ -159,18 +185,13 @@ static void look_at(plain_element *s, const plain *x, int64_t e)
         s->u[i] = x->u[s->node[i / dim] * dim + i % dim];
     uz_element_move(&motion, &s->element, s->u);
     s->stresses = uz_stress_count(s->element.model);
-    s->points = uz_element_gauss_count(s->element.kind, s->element.model);
+    s->points = list_points(s->local, weight, &s->element, which);
     for (int g = 0; g < s->points; g++) {
-        double point[3], grad[NODES][3], strain[STRESSES] = {0};
-        const double weight = uz_element_gauss(point, s->element.kind, s->element.model, g);
+        const double *point = s->local[g];
+        double grad[NODES][3], strain[STRESSES] = {0};
         const double det = uz_element_gradients(grad, &s->element, point);
-        s->volume[g] = weight * uz_element_measure(&s->element, point, det);
+        s->volume[g] = weight[g] * uz_element_measure(&s->element, point, det);
         uz_element_shape(s->N[g], s->element.kind, point);
-        for (int c = 0; c < dim; c++) {
-            s->place[g][c] = 0;
-            for (int a = 0; a < s->nodes; a++)
-                s->place[g][c] += s->N[g][a] * s->xyz[a * dim + c];
-        }
         uz_element_strain(s->strain[g], &motion, point);
         uz_thermal_strain(strain, s->element.model, s->element.lame, x->free_strain ? x->free_strain[e] : 0);
         for (int c = 0; c < s->stresses; c++)
@@ -185,18 +206,19 @@ static double *average_at(const plain *x, int64_t e, int64_t node)
     return x->average + (node * x->model->n_materials + material) * (STRESSES + 1);
 }
 
-/* y = value of the linear function at x (dim) that fits component c at the Gauss points best, by volume; quadratic
- * elements. A small system, from a middle point, by elimination with the largest pivot. */
+/* The value at x (dim) of the linear function that fits component c at the samples best, by volume; of one sample, its
+ * value. A small system by elimination with the largest pivot. */
 static double fit_at(const plain_element *s, const double *x, int c)
 {
-    const int dim = uz_element_dim(s->element.kind), n = dim + 1;
+    const int dim = uz_element_dim(s->element.kind), n = s->points == 1 ? 1 : dim + 1;
     double A[4][5] = {{0}}, scale = 0;
     for (int i = 0; i < dim; i++)
         scale = fmax(scale, fabs(s->xyz[dim + i] - s->xyz[i]));
     for (int g = 0; g < s->points; g++) {
         double b[4] = {1};
         for (int i = 0; i < dim; i++)
-            b[i + 1] = (s->place[g][i] - x[i]) / scale;
+            for (int a = 0; a < s->nodes; a++)
+                b[i + 1] += s->N[g][a] * (s->xyz[a * dim + i] - x[i]) / scale;
         for (int i = 0; i < n; i++) {
             for (int j = 0; j < n; j++)
                 A[i][j] += s->volume[g] * b[i] * b[j];
@@ -221,18 +243,14 @@ static double fit_at(const plain_element *s, const double *x, int c)
 
 static void add_averages(const plain *x, const plain_element *s, int64_t e)
 {
-    const bool fits = s->nodes > uz_element_type_of(s->element.kind)->corners;
     const int dim = x->model->mesh.dim;
-    double volume = 0, mean[STRESSES] = {0};
-    for (int g = 0; g < s->points; g++) {
+    double volume = 0;
+    for (int g = 0; g < s->points; g++)
         volume += s->volume[g];
-        for (int c = 0; c < s->stresses; c++)
-            mean[c] += s->volume[g] * s->stress[g][c];
-    }
     for (int a = 0; a < s->nodes; a++) {
         double *at = average_at(x, e, s->node[a]);
         for (int c = 0; c < s->stresses; c++)
-            at[c] += fits ? volume * fit_at(s, s->xyz + a * dim, c) : mean[c];
+            at[c] += volume * fit_at(s, s->xyz + a * dim, c);
         at[STRESSES] += volume;
     }
 }
@@ -264,11 +282,11 @@ static double plain_estimate(const uz_body_model *model, const uz_scene *scene, 
     x.free_strain = free_strain;
     x.average = body_room(model->mesh.n_nodes * model->n_materials * (STRESSES + 1), sizeof *x.average);
     for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        look_at(&s, &x, e);
+        look_at(&s, &x, e, SAMPLES);
         add_averages(&x, &s, e);
     }
     for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        look_at(&s, &x, e);
+        look_at(&s, &x, e, ENERGY);
         add_energies(&x, &s, e);
     }
     free(x.average);
@@ -304,7 +322,7 @@ static void compare_stresses(const uz_body_model *model, const uz_scene *scene, 
     double *stress = body_room(n * body.components, sizeof *u), *at = stress;
     CHECK_INT(uz_field_gauss(element, point, stress, &body, u, NULL, NULL), UZ_OK);
     for (int64_t e = 0; e < model->mesh.n_elements; e++) {
-        look_at(&s, &x, e);
+        look_at(&s, &x, e, GAUSS);
         for (int g = 0; g < s.points; g++, at += body.components)
             for (int c = 0; c < s.stresses; c++) {
                 double size = 0;
