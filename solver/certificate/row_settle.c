@@ -237,8 +237,10 @@ static bool admit(settle *s, int64_t q)
             closed = false;
         }
         fails = (!closed && gone < 0) || s->count == MOST_TOGETHER || !(s->work > 0.0);
-        if (fails)
+        if (fails) { /* also where the gap would close: there is no place for another row */
+            closed = false;
             break;
+        }
         mpq_add(pressed, pressed, s->step);
         push(s, q, s->step);
         for (int64_t k = 0; k < s->count; k++) {
