@@ -2,6 +2,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "dual/springs.h"
 
 #include <float.h>
 #include <math.h>
@@ -24,7 +25,7 @@
 #define NOISE      (64.0 * DBL_EPSILON)
 #define PULL_NOISE 1e-12
 
-enum { PASSES = 12, MOST_FILL = 16 };
+enum { PASSES = 12 };
 
 typedef struct {
     uz_sparse_load *x;
@@ -34,44 +35,6 @@ typedef struct {
     double *w, *e, *room;     /* d: u less its base */
     double worst;             /* of the active gaps, relative to their sizes */
 } multipliers;
-
-/* The lower triangle of S; left empty where it has too many entries. */
-static uz_status augment(uz_csc *S, const multipliers *a, uz_error *err)
-{
-    const uz_csc *K = a->x->load.K, *Nt = &a->dual->Nt;
-    const int64_t m = a->dual->m, d = a->dual->d;
-    int64_t count = K->ptr[d], at = 0;
-    for (int64_t i = 0; i < m; i++)
-        count += a->active[i] ? (Nt->ptr[i + 1] - Nt->ptr[i]) * (Nt->ptr[i + 1] - Nt->ptr[i] + 1) / 2 : 0;
-    memset(S, 0, sizeof *S);
-    if (count > MOST_FILL * (K->ptr[d] + d + Nt->ptr[m]))
-        return UZ_OK;
-    int64_t *row = uz_alloc(count, sizeof *row), *column = uz_alloc(count, sizeof *column);
-    double *value = uz_alloc(count, sizeof *value);
-    uz_status status = UZ_OK;
-    if (row && column && value) {
-        for (int64_t j = 0; j < d; j++)
-            for (int64_t k = K->ptr[j]; k < K->ptr[j + 1]; k++, at++) {
-                row[at] = K->idx[k];
-                column[at] = j;
-                value[at] = K->val[k];
-            }
-        for (int64_t i = 0; i < m; i++)
-            for (int64_t k = Nt->ptr[i]; a->active[i] && k < Nt->ptr[i + 1]; k++)
-                for (int64_t l = Nt->ptr[i]; l <= k; l++, at++) { /* dofs of a row ascend */
-                    row[at] = Nt->idx[k];
-                    column[at] = Nt->idx[l];
-                    value[at] = a->sigma[i] * Nt->val[k] * Nt->val[l];
-                }
-        status = uz_csc_from_triplets(S, d, d, at, row, column, value, err);
-    } else {
-        status = uz_fail(err, UZ_ERR_MEMORY, "N", "no memory for %lld rows as equations", (long long)m);
-    }
-    free(row);
-    free(column);
-    free(value);
-    return status;
-}
 
 /* e = N'r - K w, f = g0 - N w, and what the rounding of f is in proportion to. */
 static void measure(multipliers *a, const double *r)
@@ -118,15 +81,13 @@ static uz_status step(multipliers *a, double *r, const uz_factor *factor, uz_fac
 }
 
 /* Passes with one Sigma. */
-static uz_status iterate(multipliers *a, bool *slow, double *r, uz_factor_workspace *ws, uz_error *err)
+static uz_status iterate(multipliers *a, bool *slow, double *r, uz_springs *S, const uz_analysis *analysis,
+                         uz_factor_workspace *ws, uz_error *err)
 {
-    uz_csc S;
     uz_factor *factor = NULL;
     *slow = false;
-    uz_status status = augment(&S, a, err);
-    if (status == UZ_OK && S.ptr)
-        status = uz_factor_plain(&factor, &S, UZ_ORDERING_AMD, 0, NULL, err);
-    uz_csc_clear(&S);
+    uz_springs_fill(S, a->sigma);
+    uz_status status = uz_factor_create(&factor, &S->S, analysis, 0, NULL, err);
     if (status == UZ_ERR_NOT_SPD) { /* nothing is left of K in S */
         uz_error_reset(err);
         return UZ_OK;
@@ -153,6 +114,8 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
     const int64_t m = dual->m, d = dual->d;
     multipliers a = {.x = x, .dual = dual, .active = active};
     double *of_m = uz_alloc_zero(3 * m, sizeof *of_m), *of_d = uz_alloc_zero(3 * d, sizeof *of_d);
+    uz_springs S = {0};
+    uz_analysis *analysis = NULL;
     uz_status status = UZ_OK;
     bool slow = true;
     if (!of_m || !of_d) {
@@ -166,15 +129,18 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
         a.room = of_d + 2 * d;
         memset(r, 0, (size_t)m * sizeof *r);
         measure(&a, r);
+        status = uz_springs_create(&S, x->load.K, dual, active, err);
     }
-    for (double sigma = FIRST_SIGMA; status == UZ_OK && slow && sigma <= LAST_SIGMA; sigma *= MORE_SIGMA) {
+    if (status == UZ_OK && S.S.ptr)
+        status = uz_analysis_create(&analysis, &S.S, NULL, 0, 0, UZ_ORDERING_AMD, NULL, err);
+    for (double sigma = FIRST_SIGMA; status == UZ_OK && analysis && slow && sigma <= LAST_SIGMA; sigma *= MORE_SIGMA) {
         for (int64_t i = 0; i < m; i++) {
             double compliance = 0.0;
             for (int64_t k = Nt->ptr[i]; k < Nt->ptr[i + 1]; k++)
                 compliance += Nt->val[k] * Nt->val[k] * x->weight[Nt->idx[k]];
             a.sigma[i] = compliance > 0.0 ? sigma / compliance : 0.0;
         }
-        status = iterate(&a, &slow, r, ws, err);
+        status = iterate(&a, &slow, r, &S, analysis, ws, err);
         slow = slow && a.worst > SOLVABLE;
     }
     if (status == UZ_OK && a.worst <= SOLVABLE && !uz_stop_is_due(&x->load.stop)) {
@@ -187,6 +153,8 @@ uz_status uz_multipliers_solve(uz_sparse_load *x, uz_factor_workspace *ws, uz_ac
         }
         *end = UZ_ACTIVE_SOLVED;
     }
+    uz_analysis_free(analysis);
+    uz_springs_clear(&S);
     free(of_m);
     free(of_d);
     return status;
