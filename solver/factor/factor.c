@@ -185,6 +185,18 @@ uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *
     return status;
 }
 
+uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err)
+{
+    cholmod_common common;
+    if (K->cols != factor->n || K->ptr[K->cols] != factor->analysis->nnz)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "K", "K is not of the pattern that was analysed");
+    if (!uz_cholmod_start(&common))
+        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
+    uz_status status = factorize(factor, K, &common, err);
+    cholmod_l_finish(&common);
+    return status;
+}
+
 uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering, size_t memory_limit,
                           const uz_hooks *hooks, uz_error *err)
 {

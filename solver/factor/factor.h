@@ -51,6 +51,10 @@ uz_factor_info uz_analysis_describe(const uz_analysis *analysis);
  * predicted bytes, ARGUMENT another size or number of entries than the analysis's. */
 uz_status uz_factor_create(uz_factor **out, const uz_csc *K, const uz_analysis *analysis, size_t memory_limit,
                            const uz_hooks *hooks, uz_error *err);
+/* A factor that nobody shares, of K with other values: in the memory that it has. What is known of its condition is
+ * still that of the first values, and K that is singular but to rounding is not refused. After an error it is of no use
+ * but for another attempt. */
+uz_status uz_factor_again(uz_factor *factor, const uz_csc *K, uz_error *err);
 /* Both at once, with nothing that has to come last. */
 uz_status uz_factor_plain(uz_factor **out, const uz_csc *K, uz_ordering ordering, size_t memory_limit,
                           const uz_hooks *hooks, uz_error *err);
