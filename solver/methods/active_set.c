@@ -10,6 +10,7 @@
 
 #include "core/alloc.h"
 #include "core/error.h"
+#include "dual/interior.h"
 #include "methods/exchange.h"
 #include "methods/kinds.h"
 
@@ -19,7 +20,7 @@
 
 /* Where steps are small they go on to the exact answer after the target is met: there the certificate of a cached body
  * is cheaper by half a linear solve, which is more than the steps cost. */
-enum { PATIENCE = 3, MAX_STEPS = 400, EXTRA_STEPS = 12, FEW_ROWS = 1024, GUESSES = 8, MANY_GUESSES = 32 };
+enum { PATIENCE = 3, CIRCLES = 4, MAX_STEPS = 400, EXTRA_STEPS = 12, FEW_ROWS = 1024, GUESSES = 8, MANY_GUESSES = 32 };
 
 /* What an exchange of all wrong rows is expected to leave of them, before it was tried. */
 #define FAIR_RATE 0.5
@@ -36,6 +37,7 @@ typedef struct {
     move move;                             /* the last one */
     double rate[N_MOVES];                  /* wrong rows after the last move of each kind over those before */
     int64_t before;                        /* wrong rows before it, 0: there was none */
+    bool from_inside;                      /* an interior point was asked */
 } pivoting;
 
 /* From the start: the operator's own guess, where it has one. Else the rows that a projected gradient step would leave
@@ -95,6 +97,26 @@ static bool is_stuck(const pivoting *p)
 static bool may_exchange(const uz_iterate *it, const uz_dual_load *load)
 {
     return load->dual->rows_may_depend && (load->dual->can->cheap_steps || it->m <= FEW_ROWS);
+}
+
+/* Once, where guesses lead no further: the rows that an interior point finds, if its steps take less than to exchange
+ * the rows one by one. */
+static uz_status look_from_inside(pivoting *p, bool *found, const uz_iterate *it, uz_dual_load *load, uz_error *err)
+{
+    const double m = (double)it->m, exchanges = load->dual->can->cheap_steps ? m * m * m / 8.0 : INFINITY;
+    *found = false;
+    if (p->from_inside)
+        return UZ_OK;
+    p->from_inside = true;
+    uz_status status = uz_dual_load_interior(load, found, p->active, exchanges, err);
+    if (*found) {
+        p->fewest = it->m + 1;
+        p->patience = PATIENCE;
+        p->idle = 0;
+        p->before = 0;
+        p->move = EXCHANGE;
+    }
+    return status;
 }
 
 /* Solves exactly from the guess, whatever rows depend on each other. */
@@ -161,6 +183,16 @@ static uz_status run(uz_end *end, uz_iterate *it, uz_dual_load *load, const uz_m
         }
         if (status != UZ_OK || *end == UZ_END_SOLVED || (*end == UZ_END_TARGET && (over || extra-- == 0)))
             goto done;
+        bool found = false;
+        if ((over && !uz_should_stop(end, it, options)) ||
+            (!over && is_stuck(&p) && (p.move != GUESS || p.idle >= CIRCLES)))
+            status = look_from_inside(&p, &found, it, load, err);
+        if (status != UZ_OK)
+            goto done;
+        if (found) {
+            over = false;
+            continue;
+        }
         if (is_stuck(&p) && may_exchange(it, load)) {
             status = solve_by_exchange(&p, end, it, load, options, history, err);
             goto done;

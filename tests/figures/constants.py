@@ -76,7 +76,8 @@ PHRASES = {
     "Computing 56, 1996": None, "Contact Mechanics, 1985": None, "SIAM J. Numerical Analysis 38, 2000": None,
     "Int. J. Numerical Methods in Engineering 83, 2010": None, "Applied Mechanics and Engineering 193, 2004": None,
     "Applied Mechanics and Engineering 200, 2011": None,
-    "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None,
+    "(Farkas 1902)": None, "Goldfarb and Idnani (Math. Programming 27 (1983))": None, "a K below 1e-289 is": None, "(below 1e-289)": None, "Mathematical Programming 27, 1983": None, "SIAM J. Optimization 2, 1992": None,
+    "Mathematical Programming Computation 4, 2012": None,
     # rules of the program
     "A node of which less than 5 % is covered": constant(0.05, r"LEAST_COVER ([\d.]+)"),
     "by more than 1 % of its length": constant(0.01, r"#define SLACK ([\d.]+)"),

@@ -97,3 +97,82 @@ TEST(a_long_chain_is_certified)
     free(column);
     free(value);
 }
+
+/* u_i - u_(i+1) <= h_i around a circle, with h that add up to nothing: each row holds as an equation, and u, whose mean
+ * is zero, is made of halves. Of N rows at once some dozens penetrate by rounding (POWELL20 of the CUTE collection). */
+TEST(a_cycle_without_room_is_certified)
+{
+    enum { N = 100 };
+    int64_t row[2 * N], column[2 * N];
+    double value[2 * N], exact[N] = {0}, mean = 0;
+    uz_qp qp = {.p = vector(N), .h = vector(N)};
+    for (int64_t i = 0; i < N; i++) {
+        row[i] = column[i] = i;
+        value[i] = 1;
+    }
+    CHECK_INT(uz_csc_from_triplets(&qp.K, N, N, N, row, column, value, NULL), UZ_OK);
+    for (int64_t i = 0; i < N; i++) {
+        for (int64_t k = 0; k < 2; k++) {
+            row[2 * i + k] = i;
+            column[2 * i + k] = (i + k) % N;
+            value[2 * i + k] = k ? -1 : 1;
+        }
+        qp.h[i] = i + 1 == N ? 0.5 - N : 0.5 - (i % 2 ? 1.0 : -1.0) * (double)(i + 1);
+        if (i + 1 < N)
+            exact[i + 1] = exact[i] - qp.h[i];
+        mean += exact[i] / N;
+    }
+    CHECK_INT(uz_csc_from_triplets(&qp.N, N, N, 2 * N, row, column, value, NULL), UZ_OK);
+    uz_problem problem = problem_of(qp);
+    uz_settings settings = uz_settings_default();
+    uz_result *result = solve_problem(&problem, &settings);
+    if (result) {
+        double error = 0;
+        for (int64_t i = 0; i < N; i++)
+            error = fmax(error, fabs(result->u[i] - (exact[i] - mean)));
+        CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+        CHECK_MSG(error <= 1e-12 * N, "off by %g", error);
+    }
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+}
+
+/* Of 1,200 second differences that may not be negative nearly all are zero, and each that is let go moves all others:
+ * neither single exchanges nor steps of the first order come far. */
+TEST(convex_regression_takes_few_steps)
+{
+    enum { N = 1200 };
+    qp_random rng = {12};
+    int64_t *row = calloc(3 * N, sizeof *row), *column = calloc(3 * N, sizeof *column);
+    double *value = vector(3 * N);
+    uz_qp qp = {.p = vector(N), .h = vector(N - 2)};
+    if (!row || !column)
+        abort();
+    for (int64_t i = 0; i < N; i++) {
+        const double x = 2.0 * (double)i / N - 1.0;
+        row[i] = column[i] = i;
+        value[i] = 1;
+        qp.p[i] = x * x + 0.3 * random_signed(&rng);
+    }
+    CHECK_INT(uz_csc_from_triplets(&qp.K, N, N, N, row, column, value, NULL), UZ_OK);
+    for (int64_t i = 0; i + 2 < N; i++)
+        for (int64_t k = 0; k < 3; k++) {
+            row[3 * i + k] = i;
+            column[3 * i + k] = i + k;
+            value[3 * i + k] = k == 1 ? 2 : -1;
+        }
+    CHECK_INT(uz_csc_from_triplets(&qp.N, N - 2, N, 3 * (N - 2), row, column, value, NULL), UZ_OK);
+    uz_problem problem = problem_of(qp);
+    uz_settings settings = uz_settings_default();
+    uz_result *result = solve_problem(&problem, &settings);
+    if (result) {
+        CHECK_INT(result->summary.outcome, UZ_CONVERGED);
+        CHECK(result->summary.certificate.relative_error <= 1e-8);
+        CHECK_MSG(result->summary.iterations <= 40, "%d iterations", (int)result->summary.iterations);
+    }
+    uz_result_free(result);
+    uz_problem_clear(&problem);
+    free(row);
+    free(column);
+    free(value);
+}
