@@ -344,14 +344,15 @@ static uz_status recover(uz_dual_load *load, double *u, const double *r, bool co
 
 /* Dense work is about 2 n^3 flops once, at a rate some 30 times that of sparse substitutions; the factored form pays a
  * sparse solve of about 60 d flops for each of some 300 iterations. In between the choice matters little. Where rows
- * bound single dofs, a few sparse factorizations take the place of the iterations, at about the same price; they get
- * cheaper the more dofs are held. Measured, bounds on both sides of all of 900 dofs: 1.5 ms and 320 ms; on one side of
- * 450 of them: 11 and 12 ms. */
+ * bound single dofs, a few sparse factorizations take the place of the iterations, at about the price of as many solves
+ * as they are; they get cheaper the more dofs are held. Measured, bounds on both sides of all of 900 dofs: 1.5 ms and
+ * 320 ms; on one side of 450 of them: 11 and 12 ms; 1,000 contacts of a slender body of 10,000 dofs: 20 and 40 times
+ * the time of a linear solve. */
 static bool suits(const uz_dual_shape *shape)
 {
     const int64_t small = 1024;
     double n = (double)shape->m;
-    bool cheap = 2.0 * n * n * n / 30.0 <= 300.0 * 60.0 * (double)shape->d;
+    bool cheap = 2.0 * n * n * n / 30.0 <= (shape->bounds ? 20.0 : 300.0) * 60.0 * (double)shape->d;
     return shape->bounds ? cheap && 2 * shape->n_b <= shape->d : shape->m <= small || cheap;
 }
 

@@ -108,6 +108,28 @@ TEST(generated_beams_are_solved)
     }
 }
 
+/* Rows of slender bodies that come to touch or come off one by one are found by an interior point, at once: held at one
+ * end, and between two planes. */
+TEST(long_beams_take_few_steps)
+{
+    static const beam beams[] = {{"quad4", 1000, 1e-3, 0.01, 800, 2, false},
+                                 {"quad8", 1000, 1e-4, 0.5, 300, 1, false},
+                                 {"quad8", 1000, 1e-4, 0.5, 200, 1, true}};
+    for (size_t k = 0; k < sizeof beams / sizeof beams[0]; k++) {
+        uz_problem problem = beam_problem(&beams[k]);
+        uz_settings settings = uz_settings_default();
+        settings.relative_error = 1e-8;
+        uz_result *result = solve_problem(&problem, &settings);
+        if (result) {
+            const uz_summary *s = &result->summary;
+            CHECK_MSG(s->outcome == UZ_CONVERGED, "beam %d: %s", (int)k, s->message);
+            CHECK_MSG(s->iterations <= 20, "beam %d took %lld steps", (int)k, (long long)s->iterations);
+        }
+        uz_result_free(result);
+        uz_problem_clear(&problem);
+    }
+}
+
 /* Nearly all rows touch: they come off one by one. Few do: they come to touch one by one. */
 TEST(steps_are_those_of_the_shorter_way)
 {
