@@ -166,7 +166,7 @@ uz_status uz_scene_body_key(unsigned char **out, size_t *len, const uz_scene *sc
     static const char format[] = "uzawa body 3";
     uz_buffer key = {0};
     char *text = NULL;
-    const int dim = uz_model_dim(scene->model);
+    const int dim = uz_scene_dim(scene);
     *out = NULL;
     *len = 0;
     uz_buffer_put(&key, format, sizeof format);

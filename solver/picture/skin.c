@@ -39,7 +39,7 @@ static bool make_room(uz_skin *skin, int64_t cells, int64_t points)
 
 static bool is_outer(const uz_corner_table *sides, int64_t i)
 {
-    return !sides->same[i] && !uz_corner_table_shared(sides, i);
+    return !sides->same[i] && !sides->same[i + 1];
 }
 
 uz_status uz_skin_build(uz_skin *out, const uz_mesh *mesh, const uz_hooks *hooks, uz_error *err)

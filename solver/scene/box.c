@@ -16,77 +16,38 @@ static uz_status fail_at(uz_error *err, uz_status status, const char *key, int i
     return uz_fail(err, status, where, "%s", message);
 }
 
-enum { NAMES = 128 };
-
-static bool comes_before(const uz_element_type *a, const uz_element_type *b)
+/* The name must be that of an element in the box's dimensions. Otherwise those that there are are listed, as "hex8,
+ * tet4 or tet10": by family, each from few nodes to many. */
+static uz_status check_element(const uz_box *box, uz_error *err)
 {
-    return a->name[0] != b->name[0] ? a->name[0] < b->name[0] : a->nodes < b->nodes;
-}
-
-/* "hex8, tet4 or tet10": by family, each from few nodes to many. */
-static void list_elements(char names[NAMES], int dim)
-{
-    const uz_element_type *last = NULL;
-    size_t used = 0;
-    for (bool more = true; more;) {
-        const uz_element_type *next = NULL;
-        more = false;
-        for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
-            const uz_element_type *type = uz_element_types[k];
-            if (type->dim != dim || (last && !comes_before(last, type)))
-                continue;
-            more = next != NULL;
-            next = !next || comes_before(type, next) ? type : next;
-        }
-        used += (size_t)snprintf(names + used, NAMES - used, "%s%s", !last ? "" : more ? ", " : " or ", next->name);
-        last = next;
-    }
-}
-
-static uz_status check_kind(const uz_box *box, uz_error *err)
-{
-    char name[sizeof box->element + 1] = "", names[NAMES];
+    const uz_element_type *offered[UZ_ELEMENT_KINDS];
+    char name[sizeof box->element + 1] = "", names[128] = "";
     uz_element_kind kind;
-    if (box->dim != 2 && box->dim != 3)
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/size", "a box of %d dimensions; only 2 and 3 are built", box->dim);
+    size_t used = 0;
+    int count = 0;
     memcpy(name, box->element, sizeof box->element);
     if (uz_element_parse(&kind, name) && uz_element_dim(kind) == box->dim)
         return UZ_OK;
-    list_elements(names, box->dim);
+    for (int k = 0; k < UZ_ELEMENT_KINDS; k++) {
+        const uz_element_type *type = uz_element_types[k];
+        int at = type->dim == box->dim ? count++ : 0;
+        for (; at > 0; at--) {
+            const uz_element_type *before = offered[at - 1];
+            if (before->name[0] != type->name[0] ? before->name[0] < type->name[0] : before->nodes < type->nodes)
+                break;
+            offered[at] = before;
+        }
+        if (type->dim == box->dim)
+            offered[at] = type;
+    }
+    for (int k = 0; k < count; k++)
+        used += (size_t)snprintf(names + used, sizeof names - used, "%s%s",
+                                 k == 0          ? ""
+                                 : k < count - 1 ? ", "
+                                                 : " or ",
+                                 offered[k]->name);
     return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/element", "no element \"%.15s\" in a box of %d dimensions; use %s",
                    name, box->dim, names);
-}
-
-static uz_status check_lengths(const uz_box *box, uz_error *err)
-{
-    for (int i = 0; i < box->dim; i++) {
-        if (!isfinite(box->origin[i]))
-            return fail_at(err, UZ_ERR_NOT_FINITE, "origin", i, "the origin is not a finite number");
-        if (!isfinite(box->size[i]))
-            return fail_at(err, UZ_ERR_NOT_FINITE, "size", i, "the size is not a finite number");
-        if (box->size[i] <= 0)
-            return fail_at(err, UZ_ERR_SCENE, "size", i, "the size of a box must be positive");
-        if (!isfinite(box->grading[i]))
-            return fail_at(err, UZ_ERR_NOT_FINITE, "grading", i, "the grading is not a finite number");
-        if (box->grading[i] < 0)
-            return fail_at(err, UZ_ERR_SCENE, "grading", i,
-                           "the grading is the size of the last cell over that of the first: it must be positive");
-    }
-    return UZ_OK;
-}
-
-static uz_status check_cells(const uz_box *box, uz_error *err)
-{
-    for (int i = 0; i < box->dim; i++) {
-        if (box->cells[i] < 1)
-            return fail_at(err, UZ_ERR_SCENE, "cells", i, "a box needs at least one cell in each direction");
-        if (box->cells[i] >= UZ_SCENE_MAX_DOFS)
-            return fail_at(err, UZ_ERR_SCENE, "cells", i, "too many cells");
-    }
-    if (box->dim * uz_box_node_count(box) > UZ_SCENE_MAX_DOFS)
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
-                       "the box would have more than %d unknowns; use fewer cells", UZ_SCENE_MAX_DOFS);
-    return UZ_OK;
 }
 
 static bool is_graded(const uz_box *box, int axis)
@@ -105,24 +66,46 @@ static double share_before(const uz_box *box, int axis, int64_t i)
     return i == box->cells[axis] ? 1 : expm1((double)i * growth) / expm1(n * growth);
 }
 
-/* i-th of cells + 1 grid lines; both ends are exact up to one rounding. */
-static double grid_line(const uz_box *box, int axis, int64_t i)
+static uz_status check_box(const uz_box *box, uz_error *err)
 {
-    return box->origin[axis] + box->size[axis] * share_before(box, axis, i);
-}
-
-/* Far from the origin of the axes, double precision may put two grid lines on one place. */
-static uz_status check_spacing(const uz_box *box, uz_error *err)
-{
-    for (int axis = 0; axis < box->dim; axis++) {
-        const int64_t n = box->cells[axis];
-        double first = share_before(box, axis, 1), last = 1 - share_before(box, axis, n - 1);
-        double cell = box->size[axis] * (is_graded(box, axis) ? fmin(first, last) : 1 / (double)n);
-        double reach = fabs(box->origin[axis]) + box->size[axis];
+    if (box->automatic)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells", "the cells are still to be chosen: give their numbers");
+    if (box->dim != 2 && box->dim != 3)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/size", "a box of %d dimensions; only 2 and 3 are built", box->dim);
+    const uz_status status = check_element(box, err);
+    if (status != UZ_OK)
+        return status;
+    for (int i = 0; i < box->dim; i++) {
+        if (!isfinite(box->origin[i]))
+            return fail_at(err, UZ_ERR_NOT_FINITE, "origin", i, "the origin is not a finite number");
+        if (!isfinite(box->size[i]))
+            return fail_at(err, UZ_ERR_NOT_FINITE, "size", i, "the size is not a finite number");
+        if (box->size[i] <= 0)
+            return fail_at(err, UZ_ERR_SCENE, "size", i, "the size of a box must be positive");
+        if (!isfinite(box->grading[i]))
+            return fail_at(err, UZ_ERR_NOT_FINITE, "grading", i, "the grading is not a finite number");
+        if (box->grading[i] < 0)
+            return fail_at(err, UZ_ERR_SCENE, "grading", i,
+                           "the grading is the size of the last cell over that of the first: it must be positive");
+    }
+    for (int i = 0; i < box->dim; i++) {
+        if (box->cells[i] < 1)
+            return fail_at(err, UZ_ERR_SCENE, "cells", i, "a box needs at least one cell in each direction");
+        if (box->cells[i] >= UZ_SCENE_MAX_DOFS)
+            return fail_at(err, UZ_ERR_SCENE, "cells", i, "too many cells");
+    }
+    if (box->dim * uz_box_node_count(box) > UZ_SCENE_MAX_DOFS)
+        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells",
+                       "the box would have more than %d unknowns; use fewer cells", UZ_SCENE_MAX_DOFS);
+    for (int i = 0; i < box->dim; i++) {
+        const int64_t n = box->cells[i];
+        const double ends = fmin(share_before(box, i, 1), 1 - share_before(box, i, n - 1));
+        const double cell = box->size[i] * (is_graded(box, i) ? ends : 1 / (double)n);
+        const double reach = fabs(box->origin[i]) + box->size[i];
         if (!isfinite(reach))
-            return fail_at(err, UZ_ERR_NOT_FINITE, "size", axis, "the box reaches beyond the largest number");
-        if (!(cell > 1e-10 * reach))
-            return fail_at(err, UZ_ERR_SCENE, is_graded(box, axis) ? "grading" : "origin", axis,
+            return fail_at(err, UZ_ERR_NOT_FINITE, "size", i, "the box reaches beyond the largest number");
+        if (!(cell > 1e-10 * reach)) /* double precision may put two grid lines on one place */
+            return fail_at(err, UZ_ERR_SCENE, is_graded(box, i) ? "grading" : "origin", i,
                            "the cells are too small for their distance from zero to be told apart; "
                            "move the origin or use fewer cells");
     }
@@ -194,13 +177,12 @@ double *uz_box_lines(const uz_box *box, int axis, int order)
 {
     const int64_t count = axis < box->dim ? order * box->cells[axis] + 1 : 1;
     double *line = uz_alloc(count, sizeof *line);
-    for (int64_t i = 0; line && axis < box->dim && i < count; i++)
-        if (order == 1 || i % 2 == 0)
-            line[i] = grid_line(box, axis, i / order);
-        else if (!is_graded(box, axis))
-            line[i] = box->origin[axis] + box->size[axis] * ((double)i / (double)(order * box->cells[axis]));
-        else
-            line[i] = 0.5 * (grid_line(box, axis, i / 2) + grid_line(box, axis, i / 2 + 1));
+    for (int64_t i = 0; line && axis < box->dim && i < count; i += order) /* both ends are exact up to one rounding */
+        line[i] = box->origin[axis] + box->size[axis] * share_before(box, axis, i / order);
+    for (int64_t i = 1; line && order == 2 && i < count; i += 2)
+        line[i] = is_graded(box, axis)
+                      ? 0.5 * (line[i - 1] + line[i + 1])
+                      : box->origin[axis] + box->size[axis] * ((double)i / (double)(order * box->cells[axis]));
     return line;
 }
 
@@ -230,43 +212,36 @@ static uz_status fill_nodes(uz_mesh *mesh, const uz_box *box, uz_error *err)
 
 /* ---- the whole */
 
-static uz_status fill(uz_mesh *mesh, const uz_box *box, uz_error *err)
-{
-    const uz_element_type *type = uz_element_type_of(uz_box_element(box));
-    int64_t cells = 1;
-    mesh->dim = box->dim;
-    mesh->uniform = type->nodes == type->corners && type->parts == 1;
-    for (int axis = 0; axis < box->dim; axis++) {
-        cells *= box->cells[axis];
-        mesh->cell[axis] = box->size[axis] / (double)box->cells[axis];
-        mesh->extent = axis == 0 ? box->size[0] : hypot(mesh->extent, box->size[axis]);
-        mesh->uniform = mesh->uniform && !is_graded(box, axis);
-    }
-    mesh->n_nodes = (int64_t)uz_box_node_count(box);
-    mesh->n_elements = cells * uz_element_type_of(type->linear)->parts;
-    mesh->xyz = uz_alloc(mesh->n_nodes * box->dim, sizeof *mesh->xyz);
-    mesh->kind = uz_alloc(mesh->n_elements, sizeof *mesh->kind);
-    mesh->first = uz_alloc(mesh->n_elements + 1, sizeof *mesh->first);
-    mesh->node = uz_alloc(mesh->n_elements * uz_element_node_count(uz_box_element(box)), sizeof *mesh->node);
-    if (!mesh->xyz || !mesh->kind || !mesh->first || !mesh->node)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a mesh of %lld nodes", (long long)mesh->n_nodes);
-    uz_status status = fill_nodes(mesh, box, err);
-    if (status != UZ_OK)
-        return status;
-    uz_box_fill_elements(mesh, box);
-    return uz_box_fill_groups(mesh, box, err);
-}
-
 uz_status uz_mesh_from_box(uz_mesh *out, const uz_box *box, uz_error *err)
 {
-    uz_status status;
     memset(out, 0, sizeof *out);
-    if (box->automatic)
-        return uz_fail(err, UZ_ERR_SCENE, "/mesh/box/cells", "the cells are still to be chosen: give their numbers");
-    if ((status = check_kind(box, err)) != UZ_OK || (status = check_lengths(box, err)) != UZ_OK ||
-        (status = check_cells(box, err)) != UZ_OK || (status = check_spacing(box, err)) != UZ_OK)
+    uz_status status = check_box(box, err);
+    if (status != UZ_OK)
         return status;
-    status = fill(out, box, err);
+    const uz_element_type *type = uz_element_type_of(uz_box_element(box));
+    int64_t cells = 1;
+    out->dim = box->dim;
+    out->uniform = type->nodes == type->corners && type->parts == 1;
+    for (int axis = 0; axis < box->dim; axis++) {
+        cells *= box->cells[axis];
+        out->cell[axis] = box->size[axis] / (double)box->cells[axis];
+        out->extent = axis == 0 ? box->size[0] : hypot(out->extent, box->size[axis]);
+        out->uniform = out->uniform && !is_graded(box, axis);
+    }
+    out->n_nodes = (int64_t)uz_box_node_count(box);
+    out->n_elements = cells * uz_element_type_of(type->linear)->parts;
+    out->xyz = uz_alloc(out->n_nodes * box->dim, sizeof *out->xyz);
+    out->kind = uz_alloc(out->n_elements, sizeof *out->kind);
+    out->first = uz_alloc(out->n_elements + 1, sizeof *out->first);
+    out->node = uz_alloc(out->n_elements * type->nodes, sizeof *out->node);
+    if (!out->xyz || !out->kind || !out->first || !out->node)
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a mesh of %lld nodes", (long long)out->n_nodes);
+    if (status == UZ_OK)
+        status = fill_nodes(out, box, err);
+    if (status == UZ_OK) {
+        uz_box_fill_elements(out, box);
+        status = uz_box_fill_groups(out, box, err);
+    }
     if (status != UZ_OK)
         uz_mesh_clear(out);
     return status;

@@ -1,5 +1,5 @@
 /* box_elements.c: the cells of a box as elements, and the sides of the box as groups.
- All cells are cut into elements in the same way. */
+ * All cells are cut into elements in the same way. */
 #include "scene/box.h"
 
 #include "core/alloc.h"
@@ -61,39 +61,19 @@ static const struct {
 } BOX_SIDES[MOST_BOX_SIDES] = {{"left", 0, false}, {"right", 0, true}, {"bottom", 1, false},
                                {"top", 1, true},   {"back", 2, false}, {"front", 2, true}};
 
-/* The sides of a cell's elements on one side of the cell. */
-typedef struct {
-    int count, part[UZ_ELEMENT_PARTS], side[UZ_ELEMENT_PARTS];
-} cell_side;
-
-static cell_side list_cell_side(uz_element_kind kind, int axis, bool high)
-{
-    const uz_element_type *type = uz_element_type_of(kind), *linear = uz_element_type_of(type->linear);
-    cell_side out = {0};
-    for (int p = 0; p < linear->parts; p++)
-        for (int s = 0; s < type->sides; s++) {
-            const uz_element_side *side = &type->side[s];
-            int on = 0;
-            for (int n = 0; n < side->corners; n++)
-                on += CORNER[linear->part[p][side->node[n]]][axis] == (high ? 1 : 0);
-            if (on == side->corners) {
-                out.part[out.count] = p;
-                out.side[out.count++] = s;
-            }
-        }
-    return out;
-}
-
 /* A range of lattice points or cells: all of them in a plane across one axis. */
 typedef struct {
-    int64_t from[3], end[3];
+    int64_t from[3], end[3], count;
 } box_range;
 
 static box_range range_across(const uz_box *box, int per_cell, int extra, int axis, bool high)
 {
-    box_range range = {{0, 0, 0}, {1, 1, 1}};
-    for (int c = 0; c < box->dim; c++)
+    box_range range = {{0, 0, 0}, {1, 1, 1}, 1};
+    for (int c = 0; c < box->dim; c++) {
         range.end[c] = per_cell * box->cells[c] + extra;
+        if (c != axis)
+            range.count *= range.end[c];
+    }
     if (high)
         range.from[axis] = range.end[axis] - 1;
     else
@@ -101,27 +81,30 @@ static box_range range_across(const uz_box *box, int per_cell, int extra, int ax
     return range;
 }
 
-static int64_t range_count(const box_range *range)
+static uz_status fill_side(uz_group *group, const uz_box *box, int number, uz_error *err)
 {
-    int64_t count = 1;
-    for (int c = 0; c < 3; c++)
-        count *= range->end[c] - range->from[c];
-    return count;
-}
-
-static uz_status fill_side(uz_group *group, const uz_box *box, int side, uz_error *err)
-{
-    const int axis = BOX_SIDES[side].axis;
-    const bool high = BOX_SIDES[side].high;
+    const int axis = BOX_SIDES[number].axis;
+    const bool high = BOX_SIDES[number].high;
     const uz_element_kind kind = uz_box_element(box);
+    const uz_element_type *type = uz_element_type_of(kind), *linear = uz_element_type_of(type->linear);
     const uz_box_lattice lattice = uz_box_lattice_of(box);
     const box_range nodes = range_across(box, lattice.order, 1, axis, high);
     const box_range cells = range_across(box, 1, 0, axis, high);
-    const cell_side on = list_cell_side(kind, axis, high);
+    uz_face on[UZ_ELEMENT_PARTS * UZ_ELEMENT_SIDES]; /* the sides of a cell's elements that are on that side of it */
+    int count = 0;
+    for (int p = 0; p < linear->parts; p++)
+        for (int s = 0; s < type->sides; s++) {
+            const uz_element_side *side = &type->side[s];
+            int corners = 0;
+            for (int n = 0; n < side->corners; n++)
+                corners += CORNER[linear->part[p][side->node[n]]][axis] == (high ? 1 : 0);
+            if (corners == side->corners)
+                on[count++] = (uz_face){p, s};
+        }
     group->kind = UZ_GROUP_FACES;
-    snprintf(group->name, sizeof group->name, "%s", BOX_SIDES[side].name);
-    group->node = uz_alloc(range_count(&nodes), sizeof *group->node);
-    group->face = uz_alloc(range_count(&cells) * on.count, sizeof *group->face);
+    snprintf(group->name, sizeof group->name, "%s", BOX_SIDES[number].name);
+    group->node = uz_alloc(nodes.count, sizeof *group->node);
+    group->face = uz_alloc(cells.count * count, sizeof *group->face);
     if (!group->node || !group->face)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the side \"%s\" of a box", group->name);
     for (int64_t k = nodes.from[2]; k < nodes.end[2]; k++)
@@ -131,13 +114,12 @@ static uz_status fill_side(uz_group *group, const uz_box *box, int side, uz_erro
                 if (node >= 0)
                     group->node[group->n_nodes++] = node;
             }
-    int parts = uz_element_type_of(uz_element_type_of(kind)->linear)->parts;
     for (int64_t k = cells.from[2]; k < cells.end[2]; k++)
         for (int64_t j = cells.from[1]; j < cells.end[1]; j++)
             for (int64_t i = cells.from[0]; i < cells.end[0]; i++)
-                for (int s = 0; s < on.count; s++) {
+                for (int s = 0; s < count; s++) {
                     const int64_t cell = (k * box->cells[1] + j) * box->cells[0] + i;
-                    group->face[group->n_faces++] = (uz_face){cell * parts + on.part[s], on.side[s]};
+                    group->face[group->n_faces++] = (uz_face){cell * linear->parts + on[s].element, on[s].side};
                 }
     return UZ_OK;
 }

@@ -26,20 +26,19 @@ const uz_group *uz_check_group(char where[UZ_CHECK_POINTER], const uz_mesh *mesh
     return NULL;
 }
 
-uz_status uz_check_sides(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
-                         const char *remedy, uz_error *err)
+const uz_group *uz_check_sides(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
+                               int64_t i, const char *key, const char *remedy, uz_error *err)
 {
-    char where[UZ_CHECK_POINTER];
     const uz_group *group = uz_check_group(where, mesh, on, list, i, key, err);
-    if (!group)
-        return UZ_ERR_SCENE;
-    if (group->kind == UZ_GROUP_FACES)
-        return UZ_OK;
+    if (!group || group->kind == UZ_GROUP_FACES)
+        return group;
     if (group->everything)
-        return uz_fail(err, UZ_ERR_SCENE, where, "\"%s\" is the whole body, not a part of its boundary; %s",
-                       group->name, remedy);
-    return uz_fail(err, UZ_ERR_SCENE, where, "the group \"%s\" is made of %s, which have no sides here; %s",
-                   group->name, group->kind == UZ_GROUP_NODES ? "nodes" : "elements", remedy);
+        uz_fail(err, UZ_ERR_SCENE, where, "\"%s\" is the whole body, not a part of its boundary; %s", group->name,
+                remedy);
+    else
+        uz_fail(err, UZ_ERR_SCENE, where, "the group \"%s\" is made of %s, which have no sides here; %s", group->name,
+                group->kind == UZ_GROUP_NODES ? "nodes" : "elements", remedy);
+    return NULL;
 }
 
 uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err)
@@ -63,10 +62,9 @@ uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i,
 
 /* ---- the whole */
 
-/* Each item costs work on every node of its group. */
-static uz_status check_counts(const uz_scene *scene, uz_error *err)
+static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
-    enum { MOST = 1000 };
+    enum { MOST = 1000 }; /* each item costs work on every node of its group */
     const struct {
         const char *where;
         int64_t count;
@@ -74,11 +72,16 @@ static uz_status check_counts(const uz_scene *scene, uz_error *err)
                  {"/loads", scene->n_loads},
                  {"/contacts", scene->n_contacts},
                  {"/materials", scene->n_materials}};
+    uz_status status = UZ_OK;
     for (size_t i = 0; i < sizeof lists / sizeof lists[0]; i++)
         if (lists[i].count > MOST)
             return uz_fail(err, UZ_ERR_SCENE, lists[i].where, "%lld items; at most %d are allowed",
                            (long long)lists[i].count, MOST);
-    return UZ_OK;
+    for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
+        status = uz_check_support(scene, mesh, i, err);
+    for (int64_t i = 0; i < scene->n_contacts && status == UZ_OK; i++)
+        status = uz_check_contact(scene, mesh, i, err);
+    return status;
 }
 
 static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
@@ -86,8 +89,7 @@ static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, u
     const uz_formulation formulation = scene->formulation;
     if (formulation >= UZ_FORMULATIONS)
         return uz_fail(err, UZ_ERR_SCENE, "/formulation",
-                       "unknown formulation; use auto, standard, bbar or "
-                       "incompatible_modes");
+                       "unknown formulation; use auto, standard, bbar or incompatible_modes");
     if (formulation == UZ_FORMULATION_AUTO || formulation == UZ_FORMULATION_STANDARD)
         return UZ_OK;
     for (int64_t e = 0; e < mesh->n_elements; e++) {
@@ -100,12 +102,12 @@ static uz_status check_formulation(const uz_scene *scene, const uz_mesh *mesh, u
                    "use auto");
 }
 
-static uz_status check_model(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
+uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
     if (scene->model > UZ_SOLID)
         return uz_fail(err, UZ_ERR_SCENE, "/model",
                        "unknown model; use plane_stress, plane_strain, axisymmetric or solid");
-    if (uz_model_dim(scene->model) != mesh->dim)
+    if (uz_scene_dim(scene) != mesh->dim)
         return uz_fail(err, UZ_ERR_SCENE, "/model", "a mesh in %d dimensions needs the model %s", mesh->dim,
                        mesh->dim == 3 ? "solid" : "plane_stress, plane_strain or axisymmetric");
     const bool has_thickness = scene->model == UZ_PLANE_STRESS || scene->model == UZ_PLANE_STRAIN;
@@ -119,25 +121,10 @@ static uz_status check_model(const uz_scene *scene, const uz_mesh *mesh, uz_erro
                            "node %lld at (%g, %g) has a negative x, which is the radius in a body of revolution; "
                            "mesh the half with x >= 0",
                            (long long)i, mesh->xyz[2 * i], mesh->xyz[2 * i + 1]);
-    return check_formulation(scene, mesh, err);
-}
-
-static uz_status check_supports_and_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    uz_status status = check_counts(scene, err);
-    if (status == UZ_OK)
-        status = uz_check_supports(scene, mesh, err);
-    return status == UZ_OK ? uz_check_contacts(scene, mesh, err) : status;
-}
-
-uz_status uz_scene_check_body(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    uz_status status = check_model(scene, mesh, err);
+    uz_status status = check_formulation(scene, mesh, err);
     if (status == UZ_OK)
         status = uz_check_materials(scene, mesh, err);
-    if (status == UZ_OK)
-        status = check_supports_and_contacts(scene, mesh, err);
-    return status;
+    return status == UZ_OK ? check_supports_and_contacts(scene, mesh, err) : status;
 }
 
 /* ---- loads */
@@ -147,70 +134,56 @@ static const char *const LOAD_KEY[UZ_LOAD_KINDS] = {
     [UZ_LOAD_BODY_FORCE] = "body_force",  [UZ_LOAD_GRAVITY] = "gravity",   [UZ_LOAD_NODE_FORCE] = "force",
     [UZ_LOAD_TEMPERATURE] = "temperature"};
 
-static uz_status check_on_sides(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
-{
-    char where[UZ_CHECK_POINTER];
-    uz_status status = uz_check_sides(mesh, load->on, "loads", i, "on",
-                                      load->kind == UZ_LOAD_PRESSURE
-                                          ? "a pressure is a force per area of boundary: name the sides that it pushes"
-                                          : "a traction is a force per area of boundary: name the sides that it pulls",
-                                      err);
-    if (status != UZ_OK || load->kind != UZ_LOAD_PRESSURE)
-        return status;
-    const uz_group *group = uz_check_group(where, mesh, load->on, "loads", i, "on", err);
-    if (group->n_inner > 0)
-        return uz_fail(err, UZ_ERR_SCENE, where,
-                       "%lld faces of \"%s\" lie between two elements, where there is no outward normal; use a "
-                       "traction, or leave them out",
-                       (long long)group->n_inner, group->name);
-    return UZ_OK;
-}
-
-/* Density or expansion of any material: what the load is multiplied by. */
-static bool some_material_has(const uz_scene *scene, bool density)
-{
-    for (int64_t i = 0; i < scene->n_materials; i++)
-        if ((density ? scene->materials[i].density : scene->materials[i].expansion) != 0)
-            return true;
-    return false;
-}
-
+/* A load on elements is multiplied by a number of their materials, which some of them must have. */
 static uz_status check_on_elements(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
     const uz_load *load = &scene->loads[i];
     const uz_group *group = uz_check_group(where, mesh, load->on, "loads", i, "on", err);
+    bool density = false, expansion = false;
     if (!group)
         return UZ_ERR_SCENE;
     if (group->kind != UZ_GROUP_ELEMENTS)
         return uz_fail(err, UZ_ERR_SCENE, where,
                        "the group \"%s\" is not made of elements, and %s acts on elements: use \"all\"", group->name,
                        LOAD_KEY[load->kind]);
-    if (load->kind == UZ_LOAD_GRAVITY && !some_material_has(scene, true))
+    for (int64_t k = 0; k < scene->n_materials; k++) {
+        density = density || scene->materials[k].density != 0;
+        expansion = expansion || scene->materials[k].expansion != 0;
+    }
+    if (load->kind == UZ_LOAD_GRAVITY && !density)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "gravity"),
                        "no material has a density; give one, or use body_force");
-    if (load->kind == UZ_LOAD_TEMPERATURE && !some_material_has(scene, false))
+    if (load->kind == UZ_LOAD_TEMPERATURE && !expansion)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "temperature"),
                        "no material has an expansion, so that a temperature does nothing");
     return UZ_OK;
 }
 
-static uz_status check_force(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
+/* On sides, or on points: what a load on a part of the boundary may be. */
+static uz_status check_on_boundary(const uz_load *load, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
-    if (load->kind == UZ_LOAD_NODE_FORCE && mesh->n_unused > 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "node"),
-                       "%lld nodes of the file belong to no element and are left out, so that numbers are not those of "
-                       "the file; name a physical point by \"on\"",
-                       (long long)mesh->n_unused);
     if (load->kind == UZ_LOAD_NODE_FORCE) {
-        if (load->node >= 0 && load->node < mesh->n_nodes)
-            return UZ_OK;
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "loads", i, "node"),
-                       "there is no node %lld; this mesh has 0 to %lld", (long long)load->node,
-                       (long long)mesh->n_nodes - 1);
+        uz_check_place(where, "loads", i, "node");
+        if (mesh->n_unused > 0)
+            return uz_fail(err, UZ_ERR_SCENE, where,
+                           "%lld nodes of the file belong to no element and are left out, so that numbers are not "
+                           "those of the file; name a physical point by \"on\"",
+                           (long long)mesh->n_unused);
+        if (load->node < 0 || load->node >= mesh->n_nodes)
+            return uz_fail(err, UZ_ERR_SCENE, where, "there is no node %lld; this mesh has 0 to %lld",
+                           (long long)load->node, (long long)mesh->n_nodes - 1);
+        return UZ_OK;
     }
-    const uz_group *group = uz_check_group(where, mesh, load->on, "loads", i, "on", err);
+    const bool pressure = load->kind == UZ_LOAD_PRESSURE;
+    const uz_group *group =
+        load->kind == UZ_LOAD_FORCE
+            ? uz_check_group(where, mesh, load->on, "loads", i, "on", err)
+            : uz_check_sides(where, mesh, load->on, "loads", i, "on",
+                             pressure ? "a pressure is a force per area of boundary: name the sides that it pushes"
+                                      : "a traction is a force per area of boundary: name the sides that it pulls",
+                             err);
     if (!group)
         return UZ_ERR_SCENE;
     if (group->kind == UZ_GROUP_ELEMENTS)
@@ -218,43 +191,31 @@ static uz_status check_force(const uz_load *load, const uz_mesh *mesh, int64_t i
                        "the group \"%s\" is made of elements; a force is spread over sides or nodes: use body_force "
                        "(force per volume), or name sides",
                        group->name);
+    if (pressure && group->n_inner > 0)
+        return uz_fail(err, UZ_ERR_SCENE, where,
+                       "%lld faces of \"%s\" lie between two elements, where there is no outward normal; use a "
+                       "traction, or leave them out",
+                       (long long)group->n_inner, group->name);
     return UZ_OK;
-}
-
-static uz_status check_load(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
-{
-    char where[UZ_CHECK_POINTER];
-    uz_status status;
-    const uz_load *load = &scene->loads[i];
-    switch (load->kind) {
-    case UZ_LOAD_TRACTION:
-    case UZ_LOAD_PRESSURE:
-        status = check_on_sides(load, mesh, i, err);
-        break;
-    case UZ_LOAD_FORCE:
-    case UZ_LOAD_NODE_FORCE:
-        status = check_force(load, mesh, i, err);
-        break;
-    case UZ_LOAD_BODY_FORCE:
-    case UZ_LOAD_GRAVITY:
-    case UZ_LOAD_TEMPERATURE:
-        status = check_on_elements(scene, mesh, i, err);
-        break;
-    default:
-        return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "loads", i, NULL), "an unknown kind of load");
-    }
-    if (status != UZ_OK)
-        return status;
-    if (load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_TEMPERATURE)
-        return uz_check_number(load->value, "loads", i, LOAD_KEY[load->kind], err);
-    return uz_check_vector(load->v, mesh->dim, "loads", i, LOAD_KEY[load->kind], err);
 }
 
 uz_status uz_scene_check_load(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
 {
+    char where[UZ_CHECK_POINTER];
     uz_status status = check_supports_and_contacts(scene, mesh, err);
-    for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++)
-        status = check_load(scene, mesh, i, err);
+    for (int64_t i = 0; i < scene->n_loads && status == UZ_OK; i++) {
+        const uz_load *load = &scene->loads[i];
+        if (load->kind >= UZ_LOAD_KINDS)
+            return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "loads", i, NULL), "an unknown kind of load");
+        if (load->kind == UZ_LOAD_BODY_FORCE || load->kind == UZ_LOAD_GRAVITY || load->kind == UZ_LOAD_TEMPERATURE)
+            status = check_on_elements(scene, mesh, i, err);
+        else
+            status = check_on_boundary(load, mesh, i, err);
+        if (status == UZ_OK && (load->kind == UZ_LOAD_PRESSURE || load->kind == UZ_LOAD_TEMPERATURE))
+            status = uz_check_number(load->value, "loads", i, LOAD_KEY[load->kind], err);
+        else if (status == UZ_OK)
+            status = uz_check_vector(load->v, mesh->dim, "loads", i, LOAD_KEY[load->kind], err);
+    }
     for (int64_t i = 0; i < scene->n_contacts && status == UZ_OK; i++)
         if (scene->contacts[i].kind == UZ_OBSTACLE_PLANE)
             status = uz_check_vector(scene->contacts[i].point, mesh->dim, "contacts", i, "obstacle/plane/point", err);

@@ -13,15 +13,15 @@ const char *uz_check_place(char where[UZ_CHECK_POINTER], const char *list, int64
 const uz_group *uz_check_group(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
                                int64_t i, const char *key, uz_error *err);
 /* The same, and it must be made of faces. remedy: what to name instead. */
-uz_status uz_check_sides(const uz_mesh *mesh, const char *on, const char *list, int64_t i, const char *key,
-                         const char *remedy, uz_error *err);
+const uz_group *uz_check_sides(char where[UZ_CHECK_POINTER], const uz_mesh *mesh, const char *on, const char *list,
+                               int64_t i, const char *key, const char *remedy, uz_error *err);
 /* Each of dim components must be finite; key is "traction", "obstacle/plane/point", ... */
 uz_status uz_check_vector(const double *v, int dim, const char *list, int64_t i, const char *key, uz_error *err);
 uz_status uz_check_number(double value, const char *list, int64_t i, const char *key, uz_error *err);
 
-/* Groups, directions and values of supports; groups and directions of contacts. */
-uz_status uz_check_supports(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
-uz_status uz_check_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
+/* Group, directions and values of support i; groups and directions of contact i. */
+uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
+uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err);
 uz_status uz_check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_error *err);
 
 #endif

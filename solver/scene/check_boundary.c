@@ -28,25 +28,6 @@ bool uz_unit_normal(double out[3], const double normal[3], int dim)
     return true;
 }
 
-/* ---- supports */
-
-static uz_status check_components(const uz_support *support, int dim, int64_t i, uz_error *err)
-{
-    char where[UZ_CHECK_POINTER];
-    bool any = false;
-    for (int c = 0; c < dim; c++) {
-        const char key[3] = {'u', "xyz"[c], '\0'};
-        if (isinf(support->u[c]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, uz_check_place(where, "supports", i, key),
-                           "the prescribed displacement is not a finite number");
-        any = any || !isnan(support->u[c]);
-    }
-    if (any)
-        return UZ_OK;
-    return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, NULL),
-                   "this support holds no direction; give %s", dim == 2 ? "ux, uy or both" : "ux, uy, uz or some");
-}
-
 /* A direction: finite, not zero. */
 static uz_status check_direction(const double normal[3], int dim, const char *list, int64_t i, const char *key,
                                  const char *meaning, uz_error *err)
@@ -59,76 +40,73 @@ static uz_status check_direction(const double normal[3], int dim, const char *li
     return status;
 }
 
-static uz_status check_spring(const uz_support *support, const uz_mesh *mesh, int64_t i, uz_error *err)
-{
-    char where[UZ_CHECK_POINTER];
-    double sum = 0;
-    uz_status status = uz_check_vector(support->spring, mesh->dim, "supports", i, "spring", err);
-    for (int c = 0; c < mesh->dim && status == UZ_OK; c++) {
-        const char key[] = {'s', 'p', 'r', 'i', 'n', 'g', '/', (char)('0' + c), '\0'};
-        if (support->spring[c] < 0)
-            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, key),
-                           "a stiffness must not be negative; it is %g", support->spring[c]);
-        sum = fmax(sum, support->spring[c]);
-    }
-    if (status == UZ_OK && sum == 0)
-        return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
-                       "this spring has no stiffness in any direction");
-    if (status != UZ_OK)
-        return status;
-    return uz_check_sides(mesh, support->on, "supports", i, "on",
-                          "a spring is spread over sides by area: name the sides that stand on it", err);
-}
-
-static uz_status check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
+uz_status uz_check_support(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
     const uz_support *support = &scene->supports[i];
+    const int dim = mesh->dim;
+    bool any = false;
     uz_status status;
     if (!uz_check_group(where, mesh, support->on, "supports", i, "on", err))
         return UZ_ERR_SCENE;
     switch (support->kind) {
     case UZ_SUPPORT_COMPONENTS:
-        return check_components(support, mesh->dim, i, err);
+        for (int c = 0; c < dim; c++) {
+            const char key[3] = {'u', "xyz"[c], '\0'};
+            if (isinf(support->u[c]))
+                return uz_fail(err, UZ_ERR_NOT_FINITE, uz_check_place(where, "supports", i, key),
+                               "the prescribed displacement is not a finite number");
+            any = any || !isnan(support->u[c]);
+        }
+        return any ? UZ_OK
+                   : uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, NULL),
+                             "this support holds no direction; give %s",
+                             dim == 2 ? "ux, uy or both" : "ux, uy, uz or some");
     case UZ_SUPPORT_NORMAL:
-        status = check_direction(support->normal, mesh->dim, "supports", i, "normal",
-                                 "it must be the direction that is held", err);
+        status = check_direction(support->normal, dim, "supports", i, "normal", "it must be the direction that is held",
+                                 err);
         return status == UZ_OK ? uz_check_number(support->value, "supports", i, "u", err) : status;
     case UZ_SUPPORT_SPRING:
-        return check_spring(support, mesh, i, err);
+        if ((status = uz_check_vector(support->spring, dim, "supports", i, "spring", err)) != UZ_OK)
+            return status;
+        for (int c = 0; c < dim; c++) {
+            const char key[] = {'s', 'p', 'r', 'i', 'n', 'g', '/', (char)('0' + c), '\0'};
+            if (support->spring[c] < 0)
+                return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, key),
+                               "a stiffness must not be negative; it is %g", support->spring[c]);
+            any = any || support->spring[c] > 0;
+        }
+        if (!any)
+            return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "supports", i, "spring"),
+                           "this spring has no stiffness in any direction");
+        if (!uz_check_sides(where, mesh, support->on, "supports", i, "on",
+                            "a spring is spread over sides by area: name the sides that stand on it", err))
+            return UZ_ERR_SCENE;
+        return UZ_OK;
     }
     return uz_fail(err, UZ_ERR_ARGUMENT, uz_check_place(where, "supports", i, NULL), "an unknown kind of support");
 }
-
-uz_status uz_check_supports(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    for (int64_t i = 0; i < scene->n_supports && status == UZ_OK; i++)
-        status = check_support(scene, mesh, i, err);
-    return status;
-}
-
-/* ---- contacts */
 
 /* A side that may touch has an outside. */
 static uz_status check_contact_side(const uz_mesh *mesh, const char *on, int64_t i, const char *key, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
-    uz_status status = uz_check_sides(mesh, on, "contacts", i, key,
-                                      mesh->dim == 2 ? "name the side that can touch: left, right, bottom or top in a "
-                                                       "box, a group of edges in other meshes"
-                                                     : "name the side that can touch: a side of a box, a group of "
-                                                       "faces in other meshes",
-                                      err);
-    const uz_group *group = status == UZ_OK ? uz_check_group(where, mesh, on, "contacts", i, key, err) : NULL;
-    if (group && group->n_inner > 0)
+    const uz_group *group = uz_check_sides(
+        where, mesh, on, "contacts", i, key,
+        mesh->dim == 2
+            ? "name the side that can touch: left, right, bottom or top in a box, a group of edges in other meshes"
+            : "name the side that can touch: a side of a box, a group of faces in other meshes",
+        err);
+    if (!group)
+        return UZ_ERR_SCENE;
+    if (group->n_inner > 0)
         return uz_fail(err, UZ_ERR_SCENE, where,
                        "%lld faces of \"%s\" lie between two elements, where nothing can touch; leave them out",
                        (long long)group->n_inner, group->name);
-    return status;
+    return UZ_OK;
 }
 
-static uz_status check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
+uz_status uz_check_contact(const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
     char where[UZ_CHECK_POINTER];
     const uz_contact *contact = &scene->contacts[i];
@@ -144,13 +122,5 @@ static uz_status check_contact(const uz_scene *scene, const uz_mesh *mesh, int64
     if (status == UZ_OK && strncmp(contact->on, contact->with, sizeof contact->on) == 0)
         return uz_fail(err, UZ_ERR_SCENE, uz_check_place(where, "contacts", i, "with"),
                        "\"%.63s\" would touch itself; name a side of another part", contact->with);
-    return status;
-}
-
-uz_status uz_check_contacts(const uz_scene *scene, const uz_mesh *mesh, uz_error *err)
-{
-    uz_status status = UZ_OK;
-    for (int64_t i = 0; i < scene->n_contacts && status == UZ_OK; i++)
-        status = check_contact(scene, mesh, i, err);
     return status;
 }

@@ -37,19 +37,6 @@ static uz_status check_values(const uz_scene *scene, int64_t i, uz_error *err)
     return status == UZ_OK ? uz_check_number(material->expansion, "materials", i, "expansion", err) : status;
 }
 
-static uz_status twice(const uz_mesh *mesh, const uz_group *group, int64_t element, int64_t i, int64_t earlier,
-                       uz_error *err)
-{
-    char where[UZ_CHECK_POINTER];
-    uz_check_place(where, "materials", i, "on");
-    if (group->everything)
-        return uz_fail(err, UZ_ERR_SCENE, where, "the elements of \"%s\" already have material %lld", group->name,
-                       (long long)earlier);
-    return uz_fail(err, UZ_ERR_SCENE, where, "element %lld (%s) of \"%s\" already has material %lld",
-                   (long long)element, uz_element_name((uz_element_kind)mesh->kind[element]), group->name,
-                   (long long)earlier);
-}
-
 /* Gives the elements of one material their number. of: n_elements, -1 where there is none yet. */
 static uz_status cover(int32_t *of, const uz_scene *scene, const uz_mesh *mesh, int64_t i, uz_error *err)
 {
@@ -62,27 +49,14 @@ static uz_status cover(int32_t *of, const uz_scene *scene, const uz_mesh *mesh, 
                        group->kind == UZ_GROUP_FACES ? "a side" : "made of nodes");
     for (int64_t k = 0; k < uz_group_element_count(mesh, group); k++) {
         const int64_t e = uz_group_element_at(group, k);
+        if (of[e] >= 0 && group->everything)
+            return uz_fail(err, UZ_ERR_SCENE, where, "the elements of \"%s\" already have material %lld", group->name,
+                           (long long)of[e]);
         if (of[e] >= 0)
-            return twice(mesh, group, e, i, of[e], err);
+            return uz_fail(err, UZ_ERR_SCENE, where, "element %lld (%s) of \"%s\" already has material %lld",
+                           (long long)e, uz_element_name((uz_element_kind)mesh->kind[e]), group->name,
+                           (long long)of[e]);
         of[e] = (int32_t)i;
-    }
-    return UZ_OK;
-}
-
-static uz_status check_covered(const int32_t *of, const uz_mesh *mesh, uz_error *err)
-{
-    int count;
-    char z[32];
-    for (int64_t e = 0; e < mesh->n_elements; e++) {
-        if (of[e] >= 0)
-            continue;
-        const double *x = mesh->xyz + *uz_mesh_element(mesh, e, &count) * mesh->dim;
-        snprintf(z, sizeof z, ", %g", mesh->dim == 3 ? x[2] : 0);
-        return uz_fail(err, UZ_ERR_SCENE, "/materials",
-                       "element %lld (%s, with a node at (%g, %g%s)) has no material; give one on a group that it "
-                       "belongs to, such as \"all\"",
-                       (long long)e, uz_element_name((uz_element_kind)mesh->kind[e]), x[0], x[1],
-                       mesh->dim == 3 ? z : "");
     }
     return UZ_OK;
 }
@@ -102,8 +76,17 @@ uz_status uz_check_materials(const uz_scene *scene, const uz_mesh *mesh, uz_erro
         if (status == UZ_OK)
             status = check_values(scene, i, err);
     }
-    if (status == UZ_OK)
-        status = check_covered(of, mesh, err);
+    for (int64_t e = 0; e < mesh->n_elements && status == UZ_OK; e++)
+        if (of[e] < 0) {
+            const double *x = mesh->xyz + mesh->node[mesh->first[e]] * mesh->dim;
+            char z[32] = "";
+            if (mesh->dim == 3)
+                snprintf(z, sizeof z, ", %g", x[2]);
+            status = uz_fail(err, UZ_ERR_SCENE, "/materials",
+                             "element %lld (%s, with a node at (%g, %g%s)) has no material; give one on a group that "
+                             "it belongs to, such as \"all\"",
+                             (long long)e, uz_element_name((uz_element_kind)mesh->kind[e]), x[0], x[1], z);
+        }
     free(of);
     return status;
 }

@@ -70,49 +70,38 @@ static void walk_items(uz_corner_table *table, const uz_mesh *mesh, bool sides, 
     }
 }
 
-/* Buckets are small but in meshes made to be hard: a node of a regular mesh is the lowest of a few sides. */
-static void sort_entries(sort_entry *entry, int64_t count)
-{
-    enum { FEW = 16 };
-    if (count > FEW) {
-        qsort(entry, (size_t)count, sizeof *entry, compare_entries);
-        return;
-    }
-    for (int64_t i = 1; i < count; i++) {
-        const sort_entry moved = entry[i];
-        int64_t j = i;
-        for (; j > 0 && compare_entries(&entry[j - 1], &moved) > 0; j--)
-            entry[j] = entry[j - 1];
-        entry[j] = moved;
-    }
-}
-
-static void sort_bucket(uz_corner_table *table, const uz_mesh *mesh, int64_t from, int64_t end, sort_entry *entry)
-{
-    int64_t corner[UZ_MOST_CORNERS];
-    for (int64_t i = from; i < end; i++) {
-        sorted_corners(corner, mesh, table->item[i]);
-        memcpy(entry[i - from].corner, corner + 1, sizeof entry->corner);
-        entry[i - from].item = table->item[i];
-    }
-    sort_entries(entry, end - from);
-    for (int64_t i = from; i < end; i++) {
-        table->item[i] = entry[i - from].item;
-        table->same[i] = i > from && compare_corners(entry[i - from].corner, entry[i - from - 1].corner) == 0;
-    }
-}
-
+/* Sorts each bucket by its items' corners. */
 static uz_status sort_buckets(uz_corner_table *table, const uz_mesh *mesh, uz_error *err)
 {
-    int64_t largest = 0;
+    enum { FEW = 16 }; /* in a bucket, but in meshes made to be hard: a node is the lowest of a few sides */
+    int64_t largest = 0, corner[UZ_MOST_CORNERS];
     for (int64_t i = 0; i < mesh->n_nodes; i++)
         if (table->start[i + 1] - table->start[i] > largest)
             largest = table->start[i + 1] - table->start[i];
     sort_entry *entry = uz_alloc(largest, sizeof *entry);
     if (!entry)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory to compare %lld elements", (long long)mesh->n_elements);
-    for (int64_t i = 0; i < mesh->n_nodes; i++)
-        sort_bucket(table, mesh, table->start[i], table->start[i + 1], entry);
+    for (int64_t node = 0; node < mesh->n_nodes; node++) {
+        uz_face *item = table->item + table->start[node];
+        unsigned char *same = table->same + table->start[node];
+        const int64_t count = table->start[node + 1] - table->start[node];
+        for (int64_t i = 0; i < count; i++) {
+            sort_entry added = {.item = item[i]};
+            int64_t j = i;
+            sorted_corners(corner, mesh, item[i]);
+            memcpy(added.corner, corner + 1, sizeof added.corner);
+            for (; count <= FEW && j > 0 && compare_entries(&entry[j - 1], &added) > 0; j--)
+                entry[j] = entry[j - 1];
+            entry[j] = added;
+        }
+        if (count > FEW)
+            qsort(entry, (size_t)count, sizeof *entry, compare_entries);
+        for (int64_t i = 0; i < count; i++) {
+            item[i] = entry[i].item;
+            same[i] = i > 0 && compare_corners(entry[i].corner, entry[i - 1].corner) == 0;
+        }
+    }
+    table->same[table->count] = 0;
     free(entry);
     return UZ_OK;
 }
@@ -127,7 +116,7 @@ uz_status uz_corner_table_build(uz_corner_table *out, const uz_mesh *mesh, bool 
             out->start[i + 1] += out->start[i];
         out->count = out->start[mesh->n_nodes];
         out->item = uz_alloc(out->count, sizeof *out->item);
-        out->same = uz_alloc(out->count, sizeof *out->same);
+        out->same = uz_alloc(out->count + 1, sizeof *out->same);
     }
     uz_status status = UZ_OK;
     if (!out->start || !out->item || !out->same) {
@@ -170,9 +159,4 @@ int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, 
         return -1;
     sorted_corners(there, mesh, table->item[low]);
     return compare_corners(there + 1, wanted + 1) == 0 ? low : -1;
-}
-
-bool uz_corner_table_shared(const uz_corner_table *table, int64_t place)
-{
-    return place + 1 < table->count && table->same[place + 1];
 }

@@ -12,7 +12,7 @@ enum { UZ_MOST_CORNERS = UZ_ELEMENT_CORNERS };
 typedef struct {
     int64_t *start;      /* n_nodes + 1: the bucket of node i is item[start[i]..start[i + 1]) */
     uz_face *item;       /* sides; or whole elements, whose `side` is -1; equal ones by element */
-    unsigned char *same; /* has the item before it the same corners? */
+    unsigned char *same; /* count + 1: has the item before it the same corners? The last is 0 */
     int64_t count;
 } uz_corner_table;
 
@@ -21,7 +21,5 @@ void uz_corner_table_clear(uz_corner_table *table);
 
 /* Place of the first item with these corners, which are sorted here; -1 if there is none. Nodes must be in range. */
 int64_t uz_corner_table_find(const uz_corner_table *table, const uz_mesh *mesh, int64_t *corner, int count);
-/* Is the item at this place, the first of its corners, followed by another of the same? */
-bool uz_corner_table_shared(const uz_corner_table *table, int64_t place);
 
 #endif

@@ -10,61 +10,35 @@
 #include <stdlib.h>
 #include <string.h>
 
-int uz_model_dim(uz_model model)
-{
-    return model == UZ_SOLID ? 3 : 2;
-}
-
-static uz_status check_size(const uz_given_mesh *given, int dim, uz_error *err)
-{
-    const char *where = given->from_file ? "/mesh/gmsh" : "/mesh/nodes";
-    if (given->dim != dim)
-        return uz_fail(err, UZ_ERR_SCENE, where, "this is a mesh in %d dimensions; its model is %s", given->dim,
-                       given->dim == 3 ? "solid" : "plane_stress, plane_strain or axisymmetric");
-    if (given->n_nodes < 1 || given->n_elements < 1)
-        return uz_fail(err, UZ_ERR_SCENE, given->from_file ? where : "/mesh/elements", "the mesh has no element");
-    if (given->n_nodes > UZ_SCENE_MAX_DOFS / dim)
-        return uz_fail(err, UZ_ERR_SCENE, where, "%lld nodes are more than %d unknowns; use a coarser mesh",
-                       (long long)given->n_nodes, UZ_SCENE_MAX_DOFS);
-    return UZ_OK;
-}
-
-/* ---- nodes that no element uses */
-
-/* Lists the first few of them for a message. */
-static uz_status refuse_unused(const int64_t *new_node, int64_t n_nodes, int64_t unused, uz_error *err)
+/* The number of each given node, -1 where no element uses it: such nodes of a file are left out, others refused. */
+static uz_status number_nodes(int64_t *new_node, uz_mesh *mesh, const uz_given_mesh *given, uz_error *err)
 {
     enum { SHOWN = 5 };
     char list[160] = "", where[UZ_POINTER] = "";
     int shown = 0;
     size_t used = 0;
-    for (int64_t i = 0; i < n_nodes && shown < SHOWN; i++)
-        if (new_node[i] < 0) {
-            if (shown == 0)
-                snprintf(where, sizeof where, "/mesh/nodes/%lld", (long long)i);
-            used += (size_t)snprintf(list + used, sizeof list - used, "%s%lld", shown++ ? ", " : "", (long long)i);
-        }
-    return uz_fail(err, UZ_ERR_SCENE, where,
-                   "node%s %s%s belong%s to no element, so that nothing holds %s; leave %s out of the mesh",
-                   unused > 1 ? "s" : "", list, unused > SHOWN ? ", ..." : "", unused > 1 ? "" : "s",
-                   unused > 1 ? "them" : "it", unused > 1 ? "them" : "it");
-}
-
-/* The numbers of the nodes that are kept, -1 for the others; returns how many are kept. */
-static int64_t number_nodes(int64_t *new_node, const uz_given_mesh *given)
-{
-    int64_t kept = 0;
     for (int64_t i = 0; i < given->n_nodes; i++)
         new_node[i] = -1;
     for (int64_t q = 0; q < given->first[given->n_elements]; q++)
         new_node[given->node[q]] = 0;
     for (int64_t i = 0; i < given->n_nodes; i++)
         if (new_node[i] == 0)
-            new_node[i] = kept++;
-    return kept;
+            new_node[i] = mesh->n_nodes++;
+    mesh->n_unused = given->n_nodes - mesh->n_nodes;
+    if (mesh->n_unused == 0 || given->from_file)
+        return UZ_OK;
+    for (int64_t i = 0; i < given->n_nodes && shown < SHOWN; i++)
+        if (new_node[i] < 0) {
+            if (shown == 0)
+                snprintf(where, sizeof where, "/mesh/nodes/%lld", (long long)i);
+            used += (size_t)snprintf(list + used, sizeof list - used, "%s%lld", shown++ ? ", " : "", (long long)i);
+        }
+    const bool several = mesh->n_unused > 1;
+    return uz_fail(err, UZ_ERR_SCENE, where,
+                   "node%s %s%s belong%s to no element, so that nothing holds %s; leave %s out of the mesh",
+                   several ? "s" : "", list, mesh->n_unused > SHOWN ? ", ..." : "", several ? "" : "s",
+                   several ? "them" : "it", several ? "them" : "it");
 }
-
-/* ---- copying */
 
 static uz_status copy_mesh(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err)
 {
@@ -85,16 +59,14 @@ static uz_status copy_mesh(uz_mesh *mesh, const uz_given_mesh *given, const int6
     memcpy(mesh->first, given->first, (size_t)(n_elements + 1) * sizeof *mesh->first);
     for (int64_t q = 0; q < n_places; q++)
         mesh->node[q] = new_node[given->node[q]];
-    double extent = 0;
-    for (int c = 0; c < mesh->dim; c++) {
+    for (int c = 0; c < dim; c++) {
         double low = mesh->xyz[c], high = low;
         for (int64_t i = 0; i < mesh->n_nodes; i++) {
-            low = fmin(low, mesh->xyz[i * mesh->dim + c]);
-            high = fmax(high, mesh->xyz[i * mesh->dim + c]);
+            low = fmin(low, mesh->xyz[i * dim + c]);
+            high = fmax(high, mesh->xyz[i * dim + c]);
         }
-        extent = hypot(extent, high - low);
+        mesh->extent = hypot(mesh->extent, high - low);
     }
-    mesh->extent = extent;
     if (isfinite(mesh->extent))
         return UZ_OK;
     return uz_fail(err, UZ_ERR_NOT_FINITE, given->from_file ? "/mesh/gmsh" : "/mesh/nodes",
@@ -105,45 +77,33 @@ static uz_status copy_mesh(uz_mesh *mesh, const uz_given_mesh *given, const int6
 static uz_status check_twins(const uz_mesh *mesh, const uz_given_mesh *given, uz_error *err)
 {
     uz_corner_table table;
-    char where[UZ_POINTER], text[UZ_ELEMENT_TEXT];
+    char what[64];
     uz_status status = uz_corner_table_build(&table, mesh, false, err);
-    for (int64_t i = 0; i < table.count && status == UZ_OK; i++) {
-        if (!table.same[i])
-            continue;
-        uz_given_element_place(where, given, table.item[i].element);
-        uz_given_element_text(text, given, table.item[i].element);
-        status = uz_fail(err, UZ_ERR_SCENE, where, "%s has the corners of element %lld; each may be there only once",
-                         text, (long long)table.item[i - 1].element);
-    }
+    for (int64_t i = 0; i < table.count && status == UZ_OK; i++)
+        if (table.same[i]) {
+            snprintf(what, sizeof what, "has the corners of element %lld", (long long)table.item[i - 1].element);
+            status = uz_given_refuse(given, table.item[i].element, what, "each may be there only once", err);
+        }
     uz_corner_table_clear(&table);
     return status;
 }
 
-static uz_status build(uz_mesh *mesh, const uz_given_mesh *given, int64_t *new_node, uz_error *err)
-{
-    mesh->n_nodes = number_nodes(new_node, given);
-    mesh->n_unused = given->n_nodes - mesh->n_nodes;
-    if (mesh->n_unused > 0 && !given->from_file)
-        return refuse_unused(new_node, given->n_nodes, mesh->n_unused, err);
-    uz_status status = copy_mesh(mesh, given, new_node, err);
-    if (status == UZ_OK)
-        status = check_twins(mesh, given, err);
-    return status == UZ_OK ? uz_given_groups(mesh, given, new_node, err) : status;
-}
-
 uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, uz_error *err)
 {
-    int64_t *new_node = NULL;
     memset(out, 0, sizeof *out);
-    uz_status status = check_size(given, dim, err);
-    if (status == UZ_OK)
-        status = uz_given_check(given, err);
+    uz_status status = uz_given_check(given, dim, err);
     if (status != UZ_OK)
         return status;
-    new_node = uz_alloc(given->n_nodes, sizeof *new_node);
+    int64_t *new_node = uz_alloc(given->n_nodes, sizeof *new_node);
     if (!new_node)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a mesh of %lld nodes", (long long)given->n_nodes);
-    status = build(out, given, new_node, err);
+    status = number_nodes(new_node, out, given, err);
+    if (status == UZ_OK)
+        status = copy_mesh(out, given, new_node, err);
+    if (status == UZ_OK)
+        status = check_twins(out, given, err);
+    if (status == UZ_OK)
+        status = uz_given_groups(out, given, new_node, err);
     free(new_node);
     if (status != UZ_OK)
         uz_mesh_clear(out);
@@ -153,6 +113,6 @@ uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, 
 uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err)
 {
     if (scene->source == UZ_MESH_GIVEN)
-        return uz_mesh_from_given(out, &scene->given, uz_model_dim(scene->model), err);
+        return uz_mesh_from_given(out, &scene->given, uz_scene_dim(scene), err);
     return uz_mesh_from_box(out, &scene->box, err);
 }

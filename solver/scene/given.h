@@ -9,14 +9,14 @@ enum { UZ_POINTER = 96 };
 /* Most groups of a mesh. */
 #define UZ_MESH_MAX_GROUPS 4096
 
-/* Where a person finds an element: "/mesh/elements/quad4/3", or "/mesh/gmsh". */
-void uz_given_element_place(char where[UZ_POINTER], const uz_given_mesh *given, int64_t element);
-/* An element for a message: "element 12 (quad4 with nodes 4, 7, 9, 3)". */
+/* Refuses an element: "element 12 (quad4 with nodes 4, 7, 9, 3) WHAT; REMEDY" at "/mesh/elements/quad4/3", or at
+ * "/mesh/gmsh". */
 enum { UZ_ELEMENT_TEXT = 160 };
-void uz_given_element_text(char text[UZ_ELEMENT_TEXT], const uz_given_mesh *given, int64_t element);
+uz_status uz_given_refuse(const uz_given_mesh *given, int64_t element, const char *what, const char *remedy,
+                          uz_error *err);
 
-/* Kinds, node numbers, coordinates, shapes of all elements. */
-uz_status uz_given_check(const uz_given_mesh *given, uz_error *err);
+/* Sizes, coordinates; kinds, node numbers and shapes of all elements. */
+uz_status uz_given_check(const uz_given_mesh *given, int dim, uz_error *err);
 
 /* The groups of a mesh whose nodes and elements are there. new_node: the number of each given node, -1: left out. */
 uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err);

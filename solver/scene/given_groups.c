@@ -60,14 +60,22 @@ static void sort_unique(number_list *list)
     list->count = kept;
 }
 
+/* Everything that is given under one name. */
+typedef struct {
+    number_list nodes, faces, elements; /* faces: element * UZ_SIDE_STEP + side */
+    int64_t n_inner;
+} named_parts;
+
+enum { UZ_SIDE_STEP = 8 };
+
 /* ---- where a group is in the request */
 
-/* "/mesh/groups/NAME/key/i", the name escaped as RFC 6901 asks; i < 0: without it. */
+/* "/mesh/groups/NAME/key/i", the name escaped as RFC 6901 asks. */
 static void group_place(char where[UZ_POINTER], const uz_given_mesh *given, const uz_given_group *group,
                         const char *key, int64_t i)
 {
     enum { LONGEST = 44 };
-    char name[2 * sizeof group->name] = "", item[24] = "";
+    char name[2 * sizeof group->name] = "";
     size_t used = 0;
     for (size_t k = 0; k < sizeof group->name && group->name[k]; k++) {
         const char c = group->name[k];
@@ -76,20 +84,23 @@ static void group_place(char where[UZ_POINTER], const uz_given_mesh *given, cons
     for (used = used > LONGEST ? LONGEST : used; used > 0 && ((unsigned char)name[used] & 0xc0) == 0x80; used--)
         ; /* a character is not cut in two */
     name[used] = '\0';
-    if (i >= 0)
-        snprintf(item, sizeof item, "/%lld", (long long)i);
     if (given->from_file)
         snprintf(where, UZ_POINTER, "/mesh/gmsh");
     else
-        snprintf(where, UZ_POINTER, "/mesh/groups/%.*s/%.10s%s", LONGEST, name, key, item);
-}
-
-static const char *face_key(const group_work *work)
-{
-    return work->mesh->dim == 2 ? "edges" : "faces";
+        snprintf(where, UZ_POINTER, "/mesh/groups/%.*s/%.10s/%lld", LONGEST, name, key, (long long)i);
 }
 
 /* ---- faces */
+
+static bool append_face(named_parts *parts, const group_work *work, uz_face face)
+{
+    int64_t node[UZ_FACE_NODES];
+    const int count = uz_mesh_face(node, work->mesh, face);
+    bool room = append(&parts->faces, face.element * UZ_SIDE_STEP + face.side);
+    for (int k = 0; k < count && room; k++)
+        room = append(&parts->nodes, node[k]);
+    return room;
+}
 
 static uz_status refuse_face(const group_work *work, const uz_given_group *group, int64_t i, const char *what)
 {
@@ -98,45 +109,23 @@ static uz_status refuse_face(const group_work *work, const uz_given_group *group
     for (int64_t q = group->face_first[i]; q < group->face_first[i + 1] && used < UZ_ELEMENT_TEXT; q++)
         used += snprintf(nodes + used, (size_t)(UZ_ELEMENT_TEXT - used), "%s%lld", used ? ", " : "",
                          (long long)group->face_node[q]);
-    group_place(where, work->given, group, face_key(work), i);
+    group_place(where, work->given, group, work->mesh->dim == 2 ? "edges" : "faces", i);
     return uz_fail(work->err, UZ_ERR_SCENE, where, "the %s with nodes %s of the group \"%s\" %s",
                    work->mesh->dim == 2 ? "edge" : "face", nodes, group->name, what);
 }
 
-/* Corners among so many nodes of a face; 0: no face has so many. */
-static int corners_among(int64_t nodes, int dim)
+/* Adds the side of an element that a given face is, and its nodes. */
+static uz_status collect_face(named_parts *parts, const group_work *work, const uz_given_group *group, int64_t i)
 {
-    if (dim == 2)
-        return nodes == 2 || nodes == 3 ? 2 : 0;
-    return nodes == 3 || nodes == 6 ? 3 : nodes == 4 || nodes == 8 ? 4 : 0;
-}
-
-/* Are the middles that came with a face those of the element's side? */
-static bool middles_agree(const group_work *work, uz_face face, const int64_t *node, int64_t count)
-{
-    int64_t there[UZ_FACE_NODES];
-    const int has = uz_mesh_face(there, work->mesh, face);
-    for (int64_t i = 0; i < count; i++) {
-        bool found = false;
-        for (int k = 0; k < has; k++)
-            found = found || there[k] == node[i];
-        if (!found)
-            return false;
-    }
-    return true;
-}
-
-/* The side of an element that a given face is. */
-static uz_status match_face(uz_face *out, bool *inner, const group_work *work, const uz_given_group *group, int64_t i)
-{
-    int64_t node[UZ_FACE_NODES], corner[UZ_MOST_CORNERS];
+    static const int CORNERS[2][UZ_FACE_NODES + 1] = {{0, 0, 2, 2}, {0, 0, 0, 3, 4, 0, 3, 0, 4}}; /* among so many */
+    int64_t node[UZ_FACE_NODES], corner[UZ_MOST_CORNERS], there[UZ_FACE_NODES];
     const int64_t count = group->face_first[i + 1] - group->face_first[i];
-    const int corners = corners_among(count, work->mesh->dim);
+    const int dim = work->mesh->dim, corners = count > 0 && count <= UZ_FACE_NODES ? CORNERS[dim - 2][count] : 0;
     if (corners == 0)
         return refuse_face(work, group, i,
-                           work->mesh->dim == 2 ? "has not 2 nodes, nor 3 with the one in its middle"
-                                                : "has not 3 or 4 corners, alone or with the middles of its edges");
-    for (int k = 0; k < count; k++) {
+                           dim == 2 ? "has not 2 nodes, nor 3 with the one in its middle"
+                                    : "has not 3 or 4 corners, alone or with the middles of its edges");
+    for (int64_t k = 0; k < count; k++) {
         const int64_t given = group->face_node[group->face_first[i] + k];
         if (given < 0 || given >= work->given->n_nodes)
             return refuse_face(work, group, i, "has a node that is not there; nodes are numbered from 0");
@@ -148,11 +137,16 @@ static uz_status match_face(uz_face *out, bool *inner, const group_work *work, c
     const int64_t place = uz_corner_table_find(&work->sides, work->mesh, corner, corners);
     if (place < 0)
         return refuse_face(work, group, i, "belongs to no element; a group holds sides of elements");
-    *out = work->sides.item[place];
-    *inner = uz_corner_table_shared(&work->sides, place);
-    if (!middles_agree(work, *out, node, count))
-        return refuse_face(work, group, i, "has other nodes in the middle of its edges than the element there");
-    return UZ_OK;
+    const int has = uz_mesh_face(there, work->mesh, work->sides.item[place]);
+    for (int64_t k = 0; k < count; k++) {
+        bool found = false;
+        for (int l = 0; l < has; l++)
+            found = found || there[l] == node[k];
+        if (!found)
+            return refuse_face(work, group, i, "has other nodes in the middle of its edges than the element there");
+    }
+    parts->n_inner += work->sides.same[place + 1];
+    return append_face(parts, work, work->sides.item[place]) ? UZ_OK : no_memory(work);
 }
 
 /* Of a face that occurs again, which happens where groups of one name overlap, the first one stays. code: a number
@@ -182,67 +176,33 @@ static bool drop_repeated(uz_group *group, const number_list *code)
 
 /* ---- one name */
 
-/* Everything that is given under one name. */
-typedef struct {
-    number_list nodes, faces, elements; /* faces: element * UZ_SIDE_STEP + side */
-    int64_t n_inner;
-} named_parts;
-
-enum { UZ_SIDE_STEP = 8 };
-
-static uz_status collect_nodes(named_parts *parts, const group_work *work, const uz_given_group *group)
+/* Adds what one group has. */
+static uz_status collect(named_parts *parts, const group_work *work, const uz_given_group *group)
 {
     char where[UZ_POINTER];
+    const int64_t n_nodes = work->given->n_nodes, n_elements = work->mesh->n_elements;
+    uz_status status = UZ_OK;
     for (int64_t i = 0; i < group->n_nodes; i++) {
         const int64_t given = group->node[i];
-        if (given < 0 || given >= work->given->n_nodes) {
+        if (given < 0 || given >= n_nodes) {
             group_place(where, work->given, group, "nodes", i);
             return uz_fail(work->err, UZ_ERR_SCENE, where,
                            "the group \"%s\" asks for node %lld, but there are only 0 to %lld", group->name,
-                           (long long)given, (long long)work->given->n_nodes - 1);
+                           (long long)given, (long long)n_nodes - 1);
         }
         if (work->new_node[given] >= 0 && !append(&parts->nodes, work->new_node[given]))
             return no_memory(work);
     }
-    return UZ_OK;
-}
-
-static bool append_face(named_parts *parts, const group_work *work, uz_face face)
-{
-    int64_t node[UZ_FACE_NODES];
-    const int count = uz_mesh_face(node, work->mesh, face);
-    bool room = append(&parts->faces, face.element * UZ_SIDE_STEP + face.side);
-    for (int k = 0; k < count && room; k++)
-        room = append(&parts->nodes, node[k]);
-    return room;
-}
-
-static uz_status collect_faces(named_parts *parts, const group_work *work, const uz_given_group *group)
-{
-    for (int64_t i = 0; i < group->n_faces; i++) {
-        uz_face face = {0, 0};
-        bool inner = false;
-        const uz_status status = match_face(&face, &inner, work, group, i);
-        if (status != UZ_OK)
-            return status;
-        if (!append_face(parts, work, face))
-            return no_memory(work);
-        parts->n_inner += inner;
-    }
-    return UZ_OK;
-}
-
-static uz_status collect_elements(named_parts *parts, const group_work *work, const uz_given_group *group)
-{
-    char where[UZ_POINTER];
-    for (int64_t i = 0; i < group->n_elements; i++) {
+    for (int64_t i = 0; i < group->n_faces && status == UZ_OK; i++)
+        status = collect_face(parts, work, group, i);
+    for (int64_t i = 0; i < group->n_elements && status == UZ_OK; i++) {
         const int64_t e = group->element[i];
         int count;
-        if (e < 0 || e >= work->mesh->n_elements) {
+        if (e < 0 || e >= n_elements) {
             group_place(where, work->given, group, "elements", i);
             return uz_fail(work->err, UZ_ERR_SCENE, where,
                            "the group \"%s\" asks for element %lld, but there are only 0 to %lld", group->name,
-                           (long long)e, (long long)work->mesh->n_elements - 1);
+                           (long long)e, (long long)n_elements - 1);
         }
         const int64_t *node = uz_mesh_element(work->mesh, e, &count);
         bool room = append(&parts->elements, e);
@@ -251,33 +211,7 @@ static uz_status collect_elements(named_parts *parts, const group_work *work, co
         if (!room)
             return no_memory(work);
     }
-    return UZ_OK;
-}
-
-/* Gives the lists to the group. */
-static uz_status fill_group(uz_group *out, named_parts *parts, const group_work *work)
-{
-    sort_unique(&parts->nodes);
-    sort_unique(&parts->elements);
-    out->kind = parts->elements.count ? UZ_GROUP_ELEMENTS : parts->faces.count ? UZ_GROUP_FACES : UZ_GROUP_NODES;
-    out->node = parts->nodes.value;
-    out->n_nodes = parts->nodes.count;
-    parts->nodes = (number_list){NULL, 0, 0};
-    if (out->kind == UZ_GROUP_ELEMENTS) {
-        out->element = parts->elements.value;
-        out->n_elements = parts->elements.count;
-        parts->elements = (number_list){NULL, 0, 0};
-    }
-    if (out->kind != UZ_GROUP_FACES)
-        return UZ_OK;
-    out->face = uz_alloc(parts->faces.count, sizeof *out->face);
-    if (!out->face)
-        return no_memory(work);
-    for (int64_t i = 0; i < parts->faces.count; i++)
-        out->face[out->n_faces++] =
-            (uz_face){parts->faces.value[i] / UZ_SIDE_STEP, (int)(parts->faces.value[i] % UZ_SIDE_STEP)};
-    out->n_inner = parts->n_inner;
-    return drop_repeated(out, &parts->faces) ? UZ_OK : no_memory(work);
+    return status;
 }
 
 /* A new group of what was collected, with this status; frees what it does not take. */
@@ -286,7 +220,25 @@ static uz_status finish_group(const group_work *work, const char *name, named_pa
     if (status == UZ_OK) {
         uz_group *out = &work->mesh->groups[work->mesh->n_groups++];
         snprintf(out->name, sizeof out->name, "%s", name);
-        status = fill_group(out, parts, work);
+        sort_unique(&parts->nodes);
+        sort_unique(&parts->elements);
+        out->kind = parts->elements.count ? UZ_GROUP_ELEMENTS : parts->faces.count ? UZ_GROUP_FACES : UZ_GROUP_NODES;
+        out->node = parts->nodes.value;
+        out->n_nodes = parts->nodes.count;
+        parts->nodes.value = NULL;
+        if (out->kind == UZ_GROUP_ELEMENTS) {
+            out->element = parts->elements.value;
+            out->n_elements = parts->elements.count;
+            parts->elements.value = NULL;
+        } else if (out->kind == UZ_GROUP_FACES) {
+            out->n_inner = parts->n_inner;
+            out->face = uz_alloc(parts->faces.count, sizeof *out->face);
+            for (int64_t i = 0; out->face && i < parts->faces.count; i++)
+                out->face[out->n_faces++] =
+                    (uz_face){parts->faces.value[i] / UZ_SIDE_STEP, (int)(parts->faces.value[i] % UZ_SIDE_STEP)};
+            if (!out->face || !drop_repeated(out, &parts->faces))
+                status = no_memory(work);
+        }
     }
     free(parts->nodes.value);
     free(parts->faces.value);
@@ -304,13 +256,8 @@ static uz_status add_named(const group_work *work, int64_t i)
         if (strcmp(groups[k].name, groups[i].name) == 0)
             return UZ_OK;
     for (int64_t k = i; k < work->given->n_groups && status == UZ_OK; k++)
-        if (strcmp(groups[k].name, groups[i].name) == 0) {
-            status = collect_nodes(&parts, work, &groups[k]);
-            if (status == UZ_OK)
-                status = collect_faces(&parts, work, &groups[k]);
-            if (status == UZ_OK)
-                status = collect_elements(&parts, work, &groups[k]);
-        }
+        if (strcmp(groups[k].name, groups[i].name) == 0)
+            status = collect(&parts, work, &groups[k]);
     return finish_group(work, groups[i].name, &parts, status);
 }
 
@@ -323,7 +270,7 @@ static uz_status add_boundary(const group_work *work)
     named_parts parts = {0};
     uz_status status = UZ_OK;
     for (int64_t i = 0; i < sides->count && status == UZ_OK; i++)
-        if (!sides->same[i] && !uz_corner_table_shared(sides, i) && !append_face(&parts, work, sides->item[i]))
+        if (!sides->same[i] && !sides->same[i + 1] && !append_face(&parts, work, sides->item[i]))
             status = no_memory(work);
     sort_unique(&parts.faces);
     return finish_group(work, "boundary", &parts, status);
@@ -337,55 +284,37 @@ static uz_group *find_group(uz_mesh *mesh, const char *name)
     return NULL;
 }
 
-/* Whoever calls a group "all" may mean nothing less. */
-static uz_status add_all(const group_work *work)
+uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err)
 {
-    uz_mesh *mesh = work->mesh;
-    uz_group *all = find_group(mesh, "all");
-    if (all && all->n_elements < mesh->n_elements)
-        return uz_fail(work->err, UZ_ERR_SCENE, work->given->from_file ? "/mesh/gmsh" : "/mesh/groups/all",
-                       "a group called \"all\" is not all elements of the mesh; give it another name");
-    if (!all)
-        all = &mesh->groups[mesh->n_groups++];
-    free(all->node);
-    free(all->face);
-    free(all->element);
-    *all = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
-    return UZ_OK;
-}
-
-static uz_status check_groups(const uz_given_mesh *given, uz_error *err)
-{
-    char where[UZ_POINTER];
+    group_work work = {.mesh = mesh, .given = given, .new_node = new_node, .err = err};
     if (given->n_groups > UZ_MESH_MAX_GROUPS)
         return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups",
                        "%lld groups; at most %d are allowed", (long long)given->n_groups, UZ_MESH_MAX_GROUPS);
     for (int64_t i = 0; i < given->n_groups; i++) {
-        const uz_given_group *group = &given->groups[i];
-        snprintf(where, sizeof where, "/mesh/groups");
-        if (!group->name[0] || strnlen(group->name, sizeof group->name) == sizeof group->name)
-            return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : where,
-                           "the name of a group has 1 to %zu bytes", sizeof group->name - 1);
+        const size_t length = strnlen(given->groups[i].name, sizeof given->groups[i].name);
+        if (length == 0 || length == sizeof given->groups[i].name)
+            return uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups",
+                           "the name of a group has 1 to %zu bytes", sizeof given->groups[i].name - 1);
     }
-    return UZ_OK;
-}
-
-uz_status uz_given_groups(uz_mesh *mesh, const uz_given_mesh *given, const int64_t *new_node, uz_error *err)
-{
-    group_work work = {.mesh = mesh, .given = given, .new_node = new_node, .err = err};
-    uz_status status = check_groups(given, err);
-    if (status != UZ_OK)
-        return status;
     mesh->groups = uz_alloc_zero(given->n_groups + 2, sizeof *mesh->groups);
     if (!mesh->groups)
         return no_memory(&work);
-    status = uz_corner_table_build(&work.sides, mesh, true, err);
+    uz_status status = uz_corner_table_build(&work.sides, mesh, true, err);
     for (int64_t i = 0; i < given->n_groups && status == UZ_OK; i++)
         status = add_named(&work, i);
     if (status == UZ_OK && !find_group(mesh, "boundary"))
         status = add_boundary(&work);
-    if (status == UZ_OK)
-        status = add_all(&work);
+    uz_group *all = find_group(mesh, "all");
+    if (status == UZ_OK && all && all->n_elements < mesh->n_elements)
+        status = uz_fail(err, UZ_ERR_SCENE, given->from_file ? "/mesh/gmsh" : "/mesh/groups/all",
+                         "a group called \"all\" is not all elements of the mesh; give it another name");
+    if (status == UZ_OK) {
+        all = all ? all : &mesh->groups[mesh->n_groups++];
+        free(all->node);
+        free(all->face);
+        free(all->element);
+        *all = (uz_group){.name = "all", .kind = UZ_GROUP_ELEMENTS, .everything = true};
+    }
     uz_corner_table_clear(&work.sides);
     return status;
 }

@@ -29,29 +29,6 @@ static double count_cells(const uz_box *box, double length, int64_t least)
     return count;
 }
 
-/* The length of the cells of the coarsest grid. */
-static double first_length(const uz_grids *grids)
-{
-    const uz_box *box = &grids->box;
-    const double most = box->dim == 3 ? FIRST_CELLS_3D : FIRST_CELLS_2D;
-    double shortest = INFINITY, longest = 0.0;
-    for (int axis = 0; axis < box->dim; axis++) {
-        shortest = fmin(shortest, box->size[axis]);
-        longest = fmax(longest, box->size[axis]);
-    }
-    double low = shortest / (double)grids->first, high = longest;
-    if (!(low > 0.0) || !isfinite(high) || count_cells(box, low, grids->least) <= most)
-        return low;
-    for (int i = 0; i < 60; i++) {
-        const double middle = sqrt(low) * sqrt(high);
-        if (count_cells(box, middle, grids->least) > most)
-            low = middle;
-        else
-            high = middle;
-    }
-    return high;
-}
-
 uz_grids uz_grids_of_box(const uz_box *box, double most_dofs)
 {
     uz_grids grids = {.box = *box, .order = uz_box_lattice_of(box).order, .most_dofs = UZ_SCENE_MAX_DOFS};
@@ -60,7 +37,24 @@ uz_grids uz_grids_of_box(const uz_box *box, double most_dofs)
     grids.box.automatic = false;
     grids.first = grids.order == 2 ? FIRST_QUADRATIC : FIRST_LINEAR;
     grids.least = grids.order == 2 ? 1 : 2;
-    const double length = first_length(&grids);
+    const double most = box->dim == 3 ? FIRST_CELLS_3D : FIRST_CELLS_2D;
+    double shortest = INFINITY, longest = 0.0;
+    for (int axis = 0; axis < box->dim; axis++) {
+        shortest = fmin(shortest, box->size[axis]);
+        longest = fmax(longest, box->size[axis]);
+    }
+    double length = shortest / (double)grids.first; /* of the coarsest grid's cells; by bisection where too many */
+    if (length > 0.0 && isfinite(longest) && count_cells(box, length, grids.least) > most) {
+        double low = length;
+        length = longest;
+        for (int i = 0; i < 60; i++) {
+            const double middle = sqrt(low) * sqrt(length);
+            if (count_cells(box, middle, grids.least) > most)
+                low = middle;
+            else
+                length = middle;
+        }
+    }
     for (int axis = 0; axis < box->dim && axis < 3; axis++) {
         const double cells = box->size[axis] / length / (double)grids.first;
         grids.per_n[axis] = cells > 0.0 && isfinite(cells) ? cells : 1.0;
@@ -98,22 +92,6 @@ static double expect(const uz_tried *from, double rate, double requested)
     return (double)from->n * pow(from->error / (AIM * requested), 1.0 / rate);
 }
 
-/* The largest n whose grid is allowed, from `low`, which is. */
-static int64_t largest_allowed(const uz_grids *grids, int64_t low)
-{
-    int64_t high = low + 1;
-    while (uz_grid_dofs(grids, high) <= grids->most_dofs)
-        high *= 2;
-    while (high - low > 1) {
-        const int64_t middle = low + (high - low) / 2;
-        if (uz_grid_dofs(grids, middle) <= grids->most_dofs)
-            low = middle;
-        else
-            high = middle;
-    }
-    return low;
-}
-
 int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, double requested)
 {
     const uz_tried *last = &tried[count - 1];
@@ -122,7 +100,16 @@ int64_t uz_next_grid(const uz_grids *grids, const uz_tried *tried, int count, do
     /* little is known after one grid, and a solid grows with the cube */
     const double growth = count > 1 ? (solid ? 2.0 : 3.0) : (solid ? 1.6 : 2.0);
     const double wanted = expect(last, rate, requested);
-    const int64_t top = largest_allowed(grids, last->n);
+    int64_t top = last->n, beyond = top + 1; /* the largest n whose grid is allowed, by bisection */
+    while (uz_grid_dofs(grids, beyond) <= grids->most_dofs)
+        beyond *= 2;
+    while (beyond - top > 1) {
+        const int64_t middle = top + (beyond - top) / 2;
+        if (uz_grid_dofs(grids, middle) <= grids->most_dofs)
+            top = middle;
+        else
+            beyond = middle;
+    }
     if (top <= last->n || (count > 2 && wanted > 2.0 * (double)top))
         return 0;
     const double next = fmin(fmin(ceil(wanted), ceil(growth * (double)last->n)), (double)top);

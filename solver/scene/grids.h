@@ -3,8 +3,8 @@
  * Grids are numbered by n: cells_i = max(least, round(n * size_i / unit)). Cells are near square; n is the number of
  * cells along the shortest side, unless the box is so slender or so flat that even its coarsest grid of square cells
  * would be a large one. A grading of the box is kept. */
-#ifndef UZ_ADAPTIVE_GRIDS_H
-#define UZ_ADAPTIVE_GRIDS_H
+#ifndef UZ_SCENE_GRIDS_H
+#define UZ_SCENE_GRIDS_H
 
 #include "uzawa.h"
 

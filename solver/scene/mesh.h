@@ -61,8 +61,6 @@ uz_status uz_mesh_from_given(uz_mesh *out, const uz_given_mesh *given, int dim, 
 
 /* The mesh of a scene, whatever it comes from. */
 uz_status uz_mesh_from_scene(uz_mesh *out, const uz_scene *scene, uz_error *err);
-/* Dimensions of the bodies that a model is for: 2 or 3. */
-int uz_model_dim(uz_model model);
 void uz_mesh_clear(uz_mesh *mesh);
 
 /* The nodes of an element; *count of them. */

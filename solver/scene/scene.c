@@ -42,5 +42,5 @@ void uz_scene_clear(uz_scene *scene)
 
 int uz_scene_dim(const uz_scene *scene)
 {
-    return uz_model_dim(scene->model);
+    return scene->model == UZ_SOLID ? 3 : 2;
 }
