@@ -1,3 +1,5 @@
+/* blas.c: the dense kernels. Orders stay far below 2^31, where BLAS counts by int: they are bounded by the memory of an
+ * n x n array. */
 #include "linalg/blas.h"
 
 #include "core/alloc.h"
@@ -8,49 +10,38 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Dense orders stay far below 2^31: they are bounded by the memory of an n x n array. */
-static int narrow(int64_t n)
-{
-    return (int)n;
-}
-
 double uz_dot(int64_t n, const double *x, const double *y)
 {
-    return cblas_ddot(narrow(n), x, 1, y, 1);
+    return cblas_ddot((int)n, x, 1, y, 1);
 }
 
 double uz_norm(int64_t n, const double *x)
 {
-    return cblas_dnrm2(narrow(n), x, 1);
+    return cblas_dnrm2((int)n, x, 1);
 }
 
 void uz_axpy(int64_t n, double alpha, const double *x, double *y)
 {
-    cblas_daxpy(narrow(n), alpha, x, 1, y, 1);
+    cblas_daxpy((int)n, alpha, x, 1, y, 1);
 }
 
 void uz_symv_lower(int64_t n, const double *A, const double *x, double *y)
 {
     if (n > 0)
-        cblas_dsymv(CblasColMajor, CblasLower, narrow(n), 1.0, A, narrow(n), x, 1, 0.0, y, 1);
+        cblas_dsymv(CblasColMajor, CblasLower, (int)n, 1.0, A, (int)n, x, 1, 0.0, y, 1);
 }
 
 void uz_trsv_lower(int64_t n, const double *L, int64_t ld, double *x, bool transposed)
 {
     if (n > 0)
-        cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, narrow(n), L,
-                    narrow(ld), x, 1);
+        cblas_dtrsv(CblasColMajor, CblasLower, transposed ? CblasTrans : CblasNoTrans, CblasNonUnit, (int)n, L, (int)ld,
+                    x, 1);
 }
 
 void uz_trmv_lower_t(int64_t n, const double *L, double *x)
 {
     if (n > 0)
-        cblas_dtrmv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, narrow(n), L, narrow(n), x, 1);
-}
-
-bool uz_potrf_lower(int64_t n, double *A)
-{
-    return n == 0 || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(n), A, narrow(n)) == 0;
+        cblas_dtrmv(CblasColMajor, CblasLower, CblasTrans, CblasNonUnit, (int)n, L, (int)n, x, 1);
 }
 
 void uz_potrs_lower(int64_t n, const double *L, int64_t ld, double *x)
@@ -63,25 +54,25 @@ void uz_block_gemv(int64_t rows, int64_t columns, const double *A, int64_t ld, c
                    bool transposed)
 {
     if (rows > 0)
-        cblas_dgemv(CblasColMajor, transposed ? CblasTrans : CblasNoTrans, narrow(rows), narrow(columns), -1.0, A,
-                    narrow(ld), x, 1, 1.0, y, 1);
+        cblas_dgemv(CblasColMajor, transposed ? CblasTrans : CblasNoTrans, (int)rows, (int)columns, -1.0, A, (int)ld, x,
+                    1, 1.0, y, 1);
 }
 
 void uz_block_eliminate(int64_t n, int64_t rows, int64_t columns, const double *L, int64_t ld, double *X, int64_t ldx)
 {
     if (columns == 0)
         return;
-    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, narrow(n), narrow(columns), 1.0, L,
-                narrow(ld), X, narrow(ldx));
+    cblas_dtrsm(CblasColMajor, CblasLeft, CblasLower, CblasNoTrans, CblasNonUnit, (int)n, (int)columns, 1.0, L, (int)ld,
+                X, (int)ldx);
     if (rows > 0)
-        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, narrow(rows), narrow(columns), narrow(n), -1.0, L + n,
-                    narrow(ld), X, narrow(ldx), 1.0, X + n, narrow(ldx));
+        cblas_dgemm(CblasColMajor, CblasNoTrans, CblasNoTrans, (int)rows, (int)columns, (int)n, -1.0, L + n, (int)ld, X,
+                    (int)ldx, 1.0, X + n, (int)ldx);
 }
 
 void uz_block_syrk_t(int64_t n, int64_t k, const double *Z, int64_t ld, double *C)
 {
     if (n > 0)
-        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, narrow(n), narrow(k), 1.0, Z, narrow(ld), 0.0, C, narrow(n));
+        cblas_dsyrk(CblasColMajor, CblasLower, CblasTrans, (int)n, (int)k, 1.0, Z, (int)ld, 0.0, C, (int)n);
 }
 
 /* Units of work between two questions take about PANEL_FLOPS, a few milliseconds: a panel of b columns against n b
@@ -131,11 +122,10 @@ static bool syrk_while(int64_t n, int64_t k, double alpha, const double *A, int6
         double *C_j = C + j + j * ldc;
         if (uz_stop_is_due(stop))
             return false;
-        cblas_dsyrk(CblasColMajor, CblasLower, left, narrow(b), narrow(k), alpha, A_j, narrow(lda), beta, C_j,
-                    narrow(ldc));
+        cblas_dsyrk(CblasColMajor, CblasLower, left, (int)b, (int)k, alpha, A_j, (int)lda, beta, C_j, (int)ldc);
         if (below > 0)
-            cblas_dgemm(CblasColMajor, left, right, narrow(below), narrow(b), narrow(k), alpha, A_j + b * step,
-                        narrow(lda), A_j, narrow(lda), beta, C_j + b, narrow(ldc));
+            cblas_dgemm(CblasColMajor, left, right, (int)below, (int)b, (int)k, alpha, A_j + b * step, (int)lda, A_j,
+                        (int)lda, beta, C_j + b, (int)ldc);
     }
     return true;
 }
@@ -173,17 +163,17 @@ static bool pivot_column(int64_t n, double *A, int64_t *pivot, double *squares, 
         const double diagonal = A[j + j * n];
         A[j + j * n] = A[best + best * n];
         A[best + best * n] = diagonal;
-        cblas_dswap(narrow(j), A + j, narrow(n), A + best, narrow(n));
-        cblas_dswap(narrow(best - j - 1), A + j + 1 + j * n, 1, A + best + (j + 1) * n, narrow(n));
-        cblas_dswap(narrow(n - best - 1), A + best + 1 + j * n, 1, A + best + 1 + best * n, 1);
+        cblas_dswap((int)j, A + j, (int)n, A + best, (int)n);
+        cblas_dswap((int)(best - j - 1), A + j + 1 + j * n, 1, A + best + (j + 1) * n, (int)n);
+        cblas_dswap((int)(n - best - 1), A + best + 1 + j * n, 1, A + best + 1 + best * n, 1);
         squares[best] = squares[j];
         pivot[j] = pivot[best];
         pivot[best] = index;
     }
     A[j + j * n] = sqrt(left);
-    cblas_dgemv(CblasColMajor, CblasNoTrans, narrow(n - j - 1), narrow(j - k), -1.0, A + j + 1 + k * n, narrow(n),
-                A + j + k * n, narrow(n), 1.0, A + j + 1 + j * n, 1);
-    cblas_dscal(narrow(n - j - 1), 1.0 / A[j + j * n], A + j + 1 + j * n, 1);
+    cblas_dgemv(CblasColMajor, CblasNoTrans, (int)(n - j - 1), (int)(j - k), -1.0, A + j + 1 + k * n, (int)n,
+                A + j + k * n, (int)n, 1.0, A + j + 1 + j * n, 1);
+    cblas_dscal((int)(n - j - 1), 1.0 / A[j + j * n], A + j + 1 + j * n, 1);
     return true;
 }
 
@@ -239,12 +229,12 @@ bool uz_potrf_lower_while(int64_t n, double *A, const uz_stop *stop)
     for (int64_t k = 0; k < n; k += width) {
         int64_t b = least_of(n - k, width), rest = n - k - b;
         double *top = A + k + k * n, *below = top + b, *right = below + b * n;
-        if (uz_stop_is_due(stop) || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', narrow(b), top, narrow(n)) != 0)
+        if (uz_stop_is_due(stop) || LAPACKE_dpotrf_work(LAPACK_COL_MAJOR, 'L', (int)b, top, (int)n) != 0)
             return false;
         if (rest == 0)
             break;
-        cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, narrow(rest), narrow(b), 1.0, top,
-                    narrow(n), below, narrow(n));
+        cblas_dtrsm(CblasColMajor, CblasRight, CblasLower, CblasTrans, CblasNonUnit, (int)rest, (int)b, 1.0, top,
+                    (int)n, below, (int)n);
         if (!syrk_while(rest, b, -1.0, below, n, false, 1.0, right, n, stop))
             return false;
     }
@@ -294,5 +284,5 @@ bool uz_invert_llt_while(int64_t n, const double *L, double *A, double *X, const
 
 bool uz_stev(int64_t n, double *d, double *e, double *V)
 {
-    return LAPACKE_dstev(LAPACK_COL_MAJOR, 'V', narrow(n), d, e, V, narrow(n)) == 0;
+    return LAPACKE_dstev(LAPACK_COL_MAJOR, 'V', (int)n, d, e, V, (int)n) == 0;
 }

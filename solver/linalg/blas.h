@@ -1,7 +1,7 @@
 /* blas.h: the dense kernels in use, with sizes checked once and column-major lower storage throughout. The only file
  * that knows cblas and LAPACKE is blas.c. */
-#ifndef UZ_CORE_BLAS_H
-#define UZ_CORE_BLAS_H
+#ifndef UZ_LINALG_BLAS_H
+#define UZ_LINALG_BLAS_H
 
 #include "core/hooks.h"
 
@@ -17,12 +17,11 @@ void uz_symv_lower(int64_t n, const double *A, const double *x, double *y); /* y
 void uz_trsv_lower(int64_t n, const double *L, int64_t ld, double *x, bool transposed);
 void uz_potrs_lower(int64_t n, const double *L, int64_t ld, double *x);
 void uz_trmv_lower_t(int64_t n, const double *L, double *x); /* x = L'x */
-bool uz_potrf_lower(int64_t n, double *A);                   /* A = LL'; false: a pivot is not positive */
 /* x (n) = 0 by pieces of a megabyte, with cancellation points between them; false: it had to stop. For rooms that
  * nobody has written to before: the kernel makes their pages at the first touch. */
 bool uz_clear_while(int64_t n, double *x, const uz_stop *stop);
-/* The same by panels of some 5e7 flops (a few milliseconds), with cancellation points between them: false also where it
- * had to stop. */
+/* A = LL' by panels of some 5e7 flops (a few milliseconds), with cancellation points between them; false: a pivot is
+ * not positive, or it had to stop. */
 bool uz_potrf_lower_while(int64_t n, double *A, const uz_stop *stop);
 /* Cholesky with complete pivoting of a semidefinite A, P'AP = LL', by panels; pivot[k] is the original index of row k.
  * Returns the rank: pivots below `least` times the largest count as zero (Higham 1990; Lucas, LAPACK Working Note 161

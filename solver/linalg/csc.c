@@ -102,37 +102,6 @@ uz_status uz_csc_transpose(uz_csc *out, const uz_csc *A, uz_error *err)
     return UZ_OK;
 }
 
-static uz_status check_triplets(int64_t rows, int64_t cols, int64_t count, const int64_t *row, const int64_t *col,
-                                uz_error *err)
-{
-    if (count < 0)
-        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a negative number of triplets");
-    for (int64_t k = 0; k < count; k++) {
-        if (row[k] < 0 || row[k] >= rows || col[k] < 0 || col[k] >= cols)
-            return uz_fail(err, UZ_ERR_ARGUMENT, "", "triplet %lld at (%lld, %lld) is outside the %lld x %lld matrix",
-                           (long long)k, (long long)row[k], (long long)col[k], (long long)rows, (long long)cols);
-    }
-    return UZ_OK;
-}
-
-/* Adds up entries that stand next to each other with the same row; the arrays keep their room. */
-static void sum_duplicates(uz_csc *A)
-{
-    int64_t to = 0, from = 0;
-    for (int64_t j = 0; j < A->cols; j++) {
-        int64_t first = to, end = A->ptr[j + 1];
-        for (; from < end; from++) {
-            if (to > first && A->idx[to - 1] == A->idx[from]) {
-                A->val[to - 1] += A->val[from];
-            } else {
-                A->idx[to] = A->idx[from];
-                A->val[to++] = A->val[from];
-            }
-        }
-        A->ptr[j + 1] = to;
-    }
-}
-
 uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t count, const int64_t *row,
                                const int64_t *col, const double *val, uz_error *err)
 {
@@ -140,9 +109,13 @@ uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t 
     int64_t *order = NULL, *start = NULL;
     memset(out, 0, sizeof *out);
     uz_error_reset(err);
-    uz_status status = check_triplets(rows, cols, count, row, col, err);
-    if (status == UZ_OK)
-        status = uz_csc_init(&made, rows, cols, count, err);
+    if (count < 0)
+        return uz_fail(err, UZ_ERR_ARGUMENT, "", "a negative number of triplets");
+    for (int64_t k = 0; k < count; k++)
+        if (row[k] < 0 || row[k] >= rows || col[k] < 0 || col[k] >= cols)
+            return uz_fail(err, UZ_ERR_ARGUMENT, "", "triplet %lld at (%lld, %lld) is outside the %lld x %lld matrix",
+                           (long long)k, (long long)row[k], (long long)col[k], (long long)rows, (long long)cols);
+    uz_status status = uz_csc_init(&made, rows, cols, count, err);
     if (status != UZ_OK || count == 0)
         goto done;
     order = uz_alloc(count, sizeof *order);
@@ -165,7 +138,19 @@ uz_status uz_csc_from_triplets(uz_csc *out, int64_t rows, int64_t cols, int64_t 
         made.idx[at] = row[order[k]];
         made.val[at] = val[order[k]];
     }
-    sum_duplicates(&made);
+    /* Entries that stand next to each other with the same row are added up; the arrays keep their room. */
+    for (int64_t j = 0, to = 0, from = 0; j < cols; j++) {
+        const int64_t first = to, end = made.ptr[j + 1];
+        for (; from < end; from++) {
+            if (to > first && made.idx[to - 1] == made.idx[from]) {
+                made.val[to - 1] += made.val[from];
+            } else {
+                made.idx[to] = made.idx[from];
+                made.val[to++] = made.val[from];
+            }
+        }
+        made.ptr[j + 1] = to;
+    }
 done:
     free(order);
     free(start);

@@ -51,13 +51,6 @@ uz_status uz_check_finite(const double *x, int64_t n, const char *name, uz_error
     return UZ_OK;
 }
 
-static uz_status check_vector(const double *x, int64_t n, const char *name, uz_error *err)
-{
-    if (n > 0 && !x)
-        return uz_fail(err, UZ_ERR_SIZE, name, "%s is missing; it must have %lld numbers", name, (long long)n);
-    return uz_check_finite(x, n, name, err);
-}
-
 /* Below it the errors of products with it leave the range of normal numbers, and its own digits are gone soon after. */
 #define STIFFNESS_LEAST 0x1p-960
 
@@ -86,9 +79,16 @@ uz_status uz_qp_check(const uz_qp *qp, uz_error *err)
     }
     if (status == UZ_OK && N->cols > 0)
         status = check_matrix(N, false, "N", err);
-    if (status == UZ_OK)
-        status = check_vector(qp->h, qp->N.rows, "h", err);
-    if (status == UZ_OK)
-        status = check_vector(qp->p, qp->K.cols, "p", err);
+    const struct {
+        const double *x;
+        int64_t n;
+        const char *name;
+    } vectors[] = {{qp->h, N->rows, "h"}, {qp->p, K->cols, "p"}};
+    for (int i = 0; i < 2 && status == UZ_OK; i++) {
+        if (vectors[i].n > 0 && !vectors[i].x)
+            return uz_fail(err, UZ_ERR_SIZE, vectors[i].name, "%s is missing; it must have %lld numbers",
+                           vectors[i].name, (long long)vectors[i].n);
+        status = uz_check_finite(vectors[i].x, vectors[i].n, vectors[i].name, err);
+    }
     return status;
 }

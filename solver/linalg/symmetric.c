@@ -35,11 +35,6 @@ static int64_t skip_upper(const uz_csc *A, int64_t j)
     return low;
 }
 
-static pair_walk walk_column(const uz_csc *K, const uz_csc *T, int64_t j)
-{
-    return (pair_walk){K, T, j, skip_upper(K, j), skip_upper(T, j)};
-}
-
 static bool walk_next(pair_walk *walk, pair *out)
 {
     const uz_csc *K = walk->K, *T = walk->T;
@@ -66,7 +61,7 @@ static int64_t inspect(const uz_csc *K, const uz_csc *T, pair *worst, double *wo
     int64_t count = 0;
     *worst_asymmetry = 0.0;
     for (int64_t j = 0; j < K->cols; j++) {
-        pair_walk walk = walk_column(K, T, j);
+        pair_walk walk = {K, T, j, skip_upper(K, j), skip_upper(T, j)};
         for (pair p; walk_next(&walk, &p); count++) {
             const double difference = fabs(p.a - p.b);
             if (difference == 0.0)
@@ -82,28 +77,20 @@ static int64_t inspect(const uz_csc *K, const uz_csc *T, pair *worst, double *wo
     return count;
 }
 
-static uz_status check_square_and_finite(const uz_csc *K, uz_error *err)
-{
-    if (K->rows != K->cols)
-        return uz_fail(err, UZ_ERR_SIZE, "K", "K is %lld x %lld; a stiffness matrix is square", (long long)K->rows,
-                       (long long)K->cols);
-    for (int64_t k = 0; K->ptr && k < K->ptr[K->cols]; k++) {
-        if (!isfinite(K->val[k]))
-            return uz_fail(err, UZ_ERR_NOT_FINITE, "K", "K has an entry in row %lld that is not a finite number",
-                           (long long)K->idx[k] + 1);
-    }
-    return UZ_OK;
-}
-
 uz_status uz_symmetric_lower(uz_csc *K, uz_error *err)
 {
     uz_csc T = {0}, lower = {0};
     pair worst = {0};
     double ratio = 0.0;
     uz_error_reset(err);
-    uz_status status = check_square_and_finite(K, err);
-    if (status == UZ_OK)
-        status = uz_csc_transpose(&T, K, err);
+    if (K->rows != K->cols)
+        return uz_fail(err, UZ_ERR_SIZE, "K", "K is %lld x %lld; a stiffness matrix is square", (long long)K->rows,
+                       (long long)K->cols);
+    for (int64_t k = 0; K->ptr && k < K->ptr[K->cols]; k++)
+        if (!isfinite(K->val[k]))
+            return uz_fail(err, UZ_ERR_NOT_FINITE, "K", "K has an entry in row %lld that is not a finite number",
+                           (long long)K->idx[k] + 1);
+    uz_status status = uz_csc_transpose(&T, K, err);
     if (status != UZ_OK)
         goto done;
     int64_t count = K->ptr ? inspect(K, &T, &worst, &ratio) : 0;
@@ -121,7 +108,7 @@ uz_status uz_symmetric_lower(uz_csc *K, uz_error *err)
     if (K->ptr) {
         int64_t at = 0;
         for (int64_t j = 0; j < K->cols; j++) {
-            pair_walk walk = walk_column(K, &T, j);
+            pair_walk walk = {K, &T, j, skip_upper(K, j), skip_upper(&T, j)};
             for (pair p; walk_next(&walk, &p); at++) {
                 lower.idx[at] = p.i;
                 lower.val[at] = p.a + 0.5 * (p.b - p.a); /* exactly a where a = b */
