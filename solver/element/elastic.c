@@ -2,8 +2,6 @@
  * 2; temperature: ch. 13). */
 #include "element/element.h"
 
-#include <string.h>
-
 uz_lame uz_lame_of(uz_model model, double young, double poisson)
 {
     const double third = model == UZ_PLANE_STRESS ? 1 - poisson : 1 - 2 * poisson;
@@ -24,17 +22,6 @@ static int direct_count(uz_model model)
 static double trace(uz_model model, const double *v)
 {
     return model == UZ_SOLID || model == UZ_AXISYMMETRIC ? v[0] + v[1] + v[2] : v[0] + v[1];
-}
-
-void uz_elastic_matrix(double *C, uz_model model, uz_lame lame)
-{
-    const int n = uz_stress_count(model), direct = direct_count(model);
-    memset(C, 0, (size_t)(n * n) * sizeof *C);
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; i < direct && j < direct; j++)
-            C[n * i + j] = lame.lambda;
-        C[n * i + i] += i < direct ? 2 * lame.mu : lame.mu;
-    }
 }
 
 void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain)

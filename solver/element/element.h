@@ -30,9 +30,7 @@ uz_lame uz_lame_of(uz_model model, double young, double poisson);
 /* Components of stress of a model: 3, 4 or 6. */
 int uz_stress_count(uz_model model);
 
-/* C, n x n row by row with n = uz_stress_count(model): stress = C strain. */
-void uz_elastic_matrix(double *C, uz_model model, uz_lame lame);
-/* stress = C strain; the two may be the same array. */
+/* stress = C strain, each uz_stress_count(model) numbers; the two may be the same array. */
 void uz_elastic_stress(double *stress, uz_model model, uz_lame lame, const double *strain);
 /* stress' C^-1 stress, twice the complementary energy per volume. */
 double uz_complementary(uz_model model, uz_lame lame, const double *stress);
@@ -92,9 +90,6 @@ uz_shape_fault uz_element_check(const uz_element *element);
  * determinant. */
 double uz_element_gradients(double grad[UZ_ELEMENT_NODES][3], const uz_element *element, const double point[3]);
 
-/* Volume per reference volume at a local point whose Jacobian's determinant is det: det times thickness, 2 pi r or 1.
- * So volume = sum over g of weight * uz_element_measure. */
-double uz_element_measure(const uz_element *element, const double point[3], double det);
 /* Volume by the Gauss rule of the stiffness. */
 double uz_element_volume(const uz_element *element);
 
@@ -163,13 +158,8 @@ void uz_side_weights(double *w, const uz_side *side);
  */
 #define UZ_MIDDLE_SHARE 0.2
 void uz_side_positive_weights(double *w, const uz_side *side);
-/* M, nodes x nodes: integral N N' over the area. */
-void uz_side_mass(double *M, const uz_side *side);
-
 /* f (nodes x dim) += integral N' t over the area: t (dim) constant, force per area. */
 void uz_side_add_traction(double *f, const uz_side *side, const double *t);
-/* The same with t given at the nodes (nodes x dim) and interpolated. */
-void uz_side_add_nodal_traction(double *f, const uz_side *side, const double *t);
 /* f += integral -N' p n: pressure p (nodes), given at the nodes, against the outward normal. */
 void uz_side_add_pressure(double *f, const uz_side *side, const double *pressure);
 

@@ -114,17 +114,6 @@ double uz_ring_radius(double *largest, const uz_element *element, const double *
     return radius;
 }
 
-double uz_element_measure(const uz_element *element, const double point[3], double det)
-{
-    double N[UZ_ELEMENT_NODES], largest;
-    if (element->model == UZ_SOLID)
-        return det;
-    if (element->model != UZ_AXISYMMETRIC)
-        return det * element->thickness;
-    uz_element_shape(N, element->kind, point);
-    return det * 2 * PI * uz_ring_radius(&largest, element, N);
-}
-
 void uz_gauss_state_at(uz_gauss_state *state, const uz_element *element, int g)
 {
     double largest;
@@ -240,75 +229,60 @@ void uz_element_add_thermal_load(double *f, const uz_element *element, const dou
 
 /* ------------------------------------------------------------------- check */
 
-/* det against the product of the rows' lengths: a sine, whatever units and aspect ratio. */
-static uz_shape_fault check_point(const uz_element *element, const double point[3])
-{
-    double local[UZ_ELEMENT_NODES][3], J[3][3], lengths = 1;
-    const int dim = uz_element_dim(element->kind);
-    uz_element_type_of(element->kind)->shape(NULL, local, point);
-    uz_jacobian(J, element, local);
-    for (int i = 0; i < dim; i++)
-        lengths *= sqrt(J[i][0] * J[i][0] + J[i][1] * J[i][1] + (dim == 3 ? J[i][2] * J[i][2] : 0));
-    const double det = determinant(J, dim);
-    if (det > FLAT * lengths)
-        return UZ_SHAPE_GOOD;
-    return det < -FLAT * lengths ? UZ_SHAPE_INVERTED : UZ_SHAPE_DEGENERATE;
-}
-
-static uz_shape_fault worse(uz_shape_fault a, uz_shape_fault b)
-{
-    return a == UZ_SHAPE_INVERTED || b == UZ_SHAPE_GOOD ? a : b;
-}
-
+/* The worst fault of the Jacobian at nodes and Gauss points: det against the product of the rows' lengths is a sine,
+ * whatever units and aspect ratio. Where it is constant one node tells, where it is linear all corners do. */
 static uz_shape_fault check_jacobian(const uz_element *element)
 {
-    const uz_element_kind kind = element->kind;
-    const uz_element_type *type = uz_element_type_of(kind);
-    const int count = uz_element_gauss_count(kind, element->model);
-    uz_shape_fault fault = check_point(element, type->local[0]);
-    if (type->jacobian == UZ_JACOBIAN_CONSTANT)
-        return fault;
-    for (int a = 1; a < type->nodes; a++)
-        fault = worse(fault, check_point(element, type->local[a]));
-    for (int g = 0; g < count && type->jacobian != UZ_JACOBIAN_LINEAR; g++) { /* a linear one is least at a corner */
-        double point[3];
-        uz_element_gauss(point, kind, element->model, g);
-        fault = worse(fault, check_point(element, point));
+    const uz_element_type *type = uz_element_type_of(element->kind);
+    const int dim = type->dim, nodes = type->jacobian == UZ_JACOBIAN_CONSTANT ? 1 : type->nodes;
+    const int points = type->jacobian == UZ_JACOBIAN_CONSTANT || type->jacobian == UZ_JACOBIAN_LINEAR
+                           ? nodes
+                           : nodes + uz_element_gauss_count(element->kind, element->model);
+    uz_shape_fault fault = UZ_SHAPE_GOOD;
+    for (int k = 0; k < points; k++) {
+        double local[UZ_ELEMENT_NODES][3], J[3][3], point[3], lengths = 1;
+        if (k < nodes)
+            memcpy(point, type->local[k], sizeof point);
+        else
+            uz_element_gauss(point, element->kind, element->model, k - nodes);
+        type->shape(NULL, local, point);
+        uz_jacobian(J, element, local);
+        for (int i = 0; i < dim; i++)
+            lengths *= sqrt(J[i][0] * J[i][0] + J[i][1] * J[i][1] + (dim == 3 ? J[i][2] * J[i][2] : 0));
+        const double det = determinant(J, dim);
+        if (det < -FLAT * lengths)
+            fault = UZ_SHAPE_INVERTED;
+        else if (!(det > FLAT * lengths) && fault == UZ_SHAPE_GOOD)
+            fault = UZ_SHAPE_DEGENERATE;
     }
     return fault;
 }
 
-/* A node on the axis may have a rounding error of a mesh's generator for a radius. Between good nodes the quadratic
- * radius of a curved side may still be negative. */
-static bool has_negative_radius(const uz_element *element)
-{
-    double N[UZ_ELEMENT_NODES], largest;
-    const uz_element_kind kind = element->kind;
-    const int nodes = uz_element_node_count(kind), count = uz_element_gauss_count(kind, element->model);
-    for (int a = 0; a < nodes; a++) {
-        uz_element_shape(N, kind, uz_element_local_nodes(kind)[a]);
-        if (uz_ring_radius(&largest, element, N) < -UZ_AXIS * largest)
-            return true;
-    }
-    for (int g = 0; g < count; g++) {
-        double point[3];
-        uz_element_gauss(point, kind, element->model, g);
-        uz_element_shape(N, kind, point);
-        if (uz_ring_radius(&largest, element, N) <= 0)
-            return true;
-    }
-    return false;
-}
-
 uz_shape_fault uz_element_check(const uz_element *element)
 {
-    uz_shape_fault fault = check_jacobian(element);
+    const uz_element_kind kind = element->kind;
+    const uz_element_type *type = uz_element_type_of(kind);
+    const uz_shape_fault fault = check_jacobian(element);
     uz_element corners = *element;
-    corners.kind = uz_element_type_of(element->kind)->linear;
+    corners.kind = type->linear;
     if (fault != UZ_SHAPE_GOOD)
-        return corners.kind != element->kind && check_jacobian(&corners) == UZ_SHAPE_GOOD ? UZ_SHAPE_MIDDLES : fault;
-    if (element->model == UZ_AXISYMMETRIC && has_negative_radius(element))
-        return UZ_SHAPE_NEGATIVE_RADIUS;
+        return corners.kind != kind && check_jacobian(&corners) == UZ_SHAPE_GOOD ? UZ_SHAPE_MIDDLES : fault;
+    if (element->model != UZ_AXISYMMETRIC)
+        return UZ_SHAPE_GOOD;
+    /* A node on the axis may have a rounding error of a mesh's generator for a radius. Between good nodes the quadratic
+     * radius of a curved side may still be negative. */
+    const int points = type->nodes + uz_element_gauss_count(kind, element->model);
+    for (int k = 0; k < points; k++) {
+        double N[UZ_ELEMENT_NODES], point[3], largest;
+        if (k < type->nodes)
+            memcpy(point, type->local[k], sizeof point);
+        else
+            uz_element_gauss(point, kind, element->model, k - type->nodes);
+        uz_element_shape(N, kind, point);
+        const double radius = uz_ring_radius(&largest, element, N);
+        if (k < type->nodes ? radius < -UZ_AXIS * largest : radius <= 0)
+            return UZ_SHAPE_NEGATIVE_RADIUS;
+    }
     return UZ_SHAPE_GOOD;
 }
 

@@ -174,22 +174,6 @@ void uz_side_positive_weights(double *w, const uz_side *side)
     }
 }
 
-void uz_side_mass(double *M, const uz_side *side)
-{
-    const int n = side->nodes;
-    memset(M, 0, (size_t)(n * n) * sizeof *M);
-    for (int g = 0; g < uz_side_gauss_count(side); g++) {
-        side_point at;
-        side_point_at(&at, side, g);
-        for (int a = 0; a < n; a++)
-            for (int b = 0; b <= a; b++)
-                M[n * a + b] += at.area * at.N[a] * at.N[b];
-    }
-    for (int a = 0; a < n; a++)
-        for (int b = 0; b < a; b++)
-            M[n * b + a] = M[n * a + b];
-}
-
 void uz_side_add_traction(double *f, const uz_side *side, const double *t)
 {
     double w[UZ_SIDE_NODES];
@@ -197,16 +181,6 @@ void uz_side_add_traction(double *f, const uz_side *side, const double *t)
     for (int a = 0; a < side->nodes; a++)
         for (int c = 0; c < side->dim; c++)
             f[a * side->dim + c] += w[a] * t[c];
-}
-
-void uz_side_add_nodal_traction(double *f, const uz_side *side, const double *t)
-{
-    double M[UZ_SIDE_NODES * UZ_SIDE_NODES];
-    uz_side_mass(M, side);
-    for (int a = 0; a < side->nodes; a++)
-        for (int b = 0; b < side->nodes; b++)
-            for (int c = 0; c < side->dim; c++)
-                f[a * side->dim + c] += M[side->nodes * a + b] * t[b * side->dim + c];
 }
 
 void uz_side_add_pressure(double *f, const uz_side *side, const double *pressure)

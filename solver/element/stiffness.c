@@ -47,14 +47,6 @@ uz_formulation uz_resolve_formulation(uz_formulation asked, uz_element_kind kind
     return UZ_FORMULATION_STANDARD;
 }
 
-/* The lower triangle of a size x size matrix, rows MOST apart. */
-static void clear_lower(double *K, int size)
-{
-    for (int i = 0; i < size; i++)
-        for (int j = 0; j <= i; j++)
-            K[i * MOST + j] = 0;
-}
-
 /* K += weight v v', lower triangle of the leading size x size, rows MOST apart. */
 static void add_product(double *K, int size, double weight, const double *v)
 {
@@ -93,7 +85,8 @@ static int flatten(double *v, double grad[][3], int count, int dim)
     return size;
 }
 
-/* Lower triangle, with the internal parameters last; rows MOST apart. Returns the size. */
+/* Lower triangle, with the internal parameters last; rows MOST apart. Of their block A there is L, A = L L'. Returns
+ * the size. */
 static int integrate(double *K, const uz_element *element)
 {
     double S[MOST * MOST], centre[3][3], mode[3][3], v[MOST], centre_det = 1;
@@ -104,8 +97,9 @@ static int integrate(double *K, const uz_element *element)
     const int size = dofs + (modes ? dim * dim : 0);
     const double share = 2 * element->lame.mu / (element->model == UZ_PLANE_STRAIN ? 2 : 3);
     const double lambda = mean ? -share : element->lame.lambda;
-    clear_lower(S, size);
-    clear_lower(K, size);
+    for (int i = 0; i < size; i++)
+        for (int j = 0; j <= i; j++)
+            S[i * MOST + j] = K[i * MOST + j] = 0;
     if (modes)
         centre_det = uz_centre_jacobian(centre, element);
     for (int g = 0; g < count; g++) {
@@ -138,12 +132,6 @@ static int integrate(double *K, const uz_element *element)
         flatten(v, means, nodes, dim);
         add_product(K, dofs, (element->lame.lambda + share) * volume, v);
     }
-    return size;
-}
-
-/* A = L L' in place of the trailing block, that of the internal parameters. */
-static void factor_internal(double *K, int dofs, int size)
-{
     for (int i = dofs; i < size; i++)
         for (int j = dofs; j <= i; j++) {
             double sum = K[i * MOST + j];
@@ -151,6 +139,7 @@ static void factor_internal(double *K, int dofs, int size)
                 sum -= K[i * MOST + k] * K[j * MOST + k];
             K[i * MOST + j] = i == j ? sqrt(sum) : sum / K[j * MOST + j];
         }
+    return size;
 }
 
 void uz_internal_parameters(double internal[UZ_ELEMENT_INTERNAL], const uz_element *element, const double *u)
@@ -158,7 +147,6 @@ void uz_internal_parameters(double internal[UZ_ELEMENT_INTERNAL], const uz_eleme
     double K[MOST * MOST];
     const int dim = uz_element_dim(element->kind), dofs = uz_element_node_count(element->kind) * dim;
     const int size = integrate(K, element), count = size - dofs;
-    factor_internal(K, dofs, size);
     for (int i = 0; i < count; i++) { /* L y = - coupling u */
         const double *row = K + (dofs + i) * MOST;
         double sum = 0;
@@ -184,7 +172,6 @@ uz_shape_fault uz_element_stiffness(double *ke, const uz_element *element)
     if (fault != UZ_SHAPE_GOOD)
         return fault;
     const int size = integrate(K, element);
-    factor_internal(K, dofs, size);
     /* The internal parameters are those of least energy: K_uu - K_ua A^-1 K_au, first L^-1 times the coupling. */
     for (int i = dofs; i < size; i++)
         for (int j = 0; j < dofs; j++) {

@@ -22,18 +22,12 @@ static void add_point(uz_strain_rule *rule, const double point[3], double weight
     uz_element_type_of(rule->kind)->shape(rule->N[g], rule->slope[g], rule->point[g]);
 }
 
-static void add_gauss_points(uz_strain_rule *rule)
-{
-    double point[3];
-    for (int g = 0; g < uz_element_gauss_count(rule->kind, rule->model); g++) {
-        const double weight = uz_element_gauss(point, rule->kind, rule->model, g);
-        add_point(rule, point, weight);
-    }
-}
-
-static void begin_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
+void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
+                       const double point[][3], const double *weight, int count)
 {
     static const double ORIGIN[3] = {0};
+    double gauss[3], volume = 0;
+    const int gauss_count = uz_element_gauss_count(kind, model);
     memset(rule, 0, sizeof *rule);
     rule->kind = kind;
     rule->model = model;
@@ -42,28 +36,24 @@ static void begin_rule(uz_strain_rule *rule, uz_element_kind kind, uz_model mode
     rule->nodes = uz_element_node_count(kind);
     rule->stresses = uz_stress_count(model);
     rule->direct = rule->stresses == 3 ? 2 : 3;
+    rule->asked = count > 0 ? count : gauss_count;
+    rule->averaged = count;
     uz_element_type_of(kind)->shape(NULL, rule->centre, ORIGIN);
+    for (int g = 0; g < gauss_count; g++)
+        volume += uz_element_gauss(gauss, kind, model, g);
+    for (int k = 0; k < count; k++)
+        add_point(rule, point[k], weight ? weight[k] : volume / count);
+    if (count > 0 && formulation == UZ_FORMULATION_STANDARD)
+        return;
+    for (int g = 0; g < gauss_count; g++) {
+        const double part = uz_element_gauss(gauss, kind, model, g);
+        add_point(rule, gauss, part);
+    }
 }
 
 void uz_strain_rule_init(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation)
 {
-    begin_rule(rule, kind, model, formulation);
-    add_gauss_points(rule);
-    rule->asked = rule->points;
-}
-
-void uz_strain_rule_at(uz_strain_rule *rule, uz_element_kind kind, uz_model model, uz_formulation formulation,
-                       const double point[][3], const double *weight, int count)
-{
-    double unused[3], volume = 0;
-    begin_rule(rule, kind, model, formulation);
-    rule->asked = rule->averaged = count;
-    for (int g = 0; g < uz_element_gauss_count(kind, model); g++)
-        volume += uz_element_gauss(unused, kind, model, g);
-    for (int k = 0; k < count; k++)
-        add_point(rule, point[k], weight ? weight[k] : volume / count);
-    if (formulation != UZ_FORMULATION_STANDARD)
-        add_gauss_points(rule);
+    uz_strain_rule_at(rule, kind, model, formulation, NULL, NULL, 0);
 }
 
 /* ---- shape */
@@ -109,21 +99,6 @@ INLINE void invert(uz_lanes inverse[3][3], uz_lanes *det, uz_lanes X[3][3], int 
         }
 }
 
-/* Where the radius is at most UZ_AXIS of the largest, it counts as on the axis. */
-INLINE void set_ring(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, int g)
-{
-    uz_lanes radius = {0}, largest = {0};
-    for (int a = 0; a < rule->nodes; a++) {
-        const uz_lanes r = x[2 * a];
-        const lane_bits larger = (lane_bits)(r > largest);
-        radius += rule->N[g][a] * r;
-        largest = (uz_lanes)((larger & (lane_bits)r) | (~larger & (lane_bits)largest));
-    }
-    const uz_lanes inverse = 1 / radius;
-    shape->per_radius[g] = (uz_lanes)((lane_bits)(radius > UZ_AXIS * largest) & (lane_bits)inverse);
-    shape->volume[g] *= TWO_PI * radius;
-}
-
 INLINE void shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_lanes *x, double thickness, int dim)
 {
     uz_lanes X[3][3];
@@ -131,10 +106,20 @@ INLINE void shape_of(uz_lane_shape *shape, const uz_strain_rule *rule, const uz_
         differentiate(X, rule->slope[g], x, rule->nodes, dim);
         invert(shape->inverse[g], &shape->det[g], X, dim);
         shape->volume[g] = rule->weight[g] * shape->det[g];
-        if (rule->model == UZ_AXISYMMETRIC)
-            set_ring(shape, rule, x, g);
-        else if (rule->model != UZ_SOLID)
+        if (rule->model == UZ_AXISYMMETRIC) { /* a radius of at most UZ_AXIS of the largest counts as on the axis */
+            uz_lanes radius = {0}, largest = {0};
+            for (int a = 0; a < rule->nodes; a++) {
+                const uz_lanes r = x[2 * a];
+                const lane_bits larger = (lane_bits)(r > largest);
+                radius += rule->N[g][a] * r;
+                largest = (uz_lanes)((larger & (lane_bits)r) | (~larger & (lane_bits)largest));
+            }
+            const uz_lanes inverse = 1 / radius;
+            shape->per_radius[g] = (uz_lanes)((lane_bits)(radius > UZ_AXIS * largest) & (lane_bits)inverse);
+            shape->volume[g] *= TWO_PI * radius;
+        } else if (rule->model != UZ_SOLID) {
             shape->volume[g] *= thickness;
+        }
     }
     if (rule->formulation == UZ_FORMULATION_INCOMPATIBLE) {
         differentiate(X, rule->centre, x, rule->nodes, dim);
@@ -181,25 +166,6 @@ INLINE void add_mode_equations(uz_lanes A[MODES][MODES], uz_lanes b[MODES], uz_l
         }
 }
 
-/* b = A^-1 b by A = L D L', in place; only the lower triangle of A is read. */
-INLINE void solve_modes(uz_lanes A[MODES][MODES], uz_lanes b[MODES], int count)
-{
-    for (int k = 0; k < count; k++) {
-        const uz_lanes pivot = 1 / A[k][k];
-        for (int i = k + 1; i < count; i++) {
-            const uz_lanes factor = A[i][k] * pivot;
-            for (int j = k + 1; j <= i; j++)
-                A[i][j] -= factor * A[j][k];
-            b[i] -= factor * b[k];
-        }
-    }
-    for (int k = count - 1; k >= 0; k--) {
-        for (int i = k + 1; i < count; i++)
-            b[k] -= A[i][k] * b[i];
-        b[k] /= A[k][k];
-    }
-}
-
 /* The modes take the shape of least energy, and their derivatives join in. */
 INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_lane_shape *shape,
                       const uz_lane_material *material, int dim)
@@ -209,7 +175,22 @@ INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_l
         mode_slopes(slope, rule, shape, g, dim);
         add_mode_equations(A, internal, H[g], slope, material, &shape->volume[g], dim);
     }
-    solve_modes(A, internal, dim * dim);
+    /* internal = A^-1 internal by A = L D L', in place; only the lower triangle of A is read. */
+    const int count = dim * dim;
+    for (int k = 0; k < count; k++) {
+        const uz_lanes pivot = 1 / A[k][k];
+        for (int i = k + 1; i < count; i++) {
+            const uz_lanes factor = A[i][k] * pivot;
+            for (int j = k + 1; j <= i; j++)
+                A[i][j] -= factor * A[j][k];
+            internal[i] -= factor * internal[k];
+        }
+    }
+    for (int k = count - 1; k >= 0; k--) {
+        for (int i = k + 1; i < count; i++)
+            internal[k] -= A[i][k] * internal[i];
+        internal[k] /= A[k][k];
+    }
     for (int g = 0; g < rule->points; g++) {
         mode_slopes(slope, rule, shape, g, dim);
         for (int m = 0; m < dim; m++)
@@ -217,18 +198,6 @@ INLINE void add_modes(uz_lanes H[][3][3], const uz_strain_rule *rule, const uz_l
                 for (int j = 0; j < dim; j++)
                     H[g][c][j] += internal[m * dim + c] * slope[m][j];
     }
-}
-
-/* u_r / r; on the axis the radial strain. */
-INLINE void set_hoop(uz_lanes *hoop, const uz_strain_rule *rule, const uz_lane_shape *shape, const uz_lanes *u,
-                     const uz_lanes *radial, int g)
-{
-    uz_lanes displacement = {0};
-    const lane_bits on_axis = (lane_bits)(shape->per_radius[g] == 0);
-    for (int a = 0; a < rule->nodes; a++)
-        displacement += rule->N[g][a] * u[2 * a];
-    displacement *= shape->per_radius[g];
-    *hoop = (uz_lanes)((on_axis & (lane_bits)*radial) | (~on_axis & (lane_bits)displacement));
 }
 
 /* The dilatation becomes its mean over the volume: an n-th of the difference goes to each of n direct strains. */
@@ -263,7 +232,13 @@ INLINE void strain_of_gradient(uz_lanes *strain, uz_lanes H[3][3], const uz_stra
         strain[4] = H[1][2] + H[2][1];
         strain[5] = H[2][0] + H[0][2];
     } else if (rule->model == UZ_AXISYMMETRIC) {
-        set_hoop(&strain[2], rule, shape, u, &H[0][0], g);
+        /* u_r / r; on the axis the radial strain */
+        const lane_bits on_axis = (lane_bits)(shape->per_radius[g] == 0);
+        uz_lanes displacement = {0};
+        for (int a = 0; a < rule->nodes; a++)
+            displacement += rule->N[g][a] * u[2 * a];
+        displacement *= shape->per_radius[g];
+        strain[2] = (uz_lanes)((on_axis & (lane_bits)H[0][0]) | (~on_axis & (lane_bits)displacement));
         strain[3] = H[0][1] + H[1][0];
     } else {
         strain[2] = H[0][1] + H[1][0];

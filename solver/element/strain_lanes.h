@@ -1,8 +1,7 @@
 /* strain_lanes.h: strains of several elements of one kind at once, one element in each lane of a vector register.
  *
- * The same strains and volumes at the same Gauss points as uz_element_strain, uz_element_gauss and uz_element_measure
- * give for one element, up to rounding. What the elements' shape alone determines is kept apart, so that equal elements
- * share it. */
+ * The same strains and volumes at the same Gauss points as uz_element_strain and uz_gauss_state_at give for one
+ * element, up to rounding. What the elements' shape alone determines is kept apart, so that equal elements share it. */
 #ifndef UZ_ELEMENT_STRAIN_LANES_H
 #define UZ_ELEMENT_STRAIN_LANES_H
 

@@ -141,7 +141,7 @@ static inline void add_error(double *error2, double *energy2, const uz_element *
             for (int b = 0; b < nodes; b++)
                 at[c] += 0.5 * local[b][c] / nodes;
         }
-        const double volume = uz_element_measure(element, at, uz_element_gradients(grad, element, at));
+        const double volume = element_measure(element, at, uz_element_gradients(grad, element, at));
         place(x, element, at);
         uz_element_strain(got, &motion, at);
         exact_strain(want, element, x);
@@ -171,7 +171,7 @@ static inline void add_exact_force(double *f, const small_mesh *mesh)
         const uz_element element = take_element(xe, NULL, mesh, NULL, e);
         for (int g = 0; g < uz_element_gauss_count(element.kind, element.model); g++) {
             double weight = uz_element_gauss(at, element.kind, element.model, g);
-            weight *= uz_element_measure(&element, at, uz_element_gradients(grad, &element, at));
+            weight *= element_measure(&element, at, uz_element_gradients(grad, &element, at));
             place(x, &element, at);
             exact_force(b, &element, x);
             uz_element_shape(N, element.kind, at);

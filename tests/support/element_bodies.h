@@ -91,10 +91,11 @@ static inline void lift(void *ctx, const uz_side *side, const int *node)
 static inline void bend(void *ctx, const uz_side *side, const int *node)
 {
     small_body *b = ctx;
-    double f[3 * UZ_SIDE_NODES] = {0}, t[3 * UZ_SIDE_NODES] = {0};
+    double f[3 * UZ_SIDE_NODES] = {0}, M[UZ_SIDE_NODES * UZ_SIDE_NODES];
+    side_mass(M, side);
     for (int a = 0; a < side->nodes; a++)
-        t[a * side->dim] = b->value * (side->xyz[a * side->dim + 1] - 0.5);
-    uz_side_add_nodal_traction(f, side, t);
+        for (int k = 0; k < side->nodes; k++)
+            f[a * side->dim] += M[side->nodes * a + k] * b->value * (side->xyz[k * side->dim + 1] - 0.5);
     scatter(b, side, node, f);
 }
 

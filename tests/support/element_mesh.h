@@ -11,6 +11,38 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Volume per reference volume at a local point whose Jacobian's determinant is det: det times thickness, 2 pi r or 1.
+ */
+static inline double element_measure(const uz_element *element, const double point[3], double det)
+{
+    double N[UZ_ELEMENT_NODES], radius = 0;
+    if (element->model == UZ_SOLID)
+        return det;
+    if (element->model != UZ_AXISYMMETRIC)
+        return det * element->thickness;
+    uz_element_shape(N, element->kind, point);
+    for (int a = 0; a < uz_element_node_count(element->kind); a++)
+        radius += N[a] * element->xyz[2 * a];
+    return det * 6.28318530717958647693 * radius;
+}
+
+/* M, nodes x nodes: integral N N' over a side's area. */
+static inline void side_mass(double *M, const uz_side *side)
+{
+    const int n = side->nodes;
+    memset(M, 0, (size_t)(n * n) * sizeof *M);
+    for (int g = 0; g < uz_side_gauss_count(side); g++) {
+        double point[2], N[UZ_SIDE_NODES], vector[3] = {0};
+        const double weight = uz_side_gauss(point, side, g);
+        uz_side_shape(N, side, point);
+        uz_side_area_vector(vector, side, point);
+        const double area = weight * hypot(hypot(vector[0], vector[1]), vector[2]);
+        for (int a = 0; a < n; a++)
+            for (int b = 0; b < n; b++)
+                M[n * a + b] += area * (N[a] * N[b]);
+    }
+}
+
 typedef struct {
     uz_element element; /* of all elements but for xyz */
     int dim, per, n_nodes, n_elements;

@@ -3,6 +3,7 @@
 #include "assembly/assembly.h"
 #include "body_fixture.h"
 #include "element/strain_lanes.h"
+#include "element_mesh.h"
 #include "post/parts.h"
 #include "random_scene.h"
 
@@ -61,7 +62,7 @@ static void compare_lane(const four_elements *f, const uz_strain_rule *rule, con
     for (int g = 0; g < rule->points; g++) {
         double point[3], grad[NODES][3], want[STRESSES], size = 0;
         const double weight = uz_element_gauss(point, rule->kind, rule->model, g);
-        const double volume = weight * uz_element_measure(element, point, uz_element_gradients(grad, element, point));
+        const double volume = weight * element_measure(element, point, uz_element_gradients(grad, element, point));
         uz_element_strain(want, &motion, point);
         for (int c = 0; c < rule->stresses; c++)
             size = fmax(size, fabs(want[c]));
@@ -190,7 +191,7 @@ static void look_at(plain_element *s, const plain *x, int64_t e, which_points wh
         const double *point = s->local[g];
         double grad[NODES][3], strain[STRESSES] = {0};
         const double det = uz_element_gradients(grad, &s->element, point);
-        s->volume[g] = weight[g] * uz_element_measure(&s->element, point, det);
+        s->volume[g] = weight[g] * element_measure(&s->element, point, det);
         uz_element_shape(s->N[g], s->element.kind, point);
         uz_element_strain(s->strain[g], &motion, point);
         uz_thermal_strain(strain, s->element.model, s->element.lame, x->free_strain ? x->free_strain[e] : 0);

@@ -180,7 +180,7 @@ TEST(stiffness_is_the_strain_energy)
         for (int g = 0; g < uz_element_gauss_count(element.kind, element.model); g++) {
             double at[3], grad[UZ_ELEMENT_NODES][3], strain[6], stress[6];
             const double weight = uz_element_gauss(at, element.kind, element.model, g);
-            const double measure = uz_element_measure(&element, at, uz_element_gradients(grad, &element, at));
+            const double measure = element_measure(&element, at, uz_element_gradients(grad, &element, at));
             uz_element_strain(strain, &of_u, at);
             uz_element_strain(stress, &of_v, at);
             uz_elastic_stress(stress, element.model, element.lame, stress);
