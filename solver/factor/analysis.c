@@ -43,21 +43,6 @@ static uz_status analyze(uz_analysis *analysis, cholmod_sparse *A, int64_t rows,
     return UZ_OK;
 }
 
-static uz_status begin(uz_analysis *analysis, const uz_csc *K, const int64_t *last, int64_t n_last, uz_error *err)
-{
-    atomic_init(&analysis->holders, 1);
-    analysis->n = K->cols;
-    analysis->nnz = K->ptr[K->cols];
-    analysis->n_last = n_last;
-    analysis->last = uz_alloc(n_last, sizeof *last);
-    analysis->position = uz_alloc(K->cols, sizeof *analysis->position);
-    if (!analysis->last || !analysis->position)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to analyse a matrix of %lld dofs", (long long)K->cols);
-    if (n_last > 0)
-        memcpy(analysis->last, last, (size_t)n_last * sizeof *last);
-    return UZ_OK;
-}
-
 uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *dofs, int64_t n_dofs, int64_t rows,
                              uz_ordering ordering, const uz_hooks *hooks, uz_error *err)
 {
@@ -86,7 +71,17 @@ uz_status uz_analysis_create(uz_analysis **out, const uz_csc *K, const int64_t *
     A.dtype = CHOLMOD_DOUBLE;
     A.sorted = 1;
     A.packed = 1;
-    uz_status status = begin(analysis, K, dofs, n_dofs, err);
+    atomic_init(&analysis->holders, 1);
+    analysis->n = K->cols;
+    analysis->nnz = K->ptr[K->cols];
+    analysis->n_last = n_dofs;
+    analysis->last = uz_alloc(n_dofs, sizeof *dofs);
+    analysis->position = uz_alloc(K->cols, sizeof *analysis->position);
+    uz_status status = UZ_OK;
+    if (!analysis->last || !analysis->position)
+        status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory to analyse a matrix of %lld dofs", (long long)K->cols);
+    else if (n_dofs > 0)
+        memcpy(analysis->last, dofs, (size_t)n_dofs * sizeof *dofs);
     if (status == UZ_OK)
         status = analyze(analysis, &A, rows, ordering, &common, err);
     if (status == UZ_OK && uz_cancelled(hooks))
@@ -121,7 +116,6 @@ void uz_analysis_free(uz_analysis *analysis)
     free(analysis);
 }
 
-/* Perm, ColCount and position; super, pi and px; the row indices. */
 uz_factor_info uz_analysis_describe(const uz_analysis *analysis)
 {
     const cholmod_factor *L = analysis->L;
@@ -139,6 +133,7 @@ uz_factor_info uz_analysis_describe(const uz_analysis *analysis)
     return info;
 }
 
+/* Perm, ColCount and position; super, pi and px; the row indices. */
 size_t uz_analysis_bytes(const uz_analysis *analysis)
 {
     const cholmod_factor *L = analysis->L;

@@ -20,21 +20,6 @@ typedef struct {
     cholmod_common *common;
 } chooser;
 
-static uz_status order(chooser *c, uz_ordering ordering, bool contact_last, uz_error *err)
-{
-    int64_t n_last = contact_last ? c->n_last : 0;
-    if (ordering != UZ_ORDERING_METIS)
-        return uz_order(c->perm, c->graph, c->last, n_last, ordering, c->common, err);
-    if (!c->has_metis) {
-        uz_status status = uz_order(c->metis, c->graph, NULL, 0, ordering, c->common, err);
-        if (status != UZ_OK)
-            return status;
-        c->has_metis = true;
-    }
-    memcpy(c->perm, c->metis, (size_t)c->groups * sizeof *c->perm);
-    return uz_move_last(c->perm, c->groups, c->last, n_last, err);
-}
-
 /* Analyses one ordering, notes what it costs and keeps it if it is the cheapest so far. The cost: additions and
  * multiplications of the supernodal factorization, filled-in zeros included, and what condensing adds: nothing where a
  * trailing block does and the operator can wait, else Z and Z'Z, either dense on the contact or along the reach. */
@@ -43,7 +28,19 @@ static uz_status consider(chooser *c, uz_ordering ordering, bool contact_last, u
     uz_analysis *analysis = c->analysis;
     const double m = (double)c->rows, n_b = (double)analysis->n_last;
     double flops = 0.0;
-    uz_status status = order(c, ordering, contact_last, err);
+    const int64_t n_last = contact_last ? c->n_last : 0;
+    uz_status status = UZ_OK;
+    if (ordering != UZ_ORDERING_METIS) {
+        status = uz_order(c->perm, c->graph, c->last, n_last, ordering, c->common, err);
+    } else {
+        if (!c->has_metis)
+            status = uz_order(c->metis, c->graph, NULL, 0, ordering, c->common, err);
+        c->has_metis = status == UZ_OK;
+        if (status == UZ_OK) {
+            memcpy(c->perm, c->metis, (size_t)c->groups * sizeof *c->perm);
+            status = uz_move_last(c->perm, c->groups, c->last, n_last, err);
+        }
+    }
     if (status != UZ_OK)
         return status;
     cholmod_factor *G = cholmod_l_analyze_p(c->graph, (SuiteSparse_long *)c->perm, NULL, 0, c->common);

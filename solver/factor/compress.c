@@ -18,12 +18,15 @@ static uint64_t mix(uint64_t x)
     return x ^ (x >> 31);
 }
 
-/* sum[i]: of mix(j) over the neighbours j of i and i itself, and something else for the last dofs. Equal sums mean
- * equal neighbourhoods but for a chance of 2^-64, and a wrong guess costs fill, never correctness: the graph has an
- * edge for every entry of the matrix. */
-static void sum_neighbourhoods(uint64_t *sum, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
-                               int64_t n_last)
+/* head[i]: the first dof of i's group, by sum[i]: of mix(j) over the neighbours j of i and i itself, and something else
+ * for the last dofs. Equal sums mean equal neighbourhoods but for a chance of 2^-64, and a wrong guess costs fill,
+ * never correctness: the graph has an edge for every entry of the matrix. false: no memory. */
+static bool find_heads(int64_t *head, const int64_t *ptr, const int64_t *idx, int64_t n, const int64_t *last,
+                       int64_t n_last)
 {
+    uint64_t *sum = uz_alloc(n, sizeof *sum);
+    if (!sum)
+        return false;
     for (int64_t j = 0; j < n; j++)
         sum[j] = mix((uint64_t)j);
     for (int64_t j = 0; j < n; j++) {
@@ -39,17 +42,19 @@ static void sum_neighbourhoods(uint64_t *sum, const int64_t *ptr, const int64_t 
     }
     for (int64_t k = 0; k < n_last; k++)
         sum[last[k]] += mix(UINT64_MAX);
-}
-
-/* head[i]: the first dof of i's group. */
-static void find_heads(int64_t *head, const uint64_t *sum, const int64_t *ptr, const int64_t *idx, int64_t n)
-{
     for (int64_t j = 0; j < n; j++)
         head[j] = j;
     for (int64_t j = 0; j < n; j++)
         for (int64_t k = ptr[j]; head[j] == j && k < ptr[j + 1]; k++)
             if (idx[k] != j && head[idx[k]] == idx[k] && sum[idx[k]] == sum[j])
                 head[idx[k]] = j;
+    free(sum);
+    return true;
+}
+
+bool uz_group_dofs(int64_t *head, const uz_csc *K)
+{
+    return find_heads(head, K->ptr, K->idx, K->cols, NULL, 0);
 }
 
 /* Counts the edges between groups by the column they belong to, or places them (rows not NULL) at next[column]. An edge
@@ -97,50 +102,33 @@ static void drop_repeated(cholmod_sparse *graph, int64_t *mark)
 cholmod_sparse *uz_compress(int64_t *group, const cholmod_sparse *A, const int64_t *last, int64_t n_last,
                             cholmod_common *common)
 {
-    int64_t n = (int64_t)A->ncol;
-    uint64_t *sum = uz_alloc(n, sizeof *sum);
+    const int64_t n = (int64_t)A->ncol;
+    int64_t groups = 0, edges = 0;
+    if (!find_heads(group, A->p, A->i, n, last, n_last))
+        return NULL;
+    for (int64_t j = 0; j < n; j++) /* from heads to numbers, in the order of the heads */
+        group[j] = group[j] == j ? groups++ : group[group[j]];
+    SuiteSparse_long *next = uz_alloc_zero(groups + 1, sizeof *next), *mark = uz_alloc(groups, sizeof *mark);
     cholmod_sparse *graph = NULL;
-    if (sum) {
-        sum_neighbourhoods(sum, A->p, A->i, n, last, n_last);
-        find_heads(group, sum, A->p, A->i, n);
-        int64_t groups = 0; /* from heads to numbers, in the order of the heads */
-        for (int64_t j = 0; j < n; j++)
-            group[j] = group[j] == j ? groups++ : group[group[j]];
-        SuiteSparse_long *next = uz_alloc_zero(groups + 1, sizeof *next), *mark = uz_alloc(groups, sizeof *mark);
-        graph = NULL;
-        int64_t edges = 0;
-        if (next && mark) {
-            collect_edges(next, NULL, mark, A, group, groups);
-            for (int64_t g = 0; g <= groups; g++) { /* from counts to where columns begin */
-                int64_t count = next[g];
-                next[g] = edges;
-                edges += count;
-            }
-            graph = cholmod_l_allocate_sparse((size_t)groups, (size_t)groups, (size_t)edges, 0, 1, -1, CHOLMOD_PATTERN,
-                                              common);
+    if (next && mark) {
+        collect_edges(next, NULL, mark, A, group, groups);
+        for (int64_t g = 0; g <= groups; g++) { /* from counts to where columns begin */
+            int64_t count = next[g];
+            next[g] = edges;
+            edges += count;
         }
-        if (graph) {
-            SuiteSparse_long *ptr = graph->p;
-            collect_edges(next, graph->i, mark, A, group, groups);
-            ptr[0] = 0;
-            for (int64_t g = 0; g < groups; g++) /* each column was filled up to where it ends */
-                ptr[g + 1] = next[g];
-            drop_repeated(graph, mark);
-        }
-        free(next);
-        free(mark);
+        graph =
+            cholmod_l_allocate_sparse((size_t)groups, (size_t)groups, (size_t)edges, 0, 1, -1, CHOLMOD_PATTERN, common);
     }
-    free(sum);
+    if (graph) {
+        SuiteSparse_long *ptr = graph->p;
+        collect_edges(next, graph->i, mark, A, group, groups);
+        ptr[0] = 0;
+        for (int64_t g = 0; g < groups; g++) /* each column was filled up to where it ends */
+            ptr[g + 1] = next[g];
+        drop_repeated(graph, mark);
+    }
+    free(next);
+    free(mark);
     return graph;
-}
-
-bool uz_group_dofs(int64_t *head, const uz_csc *K)
-{
-    uint64_t *sum = uz_alloc(K->cols, sizeof *sum);
-    if (sum) {
-        sum_neighbourhoods(sum, K->ptr, K->idx, K->cols, NULL, 0);
-        find_heads(head, sum, K->ptr, K->idx, K->cols);
-    }
-    free(sum);
-    return sum != NULL;
 }

@@ -83,25 +83,29 @@ static uz_status factorize(uz_principal *part, bool *positive, cholmod_sparse *A
     return UZ_OK;
 }
 
-static uz_status build(uz_principal *part, bool *positive, const uz_csc *K, const bool *fixed, const uz_factor *factor,
-                       const uz_stop *stop, uz_error *err)
+uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
+                              uz_factor_workspace *ws, const uz_stop *stop, uz_error *err)
 {
-    int64_t n = factor->n, *place = uz_alloc(n, sizeof *place);
-    uz_status status = UZ_OK;
+    const int64_t n = factor->n;
+    const SuiteSparse_long *perm = factor->L.Perm;
+    uz_principal *part = uz_alloc_zero(1, sizeof *part);
+    int64_t *place = uz_alloc(n, sizeof *place); /* n: the row of a free dof in the reduced matrix, -1 for the others */
     cholmod_sparse *A = NULL;
-    part->dof = uz_alloc(n, sizeof *part->dof);
-    part->room = uz_alloc(n, sizeof *part->room);
-    bool ok = place && part->dof && part->room;
-    *positive = true;
+    uz_status status = UZ_OK;
+    bool positive = true, ok = part && place;
+    *out = NULL;
+    if (part)
+        part->ws = ws;
     if (ok) {
-        /* place (n): the row of a free dof in the reduced matrix, -1 for the others. */
-        const SuiteSparse_long *perm = factor->L.Perm;
-        for (int64_t k = 0; k < factor->n; k++) {
-            int64_t i = perm[k];
-            place[i] = fixed[i] ? -1 : part->n_free;
-            if (!fixed[i])
-                part->dof[part->n_free++] = i;
-        }
+        part->dof = uz_alloc(n, sizeof *part->dof);
+        part->room = uz_alloc(n, sizeof *part->room);
+        ok = part->dof && part->room;
+    }
+    for (int64_t k = 0; ok && k < n; k++) {
+        const int64_t i = perm[k];
+        place[i] = fixed[i] ? -1 : part->n_free;
+        if (!fixed[i])
+            part->dof[part->n_free++] = i;
     }
     if (ok && part->n_free > 0) {
         A = reduce(part, K, place);
@@ -110,24 +114,11 @@ static uz_status build(uz_principal *part, bool *positive, const uz_csc *K, cons
     if (!ok)
         status = uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor of %lld dofs", (long long)n);
     else if (uz_stop_is_due(stop))
-        *positive = false;
+        positive = false;
     else if (A)
-        status = factorize(part, positive, A, stop, err);
-    cholmod_l_free_sparse(&A, &part->ws->common);
+        status = factorize(part, &positive, A, stop, err);
+    cholmod_l_free_sparse(&A, &ws->common);
     free(place);
-    return status;
-}
-
-uz_status uz_principal_create(uz_principal **out, const uz_csc *K, const bool *fixed, const uz_factor *factor,
-                              uz_factor_workspace *ws, const uz_stop *stop, uz_error *err)
-{
-    *out = NULL;
-    uz_principal *part = uz_alloc_zero(1, sizeof *part);
-    bool positive = false;
-    if (!part)
-        return uz_fail(err, UZ_ERR_MEMORY, "K", "no memory for a factor");
-    part->ws = ws;
-    uz_status status = build(part, &positive, K, fixed, factor, stop, err);
     if (status == UZ_OK && positive)
         *out = part;
     else

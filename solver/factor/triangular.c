@@ -94,29 +94,9 @@ uz_status uz_factor_backward(const uz_factor *factor, uz_factor_workspace *ws, d
     return substitute(cholmod_l_super_ltsolve, factor, ws, x, columns, err);
 }
 
-/* One supernode: columns [first, first + ncols), nrows row indices, values column-major. */
-static bool copy_supernode(double *block, int64_t n_last, const int64_t *rank, const SuiteSparse_long *rows,
-                           int64_t nrows, int64_t first, int64_t ncols, const double *values)
-{
-    for (int64_t j = 0; j < ncols; j++) {
-        int64_t column = rank[first + j];
-        if (column < 0)
-            continue;
-        for (int64_t i = j; i < nrows; i++) {
-            int64_t row = rank[rows[i]];
-            double value = values[i + j * nrows];
-            if (row >= 0)
-                block[row + column * n_last] = value;
-            else if (value != 0.0)
-                return false; /* an interior dof is eliminated after a contact dof that it couples to */
-        }
-    }
-    return true;
-}
-
 /* The elimination tree of several unconnected bodies is a forest and its postorder may put one body's contact dofs
  * before another body's interior. That is harmless: all that is needed is that the columns of the last dofs reach only
- * rows of last dofs, which copy_supernode checks. */
+ * rows of last dofs, which is checked here. */
 uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *order, int64_t *where, uz_error *err)
 {
     const cholmod_factor *L = &factor->L;
@@ -138,9 +118,19 @@ uz_status uz_factor_last_block(const uz_factor *factor, double *block, int64_t *
     }
     memset(block, 0, (size_t)n_last * (size_t)n_last * sizeof *block);
     bool ok = true;
-    for (size_t k = 0; ok && k < L->nsuper; k++)
-        ok = copy_supernode(block, n_last, rank, s + pi[k], pi[k + 1] - pi[k], super[k], super[k + 1] - super[k],
-                            (const double *)L->x + px[k]);
+    for (size_t k = 0; ok && k < L->nsuper; k++) { /* a supernode: columns from super[k] on, rows, values by column */
+        const int64_t columns = super[k + 1] - super[k], rows = pi[k + 1] - pi[k];
+        for (int64_t j = 0; ok && j < columns; j++) {
+            const double *values = (const double *)L->x + px[k] + j * rows;
+            const int64_t column = rank[super[k] + j];
+            for (int64_t i = j; ok && column >= 0 && i < rows; i++) {
+                const int64_t row = rank[s[pi[k] + i]];
+                ok = row >= 0 || values[i] == 0.0; /* else an interior dof comes after a contact dof it couples to */
+                if (row >= 0)
+                    block[row + column * n_last] = values[i];
+            }
+        }
+    }
     free(rank);
     return ok ? UZ_OK : uz_fail(err, UZ_ERR_INTERNAL, "", "the contact dofs are not last in the elimination");
 }
