@@ -298,6 +298,7 @@ static bool worth_another(CURLcode code, const client_reply *reply, const client
     case CURLE_COULDNT_CONNECT: /* nothing of the request can have reached the server */
     case CURLE_COULDNT_RESOLVE_HOST:
     case CURLE_COULDNT_RESOLVE_PROXY:
+    case CURLE_SSL_CONNECT_ERROR: /* the connection ended in its handshake, or there is no TLS, which looks the same */
         return true;
     case CURLE_ABORTED_BY_CALLBACK: /* a local cause, or one that another attempt will meet again */
     case CURLE_OUT_OF_MEMORY:
@@ -305,7 +306,6 @@ static bool worth_another(CURLcode code, const client_reply *reply, const client
     case CURLE_UNSUPPORTED_PROTOCOL:
     case CURLE_URL_MALFORMAT:
     case CURLE_PEER_FAILED_VERIFICATION:
-    case CURLE_SSL_CONNECT_ERROR:
         return false;
     default:
         return request->repeatable;

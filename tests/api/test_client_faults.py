@@ -3,7 +3,9 @@
 import email.utils
 import json
 import os
+import shutil
 import socket
+import ssl
 import subprocess
 import sys
 import tempfile
@@ -90,6 +92,44 @@ def test_nobody_listens(_):
         start = time.monotonic()
         expect(run(url, "list", "--timeout", "0.5", "--retry", "20"), 12)
         assert time.monotonic() - start < 3
+
+
+def test_a_connection_that_ends_in_its_handshake_is_made_again(_):
+    if not shutil.which("openssl"):
+        raise service.Skip("openssl is not installed")
+    with tempfile.TemporaryDirectory() as folder, socket.create_server(("127.0.0.1", 0)) as listening:
+        key, cert = os.path.join(folder, "key.pem"), os.path.join(folder, "cert.pem")
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days",
+                        "2", "-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out",
+                        cert], check=True, capture_output=True)
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(cert, key)
+        listening.settimeout(30)
+        body = json.dumps({"id": ID, "status": "dismissed"}).encode()
+        met = []
+
+        def serve(cut_off, answered):
+            """Cuts off so many connections within their handshakes, then answers requests."""
+            for n in range(cut_off + answered):
+                connection, _ = listening.accept()
+                with connection:
+                    if n < cut_off:
+                        met.append(connection.recv(1 << 16)[:1])
+                        continue
+                    with context.wrap_socket(connection, server_side=True) as tls:
+                        met.append(tls.recv(1 << 16)[:6])
+                        tls.sendall(b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\nConnection: close\r\n\r\n" % len(body) + body)
+
+        url, environment = "https://127.0.0.1:%d" % listening.getsockname()[1], {**os.environ, "UZAWA_CA": cert}
+        for retry, cut_off, answered, code in (("3", 2, 1, 0), ("0", 1, 0, 12)):
+            met.clear()
+            server = threading.Thread(target=serve, args=(cut_off, answered))
+            server.start()
+            words = [CLIENT, "--server", url, "--retry", retry, "status", ID]
+            done = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=30)
+            server.join()
+            expect(done, code)
+            assert met == cut_off * [b"\x16"] + answered * [b"GET /v"], met
 
 
 def test_lost_reply_is_repeated_with_the_same_key(_):
