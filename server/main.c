@@ -45,31 +45,24 @@ typedef struct {
     sigset_t signals; /* taken by sigwait in main, blocked in every thread */
 } service;
 
-/* METIS installs its own SIGTERM and SIGABRT handlers while it orders and jumps out of them: blocked everywhere, these
- * signals can't reach it. Threads that libraries started before main inherit nothing of this; see own_signals. */
-static void block_signals(sigset_t *signals)
+/* The signals are blocked in every thread, since METIS installs its own SIGTERM and SIGABRT handlers while it orders
+ * and jumps out of them: blocked everywhere, these signals can't reach it. Threads that libraries start before main
+ * (those of OpenBLAS) inherit nothing of this, but the signal mask survives exec: so the program starts itself once
+ * more. */
+static void own_signals(char **argv, sigset_t *signals)
 {
+    sigset_t before, internal; /* internal: between the drain's threads */
     sigemptyset(signals);
     sigaddset(signals, SIGTERM);
     sigaddset(signals, SIGINT);
     sigaddset(signals, SIGHUP);
     sigaddset(signals, SIGABRT);
-    pthread_sigmask(SIG_BLOCK, signals, NULL);
-    sigset_t internal; /* between the drain's threads */
+    pthread_sigmask(SIG_BLOCK, signals, &before);
     sigemptyset(&internal);
     sigaddset(&internal, SIGUSR1);
     pthread_sigmask(SIG_BLOCK, &internal, NULL);
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN); /* a limit on the size of files is then met as a full disk is */
-}
-
-/* OpenBLAS starts threads when it is loaded, before main: a signal for the process could be delivered to one of them.
- * The signal mask survives exec, so the program starts itself once more with the signals blocked. */
-static void own_signals(char **argv, sigset_t *signals)
-{
-    sigset_t before;
-    pthread_sigmask(SIG_SETMASK, NULL, &before);
-    block_signals(signals);
     if (sigismember(&before, SIGTERM) && sigismember(&before, SIGABRT))
         return;
     char path[4096];
@@ -80,32 +73,19 @@ static void own_signals(char **argv, sigset_t *signals)
     }
 }
 
-/* What is freed stays in one heap, touched: a page given back to the system is dear to get again, and each of glibc's
- * eight arenas for each processor would keep pages of its own. How much lies free is the housekeeper's business
- * (work/reserve.h). */
-static void keep_freed_memory(void)
+/* What the process takes of the machine: memory, and as many descriptors as it may. What is freed stays in one heap,
+ * touched: a page given back to the system is dear to get again, and each of glibc's eight arenas for each processor
+ * would keep pages of its own. How much lies free is the housekeeper's business (work/reserve.h). */
+static void set_process_limits(void)
 {
+    struct rlimit limit;
     mallopt(M_ARENA_MAX, 1);
     mallopt(M_MMAP_MAX, 0);
     mallopt(M_TRIM_THRESHOLD, INT_MAX);
-}
-
-static void raise_descriptor_limit(void)
-{
-    struct rlimit limit;
-    if (getrlimit(RLIMIT_NOFILE, &limit) != 0)
-        return;
-    limit.rlim_cur = limit.rlim_max;
-    setrlimit(RLIMIT_NOFILE, &limit);
-}
-
-/* For GET /v1/limits; returns how many. */
-static size_t list_limits(service *s, const server_options *options)
-{
-    size_t n = options_limits(options, s->named, OPTIONS_MAX);
-    for (size_t i = 0; i < n; i++)
-        s->limits[i] = (codec_limit){s->named[i].name, s->named[i].unit, s->named[i].meaning, s->named[i].value};
-    return n;
+    if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
+        limit.rlim_cur = limit.rlim_max;
+        setrlimit(RLIMIT_NOFILE, &limit);
+    }
 }
 
 /* An address that others can reach needs tokens, or a word that says it is meant. */
@@ -136,32 +116,14 @@ static bool read_secrets(service *s, const server_options *options, char *messag
     return !options->tls_cert[0] || http_tls_read(&s->tls, options->tls_cert, options->tls_key, message, size);
 }
 
-/* After privileges went: a token file that only root can read is not read again. */
-static void check_reload(const service *s, const server_options *options)
-{
-    if (s->auth && access(options->token_file, R_OK) != 0)
-        log_write(s->log, LOG_WARN, "tokens_not_readable_again",
-                  (log_field[]){LOG_S("file", options->token_file),
-                                LOG_S("user", options->user),
-                                LOG_S("cause", strerror(errno)),
-                                {0}});
-}
-
-static bool open_store(service *s, const server_options *options, char *message, size_t size)
-{
-    s->store = store_open(options->db, message, size);
-    if (!s->store)
-        return false;
-    store_configure(s->store, &(store_settings){.metrics = s->metrics,
-                                                .max_queue = options->max_queue,
-                                                .uploads = {.one = (int64_t)options->max_upload,
-                                                            .all = (int64_t)options->uploads,
-                                                            .keep_s = options->upload_days * 86400}});
-    return true;
-}
-
+/* The store and those who work on it. */
 static bool start_work(service *s, const server_options *options, char *message, size_t size)
 {
+    const store_settings kept = {.metrics = s->metrics,
+                                 .max_queue = options->max_queue,
+                                 .uploads = {.one = (int64_t)options->max_upload,
+                                             .all = (int64_t)options->uploads,
+                                             .keep_s = options->upload_days * 86400}};
     const work_options workers = {.workers = options->workers,
                                   .max_attempts = options->max_attempts,
                                   .cache_bytes = options->cache,
@@ -173,6 +135,10 @@ static bool start_work(service *s, const server_options *options, char *message,
                                   .retention = {.keep_s = options->keep_days * 86400,
                                                 .keep_jobs = options->keep_jobs,
                                                 .keep_bytes = (int64_t)options->keep_bytes}};
+    s->store = store_open(options->db, message, size);
+    if (!s->store)
+        return false;
+    store_configure(s->store, &kept);
     s->work = work_start(s->store, &workers, s->log, message, size);
     if (!s->work)
         return false;
@@ -194,6 +160,9 @@ static bool start_http(service *s, const server_options *options, int fd, char *
                               .metrics = s->metrics,
                               .auth = s->auth};
     options_split(&s->origins, options->cors);
+    const size_t n_limits = options_limits(options, s->named, OPTIONS_MAX); /* for GET /v1/limits */
+    for (size_t i = 0; i < n_limits; i++)
+        s->limits[i] = (codec_limit){s->named[i].name, s->named[i].unit, s->named[i].meaning, s->named[i].value};
     const http_options limits = {.max_body = options->max_body,
                                  .max_upload = options->max_upload,
                                  .cors = s->origins.words,
@@ -207,15 +176,14 @@ static bool start_http(service *s, const server_options *options, int fd, char *
                                  .tls = s->tls.cert ? &s->tls : NULL,
                                  .access_log = options->access_log,
                                  .limits = s->limits,
-                                 .n_limits = list_limits(s, options)};
+                                 .n_limits = n_limits};
     s->http = http_start(fd, &parts, &limits, message, size);
     return s->http != NULL;
 }
 
 static bool start(service *s, const server_options *options, char *url, size_t url_size, char *message, size_t size)
 {
-    keep_freed_memory();
-    raise_descriptor_limit();
+    set_process_limits();
     const codec_limits limits = {.json_depth = options->max_json_depth,
                                  .dofs = (int64_t)options->max_dofs,
                                  .rows = (int64_t)options->max_rows,
@@ -235,11 +203,16 @@ static bool start(service *s, const server_options *options, char *url, size_t u
         return false;
     if (!check_exposure(s, options, fd, message, size) ||
         (options->user[0] && !privileges_drop(options->user, message, size)) ||
-        !open_store(s, options, message, size) || !start_work(s, options, message, size)) {
+        !start_work(s, options, message, size)) {
         close(fd);
         return false;
     }
-    check_reload(s, options);
+    if (s->auth && access(options->token_file, R_OK) != 0) /* now, as the user that the process has become */
+        log_write(s->log, LOG_WARN, "tokens_not_readable_again",
+                  (log_field[]){LOG_S("file", options->token_file),
+                                LOG_S("user", options->user),
+                                LOG_S("cause", strerror(errno)),
+                                {0}});
     return start_http(s, options, fd, message, size);
 }
 
@@ -298,22 +271,16 @@ static void drain_until_stopped(service *s, double seconds)
     pthread_join(thread, NULL);
 }
 
-static void reload_tokens(const service *s)
-{
-    char message[OPTION_PATH + 256] = "";
-    if (auth_reload(s->auth, message, sizeof message))
-        log_write(s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
-    else
-        log_write(s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
-}
-
 /* SIGHUP reads the tokens again where there are any; else it ends the daemon, as for every program of a terminal. */
 static int wait_for_signal(const service *s)
 {
+    char message[OPTION_PATH + 256] = "";
     int taken = 0;
     while (sigwait(&s->signals, &taken) != 0 || (taken == SIGHUP && s->auth)) {
-        if (taken == SIGHUP)
-            reload_tokens(s);
+        if (taken == SIGHUP && auth_reload(s->auth, message, sizeof message))
+            log_write(s->log, LOG_INFO, "tokens_reloaded", (log_field[]){{0}});
+        else if (taken == SIGHUP)
+            log_write(s->log, LOG_ERROR, "tokens_kept", (log_field[]){LOG_S("cause", message), {0}});
         taken = 0;
     }
     if (taken == SIGABRT) /* somebody wants a core file */

@@ -112,7 +112,8 @@ void codec_summary_free(codec_summary *summary); /* NULL is fine */
 /* The number of this name (codec/quantity.h). False: there is no such entry. True: *value, NaN where it is not known.
  */
 bool codec_summary_number(double *value, const codec_summary *summary, const char *name);
-const char *codec_summary_outcome(const codec_summary *summary); /* "": it has none */
+/* The text at a name like "problem.kind"; "": it has none, or summary is NULL. Lives as long as the summary. */
+const char *codec_summary_text(const codec_summary *summary, const char *name);
 
 /* How many cases of a job ended in each way. */
 #define CODEC_OUTCOMES (UZ_MOVING_GEOMETRY + 1)
@@ -208,12 +209,7 @@ typedef struct {
     const char *job_id, *case_name; /* case_name NULL: none */
     uz_trade trade;
     double mesh_error, solver_error;
-    bool is_scene, has_answer;
 } codec_trade;
-/* Fills the members after trade from the JSON text of a summary; false: no memory. */
-bool codec_read_trade(codec_trade *out, const char *summary);
 char *codec_encode_trade(const codec_trade *of, size_t *len);
-/* The method and the operator that a summary names; "" where it does not, or there is no memory. */
-void codec_read_method(char *method, char *op, size_t size, const char *summary);
 
 #endif

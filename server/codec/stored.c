@@ -65,38 +65,15 @@ bool codec_summary_number(double *value, const codec_summary *summary, const cha
     return quantity_read(value, summary->tree.root, name);
 }
 
-const char *codec_summary_outcome(const codec_summary *summary)
+const char *codec_summary_text(const codec_summary *summary, const char *name)
 {
-    const char *outcome = json_text(json_get(summary->tree.root, "outcome"));
-    return outcome ? outcome : "";
-}
-
-bool codec_read_trade(codec_trade *out, const char *summary)
-{
-    problem_details ignored;
-    json_tree tree;
-    if (!json_scan(&tree, summary, strlen(summary), &ignored))
-        return false;
-    const json_value *root = tree.root;
-    out->mesh_error = json_number(json_get(root, "discretization_error"), (double)NAN);
-    out->solver_error = json_number(json_get(json_get(root, "certificate"), "relative_error"), (double)NAN);
-    out->is_scene = json_text_is(json_get(json_get(root, "problem"), "kind"), "scene");
-    const json_value *outcome = json_get(root, "outcome");
-    out->has_answer = !json_text_is(outcome, "infeasible") && !json_text_is(outcome, "out_of_reach");
-    json_clear(&tree);
-    return true;
-}
-
-void codec_read_method(char *method, char *op, size_t size, const char *summary)
-{
-    problem_details ignored;
-    json_tree tree; /* left empty where there is no memory */
-    json_scan(&tree, summary, strlen(summary), &ignored);
-    const char *of_method = json_text(json_get(tree.root, "method")),
-               *of_op = json_text(json_get(tree.root, "operator"));
-    snprintf(method, size, "%s", of_method ? of_method : "");
-    snprintf(op, size, "%s", of_op ? of_op : "");
-    json_clear(&tree);
+    const json_value *node = summary ? summary->tree.root : NULL;
+    for (size_t len = strcspn(name, "."); node; name += len + 1, len = strcspn(name, ".")) {
+        node = json_get_n(node, name, len);
+        if (!name[len])
+            break;
+    }
+    return json_text(node) ? json_text(node) : "";
 }
 
 /* ---- requests, as text: a body may be large, and its matrices must not be read again only to be written again */

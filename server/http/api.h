@@ -13,6 +13,7 @@
 #include "work/work.h"
 
 #include <pthread.h>
+#include <semaphore.h>
 
 /* What handlers may use, the same for all requests. */
 typedef struct {
@@ -25,7 +26,7 @@ typedef struct {
     rate *rate;               /* NULL: no limit */
     http_options options;
     transport *server;
-    struct field_slots *fields;   /* turns of replies that are computed: fields.h */
+    sem_t turns;                  /* so many replies may be computed at a time, the others wait: fields.c */
     struct told_changes *told;    /* texts of the latest changes of jobs: events.c */
     char run[17];                 /* a random name of this run of the daemon */
     pthread_mutex_t predict_lock; /* holds nothing: predictions take turns */

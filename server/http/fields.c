@@ -2,7 +2,6 @@
 #include "http/fields.h"
 
 #include <errno.h>
-#include <semaphore.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,29 +9,8 @@
 
 /* ------------------------------------------------------------------- turns */
 
-struct field_slots {
-    sem_t free;
-};
-
 static const double LONGEST_WAIT_S = 30.0; /* for a turn; openapi.json says so */
 static const double BETWEEN_LOOKS_S = 0.2; /* at the client and the daemon's end */
-
-field_slots *field_slots_new(int count)
-{
-    field_slots *slots = calloc(1, sizeof *slots);
-    if (slots && sem_init(&slots->free, 0, (unsigned)count) != 0) {
-        free(slots);
-        slots = NULL;
-    }
-    return slots;
-}
-
-void field_slots_free(field_slots *slots)
-{
-    if (slots)
-        sem_destroy(&slots->free);
-    free(slots);
-}
 
 bool fields_open(field_reader *reader, api *context, const http_request *rq, const job *j, http_reply *reply)
 {
@@ -41,7 +19,7 @@ bool fields_open(field_reader *reader, api *context, const http_request *rq, con
     size_t len = 0;
     problem_details problem = {0};
     *reader = (field_reader){.asker = {context, rq}, .j = j};
-    for (int i = 0; i < looks && !reader->has_slot && (i == 0 || !api_is_over(&reader->asker)); i++) {
+    for (int i = 0; i < looks && !reader->has_turn && (i == 0 || !api_is_over(&reader->asker)); i++) {
         struct timespec until;
         clock_gettime(CLOCK_REALTIME, &until);
         until.tv_nsec += (long)(BETWEEN_LOOKS_S * 1e9);
@@ -49,11 +27,11 @@ bool fields_open(field_reader *reader, api *context, const http_request *rq, con
         until.tv_nsec %= 1000000000;
         int failed;
         do
-            failed = sem_timedwait(&context->fields->free, &until);
+            failed = sem_timedwait(&context->turns, &until);
         while (failed && errno == EINTR);
-        reader->has_slot = !failed;
+        reader->has_turn = !failed;
     }
-    if (!reader->has_slot) {
+    if (!reader->has_turn) {
         reply->retry_after_s = 5;
         reply_refuse(reply, 503, "busy", "Too many replies are being computed",
                      "no turn came within %g s: ask again later", LONGEST_WAIT_S);
@@ -81,8 +59,8 @@ void fields_close(field_reader *reader)
 {
     if (reader->is_open)
         codec_request_clear(&reader->request);
-    if (reader->has_slot)
-        sem_post(&reader->asker.context->fields->free);
+    if (reader->has_turn)
+        sem_post(&reader->asker.context->turns);
     *reader = (field_reader){.j = NULL};
 }
 

@@ -5,17 +5,12 @@
 #include "codec/codec.h"
 #include "http/api.h"
 
-/* How many replies may be computed at a time; others wait for their turn, each in its connection's thread. */
-typedef struct field_slots field_slots;
-field_slots *field_slots_new(int count); /* NULL: no memory */
-void field_slots_free(field_slots *slots);
-
 /* A job's problem, opened for as many of its cases as wanted. */
 typedef struct {
     api_asker asker;
     const job *j;
     codec_request request;
-    bool has_slot, is_open;
+    bool has_turn, is_open;
 } field_reader;
 
 /* Waits for a turn and decodes the stored request. False with a 409 for a problem in matrices, a 503 where no turn came

@@ -78,13 +78,13 @@ static bool add_job(curve_list *list, api *context, const job *j, const char *ca
     if (!history_rows(context, j, case_name, -1, found, reply))
         return false;
     /* The end of an id tells jobs of one minute apart; the beginning is the time. */
-    char method[40] = "", op[40] = "";
-    if (j->summary)
-        codec_read_method(method, op, sizeof method, j->summary);
+    codec_summary *summary = j->summary ? codec_summary_read(j->summary) : NULL;
+    const char *method = codec_summary_text(summary, "method"), *op = codec_summary_text(summary, "operator");
     curve_name named;
     snprintf(named.text, sizeof named.text, "%s%s%s%s%s, job \u2026%s", found->case_name,
              found->case_name[0] ? ": " : "", method[0] ? method : job_status_name(j->status), op[0] ? ", " : "", op,
              j->id + 24);
+    codec_summary_free(summary);
     list->names[list->n - 1] = named;
     static const double NOTHING[CODEC_HISTORY_COLUMNS];
     const double *rows = found->rows ? found->rows : NOTHING;
@@ -212,6 +212,7 @@ void trade_get(api *context, http_request *rq, http_reply *reply)
     double *x = NULL;
     int64_t count = 0;
     results_place at = {.cases = NULL};
+    codec_summary *summary = NULL;
     codec_trade of = {.job_id = j.id};
     if (!jobs_load(context, rq, &j, reply) || !results_exist(&j, reply) || results_known(rq, &j, reply) ||
         !results_one(&at, context, &j, target_value(&rq->target, "case"), "a record", reply))
@@ -223,11 +224,16 @@ void trade_get(api *context, http_request *rq, http_reply *reply)
     } else if (status == STORE_NOT_FOUND || !trade_unpack(&of.trade, x, count)) {
         reply_refuse(reply, 409, "not_recorded", "What accuracy took was not recorded",
                      "the job ran under another version of the service: its history has the bounds of its iterations");
-    } else if (!codec_read_trade(&of, at.summary)) {
+    } else if (!(summary = codec_summary_read(at.summary))) {
         reply_no_memory(reply);
     } else {
+        codec_summary_number(&of.mesh_error, summary, "discretization_error");
+        codec_summary_number(&of.solver_error, summary, "certificate.relative_error");
         /* where the summary does not know the error of the mesh, from the answer */
-        const bool known = !of.is_scene || !of.has_answer || isfinite(of.mesh_error);
+        const char *outcome = codec_summary_text(summary, "outcome");
+        const bool known = isfinite(of.mesh_error) ||
+                           strcmp(codec_summary_text(summary, "problem.kind"), "scene") != 0 ||
+                           strcmp(outcome, "infeasible") == 0 || strcmp(outcome, "out_of_reach") == 0;
         field_reader reader;
         size_t len = 0;
         const bool good = known || (fields_open(&reader, context, rq, &j, reply) &&
@@ -241,6 +247,7 @@ void trade_get(api *context, http_request *rq, http_reply *reply)
     }
 done:
     free(x);
+    codec_summary_free(summary);
     store_cases_free(at.cases, at.count);
     jobs_check_still_there(context, &j, reply);
     job_clear(&j);

@@ -38,8 +38,8 @@ typedef struct {
     store_status (*counts)(store *s, int64_t counts[5]);
     store_status (*webhook_next)(store *s, webhook_due *out);
     store_status (*webhooks_open)(store *s, bool *any);
-    store_status (*webhook_postpone)(store *s, const char *url, double delay_s);
-    store_status (*webhook_attempted)(store *s, const char *id, webhook_end end, double delay_s);
+    store_status (*webhook_attempted)(store *s, const webhook_due *due, webhook_end end, double delay_s,
+                                      double silent_s);
     /* The rows of uploads. */
     store_status (*upload_get)(store *s, const char *id, upload_info *out);
     store_status (*upload_add)(store *s, const char *id, int64_t bytes, upload_info *out, bool *known);

@@ -281,14 +281,9 @@ store_status store_webhooks_open(store *s, bool *any)
     return s->engine->webhooks_open(s, any);
 }
 
-store_status store_webhook_postpone(store *s, const char *url, double delay_s)
+store_status store_webhook_attempted(store *s, const webhook_due *due, webhook_end end, double delay_s, double silent_s)
 {
-    return s->engine->webhook_postpone(s, url, delay_s);
-}
-
-store_status store_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s)
-{
-    return s->engine->webhook_attempted(s, id, end, delay_s);
+    return s->engine->webhook_attempted(s, due, end, delay_s, silent_s);
 }
 
 /* ---- care */

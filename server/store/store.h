@@ -243,9 +243,9 @@ store_status store_webhook_next(store *s, webhook_due *out);
 typedef enum { WEBHOOK_TOLD = 2, WEBHOOK_GIVEN_UP = 3, WEBHOOK_AGAIN = 1 } webhook_end;
 /* Is there anybody to be told, now or later? */
 store_status store_webhooks_open(store *s, bool *any);
-/* All that is due at this address waits for delay_s: nobody answers there. */
-store_status store_webhook_postpone(store *s, const char *url, double delay_s);
-/* How an attempt ended; again: not before delay_s are over. */
-store_status store_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s);
+/* How an attempt ended; again: not before delay_s are over. Where nobody answers at its address, all others that are
+ * due there wait for silent_s (0: they do not). */
+store_status store_webhook_attempted(store *s, const webhook_due *due, webhook_end end, double delay_s,
+                                     double silent_s);
 
 #endif

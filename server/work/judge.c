@@ -88,7 +88,7 @@ static codec_finding judge_one(const codec_assertion *a, const codec_summary *su
         }
         out.value = 0.0; /* outcomes that no case had are not in a summary */
     }
-    const char *outcome = codec_summary_outcome(summary);
+    const char *outcome = codec_summary_text(summary, "outcome");
     const bool met = strcmp(outcome, "converged") == 0 || strcmp(outcome, "verified") == 0;
     const double tolerance = fmax(a->absolute, a->relative * fabs(a->near)); /* fmax leaves out what is not given */
     const range limits = !isnan(a->near)

@@ -207,9 +207,8 @@ static void tell(webhooks *all, const webhook_due *due)
                             LOG_S("cause", status ? NULL : cause),
                             {0}});
     metrics_add(all->options.metrics, end == WEBHOOK_TOLD ? METRIC_WEBHOOK_TOLD : METRIC_WEBHOOK_FAILED, 1);
-    if (status == 0 && end == WEBHOOK_AGAIN) /* each attempt takes seconds that others wait for */
-        store_webhook_postpone(all->store, due->url, wait_after(all, 0));
-    store_webhook_attempted(all->store, due->job, end, wait_after(all, due->attempts));
+    const bool silent = status == 0 && end == WEBHOOK_AGAIN; /* each attempt takes seconds that others wait for */
+    store_webhook_attempted(all->store, due, end, wait_after(all, due->attempts), silent ? wait_after(all, 0) : 0.0);
 }
 
 static void *tell_loop(void *arg)

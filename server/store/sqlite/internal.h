@@ -116,8 +116,8 @@ store_status sqlite_get_cases(store *s, const char *id, const char *name, store_
 store_status sqlite_counts(store *s, int64_t counts[5]);
 store_status sqlite_webhook_next(store *s, webhook_due *out);
 store_status sqlite_webhooks_open(store *s, bool *any);
-store_status sqlite_webhook_postpone(store *s, const char *url, double delay_s);
-store_status sqlite_webhook_attempted(store *s, const char *id, webhook_end end, double delay_s);
+store_status sqlite_webhook_attempted(store *s, const webhook_due *due, webhook_end end, double delay_s,
+                                      double silent_s);
 store_status sqlite_upload_get(store *s, const char *id, upload_info *out);
 store_status sqlite_upload_add(store *s, const char *id, int64_t bytes, upload_info *out, bool *known);
 store_status sqlite_upload_forget(store *s, const char *id);

@@ -174,7 +174,6 @@ const store_engine STORE_SQLITE = {
     .counts = sqlite_counts,
     .webhook_next = sqlite_webhook_next,
     .webhooks_open = sqlite_webhooks_open,
-    .webhook_postpone = sqlite_webhook_postpone,
     .webhook_attempted = sqlite_webhook_attempted,
     .upload_get = sqlite_upload_get,
     .upload_add = sqlite_upload_add,

@@ -30,31 +30,36 @@ store_status sqlite_webhooks_open(store *base, bool *any)
 }
 
 typedef struct {
-    query_id query;
-    const char *of; /* the job, or the address */
+    const webhook_due *due;
     webhook_end end;
-    double next;
-} told_args;
+    double delay_s, silent_s;
+} attempt;
 
-static store_status told(sqlite_store *s, connection *c, void *args)
+static store_status note_attempt(sqlite_store *s, connection *c, void *args)
 {
     (void)s;
-    const told_args *a = args;
-    statement st = statement_begin(c, a->query);
-    bind_text(&st, 1, a->of);
-    bind_real(&st, 2, a->next);
+    const attempt *a = args;
+    const double now = clock_seconds(CLOCK_REALTIME);
+    store_status status = STORE_OK;
+    if (a->silent_s > 0) {
+        statement st = statement_begin(c, QUERY_WEBHOOK_POSTPONE);
+        bind_text(&st, 1, a->due->url);
+        bind_real(&st, 2, now + a->silent_s);
+        bind_integer(&st, 3, WEBHOOK_AGAIN);
+        status = statement_run(&st);
+    }
+    if (status != STORE_OK)
+        return status;
+    statement st = statement_begin(c, QUERY_WEBHOOK_ATTEMPTED);
+    bind_text(&st, 1, a->due->job);
+    bind_real(&st, 2, now + a->delay_s);
     bind_integer(&st, 3, a->end);
     return statement_run(&st);
 }
 
-store_status sqlite_webhook_postpone(store *base, const char *url, double delay_s)
+store_status sqlite_webhook_attempted(store *base, const webhook_due *due, webhook_end end, double delay_s,
+                                      double silent_s)
 {
-    told_args a = {QUERY_WEBHOOK_POSTPONE, url, WEBHOOK_AGAIN, clock_seconds(CLOCK_REALTIME) + delay_s};
-    return sqlite_write(sqlite_of(base), WRITE_DURABLE, told, &a);
-}
-
-store_status sqlite_webhook_attempted(store *base, const char *id, webhook_end end, double delay_s)
-{
-    told_args a = {QUERY_WEBHOOK_ATTEMPTED, id, end, clock_seconds(CLOCK_REALTIME) + delay_s};
-    return sqlite_write(sqlite_of(base), WRITE_DURABLE, told, &a);
+    attempt a = {due, end, delay_s, silent_s};
+    return sqlite_write(sqlite_of(base), WRITE_DURABLE, note_attempt, &a);
 }

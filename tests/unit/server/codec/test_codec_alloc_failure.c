@@ -187,17 +187,16 @@ static bool try_results(const char *argument)
     return text != NULL;
 }
 
-/* The names of a curve are left out where there is no memory for them. */
 static bool try_trade(const char *summary)
 {
     codec_trade of = {.job_id = "id", .case_name = "a"};
-    char method[40], op[40];
     uz_trade_clear(&of.trade);
-    codec_read_method(method, op, sizeof method, summary);
-    const bool named = strcmp(method, "auto") == 0, read = codec_read_trade(&of, summary);
-    char *text = read ? codec_encode_trade(&of, NULL) : NULL;
+    codec_summary *read = codec_summary_read(summary);
+    const bool named = strcmp(codec_summary_text(read, "method"), "auto") == 0;
+    codec_summary_free(read);
+    char *text = named ? codec_encode_trade(&of, NULL) : NULL;
     free(text);
-    return named && text != NULL;
+    return text != NULL;
 }
 
 static bool try_surface(const char *argument)
