@@ -91,7 +91,7 @@ _uzawa() {
     result--server|result-s) words='' ;;
     result--timeout|result-t) words='' ;;
     result--retry) words='' ;;
-    picture--colour) words='von_mises displacements' ;;
+    picture--colour) words='von_mises displacements pressure' ;;
     picture--factor) words='' ;;
     picture--width) words='' ;;
     picture--case|picture-c) words='' ;;
@@ -108,7 +108,7 @@ _uzawa() {
     history--retry) words='' ;;
     plot--x) words='iterations seconds' ;;
     plot--with) words=$(_uzawa_ids) ;;
-    plot--colour) words='von_mises displacements' ;;
+    plot--colour) words='von_mises displacements pressure' ;;
     plot--factor) words='' ;;
     plot--width) words='' ;;
     plot--case|plot-c) words='' ;;

@@ -54,18 +54,18 @@ static uz_status write_picture(char **file, size_t *len, const output_source *of
     return uz_picture_deformed(file, len, of->scene, of->answer, &how, hooks, err);
 }
 
-/* The colour ("displacements" or "von_mises"), the factor of the displacements and the width. */
+/* The colour, the factor of the displacements and the width. */
 static bool read_picture(output_options *out, const http_request *rq, problem_details *problem)
 {
     static const char TITLE[] = "A query parameter has a value that is not allowed";
     const char *colour = target_value(&rq->target, "colour"), *factor = target_value(&rq->target, "factor");
     uz_picture *to = &out->picture;
     int64_t width = 900;
-    const bool moved = colour && strcmp(colour, "displacements") == 0;
-    to->colour = moved ? UZ_FIELD_DISPLACEMENTS : UZ_FIELD_VON_MISES;
-    if (colour && !moved && strcmp(colour, "von_mises") != 0)
-        return problem_fill(problem, 400, "bad_parameter", TITLE, "colour is displacements or von_mises, not \"%.60s\"",
-                            colour);
+    to->colour = UZ_FIELD_VON_MISES;
+    if (colour && (!uz_field_parse(&to->colour, colour, strlen(colour)) ||
+                   !(to->colour & (UZ_FIELD_DISPLACEMENTS | UZ_FIELD_VON_MISES | UZ_FIELD_PRESSURE))))
+        return problem_fill(problem, 400, "bad_parameter", TITLE,
+                            "colour is von_mises, displacements or pressure, not \"%.60s\"", colour);
     to->factor = 0;
     const size_t used = factor ? uz_parse_double(&to->factor, factor, strlen(factor)) : 0;
     if (factor && (used == 0 || factor[used] != '\0' || !(to->factor >= 0 && to->factor <= 1e12)))

@@ -58,8 +58,9 @@ uz_status uz_fields_compute(uz_fields *out, const uz_scene *scene, const uz_fiel
 void uz_fields_clear(uz_fields *fields);
 
 /* The same as a VTK XML file (.vtu) with the arrays that `which` names, zlib compressed. What belongs to rows of the
- * contact stands at their nodes: nodes without a row have pressure and reaction 0, a gap of NaN and status -1; of
- * several rows at one node the largest pressure and status, the smallest reaction and gap. stress_gauss is left out.
+ * contact stands at their nodes: nodes without a row have reaction 0, a gap of NaN and status -1; of several rows at
+ * one node the largest status, the smallest reaction and gap. The pressure is there on both sides of a contact, and 0
+ * elsewhere. stress_gauss is left out.
  * *text is NUL-terminated, the caller frees it. */
 uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz_field_source *answer, unsigned which,
                        const uz_hooks *hooks, uz_error *err);
@@ -75,14 +76,16 @@ uz_status uz_mesh_error(double *error, const uz_scene *scene, const uz_field_sou
 typedef struct {
     int width;         /* of the picture in pixels, 200 to 4000; 0: 900 */
     double factor;     /* displacements are drawn this many times as large; 0: chosen so that they show */
-    uz_field colour;   /* UZ_FIELD_DISPLACEMENTS (their length) or UZ_FIELD_VON_MISES */
+    uz_field colour;   /* UZ_FIELD_DISPLACEMENTS (their length), _VON_MISES or _PRESSURE */
     const char *title; /* may be NULL */
 } uz_picture;
 
 /* The deformed body in colour over its undeformed outline, the obstacles, an arrow for the contact pressure at each
  * node that touches (at most some 80 of them), a colour bar: as SVG, with the body's colours as a PNG image in it, so
  * that the size does not grow with the mesh. Solids are seen from the front, the right and above; obstacles stand
- * behind. *svg is NUL-terminated, the caller frees it. Errors: those of uz_fields_compute, _ARGUMENT. */
+ * behind. Of a solid in the colours of the pressure only the sides of the contacts are filled, with the edges of the
+ * bodies around them; in the plane a band along those sides is coloured. *svg is NUL-terminated, the caller frees it.
+ * Errors: those of uz_fields_compute, _ARGUMENT. */
 uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, const uz_field_source *answer,
                               const uz_picture *how, const uz_hooks *hooks, uz_error *err);
 

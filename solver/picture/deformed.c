@@ -13,28 +13,33 @@ static const char STYLE[] =
     ".before{stroke:#9aa0a8;stroke-dasharray:4 3}.obstacle{stroke:#555;stroke-width:2}.ticks{stroke:#888}"
     ".push{stroke:#c2255c;stroke-width:1.5}</style>\n";
 
-/* Lengths of the displacements, or the stress, by node. */
+static const struct {
+    uz_field field;
+    const char *what;
+} COLOURS[] = {{UZ_FIELD_DISPLACEMENTS, "displacement"},
+               {UZ_FIELD_VON_MISES, "von Mises stress"},
+               {UZ_FIELD_PRESSURE, "contact pressure"}};
+enum { N_COLOURS = sizeof COLOURS / sizeof COLOURS[0] };
+
+/* Lengths of the displacements, the stress or the pressure (NaN where there is none), by node. */
 static uz_status make_values(double **out, uz_scenery *scenery, const uz_field_body *body, uz_field colour,
                              const uz_hooks *hooks, uz_error *err)
 {
     const uz_mesh *mesh = &scenery->model->mesh;
     uz_fields fields;
-    const unsigned which = colour == UZ_FIELD_VON_MISES ? UZ_FIELD_VON_MISES : UZ_FIELD_DISPLACEMENTS;
-    uz_status status = uz_fields_of_body(&fields, body, scenery->answer, which, hooks, err);
-    if (status != UZ_OK)
-        return status;
-    if (which == UZ_FIELD_VON_MISES) {
+    uz_status status = uz_fields_of_body(&fields, body, scenery->answer, (unsigned)colour, hooks, err);
+    if (status == UZ_OK && colour == UZ_FIELD_VON_MISES) {
         *out = fields.von_mises;
         fields.von_mises = NULL;
-    } else {
-        *out = uz_alloc_zero(mesh->n_nodes, sizeof **out);
+    } else if (status == UZ_OK && !(*out = uz_alloc_zero(mesh->n_nodes, sizeof **out))) {
+        status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the colours of %lld nodes", (long long)mesh->n_nodes);
+    } else if (status == UZ_OK && colour == UZ_FIELD_PRESSURE) {
+        status = uz_nodal_pressure(*out, scenery->model, scenery->scene, fields.pressure, err);
     }
     uz_fields_clear(&fields);
-    if (!*out)
-        return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the colours of %lld nodes", (long long)mesh->n_nodes);
-    for (int64_t i = 0; which != UZ_FIELD_VON_MISES && i < mesh->n_nodes * mesh->dim; i++)
+    for (int64_t i = 0; status == UZ_OK && colour == UZ_FIELD_DISPLACEMENTS && i < mesh->n_nodes * mesh->dim; i++)
         (*out)[i / mesh->dim] = hypot((*out)[i / mesh->dim], scenery->answer->u[i]);
-    return UZ_OK;
+    return status;
 }
 
 static uz_status put_image(uz_buffer *svg, const uz_raster *raster, uz_error *err)
@@ -60,6 +65,8 @@ static uz_status put_body(uz_buffer *svg, const uz_scenery *scenery, const uz_sk
         status = uz_scenery_put_outline(svg, scenery, skin, err);
     if (status == UZ_OK)
         status = uz_scenery_paint(&raster, scenery, skin, hooks, err);
+    if (status == UZ_OK && scenery->contacts_only)
+        status = uz_scenery_paint_contacts(&raster, scenery, err);
     if (status == UZ_OK)
         status = put_image(svg, &raster, err);
     uz_raster_clear(&raster);
@@ -82,13 +89,16 @@ static uz_status draw(uz_buffer *svg, uz_scenery *scenery, const uz_field_body *
     scenery->value = value;
     scenery->pressure = pressure;
     if (status == UZ_OK) {
-        scenery->low = INFINITY;
-        scenery->high = -INFINITY;
+        scenery->contacts_only = how->colour == UZ_FIELD_PRESSURE;
+        scenery->low = scenery->contacts_only ? 0 : INFINITY;
+        scenery->high = scenery->contacts_only ? 0 : -INFINITY;
         for (int64_t a = 0; a < scenery->model->mesh.n_nodes; a++) {
             scenery->low = fmin(scenery->low, scenery->value[a]);
             scenery->high = fmax(scenery->high, scenery->value[a]);
         }
-        scenery->what = how->colour == UZ_FIELD_VON_MISES ? "von Mises stress" : "displacement";
+        for (int i = 0; i < N_COLOURS; i++)
+            if (COLOURS[i].field == how->colour)
+                scenery->what = COLOURS[i].what;
         status = uz_scenery_fit(scenery, err);
     }
     if (status == UZ_OK) {
@@ -144,8 +154,11 @@ uz_status uz_picture_deformed(char **svg, size_t *len, const uz_scene *scene, co
             uz_fail(err, UZ_ERR_ARGUMENT, "", "the width of a picture must lie in 200 to 4000, it is %d", how->width);
     if (status == UZ_OK && !(how->factor >= 0 && isfinite(how->factor)))
         status = uz_fail(err, UZ_ERR_ARGUMENT, "", "the factor of the displacements must not be negative");
-    if (status == UZ_OK && how->colour != UZ_FIELD_DISPLACEMENTS && how->colour != UZ_FIELD_VON_MISES)
-        status = uz_fail(err, UZ_ERR_ARGUMENT, "", "a picture shows displacements or von_mises");
+    bool known = false;
+    for (int i = 0; i < N_COLOURS; i++)
+        known = known || COLOURS[i].field == how->colour;
+    if (status == UZ_OK && !known)
+        status = uz_fail(err, UZ_ERR_ARGUMENT, "", "a picture shows displacements, von_mises or pressure");
     if (status == UZ_OK)
         status = uz_scenery_check_answer(answer, &model, err);
     if (status == UZ_OK)

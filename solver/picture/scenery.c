@@ -1,6 +1,7 @@
 /* scenery.c: the parts of a picture of a deformed body, from the projection to the legend. */
 #include "picture/scenery.h"
 
+#include "assembly/discretization.h"
 #include "core/error.h"
 #include "core/hooks.h"
 #include "obstacle/shape.h"
@@ -94,11 +95,40 @@ uz_status uz_scenery_fit(uz_scenery *scenery, uz_error *err)
 /* Grids of more elements than this would hide their colours behind the lines. */
 enum { MOST_LINED = 4000 };
 
+/* A convex polygon of corners with the middles of its edges, as a fan about its mean. */
+static void paint_polygon(uz_raster *raster, const uz_raster_point *p, int n, double light, bool lined)
+{
+    uz_raster_point mean = {0, 0, 0, 0};
+    for (int k = 0; k < n; k++) {
+        mean.x += p[k].x / n;
+        mean.y += p[k].y / n;
+        mean.z += p[k].z / n;
+        mean.value += p[k].value / n;
+    }
+    for (int k = 0; k < n; k++) {
+        const uz_raster_point triangle[3] = {p[k], p[(k + 1) % n], mean};
+        uz_raster_triangle(raster, triangle, light);
+    }
+    for (int k = 0; lined && k < n; k++)
+        uz_raster_line(raster, &p[k], &p[(k + 1) % n], 0.5);
+}
+
 uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                            uz_error *err)
 {
     const uz_mesh *mesh = &scenery->model->mesh;
     const bool lined = mesh->n_elements <= (mesh->dim == 2 ? 1 : 4) * MOST_LINED;
+    if (mesh->dim == 3 && scenery->contacts_only) {
+        uz_skin_edges edges;
+        const uz_status status = uz_skin_edges_build(&edges, skin, mesh, err);
+        for (int64_t i = 0; status == UZ_OK && i < edges.n_outline; i++) {
+            const uz_raster_point a = uz_scenery_node(scenery, edges.outline[2 * i], scenery->factor),
+                                  b = uz_scenery_node(scenery, edges.outline[2 * i + 1], scenery->factor);
+            uz_raster_line(raster, &a, &b, 0.5);
+        }
+        uz_skin_edges_clear(&edges);
+        return status;
+    }
     for (int64_t i = 0; i < skin->n_cells; i++) {
         if (i % 4096 == 0 && uz_cancelled(hooks))
             return uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the picture was drawn");
@@ -121,20 +151,54 @@ uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const u
                 continue;
             light = 0.55 + 0.45 * fmin(1, -area / (2 * size * size));
         }
-        /* A convex polygon of corners with the middles of its edges, as a fan about its mean. */
-        uz_raster_point mean = {0, 0, 0, 0};
-        for (int k = 0; k < n; k++) {
-            mean.x += p[k].x / n;
-            mean.y += p[k].y / n;
-            mean.z += p[k].z / n;
-            mean.value += p[k].value / n;
+        paint_polygon(raster, p, n, light, lined);
+    }
+    return UZ_OK;
+}
+
+uz_status uz_scenery_paint_contacts(uz_raster *raster, const uz_scenery *scenery, uz_error *err)
+{
+    enum { BAND = 7 }; /* pixels */
+    const uz_body_model *model = scenery->model;
+    for (int64_t k = 0; k < scenery->scene->n_contacts; k++) {
+        uz_contact_input in;
+        const uz_status status = uz_contact_input_of(&in, model, scenery->scene, k, err);
+        if (status != UZ_OK)
+            return status;
+        for (int64_t f = 0; f < in.on->n_faces + (in.with ? in.with->n_faces : 0); f++) {
+            uz_side side;
+            uz_raster_point p[UZ_FACE_NODES];
+            double xyz[3 * UZ_FACE_NODES], sum = 0;
+            int64_t node[UZ_FACE_NODES];
+            int known = 0;
+            const uz_face face = f < in.on->n_faces ? in.on->face[f] : in.with->face[f - in.on->n_faces];
+            uz_body_side(&side, xyz, node, model, face);
+            /* Around the side: each middle follows the corner before it. A plane's side is a line. */
+            const int n = side.nodes, corners = side.dim == 2 ? 2 : n % 4 == 0 ? 4 : 3;
+            for (int j = 0; j < n; j++) {
+                const int place = n == corners || j % 2 == 0 ? j / (n == corners ? 1 : 2) : corners + j / 2;
+                p[j] = uz_scenery_node(scenery, node[place], scenery->factor);
+                sum += isnan(p[j].value) ? 0 : p[j].value;
+                known += !isnan(p[j].value);
+            }
+            /* A node without a row, as one that a support holds, has what the others have. */
+            for (int j = 0; j < n && known > 0; j++)
+                if (isnan(p[j].value))
+                    p[j].value = sum / known;
+            if (known > 0 && side.dim == 3)
+                paint_polygon(raster, p, n, 1, true);
+            for (int j = 0; known > 0 && side.dim == 2 && j + 1 < n; j++) {
+                /* The body is on the left of its side; the pixels' y points down. */
+                const double dx = p[j + 1].x - p[j].x, dy = p[j + 1].y - p[j].y, length = hypot(dx, dy);
+                uz_raster_point band[4] = {p[j], p[j + 1], p[j + 1], p[j]};
+                for (int i = 0; i < 4; i++) {
+                    band[i].x += i < 2 ? 0 : BAND * dy / length;
+                    band[i].y -= i < 2 ? 0 : BAND * dx / length;
+                    band[i].z += 1;
+                }
+                paint_polygon(raster, band, 4, 1, false);
+            }
         }
-        for (int k = 0; k < n; k++) {
-            const uz_raster_point triangle[3] = {p[k], p[(k + 1) % n], mean};
-            uz_raster_triangle(raster, triangle, light);
-        }
-        for (int k = 0; lined && k < n; k++)
-            uz_raster_line(raster, &p[k], &p[(k + 1) % n], 0.5);
     }
     return UZ_OK;
 }

@@ -15,6 +15,7 @@ typedef struct {
     const double *value;    /* n_nodes: what is coloured */
     double low, high;       /* range of it */
     const char *what;       /* its name */
+    bool contacts_only;     /* `value` is there on sides of contacts alone, NaN elsewhere: they alone are coloured */
     const double *pressure; /* m: of each contact row, NaN where it has no area */
     double axes[3][3];      /* rows: to the right, upwards, towards the eye */
     double scale;           /* pixels per length */
@@ -37,9 +38,12 @@ uz_raster_point uz_scenery_point(const uz_scenery *scenery, const double *x);
 /* Where a node is; its place is that before the deformation plus `factor` times the displacement. */
 uz_raster_point uz_scenery_node(const uz_scenery *scenery, int64_t node, double factor);
 
-/* The surface of the body in colour. UZ_ERR_CANCELLED. */
+/* The surface of the body in colour; of a solid with contacts_only its sharp edges. UZ_ERR_CANCELLED, _MEMORY. */
 uz_status uz_scenery_paint(uz_raster *raster, const uz_scenery *scenery, const uz_skin *skin, const uz_hooks *hooks,
                            uz_error *err);
+
+/* The sides of the contacts in colour: bands inside a plane's border, faces of a solid. UZ_ERR_SCENE. */
+uz_status uz_scenery_paint_contacts(uz_raster *raster, const uz_scenery *scenery, uz_error *err);
 
 /* Obstacles of solids, in grey. False: there are none. */
 bool uz_scenery_paint_obstacles(uz_raster *raster, const uz_scenery *scenery);

@@ -12,6 +12,7 @@
  */
 #include "post/parts.h"
 
+#include "assembly/discretization.h"
 #include "core/alloc.h"
 #include "core/error.h"
 
@@ -128,4 +129,38 @@ uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, cons
     free(w.end);
     free(w.has_row);
     return done ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the pressure on %lld rows", (long long)m);
+}
+
+uz_status uz_nodal_pressure(double *nodal, const uz_body_model *model, const uz_scene *scene, const double *pressure,
+                            uz_error *err)
+{
+    const int64_t n_nodes = model->mesh.n_nodes;
+    const int64_t *contact = model->info.contact_of;
+    double *weight = uz_alloc_zero(n_nodes, sizeof *weight), *sum = uz_alloc_zero(n_nodes, sizeof *sum);
+    uz_status status =
+        weight && sum ? UZ_OK : uz_fail(err, UZ_ERR_MEMORY, "", "no memory for %lld nodes", (long long)n_nodes);
+    for (int64_t a = 0; a < n_nodes; a++)
+        nodal[a] = NAN;
+    uz_contact_input in;
+    for (int64_t i = 0; status == UZ_OK && i < model->m; i++) {
+        uz_contact_row row;
+        if (i == 0 || contact[i] != contact[i - 1])
+            status = uz_contact_input_of(&in, model, scene, contact[i], err);
+        if (status != UZ_OK || isnan(pressure[i]))
+            continue;
+        const int64_t node = model->info.contact_node[i];
+        const double area = model->info.contact_area[i];
+        if (!uz_row_inner(model, i))
+            nodal[node] = fmax(nodal[node], pressure[i]);
+        for (int k = 0; in.with && uz_contact_row_at(&row, &in, model->row_place[i]) && k < row.masters; k++) {
+            weight[row.master[k]] += fabs(row.master_share[k]) * area;
+            sum[row.master[k]] += fabs(row.master_share[k]) * area * pressure[i];
+        }
+    }
+    for (int64_t a = 0; status == UZ_OK && a < n_nodes; a++)
+        if (weight[a] > 0)
+            nodal[a] = fmax(nodal[a], sum[a] / weight[a]);
+    free(weight);
+    free(sum);
+    return status;
 }

@@ -68,4 +68,9 @@ double uz_von_mises(const double *stress, int components);
 /* Pressure of each contact row from the reactions r (m): see contact_pressure.c. NaN where the contact has no area. */
 uz_status uz_contact_pressure(double *pressure, const uz_body_model *model, const uz_scene *scene, const double *r,
                               uz_error *err);
+/* nodal (n_nodes): the pressure on the surfaces, NaN where there is none. Of several rows at a node the largest; on the
+ * other body's side the mean of the rows that push on the node, weighted with what each gives it, so that a uniform
+ * pressure is found exactly and none lies outside of those of the rows. UZ_ERR_MEMORY, _SCENE. */
+uz_status uz_nodal_pressure(double *nodal, const uz_body_model *model, const uz_scene *scene, const double *pressure,
+                            uz_error *err);
 #endif

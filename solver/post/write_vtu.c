@@ -15,8 +15,9 @@ typedef struct {
     uz_buffer vtu;
     const uz_field_body *body;
     const uz_fields *fields;
-    double *room;  /* 6 x n_nodes: for one array at a time */
-    bool *has_row; /* n_nodes */
+    double *room;     /* 6 x n_nodes: for one array at a time */
+    bool *has_row;    /* n_nodes */
+    double *pressure; /* n_nodes, on both sides of a contact; 0 elsewhere */
 } writing;
 
 static void put_nodal(writing *w, uz_field field, const double *data, int components, const char *const *labels)
@@ -72,7 +73,8 @@ static void write_all(writing *w, const uz_field_source *answer, unsigned which)
     if (f->von_mises)
         put_nodal(w, UZ_FIELD_VON_MISES, f->von_mises, 1, NULL);
     put_tensor(w, UZ_FIELD_STRAIN, f->strain);
-    put_rows(w, UZ_FIELD_PRESSURE, f->pressure, 0, true);
+    if (f->pressure)
+        put_nodal(w, UZ_FIELD_PRESSURE, w->pressure, 1, NULL);
     put_rows(w, UZ_FIELD_CONTACT_STATUS, f->contact_status, -1, true);
     put_rows(w, UZ_FIELD_REACTIONS, which & UZ_FIELD_REACTIONS ? answer->r : NULL, 0, false);
     put_rows(w, UZ_FIELD_GAPS, which & UZ_FIELD_GAPS ? answer->g : NULL, NAN, false);
@@ -108,17 +110,23 @@ uz_status uz_vtu_write(char **text, size_t *len, const uz_scene *scene, const uz
         writing w = {.body = &body,
                      .fields = &fields,
                      .room = uz_alloc(6 * fields.n_nodes, sizeof *w.room),
-                     .has_row = uz_alloc(fields.n_nodes, sizeof *w.has_row)};
-        if (!w.room || !w.has_row)
+                     .has_row = uz_alloc(fields.n_nodes, sizeof *w.has_row),
+                     .pressure = fields.pressure ? uz_alloc(fields.n_nodes, sizeof *w.pressure) : NULL};
+        if (!w.room || !w.has_row || (fields.pressure && !w.pressure))
             status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for a vtu file");
         else if (uz_cancelled(hooks))
             status = uz_fail(err, UZ_ERR_CANCELLED, "", "cancelled before the file was written");
+        if (status == UZ_OK && w.pressure)
+            status = uz_nodal_pressure(w.pressure, &model, scene, fields.pressure, err);
+        for (int64_t a = 0; status == UZ_OK && w.pressure && a < fields.n_nodes; a++)
+            w.pressure[a] = isnan(w.pressure[a]) ? 0 : w.pressure[a];
         if (status == UZ_OK) {
             write_all(&w, answer, which);
             status = uz_vtu_finish(text, len, &w.vtu, err);
         }
         free(w.room);
         free(w.has_row);
+        free(w.pressure);
         uz_fields_clear(&fields);
     }
     uz_field_body_clear(&body);

@@ -114,6 +114,33 @@ TEST(colours_stand_where_the_body_is)
     drop(&s);
 }
 
+/* Only a band along the side that touches has colours: yellow where it is pressed most, amid grey. */
+TEST(the_pressure_stands_on_the_sides_of_contacts)
+{
+    solved s = solve_scene(paper_scene(30, 10));
+    int width, height;
+    unsigned char high[3], grey[3];
+    char *svg = draw(&s, (uz_picture){.colour = UZ_FIELD_PRESSURE, .factor = 1});
+    unsigned char *pixels = pixels_of(svg, &width, &height);
+    uz_colour(high, 1);
+    uz_colour(grey, NAN);
+    long coloured = 0, most = 0, plain = 0;
+    for (int64_t i = 0; i < (int64_t)width * height; i++) {
+        const unsigned char *p = pixels + 4 * i;
+        const bool gaudy = p[3] && (abs(p[0] - p[1]) > 20 || abs(p[1] - p[2]) > 20);
+        coloured += gaudy;
+        most += gaudy && abs(p[0] - high[0]) < 40 && abs(p[1] - high[1]) < 30 && abs(p[2] - high[2]) < 40;
+        plain += p[3] && memcmp(p, grey, 3) == 0;
+        CHECK(!gaudy || i / width > height - 75); /* the obstacle is below */
+    }
+    CHECK_MSG(coloured > 4000 && coloured < 8 * 800 && most > 100 && plain > 100000, "%ld, %ld and %ld pixels",
+              coloured, most, plain);
+    CHECK(strstr(svg, ">contact pressure<"));
+    free(pixels);
+    free(svg);
+    drop(&s);
+}
+
 TEST(an_arrow_for_each_node_that_touches_and_the_obstacle)
 {
     solved s = solve_scene(paper_scene(30, 10));
