@@ -185,15 +185,15 @@ static double sagitta(bool *known, const work *w, const place *p)
 }
 
 /* From a point of a side on, whose gap is p->gap, in steps along its coordinates, of faces also along the third edge of
- * a triangle: obstacles may be smaller than the distance of the points that are looked at. */
+ * a triangle or both diagonals: obstacles may be smaller than the distance of the points that are looked at. */
 static void search(work *w, place *p, double local[2])
 {
-    static const double WAY[6][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}};
+    static const double WAY[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}, {1, 1}, {-1, -1}};
     const int dim = w->model->mesh.dim;
     const bool triangle = dim == 3 && w->flank[p->k].still.side[p->i].nodes % 3 == 0;
     double best = p->gap;
     for (double step = 0.25; step > 0.003; step *= 0.5)
-        for (int way = 0; way < (dim == 2 ? 2 : 6); way++) {
+        for (int way = 0; way < (dim == 2 ? 2 : triangle ? 6 : 8); way++) {
             const double a = local[0] + step * WAY[way][0], b = local[1] + step * WAY[way][1];
             if (triangle ? fmin(a, b) < 0 || a + b > 1 : fmax(fabs(a), fabs(b)) > 1)
                 continue;
