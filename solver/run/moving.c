@@ -6,8 +6,10 @@
  * strains stay linear. The first place is that of the answer before anything moved, then x_k+1 = x_k + w (u_k - x_k).
  *
  * What is left. Steps get smaller by c = ||x_k+1 - x_k|| / ||x_k - x_k-1||, so that those to come sum up to c / (1 - c)
- * times the last. w = 1 unless they do not get smaller: a node that a pass sends from one face to another and back is
- * caught by shorter steps. Errors are in the energy norm. */
+ * times the last. w = 1 unless they do not get smaller, or steadily by little: a node that a pass sends from one face
+ * to another and back is caught by shorter steps, and what creeps by longer ones, as long as the last two differences
+ * T(x) - x say (Irons and Tuck, IJNME 1 (1969) 275-277:
+ * Aitken's rule for vectors, here in the inner product of K). Errors are in the energy norm. */
 #include "run/moving.h"
 
 #include "core/alloc.h"
@@ -35,9 +37,13 @@ enum { MOST_PASSES = 30 };
 #define TRIED     0.02
 #define TOLERABLE UZ_MOST_SLIDING
 
-/* Steps that do not get smaller than this part of the last are halved. */
+/* Steps are no longer whole ones where differences do not get smaller than SLOW times the last, or twice by the same
+ * factor, but for a part STEADY of it, that is more than CREEPING. */
 #define SLOW       0.9
-#define LEAST_STEP 0.125
+#define CREEPING   0.5
+#define STEADY     0.05
+#define LEAST_STEP 0.05
+#define MOST_STEP  4.0
 
 typedef struct {
     uz_problem problem; /* at `place` */
@@ -47,7 +53,8 @@ typedef struct {
     double deadline;
     uz_setup *base; /* at no place: K */
     double *place;  /* n: where the pass finds its contacts */
-    double *v, *Kv; /* d */
+    double *v, *Kv; /* d: what the last pass changed, T(x) - x, and K times it */
+    double *before; /* d: the v before */
     int64_t n, passes;
     double step, change, ratio[2]; /* w; what the last pass changed; the last two ratios of these, 0: unknown */
 } moving;
@@ -84,7 +91,8 @@ static uz_status prepare(moving *m, const uz_result *first, const uz_problem *pr
     m->place = uz_alloc(m->n, sizeof *m->place);
     m->v = uz_alloc(m->base->model.d, sizeof *m->v);
     m->Kv = uz_alloc(m->base->model.d, sizeof *m->Kv);
-    if (!m->place || !m->v || !m->Kv)
+    m->before = uz_alloc_zero(m->base->model.d, sizeof *m->before);
+    if (!m->place || !m->v || !m->Kv || !m->before)
         return uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the place of %lld nodes", (long long)first->n_nodes);
     memcpy(m->place, first->u, (size_t)m->n * sizeof *m->place);
     m->problem.scene.place = m->place;
@@ -98,6 +106,7 @@ static void clear(moving *m)
     free(m->place);
     free(m->v);
     free(m->Kv);
+    free(m->before);
 }
 
 /* ||u - place||_K by the norm of the certificate. Both have what supports prescribe. */
@@ -115,6 +124,20 @@ static double change_by(moving *m, const uz_result *result)
     uz_csc_symv(m->Kv, K, 1.0, m->v);
     const double square = fmax(0.0, uz_dot(K->cols, m->v, m->Kv)), norm = result->summary.certificate.energy_norm;
     return square > 0.0 ? sqrt(square) / norm : 0.0;
+}
+
+/* w that would have brought the last difference to zero, were all of them along one line; Kv: K times the last. */
+static double next_step(moving *m)
+{
+    const int64_t d = m->base->model.d;
+    double along = uz_dot(d, m->before, m->Kv), square = uz_dot(d, m->v, m->Kv) - 2.0 * along;
+    /* before' K (v - before) and |v - before|^2 in K's product; K before takes the place of K v */
+    memset(m->Kv, 0, (size_t)d * sizeof *m->Kv);
+    uz_csc_symv(m->Kv, &m->base->model.K, 1.0, m->before);
+    const double own = uz_dot(d, m->before, m->Kv);
+    along -= own;
+    square += own;
+    return square > 0.0 ? fmin(MOST_STEP, fmax(LEAST_STEP, -m->step * along / square)) : m->step;
 }
 
 /* The next answer takes the place of the last, with the time that both took. */
@@ -151,16 +174,16 @@ static uz_status judge(bool *settled, moving *m, uz_result *result, uz_error *er
     m->ratio[0] = before > 0.0 ? change / before : 0.0;
     /* One ratio may be small by chance; before there is one, steps that halve are assumed. */
     const double c = m->ratio[0] > 0.0 ? fmax(m->ratio[0], m->ratio[1]) : 0.5;
-    const double left = c < 1.0 ? (1.0 - m->step + m->step * c / (1.0 - c)) * change : (double)INFINITY;
+    const double left = c < 1.0 ? (fabs(1.0 - m->step) + m->step * c / (1.0 - c)) * change : (double)INFINITY;
     /* changes of the size of what the passes themselves leave say nothing */
     const double noise = 4.0 * s->certificate.relative_error;
     s->geometry.change = change;
     s->geometry.left = change > 0.0 ? left : 0.0;
     *settled = !(s->geometry.left > s->requested_error) || change <= noise;
-    if (m->ratio[0] >= SLOW)
-        m->step = fmax(LEAST_STEP, 0.5 * m->step);
-    else if (m->ratio[0] < 0.5)
-        m->step = fmin(1.0, 2.0 * m->step);
+    const bool creeps = m->ratio[0] > CREEPING && fabs(m->ratio[0] - m->ratio[1]) < STEADY * m->ratio[0];
+    if (m->ratio[0] >= SLOW || creeps || m->step != 1.0)
+        m->step = next_step(m);
+    memcpy(m->before, m->v, (size_t)m->base->model.d * sizeof *m->v);
     for (int64_t i = 0; i < m->n; i++)
         m->place[i] += m->step * (result->u[i] - m->place[i]);
     return UZ_OK;
