@@ -15,7 +15,8 @@
  * there. The place is one of the material and stays.
  *
  * Amid a ridge the nearest way out is through a flank, whose normal says nothing of the crest that stands in the side:
- * there d is that of the side set back along its normal until it is clear of the obstacle, less the way.
+ * there d is that of the side set back along its normal until it is clear of the obstacle, less the way. Rows of nodes
+ * amid ridges are found alike (uz_obstacle_row_gap).
  *
  * Straight sides of a hole stand for a curve that lies behind them, and a pin that fits would cut into each. There d is
  * that of the curve: x is set back by sum_a N_a(x) (x - x_a) . n_a / 2 with the means n_a of the normals around nodes,
@@ -37,6 +38,9 @@
 #define SINK  0.02
 /* The side is set back until it is so far from the obstacle. */
 #define CLEAR 0.1
+/* To rows the obstacle's edges are as if rounded with this part of the distance between nodes: of a node that settles
+ * on an edge the direction from it would be rounding. */
+#define EDGE 0.5
 
 /* A row inside has a normal that is against the side's, and nodes that can give way along it, by more than this. */
 #define LEAST_SHARE 0.1
@@ -154,7 +158,7 @@ static bool leads_in(const deepest *of, int a)
     uz_gap gap;
     uz_side_shape(N, &of->side, uz_side_local_nodes(&of->side)[a]);
     place_of(x, of, N);
-    if (uz_obstacle_gap(&gap, of->obstacle, x, NULL) != UZ_OK)
+    if (uz_obstacle_row_gap(&gap, of->obstacle, x, of->normal, EDGE * of->size, NULL) != UZ_OK)
         return true;
     for (int c = 0; c < of->side.dim; c++)
         along -= gap.normal[c] * of->normal[c];
@@ -329,7 +333,7 @@ static bool describe(uz_inner_place *out, const deepest *of, const uz_body_model
     uz_side_shape(out->share, &of->side, local);
     uz_side_shape(out->linear, &straight, local);
     place_of(out->x, of, out->share);
-    if (uz_obstacle_gap(&gap, of->obstacle, out->x, NULL) != UZ_OK)
+    if (uz_obstacle_row_gap(&gap, of->obstacle, out->x, of->normal, EDGE * of->size, NULL) != UZ_OK)
         return false;
     out->back = of->back;
     for (int c = 0; c < dim; c++) {
@@ -381,7 +385,7 @@ static uz_status move_inner(uz_contact_sites *sites, const uz_contact_input *in,
         uz_body_side(&of.side, of.xyz, of.node, in->model, place->face);
         normal_of(of.normal, &of.side);
         place_of(place->x, &of, place->share);
-        status = uz_obstacle_gap(&gap, obstacle, place->x, err);
+        status = uz_obstacle_row_gap(&gap, obstacle, place->x, of.normal, EDGE * place->size, err);
         if (status != UZ_OK)
             break;
         place->gap = gap.gap - place->back;
@@ -394,21 +398,14 @@ static uz_status move_inner(uz_contact_sites *sites, const uz_contact_input *in,
     return status;
 }
 
-/* Appends the places inside sides to those of the nodes. gaps (n_nodes): of the nodes; normals: n_nodes x dim, zero. */
+/* Appends the places inside sides to those of the nodes. gaps (n_nodes): of the nodes; normals (n_nodes x dim): sums of
+ * the sides' normals. */
 static uz_status find_inner(uz_contact_sites *sites, const uz_contact_input *in, const uz_obstacle *obstacle,
-                            const double *gaps, double *normals, uz_error *err)
+                            const double *gaps, const double *normals, uz_error *err)
 {
     const int dim = in->model->mesh.dim;
     const int64_t nodes = sites->n;
     int64_t room = 0;
-    for (int64_t f = 0; f < in->on->n_faces; f++) {
-        deepest of = {.obstacle = obstacle};
-        uz_body_side(&of.side, of.xyz, of.node, in->model, in->on->face[f]);
-        normal_of(of.normal, &of.side);
-        for (int a = 0; a < of.side.nodes; a++)
-            for (int c = 0; c < dim; c++)
-                normals[dim * of.node[a] + c] += of.normal[c];
-    }
     if (in->rest)
         return move_inner(sites, in, obstacle, err);
     for (int64_t f = 0; f < in->on->n_faces; f++) {
@@ -443,12 +440,34 @@ static uz_status find_inner(uz_contact_sites *sites, const uz_contact_input *in,
     return UZ_OK;
 }
 
+/* By node: sums of the normals of its sides (x dim), and the shortest distance to another node of them. */
+static void look_around(double *normals, double *near, const uz_contact_input *in)
+{
+    const int dim = in->model->mesh.dim;
+    for (int64_t f = 0; f < in->on->n_faces; f++) {
+        deepest of;
+        uz_body_side(&of.side, of.xyz, of.node, in->model, in->on->face[f]);
+        normal_of(of.normal, &of.side);
+        for (int a = 0; a < of.side.nodes; a++) {
+            double *own = near + of.node[a];
+            for (int c = 0; c < dim; c++)
+                normals[dim * of.node[a] + c] += of.normal[c];
+            for (int b = 0; b < of.side.nodes; b++) {
+                double distance = 0;
+                for (int c = 0; c < dim; c++)
+                    distance = hypot(distance, of.xyz[dim * a + c] - of.xyz[dim * b + c]);
+                *own = a != b && !(*own > 0 && *own < distance) ? distance : *own;
+            }
+        }
+    }
+}
+
 /* A plane has no sites: where it is belongs to the load. */
 static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_error *err)
 {
     const uz_mesh *mesh = &in->model->mesh;
     uz_obstacle *obstacle = NULL;
-    double *gaps = NULL, *normals = NULL; /* by node */
+    double *gaps = NULL, *normals = NULL, *near = NULL; /* by node */
     if (in->contact->kind == UZ_OBSTACLE_PLANE)
         return UZ_OK;
     uz_status status = uz_sites_of_nodes(sites, in, err);
@@ -457,13 +476,18 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
     if (status == UZ_OK) {
         gaps = uz_alloc(mesh->n_nodes, sizeof *gaps);
         normals = uz_alloc_zero(mesh->n_nodes * mesh->dim, sizeof *normals);
+        near = uz_alloc_zero(mesh->n_nodes, sizeof *near);
     }
-    if (status == UZ_OK && !(gaps && normals))
+    if (status == UZ_OK && !(gaps && normals && near))
         status = uz_fail(err, UZ_ERR_MEMORY, "", "no memory for the gaps of %lld nodes", (long long)mesh->n_nodes);
+    if (status == UZ_OK)
+        look_around(normals, near, in);
     for (int64_t i = 0; i < sites->n && status == UZ_OK; i++) {
         const int64_t node = uz_group_node_at(in->on, i);
+        double outward[3] = {0};
         uz_gap at;
-        status = uz_obstacle_gap(&at, obstacle, mesh->xyz + node * mesh->dim, err);
+        uz_unit_normal(outward, normals + node * mesh->dim, mesh->dim);
+        status = uz_obstacle_row_gap(&at, obstacle, mesh->xyz + node * mesh->dim, outward, EDGE * near[node], err);
         if (status != UZ_OK)
             break;
         sites->gap[i] = gaps[node] = at.gap;
@@ -473,6 +497,7 @@ static uz_status find(uz_contact_sites *sites, const uz_contact_input *in, uz_er
         status = find_inner(sites, in, obstacle, gaps, normals, err);
     free(gaps);
     free(normals);
+    free(near);
     uz_obstacle_free(obstacle);
     return status;
 }

@@ -167,6 +167,7 @@ static void surface(double x[3], const uz_obstacle_patch *p, double s, double t)
 }
 
 const uz_obstacle_shape uz_shape_height = {.name = {"height", "height"},
+                                           .has_edges = true,
                                            .check = check,
                                            .largest = largest,
                                            .init = init,

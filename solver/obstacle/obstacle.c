@@ -10,6 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A way out that is longer than this many depths leads along the obstacle. */
+#define MOST_BACK 4
+
 static const uz_obstacle_shape *const shapes[] = {[UZ_OBSTACLE_PLANE] = &uz_shape_plane,
                                                   [UZ_OBSTACLE_ROUND] = &uz_shape_round,
                                                   [UZ_OBSTACLE_CYLINDER] = &uz_shape_cylinder,
@@ -106,4 +109,33 @@ uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double
     }
     const uz_status status = o->shape->gap(&scaled, o, at, err);
     return status == UZ_OK ? unscale(out, o, &scaled, err) : status;
+}
+
+uz_status uz_obstacle_row_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, const double *outward,
+                              double clear, uz_error *err)
+{
+    enum { STEPS = 40 };
+    const int dim = obstacle->dim;
+    uz_gap there;
+    double back = 0;
+    const uz_status status = uz_obstacle_gap(out, obstacle, x, err);
+    if (status != UZ_OK || !obstacle->shape->has_edges || out->gap >= clear)
+        return status;
+    const double enough = fmax(clear, -out->gap), most = 1.01 * enough + MOST_BACK * fmax(0, -out->gap);
+    there = *out;
+    /* a distance grows by no more than the way: no step leads past where it is enough */
+    for (int k = 0; k < STEPS && there.gap < 0.999 * enough && back <= most; k++) {
+        double at[3] = {0};
+        back += enough - there.gap;
+        for (int c = 0; c < dim; c++)
+            at[c] = x[c] - back * outward[c];
+        if (uz_obstacle_gap(&there, obstacle, at, NULL) != UZ_OK)
+            return UZ_OK;
+    }
+    if (there.gap < 0.999 * enough || back > most)
+        return UZ_OK;
+    *out = there;
+    for (int c = 0; c < dim; c++)
+        out->gap += back * outward[c] * there.normal[c];
+    return UZ_OK;
 }

@@ -58,4 +58,14 @@ void uz_obstacle_free(uz_obstacle *obstacle);
  * UZ_ERR_NOT_FINITE: x, or the gap overflows. */
 uz_status uz_obstacle_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, uz_error *err);
 
+/* The same of a point on the surface of a body, for its row. Within a ridge, and on it, the closest point says nothing
+ * of the way out: amid its flanks it is on either of them by rounding, and a row along one pushes the body aside that
+ * the crest should hold. So where an obstacle has edges, a point that is not `clear` of it is taken back into its body,
+ * until it is as far out as it was in and `clear` at least, and has the tangent plane of the point that is closest
+ * there: a flank's, or at the crest one between them, which turns from one to the other as the point passes over it.
+ *   outward  dim; the body's unit normal at x; zero, or a way that does not lead out soon: as uz_obstacle_gap
+ *   clear    a length: edges are as if rounded with this radius */
+uz_status uz_obstacle_row_gap(uz_gap *out, const uz_obstacle *obstacle, const double *x, const double *outward,
+                              double clear, uz_error *err);
+
 #endif

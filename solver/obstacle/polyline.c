@@ -99,6 +99,7 @@ static int64_t outline(double x[2], double way[2], const uz_contact *contact, in
 const uz_obstacle_shape uz_shape_polyline = {
     .name = {"polyline", "polyline"},
     .refused = {NULL, "a polyline is an obstacle of plane models; use height for a solid"},
+    .has_edges = true,
     .check = check,
     .largest = largest,
     .init = init,

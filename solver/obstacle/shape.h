@@ -41,6 +41,7 @@ struct uz_obstacle_shape {
     const char *name[2];    /* in requests: of plane models, of solids */
     const char *refused[2]; /* why it is no obstacle of these; NULL: it is */
     bool has_direction;     /* the contact's `normal` is one */
+    bool has_edges;         /* its normal jumps */
     uz_status (*check)(const uz_obstacle_subject *s);
     double (*largest)(const uz_contact *contact, int dim); /* magnitude among its coordinates */
     /* own from the contact, coordinates times o->scale; clear: frees what it holds, also after a failure. NULL: none.

@@ -114,6 +114,23 @@ def test_corners_between_nodes(s):
             check("coarse_contact" in warned(result), result["summary"]["warnings"])
 
 
+def test_a_node_on_a_ridge(s):
+    """Exactly amid its flanks it is on either by rounding: the answer is symmetric, and the mirror image's, as on finer meshes."""
+    for element, slope, form in itertools.product(("quad4", "quad8", "tri6"), (0.3, 1, 3), ("polyline", "height")):
+        forces = []
+        for turn, n in ((1, 8), (-1, 8), (1, 32)):
+            x, y = [2 - 3 * turn, 2, 2 + 3.3 * turn], [0.1 - 3 * slope, 0.1, 0.1 - 3.3 * slope]
+            x, y = (x, y) if turn > 0 else (x[::-1], y[::-1])
+            line = {"polyline": {"points": [list(p) for p in zip(x, y)]}} if form == "polyline" else {"height": {"x": x, "z": y}}
+            problem = {**block(n, line, element), "kinematics": "fixed"}
+            problem["mesh"]["box"] = {"size": [4, 2], "cells": [n, n // 2], "element": element}
+            forces.append(solve(s, problem)["summary"]["contact"]["force"])
+        for force in forces[:2] if element != "tri6" else []:  # whose mesh is not symmetric
+            check(abs(force[0]) < 1e-6 * force[1], (element, slope, form, forces))
+        check(element == "tri6" or abs(forces[0][1] - forces[1][1]) < 1e-6 * forces[0][1], (element, slope, form, forces))
+        check(forces[2][1] < forces[0][1] < 1.6 * forces[2][1], (element, slope, form, forces))
+
+
 def test_a_tooth_between_flat_grounds_is_narrow(s):
     """Normals are up at all nodes; still the force on its one row, at a node or inside a side, is the mesh's."""
     forces = {}

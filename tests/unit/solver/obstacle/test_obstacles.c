@@ -373,6 +373,42 @@ TEST(creases_of_a_table)
     uz_obstacle_free(o);
 }
 
+/* A point of a body's surface in a ridge: whatever rounding says of the flanks, its row is the same, that of the crest;
+ * away from it a flank's. In a block, near its flank, the way to the top is too long. */
+TEST(rows_on_a_ridge)
+{
+    double x[] = {-10, 0, 10}, z[] = {-9, 1, -9}, block_x[] = {0, 0, 1, 1}, block_y[] = {0, 5, 5, 0};
+    const uz_contact ridge = {.kind = UZ_OBSTACLE_HEIGHT, .n_x = 3, .x = x, .z = z};
+    const uz_contact block = {.kind = UZ_OBSTACLE_POLYLINE, .n_x = 4, .x = block_x, .y = block_y};
+    const double down[2] = {0, -1}, s = sqrt(0.5);
+    uz_obstacle *o = made(&ridge, UZ_PLANE_STRAIN), *b = made(&block, UZ_PLANE_STRAIN);
+    uz_gap gap;
+    for (int k = -1; k <= 1; k++)
+        for (int deep = 0; deep < 3; deep++) { /* in it, on it, over it by less than is clear */
+            const double at[2] = {1e-15 * k, 1 - 0.2 * (deep - 1)};
+            CHECK(uz_obstacle_row_gap(&gap, o, at, down, 0.3, NULL) == UZ_OK);
+            near(gap.gap, -0.2 * (deep - 1), 1e-12, "gap");
+            near(gap.normal[0], 0, 1e-12, "normal");
+            near(gap.normal[1], 1, 1e-12, "normal");
+        }
+    for (int k = -1; k <= 1; k += 2) { /* beside the crest the plane turns, and further on it is the flank's */
+        const double near_it[2] = {0.01 * k, 0.8}, far_off[2] = {k, -0.2};
+        CHECK(uz_obstacle_row_gap(&gap, o, near_it, down, 0.01, NULL) == UZ_OK);
+        CHECK(k * gap.normal[0] > 0.01 && k * gap.normal[0] < 0.1 && gap.gap > -0.21 && gap.gap < -0.19);
+        CHECK(uz_obstacle_row_gap(&gap, o, far_off, down, 0.01, NULL) == UZ_OK);
+        near(gap.normal[0], k * s, 1e-12, "normal");
+        near(gap.gap, -0.2 * s, 1e-12, "gap");
+    }
+    const double beside[2] = {0.1, 0}, none[2] = {0, 0}, amid[2] = {0, 0.5};
+    CHECK(uz_obstacle_row_gap(&gap, b, beside, down, 0.01, NULL) == UZ_OK);
+    near(gap.normal[0], -1, 1e-12, "normal");
+    near(gap.gap, -0.1, 1e-12, "gap");
+    CHECK(uz_obstacle_row_gap(&gap, o, amid, none, 0.01, NULL) == UZ_OK); /* of a node of no side */
+    near(gap.gap, -0.5 * s, 1e-12, "gap");
+    uz_obstacle_free(o);
+    uz_obstacle_free(b);
+}
+
 /* A power of two changes exponents only, other units no more than roundings. */
 TEST(units_do_not_matter)
 {

@@ -1,0 +1,249 @@
+"""Generated bodies on rigid obstacles, each posted to a daemon at its defaults, and again mirrored, turned, in other units and refined.
+usage: generated_obstacles.py BUILD_DIR OUTPUT.json [SCENES [FIRST]]
+
+What must hold of each: its mirror image has the mirrored answer; turning and units change rounding only; nothing pulls or stands in
+the obstacle; and the force is that of the mesh refined twice, or a warning says that it is not to be trusted. Obstacles have ridges,
+grooves and corners, half of them exactly where nodes are."""
+import json
+import math
+import random
+import sys
+import time
+
+import generated_contacts as contacts
+from generated_contacts import SOLID, distorted, in_units, kind_of, off_by, rotation, turned
+from two_bodies import EDGES, body
+import service
+
+# By how much a force may differ from that of the mesh refined twice without a warning, and how many of the scenes may.
+TOLERANCE = 0.35
+
+
+# ---- obstacles: dictionaries of a request, and their images
+
+def mirror_obstacle(obstacle):
+    """The image of an obstacle under x -> -x. A line that goes on with the obstacle on its right does so backwards."""
+    kind, of = next(iter(obstacle.items()))
+
+    def flip(x):
+        return [-x[0], *x[1:]]
+    if kind == "polyline":
+        return {kind: {"points": [flip(p) for p in reversed(of["points"])]}}
+    if kind == "height":
+        z = [row[::-1] for row in of["z"]] if "y" in of else of["z"][::-1]
+        return {kind: {**of, "x": [-x for x in reversed(of["x"])], "z": z}}
+    return {kind: {k: flip(v) if isinstance(v, list) else v for k, v in of.items()}}
+
+
+def turn_obstacle(obstacle, R):
+    """None: a table stays upright."""
+    kind, of = next(iter(obstacle.items()))
+
+    def turn(x):
+        return [sum(r * t for r, t in zip(row, x)) for row in R]
+    if kind == "height":
+        return None
+    return {kind: {k: [turn(p) for p in v] if k == "points" else turn(v) if isinstance(v, list) else v for k, v in of.items()}}
+
+
+def scale_obstacle(obstacle, length):
+    kind, of = next(iter(obstacle.items()))
+
+    def scale(v):
+        return [scale(t) for t in v] if isinstance(v, list) else v if isinstance(v, bool) else length * v
+    return {kind: {k: v if k in ("normal", "axis") else scale(v) for k, v in of.items()}}
+
+
+def with_obstacle(request, make):
+    scene = dict(request["problem"])
+    scene["contacts"] = [{**c, "obstacle": make(c["obstacle"])} for c in scene["contacts"]]
+    return {"problem": scene}
+
+
+def mirrored(request):
+    """Nodes at -x; elements and sides go around the other way."""
+    def order(kind):
+        shape = kind.rstrip("0123456789")
+        if shape in ("tri", "quad"):
+            n = 3 if shape == "tri" else 4
+            corners = [0, *range(n - 1, 0, -1)]
+            return corners + ([n + (n - 1 - k) for k in range(n)] if kind in ("tri6", "quad8") else [])
+        corners = {"hex": [4, 5, 6, 7, 0, 1, 2, 3], "tet": [0, 2, 1, 3], "wedge": [3, 4, 5, 0, 1, 2]}[shape]
+        edges = [frozenset(e) for e in EDGES[shape]]
+        middles = [len(corners) + edges.index(frozenset(corners[a] for a in e)) for e in EDGES[shape]]
+        return corners + (middles if kind in ("hex20", "tet10", "wedge15") else [])
+    scene = dict(request["problem"])
+    mesh = scene["mesh"]
+    scene["mesh"] = {**mesh, "nodes": [[-x[0], *x[1:]] for x in mesh["nodes"]],
+                     "elements": {kind: [[e[k] for k in order(kind)] for e in list_] for kind, list_ in mesh["elements"].items()},
+                     "groups": {name: {k: [side[::-1] if k == "edges" else [side[0], *side[:0:-1]] for side in sides]
+                                       for k, sides in g.items()} for name, g in mesh["groups"].items()}}
+    scene["supports"] = [{k: -v if k == "ux" else v for k, v in s.items()} for s in scene["supports"]]
+    return with_obstacle({"problem": scene}, mirror_obstacle)
+
+
+def profile(rng, width, size, places):
+    """A piecewise straight ground below a body of this width: x and y, touching it to a depth of `size`."""
+    kind = rng.choice(["ridge", "ridge", "teeth", "groove", "step", "random", "sampled"])
+    at = rng.choice(places) if rng.random() < 0.5 else rng.uniform(-0.4, 0.4) * width
+    far = 3 * width
+    if kind == "ridge":
+        slopes = [rng.choice((0.05, 0.2, 0.6, 1.5)) * rng.uniform(0.7, 1.4)] * 2
+        if rng.random() < 0.4:
+            slopes[1] = rng.uniform(0.05, 1.5)
+        return kind, [at - far, at, at + far], [size - far * slopes[0], size, size - far * slopes[1]]
+    if kind == "teeth":
+        wide = rng.uniform(0.03, 0.4) * width
+        low = -rng.uniform(0, 2) * size
+        return kind, [-far, at - wide, at, at + wide, far], [low, low, size, low, low]
+    if kind == "groove":
+        slope = rng.choice((0.01, 0.05, 0.3))
+        return kind, [at - far, at, at + far], [size - 0.3 * width * slope + far * slope, size - 0.3 * width * slope,
+                                                size - 0.3 * width * slope + far * slope]
+    if kind == "step":
+        wide, low = rng.choice((0.01, 0.1)) * width, -rng.uniform(0.5, 10) * size
+        return kind, [-far, at, at + wide, far], [size, size, low, low]
+    n = rng.randint(4, 9)
+    xs = sorted(rng.uniform(-0.7, 0.7) * width for _ in range(n))
+    if kind == "random":
+        return kind, [-far, *xs, far], [-size, *(rng.uniform(-3, 1) * size for _ in xs), -size]
+    bend, n = rng.uniform(0.3, 3) / width, 200
+    xs = [width * (-1 + 2 * k / n) for k in range(n + 1)]
+    return kind, xs, [size - 0.5 * bend * (x - at) ** 2 for x in xs]
+
+
+class Scene:
+    def __init__(self, number):
+        rng = random.Random(f"obstacles {number}")
+        self.dim = dim = 3 if number % 3 == 2 else 2
+        self.kind, self.symmetric = kind_of(rng, dim), False
+        width, high, deep = rng.uniform(4, 12), rng.uniform(2, 6), rng.uniform(3, 8)
+        self.cells = [2 * rng.randint(2, 8), rng.randint(2, 4)] if dim == 2 else [2 * rng.randint(1, 3), rng.randint(2, 5), rng.randint(1, 2)]
+        even = rng.random() < 0.5
+        within = (lambda *t: list(t)) if even else distorted(rng, dim, False)
+        under = rng.choice(["flat", "flat", "arc", "wedge", "corner"])
+        under = under if even or under != "wedge" else "flat"  # whose tip is a node
+        slope, bend = rng.choice((0.05, 0.2, 0.5)), rng.uniform(0.05, 1.2) / width
+        bottom = {"flat": lambda x: 0.0, "arc": lambda x: 0.5 * bend * x * x, "wedge": lambda x: slope * abs(x), "corner": lambda x: 0.0}[under]
+
+        def place(*t):
+            t = within(*t)
+            x, y, z = width * (t[0] - 0.5), [deep * (s - 0.5) for s in t[1:-1]], t[-1]
+            return (x, *y, bottom(x) + z * (high + 0.3 * width - bottom(x)))
+        self.place = place
+        names = [("bottom", "top", "left", "right"), ("z0", "z1", "x0", "x1")][dim == 3]
+        self.groups = {"on": [(0, names[0])] + ([(0, names[3])] if under == "corner" else []), "head": [(0, names[1])]}
+        size = width * 10 ** rng.uniform(-3, -1.7)
+        places = [width * (k / self.cells[0] - 0.5) for k in range(1, self.cells[0])]
+        obstacle, shape = self.obstacle(rng, width, deep, size, places)
+        vertical = "uy" if dim == 2 else "uz"
+        aside = rng.choice((0, 0, rng.uniform(-3, 3) * size))
+        motion = {"ux": aside, vertical: 0, **({"uy": 0} if dim == 3 else {})}
+        self.family = f"{dim}D {self.kind:7s} {under:6s} {shape}"
+        self.scene = {"model": "solid" if dim == 3 else rng.choice(["plane_strain", "plane_stress"]),
+                      "materials": [{"on": "all", "young": 1000, "poisson": rng.uniform(0, 0.4)}],
+                      "supports": [{"on": "head", **motion}], "loads": [], "contacts": [{"on": "on", "obstacle": obstacle}]}
+
+    def obstacle(self, rng, width, deep, size, places):
+        kind = rng.choice(["plane", "round", "polyline", "height", "height"] if self.dim == 2 else
+                          ["plane", "sphere", "cylinder", "height", "height", "table"])
+        at = rng.choice((0, rng.uniform(-0.3, 0.3) * width))
+        radius = width * 10 ** rng.uniform(-0.7, 1)
+        zeros = [0] * (self.dim - 2)
+        if kind == "plane":
+            return {"plane": {"point": [0, *zeros, size], "normal": [rng.choice((0, rng.uniform(-0.1, 0.1))), *zeros, 1]}}, kind
+        if kind == "round":
+            return {"circle": {"center": [at, size - radius], "radius": radius}}, kind
+        if kind == "sphere":
+            return {"sphere": {"center": [at, rng.uniform(-0.2, 0.2) * deep, size - radius], "radius": radius}}, kind
+        if kind == "cylinder":
+            return {"cylinder": {"point": [at, 0, size - radius], "axis": rng.choice(([0, 1, 0], [1, 0, 0])), "radius": radius}}, kind
+        if kind == "table":
+            n = [rng.randint(3, 6) for _ in range(2)]
+            x = [width * (-0.6 + 1.2 * k / (n[0] - 1)) + (0 if rng.random() < 0.5 else rng.uniform(-0.05, 0.05) * width) for k in range(n[0])]
+            y = [deep * (-0.6 + 1.2 * k / (n[1] - 1)) for k in range(n[1])]
+            return {"height": {"x": x, "y": y, "z": [[rng.uniform(-2, 1) * size for _ in x] for _ in y]}}, kind
+        shape, x, z = profile(rng, width, size, places)
+        if self.dim == 3:
+            return {"height": {"x": x, "y": [-deep, deep], "z": [z, z]}}, "table " + shape
+        return ({"height": {"x": x, "z": z}} if kind == "height" else {"polyline": {"points": [list(p) for p in zip(x, z)]}}), f"{kind} {shape}"
+
+    def request(self, level=0, **keys):
+        return body([self.kind], [[n << level for n in self.cells]], [self.place], self.groups, **{**self.scene, **keys})
+
+
+def force_of(answer):
+    return answer["summary"]["contact"]["force"]
+
+
+def distance(a, b):
+    return math.sqrt(sum((s - t) ** 2 for s, t in zip(a, b)))
+
+
+def look(scene, daemon, rng, refine=True):
+    """What is false of a scene: a list of words."""
+    false = []
+    request = scene.request()
+    answer, why = daemon.answer(request)
+    image, other_why = daemon.answer(mirrored(request))
+    if not answer or not image:
+        return [f"base: {why}"] if not answer and not image else [f"only one of two images: {why or other_why}"]
+    size = math.hypot(*force_of(answer)) or 1e-300
+    u = answer["displacements"]
+    back = [[-x[0], *x[1:]] for x in image["displacements"]]
+    if off_by(u, back) > 1e-6:
+        false.append(f"mirrored: {force_of(answer)} {force_of(image)}")
+    if max(answer["reactions"], default=0) > 1e-9 * size:
+        false.append("pulls")
+    for R in ([[0, -1], [1, 0]] if scene.dim == 2 else [[0, 0, 1], [1, 0, 0], [0, 1, 0]], rotation(rng, scene.dim)):
+        if turn_obstacle(request["problem"]["contacts"][0]["obstacle"], R) is None:
+            continue
+        other, why = daemon.answer(with_obstacle(turned(request, R), lambda o: turn_obstacle(o, R)))
+        back = other and [[sum(R[i][c] * x[i] for i in range(scene.dim)) for c in range(scene.dim)] for x in other["displacements"]]
+        if not other or off_by(u, back) > 1e-6:
+            false.append(f"turned: {why or off_by(u, back)}")
+    length, stress = 10 ** rng.uniform(-6, 6), 10 ** rng.uniform(-6, 6)
+    other, why = daemon.answer(with_obstacle(in_units(request, length, stress), lambda o: scale_obstacle(o, length)))
+    scaled = other and [[t / length for t in x] for x in other["displacements"]]
+    if not other or off_by(u, scaled) > 1e-6:
+        false.append(f"units: {why or off_by(u, scaled)}")
+    warnings = [w["code"] for w in answer["summary"].get("warnings", [])]
+    if refine and not warnings:
+        fine, why = daemon.answer(scene.request(2 if scene.dim == 2 else 1))
+        off = fine and distance(force_of(fine), force_of(answer)) / max(math.hypot(*force_of(fine)), size)
+        if not fine or off > TOLERANCE:
+            false.append(f"refined: {why or (round(off, 2), force_of(answer), force_of(fine))}")
+    return false
+
+
+def run(s, numbers, say=print, refine=True):
+    """Looks at scenes by number; returns what was counted, and what was false of which."""
+    daemon, failures = contacts.Daemon(s), []
+    for k in numbers:
+        scene = Scene(k)
+        false = look(scene, daemon, random.Random(f"variations {k}"), refine)
+        if false:
+            failures.append((k, scene.family, false))
+            say(*failures[-1], flush=True)
+    return {"scenes": len(numbers), "solves": daemon.solves, "failures": failures}
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    count, first = (int(sys.argv[k]) if len(sys.argv) > k else d for k, d in ((3, 1000), (4, 0)))
+    s = service.Service(sys.argv[1])
+    began = time.time()
+    try:
+        s.start()
+        found = run(s, range(first, first + count))
+    finally:
+        s.stop()
+    print(f"{found['scenes']} bodies on obstacles, {found['solves']} solves, {len(found['failures'])} false, {time.time() - began:.0f} s")
+    with open(sys.argv[2], "w", encoding="utf-8") as out:
+        json.dump(found, out)
+    sys.exit(bool(found["failures"]))
+
+
+if __name__ == "__main__":
+    main()
